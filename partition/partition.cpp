@@ -24,8 +24,8 @@ constexpr idx_t kSeed = 1;
 
 void check_metis(int status, const char* what) {
   if (status == METIS_OK) return;
-  // METIS has SIGTERM come to itself while it works, and gives it back as METIS_ERROR (which nothing else does): it goes on to whom it was
-  // meant for. Blocking it instead would hand it to another thread of MPI, in which METIS's handler crashes.
+  // METIS has SIGTERM come to itself while it works, and gives it back as METIS_ERROR (which nothing else does): it is passed on to the
+  // handler that it was meant for. Blocking it instead would hand it to another thread of MPI, in which METIS's handler crashes.
   if (status == METIS_ERROR) std::raise(SIGTERM);
   if (status == METIS_ERROR_MEMORY) throw SystemError(fmt::format("METIS ran out of memory in {}; use a machine with more", what));
   throw SystemError(fmt::format("METIS failed in {} (status {})", what, status));

@@ -1,4 +1,4 @@
-// carillon-precompute: one job to one mode bank, on as many ranks as mpirun starts.
+// The solver: one job to one mode bank, on as many ranks as mpirun starts. carillon-precompute becomes it (precompute/launch).
 #include <fmt/core.h>
 #include <mpi.h>
 
@@ -8,29 +8,31 @@
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <thread>
 
-#include "precompute/io/enter_folder.hpp"
-#include "precompute/io/interrupt.hpp"
-#include "precompute/io/run_job.hpp"
-#include "precompute/io/run_record.hpp"
-#include "precompute/io/validate.hpp"
-#include "precompute/petsc/blas_kernels.hpp"
 #include "precompute/petsc/session.hpp"
+#include "precompute/run/enter_folder.hpp"
+#include "precompute/run/estimate.hpp"
+#include "precompute/run/interrupt.hpp"
+#include "precompute/run/run_job.hpp"
+#include "precompute/run/run_log.hpp"
+#include "precompute/run/validate.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/printable.hpp"
+#include "runtime/base/result.hpp"
 #include "runtime/version/version.hpp"
 
 namespace {
 
 using namespace carillon;
 
-/// Prints the message once and returns the exit code. Errors are agreed on before they are thrown, so all ranks get here; should one get
-/// here alone, it would leave the others waiting for ever, so after a while it speaks for itself and ends them all.
-int fail(MPI_Comm comm, int rank, int code, const std::string& message) {
+/// Prints the error once and writes the result file. Errors are agreed on before they are thrown, so all ranks get here; should one get
+/// here alone, it would leave the others waiting for ever, so after a while it prints the error itself and ends them all.
+int fail(MPI_Comm comm, int rank, const std::string& file, const base::Result& result) {
   std::fflush(stdout);
   MPI_Request request = MPI_REQUEST_NULL;
   int all_here = 0;
@@ -39,8 +41,12 @@ int fail(MPI_Comm comm, int rank, int code, const std::string& message) {
     MPI_Test(&request, &all_here, MPI_STATUS_IGNORE);
     if (all_here == 0) std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
-  if (rank == 0 || all_here == 0) fmt::print(stderr, "carillon-precompute: error: {}\n", base::printable(message));
+  if (rank == 0 || all_here == 0) {
+    fmt::print(stderr, "carillon-precompute: error: {}\n", base::printable(result.message));
+    if (!file.empty()) base::write_result(file, result);
+  }
   std::fflush(stderr);
+  const int code = base::get_exit_code(result.kind);
   if (all_here == 0) MPI_Abort(MPI_COMM_WORLD, code);
   return code;
 }
@@ -65,23 +71,26 @@ struct CommandLine {
       "Options of PETSc and SLEPc follow after --: carillon-precompute JOB.json -- -eps_type krylovschur",
       "carillon-precompute"};
   std::string job;
-  io::RunOptions options;
+  std::string result;    // file; empty: none
+  std::string estimate;  // the size of a problem; empty: not asked for
+  run::RunOptions options;
   std::optional<CLI::ParseError> error;
 
   CommandLine(int argc, char** argv) {
     const CLI::Validator named([](const std::string& file) { return file.empty() ? "the name of the file is empty" : ""; }, "FILE");
     app.failure_message(
         [](const CLI::App* asked, const CLI::Error& error) { return base::printable_lines(CLI::FailureMessage::simple(asked, error)); });
-    app.add_option("JOB", job, "job file (JSON with // comments)")->required();
+    app.add_option("JOB", job, "job file (JSON with // comments)");
     app.add_flag("-q,--quiet", options.quiet, "nothing on standard output; warnings and errors are on standard error");
     app.add_option("--progress", options.progress, "append how far the run is to this file, a JSON object a line")->check(named);
     app.add_option("--checkpoint", options.checkpoint,
-                   "go on from this file if there is one, and save to it; SIGUSR1 and SIGTERM then save and end with 85")
+                   "resume from this file if it exists, and save to it; SIGUSR1 and SIGTERM then save and end with 85")
         ->check(named);
     app.add_option("--checkpoint-every", options.checkpoint_every_s, "seconds between two saves")
         ->check(CLI::Range(0.0, 1e9))
         ->capture_default_str();
     app.add_option("--bank", options.bank, "write the bank to this file, whatever the job says")->check(named);
+    app.add_option("--result", result, "write how the run ended to this file, a JSON object (docs/howto/when-jobs-die.md)")->check(named);
     app.add_option("--folder", options.folder, "work in folder NAME below ROOT, to which no link below ROOT leads")
         ->expected(2)
         ->type_name("ROOT NAME");
@@ -99,12 +108,17 @@ struct CommandLine {
         ->check(CLI::Range(0.0, 1e6))
         ->needs(validate);
     app.add_flag("--json", options.json, "with --validate: print one JSON object")->needs(validate);
+    app.add_flag("--profile", options.profile, "count messages and the time inside MPI too, and write them to the record of the run");
+    app.add_option("--estimate", estimate,
+                   "print what a problem of this size would cost, as JSON: '{\"element\": \"T10\", \"nodes\": 9000, \"modes\": 100}'")
+        ->type_name("SIZE");
     app.set_version_flag("--version", version::describe("carillon-precompute"));
     // What follows "--" is for PETSc and SLEPc.
     const int own = static_cast<int>(std::find(argv, argv + argc, std::string_view("--")) - argv);
     options.solver_options.assign(argv + std::min(own + 1, argc), argv + argc);
     try {
       app.parse(own, argv);
+      if (job.empty() && estimate.empty()) throw CLI::RequiredError("JOB");
     } catch (const CLI::ParseError& caught) {
       error = caught;
     }
@@ -113,7 +127,7 @@ struct CommandLine {
   bool only_asks() const { return error && error->get_exit_code() == 0; }  // --help or --version
 };
 
-/// Whether this process speaks for all that its launcher started. MPI, which would know, has not started yet.
+/// Whether this process prints for all that its launcher started. MPI, which knows the rank, has not started yet.
 bool is_first_of_all() {
   for (const char* name : {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"}) {
     if (const char* rank = std::getenv(name); rank != nullptr) return std::string_view(rank) == "0";
@@ -121,20 +135,20 @@ bool is_first_of_all() {
   return true;
 }
 
-/// What was asked for, and the exit code.
-int carry_out(const petsc::Session& session, const CommandLine& words) {
+/// Does what was asked for.
+base::Result carry_out(const petsc::Session& session, const CommandLine& words) {
   const bool speaks = session.rank() == 0;
   print_start(session, words.options.quiet || words.options.validate);
   petsc::reserve_blas_memory(PETSC_COMM_WORLD);
   if (words.options.validate) {
-    const std::string text = io::validate_job(PETSC_COMM_WORLD, words.job, words.options);
+    const std::string text = run::validate_job(PETSC_COMM_WORLD, words.job, words.options);
     if (speaks) fmt::print("{}\n", words.options.json ? text : base::printable_lines(text));
-    return 0;
+    return {};
   }
-  const io::RunSummary summary = io::run_job(PETSC_COMM_WORLD, words.job, words.options);
+  const run::RunSummary summary = run::run_job(PETSC_COMM_WORLD, words.job, words.options);
   if (summary.is_stopped) {
     if (speaks) fmt::print(stderr, "carillon-precompute: {}\n", base::printable(summary.result));
-    return kExitCheckpointed;
+    return {base::ResultKind::checkpointed, summary.result};
   }
   if (speaks && words.options.quiet && !summary.warning.empty())
     fmt::print(stderr, "carillon-precompute: warning: {}\n", base::printable(summary.warning));
@@ -142,49 +156,70 @@ int carry_out(const petsc::Session& session, const CommandLine& words) {
     if (!summary.warning.empty()) fmt::print("warning: {}\n", base::printable(summary.warning));
     fmt::print("{}\n{}\n", base::printable(summary.bank.string()), base::printable_lines(summary.result));
   }
-  return 0;
+  return {};
 }
 
-int run(const petsc::Session& session, const CommandLine& words) {
-  petsc::pin_blas_threads();
+/// Turns every way of ending that the program itself knows into a result, its file and the exit code.
+int run_program(const petsc::Session& session, const CommandLine& words) {
   MPI_Comm failures = MPI_COMM_NULL;
   MPI_Comm_dup(MPI_COMM_WORLD, &failures);
-  int code = 0;
-  const auto end = [&](int why, const std::string& message) {
-    if (words.options.json && session.rank() == 0) fmt::print("{}\n", io::describe_failure(message, why));
-    code = fail(failures, session.rank(), why, message);
-  };
+  base::Result result;
+  bool has_failed = false;
   try {
-    code = carry_out(session, words);
-  } catch (const InputError& error) {
-    end(kExitInput, error.what());
-  } catch (const SolveError& error) {
-    end(kExitSolve, error.what());
-  } catch (const std::bad_alloc&) {
-    end(kExitSystem, "out of memory; use a coarser mesh or a machine with more");
-  } catch (const std::exception& error) {
-    end(kExitSystem, error.what());
+    result = carry_out(session, words);
+  } catch (...) {
+    result = base::describe_error(std::current_exception(), "out of memory; use a coarser mesh or a machine with more");
+    has_failed = true;
+  }
+  std::error_code error;
+  result.is_resumable = result.kind != base::ResultKind::done && std::filesystem::exists(words.options.checkpoint, error);
+  const int code = base::get_exit_code(result.kind);
+  const bool speaks = session.rank() == 0;
+  if (has_failed) {
+    if (words.options.json && speaks) fmt::print("{}\n", run::describe_failure(result.message, code));
+    fail(failures, session.rank(), words.result, result);
+  } else if (speaks && !words.result.empty()) {
+    base::write_result(words.result, result);
   }
   MPI_Comm_free(&failures);
   return code;
 }
 
+/// Of one process: under mpirun the first prints.
+int print_estimate(const CommandLine& words) {
+  if (!is_first_of_all()) return 0;
+  base::Result result;
+  try {
+    fmt::print("{}\n", run::estimate_costs(words.estimate));
+  } catch (const InputError& error) {
+    fmt::print(stderr, "carillon-precompute: error: {}\n", base::printable(error.what()));
+    result = {base::ResultKind::bad_input, error.what()};
+  }
+  if (!words.result.empty()) base::write_result(words.result, result);
+  return base::get_exit_code(result.kind);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+  std::string result;  // file; empty: none
   try {
     const CommandLine words(argc, argv);
     if (words.only_asks()) return is_first_of_all() ? words.app.exit(*words.error) : 0;
-    if (!words.error && !words.options.folder.empty()) io::enter_folder(words.options.folder[0], words.options.folder[1]);
-    petsc::restart_with_fitting_kernels(argv);
-    io::end_on_signals(is_first_of_all() ? 0 : 1);
-    if (!words.options.checkpoint.empty()) io::save_on_signals();
+    if (!words.error && !words.estimate.empty()) return print_estimate(words);
+    if (!words.error && !words.options.folder.empty()) run::enter_folder(words.options.folder[0], words.options.folder[1]);
+    if (is_first_of_all()) result = words.result;
+    run::end_on_signals(is_first_of_all() ? 0 : 1);
+    if (!words.options.checkpoint.empty()) run::save_on_signals();
     const petsc::Session session(argc, argv, words.options.solver_options);
-    if (!words.error) return run(session, words);
-    if (session.rank() == 0) words.app.exit(*words.error);
+    if (!words.error) return run_program(session, words);
+    if (session.rank() != 0) return kExitInput;
+    words.app.exit(*words.error);
+    if (!result.empty()) base::write_result(result, {base::ResultKind::bad_input, words.error->what()});
     return kExitInput;
   } catch (const std::exception& error) {
-    fmt::print(stderr, "carillon-precompute: error: {}\n", carillon::base::printable(error.what()));
+    fmt::print(stderr, "carillon-precompute: error: {}\n", base::printable(error.what()));
+    if (!result.empty()) base::write_result(result, {base::ResultKind::system, error.what()});
     return kExitSystem;
   }
 }

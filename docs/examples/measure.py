@@ -3,9 +3,9 @@
 
 usage: measure.py SOUND.wav [--from S] [--to S] [--low HZ] [--high HZ] [--count N]
 
-Peaks: the sound under a Hann window, padded with zeros to four times its length or more, both ears added in power; a local maximum of the level is placed by
-the parabola through it and its two neighbours. Decay: the band about the peak is cut out (raised-cosine edges), and a straight line is fitted by
-least squares through the logarithm of its envelope (the size of the analytic signal).
+Peaks: the sound under a Hann window, padded with zeros to four times its length or more, both ears added in power; a local maximum of the
+level is placed by the parabola through it and its two neighbours. Decay: the band about the peak is cut out (raised-cosine edges), and a
+straight line is fitted by least squares through the logarithm of its envelope (the size of the analytic signal).
 """
 import argparse
 import pathlib
@@ -33,15 +33,15 @@ def calc_spectrum(samples, rate):
 
 
 def find_peaks(samples, rate, low_hz=20.0, high_hz=20000.0, count=8, floor_db=60.0):
-    """The `count` strongest peaks [(Hz, dB re the strongest)] between low and high, ascending in Hz; none that lies floor_db or more below the strongest,
-    or within two widths of the window's main lobe of a stronger one."""
+    """The `count` strongest peaks [(Hz, dB re the strongest)] between low and high, ascending in Hz; none that lies floor_db or more below
+    the strongest, or within two widths of the window's main lobe of a stronger one."""
     freq, level = calc_spectrum(samples, rate)
     inside = (freq[1:-1] >= low_hz) & (freq[1:-1] <= high_hz)
     tops = 1 + numpy.flatnonzero((level[1:-1] > level[:-2]) & (level[1:-1] >= level[2:]) & inside)
     lobe_hz = 4 * rate / len(samples)
     kept = []
     for top in tops[numpy.argsort(-level[tops])]:
-        below, at, above = level[top - 1:top + 2]
+        below, at, above = level[top - 1 : top + 2]
         shift = 0.5 * (below - above) / (below - 2 * at + above)
         hz = (top + shift) * freq[1]
         if kept and at < kept[0][1] - floor_db:
@@ -62,18 +62,18 @@ def find_peak(samples, rate, near_hz, within=0.03):
 
 
 def calc_decay(samples, rate, hz, half_width_hz, depth_db=40.0):
-    """The decay rate d [1/s] of what rings within half_width_hz of hz, amplitude ~ e^(-d t). Fitted from the envelope's top until it has fallen by
-    depth_db; the two ends of the sound, where the filter rings, are left out."""
+    """The decay rate d [1/s] of what rings within half_width_hz of hz, amplitude ~ e^(-d t). Fitted from the envelope's top until it has
+    fallen by depth_db; the two ends of the sound, where the filter rings, are left out."""
     column = samples.reshape(len(samples), -1)[:, 0]
     spectrum = numpy.fft.fft(column)
     freq = numpy.fft.fftfreq(len(column), 1 / rate)
     away = abs(freq - hz) / half_width_hz
     envelope = abs(numpy.fft.ifft(2 * spectrum * numpy.where(away < 1, 0.5 + 0.5 * numpy.cos(numpy.pi * away), 0)))
     edge = int(2 * rate / half_width_hz)
-    envelope = envelope[edge:len(envelope) - edge]
-    envelope = envelope[numpy.argmax(envelope):]
+    envelope = envelope[edge : len(envelope) - edge]
+    envelope = envelope[numpy.argmax(envelope) :]
     low = numpy.flatnonzero(envelope < envelope[0] * 10 ** (-depth_db / 20))
-    envelope = envelope[:low[0]] if len(low) else envelope
+    envelope = envelope[: low[0]] if len(low) else envelope
     if len(envelope) < 0.01 * rate:
         raise SystemExit(f"what rings at {hz:g} Hz is too short for its decay")
     return -numpy.polyfit(numpy.arange(len(envelope)) / rate, numpy.log(envelope), 1)[0]
@@ -89,7 +89,7 @@ def main():
     parser.add_argument("--count", type=int, default=8)
     options = parser.parse_args()
     rate, samples = read_wav(options.sound)
-    samples = samples[int(options.begin * rate):None if options.end is None else int(options.end * rate)]
+    samples = samples[int(options.begin * rate) : None if options.end is None else int(options.end * rate)]
     for hz, level in find_peaks(samples, rate, options.low, options.high, options.count):
         print(f"{hz:10.2f} Hz  {level:7.1f} dB")
 

@@ -56,40 +56,68 @@ class Stage:
         words = [str(word) for word in command]
         print(f"$ {shlex.join(os.path.basename(word) if pathlib.Path(word).parent == self.bin else word for word in words)}", flush=True)
         begin = time.monotonic()
-        done = subprocess.run(["bash", "-c", '. "$0"; exec "$@"', ENVIRONMENT, *words], cwd=self.out, capture_output=True, text=True, stdin=subprocess.DEVNULL)
+        done = subprocess.run(
+            ["bash", "-c", '. "$0"; exec "$@"', ENVIRONMENT, *words], cwd=self.out, capture_output=True, text=True, stdin=subprocess.DEVNULL
+        )
         if done.returncode != 0:
             sys.exit(f"{done.stdout}{done.stderr}\n{what} failed (exit code {done.returncode}); its message stands above")
         return time.monotonic() - begin
 
     def solve(self, job, name, changes=None, quick=None):
-        """Solves the job file of the example with some of its values changed (by `quick` too in the short form), as NAME.hdf. The bank's facts."""
+        """Solves the job file of the example with some of its values changed (by `quick` too in the short form), as NAME.hdf. The bank's
+        facts."""
         document = change(read_json(self.folder / job), {**(changes or {}), **(quick or {} if self.quick else {}), "bank": f"{name}.hdf"})
         (self.out / f"{name}.json").write_text(json.dumps(document, indent=1) + "\n")
         ranks = () if self.quick else ("mpirun", "-np", RANKS)
         seconds = self.run(f"the solve of {name}", *ranks, self.bin / "carillon-precompute", f"{name}.json")
-        text = subprocess.run([self.bin / "carillon-bank", "info", "--json", self.out / f"{name}.hdf"], check=True, capture_output=True, text=True).stdout
+        text = subprocess.run(
+            [self.bin / "carillon-bank", "info", "--json", self.out / f"{name}.hdf"], check=True, capture_output=True, text=True
+        ).stdout
         bank = json.loads(text)
-        print(f"  {name}: {bank['element']}, {bank['counts']['nodes']} nodes, {bank['mode_count']} modes, {bank['frequencies_hz'][0]:.2f} Hz and up,"
-              f" {seconds:.1f} s")
+        print(
+            f"  {name}: {bank['element']}, {bank['counts']['nodes']} nodes, {bank['mode_count']} modes, {bank['frequencies_hz'][0]:.2f} Hz"
+            f" and up, {seconds:.1f} s"
+        )
         return bank
 
     def render(self, name, scene, *options, picture=True, may_be_silent=False):
         """Renders a scene (a document) as NAME.wav with spectrogram (`picture`: for the page), trajectory and report, with further options
         of carillon-render; looks at the sound. (rate, samples, report)"""
         (self.out / f"{name}.json").write_text(json.dumps(scene, indent=1) + "\n")
-        self.run(f"the scene {name}", self.bin / "carillon-render", f"{name}.json", "-o", f"{name}.wav", "--spectrogram", f"{name}-spectrogram.png",
-                 "--trajectory", f"{name}-trajectory.json", "--report", f"{name}-report.json", "--audit", "--quiet", *options)
+        self.run(
+            f"the scene {name}",
+            self.bin / "carillon-render",
+            f"{name}.json",
+            "-o",
+            f"{name}.wav",
+            "--spectrogram",
+            f"{name}-spectrogram.png",
+            "--trajectory",
+            f"{name}-trajectory.json",
+            "--report",
+            f"{name}-report.json",
+            "--audit",
+            "--quiet",
+            *options,
+        )
         rate, samples = measure.read_wav(self.out / f"{name}.wav")
         report = json.loads((self.out / f"{name}-report.json").read_text())
         peak = abs(samples).max()
-        print(f"  {name}: {report['duration_s']:.3g} s, {report['contacts']} contacts, {report['modes']} modes, peak {report['peak_pa']:.3g} Pa,"
-              f" {report['real_time_factor']:.3g} x real time")
+        print(
+            f"  {name}: {report['duration_s']:.3g} s, {report['contacts']} contacts, {report['modes']} modes, peak"
+            f" {report['peak_pa']:.3g} Pa, {report['real_time_factor']:.3g} x real time"
+        )
         sane = report["resets"] == 0 and report["impulses_refused"] == 0 and (0.05 < peak < 1.0 or (may_be_silent and peak == 0.0))
         self.expect(f"{name}.wav is loud, not clipped, and nothing was lost", sane)
         energy = report["energy"]
         gained = max(energy["rise_j"], energy["hit_rise_j"])
-        self.expect(f"{name}: bodies gain {gained:.1g} J of {energy['largest_kinetic_j']:.2g} J from nowhere, modes a share of {energy['modes_rise']:.1g}",
-                    gained <= 1e-7 * energy["largest_kinetic_j"] + 1e-9 * energy["weight_n"] and energy["modes_rise"] <= 1e-9)
+        self.expect(
+            (
+                f"{name}: bodies gain {gained:.1g} J of {energy['largest_kinetic_j']:.2g} J from nowhere, modes a share of"
+                f" {energy['modes_rise']:.1g}"
+            ),
+            gained <= 1e-7 * energy["largest_kinetic_j"] + 1e-9 * energy["weight_n"] and energy["modes_rise"] <= 1e-9,
+        )
         if picture:
             self.pictures.append(f"{name}-spectrogram.png")
         return rate, samples, report

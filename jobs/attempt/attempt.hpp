@@ -22,11 +22,11 @@ struct Options {
   std::string token;          // 32 hex digits; empty: made here
   Launcher launcher = Launcher::automatic;
   std::vector<std::string> mpirun_options;  // words for mpirun or srun, before ours: which hosts, by which network
-  bool has_pictures = true;                 // in the report of the bank, where carillon-draw is installed and memory_gb has room for it
-  bool is_prediction = false;               // do not solve: find out what it needs (carillon-precompute --validate), into prediction.json
-  double grace_s = 60.0;                    // from "save and stop" to the kill
-  double hang_s = 600.0;                    // without progress, while a rank does not work
-  double silence_s = 24 * 3600.0;           // without progress, whatever the ranks do
+  bool has_pictures = false;       // draw the first modes for the report now, where memory_gb has room; carillon report does it later
+  bool is_prediction = false;      // do not solve: find out what it needs (carillon-precompute --validate), into prediction.json
+  double grace_s = 60.0;           // from "save and stop" to the kill
+  double hang_s = 600.0;           // without progress, while a rank does not work
+  double silence_s = 24 * 3600.0;  // without progress, whatever the ranks do
 };
 
 /// What carillon-draw and its X server take for the pictures of a report [GB]: 0.54 measured, for small bodies and large ones. It draws
@@ -35,14 +35,12 @@ inline constexpr double kDrawGb = 0.8;
 
 /// Not an error: another attempt has locked this folder, and this one did nothing (EX_TEMPFAIL).
 inline constexpr int kExitBusy = 75;
-/// The job is not done and goes on later: checkpointed, stopped, killed, time over, disk full.
-inline constexpr int kExitGoesOn = 85;
 
 /// Works on the job until it ends: ends what earlier attempts left running, starts the solver, waits for it, verifies the bank and
 /// publishes it. SIGUSR1, SIGTERM, SIGINT and SIGHUP ask the solver to save and stop; a second SIGTERM or SIGINT ends it at once. The end
 /// is in outcome.json of the folder (of the bank's folder when done), written last. Takes over the signals of the process and makes it
-/// adopt orphans: for a process of its own. Returns the exit code: 0, 2, 3, 4 (failed for good), kExitGoesOn or kExitBusy. InputError:
-/// `work` is no folder of work of a store. SystemError: the folder cannot be written at all.
+/// adopt orphans: for a process of its own. Returns the exit code: 0, 2, 3, 4 (failed for good), kExitCheckpointed or kExitBusy.
+/// InputError: `work` is no folder of work of a store. SystemError: the folder cannot be written at all.
 int run_attempt(const Options& options);
 
 /// The command line that does this, for `program` (carillon itself): {program, "attempt", ...}.
@@ -50,11 +48,5 @@ std::vector<std::string> make_arguments(const std::filesystem::path& program, co
 
 /// What --validate printed, in the folder of work.
 inline constexpr const char* kPredictionFile = "prediction.json";
-
-/// Whether the solver of this installation can do that.
-bool can_predict();
-
-/// A program of ours: beside this one, else in PATH; absolute. SystemError when it is nowhere.
-std::filesystem::path find_program(const std::string& name);
 
 }  // namespace carillon::attempt

@@ -1,7 +1,7 @@
 // Method:     fork and exec, never a shell: nothing of a job is ever read as a command. One thread a rank, no binding to cores (two runs
-// side
-//             by side would be bound to the same), keep-alive probes between mpirun's daemons (a lost machine is noticed in 11 s, not in 8
-//             minutes), temporary files and shared memory in folders of the attempt. One rank needs no mpirun and starts faster without.
+//             side by side would be bound to the same), keep-alive probes between mpirun's daemons (a lost machine is noticed in 11 s, not
+//             in 8 minutes), temporary files and shared memory in folders of the attempt. One rank needs no mpirun and starts faster
+//             without.
 // Source:     Open MPI 4.1, mpirun(1), ompi_info --all; Linux prctl(2), proc(5) (oom_score_adj).
 // Deviations: none.
 #include "jobs/attempt/launch.hpp"
@@ -21,6 +21,7 @@
 
 #include "jobs/store/store.hpp"
 #include "runtime/base/command.hpp"
+#include "runtime/base/descriptor.hpp"
 #include "runtime/base/file.hpp"
 
 extern "C" char** environ;
@@ -31,12 +32,12 @@ namespace {
 namespace fs = std::filesystem;
 
 // Sockets lie in the temporary folder, and their paths must be short.
-constexpr std::size_t kMostTemporaryPath = 60;
+constexpr std::size_t kMaxTemporaryPath = 60;
 
 fs::path find_temporary_base() {
   const char* named = std::getenv("TMPDIR");
   std::error_code error;
-  if (named != nullptr && named[0] == '/' && std::strlen(named) <= kMostTemporaryPath && fs::is_directory(named, error) &&
+  if (named != nullptr && named[0] == '/' && std::strlen(named) <= kMaxTemporaryPath && fs::is_directory(named, error) &&
       ::access(named, W_OK | X_OK) == 0)
     return named;
   return "/tmp";
@@ -82,14 +83,9 @@ std::vector<std::string> make_environment(const std::string& token, const Scratc
   return environment;
 }
 
-/// Whether the solver knows an option.
-bool has_option(const fs::path& program, const char* option) {
-  return base::read_file(program, "program", std::uint64_t{1} << 32).find(option) != std::string::npos;
-}
-
-int open_output(const fs::path& file, int mode) {
-  const int output = ::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK | mode, 0666);
-  if (output < 0)
+base::Descriptor open_output(const fs::path& file, int mode) {
+  base::Descriptor output(::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK | mode, 0666));
+  if (output.get() < 0)
     throw SystemError(
         fmt::format("{}: cannot write this: {}; check the folder's rights and the space on the disk", file.string(), std::strerror(errno)));
   return output;
@@ -124,28 +120,23 @@ void Scratch::remove_left(const std::string& token) {
     fs::remove_all(base / make_folder_name(token), error);
 }
 
-fs::path find_program(const std::string& name) {
-  if (const auto program = base::find_program(name)) return *program;
-  throw SystemError(fmt::format("{} is neither next to this program nor in PATH; install it", name));
-}
-
 bool is_under_slurm() { return std::getenv("SLURM_JOB_ID") != nullptr; }
 
 Launch make_launch(const Options& options, const std::string& token, const Scratch* scratch) {
   Launch launch;
   launch.environment = make_environment(token, scratch);
-  const fs::path solver = find_program("carillon-precompute");
+  const fs::path solver = base::require_program("carillon-precompute");
   Launcher launcher = options.launcher;
   if (launcher == Launcher::automatic) launcher = options.ranks == 1 && !is_under_slurm() ? Launcher::alone : Launcher::mpirun;
   if (launcher == Launcher::alone) launch.environment.push_back("OMPI_MCA_ess_singleton_isolated=1");  // no daemon for one rank
   if (launcher == Launcher::mpirun) {
-    launch.arguments = {find_program("mpirun"), "-np", std::to_string(options.ranks), "--bind-to", "none", "--oversubscribe"};
+    launch.arguments = {base::require_program("mpirun"), "-np", std::to_string(options.ranks), "--bind-to", "none", "--oversubscribe"};
     launch.arguments.insert(launch.arguments.end(), options.mpirun_options.begin(), options.mpirun_options.end());
     for (const char* name : {"CARILLON_ATTEMPT", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "HWLOC_COMPONENTS"}) {
       launch.arguments.insert(launch.arguments.end(), {"-x", name});
     }
   } else if (launcher == Launcher::srun) {
-    launch.arguments = {find_program("srun"), "--mpi=pmix", "--kill-on-bad-exit=1", "-n", std::to_string(options.ranks)};
+    launch.arguments = {base::require_program("srun"), "--mpi=pmix", "--kill-on-bad-exit=1", "-n", std::to_string(options.ranks)};
     launch.arguments.insert(launch.arguments.end(), options.mpirun_options.begin(), options.mpirun_options.end());
   }
   launch.arguments.insert(launch.arguments.end(), {solver, store::kJobFile});
@@ -155,6 +146,7 @@ Launch make_launch(const Options& options, const std::string& token, const Scrat
   // What starts ranks knows the folder by its name, and does so on other machines too: each rank goes there step by step.
   const std::string folder = fmt::format("work/{}/{}", options.id.substr(0, 2), options.id);
   if (launcher != Launcher::alone) add({"--folder", options.root.c_str(), folder.c_str()});
+  add({"--result", store::kResultFile});
   if (options.is_prediction) {
     add({"--validate", "--json", "--patience", "1000000", "--count", "20"});  // what is reserved rests on the mesh, not on an estimate
   } else {
@@ -163,32 +155,18 @@ Launch make_launch(const Options& options, const std::string& token, const Scrat
   return launch;
 }
 
-bool can_predict() { return has_option(find_program("carillon-precompute"), "--validate"); }
-
 pid_t start(const Launch& launch, const fs::path& folder, const fs::path& log, const fs::path& output) {
-  const int error_file = open_output(log, O_APPEND);
-  const int output_file = output.empty() ? error_file : open_output(output, O_TRUNC);
-  const auto close_files = [&] {
-    ::close(error_file);
-    if (output_file != error_file) ::close(output_file);
-  };
-  try {
-    // When memory runs out the solver goes, not the service.
-    const pid_t child = base::start({.words = launch.arguments,
-                                     .environment = launch.environment,
-                                     .folder = folder,
-                                     .output = output_file,
-                                     .errors = error_file,
-                                     .group = base::Command::Group::own,
-                                     .signal_at_end = SIGTERM,
-                                     .yields_memory = true,
-                                     .default_signals = true});
-    close_files();
-    return child;
-  } catch (...) {
-    close_files();
-    throw;
-  }
+  const base::Descriptor errors = open_output(log, O_APPEND);
+  const base::Descriptor own = output.empty() ? base::Descriptor() : open_output(output, O_TRUNC);
+  return base::start({.words = launch.arguments,
+                      .environment = launch.environment,
+                      .folder = folder,
+                      .output = output.empty() ? errors.get() : own.get(),
+                      .errors = errors.get(),
+                      .group = base::Command::Group::own,
+                      .signal_at_end = SIGTERM,
+                      .yields_memory = true,  // the solver goes, not the service
+                      .default_signals = true});
 }
 
 }  // namespace carillon::attempt

@@ -22,7 +22,7 @@ std::map<pid_t, Usage> find_below(pid_t root);
 /// CPU time of `pid` and all below it in `all` [ns].
 std::uint64_t calc_cpu_below(const std::map<pid_t, Usage>& all, pid_t pid);
 
-/// How often the kernel has killed a process for lack of memory since it started; 0 where it does not tell.
+/// How often the kernel has killed a process for lack of memory since it started; 0 where it is not known.
 std::uint64_t find_memory_kills();
 
 }  // namespace carillon::attempt

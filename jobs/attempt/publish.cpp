@@ -1,6 +1,5 @@
-// Method:     Hard links (copies, where there are none) into a new folder, which gets its name in one rename. Killed before: the work is as
-// it
-//             was, and the bank in it is published by the next attempt without a solve. Killed after: done, and the work is only left over.
+// Method:     Hard links (copies, where there are none) into a new folder, which gets its name in one rename. Killed before: the work is
+//             as it was, and the next attempt publishes its bank without a solve. Killed after: done, and the work is only left over.
 // Source:     rename(2), link(2), fallocate(2).
 // Deviations: none.
 #include "jobs/attempt/publish.hpp"
@@ -10,12 +9,16 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <cerrno>
+#include <cstring>
 #include <system_error>
 
 #include "jobs/attempt/attempt.hpp"
 #include "jobs/store/identity.hpp"
 #include "jobs/store/open_folder.hpp"
 #include "runtime/bank/bank.hpp"
+#include "runtime/base/descriptor.hpp"
+#include "runtime/base/failure.hpp"
 #include "runtime/base/file.hpp"
 
 namespace carillon::attempt {
@@ -28,23 +31,19 @@ constexpr off_t kReserveBytes = 64 << 10;
 
 /// Copies a regular file; follows no link, waits for no pipe. False when there is none.
 bool take_copy(const fs::path& from, const fs::path& to) {
-  const int file = ::open(from.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+  const base::Descriptor file(::open(from.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
   struct stat info {};
-  if (file < 0 || ::fstat(file, &info) != 0 || !S_ISREG(info.st_mode)) {
-    if (file >= 0) ::close(file);
-    return false;
+  if (file.get() < 0 || ::fstat(file.get(), &info) != 0 || !S_ISREG(info.st_mode)) return false;
+  base::WholeFile whole(to);
+  std::string piece(1 << 20, '\0');
+  for (;;) {
+    const ssize_t got = ::read(file.get(), piece.data(), piece.size());
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) throw_system_error(errno, fmt::format("{}: cannot read this: {}", from.string(), std::strerror(errno)));
+    if (got == 0) break;
+    whole.append(std::string_view(piece.data(), static_cast<std::size_t>(got)));
   }
-  try {
-    base::WholeFile whole(to);
-    std::string piece(1 << 20, '\0');
-    for (ssize_t got = 0; (got = ::read(file, piece.data(), piece.size())) > 0;)
-      whole.append(std::string_view(piece.data(), static_cast<std::size_t>(got)));
-    whole.commit();
-  } catch (...) {
-    ::close(file);
-    throw;
-  }
-  ::close(file);
+  whole.commit();
   return true;
 }
 
@@ -126,7 +125,7 @@ void publish(const store::Store& store, const store::Id& id, const fs::path& wor
   const fs::path folder = temporary.content().shared_path();
   try {
     link_or_copy(work / store::kBankFile, folder / store::kBankFile);
-    // The solver writes the job with every value that it used beside the bank; it runs again as a job.
+    // The solver writes the job with every value that it used next to the bank; it runs again as a job.
     if (!take_copy(work / (std::string(store::kBankFile) + ".resolved.json"), folder / store::kJobFile))
       take_copy(work / store::kJobFile, folder / store::kJobFile);
     take_copy(work / store::kRequestFile, folder / store::kRequestFile);
@@ -135,7 +134,7 @@ void publish(const store::Store& store, const store::Id& id, const fs::path& wor
     outcome::write_outcome(folder, outcome);
     store.publish(id, temporary);
   } catch (const SystemError& error) {
-    throw SystemError(store::show_names(temporary.content(), error.what()));
+    store::throw_with_names(temporary.content(), error);
   }
 }
 

@@ -16,7 +16,7 @@ namespace carillon::attempt {
 /// `has_bank` says whether there is one.
 std::optional<std::string> find_bank_fault(const std::filesystem::path& work, const store::Request& request, bool& has_bank);
 
-/// Why one of the records beside a bank in the store (job.json, request.json, outcome.json) is not what was published, or not that of this
+/// Why one of the records next to a bank in the store (job.json, request.json, outcome.json) is not what was published, or not that of this
 /// job, in one sentence; none when all are.
 std::optional<std::string> find_record_fault(const store::Store& store, const store::Id& id);
 

@@ -25,6 +25,8 @@
 #include "jobs/store/identity.hpp"
 #include "jobs/store/open_folder.hpp"
 #include "jobs/store/store.hpp"
+#include "runtime/base/clock.hpp"
+#include "runtime/base/result.hpp"
 
 namespace carillon::attempt {
 namespace {
@@ -32,8 +34,8 @@ namespace {
 namespace fs = std::filesystem;
 using outcome::Cause;
 
-constexpr std::uintmax_t kMostLog = 1 << 16;  // what is read of it
-constexpr double kMostDrawSeconds = 60.0;
+constexpr std::uintmax_t kMaxLog = 1 << 16;  // what is read of it
+constexpr double kMaxDrawSeconds = 60.0;
 
 fs::path find_root(const fs::path& work) {
   // work/ab/<id> of a store, as named: a link on the way is refused when the folder is opened
@@ -44,7 +46,7 @@ fs::path find_root(const fs::path& work) {
   return root;
 }
 
-/// Size and moment of a file: another when it was written anew. Zeros when there is none.
+/// Size and moment of a file: they change when it is written again. Zeros when there is none.
 std::pair<long long, long long> find_mark(const fs::path& file) {
   struct stat info {};
   if (::stat(file.c_str(), &info) != 0) return {0, 0};
@@ -56,25 +58,31 @@ std::string read_end(const fs::path& file, std::uintmax_t from) {
   const std::uintmax_t size = fs::file_size(file, error);
   if (error || size <= from) return {};
   std::ifstream stream(file, std::ios::binary);
-  stream.seekg(static_cast<std::streamoff>(std::max(from, size > kMostLog ? size - kMostLog : 0)));
+  stream.seekg(static_cast<std::streamoff>(std::max(from, size > kMaxLog ? size - kMaxLog : 0)));
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-double find_seconds() {
-  timespec time{};
-  ::clock_gettime(CLOCK_MONOTONIC, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+/// Whom mpirun names in its sentence on a rank that a signal ended: "rank 1 on node3"; empty when it names none. No decision rests on it.
+std::string find_dead_rank(std::string_view log) {
+  constexpr std::string_view kMark = "mpirun noticed that process ";
+  const std::size_t at = log.rfind(kMark);
+  if (at == std::string_view::npos) return {};
+  const std::string_view rest = log.substr(at + kMark.size()), line = rest.substr(0, rest.find('\n'));
+  const std::size_t pid = line.find(" with PID "), node = line.find(" on node ");
+  if (pid == std::string_view::npos || node == std::string_view::npos) return {};
+  const std::string_view host = line.substr(node + 9);
+  return fmt::format("{} on {}", line.substr(0, pid), host.substr(0, host.find(' ')));
 }
 
-/// Pictures where they are wanted and the job was given the memory to draw them.
+/// Pictures where the job asks for them now and has the memory to draw them.
 report::Options find_report_options(const Options& attempt) {
   report::Options wanted;
-  wanted.draw_limit_s = kMostDrawSeconds;
+  wanted.draw_limit_s = kMaxDrawSeconds;
   const bool has_room = attempt.memory_gb <= 0.0 || attempt.memory_gb >= kDrawGb;
   if (!attempt.has_pictures || !has_room) wanted.drawn_modes = 0;
   if (attempt.has_pictures && !has_room)
-    wanted.undrawn_reason = fmt::format("drawing takes about {:g} GB, and the job had {:g}; carillon report JOB -o FOLDER draws them",
-                                        kDrawGb, attempt.memory_gb);
+    wanted.undrawn_reason =
+        fmt::format("drawing takes about {:g} GB, and the job had {:g}; carillon report JOB draws them", kDrawGb, attempt.memory_gb);
   return wanted;
 }
 
@@ -89,7 +97,7 @@ std::optional<process::Lock> take_lock(const store::OpenFolder& work) {
     }
     return std::nullopt;
   } catch (const SystemError& error) {
-    throw SystemError(store::show_names(work, error.what()));
+    store::throw_with_names(work, error);
   }
 }
 
@@ -110,21 +118,21 @@ class Attempt {
 
   int run() {
     take_signals();
-    const double start_s = find_seconds();
+    const double start_s = base::get_steady_s();
     const std::optional<outcome::Outcome> before = outcome::read_outcome(work_);
     try {
       clean();
       solve(before ? before->percent : 0.0);
     } catch (const SystemError& error) {
-      set(store::is_disk_full(work_, error.what()) ? Cause::disk_full : Cause::system, error.what());
+      set(store::is_disk_full(work_, error) ? Cause::disk_full : Cause::system, error.what());
     } catch (const InputError& error) {
       set(Cause::bad_input, error.what());
     } catch (const std::bad_alloc&) {
       set(Cause::memory, "out of memory while the bank was verified");
     } catch (const std::exception& error) {
-      set(store::is_disk_full(work_, error.what()) ? Cause::disk_full : Cause::system, error.what());
+      set(store::is_disk_full(work_, error) ? Cause::disk_full : Cause::system, error.what());
     }
-    outcome_.seconds = find_seconds() - start_s;
+    outcome_.seconds = base::get_steady_s() - start_s;
     outcome_.percent = std::max(outcome_.percent, before ? before->percent : 0.0);
     return finish();
   }
@@ -144,7 +152,8 @@ class Attempt {
       Scratch::remove_left(before->token);
     }
     remove_temporary_files();
-    for (const char* name : {store::kLogFile, store::kProgressFile, store::kCheckpointFile, "prediction.new"}) clear_way(work_, name);
+    for (const char* name : {store::kLogFile, store::kProgressFile, store::kCheckpointFile, "prediction.new", store::kResultFile})
+      clear_way(work_, name);
     outcome::write_attempt(work_, {outcome_.token, process::find_self(), options_.ranks, options_.memory_gb, outcome_.started});
     make_reserve(work_);
   }
@@ -164,7 +173,7 @@ class Attempt {
       throw InputError(*fault + "; submit the job again, or carillon verify --repair makes its folder again");
     const store::Request request = *store::read_request(work_);
     if (const auto fault = store::find_input_fault(store_, request))
-      throw InputError(fmt::format("{}; submit the job again, which copies its {} again", *fault, request.input_kind));
+      throw InputError(fmt::format("{}; submit the job again, which copies its {} again", *fault, to_text(request.input_kind)));
     return request;
   }
 
@@ -192,23 +201,26 @@ class Attempt {
     const auto mark = find_mark(checkpoint);
     const std::uint64_t kills = find_memory_kills();
     const fs::path printed = options_.is_prediction ? work_ / "prediction.new" : fs::path();
+    ::unlink((work_ / store::kResultFile).c_str());  // of an earlier attempt
     const Watched watched = watch(start(*launch, work_, log, printed), options_, outcome_.token);
     if (const std::optional<store::Progress> progress = store::read_progress(work_)) outcome_.percent = progress->percent;
     outcome_.exit_code = watched.exit_code;
     outcome_.peak_memory_gb = watched.peak_memory_gb;
-    outcome_.is_further = outcome_.percent > percent_before && find_mark(checkpoint) != mark && find_mark(checkpoint).first != 0;
-    const std::string end = read_end(log, error ? 0 : log_start);
-    outcome::Ending ending{watched.exit_code, watched.was_asked_to_stop,   watched.was_out_of_time,    watched.was_hung,
-                           watched.still_s,   find_memory_kills() > kills, store::is_disk_full(work_), end};
-    const outcome::Verdict verdict = outcome::classify(ending);
-    set(verdict.cause, verdict.reason, verdict.memory_need_gb);
-    if (verdict.cause != Cause::done) return;
+    outcome::Ending ending{
+        watched.exit_code, watched.was_asked_to_stop,   watched.was_out_of_time,    watched.was_hung,
+        watched.still_s,   find_memory_kills() > kills, store::is_disk_full(work_), base::read_result(work_ / store::kResultFile)};
+    ending.has_saved = find_mark(checkpoint) != mark && find_mark(checkpoint).first != 0;
+    outcome_.is_further = outcome_.percent > percent_before && ending.has_saved;
+    if (ending.exit_code != 0 && !ending.result) ending.dead_rank = find_dead_rank(read_end(log, error ? 0 : log_start));
+    const outcome::FailureCause found = outcome::classify(ending);
+    set(found.cause, found.reason, found.memory_need_gb);
+    if (found.cause != Cause::done) return;
     if (options_.is_prediction) {
       fs::rename(printed, work_ / kPredictionFile);
       return set(Cause::predicted, "what it needs is predicted; waits for room");
     }
     if (const std::optional<std::string> fault = find_bank_fault(work_, request, has_bank))
-      return set(Cause::bad_bank, "the solver said that all is well, but: " + *fault);
+      return set(Cause::bad_bank, "the solver exited with 0, but its bank cannot be used: " + *fault);
     if (const auto fault = store::find_input_fault(store_, request))
       set(Cause::bad_input, fmt::format("while it was solved {}; submit the job again", *fault));
   }
@@ -226,7 +238,7 @@ class Attempt {
         return 0;
       } catch (const std::exception& error) {
         if (store_.has_bank(id_)) return 0;  // only the work could not be removed
-        set(store::is_disk_full(work_, error.what()) ? Cause::disk_full : Cause::system, error.what());
+        set(store::is_disk_full(work_, error) ? Cause::disk_full : Cause::system, error.what());
       }
     }
     fmt::print(stderr, "carillon attempt: {}: {}\n", outcome::to_text(outcome_.cause), outcome_.reason);
@@ -239,7 +251,7 @@ class Attempt {
       case Cause::no_program:
         return kExitSystem;
       default:
-        return kExitGoesOn;
+        return kExitCheckpointed;
     }
   }
 
@@ -277,7 +289,7 @@ std::vector<std::string> make_arguments(const fs::path& program, const Options& 
   if (options.time_limit_s > 0.0) add("--time-limit-s", fmt::format("{}", options.time_limit_s));
   if (options.is_prediction) arguments.emplace_back("--predict");
   for (const std::string& word : options.mpirun_options) arguments.push_back("--mpirun-option=" + word);
-  if (!options.has_pictures) arguments.emplace_back("--no-pictures");
+  if (options.has_pictures) arguments.emplace_back("--pictures");
   if (!options.token.empty()) add("--token", options.token);
   if (options.launcher == Launcher::alone) add("--launcher", "alone");
   if (options.launcher == Launcher::mpirun) add("--launcher", "mpirun");

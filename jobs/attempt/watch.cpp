@@ -1,9 +1,8 @@
 // Method:     One thread that waits for signals with a timeout. Asked to stop: SIGUSR1 ("save and stop"; mpirun hands it on, and unlike
-// SIGTERM
-//             it keeps the ranks' own exit code), again every ten seconds as mpirun loses it while it starts, SIGTERM after the grace,
-//             SIGKILL to all that carries the attempt's token five seconds later. A rank hangs when it used no CPU time at all while no
-//             process wrote a line: ranks that wait for others poll, and use some. Time is counted in short steps of the monotonic clock,
-//             so that neither a suspended machine nor a clock that somebody plays with ends a job.
+//             SIGTERM it keeps the ranks' own exit code), again every ten seconds as mpirun loses it while it starts, SIGTERM after the
+//             grace, SIGKILL to all that carries the attempt's token five seconds later. A rank hangs when it used no CPU time at all while
+//             no process wrote a line: ranks that wait for others poll, and use some. Time is counted in short steps of the monotonic
+//             clock, so that neither a suspended machine nor a change of the wall clock ends a job.
 // Source:     Open MPI 4.1 mpirun(1), signal forwarding; Linux prctl(2), sigtimedwait(2).
 // Deviations: none.
 #include "jobs/attempt/watch.hpp"
@@ -21,11 +20,12 @@
 #include "jobs/attempt/processes.hpp"
 #include "jobs/process/process.hpp"
 #include "jobs/store/store.hpp"
+#include "runtime/base/clock.hpp"
 
 namespace carillon::attempt {
 namespace {
 
-constexpr double kStepS = 0.5, kMostStepS = 2.0, kLookS = 2.0, kAskAgainS = 10.0, kTermS = 5.0;
+constexpr double kStepS = 0.5, kMaxStepS = 2.0, kLookS = 2.0, kAskAgainS = 10.0, kTermS = 5.0;
 constexpr const char* kRankName = "carillon-precom";  // as the kernel cuts it
 
 sigset_t make_signals() {
@@ -35,23 +35,17 @@ sigset_t make_signals() {
   return set;
 }
 
-double find_seconds() {
-  timespec time{};
-  ::clock_gettime(CLOCK_MONOTONIC, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
-
 class Watcher {
  public:
   Watcher(pid_t child, const Options& options, const std::string& token)
       : child_(child), options_(options), entry_("CARILLON_ATTEMPT=" + token) {}
 
   Watched run() {
-    double before = find_seconds();
+    double before = base::get_steady_s();
     while (!reap()) {
       handle(wait_for_signal());
-      const double now = find_seconds();
-      const double step = std::clamp(now - before, 0.0, kMostStepS);
+      const double now = base::get_steady_s();
+      const double step = std::clamp(now - before, 0.0, kMaxStepS);
       before = now;
       advance(step);
     }
@@ -68,13 +62,14 @@ class Watcher {
     return ::sigtimedwait(&set, nullptr, &step);
   }
 
-  /// True when the child has ended. Orphans that became ours are buried on the way.
+  /// True when the child has ended. Orphans that became ours are reaped on the way.
   bool reap() {
     for (;;) {
       int status = 0;
       const pid_t ended = ::waitpid(-1, &status, WNOHANG);
       if (ended < 0 && errno == EINTR) continue;
-      if (ended <= 0) return ended < 0;  // no child at all: somebody else buried it
+      if (ended < 0) watched_.exit_code = kExitSystem;  // no child at all: its status was taken elsewhere
+      if (ended <= 0) return ended < 0;
       if (ended != child_) continue;
       watched_.exit_code = WIFSIGNALED(status) ? 128 + WTERMSIG(status) : WEXITSTATUS(status);
       return true;

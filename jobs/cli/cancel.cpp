@@ -8,6 +8,7 @@
 #include "jobs/cli/options.hpp"
 #include "jobs/cli/shared.hpp"
 #include "jobs/cli/slurm.hpp"
+#include "jobs/queue/local.hpp"
 #include "jobs/queue/settle.hpp"
 #include "runtime/base/error.hpp"
 
@@ -27,15 +28,15 @@ int do_to_all(Shared& shared, const std::vector<registry::Job>& jobs, const Act&
   Json::Value root;
   root["jobs"] = Json::arrayValue;
   for (const registry::Job& job : jobs) {
-    const queue::Said said = act(job);
-    is_done = is_done && said.is_done;
+    const queue::CommandResult result = act(job);
+    is_done = is_done && result.is_done;
     if (shared.json) {
       Json::Value entry = describe(shared, shared.registry().find(job.id).value_or(job));
-      entry["did"] = said.is_done;
-      entry["said"] = to_json(said.text);
+      entry["did"] = result.is_done;
+      entry["said"] = to_json(result.text);
       root["jobs"].append(entry);
     } else {
-      fmt::print("{}  {}: {}\n", job.id.short_text(), show(job.name), show_message(said.text));
+      fmt::print("{}  {}: {}\n", job.id.short_text(), show(job.name), show_message(result.text));
       std::fflush(stdout);
     }
   }
@@ -46,7 +47,8 @@ int do_to_all(Shared& shared, const std::vector<registry::Job>& jobs, const Act&
 int run_cancel(Shared& shared, const Options& options) {
   shared.settle();
   return do_to_all(shared, find_jobs(shared, options.words), [&](const registry::Job& job) {
-    return job.engine == "slurm" ? cancel_in_slurm(shared, job.id) : queue::cancel(shared.store(), shared.registry(), job.id);
+    return job.engine == store::JobEngine::slurm ? cancel_in_slurm(shared, job.id)
+                                                 : queue::cancel(queue::LocalEnvironment(shared.store()), shared.registry(), job.id);
   });
 }
 
@@ -56,7 +58,7 @@ int run_retry(Shared& shared, const Options& options) {
     throw InputError("which job? Name an id or a job file, or give --failed for all that failed");
   std::vector<registry::Job> jobs = find_jobs(shared, options.words);
   if (options.all_failed) {
-    for (registry::Job& job : shared.registry().list({registry::State::failed})) jobs.push_back(std::move(job));
+    for (registry::Job& job : shared.registry().list({registry::JobState::failed})) jobs.push_back(std::move(job));
   }
   std::optional<store::Lock> lock = shared.store().lock_shared();  // gc waits
   const int code = do_to_all(shared, jobs, [&](const registry::Job& job) {
@@ -65,7 +67,7 @@ int run_retry(Shared& shared, const Options& options) {
   lock.reset();
   const auto is_for_slurm = [&](const registry::Job& job) {
     const auto row = shared.registry().find(job.id);
-    return row && row->engine == "slurm";
+    return row && row->engine == store::JobEngine::slurm;
   };
   if (std::any_of(jobs.begin(), jobs.end(), is_for_slurm)) hand_over_to_slurm(shared);
   return code;

@@ -43,12 +43,12 @@ std::map<std::string, std::string> read_leaves(const std::string& job) {
 std::vector<Change> find_changes(const store::Request& before, const store::Request& after) {
   std::vector<Change> changes;
   if (before.input_kind != after.input_kind)
-    changes.push_back({"input", "", before.input_kind, after.input_kind});
+    changes.push_back({"input", "", to_text(before.input_kind), to_text(after.input_kind)});
   else if (before.input_sha256 != after.input_sha256)
     changes.push_back(
-        {after.input_kind, "", "SHA-256 " + before.input_sha256.substr(0, 12), "SHA-256 " + after.input_sha256.substr(0, 12)});
+        {to_text(after.input_kind), "", "SHA-256 " + before.input_sha256.substr(0, 12), "SHA-256 " + after.input_sha256.substr(0, 12)});
   else if (before.input_format != after.input_format)
-    changes.push_back({after.input_kind, "", "format " + before.input_format, "format " + after.input_format});
+    changes.push_back({to_text(after.input_kind), "", "format " + before.input_format, "format " + after.input_format});
   if (before.solver != after.solver) changes.push_back({"solver", "", before.solver, after.solver});
   const auto old_leaves = read_leaves(before.job), new_leaves = read_leaves(after.job);
   for (const auto& [key, value] : old_leaves) {
@@ -74,19 +74,19 @@ std::string format_change(const Change& change, const store::Request& request) {
 }
 
 /// What would happen on submit, in one word for programs and one line for people.
-struct Verdict {
+struct Explanation {
   std::string word;  // "done", "running", "queued", "waiting", "failed", "cancelled", "new"
   std::string line;
   bool would_run = false;
 };
 
-Verdict find_verdict(Shared& shared, const store::Id& id, const std::optional<registry::Job>& job) {
+Explanation explain(Shared& shared, const store::Id& id, const std::optional<registry::Job>& job) {
   if (shared.store().has_bank(id))
     return {"done",
             fmt::format("nothing would run: its bank is {}", show((shared.store().bank_folder(id) / store::kBankFile).string(), 4000)),
             false};
-  const bool is_open =
-      job && (job->state == registry::State::queued || job->state == registry::State::running || job->state == registry::State::waiting);
+  const bool is_open = job && (job->state == registry::JobState::queued || job->state == registry::JobState::running ||
+                               job->state == registry::JobState::waiting);
   if (shared.store().has_bank_folder(id) && !is_open)
     return {"failed",
             fmt::format("it would run: {}; carillon submit, or retry, computes it again",
@@ -94,11 +94,11 @@ Verdict find_verdict(Shared& shared, const store::Id& id, const std::optional<re
             true};
   if (!job) return {"new", "it would run: the store has no bank of these inputs", true};
   const std::string state = to_text(job->state), reason = show_message(find_reason(shared, *job));
-  if (job->state == registry::State::cancelled)
+  if (job->state == registry::JobState::cancelled)
     return {state, "it would run: it was cancelled, and carillon submit asks for it again", true};
   if (is_submitted_again(*job, shared.store().has_work(id)))
     return {state, fmt::format("it would run: it failed before it ran, {}; carillon submit asks for it again", reason), true};
-  if (job->state == registry::State::failed)
+  if (job->state == registry::JobState::failed)
     return {state, fmt::format("nothing would run: it failed, {}; carillon retry {} tries again", reason, id.short_text()), false};
   return {state, fmt::format("nothing new would run: it is {} already", state), false};
 }
@@ -109,15 +109,15 @@ int run_explain(Shared& shared, const std::string& word) {
   const store::Id id = store::require_id(source.request.id, word);
   const auto job = shared.registry().find(id);
   const auto last = shared.registry().find_last_submission(source.job_file);
-  const Verdict verdict = find_verdict(shared, id, job);
+  const Explanation explanation = explain(shared, id, job);
   const std::vector<Change> changes = last ? find_changes(last->request, source.request) : std::vector<Change>();
   if (shared.json) {
     Json::Value root;
     root["id"] = id.text();
     root["job_file"] = to_json(source.job_file);
-    root["state"] = verdict.word;
-    root["would_run"] = verdict.would_run;
-    root["why"] = to_json(verdict.line);
+    root["state"] = explanation.word;
+    root["would_run"] = explanation.would_run;
+    root["why"] = to_json(explanation.line);
     root["last_id"] = last ? Json::Value(last->request.id) : Json::Value();
     root["changes"] = Json::arrayValue;
     for (const Change& change : changes) {
@@ -128,11 +128,11 @@ int run_explain(Shared& shared, const std::string& word) {
       entry["after"] = change.after.empty() ? Json::Value() : to_json(change.after);
       root["changes"].append(entry);
     }
-    root["bank"] = verdict.word == "done" ? to_json((shared.store().bank_folder(id) / store::kBankFile).string()) : Json::Value();
+    root["bank"] = explanation.word == "done" ? to_json((shared.store().bank_folder(id) / store::kBankFile).string()) : Json::Value();
     print_json(root);
     return 0;
   }
-  fmt::print("{}  {}\n{}\n", id.short_text(), show(source.job_file), verdict.line);
+  fmt::print("{}  {}\n{}\n", id.short_text(), show(source.job_file), explanation.line);
   if (!last)
     fmt::print("this job file was not submitted to this store before\n");
   else if (changes.empty())

@@ -30,7 +30,7 @@ std::vector<registry::Job> read_jobs(Shared& shared, const std::vector<store::Id
 }
 
 bool has_ended(const registry::Job& job) {
-  return job.state == registry::State::done || job.state == registry::State::failed || job.state == registry::State::cancelled;
+  return job.state == registry::JobState::done || job.state == registry::JobState::failed || job.state == registry::JobState::cancelled;
 }
 
 /// The screen's picture of the jobs; as many rows as it has.
@@ -72,11 +72,11 @@ void print_changes(Shared& shared, const std::vector<registry::Job>& jobs, std::
 }  // namespace
 
 int find_exit_code(const std::vector<registry::Job>& jobs) {
-  const auto is = [&](registry::State state) { return [state](const registry::Job& job) { return job.state == state; }; };
-  if (std::any_of(jobs.begin(), jobs.end(), is(registry::State::failed)) ||
-      std::any_of(jobs.begin(), jobs.end(), is(registry::State::cancelled)))
+  const auto is = [&](registry::JobState state) { return [state](const registry::Job& job) { return job.state == state; }; };
+  if (std::any_of(jobs.begin(), jobs.end(), is(registry::JobState::failed)) ||
+      std::any_of(jobs.begin(), jobs.end(), is(registry::JobState::cancelled)))
     return kExitSolve;
-  return std::all_of(jobs.begin(), jobs.end(), is(registry::State::done)) ? 0 : kExitNotYet;
+  return std::all_of(jobs.begin(), jobs.end(), is(registry::JobState::done)) ? 0 : kExitNotYet;
 }
 
 int follow(Shared& shared, const std::vector<store::Id>& ids, bool lines) {

@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::uint64_t kMostManifestBytes = 1ULL << 28;
+constexpr std::uint64_t kMaxManifestBytes = 1ULL << 28;
 
 std::string name_of(const fs::path& file) { return store::to_text(fs::absolute(file).lexically_normal()); }
 
@@ -77,7 +77,7 @@ std::vector<Source> read_manifest(const std::string& word) {
   const fs::path manifest = is_stdin ? fs::current_path() / "standard input" : fs::absolute(word);
   std::string text =
       is_stdin ? std::string(std::istreambuf_iterator<char>(std::cin), {})
-               : base::read_file(word, "manifest", kMostManifestBytes, "a job file ends in .json, and a manifest names one on each line");
+               : base::read_file(word, "manifest", kMaxManifestBytes, "a job file ends in .json, and a manifest names one on each line");
   if (text.find('\0') != std::string::npos)
     throw InputError(fmt::format("{}: this is no text; a job file ends in .json, and a manifest names one on each line", word));
   std::vector<Source> sources;

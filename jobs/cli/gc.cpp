@@ -1,9 +1,8 @@
 // carillon gc: what no job refers to.
 // Method:     A job file refers to what it was last submitted as, for as long as the file is there. Banks, failed and cancelled jobs that
-// no
-//             job file refers to are garbage; so are inputs that no bank and no job was made of, folders of work whose bank is published,
-//             temporary folders of processes that are gone, and registries and banks that were set aside. Names that the store does not
-//             give stay. What is queued, waits or runs never is.
+//             no job file refers to are garbage; so are inputs that no bank and no job was made of, folders of work whose bank is
+//             published, temporary folders of processes that are gone, and registries and banks that were set aside. Names that the store
+//             does not give stay. What is queued, waits or runs never is.
 // Source:     own.
 // Deviations: none.
 #include <fmt/core.h>
@@ -135,7 +134,7 @@ bool add_jobs(Shared& shared, const References& references, std::vector<Item>& i
   const auto use_input = [&](const fs::path& folder) {
     try {
       const auto request = store::read_request(folder);
-      if (request && request->input_kind != "shape")
+      if (request && request->input_kind != store::InputKind::shape)
         used_inputs.insert(
             store.input_file(store::require_id(request->input_sha256, "request"), request->input_format).replace_extension());
     } catch (const InputError&) {
@@ -151,8 +150,8 @@ bool add_jobs(Shared& shared, const References& references, std::vector<Item>& i
   for (const store::Id& id : store.list_work()) {
     const fs::path folder = store.work_folder(id);
     const auto job = shared.registry().find(id);
-    const bool has_ended = job && (job->state == registry::State::failed || job->state == registry::State::cancelled);
-    if (job && job->state == registry::State::done && store.has_bank(id))
+    const bool has_ended = job && (job->state == registry::JobState::failed || job->state == registry::JobState::cancelled);
+    if (job && job->state == registry::JobState::done && store.has_bank(id))
       items.push_back({"work", folder, "its bank is published", calc_bytes(store, "work", id), id});
     else if (has_ended && references.ids.count(id) == 0 && !is_kept_by_request(references, id, folder))
       items.push_back(

@@ -56,8 +56,8 @@ int run_get(Shared& shared, const Options& options) {
   const bool is_done = !fault, is_damaged = fault && shared.store().has_bank_folder(id);
   const std::vector<std::string> warnings = is_done ? store::read_warnings(shared.store(), id) : std::vector<std::string>();
   if (is_done && !options.to.empty()) copy_to(bank, options.to);
-  const bool is_again =
-      job && (job->state == registry::State::queued || job->state == registry::State::running || job->state == registry::State::waiting);
+  const bool is_again = job && (job->state == registry::JobState::queued || job->state == registry::JobState::running ||
+                                job->state == registry::JobState::waiting);
   const std::string state = is_done ? "done" : is_damaged && !is_again ? "failed" : job ? to_text(job->state) : "new";
   const std::string why = is_done                   ? ""
                           : is_damaged && !is_again ? fmt::format("{}; carillon retry {} computes it again", *fault, id.short_text())

@@ -19,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr auto kPause = std::chrono::milliseconds(300);
-constexpr off_t kMostJsonBytes = 16 << 20;
+constexpr off_t kMaxJsonBytes = 16 << 20;
 
 struct Options {
   std::string word;
@@ -27,7 +27,7 @@ struct Options {
 };
 
 /// The bytes from `from` on, at most `most`; `from` moves on. Empty when there are none.
-std::string read_from(const fs::path& file, off_t& from, off_t most) {
+std::string read_from(const fs::path& file, off_t& from, off_t max) {
   std::string bytes;
   const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOFOLLOW);
   if (fd < 0 && (errno == EACCES || errno == EPERM))
@@ -35,7 +35,7 @@ std::string read_from(const fs::path& file, off_t& from, off_t most) {
   if (fd < 0) return bytes;
   struct stat info {};
   if (::fstat(fd, &info) == 0 && S_ISREG(info.st_mode) && info.st_size > from) {
-    bytes.resize(static_cast<std::size_t>(std::min(most, info.st_size - from)));
+    bytes.resize(static_cast<std::size_t>(std::min(max, info.st_size - from)));
     const ssize_t got = ::pread(fd, bytes.data(), bytes.size(), from);
     bytes.resize(got > 0 ? static_cast<std::size_t>(got) : 0);
     from += static_cast<off_t>(bytes.size());
@@ -45,7 +45,7 @@ std::string read_from(const fs::path& file, off_t& from, off_t most) {
 }
 
 bool has_ended(const registry::Job& job) {
-  return job.state == registry::State::done || job.state == registry::State::failed || job.state == registry::State::cancelled;
+  return job.state == registry::JobState::done || job.state == registry::JobState::failed || job.state == registry::JobState::cancelled;
 }
 
 int run_log(Shared& shared, const Options& options) {
@@ -59,8 +59,8 @@ int run_log(Shared& shared, const Options& options) {
     root["state"] = to_text(job.state);
     root["file"] = to_json(file.string());
     struct stat info {};
-    if (::stat(file.c_str(), &info) == 0) at = std::max<off_t>(0, info.st_size - kMostJsonBytes);
-    root["text"] = to_json(read_from(file, at, kMostJsonBytes));
+    if (::stat(file.c_str(), &info) == 0) at = std::max<off_t>(0, info.st_size - kMaxJsonBytes);
+    root["text"] = to_json(read_from(file, at, kMaxJsonBytes));
     print_json(root);
     return 0;
   }
@@ -94,7 +94,7 @@ void add_log(CLI::App& app, Shared& shared, Run& run) {
   CLI::App* command =
       app.add_subcommand("log", "What the solver printed for a job, all attempts one after the other. Exit code 1: nothing yet.");
   command->add_option("ID", options->word, "Id (or its beginning) or job file")->required();
-  command->add_flag("-f,--follow", options->follow, "Go on until the job has ended");
+  command->add_flag("-f,--follow", options->follow, "Continue until the job has ended");
   command->callback([&shared, &run, options] {
     shared.only_reads = true;
     run = [&shared, options] { return run_log(shared, *options); };

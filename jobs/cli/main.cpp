@@ -1,4 +1,4 @@
-// carillon: asks for banks, works through the queue, tells where jobs stand, and hands out what is done.
+// carillon: asks for banks, works through the queue, shows the state of jobs, and returns banks.
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
@@ -62,7 +62,7 @@ void hand_over_study(int argc, char** argv) {
   if (at == argc || std::string_view(argv[at]) != "study") return;
   std::vector<std::string> rest(argv + at + 1, argv + argc);
   if (std::any_of(argv + 1, argv + at, [](const char* word) { return std::string_view(word) == "--json"; })) rest.emplace_back("--json");
-  become(find_program("carillon-study"), rest);
+  become("carillon-study", rest);
 }
 
 /// Throws InputError for a word that is no command, with the nearest one.
@@ -88,7 +88,7 @@ int run(int argc, char** argv) {
   Run command;
   app.add_option("--store", shared.store_option, "Folder of the store; made when there is none");
   app.add_option("--profile", shared.profile_option, "Profile file");
-  app.add_flag("--json", shared.json, "One JSON document (of commands that go on: one object a line)");
+  app.add_flag("--json", shared.json, "One JSON document (of commands that keep running: one object a line)");
   app.set_version_flag("--version", version::describe("carillon"));
   for (const auto add : {add_submit, add_status, add_log, add_cancel, add_retry, add_explain, add_run, add_get, add_gc, add_verify,
                          add_validate, add_study, add_report})
@@ -103,7 +103,7 @@ int run(int argc, char** argv) {
     return command();
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);
-    return fail(wants_json, std::string(error.what()) + "; carillon --help, or --help after a command, tells what there is", kExitInput);
+    return fail(wants_json, std::string(error.what()) + "; carillon --help, or --help after a command, lists the options", kExitInput);
   } catch (const InputError& error) {
     return fail(shared.json, error.what(), kExitInput);
   } catch (const SolveError& error) {

@@ -11,8 +11,8 @@
 namespace carillon::cli {
 namespace {
 
-constexpr int kMostRanks = 1'000'000;
-constexpr double kMostGb = 1e9, kMostSeconds = 1e9;
+constexpr int kMaxRanks = 1'000'000;
+constexpr double kMaxGb = 1e9, kMaxSeconds = 1e9;
 
 double find_unit(const std::string& unit) {
   if (unit.empty() || unit == "s") return 1;
@@ -27,25 +27,25 @@ double parse_seconds(const std::string& text) {
   double value = 0.0;
   const auto end = std::from_chars(text.data(), text.data() + text.size(), value);
   const double unit = end.ec == std::errc() ? find_unit(std::string(end.ptr, text.data() + text.size())) : 0;
-  if (!(unit > 0 && value > 0 && value * unit <= kMostSeconds))
+  if (!(unit > 0 && value > 0 && value * unit <= kMaxSeconds))
     throw InputError(fmt::format("--time-limit {}: give seconds, or a number with s, m, h or d: 90, 15m, 2h", show(text)));
   return value * unit;
 }
 
-CLI::Validator make_gb_check(double least) {
-  return {[least](const std::string& text) {
+CLI::Validator make_gb_check(double min) {
+  return {[min](const std::string& text) {
             double value = 0.0;
             const auto end = std::from_chars(text.data(), text.data() + text.size(), value);
-            if (end.ec == std::errc() && end.ptr == text.data() + text.size() && value >= least && value <= kMostGb) return std::string();
-            return fmt::format("{}: give gigabytes, from {} to {}", show(text), least, kMostGb);
+            if (end.ec == std::errc() && end.ptr == text.data() + text.size() && value >= min && value <= kMaxGb) return std::string();
+            return fmt::format("{}: give gigabytes, from {} to {}", show(text), min, kMaxGb);
           },
-          fmt::format("FLOAT in [{} - {}]", least, kMostGb)};
+          fmt::format("FLOAT in [{} - {}]", min, kMaxGb)};
 }
 
 void ResourceOptions::add(CLI::App& command) {
-  command.add_option("--ranks", ranks, "MPI ranks of each job; without it, predicted from the mesh")->check(CLI::Range(1, kMostRanks));
+  command.add_option("--ranks", ranks, "MPI ranks of each job; without it, predicted from the mesh")->check(CLI::Range(1, kMaxRanks));
   command.add_option("--memory-gb", memory_gb, "Memory of each job, all ranks together; without it, predicted")->check(make_gb_check(1e-6));
-  command.add_option("--time-limit", time_limit, "Of one attempt: seconds, or 15m, 2h; what is saved by then goes on in the next");
+  command.add_option("--time-limit", time_limit, "Of one attempt: seconds, or 15m, 2h; the next resumes from what is saved by then");
   command.add_option("--on", engine, "Where they run: local (this machine) or slurm")->check(CLI::IsMember({"local", "slurm"}));
 }
 
@@ -60,7 +60,8 @@ bool ResourceOptions::apply(registry::Job& job) const {
   request.resources = job.resources;
   apply(request);
   job.resources = request.resources;
-  if (!engine.empty() && job.slurm_job.empty()) job.engine = engine;  // What Slurm has is Slurm's until it is cancelled.
+  if (!engine.empty() && job.slurm_job.empty())
+    job.engine = store::find_engine(engine).value_or(job.engine);  // What Slurm has is Slurm's until it is cancelled.
   return ranks > 0 || memory_gb > 0 || !time_limit.empty() || !engine.empty();
 }
 

@@ -24,7 +24,7 @@ struct ResourceOptions {
 };
 
 /// Gigabytes of memory, `least` or more. Not-a-number lies outside, which CLI::Range does not see.
-CLI::Validator make_gb_check(double least);
+CLI::Validator make_gb_check(double min);
 
 /// Seconds of "90", "90s", "15m", "2h" or "1d". InputError for anything else.
 double parse_seconds(const std::string& text);

@@ -1,8 +1,6 @@
 #include <fmt/core.h>
-#include <unistd.h>
 
-#include <cerrno>
-#include <cstring>
+#include <string>
 #include <vector>
 
 #include "jobs/cli/shared.hpp"
@@ -18,13 +16,8 @@ constexpr std::size_t kMaxVersionBytes = 4096;
 
 }  // namespace
 
-fs::path find_program(const std::string& name) {
-  if (const auto program = base::find_program(name)) return *program;
-  throw InputError(fmt::format("{} is neither next to carillon nor in PATH; install it, or put its folder in PATH", name));
-}
-
 std::string read_solver_version() {
-  const fs::path program = find_program("carillon-precompute");
+  const fs::path program = base::require_program("carillon-precompute");
   const base::Finished finished = base::run({.words = {program, "--version"}, .output = base::kCapture, .errors = base::kInherit},
                                             {.max_bytes = kMaxVersionBytes, .keeps_tail = true});
   const std::string line = finished.output.substr(0, finished.output.find('\n'));
@@ -33,13 +26,9 @@ std::string read_solver_version() {
   return line;
 }
 
-void become(const fs::path& program, const std::vector<std::string>& arguments) {
-  std::fflush(nullptr);
-  std::vector<char*> words{const_cast<char*>(program.c_str())};
-  for (const std::string& argument : arguments) words.push_back(const_cast<char*>(argument.c_str()));
-  words.push_back(nullptr);
-  ::execv(program.c_str(), words.data());
-  throw SystemError(fmt::format("cannot start {}: {}; check the installation", program.string(), std::strerror(errno)));
+void become(const std::string& program, std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), base::require_program(program).string());
+  base::become(arguments);
 }
 
 }  // namespace carillon::cli

@@ -20,12 +20,36 @@ struct Options {
   bool no_pictures = false;
 };
 
+/// Into options.folder.
 fs::path write(const Options& options, const fs::path& bank, const fs::path& resolved_job, const std::string& title) {
   report::Options wanted;
   wanted.title = title;
   if (options.no_pictures) wanted.drawn_modes = 0;
   report::write_report(bank, resolved_job, options.folder, wanted);
   return options.folder / report::kPageFile;
+}
+
+/// The mesh or surface as the user named it; empty where the folder does not say.
+std::string find_title(const fs::path& folder) {
+  try {
+    const std::optional<store::Request> request = store::read_request(folder);
+    return request ? store::find_input_name(*request) : std::string();
+  } catch (const InputError&) {
+    return "";
+  }
+}
+
+/// Puts a page with pictures of the first modes next to the bank. A page without is still a report: what went wrong is said and no more.
+void draw_in_store(const store::Store& store, const store::Id& id, const std::string& title) {
+  try {
+    const store::Lock lock = store.lock_shared();  // gc waits
+    const store::Temporary temporary = store.make_temporary();
+    const fs::path folder = store.bank_folder(id);
+    report::write_report(folder / store::kBankFile, folder / store::kJobFile, temporary.path(), {.title = title});
+    store.replace_records(id, temporary);
+  } catch (const SystemError& error) {
+    fmt::print(stderr, "carillon: the report has no pictures: {}\n", show_message(error.what()));
+  }
 }
 
 void print(Shared& shared, Json::Value root, const fs::path& page) {
@@ -62,12 +86,15 @@ int report_job(Shared& shared, const Options& options) {
   root["state"] = is_done ? "done" : job ? to_text(job->state) : "new";
   fs::path page;
   std::error_code error;
-  if (is_done && !options.folder.empty()) {
-    const std::optional<store::Request> request = store::read_request(folder);
-    const std::string title = request ? store::find_input_name(*request) : std::string();
-    page = write(options, folder / store::kBankFile, folder / store::kJobFile, title);
-  } else if (is_done && fs::exists(folder / store::kReportFile, error)) {
-    page = folder / store::kReportFile;
+  if (is_done) {
+    const std::string title = find_title(folder);
+    const bool has_pictures = fs::exists(folder / report::kPictureFile, error);
+    if (!options.folder.empty()) {
+      page = write(options, folder / store::kBankFile, folder / store::kJobFile, title);
+    } else {
+      if (!has_pictures && !options.no_pictures && shared.store().may_write()) draw_in_store(shared.store(), id, title);
+      if (fs::exists(folder / store::kReportFile, error)) page = folder / store::kReportFile;
+    }
   }
   print(shared, root, page);
   if (!page.empty()) return 0;
@@ -83,12 +110,12 @@ void add_report(CLI::App& app, Shared& shared, Run& run) {
   auto options = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand("report",
                                          "Prints the path of a bank's report (HTML): mesh, modes and proof, error bars, time and memory, "
-                                         "pictures. With -o, writes it anew: of "
+                                         "pictures, which are drawn when it is asked for first. With -o, writes it again: of "
                                          "a job that is done, or of any bank.\nExit code 1: not there yet.");
   command->add_option("JOB|BANK", options->word, "Job file (what it holds now), an id or its beginning, or, with -o, the file of a bank")
       ->required();
   command->add_option("-o,--output", options->folder, "Write report.html and its pictures into this folder");
-  command->add_flag("--no-pictures", options->no_pictures, "With -o: without pictures of the first modes");
+  command->add_flag("--no-pictures", options->no_pictures, "Draw no pictures of the first modes");
   command->callback([&shared, &run, options] {
     shared.only_reads = true;
     run = [&shared, options] {

@@ -8,6 +8,7 @@
 #include "jobs/cli/options.hpp"
 #include "jobs/cli/shared.hpp"
 #include "jobs/cli/slurm.hpp"
+#include "jobs/queue/local.hpp"
 #include "jobs/queue/settle.hpp"
 #include "jobs/slurm/inside.hpp"
 #include "runtime/base/command.hpp"
@@ -24,19 +25,20 @@ void Shared::settle() {
   registry();
   if (is_disk_full_) return;
   try {
-    queue::settle(store(), registry());
+    queue::settle(queue::LocalEnvironment(store()), registry());
     follow_slurm(*this);
     if (hands_over) hand_over_to_slurm(*this);
   } catch (const SystemError& error) {
-    if (!fall_back(error.what())) throw;
+    if (!fall_back(error)) throw;
   }
 }
 
-int run_until_done(Shared& shared, const std::vector<store::Id>& ids) {
+int run_until_done(Shared& shared, const std::vector<store::Id>& ids, bool has_pictures) {
   queue::RunOptions options;
-  options.program = base::find_self();
+  options.attempt.has_pictures = has_pictures;
+  options.attempt.program = base::find_self();
   options.quiet = shared.json;
-  options.mpirun_options = shared.profile().mpirun_options;
+  options.attempt.mpirun_options = shared.profile().mpirun_options;
   if (const int code = queue::run(shared.store(), options); code != 0) return code;
   std::vector<registry::Job> jobs;
   for (const store::Id& id : ids) {
@@ -52,11 +54,12 @@ void add_run(CLI::App& app, Shared& shared, Run& run) {
                                          "memory allow. Any number may run on one store.\n"
                                          "Ctrl-C saves what runs and puts it back into the queue; once more ends it. Exit code 0: the "
                                          "queue is empty, whatever became of single jobs.");
-  command->add_flag("--keep", options->keep, "Stay and wait for more jobs when the queue is empty");
-  command->add_option("--cores", options->cores, "Use at most so many")->check(CLI::Range(1, 1'000'000));
-  command->add_option("--memory-gb", options->memory_gb, "Use at most so much")->check(make_gb_check(1e-3));
+  command->add_flag("--keep", options->runner.keep, "Stay and wait for more jobs when the queue is empty");
+  command->add_option("--cores", options->runner.cores, "Use at most so many")->check(CLI::Range(1, 1'000'000));
+  command->add_option("--memory-gb", options->runner.memory_gb, "Use at most so much")->check(make_gb_check(1e-3));
   command->add_flag("-q,--quiet", options->quiet, "Print nothing");
-  command->add_flag("!--no-pictures", options->has_pictures, "Make reports of banks without pictures of their first modes");
+  command->add_flag("--pictures", options->attempt.has_pictures,
+                    "Draw the first modes of each bank for its report at once, not when the report is asked for");
   auto engine = std::make_shared<std::string>("local");
   command->add_option("--on", *engine, "local: the queue of this machine; slurm: hand over to Slurm and follow, until all have ended")
       ->check(CLI::IsMember({"local", "slurm"}));
@@ -66,8 +69,8 @@ void add_run(CLI::App& app, Shared& shared, Run& run) {
         run_with_slurm(shared, *options);
         return 0;
       }
-      options->mpirun_options = shared.profile().mpirun_options;
-      options->program = base::find_self();
+      options->attempt.mpirun_options = shared.profile().mpirun_options;
+      options->attempt.program = base::find_self();
       options->json = shared.json;
       return queue::run(shared.store(), *options);
     };
@@ -89,7 +92,7 @@ void add_attempt(CLI::App& app, Run& run) {
   command->add_option("--engine", *engine)->check(CLI::IsMember({"local", "slurm"}));
   command->add_option("--launcher", *launcher)->check(CLI::IsMember({"alone", "mpirun", "srun"}));
   command->add_flag("--predict", options->is_prediction);
-  command->add_flag("!--no-pictures", options->has_pictures);
+  command->add_flag("--pictures", options->has_pictures);
   command->add_option("--grace-s", options->grace_s);
   command->add_option("--hang-s", options->hang_s);
   command->callback([&run, options, launcher, engine] {

@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kLeastPrefix = 4, kMostNamed = 5, kMostOptions = 100;
+constexpr std::size_t kMinPrefix = 4, kMaxNamed = 5, kMaxOptions = 100;
 
 bool is_there(const fs::path& file) {
   struct stat info {};
@@ -38,8 +38,8 @@ Profile read_profile(const std::string& option) {
   if (option.empty() && (profile.file.empty() || !is_there(profile.file))) return {};
   base::Object root = base::read_document(profile.file).root();
   if (root.has("store")) profile.store = root.path("store");
-  profile.engine = root.choice_or("on", {"local", "slurm"}, "local");
-  for (const base::Entry& entry : root.entries("mpirun_options", kMostOptions)) {
+  profile.engine = *store::find_engine(root.choice_or("on", {"local", "slurm"}, "local"));
+  for (const base::Entry& entry : root.entries("mpirun_options", kMaxOptions)) {
     if (entry.object) throw InputError(entry.place + ": \"mpirun_options\" is a list of words for mpirun");
     profile.mpirun_options.push_back(entry.text);
   }
@@ -87,7 +87,7 @@ registry::Registry& Shared::registry() {
     try {
       registry_.emplace(registry::Registry::open(store(), say));
     } catch (const SystemError& error) {
-      if (!fall_back(error.what())) throw;
+      if (!fall_back(error)) throw;
     }
   }
   if (!registry_)
@@ -96,14 +96,15 @@ registry::Registry& Shared::registry() {
   return *registry_;
 }
 
-bool Shared::fall_back(const std::string& error) {
+bool Shared::fall_back(const SystemError& error) {
   if (!only_reads && !works_when_full) return false;
   if (!store::is_disk_full(store().root(), error) && !store::is_disk_full(store().registry_folder())) return false;
   is_disk_full_ = true;
   registry_.reset();
-  if (!is_full_told_)
-    fmt::print(stderr, "carillon: the disk or quota is full ({}); states are as the files of the store tell them\n", show_message(error));
-  is_full_told_ = true;
+  if (!is_full_shown_)
+    fmt::print(stderr, "carillon: the disk or quota is full ({}); states are as the files of the store show them\n",
+               show_message(error.what()));
+  is_full_shown_ = true;
   return true;
 }
 
@@ -116,20 +117,20 @@ void Shared::reopen() {
 
 registry::Job find_job(Shared& shared, const std::string& word) {
   if (word.empty()) throw InputError("an id is empty; carillon status lists them");
-  if (is_hex(word) && word.size() >= kLeastPrefix) {
-    const auto jobs = shared.registry().find_by_prefix(word, kMostNamed);
+  if (is_hex(word) && word.size() >= kMinPrefix) {
+    const auto jobs = shared.registry().find_by_prefix(word, kMaxNamed);
     if (jobs.size() == 1) return jobs.front();
     if (jobs.size() > 1) {
       std::vector<std::string> names;
       for (const registry::Job& job : jobs) names.push_back(job.id.short_text());
       throw InputError(fmt::format("{}: fits several jobs ({}{}); give more digits", word, fmt::join(names, ", "),
-                                   jobs.size() == kMostNamed ? " ..." : ""));
+                                   jobs.size() == kMaxNamed ? " ..." : ""));
     }
   }
   const bool is_file = is_there(word) || word.find('/') != std::string::npos || word.ends_with(".json");
   if (is_file) return find_by_file(shared, word);
   throw InputError(fmt::format("{}: neither the beginning of an id (at least {} digits) nor a job file; carillon status lists the ids",
-                               show(word), kLeastPrefix));
+                               show(word), kMinPrefix));
 }
 
 std::vector<registry::Job> find_jobs(Shared& shared, const std::vector<std::string>& words) {
@@ -143,8 +144,8 @@ std::vector<registry::Job> find_jobs(Shared& shared, const std::vector<std::stri
 }
 
 bool is_submitted_again(const registry::Job& job, bool has_work) {
-  const bool is_lost = job.state == registry::State::failed && (!has_work || job.attempts == 0);  // a retry has nothing to resume
-  return job.state == registry::State::cancelled || is_lost;
+  const bool is_lost = job.state == registry::JobState::failed && (!has_work || job.attempts == 0);  // a retry has nothing to resume
+  return job.state == registry::JobState::cancelled || is_lost;
 }
 
 std::string find_reason(Shared& shared, const registry::Job& job) {
@@ -153,7 +154,7 @@ std::string find_reason(Shared& shared, const registry::Job& job) {
   if (reason.find(inputs) == std::string::npos) return reason;
   try {
     const auto request = store::read_request(shared.store().find_folder(job.id));
-    if (!request || request->input_kind == "shape") return reason;
+    if (!request || request->input_kind == store::InputKind::shape) return reason;
     const std::string copy = shared.store().input_file(store::require_id(request->input_sha256, "request"), request->input_format).string();
     for (std::size_t at = reason.find(copy); at != std::string::npos; at = reason.find(copy, at + request->input_file.size()))
       reason.replace(at, copy.size(), request->input_file);
@@ -163,7 +164,7 @@ std::string find_reason(Shared& shared, const registry::Job& job) {
 }
 
 std::vector<std::string> find_warnings(Shared& shared, const registry::Job& job, const std::string& name) {
-  if (job.state != registry::State::done) return {};
+  if (job.state != registry::JobState::done) return {};
   return store::read_warnings(shared.store(), job.id, name);
 }
 
@@ -178,7 +179,7 @@ Json::Value describe(Shared& shared, const registry::Job& job) {
   root["id"] = job.id.text();
   root["state"] = to_text(job.state);
   root["name"] = to_json(job.name);
-  root["engine"] = job.engine;
+  root["engine"] = to_text(job.engine);
   root["reason"] = to_json(find_reason(shared, job));
   root["attempts"] = job.attempts;
   root["failures"] = job.failures;
@@ -189,13 +190,13 @@ Json::Value describe(Shared& shared, const registry::Job& job) {
   root["submitted"] = to_json_time(job.submitted_unix_s);
   root["started"] = to_json_time(job.started_unix_s);
   root["ended"] = to_json_time(job.ended_unix_s);
-  const bool is_done = job.state == registry::State::done;
+  const bool is_done = job.state == registry::JobState::done;
   const auto progress = is_done ? std::nullopt : store::read_progress(shared.store().work_folder(job.id));
   root["phase"] = is_done ? Json::Value("done") : progress ? to_json(progress->phase) : Json::Value();
   root["percent"] = is_done ? 100.0 : progress ? progress->percent : 0.0;
   root["modes_done"] = progress && progress->modes_done >= 0 ? Json::Value(Json::Int64(progress->modes_done)) : Json::Value();
   root["modes_wanted"] = progress && progress->modes_wanted >= 0 ? Json::Value(Json::Int64(progress->modes_wanted)) : Json::Value();
-  root["seconds_left"] = progress && progress->seconds_left >= 0 && job.state == registry::State::running
+  root["seconds_left"] = progress && progress->seconds_left >= 0 && job.state == registry::JobState::running
                              ? Json::Value(progress->seconds_left)
                              : Json::Value();
   root["bank"] = is_done ? to_json((shared.store().bank_folder(job.id) / store::kBankFile).string()) : Json::Value();

@@ -14,6 +14,7 @@
 #include "jobs/registry/registry.hpp"
 #include "jobs/slurm/settings.hpp"
 #include "jobs/store/store.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::slurm {
 class Engine;
@@ -24,13 +25,13 @@ namespace carillon::cli {
 /// Not an error and not done: the job is not there yet.
 inline constexpr int kExitNotYet = 1;
 
-/// profile.json: what somebody always wants. Every key may be left out.
+/// profile.json: the user's defaults. Every key may be left out.
 struct Profile {
-  std::filesystem::path file;               // empty: there is none
-  std::filesystem::path store;              // "store"
-  std::string engine = "local";             // "on"
-  slurm::Settings slurm;                    // "slurm"
-  std::vector<std::string> mpirun_options;  // words for mpirun, here and in Slurm: where the ranks run
+  std::filesystem::path file;                         // empty: there is none
+  std::filesystem::path store;                        // "store"
+  store::JobEngine engine = store::JobEngine::local;  // "on"
+  slurm::Settings slurm;                              // "slurm"
+  std::vector<std::string> mpirun_options;            // words for mpirun, here and in Slurm: where the ranks run
 };
 
 /// The store and its registry, opened when first asked for.
@@ -45,15 +46,15 @@ class Shared {
   const Profile& profile();
   const store::Store& store();
   registry::Registry& registry();
-  /// Rows whose process is gone are settled: what every command does that looks at states. A store that may only be read is looked at anew.
+  /// Rows whose process is gone are settled: what every command does that looks at states. A store that may only be read is read again.
   void settle();
-  /// The registry is one in memory because the disk is full: states are as the store's files tell them.
+  /// The registry is one in memory because the disk is full: states are as the store's files show them.
   bool is_disk_full() const { return is_disk_full_; }
-  /// Opens the registry anew when it is next asked for, with room or without.
+  /// Opens the registry again when it is next asked for, with room or without.
   void reopen();
 
   bool hands_over = false;                      // settle() hands over to Slurm too: for a command that waits for its jobs
-  bool has_pictures = true;                     // in the reports of what is handed over to Slurm, where the profile does not say no
+  bool has_pictures = false;                    // draw them for what is handed over to Slurm, as where the profile says so
   std::shared_ptr<slurm::Engine> slurm_engine;  // made when first needed
   double slurm_asked_s = 0.0;                   // boot time
 
@@ -61,8 +62,8 @@ class Shared {
   std::optional<Profile> profile_;
   std::optional<store::Store> store_;
   std::optional<registry::Registry> registry_;
-  bool is_disk_full_ = false, is_full_told_ = false;
-  bool fall_back(const std::string& error);
+  bool is_disk_full_ = false, is_full_shown_ = false;
+  bool fall_back(const SystemError& error);
 };
 
 /// Each adds its command to `app` and sets `run` when it is called; `run` gives the exit code.
@@ -82,7 +83,7 @@ void add_validate(CLI::App& app, Shared& shared, Run& run);
 void add_study(CLI::App& app, Shared& shared, Run& run);
 
 /// A text of strangers for a terminal: no control characters, valid UTF-8, at most `most` bytes or so.
-std::string show(const std::string& text, std::size_t most = 200);
+std::string show(const std::string& text, std::size_t max = 200);
 /// A message of an error: as show(), and long ones whole.
 std::string show_message(const std::string& text);
 /// For JSON: valid UTF-8.
@@ -96,12 +97,10 @@ std::string format_seconds(double seconds);
 /// "1.2 GB"
 std::string format_bytes(double bytes);
 
-/// The file of a program of ours: beside this one, else in PATH; InputError when there is none.
-std::filesystem::path find_program(const std::string& name);
 /// The line that carillon-precompute --version prints. SystemError when it cannot be started.
 std::string read_solver_version();
-/// Starts a program in place of this one. Returns only by SystemError.
-[[noreturn]] void become(const std::filesystem::path& program, const std::vector<std::string>& arguments);
+/// Replaces this process by a program of this installation. Returns only by SystemError.
+[[noreturn]] void become(const std::string& program, std::vector<std::string> arguments);
 
 /// The rows that `words` name: ids, prefixes of ids that fit one job, or job files (their last submission). InputError for what is none.
 std::vector<registry::Job> find_jobs(Shared& shared, const std::vector<std::string>& words);

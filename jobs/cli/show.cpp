@@ -15,28 +15,28 @@
 namespace carillon::cli {
 namespace {
 
-std::string escape(const std::string& raw, std::size_t most) {
+std::string escape(const std::string& raw, std::size_t max) {
   const std::string text = base::printable(store::to_text(raw));
-  std::size_t end = std::min(most, text.size());
+  std::size_t end = std::min(max, text.size());
   while (end < text.size() && (static_cast<unsigned char>(text[end]) & 0xC0U) == 0x80U) ++end;  // cut only where a character begins
   return end < text.size() ? text.substr(0, end) + "..." : text;
 }
 
 }  // namespace
 
-std::string show(const std::string& text, std::size_t most) { return escape(text, most); }
+std::string show(const std::string& text, std::size_t max) { return escape(text, max); }
 
 std::string show_message(const std::string& text) {
-  constexpr std::size_t kMostMessage = 4000, kMostWord = 600;
+  constexpr std::size_t kMaxMessage = 4000, kMaxWord = 600;
   std::string shorter;
   for (std::size_t at = 0; at < text.size();) {
     const std::size_t end = std::min(text.find_first_of(" \n", at), text.size());
-    shorter += end - at > kMostWord ? text.substr(at, kMostWord / 2) + "..." + text.substr(end - kMostWord / 4, kMostWord / 4)
-                                    : text.substr(at, end - at);
+    shorter += end - at > kMaxWord ? text.substr(at, kMaxWord / 2) + "..." + text.substr(end - kMaxWord / 4, kMaxWord / 4)
+                                   : text.substr(at, end - at);
     if (end < text.size()) shorter += text[end];
     at = end + 1;
   }
-  return escape(shorter, kMostMessage);
+  return escape(shorter, kMaxMessage);
 }
 
 Json::Value to_json(const std::string& text) { return Json::Value(store::to_text(text)); }

@@ -9,51 +9,56 @@
 #include "jobs/queue/display.hpp"
 #include "jobs/slurm/engine.hpp"
 #include "jobs/slurm/needs.hpp"
+#include "runtime/base/clock.hpp"
 #include "runtime/base/command.hpp"
 
 namespace carillon::cli {
 namespace {
 
 using registry::Job;
-using registry::State;
+using registry::JobState;
 
 constexpr long kStepNs = 200'000'000;
 
+slurm::Settings find_settings(Shared& shared) {
+  slurm::Settings settings = shared.profile().slurm;
+  settings.has_pictures = settings.has_pictures || shared.has_pictures;
+  return settings;
+}
+
 slurm::Engine& find_engine(Shared& shared) {
   if (!shared.slurm_engine) {
-    slurm::Settings settings = shared.profile().slurm;
-    settings.has_pictures = settings.has_pictures && shared.has_pictures;
-    shared.slurm_engine = std::make_shared<slurm::Engine>(shared.store(), settings, base::find_self(), [](const std::string& line) {
-      fmt::print(stderr, "carillon: {}\n", show_message(line));
-    });
+    shared.slurm_engine =
+        std::make_shared<slurm::Engine>(shared.store(), find_settings(shared), base::find_self(),
+                                        [](const std::string& line) { fmt::print(stderr, "carillon: {}\n", show_message(line)); });
   }
   return *shared.slurm_engine;
 }
 
-bool is_of_slurm(const Job& job) { return job.engine == "slurm"; }
+bool is_of_slurm(const Job& job) { return job.engine == store::JobEngine::slurm; }
 
 std::vector<Job> list_open(Shared& shared) {
-  std::vector<Job> jobs = shared.registry().list({State::queued, State::running, State::waiting});
+  std::vector<Job> jobs = shared.registry().list({JobState::queued, JobState::running, JobState::waiting});
   std::erase_if(jobs, [](const Job& job) { return !is_of_slurm(job); });
   return jobs;
 }
 
 std::vector<Job> hand_over(Shared& shared) {
   return find_engine(shared).hand_over(shared.registry(), [&](const Job& job) {
-    return slurm::find_resources(shared.store(), job, shared.profile().slurm, base::find_self());
+    return slurm::find_resources(shared.store(), job, find_settings(shared), base::find_self());
   });
 }
 
 }  // namespace
 
 void follow_slurm(Shared& shared) {
-  const double now_s = process::find_boot_seconds();
+  const double now_s = base::get_boot_s();
   if (shared.slurm_asked_s > 0.0 && now_s - shared.slurm_asked_s < shared.profile().slurm.poll_s) return;
-  const std::vector<Job> cancelled = shared.registry().list({State::cancelled});
+  const std::vector<Job> cancelled = shared.registry().list({JobState::cancelled});
   const bool is_left = std::any_of(cancelled.begin(), cancelled.end(), [](const Job& job) { return !job.slurm_job.empty(); });
   if (!is_left && list_open(shared).empty()) return;
   find_engine(shared).follow(shared.registry());
-  shared.slurm_asked_s = process::find_boot_seconds();
+  shared.slurm_asked_s = base::get_boot_s();
 }
 
 std::size_t hand_over_to_slurm(Shared& shared) {
@@ -61,29 +66,31 @@ std::size_t hand_over_to_slurm(Shared& shared) {
   return static_cast<std::size_t>(std::count_if(jobs.begin(), jobs.end(), [](const Job& job) { return !job.slurm_job.empty(); }));
 }
 
-queue::Said cancel_in_slurm(Shared& shared, const store::Id& id) {
+queue::CommandResult cancel_in_slurm(Shared& shared, const store::Id& id) {
   const auto row = shared.registry().find(id);
   if (!row) return {false, "there is no such job"};
-  if (row->state == State::done) return {false, "it is done already; its bank stays"};
-  if (row->state == State::cancelled) return {true, "it is cancelled already"};
-  if (row->state == State::failed) return queue::cancel(shared.store(), shared.registry(), id);
-  if (!find_engine(shared).cancel(shared.registry(), id)) return {true, "Slurm is asked to end it; carillon status tells when it has"};
+  if (row->state == JobState::done) return {false, "it is done already; its bank stays"};
+  if (row->state == JobState::cancelled) return {true, "it is cancelled already"};
+  if (row->state == JobState::failed) return queue::request_cancel(shared.registry(), id);
+  if (!find_engine(shared).cancel(shared.registry(), id))
+    return {true, "Slurm is asked to end it; carillon status shows when it has ended"};
   const auto now = shared.registry().find(id);
-  if (now && now->state == State::done) return {false, "it was done before it could be stopped; its bank stays"};
+  if (now && now->state == JobState::done) return {false, "it was done before it could be stopped; its bank stays"};
   return {true, "cancelled"};
 }
 
 void run_with_slurm(Shared& shared, const queue::RunOptions& options) {
-  shared.has_pictures = options.has_pictures;
-  queue::Display display(shared.json, options.quiet);
+  shared.has_pictures = options.attempt.has_pictures;
+  queue::Display display(shared.json, options.quiet,
+                         [&](const store::Id& id) { return store::read_progress(shared.store().work_folder(id)); });
   for (;;) {
-    for (const Job& job : find_engine(shared).follow(shared.registry())) display.tell(to_text(job.state), job);
-    for (const Job& job : hand_over(shared)) display.tell(job.state == State::failed ? "failed" : "queued", job);
+    for (const Job& job : find_engine(shared).follow(shared.registry())) display.print_event(to_text(job.state), job);
+    for (const Job& job : hand_over(shared)) display.print_event(job.state == JobState::failed ? "failed" : "queued", job);
     const std::vector<Job> open = list_open(shared);
-    display.show(shared.store(), open);
-    if (open.empty() && !options.keep) return;
-    const double until_s = process::find_boot_seconds() + shared.profile().slurm.poll_s;
-    while (process::find_boot_seconds() < until_s) {
+    display.show(open);
+    if (open.empty() && !options.runner.keep) return;
+    const double until_s = base::get_boot_s() + shared.profile().slurm.poll_s;
+    while (base::get_boot_s() < until_s) {
       const timespec time{0, kStepNs};
       ::nanosleep(&time, nullptr);
     }

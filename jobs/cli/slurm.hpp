@@ -16,7 +16,7 @@ void follow_slurm(Shared& shared);
 std::size_t hand_over_to_slurm(Shared& shared);
 
 /// As queue::cancel, for a job of the engine "slurm".
-queue::Said cancel_in_slurm(Shared& shared, const store::Id& id);
+queue::CommandResult cancel_in_slurm(Shared& shared, const store::Id& id);
 
 /// carillon run --on slurm: hands over, follows, and hands over again what can be tried again, until no job of Slurm's is open (`keep`: for
 /// ever). Of the options those count that are no matter of this machine: keep, quiet, has_pictures.

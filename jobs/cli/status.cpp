@@ -9,12 +9,13 @@
 
 #include "jobs/cli/follow.hpp"
 #include "jobs/process/process.hpp"
+#include "runtime/base/clock.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::cli {
 namespace {
 
-constexpr std::size_t kMostRows = 50, kWideColumns = 1000, kBarWidth = 20;
+constexpr std::size_t kMaxRows = 50, kWideColumns = 1000, kBarWidth = 20;
 
 struct Options {
   std::vector<std::string> words;
@@ -23,9 +24,10 @@ struct Options {
 
 /// Running first, then what waits, what failed, what is done; the newest first among those that have ended.
 void sort_for_people(std::vector<registry::Job>& jobs) {
-  const auto rank = [](registry::State state) {
-    const std::map<registry::State, int> order{{registry::State::running, 0}, {registry::State::waiting, 1},   {registry::State::queued, 2},
-                                               {registry::State::failed, 3},  {registry::State::cancelled, 4}, {registry::State::done, 5}};
+  const auto rank = [](registry::JobState state) {
+    const std::map<registry::JobState, int> order{{registry::JobState::running, 0},   {registry::JobState::waiting, 1},
+                                                  {registry::JobState::queued, 2},    {registry::JobState::failed, 3},
+                                                  {registry::JobState::cancelled, 4}, {registry::JobState::done, 5}};
     return order.at(state);
   };
   std::stable_sort(jobs.begin(), jobs.end(), [&](const registry::Job& a, const registry::Job& b) {
@@ -35,7 +37,7 @@ void sort_for_people(std::vector<registry::Job>& jobs) {
 }
 
 std::string format_counts(const std::vector<registry::Job>& jobs) {
-  std::map<registry::State, std::size_t> counts;
+  std::map<registry::JobState, std::size_t> counts;
   for (const registry::Job& job : jobs) ++counts[job.state];
   std::string text = fmt::format("{} job{}", jobs.size(), jobs.size() == 1 ? "" : "s");
   for (const auto& [state, count] : counts)
@@ -50,21 +52,21 @@ std::string format_bar(double percent) {
 
 std::string format_progress(Shared& shared, const registry::Job& job) {
   const auto progress = store::read_progress(shared.store().work_folder(job.id));
-  if (!progress) return job.state == registry::State::running ? "starts" : "";
+  if (!progress) return job.state == registry::JobState::running ? "starts" : "";
   std::string text = fmt::format("{} {:3.0f} %  {}", format_bar(progress->percent), progress->percent, show(progress->phase, 30));
   if (progress->modes_done >= 0)
     text +=
         fmt::format("  {}{} modes", progress->modes_done, progress->modes_wanted >= 0 ? fmt::format("/{}", progress->modes_wanted) : "");
-  if (progress->seconds_left >= 0 && job.state == registry::State::running)
+  if (progress->seconds_left >= 0 && job.state == registry::JobState::running)
     text += fmt::format("  {} left", format_seconds(progress->seconds_left));
   return text;
 }
 
-/// The sentence beside a state: why it failed or waits, and until when.
+/// The sentence next to a state: why it failed or waits, and until when.
 std::string format_reason(Shared& shared, const registry::Job& job) {
   std::string reason = show_message(find_reason(shared, job));
-  if (job.state == registry::State::waiting) {
-    const double left_s = job.ready_boot_id == process::find_boot() ? job.ready_boot_s - process::find_boot_seconds() : 0.0;
+  if (job.state == registry::JobState::waiting) {
+    const double left_s = job.ready_boot_id == process::find_boot() ? job.ready_boot_s - base::get_boot_s() : 0.0;
     if (left_s > 0) reason += fmt::format("{}again in {}", reason.empty() ? "" : "; ", format_seconds(left_s));
   }
   return reason;
@@ -87,13 +89,13 @@ int run_status(Shared& shared, const Options& options) {
     std::vector<store::Id> ids;
     for (const registry::Job& job : jobs) {
       const bool is_open =
-          job.state == registry::State::queued || job.state == registry::State::running || job.state == registry::State::waiting;
+          job.state == registry::JobState::queued || job.state == registry::JobState::running || job.state == registry::JobState::waiting;
       if (is_open || !options.words.empty()) ids.push_back(job.id);
     }
     const int code = ids.empty() ? 0 : follow(shared, ids, true);
     if (!options.words.empty()) return code;
     // All jobs were asked for: those too that had ended before.
-    return std::max(code, find_exit_code(shared.registry().list({registry::State::failed, registry::State::cancelled})));
+    return std::max(code, find_exit_code(shared.registry().list({registry::JobState::failed, registry::JobState::cancelled})));
   }
   if (shared.json) {
     Json::Value root;
@@ -113,11 +115,11 @@ int run_status(Shared& shared, const Options& options) {
     fmt::print("no jobs in {}; carillon submit JOB.json asks for a bank\n", show(shared.store().root().string()));
     return 0;
   }
-  const std::size_t rows = options.all || !options.words.empty() ? jobs.size() * 60 + 1 : kMostRows;
+  const std::size_t rows = options.all || !options.words.empty() ? jobs.size() * 60 + 1 : kMaxRows;
   for (const std::string& line : format_bars(shared, jobs, rows, kWideColumns)) fmt::print("{}\n", line);
   if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
   if (shared.is_disk_full()) return 0;
-  if (!shared.store().may_write()) fmt::print(stderr, "carillon: this store may only be read; states are as its files tell them\n");
+  if (!shared.store().may_write()) fmt::print(stderr, "carillon: this store may only be read; states are as its files show them\n");
   return 0;
 }
 
@@ -133,7 +135,7 @@ std::vector<std::string> format_bars(Shared& shared, const std::vector<registry:
     if (lines.size() + (reason.empty() ? 1 : 2) + 2 > rows && jobs.size() > 1 && shown + 1 < jobs.size()) break;
     ++shown;
     const std::vector<std::string> warnings = find_warnings(shared, job);
-    const bool is_open = job.state == registry::State::running || job.state == registry::State::waiting;
+    const bool is_open = job.state == registry::JobState::running || job.state == registry::JobState::waiting;
     const std::string progress = is_open ? format_progress(shared, job) : "";
     lines.push_back(cut(fmt::format("{}  {:<9}  {}{}{}", job.id.short_text(), to_text(job.state), show(job.name, 40),
                                     progress.empty() ? "" : "  ", progress),

@@ -16,16 +16,17 @@
 namespace carillon::cli {
 namespace {
 
-constexpr std::size_t kMostShown = 20;
+constexpr std::size_t kMaxShown = 20;
 
 struct Options {
   std::vector<std::string> words;
   ResourceOptions resources;
+  bool has_pictures = false;
   bool wait = false, run = false, keep_going = false;
 };
 
-/// One line of the answer.
-struct Answer {
+/// One line of the result.
+struct SubmitResult {
   const Source* source = nullptr;
   std::optional<registry::Job> job;  // none: its source has an error
   bool is_new = false;               // this call made it
@@ -34,10 +35,10 @@ struct Answer {
 /// A row that was there: cancelled and lost ones are wanted again, and what was asked for explicitly counts from now on.
 void renew(Shared& shared, const Options& options, const Source& source, bool was_made) {
   shared.registry().update(store::require_id(source.request.id, "request"), [&](registry::Job& job) {
-    if (job.state == registry::State::running || (job.state == registry::State::done && !was_made)) return false;
-    const bool is_wanted = job.state == registry::State::done || is_submitted_again(job, !was_made);
+    if (job.state == registry::JobState::running || (job.state == registry::JobState::done && !was_made)) return false;
+    const bool is_wanted = job.state == registry::JobState::done || is_submitted_again(job, !was_made);
     if (is_wanted) {
-      job.state = registry::State::queued;
+      job.state = registry::JobState::queued;
       job.reason.clear();
       job.cancel_wanted = false;
       job.failures = 0;
@@ -46,7 +47,7 @@ void renew(Shared& shared, const Options& options, const Source& source, bool wa
   });
 }
 
-std::vector<Answer> enter(Shared& shared, const Options& options, const std::vector<Source>& sources) {
+std::vector<SubmitResult> enter(Shared& shared, const Options& options, const std::vector<Source>& sources) {
   shared.registry();  // brought up to date before there are new folders
   const store::Lock lock = shared.store().lock_shared();
   std::vector<registry::Submission> submissions;
@@ -58,35 +59,35 @@ std::vector<Answer> enter(Shared& shared, const Options& options, const std::vec
   }
   const std::vector<bool> was_made = store::prepare_work(shared.store(), asked);
   const std::vector<bool> was_inserted = shared.registry().submit(submissions);
-  std::vector<Answer> answers;
+  std::vector<SubmitResult> results;
   std::size_t at = 0;
   for (const Source& source : sources) {
-    Answer& answer = answers.emplace_back();
-    answer.source = &source;
+    SubmitResult& result = results.emplace_back();
+    result.source = &source;
     if (!source.error.empty()) continue;
     const std::size_t index = at++;
     if (!was_inserted[index]) renew(shared, options, source, was_made[index]);
-    answer.is_new = was_made[index];
-    answer.job = shared.registry().find(store::require_id(source.request.id, "request"));
+    result.is_new = was_made[index];
+    result.job = shared.registry().find(store::require_id(source.request.id, "request"));
   }
-  return answers;
+  return results;
 }
 
 void print_errors(const std::vector<Source>& sources) {
   std::size_t count = 0;
   for (const Source& source : sources) {
-    if (!source.error.empty() && ++count <= kMostShown) fmt::print(stderr, "carillon: {}\n", show_message(source.error));
+    if (!source.error.empty() && ++count <= kMaxShown) fmt::print(stderr, "carillon: {}\n", show_message(source.error));
   }
-  if (count > kMostShown) fmt::print(stderr, "carillon: ... and {} more\n", count - kMostShown);
+  if (count > kMaxShown) fmt::print(stderr, "carillon: ... and {} more\n", count - kMaxShown);
 }
 
 /// What the solver warned of: with the lines of the job file that was submitted, where its numbers are meant.
-std::vector<std::string> find_own_warnings(Shared& shared, const Answer& answer) {
-  std::vector<std::string> warnings = find_warnings(shared, *answer.job, answer.source->job_file);
-  std::vector<std::string> own = answer.source->job.warnings;
+std::vector<std::string> find_own_warnings(Shared& shared, const SubmitResult& result) {
+  std::vector<std::string> warnings = find_warnings(shared, *result.job, result.source->job_file);
+  std::vector<std::string> own = result.source->job.warnings;
   for (std::string& warning : warnings) {
-    if (!warning.starts_with(answer.source->job_file + ": ")) continue;
-    const std::string text = warning.substr(answer.source->job_file.size());
+    if (!warning.starts_with(result.source->job_file + ": ")) continue;
+    const std::string text = warning.substr(result.source->job_file.size());
     const auto fits = std::find_if(own.begin(), own.end(), [&](const std::string& line) { return line.ends_with(text); });
     if (fits == own.end()) continue;
     warning = store::to_text(*fits);
@@ -95,54 +96,54 @@ std::vector<std::string> find_own_warnings(Shared& shared, const Answer& answer)
   return warnings;
 }
 
-Json::Value describe_answers(Shared& shared, const std::vector<Answer>& answers) {
+Json::Value describe_results(Shared& shared, const std::vector<SubmitResult>& results) {
   Json::Value root;
   root["store"] = to_json(shared.store().root().string());
   root["jobs"] = Json::arrayValue;
   root["errors"] = Json::arrayValue;
-  for (const Answer& answer : answers) {
+  for (const SubmitResult& result : results) {
     Json::Value entry;
-    if (answer.job) {
-      entry = describe(shared, *answer.job);
-      entry["warnings"] = to_json(find_own_warnings(shared, answer));
+    if (result.job) {
+      entry = describe(shared, *result.job);
+      entry["warnings"] = to_json(find_own_warnings(shared, result));
     }
-    entry["job_file"] = to_json(answer.source->job_file);
-    if (answer.job) {
-      entry["new"] = answer.is_new;
+    entry["job_file"] = to_json(result.source->job_file);
+    if (result.job) {
+      entry["new"] = result.is_new;
       root["jobs"].append(entry);
     } else {
-      entry["error"] = to_json(answer.source->error);
+      entry["error"] = to_json(result.source->error);
       root["errors"].append(entry);
     }
   }
   return root;
 }
 
-void print_warnings(Shared& shared, const std::vector<Answer>& answers) {
+void print_warnings(Shared& shared, const std::vector<SubmitResult>& results) {
   std::size_t shown = 0;
-  for (const Answer& answer : answers) {
-    if (!answer.job) continue;
-    for (const std::string& warning : find_own_warnings(shared, answer)) {
-      if (++shown > kMostShown) return;
-      fmt::print(stderr, "carillon: {}: warning: {}\n", show(answer.job->name), show_message(warning));
+  for (const SubmitResult& result : results) {
+    if (!result.job) continue;
+    for (const std::string& warning : find_own_warnings(shared, result)) {
+      if (++shown > kMaxShown) return;
+      fmt::print(stderr, "carillon: {}: warning: {}\n", show(result.job->name), show_message(warning));
     }
   }
 }
 
-void print_lines(Shared& shared, const std::vector<Answer>& answers) {
+void print_lines(Shared& shared, const std::vector<SubmitResult>& results) {
   std::map<std::string, std::size_t> counts;
   std::size_t shown = 0, total = 0;
-  for (const Answer& answer : answers) {
-    if (!answer.job) continue;
-    const registry::Job& job = *answer.job;
-    const std::string state = to_text(job.state) + (answer.is_new                        ? ""
-                                                    : job.state == registry::State::done ? ", nothing to do"
-                                                                                         : ", known");
+  for (const SubmitResult& result : results) {
+    if (!result.job) continue;
+    const registry::Job& job = *result.job;
+    const std::string state = to_text(job.state) + (result.is_new                           ? ""
+                                                    : job.state == registry::JobState::done ? ", nothing to do"
+                                                                                            : ", known");
     ++counts[state];
-    if (++total <= kMostShown || job.state == registry::State::failed) {
+    if (++total <= kMaxShown || job.state == registry::JobState::failed) {
       ++shown;
-      fmt::print("{}  {:<22} {}\n", job.id.short_text(), state, show(answer.source->job_file));
-      if (job.state == registry::State::failed)
+      fmt::print("{}  {:<22} {}\n", job.id.short_text(), state, show(result.source->job_file));
+      if (job.state == registry::JobState::failed)
         fmt::print("              it failed before: {}; carillon retry {} tries again\n", show_message(find_reason(shared, job)),
                    job.id.short_text());
     }
@@ -156,20 +157,20 @@ void print_lines(Shared& shared, const std::vector<Answer>& answers) {
 }
 
 bool is_open(const registry::Job& job) {
-  return job.state == registry::State::queued || job.state == registry::State::waiting || job.state == registry::State::running;
+  return job.state == registry::JobState::queued || job.state == registry::JobState::waiting || job.state == registry::JobState::running;
 }
 
-/// To Slurm, and what became of it into the answers.
-void hand_over(Shared& shared, std::vector<Answer>& answers) {
+/// To Slurm, and what became of it into the results.
+void hand_over(Shared& shared, std::vector<SubmitResult>& results) {
   follow_slurm(shared);
   hand_over_to_slurm(shared);
-  for (Answer& answer : answers) {
-    if (answer.job) answer.job = shared.registry().find(answer.job->id);
+  for (SubmitResult& result : results) {
+    if (result.job) result.job = shared.registry().find(result.job->id);
   }
 }
 
 int run_submit(Shared& shared, const Options& options) {
-  const std::string engine = options.resources.engine.empty() ? shared.profile().engine : options.resources.engine;
+  const store::JobEngine engine = store::find_engine(options.resources.engine).value_or(shared.profile().engine);
   std::vector<Source> sources = gather(options.words, read_solver_version());
   bool is_bad = false, is_good = false;
   for (Source& source : sources) {
@@ -178,44 +179,45 @@ int run_submit(Shared& shared, const Options& options) {
     (source.error.empty() ? is_good : is_bad) = true;
   }
   if (is_bad && !shared.json) print_errors(sources);
-  std::vector<Answer> answers;
+  std::vector<SubmitResult> results;
   if (!is_bad || (options.keep_going && is_good))
-    answers = enter(shared, options, sources);
+    results = enter(shared, options, sources);
   else
     for (const Source& source : sources) {
-      if (!source.error.empty()) answers.push_back({&source, {}, false});
+      if (!source.error.empty()) results.push_back({&source, {}, false});
     }
   if (is_bad && !(options.keep_going && is_good) && !shared.json) {
     if (sources.size() > 1) fmt::print(stderr, "carillon: nothing was submitted; --keep-going submits the others\n");
     return kExitInput;
   }
   std::vector<store::Id> ids;
-  for (const Answer& answer : answers) {
-    if (answer.job) ids.push_back(answer.job->id);
+  for (const SubmitResult& result : results) {
+    if (result.job) ids.push_back(result.job->id);
   }
   const bool follows = options.wait || options.run;
-  const bool is_for_slurm =
-      std::any_of(answers.begin(), answers.end(), [](const Answer& answer) { return answer.job && answer.job->engine == "slurm"; });
-  if (is_for_slurm) hand_over(shared, answers);
+  const bool is_for_slurm = std::any_of(results.begin(), results.end(), [](const SubmitResult& result) {
+    return result.job && result.job->engine == store::JobEngine::slurm;
+  });
+  if (is_for_slurm) hand_over(shared, results);
   shared.hands_over = is_for_slurm && follows;
-  if (!shared.json) print_lines(shared, answers);
-  if (!follows && shared.json) print_json(describe_answers(shared, answers));
+  if (!shared.json) print_lines(shared, results);
+  if (!follows && shared.json) print_json(describe_results(shared, results));
   if (is_bad) std::fflush(stdout);
   int code = is_bad ? kExitInput : 0;
   if (follows && !ids.empty()) {
-    const int end = options.run && !is_for_slurm ? run_until_done(shared, ids) : follow(shared, ids, false);
+    const int end = options.run && !is_for_slurm ? run_until_done(shared, ids, options.has_pictures) : follow(shared, ids, false);
     if (code == 0) code = end;
-    for (Answer& answer : answers) {
-      if (answer.job) answer.job = shared.registry().find(answer.job->id);
+    for (SubmitResult& result : results) {
+      if (result.job) result.job = shared.registry().find(result.job->id);
     }
     if (shared.json)
-      print_json(describe_answers(shared, answers));
-    else if (!options.run || is_for_slurm)  // the queue has told them
-      print_warnings(shared, answers);
+      print_json(describe_results(shared, results));
+    else if (!options.run || is_for_slurm)  // the queue has printed them
+      print_warnings(shared, results);
   } else {
-    if (!shared.json) print_warnings(shared, answers);
-    for (const Answer& answer : answers) {
-      if (code == 0 && answer.job && !is_open(*answer.job) && answer.job->state != registry::State::done) code = kExitSolve;
+    if (!shared.json) print_warnings(shared, results);
+    for (const SubmitResult& result : results) {
+      if (code == 0 && result.job && !is_open(*result.job) && result.job->state != registry::JobState::done) code = kExitSolve;
     }
   }
   return code;
@@ -232,9 +234,10 @@ void add_submit(CLI::App& app, Shared& shared, Run& run) {
                                          "again. All jobs are read before any is submitted.");
   command->add_option("JOB", options->words, "Job files, folders, manifests")->required();
   options->resources.add(*command);
-  command->add_flag("--keep-going", options->keep_going, "Submit the others when some jobs cannot be used (exit code 2 all the same)");
-  command->add_flag("--wait", options->wait, "Wait until they have ended; somebody has to run the queue (carillon run, or Slurm)");
-  command->add_flag("--run", options->run, "Work through the queue here until they have ended");
+  command->add_flag("--keep-going", options->keep_going, "Submit the others when some jobs cannot be used (the exit code is still 2)");
+  command->add_flag("--wait", options->wait, "Wait until they have ended; carillon run or Slurm has to work through the queue");
+  CLI::Option* runs = command->add_flag("--run", options->run, "Work through the queue here until they have ended");
+  command->add_flag("--pictures", options->has_pictures, "With --run: as carillon run --pictures")->needs(runs);
   command->callback([&shared, &run, options] { run = [&shared, options] { return run_submit(shared, *options); }; });
 }
 

@@ -13,9 +13,9 @@ void add_validate(CLI::App& app, Shared& shared, Run& run) {
     run = [&shared, word]() -> int {
       std::vector<std::string> arguments{"--validate"};
       if (shared.json) arguments.emplace_back("--json");
-      // A name that begins with a dash is a file all the same.
+      // A name that begins with a dash is also a file.
       arguments.push_back(word->starts_with('-') ? "./" + *word : *word);
-      become(find_program("carillon-precompute"), arguments);
+      become("carillon-precompute", arguments);
     };
   });
 }
@@ -29,7 +29,7 @@ void add_study(CLI::App& app, Shared& shared, Run& run) {
     run = [&shared, command]() -> int {
       std::vector<std::string> arguments = command->remaining();
       if (shared.json) arguments.emplace_back("--json");
-      become(find_program("carillon-study"), arguments);
+      become("carillon-study", arguments);
     };
   });
 }

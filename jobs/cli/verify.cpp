@@ -66,7 +66,7 @@ void check_job(Shared& shared, const store::Id& id, std::map<std::string, std::o
     if (const auto fault = store::find_job_fault(store, id, store.work_folder(id))) findings.push_back({"work", id, *fault, "", false});
   }
   const auto request = queue::find_request(store, shared.registry(), id);
-  if (!request || request->input_kind == "shape") return;
+  if (!request || request->input_kind == store::InputKind::shape) return;
   const auto [entry, is_new] = inputs.try_emplace(request->input_sha256 + "." + request->input_format);
   if (is_new) entry->second = store::find_input_fault(store, *request);
   // Of a bank that is whole the input is not needed; one that gc took away is no damage.
@@ -78,8 +78,8 @@ void check_job(Shared& shared, const store::Id& id, std::map<std::string, std::o
 void repair(Shared& shared, Finding& finding) {
   const auto refusal = queue::restore(shared.store(), shared.registry(), finding.id);
   shared.registry().update(finding.id, [&](registry::Job& row) {
-    if (row.state == registry::State::running || row.state == registry::State::cancelled) return false;
-    row.state = refusal ? registry::State::failed : registry::State::queued;
+    if (row.state == registry::JobState::running || row.state == registry::JobState::cancelled) return false;
+    row.state = refusal ? registry::JobState::failed : registry::JobState::queued;
     row.reason = refusal ? finding.fault + "; " + *refusal : "";
     row.failures = 0;
     return true;
@@ -88,7 +88,7 @@ void repair(Shared& shared, Finding& finding) {
   finding.repair = refusal ? *refusal : "queued again; carillon run computes it";
 }
 
-/// What lies beside a bank that is whole: written again where the bank tells it, else the bank is computed again.
+/// What lies next to a bank that is whole: rebuilt from the bank if possible, else the bank is computed again.
 void repair_record(Shared& shared, Finding& finding) {
   const auto request = queue::find_request(shared.store(), shared.registry(), finding.id);
   if (!request || !attempt::repair_records(shared.store(), *request)) return repair(shared, finding);
@@ -112,9 +112,9 @@ int run_verify(Shared& shared, const Options& options) {
   if (options.words.empty()) {
     for (const store::Id& id : store.list_banks()) ids.insert(id);
     for (const store::Id& id : store.list_work()) ids.insert(id);
-    for (const registry::Job& job : shared.registry().list({registry::State::done})) ids.insert(job.id);
+    for (const registry::Job& job : shared.registry().list({registry::JobState::done})) ids.insert(job.id);
     // A job that was done and whose folder is gone.
-    for (const registry::Job& job : shared.registry().list({registry::State::failed})) {
+    for (const registry::Job& job : shared.registry().list({registry::JobState::failed})) {
       if (!store.has_work(job.id)) ids.insert(job.id);
     }
   }

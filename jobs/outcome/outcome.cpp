@@ -10,6 +10,7 @@
 
 #include "runtime/base/document.hpp"
 #include "runtime/base/file.hpp"
+#include "runtime/base/json.hpp"
 
 namespace carillon::outcome {
 namespace {
@@ -50,18 +51,19 @@ std::optional<Cause> find_cause(std::string_view word) {
 }
 
 void write_outcome(const std::filesystem::path& work, const Outcome& o) {
-  std::string text = fmt::format("{{\n  \"cause\": \"{}\",\n  \"exit_code\": {},\n  \"ranks\": {}", to_text(o.cause), o.exit_code, o.ranks);
-  text += fmt::format(",\n  \"seconds\": {:.3f},\n  \"peak_memory_gb\": {:.6f},\n  \"memory_need_gb\": {:.6f}", finite(o.seconds),
-                      finite(o.peak_memory_gb), finite(o.memory_need_gb));
-  text += fmt::format(",\n  \"percent\": {:.3f},\n  \"is_further\": {}", finite(o.percent), o.is_further);
+  base::Json root = base::Json::object();
+  root.set("cause", to_text(o.cause)).set("exit_code", o.exit_code).set("ranks", o.ranks);
+  root.set("seconds", base::decimals(finite(o.seconds), 3)).set("peak_memory_gb", base::decimals(finite(o.peak_memory_gb), 6));
+  root.set("memory_need_gb", base::decimals(finite(o.memory_need_gb), 6));
+  root.set("percent", base::decimals(finite(o.percent), 3)).set("is_further", o.is_further);
   for (const auto& [key, value] : {std::pair<const char*, const std::string&>{"token", o.token},
                                    {"reason", o.reason},
                                    {"host", o.host},
                                    {"started", o.started},
                                    {"ended", o.ended}}) {
-    if (!value.empty()) text += fmt::format(",\n  \"{}\": {}", key, base::quote(value));
+    if (!value.empty()) root.set(key, value);
   }
-  base::write_file(work / "outcome.json", text + "\n}\n");
+  base::write_file(work / "outcome.json", root.text());
 }
 
 std::optional<Outcome> read_outcome(const std::filesystem::path& work) {
@@ -98,11 +100,11 @@ Outcome make_killed(const std::string& token) {
 }
 
 void write_attempt(const std::filesystem::path& work, const Attempt& a) {
-  base::write_file(work / "attempt.json",
-                   fmt::format("{{\n  \"token\": {},\n  \"host\": {},\n  \"boot\": {},\n  \"pid\": {},\n  \"start_ticks\": {},\n"
-                               "  \"ranks\": {},\n  \"memory_gb\": {:.6f},\n  \"started\": {}\n}}\n",
-                               base::quote(a.token), base::quote(a.process.host), base::quote(a.process.boot), a.process.pid,
-                               a.process.start_ticks, a.ranks, finite(a.memory_gb), base::quote(a.started)));
+  base::Json root = base::Json::object();
+  root.set("token", a.token).set("host", a.process.host).set("boot", a.process.boot).set("pid", a.process.pid);
+  root.set("start_ticks", a.process.start_ticks).set("ranks", a.ranks).set("memory_gb", base::decimals(finite(a.memory_gb), 6));
+  root.set("started", a.started);
+  base::write_file(work / "attempt.json", root.text());
 }
 
 std::optional<Attempt> read_attempt(const std::filesystem::path& work) {

@@ -1,5 +1,5 @@
 // How an attempt at a job ended (outcome.json) and who works on it (attempt.json): two small files in the folder of the work, written by
-// the process of the attempt, wherever it runs; read by whoever keeps the registry.
+// the process of the attempt, wherever it runs; read by the program that keeps the registry.
 #pragma once
 
 #include <filesystem>
@@ -18,7 +18,7 @@ enum class Cause {
   memory,        // not enough: said by the program (4), or it was killed for it
   disk_full,     // no room on a disk
   system,        // the machine refused something else (4)
-  checkpointed,  // saved and stopped (85), asked to by somebody else than us
+  checkpointed,  // saved and stopped (85), on a request that was not ours
   stopped,       // we were asked to stop, saved or not
   time_limit,    // the time of the job was over, saved or not
   killed,        // by a signal from elsewhere

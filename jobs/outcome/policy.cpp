@@ -1,5 +1,5 @@
 // Method:     Causes that cannot pass end a job at once. Causes that can pass are tried again after 10, 40 and 160 s; an attempt that saved
-//             more than all before it starts the count anew. A full disk is waited for, however long.
+//             more than all before it resets the count. A full disk is waited for, however long.
 // Source:     own choice; docs/howto/when-jobs-die.md has the table.
 // Deviations: none.
 #include "jobs/outcome/policy.hpp"
@@ -15,7 +15,7 @@ constexpr double kNeedMargin = 1.1, kPeakGrowth = 1.5;
 
 }  // namespace
 
-Decision decide(Cause cause, int failures, bool is_further) {
+RetryDecision decide(Cause cause, int failures, bool is_further) {
   if (is_further) failures = 0;
   switch (cause) {
     case Cause::done:
@@ -34,7 +34,7 @@ Decision decide(Cause cause, int failures, bool is_further) {
       if (is_further) return {Next::queue, 0.0, 0};
       [[fallthrough]];
     default:
-      if (failures >= kMostRetries) return {Next::failed, 0.0, failures + 1};
+      if (failures >= kMaxRetries) return {Next::failed, 0.0, failures + 1};
       return {Next::wait, kFirstDelayS * std::pow(kDelayGrowth, failures), failures + 1};
   }
 }

@@ -1,6 +1,5 @@
 // Method:     A process is its number, its start in clock ticks since the boot, and the boot. What belongs together carries the same entry
-// in
-//             its environment, which is inherited and which the kernel shows (/proc/PID/environ).
+//             in its environment, which is inherited and which the kernel shows (/proc/PID/environ).
 // Source:     Linux proc(5), random(4) (boot_id), namespaces(7), flock(2), clock_gettime(2).
 // Deviations: none.
 #include "jobs/process/process.hpp"
@@ -32,7 +31,7 @@ std::string read_all(const fs::path& file) {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-/// State letter and start of a process; none when there is no such process.
+/// JobState letter and start of a process; none when there is no such process.
 struct Stat {
   char state = 'X';
   std::uint64_t start_ticks = 0;
@@ -112,12 +111,6 @@ Life find_life(const Identity& identity) {
   }
   const std::optional<Stat> stat = find_stat(identity.pid);
   return !is_dead(stat) && stat->start_ticks == identity.start_ticks ? Life::running : Life::gone;
-}
-
-double find_boot_seconds() {
-  timespec time{};
-  ::clock_gettime(CLOCK_BOOTTIME, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
 std::vector<pid_t> find_with_environment(std::string_view entry) {

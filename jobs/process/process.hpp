@@ -1,4 +1,4 @@
-// Processes of this machine: which one it is, whether it still runs, and how to end what somebody left behind.
+// Processes of this machine: which one it is, whether it still runs, and how to end processes that were left behind.
 // A process number alone says nothing, as numbers are used again: the moment of the start and the boot belong to it. Wall clocks play no
 // part.
 #pragma once
@@ -39,9 +39,6 @@ bool is_self(const Identity& identity);
 /// Of this machine and this boot: running or gone. Of an earlier boot of this machine: gone. Else: elsewhere.
 Life find_life(const Identity& identity);
 
-/// Seconds since the boot, suspended time included (CLOCK_BOOTTIME). Goes on whatever is done to the wall clock.
-double find_boot_seconds();
-
 /// The processes with `entry` ("NAME=value") in the environment they were started with, zombies and this one left out.
 std::vector<pid_t> find_with_environment(std::string_view entry);
 
@@ -49,12 +46,12 @@ std::vector<pid_t> find_with_environment(std::string_view entry);
 /// one is still there after `patience_s`.
 int end_with_environment(std::string_view entry, double patience_s = 20.0);
 
-/// An exclusive lock on a file, for as long as it lives; the kernel takes it back when the process dies, however it dies.
+/// An exclusive lock on a file, for its lifetime; the kernel releases it when the process ends, in whatever way.
 class Lock {
  public:
   /// None when another holds it. SystemError when `file` cannot be opened or made.
   static std::optional<Lock> take(const std::filesystem::path& file);
-  /// Whether somebody holds it now. A file that is not there is not locked.
+  /// Whether a process holds it now. A file that is not there is not locked.
   static bool is_held(const std::filesystem::path& file);
   Lock(Lock&& other) noexcept : descriptor_(other.descriptor_) { other.descriptor_ = -1; }
   Lock& operator=(Lock&&) = delete;

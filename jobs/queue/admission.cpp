@@ -1,9 +1,7 @@
 // Method:     See the header. Free memory is the lesser of what is not promised to running jobs and of what is available now less what
-// running
-//             jobs have been promised and do not hold yet.
+//             running jobs have been promised and do not hold yet.
 // Source:     own choice; docs/howto/when-jobs-die.md states the rule. Backfilling with a reservation for the first: Lifka 1995 (EASY),
-// with
-//             a fixed patience in place of estimates of run times.
+//             with a fixed patience in place of estimates of run times.
 // Deviations: none.
 #include "jobs/queue/admission.hpp"
 
@@ -53,38 +51,38 @@ int choose_ranks(const Host& host, const Need& need, std::size_t competitors) {
 
 double calc_memory(const Need& need, int ranks) {
   if (need.memory_gb > 0.0) return need.memory_gb;
-  if (need.predicted_gb.empty()) return std::max(kUnknownGb, need.least_gb);
+  if (need.predicted_gb.empty()) return std::max(kUnknownGb, need.min_gb);
   // Between the powers of two that were predicted the larger of both; beyond them the last.
   const auto place = static_cast<std::size_t>(std::max(0.0, std::log2(std::max(1, ranks))));
   const std::size_t last = need.predicted_gb.size() - 1;
   const bool is_power = (ranks & (ranks - 1)) == 0;
   const double predicted_gb =
       std::max(need.predicted_gb[std::min(place, last)], need.predicted_gb[std::min(place + (is_power ? 0 : 1), last)]);
-  return std::max(predicted_gb, need.least_gb);
+  return std::max(predicted_gb, need.min_gb);
 }
 
-std::vector<Ruling> choose(const Host& host, const std::vector<Admitted>& running, const std::vector<Candidate>& candidates) {
+std::vector<Admission> choose(const Host& host, const std::vector<Admitted>& running, const std::vector<Candidate>& candidates) {
   Room room = calc_room(host, running);
   std::vector<Admitted> all = running;
-  std::vector<Ruling> rulings;
+  std::vector<Admission> admissions;
   bool is_kept = false;  // for one that has waited long enough
   for (const Candidate& candidate : candidates) {
-    Ruling ruling;
-    ruling.ranks = choose_ranks(host, candidate.need, running.size() + candidates.size());
-    ruling.memory_gb = calc_memory(candidate.need, ruling.ranks);
-    if (ruling.memory_gb > kMemoryShare * host.total_gb) {
-      ruling.answer = Answer::never;
-    } else if (!is_kept && ruling.ranks <= room.cores && ruling.memory_gb <= room.memory_gb) {
-      ruling.answer = Answer::start;
-      room.cores -= ruling.ranks;
-      room.memory_gb -= ruling.memory_gb;
-      all.push_back({ruling.ranks, ruling.memory_gb, 0.0});
-    } else if (candidate.blocked_s > kPatienceSeconds && will_fit(host, all, ruling.memory_gb)) {
+    Admission admission;
+    admission.ranks = choose_ranks(host, candidate.need, running.size() + candidates.size());
+    admission.memory_gb = calc_memory(candidate.need, admission.ranks);
+    if (admission.memory_gb > kMemoryShare * host.total_gb) {
+      admission.decision = Admission::Decision::never;
+    } else if (!is_kept && admission.ranks <= room.cores && admission.memory_gb <= room.memory_gb) {
+      admission.decision = Admission::Decision::start;
+      room.cores -= admission.ranks;
+      room.memory_gb -= admission.memory_gb;
+      all.push_back({admission.ranks, admission.memory_gb, 0.0});
+    } else if (candidate.blocked_s > kPatienceSeconds && will_fit(host, all, admission.memory_gb)) {
       is_kept = true;
     }
-    rulings.push_back(ruling);
+    admissions.push_back(admission);
   }
-  return rulings;
+  return admissions;
 }
 
 }  // namespace carillon::queue

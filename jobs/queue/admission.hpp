@@ -27,7 +27,7 @@ struct Need {
   double memory_gb = 0.0;                 // asked for, or more after an attempt that ran out of it; 0: as predicted
   double seconds = 0.0;                   // on one rank, predicted; 0: not known, and small
   std::vector<double> predicted_gb = {};  // on 1, 2, 4, 8 ... ranks; empty: not known
-  double least_gb = 0.0;                  // whatever is predicted, so much is given: for what follows the solve
+  double min_gb = 0.0;                    // whatever is predicted, so much is given: for what follows the solve
 };
 
 /// Memory of a job on so many ranks [GB].
@@ -44,14 +44,15 @@ struct Candidate {
   double blocked_s = 0.0;  // for how long it would have been started but for room
 };
 
-enum class Answer { start, wait, never };
-struct Ruling {
-  Answer answer = Answer::wait;
+/// What happens to a candidate now. never: no moment of this machine has the memory.
+struct Admission {
+  enum class Decision { start, wait, never };
+  Decision decision = Decision::wait;
   int ranks = 1;           // start
   double memory_gb = 0.0;  // start and never
 };
 
-/// One ruling a candidate, in their order. never: no moment of this machine has the memory.
-std::vector<Ruling> choose(const Host& host, const std::vector<Admitted>& running, const std::vector<Candidate>& candidates);
+/// One for each candidate, in their order.
+std::vector<Admission> choose(const Host& host, const std::vector<Admitted>& running, const std::vector<Candidate>& candidates);
 
 }  // namespace carillon::queue

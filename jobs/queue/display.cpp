@@ -12,22 +12,22 @@
 
 #include "jobs/process/process.hpp"
 #include "jobs/store/records.hpp"
-#include "runtime/base/document.hpp"
+#include "runtime/base/clock.hpp"
+#include "runtime/base/json.hpp"
 #include "runtime/base/printable.hpp"
 
 namespace carillon::queue {
 namespace {
 
-constexpr int kBarWidth = 20, kLeastColumns = 40, kOtherwiseColumns = 100;
+constexpr int kBarWidth = 20, kMinColumns = 40, kOtherwiseColumns = 100;
 
 int find_columns() {
   winsize size{};
-  if (::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col >= kLeastColumns) return size.ws_col;
+  if (::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col >= kMinColumns) return size.ws_col;
   return kOtherwiseColumns;
 }
 
 std::string clean(const std::string& text) { return base::printable(text); }
-std::string quote(const std::string& text) { return store::to_plain_json(base::quote(text)); }
 
 std::string format_left(double seconds) {
   if (seconds < 0.0) return "";
@@ -41,8 +41,8 @@ std::string cut(const std::string& text, int columns) {
   std::string out;
   int letters = 0;
   for (const char byte : text) {
-    const bool goes_on = (static_cast<unsigned char>(byte) & 0xc0) == 0x80;
-    if (!goes_on && ++letters > columns) break;
+    const bool is_continuation = (static_cast<unsigned char>(byte) & 0xc0) == 0x80;
+    if (!is_continuation && ++letters > columns) break;
     out += byte;
   }
   return out;
@@ -50,7 +50,8 @@ std::string cut(const std::string& text, int columns) {
 
 }  // namespace
 
-Display::Display(bool json, bool quiet) : json_(json), quiet_(quiet), is_terminal_(::isatty(STDOUT_FILENO) == 1 && !json) {
+Display::Display(bool json, bool quiet, ReadProgress read_progress)
+    : read_progress_(std::move(read_progress)), json_(json), quiet_(quiet), is_terminal_(::isatty(STDOUT_FILENO) == 1 && !json) {
   if (!is_terminal_) json_ = true;
 }
 
@@ -69,19 +70,19 @@ void Display::print(const std::string& line) {
   std::fflush(stdout);
 }
 
-void Display::tell(const std::string& event, const registry::Job& job, const std::vector<std::string>& warnings) {
+void Display::print_event(const std::string& event, const registry::Job& job) {
   const bool is_end = event == "done" || event == "failed" || event == "cancelled";
   if (is_end) ++ended_;
-  told_percent_.erase(job.id.text());
+  shown_percent_.erase(job.id.text());
+  if (quiet_) return;
+  const std::vector<std::string> warnings = event == "done" && find_warnings_ ? find_warnings_(job) : std::vector<std::string>();
   if (json_) {
-    std::string list = event == "done" ? ", \"warnings\": [" : "";
-    for (std::size_t i = 0; i < warnings.size(); ++i) list += (i > 0 ? ", " : "") + quote(warnings[i]);
-    if (event == "done") list += "]";
-    return print(fmt::format(
-        "{{\"event\": \"{}\", \"boot_s\": {:.3f}, \"id\": \"{}\", \"name\": {}, \"ranks\": {}, \"memory_gb\": {:.3f}, \"attempt\": {}, "
-        "\"failures\": {}, \"reason\": {}{}}}",
-        event, process::find_boot_seconds(), job.id.text(), quote(job.name), job.given.ranks, job.given.memory_gb, job.attempts,
-        job.failures, quote(job.reason), list));
+    base::Json root = base::Json::object();
+    root.set("event", event).set("boot_s", base::decimals(base::get_boot_s(), 3)).set("id", job.id.text()).set("name", job.name);
+    root.set("ranks", job.given.ranks).set("memory_gb", base::decimals(job.given.memory_gb, 3)).set("attempt", job.attempts);
+    root.set("failures", job.failures).set("reason", job.reason);
+    if (event == "done") root.set("warnings", base::Json::array(warnings));
+    return print(root.line());
   }
   const bool is_in_bar = (event == "start" && job.reason.empty()) || event == "predict";
   if (is_in_bar) return;
@@ -89,30 +90,30 @@ void Display::tell(const std::string& event, const registry::Job& job, const std
   for (const std::string& warning : warnings) print("  warning: " + clean(warning));
 }
 
-void Display::say(const std::string& text) {
-  print(json_ ? fmt::format("{{\"event\": \"note\", \"text\": {}}}", quote(text)) : clean(text));
+void Display::print_note(const std::string& text) {
+  print(json_ ? base::Json::object().set("event", "note").set("text", text).line() : clean(text));
 }
 
-void Display::show(const store::Store& store, const std::vector<registry::Job>& jobs) {
+void Display::show(const std::vector<registry::Job>& jobs) {
   if (quiet_) return;
   std::size_t queued = 0, running = 0;
   std::string first;
   for (const registry::Job& job : jobs) {
-    if (job.state == registry::State::queued || job.state == registry::State::waiting) ++queued;
-    if (job.state != registry::State::running) continue;
+    if (job.state == registry::JobState::queued || job.state == registry::JobState::waiting) ++queued;
+    if (job.state != registry::JobState::running) continue;
     ++running;
-    const std::optional<store::Progress> progress = store::read_progress(store.work_folder(job.id));
+    const std::optional<store::Progress> progress = read_progress_(job.id);
     if (!progress) continue;
     if (json_) {
-      double& told = told_percent_.try_emplace(job.id.text(), -1.0).first->second;
-      if (progress->percent == told) continue;
-      told = progress->percent;
-      print(fmt::format(
-          "{{\"event\": \"progress\", \"id\": \"{}\", \"phase\": {}, \"percent\": {:.1f}, \"modes_done\": {}, \"modes_wanted\": {}, "
-          "\"seconds_left\": {}}}",
-          job.id.text(), quote(progress->phase), progress->percent, progress->modes_done,
-          progress->modes_wanted >= 0 ? std::to_string(progress->modes_wanted) : "null",
-          progress->seconds_left >= 0 ? fmt::format("{:.1f}", progress->seconds_left) : "null"));
+      double& shown = shown_percent_.try_emplace(job.id.text(), -1.0).first->second;
+      if (progress->percent == shown) continue;
+      shown = progress->percent;
+      base::Json root = base::Json::object();
+      root.set("event", "progress").set("id", job.id.text()).set("phase", progress->phase);
+      root.set("percent", base::decimals(progress->percent, 1)).set("modes_done", progress->modes_done);
+      root.set("modes_wanted", progress->modes_wanted >= 0 ? base::Json(progress->modes_wanted) : base::Json());
+      root.set("seconds_left", progress->seconds_left >= 0 ? base::decimals(progress->seconds_left, 1) : base::Json());
+      print(root.line());
     } else if (first.empty()) {
       const int filled = static_cast<int>(std::clamp(progress->percent / 100.0, 0.0, 1.0) * kBarWidth);
       first = fmt::format("  [{:#>{}}{:.>{}}] {:3.0f} % {} {}{}", "", filled, "", kBarWidth - filled, progress->percent, clean(job.name),

@@ -1,15 +1,17 @@
-// Method:     A text mesh takes about 250 bytes a node of four-node tetrahedra; ten-node ones have 7.5 times as many nodes. Nested
-//             dissection of a compact body fills with n^(4/3) (George 1973). The constants are upper bounds for bars of 1,000 to 70,000
-//             nodes; whatever is not small is predicted by carillon-precompute --validate instead.
-// Source:     own measurements. Deviations: none.
+// Method:     A job is predicted by precompute/cost from the nodes that it asks for or the size of its mesh file. Larger jobs, and those
+//             whose size is unknown, are predicted by carillon-precompute --validate instead.
+// Source:     precompute/cost. Deviations: none.
 #include "jobs/queue/needs.hpp"
 
-#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 
 #include "jobs/attempt/attempt.hpp"
+#include "precompute/cost/calibration.hpp"
+#include "precompute/cost/memory.hpp"
+#include "precompute/cost/seconds.hpp"
 #include "runtime/base/document.hpp"
 
 namespace carillon::queue {
@@ -17,15 +19,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kBytesPerNode = 250.0, kMidNodes = 7.5, kLargeNodes = 30000.0, kUnknownNodes = 60000.0;
-constexpr double kAccuracyGrowth = 4.0;  // accuracy_cents may refine the mesh
-constexpr double kBaseGb = 0.15, kFillGb = 1.2e-6, kSecondsPerNode = 7e-4;
-constexpr int kMostGuessedRanks = 1024;
-constexpr double kPredictionMargin = 1.1;
+constexpr double kLargeNodes = 30000.0;
+constexpr int kMaxGuessedRanks = 1024;
 
-/// Nodes as solved, and whether that is no more than a guess in the dark.
+/// Size as solved; unknown: an upper bound for most jobs.
 struct Size {
-  double nodes = kUnknownNodes;
+  cost::ProblemSize problem = cost::estimate_meshed_size(cost::kUnknownNodes, true);
   bool is_known = false;
 };
 
@@ -33,15 +32,16 @@ Size find_size(const store::Store& store, const store::Request& request) {
   Size size;
   try {
     base::Object job = base::parse_document(request.job, "request.json").root();
-    if (std::optional<base::Object> body = job.object_if("body"); body && body->has_number("nodes")) size = {body->number("nodes"), true};
+    const bool is_quadratic = job.string_or("element", "T10") != "T4";
+    if (std::optional<base::Object> body = job.object_if("body"); body && body->has_number("nodes"))
+      size = {cost::estimate_meshed_size(std::llround(body->number("nodes")), is_quadratic), true};
     std::error_code error;
-    if (request.input_kind == "mesh") {
-      const double bytes = static_cast<double>(
+    if (request.input_kind == store::InputKind::mesh) {
+      const auto bytes = static_cast<std::int64_t>(
           fs::file_size(store.input_file(store::require_id(request.input_sha256, "request.json"), request.input_format), error));
-      const bool is_linear = job.string_or("element", "T10") == "T4";
-      if (!error) size = {bytes / kBytesPerNode * (is_linear ? 1.0 : kMidNodes), true};
+      if (!error) size = {cost::estimate_file_size(bytes, is_quadratic), true};
     }
-    if (job.has_number("accuracy_cents")) size = {kAccuracyGrowth * size.nodes, false};
+    if (job.has_number("accuracy_cents")) size = {cost::refine(size.problem, cost::kRefinementGrowth), false};
   } catch (const InputError&) {
   }
   return size;
@@ -56,7 +56,7 @@ bool read_prediction(const fs::path& folder, Need& need) {
     base::Object bytes = root.object("memory_bytes");
     std::vector<double> memory_gb;
     for (int ranks = 1; bytes.has(std::to_string(ranks)); ranks *= 2)
-      memory_gb.push_back(kPredictionMargin * 1e-9 * bytes.number(std::to_string(ranks), base::kPositive));
+      memory_gb.push_back(cost::kAdmissionMargin * 1e-9 * bytes.number(std::to_string(ranks), base::kPositive));
     if (memory_gb.empty()) return false;
     need.predicted_gb = memory_gb;
     need.seconds = root.number_or("cpu_seconds", 0.0);
@@ -68,11 +68,11 @@ bool read_prediction(const fs::path& folder, Need& need) {
 
 }  // namespace
 
-Need guess_need(double nodes) {
+Need guess_need(const cost::ProblemSize& size) {
   Need need;
-  for (int ranks = 1; ranks <= kMostGuessedRanks; ranks *= 2)
-    need.predicted_gb.push_back(kBaseGb * ranks + kFillGb * std::pow(nodes, 4.0 / 3.0));
-  need.seconds = kSecondsPerNode * nodes;
+  for (int ranks = 1; ranks <= kMaxGuessedRanks; ranks *= 2)
+    need.predicted_gb.push_back(1e-9 * cost::kAdmissionMargin * cost::predict_bytes(size, ranks));
+  need.seconds = cost::predict_seconds(size).sum();
   return need;
 }
 
@@ -85,9 +85,10 @@ JobNeeds find_needs(const store::Store& store, const registry::Job& job) {
   } catch (const InputError&) {
   }
   const Size size = request ? find_size(store, *request) : Size{};
-  needs.need = guess_need(size.nodes);
+  needs.need = guess_need(size.problem);
   const bool has_prediction = read_prediction(folder, needs.need);
-  needs.wants_prediction = !has_prediction && job.resources.memory_gb <= 0.0 && (!size.is_known || size.nodes > kLargeNodes);
+  needs.wants_prediction = !has_prediction && job.resources.memory_gb <= 0.0 &&
+                           (!size.is_known || static_cast<double>(cost::complete(size.problem).nodes) > kLargeNodes);
   set_asked(needs, job);
   return needs;
 }

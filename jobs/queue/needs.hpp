@@ -4,6 +4,7 @@
 #include "jobs/queue/admission.hpp"
 #include "jobs/registry/registry.hpp"
 #include "jobs/store/store.hpp"
+#include "precompute/cost/problem_size.hpp"
 
 namespace carillon::queue {
 
@@ -19,7 +20,7 @@ JobNeeds find_needs(const store::Store& store, const registry::Job& job);
 /// What the row asks for, which may have changed since the needs were found.
 void set_asked(JobNeeds& needs, const registry::Job& job);
 
-/// A guess by the number of nodes of the volume mesh as solved: upper bounds for compact bodies in the whole band.
-Need guess_need(double nodes);
+/// The need of a problem of which no more than the size is known, by the cost model.
+Need guess_need(const cost::ProblemSize& size);
 
 }  // namespace carillon::queue

@@ -1,4 +1,4 @@
-// Method:     The id tells which of the records of a job is whole; from that one the folder of work is made again.
+// Method:     The id shows which record of a job is complete; the folder of work is rebuilt from it.
 // Source:     own.
 // Deviations: none.
 #include "jobs/queue/repair.hpp"
@@ -32,7 +32,7 @@ std::optional<std::string> restore(const store::Store& store, const registry::Re
   const std::optional<std::string> fault = store::find_input_fault(store, *request);
   if (fault && !store::restore_input(store, *request))
     return fmt::format("{}, and {} has been removed or changed; submit the job with its {}", *fault, request->input_file,
-                       request->input_kind);
+                       to_text(request->input_kind));
   if (store.has_bank_folder(id)) store.set_bank_aside(id);
   if (!is_whole) store::restore_work(store, *request);
   return std::nullopt;

@@ -1,23 +1,17 @@
 // The loop of `carillon run`: works through the queue of this machine.
 #pragma once
 
-#include <filesystem>
-#include <string>
-#include <vector>
-
+#include "jobs/queue/local.hpp"
+#include "jobs/queue/runner.hpp"
 #include "jobs/store/store.hpp"
 
 namespace carillon::queue {
 
 struct RunOptions {
-  std::filesystem::path program;            // carillon itself, which makes the attempts
-  bool keep = false;                        // stay and wait for more when the queue is empty
-  bool json = false;                        // JSON lines, on a terminal too
-  bool quiet = false;                       // neither bar nor lines
-  bool has_pictures = true;                 // in the reports of banks
-  std::vector<std::string> mpirun_options;  // words for mpirun: which hosts, by which network
-  int cores = 0;                            // at most so many; 0: all that this process may use
-  double memory_gb = 0.0;                   // at most so much; 0: what the machine has
+  AttemptCommand attempt;
+  RunnerOptions runner;
+  bool json = false;   // JSON lines, on a terminal too
+  bool quiet = false;  // neither bar nor lines
 };
 
 /// Starts what fits, settles what ends, adopts what others left running, until no local job is queued, waiting or running. Any number may

@@ -10,7 +10,7 @@
 #include <string_view>
 
 #include "jobs/store/files.hpp"
-#include "runtime/base/error.hpp"
+#include "runtime/base/failure.hpp"
 #include "runtime/base/file.hpp"
 
 namespace carillon::registry {
@@ -19,7 +19,7 @@ namespace {
 constexpr int kBusyMs = 60'000;
 constexpr const char* kFilesName = "carillon-registry";
 
-/// SQLite's own access to files, but for what a journal that somebody else put beside the registry could ask for: it may name a "super
+/// SQLite's own access to files, but for what a journal that another user put next to the registry could ask for: it may name a "super
 /// journal", any file at all, which SQLite reads and then removes. The registry never has one.
 const char* find_files() {
   static sqlite3_vfs& system = *sqlite3_vfs_find(nullptr);
@@ -83,17 +83,17 @@ void Database::run(const char* sql) {
 
 void Database::fail(int code) const {
   std::string what = fmt::format("{}: {}", file_.string(), handle_ != nullptr ? sqlite3_errmsg(handle_) : sqlite3_errstr(code));
-  // A full disk shows itself in many ways: no log, no shared memory, no journal. A quota is told by errno alone.
+  // A full disk shows itself in many ways: no log, no shared memory, no journal. Only errno shows a full quota.
   const int number = handle_ != nullptr ? sqlite3_system_errno(handle_) : 0;
   const bool is_refused = (code & 0xFF) == SQLITE_IOERR && base::is_full_error(number);
   if (is_refused) what += fmt::format(" ({})", std::strerror(number));
   const bool is_full = is_refused || (file_.has_parent_path() && store::is_disk_full(file_.parent_path()));
   if (is_full && (code & 0xFF) != SQLITE_FULL && (code & 0xFF) != SQLITE_BUSY && (code & 0xFF) != SQLITE_CORRUPT &&
       (code & 0xFF) != SQLITE_NOTADB)
-    throw SystemError(fmt::format("{}; {}", what, store::kFullAdvice));
+    throw DiskFullError(fmt::format("{}; {}", what, store::kFullAdvice));
   switch (code & 0xFF) {
     case SQLITE_FULL:
-      throw SystemError(fmt::format("{}; {}", what, store::kFullAdvice));
+      throw DiskFullError(fmt::format("{}; {}", what, store::kFullAdvice));
     case SQLITE_BUSY:
     case SQLITE_LOCKED:
       throw SystemError(what + " by another process for a minute; find out what it does, and try again");

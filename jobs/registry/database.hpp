@@ -15,6 +15,7 @@ class Damaged : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// One connection to SQLite, open as long as this exists. Every error of SQLite leaves as Damaged or SystemError.
 class Database {
  public:
   /// Opens a file that exists: WAL, synchronous=FULL, waits up to a minute for others. Throws Damaged, SystemError.

@@ -28,17 +28,17 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kLogName = "submissions.jsonl";
-constexpr std::size_t kMostLineBytes = 32 << 20;
+constexpr std::size_t kMaxLineBytes = 32 << 20;
 
-/// A job whose attempt lives is running, whatever the registry has forgotten. Whether a node of Slurm is gone cannot be told here.
+/// A job whose attempt lives is running, whatever the registry has forgotten. Whether a node of Slurm is gone is not known here.
 bool adopt_attempt(Job& job, const fs::path& work) {
   const auto attempt = outcome::read_attempt(work);
   if (!attempt) return false;
   const process::Life life = process::find_life(attempt->process);
   const auto ended = outcome::read_outcome(work);
   const bool is_over = ended && ended->token == attempt->token;
-  if (life == process::Life::gone || (life == process::Life::elsewhere && (job.engine != "slurm" || is_over))) return false;
-  job.state = State::running;
+  if (life == process::Life::gone || (life == process::Life::elsewhere && (job.engine != store::JobEngine::slurm || is_over))) return false;
+  job.state = JobState::running;
   job.token = attempt->token;
   job.worker = attempt->process;
   return true;
@@ -63,21 +63,20 @@ Job make_job(const store::Store& store, const store::Id& id) {
   }
   const std::optional<std::string> fault = store.find_bank_fault(id, store::Look::quick);
   if (!fault) {
-    job.state = State::done;
+    job.state = JobState::done;
     return job;
   }
   if (!store.has_work(id)) {
-    job.state = State::failed;
+    job.state = JobState::failed;
     job.reason = describe_fault(*fault);
     return job;
   }
   try {
-    if (const auto standing = store::read_standing(folder)) {
-      const State state = find_state(standing->state).value_or(State::queued);
-      job.state = state == State::waiting ? State::queued : state;
-      job.reason = standing->reason;
-      job.attempts = standing->attempts;
-      job.failures = standing->failures;
+    if (const auto saved = store::read_state(folder)) {
+      job.state = saved->state == JobState::waiting ? JobState::queued : saved->state;
+      job.reason = saved->reason;
+      job.attempts = saved->attempts;
+      job.failures = saved->failures;
     }
   } catch (const InputError&) {
   }
@@ -89,16 +88,16 @@ Job make_job(const store::Store& store, const store::Id& id) {
 struct Differences {
   std::vector<store::Id> unknown;            // a folder, no row
   std::vector<store::Id> finished, missing;  // rows whose bank is there; rows with no folder at all
-  std::vector<store::Id> alive;              // rows that wait while somebody works on them
+  std::vector<store::Id> alive;              // rows that wait while a process works on them
   bool is_empty() const { return unknown.empty() && finished.empty() && missing.empty() && alive.empty(); }
 };
 
 Differences find_differences(Database& database, const store::Store& store) {
-  std::map<store::Id, State> rows;
+  std::map<store::Id, JobState> rows;
   Statement row(database, "select id, state from jobs");
   while (row.step()) {
     const auto id = store::parse_id(row.text(0));
-    const auto state = find_state(row.text(1));
+    const auto state = store::find_state(row.text(1));
     if (!id || !state) throw Damaged("a row of the registry names no job or no state");
     rows.emplace(*id, *state);
   }
@@ -113,13 +112,13 @@ Differences find_differences(Database& database, const store::Store& store) {
   std::copy_if(banks.begin(), banks.end(), std::back_inserter(whole), [&](const store::Id& id) { return store.has_bank(id); });
   for (const store::Id& id : whole) {
     const auto at = rows.find(id);
-    if (at != rows.end() && at->second != State::done && at->second != State::running) found.finished.push_back(id);
+    if (at != rows.end() && at->second != JobState::done && at->second != JobState::running) found.finished.push_back(id);
   }
   for (const auto& [id, state] : rows) {
     Job probe{id};
-    if ((state == State::queued || state == State::waiting) && adopt_attempt(probe, store.work_folder(id))) found.alive.push_back(id);
-    if (state == State::running || state == State::failed || std::binary_search(whole.begin(), whole.end(), id)) continue;
-    if (state == State::done || !std::binary_search(work.begin(), work.end(), id)) found.missing.push_back(id);
+    if ((state == JobState::queued || state == JobState::waiting) && adopt_attempt(probe, store.work_folder(id))) found.alive.push_back(id);
+    if (state == JobState::running || state == JobState::failed || std::binary_search(whole.begin(), whole.end(), id)) continue;
+    if (state == JobState::done || !std::binary_search(work.begin(), work.end(), id)) found.missing.push_back(id);
   }
   return found;
 }
@@ -127,16 +126,16 @@ Differences find_differences(Database& database, const store::Store& store) {
 /// False when there is nothing to change any more.
 bool settle_missing(Job& job, const store::Store& store) {
   const std::optional<std::string> fault = store.find_bank_fault(job.id, store::Look::quick);
-  if (!fault || job.state == State::running || job.state == State::failed) return false;
+  if (!fault || job.state == JobState::running || job.state == JobState::failed) return false;
   if (store.has_work(job.id)) {
-    if (job.state != State::done) return false;
-    job.state = State::queued;
+    if (job.state != JobState::done) return false;
+    job.state = JobState::queued;
     return true;
   }
   job.reason = store.has_bank_folder(job.id) ? describe_fault(*fault)
-               : job.state == State::done    ? "its bank is no longer in the store; submit the job again"
+               : job.state == JobState::done ? "its bank is no longer in the store; submit the job again"
                                              : "its folder is no longer in the store; submit the job again";
-  job.state = State::failed;
+  job.state = JobState::failed;
   return true;
 }
 
@@ -197,7 +196,7 @@ std::vector<Submission> read_submission_log(const store::Store& store) {
   if (!fs::is_regular_file(store.root() / kLogName, error)) return submissions;
   std::ifstream stream(store.root() / kLogName, std::ios::binary);
   for (std::string line; std::getline(stream, line);) {
-    if (line.empty() || line.size() > kMostLineBytes) continue;
+    if (line.empty() || line.size() > kMaxLineBytes) continue;
     try {
       const store::Request request = store::parse_request(line, kLogName);
       newest[request.job_file] = submissions.size();
@@ -245,7 +244,7 @@ void reconcile(Database& database, const store::Store& store, const Say& say) {
   for (const store::Id& id : found.unknown) insert_job(database, make_job(store, id), seq++);
   for (const store::Id& id : found.finished) {
     Job job = *read_job(database, id);
-    job.state = State::done;
+    job.state = JobState::done;
     job.reason.clear();
     update_job(database, job);
   }

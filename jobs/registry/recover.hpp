@@ -19,7 +19,7 @@ std::filesystem::path set_aside(const std::filesystem::path& file);
 void append_submissions(const store::Store& store, const std::vector<Submission>& submissions);
 /// The newest line of each job file, in the order of the file; what is no line of ours is passed over.
 std::vector<Submission> read_submission_log(const store::Store& store);
-/// Writes the log anew with only those. No process may append meanwhile (store::Store::lock_exclusive).
+/// Replaces the log by only those. No process may append meanwhile (store::Store::lock_exclusive).
 void rewrite_submission_log(const store::Store& store, const std::vector<Submission>& submissions);
 
 /// Fills new tables with all that the store knows. In a transaction. Returns the number of jobs.

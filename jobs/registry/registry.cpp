@@ -1,5 +1,5 @@
-// Method:     Every change is one write transaction of SQLite that reads the row, changes it and writes it whole. What the store could not
-//             tell again (reasons, counts) is written beside the job, in state.json, before the transaction is committed.
+// Method:     Every change is one write transaction of SQLite that reads the row, changes it and writes it whole. What could not be
+//             read from the store again (reasons, counts) is written next to the job, in state.json, before the transaction is committed.
 // Source:     sqlite.org, lang_transaction.html, wal.html.
 // Deviations: none.
 #include "jobs/registry/registry.hpp"
@@ -17,6 +17,7 @@
 #include "jobs/registry/recover.hpp"
 #include "jobs/registry/rows.hpp"
 #include "jobs/store/files.hpp"
+#include "runtime/base/clock.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::registry {
@@ -25,8 +26,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kFileName = "registry.sqlite";
-constexpr int kMostRepairs = 3;
-constexpr double kMostWaitS = 600.0;
+constexpr int kMaxRepairs = 3;
 
 /// Device and number of a file; zeros when there is none.
 std::pair<dev_t, ino_t> find_file(const fs::path& file) {
@@ -34,14 +34,14 @@ std::pair<dev_t, ino_t> find_file(const fs::path& file) {
   return ::stat(file.c_str(), &info) == 0 ? std::pair(info.st_dev, info.st_ino) : std::pair<dev_t, ino_t>(0, 0);
 }
 
-/// Makes the file unless it is there: its group gets the rights of the store, and SQLite gives the same to the files beside it.
+/// Makes the file unless it is there: its group gets the rights of the store, and SQLite gives the same to the files next to it.
 void make_file(const fs::path& file) {
   struct stat info {};
   for (const char* ending : {"-journal", "-wal", "-shm"}) {
-    const fs::path beside = fs::path(file) += ending;
-    if (::lstat(beside.c_str(), &info) != 0 || S_ISREG(info.st_mode)) continue;
+    const fs::path companion = fs::path(file) += ending;
+    if (::lstat(companion.c_str(), &info) != 0 || S_ISREG(info.st_mode)) continue;
     throw InputError(fmt::format("{}: {}, and the registry keeps a file of its own here; find out who put it there, and remove it",
-                                 beside.string(), S_ISLNK(info.st_mode) ? "this is a link" : "this is something else"));
+                                 companion.string(), S_ISLNK(info.st_mode) ? "this is a link" : "this is something else"));
   }
   if (::lstat(file.c_str(), &info) == 0) {
     if (!S_ISREG(info.st_mode))
@@ -71,23 +71,17 @@ class Gate {
   int descriptor_;
 };
 
-store::Standing make_standing(const Job& job) { return {to_text(job.state), job.reason, job.attempts, job.failures}; }
+store::SavedState make_saved_state(const Job& job) { return {job.state, job.reason, job.attempts, job.failures}; }
 
-/// Beside the job, for a registry that has to be made again.
-void write_standing(const store::Store& store, const Job& job) {
-  if (job.state == State::running || job.state == State::done || !store.has_work(job.id)) return;
+/// Next to the job, for a registry that has to be made again.
+void write_state(const store::Store& store, const Job& job) {
+  if (job.state == JobState::running || job.state == JobState::done || !store.has_work(job.id)) return;
   const store::OpenFolder work = store.open_work(job.id);
   try {
-    store::write_standing(work.path(), make_standing(job));
+    store::write_state(work.path(), make_saved_state(job));
   } catch (const SystemError& error) {
-    throw SystemError(store::show_names(work, error.what()));
+    store::throw_with_names(work, error);
   }
-}
-
-bool is_ready(const Job& job, const std::string& boot, double now_s) {
-  if (job.state != State::waiting) return job.state == State::queued;
-  // Later than anybody waits: written by another clock (a container may have its own).
-  return job.ready_boot_id != boot || job.ready_boot_s <= now_s || job.ready_boot_s > now_s + kMostWaitS;
 }
 
 }  // namespace
@@ -99,12 +93,12 @@ struct Registry::Data {
   std::unique_ptr<Database> database;
   std::pair<dev_t, ino_t> opened{};
 
-  /// Opens, checks, and makes anew what is damaged.
+  /// Opens, checks, and rebuilds what is damaged.
   void open() {
     database.reset();
     const Gate gate(file.parent_path());
     std::string damage;
-    for (int repairs = 0; repairs < kMostRepairs; ++repairs) {
+    for (int repairs = 0; repairs < kMaxRepairs; ++repairs) {
       try {
         make_file(file);
         database = std::make_unique<Database>(file);
@@ -182,7 +176,7 @@ std::vector<bool> Registry::submit(const std::vector<Submission>& submissions) {
     for (const Submission& submission : submissions) {
       const store::Request& request = submission.request;
       Job job{store::require_id(request.id, "submission")};
-      job.state = data_->store.has_bank(job.id) ? State::done : State::queued;
+      job.state = data_->store.has_bank(job.id) ? JobState::done : JobState::queued;
       job.name = find_name(submission.job_file);
       job.engine = request.engine;
       job.resources = request.resources;
@@ -199,23 +193,23 @@ std::optional<Job> Registry::find(const store::Id& id) const {
   return data_->guard([&](Database& database) { return read_job(database, id); });
 }
 
-std::vector<Job> Registry::find_by_prefix(std::string_view prefix, std::size_t most) const {
+std::vector<Job> Registry::find_by_prefix(std::string_view prefix, std::size_t max) const {
   const bool is_hex = std::all_of(prefix.begin(), prefix.end(), [](char c) { return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f'); });
   if (!is_hex || prefix.empty()) return {};
   return data_->guard([&](Database& database) {
     std::vector<Job> jobs = read_jobs(database, "where id >= ? and id < ?", {std::string(prefix), std::string(prefix) + "g"});
-    if (jobs.size() > most) jobs.erase(jobs.begin() + static_cast<std::ptrdiff_t>(most), jobs.end());
+    if (jobs.size() > max) jobs.erase(jobs.begin() + static_cast<std::ptrdiff_t>(max), jobs.end());
     return jobs;
   });
 }
 
-std::vector<Job> Registry::list(const std::vector<State>& states) const {
+std::vector<Job> Registry::list(const std::vector<JobState>& states) const {
   return data_->guard([&](Database& database) {
     if (states.empty()) return read_jobs(database);
     std::string condition = "where state in (";
-    for (const State state : states) condition += fmt::format("{}'{}'", condition.ends_with('(') ? "" : ", ", to_text(state));
-    const bool is_open = std::none_of(states.begin(), states.end(), [](State state) {
-      return state == State::done || state == State::failed || state == State::cancelled;
+    for (const JobState state : states) condition += fmt::format("{}'{}'", condition.ends_with('(') ? "" : ", ", to_text(state));
+    const bool is_open = std::none_of(states.begin(), states.end(), [](JobState state) {
+      return state == JobState::done || state == JobState::failed || state == JobState::cancelled;
     });
     if (is_open) condition += ") and state in ('queued', 'waiting', 'running'";  // so that the index serves
     return read_jobs(database, condition + ")");
@@ -234,39 +228,17 @@ std::vector<Submission> Registry::list_last_submissions() const {
   return data_->guard([&](Database& database) { return read_submissions(database); });
 }
 
-std::vector<Job> Registry::claim(const std::string& engine, const process::Identity& worker, const Choose& choose, std::size_t most) {
+std::vector<Job> Registry::claim(store::JobEngine engine, const process::Identity& worker, const Choose& choose, std::size_t max) {
   data_->require_writing();
   return data_->guard([&](Database& database) {
     Transaction transaction(database);
-    const std::string boot = process::find_boot();
-    const double now_s = process::find_boot_seconds();
-    std::vector<Job> running, ready, claimed;
-    for (Job& job : read_jobs(database, "where state in ('queued', 'waiting', 'running')")) {
-      if (job.state == State::running)
-        running.push_back(std::move(job));
-      else if (job.engine == engine && ready.size() < most && is_ready(job, boot, now_s))
-        ready.push_back(std::move(job));
-    }
-    for (Job job : choose(running, ready)) {
-      const auto known = read_job(database, job.id);
-      if (!known || !is_ready(*known, boot, now_s)) continue;
-      if (data_->store.has_bank(job.id)) {
-        job.state = State::done;
-        job.reason.clear();
-      } else {
-        job.state = State::running;
-        job.token = store::make_random_name();
-        job.worker = worker;
-        job.slurm_job.clear();
-        job.attempts += 1;
-        job.started_unix_s = find_unix_seconds();
-        job.ended_unix_s = 0.0;
-        claimed.push_back(job);
-      }
-      update_job(database, job);
-    }
+    const ClaimTerms terms{
+        engine, worker, max, base::get_boot_s(), process::find_boot(), [&](const store::Id& id) { return data_->store.has_bank(id); }};
+    std::vector<Job> changed = calc_claims(read_jobs(database, "where state in ('queued', 'waiting', 'running')"), terms, choose);
+    for (const Job& job : changed) update_job(database, job);
     transaction.commit();
-    return claimed;
+    std::erase_if(changed, [](const Job& job) { return job.state != JobState::running; });
+    return changed;
   });
 }
 
@@ -278,7 +250,7 @@ bool Registry::update(const store::Id& id, const std::function<bool(Job&)>& chan
     if (!known) return false;
     Job job = *known;
     if (!change(job)) return false;
-    write_standing(data_->store, job);
+    write_state(data_->store, job);
     update_job(database, job);
     transaction.commit();
     return true;

@@ -11,40 +11,12 @@
 #include <vector>
 
 #include "jobs/process/process.hpp"
+#include "jobs/registry/job_table.hpp"
 #include "jobs/store/id.hpp"
 #include "jobs/store/records.hpp"
 #include "jobs/store/store.hpp"
 
 namespace carillon::registry {
-
-/// queued: may be claimed. running: claimed; `worker` is the process of the attempt, before it is known the one that claimed. waiting: as
-/// queued, but not before `ready_boot_s` of boot `ready_boot_id` (another boot: at once). done, failed, cancelled: ended.
-enum class State { queued, running, waiting, done, failed, cancelled };
-std::string to_text(State state);
-
-/// The wall clock, seconds since 1970: for people, never for decisions.
-double find_unix_seconds();
-/// The last part of a job file's name.
-std::string find_name(const std::string& job_file);
-
-struct Job {
-  store::Id id;
-  State state = State::queued;
-  std::string name = {};            // of the job file that asked last, for people
-  std::string engine = "local";     // "local" or "slurm"
-  store::Resources resources = {};  // as asked for
-  store::Resources given = {};      // ranks and memory of the last attempt, as the queue chose them
-  std::string reason = {};          // one sentence: why it failed, waits, or was cancelled
-  std::string token = {};           // of the attempt, 32 hex digits; empty before the first
-  process::Identity worker = {};    // of the attempt; of the one who claimed, before that is known
-  std::string slurm_job = {};       // "123" or "123_4"
-  bool cancel_wanted = false;       // somebody asked a running job to end
-  int attempts = 0;
-  int failures = 0;  // attempts that count against the retries
-  double ready_boot_s = 0.0;
-  std::string ready_boot_id = {};
-  double submitted_unix_s = 0.0, started_unix_s = 0.0, ended_unix_s = 0.0;
-};
 
 /// One request of one job file.
 struct Submission {
@@ -52,39 +24,35 @@ struct Submission {
   store::Request request;
 };
 
-class Registry {
+/// The rows of all jobs of a store. Every change is one transaction, so that other processes see rows before or after it. All of it can be
+/// made again from the store but times, ranks given and numbers of Slurm.
+class Registry final : public JobTable {
  public:
   /// Opens the store's registry; a damaged one is set aside and rebuilt, and `say` gets one line about it. Then brings it up to date with
   /// the store: folders without a row get one, a row whose bank is there is done, a done row whose bank is gone is failed.
   static Registry open(const store::Store& store, const std::function<void(const std::string&)>& say);
-  /// For who may only read the store: its jobs as its folders and its log of submissions tell them now, in memory; the registry's own file
-  /// is neither opened nor made. What folders do not tell (ranks given, times, numbers of Slurm) is as in a new row. What changes jobs
+  /// For who may only read the store: its jobs as its folders and its log of submissions show them now, in memory; the registry's own file
+  /// is neither opened nor made. What folders do not record (ranks given, times, numbers of Slurm) is as in a new row. What changes jobs
   /// throws InputError.
   static Registry open_to_read(const store::Store& store);
   Registry(Registry&&) noexcept;
-  ~Registry();
+  ~Registry() override;
 
   /// Inserts each job unless there is a row; a failed or cancelled row stays. One transaction. Per submission: true when a row was made.
   std::vector<bool> submit(const std::vector<Submission>& submissions);
 
-  std::optional<Job> find(const store::Id& id) const;
+  std::optional<Job> find(const store::Id& id) const override;
   /// All rows whose id begins with `prefix` (hex digits), at most `most`.
-  std::vector<Job> find_by_prefix(std::string_view prefix, std::size_t most = 10) const;
-  /// In the order of submission; empty `states`: all.
-  std::vector<Job> list(const std::vector<State>& states = {}) const;
+  std::vector<Job> find_by_prefix(std::string_view prefix, std::size_t max = 10) const;
+  std::vector<Job> list(const std::vector<JobState>& states) const override;
+  std::vector<Job> list() const { return list({}); }
   /// The newest submission of a job file; of all job files, the newest of each.
   std::optional<Submission> find_last_submission(const std::string& job_file) const;
   std::vector<Submission> list_last_submissions() const;
 
-  /// In one write transaction: hands `choose` the jobs that run (all engines) and at most `most` that are ready for `engine` in the order
-  /// of submission; those that it returns (with `given` and `reason` set) become running: attempts + 1, new token, `runner` answers
-  /// for them. Returns them. Nothing in `choose` may use the registry.
-  using Choose = std::function<std::vector<Job>(const std::vector<Job>& running, const std::vector<Job>& ready)>;
-  std::vector<Job> claim(const std::string& engine, const process::Identity& worker, const Choose& choose, std::size_t most = 1000);
-
-  /// Reads the row in a write transaction, lets `change` edit it, writes it back. False, and nothing is written, when there is no such row
-  /// or `change` returns false (it found the row not as expected, e.g. another token).
-  bool update(const store::Id& id, const std::function<bool(Job&)>& change);
+  /// Each in one write transaction.
+  std::vector<Job> claim(store::JobEngine engine, const process::Identity& worker, const Choose& choose, std::size_t max = 1000) override;
+  bool update(const store::Id& id, const std::function<bool(Job&)>& change) override;
 
   /// Forgets rows that have ended (gc); others stay.
   void remove(const std::vector<store::Id>& ids);

@@ -33,13 +33,11 @@ constexpr const char* kColumns =
     "ready_boot_s, ready_boot_id, submitted_unix_s, started_unix_s, ended_unix_s, given_ranks, given_memory_gb, sum";
 constexpr int kSumColumn = 25;
 
-constexpr std::array<State, 6> kStates{State::queued, State::running, State::waiting, State::done, State::failed, State::cancelled};
-
 std::string calc_sum(const std::string& fields) { return store::hash_text(fields).text().substr(0, 16); }
 
 std::string calc_sum(const Job& job, long long seq) {
-  std::string fields = fmt::format("{}|{}|{}|{}|{}|{}|{}|{}", job.id.text(), seq, to_text(job.state), job.engine, job.resources.ranks,
-                                   job.resources.memory_gb, job.resources.time_limit_s, job.cancel_wanted);
+  std::string fields = fmt::format("{}|{}|{}|{}|{}|{}|{}|{}", job.id.text(), seq, to_text(job.state), to_text(job.engine),
+                                   job.resources.ranks, job.resources.memory_gb, job.resources.time_limit_s, job.cancel_wanted);
   fields += fmt::format("|{}|{}|{}|{}|{}|{}|{}", job.worker.pid, job.worker.start_ticks, job.attempts, job.failures, job.ready_boot_s,
                         job.submitted_unix_s, job.started_unix_s);
   fields += fmt::format("|{}|{}|{}", job.ended_unix_s, job.given.ranks, job.given.memory_gb);
@@ -57,12 +55,13 @@ std::string calc_version_sum(long long version) { return calc_sum(fmt::format("c
 
 Job read_row(const Statement& row) {
   const auto id = store::parse_id(row.text(0));
-  const auto state = find_state(row.text(2));
-  if (!id || !state) throw Damaged("a row of the registry names no job or no state");
+  const auto state = store::find_state(row.text(2));
+  const auto engine = store::find_engine(row.text(4));
+  if (!id || !state || !engine) throw Damaged("a row of the registry names no job or no state");
   Job job{*id};
   job.state = *state;
   job.name = row.text(3);
-  job.engine = row.text(4);
+  job.engine = *engine;
   job.resources.ranks = static_cast<int>(row.integer(5));
   job.resources.memory_gb = row.number(6);
   job.resources.time_limit_s = row.number(7);
@@ -85,7 +84,7 @@ Job read_row(const Statement& row) {
 }
 
 void bind_row(Statement& row, const Job& job, long long seq) {
-  row.bind(job.id.text()).bind(seq).bind(to_text(job.state)).bind(job.name).bind(job.engine);
+  row.bind(job.id.text()).bind(seq).bind(to_text(job.state)).bind(job.name).bind(to_text(job.engine));
   row.bind(static_cast<long long>(job.resources.ranks)).bind(job.resources.memory_gb).bind(job.resources.time_limit_s);
   row.bind(job.reason).bind(job.token).bind(job.worker.host).bind(job.worker.boot).bind(static_cast<long long>(job.worker.pid));
   row.bind(static_cast<long long>(job.worker.start_ticks)).bind(job.slurm_job).bind(job.cancel_wanted ? 1LL : 0LL);
@@ -118,30 +117,6 @@ Submission read_submission_row(const Statement& row) {
 }
 
 }  // namespace
-
-std::string to_text(State state) {
-  switch (state) {
-    case State::queued:
-      return "queued";
-    case State::running:
-      return "running";
-    case State::waiting:
-      return "waiting";
-    case State::done:
-      return "done";
-    case State::failed:
-      return "failed";
-    default:
-      return "cancelled";
-  }
-}
-
-std::optional<State> find_state(const std::string& text) {
-  for (const State state : kStates) {
-    if (text == to_text(state)) return state;
-  }
-  return std::nullopt;
-}
 
 bool make_tables(Database& database) {
   Statement count(database, "select count(*) from sqlite_schema");

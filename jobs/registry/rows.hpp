@@ -18,8 +18,6 @@ bool make_tables(Database& database);
 /// Looks at every page and every row. Throws Damaged for what is not as we wrote it, InputError for a newer version.
 void check_tables(Database& database);
 
-std::optional<State> find_state(const std::string& text);
-
 /// All rows in the order of submission, or those that `condition` ("where ...", without the word order) picks; `bind` fills its marks.
 std::vector<Job> read_jobs(Database& database, const std::string& condition = "", const std::vector<std::string>& bind = {});
 std::optional<Job> read_job(Database& database, const store::Id& id);

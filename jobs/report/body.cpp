@@ -11,8 +11,8 @@
 namespace carillon::report {
 namespace {
 
-constexpr std::size_t kMostFaults = 50;
-constexpr std::size_t kMostJobBytes = 200000;
+constexpr std::size_t kMaxFaults = 50;
+constexpr std::size_t kMaxJobBytes = 200000;
 
 Html make_tile(std::string_view what, const Html& value, std::string_view remark) {
   return html("<div class=\"tile\"><div class=\"what\">{}</div><div class=\"value\">{}</div><div class=\"remark\">{}</div></div>\n", what,
@@ -126,7 +126,7 @@ Html make_check_section(const Subject& subject) {
   Table table({{""}, {"property"}, {"figure"}});
   for (const bank::Check& check : subject.checks) {
     if (check.faults.empty()) table.add({html("<span class=\"ok\">ok</span>"), html("{}", check.property), html("{}", check.figure)});
-    for (std::size_t i = 0; i < std::min<std::size_t>(check.faults.size(), kMostFaults); ++i)
+    for (std::size_t i = 0; i < std::min<std::size_t>(check.faults.size(), kMaxFaults); ++i)
       table.add({html("<span class=\"fault\">FAULT</span>"), html("{}", check.property), html("{}", check.faults[i])});
   }
   return make_section("checks", "Checks",
@@ -137,7 +137,7 @@ Html make_job_section(const Subject& subject) {
   Json::Value job = subject.record.job;
   if (!job.isObject()) return leave_out("job", "Job", "neither the file of the resolved job nor the bank holds it.");
   job.removeMember("run");
-  Html out = html("<pre>{}</pre>\n", escape(write_lines(job), kMostJobBytes));
+  Html out = html("<pre>{}</pre>\n", escape(write_lines(job), kMaxJobBytes));
   return make_section("job", "Job", out);
 }
 

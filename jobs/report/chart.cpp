@@ -1,6 +1,6 @@
 // Method:     a scale from values to pixels for each axis; ticks at 1, 2 and 5 times powers of ten.
 // Source:     none.
-// Deviations: more marks than kMostTitled are one path without titles, which a browser draws at once.
+// Deviations: more marks than kMaxTitled are one path without titles, which a browser draws at once.
 #include "jobs/report/chart.hpp"
 
 #include <algorithm>
@@ -10,8 +10,8 @@ namespace carillon::report {
 namespace {
 
 constexpr double kWidth = 920.0;
-constexpr std::size_t kMostTitled = 1500;
-constexpr double kMostDecades = 60.0;
+constexpr std::size_t kMaxTitled = 1500;
+constexpr double kMaxDecades = 60.0;
 
 bool is_on(const Axis& axis, double value) { return std::isfinite(value) && (!axis.is_log || value > 0.0); }
 
@@ -20,7 +20,7 @@ class Scale {
  public:
   Scale(const Axis& axis, double low, double high, double from_px, double to_px)
       : is_log_(axis.is_log), low_(turn(low)), high_(turn(high)), from_px_(from_px), to_px_(to_px) {
-    if (is_log_) low_ = std::max(low_, high_ - kMostDecades);
+    if (is_log_) low_ = std::max(low_, high_ - kMaxDecades);
     const double room = std::max(high_ - low_, is_log_ ? 0.3 : std::max(std::abs(high_), 1e-300) * 1e-3);
     const double middle = 0.5 * (low_ + high_);
     low_ = middle - 0.53 * room;
@@ -123,7 +123,7 @@ Html draw_series(const Frame& frame, const Series& series, const std::vector<con
       const double from = x.find(mark->x_low), to = x.find(mark->x_high);
       bars.push_back(html("M{0:.1f} {2:.1f}v6m0 -3H{1:.1f}m0 -3v6", from, to, height - 3.0));
     }
-    if (marks.size() > kMostTitled)
+    if (marks.size() > kMaxTitled)
       dots.push_back(html("M{:.1f} {:.1f}h0", at, height));
     else
       titled += html("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3\"><title>{}</title></circle>\n", at, height, mark->title);
@@ -156,13 +156,13 @@ Html draw_legend(const std::vector<Series>& series) {
 Html draw_bars(std::string_view title, const std::vector<Bar>& bars) {
   if (bars.empty()) return {};
   constexpr double kRow = 27.0, kLabel = 170.0, kText = 180.0;
-  double most = 0.0;
-  for (const Bar& bar : bars) most = std::max(most, bar.value);
+  double max = 0.0;
+  for (const Bar& bar : bars) max = std::max(max, bar.value);
   const double height = kRow * static_cast<double>(bars.size()) + 4.0;
   Html out = html("<svg viewBox=\"0 0 {:.0f} {:.0f}\" role=\"img\" aria-label=\"{}\">\n", kWidth, height, title);
   for (std::size_t i = 0; i < bars.size(); ++i) {
     const double top = kRow * static_cast<double>(i) + 2.0;
-    const double width = most > 0.0 ? (kWidth - kLabel - kText) * (bars[i].value / most) : 0.0;
+    const double width = max > 0.0 ? (kWidth - kLabel - kText) * (bars[i].value / max) : 0.0;
     out += html("<text x=\"{:.0f}\" y=\"{:.1f}\" text-anchor=\"end\">{}</text>", kLabel - 10.0, top + 17.0, escape(bars[i].label, 40));
     out += html("<rect class=\"c0\" x=\"{:.0f}\" y=\"{:.1f}\" width=\"{:.2f}\" height=\"18\" rx=\"2\"/>", kLabel, top + 3.0,
                 std::max(width, 1.0));

@@ -12,22 +12,12 @@
 #include <vector>
 
 #include "runtime/base/command.hpp"
+#include "runtime/base/result.hpp"
 
 namespace carillon::report {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr std::size_t kKeptBytes = 4096;  // of what it prints
-
-/// The last line of what it printed, without the name of the program.
-std::string find_last_line(std::string text) {
-  while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) text.pop_back();
-  if (const auto line = text.rfind('\n'); line != std::string::npos) text.erase(0, line + 1);
-  constexpr std::string_view kName = "carillon-draw: ";
-  if (text.starts_with(kName)) text.erase(0, kName.size());
-  return text;
-}
 
 bool is_whole_png(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
@@ -42,20 +32,20 @@ bool is_whole_png(const fs::path& file) {
 std::string run(const fs::path& program, const fs::path& bank, int modes, const fs::path& picture, double limit_s) {
   std::string numbers = "1";
   for (int mode = 2; mode <= modes; ++mode) numbers += fmt::format(",{}", mode);
+  const fs::path file = picture.parent_path() / "result.json";
   base::Finished finished;
   try {
-    finished =
-        base::run({.words = {program, "modes", bank, "-o", picture, "--modes", numbers}, .errors = base::kCapture, .default_signals = true},
-                  {.patience_s = limit_s, .max_bytes = kKeptBytes, .keeps_tail = true});
+    finished = base::run({.words = {program, "modes", bank, "-o", picture, "--modes", numbers, "--result", file}, .default_signals = true},
+                         {.patience_s = limit_s});
   } catch (const SystemError& error) {
     return error.what();
   }
-  const std::string last_line = find_last_line(finished.errors);
   if (finished.was_slow) return fmt::format("carillon-draw took longer than {:g} s and was ended", limit_s);
   if (finished.signal != 0) return fmt::format("carillon-draw was ended by signal {}", finished.signal);
   if (finished.exit_code == 0) return {};
-  if (last_line.empty()) return fmt::format("carillon-draw failed with exit code {}", finished.exit_code);
-  return fmt::format("carillon-draw said: {}", last_line);
+  const std::optional<base::Result> result = base::read_result(file);
+  if (!result || result->message.empty()) return fmt::format("carillon-draw failed with exit code {}", finished.exit_code);
+  return fmt::format("carillon-draw: {}", result->message);
 }
 
 }  // namespace
@@ -65,7 +55,7 @@ Drawing draw_modes(const fs::path& given, const fs::path& bank, int modes, const
   fs::remove(picture, error);
   const std::optional<fs::path> program = given.empty() ? base::find_program("carillon-draw") : std::optional(fs::absolute(given, error));
   if (!program || !base::is_program(*program)) return {"carillon-draw is not installed here"};
-  // In a folder of its own, which goes with all that is in it, whatever becomes of the program.
+  // In a folder of its own, which is removed with its content, however the program ends.
   std::string place = (fs::absolute(picture, error).parent_path() / ".drawing-XXXXXX").string();
   if (::mkdtemp(place.data()) == nullptr) return {fmt::format("there is no place to draw: {}", std::strerror(errno))};
   const fs::path drawn = fs::path(place) / picture.filename();

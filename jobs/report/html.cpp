@@ -51,11 +51,11 @@ const char* find_entity(char c) {
 
 }  // namespace
 
-Html escape(std::string_view text, std::size_t most) {
+Html escape(std::string_view text, std::size_t max) {
   std::string out;
   for (std::size_t at = 0; at < text.size();) {
     const auto [length, point] = decode(text, at);
-    if (at + length > most) {
+    if (at + length > max) {
       out += "\u2026";
       break;
     }

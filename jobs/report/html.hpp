@@ -33,7 +33,7 @@ class Html {
 
 /// Text as a page or an attribute in quotation marks shows it. What is no UTF-8, control characters and those that turn the direction of
 /// writing are shown as \x1b or \u202e; what is longer than `most` bytes is cut, with an ellipsis.
-Html escape(std::string_view text, std::size_t most = 300);
+Html escape(std::string_view text, std::size_t max = 300);
 
 template <class T>
 using Shown = std::conditional_t<std::is_arithmetic_v<T>, T, std::string>;
@@ -65,6 +65,7 @@ struct Column {
   bool is_number = false;
 };
 
+/// A table whose rows have as many cells as there are columns. Cells are Html, so that no text is unescaped.
 class Table {
  public:
   explicit Table(std::vector<Column> columns) : columns_(std::move(columns)) {}

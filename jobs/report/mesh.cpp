@@ -98,7 +98,7 @@ Html make_mesh_section(const Subject& subject) {
   facts.add("connected parts", html("{}", format_count(bank.counts.components)));
   facts.add("surface", html("{} triangles", format_count(static_cast<std::int64_t>(bank.triangles.size()))),
             fmt::format("{} vertices", format_count(static_cast<std::int64_t>(bank.vertex_count()))));
-  add_if_any(facts, mesh, "held_nodes", "fixed nodes", "by the job");
+  add_if_any(facts, mesh, "fixed_nodes", "fixed nodes", "by the job");
   add_count(facts, mesh, "file_nodes", "nodes of the file");
   add_if_any(facts, mesh, "refinements", "refined", "times");
   add_if_any(facts, mesh, "reoriented", "turned round", "elements that were inside out");

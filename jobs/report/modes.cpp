@@ -1,4 +1,4 @@
-// Method:     frequencies on a logarithmic axis, each with what is known of its error; numbers in tables beside the charts.
+// Method:     frequencies on a logarithmic axis, each with what is known of its error; numbers in tables next to the charts.
 // Source:     docs/error-bars.md, docs/howto/trust-a-bank.md.
 // Deviations: none.
 #include <algorithm>
@@ -11,7 +11,7 @@
 namespace carillon::report {
 namespace {
 
-constexpr std::size_t kMostRows = 1000;
+constexpr std::size_t kMaxRows = 1000;
 constexpr double kResidualLimit = 1e-4;  // of a sane bank
 
 double calc_t60_s(const bank::Bank& bank, std::size_t mode) { return std::log(1000.0) / bank.decay_per_s[mode]; }
@@ -79,7 +79,7 @@ Html make_mode_table(const bank::Bank& bank) {
                {"T60 [s]", true},
                {"residual", true},
                {"gain", true}});
-  const std::size_t shown = std::min(kMostRows, bank.mode_count());
+  const std::size_t shown = std::min(kMaxRows, bank.mode_count());
   for (std::size_t i = 0; i < shown; ++i) {
     table.add({html("{}", i + 1), html("{:.2f}", bank.freq_hz(i)), make_cents(bank.algebraic_error_cents, i),
                make_cents(bank.discretisation_error_cents, i), html("{:.4g}", bank.decay_per_s[i]), html("{:.3g}", calc_t60_s(bank, i)),
@@ -100,7 +100,7 @@ Html find_largest(const std::vector<double>& values, const bank::Bank& bank, std
   return html("{} at {}", format(*worst), name_mode(bank, static_cast<std::size_t>(worst - values.begin())));
 }
 
-/// Both error bars over the frequency; bounds that are next to nothing beside the estimates only in words.
+/// Both error bars over the frequency; bounds that are negligible against the estimates only in words.
 Html draw_errors(const bank::Bank& bank) {
   constexpr double kNothing = 1e-3;
   const auto find_worst = [](const std::vector<double>& bars) { return bars.empty() ? 0.0 : *std::max_element(bars.begin(), bars.end()); };
@@ -114,7 +114,7 @@ Html draw_errors(const bank::Bank& bank) {
   if (mesh > kNothing * body) chart.series.push_back(make_series(bank, "mesh (bound)", 1, bank.algebraic_error_cents, format_cents));
   Html out = draw_scatter(chart);
   if (body > 0.0 && mesh > 0.0 && mesh <= kNothing * body)
-    out += html("<p class=\"remark\">Estimates against the body; the bounds of the mesh are next to nothing beside them.</p>\n");
+    out += html("<p class=\"remark\">Estimates against the body; the bounds of the mesh are negligible against them.</p>\n");
   return out;
 }
 
@@ -124,7 +124,7 @@ Html make_cut_table(const bank::Bank& bank) {
   Table table(
       {{"below [Hz]", true}, {"counted by inertia", true}, {"counted since the cut before", true}, {"modes here", true}, {"margin", true}});
   const std::size_t cuts = std::min({proof.cut_hz.size(), proof.below.size(), proof.margin.size()});
-  for (std::size_t i = 0; i < std::min(cuts, kMostRows); ++i) {
+  for (std::size_t i = 0; i < std::min(cuts, kMaxRows); ++i) {
     std::int64_t here = 0;
     for (std::size_t m = 0; i > 0 && m < bank.mode_count(); ++m)
       here += static_cast<std::int64_t>(bank.freq_hz(m) >= proof.cut_hz[i - 1] && bank.freq_hz(m) < proof.cut_hz[i]);
@@ -175,8 +175,8 @@ Html make_proof_section(const Subject& subject) {
   for (std::size_t i = 0; i < std::min<std::size_t>(proof.rigid_per_component.size(), 24); ++i)
     rigid += fmt::format("{}{}", i == 0 ? "" : ", ", proof.rigid_per_component[i]);
   if (proof.rigid_per_component.size() > 24) rigid += " ...";
-  facts.add("rigid motions", html("{}", rigid), "of each connected part; 6 where nothing is held");
-  facts.add("groups of equal modes", html("{}", proof.cluster_first.size()), "their single shapes are one choice among many");
+  facts.add("rigid motions", html("{}", rigid), "of each connected part; 6 where no node is fixed");
+  facts.add("groups of degenerate modes", html("{}", proof.cluster_first.size()), "their single shapes are one choice among many");
   facts.add("method", html("{}", proof.method));
   out += facts.finish();
   return make_section("proof", "Proof that no mode is missing", out);

@@ -15,9 +15,9 @@
 namespace carillon::report {
 namespace {
 
-constexpr std::uint64_t kMostBytes = 64 << 20;
-constexpr Json::ArrayIndex kMostTexts = 50;
-constexpr double kMostCount = 9e15;  // below 2^53
+constexpr std::uint64_t kMaxBytes = 64 << 20;
+constexpr Json::ArrayIndex kMaxTexts = 50;
+constexpr double kMaxCount = 9e15;  // below 2^53
 
 }  // namespace
 
@@ -52,7 +52,7 @@ std::optional<double> find_amount(const Json::Value& in, const char* key) {
 
 std::optional<std::int64_t> find_count(const Json::Value& in, const char* key) {
   const std::optional<double> value = find_amount(in, key);
-  if (!value || *value > kMostCount || *value != std::floor(*value)) return std::nullopt;
+  if (!value || *value > kMaxCount || *value != std::floor(*value)) return std::nullopt;
   return static_cast<std::int64_t>(*value);
 }
 
@@ -64,7 +64,7 @@ std::optional<std::string> find_text(const Json::Value& in, const char* key) {
 
 std::vector<std::string> find_texts(const Json::Value& list) {
   std::vector<std::string> texts;
-  for (Json::ArrayIndex i = 0; list.isArray() && i < std::min(list.size(), kMostTexts); ++i)
+  for (Json::ArrayIndex i = 0; list.isArray() && i < std::min(list.size(), kMaxTexts); ++i)
     if (list[i].isString() && std::find(texts.begin(), texts.end(), list[i].asString()) == texts.end()) texts.push_back(list[i].asString());
   return texts;
 }
@@ -73,7 +73,7 @@ Record read_record(const std::filesystem::path& resolved_job, const std::string&
   Record record;
   if (!resolved_job.empty()) {
     try {
-      record.job = parse_json(base::read_file(resolved_job, "resolved job", kMostBytes));
+      record.job = parse_json(base::read_file(resolved_job, "resolved job", kMaxBytes));
       if (!record.job.isObject()) record.remarks.emplace_back("The file of the resolved job is no JSON object.");
     } catch (const InputError&) {
       record.remarks.emplace_back("The file of the resolved job cannot be read.");

@@ -1,4 +1,4 @@
-// The record of a run as somebody left it: nothing in it is sure.
+// The record of a run, which is untrusted input.
 #pragma once
 
 #include <json/json.h>

@@ -1,4 +1,5 @@
-// Method:     the bank is read without judging it, its checks and the record of its run beside; each section is made from what is there.
+// Method:     the bank is read without judging it, and so are its checks and the record of its run; each section is made from what is
+//             there.
 // Source:     none.
 // Deviations: none.
 #include "jobs/report/report.hpp"
@@ -14,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kMostDrawn = 12;  // carillon-draw takes no more
+constexpr int kMaxDrawn = 12;  // carillon-draw takes no more
 
 Subject read_subject(const fs::path& file, const fs::path& resolved_job) {
   Subject subject;
@@ -42,13 +43,13 @@ std::string find_title(const Subject& subject) {
 Html make_picture_section(const Subject& subject, const fs::path& folder, const Options& options) {
   constexpr const char* kHeading = "The first modes";
   const int modes =
-      std::min({options.drawn_modes, kMostDrawn, static_cast<int>(std::min<std::size_t>(subject.bank.mode_count(), kMostDrawn))});
+      std::min({options.drawn_modes, kMaxDrawn, static_cast<int>(std::min<std::size_t>(subject.bank.mode_count(), kMaxDrawn))});
   std::error_code error;
   if (modes < 1) {
     fs::remove(folder / kPictureFile, error);
     return leave_out("pictures", kHeading,
                      subject.bank.mode_count() == 0   ? "the bank has no modes to draw."
-                     : options.undrawn_reason.empty() ? "no pictures were asked for."
+                     : options.undrawn_reason.empty() ? "not drawn yet; carillon report draws them."
                                                       : options.undrawn_reason + ".");
   }
   const Drawing drawing = draw_modes(options.draw_program, subject.file, modes, folder / kPictureFile, options.draw_limit_s);

@@ -11,8 +11,8 @@
 namespace carillon::report {
 namespace {
 
-constexpr std::size_t kMostBars = 32;
-constexpr std::size_t kMostRows = 200;
+constexpr std::size_t kMaxBars = 32;
+constexpr std::size_t kMaxRows = 200;
 
 /// The phases of a record in the order in which they happen, others behind them.
 std::vector<std::string> order_phases(const Json::Value& phases) {
@@ -23,7 +23,7 @@ std::vector<std::string> order_phases(const Json::Value& phases) {
   for (const std::string& name : known)
     if (phases.isMember(name)) names.push_back(name);
   for (const std::string& name : phases.getMemberNames())
-    if (std::find(known.begin(), known.end(), name) == known.end() && names.size() < kMostBars) names.push_back(name);
+    if (std::find(known.begin(), known.end(), name) == known.end() && names.size() < kMaxBars) names.push_back(name);
   return names;
 }
 
@@ -42,18 +42,18 @@ std::vector<Phase> find_phases(const Subject& subject) {
 
 Html format_or_dash(const std::optional<double>& value, std::string (*format)(double)) { return html("{}", value ? format(*value) : "-"); }
 
-Html make_station_table(const Subject& subject) {
-  const Json::Value& stations = find(subject.record.run, "stations");
+Html make_phase_table(const Subject& subject) {
+  const Json::Value& recorded = find(subject.record.run, "stations");
   Table table(
-      {{"station"}, {"wall clock", true}, {"CPU, all ranks", true}, {"peak so far, largest rank", true}, {"peak so far, all ranks", true}});
-  for (Json::ArrayIndex i = 0; stations.isArray() && i < std::min<Json::ArrayIndex>(stations.size(), kMostRows); ++i) {
-    const Json::Value& station = stations[i];
-    const auto name = find_text(station, "name");
+      {{"phase"}, {"wall clock", true}, {"CPU, all ranks", true}, {"peak so far, largest rank", true}, {"peak so far, all ranks", true}});
+  for (Json::ArrayIndex i = 0; recorded.isArray() && i < std::min<Json::ArrayIndex>(recorded.size(), kMaxRows); ++i) {
+    const Json::Value& phase = recorded[i];
+    const auto name = find_text(phase, "name");
     if (!name) continue;
-    table.add({html("{}", *name), format_or_dash(find_amount(station, "seconds"), format_seconds),
-               format_or_dash(find_amount(station, "cpu_seconds"), format_seconds),
-               format_or_dash(find_amount(station, "peak_bytes_largest_rank"), format_bytes),
-               format_or_dash(find_amount(station, "peak_bytes_all_ranks"), format_bytes)});
+    table.add({html("{}", *name), format_or_dash(find_amount(phase, "seconds"), format_seconds),
+               format_or_dash(find_amount(phase, "cpu_seconds"), format_seconds),
+               format_or_dash(find_amount(phase, "peak_bytes_largest_rank"), format_bytes),
+               format_or_dash(find_amount(phase, "peak_bytes_all_ranks"), format_bytes)});
   }
   return table.finish();
 }
@@ -70,13 +70,13 @@ std::vector<double> find_rank_bytes(const Subject& subject) {
 }
 
 std::vector<Bar> make_rank_bars(const std::vector<double>& bytes) {
-  const std::size_t each = (bytes.size() + kMostBars - 1) / kMostBars;
+  const std::size_t each = (bytes.size() + kMaxBars - 1) / kMaxBars;
   std::vector<Bar> bars;
   for (std::size_t first = 0; first < bytes.size(); first += each) {
     const std::size_t last = std::min(first + each, bytes.size());
-    const double most =
+    const double max =
         *std::max_element(bytes.begin() + static_cast<std::ptrdiff_t>(first), bytes.begin() + static_cast<std::ptrdiff_t>(last));
-    bars.push_back({each == 1 ? fmt::format("rank {}", first) : fmt::format("ranks {} - {}", first, last - 1), most, format_bytes(most)});
+    bars.push_back({each == 1 ? fmt::format("rank {}", first) : fmt::format("ranks {} - {}", first, last - 1), max, format_bytes(max)});
   }
   return bars;
 }
@@ -89,7 +89,7 @@ Html make_rank_table(const Subject& subject) {
     const auto count = find_count(rank, key);
     return html("{}", count ? format_count(*count) : "-");
   };
-  for (Json::ArrayIndex i = 0; ranks.isArray() && i < std::min<Json::ArrayIndex>(ranks.size(), kMostRows); ++i)
+  for (Json::ArrayIndex i = 0; ranks.isArray() && i < std::min<Json::ArrayIndex>(ranks.size(), kMaxRows); ++i)
     table.add({html("{}", i), cell(ranks[i], "elements"), cell(ranks[i], "owned_nodes"), cell(ranks[i], "halo_nodes")});
   if (table.empty()) return {};
   Facts facts;
@@ -100,7 +100,7 @@ Html make_rank_table(const Subject& subject) {
   Html out = html("<h3>How the mesh was shared</h3>\n");
   out += facts.finish();
   out += table.finish();
-  if (ranks.size() > kMostRows) out += html("<p class=\"remark\">The first {} of {} ranks.</p>\n", kMostRows, ranks.size());
+  if (ranks.size() > kMaxRows) out += html("<p class=\"remark\">The first {} of {} ranks.</p>\n", kMaxRows, ranks.size());
   return out;
 }
 
@@ -136,8 +136,8 @@ Html make_time_section(const Subject& subject) {
                       fmt::format("{} \u00b7 {}", format_seconds(phase.seconds), format_percent(sum > 0.0 ? phase.seconds / sum : 0.0))});
     out += draw_bars("Seconds by phase", bars);
   }
-  const Html stations = make_station_table(subject);
-  if (!stations.empty()) out += html("<details><summary>Stations of the run</summary>\n{}</details>\n", stations);
+  const Html table = make_phase_table(subject);
+  if (!table.empty()) out += html("<details><summary>Phases of the run</summary>\n{}</details>\n", table);
   if (out.empty()) return leave_out("time", "Time", explain_missing(subject, "times"));
   return make_section("time", "Time", out);
 }
@@ -148,7 +148,7 @@ Html make_memory_section(const Subject& subject) {
   if (!bytes.empty()) {
     out += html("<p>At most {} on all ranks together.</p>\n", format_bytes(*find_peak_bytes(subject)));
     out += draw_bars("Peak memory by rank", make_rank_bars(bytes));
-    if (bytes.size() > kMostBars) out += html("<p class=\"remark\">Each bar is the largest of its ranks.</p>\n");
+    if (bytes.size() > kMaxBars) out += html("<p class=\"remark\">Each bar is the largest of its ranks.</p>\n");
   }
   out += make_rank_table(subject);
   if (out.empty()) return leave_out("memory", "Memory", explain_missing(subject, "memory"));
@@ -170,16 +170,22 @@ Html make_work_section(const Subject& subject) {
   add("factorisations", "factorisations", "those of the proof among them");
   add("solves", "solves", "right-hand sides");
   Html out = facts.finish();
-  Table table(
-      {{"phase"}, {"operations", true}, {"messages", true}, {"bytes", true}, {"collectives", true}, {"bytes of collectives", true}});
+  const bool is_profiled = std::any_of(work.begin(), work.end(), [](const Json::Value& phase) { return find_amount(phase, "messages"); });
+  std::vector<Column> columns{{"phase"}, {"operations", true}};
+  if (is_profiled)
+    columns.insert(columns.end(), {{"messages", true}, {"bytes", true}, {"collectives", true}, {"bytes of collectives", true}});
+  Table table(columns);
   const auto cell = [](const Json::Value& of, const char* key, std::string (*format)(double)) {
     return format_or_dash(find_amount(of, key), format);
   };
   for (const std::string& name : order_phases(work)) {
     const Json::Value& of = work[name];
     if (!of.isObject()) continue;
-    table.add({html("{}", name), cell(of, "flops", format_large), cell(of, "messages", format_large), cell(of, "bytes", format_bytes),
-               cell(of, "collectives", format_large), cell(of, "collective_bytes", format_bytes)});
+    std::vector<Html> row{html("{}", name), cell(of, "flops", format_large)};
+    if (is_profiled)
+      row.insert(row.end(), {cell(of, "messages", format_large), cell(of, "bytes", format_bytes), cell(of, "collectives", format_large),
+                             cell(of, "collective_bytes", format_bytes)});
+    table.add(row);
   }
   if (!table.empty()) out += html("<h3>Counted on all ranks, by phase</h3>\n{}", table.finish());
   if (out.empty()) return leave_out("work", "Work", explain_missing(subject, "work"));
@@ -198,7 +204,7 @@ Html make_program_section(const Subject& subject) {
   if (versions.isObject()) {
     for (const std::string& name : versions.getMemberNames()) {
       const auto version = find_text(versions, name.c_str());
-      if (version && ++shown <= kMostBars) facts.add(name, html("{}", *version));
+      if (version && ++shown <= kMaxBars) facts.add(name, html("{}", *version));
     }
   }
   if (facts.empty()) return leave_out("program", "Program and libraries", explain_missing(subject, "versions"));

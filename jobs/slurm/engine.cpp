@@ -1,6 +1,6 @@
 // Method:     Rows are claimed in one transaction; what is handed over is written to the jobs' folders, then sbatch is called, then the
-//             number is written: whoever dies in between leaves enough to find the job in Slurm by its name, or to know that it is not
-//             there.
+//             number is written: a process that dies in between leaves enough to find the job in Slurm by its name, or to know that it is
+//             not there.
 // Source:     docs/howto/slurm.md. Deviations: none.
 #include "jobs/slurm/engine.hpp"
 
@@ -12,55 +12,59 @@
 #include <set>
 #include <tuple>
 
+#include "jobs/outcome/policy.hpp"
 #include "jobs/process/process.hpp"
+#include "jobs/queue/local.hpp"
 #include "jobs/queue/settle.hpp"
 #include "jobs/store/files.hpp"
 #include "jobs/store/open_folder.hpp"
+#include "runtime/base/clock.hpp"
+#include "runtime/base/failure.hpp"
 
 namespace carillon::slurm {
 namespace {
 
 namespace fs = std::filesystem;
 using registry::Job;
-using registry::State;
+using registry::JobState;
 
 constexpr double kMemoryGrowth = 1.5;
 constexpr double kCancelPatienceS = 5.0;
 
-bool is_open(const Job& job) { return job.state == State::queued || job.state == State::running || job.state == State::waiting; }
+bool is_open(const Job& job) { return job.state == JobState::queued || job.state == JobState::running || job.state == JobState::waiting; }
 
-std::string make_name(const Handed& handed, const std::string& number) {
-  return handed.task < 0 ? number : fmt::format("{}_{}", number, handed.task);
+std::string make_name(const SubmittedJob& submitted, const std::string& number) {
+  return submitted.task < 0 ? number : fmt::format("{}_{}", number, submitted.task);
 }
 
 void make_queued(Job& row, const std::string& reason) {
-  row.state = State::queued;
+  row.state = JobState::queued;
   row.slurm_job.clear();
   row.reason = reason;
 }
 
 /// What Slurm said goes to the end of the job's own log, where people look.
-void append_output(const fs::path& root, const fs::path& work, const Handed& handed) {
-  const std::string output = read_output(root, handed);
+void append_output(const fs::path& root, const fs::path& work, const SubmittedJob& submitted) {
+  const std::string output = read_output(root, submitted);
   if (output.empty()) return;
   store::append_text(work / store::kLogFile, output + (output.ends_with('\n') ? "" : "\n"));
   std::error_code error;
-  fs::remove(make_output_file(root, handed.batch, std::max(handed.task, 0)), error);
+  fs::remove(make_output_file(root, submitted.batch, std::max(submitted.task, 0)), error);
 }
 
-void remove_handed(const store::Store& store, const store::Id& id) {
-  if (store.has_work(id)) slurm::remove_handed(store.open_work(id).path());
+void remove_submitted_job(const store::Store& store, const store::Id& id) {
+  if (store.has_work(id)) slurm::remove_submitted_job(store.open_work(id).path());
 }
 
 /// As queue::apply(). Memory that the user named is not raised behind his back; memory that was predicted is, beyond what was given.
 void apply(Job& row, const outcome::Outcome& outcome, bool has_asked_memory) {
   if (outcome.cause == outcome::Cause::memory && has_asked_memory && !row.cancel_wanted) {
-    row.state = State::failed;
+    row.state = JobState::failed;
     row.reason = outcome.reason + "; ask for more by \"resources\": {\"memory_gb\": ...} in the job";
     return;
   }
   const double given_gb = row.given.memory_gb;
-  queue::apply(row, outcome);
+  queue::apply(row, outcome, queue::LocalClock());
   if (outcome.cause == outcome::Cause::memory) row.resources.memory_gb = std::max(row.resources.memory_gb, kMemoryGrowth * given_gb);
 }
 
@@ -74,48 +78,49 @@ store::Resources find_asked(const fs::path& work) {
 }
 
 bool has_ready(const registry::Registry& registry) {
-  const std::vector<Job> jobs = registry.list({State::queued, State::waiting});
-  return std::any_of(jobs.begin(), jobs.end(), [](const Job& job) { return job.engine == "slurm" && job.slurm_job.empty(); });
+  const std::vector<Job> jobs = registry.list({JobState::queued, JobState::waiting});
+  return std::any_of(jobs.begin(), jobs.end(),
+                     [](const Job& job) { return job.engine == store::JobEngine::slurm && job.slurm_job.empty(); });
 }
 
 }  // namespace
 
 Engine::Engine(const store::Store& store, Settings settings, fs::path program, std::function<void(const std::string&)> say)
-    : store_(store), site_(std::move(settings)), program_(std::move(program)), say_(std::move(say)) {
-  if (!site_.settings().program.empty()) program_ = site_.settings().program;
+    : store_(store), client_(std::move(settings)), program_(std::move(program)), say_(std::move(say)) {
+  if (!client_.settings().program.empty()) program_ = client_.settings().program;
 }
 
-void Engine::tell_unreachable(const Unreachable& error) {
-  if (!is_unreachable_told_) say_(fmt::format("{}; the jobs stay as they are until it does", error.what()));
-  is_unreachable_told_ = true;
+void Engine::show_unreachable(const Unreachable& error) {
+  if (!is_unreachable_shown_) say_(fmt::format("{}; the jobs stay as they are until it does", error.what()));
+  is_unreachable_shown_ = true;
 }
 
 std::vector<Job> Engine::hand_over(registry::Registry& registry, const FindNeeds& find_needs) {
   const auto choose = [&](const std::vector<Job>&, const std::vector<Job>& ready) {
     std::vector<Job> chosen;
     for (const Job& job : ready) {
-      if (job.slurm_job.empty() && !read_handed(store_.work_folder(job.id))) chosen.emplace_back(job).reason.clear();
+      if (job.slurm_job.empty() && !read_submitted_job(store_.work_folder(job.id))) chosen.emplace_back(job).reason.clear();
     }
     return chosen;
   };
   std::map<std::tuple<int, double, double>, Rows> alike;
   Rows changed;
   if (!has_ready(registry)) return changed;
-  std::size_t most = 1;
+  std::size_t max_tasks = 1;
   try {
-    most = static_cast<std::size_t>(site_.find_most_tasks());
+    max_tasks = static_cast<std::size_t>(client_.find_max_tasks());
   } catch (const Unreachable& error) {
-    tell_unreachable(error);
+    show_unreachable(error);
     return changed;
   }
-  for (Job& job : registry.claim("slurm", process::find_self(), choose, static_cast<std::size_t>(-1))) {
+  for (Job& job : registry.claim(store::JobEngine::slurm, process::find_self(), choose, static_cast<std::size_t>(-1))) {
     job.given = find_needs(job);
     alike[{job.given.ranks, job.given.memory_gb, job.given.time_limit_s}].push_back(job);
   }
   for (const auto& [needs, jobs] : alike) {
-    for (std::size_t at = 0; at < jobs.size(); at += most) {
+    for (std::size_t at = 0; at < jobs.size(); at += max_tasks) {
       const Rows part(jobs.begin() + static_cast<std::ptrdiff_t>(at),
-                      jobs.begin() + static_cast<std::ptrdiff_t>(std::min(at + most, jobs.size())));
+                      jobs.begin() + static_cast<std::ptrdiff_t>(std::min(at + max_tasks, jobs.size())));
       Batch batch;
       batch.name = store::make_random_name();
       const bool is_single = part.size() == 1;
@@ -134,26 +139,29 @@ std::vector<Job> Engine::hand_over(registry::Registry& registry, const FindNeeds
 void Engine::submit(registry::Registry& registry, const Batch& batch, const Rows& jobs, Rows& changed) {
   const auto change = [&](const Job& job, const std::function<void(Job&)>& act) {
     registry.update(job.id, [&](Job& row) {
-      if (row.state != State::running || row.token != job.token) return false;
+      if (row.state != JobState::running || row.token != job.token) return false;
       act(row);
       changed.push_back(row);
       return true;
     });
   };
-  const auto give_up = [&](State state, const std::string& reason) {
+  const auto give_up = [&](JobState state, const std::string& reason, double delay_s = 0.0) {
     for (const Job& job : jobs) {
-      remove_handed(store_, job.id);
+      remove_submitted_job(store_, job.id);
       change(job, [&](Job& row) {
         make_queued(row, reason);
-        row.state = row.cancel_wanted ? State::cancelled : state;
+        row.state = row.cancel_wanted ? JobState::cancelled : state;
         row.attempts -= 1;
+        row.ready_boot_s = base::get_boot_s() + delay_s;
+        row.ready_boot_id = process::find_boot();
+        if (row.state == JobState::failed || row.state == JobState::cancelled) row.ended_unix_s = registry::find_unix_seconds();
       });
     }
     remove_batch_folder(batch.root, batch.name);
   };
   std::string number;
   try {
-    const std::string script = make_script(batch, site_.settings());
+    const std::string script = make_script(batch, client_.settings());
     std::vector<store::Id> ids;
     for (std::size_t i = 0; i < jobs.size(); ++i) {
       const store::OpenFolder opened = store_.open_work(jobs[i].id);
@@ -161,23 +169,25 @@ void Engine::submit(registry::Registry& registry, const Batch& batch, const Rows
       ids.push_back(jobs[i].id);
       write_failures(work, jobs[i].failures);
       const std::optional<outcome::Attempt> before = outcome::read_attempt(work);
-      write_handed(work, {batch.name, batch.title, jobs.size() > 1 ? static_cast<int>(i) : -1, before ? before->token : ""});
+      write_submitted_job(work, {batch.name, batch.title, jobs.size() > 1 ? static_cast<int>(i) : -1, before ? before->token : ""});
     }
     make_batch_folder(store_, batch.name, script, ids);
-    number = site_.submit(batch);
+    number = client_.submit(batch);
   } catch (const Unreachable& error) {
-    // It may have taken the batch and not told: then it is there by its name, and adopt() finds it.
-    return tell_unreachable(error);
+    // Slurm may still have accepted the batch: then adopt() finds it by its name.
+    return show_unreachable(error);
+  } catch (const DiskFullError& error) {
+    return give_up(JobState::waiting, error.what(), outcome::decide(outcome::Cause::disk_full, 0, false).delay_s);
   } catch (const SystemError& error) {
-    return give_up(State::failed, error.what());
+    return give_up(JobState::failed, error.what());
   } catch (const InputError& error) {
-    return give_up(State::failed, error.what());
+    return give_up(JobState::failed, error.what());
   }
   // Slurm has it. Where this cannot be written any more (a full disk) adopt() finds it later, as after a kill.
   write_number(batch.root, batch.name, number);
   for (std::size_t i = 0; i < jobs.size(); ++i) {
     change(jobs[i], [&](Job& row) {
-      row.state = State::queued;
+      row.state = JobState::queued;
       row.slurm_job = jobs.size() > 1 ? fmt::format("{}_{}", number, i) : number;
       row.given = jobs[i].given;
       row.reason = "handed to Slurm";
@@ -186,8 +196,8 @@ void Engine::submit(registry::Registry& registry, const Batch& batch, const Rows
 }
 
 std::vector<Job> Engine::follow(registry::Registry& registry) {
-  Rows changed, jobs = registry.list({State::queued, State::running, State::waiting});
-  std::erase_if(jobs, [](const Job& job) { return job.engine != "slurm"; });
+  Rows changed, jobs = registry.list({JobState::queued, JobState::running, JobState::waiting});
+  std::erase_if(jobs, [](const Job& job) { return job.engine != store::JobEngine::slurm; });
   try {
     adopt(registry, jobs);
     std::vector<std::string> names, unwanted;
@@ -197,20 +207,20 @@ std::vector<Job> Engine::follow(registry::Registry& registry) {
       if (job.cancel_wanted) unwanted.push_back(job.slurm_job);
     }
     cancel_left(registry);
-    if (!unwanted.empty()) site_.cancel(unwanted);
-    const std::map<std::string, Seen> all = names.empty() ? std::map<std::string, Seen>() : site_.list(names);
+    if (!unwanted.empty()) client_.cancel(unwanted);
+    const std::map<std::string, SlurmStatus> all = names.empty() ? std::map<std::string, SlurmStatus>() : client_.list(names);
     for (const Job& job : jobs) {
       if (job.slurm_job.empty()) continue;
       const auto seen = all.find(job.slurm_job);
-      if (seen == all.end() || seen->second.phase == Phase::ended)
-        settle(registry, job, site_.find_end(job.slurm_job), changed);
+      if (seen == all.end() || seen->second.phase == SlurmPhase::ended)
+        settle(registry, job, client_.find_end(job.slurm_job), changed);
       else
         look_at(registry, job, seen->second, changed);
     }
     clean();
-    is_unreachable_told_ = false;
+    is_unreachable_shown_ = false;
   } catch (const Unreachable& error) {
-    tell_unreachable(error);
+    show_unreachable(error);
   }
   return changed;
 }
@@ -219,35 +229,36 @@ void Engine::adopt(registry::Registry& registry, Rows& jobs) {
   std::map<std::string, std::string> numbers;  // by batch
   for (Job& job : jobs) {
     if (!job.slurm_job.empty()) continue;
-    const bool is_claimed = job.state == State::running;
-    const std::optional<Handed> handed = read_handed(store_.work_folder(job.id));
-    // A registry that was made again names the attempt itself, wherever it runs; else whoever claimed the job may be about to hand it over.
+    const bool is_claimed = job.state == JobState::running;
+    const std::optional<SubmittedJob> submitted = read_submitted_job(store_.work_folder(job.id));
+    // A registry that was made again names the attempt itself, wherever it runs; else the process that claimed the job may be about to hand
+    // it over.
     const auto attempt = outcome::read_attempt(store_.work_folder(job.id));
-    const bool is_attempt = handed && attempt && attempt->token == job.token;
+    const bool is_attempt = submitted && attempt && attempt->token == job.token;
     if (is_claimed && !is_attempt && process::find_life(job.worker) != process::Life::gone && !process::is_self(job.worker)) continue;
     std::string number;
-    if (handed) {
-      number = numbers.try_emplace(handed->batch, read_number(store_.root(), handed->batch)).first->second;
-      if (number.empty()) number = numbers[handed->batch] = site_.find_by_title(handed->title, handed->batch).value_or("none");
-      if (number != "none") write_number(store_.root(), handed->batch, number);
+    if (submitted) {
+      number = numbers.try_emplace(submitted->batch, read_number(store_.root(), submitted->batch)).first->second;
+      if (number.empty()) number = numbers[submitted->batch] = client_.find_by_title(submitted->title, submitted->batch).value_or("none");
+      if (number != "none") write_number(store_.root(), submitted->batch, number);
     }
-    if (!handed && !is_claimed) continue;  // waits to be handed over
-    if (handed && number == "none") remove_handed(store_, job.id);
+    if (!submitted && !is_claimed) continue;  // waits to be handed over
+    if (submitted && number == "none") remove_submitted_job(store_, job.id);
     registry.update(job.id, [&](Job& row) {
       if (!row.slurm_job.empty() || row.state != job.state || row.token != job.token) return false;
       make_queued(row, "");
-      if (handed && number != "none") row.slurm_job = make_name(*handed, number);
+      if (submitted && number != "none") row.slurm_job = make_name(*submitted, number);
       job = row;
       return true;
     });
   }
 }
 
-void Engine::look_at(registry::Registry& registry, const Job& job, const Seen& seen, Rows& changed) {
-  const bool is_running = seen.phase == Phase::runs;
-  const State state = is_running ? State::running : State::queued;
-  const bool is_told = !seen.reason.empty() && seen.reason != "None";
-  const std::string reason = is_running ? "" : fmt::format("waits in Slurm{}", is_told ? " (" + seen.reason + ")" : "");
+void Engine::look_at(registry::Registry& registry, const Job& job, const SlurmStatus& seen, Rows& changed) {
+  const bool is_running = seen.phase == SlurmPhase::runs;
+  const JobState state = is_running ? JobState::running : JobState::queued;
+  const bool has_reason = !seen.reason.empty() && seen.reason != "None";
+  const std::string reason = is_running ? "" : fmt::format("waits in Slurm{}", has_reason ? " (" + seen.reason + ")" : "");
   if (job.state == state && job.reason == reason) return;
   registry.update(job.id, [&](Job& row) {
     if (row.slurm_job != job.slurm_job || !is_open(row)) return false;
@@ -261,34 +272,34 @@ void Engine::look_at(registry::Registry& registry, const Job& job, const Seen& s
   });
 }
 
-void Engine::settle(registry::Registry& registry, const Job& job, const std::optional<Seen>& seen, Rows& changed) {
-  if (seen && seen->phase != Phase::ended) return look_at(registry, job, *seen, changed);
-  // Another command may have settled it while Slurm was asked, and handed it over again.
+void Engine::settle(registry::Registry& registry, const Job& job, const std::optional<SlurmStatus>& seen, Rows& changed) {
+  if (seen && seen->phase != SlurmPhase::ended) return look_at(registry, job, *seen, changed);
+  // Another command may have settled it while Slurm was asked, and submitted it over again.
   const std::optional<Job> now = registry.find(job.id);
   if (!now || now->slurm_job != job.slurm_job || !is_open(*now)) return;
   const fs::path work = store_.work_folder(job.id);
-  const Handed handed = read_handed(work).value_or(Handed{});
+  const SubmittedJob submitted = read_submitted_job(work).value_or(SubmittedJob{});
   const bool is_done = store_.has_bank(job.id);
-  Judgement judgement;
+  SlurmOutcome judgement;
   int failures = 0;
   bool has_asked_memory = false;
   if (!is_done) {
-    judgement = judge(store_, job.id, handed, seen);
+    judgement = judge(store_, job.id, submitted, seen);
     failures = read_failures(work);
-    if (store_.has_work(job.id)) append_output(store_.root(), store_.open_work(job.id).path(), handed);
+    if (store_.has_work(job.id)) append_output(store_.root(), store_.open_work(job.id).path(), submitted);
     has_asked_memory = find_asked(work).memory_gb > 0.0;
   }
   registry.update(job.id, [&](Job& row) {
     if (row.slurm_job != job.slurm_job || !is_open(row)) return false;
-    remove_handed(store_, job.id);
+    remove_submitted_job(store_, job.id);
     row.slurm_job.clear();
     row.attempts += seen ? seen->restarts : 0;
     row.ended_unix_s = registry::find_unix_seconds();
     if (is_done) {
-      row.state = State::done;
+      row.state = JobState::done;
       row.reason.clear();
     } else if (judgement.is_cancelled) {
-      row.state = State::cancelled;
+      row.state = JobState::cancelled;
       row.reason = row.cancel_wanted ? "cancelled" : "cancelled in Slurm (scancel)";
     } else {
       row.failures = failures;
@@ -307,8 +318,8 @@ void Engine::clean() {
     const std::string batch = entry.path().filename().string();
     bool is_used = false;
     for (const store::Id& id : read_jobs(store_.root(), batch)) {
-      const std::optional<Handed> handed = read_handed(store_.work_folder(id));
-      is_used = is_used || (handed && handed->batch == batch);
+      const std::optional<SubmittedJob> submitted = read_submitted_job(store_.work_folder(id));
+      is_used = is_used || (submitted && submitted->batch == batch);
     }
     if (!is_used) remove_batch_folder(store_.root(), batch);
   }
@@ -318,32 +329,32 @@ bool Engine::cancel(registry::Registry& registry, const store::Id& id) {
   bool has_slurm = false;
   registry.update(id, [&](Job& row) {
     if (!is_open(row)) return false;
-    const bool is_with_slurm = !row.slurm_job.empty() || row.state == State::running || read_handed(store_.work_folder(id));
+    const bool is_with_slurm = !row.slurm_job.empty() || row.state == JobState::running || read_submitted_job(store_.work_folder(id));
     if (!is_with_slurm) {
-      queue::cancel_unstarted(row);
+      queue::cancel_not_started(row);
       return true;
     }
     has_slurm = row.cancel_wanted = true;
     return true;
   });
   if (!has_slurm) return true;
-  for (const double start_s = process::find_boot_seconds();;) {
+  for (const double start_s = base::get_boot_s();;) {
     follow(registry);
     const std::optional<Job> row = registry.find(id);
     if (!row || !is_open(*row)) return true;
-    if (is_unreachable_told_ || process::find_boot_seconds() - start_s > kCancelPatienceS) return false;
+    if (is_unreachable_shown_ || base::get_boot_s() - start_s > kCancelPatienceS) return false;
     const timespec time{0, 300000000};
     ::nanosleep(&time, nullptr);
   }
 }
 
 void Engine::cancel_left(registry::Registry& registry) {
-  for (const Job& job : registry.list({State::cancelled})) {
-    if (job.engine != "slurm" || job.slurm_job.empty()) continue;
-    site_.cancel({job.slurm_job});
-    remove_handed(store_, job.id);
+  for (const Job& job : registry.list({JobState::cancelled})) {
+    if (job.engine != store::JobEngine::slurm || job.slurm_job.empty()) continue;
+    client_.cancel({job.slurm_job});
+    remove_submitted_job(store_, job.id);
     registry.update(job.id, [&](Job& row) {
-      if (row.state != State::cancelled || row.slurm_job != job.slurm_job) return false;
+      if (row.state != JobState::cancelled || row.slurm_job != job.slurm_job) return false;
       row.slurm_job.clear();
       return true;
     });

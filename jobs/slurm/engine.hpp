@@ -12,13 +12,15 @@
 
 #include "jobs/outcome/outcome.hpp"
 #include "jobs/registry/registry.hpp"
+#include "jobs/slurm/client.hpp"
 #include "jobs/slurm/records.hpp"
 #include "jobs/slurm/settings.hpp"
-#include "jobs/slurm/site.hpp"
 #include "jobs/store/store.hpp"
 
 namespace carillon::slurm {
 
+/// Hands jobs to Slurm and follows them. What was handed over is in the job's folder before sbatch is called, so that no job is submitted
+/// twice, whenever this process ends.
 class Engine {
  public:
   /// Ranks, memory and time limit of a job. Asked outside of transactions.
@@ -31,7 +33,7 @@ class Engine {
   /// Slurm does not answer they stay queued. Returns the rows that Slurm took or refused. Call follow() first.
   std::vector<registry::Job> hand_over(registry::Registry& registry, const FindNeeds& find_needs);
 
-  /// Brings the rows up to date: waits, runs, ended and why, to be handed over again. Ends those with a wish to be cancelled. Rows stay as
+  /// Brings the rows up to date: waits, runs, ended and why, to be handed over again. Ends those that are to be cancelled. Rows stay as
   /// they are while Slurm does not answer. Returns those whose state changed.
   std::vector<registry::Job> follow(registry::Registry& registry);
 
@@ -42,24 +44,24 @@ class Engine {
   using Rows = std::vector<registry::Job>;
   void submit(registry::Registry& registry, const Batch& batch, const Rows& jobs, Rows& changed);
   void adopt(registry::Registry& registry, Rows& jobs);
-  void look_at(registry::Registry& registry, const registry::Job& job, const Seen& seen, Rows& changed);
-  void settle(registry::Registry& registry, const registry::Job& job, const std::optional<Seen>& seen, Rows& changed);
+  void look_at(registry::Registry& registry, const registry::Job& job, const SlurmStatus& seen, Rows& changed);
+  void settle(registry::Registry& registry, const registry::Job& job, const std::optional<SlurmStatus>& seen, Rows& changed);
   void cancel_left(registry::Registry& registry);
   void clean();
-  void tell_unreachable(const Unreachable& error);
+  void show_unreachable(const Unreachable& error);
 
   const store::Store& store_;
-  Site site_;
+  SlurmClient client_;
   std::filesystem::path program_;
   std::function<void(const std::string&)> say_;
-  bool is_unreachable_told_ = false;
+  bool is_unreachable_shown_ = false;
 };
 
 /// What became of a job that Slurm has ended, from what it left in its folder and what Slurm says. Reads files only.
-struct Judgement {
-  bool is_cancelled = false;  // in Slurm, by somebody
+struct SlurmOutcome {
+  bool is_cancelled = false;  // by scancel
   outcome::Outcome outcome;
 };
-Judgement judge(const store::Store& store, const store::Id& id, const Handed& handed, const std::optional<Seen>& seen);
+SlurmOutcome judge(const store::Store& store, const store::Id& id, const SubmittedJob& submitted, const std::optional<SlurmStatus>& seen);
 
 }  // namespace carillon::slurm

@@ -11,8 +11,8 @@
 
 #include "jobs/attempt/attempt.hpp"
 #include "jobs/outcome/policy.hpp"
+#include "jobs/slurm/client.hpp"
 #include "jobs/slurm/records.hpp"
-#include "jobs/slurm/site.hpp"
 #include "jobs/store/files.hpp"
 #include "jobs/store/open_folder.hpp"
 #include "jobs/store/store.hpp"
@@ -35,7 +35,7 @@ outcome::Outcome explain_stop(outcome::Outcome outcome) {
 
 int end_attempt(const std::filesystem::path& named, int exit_code) {
   const char* job = std::getenv("SLURM_JOB_ID");
-  if (job == nullptr || exit_code != attempt::kExitGoesOn) return exit_code;
+  if (job == nullptr || exit_code != kExitCheckpointed) return exit_code;
   // work/ab/<id>: each opened in the one above.
   const std::filesystem::path shard = named.parent_path();
   const auto opened = store::OpenFolder::open(shard.parent_path()).find(shard.filename().string());
@@ -44,17 +44,17 @@ int end_attempt(const std::filesystem::path& named, int exit_code) {
   const std::filesystem::path work = folder->path();
   const std::optional<outcome::Outcome> left = outcome::read_outcome(work);
   if (!left || is_for_outside(left->cause)) return exit_code;
-  const Site site{Settings{}};
+  const SlurmClient client{Settings{}};
   const int failures = read_failures(work);
   try {
-    if (!site.is_running(job)) return exit_code;
+    if (!client.is_running(job)) return exit_code;
     const outcome::Outcome outcome = explain_stop(*left);
     outcome::write_outcome(work, outcome);
-    const outcome::Decision decision = outcome::decide(outcome.cause, failures, outcome.is_further);
+    const outcome::RetryDecision decision = outcome::decide(outcome.cause, failures, outcome.is_further);
     if (decision.next == outcome::Next::failed) return kExitSystem;
     write_failures(work, decision.failures);
     store::append_text(work / store::kLogFile, "carillon: " + outcome.reason + "; queued again in Slurm\n");
-    site.requeue(job, decision.delay_s);
+    client.requeue(job, decision.delay_s);
   } catch (const SystemError& error) {
     fmt::print(stderr, "carillon: {}\n", error.what());
     try {

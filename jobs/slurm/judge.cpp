@@ -1,6 +1,5 @@
 // Method:     The attempt's own word comes first, if it is from the attempt that Slurm ran last; then Slurm's state, which knows of
-// machines
-//             and limits; then what Slurm wrote beside the job.
+//             machines and limits; then what Slurm wrote next to the job.
 // Source:     squeue(1), "JOB STATE CODES" of Slurm 22.05; slurmstepd's messages.
 // Deviations: none.
 #include <fmt/core.h>
@@ -27,13 +26,13 @@ std::string find_last_line(std::string text) {
   return line.substr(0, line.find_last_not_of(" .") + 1);
 }
 
-bool is_out_of_memory(const std::optional<Seen>& seen, const std::string& output) {
+bool is_out_of_memory(const std::optional<SlurmStatus>& seen, const std::string& output) {
   return (seen && seen->state == "OUT_OF_MEMORY") || output.find("exceeded memory limit") != std::string::npos ||
          output.find("exceeded job memory limit") != std::string::npos || output.find("oom-kill") != std::string::npos;
 }
 
 /// By Slurm alone: the attempt left no word.
-std::pair<Cause, std::string> find_cause(const std::optional<Seen>& seen, const std::string& output) {
+std::pair<Cause, std::string> find_cause(const std::optional<SlurmStatus>& seen, const std::string& output) {
   const std::string last = find_last_line(output), said = last.empty() ? "" : ": " + last;
   if (is_out_of_memory(seen, output)) return {Cause::memory, "Slurm ended it for using more memory than it had been given" + said};
   if (!seen) return {Cause::killed, "Slurm no longer knows the job, and the job left no word of how it ended" + said};
@@ -52,13 +51,13 @@ std::pair<Cause, std::string> find_cause(const std::optional<Seen>& seen, const 
 
 }  // namespace
 
-Judgement judge(const store::Store& store, const store::Id& id, const Handed& handed, const std::optional<Seen>& seen) {
+SlurmOutcome judge(const store::Store& store, const store::Id& id, const SubmittedJob& submitted, const std::optional<SlurmStatus>& seen) {
   const std::filesystem::path work = store.work_folder(id);
-  const std::string output = read_output(store.root(), handed);
+  const std::string output = read_output(store.root(), submitted);
   const std::optional<outcome::Attempt> attempt = outcome::read_attempt(work);
   const std::optional<outcome::Outcome> left = outcome::read_outcome(work);
-  const bool has_begun = attempt && attempt->token != handed.before;
-  Judgement judgement;
+  const bool has_begun = attempt && attempt->token != submitted.before;
+  SlurmOutcome judgement;
   judgement.is_cancelled = seen && seen->state.starts_with("CANCELLED");
   if (has_begun && left && left->token == attempt->token) {
     judgement.outcome = *left;

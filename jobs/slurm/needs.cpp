@@ -9,18 +9,17 @@
 #include "jobs/queue/admission.hpp"
 #include "jobs/queue/needs.hpp"
 #include "jobs/slurm/command.hpp"
+#include "precompute/cost/calibration.hpp"
 #include "runtime/base/host.hpp"
 
 namespace carillon::slurm {
 namespace {
 
 constexpr double kPredictionPatienceS = 600.0;
-// Slurm without control groups adds up what its processes hold, and counts the libraries of each rank, and of mpirun, anew.
-constexpr double kMargin = 1.2, kProcessGb = 0.1;
 
 void predict(const store::Store& store, const registry::Job& job, const queue::Need& guess, const std::filesystem::path& program) {
   const double memory_gb = queue::calc_memory(guess, 1);
-  if (memory_gb > base::find_host().available_gb || !attempt::can_predict()) return;
+  if (memory_gb > base::find_host().available_gb) return;
   attempt::Options attempt;
   attempt.work = store.work_folder(job.id);
   attempt.is_prediction = true;
@@ -36,17 +35,18 @@ store::Resources find_resources(const store::Store& store, const registry::Job& 
     predict(store, job, needs.need, program);
     needs = queue::find_needs(store, job);
   }
-  if (settings.has_pictures) needs.need.least_gb = attempt::kDrawGb;
+  if (settings.has_pictures) needs.need.min_gb = attempt::kDrawGb;
   store::Resources resources;
   resources.time_limit_s = needs.time_limit_s;
   resources.ranks = needs.need.ranks;
   if (resources.ranks <= 0) {
     const bool is_small = needs.need.seconds < queue::kSmallSeconds;
     const double worth = is_small ? 1.0 : std::floor(needs.need.seconds / queue::kSecondsPerRank);
-    resources.ranks = static_cast<int>(std::clamp(worth, 1.0, static_cast<double>(settings.most_ranks)));
+    resources.ranks = static_cast<int>(std::clamp(worth, 1.0, static_cast<double>(settings.max_ranks)));
   }
   resources.memory_gb = queue::calc_memory(needs.need, resources.ranks);
-  if (needs.need.memory_gb <= 0.0) resources.memory_gb = kMargin * resources.memory_gb + kProcessGb * (resources.ranks + 1);
+  if (needs.need.memory_gb <= 0.0)
+    resources.memory_gb = cost::kChargedMargin * resources.memory_gb + cost::kChargedGbPerProcess * (resources.ranks + 1);
   return resources;
 }
 

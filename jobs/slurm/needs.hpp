@@ -9,7 +9,7 @@
 
 namespace carillon::slurm {
 
-/// As the job says; else ranks by the time that it will take on one (at most settings.most_ranks), memory as predicted for them. A job too
+/// As the job says; else ranks by the time that it will take on one (at most settings.max_ranks), memory as predicted for them. A job too
 /// large to be guessed is predicted first by `program` attempt --predict, here; where that fails the guess has to do.
 store::Resources find_resources(const store::Store& store, const registry::Job& job, const Settings& settings,
                                 const std::filesystem::path& program);

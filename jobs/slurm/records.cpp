@@ -1,7 +1,5 @@
 #include "jobs/slurm/records.hpp"
 
-#include <fmt/core.h>
-
 #include <algorithm>
 #include <fstream>
 #include <system_error>
@@ -10,53 +8,55 @@
 #include "jobs/store/open_folder.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/file.hpp"
+#include "runtime/base/json.hpp"
 
 namespace carillon::slurm {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kNobody = "none";
-constexpr const char* kHandedFile = "slurm.json";
+constexpr const char* kNoJob = "none";
+constexpr const char* kSubmittedFile = "slurm.json";
 constexpr const char* kRetriesFile = "retries.json";
 constexpr const char* kJobsFile = "jobs";
 constexpr const char* kNumberFile = "number";
-constexpr std::streamoff kMostOutputBytes = 4096;
+constexpr std::streamoff kMaxOutputBytes = 4096;
 
 bool is_name(const std::string& text) { return text.size() == 32 && text.find_first_not_of("0123456789abcdef") == std::string::npos; }
 
 }  // namespace
 
-void write_handed(const fs::path& work, const Handed& handed) {
-  base::write_file(work / kHandedFile,
-                   fmt::format("{{\"batch\": {}, \"title\": {}, \"task\": {}, \"before\": {}}}\n", base::quote(handed.batch),
-                               base::quote(handed.title), handed.task, base::quote(handed.before.empty() ? kNobody : handed.before)));
+void write_submitted_job(const fs::path& work, const SubmittedJob& submitted) {
+  base::Json root = base::Json::object();
+  root.set("batch", submitted.batch).set("title", submitted.title).set("task", submitted.task);
+  root.set("before", submitted.before.empty() ? kNoJob : submitted.before);
+  base::write_file(work / kSubmittedFile, root.text());
 }
 
-std::optional<Handed> read_handed(const fs::path& work) {
+std::optional<SubmittedJob> read_submitted_job(const fs::path& work) {
   std::error_code error;
-  if (!fs::exists(work / kHandedFile, error)) return std::nullopt;
+  if (!fs::exists(work / kSubmittedFile, error)) return std::nullopt;
   try {
-    base::Object root = base::read_document(work / kHandedFile).root();
-    Handed handed;
-    handed.batch = root.string("batch");
-    handed.title = root.string("title");
-    handed.task = static_cast<int>(root.integer("task", -1, 1 << 30));
-    handed.before = root.string("before");
-    if (handed.before == kNobody) handed.before.clear();
-    if (is_name(handed.batch)) return handed;
+    base::Object root = base::read_document(work / kSubmittedFile).root();
+    SubmittedJob submitted;
+    submitted.batch = root.string("batch");
+    submitted.title = root.string("title");
+    submitted.task = static_cast<int>(root.integer("task", -1, 1 << 30));
+    submitted.before = root.string("before");
+    if (submitted.before == kNoJob) submitted.before.clear();
+    if (is_name(submitted.batch)) return submitted;
   } catch (const InputError&) {
   }
   return std::nullopt;
 }
 
-void remove_handed(const fs::path& work) {
+void remove_submitted_job(const fs::path& work) {
   std::error_code error;
-  fs::remove(work / kHandedFile, error);
+  fs::remove(work / kSubmittedFile, error);
 }
 
 void write_failures(const fs::path& work, int failures) {
-  base::write_file(work / kRetriesFile, fmt::format("{{\"failures\": {}}}\n", failures));
+  base::write_file(work / kRetriesFile, base::Json::object().set("failures", failures).text());
 }
 
 int read_failures(const fs::path& work) {
@@ -108,12 +108,12 @@ void remove_batch_folder(const fs::path& root, const std::string& batch) {
   }
 }
 
-std::string read_output(const fs::path& root, const Handed& handed) {
-  std::ifstream stream(make_output_file(root, handed.batch, std::max(handed.task, 0)), std::ios::binary | std::ios::ate);
+std::string read_output(const fs::path& root, const SubmittedJob& submitted) {
+  std::ifstream stream(make_output_file(root, submitted.batch, std::max(submitted.task, 0)), std::ios::binary | std::ios::ate);
   if (!stream) return "";
   const std::streamoff size = stream.tellg();
-  stream.seekg(std::max<std::streamoff>(0, size - kMostOutputBytes));
-  std::string text(static_cast<std::size_t>(std::min(size, kMostOutputBytes)), '\0');
+  stream.seekg(std::max<std::streamoff>(0, size - kMaxOutputBytes));
+  std::string text(static_cast<std::size_t>(std::min(size, kMaxOutputBytes)), '\0');
   stream.read(text.data(), static_cast<std::streamsize>(text.size()));
   text.resize(static_cast<std::size_t>(std::max<std::streamsize>(0, stream.gcount())));
   return text;

@@ -13,23 +13,23 @@ namespace carillon::slurm {
 
 /// WORK/slurm.json, written before sbatch is called; gone when Slurm has nothing to do with the job any more. The number of the job in
 /// Slurm is in ROOT/slurm/<batch>/number, written after.
-struct Handed {
+struct SubmittedJob {
   std::string batch;   // 32 hex digits
   std::string title;   // the name of the job in Slurm
   int task = -1;       // of the array; -1: no array
   std::string before;  // token of the attempt there was before
 };
-void write_handed(const std::filesystem::path& work, const Handed& handed);
-std::optional<Handed> read_handed(const std::filesystem::path& work);
-void remove_handed(const std::filesystem::path& work);
+void write_submitted_job(const std::filesystem::path& work, const SubmittedJob& submitted);
+std::optional<SubmittedJob> read_submitted_job(const std::filesystem::path& work);
+void remove_submitted_job(const std::filesystem::path& work);
 
 /// WORK/retries.json: how many attempts before this one failed in a row. Written when the job is handed over, and where it ran when it is
 /// queued again there.
 void write_failures(const std::filesystem::path& work, int failures);
 int read_failures(const std::filesystem::path& work);
 
-/// ROOT/slurm/<batch>/: the script, the ids of its jobs, what Slurm itself said of each task, the number. Made after all write_handed(),
-/// and whole.
+/// ROOT/slurm/<batch>/: the script, the ids of its jobs, what Slurm itself said of each task, the number. Made after all
+/// write_submitted_job(), and whole.
 void make_batch_folder(const store::Store& store, const std::string& batch, const std::string& script, const std::vector<store::Id>& jobs);
 std::vector<store::Id> read_jobs(const std::filesystem::path& root, const std::string& batch);
 void write_number(const std::filesystem::path& root, const std::string& batch, const std::string& number);
@@ -38,6 +38,6 @@ std::string read_number(const std::filesystem::path& root, const std::string& ba
 void remove_batch_folder(const std::filesystem::path& root, const std::string& batch);
 
 /// The last lines of what Slurm said of a task, at most 4 KiB; empty: nothing.
-std::string read_output(const std::filesystem::path& root, const Handed& handed);
+std::string read_output(const std::filesystem::path& root, const SubmittedJob& submitted);
 
 }  // namespace carillon::slurm

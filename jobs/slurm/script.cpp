@@ -52,8 +52,8 @@ long long round_up(double value) { return static_cast<long long>(std::ceil(value
 
 /// Long enough for Slurm, which looks every half a minute, and never more than half of what there is.
 long long calc_signal_s(const Batch& batch, const Settings& settings) {
-  const double most_s = batch.time_limit_s > 0.0 ? batch.time_limit_s / 2.0 : settings.signal_before_s;
-  return std::max(1LL, round_up(std::min(settings.signal_before_s, most_s)));
+  const double max_s = batch.time_limit_s > 0.0 ? batch.time_limit_s / 2.0 : settings.signal_before_s;
+  return std::max(1LL, round_up(std::min(settings.signal_before_s, max_s)));
 }
 
 }  // namespace
@@ -75,7 +75,7 @@ std::string make_script(const Batch& batch, const Settings& settings) {
   std::string prologue, folders, options;
   for (const std::string& line : settings.prologue) prologue += line + "\n";
   for (const std::string& word : settings.mpirun_options) options += " --mpirun-option=" + quote_word(word);
-  if (!settings.has_pictures) options += " --no-pictures";
+  if (settings.has_pictures) options += " --pictures";
   for (const std::string& folder : batch.folders) folders += (folders.empty() ? "" : " ") + quote_word(folder);
   return fill(kJobScript, {{"@PROLOGUE@\n", prologue},
                            {"@FOLDERS@", folders},
@@ -104,8 +104,8 @@ std::vector<std::string> make_sbatch(const Batch& batch, const Settings& setting
   const bool is_array = batch.folders.size() > 1;
   add("--output=" + escape_pattern((batch.root / "slurm" / batch.name).string()) + (is_array ? "/%a.out" : "/0.out"));
   if (is_array) {
-    const std::string most = settings.most_running > 0 ? fmt::format("%{}", settings.most_running) : "";
-    add(fmt::format("--array=0-{}{}", batch.folders.size() - 1, most));
+    const std::string limit = settings.max_running > 0 ? fmt::format("%{}", settings.max_running) : "";
+    add(fmt::format("--array=0-{}{}", batch.folders.size() - 1, limit));
   }
   add(fmt::format("--ntasks={}", batch.ranks));
   add("--cpus-per-task=1");

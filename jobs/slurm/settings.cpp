@@ -5,11 +5,11 @@
 namespace carillon::slurm {
 namespace {
 
-constexpr std::size_t kMostWords = 100;
+constexpr std::size_t kMaxWords = 100;
 
 std::vector<std::string> read_texts(base::Object& object, std::string_view key) {
   std::vector<std::string> texts;
-  for (base::Entry& entry : object.entries(key, kMostWords)) {
+  for (base::Entry& entry : object.entries(key, kMaxWords)) {
     if (entry.object || entry.text.find('\0') != std::string::npos) throw InputError(entry.place + ": must be a text");
     texts.push_back(entry.text);
   }
@@ -27,9 +27,9 @@ Settings read_settings(std::optional<base::Object> object) {
   settings.launcher = object->choice_or("launcher", {"mpirun", "srun"}, settings.launcher);
   settings.signal_before_s = object->number_or("signal_before_s", settings.signal_before_s, {0.0, 65536.0});
   settings.poll_s = object->number_or("poll_s", settings.poll_s, {0.0, 86400.0});
-  settings.most_ranks = static_cast<int>(object->integer_if("most_ranks", 1, 1 << 20).value_or(settings.most_ranks));
-  settings.most_running = static_cast<int>(object->integer_if("most_running", 0, 1 << 20).value_or(settings.most_running));
-  settings.most_in_array = static_cast<int>(object->integer_if("most_in_array", 1, 1 << 20).value_or(settings.most_in_array));
+  settings.max_ranks = static_cast<int>(object->integer_if("max_ranks", 1, 1 << 20).value_or(settings.max_ranks));
+  settings.max_running = static_cast<int>(object->integer_if("max_running", 0, 1 << 20).value_or(settings.max_running));
+  settings.max_in_array = static_cast<int>(object->integer_if("max_in_array", 1, 1 << 20).value_or(settings.max_in_array));
   settings.has_pictures = object->boolean_or("pictures", settings.has_pictures);
   settings.options = read_texts(*object, "options");
   settings.prologue = read_texts(*object, "prologue");

@@ -9,7 +9,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "runtime/base/error.hpp"
+#include "runtime/base/failure.hpp"
 #include "runtime/base/file.hpp"
 
 namespace carillon::store {
@@ -39,7 +39,7 @@ void throw_errno(const fs::path& path, const std::string& verb, int error) {
   const char* advice = base::is_full_error(error)                            ? kFullAdvice
                        : error == EACCES || error == EPERM || error == EROFS ? "check owner, group and rights"
                                                                              : "check the disk";
-  throw SystemError(fmt::format("{}: cannot {}: {}; {}", path.string(), verb, std::strerror(error), advice));
+  throw_system_error(error, fmt::format("{}: cannot {}: {}; {}", path.string(), verb, std::strerror(error), advice));
 }
 
 bool append_text(const fs::path& file, const std::string& text) {
@@ -52,9 +52,10 @@ bool append_text(const fs::path& file, const std::string& text) {
   return is_written;
 }
 
-bool is_disk_full(const fs::path& folder, std::string_view message) {
-  const auto says = [&](int error) { return message.find(std::strerror(error)) != std::string_view::npos; };
-  return is_disk_full(folder) || says(ENOSPC) || says(EDQUOT);
+bool is_disk_full(const fs::path& folder, const std::exception& error) {
+  const auto* file_error = dynamic_cast<const fs::filesystem_error*>(&error);
+  return is_disk_full(folder) || dynamic_cast<const DiskFullError*>(&error) != nullptr ||
+         (file_error != nullptr && base::is_full_error(file_error->code().value()));
 }
 
 bool is_disk_full(const fs::path& folder) {

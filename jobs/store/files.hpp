@@ -1,6 +1,7 @@
 // Files and folders that have to be on the disk, and sentences about those that are not.
 #pragma once
 
+#include <exception>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -25,7 +26,7 @@ inline constexpr const char* kFullAdvice = "the disk or quota is full: make room
 
 /// Whether hardly a byte is free on the file system of `folder`.
 bool is_disk_full(const std::filesystem::path& folder);
-/// The same, or `message`, of an error, says so: how full a quota is cannot be asked.
-bool is_disk_full(const std::filesystem::path& folder, std::string_view message);
+/// The same, or `error` says so: how full a quota is cannot be asked.
+bool is_disk_full(const std::filesystem::path& folder, const std::exception& error);
 
 }  // namespace carillon::store

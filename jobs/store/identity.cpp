@@ -31,8 +31,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kHeadBytes = 4096;
-constexpr std::uint64_t kMostJobBytes = 64 << 20;
-constexpr std::size_t kMostTexts = 50;
+constexpr std::uint64_t kMaxJobBytes = 64 << 20;
+constexpr std::size_t kMaxTexts = 50;
 constexpr const char* kScheme = "carillon identity 1";
 
 Json::Value parse_json(const std::string& text) {
@@ -84,11 +84,11 @@ Json::Value parse_object(const std::string& text) {
 Origin compare_origin(Json::Value root, const Request& request) {
   if (!root.isObject()) return Origin::unknown;
   try {
-    const Json::Value& named = request.input_kind == "surface" ? root["body"]["surface"] : root["mesh"];
+    const Json::Value& named = request.input_kind == InputKind::surface ? root["body"]["surface"] : root["mesh"];
     const std::string input = named.isString() ? fs::path(named.asString()).stem().string() : "";
     for (const char* key : {"run", "bank"}) root.removeMember(key);
     if (make_canonical(root) != request.job) return Origin::another_job;
-    return request.input_kind == "shape" || input == request.input_sha256 ? Origin::same : Origin::another_input;
+    return request.input_kind == InputKind::shape || input == request.input_sha256 ? Origin::same : Origin::another_input;
   } catch (const Json::Exception&) {
     return Origin::unknown;
   }
@@ -101,7 +101,7 @@ std::string lower_ending(const fs::path& file) {
   return ending;
 }
 
-/// As the reader of meshes finds it: by the content where that tells, else by the ending.
+/// As the reader of meshes finds it: by the content if that is conclusive, else by the file extension.
 std::string find_mesh_format(const std::string& head, const std::string& ending) {
   std::string_view text = head;
   if (text.starts_with("\x89HDF\r\n")) return "hdf";
@@ -132,7 +132,7 @@ std::string find_user() {
 const fs::path& get_input(const job::JobSpec& job) { return job.body ? job.body->surface : job.mesh; }
 
 /// Copies a file to `target` while it is hashed.
-Id copy_hashed(const fs::path& file, const char* what, const fs::path& target) {
+Id copy_hashed(const fs::path& file, std::string_view what, const fs::path& target) {
   const int fd = ::open(target.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0444);
   if (fd < 0) throw_errno(target, "write", errno);
   int error = 0;
@@ -162,7 +162,7 @@ void take_snapshot(const Store& store, const fs::path& input, const Request& req
   const bool is_pair = request.input_format == "tetgen";
   const Temporary temporary = store.make_temporary();
   const auto pair = find_tetgen_pair(input);
-  const char* what = request.input_kind.c_str();
+  const std::string what = to_text(request.input_kind);
   Id found = copy_hashed(is_pair ? pair[0] : input, what, temporary / "first");
   if (is_pair) found = hash_pair(found, copy_hashed(pair[1], what, temporary / "second"));
   if (found != wanted)
@@ -185,7 +185,7 @@ using Inputs = std::map<std::string, bool>;
 
 /// True when the input was not there, or damaged, and is whole now.
 bool ensure_input(const Store& store, const job::JobSpec& job, const Request& request, Inputs& known) {
-  if (request.input_kind == "shape") return false;
+  if (request.input_kind == InputKind::shape) return false;
   const auto [entry, is_new] = known.try_emplace(request.input_sha256 + "." + request.input_format, false);
   if (is_new && find_input_fault(store, request)) {
     take_snapshot(store, get_input(job), request);
@@ -207,23 +207,23 @@ void write_unsynced(const fs::path& file, const std::string& text) {
 void fill_work(const Store& store, const job::JobSpec& job, const Request& request, const Id& id, const fs::path& folder) {
   job::JobSpec inner = job;
   const fs::path work = store.work_folder(id);
-  if (request.input_kind != "shape") {
+  if (request.input_kind != InputKind::shape) {
     const fs::path input = store.input_file(require_id(request.input_sha256, "the request"), request.input_format);
     (job.body ? inner.body->surface : inner.mesh) = input;
   }
   inner.bank = work / kBankFile;
   write_unsynced(folder / kJobFile, job::resolved_json(inner, work, ""));
   write_unsynced(folder / kRequestFile, format_request(request));
-  write_unsynced(folder / kStandingFile, format_standing({}));
+  write_unsynced(folder / kStateFile, format_state({}));
 }
 
 /// The job of a request, with its input in the store and its bank where carillon-precompute is to write it.
 job::JobSpec make_job(const Store& store, const Request& request, const Id& id) {
   Json::Value root = parse_json(request.job);
   const fs::path work = store.work_folder(id);
-  if (request.input_kind != "shape") {
+  if (request.input_kind != InputKind::shape) {
     const fs::path input = store.input_file(require_id(request.input_sha256, "the request"), request.input_format);
-    (request.input_kind == "surface" ? root["body"]["surface"] : root["mesh"]) = input.string();
+    (request.input_kind == InputKind::surface ? root["body"]["surface"] : root["mesh"]) = input.string();
   }
   root["bank"] = (work / kBankFile).string();
   Json::StreamWriterBuilder writer;
@@ -274,15 +274,15 @@ Request RequestMaker::make(const job::JobSpec& job) {
   request.submitted_unix_s = std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
   const fs::path& input = get_input(job);
   const std::string ending = lower_ending(input);
-  request.input_kind = input.empty() ? "shape" : job.body ? "surface" : "mesh";
+  request.input_kind = input.empty() ? InputKind::shape : job.body ? InputKind::surface : InputKind::mesh;
   if (!input.empty()) request.input_file = to_text(input);
-  if (request.input_kind == "mesh" && (ending == "node" || ending == "ele")) {
+  if (request.input_kind == InputKind::mesh && (ending == "node" || ending == "ele")) {
     const auto pair = find_tetgen_pair(input);
     const Id node = find_input(pair[0], "mesh").sha256;
     request.input_format = "tetgen";
     request.input_sha256 = hash_pair(node, find_input(pair[1], "mesh").sha256).text();
   } else if (!input.empty()) {
-    const Known& known = find_input(input, request.input_kind);
+    const Known& known = find_input(input, to_text(request.input_kind));
     request.input_format = job.body ? ending : find_mesh_format(known.head, ending);
     request.input_sha256 = known.sha256.text();
   }
@@ -292,23 +292,23 @@ Request RequestMaker::make(const job::JobSpec& job) {
 }
 
 Id calc_id(const Request& request) {
-  return hash_text(fmt::format("{}\njob {}\ninput {} {} {}\nsolver {}\n", kScheme, request.job, request.input_kind,
+  return hash_text(fmt::format("{}\njob {}\ninput {} {} {}\nsolver {}\n", kScheme, request.job, to_text(request.input_kind),
                                to_text(request.input_format), request.input_sha256, request.solver));
 }
 
 std::optional<std::string> find_input_fault(const Store& store, const Request& request) {
-  if (request.input_kind == "shape") return std::nullopt;
+  if (request.input_kind == InputKind::shape) return std::nullopt;
   const Id wanted = require_id(request.input_sha256, "the request");
   const fs::path file = store.input_file(wanted, request.input_format);
   const std::string what =
-      fmt::format("the copy of its {} in the store, {},", request.input_kind, file.lexically_relative(store.root()).string());
+      fmt::format("the copy of its {} in the store, {},", to_text(request.input_kind), file.lexically_relative(store.root()).string());
   try {
     const auto inputs = OpenFolder::open(store.root()).find("inputs");
     const auto shard = inputs ? inputs->find(wanted.text().substr(0, 2)) : std::nullopt;
     const auto hash = [&](const fs::path& name) -> std::optional<Id> {
       const auto info = shard ? shard->look_at(name.filename().string()) : std::nullopt;
       if (!info || !S_ISREG(info->st_mode)) return std::nullopt;
-      return hash_file(shard->path() / name.filename(), request.input_kind);
+      return hash_file(shard->path() / name.filename(), to_text(request.input_kind));
     };
     std::optional<Id> found = hash(file);
     if (found && request.input_format == "tetgen") {
@@ -330,14 +330,13 @@ std::optional<std::string> find_job_fault(const Store& store, const Id& id, cons
     const std::optional<Request> request = read_request(folder);
     if (!request) return "its request.json is missing";
     if (request->id != id.text() || calc_id(*request) != id) return "its request.json is not what was submitted";
-    const job::JobSpec job =
-        job::parse_job(base::read_file(folder / kJobFile, "job file", kMostJobBytes), store.work_folder(id) / kJobFile);
+    const job::JobSpec job = job::parse_job(base::read_file(folder / kJobFile, "job file", kMaxJobBytes), store.work_folder(id) / kJobFile);
     if (make_canonical_job(job) != request->job) return "its job.json asks for something else than was submitted";
     if (job.bank != store.work_folder(id) / kBankFile) return "its job.json names another bank than was submitted";
-    const fs::path wanted = request->input_kind == "shape"
+    const fs::path wanted = request->input_kind == InputKind::shape
                                 ? fs::path()
                                 : store.input_file(require_id(request->input_sha256, "the request"), request->input_format);
-    if (get_input(job) != wanted) return fmt::format("its job.json names another {} than was submitted", request->input_kind);
+    if (get_input(job) != wanted) return fmt::format("its job.json names another {} than was submitted", to_text(request->input_kind));
     return std::nullopt;
   } catch (const InputError& error) {
     return fmt::format("its files cannot be read: {}", error.what());
@@ -349,13 +348,13 @@ std::optional<std::string> find_origin_fault(const std::string& provenance, cons
     case Origin::same:
       return std::nullopt;
     case Origin::unknown:
-      return "the bank does not tell which job it was made of";
+      return "the bank does not say which job it was made of";
     case Origin::another_job:
       return "the bank was made of another job than this one";
     case Origin::another_input:
       break;
   }
-  return fmt::format("the bank was made of another {} than this job's", request.input_kind);
+  return fmt::format("the bank was made of another {} than this job's", to_text(request.input_kind));
 }
 
 std::optional<std::string> find_resolved_fault(const fs::path& folder, const Id& id) {
@@ -369,7 +368,7 @@ std::optional<std::string> find_resolved_fault(const fs::path& folder, const Id&
   if (request->id != id.text() || calc_id(*request) != id) return "its request.json is not what was submitted";
   std::string text;
   try {
-    text = base::read_file(folder / kJobFile, "record", kMostJobBytes);
+    text = base::read_file(folder / kJobFile, "record", kMaxJobBytes);
   } catch (const InputError&) {
     return "its job.json is missing, or cannot be read";
   }
@@ -398,12 +397,12 @@ std::vector<std::string> read_warnings(const Store& store, const Id& id, const s
   std::vector<std::string> texts;
   const fs::path folder = store.bank_folder(id);
   try {
-    const Json::Value root = parse_object(base::read_file(folder / kJobFile, "record", kMostJobBytes));
+    const Json::Value root = parse_object(base::read_file(folder / kJobFile, "record", kMaxJobBytes));
     const Json::Value& list = root["run"]["warnings"];
     if (list.empty()) return texts;
     const std::optional<Request> request = read_request(folder);
     if (!request || request->id != id.text() || calc_id(*request) != id || compare_origin(root, *request) != Origin::same) return texts;
-    for (Json::ArrayIndex i = 0; list.isArray() && i < list.size() && texts.size() < kMostTexts; ++i) {
+    for (Json::ArrayIndex i = 0; list.isArray() && i < list.size() && texts.size() < kMaxTexts; ++i) {
       if (!list[i].isString()) continue;
       const std::string text = name_job(list[i].asString(), id, name);
       if (std::find(texts.begin(), texts.end(), text) == texts.end()) texts.push_back(text);

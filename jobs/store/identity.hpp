@@ -61,10 +61,10 @@ std::optional<std::string> find_job_fault(const Store& store, const Id& id, cons
 /// Why a bank with this record of its making (JSON) was not made of that request; none when it was.
 std::optional<std::string> find_origin_fault(const std::string& provenance, const Request& request);
 
-/// Why request.json or job.json beside a bank do not belong to `id`, in one sentence; none when they do. `folder` is that of the bank.
+/// Why request.json or job.json next to a bank do not belong to `id`, in one sentence; none when they do. `folder` is that of the bank.
 std::optional<std::string> find_resolved_fault(const std::filesystem::path& folder, const Id& id);
 
-/// What the solver warned of, from the record beside the bank of `id` (member "run" of job.json): each text once, at most fifty. None when
+/// What the solver warned of, from the record next to the bank of `id` (member "run" of job.json): each text once, at most fifty. None when
 /// that record is damaged or another job's. `name` stands for the store's copy of the job file, as in name_job().
 std::vector<std::string> read_warnings(const Store& store, const Id& id, const std::string& name = "the job");
 

@@ -16,6 +16,7 @@
 
 #include "jobs/store/files.hpp"
 #include "runtime/base/error.hpp"
+#include "runtime/base/failure.hpp"
 
 namespace carillon::store {
 namespace {
@@ -23,7 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kInside = O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC;
-constexpr int kMostDepth = 100;  // each level takes a descriptor
+constexpr int kMaxDepth = 100;  // each level takes a descriptor
 
 std::vector<std::string> list_names(int descriptor, const fs::path& name) {
   const int own = ::openat(descriptor, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
@@ -121,7 +122,7 @@ std::optional<struct stat> OpenFolder::look_at(const std::string& name) const {
 }
 
 std::vector<std::string> OpenFolder::list() const { return list_names(descriptor_, name_); }
-void OpenFolder::remove(const std::string& name) const { remove_below(descriptor_, name, name_ / name, kMostDepth); }
+void OpenFolder::remove(const std::string& name) const { remove_below(descriptor_, name, name_ / name, kMaxDepth); }
 
 void OpenFolder::sync() const {
   // A file system without fsync of folders says EINVAL.
@@ -141,6 +142,12 @@ std::string show_names(const OpenFolder& folder, std::string text) {
     }
   }
   return text;
+}
+
+void throw_with_names(const OpenFolder& folder, const SystemError& error) {
+  const std::string text = show_names(folder, error.what());
+  if (dynamic_cast<const DiskFullError*>(&error) != nullptr) throw DiskFullError(text);
+  throw SystemError(text);
 }
 
 }  // namespace carillon::store

@@ -9,8 +9,12 @@
 #include <string>
 #include <vector>
 
+#include "runtime/base/error.hpp"
+
 namespace carillon::store {
 
+/// Owns the descriptor of one folder. All it does is relative to that descriptor and follows no link, so that it stays within the folder
+/// that was opened, whatever becomes of its name.
 class OpenFolder {
  public:
   /// A folder that the user named: its own name may lead through links. SystemError when it cannot be opened.
@@ -50,5 +54,7 @@ class OpenFolder {
 
 /// `text` with name() for path().
 std::string show_names(const OpenFolder& folder, std::string text);
+/// Throws an error of the same kind with these names in its message.
+[[noreturn]] void throw_with_names(const OpenFolder& folder, const SystemError& error);
 
 }  // namespace carillon::store

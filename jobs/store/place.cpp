@@ -55,7 +55,7 @@ fs::path make_local_folder(const fs::path& folder, const fs::path& root) {
   const bool is_ours = info.st_uid == ::geteuid() || (is_group && info.st_gid == store.st_gid && info.st_uid != 0);
   if (!S_ISDIR(info.st_mode) || !is_ours || (info.st_mode & S_IWOTH) != 0)
     throw SystemError(fmt::format(
-        "{}: the registry of {} should lie here, and this belongs to somebody else; set XDG_STATE_HOME to a folder of a local disk",
+        "{}: the registry of {} should lie here, and this belongs to another user; set XDG_STATE_HOME to a folder of a local disk",
         folder.string(), root.string()));
   return folder;
 }

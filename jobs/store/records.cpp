@@ -8,25 +8,46 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <sstream>
 
 #include "jobs/store/store.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/file.hpp"
+#include "runtime/base/json.hpp"
 
 namespace carillon::store {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kMostCount = 1'000'000'000;
+constexpr int kMaxCount = 1'000'000'000;
 
-std::string write_json(const Json::Value& root, const char* indentation) {
-  Json::StreamWriterBuilder writer;
-  writer["indentation"] = indentation;
-  writer["precision"] = 17;
-  writer["emitUTF8"] = true;
-  return Json::writeString(writer, root);
+template <class Value>
+struct Word {
+  Value value;
+  std::string_view word;
+};
+constexpr std::array<Word<JobState>, 6> kStates{{{JobState::queued, "queued"},
+                                                 {JobState::running, "running"},
+                                                 {JobState::waiting, "waiting"},
+                                                 {JobState::done, "done"},
+                                                 {JobState::failed, "failed"},
+                                                 {JobState::cancelled, "cancelled"}}};
+constexpr std::array<Word<JobEngine>, 2> kEngines{{{JobEngine::local, "local"}, {JobEngine::slurm, "slurm"}}};
+constexpr std::array<Word<InputKind>, 3> kInputKinds{
+    {{InputKind::mesh, "mesh"}, {InputKind::surface, "surface"}, {InputKind::shape, "shape"}}};
+
+template <class Words>
+auto find_word(const Words& words, std::string_view word) {
+  const auto found = std::find_if(words.begin(), words.end(), [&](const auto& known) { return known.word == word; });
+  return found == words.end() ? std::nullopt : std::optional(found->value);
+}
+
+/// Values are in the order of their enumeration.
+template <class Words, class Value>
+std::string get_word(const Words& words, Value value) {
+  return std::string(words.at(static_cast<std::size_t>(value)).word);
 }
 
 std::optional<base::Object> read_root(const fs::path& file) {
@@ -41,15 +62,15 @@ Request read_request_root(base::Object root, const std::string& where) {
   Request request;
   request.id = require_id(root.string("id"), where).text();
   request.job = root.string("job");
-  request.input_kind = root.choice("input_kind", {"mesh", "surface", "shape"});
+  request.input_kind = *find_word(kInputKinds, root.choice("input_kind", {"mesh", "surface", "shape"}));
   request.input_format = read_empty_or(root, "input_format");
   request.input_sha256 = read_empty_or(root, "input_sha256");
-  if (request.input_kind != "shape") require_id(request.input_sha256, where);
+  if (request.input_kind != InputKind::shape) require_id(request.input_sha256, where);
   request.solver = root.string("solver");
-  request.resources.ranks = static_cast<int>(root.integer("ranks", 0, kMostCount));
+  request.resources.ranks = static_cast<int>(root.integer("ranks", 0, kMaxCount));
   request.resources.memory_gb = root.number("memory_gb");
   request.resources.time_limit_s = root.number("time_limit_s");
-  request.engine = root.choice("engine", {"local", "slurm"});
+  request.engine = *find_engine(root.choice("engine", {"local", "slurm"}));
   request.job_file = read_empty_or(root, "job_file");
   request.input_file = read_empty_or(root, "input_file");
   request.user = read_empty_or(root, "user");
@@ -58,13 +79,13 @@ Request read_request_root(base::Object root, const std::string& where) {
 }
 
 /// The last `most` bytes of a regular file; empty when there is none.
-std::string read_tail(const fs::path& file, off_t most) {
+std::string read_tail(const fs::path& file, off_t max) {
   std::string text;
   const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOFOLLOW);
   if (fd < 0) return text;
   struct stat info {};
   if (::fstat(fd, &info) == 0 && S_ISREG(info.st_mode)) {
-    text.resize(static_cast<std::size_t>(std::min(most, info.st_size)));
+    text.resize(static_cast<std::size_t>(std::min(max, info.st_size)));
     const ssize_t got = ::pread(fd, text.data(), text.size(), info.st_size - static_cast<off_t>(text.size()));
     text.resize(got > 0 ? static_cast<std::size_t>(got) : 0);
   }
@@ -85,8 +106,8 @@ std::optional<Progress> parse_progress(const std::string& line) {
     progress.percent = std::clamp(number("percent", 0.0), 0.0, 100.0);
     progress.modes_done = static_cast<long long>(std::clamp(number("modes_done", -1.0), -1.0, 1e15));
     progress.modes_wanted = static_cast<long long>(std::clamp(number("modes_wanted", -1.0), -1.0, 1e15));
-    progress.seconds_left = std::max(number("seconds_left", -1.0), -1.0);
-    progress.seconds = std::max(number("seconds", 0.0), 0.0);
+    progress.seconds_left = std::clamp(number("seconds_left", -1.0), -1.0, 1e12);
+    progress.seconds = std::clamp(number("seconds", 0.0), 0.0, 1e12);
     return progress;
   } catch (const Json::Exception&) {
     return std::nullopt;
@@ -95,26 +116,27 @@ std::optional<Progress> parse_progress(const std::string& line) {
 
 }  // namespace
 
+std::string to_text(JobState state) { return get_word(kStates, state); }
+std::string to_text(JobEngine engine) { return get_word(kEngines, engine); }
+std::string to_text(InputKind kind) { return get_word(kInputKinds, kind); }
+std::optional<JobState> find_state(std::string_view word) { return find_word(kStates, word); }
+std::optional<JobEngine> find_engine(std::string_view word) { return find_word(kEngines, word); }
+
 std::string format_request(const Request& request, bool one_line) {
-  Json::Value root;
-  root["id"] = request.id;
-  root["job"] = request.job;
-  root["input_kind"] = request.input_kind;
-  root["input_format"] = request.input_format;
-  root["input_sha256"] = request.input_sha256;
-  root["solver"] = request.solver;
-  root["ranks"] = request.resources.ranks;
-  root["memory_gb"] = request.resources.memory_gb;
-  root["time_limit_s"] = request.resources.time_limit_s;
-  root["engine"] = request.engine;
-  root["job_file"] = request.job_file;
-  root["input_file"] = request.input_file;
-  root["user"] = request.user;
-  root["submitted_unix_s"] = request.submitted_unix_s;
-  for (const char* key : {"input_format", "input_sha256", "job_file", "input_file", "user"}) {
-    if (root[key].asString().empty()) root.removeMember(key);  // a text of a document of ours is never empty
-  }
-  return write_json(root, one_line ? "" : "  ") + "\n";
+  base::Json root = base::Json::object();
+  const auto set_text = [&](const char* key, const std::string& text) {
+    if (!text.empty()) root.set(key, text);  // a text of a document of ours is never empty
+  };
+  root.set("id", request.id).set("job", request.job).set("input_kind", to_text(request.input_kind));
+  set_text("input_format", request.input_format);
+  set_text("input_sha256", request.input_sha256);
+  root.set("solver", request.solver).set("ranks", request.resources.ranks).set("memory_gb", request.resources.memory_gb);
+  root.set("time_limit_s", request.resources.time_limit_s).set("engine", to_text(request.engine));
+  set_text("job_file", request.job_file);
+  set_text("input_file", request.input_file);
+  set_text("user", request.user);
+  root.set("submitted_unix_s", request.submitted_unix_s);
+  return one_line ? root.line() + "\n" : root.text();
 }
 
 Request parse_request(std::string_view text, const fs::path& name) {
@@ -129,29 +151,25 @@ std::optional<Request> read_request(const fs::path& folder) {
 
 void write_request(const fs::path& folder, const Request& request) { base::write_file(folder / kRequestFile, format_request(request)); }
 
-std::optional<Standing> read_standing(const fs::path& folder) {
-  auto root = read_root(folder / kStandingFile);
+std::optional<SavedState> read_state(const fs::path& folder) {
+  auto root = read_root(folder / kStateFile);
   if (!root) return std::nullopt;
-  Standing standing;
-  standing.state = root->choice("state", {"queued", "waiting", "failed", "cancelled"});
-  standing.reason = read_empty_or(*root, "reason");
-  standing.attempts = static_cast<int>(root->integer("attempts", 0, kMostCount));
-  standing.failures = static_cast<int>(root->integer("failures", 0, kMostCount));
-  return standing;
+  SavedState saved;
+  saved.state = *find_state(root->choice("state", {"queued", "waiting", "failed", "cancelled"}));
+  saved.reason = read_empty_or(*root, "reason");
+  saved.attempts = static_cast<int>(root->integer("attempts", 0, kMaxCount));
+  saved.failures = static_cast<int>(root->integer("failures", 0, kMaxCount));
+  return saved;
 }
 
-std::string format_standing(const Standing& standing) {
-  Json::Value root;
-  root["state"] = standing.state;
-  if (!standing.reason.empty()) root["reason"] = standing.reason;
-  root["attempts"] = standing.attempts;
-  root["failures"] = standing.failures;
-  return write_json(root, "  ") + "\n";
+std::string format_state(const SavedState& saved) {
+  base::Json root = base::Json::object();
+  root.set("state", to_text(saved.state)).set("attempts", saved.attempts).set("failures", saved.failures);
+  if (!saved.reason.empty()) root.set("reason", saved.reason);
+  return root.text();
 }
 
-void write_standing(const fs::path& folder, const Standing& standing) {
-  base::write_file(folder / kStandingFile, format_standing(standing));
-}
+void write_state(const fs::path& folder, const SavedState& saved) { base::write_file(folder / kStateFile, format_state(saved)); }
 
 std::optional<Progress> read_progress(const fs::path& folder) {
   const std::string text = read_tail(folder / "progress.jsonl", 1 << 16);

@@ -35,11 +35,11 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kVersionText = "carillon store 1\n";
-constexpr std::uint64_t kMostVersionBytes = 1000;
+constexpr std::uint64_t kMaxVersionBytes = 1000;
 constexpr std::size_t kHeadBytes = 4096;  // the seal of a bank
 constexpr const char* kContentName = "content";
-constexpr off_t kMostCopiedBytes = 16 << 20;
-constexpr std::size_t kMostHostLength = 64;
+constexpr off_t kMaxCopiedBytes = 16 << 20;
+constexpr std::size_t kMaxHostLength = 64;
 constexpr std::size_t kFewFolders = 8;  // are synced one by one; of more, the whole file system once
 const std::set<std::string> kFolders{"banks", "inputs", "work", "tmp"};
 
@@ -72,8 +72,7 @@ void make_root(const fs::path& root) {
 }
 
 void check_version(const fs::path& root) {
-  const std::string text =
-      base::read_file(root / "VERSION", "version file of the store", kMostVersionBytes, "this is no store of Carillon");
+  const std::string text = base::read_file(root / "VERSION", "version file of the store", kMaxVersionBytes, "this is no store of Carillon");
   if (text == kVersionText) return;
   throw InputError(fmt::format("{}: holds \"{}\", and this program knows \"{}\"; use the newer Carillon, or another store",
                                (root / "VERSION").string(), text.substr(0, text.find('\n')),
@@ -187,7 +186,7 @@ void seal_file(const OpenFolder& folder, const std::string& name) {
   if (file.value < 0) throw_errno(folder.name() / name, "read", errno);
   struct stat info {};
   if (::fstat(file.value, &info) != 0) throw_errno(folder.name() / name, "read", errno);
-  const bool is_shared = info.st_nlink > 2 || (info.st_nlink > 1 && info.st_size < kMostCopiedBytes) || info.st_uid != ::geteuid();
+  const bool is_shared = info.st_nlink > 2 || (info.st_nlink > 1 && info.st_size < kMaxCopiedBytes) || info.st_uid != ::geteuid();
   if (is_shared || ::fchmod(file.value, 0444) != 0) {
     const std::string copy = name.substr(0, 200) + ".copy";
     folder.remove(copy);
@@ -240,7 +239,7 @@ bool rename_into(const OpenFolder& from, const std::string& name, const OpenFold
   throw_errno(shard.name() / id.text(), "rename", errno);
 }
 
-/// bank.sum: what a bank was when it was published, on one line; then a line for each record beside it, with its name and SHA-256.
+/// bank.sum: what a bank was when it was published, on one line; then a line for each record next to it, with its name and SHA-256.
 struct Sum {
   std::string id, sha256, head;  // head: SHA-256 of the first bytes
   long long bytes = 0, written_ns = 0;
@@ -249,8 +248,8 @@ struct Sum {
 constexpr const char* kSumWord = "carillon-bank-sum-1";
 constexpr std::array kRecords{kJobFile, kRequestFile, kOutcomeFile};
 
-std::string read_head(int file, std::size_t most) {
-  std::string head(most, '\0');
+std::string read_head(int file, std::size_t max) {
+  std::string head(max, '\0');
   const ssize_t got = ::pread(file, head.data(), head.size(), 0);
   head.resize(got > 0 ? static_cast<std::size_t>(got) : 0);
   return head;
@@ -297,7 +296,7 @@ Sum calc_sum(const OpenFolder& folder, const Id& id) {
           {}};
 }
 
-/// Why a bank is not sane, or was not made of the job of `id`, as all its bytes tell. What its own records do not tell is no fault where
+/// Why a bank is not sane, or was not made of the job of `id`, as all its bytes show. What its own records do not say is no fault where
 /// `has_sum` says that it is what was published.
 std::optional<std::string> find_content_fault(const OpenFolder& folder, const Id& id, bool has_sum) {
   try {
@@ -413,7 +412,7 @@ std::optional<std::string> Store::find_record_change(const Id& id) const {
   const OpenFolder folder = open_bank(id);
   const auto sum = read_sum(folder);
   for (const auto& [name, sha256] : sum ? sum->records : std::map<std::string, std::string>()) {
-    const bool is_ours = std::any_of(kRecords.begin(), kRecords.end(), [&](const char* record) { return name == record; });
+    const bool is_ours = std::find(kRecords.begin(), kRecords.end(), name) != kRecords.end();
     if (!is_ours) continue;
     const auto info = folder.look_at(name);
     if (!info) return fmt::format("its {} is missing", name);
@@ -427,12 +426,14 @@ std::optional<std::string> Store::find_record_change(const Id& id) const {
 void Store::replace_records(const Id& id, const Temporary& folder) const {
   const OpenFolder bank = open_bank(id);
   if (::fchmod(bank.get(), 0755) != 0) throw_errno(bank.name(), "write to this folder", errno);
+  bool has_record = false;  // what else lies next to a bank must not make a damaged record look like one that was published
   for (const std::string& name : folder.content().list()) {
+    has_record = has_record || std::any_of(kRecords.begin(), kRecords.end(), [&](const char* record) { return name == record; });
     seal_file(folder.content(), name);
     if (bank.look_at(name)) bank.remove(name);
     if (::renameat(folder.content().get(), name.c_str(), bank.get(), name.c_str()) != 0) throw_errno(bank.name() / name, "write", errno);
   }
-  if (const auto sum = read_sum(bank); sum && sum->id == id.text()) {
+  if (const auto sum = read_sum(bank); has_record && sum && sum->id == id.text()) {
     write_sum(bank, *sum);
     seal_file(bank, kSumFile);
   }
@@ -485,7 +486,7 @@ fs::path Store::input_file(const Id& sha256, const std::string& format) const {
 
 Temporary Store::make_temporary() const {
   const process::Identity self = process::find_self();
-  std::string host = self.host.substr(0, kMostHostLength);
+  std::string host = self.host.substr(0, kMaxHostLength);
   std::replace(host.begin(), host.end(), '/', '_');
   std::replace(host.begin(), host.end(), ',', '_');
   const std::string name = fmt::format("{},{},{},{},{}", host, self.boot, self.pid, self.start_ticks, make_random_name().substr(0, 12));
@@ -577,7 +578,7 @@ void Store::remove_folder(const char* folder, const Id& id) const {
   try {
     temporary.emplace(make_temporary());
   } catch (const SystemError& error) {
-    if (!is_disk_full(root_, error.what())) throw;
+    if (!is_disk_full(root_, error)) throw;
   }
   // A full disk may have no room for another folder: what is left in the middle of this is no whole bank and no job, and is seen as such.
   if (!temporary) return shard->remove(id.text());

@@ -5,8 +5,7 @@
 //   banks/ab/<id>/             read-only: bank.hdf, job.json, request.json, outcome.json, log, report.html ...
 //   inputs/ab/<sha256>.<end>   read-only snapshots of meshes and surfaces
 //   work/ab/<id>/              job.json (for carillon-precompute: mesh in inputs/, bank "bank.hdf"), request.json, attempt.json,
-//   outcome.json,
-//                              log, progress.jsonl, checkpoint.hdf, bank.hdf
+//                              outcome.json, result.json, log, progress.jsonl, checkpoint, bank.hdf
 //   tmp/                       what will get its name when it is whole; each entry belongs to one process and to its user alone (0700)
 //   damaged/                   banks that were set aside
 //   submissions.jsonl          which job file asked for which id, appended
@@ -34,12 +33,13 @@ inline constexpr const char* kBankFile = "bank.hdf";
 inline constexpr const char* kJobFile = "job.json";
 inline constexpr const char* kLogFile = "log";
 inline constexpr const char* kRequestFile = "request.json";
-inline constexpr const char* kStandingFile = "state.json";
+inline constexpr const char* kStateFile = "state.json";
 inline constexpr const char* kProgressFile = "progress.jsonl";
-inline constexpr const char* kCheckpointFile = "checkpoint.hdf";
+inline constexpr const char* kCheckpointFile = "checkpoint";
 inline constexpr const char* kReportFile = "report.html";
 inline constexpr const char* kOutcomeFile = "outcome.json";
-inline constexpr const char* kSumFile = "bank.sum";  // what the bank and its records were when it was published
+inline constexpr const char* kResultFile = "result.json";  // of the solver (base::Result)
+inline constexpr const char* kSumFile = "bank.sum";        // what the bank and its records were when it was published
 
 /// Holds the store's lock while it lives.
 class Lock {
@@ -79,6 +79,8 @@ class Temporary {
 /// its bytes; or by all its bytes and what they say. A bank without bank.sum (an earlier version made it) is read whole for `full` too.
 enum class Look { quick, full, content };
 
+/// The folders of one store. A bank is in banks/ whole or not at all, under the hash of what made it, and never changes there; no link
+/// inside the store is followed. Keeps no state: any number of processes may use it at once.
 class Store {
  public:
   /// Opens the store in `folder`, which is made when there is none. Throws InputError: the folder holds something else, or a newer store;
@@ -103,10 +105,11 @@ class Store {
   bool has_work(const Id& id) const;
   /// Why the bank of `id` is not what was published, in one sentence; none when it is.
   std::optional<std::string> find_bank_fault(const Id& id, Look look) const;
-  /// Which of the records beside the bank (job.json, request.json, outcome.json) is not what was published, in one sentence; none when all
+  /// Which of the records next to the bank (job.json, request.json, outcome.json) is not what was published, in one sentence; none when all
   /// are, or when bank.sum does not say.
   std::optional<std::string> find_record_change(const Id& id) const;
-  /// Puts the files of a temporary folder in place of those beside a bank, read-only. SystemError when that cannot be.
+  /// Puts the files of a temporary folder in place of those next to a bank, read-only; bank.sum follows where records are among them.
+  /// SystemError when that cannot be.
   void replace_records(const Id& id, const Temporary& folder) const;
   /// Sets a bank aside into damaged/; the folder's new name there. Empty when there was none.
   std::string set_bank_aside(const Id& id) const;
@@ -123,7 +126,7 @@ class Store {
   std::vector<Id> list_banks() const;
   std::vector<Id> list_work() const;
 
-  /// Its name tells the process it belongs to.
+  /// Its name holds the number of its process.
   Temporary make_temporary() const;
   /// Whether a name in tmp/ is one that make_temporary() gives.
   static bool is_temporary_name(const std::string& name);

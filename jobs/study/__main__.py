@@ -32,6 +32,7 @@ def read_numbers(name, least):
         if numbers[0] < least:
             raise argparse.ArgumentTypeError(f"{numbers[0]}: {name} are {least} or more")
         return numbers
+
     return read
 
 
@@ -51,21 +52,41 @@ def make_parser():
     parser = Parser(prog="carillon-study", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--version", action="version", version=f"carillon-study {VERSION}")
     commands = parser.add_subparsers(dest="command", required=True, parser_class=Parser)
-    one = commands.add_parser("scaling", help="strong and weak scaling, growth with the mesh, and what limits each phase",
-                              description="Solves a job on several numbers of ranks and, where the job has a \"body\", on meshes of several sizes; writes a report "
-                              "(report.md, cases.csv and SVG pictures). A job with a \"mesh\" file has one mesh, and gets strong scaling only.")
+    one = commands.add_parser(
+        "scaling",
+        help="strong and weak scaling, growth with the mesh, and what limits each phase",
+        description='Solves a job on several numbers of ranks and, where the job has a "body", on meshes of several sizes; writes a report '
+        '(report.md, cases.csv and SVG pictures). A job with a "mesh" file has one mesh, and gets strong scaling only.',
+    )
     one.add_argument("job", metavar="JOB.json", help="a job of carillon-precompute")
     one.add_argument("-o", "--out", metavar="FOLDER", default="study", help="where everything goes (default: study)")
-    one.add_argument("--ranks", type=read_numbers("ranks", 1), metavar="1,2,4", help="numbers of ranks (default: 1,2,4); more than there are cores are marked")
-    one.add_argument("--nodes", "--sizes", dest="nodes", type=read_numbers("nodes", 8), metavar="N,N,N",
-                     help="meshes of the body; the largest serves for strong scaling (default: a quarter, half and all of the job's)")
+    one.add_argument(
+        "--ranks",
+        type=read_numbers("ranks", 1),
+        metavar="1,2,4",
+        help="numbers of ranks (default: 1,2,4); more than there are cores are marked",
+    )
+    one.add_argument(
+        "--nodes",
+        "--sizes",
+        dest="nodes",
+        type=read_numbers("nodes", 8),
+        metavar="N,N,N",
+        help="meshes of the body; the largest serves for strong scaling (default: a quarter, half and all of the job's)",
+    )
     one.add_argument("--repeats", type=read_count, help="of every case, all cases in turn (default: 3)")
     one.add_argument("--quick", action="store_true", help="meshes of 600 and 1200 nodes, 1 and 2 ranks, one repeat, unless given otherwise")
     one.add_argument("--record", metavar="FILE", help="keep the work per phase (operations, messages, bytes) in this file")
-    one.add_argument("--check", metavar="FILE", help="compare the work per phase with this file's, and fail where it has grown by more than 5 %%")
+    one.add_argument(
+        "--check", metavar="FILE", help="compare the work per phase with this file's, and fail where it has grown by more than 5 %%"
+    )
     one.add_argument("--timeout", type=programs.read_seconds, default=3600, help="seconds that one run may take (default: 3600)")
-    one.add_argument("--bin", metavar="FOLDER", help="where carillon-precompute is (default: beside this program)")
-    one.add_argument("--json", action="store_true", help="one JSON document on standard output: the report's path and the work of every case; the rest on standard error")
+    one.add_argument("--bin", metavar="FOLDER", help="where carillon-precompute is (default: next to this program)")
+    one.add_argument(
+        "--json",
+        action="store_true",
+        help="one JSON document on standard output: the report's path and the work of every case; the rest on standard error",
+    )
     study.add_command(commands, read_count)
     advise.add_command(commands)
     return parser

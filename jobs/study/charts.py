@@ -3,16 +3,32 @@ import math
 
 import measuring
 
-PALETTE = {"read": "#9aa5b1", "partition": "#c9b458", "assemble": "#8fb98b", "factor": "#c8553d", "solve": "#2f6690", "orthogonalise": "#7b5ea7", "errors": "#e09f3e",
-           "error bars": "#e09f3e", "write": "#588157", "other": "#bdbdbd", "in all": "#1a1a1a"}
+PALETTE = {
+    "read": "#9aa5b1",
+    "partition": "#c9b458",
+    "assemble": "#8fb98b",
+    "factor": "#c8553d",
+    "solve": "#2f6690",
+    "orthogonalise": "#7b5ea7",
+    "errors": "#e09f3e",
+    "error bars": "#e09f3e",
+    "write": "#588157",
+    "other": "#bdbdbd",
+    "in all": "#1a1a1a",
+}
 HATCH = "#f4f4f4"
 
 
 def start(width, height, title, subtitle=""):
-    return [f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}" font-family="sans-serif" font-size="13">',
-            '<rect width="100%" height="100%" fill="white"/>',
-            f'<text x="16" y="26" font-size="16" font-weight="bold">{measuring.escape(title)}</text>',
-            f'<text x="16" y="46" fill="#555">{measuring.escape(subtitle)}</text>']
+    return [
+        (
+            f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}"'
+            ' font-family="sans-serif" font-size="13">'
+        ),
+        '<rect width="100%" height="100%" fill="white"/>',
+        f'<text x="16" y="26" font-size="16" font-weight="bold">{measuring.escape(title)}</text>',
+        f'<text x="16" y="46" fill="#555">{measuring.escape(subtitle)}</text>',
+    ]
 
 
 def describe_number(value):
@@ -29,7 +45,11 @@ def find_ticks(low, high):
     """1, 2 and 5 times powers of ten where there is room, else the powers alone."""
     first, last = math.floor(math.log10(low)), math.ceil(math.log10(high))
     factors = (1, 2, 5) if last - first <= 2 else (1,)
-    return [tick for tick in (factor * 10.0**power for power in range(first, last + 1) for factor in factors) if low * 0.999 <= tick <= high * 1.001]
+    return [
+        tick
+        for tick in (factor * 10.0**power for power in range(first, last + 1) for factor in factors)
+        if low * 0.999 <= tick <= high * 1.001
+    ]
 
 
 class Axes:
@@ -57,16 +77,25 @@ class Axes:
         out = []
         for tick in y_ticks:
             y = self.place_y(tick)
-            out.append(f'<line x1="{self.left}" x2="{self.left + self.width}" y1="{y:.1f}" y2="{y:.1f}" stroke="#e3e3e3"/>'
-                       f'<text x="{self.left - 8}" y="{y + 4:.1f}" text-anchor="end">{describe_number(tick)}</text>')
+            out.append(
+                f'<line x1="{self.left}" x2="{self.left + self.width}" y1="{y:.1f}" y2="{y:.1f}" stroke="#e3e3e3"/>'
+                f'<text x="{self.left - 8}" y="{y + 4:.1f}" text-anchor="end">{describe_number(tick)}</text>'
+            )
         for tick in x_ticks:
             x = self.place_x(tick)
-            out.append(f'<line x1="{x:.1f}" x2="{x:.1f}" y1="{self.top}" y2="{self.top + self.height}" stroke="#eeeeee"/>'
-                       f'<text x="{x:.1f}" y="{self.top + self.height + 20}" text-anchor="middle">{describe_number(tick)}{"*" if tick in marks else ""}</text>')
+            out.append(
+                f'<line x1="{x:.1f}" x2="{x:.1f}" y1="{self.top}" y2="{self.top + self.height}" stroke="#eeeeee"/><text x="{x:.1f}"'
+                f' y="{self.top + self.height + 20}" text-anchor="middle">{describe_number(tick)}{"*" if tick in marks else ""}</text>'
+            )
         out.append(f'<rect x="{self.left}" y="{self.top}" width="{self.width}" height="{self.height}" fill="none" stroke="#999"/>')
-        out.append(f'<text x="{self.left + self.width / 2}" y="{self.top + self.height + 44}" text-anchor="middle">{measuring.escape(x_label)}</text>')
+        out.append(
+            f'<text x="{self.left + self.width / 2}" y="{self.top + self.height + 44}"'
+            f' text-anchor="middle">{measuring.escape(x_label)}</text>'
+        )
         middle, side = self.top + self.height / 2, self.left - 64
-        out.append(f'<text x="{side}" y="{middle}" text-anchor="middle" transform="rotate(-90 {side} {middle})">{measuring.escape(y_label)}</text>')
+        out.append(
+            f'<text x="{side}" y="{middle}" text-anchor="middle" transform="rotate(-90 {side} {middle})">{measuring.escape(y_label)}</text>'
+        )
         return out
 
     def draw_curve(self, points, colour, width=2.0, is_dashed=False):
@@ -75,8 +104,10 @@ class Axes:
         return f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-width="{width:g}"{dashes}/>'
 
     def draw_point(self, x, y, colour, text, fill=None, radius=4):
-        return (f'<circle cx="{self.place_x(x):.1f}" cy="{self.place_y(y):.1f}" r="{radius:g}" fill="{fill or colour}" stroke="{colour}" stroke-width="2">'
-                f"<title>{measuring.escape(text)}</title></circle>")
+        return (
+            f'<circle cx="{self.place_x(x):.1f}" cy="{self.place_y(y):.1f}" r="{radius:g}" fill="{fill or colour}" stroke="{colour}"'
+            f' stroke-width="2"><title>{measuring.escape(text)}</title></circle>'
+        )
 
 
 def draw_lines(curves, title, subtitle, x_label, y_label, x_ticks, marks=(), dashed=()):
@@ -107,16 +138,22 @@ def draw_lines(curves, title, subtitle, x_label, y_label, x_ticks, marks=(), das
             limit = label[0] - 16
     bold = ' font-weight="bold"'
     for place, name, colour in labels:
-        out.append(f'<text x="{left + width + 12}" y="{place + 4:.1f}" fill="{colour}"{bold if name == "in all" else ""}>{measuring.escape(name)}</text>')
+        out.append(
+            f'<text x="{left + width + 12}" y="{place + 4:.1f}"'
+            f' fill="{colour}"{bold if name == "in all" else ""}>{measuring.escape(name)}</text>'
+        )
     return "\n".join(out) + "\n</svg>\n"
 
 
 def draw_bars(bars, title, subtitle, unit="s"):
-    """bars: [(label, [(name, value, paler value)])]: parts in the colours of their names; the pale end of each is what was spent inside MPI (0: not asked)."""
+    """bars: [(label, [(name, value, paler value)])]: parts in the colours of their names; the pale end of each is what was spent inside MPI
+    (0: not asked)."""
     width, height, top = 560, 26, 104
     left = max(190, 40 + round(7.2 * max(len(label) for label, _ in bars)))
     longest = max(sum(a + b for _, a, b in parts) for _, parts in bars) or 1.0
-    names = [name for name in PALETTE if any(part[0] == name and part[1] + part[2] > 0.002 * longest for _, parts in bars for part in parts)]
+    names = [
+        name for name in PALETTE if any(part[0] == name and part[1] + part[2] > 0.002 * longest for _, parts in bars for part in parts)
+    ]
     full = top + len(bars) * (height + 12) + 20
     out = start(left + width + 90, full, title, subtitle)
     x = 16.0
@@ -131,7 +168,10 @@ def draw_bars(bars, title, subtitle, unit="s"):
             for value, opacity, what in ((computing, 1.0, ", computing" if inside else ""), (inside, 0.35, ", inside MPI")):
                 length = value / longest * width
                 if length > 0.05:
-                    out.append(f'<rect x="{x:.2f}" y="{y}" width="{length:.2f}" height="{height}" fill="{PALETTE[name]}" fill-opacity="{opacity}"><title>{name}{what}: {value:.3g} {unit}</title></rect>')
+                    out.append(
+                        f'<rect x="{x:.2f}" y="{y}" width="{length:.2f}" height="{height}" fill="{PALETTE[name]}"'
+                        f' fill-opacity="{opacity}"><title>{name}{what}: {value:.3g} {unit}</title></rect>'
+                    )
                 x += max(length, 0)
         out.append(f'<text x="{x + 8:.1f}" y="{y + 18}">{sum(a + b for _, a, b in parts):.3g} {unit}</text>')
     return "\n".join(out) + "\n</svg>\n"

@@ -15,10 +15,13 @@ class RunError(Exception):
 
 
 def printable(text):
-    """`text` on one line, without what a terminal obeys: control and format characters as escapes (as config::printable does for the other programs)."""
+    """`text` on one line, without what a terminal obeys: control and format characters as escapes (as config::printable does for the other
+    programs)."""
+
     def show(letter):
         if 0xDC80 <= ord(letter) <= 0xDCFF:  # a byte of a file name that is no UTF-8
             return f"\\x{ord(letter) - 0xDC00:02x}"
         hidden = unicodedata.category(letter) in ("Cc", "Cf", "Cs", "Zl", "Zp") and letter not in "\u00ad\u200c\u200d"
         return f"\\u{ord(letter):04x}" if hidden else letter
+
     return "".join(map(show, str(text)))

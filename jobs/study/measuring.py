@@ -19,6 +19,7 @@ PHASES = ("read", "partition", "assemble", "factor", "solve", "orthogonalise", "
 @dataclasses.dataclass
 class Cost:
     """What one run of one program took. CPU is user + system time of the process and of every child that it waited for."""
+
     cpu_s: float
     wall_s: float
 
@@ -43,13 +44,35 @@ library = ctypes.CDLL("libopenblas.so.0")
 library.openblas_get_corename.restype = ctypes.c_char_p
 print(library.openblas_get_corename().decode())"""
 # By the vector instructions they use: 2 is AVX2 with FMA; names that are not here are newer.
-KERNEL_RANKS = dict.fromkeys(("generic", "katmai", "coppermine", "northwood", "prescott", "banias", "atom", "core2", "penryn", "dunnington",
-                              "nehalem", "athlon", "opteron", "opteron_sse3", "barcelona", "bobcat", "nano"), 0)
-KERNEL_RANKS |= dict.fromkeys(("sandybridge", "bulldozer", "piledriver", "steamroller"), 1) | dict.fromkeys(("haswell", "zen", "excavator"), 2)
+KERNEL_RANKS = dict.fromkeys(
+    (
+        "generic",
+        "katmai",
+        "coppermine",
+        "northwood",
+        "prescott",
+        "banias",
+        "atom",
+        "core2",
+        "penryn",
+        "dunnington",
+        "nehalem",
+        "athlon",
+        "opteron",
+        "opteron_sse3",
+        "barcelona",
+        "bobcat",
+        "nano",
+    ),
+    0,
+)
+KERNEL_RANKS |= dict.fromkeys(("sandybridge", "bulldozer", "piledriver", "steamroller"), 1) | dict.fromkeys(
+    ("haswell", "zen", "excavator"), 2
+)
 
 
 def find_fitting_kernels(cpuinfo):
-    """(kernels, rank) for the processor that the text of /proc/cpuinfo is of; ("", 0) when there is no telling."""
+    """(kernels, rank) for the processor that the text of /proc/cpuinfo is of; ("", 0) when it is not known."""
     fields = dict(line.split(":", 1) for line in cpuinfo.splitlines() if ":" in line)
     fields = {name.strip(): value.split() for name, value in fields.items()}
     flags = set(fields.get("flags", []))
@@ -66,9 +89,17 @@ def make_environment():
     kernels, _ = find_kernels()
     if kernels:
         kept["OPENBLAS_CORETYPE"] = kernels
-    return kept | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OMP_WAIT_POLICY": "passive", "OMPI_ALLOW_RUN_AS_ROOT": "1",
-                   "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_rmaps_base_oversubscribe": "1", "OMPI_MCA_hwloc_base_binding_policy": "none",
-                   "OMPI_MCA_mpi_yield_when_idle": "1", "HWLOC_COMPONENTS": "-gl"}
+    return kept | {
+        "OPENBLAS_NUM_THREADS": "1",
+        "OMP_NUM_THREADS": "1",
+        "OMP_WAIT_POLICY": "passive",
+        "OMPI_ALLOW_RUN_AS_ROOT": "1",
+        "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+        "OMPI_MCA_rmaps_base_oversubscribe": "1",
+        "OMPI_MCA_hwloc_base_binding_policy": "none",
+        "OMPI_MCA_mpi_yield_when_idle": "1",
+        "HWLOC_COMPONENTS": "-gl",
+    }
 
 
 class Failed(RuntimeError):
@@ -83,8 +114,15 @@ def run_measured(command, cwd, environment=None, timeout_s=3600):
     """Runs the command; its output goes nowhere unless it fails. Raises Failed when it does."""
     with tempfile.TemporaryFile("w+") as log:
         start = time.monotonic()
-        child = subprocess.Popen([str(word) for word in command], cwd=cwd, stdout=log, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
-                                 env=make_environment() | (environment or {}), start_new_session=True)
+        child = subprocess.Popen(
+            [str(word) for word in command],
+            cwd=cwd,
+            stdout=log,
+            stderr=subprocess.STDOUT,
+            stdin=subprocess.DEVNULL,
+            env=make_environment() | (environment or {}),
+            start_new_session=True,
+        )
         try:
             while True:
                 pid, status, usage = os.wait4(child.pid, os.WNOHANG)
@@ -105,7 +143,8 @@ def run_measured(command, cwd, environment=None, timeout_s=3600):
 
 
 def run_part(command, cwd, what, environment=None, timeout_s=3600):
-    """run_measured of a part of a study. RunError names it and has the program's own error line and exit code; 4, where that is none of those that say whose fault it was."""
+    """run_measured of a part of a study. RunError names it and has the program's own error line and exit code; 4, where that is none of
+    those that say whose fault it was."""
     try:
         return run_measured(command, cwd, environment, timeout_s)
     except Failed as error:
@@ -125,22 +164,31 @@ def find_spread(values):
     return (max(values) - min(values)) / 2 / find_median(values) if len(values) > 1 else 0.0
 
 
-STATIONS = {"mesh": "read", "read": "read", "partition": "partition", "assembly": "assemble", "assemble": "assemble", "errors": "error bars",
-            "collect": "write", "bank": "write", "write": "write"}
+PHASE_OF_RECORDED = {
+    "mesh": "read",
+    "read": "read",
+    "partition": "partition",
+    "assembly": "assemble",
+    "assemble": "assemble",
+    "errors": "error bars",
+    "collect": "write",
+    "bank": "write",
+    "write": "write",
+}
 
 
 def to_phases(record, total_s):
     """The `run` record of a resolved job as CPU seconds by PHASES, {phase: s}, that add up to total_s; what no phase claims is "other".
 
-    Stations tell their CPU seconds (all ranks); inside the station "modes" the wall seconds of its parts tell how they are shared out."""
+    Phases of the record give their CPU seconds (all ranks); inside "modes" the wall seconds of its parts say how they are shared out."""
     seconds = dict.fromkeys(PHASES, 0.0)
     solver = record["solver"]["seconds"]
-    for station in record["stations"]:
-        cpu_s = station.get("cpu_seconds", station["seconds"])
-        if station["name"] != "modes":
-            seconds[STATIONS.get(station["name"], "other")] += cpu_s
+    for phase in record["stations"]:
+        cpu_s = phase.get("cpu_seconds", phase["seconds"])
+        if phase["name"] != "modes":
+            seconds[PHASE_OF_RECORDED.get(phase["name"], "other")] += cpu_s
             continue
-        share = cpu_s / max(station["seconds"], 1e-9)
+        share = cpu_s / max(phase["seconds"], 1e-9)
         parts = {"factor": solver.get("analyse", 0.0) + solver["factor"], "solve": solver["solve"]}
         for name, value in parts.items():
             seconds[name] += value * share
@@ -154,15 +202,18 @@ def to_phases(record, total_s):
 def find_extras(record, total_s):
     """What trust costs: rows (part, CPU s, share of the run) of counting, checking and error bars; as to_phases() shares them out."""
     solver = record["solver"]["seconds"]
-    station = next(s for s in record["stations"] if s["name"] == "modes")
-    share = station.get("cpu_seconds", station["seconds"]) / max(station["seconds"], 1e-9)
+    phase = next(s for s in record["stations"] if s["name"] == "modes")
+    share = phase.get("cpu_seconds", phase["seconds"]) / max(phase["seconds"], 1e-9)
     factorisations = max(record["solver"]["factorisations"], 1)
     rows = [("part of the run", "CPU s", "share")]
 
     def add(name, cpu_s):
         rows.append((name, f"{cpu_s:.2f}", f"{100 * cpu_s / total_s:.1f} %"))
 
-    add(f"proof: 2 of {factorisations} factorisations, at the ends of the band", share * solver["factor"] * min(2, factorisations) / factorisations)
+    add(
+        f"proof: 2 of {factorisations} factorisations, at the ends of the band",
+        share * solver["factor"] * min(2, factorisations) / factorisations,
+    )
     add("residuals, orthonormality, canonical basis", share * solver["check"])
     add("error bars", to_phases(record, total_s)["error bars"])
     return rows
@@ -182,19 +233,31 @@ def format_table(rows, is_markdown=False):
     if not is_markdown:
         return "\n".join(["  ".join(cells[0]), "  ".join("-" * w for w in widths), *("  ".join(row) for row in cells[1:])])
     rule = "|" + "|".join("---" if i == 0 else "--:" for i in range(len(widths))) + "|"
-    return "\n".join(["| " + " | ".join(str(c) for c in rows[0]) + " |", rule, *("| " + " | ".join(str(c) for c in row) + " |" for row in rows[1:])])
+    return "\n".join(
+        ["| " + " | ".join(str(c) for c in rows[0]) + " |", rule, *("| " + " | ".join(str(c) for c in row) + " |" for row in rows[1:])]
+    )
 
 
 def make_rows(results, ours):
-    """results: {name: {"cpu_s": [...], "wall_s": [...], "peak_bytes": int, "modes": int, "residual": x, "frequency_error": x, "label": text}} ->
-    rows of the table, quickest first, with each program's CPU time over that of `ours`."""
+    """results: {name: {"cpu_s": [...], "wall_s": [...], "peak_bytes": int, "modes": int, "residual": x, "frequency_error": x, "label":
+    text}} -> rows of the table, quickest first, with each program's CPU time over that of `ours`; a single run has no spread."""
     base = find_median(results[ours]["cpu_s"])
     rows = [("program", "CPU s", "spread", "times ours", "wall s", "peak GB", "modes", "worst residual", "frequencies agree to")]
     for name, result in sorted(results.items(), key=lambda item: (not item[0].startswith("carillon"), find_median(item[1]["cpu_s"]))):
         cpu = find_median(result["cpu_s"])
-        rows.append((result["label"], f"{cpu:.1f}" if cpu >= 1 else f"{cpu:.2f}", f"{100 * find_spread(result['cpu_s']):.0f} %", f"{cpu / base:.2f}",
-                     f"{find_median(result['wall_s']):.1f}", f"{result['peak_bytes'] / 1e9:.2f}", result["modes"], f"{result['residual']:.1e}",
-                     f"{result['frequency_error']:.0e}"))
+        rows.append(
+            (
+                result["label"],
+                f"{cpu:.1f}" if cpu >= 1 else f"{cpu:.2f}",
+                f"{100 * find_spread(result['cpu_s']):.0f} %" if len(result["cpu_s"]) > 1 else "-",
+                f"{cpu / base:.2f}",
+                f"{find_median(result['wall_s']):.1f}",
+                f"{result['peak_bytes'] / 1e9:.2f}",
+                result["modes"],
+                f"{result['residual']:.1e}",
+                f"{result['frequency_error']:.0e}",
+            )
+        )
     return rows
 
 

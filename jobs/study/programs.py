@@ -1,4 +1,4 @@
-"""The programs that a study starts: given, beside this program, or on the way of commands."""
+"""The programs that a study starts: given, next to this program, or on the way of commands."""
 import argparse
 import math
 import os
@@ -24,9 +24,9 @@ def find_program(given, name="carillon-precompute"):
     if given:
         candidates = [pathlib.Path(given) / name]
     else:
-        beside = pathlib.Path(sys.argv[0]).resolve().parent / name
+        sibling = pathlib.Path(sys.argv[0]).resolve().parent / name
         found = shutil.which(name)
-        candidates = [beside] + ([pathlib.Path(found)] if found else [])
+        candidates = [sibling] + ([pathlib.Path(found)] if found else [])
     for candidate in candidates:
         if os.access(candidate, os.X_OK) and candidate.is_file():
             return candidate.resolve()

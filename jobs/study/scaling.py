@@ -9,10 +9,10 @@ import statistics
 import stat
 
 import measuring
-from errors import InputError, RunError
+from errors import InputError
 
 PHASES = ("read", "partition", "assemble", "factor", "solve", "orthogonalise", "errors", "write", "other")
-MOST_BYTES = 16 << 20
+MAX_BYTES = 16 << 20
 QUICK_NODES = [600, 1200]
 
 
@@ -22,8 +22,8 @@ def read_text(path, what, remedy):
         status = os.stat(path)
         if not stat.S_ISREG(status.st_mode):
             raise InputError(f"{path}: this is no regular file; {remedy}")
-        if status.st_size > MOST_BYTES:
-            raise InputError(f"{path}: a {what} of {status.st_size} bytes; at most {MOST_BYTES} are read")
+        if status.st_size > MAX_BYTES:
+            raise InputError(f"{path}: a {what} of {status.st_size} bytes; at most {MAX_BYTES} are read")
         return pathlib.Path(path).read_text()
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: the {what} cannot be read: {error}; {remedy}") from None
@@ -81,11 +81,16 @@ class Study:
 
     def check_job(self):
         if "accuracy_cents" in self.job:
-            raise InputError(f'{self.job_file}: "accuracy_cents" chooses another mesh on every occasion; give "element" and the size of the mesh for a study')
+            raise InputError(
+                f'{self.job_file}: "accuracy_cents" chooses another mesh on every occasion; give "element" and the size of the mesh for a'
+                " study"
+            )
         if not self.has_body and "mesh" not in self.job:
             raise InputError(f'{self.job_file}: the job has neither "body" nor "mesh"')
         if not self.has_body and self.options.nodes:
-            raise InputError(f'{self.job_file}: --nodes needs a job with a "body" (a shape or a surface): a mesh file cannot be meshed again')
+            raise InputError(
+                f'{self.job_file}: --nodes needs a job with a "body" (a shape or a surface): a mesh file cannot be meshed again'
+            )
 
     def find_sizes(self):
         if not self.has_body:
@@ -139,19 +144,25 @@ class Study:
         for case in self.cases:
             self.make_job(case)
         if not self.weak and len(self.ranks) > 1:
-            print("a mesh file cannot be meshed again: strong scaling only; give the job a \"body\" for weak scaling and growth", flush=True)
+            print('a mesh file cannot be meshed again: strong scaling only; give the job a "body" for weak scaling and growth', flush=True)
         for repeat in range(self.repeats):
-            # In turn, and every other time backwards: what the machine does besides falls on all of them.
+            # In turn, and every other time backwards: other load on the machine affects all of them.
             for case in self.cases if repeat % 2 == 0 else reversed(self.cases):
                 self.runs.setdefault(case, []).append(self.run_case(case))
 
     def run_case(self, case):
         name = self.name(case)
-        command = ["mpirun", "-np", case.ranks, self.program, "-q", f"{name}.json"]
+        command = ["mpirun", "-np", case.ranks, self.program, "-q", "--profile", f"{name}.json"]
         cost = measuring.run_part(command if case.ranks > 1 else command[3:], self.out, name, timeout_s=self.options.timeout)
         record = json.loads((self.out / f"{name}.hdf.resolved.json").read_text())["run"]
         record["cost"] = dataclasses.asdict(cost)
-        print(f"{self.describe(case)}: {3 * record['mesh']['free_nodes']:,} unknowns, {record['solver']['modes']} modes, {cost.cpu_s:.2f} CPU s, {cost.wall_s:.2f} s", flush=True)
+        print(
+            (
+                f"{self.describe(case)}: {3 * record['mesh']['free_nodes']:,} unknowns, {record['solver']['modes']} modes,"
+                f" {cost.cpu_s:.2f} CPU s, {cost.wall_s:.2f} s"
+            ),
+            flush=True,
+        )
         return record
 
     def describe(self, case):
@@ -173,7 +184,10 @@ class Study:
     def calc_phase(self, case, phase):
         """(seconds of wall clock, of these in computing, inside MPI), means over the ranks, medians over the repeats."""
         wall = self.calc_median(case, lambda record: record["effort"][phase]["wall_seconds"]) / case.ranks
-        inside = self.calc_median(case, lambda record: min(record["effort"][phase]["mpi_seconds"], record["effort"][phase]["wall_seconds"])) / case.ranks
+        inside = (
+            self.calc_median(case, lambda record: min(record["effort"][phase]["mpi_seconds"], record["effort"][phase]["wall_seconds"]))
+            / case.ranks
+        )
         return wall, wall - inside, inside
 
     def calc_seconds(self, case):
@@ -196,7 +210,8 @@ class Study:
 
 
 def fit_power(x, y):
-    """(exponent, largest factor between a value and the fit) of y = a x^p by least squares of logarithms; None without two sizes of positive values."""
+    """(exponent, largest factor between a value and the fit) of y = a x^p by least squares of logarithms; None without two sizes of
+    positive values."""
     points = [(math.log(a), math.log(b)) for a, b in zip(x, y) if a > 0 and b > 0]
     if len({a for a, _ in points}) < 2:
         return None
@@ -211,6 +226,7 @@ LATENCY_S, BYTES_PER_S = 2e-6, 4e9  # of a message between two ranks of one mach
 @dataclasses.dataclass
 class Limit:
     """Where the rank-seconds go that p ranks take beyond those of one."""
+
     lost: float  # seconds on every rank beyond a p-th of one rank's
     shares: dict  # {reason: seconds of all ranks}
     text: str
@@ -229,9 +245,13 @@ def find_limit(study, phase, case):
     calls = work["messages"] + work["collectives"] * max(math.log2(p), 1)
     transfer = min(calls * LATENCY_S + (work["bytes"] + work["collective_bytes"]) / BYTES_PER_S, p * inside)
     slower = max(p * compute - compute_1 - more, 0.0)
-    shares = {"more operations than on one rank": more, "slower computing: the ranks share the memory or the cores": slower, "messages": transfer,
-              "waiting for other ranks": max(p * inside - transfer, 0.0)}
+    shares = {
+        "more operations than on one rank": more,
+        "slower computing: the ranks share the memory or the cores": slower,
+        "messages": transfer,
+        "waiting for other ranks": max(p * inside - transfer, 0.0),
+    }
     lost = wall - wall_1 / p
     if wall < 0.005 or lost < 0.1 * wall:
-        return Limit(lost, shares, "nothing: it scales" if wall >= 0.005 else "too short to tell")
+        return Limit(lost, shares, "nothing: it scales" if wall >= 0.005 else "too short to say")
     return Limit(lost, shares, max(shares, key=shares.get))

@@ -6,7 +6,7 @@ import pathlib
 import scaling
 
 QUANTITIES = ("flops", "messages", "bytes", "collectives", "collective_bytes")
-MOST_GROWTH = 0.05
+MAX_GROWTH = 0.05
 FORMAT = 1
 
 
@@ -16,8 +16,16 @@ class HasGrown(Exception):
 
 def collect(study):
     """[{"nodes", "ranks", "unknowns", "modes", "work": {phase: {quantity: number}}}]."""
-    return [{"nodes": case.nodes, "ranks": case.ranks, "unknowns": study.get_unknowns(case), "modes": study.runs[case][0]["solver"]["modes"],
-             "work": study.get_work(case)} for case in study.cases]
+    return [
+        {
+            "nodes": case.nodes,
+            "ranks": case.ranks,
+            "unknowns": study.get_unknowns(case),
+            "modes": study.runs[case][0]["solver"]["modes"],
+            "work": study.get_work(case),
+        }
+        for case in study.cases
+    ]
 
 
 def write(path, study):
@@ -34,9 +42,14 @@ def write(path, study):
 
 def read(path):
     """A record as write() made it. InputError names what is missing in it."""
-    remedy = f"make it anew with --record {path}"
+    remedy = f"make it again with --record {path}"
     record = scaling.parse(scaling.read_text(path, "record", remedy), path, remedy)
-    if not isinstance(record, dict) or record.get("format") != FORMAT or not isinstance(record.get("job"), dict) or not isinstance(record.get("cases"), list):
+    if (
+        not isinstance(record, dict)
+        or record.get("format") != FORMAT
+        or not isinstance(record.get("job"), dict)
+        or not isinstance(record.get("cases"), list)
+    ):
         raise scaling.InputError(f"{path}: this is no record of a study; {remedy}")
     for number, case in enumerate(record["cases"], 1):
         if fault := find_fault(case):
@@ -70,11 +83,14 @@ def compare(recorded, cases):
     for old in recorded:
         new = found.get((old["nodes"], old["ranks"]))
         if new is None:
-            raise scaling.InputError(f"the record has a case of {old['nodes']} nodes on {old['ranks']} ranks, and the study has none: take the options it was made with")
+            raise scaling.InputError(
+                f"the record has a case of {old['nodes']} nodes on {old['ranks']} ranks, and the study has none: take the options it was"
+                " made with"
+            )
         for phase in sorted({*old["work"], *new["work"]}):
             for quantity in QUANTITIES:
                 before, now = (side["work"].get(phase, {}).get(quantity, 0) for side in (old, new))
-                if now > before * (1 + MOST_GROWTH) or now < before * (1 - MOST_GROWTH):
+                if now > before * (1 + MAX_GROWTH) or now < before * (1 - MAX_GROWTH):
                     differences.append((old, phase, quantity, before, now))
     return sorted(differences, key=lambda entry: -entry[4] / max(entry[3], 1))
 
@@ -82,12 +98,14 @@ def compare(recorded, cases):
 def check(record, study, options):
     """Raises HasGrown with all that has; says what has shrunk."""
     if record["job"] != study.job:
-        raise scaling.InputError(f"{options.check}: the record is of another job than {study.job_file}; make it anew with --record")
+        raise scaling.InputError(f"{options.check}: the record is of another job than {study.job_file}; make it again with --record")
     differences = compare(record["cases"], collect(study))
     lines = {True: [], False: []}
     for case, phase, quantity, before, now in differences:
         change = f"{100 * (now / before - 1):+.1f} %" if before else "new"
-        lines[now > before].append(f"  {case['nodes']} nodes, {case['ranks']} ranks, {phase}: {quantity} {before:.0f} -> {now:.0f} ({change})")
+        lines[now > before].append(
+            f"  {case['nodes']} nodes, {case['ranks']} ranks, {phase}: {quantity} {before:.0f} -> {now:.0f} ({change})"
+        )
     command = f"carillon-study scaling {options.job}{' --quick' if options.quick else ''} --record {options.check}"
     for given, flag in ((options.ranks, "--ranks"), (options.nodes, "--nodes")):
         if given:
@@ -95,6 +113,9 @@ def check(record, study, options):
     if lines[False]:
         print("less work than recorded; record it:\n" + "\n".join(lines[False]), flush=True)
     if lines[True]:
-        raise HasGrown(f"the work has grown by more than {100 * MOST_GROWTH:.0f} % against {options.check}:\n" + "\n".join(lines[True]) +
-                       f"\nIf that is meant, record it in the same commit:\n  {command}")
-    print(f"{options.check}: the work is as recorded, within {100 * MOST_GROWTH:.0f} %", flush=True)
+        raise HasGrown(
+            f"the work has grown by more than {100 * MAX_GROWTH:.0f} % against {options.check}:\n"
+            + "\n".join(lines[True])
+            + f"\nIf that is meant, record it in the same commit:\n  {command}"
+        )
+    print(f"{options.check}: the work is as recorded, within {100 * MAX_GROWTH:.0f} %", flush=True)

@@ -11,6 +11,7 @@ Exit codes: 0 done, 2 the input cannot be used, 4 the machine refused.
 import argparse
 import atexit
 import ctypes
+import errno
 import hashlib
 import json
 import math
@@ -33,8 +34,22 @@ SUPERSAMPLING = 2  # pixels drawn per pixel written, along each side
 TEXT = (0.16, 0.17, 0.20)
 BACKGROUND = ((1.0, 1.0, 1.0), (0.90, 0.92, 0.95))  # top, bottom
 # viridis (van der Walt and Smith 2015), nine of its colours; equal steps look equal.
-VIRIDIS = numpy.array([(68, 1, 84), (71, 44, 122), (59, 82, 139), (44, 113, 142), (33, 145, 140), (39, 173, 129), (92, 200, 99),
-                       (170, 220, 50), (253, 231, 37)]) / 255.0
+VIRIDIS = (
+    numpy.array(
+        [
+            (68, 1, 84),
+            (71, 44, 122),
+            (59, 82, 139),
+            (44, 113, 142),
+            (33, 145, 140),
+            (39, 173, 129),
+            (92, 200, 99),
+            (170, 220, 50),
+            (253, 231, 37),
+        ]
+    )
+    / 255.0
+)
 MOVING = [(0.85, 0.42, 0.20), (0.20, 0.45, 0.78), (0.55, 0.30, 0.62), (0.25, 0.60, 0.35)]
 FIXED = [(0.55, 0.66, 0.80), (0.72, 0.74, 0.78), (0.80, 0.66, 0.46), (0.62, 0.74, 0.62), (0.76, 0.62, 0.70)]
 
@@ -48,12 +63,15 @@ class SystemError_(Exception):
 
 
 def printable(text):
-    """`text` on one line, without what a terminal obeys: control and format characters as escapes (as config::printable does for the other programs)."""
+    """`text` on one line, without what a terminal obeys: control and format characters as escapes (as config::printable does for the other
+    programs)."""
+
     def show(letter):
         if 0xDC80 <= ord(letter) <= 0xDCFF:  # a byte of a file name that is no UTF-8
             return f"\\x{ord(letter) - 0xDC00:02x}"
         hidden = unicodedata.category(letter) in ("Cc", "Cf", "Cs", "Zl", "Zp") and letter not in "\u00ad\u200c\u200d"
         return f"\\u{ord(letter):04x}" if hidden else letter
+
     return "".join(map(show, str(text)))
 
 
@@ -61,7 +79,8 @@ def printable(text):
 
 
 class Bank:
-    """The drawable part of a mode bank: surface, frequencies, modes on demand. Checked by its seal (docs/bank-format.md) before HDF5 sees it."""
+    """The drawable part of a mode bank: surface, frequencies, modes on demand. Checked by its seal (docs/bank-format.md) before HDF5 sees
+    it."""
 
     def __init__(self, path):
         self.path = pathlib.Path(path)
@@ -91,13 +110,22 @@ class Bank:
         self.check()
 
     def check(self):
-        """InputError unless everything can be drawn that is not drawn yet: shapes of arrays, finite numbers, triangles of vertices that there are."""
+        """InputError unless everything can be drawn that is not drawn yet: shapes of arrays, finite numbers, triangles of vertices that
+        there are."""
+
         def refuse(what):
             raise InputError(f"{self.path}: {what}; run carillon-bank check on it")
+
         numbers = [self.vertices, self.freq_hz, self.centre]
         if any(not numpy.issubdtype(values.dtype, numpy.number) for values in [*numbers, self.triangles]):
             refuse("mesh, frequencies or centre are no numbers")
-        if self.vertices.ndim != 2 or self.vertices.shape[1] != 3 or self.triangles.ndim != 2 or self.triangles.shape[1] != 3 or not len(self.triangles):
+        if (
+            self.vertices.ndim != 2
+            or self.vertices.shape[1] != 3
+            or self.triangles.ndim != 2
+            or self.triangles.shape[1] != 3
+            or not len(self.triangles)
+        ):
             refuse("the surface is no list of vertices and triangles")
         if self.freq_hz.ndim != 1 or self.shape_extent != (len(self.vertices), len(self.freq_hz), 3):
             refuse("frequencies, shapes and vertices do not fit each other")
@@ -156,8 +184,9 @@ class Trajectory:
             if any(numpy.abs(poses).max() > 1e12 for _, _, _, poses in self.bodies):
                 raise InputError(f"{path}: a body is farther away than can be drawn; render the scene again")
         except (KeyError, TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
-            raise InputError(f"{path}: this is no trajectory ({type(error).__name__}: {error}); "
-                             "carillon-render --trajectory writes one") from None
+            raise InputError(
+                f"{path}: this is no trajectory ({type(error).__name__}: {error}); carillon-render --trajectory writes one"
+            ) from None
 
 
 def drop_cavities(vertices, triangles):
@@ -193,9 +222,14 @@ def start_server():
     first = 100 + os.getpid() % 900
     for number in range(first, first + 20):
         read_end, write_end = os.pipe()
-        server = subprocess.Popen(["Xvfb", f":{number}", "-displayfd", str(write_end), "-screen", "0", "1280x1024x24", "-nolisten", "tcp", "-noreset"],
-                                  pass_fds=[write_end], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-                                  preexec_fn=lambda: ctypes.CDLL(None).prctl(1, signal.SIGTERM))  # PR_SET_PDEATHSIG: it ends with us
+        server = subprocess.Popen(
+            ["Xvfb", f":{number}", "-displayfd", str(write_end), "-screen", "0", "1280x1024x24", "-nolisten", "tcp", "-noreset"],
+            pass_fds=[write_end],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            preexec_fn=lambda: ctypes.CDLL(None).prctl(1, signal.SIGTERM),
+        )  # PR_SET_PDEATHSIG: it ends with us
         os.close(write_end)
         with os.fdopen(read_end) as pipe:
             if pipe.readline().strip():
@@ -214,7 +248,7 @@ def open_display():
     number = start_server()
     if number is None:
         raise SystemError_("the virtual display Xvfb did not start; try 'Xvfb :99' by hand to see why")
-    # VTK ends the process when it cannot connect, so somebody else tries first.
+    # VTK ends the process when it cannot connect, so a plain Xlib call tries first.
     x11 = ctypes.CDLL("libX11.so.6")
     x11.XOpenDisplay.restype = ctypes.c_void_p
     x11.XCloseDisplay.argtypes = [ctypes.c_void_p]
@@ -311,8 +345,12 @@ def make_text(text, x, y, size, bold=False, centred=True, colour=TEXT):
 def make_lights(renderer):
     """A key from the upper left of the eye, soft fills from the right and below, a rim from behind."""
     renderer.AutomaticLightCreationOff()
-    for place, strength, colour in [((-0.7, 0.9, 1.0), 0.80, (1.0, 0.98, 0.95)), ((1.0, 0.2, 0.8), 0.34, (0.92, 0.95, 1.0)),
-                                    ((0.1, 0.8, -1.0), 0.25, (1.0, 1.0, 1.0)), ((0.0, -0.9, 0.6), 0.22, (0.96, 0.97, 1.0))]:
+    for place, strength, colour in [
+        ((-0.7, 0.9, 1.0), 0.80, (1.0, 0.98, 0.95)),
+        ((1.0, 0.2, 0.8), 0.34, (0.92, 0.95, 1.0)),
+        ((0.1, 0.8, -1.0), 0.25, (1.0, 1.0, 1.0)),
+        ((0.0, -0.9, 0.6), 0.22, (0.96, 0.97, 1.0)),
+    ]:
         light = vtk.vtkLight()
         light.SetLightTypeToCameraLight()
         light.SetPosition(*place)
@@ -357,7 +395,7 @@ def draw(renderers, width, height):
 
 
 def write_png(image, path):
-    """Writes the picture beside `path` first and renames it, so that there is a whole picture or none; "-" is standard output."""
+    """Writes the picture next to `path` first and renames it, so that there is a whole picture or none; "-" is standard output."""
     height, width, _ = image.shape
     data = vtk.vtkImageData()
     data.SetDimensions(width, height, 1)
@@ -485,8 +523,8 @@ def draw_modes(bank, numbers, up):
         renderer.AddActor2D(make_text(f"Mode {number}", 0.5, 80 / height, 30, bold=True))
         renderer.AddActor2D(make_text(f"{bank.freq_hz[number - 1]:,.1f} Hz", 0.5, 42 / height, 26))
         row, column = divmod(index, columns)
-        canvas[row * height:(row + 1) * height, column * width:(column + 1) * width] = draw([renderer, above], width, height)
-    canvas[rows * height:] = draw_legend(canvas.shape[1], legend, colours, bank)
+        canvas[row * height : (row + 1) * height, column * width : (column + 1) * width] = draw([renderer, above], width, height)
+    canvas[rows * height :] = draw_legend(canvas.shape[1], legend, colours, bank)
     return canvas
 
 
@@ -512,24 +550,31 @@ def draw_legend(width, height, colours, bank):
     middle = 0.5 + 14 / height
     renderer.AddActor2D(make_text("at rest", 0.5 - (180 + 48) / width, middle, 19))
     renderer.AddActor2D(make_text("largest displacement", 0.5 + (180 + 108) / width, middle, 19))
-    renderer.AddActor2D(make_text(f"{bank.path.name}   ·   {bank.note}   ·   grey: undeformed; displacements exaggerated", 0.5,
-                                  18 / height, 16, colour=(0.42, 0.44, 0.48)))
+    renderer.AddActor2D(
+        make_text(
+            f"{bank.path.name}   ·   {bank.note}   ·   grey: undeformed; displacements exaggerated",
+            0.5,
+            18 / height,
+            16,
+            colour=(0.42, 0.44, 0.48),
+        )
+    )
     return draw([renderer], width, height)
 
 
 # ------------------------------------------------------------------ scene
 
 
-def decimate(vertices, triangles, most):
-    """A body of at most about `most` triangles, for copies that are drawn many times."""
-    if len(triangles) <= most:
+def decimate(vertices, triangles, max_triangles):
+    """A body of at most about `max_triangles` triangles, for copies that are drawn many times."""
+    if len(triangles) <= max_triangles:
         return vertices, triangles
     clean = vtk.vtkCleanPolyData()  # also drops the points that no triangle uses
     clean.SetInputData(make_surface(vertices, triangles, crease_deg=180.0))
     clean.SetTolerance(0.0)
     thin = vtk.vtkQuadricDecimation()
     thin.SetInputConnection(clean.GetOutputPort())
-    thin.SetTargetReduction(1.0 - most / len(triangles))
+    thin.SetTargetReduction(1.0 - max_triangles / len(triangles))
     thin.Update()
     output = thin.GetOutput()
     return to_numpy(output.GetPoints().GetData()).astype(float), to_numpy(output.GetPolys().GetData()).reshape(-1, 4)[:, 1:]
@@ -543,7 +588,9 @@ def choose_poses(centres, poses, radius, count):
     if total[-1] < 0.05 * radius:
         return [len(poses) - 1]
     count = int(min(count, max(2, round(total[-1] / (0.9 * radius)) + 1)))
-    return sorted({int(numpy.searchsorted(total, t)) for t in numpy.linspace(0, total[-1], count)} & set(range(len(poses))) | {len(poses) - 1})
+    return sorted(
+        {int(numpy.searchsorted(total, t)) for t in numpy.linspace(0, total[-1], count)} & set(range(len(poses))) | {len(poses) - 1}
+    )
 
 
 def make_line(points, radius, colour, opacity=1.0):
@@ -770,6 +817,8 @@ def run():
     scene = commands.add_parser("scene", help="the bodies of a simulated scene along their ways", allow_abbrev=False)
     scene.add_argument("trajectory", metavar="TRAJECTORY.json", help="written by carillon-render --trajectory")
     scene.add_argument("-o", "--output", required=True, type=pathlib.Path, metavar="OUT.png")
+    for command in (modes, scene):
+        command.add_argument("--result", type=pathlib.Path, metavar="FILE", help="write how the program ended to this file, a JSON object")
     arguments = parser.parse_args()
 
     check_output(arguments.output)
@@ -783,21 +832,59 @@ def run():
     image = draw_modes(bank, numbers, "xyz".index(arguments.up)) if arguments.command == "modes" else draw_scene(trajectory)
     write_png(image, arguments.output)
     piped = arguments.output == STANDARD_OUTPUT
-    print(f"{'standard output' if piped else printable(arguments.output)}: {image.shape[1]} x {image.shape[0]} pixels", file=sys.stderr if piped else sys.stdout)
+    print(
+        f"{'standard output' if piped else printable(arguments.output)}: {image.shape[1]} x {image.shape[0]} pixels",
+        file=sys.stderr if piped else sys.stdout,
+    )
+
+
+def find_result_file(words):
+    """The file of --result, also of a command line that argparse refuses; None when there is none."""
+    for word, following in zip(words, [*words[1:], None]):
+        if word == "--result":
+            return following
+        if word.startswith("--result="):
+            return word.partition("=")[2]
+    return None
+
+
+def write_result(file, kind, message):
+    """How the program ended, whole or not at all (runtime/base/result.hpp). The exit code says it, too, where this cannot be written."""
+    if not file:
+        return
+    temporary = f"{file}.tmp.{os.getpid()}"
+    try:
+        with open(temporary, "x", encoding="utf-8") as out:
+            json.dump({"kind": kind, **({"message": message} if message else {}), "resumable": False}, out)
+        os.replace(temporary, file)
+    except OSError:
+        pass
+
+
+def describe_error(error):
+    """Kind, message and exit code of an exception."""
+    if isinstance(error, InputError):
+        return "bad-input", str(error), 2
+    if isinstance(error, MemoryError):
+        return "memory", "out of memory; close other programs", 4
+    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return "disk-full", str(error), 4
+    if isinstance(error, (SystemError_, ImportError, OSError)):
+        return "system", str(error), 4
+    # Numbers that nothing above looks for.
+    return "bad-input", f"this cannot be drawn ({type(error).__name__}: {error}); run carillon-bank check on its banks", 2
 
 
 def main():
+    file = find_result_file(sys.argv[1:])
     try:
         run()
-    except InputError as error:
-        print(f"carillon-draw: {printable(error)}", file=sys.stderr)
-        return 2
-    except (SystemError_, ImportError, MemoryError, OSError) as error:
-        print(f"carillon-draw: {printable(error)}", file=sys.stderr)
-        return 4
-    except Exception as error:  # numbers that nothing above looks for
-        print(f"carillon-draw: this cannot be drawn ({type(error).__name__}: {printable(error)}); run carillon-bank check on its banks", file=sys.stderr)
-        return 2
+    except Exception as error:
+        kind, message, code = describe_error(error)
+        print(f"carillon-draw: {printable(message)}", file=sys.stderr)
+        write_result(file, kind, message)
+        return code
+    write_result(file, "done", "")
     return 0
 
 

@@ -1,81 +1,76 @@
-// Block Lanczos with shift and invert, as a type of SLEPc's eigensolver object.
+// Block Lanczos with shift and invert.
 #pragma once
 
-#include <mpi.h>
-#include <slepceps.h>
-
-#include <array>
 #include <cstdint>
 #include <functional>
-#include <string>
-#include <vector>
 
-#include "precompute/eigen/block_kernels.hpp"
-#include "precompute/eigen/checkpoint.hpp"
-#include "precompute/eigen/orthogonality.hpp"
+#include "precompute/eigen/inner_product.hpp"
+#include "precompute/eigen/lanczos_basis.hpp"
+#include "precompute/eigen/lanczos_checkpoint.hpp"
+#include "precompute/eigen/locked_modes.hpp"
+#include "precompute/eigen/orthogonaliser.hpp"
+#include "precompute/eigen/ritz.hpp"
+#include "precompute/eigen/shift_invert.hpp"
 
 namespace carillon::eigen {
 
-/// The name for EPSSetType and -eps_type.
-inline constexpr const char* kBlockLanczosType = "blocklanczos";
+/// What an iteration works on; everything must outlive it.
+struct LanczosProblem {
+  const ShiftInvert& inverse;
+  InnerProduct& inner;
+  LanczosBasis& basis;  // the starting block stands in its first columns
+  const LockedModes& locked;
+  PetscInt n = 0;          // rows of all ranks,
+  PetscInt first_row = 0;  // and the first of this one
+};
 
-/// Makes the type known to SLEPc; again and again does no harm. Call after SlepcInitialize.
-///
-/// For EPS_HEP and EPS_GHEP. With EPS_ALL it seeks the eigenvalues of the interval (EPSSetInterval), nev says how many there are (a guess
-/// after set_count_known); it stops when it has them, or when everything it sees in the interval and something beyond it has converged:
-/// copies of repeated eigenvalues that are still missing need another run with these deflated. Otherwise it seeks the nev wanted ones. It
-/// heeds ncv (size of the basis; a full one is restarted with its best Ritz vectors), tol, max_it (in blocks), the convergence and stopping
-/// tests, monitors, the deflation and the initial space, and -eps_blocklanczos_block_size. Errors are PETSc's. Collective.
-PetscErrorCode register_block_lanczos();
+/// Keeps the Krylov relation of its basis between its calls, and the basis semi-orthogonal (orthogonaliser.hpp). Every member but the get_
+/// ones is collective.
+class BlockLanczos {
+ public:
+  enum class End { kStopped, kExhausted, kCheckpointed };
+  /// After a Ritz step, with all steps so far: true ends the iteration.
+  using Monitor = std::function<bool(const RitzPairs&, const RitzSelection&, int steps)>;
 
-/// Columns per block; PETSC_DEFAULT: 16. Logically collective.
-PetscErrorCode set_block_size(EPS eps, PetscInt columns);
+  /// max_steps: blocks at most. checkpoint: may be null.
+  BlockLanczos(const LanczosProblem& problem, RitzGoal goal, int max_steps, LanczosCheckpoint* checkpoint);
 
-/// Whether nev is the number of eigenvalues in the interval (as it is at first) or a guess, which does not end the iteration. Logically
-/// collective.
-PetscErrorCode set_count_known(EPS eps, PetscBool known);
+  /// Until the monitor says so, the space is exhausted or the checkpoint stops it. After kStopped the basis holds get_converged() Ritz
+  /// vectors, M-orthonormal, in the order of the selection.
+  End run(const Monitor& monitor);
+  std::int64_t get_converged() const { return converged_; }
+  int get_steps() const { return steps_; }
 
-/// Eigenvectors that are known, beside the deflation space: M-orthonormal columns of this rank's rows, and their eigenvalues.
-struct LockedModes {
-  std::vector<Columns> sets;   // somebody else's
-  std::vector<double> lambda;  // of all columns, set by set
-
-  int count() const { return static_cast<int>(lambda.size()); }
-  /// L^T B of all ranks for a range of columns of L, (range.count, b.count). Collective.
-  std::vector<double> multiply_transposed(MPI_Comm comm, LockedRange range, const Columns& b) const;
-  /// B <- B - L S for that range, S: (range.count, b.count). Local.
-  void subtract_product(LockedRange range, const std::vector<double>& s, const Columns& b) const;
+  /// The parts of run(). start(): from the starting block; false where nothing is left of it. step(): one block more stands behind the
+  /// basis; false when the space is exhausted. restart(): with the best Ritz vectors.
+  bool start();
+  bool step();
+  void restart(RitzPairs& pairs, const RitzSelection& selection);
 
  private:
-  template <class Visit>
-  void for_parts(LockedRange range, const Visit& visit) const;
+  void invert(int to);
+  bool resume();
+  bool is_orthonormal(int first, int width);
+  bool save_if_requested();
+  void plan_check(const RitzSelection& selection);
+  void finish(RitzPairs& pairs, const RitzSelection& selection);
+  la::Matrix calc_purified(const RitzPairs& pairs, const RitzSelection& selection, int count) const;
+  void clear_nearest(const RitzPairs& pairs, const RitzSelection& selection, int count);
+  void clear_locked(int count);
+
+  const ShiftInvert& inverse_;
+  InnerProduct& inner_;
+  LanczosBasis& basis_;
+  const LockedModes& locked_;
+  RitzGoal goal_;
+  int max_steps_;
+  LanczosCheckpoint* checkpoint_;
+  Orthogonaliser orthogonaliser_;
+  int steps_ = 0;
+  int next_check_ = 0;  // size of the basis at the next Ritz step,
+  int last_size_ = 0;   // and at the last one,
+  std::int64_t last_converged_ = 0;
+  std::int64_t converged_ = 0;
 };
-
-/// Modes that the iteration stays orthogonal to. They are taken as they are, which is what makes hundreds of them cheap
-/// (EPSSetDeflationSpace orthonormalises anew, vector by vector), and what they weigh in a step is predicted (orthogonality.hpp). Must
-/// outlive the solve; null: none. Logically collective.
-PetscErrorCode set_locked(EPS eps, const LockedModes* locked);
-
-/// Where an iteration stands between two steps, beside its basis. The same on every rank.
-struct LanczosState {
-  /// block, room, size, width, previous, next_check, last_size, last_converged, iterations, noise: as the iteration calls them.
-  std::array<std::int64_t, 10> sizes{};
-  std::vector<double> t;  // (size, size) the projected operator
-
-  std::int64_t size() const { return sizes[2]; }
-};
-
-/// Saves an iteration on its way, and resumes one.
-struct LanczosKeeper {
-  std::function<Wish()> ask;                                            // local, every step
-  std::function<void(const LanczosState&, const Columns& basis)> save;  // collective
-  const LanczosState* start = nullptr;                                  // null: from the beginning
-  std::function<void(const Columns& basis)> read;                       // of start; collective
-  std::function<void(const std::string& why)> reject;                   // start does not fit; collective
-  bool was_stopped = false;                                             // it ended because ask() wished so, after save()
-};
-
-/// Null: none. The keeper must outlive the solve. Logically collective.
-PetscErrorCode set_keeper(EPS eps, LanczosKeeper* keeper);
 
 }  // namespace carillon::eigen

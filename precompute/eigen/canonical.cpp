@@ -1,15 +1,13 @@
 // Method:     Modes that agree to the tolerance may be mixtures of such as do not agree to rounding. Their span is far more exact than
 //             they are: Rayleigh and Ritz in it, of K - mean M, so that differences keep their digits, separate what can be separated
-//             (split_groups). In the span of what is left, a cluster Phi, the symmetric matrix Phi^T D Phi, D = diag(m_i w_d(x_i)) with
+//             (split_clusters). In the span of what is left, a cluster Phi, the symmetric matrix Phi^T D Phi, D = diag(m_i w_d(x_i)) with
 //             smooth weights w_d of no symmetry, has eigenvectors that depend on the span alone. Phi times these, by ascending eigenvalue,
-//             is the basis. If two eigenvalues of one form nearly coincide, another form is taken: the first of a fixed list that parts
+//             is the basis. If two eigenvalues of one form nearly coincide, another form is taken: the first of a fixed list that separates
 //             them well, or the best of the list.
 // Source:     Stewart, Sun, Matrix perturbation theory, 1990, chapter V: an eigenvector moves by the perturbation over the gap. Parlett,
 //             The symmetric eigenvalue problem, 1998, section 11.4 (what Rayleigh and Ritz make of a span).
 // Deviations: none.
 #include "precompute/eigen/canonical.hpp"
-
-#include <petscblaslapack.h>
 
 #include <algorithm>
 #include <array>
@@ -18,17 +16,20 @@
 #include <numeric>
 #include <string>
 
-#include "precompute/eigen/local_columns.hpp"
+#include "precompute/comm/communicator.hpp"
+#include "precompute/la/lapack.hpp"
+#include "precompute/la/local_columns.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::eigen {
 namespace {
 
+using la::LocalColumns;
 using petsc::check;
 
 constexpr int kForms = 12;
-constexpr double kEqual = 0.25;      // Of the tolerance: a mixture of such modes has residuals below it.
+constexpr double kMixture = 0.25;    // Of the tolerance: a mixture of such modes has residuals below it.
 constexpr double kLoosest = 2.5e-9;  // Not beyond this, however loose the tolerance,
 constexpr double kTightest = 1e-12;  // and not below rounding.
 constexpr double kGoodGap = 0.05;    // over the square of the size: the eigenvalues of a cluster crowd.
@@ -39,16 +40,16 @@ struct Box {
   double size = 1;
 };
 
-Box find_box(MPI_Comm comm, const std::vector<Vec3>& positions) {
+Box find_box(const comm::Communicator& comm, const std::vector<Vec3>& nodes_m) {
   std::array<double, 6> ends;  // largest x, y, z and largest -x, -y, -z
   ends.fill(-std::numeric_limits<double>::infinity());
-  for (const Vec3& x : positions) {
+  for (const Vec3& x : nodes_m) {
     for (std::size_t d = 0; d < 3; ++d) {
       ends[d] = std::max(ends[d], x[d]);
       ends[3 + d] = std::max(ends[3 + d], -x[d]);
     }
   }
-  MPI_Allreduce(MPI_IN_PLACE, ends.data(), 6, MPI_DOUBLE, MPI_MAX, comm);
+  comm.max(ends);
   Box box;
   double square = 0;
   for (std::size_t d = 0; d < 3; ++d) {
@@ -71,49 +72,36 @@ double calc_weight(const Box& box, const Vec3& x, std::int32_t component, std::s
   return std::sin(phase) + 0.31 * std::cos(1.8392867552 * phase + 0.5 * d);
 }
 
-// The eigenvalues, ascending, of a symmetric matrix (order, order) that every rank has; its eigenvectors take its place. The first rank's
-// are every rank's, so that all decide alike. Collective. Throws SolveError(failure) on every rank when LAPACK fails.
-std::vector<double> diagonalise(MPI_Comm comm, PetscBLASInt order, std::vector<double>& matrix, const std::string& failure) {
-  int rank = 0;
-  MPI_Comm_rank(comm, &rank);
-  std::vector<double> values;
-  petsc::run_agreed(comm, [&] {
-    values.resize(static_cast<std::size_t>(order));
-    if (rank != 0) return;
-    PetscBLASInt room = 64 * order + 3 * order;
-    PetscBLASInt info = 0;
-    std::vector<double> work(static_cast<std::size_t>(room));
-    LAPACKsyev_("V", "L", &order, matrix.data(), &order, values.data(), work.data(), &room, &info);
-    if (info != 0) throw SolveError(failure + " (LAPACK dsyev failed).");
+// The eigenvalues, ascending, of a symmetric matrix that every rank has; its eigenvectors take its place. The first rank's are every
+// rank's, so that all decide alike. Collective. Throws SolveError(failure) on every rank when LAPACK fails.
+la::Vector diagonalise(const comm::Communicator& comm, la::Matrix& matrix, const std::string& failure) {
+  la::Vector values(matrix.rows());
+  comm.agree([&] {
+    if (comm.is_root() && la::calc_eigenpairs(matrix, values) != 0) throw SolveError(failure + " (LAPACK dsyev failed).");
   });
-  MPI_Bcast(matrix.data(), static_cast<int>(matrix.size()), MPI_DOUBLE, 0, comm);
-  MPI_Bcast(values.data(), static_cast<int>(order), MPI_DOUBLE, 0, comm);
+  comm.broadcast_into(la::entries(matrix));
+  comm.broadcast_into(la::entries(values));
   return values;
 }
 
 struct Basis {
-  std::vector<double> rotation;  // (count, count), columns by ascending eigenvalue
-  double gap = 0;                // smallest distance of two eigenvalues
+  la::Matrix rotation;  // columns by ascending eigenvalue
+  double gap = 0;       // smallest distance of two eigenvalues
 };
 
 Basis calc_basis(const Operators& operators, const NodeLayout& nodes, const Box& box, const Columns& phi, int form) {
   const auto count = static_cast<std::size_t>(phi.count);
   std::vector<double> weight(static_cast<std::size_t>(phi.rows));
   for (std::size_t i = 0; i < weight.size(); ++i)
-    weight[i] = operators.mass_diagonal[i] * calc_weight(box, nodes.position[i / 3], nodes.component[i / 3], i % 3, form);
+    weight[i] = operators.mass_diagonal[i] * calc_weight(box, nodes.nodes_m[i / 3], nodes.component[i / 3], i % 3, form);
   std::vector<double> space(weight.size() * count);
   const Columns weighted{space.data(), phi.rows, phi.rows, phi.count};
   for (int j = 0; j < phi.count; ++j) {
     for (std::size_t i = 0; i < weight.size(); ++i) weighted.column(j)[i] = weight[i] * phi.column(j)[i];
   }
-  Basis basis;
-  basis.rotation.assign(count * count, 0.0);
-  multiply_transposed(phi, weighted, basis.rotation.data(), phi.count);
-  MPI_Allreduce(MPI_IN_PLACE, basis.rotation.data(), static_cast<int>(basis.rotation.size()), MPI_DOUBLE, MPI_SUM, operators.comm);
-  const std::vector<double> values =
-      diagonalise(operators.comm, phi.count, basis.rotation, "A cluster of equal modes has no canonical basis");
-  basis.gap = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 1; i < count; ++i) basis.gap = std::min(basis.gap, values[i] - values[i - 1]);
+  Basis basis{multiply_transposed(operators.comm, phi, weighted), std::numeric_limits<double>::infinity()};
+  const la::Vector values = diagonalise(operators.comm, basis.rotation, "A cluster of degenerate modes has no canonical basis");
+  for (Eigen::Index i = 1; i < values.size(); ++i) basis.gap = std::min(basis.gap, values[i] - values[i - 1]);
   return basis;
 }
 
@@ -121,7 +109,7 @@ Basis calc_basis(const Operators& operators, const NodeLayout& nodes, const Box&
 std::vector<Cluster> find_runs(const std::vector<double>& lambda, const ModeErrors& errors, double equal) {
   std::vector<Cluster> runs;
   for (std::size_t j = 1; j < lambda.size(); ++j) {
-    const double open = std::max(equal, kEqual * std::min(errors.floor[j - 1], errors.floor[j]));
+    const double open = std::max(equal, kMixture * std::min(errors.floor[j - 1], errors.floor[j]));
     if (lambda[j] - lambda[j - 1] > open * lambda[j]) continue;
     const auto at = static_cast<std::int64_t>(j);
     if (runs.empty() || runs.back().first + runs.back().count != at) runs.push_back({at - 1, 1});
@@ -131,37 +119,34 @@ std::vector<Cluster> find_runs(const std::vector<double>& lambda, const ModeErro
 }
 
 // The eigenvectors of Phi^T (K - mean M) Phi, and its eigenvalues, ascending; the same on every rank.
-std::vector<double> calc_differences(const Operators& operators, const Columns& phi, double mean, std::vector<double>& rotation) {
-  const auto count = static_cast<std::size_t>(phi.count);
-  const auto size = static_cast<std::size_t>(phi.rows) * count;
+la::Vector calc_differences(const Operators& operators, const Columns& phi, double mean, la::Matrix& rotation) {
+  const auto size = static_cast<std::size_t>(phi.rows) * static_cast<std::size_t>(phi.count);
   std::vector<double> space(2 * size);
   const Columns k_phi{space.data(), phi.rows, phi.rows, phi.count};
   const Columns m_phi{space.data() + size, phi.rows, phi.rows, phi.count};
   operators.stiffness.multiply(phi, k_phi);
   operators.mass.multiply(phi, m_phi);
   for (std::size_t i = 0; i < size; ++i) k_phi.values[i] -= mean * m_phi.values[i];
-  rotation.assign(count * count, 0.0);
-  multiply_transposed(phi, k_phi, rotation.data(), phi.count);
-  MPI_Allreduce(MPI_IN_PLACE, rotation.data(), static_cast<int>(rotation.size()), MPI_DOUBLE, MPI_SUM, operators.comm);
-  return diagonalise(operators.comm, phi.count, rotation, "A group of nearly equal modes cannot be parted");
+  rotation = multiply_transposed(operators.comm, phi, k_phi);
+  return diagonalise(operators.comm, rotation, "A group of nearly degenerate modes cannot be separated");
 }
 
 }  // namespace
 
 std::vector<Cluster> find_groups(const std::vector<double>& lambda, const ModeErrors& errors, double tolerance) {
-  return find_runs(lambda, errors, std::clamp(kEqual * tolerance, kTightest, kLoosest));
+  return find_runs(lambda, errors, std::clamp(kMixture * tolerance, kTightest, kLoosest));
 }
 
-std::vector<Cluster> split_groups(const Operators& operators, const std::vector<Cluster>& groups, const ModeErrors& errors,
-                                  std::vector<double>& lambda, Mat shapes) {
+std::vector<Cluster> split_clusters(const Operators& operators, const std::vector<Cluster>& groups, const ModeErrors& errors,
+                                    std::vector<double>& lambda, Mat shapes) {
   if (groups.empty()) return {};
   const LocalColumns access(shapes);
   for (const Cluster& group : groups) {
     const Columns phi = access.view().part(static_cast<int>(group.first), static_cast<int>(group.count));
     const auto begin = lambda.begin() + group.first;
     const double mean = std::accumulate(begin, begin + group.count, 0.0) / static_cast<double>(group.count);
-    std::vector<double> rotation;
-    const std::vector<double> differences = calc_differences(operators, phi, mean, rotation);
+    la::Matrix rotation;
+    const la::Vector differences = calc_differences(operators, phi, mean, rotation);
     combine_columns(phi, rotation.data(), phi.count);
     std::transform(differences.begin(), differences.end(), begin, [mean](double difference) { return mean + difference; });
   }
@@ -171,7 +156,7 @@ std::vector<Cluster> split_groups(const Operators& operators, const std::vector<
 void make_canonical(const Operators& operators, const NodeLayout& nodes, const std::vector<Cluster>& clusters, std::vector<double>& lambda,
                     Mat shapes) {
   if (clusters.empty()) return;
-  const Box box = find_box(operators.comm, nodes.position);
+  const Box box = find_box(operators.comm, nodes.nodes_m);
   const LocalColumns access(shapes);
   for (const Cluster& cluster : clusters) {
     const Columns phi = access.view().part(static_cast<int>(cluster.first), static_cast<int>(cluster.count));

@@ -22,34 +22,29 @@ void check_input(const Problem& problem, const Options& options) {
   if (!(options.tolerance > 0) || options.tolerance > 1e-2) {
     throw InputError(fmt::format("The tolerance {} is out of range: take one between 1e-14 and 1e-2.", options.tolerance));
   }
-  MPI_Comm comm = MPI_COMM_NULL;
-  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(problem.stiffness), &comm));
-  int size = 1;
-  MPI_Comm_size(comm, &size);
-  if (size > 1 && options.factorisation == Factorisation::kCholmod) {
-    throw InputError(fmt::format("CHOLMOD factorises on one rank and there are {}: leave the choice to the program, or take MUMPS.", size));
+  const comm::Communicator comm = petsc::get_communicator(problem.stiffness);
+  if (comm.size() > 1 && options.factorisation == Factorisation::kCholmod) {
+    throw InputError(
+        fmt::format("CHOLMOD factorises on one rank and there are {}: leave the choice to the program, or take MUMPS.", comm.size()));
   }
-  petsc::run_agreed(comm, [&] {
+  comm.agree([&] {
     PetscInt rows = 0;
     PetscInt n = 0;
     check(MatGetLocalSize(problem.stiffness, &rows, nullptr));
     check(MatGetSize(problem.stiffness, &n, nullptr));
-    if (options.method == Method::kDense && n > kMostDenseUnknowns)
-      throw InputError(
-          fmt::format("LAPACK solves up to {} unknowns densely and there are {}: take another method.", kMostDenseUnknowns, n));
+    if (options.method == Method::kDense && n > kMaxDenseUnknowns)
+      throw InputError(fmt::format("LAPACK solves up to {} unknowns densely and there are {}: take another method.", kMaxDenseUnknowns, n));
     const NodeLayout& nodes = problem.nodes;
-    if (static_cast<std::size_t>(rows) != 3 * nodes.position.size() || nodes.position.size() != nodes.component.size()) {
+    if (static_cast<std::size_t>(rows) != 3 * nodes.nodes_m.size() || nodes.nodes_m.size() != nodes.component.size()) {
       throw InputError(fmt::format("The node layout has {} positions and {} components for {} rows of the stiffness matrix.",
-                                   nodes.position.size(), nodes.component.size(), rows));
+                                   nodes.nodes_m.size(), nodes.component.size(), rows));
     }
     for (const std::int32_t c : nodes.component) {
       if (c < 0 || c >= nodes.component_count)
         throw InputError(fmt::format("Component {} is none of the layout's {}.", c, nodes.component_count));
     }
     const std::size_t order = nodes.elimination_position.size();
-    int rank = 0;
-    MPI_Comm_rank(comm, &rank);
-    if (rank == 0 && order != 0 && 3 * order != static_cast<std::size_t>(n)) {
+    if (comm.is_root() && order != 0 && 3 * order != static_cast<std::size_t>(n)) {
       throw InputError(fmt::format("The elimination order names {} nodes of {}.", order, n / 3));
     }
   });

@@ -1,7 +1,7 @@
 // What the eigensolver asks of its caller.
 #pragma once
 
-#include "precompute/eigen/solve_modes.hpp"
+#include "precompute/eigen/types.hpp"
 
 namespace carillon::eigen {
 

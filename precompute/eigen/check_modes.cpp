@@ -5,7 +5,6 @@
 #include "precompute/eigen/check_modes.hpp"
 
 #include <fmt/core.h>
-#include <petscblaslapack.h>
 
 #include <algorithm>
 #include <array>
@@ -14,7 +13,8 @@
 #include <numeric>
 #include <tuple>
 
-#include "precompute/eigen/local_columns.hpp"
+#include "precompute/la/lapack.hpp"
+#include "precompute/la/local_columns.hpp"
 #include "precompute/petsc/diagonal.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/base/error.hpp"
@@ -26,13 +26,25 @@ using petsc::check;
 
 constexpr double kTieTolerance = 1e-4;  // Far above the errors of shapes, so that rounding breaks no tie.
 constexpr double kRoundOff = 10;        // Refined modes of thin shelves come out at 1 to 2.
+using la::LocalColumns;
+using la::NodeMatrix;
 using Row = NodeMatrix::Row;
 constexpr int kStrip = NodeMatrix::kStrip;
 constexpr int kWide = 4 * kStrip;  // Columns at a time in a Gram matrix: wide enough for BLAS to run at full speed.
 constexpr double kNear = 1e-4;     // Relative to lambda: nearer ones serve to measure a residual.
 
-void sum_over_ranks(MPI_Comm comm, std::vector<double>& values) {
-  MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()), MPI_DOUBLE, MPI_SUM, comm);
+// The upper triangle of Phi^T M Phi, summed over the ranks; calc_mass_product(first, m_phi) writes M times as many columns from `first` on.
+template <class CalcMassProduct>
+la::Matrix calc_gram(const comm::Communicator& comm, const Columns& phi, const CalcMassProduct& calc_mass_product) {
+  la::Matrix gram = la::Matrix::Zero(phi.count, phi.count);
+  std::vector<double> space(static_cast<std::size_t>(phi.rows) * kWide);
+  for (int first = 0; first < phi.count; first += kWide) {
+    const Columns m_phi{space.data(), phi.rows, phi.rows, std::min(kWide, phi.count - first)};
+    calc_mass_product(first, m_phi);
+    multiply_transposed(phi.part(0, first + m_phi.count), m_phi, gram.col(first).data(), phi.count);
+  }
+  comm.sum(la::entries(gram));
+  return gram;
 }
 
 // Sums over the rows for sixteen columns each; r = K phi - lambda M phi with a lambda that is given.
@@ -92,17 +104,19 @@ void multiply_and_sum(const Operators& operators, const Columns& phi, int first,
     add_sums(3 * count, packed.data() + 3 * node, m_rows, k_rows, operators.stiffness_diagonal.data() + 3 * node, lambda, total.data());
     NodeMatrix::unpack(m_rows, node, count, m_phi);
   }
-  MPI_Allreduce(MPI_IN_PLACE, total.data(), kSums * kStrip, MPI_DOUBLE, MPI_SUM, operators.comm);
+  operators.comm.sum(std::span(reinterpret_cast<double*>(total.data()), kSums * kStrip));
 }
 
 }  // namespace
 
-Operators::Operators(Mat stiffness_mat, Mat mass_mat)
-    : stiffness(stiffness_mat),
-      mass(mass_mat),
-      stiffness_diagonal(petsc::read_diagonal(stiffness_mat)),
-      mass_diagonal(petsc::read_diagonal(mass_mat)) {
-  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(stiffness_mat), &comm));
+Operators::Operators(const la::Pencil& pencil)
+    : stiffness(pencil.stiffness, pencil.stiffness_factor),
+      mass(pencil.mass, pencil.mass_factor),
+      stiffness_diagonal(petsc::read_diagonal(pencil.stiffness)),
+      mass_diagonal(petsc::read_diagonal(pencil.mass)),
+      comm(petsc::get_communicator(pencil.stiffness)) {
+  for (double& x : stiffness_diagonal) x *= pencil.stiffness_factor;
+  for (double& x : mass_diagonal) x *= pencil.mass_factor;
 }
 
 // The residual comes from a lambda at hand: r = (K - lambda' M) phi - delta M phi, delta = lambda - lambda'. Its norm then loses nothing to
@@ -114,12 +128,9 @@ ModeErrors normalise_and_measure(const Operators& operators, std::vector<double>
   const LocalColumns access(shapes);
   const Columns phi = access.view();
   const auto rows = static_cast<std::size_t>(phi.rows);
-  std::vector<double> m_space(rows * kWide);
   std::vector<Row> packed, packed_for_mass;
-  std::vector<double> gram(modes * modes, 0.0);
   std::vector<double> square(modes);  // phi^T M phi
-  for (int wide = 0; wide < phi.count; wide += kWide) {
-    const Columns m_phi{m_space.data(), phi.rows, phi.rows, std::min(kWide, phi.count - wide)};
+  const la::Matrix gram = calc_gram(operators.comm, phi, [&](int wide, const Columns& m_phi) {
     for (int first = wide; first < wide + m_phi.count; first += kStrip) {
       const int width = std::min(kStrip, phi.count - first);
       Row near{};
@@ -145,12 +156,10 @@ ModeErrors normalise_and_measure(const Operators& operators, std::vector<double>
         errors.floor.push_back(kRoundOff * PETSC_MACHINE_EPSILON * std::sqrt(sums[kDiagonal].column[c]) / scale);
       }
     }
-    multiply_transposed(phi.part(0, wide + m_phi.count), m_phi, gram.data() + static_cast<std::size_t>(wide) * modes, phi.count);
-  }
-  MPI_Allreduce(MPI_IN_PLACE, gram.data(), static_cast<int>(gram.size()), MPI_DOUBLE, MPI_SUM, operators.comm);
+  });
   for (std::size_t j = 0; j < modes; ++j) {
     for (std::size_t i = 0; i < j; ++i)
-      errors.orthonormality = std::max(errors.orthonormality, std::abs(gram[j * modes + i]) / std::sqrt(square[i] * square[j]));
+      errors.orthonormality = std::max(errors.orthonormality, std::abs(gram(i, j)) / std::sqrt(square[i] * square[j]));
     const double factor = 1 / std::sqrt(square[j]);
     double* column = phi.column(static_cast<int>(j));
     for (std::size_t i = 0; i < rows; ++i) column[i] *= factor;
@@ -174,34 +183,16 @@ void sort_modes(std::vector<double>& lambda, Mat shapes, ModeErrors& errors) {
 void orthonormalise_shapes(const Operators& operators, Mat shapes) {
   const LocalColumns access(shapes);
   const Columns phi = access.view();
-  const auto modes = static_cast<std::size_t>(phi.count);
-  std::vector<double> gram(modes * modes, 0.0);
-  std::vector<double> space(static_cast<std::size_t>(phi.rows) * kWide);
-  for (int first = 0; first < phi.count; first += kWide) {
-    const int width = std::min(kWide, phi.count - first);
-    const Columns m_phi{space.data(), phi.rows, phi.rows, width};
-    operators.mass.multiply(phi.part(first, width), m_phi);
-    multiply_transposed(phi.part(0, first + width), m_phi, gram.data() + static_cast<std::size_t>(first) * modes, phi.count);
-  }
-  sum_over_ranks(operators.comm, gram);
-  PetscBLASInt rows = static_cast<PetscBLASInt>(phi.rows);
-  PetscBLASInt count = phi.count;
-  PetscBLASInt stride = static_cast<PetscBLASInt>(std::max<std::ptrdiff_t>(phi.stride, 1));
-  PetscBLASInt info = 0;
-  double one = 1;
-  LAPACKpotrf_("U", &count, gram.data(), &count, &info);
+  la::Matrix gram = calc_gram(operators.comm, phi,
+                              [&](int first, const Columns& m_phi) { operators.mass.multiply(phi.part(first, m_phi.count), m_phi); });
+  const int info = la::factorise_cholesky(gram);
   if (info != 0)
     throw SolveError(fmt::format("Mode {} is a combination of lower ones: it converged twice. Solve the band in parts.", info));
-  if (rows > 0) BLAStrsm_("R", "U", "N", "N", &rows, &count, &one, gram.data(), &count, phi.values, &stride);
+  la::solve_upper_from_right(phi.rows, phi.count, gram.data(), phi.count, phi.values, phi.stride);
 }
 
-void orient_shapes(Mat shapes, const std::vector<Vec3>& positions) {
-  MPI_Comm comm = MPI_COMM_NULL;
-  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(shapes), &comm));
-  int rank = 0;
-  int size = 1;
-  MPI_Comm_rank(comm, &rank);
-  MPI_Comm_size(comm, &size);
+void orient_shapes(Mat shapes, const std::vector<Vec3>& nodes_m) {
+  const comm::Communicator comm = petsc::get_communicator(shapes);
   const LocalColumns phi(shapes);
   const auto modes = static_cast<std::size_t>(phi.columns);
   std::vector<double> largest(modes, 0.0);
@@ -215,7 +206,7 @@ void orient_shapes(Mat shapes, const std::vector<Vec3>& positions) {
     for (; i < phi.rows; ++i) lanes[0] = std::max(lanes[0], std::abs(column[i]));
     largest[j] = *std::max_element(lanes, lanes + 8);
   }
-  MPI_Allreduce(MPI_IN_PLACE, largest.data(), static_cast<int>(modes), MPI_DOUBLE, MPI_MAX, comm);
+  comm.max(largest);
 
   // Each rank's first candidate by (x, y, z, axis); all ranks' candidates meet everywhere.
   using Candidate = std::array<double, 5>;  // x, y, z, axis, entry; entry 0: none
@@ -228,17 +219,15 @@ void orient_shapes(Mat shapes, const std::vector<Vec3>& positions) {
     const double* column = phi.column(static_cast<PetscInt>(j));
     for (PetscInt i = 0; i < phi.rows; ++i) {
       if (std::abs(column[i]) < (1 - kTieTolerance) * largest[j]) continue;
-      const Vec3& x = positions[static_cast<std::size_t>(i / 3)];
+      const Vec3& x = nodes_m[static_cast<std::size_t>(i / 3)];
       const Candidate candidate{x[0], x[1], x[2], static_cast<double>(i % 3), column[i]};
       if (comes_first(candidate, mine[j])) mine[j] = candidate;
     }
   }
-  std::vector<Candidate> all(modes * static_cast<std::size_t>(size));
-  const int count = static_cast<int>(5 * modes);
-  MPI_Allgather(mine.data(), count, MPI_DOUBLE, all.data(), count, MPI_DOUBLE, comm);
+  const std::vector<Candidate> all = comm.all_gather(mine);
   for (std::size_t j = 0; j < modes; ++j) {
     Candidate first = all[j];
-    for (std::size_t r = 1; r < static_cast<std::size_t>(size); ++r) {
+    for (std::size_t r = 1; r < static_cast<std::size_t>(comm.size()); ++r) {
       if (comes_first(all[r * modes + j], first)) first = all[r * modes + j];
     }
     if (first[4] >= 0) continue;

@@ -5,20 +5,21 @@
 
 #include <vector>
 
-#include "precompute/eigen/node_matrix.hpp"
-#include "precompute/eigen/solve_modes.hpp"
+#include "precompute/comm/communicator.hpp"
+#include "precompute/eigen/types.hpp"
+#include "precompute/la/node_matrix.hpp"
 
 namespace carillon::eigen {
 
-/// K and M once more, for products with many columns.
+/// K and M of a pencil, with its factors, for products with many columns.
 struct Operators {
-  Operators(Mat stiffness_mat, Mat mass_mat);
+  explicit Operators(const la::Pencil& pencil);
 
-  NodeMatrix stiffness;
-  NodeMatrix mass;
+  la::NodeMatrix stiffness;
+  la::NodeMatrix mass;
   std::vector<double> stiffness_diagonal;  // (own rows)
   std::vector<double> mass_diagonal;       // (own rows)
-  MPI_Comm comm = MPI_COMM_NULL;
+  comm::Communicator comm;
 };
 
 struct ModeErrors {
@@ -36,12 +37,12 @@ ModeErrors normalise_and_measure(const Operators& operators, std::vector<double>
 void sort_modes(std::vector<double>& lambda, Mat shapes, ModeErrors& errors);
 
 /// Gram-Schmidt in the M inner product from the first column on: Phi <- Phi R^-1 with Phi^T M Phi = R^T R. Columns must ascend in lambda:
-/// an error of a high mode, small beside its own lambda, would be large beside a low one's, so the low modes must take none from above.
+/// an error of a high mode, small against its own lambda, would be large against a low one's, so the low modes must take none from above.
 /// Collective. Throws SolveError when columns are linearly dependent.
 void orthonormalise_shapes(const Operators& operators, Mat shapes);
 
 /// Turns each column so that its entry of largest magnitude is positive; among entries as large to 1e-4 the one whose node comes first by
 /// x, y, z decides, so that the partition has no say. Collective.
-void orient_shapes(Mat shapes, const std::vector<Vec3>& positions);
+void orient_shapes(Mat shapes, const std::vector<Vec3>& nodes_m);
 
 }  // namespace carillon::eigen

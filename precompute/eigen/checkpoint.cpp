@@ -8,6 +8,13 @@
 
 namespace carillon::eigen {
 
+CheckpointRequest vote(const comm::Communicator& comm, const Checkpoint& checkpoint) {
+  const CheckpointRequest mine = checkpoint.ask();
+  std::array<std::int32_t, 2> any{mine.stop ? 1 : 0, mine.save ? 1 : 0};
+  comm.max(any);
+  return {any[0] != 0, any[1] != 0};
+}
+
 void NumberWriter::add(double value) { bytes.append(reinterpret_cast<const char*>(&value), sizeof value); }
 
 void NumberWriter::add(std::int64_t value) { bytes.append(reinterpret_cast<const char*>(&value), sizeof value); }
@@ -35,16 +42,16 @@ double NumberReader::get_double() {
   return value;
 }
 
-std::int64_t NumberReader::get_count(std::int64_t least, std::int64_t most) {
+std::int64_t NumberReader::get_count(std::int64_t min, std::int64_t max) {
   std::int64_t value = 0;
   take(&value, sizeof value);
-  if (value < least || value > most) throw InputError("a number in it is out of range");
+  if (value < min || value > max) throw InputError("a number in it is out of range");
   return value;
 }
 
-std::vector<double> NumberReader::get_doubles(std::int64_t most) {
+std::vector<double> NumberReader::get_doubles(std::int64_t max) {
   const std::int64_t left = static_cast<std::int64_t>((bytes_.size() - at_) / sizeof(double));
-  const std::int64_t count = get_count(0, std::min(most, left));
+  const std::int64_t count = get_count(0, std::min(max, left));
   std::vector<double> values;
   values.reserve(static_cast<std::size_t>(count));
   for (std::int64_t i = 0; i < count; ++i) values.push_back(get_double());

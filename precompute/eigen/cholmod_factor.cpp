@@ -18,9 +18,9 @@ using petsc::check;
 
 class CholmodFactor final : public ShiftedFactor {
  public:
-  CholmodFactor(Mat stiffness, Mat mass, const std::vector<std::int32_t>& elimination_position) : stiffness_(stiffness), mass_(mass) {
+  CholmodFactor(const la::Pencil& pencil, const std::vector<std::int32_t>& elimination_position) : pencil_(pencil) {
     PetscInt n = 0;
-    check(MatGetSize(stiffness, &n, nullptr));
+    check(MatGetSize(pencil.stiffness, &n, nullptr));
     is_given_ = !elimination_position.empty();
     if (is_given_) {
       std::vector<PetscInt> pivot_rows(static_cast<std::size_t>(n));
@@ -39,8 +39,9 @@ class CholmodFactor final : public ShiftedFactor {
     MatFactorInfo info;
     check(MatFactorInfoInitialize(&info));
     info.fill = 5;
-    check(MatDuplicate(stiffness_, MAT_COPY_VALUES, shifted_.out()));
-    check(MatAXPY(shifted_, -sigma, mass_, UNKNOWN_NONZERO_PATTERN));
+    check(MatDuplicate(pencil_.stiffness, MAT_COPY_VALUES, shifted_.out()));
+    check(MatScale(shifted_, pencil_.stiffness_factor));
+    check(MatAXPY(shifted_, -sigma * pencil_.mass_factor, pencil_.mass, UNKNOWN_NONZERO_PATTERN));
     check(MatSetOption(shifted_, MAT_SPD, PETSC_TRUE));
     // PETSc hands CHOLMOD its settings through the options of this process alone: supernodal, and nothing but the order that is given.
     check(PetscOptionsSetValue(nullptr, "-mat_cholmod_factor", "SUPERNODAL"));
@@ -57,7 +58,7 @@ class CholmodFactor final : public ShiftedFactor {
 
   void solve(const double* b, double* x, std::ptrdiff_t stride, int columns) override {
     PetscInt n = 0;
-    check(MatGetSize(stiffness_, &n, nullptr));
+    check(MatGetSize(pencil_.stiffness, &n, nullptr));
     for (int j = 0; j < columns && b != x; ++j) std::copy_n(b + j * stride, n, x + j * stride);
     petsc::MatHandle solution;
     petsc::MatHandle right;
@@ -81,8 +82,7 @@ class CholmodFactor final : public ShiftedFactor {
   double get_flops() const override { return 0; }
 
  private:
-  Mat stiffness_ = nullptr;
-  Mat mass_ = nullptr;
+  la::Pencil pencil_;
   bool is_given_ = false;
   petsc::IsHandle order_;
   petsc::MatHandle shifted_;
@@ -91,8 +91,8 @@ class CholmodFactor final : public ShiftedFactor {
 
 }  // namespace
 
-std::unique_ptr<ShiftedFactor> make_cholmod_factor(Mat stiffness, Mat mass, const std::vector<std::int32_t>& elimination_position) {
-  return std::make_unique<CholmodFactor>(stiffness, mass, elimination_position);
+std::unique_ptr<ShiftedFactor> make_cholmod_factor(const la::Pencil& pencil, const std::vector<std::int32_t>& elimination_position) {
+  return std::make_unique<CholmodFactor>(pencil, elimination_position);
 }
 
 }  // namespace carillon::eigen

@@ -5,6 +5,7 @@
 
 #include <vector>
 
+#include "precompute/la/pencil.hpp"
 #include "precompute/petsc/handle.hpp"
 
 namespace carillon::eigen {
@@ -16,6 +17,6 @@ struct DensePairs {
 
 /// Solves K x = lambda M x completely with dense matrices on every rank. Collective; memory grows as n^2 on each rank, time as n^3.
 /// Throws SolveError when M is not positive definite.
-DensePairs solve_dense(Mat stiffness, Mat mass);
+DensePairs solve_dense(const la::Pencil& pencil);
 
 }  // namespace carillon::eigen

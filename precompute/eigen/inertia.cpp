@@ -1,7 +1,7 @@
 // Method:     Sylvester's law of inertia: A = K - sigma M = L D L^T has as many negative pivots as there are eigenvalues below sigma.
-//             Rounding of K moves the eigenvalues of rigid motions, R, off zero to either side, and past a sigma as small. Counted is then
-//             what there is beside them: A on the vectors M-orthogonal to R has n(A) + n(S) - dim R negative eigenvalues, n(A) those of A
-//             and n(S) those of S = -(M R)^T A^-1 M R, by the inertia of [A, M R; (M R)^T, 0] taken apart in two ways.
+//             Rounding of K moves the eigenvalues of rigid motions, R, off zero to either side, and past a sigma as small. The count is
+//             then of all others: A on the vectors M-orthogonal to R has n(A) + n(S) - dim R negative eigenvalues, n(A) those of A and n(S)
+//             those of S = -(M R)^T A^-1 M R, by the inertia of [A, M R; (M R)^T, 0] taken apart in two ways.
 // Source:     Parlett, The symmetric eigenvalue problem, 1998, section 3.3; Haynsworth, Linear Algebra Appl. 1, 1968 (inertia is
 //             additive); Gould, Math. Program. 32, 1985 (inertia on a subspace).
 // Deviations: none.
@@ -12,9 +12,9 @@
 #include <Eigen/Dense>
 #include <algorithm>
 
-#include "precompute/eigen/block_kernels.hpp"
 #include "precompute/eigen/memory.hpp"
 #include "precompute/eigen/timer.hpp"
+#include "precompute/la/block_kernels.hpp"
 #include "precompute/petsc/session.hpp"
 #include "precompute/petsc/work.hpp"
 #include "runtime/base/error.hpp"
@@ -24,30 +24,36 @@ namespace {
 
 using petsc::check;
 
-constexpr double kNearZero = 1e4;   // Of rounding_: below, rigid modes may lie on either side.
-constexpr double kWorthless = 1e3;  // Of rounding_: above, a shift that cannot be factorised is not so for rounding.
-constexpr double kHopeless = 1e-3;  // Of rounding_: below, there is no need to try.
-constexpr double kStep = 16;        // From one such shift to the next: four times the frequency.
+constexpr double kRigidRange = 1e4;     // Of rounding_: below, rigid modes may lie on either side.
+constexpr double kRoundingRange = 1e3;  // Of rounding_: below, rounding may keep a shift from being factorised.
+constexpr double kMinShift = 1e-3;      // Of rounding_: no shift below is tried.
+constexpr double kShiftStep = 16;       // From one such shift to the next: four times the frequency.
 
 }  // namespace
 
-InertiaCounter::InertiaCounter(const Problem& problem, const Options& options, const std::vector<petsc::VecHandle>& rigid, Seconds& seconds,
-                               FactorStatistics& statistics, std::function<double(double)> to_hz)
-    : problem_(problem), options_(options), rigid_(rigid), seconds_(seconds), statistics_(statistics), to_hz_(std::move(to_hz)) {
-  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(problem.stiffness), &comm_));
+InertiaCounter::InertiaCounter(const la::Pencil& pencil, const Problem& problem, const Options& options,
+                               const std::vector<petsc::VecHandle>& rigid, Seconds& seconds, FactorStatistics& statistics,
+                               std::function<double(double)> to_hz)
+    : pencil_(pencil),
+      problem_(problem),
+      options_(options),
+      rigid_(rigid),
+      seconds_(seconds),
+      statistics_(statistics),
+      to_hz_(std::move(to_hz)),
+      comm_(petsc::get_communicator(problem.stiffness)) {
   PetscScalar k = 0;
   PetscScalar m = 0;
   check(MatGetTrace(problem.stiffness, &k));
   check(MatGetTrace(problem.mass, &m));
-  rounding_ = PETSC_MACHINE_EPSILON * k / m;
+  rounding_ = PETSC_MACHINE_EPSILON * (pencil.stiffness_factor * k) / (pencil.mass_factor * m);
   uses_mumps_ = options.factorisation == Factorisation::kMumps;
 }
 
 const ShiftedFactor& InertiaCounter::analyse() {
   const petsc::WorkScope scope(petsc::WorkPhase::kFactor);
   const Timer timer(seconds_.analyse);
-  factor_ = uses_mumps_ ? make_mumps_factor(problem_.stiffness, problem_.mass, problem_.nodes.elimination_position)
-                        : make_ldlt_factor(problem_.stiffness, problem_.mass);
+  factor_ = uses_mumps_ ? make_mumps_factor(pencil_, problem_.nodes.elimination_position) : make_ldlt_factor(pencil_);
   statistics_.solver = factor_->get_solver();
   statistics_.ordering = factor_->get_ordering();
   return *factor_;
@@ -68,9 +74,9 @@ bool InertiaCounter::try_factorise(double sigma) {
   const petsc::WorkScope scope(petsc::WorkPhase::kFactor);
   const Timer timer(seconds_.factor);
   ++statistics_.factorisations;
-  stands_ = !is_refused(sigma) && factor_->factorise(sigma);
-  if (!stands_) return false;
-  standing_ = sigma;
+  is_current_ = !is_refused(sigma) && factor_->factorise(sigma);
+  if (!is_current_) return false;
+  sigma_ = sigma;
   statistics_.entries = factor_->get_entries();
   statistics_.flops = factor_->get_flops();
   worst_backward_error_ = std::max(worst_backward_error_, factor_->get_backward_error());
@@ -82,17 +88,17 @@ bool InertiaCounter::try_around(double lambda, double reach) {
   if (factor_ == nullptr) make_factor();
   for (int i = 0; i < kNudges; ++i) {
     if (!try_factorise(lambda * (1 + reach * i / kNudges))) continue;
-    taken_.push_back({standing_, count_below()});
+    counts_.push_back({sigma_, count_negative()});
     return true;
   }
   return false;
 }
 
-// Eigenvalues below the shift where the factor stands; the rigid ones are below it.
-std::int64_t InertiaCounter::count_below() {
+// Eigenvalues below the current shift; the rigid ones are below it.
+std::int64_t InertiaCounter::count_negative() {
   const std::int64_t all = factor_->get_negative_pivots();
   const auto rigid = static_cast<int>(rigid_.size());
-  if (rigid == 0 || standing_ > kNearZero * rounding_) return all;
+  if (rigid == 0 || sigma_ > kRigidRange * rounding_) return all;
   petsc::VecHandle image;
   PetscInt rows = 0;
   check(MatCreateVecs(problem_.mass, nullptr, image.out()));
@@ -105,28 +111,25 @@ std::int64_t InertiaCounter::count_below() {
     const PetscScalar* values = nullptr;
     check(MatMult(problem_.mass, rigid_[static_cast<std::size_t>(j)], image));
     check(VecGetArrayRead(image, &values));
-    std::copy_n(values, rows, images.column(j));
+    std::transform(values, values + rows, images.column(j), [&](double x) { return pencil_.mass_factor * x; });
     check(VecRestoreArrayRead(image, &values));
   }
   factor_->solve(images.values, solved.values, solved.stride, rigid);
   statistics_.solves += rigid;
-  std::vector<double> products(rigid_.size() * rigid_.size());
-  multiply_transposed(images, solved, products.data(), rigid);
-  MPI_Allreduce(MPI_IN_PLACE, products.data(), static_cast<int>(products.size()), MPI_DOUBLE, MPI_SUM, comm_);
-  const Eigen::Map<const Eigen::MatrixXd> s(products.data(), rigid, rigid);
-  std::int64_t positive =
-      (Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(0.5 * (s + s.transpose()), Eigen::EigenvaluesOnly).eigenvalues().array() > 0).count();
-  MPI_Bcast(&positive, 1, MPI_INT64_T, 0, comm_);
-  return all + positive;  // all + n(S) - dim R beside the rigid ones, and dim R of these; n(S) of -products
+  const la::Matrix s = multiply_transposed(comm_, images, solved);
+  const auto positive = comm_.broadcast(std::int64_t{
+      (Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(0.5 * (s + s.transpose()), Eigen::EigenvaluesOnly).eigenvalues().array() > 0)
+          .count()});
+  return all + positive;  // all + n(S) - dim R without the rigid ones, and dim R of these; n(S) of -s
 }
 
-Inertia InertiaCounter::take(double lambda, double reach, Want want) {
-  if (want == Want::kHereOrAbove) lambda = std::max(lambda, kHopeless * rounding_);
-  for (; want == Want::kHereOrAbove && lambda <= kWorthless * rounding_; lambda *= kStep)
-    if (try_around(lambda, reach)) return taken_.back();
+Inertia InertiaCounter::count_below(double lambda, double reach, ShiftRule rule) {
+  if (rule == ShiftRule::kMayMoveUp) lambda = std::max(lambda, kMinShift * rounding_);
+  for (; rule == ShiftRule::kMayMoveUp && lambda <= kRoundingRange * rounding_; lambda *= kShiftStep)
+    if (try_around(lambda, reach)) return counts_.back();
   while (true) {
-    if (try_around(lambda, reach)) return taken_.back();
-    if (!turn_to_mumps()) break;
+    if (try_around(lambda, reach)) return counts_.back();
+    if (!switch_to_mumps()) break;
   }
   throw SolveError(
       fmt::format("K - sigma M is singular all around {:.6g} Hz: the mesh has nodes without mass or stiffness, or the mass matrix is "
@@ -134,16 +137,16 @@ Inertia InertiaCounter::take(double lambda, double reach, Want want) {
                   to_hz_(lambda)));
 }
 
-bool InertiaCounter::turn_to_mumps() {
+bool InertiaCounter::switch_to_mumps() {
   if (uses_mumps_ || options_.factorisation == Factorisation::kLdlt) return false;
   uses_mumps_ = true;
   release();
   return true;
 }
 
-ShiftedFactor& InertiaCounter::stand_at(double sigma) {
+ShiftedFactor& InertiaCounter::factor_at(double sigma) {
   if (factor_ == nullptr) make_factor();
-  if (stands_ && standing_ == sigma) return *factor_;
+  if (is_current_ && sigma_ == sigma) return *factor_;
   if (try_factorise(sigma)) return *factor_;
   if (!uses_mumps_ && options_.factorisation == Factorisation::kAutomatic) {
     uses_mumps_ = true;
@@ -154,7 +157,7 @@ ShiftedFactor& InertiaCounter::stand_at(double sigma) {
   throw SolveError(fmt::format("K - sigma M cannot be factorised again at {:.6g} Hz, where it was before.", to_hz_(sigma)));
 }
 
-void InertiaCounter::go_on(bool uses_mumps, double worst_backward_error) {
+void InertiaCounter::resume(bool uses_mumps, double worst_backward_error) {
   uses_mumps_ = uses_mumps_ || uses_mumps;
   worst_backward_error_ = worst_backward_error;
 }
@@ -165,7 +168,7 @@ ShiftedFactor& InertiaCounter::get_factor() {
 }
 
 void InertiaCounter::forget(double lambda) {
-  std::erase_if(taken_, [&](const Inertia& taken) { return taken.lambda == lambda; });
+  std::erase_if(counts_, [&](const Inertia& taken) { return taken.lambda == lambda; });
 }
 
 }  // namespace carillon::eigen

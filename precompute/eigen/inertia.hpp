@@ -7,8 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "precompute/comm/communicator.hpp"
 #include "precompute/eigen/shifted_factor.hpp"
-#include "precompute/eigen/solve_modes.hpp"
+#include "precompute/eigen/types.hpp"
 #include "precompute/petsc/handle.hpp"
 
 namespace carillon::eigen {
@@ -19,46 +20,48 @@ struct Inertia {
   std::int64_t below = 0;
 };
 
-/// Where a count is wanted: there; or, where rounding makes a shift so near zero worthless, at the least one above that is not.
-enum class Want { kHere, kHereOrAbove };
+/// What shift a count may be taken at: the one given; or, where rounding makes a shift so near zero unusable, the lowest one above that is
+/// usable.
+enum class ShiftRule { kExact, kMayMoveUp };
 
-/// Factorises K - sigma M where it is asked to, with the solver that the options name, and remembers every count.
+/// Keeps a factorisation of K - sigma M at the last shift, with the solver that the options name, and every count that was taken.
 class InertiaCounter {
  public:
   /// Problem, options, rigid modes (M-orthonormal), seconds and statistics must outlive it. to_hz: of a scaled lambda, for messages.
-  InertiaCounter(const Problem& problem, const Options& options, const std::vector<petsc::VecHandle>& rigid, Seconds& seconds,
-                 FactorStatistics& statistics, std::function<double(double)> to_hz);
+  InertiaCounter(const la::Pencil& pencil, const Problem& problem, const Options& options, const std::vector<petsc::VecHandle>& rigid,
+                 Seconds& seconds, FactorStatistics& statistics, std::function<double(double)> to_hz);
 
-  /// Factorises at lambda, or up to `reach` (relative) above it where lambda hits an eigenvalue, and counts. The factor is left there.
-  /// Near zero, rigid modes count as below lambda whatever rounding of K has made of them. Throws SolveError when K - sigma M is singular
-  /// all around, SystemError when memory does not suffice. Collective.
-  Inertia take(double lambda, double reach = 1e-6, Want want = Want::kHere);
-
-  /// The factor without numbers: what it will take. Collective.
-  const ShiftedFactor& analyse();
-  /// The factor of the last take; one that is analysed only if there was none, or it was released. Collective.
-  ShiftedFactor& get_factor();
-  /// The factor where the last take left it; null if none stands.
-  ShiftedFactor* find_standing() { return stands_ ? factor_.get() : nullptr; }
-  /// The next factor is one that pivots across fronts: slower, and stable where ours is not. False if it does already, or the options
-  /// forbid it. Frees the factor. Collective.
-  bool turn_to_mumps();
-  /// Frees the factor; the next take makes another. Collective.
-  void release() {
-    factor_.reset();
-    stands_ = false;
-  }
-
-  const std::vector<Inertia>& get_taken() const { return taken_; }
-  /// The factor at sigma, where a count was taken before; factorised anew if it stands elsewhere. Throws as take() does. Collective.
-  ShiftedFactor& stand_at(double sigma);
+  /// Factorises at lambda, or up to `reach` (relative) above it where lambda hits an eigenvalue, and counts. Near zero, rigid modes count
+  /// as below lambda whatever rounding of K has made of them. Throws SolveError when K - sigma M is singular all around, SystemError when
+  /// memory does not suffice. Collective.
+  Inertia count_below(double lambda, double reach = 1e-6, ShiftRule rule = ShiftRule::kExact);
+  const std::vector<Inertia>& counts() const { return counts_; }
   /// A count that was taken before, by another run.
-  void recall(const Inertia& taken) { taken_.push_back(taken); }
-  /// Goes on from another run.
-  void go_on(bool uses_mumps, double worst_backward_error);
-  bool uses_mumps() const { return uses_mumps_; }
+  void restore(const Inertia& count) { counts_.push_back(count); }
   /// Forgets counts that were taken too near an eigenvalue.
   void forget(double lambda);
+
+  /// The factor without numbers: its fill, flops and memory. Collective.
+  const ShiftedFactor& analyse();
+  /// The factor of the last count; one that is analysed only if there was none, or it was released. Collective.
+  ShiftedFactor& get_factor();
+  /// The factor where the last count left it; null if it has no numbers.
+  ShiftedFactor* current_factor() { return is_current_ ? factor_.get() : nullptr; }
+  /// The factor at sigma, where a count was taken before; factorised again if it is at another shift. Throws as count_below() does.
+  /// Collective.
+  ShiftedFactor& factor_at(double sigma);
+  /// The next factor is one that pivots across fronts: slower, and stable where ours is not. False if it does already, or the options
+  /// forbid it. Frees the factor. Collective.
+  bool switch_to_mumps();
+  /// Frees the factor; the next count makes another. Collective.
+  void release() {
+    factor_.reset();
+    is_current_ = false;
+  }
+
+  /// Takes over what another run has found out of the factorisation.
+  void resume(bool uses_mumps, double worst_backward_error);
+  bool uses_mumps() const { return uses_mumps_; }
   double get_worst_backward_error() const { return worst_backward_error_; }
 
  private:
@@ -66,21 +69,22 @@ class InertiaCounter {
   bool is_refused(double sigma) const;
   bool try_factorise(double sigma);
   bool try_around(double lambda, double reach);
-  std::int64_t count_below();
+  std::int64_t count_negative();
 
+  const la::Pencil pencil_;
   const Problem& problem_;
   const Options& options_;
   const std::vector<petsc::VecHandle>& rigid_;
   Seconds& seconds_;
   FactorStatistics& statistics_;
   std::function<double(double)> to_hz_;
-  MPI_Comm comm_ = MPI_COMM_NULL;
+  const comm::Communicator comm_;
   double rounding_ = 0;  // of an eigenvalue, by that of an ordinary entry of K
   bool uses_mumps_ = false;
   std::unique_ptr<ShiftedFactor> factor_;
-  bool stands_ = false;  // factor_ holds the values at standing_
-  double standing_ = 0;
-  std::vector<Inertia> taken_;
+  bool is_current_ = false;  // factor_ holds the values at sigma_
+  double sigma_ = 0;
+  std::vector<Inertia> counts_;
   double worst_backward_error_ = 0;
 };
 

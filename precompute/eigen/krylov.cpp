@@ -11,9 +11,9 @@
 #include <numeric>
 #include <string>
 
-#include "precompute/eigen/block_lanczos.hpp"
-#include "precompute/eigen/local_columns.hpp"
+#include "precompute/eigen/slepc_block_lanczos.hpp"
 #include "precompute/eigen/solver_options.hpp"
+#include "precompute/la/local_columns.hpp"
 #include "precompute/petsc/guard.hpp"
 #include "precompute/petsc/noise.hpp"
 #include "precompute/petsc/session.hpp"
@@ -22,6 +22,7 @@
 namespace carillon::eigen {
 namespace {
 
+using la::LocalColumns;
 using petsc::check;
 using petsc::guard;
 
@@ -76,11 +77,19 @@ PetscErrorCode apply_inverse_to_block(PC pc, Mat b, Mat x) {
   });
 }
 
-// M as SLEPc sees it: single vectors through PETSc's matrix, blocks through ours.
+// K and M of the pencil as SLEPc sees them: single vectors through PETSc's matrices, blocks by M through ours.
+PetscErrorCode multiply_stiffness(Mat shell, Vec x, Vec y) {
+  const KrylovRequest* request = nullptr;
+  PetscCall(MatShellGetContext(shell, &request));
+  PetscCall(MatMult(request->pencil.stiffness, x, y));
+  return VecScale(y, request->pencil.stiffness_factor);
+}
+
 PetscErrorCode multiply_mass(Mat shell, Vec x, Vec y) {
   const KrylovRequest* request = nullptr;
   PetscCall(MatShellGetContext(shell, &request));
-  return MatMult(request->mass, x, y);
+  PetscCall(MatMult(request->pencil.mass, x, y));
+  return VecScale(y, request->pencil.mass_factor);
 }
 
 PetscErrorCode multiply_mass_block(Mat shell, Mat x, Mat y, void*) {
@@ -93,17 +102,22 @@ PetscErrorCode multiply_mass_block(Mat shell, Mat x, Mat y, void*) {
   });
 }
 
-petsc::MatHandle make_mass_shell(const KrylovRequest& request) {
-  MPI_Comm comm = MPI_COMM_NULL;
+petsc::MatHandle make_shell(const KrylovRequest& request, PetscErrorCode (*multiply)(Mat, Vec, Vec)) {
   PetscInt rows = 0;
   PetscInt n = 0;
-  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(request.mass), &comm));
-  check(MatGetLocalSize(request.mass, &rows, nullptr));
-  check(MatGetSize(request.mass, &n, nullptr));
+  const Mat matrix = request.pencil.mass;
+  const comm::Communicator comm = petsc::get_communicator(matrix);
+  check(MatGetLocalSize(matrix, &rows, nullptr));
+  check(MatGetSize(matrix, &n, nullptr));
   petsc::MatHandle shell;
   check(MatCreateShell(comm, rows, rows, n, n, const_cast<KrylovRequest*>(&request), shell.out()));
-  check(MatShellSetOperation(shell, MATOP_MULT, reinterpret_cast<void (*)()>(multiply_mass)));
-  check(MatShellSetOperation(shell, MATOP_MULT_TRANSPOSE, reinterpret_cast<void (*)()>(multiply_mass)));
+  check(MatShellSetOperation(shell, MATOP_MULT, reinterpret_cast<void (*)()>(multiply)));
+  check(MatShellSetOperation(shell, MATOP_MULT_TRANSPOSE, reinterpret_cast<void (*)()>(multiply)));
+  return shell;
+}
+
+petsc::MatHandle make_mass_shell(const KrylovRequest& request) {
+  petsc::MatHandle shell = make_shell(request, multiply_mass);
   check(MatShellSetMatProductOperation(shell, MATPRODUCT_AB, nullptr, multiply_mass_block, nullptr, MATDENSE, MATDENSE));
   return shell;
 }
@@ -145,12 +159,12 @@ void set_starting_block(EPS eps, const KrylovRequest& request) {
   std::vector<petsc::VecHandle> vectors(kBlock);
   std::vector<Vec> plain;
   for (std::size_t j = 0; j < vectors.size(); ++j) {
-    check(MatCreateVecs(request.stiffness, vectors[j].out(), nullptr));
+    check(MatCreateVecs(request.pencil.stiffness, vectors[j].out(), nullptr));
     PetscScalar* values = nullptr;
     check(VecGetArray(vectors[j], &values));
-    for (std::size_t node = 0; node < request.position->size(); ++node) {
+    for (std::size_t node = 0; node < request.nodes_m->size(); ++node) {
       for (std::size_t d = 0; d < 3; ++d)
-        values[3 * node + d] = make_noise((*request.position)[node], 3 * j + d + 1, static_cast<std::uint64_t>(request.round));
+        values[3 * node + d] = make_noise((*request.nodes_m)[node], 3 * j + d + 1, static_cast<std::uint64_t>(request.round));
     }
     check(VecRestoreArray(vectors[j], &values));
     plain.push_back(vectors[j]);
@@ -158,12 +172,30 @@ void set_starting_block(EPS eps, const KrylovRequest& request) {
   check(EPSSetInitialSpace(eps, static_cast<PetscInt>(plain.size()), plain.data()));
 }
 
+// With its factor, where the entries themselves are needed.
+petsc::MatHandle copy_scaled(Mat matrix, double factor) {
+  petsc::MatHandle copy;
+  check(MatDuplicate(matrix, MAT_COPY_VALUES, copy.out()));
+  check(MatScale(copy, factor));
+  return copy;
+}
+
+// K and M in the form that the family needs.
+struct Operands {
+  Operands(const KrylovRequest& request, Family family) {
+    const la::Pencil& pencil = request.pencil;
+    stiffness = family == Family::dense ? copy_scaled(pencil.stiffness, pencil.stiffness_factor) : make_shell(request, multiply_stiffness);
+    mass = family == Family::dense ? copy_scaled(pencil.mass, pencil.mass_factor) : make_mass_shell(request);
+  }
+  petsc::MatHandle stiffness, mass;
+};
+
 // The factor at hand as the operator's inverse, or as a preconditioner.
-void set_operator(EPS eps, const KrylovRequest& request, Family family, ShellContext& shell, Mat mass) {
+void set_operator(EPS eps, const KrylovRequest& request, Family family, ShellContext& shell, const Operands& operands) {
   ST st = nullptr;
   KSP ksp = nullptr;
   PC pc = nullptr;
-  check(EPSSetOperators(eps, request.stiffness, family == Family::dense ? request.mass : mass));
+  check(EPSSetOperators(eps, operands.stiffness, operands.mass));
   check(EPSSetProblemType(eps, EPS_GHEP));
   check(EPSSetTarget(eps, request.sigma));
   check(EPSGetST(eps, &st));
@@ -191,7 +223,7 @@ void set_operator(EPS eps, const KrylovRequest& request, Family family, ShellCon
 // Sizes for the type that the options left: the block method seeks the interval, the others what is nearest.
 void set_goal(EPS eps, const KrylovRequest& request, Family family, PetscInt locked) {
   PetscInt n = 0;
-  check(MatGetSize(request.stiffness, &n, nullptr));
+  check(MatGetSize(request.pencil.stiffness, &n, nullptr));
   const PetscInt room = n - locked;
   if (family == Family::block) {
     const PetscInt wanted = std::min(request.count, room);
@@ -217,7 +249,7 @@ void set_goal(EPS eps, const KrylovRequest& request, Family family, PetscInt loc
   if (family == Family::davidson) check(EPSSetTolerances(eps, PETSC_DEFAULT, 50 * wanted + 200));
 }
 
-// For the types that know no locked columns.
+// For the types without support of locked columns.
 void set_deflation_space(EPS eps, const KrylovRequest& request, const LockedModes& locked) {
   if (locked.count() == 0) return;
   std::vector<petsc::VecHandle> vectors;
@@ -225,7 +257,7 @@ void set_deflation_space(EPS eps, const KrylovRequest& request, const LockedMode
   for (const Columns& set : locked.sets) {
     for (int j = 0; j < set.count; ++j) {
       petsc::VecHandle& vector = vectors.emplace_back();
-      check(MatCreateVecs(request.stiffness, vector.out(), nullptr));
+      check(MatCreateVecs(request.pencil.stiffness, vector.out(), nullptr));
       PetscScalar* values = nullptr;
       check(VecGetArrayWrite(vector, &values));
       std::copy_n(set.column(j), set.rows, values);
@@ -239,20 +271,20 @@ void set_deflation_space(EPS eps, const KrylovRequest& request, const LockedMode
 // For the types that know neither: takes the locked columns out of a vector. False if most of it goes with them: it is one of them.
 bool clear_of_locked(const KrylovRequest& request, const LockedModes& locked, Vec shape) {
   if (locked.count() == 0) return true;
-  MPI_Comm comm = MPI_COMM_NULL;
-  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(shape), &comm));
+  const comm::Communicator comm = petsc::get_communicator(shape);
   const LockedRange all{0, locked.count()};
   petsc::VecHandle image;
   check(VecDuplicate(shape, image.out()));
-  check(MatMult(request.mass, shape, image));
+  check(MatMult(request.pencil.mass, shape, image));
+  check(VecScale(image, request.pencil.mass_factor));
   PetscInt rows = 0;
   PetscScalar* x = nullptr;
   PetscScalar* m_x = nullptr;
   check(VecGetLocalSize(shape, &rows));
   check(VecGetArray(image, &m_x));
-  const std::vector<double> parts = locked.multiply_transposed(comm, all, {m_x, rows, rows, 1});
+  const la::Matrix parts = locked.multiply_transposed(comm, all, {m_x, rows, rows, 1});
   check(VecRestoreArray(image, &m_x));
-  const double known = std::inner_product(parts.begin(), parts.end(), parts.begin(), 0.0);
+  const double known = std::inner_product(parts.data(), parts.data() + parts.size(), parts.data(), 0.0);
   if (known > 0.5) return false;
   check(VecGetArray(shape, &x));
   locked.subtract_product(all, parts, {x, rows, rows, 1});
@@ -264,10 +296,9 @@ bool clear_of_locked(const KrylovRequest& request, const LockedModes& locked, Ve
 }  // namespace
 
 petsc::MatHandle FoundModes::make_columns(PetscInt count) const {
-  MPI_Comm comm = MPI_COMM_NULL;
   PetscInt rows = 0;
   PetscInt n = 0;
-  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(stiffness_), &comm));
+  const comm::Communicator comm = petsc::get_communicator(stiffness_);
   check(MatGetLocalSize(stiffness_, &rows, nullptr));
   check(MatGetSize(stiffness_, &n, nullptr));
   petsc::MatHandle columns;
@@ -353,11 +384,9 @@ std::int64_t calc_basis_size(std::int64_t wanted, std::int64_t locked, bool is_c
 }
 
 KrylovStatistics run_krylov(const KrylovRequest& request, FoundModes& found) {
-  MPI_Comm comm = MPI_COMM_NULL;
-  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(request.stiffness), &comm));
+  const comm::Communicator comm = petsc::get_communicator(request.pencil.stiffness);
   check(register_block_lanczos());
   ShellContext shell{&request, {}, 0};
-  const petsc::MatHandle mass = make_mass_shell(request);
   const LockedModes locked = found.find_above(request.locked_above);
   petsc::EpsHandle eps;
   check(EPSCreate(comm, eps.out()));
@@ -367,7 +396,8 @@ KrylovStatistics run_krylov(const KrylovRequest& request, FoundModes& found) {
   check(PetscOptionsGetString(nullptr, nullptr, "-eps_type", type.data(), type.size(), &is_chosen));
   if (is_chosen == PETSC_TRUE) check(EPSSetType(eps, type.c_str()));
   const Family family = find_family(eps);
-  set_operator(eps, request, family, shell, mass);
+  const Operands operands(request, family);
+  set_operator(eps, request, family, shell, operands);
   check(set_block_size(eps, kBlock));
   check(set_count_known(eps, request.is_count_known ? PETSC_TRUE : PETSC_FALSE));
   check(EPSLanczosSetReorthog(eps, EPS_LANCZOS_REORTHOG_FULL));
@@ -381,7 +411,7 @@ KrylovStatistics run_krylov(const KrylovRequest& request, FoundModes& found) {
   check(EPSSetFromOptions(eps));
   if (family == Family::block) {
     check(set_locked(eps, &locked));
-    check(set_keeper(eps, request.keeper));
+    check(set_checkpoint(eps, request.checkpoint));
     set_starting_block(eps, request);
   } else if (family == Family::krylov || family == Family::davidson) {
     set_deflation_space(eps, request, locked);
@@ -390,7 +420,7 @@ KrylovStatistics run_krylov(const KrylovRequest& request, FoundModes& found) {
 
   check(EPSSolve(eps));
 
-  if (request.keeper != nullptr && request.keeper->was_stopped) return shell.statistics;
+  if (request.checkpoint != nullptr && request.checkpoint->was_stopped) return shell.statistics;
   EPSConvergedReason reason = EPS_CONVERGED_ITERATING;
   check(EPSGetConvergedReason(eps, &reason));
   PetscInt converged = 0;

@@ -6,10 +6,11 @@
 #include <functional>
 #include <vector>
 
-#include "precompute/eigen/block_lanczos.hpp"
-#include "precompute/eigen/node_matrix.hpp"
+#include "precompute/eigen/lanczos_checkpoint.hpp"
+#include "precompute/eigen/locked_modes.hpp"
 #include "precompute/eigen/shifted_factor.hpp"
-#include "precompute/eigen/solve_modes.hpp"
+#include "precompute/eigen/types.hpp"
+#include "precompute/la/node_matrix.hpp"
 #include "precompute/petsc/handle.hpp"
 
 namespace carillon::eigen {
@@ -17,7 +18,7 @@ namespace carillon::eigen {
 /// Modes found so far, in the order they came: M-orthonormal columns of one dense matrix with room for more.
 class FoundModes {
  public:
-  /// Forgets all modes and makes room for `capacity` with K's rows; `rigid` are found beforehand. Collective.
+  /// Drops all modes and makes room for `capacity` with K's rows; `rigid` are found beforehand. Collective.
   void reset(Mat stiffness, PetscInt capacity, const std::vector<petsc::VecHandle>& rigid);
   /// Adds a pair whose shape `write` puts into the vector it is given; nothing where that returns false. Collective.
   void add(double eigenvalue, const std::function<bool(Vec shape)>& write);
@@ -43,33 +44,32 @@ class FoundModes {
 };
 
 struct KrylovRequest {
-  Mat stiffness = nullptr;
-  Mat mass = nullptr;
-  const NodeMatrix* mass_blocks = nullptr;  // M again, for many columns at a time
-  ShiftedFactor* factor = nullptr;          // already factorised at sigma
+  la::Pencil pencil;
+  const la::NodeMatrix* mass_blocks = nullptr;  // M of the pencil, for many columns at a time
+  ShiftedFactor* factor = nullptr;              // already factorised at sigma
   double sigma = 0;
   double low = 0;  // the interval whose eigenvalues are sought,
   double high = 0;
-  PetscInt count = 0;                           // how many it holds beside the locked ones,
-  bool is_count_known = true;                   // as is known, or guessed,
-  PetscInt nearest = 0;                         // and so many nearest sigma cover them (for what can only seek the nearest)
-  Method method = Method::kAutomatic;           // unless SLEPc's options say otherwise
-  double tolerance = 1e-10;                     // of the Ritz residual, relative to theta = 1 / (lambda - sigma) and to lambda
-  double locked_above = 0;                      // modes found above this lambda, and the rigid ones: the run stays M-orthogonal to them
-  const std::vector<Vec3>* position = nullptr;  // of the nodes: what the starting block is made of
-  int round = 0;                                // starting blocks of different rounds differ
+  PetscInt count = 0;                          // how many it holds without the locked ones,
+  bool is_count_known = true;                  // as is known, or guessed,
+  PetscInt nearest = 0;                        // and so many nearest sigma cover them (for what can only seek the nearest)
+  Method method = Method::kAutomatic;          // unless SLEPc's options say otherwise
+  double tolerance = 1e-10;                    // of the Ritz residual, relative to theta = 1 / (lambda - sigma) and to lambda
+  double locked_above = 0;                     // modes found above this lambda, and the rigid ones: the run stays M-orthogonal to them
+  const std::vector<Vec3>* nodes_m = nullptr;  // what the starting block is made of
+  int round = 0;                               // starting blocks of different rounds differ
   /// Pairs converged and right-hand sides solved in this run so far; may be empty.
   std::function<void(std::int64_t converged, std::int64_t solves)> progress;
-  LanczosKeeper* keeper = nullptr;  // of the block method; may be null
+  LanczosCheckpoint* checkpoint = nullptr;  // of the block method; may be null
 };
 
 struct KrylovStatistics {
   std::int64_t solves = 0;
   double solve_seconds = 0;
-  double solved_to = 0;  // From sigma up to here no eigenvalue is missing, as far as the run can tell; at most the interval's end.
+  double solved_to = 0;  // From sigma up to here no eigenvalue is missing, as far as the run shows; at most the interval's end.
 };
 
-/// Columns of the block method's basis, residuals included, for `wanted` eigenvalues with `locked` columns held away: twice the modes and
+/// Columns of the block method's basis, residuals included, for `wanted` eigenvalues with `locked` columns deflated: twice the modes and
 /// eight blocks are what runs from the bottom of a spectrum take; it is more with neighbours on both sides, or after a guess.
 std::int64_t calc_basis_size(std::int64_t wanted, std::int64_t locked, bool is_count_known);
 

@@ -9,11 +9,7 @@ namespace {
 
 class LdltFactor final : public ShiftedFactor {
  public:
-  LdltFactor(Mat stiffness, Mat mass) : factor_(stiffness, mass) {
-    MPI_Comm comm = MPI_COMM_NULL;
-    petsc::check(PetscObjectGetComm(reinterpret_cast<PetscObject>(stiffness), &comm));
-    MPI_Comm_rank(comm, &rank_);
-  }
+  explicit LdltFactor(const la::Pencil& pencil) : factor_(pencil), rank_(petsc::get_communicator(pencil.stiffness).rank()) {}
 
   bool factorise(double sigma) override { return factor_.factorise(sigma); }
   void solve(const double* b, double* x, std::ptrdiff_t stride, int columns) override {
@@ -23,17 +19,17 @@ class LdltFactor final : public ShiftedFactor {
   double get_backward_error() const override { return factor_.get_backward_error(); }
   std::int64_t get_peak_bytes() const override { return factor_.get_analysis().ranks[static_cast<std::size_t>(rank_)].peak_bytes; }
   std::string get_solver() const override { return "carillon L D L^T"; }
-  std::string get_ordering() const override { return "METIS nested dissection by rank, interfaces last"; }
+  std::string get_ordering() const override { return "METIS nested dissection by rank, separators last"; }
   std::int64_t get_entries() const override { return factor_.get_analysis().entries; }
   double get_flops() const override { return factor_.get_analysis().flops; }
 
  private:
   ldlt::Factor factor_;
-  int rank_ = 0;
+  int rank_;
 };
 
 }  // namespace
 
-std::unique_ptr<ShiftedFactor> make_ldlt_factor(Mat stiffness, Mat mass) { return std::make_unique<LdltFactor>(stiffness, mass); }
+std::unique_ptr<ShiftedFactor> make_ldlt_factor(const la::Pencil& pencil) { return std::make_unique<LdltFactor>(pencil); }
 
 }  // namespace carillon::eigen

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "precompute/petsc/session.hpp"
-#include "runtime/base/error.hpp"
+#include "runtime/base/failure.hpp"
 #include "runtime/base/host.hpp"
 
 namespace carillon::eigen {
@@ -23,34 +23,33 @@ double to_gb(std::int64_t bytes) { return static_cast<double>(bytes) / 1e9; }
 
 std::int64_t find_memory_left() { return std::min(find_host_left(), base::find_address_space_left()); }
 
-void check_memory(MPI_Comm comm, std::int64_t need_bytes, std::int64_t limit_bytes, const std::string& what) {
-  MPI_Comm host = MPI_COMM_NULL;
-  MPI_Comm_split_type(comm, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &host);
+void check_memory(const comm::Communicator& comm, std::int64_t need_bytes, std::int64_t limit_bytes, const std::string& what) {
+  MPI_Comm own_host = MPI_COMM_NULL;
+  MPI_Comm_split_type(comm, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &own_host);
+  const comm::Communicator host(own_host);
   std::array<std::int64_t, 2> together{need_bytes, base::find_memory().resident};
-  int ranks = 1;
-  MPI_Comm_size(host, &ranks);
-  MPI_Allreduce(MPI_IN_PLACE, together.data(), 2, MPI_INT64_T, MPI_SUM, host);
+  host.sum(together);
   std::int64_t left = find_host_left();
   if (limit_bytes > 0) left = std::min(left, std::max<std::int64_t>(limit_bytes - together[1], 0));
-  MPI_Allreduce(MPI_IN_PLACE, &left, 1, MPI_INT64_T, MPI_MIN, host);
-  MPI_Comm_free(&host);
+  left = host.min(left);
+  MPI_Comm_free(&own_host);
   const std::int64_t own_left = base::find_address_space_left();
-  std::int64_t everywhere = need_bytes;
-  MPI_Allreduce(MPI_IN_PLACE, &everywhere, 1, MPI_INT64_T, MPI_SUM, comm);
-  petsc::run_agreed(comm, [&] {
-    constexpr const char* kMend = "Take a coarser mesh, a narrower band or fewer modes, or more ranks on more machines.";
+  const std::int64_t everywhere = comm.sum(need_bytes);
+  comm.agree([&] {
+    constexpr const char* kRemedy = "Take a coarser mesh, a narrower band or fewer modes, or more ranks on more machines.";
     if (need_bytes > own_left) {
-      throw SystemError(
-          fmt::format("{} needs about {:.2f} GB on one rank ({:.2f} GB on all), and this process may take {:.2f} GB more "
-                      "(ulimit -v). {}",
-                      what, to_gb(need_bytes), to_gb(everywhere), to_gb(own_left), kMend));
+      throw MemoryError(fmt::format("{} needs about {:.2f} GB on one rank ({:.2f} GB on all), and this process may take {:.2f} GB more "
+                                    "(ulimit -v). {}",
+                                    what, to_gb(need_bytes), to_gb(everywhere), to_gb(own_left), kRemedy),
+                        static_cast<double>(together[0]));
     }
     if (together[0] > left) {
       std::array<char, 256> name{};
       gethostname(name.data(), name.size() - 1);
-      throw SystemError(
+      throw MemoryError(
           fmt::format("{} needs about {:.2f} GB on {} ({} ranks; {:.2f} GB on all machines), and {:.2f} GB are left there. {}", what,
-                      to_gb(together[0]), name.data(), ranks, to_gb(everywhere), to_gb(left), kMend));
+                      to_gb(together[0]), name.data(), host.size(), to_gb(everywhere), to_gb(left), kRemedy),
+          static_cast<double>(together[0]));
     }
   });
 }

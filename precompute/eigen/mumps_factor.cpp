@@ -1,8 +1,8 @@
 // Method:     Multifrontal L D L^T of K - sigma M with 1x1 and 2x2 pivots; the entries stay on the ranks that assembled them, the analysis
 //             is sequential under a METIS order handed in, right-hand sides and solutions are distributed.
 // Source:     MUMPS 5.5.1 users' guide, sections 3, 5 and 6. The inertia: Parlett, The symmetric eigenvalue problem, 1998, section 3.3.
-// Deviations: PETSc's own interface to MUMPS is not used, for it cannot hand an order to a distributed matrix, and Debian's MUMPS is built
-//             without METIS.
+// Deviations: PETSc's own interface to MUMPS is not used, for it cannot hand an order to a distributed matrix, and the MUMPS of Debian
+//             that PETSc links is built without METIS.
 #include <dmumps_c.h>
 #include <fmt/core.h>
 
@@ -15,7 +15,7 @@
 #include "precompute/eigen/shifted_factor.hpp"
 #include "precompute/petsc/handle.hpp"
 #include "precompute/petsc/session.hpp"
-#include "runtime/base/error.hpp"
+#include "runtime/base/failure.hpp"
 
 namespace carillon::eigen {
 namespace {
@@ -26,14 +26,16 @@ constexpr int kJobAnalyse = 1;
 constexpr int kJobFactorise = 2;
 constexpr int kJobSolve = 3;
 
-// MUMPS' ICNTL(7) by the names of "-mumps_ordering". Debian's MUMPS has neither METIS, whose order is handed in, nor SCOTCH.
+// MUMPS' ICNTL(7) by the names of "-mumps_ordering". The MUMPS that Debian's PETSc links (libmumps-5.5) has neither METIS, whose order is
+// handed in, nor SCOTCH; libmumps-scotch-5.5, which has SCOTCH, is another build of the same library and is not linked.
 constexpr std::array<std::pair<std::string_view, int>, 4> kOwnOrderings{{{"amd", 0}, {"amf", 2}, {"pord", 4}, {"qamd", 6}}};
 
 using petsc::check;
 
 // Calls visit(row, column, k, m) for every entry of the lower triangle of the union of both patterns, own rows in order.
 template <typename Visit>
-void visit_lower_entries(Mat stiffness, Mat mass, Visit&& visit) {
+void visit_lower_entries(const la::Pencil& pencil, Visit&& visit) {
+  const auto [stiffness, mass, stiffness_factor, mass_factor] = pencil;
   PetscInt first = 0;
   PetscInt last = 0;
   check(MatGetOwnershipRange(stiffness, &first, &last));
@@ -53,7 +55,7 @@ void visit_lower_entries(Mat stiffness, Mat mass, Visit&& visit) {
       const PetscInt m_column = m < m_count ? m_columns[m] : PETSC_MAX_INT;
       const PetscInt column = std::min(k_column, m_column);
       if (column > row) break;
-      visit(row, column, k_column == column ? k_values[k] : 0.0, m_column == column ? m_values[m] : 0.0);
+      visit(row, column, k_column == column ? stiffness_factor * k_values[k] : 0.0, m_column == column ? mass_factor * m_values[m] : 0.0);
       if (k_column == column) ++k;
       if (m_column == column) ++m;
     }
@@ -97,7 +99,7 @@ int find_own_ordering() {
 
 class MumpsFactor final : public ShiftedFactor {
  public:
-  MumpsFactor(Mat stiffness, Mat mass, const std::vector<std::int32_t>& elimination_position);
+  MumpsFactor(const la::Pencil& pencil, const std::vector<std::int32_t>& elimination_position);
   ~MumpsFactor() override;
 
   bool factorise(double sigma) override;
@@ -119,10 +121,7 @@ bool lacks_workspace(int code) { return code == -8 || code == -9 || code == -14 
 bool lacks_memory(int code) { return code == -5 || code == -7 || code == -13 || code == -19; }
 
 struct MumpsFactor::State {
-  Mat stiffness = nullptr;
-  Mat mass = nullptr;
-  MPI_Comm comm = MPI_COMM_NULL;
-  int rank = 0;
+  la::Pencil pencil;
   int size = 1;
   bool is_alive = false;
   int analysis_megabytes = 0;
@@ -166,26 +165,24 @@ void MumpsFactor::State::set_controls() {
   icntl(21) = size > 1 ? 1 : 0;
 }
 
-MumpsFactor::MumpsFactor(Mat stiffness, Mat mass, const std::vector<std::int32_t>& elimination_position)
+MumpsFactor::MumpsFactor(const la::Pencil& pencil, const std::vector<std::int32_t>& elimination_position)
     : state_(std::make_unique<State>()) {
   const int own_ordering = find_own_ordering();
   State& s = *state_;
-  s.stiffness = stiffness;
-  s.mass = mass;
-  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(stiffness), &s.comm));
-  MPI_Comm_rank(s.comm, &s.rank);
-  MPI_Comm_size(s.comm, &s.size);
+  s.pencil = pencil;
+  const comm::Communicator comm = petsc::get_communicator(pencil.stiffness);
+  s.size = comm.size();
   PetscInt n = 0;
-  check(MatGetSize(stiffness, &n, nullptr));
+  check(MatGetSize(pencil.stiffness, &n, nullptr));
 
-  s.mumps.comm_fortran = static_cast<MUMPS_INT>(MPI_Comm_c2f(s.comm));
+  s.mumps.comm_fortran = static_cast<MUMPS_INT>(MPI_Comm_c2f(comm));
   s.mumps.par = 1;
   s.mumps.sym = 2;
   if (s.call(kJobInit) != 0) throw SystemError(fmt::format("MUMPS does not start (code {}).", s.infog(1)));
   s.is_alive = true;
   s.set_controls();
 
-  visit_lower_entries(stiffness, mass, [&](PetscInt row, PetscInt column, double, double) {
+  visit_lower_entries(pencil, [&](PetscInt row, PetscInt column, double, double) {
     s.rows.push_back(row + 1);
     s.columns.push_back(column + 1);
   });
@@ -196,11 +193,10 @@ MumpsFactor::MumpsFactor(Mat stiffness, Mat mass, const std::vector<std::int32_t
   s.mumps.jcn_loc = s.columns.data();
   s.mumps.a_loc = s.values.data();
 
-  int is_given = elimination_position.empty() || own_ordering >= 0 ? 0 : 1;
-  MPI_Bcast(&is_given, 1, MPI_INT, 0, s.comm);
+  const bool is_given = comm.broadcast(!elimination_position.empty() && own_ordering < 0);
   constexpr int kOrderGiven = 1, kOrderChosen = 7;
-  s.icntl(7) = is_given == 1 ? kOrderGiven : own_ordering >= 0 ? own_ordering : kOrderChosen;
-  if (is_given == 1 && s.rank == 0) {
+  s.icntl(7) = is_given ? kOrderGiven : own_ordering >= 0 ? own_ordering : kOrderChosen;
+  if (is_given && comm.is_root()) {
     s.permutation.resize(static_cast<std::size_t>(n));
     for (std::size_t node = 0; node < elimination_position.size(); ++node) {
       for (std::size_t d = 0; d < 3; ++d) s.permutation[3 * node + d] = static_cast<MUMPS_INT>(3 * elimination_position[node] + d + 1);
@@ -209,13 +205,13 @@ MumpsFactor::MumpsFactor(Mat stiffness, Mat mass, const std::vector<std::int32_t
   }
   const int code = s.call(kJobAnalyse);
   if (lacks_memory(code))
-    throw SystemError("Out of memory in the analysis of K - sigma M. Take a coarser mesh or more ranks on more machines.");
+    throw MemoryError("Out of memory in the analysis of K - sigma M. Take a coarser mesh or more ranks on more machines.");
   if (code < 0) throw SolveError(fmt::format("MUMPS cannot analyse K - sigma M: code {}, {}.", code, s.infog(2)));
   s.analysis_megabytes = s.mumps.info[14];  // INFO(15): what this rank's factorisation is estimated to take.
 
   PetscInt first = 0;
   PetscInt last = 0;
-  check(MatGetOwnershipRange(stiffness, &first, &last));
+  check(MatGetOwnershipRange(pencil.stiffness, &first, &last));
   for (PetscInt row = first; row < last; ++row) s.own_rows.push_back(row + 1);
 }
 
@@ -228,7 +224,7 @@ MumpsFactor::~MumpsFactor() {
 bool MumpsFactor::factorise(double sigma) {
   State& s = *state_;
   std::size_t entry = 0;
-  visit_lower_entries(s.stiffness, s.mass, [&](PetscInt, PetscInt, double k, double m) { s.values[entry++] = k - sigma * m; });
+  visit_lower_entries(s.pencil, [&](PetscInt, PetscInt, double k, double m) { s.values[entry++] = k - sigma * m; });
   constexpr int kAttempts = 8;
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
     const int code = s.call(kJobFactorise);
@@ -242,7 +238,7 @@ bool MumpsFactor::factorise(double sigma) {
       continue;
     }
     if (lacks_memory(code)) {
-      throw SystemError("Out of memory in the factorisation of K - sigma M. Take a coarser mesh or more ranks on more machines.");
+      throw MemoryError("Out of memory in the factorisation of K - sigma M. Take a coarser mesh or more ranks on more machines.");
     }
     throw SolveError(fmt::format("MUMPS cannot factorise K - sigma M at sigma = {:.9g}: code {}, {}.", sigma, code, s.infog(2)));
   }
@@ -263,12 +259,12 @@ void MumpsFactor::State::prepare_solution(int columns) {
 void MumpsFactor::State::make_scatter() {
   const int local = mumps.info[22];
   check(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, local, nullptr, solution_vec.out()));
-  check(MatCreateVecs(stiffness, result_vec.out(), nullptr));
+  check(MatCreateVecs(pencil.stiffness, result_vec.out(), nullptr));
   std::vector<PetscInt> rows(static_cast<std::size_t>(local));
   for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = solution_rows[i] - 1;
   petsc::IsHandle to;
   petsc::IsHandle from;
-  check(ISCreateGeneral(comm, local, rows.data(), PETSC_COPY_VALUES, to.out()));
+  check(ISCreateGeneral(petsc::get_communicator(pencil.stiffness), local, rows.data(), PETSC_COPY_VALUES, to.out()));
   check(ISCreateStride(PETSC_COMM_SELF, local, 0, 1, from.out()));
   check(VecScatterCreate(solution_vec, from, result_vec, to, scatter.out()));
 }
@@ -290,7 +286,7 @@ void MumpsFactor::solve(const double* b, double* x, std::ptrdiff_t stride, int c
   }
   const int code = s.call(kJobSolve);
   if (lacks_memory(code))
-    throw SystemError("Out of memory in a solve with the factor. Take a coarser mesh or more ranks on more machines.");
+    throw MemoryError("Out of memory in a solve with the factor. Take a coarser mesh or more ranks on more machines.");
   if (code < 0) throw SolveError(fmt::format("MUMPS cannot solve with its factor: code {}, {}.", code, s.infog(2)));
   if (s.size == 1) return;
   if (s.scatter.get() == nullptr) s.make_scatter();
@@ -318,8 +314,8 @@ double MumpsFactor::get_flops() const { return state_->mumps.rinfog[2]; }
 
 }  // namespace
 
-std::unique_ptr<ShiftedFactor> make_mumps_factor(Mat stiffness, Mat mass, const std::vector<std::int32_t>& elimination_position) {
-  return std::make_unique<MumpsFactor>(stiffness, mass, elimination_position);
+std::unique_ptr<ShiftedFactor> make_mumps_factor(const la::Pencil& pencil, const std::vector<std::int32_t>& elimination_position) {
+  return std::make_unique<MumpsFactor>(pencil, elimination_position);
 }
 
 }  // namespace carillon::eigen

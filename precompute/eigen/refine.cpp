@@ -12,20 +12,21 @@
 #include "precompute/eigen/refine.hpp"
 
 #include <fmt/core.h>
-#include <petscblaslapack.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numeric>
 
-#include "precompute/eigen/local_columns.hpp"
+#include "precompute/la/lapack.hpp"
+#include "precompute/la/local_columns.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::eigen {
 namespace {
 
+using la::LocalColumns;
 using petsc::check;
 
 // Highest lambda of a group over its lowest, pass by pass. An error in the direction of a mode just outside the group's far end decays
@@ -47,25 +48,15 @@ std::vector<Group> group_neighbours(const std::vector<std::size_t>& bad, const s
 // Rayleigh-Ritz in the span of the columns: they become M-orthonormal Ritz vectors, their ascending Ritz values are returned. work: as many
 // columns.
 std::vector<double> calc_ritz(const Operators& operators, const Columns& x, const Columns& work) {
-  const auto count = static_cast<std::size_t>(x.count);
-  std::vector<double> m(count * count);
-  std::vector<double> k(count * count);
   operators.mass.multiply(x, work);
-  multiply_transposed(x, work, m.data(), x.count);
+  la::Matrix m = multiply_transposed(operators.comm, x, work);
   operators.stiffness.multiply(x, work);
-  multiply_transposed(x, work, k.data(), x.count);
-  for (std::vector<double>* sums : {&m, &k})
-    MPI_Allreduce(MPI_IN_PLACE, sums->data(), static_cast<int>(sums->size()), MPI_DOUBLE, MPI_SUM, operators.comm);
-  std::vector<double> values(count);
-  PetscBLASInt type = 1;
-  PetscBLASInt size = x.count;
-  PetscBLASInt info = 0;
-  PetscBLASInt room = 64 * size + 3 * size;
-  std::vector<double> space(static_cast<std::size_t>(room));
-  LAPACKsygv_(&type, "V", "L", &size, k.data(), &size, m.data(), &size, values.data(), space.data(), &room, &info);
+  la::Matrix k = multiply_transposed(operators.comm, x, work);
+  la::Vector values;
+  const int info = la::calc_generalised_eigenpairs(k, m, values);
   if (info != 0) throw SolveError(fmt::format("The modes to be refined are linearly dependent (LAPACK dsygv: {}).", info));
   combine_columns(x, k.data(), x.count);
-  return values;
+  return {values.begin(), values.end()};
 }
 
 // The columns to M-norm one; first to an ordinary size, for near an eigenvalue a solution is huge.
@@ -81,19 +72,20 @@ void normalise(const Operators& operators, const Columns& x, const Columns& work
     for (std::ptrdiff_t i = 0; i < x.rows; ++i)
       largest[static_cast<std::size_t>(j)] = std::max(largest[static_cast<std::size_t>(j)], std::abs(x.column(j)[i]));
   }
-  MPI_Allreduce(MPI_IN_PLACE, largest.data(), x.count, MPI_DOUBLE, MPI_MAX, operators.comm);
+  operators.comm.max(largest);
   scale_all(largest);
   operators.mass.multiply(x, work);
   std::vector<double> norm(count);
   for (int j = 0; j < x.count; ++j)
     norm[static_cast<std::size_t>(j)] = std::inner_product(x.column(j), x.column(j) + x.rows, work.column(j), 0.0);
-  MPI_Allreduce(MPI_IN_PLACE, norm.data(), x.count, MPI_DOUBLE, MPI_SUM, operators.comm);
+  operators.comm.sum(norm);
   for (double& square : norm) square = std::sqrt(square);
   scale_all(norm);
 }
 
 // The factor at a shift below the group, `nearness` away relative to lambda. Returns the shift.
-double stand_below(const RefineRequest& request, const Group& group, double nearness, const std::vector<double>& lambda, RefineCost& cost) {
+double factorise_below(const RefineRequest& request, const Group& group, double nearness, const std::vector<double>& lambda,
+                       RefineCost& cost) {
   constexpr int kShifts = 6;
   const double low = lambda[group.front()];
   do {
@@ -103,7 +95,7 @@ double stand_below(const RefineRequest& request, const Group& group, double near
       ++cost.factorisations;
       if (factor.factorise(sigma)) return sigma;
     }
-  } while (request.turn_stable && request.turn_stable());
+  } while (request.switch_to_pivoting_solver && request.switch_to_pivoting_solver());
   throw SolveError("K - sigma M is singular all around a mode: the mesh has nodes without mass or stiffness.");
 }
 
@@ -135,7 +127,7 @@ struct Corrections {
     request.operators->mass.multiply(d, work);
     std::vector<double> norms;
     for (int c = 0; c < d.count; ++c) norms.push_back(std::inner_product(d.column(c), d.column(c) + rows, work.column(c), 0.0));
-    MPI_Allreduce(MPI_IN_PLACE, norms.data(), d.count, MPI_DOUBLE, MPI_SUM, request.operators->comm);
+    request.operators->comm.sum(norms);
     for (double& norm : norms) norm = std::sqrt(norm);
     return norms;
   }
@@ -159,14 +151,14 @@ struct Corrections {
 // Replaces the group's modes by better ones. `nearness` is the distance of the shift below the group, relative to lambda.
 void improve_group(const RefineRequest& request, const Group& group, double nearness, std::vector<double>& lambda, Mat shapes,
                    RefineCost& cost) {
-  stand_below(request, group, nearness, lambda, cost);
+  factorise_below(request, group, nearness, lambda, cost);
   const LocalColumns access(shapes);
   const Columns all = access.view();
   Corrections(request, group, lambda, all, cost).apply(request, group, lambda, all);
 }
 
 // The modes once through the operator at hand, whatever its shift; what that brings in of the others is taken out again. Modes that it does
-// not improve stay as they were. The other modes do not move, so nothing else needs to be measured anew.
+// not improve stay as they were. The other modes do not move, so nothing else needs to be measured again.
 void polish(const RefineRequest& request, const Group& bad, std::vector<double>& lambda, Mat shapes, ModeErrors& errors, RefineCost& cost) {
   const Operators& operators = *request.operators;
   const LocalColumns access(shapes);
@@ -191,14 +183,10 @@ void polish(const RefineRequest& request, const Group& bad, std::vector<double>&
     for (int pass = 0; pass < 3; ++pass) {
       normalise(operators, x, work);
       operators.mass.multiply(x, work);
-      std::vector<double> products(static_cast<std::size_t>(all.count) * bad.size());
-      multiply_transposed(all, work, products.data(), all.count);
-      MPI_Allreduce(MPI_IN_PLACE, products.data(), static_cast<int>(products.size()), MPI_DOUBLE, MPI_SUM, operators.comm);
-      for (std::size_t c = 0; c < bad.size(); ++c) {
-        for (const std::size_t j : bad) products[c * static_cast<std::size_t>(all.count) + j] = 0;
-      }
+      la::Matrix products = multiply_transposed(operators.comm, all, work);
+      for (const std::size_t j : bad) products.row(static_cast<Eigen::Index>(j)).setZero();
       overlap = 0;
-      for (const double product : products) overlap = std::max(overlap, std::abs(product));
+      for (const double product : products.reshaped()) overlap = std::max(overlap, std::abs(product));
       if (pass < 2) subtract_product(all, products.data(), all.count, x);
     }
     ritz = calc_ritz(operators, x, work);
@@ -238,7 +226,7 @@ bool is_accepted(const ModeErrors& errors, std::size_t j, double tolerance) {
   return errors.residual[j] <= std::max(tolerance, errors.floor[j]);
 }
 
-RefineCost certify_modes(const RefineRequest& request, std::vector<double>& lambda, Mat shapes, ModeErrors& errors) {
+RefineCost bound_error_by_inverse_residual(const RefineRequest& request, std::vector<double>& lambda, Mat shapes, ModeErrors& errors) {
   // A mode below the shift that is nearer to it than the group's upper end is would grow: groups are narrow and their shifts near, though
   // not so near that the rounding of the factors decides.
   constexpr std::array<std::array<double, 2>, 4> kRounds{{{1.2, 0.1}, {1.02, 0.01}, {1.005, 0.01}, {1.005, 0.01}}};  // spread, nearness
@@ -249,10 +237,10 @@ RefineCost certify_modes(const RefineRequest& request, std::vector<double>& lamb
     for (std::size_t j = 0; j < lambda.size(); ++j) {
       if (errors.residual[j] > request.tolerance) above.push_back(j);
     }
-    std::vector<double> certified = errors.residual;
+    std::vector<double> bounded = errors.residual;
     bool is_corrected = false;
     for (const Group& group : group_neighbours(above, lambda, spread)) {
-      const double sigma = stand_below(request, group, nearness, lambda, cost);
+      const double sigma = factorise_below(request, group, nearness, lambda, cost);
       const LocalColumns access(shapes);
       const Columns all = access.view();
       Corrections corrections(request, group, lambda, all, cost);
@@ -260,16 +248,16 @@ RefineCost certify_modes(const RefineRequest& request, std::vector<double>& lamb
       double worst = 0;
       for (std::size_t c = 0; c < group.size(); ++c) {
         const std::size_t j = group[c];
-        certified[j] = std::min(certified[j], size[c] * (lambda[j] - sigma) / lambda[j]);
-        worst = std::max(worst, certified[j]);
+        bounded[j] = std::min(bounded[j], size[c] * (lambda[j] - sigma) / lambda[j]);
+        worst = std::max(worst, bounded[j]);
       }
       if (worst <= request.tolerance || round + 1 == kRounds.size()) continue;
       corrections.apply(request, group, lambda, all);
       is_corrected = true;
     }
     if (!is_corrected) {
-      errors.residual = certified;
-      for (const std::size_t j : above) errors.floor[j] = std::min(errors.floor[j], certified[j]);
+      errors.residual = bounded;
+      for (const std::size_t j : above) errors.floor[j] = std::min(errors.floor[j], bounded[j]);
       return cost;
     }
     errors = measure_orthonormal(request, lambda, shapes);

@@ -14,10 +14,10 @@ namespace carillon::eigen {
 
 struct RefineRequest {
   const Operators* operators = nullptr;
-  double tolerance = 1e-8;                     // of the relative residual
-  ShiftedFactor* at_hand = nullptr;            // a factor that stands, of any shift in or near the band: tried first; may be null
-  std::function<ShiftedFactor&()> get_factor;  // L D L^T of any shift; asked for only when a mode needs it
-  std::function<bool()> turn_stable;           // makes get_factor's one that pivots more; false when there is none. May be empty
+  double tolerance = 1e-8;                          // of the relative residual
+  ShiftedFactor* at_hand = nullptr;                 // a factor with numbers, of any shift in or near the band: tried first; may be null
+  std::function<ShiftedFactor&()> get_factor;       // L D L^T of any shift; called only when a mode needs it
+  std::function<bool()> switch_to_pivoting_solver;  // get_factor then gives one that pivots more; false when there is none. May be empty
 };
 
 struct RefineCost {
@@ -37,7 +37,7 @@ RefineCost refine_modes(const RefineRequest& request, std::vector<double>& lambd
 /// errors.residual becomes ||d||_M (lambda - sigma) / lambda where that is less, and errors.floor no more than it. It bounds the distance
 /// of lambda from an eigenvalue, relative to lambda, as the residual does. Modes that are still above are corrected by d, three times at
 /// most. shapes: M-orthonormal, and so afterwards. Collective. Throws as refine_modes does.
-RefineCost certify_modes(const RefineRequest& request, std::vector<double>& lambda, Mat shapes, ModeErrors& errors);
+RefineCost bound_error_by_inverse_residual(const RefineRequest& request, std::vector<double>& lambda, Mat shapes, ModeErrors& errors);
 
 /// True if mode j is good: its residual is within the tolerance, or within what rounding explains.
 bool is_accepted(const ModeErrors& errors, std::size_t j, double tolerance);

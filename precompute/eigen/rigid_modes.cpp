@@ -1,9 +1,10 @@
 // Method:     A rigid motion of component c is u(x) = sum_j a_j b_j(x), with three translations b = e_i and three rotations
-//             b = p_i x (x - x_c) / R about the centre x_c, along the principal axes p_i of its nodes. Held nodes demand H a = 0 (H: 3 rows
-//             per held node, 6 columns); the null space of H comes from its singular value decomposition. The motions are then made
+//             b = p_i x (x - x_c) / R about the centre x_c, along the principal axes p_i of its nodes. Fixed nodes demand H a = 0 (H: 3
+//             rows per fixed node, 6 columns); the null space of H comes from its singular value decomposition. The motions are then made
 //             M-orthonormal by Gram-Schmidt, twice.
 // Source:     Geradin, Rixen, Mechanical Vibrations, 3rd ed. 2015, section 2.2 (rigid body modes); Golub, Van Loan, section 2.4 (null
-// space). Deviations: none.
+//             space).
+// Deviations: none.
 #include "precompute/eigen/rigid_modes.hpp"
 
 #include <fmt/core.h>
@@ -13,6 +14,7 @@
 #include <array>
 #include <cmath>
 
+#include "precompute/comm/communicator.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/base/error.hpp"
 
@@ -30,7 +32,7 @@ constexpr double kLineTolerance = 1e-10;
 
 Vector3 to_vector(const Vec3& x) { return {x[0], x[1], x[2]}; }
 
-// Centre, principal axes and size of one component, held nodes included, the same on every rank.
+// Centre, principal axes and size of one component, fixed nodes included, the same on every rank.
 struct Body {
   Vector3 centre = Vector3::Zero();
   Matrix3 axes = Matrix3::Identity();  // columns
@@ -48,24 +50,21 @@ Eigen::Matrix<double, 3, 6> calc_basis(const Body& body, const Vector3& x) {
 }
 
 // Sums over the nodes of every component: count, position, and after the centres are known the second moments.
-std::vector<Body> calc_bodies(MPI_Comm comm, const NodeLayout& nodes) {
+std::vector<Body> calc_bodies(const comm::Communicator& comm, const NodeLayout& nodes) {
   const auto count = static_cast<std::size_t>(nodes.component_count);
   std::vector<double> sums(4 * count, 0.0);
-  int rank = 0;
-  MPI_Comm_rank(comm, &rank);
   const auto for_each_node = [&](auto&& visit) {
-    for (std::size_t i = 0; i < nodes.position.size(); ++i)
-      visit(static_cast<std::size_t>(nodes.component[i]), to_vector(nodes.position[i]));
-    if (rank != 0) return;  // Every rank knows the held nodes; one of them counts them.
-    for (std::size_t c = 0; c < std::min(count, nodes.held.size()); ++c) {
-      for (const Vec3& x : nodes.held[c]) visit(c, to_vector(x));
+    for (std::size_t i = 0; i < nodes.nodes_m.size(); ++i) visit(static_cast<std::size_t>(nodes.component[i]), to_vector(nodes.nodes_m[i]));
+    if (!comm.is_root()) return;  // Every rank knows the fixed nodes; one of them counts them.
+    for (std::size_t c = 0; c < std::min(count, nodes.fixed.size()); ++c) {
+      for (const Vec3& x : nodes.fixed[c]) visit(c, to_vector(x));
     }
   };
   for_each_node([&](std::size_t c, const Vector3& x) {
     sums[4 * c] += 1;
     for (int d = 0; d < 3; ++d) sums[4 * c + 1 + static_cast<std::size_t>(d)] += x[d];
   });
-  MPI_Allreduce(MPI_IN_PLACE, sums.data(), static_cast<int>(sums.size()), MPI_DOUBLE, MPI_SUM, comm);
+  comm.sum(sums);
   std::vector<Body> bodies(count);
   for (std::size_t c = 0; c < count; ++c) {
     if (sums[4 * c] > 0) bodies[c].centre = Vector3(sums[4 * c + 1], sums[4 * c + 2], sums[4 * c + 3]) / sums[4 * c];
@@ -75,7 +74,7 @@ std::vector<Body> calc_bodies(MPI_Comm comm, const NodeLayout& nodes) {
     Eigen::Map<Matrix3> moment(moments.data() + 9 * c);
     moment += (x - bodies[c].centre) * (x - bodies[c].centre).transpose();
   });
-  MPI_Allreduce(MPI_IN_PLACE, moments.data(), static_cast<int>(moments.size()), MPI_DOUBLE, MPI_SUM, comm);
+  comm.sum(moments);
   for (std::size_t c = 0; c < count; ++c) {
     const Matrix3 moment = Eigen::Map<Matrix3>(moments.data() + 9 * c);
     const double square = moment.trace() / std::max(sums[4 * c], 1.0);
@@ -86,13 +85,13 @@ std::vector<Body> calc_bodies(MPI_Comm comm, const NodeLayout& nodes) {
   return bodies;
 }
 
-// The combinations of basis motions that leave the held nodes where they are.
-Motions calc_admissible_motions(const Body& body, const std::vector<Vec3>& held) {
-  if (held.empty()) return Motions::Identity(6, 6);
+// The combinations of basis motions that leave the fixed nodes where they are.
+Motions calc_admissible_motions(const Body& body, const std::vector<Vec3>& fixed) {
+  if (fixed.empty()) return Motions::Identity(6, 6);
   // H^T H would square the condition; H R with H = Q R is as small and keeps it.
-  Eigen::MatrixXd constraints(3 * static_cast<Eigen::Index>(held.size()), 6);
-  for (std::size_t i = 0; i < held.size(); ++i)
-    constraints.middleRows<3>(3 * static_cast<Eigen::Index>(i)) = calc_basis(body, to_vector(held[i]));
+  Eigen::MatrixXd constraints(3 * static_cast<Eigen::Index>(fixed.size()), 6);
+  for (std::size_t i = 0; i < fixed.size(); ++i)
+    constraints.middleRows<3>(3 * static_cast<Eigen::Index>(i)) = calc_basis(body, to_vector(fixed[i]));
   Eigen::Matrix<double, Eigen::Dynamic, 6> small = constraints;
   if (constraints.rows() > 6) {
     const Eigen::HouseholderQR<Eigen::MatrixXd> qr(constraints);
@@ -121,14 +120,14 @@ void fill_motion(const NodeLayout& nodes, std::int32_t c, const Body& body, cons
   PetscScalar* values = nullptr;
   check(VecZeroEntries(motion));
   check(VecGetArray(motion, &values));
-  for (std::size_t i = 0; i < nodes.position.size(); ++i) {
-    if (nodes.component[i] == c) Eigen::Map<Vector3>(values + 3 * i) = calc_basis(body, to_vector(nodes.position[i])) * a;
+  for (std::size_t i = 0; i < nodes.nodes_m.size(); ++i) {
+    if (nodes.component[i] == c) Eigen::Map<Vector3>(values + 3 * i) = calc_basis(body, to_vector(nodes.nodes_m[i])) * a;
   }
   check(VecRestoreArray(motion, &values));
 }
 
-// M-orthonormalises `candidate` against `basis`, the motions of the same component; false if nothing is left of it beside `unit`, the norm
-// of a translation.
+// M-orthonormalises `candidate` against `basis`, the motions of the same component; false if nothing is left of it relative to `unit`, the
+// norm of a translation.
 bool orthonormalise(Mat mass, Vec candidate, Vec work, const std::vector<Vec>& basis, double unit) {
   for (int pass = 0; pass < 2; ++pass) {
     check(MatMult(mass, candidate, work));
@@ -140,7 +139,7 @@ bool orthonormalise(Mat mass, Vec candidate, Vec work, const std::vector<Vec>& b
   return true;
 }
 
-// ||K r|| must vanish beside what the entries of K alone would give, ||diag(K) r||.
+// ||K r|| must vanish relative to what the entries of K alone would give, ||diag(K) r||.
 void check_stress_free(Mat stiffness, Vec motion, Vec work, Vec diagonal, std::int32_t component) {
   check(MatMult(stiffness, motion, work));
   PetscReal force = 0;
@@ -152,16 +151,17 @@ void check_stress_free(Mat stiffness, Vec motion, Vec work, Vec diagonal, std::i
   if (!(force <= kForceTolerance * scale)) {
     throw SolveError(
         fmt::format("A rigid motion of component {} meets elastic forces ({:.2g} of the largest possible): the stiffness matrix and "
-                    "the node layout are not of the same body, or held nodes are missing from the layout.",
+                    "the node layout are not of the same body, or fixed nodes are missing from the layout.",
                     component, force / scale));
   }
 }
 
 }  // namespace
 
-std::vector<petsc::VecHandle> make_rigid_modes(Mat stiffness, Mat mass, const NodeLayout& nodes, std::vector<std::int64_t>& per_component) {
-  MPI_Comm comm = MPI_COMM_NULL;
-  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(stiffness), &comm));
+std::vector<petsc::VecHandle> make_rigid_modes(const la::Pencil& pencil, const NodeLayout& nodes,
+                                               std::vector<std::int64_t>& per_component) {
+  const Mat stiffness = pencil.stiffness, mass = pencil.mass;
+  const comm::Communicator comm = petsc::get_communicator(stiffness);
   std::vector<Body> bodies = calc_bodies(comm, nodes);
   petsc::VecHandle work;
   petsc::VecHandle diagonal;
@@ -174,8 +174,8 @@ std::vector<petsc::VecHandle> make_rigid_modes(Mat stiffness, Mat mass, const No
   per_component.clear();
   for (std::int32_t c = 0; c < nodes.component_count; ++c) {
     Body& body = bodies[static_cast<std::size_t>(c)];
-    const auto& held = static_cast<std::size_t>(c) < nodes.held.size() ? nodes.held[static_cast<std::size_t>(c)] : none;
-    body.motions = calc_admissible_motions(body, held);
+    const auto& fixed = static_cast<std::size_t>(c) < nodes.fixed.size() ? nodes.fixed[static_cast<std::size_t>(c)] : none;
+    body.motions = calc_admissible_motions(body, fixed);
     fill_motion(nodes, c, body, Eigen::Matrix<double, 6, 1>::Unit(0), candidate);
     const double unit = calc_mass_norm(mass, candidate, work);
     std::vector<Vec> of_component;
@@ -191,6 +191,8 @@ std::vector<petsc::VecHandle> make_rigid_modes(Mat stiffness, Mat mass, const No
     }
     per_component.push_back(static_cast<std::int64_t>(of_component.size()));
   }
+  // M-orthonormal so far; the root of the factor is a power of two as well.
+  for (petsc::VecHandle& mode : modes) check(VecScale(mode, 1 / std::sqrt(pencil.mass_factor)));
   return modes;
 }
 

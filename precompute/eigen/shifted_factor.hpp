@@ -1,13 +1,13 @@
 // Factorisations of K - sigma M that the shift-invert iteration and the counts of eigenvalues need.
 #pragma once
 
-#include <petscmat.h>
-
 #include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
+
+#include "precompute/la/pencil.hpp"
 
 namespace carillon::eigen {
 
@@ -37,13 +37,13 @@ class ShiftedFactor {
 
 /// carillon::ldlt: supernodal L D L^T over the ranks, made for many right-hand sides. factorise is also false when its measured backward
 /// error is too large.
-std::unique_ptr<ShiftedFactor> make_ldlt_factor(Mat stiffness, Mat mass);
+std::unique_ptr<ShiftedFactor> make_ldlt_factor(const la::Pencil& pencil);
 
 /// MUMPS: L D L^T with pivoting across fronts. elimination_position: on rank 0, per node the place in the elimination order; empty: MUMPS
 /// orders.
-std::unique_ptr<ShiftedFactor> make_mumps_factor(Mat stiffness, Mat mass, const std::vector<std::int32_t>& elimination_position);
+std::unique_ptr<ShiftedFactor> make_mumps_factor(const la::Pencil& pencil, const std::vector<std::int32_t>& elimination_position);
 
 /// CHOLMOD: supernodal L L^T on one rank; sigma must be negative, so it cannot count.
-std::unique_ptr<ShiftedFactor> make_cholmod_factor(Mat stiffness, Mat mass, const std::vector<std::int32_t>& elimination_position);
+std::unique_ptr<ShiftedFactor> make_cholmod_factor(const la::Pencil& pencil, const std::vector<std::int32_t>& elimination_position);
 
 }  // namespace carillon::eigen

@@ -13,10 +13,10 @@
 namespace carillon::eigen {
 namespace {
 
-constexpr double kUsualPower = 0.8;  // of lambda, where nothing better is known: between plates and solids
-constexpr double kNearEnd = 0.05;    // A guess stays this far from the ends of the interval it falls into, as a part of it in frequency.
-constexpr double kNarrow = 1e-4;     // of lambda: the width of what is not cut
-constexpr double kLopsided = 2;      // A shift is at most this much nearer to one end of its slice than to the other.
+constexpr double kDefaultPower = 0.8;  // of lambda, where nothing better is known: between plates and solids
+constexpr double kNearEnd = 0.05;      // A guess stays this far from the ends of the interval it falls into, as a part of it in frequency.
+constexpr double kNarrow = 1e-4;       // of lambda: the width of what is not cut
+constexpr double kLopsided = 2;        // A shift is at most this much nearer to one end of its slice than to the other.
 
 double calc_power(const std::pair<const double, std::int64_t>& a, const std::pair<const double, std::int64_t>& b) {
   const double power = std::log(static_cast<double>(b.second) / static_cast<double>(a.second)) / std::log(b.first / a.first);
@@ -34,7 +34,7 @@ double Counts::find_lambda(double below, double margin) const {
   auto high = std::find_if(std::next(known_.begin()), known_.end(), [&](const auto& k) { return static_cast<double>(k.second) >= wanted; });
   if (high == known_.end()) --high;
   const auto low = std::prev(high);
-  double power = kUsualPower;
+  double power = kDefaultPower;
   if (low->second > 0) {
     power = calc_power(*low, *high);
   } else if (std::next(high) != known_.end()) {
@@ -64,14 +64,14 @@ Slice cut_to_lowest(const Slice& band, std::int64_t wanted, const CountBelow& co
   return cut;
 }
 
-Sweep::Sweep(const Slice& band, std::int64_t most, CountBelow count_below)
-    : rest_(band), most_(most), count_below_(std::move(count_below)), counts_(band) {}
+Sweep::Sweep(const Slice& band, std::int64_t max, CountBelow count_below)
+    : rest_(band), max_(max), count_below_(std::move(count_below)), counts_(band) {}
 
-bool Sweep::is_last() const { return rest_.count() <= most_ || rest_.high - rest_.low < kNarrow * rest_.high; }
+bool Sweep::is_last() const { return rest_.count() <= max_ || rest_.high - rest_.low < kNarrow * rest_.high; }
 
 Sweep::Part Sweep::take() {
   constexpr int kTrials = 3;  // by what the counts predict, then by halves
-  const double parts = std::ceil(static_cast<double>(rest_.count()) / static_cast<double>(most_));
+  const double parts = std::ceil(static_cast<double>(rest_.count()) / static_cast<double>(max_));
   const double share = static_cast<double>(rest_.count()) / parts;
   const auto below_low = static_cast<double>(rest_.below_low);
   Part part{rest_.low, rest_.below_low, rest_};
@@ -87,7 +87,7 @@ Sweep::Part Sweep::take() {
     counts_.add(part.sigma, below);
     part.below_sigma = below;
     under = static_cast<double>(below) - below_low;
-    if (is_cluster || (under >= 0.2 * share && under <= static_cast<double>(most_))) break;
+    if (is_cluster || (under >= 0.2 * share && under <= static_cast<double>(max_))) break;
     (under < share ? few : many) = part.sigma;
     is_cluster = many - few < kNarrow * many;
     if (is_cluster && (part.sigma == many || many == rest_.high)) break;  // Else once more, above it: all of it is below the shift then.

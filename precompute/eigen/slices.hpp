@@ -37,11 +37,11 @@ class Counts {
 /// Lowers the upper end until the slice holds `wanted` eigenvalues and few more; the slice itself when it holds no more than that.
 Slice cut_to_lowest(const Slice& band, std::int64_t wanted, const CountBelow& count_below);
 
-/// Goes up a band in slices of at most about `most` eigenvalues. The only count that a slice costs is the one at the shift inside it, where
+/// Goes up a band in slices of at most about `max` eigenvalues. The only count that a slice costs is the one at the shift inside it, where
 /// K - sigma M is factorised anyway; what lies above the shift shows at the next one.
 class Sweep {
  public:
-  Sweep(const Slice& band, std::int64_t most, CountBelow count_below);
+  Sweep(const Slice& band, std::int64_t max, CountBelow count_below);
 
   /// What is left to be solved. Its count is right when all below it is found.
   const Slice& get_rest() const { return rest_; }
@@ -60,7 +60,7 @@ class Sweep {
 
  private:
   Slice rest_;
-  std::int64_t most_;
+  std::int64_t max_;
   CountBelow count_below_;
   Counts counts_;
 };

@@ -8,8 +8,8 @@
 #include <string_view>
 #include <vector>
 
-#include "precompute/eigen/block_lanczos.hpp"
-#include "precompute/eigen/solve_modes.hpp"
+#include "precompute/eigen/slepc_block_lanczos.hpp"
+#include "precompute/eigen/types.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/base/error.hpp"
 
@@ -104,10 +104,10 @@ void check_type(const std::string& type, PetscInt unknowns) {
   for (const Refused& refused : kRefusedTypes) {
     if (refused.name == type) throw InputError(fmt::format("\"-eps_type {}\": {}; take one of {}", type, refused.why, choice));
   }
-  if (type == EPSLAPACK && unknowns > kMostDenseUnknowns)
+  if (type == EPSLAPACK && unknowns > kMaxDenseUnknowns)
     throw InputError(
         fmt::format("\"-eps_type lapack\": LAPACK solves up to {} unknowns, and there are {}; take another type or a coarser mesh",
-                    kMostDenseUnknowns, unknowns));
+                    kMaxDenseUnknowns, unknowns));
 }
 
 }  // namespace

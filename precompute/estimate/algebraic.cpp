@@ -1,7 +1,6 @@
 // Method: with r = K phi - lambda M phi and phi^T M phi = 1 an eigenvalue lies within rho = ||r||_{M^-1} of lambda. Both norms come from
-// the
-//   residual that is known: ||r||_{M^-1} <= ||r||_2 / sqrt(least eigenvalue of M), ||M phi||_2 <= sqrt(greatest eigenvalue of M), and
-//   M lies between multiples of its diagonal. k-th against k-th: modes whose intervals touch are one group; its eigenvalues pair with those
+//   the residual that is known: ||r||_{M^-1} <= ||r||_2 / sqrt(least eigenvalue of M), ||M phi||_2 <= sqrt(greatest eigenvalue of M), and M
+//   lies between multiples of its diagonal. k-th against k-th: modes whose intervals touch are one group; its eigenvalues pair with those
 //   of K phi = lambda M phi within sqrt(sum rho^2), or within sum rho^2 / gap where the gap to whatever else there can be is wider.
 //   Rounding: entries of K are wrong by parts of eps |K_ij|, which moves lambda by phi^T dK phi.
 // Source: Fried 1972, SIAM J. Numer. Anal. 9, 448 (element eigenvalues bound those of the whole); Parlett 1998, The Symmetric Eigenvalue
@@ -115,34 +114,34 @@ std::vector<double> calc_bounds(std::span<const double> lambda, const std::vecto
 
 }  // namespace
 
-MassBounds find_mass_bounds(MPI_Comm comm, const fem::LocalMesh& local, job::Mass mass_kind) {
+MassBounds find_mass_bounds(const comm::Communicator& comm, const partition::LocalMesh& local, job::Mass mass_kind) {
   if (mass_kind == job::Mass::lumped) return {};
   if (local.order == 1) return {0.5, 2.5};
   std::array<Vec3, 10> x{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
   for (int e = 0; e < 6; ++e)
     for (int k = 0; k < 3; ++k) x[4 + e][k] = (x[mesh::kEdges[e][0]][k] + x[mesh::kEdges[e][1]][k]) / 2;
   const MassBounds straight = find_element_bounds(x);
-  std::array<double, 2> worst{straight.greatest, 1.0 / straight.least};
+  std::array<double, 2> worst{straight.max, 1.0 / straight.min};
   for (std::int32_t e = 0; e < local.tet_count(); ++e) {
     for (int i = 0; i < 10; ++i) x[i] = local.nodes_m[local.tets[10 * static_cast<std::size_t>(e) + i]];
-    const auto [least, greatest] = enclose_jacobian(x);
-    if (greatest < (1 + 1e-9) * least) continue;
-    const MassBounds bounds = least > 0.5 * greatest ? MassBounds{straight.least * least / greatest, straight.greatest * greatest / least}
-                                                     : find_element_bounds(x);
-    worst = {std::max(worst[0], bounds.greatest), std::max(worst[1], 1.0 / bounds.least)};
+    const auto [min, max] = enclose_jacobian(x);
+    if (max < (1 + 1e-9) * min) continue;
+    const MassBounds bounds = min > 0.5 * max ? MassBounds{straight.min * min / max, straight.max * max / min} : find_element_bounds(x);
+    worst = {std::max(worst[0], bounds.max), std::max(worst[1], 1.0 / bounds.min)};
   }
-  MPI_Allreduce(MPI_IN_PLACE, worst.data(), 2, MPI_DOUBLE, MPI_MAX, comm);
+  comm.max(worst);
   return {1.0 / worst[1], worst[0]};
 }
 
-std::vector<double> calc_algebraic_cents(MPI_Comm comm, Mat stiffness, Mat mass, const MassBounds& bounds, const Solution& solution) {
+std::vector<double> calc_algebraic_cents(const comm::Communicator& comm, Mat stiffness, Mat mass, const MassBounds& bounds,
+                                         const Solution& solution) {
   const std::size_t count = solution.lambda.size();
   petsc::VecHandle diagonal;
   petsc::check(MatCreateVecs(mass, diagonal.out(), nullptr));
   petsc::check(MatGetDiagonal(mass, diagonal));
-  PetscReal least = 0, greatest = 0;
-  petsc::check(VecMin(diagonal, nullptr, &least));
-  petsc::check(VecMax(diagonal, nullptr, &greatest));
+  PetscReal min = 0, max = 0;
+  petsc::check(VecMin(diagonal, nullptr, &min));
+  petsc::check(VecMax(diagonal, nullptr, &max));
   petsc::check(MatGetDiagonal(stiffness, diagonal));
 
   std::vector<double> scale(count, 0.0);  // phi^T diag(K) phi
@@ -159,10 +158,10 @@ std::vector<double> calc_algebraic_cents(MPI_Comm comm, Mat stiffness, Mat mass,
     }
   petsc::check(MatDenseRestoreArrayRead(solution.shapes, &phi));
   petsc::check(VecRestoreArrayRead(diagonal, &k));
-  MPI_Allreduce(MPI_IN_PLACE, scale.data(), static_cast<int>(count), MPI_DOUBLE, MPI_SUM, comm);
+  comm.sum(scale);
 
   // |r|_{M^-1} / lambda <= residual * amplification
-  const double amplification = std::sqrt(bounds.greatest * greatest / (bounds.least * least));
+  const double amplification = std::sqrt(bounds.max * max / (bounds.min * min));
   std::vector<double> rho(count);
   for (std::size_t m = 0; m < count; ++m) rho[m] = solution.residual[m] * amplification * solution.lambda[m];
   constexpr double kTwoPi = 2 * std::numbers::pi;

@@ -12,14 +12,15 @@ namespace carillon::estimate {
 
 /// Constants with least D <= M <= greatest D, D = diag(M), in the sense of quadratic forms; the same on every rank.
 struct MassBounds {
-  double least = 1.0;
-  double greatest = 1.0;
+  double min = 1.0;
+  double max = 1.0;
 };
 
 /// From the elements: M = sum M_e and D = sum D_e, so the extreme eigenvalues of all D_e^-1 M_e bound those of D^-1 M. Collective.
-MassBounds find_mass_bounds(MPI_Comm comm, const fem::LocalMesh& local, job::Mass mass_kind);
+MassBounds find_mass_bounds(const comm::Communicator& comm, const partition::LocalMesh& local, job::Mass mass_kind);
 
 /// The bound per mode in cents; see ErrorBars::algebraic_cents. Collective.
-std::vector<double> calc_algebraic_cents(MPI_Comm comm, Mat stiffness, Mat mass, const MassBounds& bounds, const Solution& solution);
+std::vector<double> calc_algebraic_cents(const comm::Communicator& comm, Mat stiffness, Mat mass, const MassBounds& bounds,
+                                         const Solution& solution);
 
 }  // namespace carillon::estimate

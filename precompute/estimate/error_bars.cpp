@@ -17,14 +17,15 @@
 #include "precompute/estimate/algebraic.hpp"
 #include "precompute/estimate/order.hpp"
 #include "precompute/estimate/recovery.hpp"
+#include "precompute/mesh/tet_mesh.hpp"
 #include "precompute/petsc/session.hpp"
 
 namespace carillon::estimate {
 namespace {
 
-void check_arguments(MPI_Comm comm, const fem::LocalMesh& local, std::span<const Solid> solids,
+void check_arguments(const comm::Communicator& comm, const partition::LocalMesh& local, std::span<const Solid> solids,
                      std::span<const std::int32_t> material_of_tet, const Solution& solution) {
-  petsc::run_agreed(comm, [&] {
+  comm.agree([&] {
     if (solids.empty()) throw InputError("error bars need a material");
     if (material_of_tet.empty() ? solids.size() > 1 : material_of_tet.size() != static_cast<std::size_t>(local.tet_count()))
       throw InputError(fmt::format("{} elements have {} materials", local.tet_count(), material_of_tet.size()));
@@ -55,7 +56,7 @@ struct Room {
 
 /// to: (nodes, 3, kLanes).
 template <typename Number>
-void load_displacement(const fem::LocalMesh& local, const std::vector<std::int32_t>& place, const double* shapes, std::size_t stride,
+void load_displacement(const partition::LocalMesh& local, const std::vector<std::int32_t>& place, const double* shapes, std::size_t stride,
                        std::size_t first, std::size_t count, const Solution& solution, Number* to) {
   std::array<const double*, kLanes> column{};
   std::array<double, kLanes> scale{};  // 0: an empty lane
@@ -107,13 +108,13 @@ Sums calc_block(const Kernels& kernels, Recovery& recovery, Room& room, job::Mas
 }
 
 /// (modes, kSums), shares of lambda, summed over the ranks.
-std::vector<double> calc_sums(MPI_Comm comm, const fem::LocalMesh& local, Recovery& recovery, job::Mass mass_kind,
+std::vector<double> calc_sums(const comm::Communicator& comm, const partition::LocalMesh& local, Recovery& recovery, job::Mass mass_kind,
                               const Solution& solution) {
   const Elements& elements = recovery.elements;
   const std::size_t count = solution.lambda.size(), materials = static_cast<std::size_t>(elements.materials);
   Room room;
   std::vector<double> result(count * kSums, 0.0);
-  petsc::run_agreed(comm, [&] {
+  comm.agree([&] {
     if (elements.terms > 1) {
       room.displacement2.resize(3 * local.nodes_m.size());
       room.strains.resize(elements.count * elements.samples);
@@ -122,8 +123,8 @@ std::vector<double> calc_sums(MPI_Comm comm, const fem::LocalMesh& local, Recove
     }
     room.patches.resize(recovery.vertex_node.size() * materials * elements.terms);
     if (elements.terms > 1) room.values.resize(local.nodes_m.size() * materials);
-    recovery.nodes.reserve(3 * kLanes);
-    recovery.vertices.reserve(static_cast<std::size_t>(elements.terms) * materials * 6 * kLanes);
+    recovery.nodes.reserve(3 * kLanes * sizeof(double));
+    recovery.vertices.reserve(static_cast<std::size_t>(elements.terms) * materials * 6 * kLanes * sizeof(float));
   });
   const Kernels& kernels = *list_kernels(elements.nodes).front();
   PetscInt stride = 0;
@@ -143,14 +144,14 @@ std::vector<double> calc_sums(MPI_Comm comm, const fem::LocalMesh& local, Recove
       for (int s = 0; s < kSums; ++s) result[(first + m) * kSums + s] = sums[s].lane[m];
   }
   petsc::check(MatDenseRestoreArrayRead(solution.shapes, &shapes));
-  MPI_Allreduce(MPI_IN_PLACE, result.data(), static_cast<int>(result.size()), MPI_DOUBLE, MPI_SUM, comm);
+  comm.sum(result);
   return result;
 }
 
-bool is_curved(MPI_Comm comm, const fem::LocalMesh& local) {
-  int curved = 0;
+bool is_curved(const comm::Communicator& comm, const partition::LocalMesh& local) {
+  bool is_straight = true;
   if (local.order == 2)
-    for (std::size_t e = 0; e < local.tets.size() && curved == 0; e += 10)
+    for (std::size_t e = 0; e < local.tets.size() && is_straight; e += 10)
       for (int m = 0; m < 6; ++m) {
         const Vec3 &a = local.nodes_m[local.tets[e + mesh::kEdges[m][0]]], &b = local.nodes_m[local.tets[e + mesh::kEdges[m][1]]];
         const Vec3& middle = local.nodes_m[local.tets[e + 4 + m]];
@@ -159,16 +160,16 @@ bool is_curved(MPI_Comm comm, const fem::LocalMesh& local) {
           off += std::pow(middle[k] - (a[k] + b[k]) / 2, 2);
           length += std::pow(b[k] - a[k], 2);
         }
-        if (off > 1e-12 * length) curved = 1;
+        if (off > 1e-12 * length) is_straight = false;
       }
-  MPI_Allreduce(MPI_IN_PLACE, &curved, 1, MPI_INT, MPI_MAX, comm);
-  return curved != 0;
+  return !comm.all(is_straight);
 }
 
 }  // namespace
 
-ErrorBars calc_error_bars(MPI_Comm comm, const fem::LocalMesh& local, Mat stiffness, Mat mass, std::span<const Solid> solids,
-                          std::span<const std::int32_t> material_of_tet, job::Mass mass_kind, const Solution& solution) {
+ErrorBars calc_error_bars(const comm::Communicator& comm, const partition::LocalMesh& local, Mat stiffness, Mat mass,
+                          std::span<const Solid> solids, std::span<const std::int32_t> material_of_tet, job::Mass mass_kind,
+                          const Solution& solution) {
   check_arguments(comm, local, solids, material_of_tet, solution);
   ErrorBars bars;
   if (solution.lambda.empty()) return bars;

@@ -10,7 +10,7 @@
 #include <span>
 #include <vector>
 
-#include "precompute/fem/distribute.hpp"
+#include "partition/distributed_mesh.hpp"
 #include "precompute/job/job_spec.hpp"
 
 namespace carillon::estimate {
@@ -21,7 +21,7 @@ struct Solid {
   double density_kg_m3 = 0.0;
 };
 
-/// The computed modes, as eigen::Modes holds them.
+/// The computed modes, as in eigen::Modes.
 struct Solution {
   std::span<const double> lambda;    // (m) [rad^2/s^2], ascending; no rigid modes
   std::span<const double> residual;  // (m) || K phi - lambda M phi ||_2 / (lambda || M phi ||_2)
@@ -67,14 +67,15 @@ struct ErrorBars {
 /// solids: by material; material_of_tet: (e) index into solids, may be empty when there is one. stiffness, mass: those of fem::System.
 /// Results do not depend on the number of ranks beyond rounding. Collective. Throws InputError when the arguments do not fit one another,
 /// SystemError when memory runs out; on all ranks alike.
-ErrorBars calc_error_bars(MPI_Comm comm, const fem::LocalMesh& local, Mat stiffness, Mat mass, std::span<const Solid> solids,
-                          std::span<const std::int32_t> material_of_tet, job::Mass mass_kind, const Solution& solution);
+ErrorBars calc_error_bars(const comm::Communicator& comm, const partition::LocalMesh& local, Mat stiffness, Mat mass,
+                          std::span<const Solid> solids, std::span<const std::int32_t> material_of_tet, job::Mass mass_kind,
+                          const Solution& solution);
 
 /// The elasticity of an isotropic solid.
 Solid make_isotropic(double young_modulus_pa, double poisson_ratio, double density_kg_m3);
 
 /// Predicts the discretisation bar [cents] of a mode on a mesh whose edges are `edge_ratio` times as long as those the parts come from,
-/// with the rates of `kind` (smooth modes; a held face with its singular rim converges slower, which the safety factor covers for ratios
+/// with the rates of `kind` (smooth modes; a fixed face with its singular rim converges slower, which the safety factor covers for ratios
 /// down to about 1/4). Pure.
 double predict_cents(const ErrorBars::Parts& parts, Kind kind, double edge_ratio = 1.0);
 

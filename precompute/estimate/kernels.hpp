@@ -57,7 +57,7 @@ struct Shift {
   std::array<std::int32_t, 2> value{};  // recovered strains whose mean is taken
   std::array<std::int32_t, 2> node{};   // displacements whose mean is taken
   float volume_m3 = 0.0F;               // gap times area
-  float density = 0.0F;                 // 0 where held
+  float density = 0.0F;                 // 0 where fixed
 };
 
 /// A node of the free surface, where no traction acts.
@@ -75,8 +75,8 @@ struct Kernels {
                       DoubleLanes& difference);
   /// Recovered strains at mid-side nodes from patches with ten terms. values: (nodes * materials).
   void (*find_middles)(const std::vector<Middle>& middles, int materials, const Strain* patches, Strain* values);
-  /// Adds per element the energies of recovered minus computed strain, and of the computed one. T4 find their strains anew: that costs less
-  /// than to read what add_strains would have to write.
+  /// Adds per element the energies of recovered minus computed strain, and of the computed one. T4 compute their strains again: that costs
+  /// less than to read what add_strains would have to write.
   void (*add_energies)(const Elements& elements, const std::int32_t* value_of, const Strain* values, const void* displacement,
                        const Strain* strains, DoubleLanes& error, DoubleLanes& energy);
   /// Adds gap times (2 W - lambda rho |u|^2), and the sum of its magnitudes.

@@ -51,15 +51,15 @@ std::vector<double> widen_for_order(std::span<const double> lambda, const OwnBar
   std::sort(low.begin(), low.end());
   std::sort(high.begin(), high.end());
   const double top = unlisted.high_hz > 0 ? std::max(at[count - 1], place_hz(unlisted.high_hz)) : at[count - 1];
-  const double least = top - predict(at, own.cents, top);  // of all above
-  double most = at[0] - 1e9;                               // of all below
+  const double min = top - predict(at, own.cents, top);  // of all above
+  double max = at[0] - 1e9;                              // of all below
   if (unlisted.below > 0 && unlisted.low_hz > 0) {
     const double bottom = std::min(at[0], place_hz(unlisted.low_hz));
     const auto octave = std::upper_bound(at.begin(), at.end(), bottom + kOctave) - at.begin();
     const auto last = std::max(octave, static_cast<std::ptrdiff_t>((count + 3) / 4));
-    most = bottom + *std::max_element(own.cents_above.begin(), own.cents_above.begin() + last);
+    max = bottom + *std::max_element(own.cents_above.begin(), own.cents_above.begin() + last);
   }
-  for (std::size_t m = 0; m < count; ++m) result[m] = std::max(at[m] - std::min(low[m], least), std::max(high[m], most) - at[m]);
+  for (std::size_t m = 0; m < count; ++m) result[m] = std::max(at[m] - std::min(low[m], min), std::max(high[m], max) - at[m]);
   return result;
 }
 

@@ -21,12 +21,12 @@ Solid make_isotropic(double young_modulus_pa, double poisson_ratio, double densi
 }
 
 double predict_cents(const ErrorBars::Parts& parts, Kind kind, double edge_ratio) {
-  constexpr double kMostOfEnergy = 0.99, kGeometry = 1.5, kNoise = 0.15, kT10 = 3.5, kT10Lumped = 4.5;
+  constexpr double kMaxOfEnergy = 0.99, kGeometry = 1.5, kNoise = 0.15, kT10 = 3.5, kT10Lumped = 4.5;
   const double second = edge_ratio * edge_ratio, fourth = second * second;
   const double interpolation = parts.interpolation * (kind == Kind::kT4 ? second : fourth), lumping = std::abs(parts.lumping) * second;
   // A share of the computed lambda as a share of the true one, which is smaller, times a safety factor.
   const auto enlarge = [&](double factor, double share) {
-    const double s = std::clamp(share, 0.0, kMostOfEnergy);
+    const double s = std::clamp(share, 0.0, kMaxOfEnergy);
     return factor * s / (1.0 - s);
   };
   // Interpolation raises lambda and a lumped mass lowers it. Where both matter they are trusted to cancel within limits only.

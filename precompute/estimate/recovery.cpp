@@ -105,11 +105,12 @@ std::array<float, 36> calc_root(const Solid& solid) {
   return root;
 }
 
-/// sqrt(K_full / K) of the bulk moduli that the variation and the mean of the dilatation of a T10 meet; fem::Solid::mean_lambda_pa.
+/// sqrt(K_full / K) of the bulk moduli that the variation and the mean of the dilatation of a T10 meet;
+/// fem::Solid::mean_dilatation_modulus_pa.
 float find_dilatation(const Solid& solid) {
-  const double mean = fem::calc_mean_lambda(solid.elasticity_pa);
+  const double mean = fem::calc_mean_dilatation_modulus_pa(solid.elasticity_pa);
   if (mean == 0.0) return 1.0F;
-  const double full = (fem::kFullLambda + 2.0 / 3) * job::calc_mean_shear_pa(solid.elasticity_pa);
+  const double full = (fem::kMaxDisplacementLambda + 2.0 / 3) * job::calc_mean_shear_pa(solid.elasticity_pa);
   return static_cast<float>(std::sqrt(full / (full + mean)));
 }
 
@@ -126,7 +127,9 @@ class Patches {
       for (int c = 0; c < terms_; ++c) n[r * terms_ + c] += p[r] * p[c];
   }
 
-  void sum(NodeExchange& vertices, int materials) { vertices.sum(normal_.data(), static_cast<std::size_t>(terms_) * terms_ * materials); }
+  void sum(comm::HaloExchange& vertices, int materials) {
+    vertices.sum(normal_.data(), static_cast<std::size_t>(terms_) * terms_ * materials);
+  }
 
   /// N becomes D (D N D + ridge)^-1 D with D = diag(N)^-1/2; the ridge is on the terms of the highest degree alone.
   void invert() {
@@ -156,14 +159,14 @@ class Patches {
 };
 
 /// Elements along a curve that fills space (Morton's), so that neighbours in the arrays are neighbours in the body.
-std::vector<std::int32_t> order_elements(const fem::LocalMesh& local) {
+std::vector<std::int32_t> order_elements(const partition::LocalMesh& local) {
   const int n = local.nodes_per_tet();
   Vec3 low{}, high{};
   for (int k = 0; k < 3 && !local.nodes_m.empty(); ++k) {
-    const auto [least, greatest] =
+    const auto [min, max] =
         std::minmax_element(local.nodes_m.begin(), local.nodes_m.end(), [&](const Vec3& a, const Vec3& b) { return a[k] < b[k]; });
-    low[k] = (*least)[k];
-    high[k] = (*greatest)[k];
+    low[k] = (*min)[k];
+    high[k] = (*max)[k];
   }
   const double size = std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2], 1e-300});
   std::vector<std::pair<std::uint32_t, std::int32_t>> keys;
@@ -184,7 +187,7 @@ std::vector<std::int32_t> order_elements(const fem::LocalMesh& local) {
 }
 
 /// (nodes) a running number for the nodes in the order in which the elements touch them; corners_only: -1 for mid-side nodes.
-std::vector<std::int32_t> find_places(const fem::LocalMesh& local, const std::vector<std::int32_t>& order, bool corners_only) {
+std::vector<std::int32_t> find_places(const partition::LocalMesh& local, const std::vector<std::int32_t>& order, bool corners_only) {
   const int n = local.nodes_per_tet();
   std::vector<std::int32_t> place(local.nodes_m.size(), -1);
   std::int32_t next = 0;
@@ -196,7 +199,7 @@ std::vector<std::int32_t> find_places(const fem::LocalMesh& local, const std::ve
   return place;
 }
 
-void fill_elements(const fem::LocalMesh& local, std::span<const Solid> solids, std::span<const std::int32_t> material_of_tet,
+void fill_elements(const partition::LocalMesh& local, std::span<const Solid> solids, std::span<const std::int32_t> material_of_tet,
                    Recovery& recovery) {
   Elements& elements = recovery.elements;
   const int n = elements.nodes, s = elements.samples;
@@ -236,7 +239,7 @@ void fill_elements(const fem::LocalMesh& local, std::span<const Solid> solids, s
 
 /// Calls use(element, corner, sample, patch, monomials) for every sample of every element and corner.
 template <typename Use>
-void for_each_sample(const fem::LocalMesh& local, const Recovery& recovery, const Patches& patches, const Use& use) {
+void for_each_sample(const partition::LocalMesh& local, const Recovery& recovery, const Patches& patches, const Use& use) {
   const Elements& elements = recovery.elements;
   const int n = elements.nodes, s = elements.samples;
   std::vector<Vec3> x(n);
@@ -249,7 +252,7 @@ void for_each_sample(const fem::LocalMesh& local, const Recovery& recovery, cons
   }
 }
 
-void find_middles(const fem::LocalMesh& local, const Patches& patches, Recovery& recovery) {
+void find_middles(const partition::LocalMesh& local, const Patches& patches, Recovery& recovery) {
   std::vector<char> done(local.nodes_m.size(), 0);
   for (std::size_t e = 0; e < recovery.elements.count; ++e)
     for (int m = 0; m < 6; ++m) {
@@ -270,29 +273,29 @@ void find_middles(const fem::LocalMesh& local, const Patches& patches, Recovery&
 }
 
 /// Both faces of an edge in one entry, in the order of the elements.
-std::vector<Shift> find_shifts(const std::vector<SurfaceEdge>& edges, const fem::LocalMesh& local,
+std::vector<Shift> find_shifts(const std::vector<SurfaceEdge>& edges, const partition::LocalMesh& local,
                                std::span<const std::int32_t> material_of_tet, const Recovery& recovery) {
   const Elements& elements = recovery.elements;
-  std::map<std::array<std::int32_t, 3>, double> volumes;  // by nodes, material and whether it is held
+  std::map<std::array<std::int32_t, 3>, double> volumes;  // by nodes, material and whether it is fixed
   for (const SurfaceEdge& edge : edges) {
     const std::size_t first = static_cast<std::size_t>(edge.tet) * elements.nodes;
     std::array<int, 2> at = mesh::kEdges[edge.edge];
     if (elements.nodes == 10) at = {4 + edge.edge, 4 + edge.edge};
     const std::int32_t a = recovery.place[local.tets[first + at[0]]], b = recovery.place[local.tets[first + at[1]]];
     const std::int32_t material = material_of_tet.empty() ? 0 : material_of_tet[edge.tet];
-    volumes[{std::min(a, b), std::max(a, b), 2 * material + (edge.held ? 1 : 0)}] += edge.gap_m * edge.third_m2;
+    volumes[{std::min(a, b), std::max(a, b), 2 * material + (edge.is_fixed ? 1 : 0)}] += edge.gap_m * edge.third_m2;
   }
   std::vector<Shift> shifts;
   for (const auto& [key, volume] : volumes) {
     const std::int32_t material = key[2] / 2;
-    const bool held = key[2] % 2 == 1;
+    const bool is_fixed = key[2] % 2 == 1;
     Shift shift;
     for (int end = 0; end < 2; ++end) {
       shift.node[end] = key[end];
       shift.value[end] = key[end] * elements.materials + material;
     }
-    shift.volume_m3 = static_cast<float>(held ? -volume : volume);
-    shift.density = held ? 0.0F : elements.density[material];
+    shift.volume_m3 = static_cast<float>(is_fixed ? -volume : volume);
+    shift.density = is_fixed ? 0.0F : elements.density[material];
     shifts.push_back(shift);
   }
   return shifts;
@@ -311,7 +314,7 @@ Eigen::Matrix<double, 6, 3> find_traction_parts(const std::array<float, 36>& roo
 
 /// Of T10, at the middles of the edges, where three of them integrate squares of linear fields exactly. Neighbours on one smooth surface
 /// share theirs.
-void find_tractions(const std::vector<FreeFace>& faces, const fem::LocalMesh& local, std::span<const std::int32_t> material_of_tet,
+void find_tractions(const std::vector<FreeFace>& faces, const partition::LocalMesh& local, std::span<const std::int32_t> material_of_tet,
                     Recovery& recovery) {
   const Elements& elements = recovery.elements;
   struct Point {
@@ -341,14 +344,37 @@ void find_tractions(const std::vector<FreeFace>& faces, const fem::LocalMesh& lo
   }
 }
 
+/// The exchange of values at the nodes that have a place: place (nodes), -1: none, on any rank. Collective.
+comm::HaloExchange make_exchange(const comm::Communicator& comm, const partition::LocalMesh& local,
+                                 const std::vector<std::int32_t>& place) {
+  if (comm.size() == 1) return {};
+  const auto own_end = local.node_in_mesh.begin() + local.owned_nodes;
+  comm::Halo halo;
+  const auto owned = comm.agree([&] {
+    for (std::size_t n = static_cast<std::size_t>(local.owned_nodes); n < place.size(); ++n) {
+      if (place[n] < 0) continue;
+      halo.number.push_back(local.node_in_mesh[n]);
+      halo.place.push_back(place[n]);
+    }
+    return std::vector(local.node_in_mesh.begin(), own_end);
+  });
+  halo.owner = comm::find_owners(comm, owned, halo.number);
+  const auto place_of = comm.agree([&] {
+    std::unordered_map<std::int32_t, std::int32_t> places;
+    for (std::size_t n = 0; n < owned.size(); ++n) places[owned[n]] = place[n];
+    return places;
+  });
+  return {comm, halo, [&](std::int32_t number) { return place_of.at(number); }};
+}
+
 }  // namespace
 
-Recovery make_recovery(MPI_Comm comm, const fem::LocalMesh& local, std::span<const Solid> solids,
+Recovery make_recovery(const comm::Communicator& comm, const partition::LocalMesh& local, std::span<const Solid> solids,
                        std::span<const std::int32_t> material_of_tet, job::Mass mass_kind) {
   const std::vector<std::int32_t> order = order_elements(local), place = find_places(local, order, false),
                                   vertex_place = find_places(local, order, true);
   Recovery recovery{
-      {}, order, place, vertex_place, {}, {}, {}, {}, {}, {}, NodeExchange(comm, local, place), NodeExchange(comm, local, vertex_place)};
+      {}, order, place, vertex_place, {}, {}, {}, {}, {}, {}, make_exchange(comm, local, place), make_exchange(comm, local, vertex_place)};
   Elements& elements = recovery.elements;
   elements.nodes = local.nodes_per_tet();
   elements.samples = local.order == 1 ? 1 : 4;
@@ -356,17 +382,17 @@ Recovery make_recovery(MPI_Comm comm, const fem::LocalMesh& local, std::span<con
   elements.materials = static_cast<int>(solids.size());
   elements.count = static_cast<std::size_t>(local.tet_count());
   std::array<double, 2> size{0.0, static_cast<double>(elements.count)};  // volume, elements
-  petsc::run_agreed(comm, [&] {
+  comm.agree([&] {
     recovery.vertex_node.resize(static_cast<std::size_t>(*std::max_element(vertex_place.begin(), vertex_place.end()) + 1));
     for (std::size_t n = 0; n < place.size(); ++n)
       if (vertex_place[n] >= 0) recovery.vertex_node[vertex_place[n]] = place[n];
     fill_elements(local, solids, material_of_tet, recovery);
     for (const float volume : elements.volume) size[0] += volume;
   });
-  MPI_Allreduce(MPI_IN_PLACE, size.data(), 2, MPI_DOUBLE, MPI_SUM, comm);
+  comm.sum(size);
 
   std::unique_ptr<Patches> patches;
-  petsc::run_agreed(comm, [&] {
+  comm.agree([&] {
     patches =
         std::make_unique<Patches>(local.order == 1 ? 4 : 10, recovery.vertex_node.size() * solids.size(), std::cbrt(size[0] / size[1]));
     for_each_sample(local, recovery, *patches, [&](std::size_t, int, int, std::size_t patch, const auto& p) { patches->add(patch, p); });
@@ -374,7 +400,7 @@ Recovery make_recovery(MPI_Comm comm, const fem::LocalMesh& local, std::span<con
   patches->sum(recovery.vertices, elements.materials);
   const Surface surface = find_surface(comm, local);
   const std::vector<SurfaceEdge> doubtful = find_doubtful_edges(comm, local);
-  petsc::run_agreed(comm, [&] {
+  comm.agree([&] {
     patches->invert();
     elements.weight.resize(elements.count * 4 * elements.samples * elements.terms);
     for_each_sample(local, recovery, *patches, [&](std::size_t e, int v, int s, std::size_t patch, const auto& p) {

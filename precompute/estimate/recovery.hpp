@@ -1,14 +1,12 @@
 // What the estimate knows of the mesh before it sees a mode: gradients, patches of elements around vertices, where the surface is off.
 #pragma once
 
-#include <mpi.h>
-
 #include <cstdint>
 #include <span>
 #include <vector>
 
+#include "precompute/comm/halo_exchange.hpp"
 #include "precompute/estimate/error_bars.hpp"
-#include "precompute/estimate/exchange.hpp"
 #include "precompute/estimate/kernels.hpp"
 
 namespace carillon::estimate {
@@ -25,11 +23,11 @@ struct Recovery {
   std::vector<std::int32_t> value_of;      // (e, n) where the recovered value of an element's node is
   std::vector<Shift> shifts, doubts;       // to the smooth surface; to the surface that the body may have as well
   std::vector<Traction> tractions;         // T10 with a consistent mass only
-  NodeExchange nodes, vertices;
+  comm::HaloExchange nodes, vertices;      // of values at places; at places among the vertices
 };
 
 /// Collective. Throws InputError naming an element without volume and a material that is not positive definite, on all ranks alike.
-Recovery make_recovery(MPI_Comm comm, const fem::LocalMesh& local, std::span<const Solid> solids,
+Recovery make_recovery(const comm::Communicator& comm, const partition::LocalMesh& local, std::span<const Solid> solids,
                        std::span<const std::int32_t> material_of_tet, job::Mass mass_kind);
 
 }  // namespace carillon::estimate

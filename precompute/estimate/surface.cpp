@@ -13,7 +13,7 @@
 #include <numeric>
 #include <unordered_map>
 
-#include "precompute/estimate/exchange.hpp"
+#include "precompute/comm/exchange.hpp"
 #include "precompute/mesh/faces.hpp"
 #include "runtime/base/vector.hpp"
 
@@ -43,21 +43,19 @@ struct FaceHash {
   }
 };
 
-std::int32_t get_node(const fem::LocalMesh& local, std::int32_t tet, int i) {
+std::int32_t get_node(const partition::LocalMesh& local, std::int32_t tet, int i) {
   return local.tets[static_cast<std::size_t>(tet) * local.nodes_per_tet() + i];
 }
 
-FaceKey find_key(const fem::LocalMesh& local, const Face& face) {
+FaceKey find_key(const partition::LocalMesh& local, const Face& face) {
   FaceKey key;
   for (int i = 0; i < 3; ++i) key[i] = local.node_in_mesh[get_node(local, face.tet, mesh::kFaces[face.face][i])];
   std::sort(key.begin(), key.end());
   return key;
 }
 
-/// Faces of one element only, over all ranks.
-std::vector<Face> find_faces(MPI_Comm comm, const fem::LocalMesh& local) {
-  int ranks = 1;
-  MPI_Comm_size(comm, &ranks);
+/// Faces of one element only of this rank's, by element.
+std::vector<Face> find_own_faces(const partition::LocalMesh& local) {
   // Faces fall into buckets by their lowest corner: a face then meets its twin among the few faces of one node.
   struct Sided {
     std::int64_t rest;  // of its corners, ascending, as one number
@@ -92,28 +90,31 @@ std::vector<Face> find_faces(MPI_Comm comm, const fem::LocalMesh& local) {
     first = end[n];
   }
   std::sort(faces.begin(), faces.end(), [](const Face& a, const Face& b) { return a.tet != b.tet ? a.tet < b.tet : a.face < b.face; });
-  if (ranks == 1) return faces;
-  std::vector<std::vector<FaceKey>> asked(ranks);
-  std::vector<std::vector<Face>> asked_faces(ranks);
-  for (const Face& face : faces) {
-    const FaceKey key = find_key(local, face);
-    const std::size_t r = FaceHash{}(key) % static_cast<std::size_t>(ranks);
-    asked[r].push_back(key);
-    asked_faces[r].push_back(face);
-  }
-  const auto questions = exchange_lists(comm, asked);
-  std::unordered_map<FaceKey, int, FaceHash> times;
-  for (const auto& list : questions)
-    for (const FaceKey& key : list) ++times[key];
-  std::vector<std::vector<char>> answers(ranks);
-  for (int r = 0; r < ranks; ++r)
-    for (const FaceKey& key : questions[r]) answers[r].push_back(times[key] == 1 ? 1 : 0);
-  const auto outer = exchange_lists(comm, answers);
-  faces.clear();
-  for (int r = 0; r < ranks; ++r)
-    for (std::size_t i = 0; i < outer[r].size(); ++i)
-      if (outer[r][i] != 0) faces.push_back(asked_faces[r][i]);
-  std::sort(faces.begin(), faces.end(), [](const Face& a, const Face& b) { return a.tet != b.tet ? a.tet < b.tet : a.face < b.face; });
+  return faces;
+}
+
+/// The same over all ranks. Two ranks' faces meet at a rank that their corners name. Collective.
+std::vector<Face> find_faces(const comm::Communicator& comm, const partition::LocalMesh& local) {
+  auto faces = comm.agree([&] { return find_own_faces(local); });
+  if (comm.size() == 1) return faces;
+  const auto keys = comm.agree([&] {
+    std::vector<FaceKey> list;
+    for (const Face& face : faces) list.push_back(find_key(local, face));
+    return list;
+  });
+  const auto is_outer = comm::query_owners<char>(
+      comm, keys, [&](const FaceKey& key) { return static_cast<int>(FaceHash{}(key) % static_cast<std::size_t>(comm.size())); },
+      [](const comm::ByRank<FaceKey>& asked) {
+        std::unordered_map<FaceKey, int, FaceHash> times;
+        for (const FaceKey& key : asked.items) ++times[key];
+        std::vector<char> answers;
+        for (const FaceKey& key : asked.items) answers.push_back(times[key] == 1);
+        return answers;
+      });
+  std::size_t kept = 0;
+  for (std::size_t f = 0; f < faces.size(); ++f)
+    if (is_outer[f] != 0) faces[kept++] = faces[f];
+  faces.resize(kept);
   return faces;
 }
 
@@ -124,55 +125,56 @@ struct Corner {
 };
 
 /// The tangent of the surface at corner a towards corner b: of the parabola through the mid-side node where there is one.
-Vec3 find_tangent(const fem::LocalMesh& local, const Face& face, int a, int b) {
+Vec3 find_tangent(const partition::LocalMesh& local, const Face& face, int a, int b) {
   const Vec3 &xa = local.nodes_m[get_node(local, face.tet, a)], &xb = local.nodes_m[get_node(local, face.tet, b)];
   if (local.order == 1) return xb - xa;
   const Vec3& xm = local.nodes_m[get_node(local, face.tet, 4 + mesh::find_edge(a, b))];
   return {4 * xm[0] - 3 * xa[0] - xb[0], 4 * xm[1] - 3 * xa[1] - xb[1], 4 * xm[2] - 3 * xa[2] - xb[2]};
 }
 
-/// The smooth normals at the corners of the faces, (faces, 3).
-std::vector<Vec3> find_normals(MPI_Comm comm, const fem::LocalMesh& local, const std::vector<Face>& faces) {
-  int ranks = 1;
-  MPI_Comm_size(comm, &ranks);
-  std::vector<std::vector<Corner>> corners(ranks);
-  std::vector<std::vector<std::size_t>> places(ranks);
-  for (std::size_t f = 0; f < faces.size(); ++f)
+/// The corners of the faces, (faces, 3).
+std::vector<Corner> list_corners(const partition::LocalMesh& local, const std::vector<Face>& faces) {
+  std::vector<Corner> corners;
+  for (const Face& face : faces)
     for (int i = 0; i < 3; ++i) {
-      const auto& loop = mesh::kFaces[faces[f].face];
+      const auto& loop = mesh::kFaces[face.face];
       const int a = loop[i], b = loop[(i + 1) % 3], c = loop[(i + 2) % 3];
-      const std::int32_t node = get_node(local, faces[f].tet, a);
-      const Vec3 to_b = local.nodes_m[get_node(local, faces[f].tet, b)] - local.nodes_m[node];
-      const Vec3 to_c = local.nodes_m[get_node(local, faces[f].tet, c)] - local.nodes_m[node];
+      const std::int32_t node = get_node(local, face.tet, a);
+      const Vec3 to_b = local.nodes_m[get_node(local, face.tet, b)] - local.nodes_m[node];
+      const Vec3 to_c = local.nodes_m[get_node(local, face.tet, c)] - local.nodes_m[node];
       const Vec3 chord = cross(to_b, to_c);
-      const Vec3 normal = normalise(cross(find_tangent(local, faces[f], a, b), find_tangent(local, faces[f], a, c)));
-      const std::int32_t id = local.node_in_mesh[node];
-      corners[id % ranks].push_back({id, normal, std::sqrt(dot(chord, chord)) / (dot(to_b, to_b) * dot(to_c, to_c))});
-      places[id % ranks].push_back(3 * f + i);
+      const Vec3 normal = normalise(cross(find_tangent(local, face, a, b), find_tangent(local, face, a, c)));
+      corners.push_back({local.node_in_mesh[node], normal, std::sqrt(dot(chord, chord)) / (dot(to_b, to_b) * dot(to_c, to_c))});
     }
-  const auto met = exchange_lists(comm, corners);
+  return corners;
+}
+
+/// For each corner the mean normal of all corners at its vertex that turn little from it.
+std::vector<Vec3> smooth_normals(const std::vector<Corner>& corners) {
   std::unordered_map<std::int32_t, std::vector<const Corner*>> around;
-  for (const auto& list : met)
-    for (const Corner& corner : list) around[corner.vertex].push_back(&corner);
-  std::vector<std::vector<Vec3>> answers(ranks);
-  for (int r = 0; r < ranks; ++r)
-    for (const Corner& corner : met[r]) {
-      Vec3 sum{};
-      for (const Corner* other : around[corner.vertex])
-        if (dot(other->normal, corner.normal) >= kSmoothCosine)
-          for (int k = 0; k < 3; ++k) sum[k] += other->weight * other->normal[k];
-      answers[r].push_back(normalise(sum));
-    }
-  const auto normals = exchange_lists(comm, answers);
-  std::vector<Vec3> result(3 * faces.size());
-  for (int r = 0; r < ranks; ++r)
-    for (std::size_t i = 0; i < places[r].size(); ++i) result[places[r][i]] = normals[r][i];
-  return result;
+  for (const Corner& corner : corners) around[corner.vertex].push_back(&corner);
+  std::vector<Vec3> normals;
+  for (const Corner& corner : corners) {
+    Vec3 sum{};
+    for (const Corner* other : around[corner.vertex])
+      if (dot(other->normal, corner.normal) >= kSmoothCosine)
+        for (int k = 0; k < 3; ++k) sum[k] += other->weight * other->normal[k];
+    normals.push_back(normalise(sum));
+  }
+  return normals;
+}
+
+/// The smooth normals at the corners of the faces, (faces, 3). Collective.
+std::vector<Vec3> find_normals(const comm::Communicator& comm, const partition::LocalMesh& local, const std::vector<Face>& faces) {
+  const auto corners = comm.agree([&] { return list_corners(local, faces); });
+  return comm::query_owners<Vec3>(
+      comm, corners, [&](const Corner& corner) { return corner.vertex % comm.size(); },
+      [](const comm::ByRank<Corner>& met) { return smooth_normals(met.items); });
 }
 
 }  // namespace
 
-Surface find_surface(MPI_Comm comm, const fem::LocalMesh& local) {
+Surface find_surface(const comm::Communicator& comm, const partition::LocalMesh& local) {
   const std::vector<Face> faces = find_faces(comm, local);
   const std::vector<Vec3> normals = find_normals(comm, local, faces);
   Surface surface;
@@ -183,7 +185,7 @@ Surface find_surface(MPI_Comm comm, const fem::LocalMesh& local) {
     const Vec3& origin = local.nodes_m[nodes[0]];
     const Vec3 area = cross(local.nodes_m[nodes[1]] - origin, local.nodes_m[nodes[2]] - origin);
     const double twice = std::sqrt(dot(area, area)), third = twice / 6;
-    const bool held = local.row[nodes[0]] < 0 && local.row[nodes[1]] < 0 && local.row[nodes[2]] < 0;
+    const bool is_fixed = local.row[nodes[0]] < 0 && local.row[nodes[1]] < 0 && local.row[nodes[2]] < 0;
     FreeFace free{faces[f].tet, static_cast<std::int8_t>(faces[f].face), {}, twice / 2, 0.0};
     const Vec3& apex = local.nodes_m[get_node(local, faces[f].tet, faces[f].face)];  // opposite
     if (twice > 0) free.height_m = std::abs(dot(area, apex - origin)) / twice;
@@ -200,18 +202,17 @@ Surface find_surface(MPI_Comm comm, const fem::LocalMesh& local) {
         const Vec3 rise{xm[0] - (xa[0] + xb[0]) / 2, xm[1] - (xa[1] + xb[1]) / 2, xm[2] - (xa[2] + xb[2]) / 2};
         gap -= dot(rise, mean);
       }
-      if (gap * gap > 1e-20 * dot(along, along)) surface.edges.push_back({faces[f].tet, static_cast<std::int8_t>(edge), held, gap, third});
+      if (gap * gap > 1e-20 * dot(along, along))
+        surface.edges.push_back({faces[f].tet, static_cast<std::int8_t>(edge), is_fixed, gap, third});
     }
-    if (!held) surface.free_faces.push_back(free);
+    if (!is_fixed) surface.free_faces.push_back(free);
   }
   return surface;
 }
 
-std::vector<SurfaceEdge> find_doubtful_edges(MPI_Comm comm, const fem::LocalMesh& local) {
-  int has_any = local.doubt_m.empty() ? 0 : 1;
-  MPI_Allreduce(MPI_IN_PLACE, &has_any, 1, MPI_INT, MPI_MAX, comm);
+std::vector<SurfaceEdge> find_doubtful_edges(const comm::Communicator& comm, const partition::LocalMesh& local) {
   std::vector<SurfaceEdge> edges;
-  if (has_any == 0) return edges;
+  if (comm.all(local.doubt_m.empty())) return edges;
   const std::vector<Face> faces = find_faces(comm, local);
   if (local.doubt_m.empty()) return edges;
   for (const Face& face : faces) {
@@ -220,12 +221,12 @@ std::vector<SurfaceEdge> find_doubtful_edges(MPI_Comm comm, const fem::LocalMesh
     for (int i = 0; i < 3; ++i) nodes[i] = get_node(local, face.tet, loop[i]);
     const Vec3 area = cross(local.nodes_m[nodes[1]] - local.nodes_m[nodes[0]], local.nodes_m[nodes[2]] - local.nodes_m[nodes[0]]);
     const Vec3 normal = normalise(area);
-    const bool held = local.row[nodes[0]] < 0 && local.row[nodes[1]] < 0 && local.row[nodes[2]] < 0;
+    const bool is_fixed = local.row[nodes[0]] < 0 && local.row[nodes[1]] < 0 && local.row[nodes[2]] < 0;
     for (int i = 0; i < 3; ++i) {
       const int j = (i + 1) % 3, edge = mesh::find_edge(loop[i], loop[j]);
       const double gap = local.order == 2 ? dot(local.doubt_m[get_node(local, face.tet, 4 + edge)], normal)
                                           : 0.5 * (dot(local.doubt_m[nodes[i]], normal) + dot(local.doubt_m[nodes[j]], normal));
-      if (gap != 0.0) edges.push_back({face.tet, static_cast<std::int8_t>(edge), held, gap, std::sqrt(dot(area, area)) / 6});
+      if (gap != 0.0) edges.push_back({face.tet, static_cast<std::int8_t>(edge), is_fixed, gap, std::sqrt(dot(area, area)) / 6});
     }
   }
   return edges;

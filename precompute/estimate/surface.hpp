@@ -1,13 +1,11 @@
 // How far the surface of the mesh lies from the smooth surface that its vertices seem to come from.
 #pragma once
 
-#include <mpi.h>
-
 #include <array>
 #include <cstdint>
 #include <vector>
 
-#include "precompute/fem/distribute.hpp"
+#include "partition/distributed_mesh.hpp"
 
 namespace carillon::estimate {
 
@@ -16,7 +14,7 @@ namespace carillon::estimate {
 struct SurfaceEdge {
   std::int32_t tet = 0;   // local element
   std::int8_t edge = 0;   // of mesh::kEdges
-  bool held = false;      // on a face whose nodes are all held
+  bool is_fixed = false;  // on a face whose nodes are all fixed
   double gap_m = 0.0;     // at the middle of the edge, outwards
   double third_m2 = 0.0;  // a third of the face's area
 };
@@ -37,10 +35,10 @@ struct Surface {
 
 /// The surface faces of this rank's elements. Faces that meet at less than 50 degrees belong to one smooth surface; at sharper edges each
 /// side is smooth by itself. Collective.
-Surface find_surface(MPI_Comm comm, const fem::LocalMesh& local);
+Surface find_surface(const comm::Communicator& comm, const partition::LocalMesh& local);
 
 /// The same edges with the way to the surface that the body may have as well (TetMesh::doubt_m), in `gap_m`; those without doubt are left
 /// out. Collective.
-std::vector<SurfaceEdge> find_doubtful_edges(MPI_Comm comm, const fem::LocalMesh& local);
+std::vector<SurfaceEdge> find_doubtful_edges(const comm::Communicator& comm, const partition::LocalMesh& local);
 
 }  // namespace carillon::estimate

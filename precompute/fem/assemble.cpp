@@ -1,7 +1,7 @@
 // Method: element matrices are added into rows whose pattern is known before (block_rows). Rigid-body data: sums of element moments about a
 //   common point.
 // Source: OSG02 section 3.2.
-// Deviations: held nodes are left out (no row, no column) instead of being penalised.
+// Deviations: fixed nodes are left out (no row, no column) instead of being penalised.
 #include "precompute/fem/assemble.hpp"
 
 #include <fmt/core.h>
@@ -19,6 +19,8 @@
 namespace carillon::fem {
 namespace {
 
+using partition::LocalMesh;
+
 std::span<const std::int32_t> get_tet(const LocalMesh& local, std::int32_t e) {
   const auto width = static_cast<std::size_t>(local.nodes_per_tet());
   return {&local.tets[e * width], width};
@@ -31,17 +33,17 @@ std::span<const Vec3> copy_positions(const LocalMesh& local, std::int32_t e, std
   return {x.data(), nodes.size()};
 }
 
-/// The tetrahedra by the least row of their nodes, so that the rows being summed stay in the cache whatever order the mesh file has.
+/// The tetrahedra by the lowest row of their nodes, so that the rows being summed stay in the cache whatever order the mesh file has.
 std::vector<std::int32_t> order_by_row(const LocalMesh& local) {
-  std::vector<std::int32_t> least(local.tet_count()), order(local.tet_count());
+  std::vector<std::int32_t> lowest(local.tet_count()), order(local.tet_count());
   std::vector<std::int64_t> begin(local.nodes_m.size() + 1, 0);
   for (std::int32_t e = 0; e < local.tet_count(); ++e) {
     const auto nodes = get_tet(local, e);
-    least[e] = *std::min_element(nodes.begin(), nodes.end());
-    ++begin[least[e] + 1];
+    lowest[e] = *std::min_element(nodes.begin(), nodes.end());
+    ++begin[lowest[e] + 1];
   }
   std::partial_sum(begin.begin(), begin.end(), begin.begin());
-  for (std::int32_t e = 0; e < local.tet_count(); ++e) order[begin[least[e]]++] = e;
+  for (std::int32_t e = 0; e < local.tet_count(); ++e) order[begin[lowest[e]]++] = e;
   return order;
 }
 
@@ -60,9 +62,9 @@ std::vector<std::int32_t> order_by_row(const LocalMesh& local) {
 
 }  // namespace
 
-System assemble(MPI_Comm comm, const LocalMesh& local, const Materials& materials, job::Mass mass, Form form) {
+System assemble(const comm::Communicator& comm, const LocalMesh& local, const Materials& materials, job::Mass mass, Form form) {
   LocalRows rows = make_rows(comm, local, mass == job::Mass::lumped);
-  petsc::run_agreed(comm, [&] {
+  comm.agree([&] {
     std::vector<Solid> solids;
     for (const job::Material& material : materials.list) solids.emplace_back(material, form == Form::displacement);
     ElementMatrices element;
@@ -79,7 +81,7 @@ System assemble(MPI_Comm comm, const LocalMesh& local, const Materials& material
   return system;
 }
 
-RigidBody calc_rigid_body(MPI_Comm comm, const LocalMesh& local, const Materials& materials) {
+RigidBody calc_rigid_body(const comm::Communicator& comm, const LocalMesh& local, const Materials& materials) {
   // Moments are taken about the centre of the nodes' box, so that a body far from the origin keeps its digits.
   Vec3 low, high, origin;
   low.fill(1e300);
@@ -89,8 +91,8 @@ RigidBody calc_rigid_body(MPI_Comm comm, const LocalMesh& local, const Materials
       low[k] = std::min(low[k], x[k]);
       high[k] = std::max(high[k], x[k]);
     }
-  MPI_Allreduce(MPI_IN_PLACE, low.data(), 3, MPI_DOUBLE, MPI_MIN, comm);
-  MPI_Allreduce(MPI_IN_PLACE, high.data(), 3, MPI_DOUBLE, MPI_MAX, comm);
+  comm.min(low);
+  comm.max(high);
   for (int k = 0; k < 3; ++k) origin[k] = (low[k] + high[k]) / 2;
 
   std::array<double, 14> sum{};  // volume, mass, first moments, second moments
@@ -105,7 +107,7 @@ RigidBody calc_rigid_body(MPI_Comm comm, const LocalMesh& local, const Materials
     for (int k = 0; k < 3; ++k) sum[2 + k] += moments.first_kg_m[k];
     for (int k = 0; k < 9; ++k) sum[5 + k] += moments.second_kg_m2[k];
   }
-  MPI_Allreduce(MPI_IN_PLACE, sum.data(), static_cast<int>(sum.size()), MPI_DOUBLE, MPI_SUM, comm);
+  comm.sum(sum);
 
   RigidBody body;
   body.volume_m3 = sum[0];

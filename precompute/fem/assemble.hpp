@@ -1,17 +1,15 @@
 // K and M of the whole body as distributed PETSc matrices, and its rigid-body data.
 #pragma once
 
-#include <mpi.h>
-
-#include "precompute/fem/distribute.hpp"
+#include "partition/distributed_mesh.hpp"
 #include "precompute/fem/materials.hpp"
 #include "precompute/job/job_spec.hpp"
 #include "precompute/petsc/handle.hpp"
 
 namespace carillon::fem {
 
-/// The equations of motion M u'' + K u = 0 of the free nodes. Held nodes are eliminated. Row 3 r + d is direction d of the node whose
-/// LocalMesh::row is r; each rank holds the rows of the free nodes that it owns.
+/// The equations of motion M u'' + K u = 0 of the free nodes. Fixed nodes are eliminated. Row 3 r + d is direction d of the node whose
+/// LocalMesh::row is r; each rank has the rows of the free nodes that it owns.
 struct System {
   petsc::MatHandle stiffness;  // K [N/m], (3n, 3n), AIJ, both triangles, symmetric positive semidefinite
   petsc::MatHandle mass;       // M [kg], (3n, 3n), AIJ, in K's pattern (diagonal when lumped): m_ij I, the zeros of I not stored
@@ -20,7 +18,7 @@ struct System {
 /// The form of T10 in nearly incompressible solids. automatic: mean dilatation, see Solid; displacement: none, which locks, for comparison.
 enum class Form { automatic, displacement };
 
-/// Mass, centre, inertia and volume of the body, held nodes included; axes of the mesh.
+/// Mass, centre, inertia and volume of the body, fixed nodes included; axes of the mesh.
 struct RigidBody {
   double mass_kg = 0.0;
   Vec3 centre_m{};
@@ -32,9 +30,10 @@ struct RigidBody {
 /// their pattern cannot be changed. Nodes that no tetrahedron of `local` uses have empty rows.
 /// Collective. Throws on every rank: InputError naming an element whose Jacobian is not positive everywhere (inside out, or a mid-side node
 /// out of place); SystemError when memory runs out.
-System assemble(MPI_Comm comm, const LocalMesh& local, const Materials& materials, job::Mass mass, Form form = Form::automatic);
+System assemble(const comm::Communicator& comm, const partition::LocalMesh& local, const Materials& materials, job::Mass mass,
+                Form form = Form::automatic);
 
 /// Integrates the rigid-body data over the tetrahedra. Collective.
-RigidBody calc_rigid_body(MPI_Comm comm, const LocalMesh& local, const Materials& materials);
+RigidBody calc_rigid_body(const comm::Communicator& comm, const partition::LocalMesh& local, const Materials& materials);
 
 }  // namespace carillon::fem

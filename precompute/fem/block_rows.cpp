@@ -1,7 +1,6 @@
 // Method: the neighbours of a node are the nodes of its elements; as neighbourhood is mutual, handing each node to its neighbours in
-// ascending
-//   order gives every row sorted. Blocks of own nodes are summed in the upper triangle and copied to the lower once. Rows of other ranks'
-//   nodes are summed apart and sent. The arrays become PETSc's without a copy.
+//   ascending order gives every row sorted. Blocks of own nodes are summed in the upper triangle and copied to the lower once. Rows of
+//   other ranks' nodes are summed apart and sent. The arrays become PETSc's without a copy.
 // Source: PETSc manual, MatCreateSeqAIJWithArrays, MatCreateMPIAIJWithSplitArrays.
 // Deviations: none.
 #include "precompute/fem/block_rows.hpp"
@@ -13,10 +12,13 @@
 #include <numeric>
 #include <utility>
 
+#include "precompute/comm/exchange.hpp"
 #include "precompute/petsc/session.hpp"
 
 namespace carillon::fem {
 namespace {
+
+using partition::LocalMesh;
 
 /// The tetrahedra of each local node.
 struct Incidence {
@@ -112,22 +114,6 @@ std::vector<std::int64_t> find_halo_ranges(const LocalRows& rows) {
   return at;
 }
 
-/// Every rank's list to every other: `sent_at` (ranks + 1) cuts `sent`. Collective; the sizes fit int, as share_pattern() has made sure.
-template <class T>
-std::vector<T> exchange(MPI_Comm comm, MPI_Datatype type, const std::vector<T>& sent, const std::vector<int>& sent_at,
-                        std::vector<int>& got_at) {
-  const std::size_t ranks = sent_at.size() - 1;
-  std::vector<int> send(ranks), got(ranks);
-  for (std::size_t r = 0; r < ranks; ++r) send[r] = sent_at[r + 1] - sent_at[r];
-  MPI_Alltoall(send.data(), 1, MPI_INT, got.data(), 1, MPI_INT, comm);
-  got_at.assign(ranks + 1, 0);
-  std::partial_sum(got.begin(), got.end(), got_at.begin() + 1);
-  std::vector<T> arrived;
-  petsc::run_agreed(comm, [&] { arrived.resize(got_at.back()); });
-  MPI_Alltoallv(sent.data(), send.data(), sent_at.data(), type, arrived.data(), got.data(), got_at.data(), type, comm);
-  return arrived;
-}
-
 /// Calls visit(place in the list of columns, row, columns) for each row in a list of (row, number of columns, columns).
 template <class Visit>
 void for_each_row(const std::vector<std::int32_t>& list, Visit&& visit) {
@@ -153,27 +139,26 @@ void insert(BlockRows& rows, const std::vector<Place>& places) {
   rows = std::move(merged);
 }
 
-/// Tells the owners of halo rows which columns they have here. Collective.
-void share_pattern(MPI_Comm comm, LocalRows& rows) {
+/// Sends the owners of halo rows the columns that these rows have here. Collective.
+void share_pattern(const comm::Communicator& comm, LocalRows& rows) {
   const std::vector<std::int64_t> halo_at = find_halo_ranges(rows);
-  std::vector<std::int32_t> sent;
-  std::vector<int> sent_at{0};
-  petsc::run_agreed(comm, [&] {
-    if (10 * rows.halo.column.size() + 2 * rows.halo_row.size() > std::numeric_limits<int>::max())
-      throw SystemError("the seam between two ranks is beyond 32-bit message sizes; use fewer or more ranks");
+  const auto list_halo_rows = [&] {
+    comm::ByRank<std::int32_t> sent{{}, {0}};
     for (std::size_t r = 0; r + 1 < halo_at.size(); ++r) {
       for (std::int64_t h = halo_at[r]; h < halo_at[r + 1]; ++h) {
-        sent.push_back(rows.halo_row[h]);
-        sent.push_back(static_cast<std::int32_t>(rows.halo.begin[h + 1] - rows.halo.begin[h]));
-        sent.insert(sent.end(), rows.halo.column.begin() + rows.halo.begin[h], rows.halo.column.begin() + rows.halo.begin[h + 1]);
+        const auto columns = std::span(rows.halo.column).subspan(rows.halo.begin[h], rows.halo.begin[h + 1] - rows.halo.begin[h]);
+        sent.items.push_back(rows.halo_row[h]);
+        sent.items.push_back(static_cast<std::int32_t>(columns.size()));
+        sent.items.insert(sent.items.end(), columns.begin(), columns.end());
       }
-      sent_at.push_back(static_cast<int>(sent.size()));
+      sent.begin.push_back(static_cast<std::int64_t>(sent.items.size()));
     }
-  });
-  rows.arriving = exchange(comm, MPI_INT32_T, sent, sent_at, rows.arriving_at);
+    return sent;
+  };
+  rows.arriving = comm::all_to_all(comm, list_halo_rows).items;
   std::vector<Place> own, off;
   const std::int32_t end = rows.first_own + static_cast<std::int32_t>(rows.own.row_count());
-  petsc::run_agreed(comm, [&] {
+  comm.agree([&] {
     for_each_row(rows.arriving, [&](std::int32_t row, std::span<const std::int32_t> columns) {
       for (const std::int32_t c : columns) {
         const bool is_own = c >= rows.first_own && c < end;
@@ -259,17 +244,15 @@ Arrays take_lumped_arrays(const std::vector<double>& lumped, std::int64_t rows, 
 }
 
 /// A matrix on the arrays, which live as long as it. Collective.
-petsc::MatHandle make_matrix(MPI_Comm comm, Arrays own, Arrays off) {
+petsc::MatHandle make_matrix(const comm::Communicator& comm, Arrays own, Arrays off) {
   using Both = std::array<Arrays, 2>;
   auto* arrays = new Both{std::move(own), std::move(off)};
-  int ranks = 1;
-  MPI_Comm_size(comm, &ranks);
   const auto rows = static_cast<PetscInt>((*arrays)[0].begin.size()) - 1;
-  // PETSc wants arrays that are there even when empty.
+  // PETSc needs arrays that are allocated even when empty.
   for (Arrays& part : *arrays) part.value.reserve(1);
   petsc::MatHandle matrix;
   auto& [a, b] = *arrays;
-  if (ranks == 1) {
+  if (comm.size() == 1) {
     petsc::check(MatCreateSeqAIJWithArrays(comm, rows, rows, a.begin.data(), a.column.get(), a.value.data(), matrix.out()));
   } else {
     petsc::check(MatCreateMPIAIJWithSplitArrays(comm, rows, rows, PETSC_DETERMINE, PETSC_DETERMINE, a.begin.data(), a.column.get(),
@@ -330,23 +313,20 @@ void LocalRows::add(std::span<const std::int32_t> nodes, const LocalMesh& local,
   }
 }
 
-LocalRows make_rows(MPI_Comm comm, const LocalMesh& local, bool lumped) {
+LocalRows make_rows(const comm::Communicator& comm, const LocalMesh& local, bool lumped) {
   LocalRows rows;
   rows.is_lumped = lumped;
-  int ranks = 1, rank = 0;
-  MPI_Comm_size(comm, &ranks);
-  MPI_Comm_rank(comm, &rank);
-  rows.first_row.assign(ranks + 1, 0);
-  MPI_Allgather(&local.free_nodes, 1, MPI_INT32_T, rows.first_row.data() + 1, 1, MPI_INT32_T, comm);
-  std::partial_sum(rows.first_row.begin(), rows.first_row.end(), rows.first_row.begin());
-  rows.first_own = rows.first_row[rank];
-  petsc::run_agreed(comm, [&] {
+  const std::vector<std::int32_t> counts = comm.all_gather(std::vector{local.free_nodes});
+  rows.first_row.assign(counts.size() + 1, 0);
+  std::partial_sum(counts.begin(), counts.end(), rows.first_row.begin() + 1);
+  rows.first_own = rows.first_row[comm.rank()];
+  comm.agree([&] {
     Neighbours neighbours(local);
     find_own_pattern(local, neighbours, rows);
     find_halo_pattern(local, neighbours, rows);
   });
-  if (ranks > 1) share_pattern(comm, rows);
-  petsc::run_agreed(comm, [&] {
+  if (comm.size() > 1) share_pattern(comm, rows);
+  comm.agree([&] {
     for (BlockRows* part : {&rows.own, &rows.off, &rows.halo}) {
       if (9 * part->column.size() > static_cast<std::size_t>(std::numeric_limits<PetscInt>::max()))
         throw SystemError("a rank's part of the stiffness matrix is beyond 32-bit indices; use more ranks or a coarser mesh");
@@ -358,30 +338,30 @@ LocalRows make_rows(MPI_Comm comm, const LocalMesh& local, bool lumped) {
   return rows;
 }
 
-void finish(MPI_Comm comm, LocalRows& rows) {
+void finish(const comm::Communicator& comm, LocalRows& rows) {
   if (rows.first_row.size() > 2) {
     const bool lumped = rows.is_lumped;
     const std::vector<std::int64_t> halo_at = find_halo_ranges(rows);
-    std::vector<double> sent;
-    std::vector<int> sent_at{0}, got_at;
-    petsc::run_agreed(comm, [&] {
-      sent.reserve(10 * rows.halo.column.size());
+    auto sent = comm.agree([&] {
+      comm::ByRank<double> values{{}, {0}};
+      values.items.reserve(10 * rows.halo.column.size());
       for (std::size_t r = 0; r + 1 < halo_at.size(); ++r) {
         for (std::int64_t h = halo_at[r]; h < halo_at[r + 1]; ++h) {
           const std::int64_t begin = rows.halo.begin[h], end = rows.halo.begin[h + 1];
-          sent.insert(sent.end(), rows.halo.stiffness.begin() + 9 * begin, rows.halo.stiffness.begin() + 9 * end);
+          values.items.insert(values.items.end(), rows.halo.stiffness.begin() + 9 * begin, rows.halo.stiffness.begin() + 9 * end);
           if (lumped) {
-            sent.push_back(rows.lumped[rows.own.row_count() + h]);
+            values.items.push_back(rows.lumped[rows.own.row_count() + h]);
           } else {
-            sent.insert(sent.end(), rows.halo.mass.begin() + begin, rows.halo.mass.begin() + end);
+            values.items.insert(values.items.end(), rows.halo.mass.begin() + begin, rows.halo.mass.begin() + end);
           }
         }
-        sent_at.push_back(static_cast<int>(sent.size()));
+        values.begin.push_back(static_cast<std::int64_t>(values.items.size()));
       }
+      return values;
     });
     rows.halo = {};
-    const std::vector<double> arrived = exchange(comm, MPI_DOUBLE, sent, sent_at, got_at);
-    const double* at = arrived.data();
+    const auto arrived = comm::all_to_all(comm, sent);
+    const double* at = arrived.items.data();
     const std::int32_t end = rows.first_own + static_cast<std::int32_t>(rows.own.row_count());
     for_each_row(rows.arriving, [&](std::int32_t global_row, std::span<const std::int32_t> columns) {
       const std::int32_t row = global_row - rows.first_own;
@@ -403,18 +383,18 @@ void finish(MPI_Comm comm, LocalRows& rows) {
   mirror(rows.own);
 }
 
-petsc::MatHandle take_stiffness(MPI_Comm comm, LocalRows& rows) {
+petsc::MatHandle take_stiffness(const comm::Communicator& comm, LocalRows& rows) {
   Arrays own, off;
-  petsc::run_agreed(comm, [&] {
+  comm.agree([&] {
     own = take_stiffness_arrays(rows.own);
     off = take_stiffness_arrays(rows.off);
   });
   return make_matrix(comm, std::move(own), std::move(off));
 }
 
-petsc::MatHandle take_mass(MPI_Comm comm, LocalRows& rows) {
+petsc::MatHandle take_mass(const comm::Communicator& comm, LocalRows& rows) {
   Arrays own, off;
-  petsc::run_agreed(comm, [&] {
+  comm.agree([&] {
     if (!rows.is_lumped) {
       own = take_mass_arrays(rows.own);
       off = take_mass_arrays(rows.off);

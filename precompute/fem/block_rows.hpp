@@ -7,14 +7,15 @@
 #include <span>
 #include <vector>
 
-#include "precompute/fem/distribute.hpp"
+#include "partition/distributed_mesh.hpp"
+#include "precompute/comm/communicator.hpp"
 #include "precompute/fem/element.hpp"
 #include "precompute/petsc/handle.hpp"
 
 namespace carillon::fem {
 
-/// Rows of 3 x 3 blocks, one row a node. Blocks of a row lie as PETSc wants them: its three scalar rows one after the other, each with
-/// three entries a column.
+/// Rows of 3 x 3 blocks, one row a node. Blocks of a row are stored as PETSc needs them: its three scalar rows one after the other, each
+/// with three entries a column.
 struct BlockRows {
   std::vector<std::int64_t> begin{0};  // (rows + 1) place of each row's first column
   std::vector<std::int32_t> column;    // ascending in each row
@@ -34,25 +35,24 @@ struct LocalRows {
   BlockRows off;   // own rows, columns of other ranks by global number
   BlockRows halo;  // rows of other ranks, columns by global number
   std::vector<std::int32_t> halo_row;  // (halo rows) global number, ascending
-  std::vector<std::int32_t> slot;      // (local nodes) own row, or -2 - halo row, or -1: held
+  std::vector<std::int32_t> slot;      // (local nodes) own row, or -2 - halo row, or -1: fixed
   bool is_lumped = false;
   std::vector<double> lumped;          // (own rows), then (halo rows), when lumped
   std::vector<std::int32_t> arriving;  // what other ranks send of own rows: row, number of columns, columns, by rank
-  std::vector<int> arriving_at;        // (ranks + 1) into `arriving`
 
   /// Adds the matrices of an element whose nodes are the local `nodes`.
-  void add(std::span<const std::int32_t> nodes, const LocalMesh& local, const ElementMatrices& element);
+  void add(std::span<const std::int32_t> nodes, const partition::LocalMesh& local, const ElementMatrices& element);
 };
 
 /// The pattern of the elements of all ranks, values zero. Collective. Throws SystemError on every rank when a rank's share is beyond 32-bit
 /// indices or memory.
-LocalRows make_rows(MPI_Comm comm, const LocalMesh& local, bool lumped);
+LocalRows make_rows(const comm::Communicator& comm, const partition::LocalMesh& local, bool lumped);
 
 /// Sends what was summed for other ranks' rows to them, adds what they send, and completes the lower triangle. Collective.
-void finish(MPI_Comm comm, LocalRows& rows);
+void finish(const comm::Communicator& comm, LocalRows& rows);
 
 /// Hands the stiffness over to a PETSc matrix, then the mass; each takes its part of the arrays out of `rows`. Collective.
-petsc::MatHandle take_stiffness(MPI_Comm comm, LocalRows& rows);
-petsc::MatHandle take_mass(MPI_Comm comm, LocalRows& rows);
+petsc::MatHandle take_stiffness(const comm::Communicator& comm, LocalRows& rows);
+petsc::MatHandle take_mass(const comm::Communicator& comm, LocalRows& rows);
 
 }  // namespace carillon::fem

@@ -1,8 +1,8 @@
 // Method: everything an element's stiffness needs of its shape are the integrals of products of gradients, P_ij = integral b_i b_j^T dV.
 //   They are constant for T4; a straight T10 is a fixed combination of its T4; a curved one takes a rule of 14 points. The material then
 //   contracts them. The mass of a curved T10 is exact: its Jacobian is a cubic, known by 20 values, and integral N_i N_j (cubic k) is a
-//   table. Nearly incompressible T10: of the dilatation in an element only the mean meets a lambda above kFullLambda mu. Ten nodes cannot
-//   keep the whole field free of dilatation and bend as well; one condition an element they can.
+//   table. Nearly incompressible T10: of the dilatation in an element only the mean meets a lambda above kMaxDisplacementLambda mu. Ten
+//   nodes cannot keep the whole field free of dilatation and bend as well; one condition an element they can.
 // Source: OSG02 section 3.2; Zienkiewicz and Taylor, "The Finite Element Method", vol. 1 (T10); Hinton, Rock and Zienkiewicz 1976,
 //   Earthquake Eng. Struct. Dyn. 4, 245 (HRZ lumping); Nagtegaal, Parks and Rice 1974, CMAME 4, 153, and Malkus and Hughes 1978, CMAME 15,
 //   63 (mean dilatation, selective integration).
@@ -44,7 +44,7 @@ inline void contract(const double* p, const Solid& solid, double lambda, double*
   }
 }
 
-void put_block(const double* k, int i, int j, ElementMatrices& out) {
+void set_block(const double* k, int i, int j, ElementMatrices& out) {
   const int width = 3 * out.nodes;
   double* upper = &out.stiffness[3 * i * width + 3 * j];
   double* lower = &out.stiffness[3 * j * width + 3 * i];
@@ -55,12 +55,12 @@ void put_block(const double* k, int i, int j, ElementMatrices& out) {
     }
 }
 
-void put_stiffness(const Products& products, const Solid& solid, double lambda, ElementMatrices& out) {
+void set_stiffness(const Products& products, const Solid& solid, double lambda, ElementMatrices& out) {
   std::array<double, 9> k;
   for (int i = 0; i < out.nodes; ++i)
     for (int j = i; j < out.nodes; ++j) {
       contract(products.at(i, j), solid, lambda, k.data());
-      put_block(k.data(), i, j, out);
+      set_block(k.data(), i, j, out);
     }
 }
 
@@ -112,7 +112,7 @@ Products calc_linear_products(const std::array<Vec3, 4>& b, double volume) {
 
 /// N_i of a T10 has d N_i / d L_a for one corner a (corner nodes: 4 L_a - 1) or two (mid nodes: 4 times the other end's L).
 /// G_ij^ab = integral (d N_i / d L_a) (d N_j / d L_b) dV / V, so that K_ij = sum over a, b of G_ij^ab K_ab of the linear tetrahedron.
-struct Recipe {
+struct ReferenceProducts {
   struct Term {
     int a, b;
     double factor;
@@ -121,8 +121,8 @@ struct Recipe {
   std::array<int, kPairs> count{};
 };
 
-const Recipe& get_recipe() {
-  static const Recipe recipe = [] {
+const ReferenceProducts& get_reference_products() {
+  static const ReferenceProducts products = [] {
     struct Slope {
       int along, of;  // d N / d L_along = 4 L_of + offset
       double offset;
@@ -132,7 +132,7 @@ const Recipe& get_recipe() {
       const auto [a, b] = mesh::kEdges[i - 4];
       return std::vector<Slope>{{a, b, 0.0}, {b, a, 0.0}};
     };
-    Recipe made;
+    ReferenceProducts made;
     int pair = 0;
     for (int i = 0; i < kMaxNodes; ++i)
       for (int j = i; j < kMaxNodes; ++j, ++pair)
@@ -142,7 +142,7 @@ const Recipe& get_recipe() {
                                                     16 * find_moment(p.of, q.of) + p.offset + q.offset + p.offset * q.offset};
     return made;
   }();
-  return recipe;
+  return products;
 }
 
 /// m_ij / (rho V) of the straight T10, in 420ths, from integral L0^a L1^b L2^c L3^d dV = 6 V a! b! c! d! / (a + b + c + d + 3)!.
@@ -157,7 +157,7 @@ double straight_mass_420(int i, int j) {
   return touch ? 16 : 8;
 }
 
-void put_straight_mass(double mass_kg, ElementMatrices& out) {
+void set_straight_mass(double mass_kg, ElementMatrices& out) {
   static const std::array<double, kMaxNodes* kMaxNodes> kParts = [] {
     std::array<double, kMaxNodes * kMaxNodes> parts{};
     for (int i = 0; i < kMaxNodes; ++i)
@@ -167,21 +167,21 @@ void put_straight_mass(double mass_kg, ElementMatrices& out) {
   for (std::size_t i = 0; i < kParts.size(); ++i) out.mass[i] = mass_kg * kParts[i];
 }
 
-void put_straight_t10(const std::array<Vec3, 4>& b, double volume, const Solid& solid, ElementMatrices& out) {
+void set_straight_stiffness(const std::array<Vec3, 4>& b, double volume, const Solid& solid, ElementMatrices& out) {
   const Products products = calc_linear_products(b, volume);
   std::array<std::array<double, 9>, 16> linear;
   for (int a = 0; a < 4; ++a)
-    for (int c = 0; c < 4; ++c) contract(products.at(a, c), solid, solid.full_lambda_pa, linear[4 * a + c].data());
-  const Recipe& recipe = get_recipe();
+    for (int c = 0; c < 4; ++c) contract(products.at(a, c), solid, solid.displacement_lambda_pa, linear[4 * a + c].data());
+  const ReferenceProducts& reference = get_reference_products();
   int pair = 0;
   for (int i = 0; i < kMaxNodes; ++i)
     for (int j = i; j < kMaxNodes; ++j, ++pair) {
       std::array<double, 9> k{};
-      for (int t = 0; t < recipe.count[pair]; ++t) {
-        const auto& [a, c, factor] = recipe.terms[pair][t];
+      for (int t = 0; t < reference.count[pair]; ++t) {
+        const auto& [a, c, factor] = reference.terms[pair][t];
         for (int v = 0; v < 9; ++v) k[v] += factor * linear[4 * a + c][v];
       }
-      put_block(k.data(), i, j, out);
+      set_block(k.data(), i, j, out);
     }
 }
 
@@ -273,8 +273,11 @@ double calc_curved_mass(std::span<const Vec3> x, std::array<double, kMaxNodes * 
   return volume;
 }
 
+/// Integral of div u over the element per degree of freedom.
+using Divergence = std::array<double, 3 * kMaxNodes>;
+
 /// Adds what the bulk modulus is stiffer than the products have it, for the mean dilatation only: excess (integral div u)^2 / V.
-void add_mean_dilatation(const std::array<double, 3 * kMaxNodes>& divergence, double volume, double excess, ElementMatrices& out) {
+void add_mean_dilatation(const Divergence& divergence, double volume, double excess, ElementMatrices& out) {
   const int width = 3 * out.nodes;
   for (int row = 0; row < width; ++row)
     for (int column = 0; column < width; ++column)
@@ -289,9 +292,54 @@ void lump_hrz(ElementMatrices& out, double mass_kg) {
     for (int j = 0; j < n; ++j) out.mass[i * n + j] = i == j ? out.mass[i * n + i] * mass_kg / trace : 0.0;
 }
 
+/// K and M of a T4 from the gradients b and the volume of the tetrahedron.
+void calc_t4(const std::array<Vec3, 4>& b, double volume, const Solid& solid, ElementMatrices& out) {
+  set_stiffness(calc_linear_products(b, volume), solid, solid.displacement_lambda_pa + solid.mean_dilatation_modulus_pa, out);
+  if (!solid.isotropic && solid.mean_dilatation_modulus_pa > 0) {
+    Divergence divergence{};
+    for (int i = 0; i < 4; ++i)
+      for (int r = 0; r < 3; ++r) divergence[3 * i + r] = volume * b[i][r];
+    add_mean_dilatation(divergence, volume, solid.mean_dilatation_modulus_pa, out);
+  }
+  const double mass_kg = solid.density_kg_m3 * volume;
+  for (int i = 0; i < 4; ++i)
+    for (int j = 0; j < 4; ++j) out.mass[i * 4 + j] = mass_kg / 20.0 * (i == j ? 2 : 1);
+}
+
+/// The same of a T10 with straight sides.
+void calc_straight_t10(const std::array<Vec3, 4>& b, double volume, const Solid& solid, ElementMatrices& out) {
+  set_straight_stiffness(b, volume, solid, out);
+  set_straight_mass(solid.density_kg_m3 * volume, out);
+  if (!(solid.mean_dilatation_modulus_pa > 0)) return;
+  // integral d N / d L_a is 0 for corners (4 L_a - 1) and V for mid nodes (4 L_b)
+  Divergence divergence{};
+  for (int e = 0; e < 6; ++e)
+    for (int r = 0; r < 3; ++r) divergence[12 + 3 * e + r] = volume * (b[mesh::kEdges[e][0]][r] + b[mesh::kEdges[e][1]][r]);
+  add_mean_dilatation(divergence, volume, solid.mean_dilatation_modulus_pa, out);
+}
+
+/// The same of a curved T10; mass_kg becomes that of the element. False when the Jacobian is not positive everywhere.
+bool calc_curved_t10(std::span<const Vec3> x, const Solid& solid, double& mass_kg, ElementMatrices& out) {
+  Gradients gradients;
+  if (!calc_gradients(x, gradients)) return false;
+  set_stiffness(calc_curved_products(gradients), solid, solid.displacement_lambda_pa, out);
+  if (solid.mean_dilatation_modulus_pa > 0) {
+    Divergence divergence{};
+    double volume = 0.0;
+    for (std::size_t q = 0; q < 14; ++q) {
+      volume += gradients.dv[q];
+      for (std::size_t i = 0; i < divergence.size(); ++i) divergence[i] += gradients.dv[q] * gradients.b[q][i];
+    }
+    add_mean_dilatation(divergence, volume, solid.mean_dilatation_modulus_pa, out);
+  }
+  mass_kg = solid.density_kg_m3 * calc_curved_mass(x, out.mass);
+  for (double& m : out.mass) m *= solid.density_kg_m3;
+  return true;
+}
+
 }  // namespace
 
-double calc_mean_lambda(const job::Elasticity& c) {
+double calc_mean_dilatation_modulus_pa(const job::Elasticity& c) {
   // C s = 1 for the normal strains s under a unit pressure, by elimination; C is positive definite.
   std::array<std::array<double, 7>, 6> row{};
   for (int i = 0; i < 6; ++i) {
@@ -307,68 +355,37 @@ double calc_mean_lambda(const job::Elasticity& c) {
   double dilatation = 0.0;
   for (int i = 0; i < 3; ++i) dilatation += row[i][6] / row[i][i];
   const double bulk = 1 / dilatation;
-  return std::max(bulk - (kFullLambda + 2.0 / 3) * job::calc_mean_shear_pa(c), 0.0);
+  return std::max(bulk - (kMaxDisplacementLambda + 2.0 / 3) * job::calc_mean_shear_pa(c), 0.0);
 }
 
 Solid::Solid(const job::Material& material, bool full)
     : isotropic(!material.orthotropic), lame_mu_pa(material.lame_mu_pa()), density_kg_m3(material.density_kg_m3) {
   if (isotropic) {
-    mean_lambda_pa = full ? 0.0 : std::max(material.lame_lambda_pa() - kFullLambda * lame_mu_pa, 0.0);
-    full_lambda_pa = material.lame_lambda_pa() - mean_lambda_pa;
+    mean_dilatation_modulus_pa = full ? 0.0 : std::max(material.lame_lambda_pa() - kMaxDisplacementLambda * lame_mu_pa, 0.0);
+    displacement_lambda_pa = material.lame_lambda_pa() - mean_dilatation_modulus_pa;
     return;
   }
   constexpr int kVoigt[3][3] = {{0, 5, 4}, {5, 1, 3}, {4, 3, 2}};
   const job::Elasticity c = material.calc_elasticity_pa();
-  mean_lambda_pa = full ? 0.0 : calc_mean_lambda(c);
+  mean_dilatation_modulus_pa = full ? 0.0 : calc_mean_dilatation_modulus_pa(c);
   for (int r = 0; r < 3; ++r)
     for (int s = 0; s < 3; ++s)
       for (int b = 0; b < 3; ++b)
         for (int d = 0; d < 3; ++d)
-          tensor_pa[27 * r + 9 * s + 3 * b + d] = c[6 * kVoigt[r][b] + kVoigt[s][d]] - (r == b && s == d ? mean_lambda_pa : 0.0);
+          tensor_pa[27 * r + 9 * s + 3 * b + d] =
+              c[6 * kVoigt[r][b] + kVoigt[s][d]] - (r == b && s == d ? mean_dilatation_modulus_pa : 0.0);
 }
 
 bool calc_element(std::span<const Vec3> x, const Solid& solid, job::Mass mass, ElementMatrices& out) {
-  const int n = out.nodes = static_cast<int>(x.size());
+  out.nodes = static_cast<int>(x.size());
   std::array<Vec3, 4> b;
   const double volume = calc_linear(x.first(4), b);
   double mass_kg = solid.density_kg_m3 * volume;
-  const bool curved = n == kMaxNodes && !is_straight(x);
-  if (!curved && !(volume > 0.0)) return false;
-  if (n == 4) {
-    put_stiffness(calc_linear_products(b, volume), solid, solid.full_lambda_pa + solid.mean_lambda_pa, out);
-    if (!solid.isotropic && solid.mean_lambda_pa > 0) {
-      std::array<double, 3 * kMaxNodes> divergence{};
-      for (int i = 0; i < 4; ++i)
-        for (int r = 0; r < 3; ++r) divergence[3 * i + r] = volume * b[i][r];
-      add_mean_dilatation(divergence, volume, solid.mean_lambda_pa, out);
-    }
-    for (int i = 0; i < 4; ++i)
-      for (int j = 0; j < 4; ++j) out.mass[i * 4 + j] = mass_kg / 20.0 * (i == j ? 2 : 1);
-  } else if (!curved) {
-    put_straight_t10(b, volume, solid, out);
-    put_straight_mass(mass_kg, out);
-    if (solid.mean_lambda_pa > 0) {
-      // integral d N / d L_a is 0 for corners (4 L_a - 1) and V for mid nodes (4 L_b)
-      std::array<double, 3 * kMaxNodes> divergence{};
-      for (int e = 0; e < 6; ++e)
-        for (int r = 0; r < 3; ++r) divergence[12 + 3 * e + r] = volume * (b[mesh::kEdges[e][0]][r] + b[mesh::kEdges[e][1]][r]);
-      add_mean_dilatation(divergence, volume, solid.mean_lambda_pa, out);
-    }
+  if (out.nodes == kMaxNodes && !is_straight(x)) {
+    if (!calc_curved_t10(x, solid, mass_kg, out)) return false;
   } else {
-    Gradients gradients;
-    if (!calc_gradients(x, gradients)) return false;
-    put_stiffness(calc_curved_products(gradients), solid, solid.full_lambda_pa, out);
-    if (solid.mean_lambda_pa > 0) {
-      std::array<double, 3 * kMaxNodes> divergence{};
-      double sum = 0.0;
-      for (std::size_t q = 0; q < 14; ++q) {
-        sum += gradients.dv[q];
-        for (std::size_t i = 0; i < divergence.size(); ++i) divergence[i] += gradients.dv[q] * gradients.b[q][i];
-      }
-      add_mean_dilatation(divergence, sum, solid.mean_lambda_pa, out);
-    }
-    mass_kg = solid.density_kg_m3 * calc_curved_mass(x, out.mass);
-    for (double& m : out.mass) m *= solid.density_kg_m3;
+    if (!(volume > 0.0)) return false;
+    out.nodes == 4 ? calc_t4(b, volume, solid, out) : calc_straight_t10(b, volume, solid, out);
   }
   if (mass == job::Mass::lumped) lump_hrz(out, mass_kg);  // for the T4, whose diagonal is constant, this is the row sum
   return true;

@@ -25,33 +25,34 @@ struct ElementMoments {
   std::array<double, 9> second_kg_m2{};  // (3, 3) integral rho x x^T
 };
 
-/// Of the dilatation within a T10 only its mean meets a lambda above this many mu; docs/elements.md has the figures behind the number.
-/// Poisson's ratios up to kFullLambda / (2 (kFullLambda + 1)) = 0.4545 are not touched.
-inline constexpr double kFullLambda = 10.0;
+/// Of the dilatation within a T10 only its mean is resisted by the part of lambda above this many mu; docs/elements.md has the figures
+/// behind the number. Poisson's ratios up to kMaxDisplacementLambda / (2 (kMaxDisplacementLambda + 1)) = 0.4545 are not touched.
+inline constexpr double kMaxDisplacementLambda = 10.0;
 
-/// What the mean of the dilatation alone meets in a T10 [Pa]: the part of the bulk modulus (Reuss' average) above (kFullLambda + 2/3) times
-/// the shear modulus (Voigt's average), for an isotropic solid lambda - kFullLambda mu; 0 if there is none. C less this part of every
-/// normal pair is still positive definite.
-double calc_mean_lambda(const job::Elasticity& elasticity_pa);
+/// The modulus that resists the mean of the dilatation alone in a T10 [Pa]: the part of the bulk modulus (Reuss' average) above
+/// (kMaxDisplacementLambda + 2/3) times the shear modulus (Voigt's average), for an isotropic solid lambda - kMaxDisplacementLambda mu; 0
+/// if there is none. C less this part of every normal pair is still positive definite.
+double calc_mean_dilatation_modulus_pa(const job::Elasticity& elasticity_pa);
 
 /// A material as the elements use it, made once for many elements.
 struct Solid {
-  /// full: all of the dilatation within an element meets all of the elasticity, near incompressibility too.
+  /// full: no mean dilatation; all of lambda resists all of the dilatation, near incompressibility too.
   Solid(const job::Material& material, bool full = false);  // NOLINT(google-explicit-constructor): a material is a solid
 
   bool isotropic = true;
-  double full_lambda_pa = 0.0;  // of isotropic solids: what all of the dilatation in a T10 meets;
-  double mean_lambda_pa = 0.0;  // of all: what its mean over the element meets beside
+  double displacement_lambda_pa = 0.0;      // of isotropic solids: resists all of the dilatation in a T10;
+  double mean_dilatation_modulus_pa = 0.0;  // of all solids: resists its mean over the element only
   double lame_mu_pa = 0.0;
   double density_kg_m3 = 0.0;
-  std::array<double, 81> tensor_pa{};  // C_rbcd at 27 r + 9 c + 3 b + d: stress_rb from strain_cd, less mean_lambda_pa; of anisotropic ones
+  std::array<double, 81>
+      tensor_pa{};  // C_rbcd at 27 r + 9 c + 3 b + d: stress_rb from strain_cd, less mean_dilatation_modulus_pa; of anisotropic ones
 };
 
 /// Calculates K and M of the element with node positions x, (4) or (10) in the order of mesh::TetMesh. Mid-side nodes are used where they
 /// are (isoparametric) unless all lie within 1e-6 of an edge's length from its middle. Straight-sided T10 are integrated exactly; the mass
 /// of curved ones too, their stiffness by a rule of degree 5.
 /// T4: OSG02 eqs. 12 (corrected: + vol), 14, 15; T10: the same strain energy, HRZ lumping (Hinton, Rock and Zienkiewicz 1976).
-/// T10 of nearly incompressible solids: mean dilatation for Solid::mean_lambda_pa.
+/// T10 of nearly incompressible solids: mean dilatation for Solid::mean_dilatation_modulus_pa.
 /// Returns false, with `out` unusable, when the Jacobian is not positive at every node and integration point of the stiffness; each of them
 /// is one that mesh::is_folded tests. Not collective.
 [[nodiscard]] bool calc_element(std::span<const Vec3> x, const Solid& solid, job::Mass mass, ElementMatrices& out);

@@ -1,4 +1,4 @@
-// Method: K_r and M_r of the elements of one material at a time, multiplied with the shapes in slabs.
+// Method: K_r and M_r of the elements of one material at a time, multiplied with the shapes in blocks.
 // Source: Ungar and Kerwin 1962, J. Acoust. Soc. Am. 34, 954 (loss of a composite from the shares of its strain energy); OSG02 section 3.3.
 // Deviations: none.
 #include "precompute/fem/energy.hpp"
@@ -12,8 +12,8 @@ namespace carillon::fem {
 namespace {
 
 /// The same nodes with the tetrahedra of one material only.
-LocalMesh take_material(const LocalMesh& local, const Materials& materials, std::int32_t wanted) {
-  LocalMesh part = local;
+partition::LocalMesh take_material(const partition::LocalMesh& local, const Materials& materials, std::int32_t wanted) {
+  partition::LocalMesh part = local;
   part.tets.clear();
   part.tet_in_mesh.clear();
   part.region.clear();
@@ -28,7 +28,7 @@ LocalMesh take_material(const LocalMesh& local, const Materials& materials, std:
 }
 
 /// phi_j^T A phi_j of every column. Collective.
-std::vector<double> calc_forms(MPI_Comm comm, Mat a, Mat shapes, std::int64_t modes) {
+std::vector<double> calc_forms(const comm::Communicator& comm, Mat a, Mat shapes, std::int64_t modes) {
   std::vector<double> forms(modes, 0.0);
   petsc::VecHandle x, y;
   petsc::check(MatCreateVecs(a, x.out(), y.out()));
@@ -48,7 +48,7 @@ std::vector<double> calc_forms(MPI_Comm comm, Mat a, Mat shapes, std::int64_t mo
     petsc::check(VecRestoreArrayRead(y, &image));
   }
   petsc::check(MatDenseRestoreArrayRead(shapes, &columns));
-  MPI_Allreduce(MPI_IN_PLACE, forms.data(), static_cast<int>(modes), MPI_DOUBLE, MPI_SUM, comm);
+  comm.sum(forms);
   return forms;
 }
 
@@ -65,8 +65,8 @@ std::vector<double> normalise(const std::vector<std::vector<double>>& by_materia
 
 }  // namespace
 
-Decay calc_decay(MPI_Comm comm, const LocalMesh& local, const Materials& materials, job::Mass mass, std::span<const double> lambda,
-                 Mat shapes) {
+Decay calc_decay(const comm::Communicator& comm, const partition::LocalMesh& local, const Materials& materials, job::Mass mass,
+                 std::span<const double> lambda, Mat shapes) {
   Decay decay;
   if (materials.list.size() == 1 || lambda.empty()) {
     for (const double value : lambda) decay.decay_per_s.push_back(materials.list[0].calc_decay_per_s(value));
@@ -76,7 +76,7 @@ Decay calc_decay(MPI_Comm comm, const LocalMesh& local, const Materials& materia
   const auto count = static_cast<std::int32_t>(materials.list.size());
   std::vector<std::vector<double>> elastic, kinetic;
   for (std::int32_t r = 0; r < count; ++r) {
-    const LocalMesh part = take_material(local, materials, r);
+    const partition::LocalMesh part = take_material(local, materials, r);
     const System system = assemble(comm, part, materials.list[r], mass);
     elastic.push_back(calc_forms(comm, system.stiffness, shapes, modes));
     kinetic.push_back(calc_forms(comm, system.mass, shapes, modes));

@@ -27,7 +27,7 @@ struct Decay {
 /// law draws from its share of the mode's elastic and kinetic energy (job::Material::calc_damping_per_s), which is the diagonal of the
 /// modal damping matrix; docs/equations.md, damping. `lambda` (modes) [rad^2/s^2]; `shapes` (3n, modes) dense, rows as those of the system
 /// of `local`, null when there are no modes. Collective. Throws on every rank what assemble() throws.
-Decay calc_decay(MPI_Comm comm, const LocalMesh& local, const Materials& materials, job::Mass mass, std::span<const double> lambda,
-                 Mat shapes);
+Decay calc_decay(const comm::Communicator& comm, const partition::LocalMesh& local, const Materials& materials, job::Mass mass,
+                 std::span<const double> lambda, Mat shapes);
 
 }  // namespace carillon::fem

@@ -1,7 +1,6 @@
 // Method: fixed nodes of one entry that a chain of tetrahedra joins are one support: every rank joins those of its own elements, rank 0
-// what
-//   meets in one node. The reaction is summed over the elements that touch fixed nodes, a few modes at a time: their shapes are fetched for
-//   the nodes of these elements only.
+//   what meets in one node. The reaction is summed over the elements that touch fixed nodes, a few modes at a time: their shapes are
+//   fetched for the nodes of these elements only.
 // Source: the reaction of a mode, e.g. Meirovitch, Principles and Techniques of Vibrations (1997), 7.16 (constraint forces).
 // Deviations: none.
 #include "precompute/fem/supports.hpp"
@@ -14,6 +13,7 @@
 #include <tuple>
 #include <unordered_map>
 
+#include "precompute/comm/exchange.hpp"
 #include "precompute/fem/element.hpp"
 #include "precompute/mesh/faces.hpp"
 #include "precompute/petsc/handle.hpp"
@@ -23,9 +23,11 @@
 namespace carillon::fem {
 namespace {
 
-constexpr PetscInt kBlock = 16;              // modes at a time
-constexpr std::size_t kMostSupports = 1000;  // more patches than this are one for each entry
-constexpr double kOpenShare = 0.05;          // of the area: a patch whose faces sum up to less is closed and has no normal
+using partition::LocalMesh;
+
+constexpr PetscInt kBlock = 16;             // modes at a time
+constexpr std::size_t kMaxSupports = 1000;  // more patches than this are one for each entry
+constexpr double kOpenShare = 0.05;         // of the area: a patch whose faces sum up to less is closed and has no normal
 
 double calc_norm(const Vec3& v) { return std::hypot(v[0], v[1], v[2]); }
 
@@ -40,27 +42,6 @@ struct FaceRecord {
   std::array<std::int32_t, 3> node;
   std::int32_t entry;
 };
-
-/// Records of all ranks on rank 0. Collective.
-template <class Record>
-std::vector<Record> gather(MPI_Comm comm, const std::vector<Record>& own) {
-  int rank = 0, ranks = 1;
-  MPI_Comm_rank(comm, &rank);
-  MPI_Comm_size(comm, &ranks);
-  static_assert(sizeof(Record) % 4 == 0);
-  constexpr int kWords = sizeof(Record) / 4;
-  const int count = kWords * static_cast<int>(own.size());
-  std::vector<int> counts(static_cast<std::size_t>(ranks)), begins(static_cast<std::size_t>(ranks), 0);
-  MPI_Gather(&count, 1, MPI_INT, counts.data(), 1, MPI_INT, 0, comm);
-  std::vector<Record> all;
-  petsc::run_agreed(comm, [&] {
-    if (rank != 0) return;
-    std::partial_sum(counts.begin(), counts.end() - 1, begins.begin() + 1);
-    all.resize(static_cast<std::size_t>(begins.back() + counts.back()) / kWords);
-  });
-  MPI_Gatherv(own.data(), count, MPI_INT32_T, all.data(), counts.data(), begins.data(), MPI_INT32_T, 0, comm);
-  return all;
-}
 
 std::span<const std::int32_t> get_tet(const LocalMesh& local, std::int32_t e) {
   const auto width = static_cast<std::size_t>(local.nodes_per_tet());
@@ -107,7 +88,7 @@ std::vector<FaceRecord> list_faces(const LocalMesh& local) {
   return list;
 }
 
-/// What rank 0 tells: which node of the mesh belongs to which support, and where it is.
+/// What rank 0 finds for all: which node of the mesh belongs to which support, and where it is.
 struct Member {
   std::int32_t node, support;
   Vec3 x;
@@ -140,7 +121,7 @@ Layout find_members(std::vector<NodeRecord> nodes) {
       roots.emplace_back(layout.members[i].support, static_cast<std::int32_t>(i));
   }
   std::sort(roots.begin(), roots.end());
-  const bool is_many = roots.size() > kMostSupports;
+  const bool is_many = roots.size() > kMaxSupports;
   std::map<std::int32_t, std::int32_t> of_root;
   for (const auto& [entry, root] : roots) {
     if (!is_many || layout.list.empty() || layout.list.back().entry != entry) layout.list.emplace_back().entry = entry;
@@ -166,8 +147,8 @@ double calc_middle_eigenvalue(const std::array<double, 9>& c) {
   for (double& x : b) x /= p;
   const double half = 0.5 * (b[0] * (b[4] * b[8] - b[5] * b[7]) - b[1] * (b[3] * b[8] - b[5] * b[6]) + b[2] * (b[3] * b[7] - b[4] * b[6]));
   const double angle = std::acos(std::clamp(half, -1.0, 1.0)) / 3.0;
-  const double most = 2.0 * std::cos(angle), least = 2.0 * std::cos(angle + 2.0 * std::acos(-1.0) / 3.0);
-  return mean + p * (0.0 - most - least);
+  const double max = 2.0 * std::cos(angle), min = 2.0 * std::cos(angle + 2.0 * std::acos(-1.0) / 3.0);
+  return mean + p * (0.0 - max - min);
 }
 
 /// Faces of the body's surface only: what two elements share is inside.
@@ -245,31 +226,17 @@ void measure(const std::vector<FaceRecord>& faces, Layout& layout) {
 }
 
 /// The supports, the same on every rank. Collective.
-Layout find_layout(MPI_Comm comm, const LocalMesh& local) {
-  int rank = 0;
-  MPI_Comm_rank(comm, &rank);
-  std::vector<NodeRecord> nodes;
-  std::vector<FaceRecord> faces;
-  petsc::run_agreed(comm, [&] {
-    nodes = list_nodes(local);
-    faces = list_faces(local);
-  });
-  const auto all_nodes = gather(comm, nodes);
-  auto all_faces = gather(comm, faces);
+Layout find_layout(const comm::Communicator& comm, const LocalMesh& local) {
+  const auto nodes = comm::gather(comm, [&] { return list_nodes(local); });
+  auto faces = comm::gather(comm, [&] { return list_faces(local); });
   Layout layout;
-  petsc::run_agreed(comm, [&] {
-    if (rank != 0) return;
-    layout = find_members(all_nodes);
-    measure(find_outer(std::move(all_faces)), layout);
+  comm.agree([&] {
+    if (!comm.is_root()) return;
+    layout = find_members(nodes);
+    measure(find_outer(std::move(faces)), layout);
   });
-  std::array<std::int64_t, 2> sizes{static_cast<std::int64_t>(layout.list.size()), static_cast<std::int64_t>(layout.members.size())};
-  MPI_Bcast(sizes.data(), 2, MPI_INT64_T, 0, comm);
-  petsc::run_agreed(comm, [&] {
-    layout.list.resize(static_cast<std::size_t>(sizes[0]));
-    layout.members.resize(static_cast<std::size_t>(sizes[1]));
-  });
-  MPI_Bcast(layout.list.data(), static_cast<int>(sizes[0] * static_cast<std::int64_t>(sizeof(Support))), MPI_BYTE, 0, comm);
-  MPI_Bcast(layout.members.data(), static_cast<int>(sizes[1] * static_cast<std::int64_t>(sizeof(Member) / 4)), MPI_INT32_T, 0, comm);
+  layout.list = comm.broadcast(std::move(layout.list));
+  layout.members = comm.broadcast(std::move(layout.members));
   return layout;
 }
 
@@ -341,11 +308,11 @@ std::vector<Near> find_near(const LocalMesh& local, const Layout& layout, const 
       Vec3 middle{};
       for (std::size_t i = 0; i < 4; ++i)
         for (int k = 0; k < 3; ++k) middle[k] += local.nodes_m[nodes[i]][k] / 4.0;
-      double least = 1e300;
+      double min = 1e300;
       for (std::size_t s = 0; s < nearby.size(); ++s) {
         const double distance = nearby[s].find_distance(middle);
-        if (distance >= least) continue;
-        least = distance;
+        if (distance >= min) continue;
+        min = distance;
         best = static_cast<std::int32_t>(s);
       }
     }
@@ -358,7 +325,7 @@ std::vector<Near> find_near(const LocalMesh& local, const Layout& layout, const 
 class Fetch {
  public:
   /// Collective.
-  Fetch(MPI_Comm comm, const LocalMesh& local, const std::vector<std::int32_t>& nodes, Mat shapes) : shapes_(shapes) {
+  Fetch(const comm::Communicator& comm, const LocalMesh& local, const std::vector<std::int32_t>& nodes, Mat shapes) : shapes_(shapes) {
     petsc::check(MatGetLocalSize(shapes, &rows_, nullptr));
     petsc::check(MatDenseGetLDA(shapes, &stride_));
     std::vector<PetscInt> wanted;
@@ -445,17 +412,15 @@ void add_element(const Sums& sums, const Near& near, const ElementMatrices& elem
 
 }  // namespace
 
-Supports calc_supports(MPI_Comm comm, const LocalMesh& local, const Materials& materials, job::Mass mass, std::span<const double> lambda,
-                       Mat shapes) {
+Supports calc_supports(const comm::Communicator& comm, const LocalMesh& local, const Materials& materials, job::Mass mass,
+                       std::span<const double> lambda, Mat shapes) {
   Supports supports;
-  int is_fixed = std::any_of(local.fixed_by.begin(), local.fixed_by.end(), [](std::int32_t entry) { return entry >= 0; }) ? 1 : 0;
-  MPI_Allreduce(MPI_IN_PLACE, &is_fixed, 1, MPI_INT, MPI_MAX, comm);
-  if (is_fixed == 0) return supports;
+  if (comm.all(std::none_of(local.fixed_by.begin(), local.fixed_by.end(), [](std::int32_t entry) { return entry >= 0; }))) return supports;
   const Layout layout = find_layout(comm, local);
   const std::size_t count = layout.list.size(), modes = lambda.size();
   std::vector<std::int32_t> support_of, place, fetched;
   std::vector<Near> near;
-  petsc::run_agreed(comm, [&] {
+  comm.agree([&] {
     support_of.assign(local.nodes_m.size(), -1);
     for (std::size_t i = 0; i < support_of.size(); ++i) {
       if (local.fixed_by[i] < 0) continue;
@@ -496,8 +461,8 @@ Supports calc_supports(MPI_Comm comm, const LocalMesh& local, const Materials& m
       }
     }
   }
-  MPI_Allreduce(MPI_IN_PLACE, supports.reaction.data(), static_cast<int>(supports.reaction.size()), MPI_DOUBLE, MPI_SUM, comm);
-  MPI_Allreduce(MPI_IN_PLACE, supports.energy.data(), static_cast<int>(supports.energy.size()), MPI_DOUBLE, MPI_SUM, comm);
+  comm.sum(supports.reaction);
+  comm.sum(supports.energy);
   for (std::size_t m = 0; m < modes; ++m)
     for (std::size_t s = 0; s < count; ++s)
       supports.energy[m * count + s] = std::clamp(supports.energy[m * count + s] / lambda[m], 0.0, 1.0);

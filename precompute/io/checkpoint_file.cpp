@@ -1,11 +1,10 @@
-// One file from its first byte to its last, written and read: longer than most.
 // Method:     Bytes 0..255 header, then the settings that were tried, the numbers of the solve, zeros up to a multiple of 4,096, and the
 //             columns by groups of 16: of each group node after node, of each node x, y, z, of each the group's columns. SHA-256 guards all
 //             but the columns, whose records are mixed one by one and summed, so that each rank does it for its own. A new file is
-//             written beside the old one, brought to the disk, and renamed.
+//             written in the same folder, synchronised to the disk, and renamed.
 // Source:     POSIX.1-2008 (open, pread, pwrite, fcntl, rename, fsync); nfs(5), "data and metadata coherence".
-// Deviations: no HDF5: its reader trusts what it reads, and a file of it that was cut or flipped can end the process. No MPI-IO: it opens
-//             files by name on every rank, follows links, and puts files of its own beside them.
+// Deviations: no HDF5: a truncated or altered file can crash its reader. No MPI-IO: it opens
+//             files by name on every rank, follows links, and creates files of its own in the same folder.
 #include "precompute/io/checkpoint_file.hpp"
 
 #include <fcntl.h>
@@ -19,10 +18,8 @@
 #include <cerrno>
 #include <cstring>
 #include <exception>
-#include <tuple>
 #include <utility>
 
-#include "precompute/io/interrupt.hpp"
 #include "precompute/petsc/session.hpp"
 #include "precompute/petsc/work.hpp"
 #include "runtime/base/error.hpp"
@@ -37,12 +34,12 @@ using Clock = std::chrono::steady_clock;
 
 constexpr char kMagic[24] = "carillon checkpoint 1\n";
 constexpr std::uint64_t kByteOrder = 0x0102030405060708;
-constexpr int kGroup = 16;                     // columns
-constexpr std::int64_t kAlign = 4096;          // of the first column
-constexpr std::int64_t kMostText = 1LL << 32;  // bytes of settings and numbers
-constexpr std::int64_t kMostRows = 1LL << 31, kMostColumns = 1LL << 24;
-constexpr std::size_t kMostSettings = 100;
-constexpr double kLeastPause = 20;  // times what the last save took, until the next
+constexpr int kGroup = 16;                    // columns
+constexpr std::int64_t kAlign = 4096;         // of the first column
+constexpr std::int64_t kMaxText = 1LL << 32;  // bytes of settings and numbers
+constexpr std::int64_t kMaxRows = 1LL << 31, kMaxColumns = 1LL << 24;
+constexpr std::size_t kMaxSettings = 100;
+constexpr double kMinPause = 20;  // times what the last save took, until the next
 
 struct RawHeader {
   char magic[24];
@@ -92,14 +89,6 @@ void with_descriptor(const fs::path& file, int flags, const std::function<bool(i
   if (!ok) throw SystemError(std::strerror(error));
 }
 
-void share_text(MPI_Comm comm, std::string& text) {
-  auto size = static_cast<std::int64_t>(text.size());
-  MPI_Bcast(&size, 1, MPI_INT64_T, 0, comm);
-  petsc::run_agreed(comm, [&] { text.resize(static_cast<std::size_t>(size)); });
-  for (std::int64_t at = 0; at < size; at += 1 << 30)
-    MPI_Bcast(text.data() + at, static_cast<int>(std::min<std::int64_t>(size - at, 1 << 30)), MPI_CHAR, 0, comm);
-}
-
 int find_width(std::int64_t columns, std::int64_t group) {
   return static_cast<int>(std::min<std::int64_t>(kGroup, columns - group * kGroup));
 }
@@ -111,19 +100,16 @@ int find_width(std::int64_t columns, std::int64_t group) {
 class SharedFile {
  public:
   enum class Use { create, read };
-  SharedFile(MPI_Comm comm, const fs::path& file, Use use) : comm_(comm) {
-    int rank = 0;
-    MPI_Comm_rank(comm, &rank);
+  SharedFile(const comm::Communicator& comm, const fs::path& file, Use use) : comm_(comm) {
     const bool creates = use == Use::create;
-    // A name without a folder is a file of this folder, and a link there is somebody else's; what the user names may be one.
+    // A name without a folder is a file of this folder, and a link there was made by another program; what the user names may be one.
     const int links = creates || !file.has_parent_path() ? O_NOFOLLOW : 0;
-    petsc::run_agreed(comm, [&] {
-      if (rank == 0) open(file, links | (creates ? O_WRONLY | O_CREAT | O_EXCL : O_RDONLY));
+    comm.agree([&] {
+      if (comm.is_root()) open(file, links | (creates ? O_WRONLY | O_CREAT | O_EXCL : O_RDONLY));
     });
-    std::uint64_t number = number_;
-    MPI_Bcast(&number, 1, MPI_UINT64_T, 0, comm);
-    petsc::run_agreed(comm, [&] {
-      if (rank != 0) open(file, links | (creates ? O_WRONLY : O_RDONLY));
+    const std::uint64_t number = comm.broadcast(number_);
+    comm.agree([&] {
+      if (!comm.is_root()) open(file, links | (creates ? O_WRONLY : O_RDONLY));
       if (number_ != number) throw SystemError(kReplaced);
     });
   }
@@ -135,13 +121,13 @@ class SharedFile {
   /// Local. Throws SystemError.
   void write(std::int64_t at, const void* bytes, std::size_t count) { move(at, count, true, static_cast<char*>(const_cast<void*>(bytes))); }
   void read(std::int64_t at, void* bytes, std::size_t count) { move(at, count, false, static_cast<char*>(bytes)); }
-  /// What this rank wrote is on the disk. Local.
+  /// Synchronises this rank's writes to the disk. Local.
   void flush() {
     if (::fsync(own_.descriptor) != 0) throw SystemError(std::strerror(errno));
   }
-  /// What was written is on the disk. Collective.
+  /// Synchronises all ranks' writes to the disk. Collective.
   void sync() {
-    petsc::run_agreed(comm_, [&] { flush(); });
+    comm_.agree([&] { flush(); });
   }
   /// Whether `name` leads to this file, and is no link. Local.
   bool has_name(const fs::path& name) const {
@@ -192,7 +178,7 @@ class SharedFile {
 
   static constexpr std::size_t kPiece = 32 << 20;  // bytes to or from the disk at once
   static constexpr long kNfs = 0x6969;             // statfs(2)
-  MPI_Comm comm_;
+  comm::Communicator comm_;
   struct Own {
     int descriptor = -1;
     ~Own() {
@@ -203,17 +189,16 @@ class SharedFile {
   bool locks_ = false;
 };
 
-CheckpointFile::CheckpointFile(MPI_Comm comm, fs::path file, double every_s, const Fingerprint& job, Stations& stations)
-    : comm_(comm), file_(std::move(file)), every_s_(every_s), job_(job), stations_(stations), last_save_(Clock::now()) {
-  MPI_Comm_rank(comm, &rank_);
+CheckpointFile::CheckpointFile(const comm::Communicator& comm, fs::path file, double every_s, const Fingerprint& job, CheckpointHost host)
+    : comm_(comm), file_(std::move(file)), every_s_(every_s), job_(job), host_(std::move(host)), last_save_(Clock::now()) {
   temporary_ = file_.parent_path() / ("." + file_.filename().string().substr(0, 200) + ".new");
   checkpoint_.ask = [this] {
-    const double pause = std::max(every_s_, kLeastPause * save_seconds_);
-    const bool is_due = rank_ == 0 && !is_ahead() && std::chrono::duration<double>(Clock::now() - last_save_).count() >= pause;
-    return eigen::Wish{is_stop_asked(), is_due};
+    const double pause = std::max(every_s_, kMinPause * save_seconds_);
+    const bool is_due = comm_.is_root() && !is_ahead() && std::chrono::duration<double>(Clock::now() - last_save_).count() >= pause;
+    return eigen::CheckpointRequest{host_.is_stop_requested(), is_due};
   };
   checkpoint_.save = [this](const std::string& numbers, const std::vector<eigen::Columns>& columns) { return save(numbers, columns); };
-  checkpoint_.tell_news = [this](bool has_news) { set_news(has_news && !is_ahead()); };
+  checkpoint_.report_unsaved = [this](bool has_news) { host_.set_unsaved(has_news && !is_ahead()); };
   checkpoint_.read = [this](std::int64_t first, const eigen::Columns& into) { read_columns(first, into); };
   checkpoint_.reject = [this](const std::string& why) { set_aside(why); };
   look();
@@ -244,9 +229,9 @@ std::string CheckpointFile::read_content(Content& content) const {
   };
   if (!read_all(&header, sizeof header, 0)) return "it is too short";
   if (std::memcmp(header.magic, kMagic, sizeof kMagic) != 0 || header.byte_order != kByteOrder) return "it is no checkpoint of this format";
-  const auto within = [](std::int64_t value, std::int64_t most) { return value >= 0 && value <= most; };
-  if (!within(header.rows, kMostRows) || !within(header.columns, kMostColumns) || !within(header.settings_bytes, kMostText) ||
-      !within(header.numbers_bytes, kMostText))
+  const auto within = [](std::int64_t value, std::int64_t max) { return value >= 0 && value <= max; };
+  if (!within(header.rows, kMaxRows) || !within(header.columns, kMaxColumns) || !within(header.settings_bytes, kMaxText) ||
+      !within(header.numbers_bytes, kMaxText))
     return "it is damaged";
   const std::int64_t data_at = find_data_start(header.settings_bytes, header.numbers_bytes);
   const auto total = static_cast<std::int64_t>(data_at + 24.0 * static_cast<double>(header.rows) * static_cast<double>(header.columns));
@@ -268,24 +253,26 @@ std::string CheckpointFile::read_content(Content& content) const {
 
 void CheckpointFile::look() {
   Content content;
-  std::string trouble;
-  petsc::run_agreed(comm_, [&] {
-    if (rank_ == 0) trouble = read_content(content);
-  });
-  share_text(comm_, trouble);
+  const std::string trouble = comm_.broadcast([&] { return read_content(content); });
   if (!trouble.empty()) return set_aside(trouble);
-  std::array<std::int64_t, 3> sizes{content.rows, content.columns, content.data_at};
-  MPI_Bcast(sizes.data(), 3, MPI_INT64_T, 0, comm_);
-  MPI_Bcast(&content.sum, 1, MPI_UINT64_T, 0, comm_);
-  MPI_Bcast(content.system.data(), static_cast<int>(content.system.size()), MPI_BYTE, 0, comm_);
-  share_text(comm_, content.numbers);
-  share_text(comm_, content.settings);
-  if (sizes[2] == 0) return;  // there is none
-  std::tie(content.rows, content.columns, content.data_at) = std::tie(sizes[0], sizes[1], sizes[2]);
+  struct Sizes {
+    std::int64_t rows, columns, data_at;
+    std::uint64_t sum;
+    Fingerprint system;
+  };
+  const Sizes sizes = comm_.broadcast(Sizes{content.rows, content.columns, content.data_at, content.sum, content.system});
+  content.rows = sizes.rows;
+  content.columns = sizes.columns;
+  content.data_at = sizes.data_at;
+  content.sum = sizes.sum;
+  content.system = sizes.system;
+  content.numbers = comm_.broadcast(std::move(content.numbers));
+  content.settings = comm_.broadcast(std::move(content.settings));
+  if (content.data_at == 0) return;  // there is none
   content_ = std::move(content);
   try {
     eigen::NumberReader from(content_.settings);
-    const std::int64_t count = from.get_count(1, kMostSettings);
+    const std::int64_t count = from.get_count(1, kMaxSettings);
     for (std::int64_t i = 0; i < count; ++i) kept_settings_.push_back(read_setting(from));
     from.end();
   } catch (const InputError& error) {
@@ -299,7 +286,7 @@ const Setting* CheckpointFile::find_setting(std::size_t trials) const {
   return is_there_ && trials < kept_settings_.size() ? &kept_settings_[trials] : nullptr;
 }
 
-void CheckpointFile::begin(const Setting& setting, const Fingerprint& system, const fem::LocalMesh& local) {
+void CheckpointFile::begin(const Setting& setting, const Fingerprint& system, const partition::LocalMesh& local) {
   settings_.push_back(setting);
   system_ = system;
   order_ = std::make_unique<NodeOrder>(comm_, local);
@@ -309,7 +296,7 @@ void CheckpointFile::begin(const Setting& setting, const Fingerprint& system, co
   if (!trouble.empty()) return set_aside(trouble);
   checkpoint_.numbers = content_.numbers;
   checkpoint_.column_count = content_.columns;
-  stations_.say(fmt::format("resumes from {}", file_.string()));
+  host_.log(fmt::format("resumes from {}", file_.string()));
 }
 
 /// Whether the columns are what they were.
@@ -319,7 +306,7 @@ std::string CheckpointFile::verify() {
   try {
     SharedFile file(comm_, file_, SharedFile::Use::read);
     NodeOrder::Room room;
-    petsc::run_agreed(comm_, [&] {
+    comm_.agree([&] {
       order_->make_room(kGroup, room);
       for (std::int64_t group = 0; group * kGroup < content_.columns; ++group) {
         const int width = find_width(content_.columns, group);
@@ -331,8 +318,7 @@ std::string CheckpointFile::verify() {
   } catch (const SystemError& error) {
     return std::string("it cannot be read: ") + error.what();
   }
-  MPI_Allreduce(MPI_IN_PLACE, &sum, 1, MPI_UINT64_T, MPI_SUM, comm_);
-  return sum == content_.sum ? "" : "it is damaged";
+  return comm_.sum(sum) == content_.sum ? "" : "it is damaged";
 }
 
 std::int64_t CheckpointFile::find_place(std::int64_t data_at, std::int64_t group, int width) const {
@@ -343,14 +329,14 @@ void CheckpointFile::read_columns(std::int64_t first, const eigen::Columns& into
   SharedFile file(comm_, file_, SharedFile::Use::read);
   NodeOrder::Room room;
   std::vector<double> rows;  // of a group
-  petsc::run_agreed(comm_, [&] {
+  comm_.agree([&] {
     order_->make_room(kGroup, room);
     rows.resize(static_cast<std::size_t>(into.rows) * kGroup);
   });
   const std::int64_t last = first + into.count;
   for (std::int64_t group = first / kGroup; group * kGroup < last; ++group) {
     const eigen::Columns part{rows.data(), into.rows, into.rows, find_width(content_.columns, group)};
-    petsc::run_agreed(comm_, [&] {
+    comm_.agree([&] {
       room.records.resize(static_cast<std::size_t>(order_->count() * 3 * part.count));
       file.read(find_place(content_.data_at, group, part.count), room.records.data(), room.records.size() * sizeof(double));
     });
@@ -362,22 +348,22 @@ void CheckpointFile::read_columns(std::int64_t first, const eigen::Columns& into
   }
 }
 
-/// Says why the file is not resumed from, and gives it another name: it may be worth something to somebody.
+/// Warns why the file is not resumed from, and renames it, so that its owner can still use it.
 void CheckpointFile::set_aside(const std::string& why) {
   is_there_ = false;
   checkpoint_.numbers.clear();
   checkpoint_.column_count = 0;
-  if (rank_ == 0) {
+  if (comm_.is_root()) {
     const fs::path aside = file_.string() + ".aside";
     const bool is_moved = ::rename(file_.c_str(), aside.c_str()) == 0;
-    stations_.warn(fmt::format("{}: the checkpoint is not resumed from, because {}{}", file_.string(), why,
-                               is_moved ? "; it is now " + aside.filename().string() : ""));
+    host_.warn(fmt::format("{}: the checkpoint is not resumed from, because {}{}", file_.string(), why,
+                           is_moved ? "; it is now " + aside.filename().string() : ""));
   }
   MPI_Barrier(comm_);
 }
 
 bool CheckpointFile::save(const std::string& numbers, const std::vector<eigen::Columns>& columns) {
-  if (is_ahead()) return true;  // What is kept is of a later setting, and worth more.
+  if (is_ahead()) return true;  // The file is of a later setting: keep it.
   const petsc::WorkScope scope(petsc::WorkPhase::kWrite);
   const auto start = Clock::now();
   std::string trouble;
@@ -389,15 +375,15 @@ bool CheckpointFile::save(const std::string& numbers, const std::vector<eigen::C
   last_save_ = Clock::now();
   save_seconds_ = std::chrono::duration<double>(last_save_ - start).count();
   if (trouble.empty()) {
-    is_there_ = false;  // What it was is in the past.
+    is_there_ = false;  // The content of the former run is replaced.
     was_saved_ = true;
     last_trouble_.clear();
     return true;
   }
-  if (rank_ == 0) ::unlink(temporary_.c_str());
+  if (comm_.is_root()) ::unlink(temporary_.c_str());
   if (trouble != last_trouble_)
-    stations_.warn(
-        fmt::format("{}: the checkpoint cannot be saved: {}; the solve goes on, and the one before stays", file_.string(), trouble));
+    host_.warn(
+        fmt::format("{}: the checkpoint cannot be saved: {}; the solve continues, and the previous one stays", file_.string(), trouble));
   last_trouble_ = trouble;
   return false;
 }
@@ -408,8 +394,8 @@ void CheckpointFile::write(const std::string& numbers, const std::vector<eigen::
   for (const eigen::Columns& part : columns) count += part.count;
   RawHeader header{};
   std::string text;
-  petsc::run_agreed(comm_, [&] {
-    if (rank_ == 0) ::unlink(temporary_.c_str());  // of a run that was killed
+  comm_.agree([&] {
+    if (comm_.is_root()) ::unlink(temporary_.c_str());  // of a run that was killed
   });
   eigen::NumberWriter settings;
   settings.add(static_cast<std::int64_t>(settings_.size()));
@@ -430,8 +416,8 @@ void CheckpointFile::write(const std::string& numbers, const std::vector<eigen::
   SharedFile file(comm_, temporary_, SharedFile::Use::create);
   header.sum = write_columns(file, data_at, count, columns);
   file.sync();
-  petsc::run_agreed(comm_, [&] {
-    if (rank_ != 0) return;
+  comm_.agree([&] {
+    if (!comm_.is_root()) return;
     header.sha256 = seal(header, text);
     std::string start(reinterpret_cast<const char*>(&header), sizeof header);
     start += text;
@@ -455,7 +441,7 @@ std::uint64_t CheckpointFile::write_columns(SharedFile& file, std::int64_t data_
   for (const eigen::Columns& part : columns)
     for (int j = 0; j < part.count; ++j) all.push_back(part.column(j));
   NodeOrder::Room room;
-  petsc::run_agreed(comm_, [&] { order_->make_room(kGroup, room); });
+  comm_.agree([&] { order_->make_room(kGroup, room); });
   std::exception_ptr trouble;
   std::uint64_t sum = 0;
   for (std::int64_t group = 0; group * kGroup < count; ++group) {
@@ -469,30 +455,24 @@ std::uint64_t CheckpointFile::write_columns(SharedFile& file, std::int64_t data_
       trouble = std::current_exception();
     }
   }
-  petsc::agree(comm_, trouble);
-  MPI_Allreduce(MPI_IN_PLACE, &sum, 1, MPI_UINT64_T, MPI_SUM, comm_);
-  return sum;
+  comm_.agree(trouble);
+  return comm_.sum(sum);
 }
 
 void CheckpointFile::end() {
   checkpoint_.numbers.clear();
   checkpoint_.column_count = 0;
   order_.reset();
-  set_news(false);
+  host_.set_unsaved(false);
 }
 
-eigen::Wish CheckpointFile::vote() const {
-  const eigen::Wish mine = checkpoint_.ask();
-  std::array<int, 2> any{mine.stop ? 1 : 0, mine.save ? 1 : 0};
-  MPI_Allreduce(MPI_IN_PLACE, any.data(), 2, MPI_INT, MPI_MAX, comm_);
-  return {any[0] != 0, any[1] != 0};
-}
+eigen::CheckpointRequest CheckpointFile::vote() const { return eigen::vote(comm_, checkpoint_); }
 
-void CheckpointFile::finish() { set_news(true); }
+void CheckpointFile::finish() { host_.set_unsaved(true); }
 
 void CheckpointFile::remove() {
   is_there_ = false;
-  if (rank_ != 0) return;
+  if (!comm_.is_root()) return;
   ::unlink(temporary_.c_str());
   ::unlink(file_.c_str());
 }

@@ -1,7 +1,5 @@
-// The file that a solve is saved to on its way, and resumed from.
+// Checkpoint file of a solve.
 #pragma once
-
-#include <mpi.h>
 
 #include <array>
 #include <chrono>
@@ -12,40 +10,46 @@
 #include <string>
 #include <vector>
 
+#include "precompute/comm/communicator.hpp"
 #include "precompute/eigen/checkpoint.hpp"
-#include "precompute/io/body.hpp"
 #include "precompute/io/fingerprint.hpp"
 #include "precompute/io/node_order.hpp"
-#include "precompute/io/run_record.hpp"
 
 namespace carillon::io {
 
 class SharedFile;
 
-/// One file for one run: a header, what the run has decided, the numbers of the solve, and its columns in the order of the mesh's nodes,
-/// written and read by all ranks at once through MPI. docs/decisions/checkpoint.md has the layout. It appears whole or not at all: the old
-/// one stays until the new one is on the disk. What is damaged, of another job, mesh or version is said in one line and left alone until
-/// there is something to save. Everything is collective unless it says otherwise.
+/// What a checkpoint file asks of the run that it belongs to, and reports to it. None may be empty.
+struct CheckpointHost {
+  std::function<void(const std::string&)> log, warn;  // one line; on every rank, printed on rank 0
+  std::function<bool()> is_stop_requested;            // by a signal to this process; local
+  std::function<void(bool)> set_unsaved;              // whether a save would keep something new; local
+};
+
+/// One file for one run: a header, the settings that the run tried, the numbers of the solve, and its columns in the order of the mesh's
+/// nodes, written and read by all ranks at once (pwrite, pread). docs/decisions/checkpoint.md has the layout. It appears whole or not at
+/// all: the old one stays until the new one is on the disk. A file that is damaged or of another job, mesh or version is warned of in one
+/// line and renamed to <file>.aside. Everything is collective unless it says otherwise.
 class CheckpointFile {
  public:
-  /// job: fingerprint of what is asked for and of who solves. Looks at the file, if there is one. Warnings go to stations.
-  CheckpointFile(MPI_Comm comm, std::filesystem::path file, double every_s, const Fingerprint& job, Stations& stations);
+  /// job: fingerprint of what is asked for and of who solves. Looks at the file, if there is one.
+  CheckpointFile(const comm::Communicator& comm, std::filesystem::path file, double every_s, const Fingerprint& job, CheckpointHost host);
   ~CheckpointFile();
   CheckpointFile(const CheckpointFile&) = delete;
   CheckpointFile& operator=(const CheckpointFile&) = delete;
 
-  /// The setting that the run that left the file tried after `trials` others; null where it says nothing.
+  /// The setting that the saved run tried after `trials` others; null: unknown.
   const Setting* find_setting(std::size_t trials) const;
   /// A solve begins: of this setting and system, the nodes as they lie on the ranks. Until it ends, get() may be used.
-  void begin(const Setting& setting, const Fingerprint& system, const fem::LocalMesh& local);
+  void begin(const Setting& setting, const Fingerprint& system, const partition::LocalMesh& local);
   eigen::Checkpoint& get() { return checkpoint_; }
   /// The solve is over; what comes next belongs to another.
   void end();
-  /// What any rank wishes.
-  eigen::Wish vote() const;
-  /// From now on the run goes to its end, which is near.
+  /// The requests of all ranks, combined.
+  eigen::CheckpointRequest vote() const;
+  /// No more requests to stop are honoured: the run is about to end.
   void finish();
-  /// The bank is whole: nothing is to be resumed.
+  /// Removes the file: the bank is complete.
   void remove();
   /// Whether this run has saved something.
   bool was_saved() const { return was_saved_; }
@@ -73,14 +77,13 @@ class CheckpointFile {
   std::string cut_version() const;
   bool is_ahead() const { return is_there_ && settings_.size() < kept_settings_.size(); }
 
-  MPI_Comm comm_;
-  int rank_ = 0;
+  comm::Communicator comm_;
   std::filesystem::path file_;
   std::filesystem::path temporary_;
   double every_s_;
   Fingerprint job_;
-  Stations& stations_;
-  bool is_there_ = false;               // the file holds what this job may go on from,
+  CheckpointHost host_;
+  bool is_there_ = false;               // the file can be resumed from by this job,
   Content content_;                     // which is this,
   std::vector<Setting> kept_settings_;  // and what was tried before it, itself the last
   std::vector<Setting> settings_;       // the same of this run

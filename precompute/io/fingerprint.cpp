@@ -1,7 +1,7 @@
 // Method:     What lies on one rank or is the same on all goes through SHA-256. Nodes and elements lie where the partition put them: each
-//             is mixed to 64 bits by itself, its number in the mesh included, and their sum knows no order.
+//             is mixed to 64 bits by itself, its number in the mesh included, and their sum does not depend on the order.
 // Source:     Bellare, Micciancio, A new paradigm for collision-free hashing, EUROCRYPT 1997 (sums). FIPS 180-4 (SHA-256).
-// Deviations: the sums guard against mistakes and damage; somebody who wants two meshes to have one sum can make them.
+// Deviations: the sums guard against mistakes and damage; two meshes with the same sum can be made on purpose.
 #include "precompute/io/fingerprint.hpp"
 
 #include <json/json.h>
@@ -9,7 +9,6 @@
 #include <bit>
 #include <sstream>
 
-#include "precompute/io/run_record.hpp"
 #include "precompute/petsc/noise.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/version/version.hpp"
@@ -55,7 +54,8 @@ Fingerprint find_job_fingerprint(const job::JobSpec& job, const std::vector<std:
   return base::calc_sha256(text);
 }
 
-Fingerprint find_system_fingerprint(MPI_Comm comm, const Fingerprint& job, const Setting& setting, const fem::LocalMesh& local) {
+Fingerprint find_system_fingerprint(const comm::Communicator& comm, const Fingerprint& job, const Setting& setting,
+                                    const partition::LocalMesh& local) {
   std::array<std::uint64_t, 4> sums{};  // of nodes, of elements; how many
   for (std::int32_t i = 0; i < local.owned_nodes; ++i) {
     const auto at = static_cast<std::size_t>(i);
@@ -74,7 +74,7 @@ Fingerprint find_system_fingerprint(MPI_Comm comm, const Fingerprint& job, const
   }
   sums[2] = static_cast<std::uint64_t>(local.owned_nodes);
   sums[3] = local.tet_in_mesh.size();
-  MPI_Allreduce(MPI_IN_PLACE, sums.data(), 4, MPI_UINT64_T, MPI_SUM, comm);
+  comm.sum(sums);
   eigen::NumberWriter all;
   all.bytes.assign(reinterpret_cast<const char*>(job.data()), job.size());
   for (const std::uint64_t sum : sums) all.add(static_cast<std::int64_t>(sum));

@@ -1,4 +1,4 @@
-// Whether two solves are of the same system, whatever ranks they run on.
+// Fingerprints of jobs and systems, the same for every number of ranks.
 #pragma once
 
 #include <mpi.h>
@@ -9,12 +9,15 @@
 #include <string_view>
 #include <vector>
 
+#include "partition/distributed_mesh.hpp"
+#include "precompute/comm/communicator.hpp"
 #include "precompute/eigen/checkpoint.hpp"
-#include "precompute/fem/distribute.hpp"
-#include "precompute/io/body.hpp"
+#include "precompute/job/setting.hpp"
 #include "runtime/base/sha256.hpp"
 
 namespace carillon::io {
+
+using job::Setting;
 
 using Fingerprint = base::Sha256::Hash;
 
@@ -23,7 +26,8 @@ Fingerprint find_job_fingerprint(const job::JobSpec& job, const std::vector<std:
 
 /// Of the job, the setting, and every node and element of the mesh with the bits of its numbers. The same on every rank and for every
 /// number of ranks. Collective.
-Fingerprint find_system_fingerprint(MPI_Comm comm, const Fingerprint& job, const Setting& setting, const fem::LocalMesh& local);
+Fingerprint find_system_fingerprint(const comm::Communicator& comm, const Fingerprint& job, const Setting& setting,
+                                    const partition::LocalMesh& local);
 
 /// A setting as numbers, and back. Throws InputError for what is none.
 void write_setting(eigen::NumberWriter& to, const Setting& setting);
@@ -32,7 +36,7 @@ Setting read_setting(eigen::NumberReader& from);
 /// "0.1.0 (3403b64...)"
 std::string find_program_version();
 
-/// A number of 64 bits of a few others and their order; for sums that tell whether a set of records is what it was.
+/// A number of 64 bits of a few others and their order; for sums that show whether a set of records has changed.
 class Mixer {
  public:
   explicit Mixer(std::uint64_t seed) : state_(seed * 0x9E3779B97F4A7C15ull + 0x2545F4914F6CDD1Dull) {}

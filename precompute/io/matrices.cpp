@@ -32,11 +32,8 @@ constexpr std::size_t kPieceBytes = std::size_t{1} << 22;
 using NextPiece = std::function<void(std::string& piece)>;
 
 /// The pieces of rank 0, then those of rank 1 and so on, in one file. Collective; fails on all ranks alike.
-void write_in_turn(MPI_Comm comm, const fs::path& file, const std::string& head, const NextPiece& next_piece) {
-  int rank = 0;
-  int ranks = 1;
-  MPI_Comm_rank(comm, &rank);
-  MPI_Comm_size(comm, &ranks);
+void write_in_turn(const comm::Communicator& comm, const fs::path& file, const std::string& head, const NextPiece& next_piece) {
+  const int rank = comm.rank();
   std::exception_ptr error;
   const auto attempt = [&](const auto& step) {
     if (error) return;
@@ -54,7 +51,7 @@ void write_in_turn(MPI_Comm comm, const fs::path& file, const std::string& head,
     });
   }
   std::string piece;
-  for (int turn = 0; turn < ranks; ++turn) {
+  for (int turn = 0; turn < comm.size(); ++turn) {
     for (std::int64_t size = 1; size > 0;) {
       piece.clear();
       if (rank == turn) attempt([&] { next_piece(piece); });
@@ -68,21 +65,16 @@ void write_in_turn(MPI_Comm comm, const fs::path& file, const std::string& head,
       if (rank == 0) attempt([&] { whole->append(piece); });
     }
   }
-  petsc::agree(comm, error);
-  petsc::run_agreed(comm, [&] {
+  comm.agree(error);
+  comm.agree([&] {
     if (rank == 0) whole->commit();
   });
 }
 
 /// By row of K and M in nodes: the place of the node among the free nodes in the order of the mesh. The same on every rank.
-std::vector<std::int32_t> find_places(MPI_Comm comm, const fem::LocalMesh& local) {
-  int ranks = 1;
-  MPI_Comm_size(comm, &ranks);
-  std::vector<int> counts(static_cast<std::size_t>(ranks)), starts(counts);
-  MPI_Allgather(&local.free_nodes, 1, MPI_INT, counts.data(), 1, MPI_INT, comm);
-  std::exclusive_scan(counts.begin(), counts.end(), starts.begin(), 0);
-  std::vector<std::int32_t> in_mesh(static_cast<std::size_t>(starts.back() + counts.back()));
-  MPI_Allgatherv(local.node_in_mesh.data(), local.free_nodes, MPI_INT32_T, in_mesh.data(), counts.data(), starts.data(), MPI_INT32_T, comm);
+std::vector<std::int32_t> find_places(const comm::Communicator& comm, const partition::LocalMesh& local) {
+  const auto in_mesh =
+      comm.all_gather([&] { return std::vector(local.node_in_mesh.begin(), local.node_in_mesh.begin() + local.free_nodes); });
   std::vector<std::int32_t> order(in_mesh.size()), places(in_mesh.size());
   std::iota(order.begin(), order.end(), 0);
   std::sort(order.begin(), order.end(),
@@ -107,18 +99,19 @@ void visit_row(Mat matrix, PetscInt row, const std::vector<std::int32_t>& places
   check(MatRestoreRow(matrix, row, &count, &columns, &values));
 }
 
-void write_matrix(const Run& run, const fs::path& file, const std::string& what, Mat matrix, const std::vector<std::int32_t>& places) {
+void write_matrix(const comm::Communicator& comm, const fs::path& file, const std::string& what, Mat matrix,
+                  const std::vector<std::int32_t>& places) {
   PetscInt first = 0;
   PetscInt last = 0;
   check(MatGetOwnershipRange(matrix, &first, &last));
   std::int64_t entries = 0;
   for (PetscInt row = first; row < last; ++row) visit_row(matrix, row, places, [&](std::int64_t, std::int64_t, double) { ++entries; });
-  MPI_Allreduce(MPI_IN_PLACE, &entries, 1, MPI_INT64_T, MPI_SUM, run.comm);
+  entries = comm.sum(entries);
   const std::size_t n = 3 * places.size();
   const std::string head =
       fmt::format("%%MatrixMarket matrix coordinate real symmetric\n% {}; rows: nodes.csv\n{} {} {}\n", what, n, n, entries);
   PetscInt row = first;
-  write_in_turn(run.comm, file, head, [&](std::string& piece) {
+  write_in_turn(comm, file, head, [&](std::string& piece) {
     for (; row < last && piece.size() < kPieceBytes; ++row) {
       visit_row(matrix, row, places, [&](std::int64_t i, std::int64_t j, double value) {
         fmt::format_to(std::back_inserter(piece), "{} {} {:.17g}\n", i, j, value);
@@ -127,8 +120,8 @@ void write_matrix(const Run& run, const fs::path& file, const std::string& what,
   });
 }
 
-void write_nodes(const Run& run, const fs::path& file, const fem::LocalMesh& local) {
-  const NodeOrder order(run.comm, local);
+void write_nodes(const comm::Communicator& comm, const fs::path& file, const partition::LocalMesh& local) {
+  NodeOrder order(comm, local);
   std::vector<double> positions, numbers;
   for (std::int32_t i = 0; i < local.free_nodes; ++i) {
     for (const double x : local.nodes_m[static_cast<std::size_t>(i)]) positions.push_back(x);
@@ -138,7 +131,7 @@ void write_nodes(const Run& run, const fs::path& file, const fem::LocalMesh& loc
   const std::vector<const double*> columns{numbers.data(), positions.data()};
   order.to_records(columns, room);
   std::int64_t node = 0;
-  write_in_turn(run.comm, file, "node,x_m,y_m,z_m\n", [&](std::string& piece) {
+  write_in_turn(comm, file, "node,x_m,y_m,z_m\n", [&](std::string& piece) {
     for (; node < order.count() && piece.size() < kPieceBytes; ++node) {
       const double* record = room.records.data() + 6 * node;
       fmt::format_to(std::back_inserter(piece), "{:.0f},{:.17g},{:.17g},{:.17g}\n", record[0], record[1], record[3], record[5]);
@@ -148,24 +141,19 @@ void write_nodes(const Run& run, const fs::path& file, const fem::LocalMesh& loc
 
 }  // namespace
 
-void check_matrices(const Run& run) {
-  const fs::path& folder = run.options.matrices;
+void check_matrices(const comm::Communicator& comm, const fs::path& folder) {
   if (folder.empty()) return;
-  petsc::run_agreed(run.comm, [&] {
-    if (run.rank != 0) return;
+  comm.agree([&] {
+    if (!comm.is_root()) return;
     for (const char* name : {"stiffness.mtx", "mass.mtx", "nodes.csv"}) base::check_writable(folder / name, "file of the matrices");
   });
 }
 
-void write_matrices(Run& run, const Body& body, const fem::System& system) {
-  const fs::path& folder = run.options.matrices;
-  if (folder.empty()) return;
-  run.stations.begin("matrices", folder.string());
-  const std::vector<std::int32_t> places = find_places(run.comm, body.pieces.local);
-  write_matrix(run, folder / "stiffness.mtx", "stiffness matrix K [N/m]", system.stiffness, places);
-  write_matrix(run, folder / "mass.mtx", "mass matrix M [kg]", system.mass, places);
-  write_nodes(run, folder / "nodes.csv", body.pieces.local);
-  run.stations.end();
+void write_matrices(const comm::Communicator& comm, const fs::path& folder, const partition::LocalMesh& local, const fem::System& system) {
+  const std::vector<std::int32_t> places = find_places(comm, local);
+  write_matrix(comm, folder / "stiffness.mtx", "stiffness matrix K [N/m]", system.stiffness, places);
+  write_matrix(comm, folder / "mass.mtx", "mass matrix M [kg]", system.mass, places);
+  write_nodes(comm, folder / "nodes.csv", local);
 }
 
 }  // namespace carillon::io

@@ -1,14 +1,13 @@
-// Rows of the ranks in an order that knows of no ranks: that of the mesh's nodes.
+// Rows of the ranks in an order that does not depend on the partition: that of the mesh's nodes.
 #pragma once
-
-#include <mpi.h>
 
 #include <cstdint>
 #include <span>
 #include <vector>
 
-#include "precompute/eigen/block_kernels.hpp"
-#include "precompute/fem/distribute.hpp"
+#include "partition/distributed_mesh.hpp"
+#include "precompute/comm/exchange.hpp"
+#include "precompute/la/block_kernels.hpp"
 
 namespace carillon::io {
 
@@ -17,7 +16,7 @@ namespace carillon::io {
 class NodeOrder {
  public:
   /// Collective.
-  NodeOrder(MPI_Comm comm, const fem::LocalMesh& local);
+  NodeOrder(const comm::Communicator& comm, const partition::LocalMesh& local);
 
   std::int64_t first() const { return first_; }                                    // place of this rank's stretch,
   std::int64_t count() const { return static_cast<std::int64_t>(place_.size()); }  // how many nodes it has,
@@ -28,16 +27,15 @@ class NodeOrder {
     std::vector<double> sent, come, records;
   };
   /// For so many columns at a time. Local; what follows then takes no more memory.
-  void make_room(int columns, Room& room) const;
+  void make_room(int columns, Room& room);
   /// columns: where each begins, this rank's rows of K. Collective.
-  void to_records(std::span<const double* const> columns, Room& room) const;
-  void from_records(Room& room, const eigen::Columns& columns) const;
+  void to_records(std::span<const double* const> columns, Room& room);
+  void from_records(Room& room, const la::Columns& columns);
 
  private:
-  MPI_Comm comm_;
-  std::vector<std::int32_t> row_;                   // own free nodes as they are sent: by rank
-  std::vector<int> sent_, sent_at_, got_, got_at_;  // nodes to and from each rank
-  std::vector<std::int32_t> place_;                 // of nodes as they come in, within this rank's stretch
+  std::vector<std::int32_t> row_;  // own free nodes as they are sent: by rank
+  comm::Exchange exchange_;
+  std::vector<std::int32_t> place_;  // of nodes as they come in, within this rank's stretch
   std::int64_t first_ = 0;
   std::int64_t all_ = 0;
 };

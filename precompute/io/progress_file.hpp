@@ -1,58 +1,43 @@
-// How far a run is, in a file that others read while it runs.
+// The file of --progress: one JSON object a line, which others read during the run.
 #pragma once
 
-#include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <filesystem>
-#include <mutex>
+#include <optional>
 #include <string>
-#include <thread>
 
-#include "precompute/eigen/solve_modes.hpp"
-#include "precompute/io/costs.hpp"
-#include "precompute/io/run_estimate.hpp"
+#include "runtime/base/descriptor.hpp"
 
 namespace carillon::io {
 
-/// Appends lines of JSON: {"phase": "factor", "percent": 31.4, "modes_done": 0, "modes_wanted": 228, "seconds_left": 8.1, "seconds": 3.7}.
-/// A line at every phase, and every half second in between while anything moves. percent is of the whole run and never falls; the last line
-/// has the phase "done" and 100. What is not known yet ("modes_wanted", "seconds_left") is left out. A thread of its own writes the lines
-/// in between. Used on rank 0 only.
+/// What a line says. Unknown members are left out.
+struct ProgressLine {
+  std::string phase;
+  double percent = 0;  // of the whole run
+  std::int64_t modes_done = 0;
+  std::optional<std::int64_t> modes_wanted;
+  std::optional<double> seconds_left;
+  double seconds = 0;  // since the run began
+};
+
+/// {"phase": "factor", "percent": 31.40, "modes_done": 0, "modes_wanted": 228, "seconds_left": 8.1, "seconds": 3.70} and a line break.
+std::string format_progress(const ProgressLine& line);
+
+/// Appends whole lines, each by one write(2), so that a reader never sees a line of two runs mixed. A line equal to the one before, but for
+/// its times, is left out. Not thread-safe.
 class ProgressFile {
  public:
-  /// Throws InputError when the file is no regular file or character device, or cannot be appended to.
-  ProgressFile(const std::filesystem::path& file, int ranks);
-  ~ProgressFile();
-  ProgressFile(const ProgressFile&) = delete;
-  ProgressFile& operator=(const ProgressFile&) = delete;
+  /// Throws InputError when the file is no regular file or character device, or cannot be appended to. A name without a folder may be no
+  /// symbolic link.
+  explicit ProgressFile(const std::filesystem::path& file);
 
-  /// A station of the run begins.
-  void begin(const std::string& station);
-  /// What is known of the body by now.
-  void learn(const Extent& extent);
-  /// The solver has got so far.
-  void advance(const eigen::Progress& progress);
-  /// The last line.
-  void finish();
-  /// The settings that are tried for "accuracy_cents" before the last one; how many is not known beforehand.
-  void expect_trials();
+  /// False when the disk refuses for the first time; errno says why. Later lines are dropped.
+  bool append(const ProgressLine& line);
 
  private:
-  double find_seconds() const;
-  void write_line();
-  void run();
-
-  int file_ = -1;
-  std::chrono::steady_clock::time_point start_;
-  std::mutex mutex_;  // of all below
-  RunEstimate estimate_;
-  std::string phase_;
-  std::string last_;  // line, without its seconds
+  base::Descriptor file_;
+  std::string last_;  // line without its times
   bool is_broken_ = false;
-  bool is_over_ = false;
-  std::condition_variable over_;
-  std::thread writer_;
 };
 
 }  // namespace carillon::io

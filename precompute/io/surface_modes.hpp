@@ -1,13 +1,13 @@
 // Modes as a bank keeps them: shapes on the surface as 16-bit steps, and how loud each mode is.
 #pragma once
 
-#include <mpi.h>
 #include <petscmat.h>
 
 #include <cstdint>
 #include <span>
 #include <vector>
 
+#include "precompute/comm/communicator.hpp"
 #include "precompute/io/radiation.hpp"
 
 namespace carillon::io {
@@ -16,7 +16,7 @@ namespace carillon::io {
 struct Surface {
   std::vector<Vec3> vertices_m;     // (V) in the order of the mesh's nodes
   std::vector<Triangle> triangles;  // (T) of vertices, counter-clockwise from outside
-  std::vector<std::int32_t> row;    // (V) r stands for the rows 3 r, 3 r + 1, 3 r + 2 of the shapes; -1: held, at rest
+  std::vector<std::int32_t> row;    // (V) r stands for the rows 3 r, 3 r + 1, 3 r + 2 of the shapes; -1: fixed, at rest
 };
 
 struct SurfaceModes {
@@ -29,6 +29,6 @@ struct SurfaceModes {
 /// shapes: dense (3n, m) [kg^-1/2], or null when there are no modes; omega_rad_s: (m).
 /// shape and shape_scale have the same bits for every number of ranks, radiation_gain the same to rounding.
 /// Collective. Throws SolveError on every rank when a shape is not finite, SystemError when memory runs out.
-SurfaceModes calc_surface_modes(MPI_Comm comm, Mat shapes, std::span<const double> omega_rad_s, const Surface& surface);
+SurfaceModes calc_surface_modes(const comm::Communicator& comm, Mat shapes, std::span<const double> omega_rad_s, const Surface& surface);
 
 }  // namespace carillon::io

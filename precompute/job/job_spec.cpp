@@ -12,13 +12,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kMostHz = 1e12;
-constexpr std::size_t kMostFixed = 1000, kMostRegions = 10000;
+constexpr double kMaxHz = 1e12;
+constexpr std::size_t kMaxFixed = 1000, kMaxRegions = 10000;
 constexpr std::size_t kLongestName = 200;  // bytes
-constexpr long long kMostRanks = 1'000'000;
-constexpr double kMostGb = 1e9, kMostSeconds = 1e9;
-constexpr double kLeastScale = 1e-9, kMostScale = 1e6;
-constexpr double kLeastCents = 1e-3, kMostCents = 1200;
+constexpr long long kMaxRanks = 1'000'000;
+constexpr double kMaxGb = 1e9, kMaxSeconds = 1e9;
+constexpr double kMinScale = 1e-9, kMaxScale = 1e6;
+constexpr double kMinCents = 1e-3, kMaxCents = 1200;
 
 /// The words of a schema and their meaning; a job may write `words` only.
 template <class Choice>
@@ -78,7 +78,7 @@ Fixed read_fixed(base::Object fixed) {
 /// A node set's name, an object, or a list of both.
 std::vector<Fixed> read_all_fixed(base::Object& job) {
   std::vector<Fixed> list;
-  for (base::Entry& entry : job.entries("fixed", kMostFixed)) {
+  for (base::Entry& entry : job.entries("fixed", kMaxFixed)) {
     Fixed& fixed = list.emplace_back(entry.object ? read_fixed(*entry.object) : Fixed{entry.text, {}, {}, {}, {}});
     fixed.place = entry.place;
   }
@@ -88,11 +88,11 @@ std::vector<Fixed> read_all_fixed(base::Object& job) {
 void read_materials(base::Object& job, JobSpec& spec) {
   const auto read = [&](base::Object object) { return read_material(std::move(object), spec.band_hz, spec.warnings); };
   if (auto materials = job.object_if("materials")) {
-    if (materials->keys().empty() || materials->keys().size() > kMostRegions)
+    if (materials->keys().empty() || materials->keys().size() > kMaxRegions)
       job.fail("materials",
                fmt::format("holds one material for each region of the mesh, by its tag or name: {{\"1\": {{...}}, \"2\": {{...}}}}; "
                            "give 1 to {}",
-                           kMostRegions));
+                           kMaxRegions));
     for (const std::string& region : materials->keys()) {
       if (region.empty()) materials->fail("", "a region's name is empty; give its tag or its name");
       spec.materials[region] = read(materials->object(region));
@@ -116,9 +116,9 @@ void read_solver(base::Object& job, JobSpec& spec) {
 void read_resources(base::Object& job, JobSpec& spec) {
   auto resources = job.object_if("resources");
   if (!resources) return;
-  if (auto ranks = resources->integer_if("ranks", 1, kMostRanks)) spec.resources.ranks = static_cast<int>(*ranks);
-  spec.resources.memory_gb = resources->number_if("memory_gb", {0.0, kMostGb}).value_or(0.0);
-  spec.resources.time_limit_s = resources->number_if("time_limit_s", {0.0, kMostSeconds}).value_or(0.0);
+  if (auto ranks = resources->integer_if("ranks", 1, kMaxRanks)) spec.resources.ranks = static_cast<int>(*ranks);
+  spec.resources.memory_gb = resources->number_if("memory_gb", {0.0, kMaxGb}).value_or(0.0);
+  spec.resources.time_limit_s = resources->number_if("time_limit_s", {0.0, kMaxSeconds}).value_or(0.0);
   resources->finish();
 }
 
@@ -131,9 +131,9 @@ void read_geometry(base::Object& job, JobSpec& spec) {
   } else {
     spec.mesh = job.path("mesh");
     spec.mesh_scale = job.number_or("mesh_scale", spec.mesh_scale, base::kPositive);
-    if (spec.mesh_scale < kLeastScale || spec.mesh_scale > kMostScale)
+    if (spec.mesh_scale < kMinScale || spec.mesh_scale > kMaxScale)
       job.fail("mesh_scale", fmt::format("metres per unit of the mesh file, from {:g} to {:g} (0.001 for millimetres), and is {:g}",
-                                         kLeastScale, kMostScale, spec.mesh_scale));
+                                         kMinScale, kMaxScale, spec.mesh_scale));
   }
   if (!spec.accuracy_cents) return;
   if (job.has("element")) job.fail("element", "\"accuracy_cents\" chooses the element; give one of the two");
@@ -164,9 +164,8 @@ JobSpec read_root(base::Object job, const fs::path& file, BankKey bank) {
   spec.file = file;
   if (job.has("accuracy_cents")) {
     spec.accuracy_cents = job.number("accuracy_cents", base::kPositive);
-    if (*spec.accuracy_cents < kLeastCents || *spec.accuracy_cents > kMostCents)
-      job.fail("accuracy_cents",
-               fmt::format("must be from {:g} to {:g} cents, and is {:g}", kLeastCents, kMostCents, *spec.accuracy_cents));
+    if (*spec.accuracy_cents < kMinCents || *spec.accuracy_cents > kMaxCents)
+      job.fail("accuracy_cents", fmt::format("must be from {:g} to {:g} cents, and is {:g}", kMinCents, kMaxCents, *spec.accuracy_cents));
   }
   read_geometry(job, spec);
   if (bank == BankKey::required || job.has("bank")) spec.bank = job.path("bank");
@@ -174,8 +173,7 @@ JobSpec read_root(base::Object job, const fs::path& file, BankKey bank) {
   if (!(spec.band_hz[0] > 0 && spec.band_hz[1] > spec.band_hz[0])) {
     job.fail("band_hz", fmt::format("must be [low, high] with 0 < low < high in Hz, and is [{}, {}]", spec.band_hz[0], spec.band_hz[1]));
   }
-  if (spec.band_hz[1] > kMostHz)
-    job.fail("band_hz", fmt::format("must end at {:g} Hz at most, and ends at {:g}", kMostHz, spec.band_hz[1]));
+  if (spec.band_hz[1] > kMaxHz) job.fail("band_hz", fmt::format("must end at {:g} Hz at most, and ends at {:g}", kMaxHz, spec.band_hz[1]));
   read_materials(job, spec);
   spec.element = kElements.read(job, "element", spec.element);
   spec.mass = kMasses.read(job, "mass", spec.mass);

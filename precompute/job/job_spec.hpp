@@ -66,7 +66,7 @@ struct JobSpec {
   Mass mass = Mass::consistent;
   std::array<double, 2> band_hz{20.0, 20000.0};
   std::optional<int> max_modes;          // the lowest that many of the band
-  std::vector<Fixed> fixed;              // their union is held; empty: a free body
+  std::vector<Fixed> fixed;              // their union is fixed; empty: a free body
   double tolerance = 1e-8;               // solver.tolerance: relative residual of every mode; a bank takes none above 1e-4
   std::optional<double> accuracy_cents;  // in place of element, the mesh's size and tolerance: those are then the program's to choose
   Method method = Method::automatic;     // solver.method
@@ -83,7 +83,7 @@ JobSpec read_job(const std::filesystem::path& file, BankKey bank = BankKey::requ
 /// The same from text; `file` names it in messages and anchors relative paths, `first_line` is the number of its first line there.
 JobSpec parse_job(std::string_view text, const std::filesystem::path& file, BankKey bank = BankKey::required, int first_line = 1);
 
-/// Where the resolved job goes: beside the bank, "<bank>.resolved.json".
+/// Where the resolved job goes: next to the bank, "<bank>.resolved.json".
 std::filesystem::path find_resolved_path(const std::filesystem::path& bank);
 
 /// The job as JSON text with every value used, "resources" left out. Paths are written relative to `folder` where they can be. `run_json`

@@ -1,11 +1,9 @@
 // Method: compliance of the nine constants, inverted and turned to the mesh's axes as a tensor of the fourth order; averages by Voigt,
-// Reuss
-//   and Hill; damping laws as functions of lambda, split by the energies of a mode.
+//   Reuss and Hill; damping laws as functions of lambda, split by the energies of a mode.
 // Source: Lekhnitskii 1981, "Theory of elasticity of an anisotropic body", section 3 (orthotropy); Hill 1952, Proc. Phys. Soc. A 65, 349;
 //   OSG02 section 3.3; vdDP96; Caughey 1960, J. Appl. Mech. 27, 269; Ungar and Kerwin 1962, J. Acoust. Soc. Am. 34, 954 (energy shares).
 // Deviations: a term of a Caughey series draws on the elastic energy from the power 1/2 on and on the kinetic energy below, so that the
-// powers
-//   1, 1/2 and 0 are Rayleigh's alpha1, internal friction and Rayleigh's alpha2.
+//   powers 1, 1/2 and 0 are Rayleigh's alpha1, internal friction and Rayleigh's alpha2.
 #include "precompute/job/material.hpp"
 
 #include <fmt/core.h>

@@ -42,7 +42,7 @@ struct LossRow {
 };
 
 /// Young's modulus and Poisson's ratio are derived where the job gives Lame's constants; of an orthotropic material they are those of the
-/// isotropic solid nearest to it (Hill's average of all orientations), for whoever needs one number.
+/// isotropic solid nearest to it (Hill's average of all orientations), for code that needs one number.
 struct Material {
   double young_modulus_pa = 0.0;
   double poisson_ratio = 0.0;

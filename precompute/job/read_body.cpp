@@ -9,14 +9,14 @@ namespace carillon::job {
 namespace {
 
 // As carillon-mesh has them.
-constexpr double kLeastLength = 1e-6, kMostLength = 1e4;      // [m]
-constexpr double kLeastOpening = 20.0, kMostOpening = 340.0;  // [degrees]
-constexpr long long kMostNodes = 20'000'000;
+constexpr double kMinLength = 1e-6, kMaxLength = 1e4;      // [m]
+constexpr double kMinOpening = 20.0, kMaxOpening = 340.0;  // [degrees]
+constexpr long long kMaxNodes = 20'000'000;
 
 double read_length(base::Object& body, const std::string& key) {
   const double value = body.number(key, base::kPositive);
-  if (value < kLeastLength || value > kMostLength)
-    body.fail(key, fmt::format("lengths are metres, from {:g} to {:g}, and this is {:g}", kLeastLength, kMostLength, value));
+  if (value < kMinLength || value > kMaxLength)
+    body.fail(key, fmt::format("lengths are metres, from {:g} to {:g}, and this is {:g}", kMinLength, kMaxLength, value));
   return value;
 }
 
@@ -38,8 +38,8 @@ void read_shape(base::Object& body, Body& result) {
         continue;
       }
       const double angle = body.number(key);
-      if (!(angle >= kLeastOpening && angle <= kMostOpening))
-        body.fail(key, fmt::format("must be {:g} to {:g} degrees (180 is a hemisphere), and is {:g}", kLeastOpening, kMostOpening, angle));
+      if (!(angle >= kMinOpening && angle <= kMaxOpening))
+        body.fail(key, fmt::format("must be {:g} to {:g} degrees (180 is a hemisphere), and is {:g}", kMinOpening, kMaxOpening, angle));
       result.dimensions[dimension] = angle;
     }
   }
@@ -92,9 +92,9 @@ Body read_body(base::Object body) {
   else
     read_surface(body, result);
   result.nodes = body.integer_if("nodes", 4, std::numeric_limits<long long>::max());
-  if (result.nodes.value_or(0) > kMostNodes)
+  if (result.nodes.value_or(0) > kMaxNodes)
     body.fail("nodes", fmt::format("the mesher makes at most {} nodes, and this asks for {}; larger bodies come as a \"mesh\" file",
-                                   kMostNodes, *result.nodes));
+                                   kMaxNodes, *result.nodes));
   result.edge_m = read_length_if(body, "edge_m");
   if (result.nodes && result.edge_m) body.fail("edge_m", "\"nodes\" says how fine the mesh is already; give one of them");
   body.finish();

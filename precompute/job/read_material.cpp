@@ -15,21 +15,21 @@ namespace carillon::job {
 namespace {
 
 // Far beyond every solid: what lies outside is a slip of the unit, and would only end in overflow later.
-using material::kLeastDensityKgM3, material::kLeastStiffnessPa, material::kMostDensityKgM3, material::kMostStiffnessPa;
-constexpr double kMostDampingS = 1e6, kMostDampingPerS = 1e12;
-constexpr double kMostLossFactor = 2;  // d = omega eta / 2: from here on no mode swings, whatever its frequency
-constexpr double kMostPower = 8;
+using material::kMinDensityKgM3, material::kMinStiffnessPa, material::kMaxDensityKgM3, material::kMaxStiffnessPa;
+constexpr double kMaxDampingS = 1e6, kMaxDampingPerS = 1e12;
+constexpr double kMaxLossFactor = 2;  // d = omega eta / 2: from here on no mode swings, whatever its frequency
+constexpr double kMaxPower = 8;
 
 [[noreturn]] void fail_unit(const base::Object& object, std::string_view key, double value) {
   const bool is_density = key == "density_kg_m3";
   object.fail(key, fmt::format("must be from {:g} to {:g}, a range that covers every solid, and is {:g}; check the unit{}",
-                               is_density ? kLeastDensityKgM3 : kLeastStiffnessPa, is_density ? kMostDensityKgM3 : kMostStiffnessPa, value,
-                               is_density && value < kLeastDensityKgM3 ? " (steel is 7850 kg/m^3, or 7.85e-9 t/mm^3)" : ""));
+                               is_density ? kMinDensityKgM3 : kMinStiffnessPa, is_density ? kMaxDensityKgM3 : kMaxStiffnessPa, value,
+                               is_density && value < kMinDensityKgM3 ? " (steel is 7850 kg/m^3, or 7.85e-9 t/mm^3)" : ""));
 }
 
-double read_positive(base::Object& object, std::string_view key, double most) {
+double read_positive(base::Object& object, std::string_view key, double max) {
   const double value = object.number(key, base::kPositive);
-  if (value < std::max(kLeastStiffnessPa, kLeastDensityKgM3) || value > most) fail_unit(object, key, value);
+  if (value < std::max(kMinStiffnessPa, kMinDensityKgM3) || value > max) fail_unit(object, key, value);
   return value;
 }
 
@@ -53,13 +53,13 @@ void read_isotropic(base::Object& material, Material& result) {
                   "give young_modulus_pa and poisson_ratio, or lame_lambda_pa and lame_mu_pa, not both pairs");
   }
   if (!lame) {
-    result.young_modulus_pa = read_positive(material, "young_modulus_pa", kMostStiffnessPa);
+    result.young_modulus_pa = read_positive(material, "young_modulus_pa", kMaxStiffnessPa);
     result.poisson_ratio = material.number("poisson_ratio", {-1.0, 0.5});
     check_definite(material, "poisson_ratio", result.poisson_ratio);
     return;
   }
-  const double mu = read_positive(material, "lame_mu_pa", kMostStiffnessPa);
-  const double lambda = material.number("lame_lambda_pa", {-kMostStiffnessPa, kMostStiffnessPa});
+  const double mu = read_positive(material, "lame_mu_pa", kMaxStiffnessPa);
+  const double lambda = material.number("lame_lambda_pa", {-kMaxStiffnessPa, kMaxStiffnessPa});
   // Positive definite: mu > 0 and 3 lambda + 2 mu > 0.
   if (!(3 * lambda + 2 * mu > 0))
     material.fail("lame_lambda_pa", fmt::format("must be greater than -2/3 of lame_mu_pa ({}), and is {}", -2 * mu / 3, lambda));
@@ -75,12 +75,12 @@ void read_axes(base::Object& orthotropic, Orthotropic& result) {
   std::array<std::array<double, 3>, 3> axis{};
   for (std::size_t r = 0; r < rows.size(); ++r) {
     std::copy(rows[r].begin(), rows[r].end(), axis[r].begin());
-    const double most = std::max({std::abs(axis[r][0]), std::abs(axis[r][1]), std::abs(axis[r][2])});
-    if (!(most > 0)) orthotropic.fail("axes", fmt::format("direction {} has no length", r + 1));
-    for (double& value : axis[r]) value /= most;
+    const double max = std::max({std::abs(axis[r][0]), std::abs(axis[r][1]), std::abs(axis[r][2])});
+    if (!(max > 0)) orthotropic.fail("axes", fmt::format("direction {} has no length", r + 1));
+    for (double& value : axis[r]) value /= max;
     const double length = std::sqrt(dot(axis[r], axis[r]));
     // A resolved job holds unit vectors already; those are taken as they are, so that it resolves to itself.
-    const bool is_unit = most == 1.0 ? std::abs(length - 1) < 1e-15 : std::abs(length * most - 1) < 4e-16;
+    const bool is_unit = max == 1.0 ? std::abs(length - 1) < 1e-15 : std::abs(length * max - 1) < 4e-16;
     for (std::size_t k = 0; k < 3; ++k) axis[r][k] = is_unit ? rows[r][k] : axis[r][k] / length;
   }
   constexpr double kSkew = 0.02;  // about one degree
@@ -106,7 +106,7 @@ void read_axes(base::Object& orthotropic, Orthotropic& result) {
   result.axes = axis;
 }
 
-/// The compliance, scaled to a unit diagonal, has -nu_ij sqrt(E_j / E_i) beside it; its least eigenvalue has to be positive.
+/// The compliance, scaled to a unit diagonal, has -nu_ij sqrt(E_j / E_i) off it; its least eigenvalue has to be positive.
 void check_orthotropic(base::Object& object, const Orthotropic& o) {
   const auto& e = o.young_modulus_pa;
   const auto& nu = o.poisson_ratio;
@@ -121,18 +121,18 @@ void check_orthotropic(base::Object& object, const Orthotropic& o) {
                               names[i], nu[i], std::abs(nu[i] / scaled[i])));
   // The eigenvalues of [0 a b; a 0 c; b c 0] are the roots of x^3 - p x - q, by Viete's formula.
   const double p = n12 * n12 + n23 * n23 + n13 * n13, q = -2 * n12 * n23 * n13;
-  double least = 1.0;
+  double min = 1.0;
   if (p > 0) {
     const double angle = std::acos(std::clamp(1.5 * q / p * std::sqrt(3 / p), -1.0, 1.0)) / 3;
-    least = 1 + 2 * std::sqrt(p / 3) * std::cos(angle + 2 * std::numbers::pi / 3);
+    min = 1 + 2 * std::sqrt(p / 3) * std::cos(angle + 2 * std::numbers::pi / 3);
   }
-  if (!(least > 2 * kMargin))  // 1 - 2 nu of an isotropic solid
+  if (!(min > 2 * kMargin))  // 1 - 2 nu of an isotropic solid
     object.fail(
         "poisson_ratio",
         fmt::format("the elasticity is not positive definite: the least eigenvalue of the compliance (scaled to a unit diagonal) is "
                     "{:.3g}, and has to be above {:g}; multiply the three ratios by less than {:.4g}, or check their order nu12, "
                     "nu23, nu13 with nu_ij / E_i = nu_ji / E_j",
-                    least, 2 * kMargin, 1 / (1 - least)));
+                    min, 2 * kMargin, 1 / (1 - min)));
 }
 
 void read_orthotropic(base::Object object, Material& result) {
@@ -141,7 +141,7 @@ void read_orthotropic(base::Object object, Material& result) {
        {std::pair{"young_modulus_pa", &o.young_modulus_pa}, std::pair{"shear_modulus_pa", &o.shear_modulus_pa}}) {
     *values = object.numbers<3>(key);
     for (const double value : *values)
-      if (!(value >= kLeastStiffnessPa && value <= kMostStiffnessPa)) fail_unit(object, key, value);
+      if (!(value >= kMinStiffnessPa && value <= kMaxStiffnessPa)) fail_unit(object, key, value);
   }
   o.poisson_ratio = object.numbers<3>("poisson_ratio");
   if (object.has("axes")) read_axes(object, o);
@@ -167,35 +167,34 @@ void read_elasticity(base::Object& material, Material& result) {
   read_orthotropic(*orthotropic, result);
 }
 
-double read_not_negative(base::Object& object, std::string_view key, double most) {
+double read_not_negative(base::Object& object, std::string_view key, double max) {
   const double value = object.number_or(key, 0.0);
-  if (value > most) object.fail(key, fmt::format("must be at most {:g}, and is {:g}; check the unit", most, value));
+  if (value > max) object.fail(key, fmt::format("must be at most {:g}, and is {:g}; check the unit", max, value));
   if (value < 0) object.fail(key, fmt::format("must not be negative, and is {}", value));
   return value;
 }
 
 /// Fails unless 0 <= loss < 2. what: "tan(phi)", "the loss factor at 100 Hz".
 void check_loss(base::Object& object, std::string_view key, const std::string& what, double loss) {
-  if (loss >= 0 && loss < kMostLossFactor) return;
+  if (loss >= 0 && loss < kMaxLossFactor) return;
   object.fail(key,
               fmt::format("{} must not be negative and must be below {:g}, where a mode's decay rate is its frequency and nothing swings "
                           "any more, and is {:g}; steel has 1e-4, wood 0.01, soft rubber up to 1",
-                          what, kMostLossFactor, loss));
+                          what, kMaxLossFactor, loss));
 }
 
 void read_caughey(base::Object caughey, Material& result) {
-  constexpr std::size_t kMostTerms = 32;
-  const std::vector<double> coefficients = caughey.number_list("coefficients", kMostTerms);
+  constexpr std::size_t kMaxTerms = 32;
+  const std::vector<double> coefficients = caughey.number_list("coefficients", kMaxTerms);
   std::vector<double> powers;
   if (caughey.has("powers"))
-    powers = caughey.number_list("powers", kMostTerms);
+    powers = caughey.number_list("powers", kMaxTerms);
   else
     for (std::size_t j = 0; j < coefficients.size(); ++j) powers.push_back(static_cast<double>(j));
   if (powers.size() != coefficients.size())
     caughey.fail("powers", fmt::format("must have one entry a coefficient, {}, and has {}", coefficients.size(), powers.size()));
   for (std::size_t j = 0; j < powers.size(); ++j) {
-    if (std::abs(powers[j]) > kMostPower)
-      caughey.fail("powers", fmt::format("must lie within +-{:g}, and hold {:g}", kMostPower, powers[j]));
+    if (std::abs(powers[j]) > kMaxPower) caughey.fail("powers", fmt::format("must lie within +-{:g}, and hold {:g}", kMaxPower, powers[j]));
     result.caughey.push_back({powers[j], coefficients[j]});
   }
   caughey.finish();
@@ -258,8 +257,8 @@ void read_damping(base::Object damping, Material& result, const std::array<doubl
     read_loss_table(damping, result);
   } else {
     base::Object rayleigh = damping.object("rayleigh");
-    result.alpha1_s = read_not_negative(rayleigh, "alpha1_s", kMostDampingS);
-    result.alpha2_per_s = read_not_negative(rayleigh, "alpha2_per_s", kMostDampingPerS);
+    result.alpha1_s = read_not_negative(rayleigh, "alpha1_s", kMaxDampingS);
+    result.alpha2_per_s = read_not_negative(rayleigh, "alpha2_per_s", kMaxDampingPerS);
     rayleigh.finish();
   }
   damping.finish();
@@ -287,15 +286,15 @@ void ask_about_damping(base::Object& material, const Material& result, const std
                        std::vector<std::string>& warnings) {
   constexpr int kSteps = 60;
   int swinging = 0;
-  double most = 0.0;
+  double max = 0.0;
   for (int i = 0; i <= kSteps; ++i) {
     const double omega = 2 * std::numbers::pi * band_hz[0] * std::pow(band_hz[1] / band_hz[0], static_cast<double>(i) / kSteps);
     const double decay = result.calc_decay_per_s(omega * omega);
-    most = std::max(most, decay);
+    max = std::max(max, decay);
     if (decay < omega) ++swinging;
   }
   const std::string place = material.find_place("damping");
-  if (most == 0.0) {
+  if (max == 0.0) {
     warnings.push_back(fmt::format(
         "{}: \"damping\" is zero: what is struck rings for ever; steel has \"internal_friction\" {{\"tan_phi\": 1e-4}}", place));
   } else if (2 * swinging < kSteps + 1) {
@@ -313,7 +312,7 @@ Material read_material(base::Object material, const std::array<double, 2>& band_
   Material result;
   result.place = material.find_place("");
   read_elasticity(material, result);
-  result.density_kg_m3 = read_positive(material, "density_kg_m3", kMostDensityKgM3);
+  result.density_kg_m3 = read_positive(material, "density_kg_m3", kMaxDensityKgM3);
   read_damping(material.object("damping"), result, band_hz);
   ask_about_units(material, result, warnings);
   ask_about_damping(material, result, band_hz, warnings);

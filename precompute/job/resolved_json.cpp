@@ -89,10 +89,9 @@ Json::Value write_body(const Body& body, const fs::path& base) {
 }
 
 /// The members of a JSON object, added to `entry`.
-void add_members(const std::string& members, Json::Value& entry) {
-  if (members.empty()) return;
+void add_members(const base::Json& members, Json::Value& entry) {
   Json::Value added;
-  std::istringstream stream("{" + members + "}");
+  std::istringstream stream(members.line());
   std::string errors;
   if (!Json::parseFromStream(Json::CharReaderBuilder(), stream, &added, &errors)) throw SolveError("internal: not JSON: " + errors);
   for (const std::string& key : added.getMemberNames()) entry[key] = added[key];

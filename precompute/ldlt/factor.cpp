@@ -1,7 +1,7 @@
 // Method:     Plan, numbers and workspace behind one door; a factorisation is trusted by what it does to a vector whose image is known.
 //             Shifts that let the numbers grow, as pivots are sought inside the blocks only, get a step of iterative refinement.
 // Source:     Rigal and Gaches 1967 (normwise backward error); Higham 2002, sections 7.1, 12.1 (fixed precision refinement).
-//             What is factorised is graded (graded.cpp).
+//             What is factorised is equilibrated (equilibrated.cpp).
 // Deviations: the infinity norm of K - sigma M is bounded by ||K|| + |sigma| ||M||.
 #include "precompute/ldlt/factor.hpp"
 
@@ -14,14 +14,14 @@
 #include <utility>
 #include <vector>
 
-#include "precompute/ldlt/graded.hpp"
-#include "precompute/ldlt/local_rows.hpp"
+#include "precompute/la/node_rows.hpp"
+#include "precompute/ldlt/equilibrated.hpp"
 #include "precompute/ldlt/numeric.hpp"
 #include "precompute/petsc/handle.hpp"
 #include "precompute/petsc/noise.hpp"
 #include "precompute/petsc/session.hpp"
 #include "precompute/petsc/work.hpp"
-#include "runtime/base/error.hpp"
+#include "runtime/base/failure.hpp"
 
 namespace carillon::ldlt {
 namespace {
@@ -35,13 +35,12 @@ constexpr double kVanishedPivot = 64 * std::numeric_limits<double>::epsilon();  
 }  // namespace
 
 struct Factor::State {
-  State(Mat stiffness_mat, Mat mass_mat) : stiffness(stiffness_mat), mass(mass_mat), plan(make_plan(stiffness, mass)) {}
+  explicit State(const la::Pencil& given_pencil) : given(given_pencil), plan(make_plan(given.stiffness, given.mass)) {}
 
-  const Mat stiffness;
-  const Mat mass;
+  const la::Pencil given;
   Plan plan;
-  std::optional<GradedPair> graded;  // what is factorised, measured and refined with; from the first factorisation on
-  double stiffness_norm = 0;         // of the graded K, and M
+  std::optional<EquilibratedPencil> equilibrated;  // what is factorised, measured and refined with; from the first factorisation on
+  double stiffness_norm = 0;                       // of the equilibrated K, and M
   double mass_norm = 0;
   Numbers numbers;
   Workspace workspace;
@@ -51,7 +50,7 @@ struct Factor::State {
   double backward_error = 0;  // of the solves as they are made
   bool is_allocated = false;
 
-  /// Runs work, whose only SystemError is want of memory, and says how much is needed. Collective.
+  /// Runs work, and says how much is needed where memory runs out. Collective.
   template <typename Work>
   void name_need(Work&& work) const;
   /// What all factorisations share. Collective.
@@ -59,7 +58,7 @@ struct Factor::State {
   /// y = (K - sigma M) x on this rank's rows. Collective.
   void apply(Vec x, Vec y, Vec scratch) const;
   double measure_backward_error(bool is_refined);
-  /// X <- A^-1 B, A graded, with the factorisation alone. Collective.
+  /// X <- A^-1 B, A equilibrated, with the factorisation alone. Collective.
   void solve(const double* b, double* x, int stride, int columns);
   /// X <- A^-1 X with one step of iterative refinement. Collective.
   void solve_refined(double* x, int stride, int columns);
@@ -69,24 +68,28 @@ template <typename Work>
 void Factor::State::name_need(Work&& work) const {
   try {
     work();
-  } catch (const SystemError&) {
-    throw SystemError(
+  } catch (const MemoryError&) {
+    throw MemoryError(
         fmt::format("Out of memory: L D L^T of K - sigma M needs {:.3f} GB, {:.3f} GB on the fullest of {} ranks. Take a coarser mesh, or "
                     "more machines.",
                     1e-9 * static_cast<double>(plan.analysis.peak_bytes), 1e-9 * static_cast<double>(plan.analysis.largest_peak_bytes),
-                    plan.analysis.ranks.size()));
+                    plan.analysis.ranks.size()),
+        static_cast<double>(plan.analysis.peak_bytes));
   }
 }
 
 void Factor::State::prepare() {
-  if (!graded) {
-    GradedPair pair(stiffness, mass);
-    check(MatNorm(pair.get_stiffness(), NORM_INFINITY, &stiffness_norm));
-    check(MatNorm(pair.get_mass(), NORM_INFINITY, &mass_norm));
-    graded = std::move(pair);
+  if (!equilibrated) {
+    EquilibratedPencil candidate(given);
+    const la::Pencil& pencil = candidate.get();
+    check(MatNorm(pencil.stiffness, NORM_INFINITY, &stiffness_norm));
+    check(MatNorm(pencil.mass, NORM_INFINITY, &mass_norm));
+    stiffness_norm *= pencil.stiffness_factor;
+    mass_norm *= pencil.mass_factor;
+    equilibrated = std::move(candidate);
   }
   if (is_allocated) return;
-  petsc::run_agreed(plan.comm, [&] {
+  comm::Communicator(plan.comm).agree([&] {
     numbers = make_numbers(plan);
     workspace = make_workspace(plan);
   });
@@ -94,16 +97,18 @@ void Factor::State::prepare() {
 }
 
 void Factor::State::apply(Vec x, Vec y, Vec scratch) const {
-  check(MatMult(graded->get_stiffness(), x, y));
-  check(MatMult(graded->get_mass(), x, scratch));
-  check(VecAXPY(y, -sigma, scratch));
+  const la::Pencil& pencil = equilibrated->get();
+  check(MatMult(pencil.stiffness, x, y));
+  check(VecScale(y, pencil.stiffness_factor));
+  check(MatMult(pencil.mass, x, scratch));
+  check(VecAXPY(y, -sigma * pencil.mass_factor, scratch));
 }
 
 double Factor::State::measure_backward_error(bool is_refined) {
   petsc::VecHandle x;
   petsc::VecHandle b;
   petsc::VecHandle scratch;
-  check(MatCreateVecs(graded->get_stiffness(), x.out(), b.out()));
+  check(MatCreateVecs(given.stiffness, x.out(), b.out()));
   check(VecDuplicate(x, scratch.out()));
   PetscInt first = 0;
   PetscInt last = 0;
@@ -136,7 +141,7 @@ double Factor::State::measure_backward_error(bool is_refined) {
   return std::isfinite(error) ? error : std::numeric_limits<double>::infinity();
 }
 
-Factor::Factor(Mat stiffness, Mat mass) : state_(std::make_unique<State>(stiffness, mass)) {}
+Factor::Factor(const la::Pencil& pencil) : state_(std::make_unique<State>(pencil)) {}
 
 Factor::~Factor() = default;
 Factor::Factor(Factor&&) noexcept = default;
@@ -150,7 +155,7 @@ bool Factor::factorise(double sigma) {
   s.name_need([&] {
     s.prepare();
     s.norm = s.stiffness_norm + std::abs(sigma) * s.mass_norm;
-    factorise_fronts(s.plan, s.graded->get_stiffness(), s.graded->get_mass(), sigma, s.numbers);
+    factorise_fronts(s.plan, s.equilibrated->get(), sigma, s.numbers);
     petsc::add_flops(s.plan.analysis.ranks[static_cast<std::size_t>(s.plan.rank)].flops);
   });
   s.backward_error = std::numeric_limits<double>::infinity();
@@ -178,7 +183,7 @@ void Factor::State::solve_refined(double* x, int stride, int columns) {
   petsc::VecHandle from;
   petsc::VecHandle to;
   petsc::VecHandle scratch;
-  check(MatCreateVecs(graded->get_stiffness(), from.out(), to.out()));
+  check(MatCreateVecs(given.stiffness, from.out(), to.out()));
   check(VecDuplicate(from, scratch.out()));
   PetscInt rows = 0;
   check(VecGetLocalSize(from, &rows));
@@ -202,19 +207,19 @@ void Factor::State::solve_refined(double* x, int stride, int columns) {
 
 void Factor::solve(const double* b, double* x, int stride, int columns) {
   State& s = *state_;
-  if (s.graded->is_scaled() || s.needs_refinement) {
+  if (s.equilibrated->is_scaled() || s.needs_refinement) {
     for (int j = 0; j < columns && b != x; ++j) {
       const std::ptrdiff_t at = std::ptrdiff_t{j} * stride;
       std::copy_n(b + at, 3 * s.plan.own_nodes, x + at);
     }
     b = x;
   }
-  s.graded->scale(x, stride, columns);
+  s.equilibrated->scale(x, stride, columns);
   if (s.needs_refinement)
     s.solve_refined(x, stride, columns);
   else
     s.solve(b, x, stride, columns);
-  s.graded->scale(x, stride, columns);
+  s.equilibrated->scale(x, stride, columns);
 }
 
 }  // namespace carillon::ldlt

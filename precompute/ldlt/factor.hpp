@@ -1,11 +1,11 @@
 // Sparse L D L^T of K - sigma M over the ranks, made for many shifts and many right-hand sides.
 #pragma once
 
-#include <petscmat.h>
-
 #include <cstdint>
 #include <memory>
 #include <vector>
+
+#include "precompute/la/pencil.hpp"
 
 namespace carillon::ldlt {
 
@@ -22,7 +22,7 @@ struct Analysis {
   std::int64_t peak_bytes = 0;
   std::int64_t largest_peak_bytes = 0;  // of one rank
   std::int64_t supernodes = 0;
-  std::int64_t interface_nodes = 0;  // of the separator between the ranks
+  std::int64_t separator_nodes = 0;  // of the separator between the ranks
 };
 
 /// L D L^T of K - sigma M with a fixed pattern and changing sigma, by the multifrontal method (docs/decisions/factorisation.md).
@@ -32,9 +32,9 @@ struct Analysis {
 /// on they must stay, and outlive the factor. Every member but the get_ ones is collective and fails on all ranks alike.
 class Factor {
  public:
-  /// Orders the nodes and plans fronts, memory and messages; computes no number. Symmetry is taken on trust. Throws InputError when the
-  /// rows are not whole nodes or the matrices not AIJ, SystemError when memory runs out.
-  Factor(Mat stiffness, Mat mass);
+  /// Orders the nodes and plans fronts, memory and messages; computes no number. Symmetry is assumed and not checked. Throws InputError
+  /// when the rows are not whole nodes or the matrices not AIJ, SystemError when memory runs out.
+  explicit Factor(const la::Pencil& pencil);
   ~Factor();
   Factor(Factor&&) noexcept;
   Factor& operator=(Factor&&) noexcept;
@@ -55,7 +55,7 @@ class Factor {
   double get_growth() const;
 
   /// X <- (K - sigma M)^-1 B. b, x: this rank's rows, column-major (stride >= own rows), any number of columns; fastest in multiples of 16.
-  /// b may be x, and shares no part of it else.
+  /// b may be x; otherwise they must not overlap.
   /// With one step of iterative refinement, at twice the price, where the backward error of the factorisation is above 3e-13.
   void solve(const double* b, double* x, int stride, int columns);
 

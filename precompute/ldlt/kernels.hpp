@@ -56,24 +56,24 @@ struct Kernels {
   /// out (n rows) -= A^T X. next: what will be read after A; it is fetched meanwhile.
   void (*subtract_transposed)(const double* tiles, int m, int n, int vectors, const int* nodes, double* x, double* out, const double* next);
   /// out (n rows) = T in, T a lower triangle in tiles.
-  void (*set_triangle)(const double* tiles, int n, int vectors, const double* in, double* out);
+  void (*trmm)(const double* tiles, int n, int vectors, const double* in, double* out);
   /// out (n rows) += T^T in. next: as above.
-  void (*add_triangle_transposed)(const double* tiles, int n, int vectors, double* in, double* out, const double* next);
+  void (*add_trmm_transposed)(const double* tiles, int n, int vectors, double* in, double* out, const double* next);
   /// Factorises a symmetric block, both triangles given, columns kMaxBlock apart, by rook pivoting; overwrites it and puts L^-1 in tiles
   /// (count_triangle). False if a pivot vanishes exactly or is not finite.
   bool (*factorise_block)(double* block, int n, BlockPivots& pivots, double* tiles);
   /// W = A P^T L^-T for the rows begin to end of a front, to strips of kWideRows rows. columns: (n) where row 0 of each column of A would
   /// be, in the order of the pivots; triangle: L^-1.
-  void (*calc_wide)(const double* const* columns, int begin, int end, int n, const double* triangle, double* wide);
+  void (*trsm)(const double* const* columns, int begin, int end, int n, const double* triangle, double* wide);
   /// L = W D^-1 (m, n), strips to tiles. Raises growth to the largest magnitude in L.
-  void (*divide_wide)(const double* wide, int m, int n, const BlockPivots& pivots, double* tiles, double& growth);
+  void (*scale_by_d_inverse)(const double* wide, int m, int n, const BlockPivots& pivots, double* tiles, double& growth);
   /// C -= L W^T (or = -L W^T where the update matrix is to be made), the columns panel.begin to end of a front with `end` rows, of which
   /// the first `pivots`, a multiple of kTileRows behind panel.begin, stand whole and the others in strips. columns: (end) where row 0 of
   /// each column would be. What is stored above the diagonal is left undefined.
   void (*update)(const Panel& panel, int pivots, int end, bool is_made, double* const* columns);
   /// target[c][run.to + i] += source[c][run.from + i] for every run and three columns; in column c rows before the c-th of the first run
   /// are left out.
-  void (*add_runs)(const double* const* source, const Run* runs, int count, double* const* target);
+  void (*extend_add)(const double* const* source, const Run* runs, int count, double* const* target);
   const char* name;
 };
 

@@ -1,6 +1,5 @@
 // Method:     Products of tiles with up to 16 right-hand sides keep a tile's sums in registers; every number of L is read once, in order,
-// and
-//             multiplied into whole vectors. Diagonal blocks: right-looking L D L^T with rook pivoting on the full square in the
+//             and multiplied into whole vectors. Diagonal blocks: right-looking L D L^T with rook pivoting on the full square in the
 //             first-level cache, then the inverse of L by rows.
 // Source:     Goto and van de Geijn 2008, Anatomy of high-performance matrix multiplication. Ashcraft, Grimes, Lewis 1998, Accurate
 //             symmetric indefinite linear equation solvers (rook pivoting; LAPACK's dsytf2_rk). Schenk and Gaertner 2006, On fast
@@ -111,7 +110,7 @@ void subtract_product(const double* tiles, int m, int n, const double* in_rows, 
 }
 
 template <int kStride>
-void set_triangle(const double* tiles, int n, const double* in_rows, double* out_rows) {
+void trmm(const double* tiles, int n, const double* in_rows, double* out_rows) {
   const auto* in = reinterpret_cast<const Vector*>(in_rows);
   auto* out = reinterpret_cast<Vector*>(out_rows);
   int i = 0;
@@ -177,7 +176,7 @@ void subtract_transposed(const double* tiles, int m, int n, const int* nodes, do
 }
 
 template <int kStride>
-void add_triangle_transposed(const double* tiles, int n, double* in_rows, double* out_rows, const double* next) {
+void add_trmm_transposed(const double* tiles, int n, double* in_rows, double* out_rows, const double* next) {
   auto* in = reinterpret_cast<Vector*>(in_rows);
   auto* out = reinterpret_cast<Vector*>(out_rows);
   const Reading reading{tiles + count_triangle(n), next};
@@ -197,11 +196,11 @@ void subtract_product(const double* tiles, int m, int n, int vectors, const doub
 void subtract_transposed(const double* tiles, int m, int n, int vectors, const int* nodes, double* rows, double* out, const double* next) {
   vectors == 1 ? subtract_transposed<1>(tiles, m, n, nodes, rows, out, next) : subtract_transposed<2>(tiles, m, n, nodes, rows, out, next);
 }
-void set_triangle(const double* tiles, int n, int vectors, const double* in, double* out) {
-  vectors == 1 ? set_triangle<1>(tiles, n, in, out) : set_triangle<2>(tiles, n, in, out);
+void trmm(const double* tiles, int n, int vectors, const double* in, double* out) {
+  vectors == 1 ? trmm<1>(tiles, n, in, out) : trmm<2>(tiles, n, in, out);
 }
-void add_triangle_transposed(const double* tiles, int n, int vectors, double* in, double* out, const double* next) {
-  vectors == 1 ? add_triangle_transposed<1>(tiles, n, in, out, next) : add_triangle_transposed<2>(tiles, n, in, out, next);
+void add_trmm_transposed(const double* tiles, int n, int vectors, double* in, double* out, const double* next) {
+  vectors == 1 ? add_trmm_transposed<1>(tiles, n, in, out, next) : add_trmm_transposed<2>(tiles, n, in, out, next);
 }
 
 inline double magnitude(double x) { return __builtin_fabs(x); }
@@ -430,7 +429,7 @@ inline void update_block(const double* tile, const Vector* strip, int n, bool is
   }
 }
 
-void calc_wide(const double* const* columns, int begin, int end, int n, const double* triangle, double* wide) {
+void trsm(const double* const* columns, int begin, int end, int n, const double* triangle, double* wide) {
   Vector sums[kTileRows * kLanes];
   for (int row = begin; row < end; row += kWideRows, wide += kWideRows * n) {
     auto* strip = reinterpret_cast<Vector*>(wide);
@@ -458,7 +457,7 @@ void calc_wide(const double* const* columns, int begin, int end, int n, const do
   }
 }
 
-void divide_wide(const double* wide, int m, int n, const BlockPivots& pivots, double* tiles, double& growth) {
+void scale_by_d_inverse(const double* wide, int m, int n, const BlockPivots& pivots, double* tiles, double& growth) {
   constexpr int kParts = kTileRows / 4;
   Quad largest{};
   for (int row = 0; row < m; row += kTileRows) {
@@ -548,7 +547,7 @@ inline void add_run(const double* __restrict__ from, double* __restrict__ to, in
   for (; i < length; ++i) to[i] += from[i];
 }
 
-void add_runs(const double* const* source, const Run* runs, int count, double* const* target) {
+void extend_add(const double* const* source, const Run* runs, int count, double* const* target) {
   for (int c = 0; c < 3; ++c) add_run(source[c] + runs[0].from + c, target[c] + runs[0].to + c, runs[0].length - c);
   for (int k = 1; k < count; ++k)
     for (int c = 0; c < 3; ++c) add_run(source[c] + runs[k].from, target[c] + runs[k].to, runs[k].length);
@@ -557,8 +556,7 @@ void add_runs(const double* const* source, const Run* runs, int count, double* c
 }  // namespace
 
 extern const Kernels kTable;
-const Kernels kTable{subtract_product, subtract_transposed, set_triangle, add_triangle_transposed,
-                     factorise_block,  calc_wide,           divide_wide,  update,
-                     add_runs,         CARILLON_ISA_NAME};
+const Kernels kTable{subtract_product, subtract_transposed, trmm, add_trmm_transposed, factorise_block, trsm, scale_by_d_inverse, update,
+                     extend_add,       CARILLON_ISA_NAME};
 
 }  // namespace carillon::ldlt::CARILLON_ISA

@@ -5,7 +5,7 @@
 // Source:     Duff and Reid 1983; Liu 1992; Schenk and Gaertner 2006 (pivots are sought inside the diagonal block only). The explicit
 //             inverse: Higham 2002, Accuracy and stability of numerical algorithms, chapter 14 (L11 has entries of order one by rook
 //             pivoting).
-// Deviations: no delayed pivots: a bad pivot shows in the backward error, which the caller is told.
+// Deviations: no delayed pivots: a bad pivot shows in the backward error, which is reported to the caller.
 #include "precompute/ldlt/numeric.hpp"
 
 #include <sys/mman.h>
@@ -16,20 +16,28 @@
 #include <new>
 #include <numeric>
 
+#include "precompute/la/node_rows.hpp"
 #include "precompute/ldlt/kernels.hpp"
-#include "precompute/ldlt/local_rows.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::ldlt {
 namespace {
 
+using la::NodeRows;
+
 static_assert(3 * kPanelNodes <= kMaxBlock);
 
 class Factoriser {
  public:
-  Factoriser(const Plan& plan, Mat stiffness, Mat mass, double sigma, Numbers& numbers)
-      : plan_(plan), k_(stiffness), m_(mass), sigma_(sigma), numbers_(numbers), kernels_(get_kernels()) {
+  Factoriser(const Plan& plan, const la::Pencil& pencil, double sigma, Numbers& numbers)
+      : plan_(plan),
+        k_(pencil.stiffness),
+        m_(pencil.mass),
+        k_factor_(pencil.stiffness_factor),
+        m_factor_(-sigma * pencil.mass_factor),
+        numbers_(numbers),
+        kernels_(get_kernels()) {
     std::int64_t largest = 0;
     std::int64_t scratch = 0;
     for (const Front& front : plan.fronts) {
@@ -56,10 +64,10 @@ class Factoriser {
 
   void run() {
     start_blocks();
-    for (std::int32_t s = 0; s < plan_.interior_fronts; ++s) process(s);
+    for (std::int32_t s = 0; s < plan_.subdomain_fronts; ++s) process(s);
     finish_blocks();
     for (Buffer& stack : stack_) stack = Buffer();
-    for (std::int32_t s = plan_.interior_fronts; s < static_cast<std::int32_t>(plan_.fronts.size()); ++s) {
+    for (std::int32_t s = plan_.subdomain_fronts; s < static_cast<std::int32_t>(plan_.fronts.size()); ++s) {
       release_sent();
       process(s);
     }
@@ -69,7 +77,7 @@ class Factoriser {
 
  private:
   static std::int64_t count_rows(const Ints& nodes) { return 3 * static_cast<std::int64_t>(nodes.size()); }
-  bool is_stacked(const Front& front) const { return front.parent >= 0 && front.parent < plan_.interior_fronts; }
+  bool is_stacked(const Front& front) const { return front.parent >= 0 && front.parent < plan_.subdomain_fronts; }
 
   void process(std::int32_t s) {
     const Front& front = plan_.fronts[s];
@@ -83,7 +91,7 @@ class Factoriser {
     for (std::size_t i = 0; i < front.rows.size(); ++i) where_[front.rows[i]] = front.width + static_cast<std::int32_t>(i);
     std::fill_n(columns_.data(), static_cast<std::size_t>(f_) * static_cast<std::size_t>(w_), 0.0);
     double* panels = numbers_.panels.data() + numbers_.front_offsets[s];
-    if (front.is_interface) {
+    if (front.is_separator) {
       std::fill_n(update_, count_update(r_), 0.0);  // none where nothing is updated
       add_blocks(front);
       for (std::size_t c = front.children.size(); c-- > 0;) add_child(front.children[c], Part::kAll);  // the last one lies on top
@@ -109,7 +117,7 @@ class Factoriser {
   }
 
   /// Adds factor times this rank's row 3 v + d of a matrix to column `target` of the front; `first`: its first pivot.
-  void add_row(const LocalRows& rows, const Ints& ghosts, PetscInt row, std::int32_t first, double factor, double* target) const {
+  void add_row(const NodeRows& rows, const Ints& ghosts, PetscInt row, std::int32_t first, double factor, double* target) const {
     const auto add = [&](std::int32_t node, PetscInt column, double value) {
       if (node >= first) target[3 * where_[node] + column % 3] += factor * value;
     };
@@ -125,8 +133,8 @@ class Factoriser {
       if (k_.has_blocks())
         add_node_rows(own, front.first, target);
       else
-        for (int d = 0; d < 3; ++d) add_row(k_, plan_.node_of_ghost_k, 3 * own + d, front.first, 1.0, target + d * f_);
-      for (int d = 0; d < 3; ++d) add_row(m_, plan_.node_of_ghost_m, 3 * own + d, front.first, -sigma_, target + d * f_);
+        for (int d = 0; d < 3; ++d) add_row(k_, plan_.node_of_ghost_k, 3 * own + d, front.first, k_factor_, target + d * f_);
+      for (int d = 0; d < 3; ++d) add_row(m_, plan_.node_of_ghost_m, 3 * own + d, front.first, m_factor_, target + d * f_);
     }
   }
 
@@ -136,14 +144,14 @@ class Factoriser {
       if (node < first) return;
       double* to = target + 3 * where_[node];
       for (int d = 0; d < 3; ++d)
-        for (int e = 0; e < 3; ++e) to[d * f_ + e] += values[d][e];
+        for (int e = 0; e < 3; ++e) to[d * f_ + e] += k_factor_ * values[d][e];
     };
     k_.visit_blocks(
         own, [&](PetscInt column, const double* const(&values)[3]) { add(plan_.node_of_own[column / 3], values); },
         [&](PetscInt ghost, const double* const(&values)[3]) { add(plan_.node_of_ghost_k[ghost], values); });
   }
 
-  /// Collects the 3x3 blocks between interface nodes that this rank's rows hold, and sends them to the owners of their fronts.
+  /// Collects the 3x3 blocks between separator nodes that this rank's rows hold, and sends them to the owners of their fronts.
   void start_blocks() {
     Ints slot(plan_.local_nodes, -1);
     for (std::size_t l = 0; l < plan_.sent.size(); ++l) {
@@ -170,7 +178,7 @@ class Factoriser {
 
   void collect_blocks(std::int32_t own, const Ints& slot, std::vector<double>& blocks) const {
     for (int d = 0; d < 3; ++d) {
-      const auto collect = [&](const LocalRows& rows, const Ints& ghosts, double factor) {
+      const auto collect = [&](const NodeRows& rows, const Ints& ghosts, double factor) {
         const auto add = [&](std::int32_t node, PetscInt column, double value) {
           if (node >= 0 && slot[node] >= 0)
             blocks[9 * static_cast<std::size_t>(slot[node]) + static_cast<std::size_t>(3 * d + column % 3)] += factor * value;
@@ -179,8 +187,8 @@ class Factoriser {
             3 * own + d, [&](PetscInt column, double value) { add(plan_.node_of_own[column / 3], column, value); },
             [&](PetscInt ghost, double value) { add(ghosts[ghost], rows.ghosts()[ghost], value); });
       };
-      collect(k_, plan_.node_of_ghost_k, 1.0);
-      collect(m_, plan_.node_of_ghost_m, -sigma_);
+      collect(k_, plan_.node_of_ghost_k, k_factor_);
+      collect(m_, plan_.node_of_ghost_m, m_factor_);
     }
   }
 
@@ -193,7 +201,7 @@ class Factoriser {
     block_at_.assign(plan_.received.size(), 0);
   }
 
-  /// Adds the blocks of an interface front; fronts and blocks are in the same order.
+  /// Adds the blocks of a separator front; fronts and blocks are in the same order.
   void add_blocks(const Front& front) {
     for (std::size_t l = 0; l < plan_.received.size(); ++l) {
       const BlockList& list = plan_.received[l];
@@ -230,7 +238,7 @@ class Factoriser {
     const double* source[3];
     for (int c = 0; c < 3; ++c) source[c] = update + find_update_column(r, from + c);
     runs_[k] = {from, column, whole.length - (from - whole.from)};
-    kernels_.add_runs(source, runs_.data() + k, static_cast<int>(runs_.size()) - k, starts_.data() + column);
+    kernels_.extend_add(source, runs_.data() + k, static_cast<int>(runs_.size()) - k, starts_.data() + column);
     runs_[k] = whole;
   }
 
@@ -299,8 +307,8 @@ class Factoriser {
     if (end == f_) return tiles;
     const double* columns[kMaxBlock];
     for (int k = 0; k < n; ++k) columns[k] = starts_[begin + pivots.order[k]];
-    kernels_.calc_wide(columns, end, f_, n, triangle, wide_.data());
-    kernels_.divide_wide(wide_.data(), f_ - end, n, pivots, tiles, growth_);
+    kernels_.trsm(columns, end, f_, n, triangle, wide_.data());
+    kernels_.scale_by_d_inverse(wide_.data(), f_ - end, n, pivots, tiles, growth_);
     kernels_.update({tiles, wide_.data(), n, end}, w_, f_, is_made, starts_.data());
     return tiles + static_cast<std::ptrdiff_t>(f_ - end) * n;
   }
@@ -335,9 +343,10 @@ class Factoriser {
   static constexpr int kUpdateTag = 2;
 
   const Plan& plan_;
-  LocalRows k_;
-  LocalRows m_;
-  double sigma_;
+  NodeRows k_;
+  NodeRows m_;
+  double k_factor_;  // of the entries of K and M: a and -sigma b of A = a K - sigma b M
+  double m_factor_;
   Numbers& numbers_;
   const Kernels& kernels_;
 
@@ -356,7 +365,7 @@ class Factoriser {
 
   Buffer stack_[2];
   std::int64_t used_[2] = {0, 0};
-  std::vector<Buffer> loose_;                // update matrices for the interface
+  std::vector<Buffer> loose_;                // update matrices for the separator
   std::vector<std::vector<Buffer>> remote_;  // those of other ranks, packed
   std::vector<std::vector<double>> sent_;
   std::vector<std::vector<double>> received_;
@@ -412,9 +421,9 @@ Numbers make_numbers(const Plan& plan) {
   return numbers;
 }
 
-void factorise_fronts(const Plan& plan, Mat stiffness, Mat mass, double sigma, Numbers& numbers) {
+void factorise_fronts(const Plan& plan, const la::Pencil& pencil, double sigma, Numbers& numbers) {
   std::unique_ptr<Factoriser> factoriser;
-  petsc::run_agreed(plan.comm, [&] { factoriser = std::make_unique<Factoriser>(plan, stiffness, mass, sigma, numbers); });
+  comm::Communicator(plan.comm).agree([&] { factoriser = std::make_unique<Factoriser>(plan, pencil, sigma, numbers); });
   factoriser->run();
 }
 

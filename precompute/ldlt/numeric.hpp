@@ -49,7 +49,7 @@ struct Numbers {
 Numbers make_numbers(const Plan& plan);
 
 /// Computes L D L^T of K - sigma M. Collective. Throws SystemError on all ranks when memory runs out.
-void factorise_fronts(const Plan& plan, Mat stiffness, Mat mass, double sigma, Numbers& numbers);
+void factorise_fronts(const Plan& plan, const la::Pencil& pencil, double sigma, Numbers& numbers);
 
 /// Right-hand sides in order of elimination: blocks of 8 or 16 columns, in each a row of them per row of the matrix.
 struct Workspace {

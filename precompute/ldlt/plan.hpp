@@ -26,25 +26,25 @@ struct Front : Supernode {
   Ints children;                      // fronts of this rank, in order of assembly
   std::vector<Edge> remote_children;  // after them
   Edge to_parent;                     // rank >= 0: the parent lives there
-  std::int32_t depth = 0;             // below its root among the interior fronts; the parity picks the stack of its update matrix
-  bool is_interface = false;
+  std::int32_t depth = 0;             // below its root among the subdomain fronts; the parity picks the stack of its update matrix
+  bool is_separator = false;
 };
 
-/// What happens at one supernode of the interface during the solves: its owner collects what other ranks have added to its pivots, and
+/// What happens at one supernode of the separator during the solves: its owner collects what other ranks have added to its pivots, and
 /// gives them the solution there.
-struct Meeting {
+struct SolveExchange {
   std::int32_t front = -1;  // on the owner
   int owner = -1;           // elsewhere: the rank to send to
   int tag = 0;
-  struct Guest {
+  struct Participant {
     int rank = -1;
     Ints nodes;  // local nodes
   };
-  std::vector<Guest> guests;  // on the owner
-  Ints nodes;                 // elsewhere: local nodes among the pivots
+  std::vector<Participant> participants;  // on the owner
+  Ints nodes;                             // elsewhere: local nodes among the pivots
 };
 
-/// 3x3 blocks of A between interface nodes on their way from the rank of the column to the owner of its front. Local nodes of this rank,
+/// 3x3 blocks of A between separator nodes on their way from the rank of the column to the owner of its front. Local nodes of this rank,
 /// columns ascending, rows ascending in a column.
 struct BlockList {
   int rank = -1;  // to or from
@@ -52,22 +52,22 @@ struct BlockList {
   Ints rows;
 };
 
-/// Local nodes are numbered in order of elimination: first this rank's interior nodes, then those interface nodes with which it has to do.
+/// Local nodes are numbered in order of elimination: first this rank's subdomain nodes, then those separator nodes with which it has to do.
 struct Plan {
   MPI_Comm comm = MPI_COMM_NULL;
   int rank = 0;
   std::int32_t own_nodes = 0;
-  std::int32_t interior_nodes = 0;
+  std::int32_t subdomain_nodes = 0;
   std::int32_t local_nodes = 0;
   Ints node_of_own;           // (own_nodes) local node of each node of this rank
   Ints node_of_ghost_k;       // (ghost columns of K) local node, -1: none
   Ints node_of_ghost_m;       // the same for M
-  std::vector<Front> fronts;  // interior ones in postorder, then own ones of the interface
-  std::int32_t interior_fronts = 0;
-  std::vector<Meeting> meetings;  // in order of the interface: of own fronts and of those where this rank is a guest
+  std::vector<Front> fronts;  // subdomain ones in postorder, then own ones of the separator
+  std::int32_t subdomain_fronts = 0;
+  std::vector<SolveExchange> exchanges;  // in order of the separator: of own fronts and of those where this rank is a participant
   std::vector<BlockList> sent;
   std::vector<BlockList> received;
-  std::int64_t stack_entries[2] = {0, 0};  // the most that update matrices of interior fronts of even and odd depth take
+  std::int64_t stack_entries[2] = {0, 0};  // the most that update matrices of subdomain fronts of even and odd depth take
   Analysis analysis;
 };
 

@@ -1,6 +1,6 @@
 // Method:     L D L^T X = B by fronts: forward in order of elimination, backward against it, on the rows of the right-hand sides where they
 //             lie. Panels are applied as products (L11^-1 is at hand, so there is no triangular solve), and read once in each direction for
-//             up to 32 columns. At a front of the interface the owner adds up what other ranks have gathered at its pivots, and on the way
+//             up to 32 columns. At a front of the separator the owner adds up what other ranks have gathered at its pivots, and on the way
 //             back sends them the solution there.
 // Source:     Liu 1992, section 6; Ashcraft, Eisenstat, Liu 1990, A fan-in algorithm for distributed sparse numerical factorization (sums
 //             travel to the owner once).
@@ -37,8 +37,8 @@ class Solver {
   void load(const double* b, std::ptrdiff_t stride) const {
     for (const Block& block : blocks_) {
       std::memset(
-          find_row(block, plan_.interior_nodes), 0,
-          sizeof(double) * 3 * static_cast<std::size_t>(plan_.local_nodes - plan_.interior_nodes) * static_cast<std::size_t>(block.width));
+          find_row(block, plan_.subdomain_nodes), 0,
+          sizeof(double) * 3 * static_cast<std::size_t>(plan_.local_nodes - plan_.subdomain_nodes) * static_cast<std::size_t>(block.width));
       for (std::ptrdiff_t v = 0; v < plan_.own_nodes; ++v) {
         double* row = find_own(block, v);
         call_rows(block, v, true);
@@ -71,28 +71,30 @@ class Solver {
   }
 
   void forward() {
-    for (std::int32_t s = 0; s < plan_.interior_fronts; ++s) forward(s);
-    for (const Meeting& meeting : plan_.meetings) {
-      if (meeting.front >= 0) {
-        for (const Meeting::Guest& guest : meeting.guests) receive(guest.rank, meeting.tag, guest.nodes, true);
-        forward(meeting.front);
+    for (std::int32_t s = 0; s < plan_.subdomain_fronts; ++s) forward(s);
+    for (const SolveExchange& exchange : plan_.exchanges) {
+      if (exchange.front >= 0) {
+        for (const SolveExchange::Participant& participant : exchange.participants)
+          receive(participant.rank, exchange.tag, participant.nodes, true);
+        forward(exchange.front);
       } else {
-        send(meeting.owner, meeting.tag, meeting.nodes);
+        send(exchange.owner, exchange.tag, exchange.nodes);
       }
     }
     finish_sends();
   }
 
   void backward() {
-    for (auto meeting = plan_.meetings.rbegin(); meeting != plan_.meetings.rend(); ++meeting) {
-      if (meeting->front >= 0) {
-        backward(meeting->front);
-        for (const Meeting::Guest& guest : meeting->guests) send(guest.rank, meeting->tag, guest.nodes);
+    for (auto exchange = plan_.exchanges.rbegin(); exchange != plan_.exchanges.rend(); ++exchange) {
+      if (exchange->front >= 0) {
+        backward(exchange->front);
+        for (const SolveExchange::Participant& participant : exchange->participants)
+          send(participant.rank, exchange->tag, participant.nodes);
       } else {
-        receive(meeting->owner, meeting->tag, meeting->nodes, false);
+        receive(exchange->owner, exchange->tag, exchange->nodes, false);
       }
     }
-    for (std::int32_t s = plan_.interior_fronts; s-- > 0;) backward(s);
+    for (std::int32_t s = plan_.subdomain_fronts; s-- > 0;) backward(s);
     finish_sends();
   }
 
@@ -142,7 +144,7 @@ class Solver {
       for (const Block& block : blocks_) {
         double* own = find_row(block, front.first) + begin * block.width;
         for (int k = 0; k < n; ++k) copy_row(own + order[k] * block.width, block.width, pivots + k * block.width);
-        kernels_.set_triangle(tiles, n, block.width / 8, pivots, own);
+        kernels_.trmm(tiles, n, block.width / 8, pivots, own);
         kernels_.subtract_product(tiles + count_triangle(n), m, n, block.width / 8, own, nodes_.data() + end / 3, block.rows);
       }
       tiles += count_triangle(n) + static_cast<std::ptrdiff_t>(n) * m;
@@ -168,8 +170,8 @@ class Solver {
         divide_by_pivots(3 * static_cast<std::size_t>(front.first) + static_cast<std::size_t>(begin), n, block.width, own, pivots);
         kernels_.subtract_transposed(tiles + count_triangle(n), m, n, block.width / 8, nodes_.data() + end / 3, block.rows, pivots, tiles);
         std::memset(solution, 0, sizeof(double) * static_cast<std::size_t>(n * block.width));
-        kernels_.add_triangle_transposed(tiles, n, block.width / 8, pivots, solution,
-                                         &block == &blocks_.back() ? next : tiles + count_triangle(n));
+        kernels_.add_trmm_transposed(tiles, n, block.width / 8, pivots, solution,
+                                     &block == &blocks_.back() ? next : tiles + count_triangle(n));
         for (int k = 0; k < n; ++k) copy_row(solution + k * block.width, block.width, own + order[k] * block.width);
       }
     }

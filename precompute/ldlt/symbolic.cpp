@@ -16,7 +16,7 @@ namespace {
 using Ints = std::vector<std::int32_t>;
 using partition::Graph;
 
-// Measured with tests/ldlt's bench on one core of Zen 5 with AVX-512: a factorisation and 30 solves of 16 columns.
+// Measured with tests/unit/precompute/ldlt's bench on one core of Zen 5 with AVX-512: a factorisation and 30 solves of 16 columns.
 constexpr double kFrontNs = 14'000;   // calls, lists and loops that do not fill the vector units
 constexpr double kRowNs = 120;        // a row of a right-hand side read and written
 constexpr double kEntryNs = 24;       // an entry of L used in the solves
@@ -95,15 +95,15 @@ struct Group {
 };
 
 /// Supernodes of equal structure: v follows u if it is u's parent and u has its structure and itself.
-std::vector<Group> group_equal_columns(const Ints& parent, const Ints& columns, std::int32_t hubs) {
+std::vector<Group> group_equal_columns(const Ints& parent, const Ints& columns, std::int32_t elements) {
   const auto count = static_cast<std::int32_t>(parent.size());
-  Ints pivot_parent(count - hubs);
-  for (std::int32_t v = hubs; v < count; ++v) pivot_parent[v - hubs] = parent[v] < 0 ? -1 : parent[v] - hubs;
+  Ints pivot_parent(count - elements);
+  for (std::int32_t v = elements; v < count; ++v) pivot_parent[v - elements] = parent[v] < 0 ? -1 : parent[v] - elements;
   std::vector<Group> groups;
   Ints group_of(count, -1);
   std::int32_t last = -1;
   for (const std::int32_t pivot : find_postorder(pivot_parent)) {
-    const std::int32_t v = pivot + hubs;
+    const std::int32_t v = pivot + elements;
     if (last < 0 || parent[last] != v || columns[last] != columns[v] + 1) {
       groups.emplace_back();
       groups.back().size = columns[v];
@@ -166,22 +166,22 @@ Ints number_groups(std::vector<Group>& groups, Ints& kept) {
   return parent;
 }
 
-/// Rows of each supernode: what its pivots, its children and its hubs touch behind its pivots.
-void fill_rows(const Graph& graph, const Ints& parent, std::int32_t hubs, const std::vector<Ints>& vertices, Forest& forest) {
+/// Rows of each supernode: what its pivots, its children and its elements touch behind its pivots.
+void fill_rows(const Graph& graph, const Ints& parent, std::int32_t elements, const std::vector<Ints>& vertices, Forest& forest) {
   const auto pivots = static_cast<std::int32_t>(forest.position.size());
-  const auto place = [&](std::int32_t v) { return v < hubs + pivots ? forest.position[v - hubs] : v - hubs; };
+  const auto place = [&](std::int32_t v) { return v < elements + pivots ? forest.position[v - elements] : v - elements; };
   Ints supernode_of(pivots);
   for (std::size_t s = 0; s < vertices.size(); ++s)
     for (const std::int32_t v : vertices[s]) supernode_of[place(v)] = static_cast<std::int32_t>(s);
   std::vector<Ints> hubs_of(vertices.size());
-  forest.hub_parents.assign(hubs, -1);
-  for (std::int32_t h = 0; h < hubs; ++h) {
+  forest.element_parents.assign(elements, -1);
+  for (std::int32_t h = 0; h < elements; ++h) {
     if (parent[h] < 0) continue;
-    forest.hub_parents[h] = supernode_of[place(parent[h])];
-    hubs_of[forest.hub_parents[h]].push_back(h);
+    forest.element_parents[h] = supernode_of[place(parent[h])];
+    hubs_of[forest.element_parents[h]].push_back(h);
   }
   std::vector<Ints> children(vertices.size());
-  Ints mark(static_cast<std::size_t>(graph.vertex_count() - hubs), -1);
+  Ints mark(static_cast<std::size_t>(graph.vertex_count() - elements), -1);
   for (std::size_t s = 0; s < vertices.size(); ++s) {
     Supernode& node = forest.supernodes[s];
     const std::int32_t behind = node.first + node.width;
@@ -192,7 +192,7 @@ void fill_rows(const Graph& graph, const Ints& parent, std::int32_t hubs, const 
     };
     const auto add_neighbours = [&](std::int32_t v) {
       for (std::int32_t k = graph.offsets[v]; k < graph.offsets[v + 1]; ++k)
-        if (graph.neighbours[k] >= hubs) add(place(graph.neighbours[k]));
+        if (graph.neighbours[k] >= elements) add(place(graph.neighbours[k]));
     };
     for (const std::int32_t v : vertices[s]) add_neighbours(v);
     for (const std::int32_t h : hubs_of[s]) add_neighbours(h);
@@ -223,9 +223,9 @@ double calc_cost_ns(std::int64_t width, std::int64_t size) {
          kUpdateNs * r * r / 2;
 }
 
-Forest find_supernodes(const Graph& graph, std::int32_t hubs, std::int32_t pivots) {
-  const Ints parent = find_elimination_tree(graph, hubs + pivots);
-  std::vector<Group> groups = group_equal_columns(parent, count_columns(graph, parent), hubs);
+Forest find_supernodes(const Graph& graph, std::int32_t elements, std::int32_t pivots) {
+  const Ints parent = find_elimination_tree(graph, elements + pivots);
+  std::vector<Group> groups = group_equal_columns(parent, count_columns(graph, parent), elements);
   amalgamate(groups);
   Ints kept;
   const Ints group_parent = number_groups(groups, kept);
@@ -238,10 +238,10 @@ Forest find_supernodes(const Graph& graph, std::int32_t hubs, std::int32_t pivot
     Supernode& node = forest.supernodes.emplace_back();
     node.first = next;
     node.width = static_cast<std::int32_t>(group.width);
-    for (const std::int32_t v : group.vertices) forest.position[v - hubs] = next++;
+    for (const std::int32_t v : group.vertices) forest.position[v - elements] = next++;
     vertices.push_back(std::move(group.vertices));
   }
-  fill_rows(graph, parent, hubs, vertices, forest);
+  fill_rows(graph, parent, elements, vertices, forest);
   return forest;
 }
 

@@ -20,15 +20,15 @@ struct Supernode {
 /// Supernodes in postorder: children stand before their parents, and the subtree of each is contiguous.
 struct Forest {
   std::vector<Supernode> supernodes;
-  std::vector<std::int32_t> position;     // (pivots) new place of each pivot vertex
-  std::vector<std::int32_t> hub_parents;  // (hubs) the supernode that holds the hub's first row, -1: none
+  std::vector<std::int32_t> position;         // (pivots) new place of each pivot vertex
+  std::vector<std::int32_t> element_parents;  // (elements) the supernode that holds the element's first row, -1: none
 };
 
-/// Finds the supernodes of a graph whose vertices stand in the order of elimination. The first `hubs` vertices are gone already: they
-/// stand for subtrees eliminated elsewhere, and their neighbours form cliques. The next `pivots` are eliminated here. The others, the
-/// boundary, stay. In the result hubs are dropped: pivot vertex hubs + i becomes position[i], boundary vertex hubs + pivots + k becomes
-/// pivots + k. Edges between boundary vertices are of no account.
-Forest find_supernodes(const partition::Graph& graph, std::int32_t hubs, std::int32_t pivots);
+/// Finds the supernodes of a graph whose vertices stand in the order of elimination. The first `elements` vertices are eliminated elements
+/// of the quotient graph: they stand for subtrees eliminated elsewhere, and their neighbours form cliques. The next `pivots` are eliminated
+/// here. The others, the boundary, stay. In the result elements are dropped: pivot vertex elements + i becomes position[i], boundary vertex
+/// elements + pivots + k becomes pivots + k. Edges between boundary vertices are ignored.
+Forest find_supernodes(const partition::Graph& graph, std::int32_t elements, std::int32_t pivots);
 
 /// Entries kept of L and D, and flops of the elimination, of a front of `width` pivot nodes and `size` nodes in all.
 std::int64_t count_entries(std::int64_t width, std::int64_t size);

@@ -1,6 +1,5 @@
 // Method: indices, welding, orientation, volume, twins of elements, then the faces: two elements on a face run through its corners in
-// opposite
-//   senses when they lie on opposite sides of it; faces that stay alone form the boundary, whose edges must pair up.
+//   opposite senses when they lie on opposite sides of it; faces that stay alone form the boundary, whose edges must pair up.
 // Source: own; orientation by the sign of det(x1 - x0, x2 - x0, x3 - x0).
 // Deviations: elements that interpenetrate without sharing a face are not found (that would need a search for intersections).
 
@@ -29,7 +28,7 @@ void check_indices(const TetMesh& mesh, const std::string& name) {
   if (mesh.tets.empty()) refuse(name, "the mesh has no tetrahedra; mesh the volume first");
   if (mesh.tets.size() % static_cast<std::size_t>(mesh.nodes_per_tet()) != 0)
     refuse(name, "the last element lacks nodes; write the mesh again");
-  const auto count = static_cast<std::int64_t>(mesh.nodes.size());
+  const auto count = static_cast<std::int64_t>(mesh.nodes_m.size());
   std::vector<std::int64_t> repeated;
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e) {
     const auto tet = mesh.tet(e);
@@ -46,7 +45,7 @@ void check_indices(const TetMesh& mesh, const std::string& name) {
     refuse(name, fmt::format("{} element{} with a repeated node: {}; mesh the body again", repeated.size(), repeated.size() == 1 ? "" : "s",
                              list_elements(repeated)));
   for (std::int64_t i = 0; i < count; ++i)
-    for (const double x : mesh.nodes[static_cast<std::size_t>(i)])
+    for (const double x : mesh.nodes_m[static_cast<std::size_t>(i)])
       if (!std::isfinite(x))
         refuse(name, fmt::format("node {} has a coordinate that is not finite; correct the mesh where it was made", i + 1));
   for (const auto& [set, nodes] : mesh.node_sets)
@@ -57,7 +56,7 @@ void check_indices(const TetMesh& mesh, const std::string& name) {
 
 double calc_determinant(const TetMesh& mesh, std::int64_t e, double& longest_squared) {
   const auto tet = mesh.tet(e);
-  const auto at = [&](int i) -> const Vec3& { return mesh.nodes[static_cast<std::size_t>(tet[static_cast<std::size_t>(i)])]; };
+  const auto at = [&](int i) -> const Vec3& { return mesh.nodes_m[static_cast<std::size_t>(tet[static_cast<std::size_t>(i)])]; };
   std::array<Vec3, 6> edge{};
   longest_squared = 0.0;
   for (std::size_t m = 0; m < 6; ++m) {
@@ -208,18 +207,18 @@ void check_boundary(const std::vector<Face>& boundary, std::size_t node_count, c
 
 /// Drops the nodes of no element (welded ones are among them), renumbers elements and sets.
 void drop_unused(TetMesh& mesh, const std::vector<std::int32_t>& stand, CheckReport& report) {
-  std::vector<std::int32_t> number(mesh.nodes.size(), -1);
+  std::vector<std::int32_t> number(mesh.nodes_m.size(), -1);
   for (const auto node : mesh.tets) number[static_cast<std::size_t>(node)] = 0;
   std::int32_t kept = 0;
   for (std::size_t i = 0; i < number.size(); ++i)
     if (number[i] == 0) {
-      mesh.nodes[static_cast<std::size_t>(kept)] = mesh.nodes[i];
+      mesh.nodes_m[static_cast<std::size_t>(kept)] = mesh.nodes_m[i];
       if (!mesh.doubt_m.empty()) mesh.doubt_m[static_cast<std::size_t>(kept)] = mesh.doubt_m[i];
       number[i] = kept++;
     }
-  report.unreferenced = static_cast<std::int64_t>(mesh.nodes.size()) - kept - report.welded;
-  if (static_cast<std::size_t>(kept) == mesh.nodes.size()) return;
-  mesh.nodes.resize(static_cast<std::size_t>(kept));
+  report.unreferenced = static_cast<std::int64_t>(mesh.nodes_m.size()) - kept - report.welded;
+  if (static_cast<std::size_t>(kept) == mesh.nodes_m.size()) return;
+  mesh.nodes_m.resize(static_cast<std::size_t>(kept));
   if (!mesh.doubt_m.empty()) mesh.doubt_m.resize(static_cast<std::size_t>(kept));
   for (auto& node : mesh.tets) node = number[static_cast<std::size_t>(node)];
   for (auto& [name, set] : mesh.node_sets) {
@@ -231,11 +230,11 @@ void drop_unused(TetMesh& mesh, const std::vector<std::int32_t>& stand, CheckRep
 }
 
 void find_components(const TetMesh& mesh, CheckReport& report) {
-  Parts parts(mesh.nodes.size());
+  Parts parts(mesh.nodes_m.size());
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
     for (const auto node : mesh.tet(e)) parts.join(mesh.tet(e)[0], node);
-  report.component_of_node.assign(mesh.nodes.size(), -1);
-  for (std::size_t i = 0; i < mesh.nodes.size(); ++i) {
+  report.component_of_node.assign(mesh.nodes_m.size(), -1);
+  for (std::size_t i = 0; i < mesh.nodes_m.size(); ++i) {
     auto& first = report.component_of_node[static_cast<std::size_t>(parts.find(static_cast<std::int32_t>(i)))];
     if (first < 0) first = report.components++;
     report.component_of_node[i] = first;
@@ -263,6 +262,7 @@ void warn_of_elements(CheckReport& report) {
   const auto add = [&](const std::string& text) { report.warnings.push_back(text); };
   const double diagonal =
       std::hypot(report.box_high[0] - report.box_low[0], report.box_high[1] - report.box_low[1], report.box_high[2] - report.box_low[2]);
+  report.has_odd_size = diagonal > 50.0 || diagonal < 1e-3;
   if (diagonal > 50.0) add(fmt::format("the body measures {:.4g} m across: were millimetres given as metres?", diagonal));
   if (diagonal < 1e-3) add(fmt::format("the body measures only {:.3g} m across: coordinates are taken as metres", diagonal));
   if (report.slivers > 0)
@@ -315,13 +315,13 @@ CheckReport check_mesh(TetMesh& mesh, const std::string& name) {
   {
     const auto faces = sort_faces(mesh);
     refuse_duplicates(mesh, faces, name);
-    check_boundary(check_faces(mesh, faces, name), mesh.nodes.size(), name, report);
+    check_boundary(check_faces(mesh, faces, name), mesh.nodes_m.size(), name, report);
   }
   drop_unused(mesh, stand, report);
   find_components(mesh, report);
   straighten_folded(mesh, report);
   calc_quality(mesh, report);
-  report.nodes = static_cast<std::int64_t>(mesh.nodes.size());
+  report.nodes = static_cast<std::int64_t>(mesh.nodes_m.size());
   report.tets = mesh.tet_count();
   report.order = mesh.order;
   collect_warnings(report);

@@ -27,6 +27,7 @@ struct CheckReport {
   std::int64_t straightened = 0;  // quadratic elements whose curved edges folded them over, made straight-sided
 
   // What the mesh is.
+  bool has_odd_size = false;                    // in a unit that is probably not the metre; the first of the warnings says so
   int components = 0;                           // parts that share no node
   std::vector<std::int32_t> component_of_node;  // (N), numbered by their first node
   std::int64_t boundary_faces = 0;              // element faces on the boundary

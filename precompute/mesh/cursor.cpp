@@ -4,6 +4,8 @@
 #include <charconv>
 #include <cstdlib>
 
+#include "runtime/base/failure.hpp"
+
 namespace carillon::mesh {
 
 namespace {
@@ -20,7 +22,7 @@ std::string quote_excerpt(std::string_view text) {
 void Cursor::fail_text(std::size_t place, const std::string& message) const {
   if (binary_) throw InputError(fmt::format("{}: byte {}: {}", name_, place, message));
   const auto end = bytes_.begin() + static_cast<std::ptrdiff_t>(std::min(place, bytes_.size()));
-  throw InputError(fmt::format("{}:{}: {}", name_, 1 + std::count(bytes_.begin(), end, '\n'), message));
+  throw PlacedError(fmt::format("{}:{}", name_, 1 + std::count(bytes_.begin(), end, '\n')), message);
 }
 
 bool Cursor::skip_space() {
@@ -80,11 +82,11 @@ double Cursor::text_real(const char* what) {
   return value;
 }
 
-std::size_t Cursor::checked_count(std::int64_t count, std::size_t least_bytes, const char* what, std::size_t place) const {
-  const std::size_t most = remaining() / least_bytes + 1;
-  if (count < 0 || static_cast<std::uint64_t>(count) > most)
+std::size_t Cursor::checked_count(std::int64_t count, std::size_t min_bytes, const char* what, std::size_t place) const {
+  const std::size_t max = remaining() / min_bytes + 1;
+  if (count < 0 || static_cast<std::uint64_t>(count) > max)
     fail(place, "the file announces {} {}, but the {} bytes after it have room for {} at most; it was cut short or damaged: write it again",
-         count, what, remaining(), most);
+         count, what, remaining(), max);
   return static_cast<std::size_t>(count);
 }
 

@@ -17,6 +17,7 @@ namespace carillon::mesh {
 /// The first characters of untrusted text, made printable, for messages.
 std::string quote_excerpt(std::string_view text);
 
+/// A place in the bytes of a mesh file. No read goes beyond the end: it throws InputError, which names the file and the place.
 class Cursor {
  public:
   Cursor(std::string_view bytes, std::string name) : bytes_(bytes), name_(std::move(name)) {}
@@ -59,8 +60,8 @@ class Cursor {
   std::int64_t text_int(const char* what, std::int64_t low, std::int64_t high);
   double text_real(const char* what);
 
-  /// Checks that `count` things of at least `least_bytes` each can still follow; a hostile count never reaches an allocation.
-  std::size_t checked_count(std::int64_t count, std::size_t least_bytes, const char* what, std::size_t place) const;
+  /// Checks that `count` things of at least `min_bytes` each can still follow; a hostile count never reaches an allocation.
+  std::size_t checked_count(std::int64_t count, std::size_t min_bytes, const char* what, std::size_t place) const;
 
   template <class T>
   T raw(const char* what) {

@@ -29,7 +29,7 @@ std::vector<Face> sort_faces(const TetMesh& mesh, const std::vector<std::int32_t
     order(0, 1);
     return Face{v[0], v[1], v[2], static_cast<std::int32_t>(e), static_cast<std::int8_t>(local), odd};
   };
-  std::vector<std::size_t> begin(mesh.nodes.size() + 1, 0);
+  std::vector<std::size_t> begin(mesh.nodes_m.size() + 1, 0);
   std::vector<Face> unsorted;
   unsorted.reserve(static_cast<std::size_t>(4 * mesh.tet_count()));
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
@@ -95,7 +95,7 @@ Surface extract_boundary(const TetMesh& mesh) {
     add(e, ki, jk, k);
     add(e, ij, jk, ki);
   }
-  std::vector<std::int32_t> vertex(mesh.nodes.size(), -1);
+  std::vector<std::int32_t> vertex(mesh.nodes_m.size(), -1);
   for (const auto& triangle : surface.triangles)
     for (const auto node : triangle) vertex[static_cast<std::size_t>(node)] = 0;
   for (std::size_t i = 0; i < vertex.size(); ++i)

@@ -11,7 +11,7 @@ TetMesh to_quadratic(const TetMesh& mesh) {
   if (mesh.order == 2) return mesh;
   TetMesh fine;
   fine.order = 2;
-  fine.nodes = mesh.nodes;
+  fine.nodes_m = mesh.nodes_m;
   fine.doubt_m = mesh.doubt_m;
   fine.regions = mesh.regions;
   fine.region_names = mesh.region_names;
@@ -22,7 +22,7 @@ TetMesh to_quadratic(const TetMesh& mesh) {
     std::int32_t high;
     std::int64_t slot;  // where in fine.tets its mid node belongs
   };
-  std::vector<std::size_t> begin(mesh.nodes.size() + 1, 0);
+  std::vector<std::size_t> begin(mesh.nodes_m.size() + 1, 0);
   const auto corners = [&](std::size_t e, std::size_t k) {
     const auto tet = mesh.tet(static_cast<std::int64_t>(e));
     return std::minmax(tet[static_cast<std::size_t>(kEdges[k][0])], tet[static_cast<std::size_t>(kEdges[k][1])]);
@@ -46,24 +46,24 @@ TetMesh to_quadratic(const TetMesh& mesh) {
     std::sort(first, last, [](const Edge& x, const Edge& y) { return x.high < y.high || (x.high == y.high && x.slot < y.slot); });
     for (auto edge = first; edge != last; ++edge) {
       if (edge == first || edge->high != (edge - 1)->high) {
-        const Vec3 a = mesh.nodes[low], b = mesh.nodes[static_cast<std::size_t>(edge->high)];
-        fine.nodes.push_back({0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.5 * (a[2] + b[2])});
+        const Vec3 a = mesh.nodes_m[low], b = mesh.nodes_m[static_cast<std::size_t>(edge->high)];
+        fine.nodes_m.push_back({0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.5 * (a[2] + b[2])});
         if (!mesh.doubt_m.empty()) {
           const Vec3 &p = mesh.doubt_m[low], &q = mesh.doubt_m[static_cast<std::size_t>(edge->high)];
           fine.doubt_m.push_back({0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1]), 0.5 * (p[2] + q[2])});
         }
         ends.push_back({static_cast<std::int32_t>(low), edge->high});
       }
-      fine.tets[static_cast<std::size_t>(edge->slot)] = static_cast<std::int32_t>(fine.nodes.size()) - 1;
+      fine.tets[static_cast<std::size_t>(edge->slot)] = static_cast<std::int32_t>(fine.nodes_m.size()) - 1;
     }
   }
-  std::vector<char> inside(mesh.nodes.size());
+  std::vector<char> inside(mesh.nodes_m.size());
   for (auto& [name, set] : fine.node_sets) {
     std::fill(inside.begin(), inside.end(), 0);
     for (const auto node : mesh.node_sets.at(name)) inside[static_cast<std::size_t>(node)] = 1;
     for (std::size_t m = 0; m < ends.size(); ++m)
       if (inside[static_cast<std::size_t>(ends[m][0])] != 0 && inside[static_cast<std::size_t>(ends[m][1])] != 0)
-        set.push_back(static_cast<std::int32_t>(mesh.nodes.size() + m));
+        set.push_back(static_cast<std::int32_t>(mesh.nodes_m.size() + m));
   }
   return fine;
 }
@@ -74,13 +74,13 @@ TetMesh to_linear(const TetMesh& mesh) {
   coarse.order = 1;
   coarse.regions = mesh.regions;
   coarse.region_names = mesh.region_names;
-  std::vector<std::int32_t> number(mesh.nodes.size(), -1);
+  std::vector<std::int32_t> number(mesh.nodes_m.size(), -1);
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
     for (std::size_t k = 0; k < 4; ++k) number[static_cast<std::size_t>(mesh.tet(e)[k])] = 0;
   for (std::size_t i = 0; i < number.size(); ++i)
     if (number[i] == 0) {
-      number[i] = static_cast<std::int32_t>(coarse.nodes.size());
-      coarse.nodes.push_back(mesh.nodes[i]);
+      number[i] = static_cast<std::int32_t>(coarse.nodes_m.size());
+      coarse.nodes_m.push_back(mesh.nodes_m[i]);
       if (!mesh.doubt_m.empty()) coarse.doubt_m.push_back(mesh.doubt_m[i]);
     }
   coarse.tets.reserve(static_cast<std::size_t>(4 * mesh.tet_count()));

@@ -23,8 +23,8 @@ void straighten_folded(TetMesh& mesh, CheckReport& report) {
 void calc_quality(const TetMesh& mesh, CheckReport& report) {
   constexpr double kSliverDeg = 5.0;
   const double sliver_cosine = std::cos(kSliverDeg * std::numbers::pi / 180.0);
-  report.box_low = report.box_high = mesh.nodes.front();
-  for (const Vec3& x : mesh.nodes)
+  report.box_low = report.box_high = mesh.nodes_m.front();
+  for (const Vec3& x : mesh.nodes_m)
     for (std::size_t k = 0; k < 3; ++k) {
       report.box_low[k] = std::min(report.box_low[k], x[k]);
       report.box_high[k] = std::max(report.box_high[k], x[k]);
@@ -32,11 +32,11 @@ void calc_quality(const TetMesh& mesh, CheckReport& report) {
   const std::int64_t count = mesh.tet_count();
   std::vector<double> ratios(static_cast<std::size_t>(count));
   double shortest = std::numeric_limits<double>::infinity();  // of the squared edges
-  double greatest = -1.0, least = 1.0, sum = 0.0;             // of the cosines of the dihedral angles
+  double max = -1.0, min = 1.0, sum = 0.0;                    // of the cosines of the dihedral angles
   for (std::int64_t e = 0; e < count; ++e) {
     const auto tet = mesh.tet(e);
     std::array<Vec3, 4> x{};
-    for (std::size_t i = 0; i < 4; ++i) x[i] = mesh.nodes[static_cast<std::size_t>(tet[i])];
+    for (std::size_t i = 0; i < 4; ++i) x[i] = mesh.nodes_m[static_cast<std::size_t>(tet[i])];
     std::array<Vec3, 4> normal{};
     for (std::size_t f = 0; f < 4; ++f) {
       const auto [i, j, k] = kFaces[f];
@@ -45,15 +45,15 @@ void calc_quality(const TetMesh& mesh, CheckReport& report) {
       const double length = std::sqrt(dot(normal[f], normal[f]));
       for (double& value : normal[f]) value /= length;
     }
-    double own_greatest = -1.0, own_least = 1.0;
+    double own_max = -1.0, own_min = 1.0;
     for (const auto& [f, g] : kEdges) {  // every pair of faces, too
       const double cosine = -dot(normal[static_cast<std::size_t>(f)], normal[static_cast<std::size_t>(g)]);
-      own_greatest = std::max(own_greatest, cosine);
-      own_least = std::min(own_least, cosine);
+      own_max = std::max(own_max, cosine);
+      own_min = std::min(own_min, cosine);
     }
-    greatest = std::max(greatest, own_greatest);
-    least = std::min(least, own_least);
-    report.slivers += own_greatest > sliver_cosine || own_least < -sliver_cosine;
+    max = std::max(max, own_max);
+    min = std::min(min, own_min);
+    report.slivers += own_max > sliver_cosine || own_min < -sliver_cosine;
     const double volume = dot(x[1] - x[0], cross(x[2] - x[0], x[3] - x[0])) / 6.0;
     double squares = 0.0;
     for (const auto& [i, j] : kEdges) {
@@ -72,8 +72,8 @@ void calc_quality(const TetMesh& mesh, CheckReport& report) {
   }
   report.shortest_edge_m = std::sqrt(shortest);
   const double degrees = 180.0 / std::numbers::pi;
-  report.min_dihedral_deg = degrees * std::acos(std::clamp(greatest, -1.0, 1.0));
-  report.max_dihedral_deg = degrees * std::acos(std::clamp(least, -1.0, 1.0));
+  report.min_dihedral_deg = degrees * std::acos(std::clamp(max, -1.0, 1.0));
+  report.max_dihedral_deg = degrees * std::acos(std::clamp(min, -1.0, 1.0));
   report.mean_ratio_mean = sum / static_cast<double>(count);
   report.mean_ratio_min = *std::min_element(ratios.begin(), ratios.end());
   const auto percentile = ratios.begin() + count / 100;

@@ -4,7 +4,8 @@
 #include <cctype>
 #include <new>
 
-#include "precompute/mesh/assemble.hpp"
+#include "precompute/mesh/build_mesh.hpp"
+#include "runtime/base/failure.hpp"
 #include "runtime/base/file.hpp"
 
 namespace carillon::mesh {
@@ -12,10 +13,10 @@ namespace carillon::mesh {
 namespace {
 
 /// No mesh that could be solved here is larger; what is, is no mesh.
-constexpr std::uint64_t kMostBytes = 32ULL << 30;
+constexpr std::uint64_t kMaxBytes = 32ULL << 30;
 
 std::string read_bytes(const std::filesystem::path& file) {
-  std::string bytes = base::read_file(file, "mesh file", kMostBytes);
+  std::string bytes = base::read_file(file, "mesh file", kMaxBytes);
   if (bytes.empty()) throw InputError(fmt::format("{}: the file is empty; write the mesh again", file.string()));
   return bytes;
 }
@@ -80,7 +81,7 @@ TetMesh read_mesh(const std::filesystem::path& file) {
     const std::string bytes = read_bytes(file);
     return parse_mesh(std::as_bytes(std::span(bytes)), file.string(), find_format(bytes, file.string(), extension));
   } catch (const std::bad_alloc&) {
-    throw SystemError(fmt::format("{}: not enough memory to read the mesh; use a machine with more, or a coarser mesh", file.string()));
+    throw MemoryError(fmt::format("{}: not enough memory to read the mesh; use a machine with more, or a coarser mesh", file.string()));
   }
 }
 

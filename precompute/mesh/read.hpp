@@ -35,7 +35,7 @@ TetMesh read_mesh(const std::filesystem::path& file);
 /// The same from memory; `name` is what messages call the file. kTetgen takes both files with one NUL byte between them: .node, NUL, .ele.
 TetMesh parse_mesh(std::span<const std::byte> bytes, const std::string& name, MeshFormat format);
 
-/// True if a cell array of VTK's formats that is called this tells the regions: region, material, physical, ref or the like.
+/// True if a cell array of VTK's formats of this name gives the regions: region, material, physical, ref or the like.
 bool is_region_name(std::string name);
 
 }  // namespace carillon::mesh

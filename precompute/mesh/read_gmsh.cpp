@@ -1,9 +1,8 @@
 // One format, whose sections share one cursor and one set of tags: longer than most files.
 // Method: one pass over the sections of a .msh file, versions 2.0-2.2 and 4.1, text and binary in either byte order; sections that are not
-//   about the mesh are skipped. Tags become indices at the end (assemble_mesh), so the order of the sections is free.
+//   about the mesh are skipped. Tags become indices at the end (build_mesh), so the order of the sections is free.
 // Source: Gmsh reference manual, "MSH file format" and "MSH file format version 2 (Legacy)". Gmsh's quadratic tetrahedron swaps the last
-// two
-//   mid nodes against VTK's.
+//   two mid nodes against VTK's.
 // Deviations: $Periodic, $GhostElements, parametric coordinates and post-processing data but carillon-mesh's own are not used.
 
 #include <algorithm>
@@ -12,7 +11,7 @@
 #include <set>
 #include <unordered_map>
 
-#include "precompute/mesh/assemble.hpp"
+#include "precompute/mesh/build_mesh.hpp"
 
 namespace carillon::mesh {
 
@@ -510,7 +509,7 @@ TetMesh GmshReader::read() {
   std::vector<Vec3> doubt_m(doubt_m_.empty() ? 0 : raw_.nodes.size());
   for (std::size_t i = 0; i < doubt_m.size(); ++i)
     if (const auto found = doubt_m_.find(raw_.node_tags[i]); found != doubt_m_.end()) doubt_m[i] = found->second;
-  TetMesh mesh = assemble_mesh(std::move(raw_), cursor_, cursor_);
+  TetMesh mesh = build_mesh(std::move(raw_), cursor_, cursor_);
   mesh.doubt_m = std::move(doubt_m);
   for (const auto& [group, name] : names_)
     if (group.first == 3) mesh.region_names[group.second] = name;

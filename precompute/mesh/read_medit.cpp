@@ -10,7 +10,7 @@
 #include <cctype>
 #include <optional>
 
-#include "precompute/mesh/assemble.hpp"
+#include "precompute/mesh/build_mesh.hpp"
 
 namespace carillon::mesh {
 
@@ -52,9 +52,9 @@ class MeditReader {
   TetMesh read();
 
  private:
-  std::size_t read_count(std::size_t least_bytes, const char* what) {
+  std::size_t read_count(std::size_t min_bytes, const char* what) {
     const std::size_t place = cursor_.place();
-    return cursor_.checked_count(cursor_.text_int("a count", INT64_MIN, INT64_MAX), least_bytes, what, place);
+    return cursor_.checked_count(cursor_.text_int("a count", INT64_MIN, INT64_MAX), min_bytes, what, place);
   }
   int count_line_numbers();
   void read_vertices();
@@ -173,7 +173,7 @@ void MeditReader::order_mid_nodes() {
     std::array<double, 2> distance{};
     for (std::size_t e = 0; e < raw_.tet_tags.size(); ++e) {
       const std::int64_t* tags = raw_.tets.data() + 10 * e;
-      if (!std::all_of(tags, tags + 10, known)) return;  // assemble_mesh refuses it by name
+      if (!std::all_of(tags, tags + 10, known)) return;  // build_mesh refuses it by name
       for (std::size_t edge = 4; edge < 6; ++edge)
         for (std::size_t way = 0; way < 2; ++way) {
           const Vec3 a = at(tags[kEdges[edge][0]]), b = at(tags[kEdges[edge][1]]);
@@ -223,7 +223,7 @@ TetMesh MeditReader::read() {
     }
   }
   order_mid_nodes();
-  TetMesh mesh = assemble_mesh(std::move(raw_), cursor_, cursor_);
+  TetMesh mesh = build_mesh(std::move(raw_), cursor_, cursor_);
   add_value_sets("ref", references_, 0, mesh);
   return mesh;
 }

@@ -1,12 +1,11 @@
 // Method: the two text files of TetGen, numbered from 0 or 1 (or any other way: the numbers are looked up).
 // Source: TetGen 1.5 manual, sections 5.2.1 (.node) and 5.2.4 (.ele). The order of the mid nodes of -o2 was read off the program's own
-// output
-//   (tests/mesh/data/box2.1.ele): edges 23, 03, 01, 12, 13, 02.
+//   output (tests/unit/precompute/mesh/data/box2.1.ele): edges 23, 03, 01, 12, 13, 02.
 // Deviations: .face, .edge and .neigh files are not needed; attributes of nodes are skipped.
 
 #include <cmath>
 
-#include "precompute/mesh/assemble.hpp"
+#include "precompute/mesh/build_mesh.hpp"
 
 namespace carillon::mesh {
 
@@ -68,7 +67,7 @@ TetMesh parse_tetgen(std::string_view node_bytes, const std::string& node_name, 
     raw.add_tet(ele, tag, tags, static_cast<int>(corners), corners == 4 ? kVtkOrder : kTetgenOrder, region, place);
   }
   if (ele.skip_space()) ele.fail(ele.place(), "more than the {} tetrahedra that the first line announces; correct that line", tet_count);
-  TetMesh mesh = assemble_mesh(std::move(raw), node, ele);
+  TetMesh mesh = build_mesh(std::move(raw), node, ele);
   add_value_sets("marker", values, 0, mesh);
   return mesh;
 }

@@ -10,7 +10,7 @@
 #include <memory>
 #include <pugixml.hpp>
 
-#include "precompute/mesh/assemble.hpp"
+#include "precompute/mesh/build_mesh.hpp"
 #include "precompute/mesh/read.hpp"
 #include "precompute/mesh/vtu_data.hpp"
 
@@ -18,7 +18,7 @@ namespace carillon::mesh {
 
 namespace {
 
-constexpr std::size_t kMostSetArrays = 64;
+constexpr std::size_t kMaxSetArrays = 64;
 
 const char* solid_name(std::int64_t type) {
   switch (type) {
@@ -78,7 +78,7 @@ class VtuReader {
   void parse_xml();
   VtuEncoding read_encoding(const pugi::xml_node& root) const;
   std::size_t place_of(const pugi::xml_node& node) const;
-  std::size_t read_size(const pugi::xml_node& node, const char* key, std::int64_t most = INT32_MAX) const;
+  std::size_t read_size(const pugi::xml_node& node, const char* key, std::int64_t max = INT32_MAX) const;
   pugi::xml_node find_array(const Piece& piece, const char* parent, const char* name) const;
   template <class T>
   std::vector<T> read_array(const pugi::xml_node& array, std::size_t count);
@@ -152,13 +152,13 @@ VtuEncoding VtuReader::read_encoding(const pugi::xml_node& root) const {
   return encoding;
 }
 
-std::size_t VtuReader::read_size(const pugi::xml_node& node, const char* key, std::int64_t most) const {
+std::size_t VtuReader::read_size(const pugi::xml_node& node, const char* key, std::int64_t max) const {
   const std::string text = node.attribute(key).as_string();
   Cursor number(text, file_.name());
   try {
-    return static_cast<std::size_t>(number.text_int(key, 0, most));
+    return static_cast<std::size_t>(number.text_int(key, 0, max));
   } catch (const InputError&) {
-    file_.fail(place_of(node), "{} is {}; it has to be a whole number from 0 to {}: write the mesh again", key, quote_excerpt(text), most);
+    file_.fail(place_of(node), "{} is {}; it has to be a whole number from 0 to {}: write the mesh again", key, quote_excerpt(text), max);
   }
 }
 
@@ -196,7 +196,7 @@ void VtuReader::read_point_sets(const Piece& piece, std::size_t first_node) {
     const std::string name = array.attribute("Name").as_string();
     if (name.empty() || !is_integer(array.attribute("type").as_string()) || array.attribute("NumberOfComponents").as_int(1) != 1) continue;
     // These arrays are a convenience; a file with hundreds of them is not a list of node sets.
-    if (++arrays > kMostSetArrays || (point_values_.size() >= kMostSetArrays && !point_values_.contains(name))) break;
+    if (++arrays > kMaxSetArrays || (point_values_.size() >= kMaxSetArrays && !point_values_.contains(name))) break;
     const auto values = read_array<std::int64_t>(array, piece.points);
     auto& all = point_values_[name];
     all.resize(first_node, 0);
@@ -272,7 +272,7 @@ TetMesh VtuReader::read() {
   if (!grid) file_.fail(place_of(root), "<UnstructuredGrid> is missing; the file was cut short or damaged: write it again");
   for (const pugi::xml_node& node : grid.children("Piece"))
     read_piece({node, read_size(node, "NumberOfPoints"), read_size(node, "NumberOfCells"), place_of(node)});
-  TetMesh mesh = assemble_mesh(std::move(raw_), file_, file_);
+  TetMesh mesh = build_mesh(std::move(raw_), file_, file_);
   for (auto& [name, values] : point_values_) {
     auto& set = mesh.node_sets[name];
     for (std::size_t i = 0; i < values.size(); ++i)

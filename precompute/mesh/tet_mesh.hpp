@@ -16,7 +16,7 @@ namespace carillon::mesh {
 /// det(x1 - x0, x2 - x0, x3 - x0) > 0, then the mid-side nodes of the edges 01, 12, 02, 03, 13, 23 (VTK's order).
 struct TetMesh {
   int order = 1;                                               // 1 or 2
-  std::vector<Vec3> nodes;                                     // (N) [m]
+  std::vector<Vec3> nodes_m;                                   // (N) [m]
   std::vector<std::int32_t> tets;                              // (E, 4) or (E, 10), zero-based
   std::vector<std::int32_t> regions;                           // (E), the file's region tag, 0 where it has none
   std::map<std::int32_t, std::string> region_names;            // of the tags that the file names

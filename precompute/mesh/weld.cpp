@@ -1,6 +1,5 @@
 // Method: nodes are sorted into cells of a grid a thousand times coarser than the tolerance; twins are joined transitively. Twins are
-// welded
-//   only where two boundary faces coincide corner by corner, so that bodies touching at a point or along an edge stay apart.
+//   welded only where two boundary faces coincide corner by corner, so that bodies touching at a point or along an edge stay apart.
 // Source: own.
 // Deviations: the tolerance is 1e-6 of the diagonal of the box of the nodes in use, but 0.01 of the shortest edge at most, and
 //   calc_place_tolerance at least.
@@ -30,24 +29,24 @@ bool join_twins(const TetMesh& mesh, const std::vector<char>& used, const Vec3& 
   };
   const auto cell_of = [&](double x, double origin) { return 1 + static_cast<std::int64_t>(std::floor((x - origin) / cell)); };
   std::vector<Entry> entries;
-  for (std::size_t i = 0; i < mesh.nodes.size(); ++i) {
+  for (std::size_t i = 0; i < mesh.nodes_m.size(); ++i) {
     if (used[i] == 0) continue;
-    const Vec3& x = mesh.nodes[i];
+    const Vec3& x = mesh.nodes_m[i];
     entries.push_back({key_of({cell_of(x[0], low[0]), cell_of(x[1], low[1]), cell_of(x[2], low[2])}), static_cast<std::int32_t>(i)});
   }
   std::sort(entries.begin(), entries.end(),
             [](const Entry& a, const Entry& b) { return a.key < b.key || (a.key == b.key && a.node < b.node); });
   bool any = false;
   const auto compare = [&](std::int32_t i, std::int32_t j) {
-    const Vec3& x = mesh.nodes[static_cast<std::size_t>(i)];
-    const Vec3& y = mesh.nodes[static_cast<std::size_t>(j)];
+    const Vec3& x = mesh.nodes_m[static_cast<std::size_t>(i)];
+    const Vec3& y = mesh.nodes_m[static_cast<std::size_t>(j)];
     if (i == j || std::hypot(x[0] - y[0], x[1] - y[1], x[2] - y[2]) > tolerance) return;
     twins.join(i, j);
     any = true;
   };
   for (std::size_t n = 0; n < entries.size(); ++n) {
     for (std::size_t m = n + 1; m < entries.size() && entries[m].key == entries[n].key; ++m) compare(entries[n].node, entries[m].node);
-    const Vec3& x = mesh.nodes[static_cast<std::size_t>(entries[n].node)];
+    const Vec3& x = mesh.nodes_m[static_cast<std::size_t>(entries[n].node)];
     std::array<std::int64_t, 3> from{}, to{};
     for (std::size_t k = 0; k < 3; ++k) {
       from[k] = cell_of(x[k] - tolerance, low[k]);
@@ -102,7 +101,7 @@ struct MidNode {
 /// Every edge of a quadratic mesh has one mid node: twins are marked for welding, different places are refused.
 void match_mid_nodes(const TetMesh& mesh, const std::string& name, const std::vector<std::int32_t>& twin_of,
                      const std::vector<std::int32_t>& corner_of, std::vector<char>& marked) {
-  std::vector<std::size_t> begin(mesh.nodes.size() + 1, 0);
+  std::vector<std::size_t> begin(mesh.nodes_m.size() + 1, 0);
   const auto ends = [&](std::int64_t e, std::size_t k) {
     const auto tet = mesh.tet(e);
     const auto a = corner_of[static_cast<std::size_t>(tet[static_cast<std::size_t>(kEdges[k][0])])];
@@ -114,7 +113,7 @@ void match_mid_nodes(const TetMesh& mesh, const std::string& name, const std::ve
   for (std::size_t i = 1; i < begin.size(); ++i) begin[i] += begin[i - 1];
   std::vector<MidNode> edges(static_cast<std::size_t>(6 * mesh.tet_count()));
   std::vector<std::size_t> next(begin.begin(), begin.end() - 1);
-  std::vector<std::array<std::int32_t, 2>> edge_of(mesh.nodes.size(), {-1, -1});
+  std::vector<std::array<std::int32_t, 2>> edge_of(mesh.nodes_m.size(), {-1, -1});
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
     for (std::size_t k = 0; k < 6; ++k) {
       const auto [low, high] = ends(e, k);
@@ -158,8 +157,8 @@ double find_shortest_edge(const TetMesh& mesh) {
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e) {
     const auto tet = mesh.tet(e);
     for (const auto& [i, j] : kEdges) {
-      const Vec3 &a = mesh.nodes[static_cast<std::size_t>(tet[static_cast<std::size_t>(i)])],
-                 &b = mesh.nodes[static_cast<std::size_t>(tet[static_cast<std::size_t>(j)])];
+      const Vec3 &a = mesh.nodes_m[static_cast<std::size_t>(tet[static_cast<std::size_t>(i)])],
+                 &b = mesh.nodes_m[static_cast<std::size_t>(tet[static_cast<std::size_t>(j)])];
       shortest = std::min(shortest, std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]));
     }
   }
@@ -169,18 +168,18 @@ double find_shortest_edge(const TetMesh& mesh) {
 }  // namespace
 
 std::vector<std::int32_t> weld_cracks(TetMesh& mesh, const std::string& name, CheckReport& report) {
-  const std::size_t count = mesh.nodes.size();
+  const std::size_t count = mesh.nodes_m.size();
   std::vector<char> used(count, 0);
   for (const auto node : mesh.tets) used[static_cast<std::size_t>(node)] = 1;
   Vec3 low{HUGE_VAL, HUGE_VAL, HUGE_VAL}, high{-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
   for (std::size_t i = 0; i < count; ++i)
     for (std::size_t k = 0; used[i] != 0 && k < 3; ++k) {
-      low[k] = std::min(low[k], mesh.nodes[i][k]);
-      high[k] = std::max(high[k], mesh.nodes[i][k]);
+      low[k] = std::min(low[k], mesh.nodes_m[i][k]);
+      high[k] = std::max(high[k], mesh.nodes_m[i][k]);
     }
   if (!std::isfinite(std::hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2])))
     throw InputError(fmt::format("{}: the coordinates are too large to compute with; give them in metres", name));
-  // Coordinates of single precision differ by 1e-7 of the body; nodes that close on the scale of an element are no twins all the same.
+  // Coordinates of single precision differ by 1e-7 of the body; nodes that close on the scale of an element are still not twins.
   constexpr double kSingle = 1e-6, kOfEdge = 1e-2;
   const double diagonal = std::hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
   const double tolerance = std::max(calc_place_tolerance(low, high), std::min(kSingle * diagonal, kOfEdge * find_shortest_edge(mesh)));

@@ -10,7 +10,7 @@
 #include <bit>
 #include <iterator>
 
-#include "precompute/mesh/assemble.hpp"
+#include "precompute/mesh/build_mesh.hpp"
 #include "runtime/base/file.hpp"
 
 namespace carillon::mesh {
@@ -96,8 +96,8 @@ std::string make_gmsh(const TetMesh& mesh, GmshEncoding encoding) {
   std::vector<std::size_t> filled;  // sets that have nodes
   for (std::size_t s = 0; s < sets.size(); ++s)
     if (!sets[s].second->empty()) filled.push_back(s);
-  Vec3 low = mesh.nodes.empty() ? Vec3{} : mesh.nodes.front(), high = low;
-  for (const Vec3& x : mesh.nodes)
+  Vec3 low = mesh.nodes_m.empty() ? Vec3{} : mesh.nodes_m.front(), high = low;
+  for (const Vec3& x : mesh.nodes_m)
     for (std::size_t k = 0; k < 3; ++k) {
       low[k] = std::min(low[k], x[k]);
       high[k] = std::max(high[k], x[k]);
@@ -107,7 +107,7 @@ std::string make_gmsh(const TetMesh& mesh, GmshEncoding encoding) {
   out.end_line();
   for (const std::size_t s : filled) {
     out.int32(static_cast<std::int32_t>(s + 1));
-    for (const double value : mesh.nodes[static_cast<std::size_t>(sets[s].second->front())]) out.real(value);
+    for (const double value : mesh.nodes_m[static_cast<std::size_t>(sets[s].second->front())]) out.real(value);
     out.size(1);
     out.int32(static_cast<std::int32_t>(s + 1));
     out.end_line();
@@ -122,16 +122,16 @@ std::string make_gmsh(const TetMesh& mesh, GmshEncoding encoding) {
     out.end_line();
   }
   out.text(binary ? "\n$EndEntities\n$Nodes\n" : "$EndEntities\n$Nodes\n");
-  for (const std::size_t value : {std::size_t{1}, mesh.nodes.size(), std::size_t{1}, mesh.nodes.size()}) out.size(value);
+  for (const std::size_t value : {std::size_t{1}, mesh.nodes_m.size(), std::size_t{1}, mesh.nodes_m.size()}) out.size(value);
   out.end_line();
   for (const std::int32_t value : {3, 1, 0}) out.int32(value);
-  out.size(mesh.nodes.size());
+  out.size(mesh.nodes_m.size());
   out.end_line();
-  for (std::size_t i = 0; i < mesh.nodes.size(); ++i) {
+  for (std::size_t i = 0; i < mesh.nodes_m.size(); ++i) {
     out.size(i + 1);
     out.end_line();
   }
-  for (const Vec3& x : mesh.nodes) {
+  for (const Vec3& x : mesh.nodes_m) {
     for (const double value : x) out.real(value);
     out.end_line();
   }

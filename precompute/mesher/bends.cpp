@@ -1,8 +1,7 @@
 // Method: coplanar triangles are joined to panes. From every edge that turns by less than 50 degrees a row of panes is followed to both
-//   sides:
-//   through a pane with four corners to the opposite side, through others straight on. The row ends at a sharp edge, at a pane more than
-//   three times wider or a polygon, and where the turn changes its sign or its size by more than a factor. Its length tells an arc cut into
-//   facets from a bevel.
+//   sides: through a pane with four corners to the opposite side, through others straight on. The row ends at a sharp edge, at a pane more
+//   than three times wider or a polygon, and where the turn changes its sign or its size by more than a factor. Its length distinguishes an
+//   arc cut into facets from a bevel.
 // Source: our own. The thresholds are measured: docs/decisions/surface-meshing.md.
 // Deviations: none.
 #include "precompute/mesher/bends.hpp"
@@ -21,10 +20,10 @@ constexpr double kFlatDeg = 0.1;     // faces that turn by less are one plane
 constexpr double kCornerDeg = 10;    // the outline of a pane has a corner where it turns by more
 constexpr double kWider = 3;         // a pane this many times wider than its neighbour is not of its row
 constexpr double kAlike = 3.3;       // turns that differ by more than this factor are not of one row
-constexpr double kMostTurnDeg = 50;  // no smooth surface is cut as coarsely
+constexpr double kMaxTurnDeg = 50;   // no smooth surface is cut as coarsely
 constexpr double kSureTurnDeg = 25;  // fifteen sides and more are a circle
 constexpr int kRow = 4;              // panes that make an arc
-constexpr int kShortRow = 5;         // bends and panes that may be an arc: two panes between planes, or three and nothing beside them
+constexpr int kShortRow = 5;         // bends and panes that may be an arc: two panes between planes, or three and nothing next to them
 constexpr int kFollowed = 4;         // to each side
 
 Vec3 calc_unit(const Vec3& a) {
@@ -38,7 +37,7 @@ struct Outline {
   std::vector<int> side;            // of each edge, numbered around; empty if the outline is no single loop
   int sides = 0;
   int triangles = 0;
-  int sharp = 0;       // edges on which no smooth surface goes on
+  int sharp = 0;       // edges across which no smooth surface continues
   int neighbours = 0;  // panes on which it may
   double rim_turn_deg = 0;
 };
@@ -76,7 +75,7 @@ class Judge {
   std::int32_t pane_of(const Bend& edge, int side) const { return out_.pane[edge.faces[side]]; }
   const Outline& outline_of(std::int32_t pane) const { return outlines_[place_[pane]]; }
   bool is_plane(const Bend& edge) const { return edge.count == 2 && edge.turn_deg < kFlatDeg; }
-  bool is_bend(const Bend& edge) const { return edge.count == 2 && edge.turn_deg >= kFlatDeg && edge.turn_deg <= kMostTurnDeg; }
+  bool is_bend(const Bend& edge) const { return edge.count == 2 && edge.turn_deg >= kFlatDeg && edge.turn_deg <= kMaxTurnDeg; }
 
   void find_edges() {
     std::map<std::array<std::int32_t, 2>, std::int32_t> number;  // ordered: the new points come in a fixed order
@@ -197,12 +196,12 @@ class Judge {
     const Bend& from = out_.edges[entry];
     const Vec3 start = calc_middle(from);
     std::int32_t best = -1;
-    double least = HUGE_VAL;
+    double min = HUGE_VAL;
     const auto find_nearest = [&](int other_side) {
       for (std::size_t i = 0; i < outline.edges.size(); ++i) {
         if (outline.side[i] != other_side) continue;
         const double distance = norm(calc_middle(out_.edges[outline.edges[i]]) - start);
-        if (distance < least) least = distance, best = outline.edges[i];
+        if (distance < min) min = distance, best = outline.edges[i];
       }
       return best;
     };
@@ -226,7 +225,7 @@ class Judge {
       const double qa = dot(along, a), qb = dot(along, b);
       if ((qa < 0) == (qb < 0)) continue;
       const double distance = dot(inward, a) + (dot(inward, b) - dot(inward, a)) * qa / (qa - qb);
-      if (distance > 1e-9 * norm(a) && distance < least) least = distance, best = e;
+      if (distance > 1e-9 * norm(a) && distance < min) min = distance, best = e;
     }
     return best;
   }
@@ -293,7 +292,7 @@ class Judge {
 
   /// The least turn of the rim at the places where a bend of the pane meets it; 0 if none does.
   double calc_rim_turn(std::int32_t pane) const {
-    double least = HUGE_VAL;
+    double min = HUGE_VAL;
     for (const std::int32_t e : outline_of(pane).edges) {
       const Bend& edge = out_.edges[e];
       if (!is_bend(edge)) continue;
@@ -306,10 +305,10 @@ class Judge {
           if (before < 0 || next < 0) continue;
           turn = calc_turn(before, v, next);
         }
-        least = std::min(least, turn);
+        min = std::min(min, turn);
       }
     }
-    return least < HUGE_VAL ? least : 0;
+    return min < HUGE_VAL ? min : 0;
   }
 
   /// A single triangle without a side on a sharp edge, or with one.
@@ -355,7 +354,7 @@ class Judge {
     // A shallow pyramid turns less at its edges than its outline does.
     const double turn = std::max(edge.turn_deg, std::min(outline_of(panes[0]).rim_turn_deg, outline_of(panes[1]).rim_turn_deg));
     edge.sharp = turn > sharp_angle_deg_;
-    edge.doubtful = turn > kSureTurnDeg && turn <= kMostTurnDeg;
+    edge.doubtful = turn > kSureTurnDeg && turn <= kMaxTurnDeg;
     if (edge.sharp) return;
     std::array<double, 2> reach{};
     for (int side = 0; side < 2; ++side) reach[side] = calc_reach(panes[side], edge);
@@ -377,7 +376,7 @@ class Judge {
 Bends find_bends(const TriangleSurface& surface, double sharp_angle_deg) { return Judge(surface, sharp_angle_deg).judge(); }
 
 bool is_tip(const TriangleSurface& surface, const Bends& bends, std::int32_t v, const Vec3& normal) {
-  constexpr double kLeast = 0.05;   // 3 degrees
+  constexpr double kMin = 0.05;     // 3 degrees
   constexpr double kFurther = 0.4;  // of the slope: on a ball the next edge turns by twice of it
   const auto at = [&](std::int32_t n) -> const Vec3& { return surface.points[static_cast<std::size_t>(n)]; };
   double all = 0;
@@ -387,7 +386,7 @@ bool is_tip(const TriangleSurface& surface, const Bends& bends, std::int32_t v, 
     std::int32_t f = corner / 3, e = bends.edges_of[f][(corner % 3 + 1) % 3];
     const Vec3 away = calc_unit(0.5 * (at(bends.edges[e].ends[0]) + at(bends.edges[e].ends[1])) - at(v));
     const double slope = -dot(away, normal);
-    if (std::abs(slope) < kLeast || slope * all < 0) return false;
+    if (std::abs(slope) < kMin || slope * all < 0) return false;
     all += slope;
     ++panes[bends.pane[f]];
     const Vec3 sideways = cross(bends.normals[f], away);

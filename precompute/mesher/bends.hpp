@@ -16,9 +16,9 @@ struct Bend {
   int count = 0;                              // of triangles; 2 on a closed surface
   double turn_deg = 180;
   double sign = 1;        // 1: convex, -1: concave
-  bool sharp = true;      // an edge of the body; otherwise the smooth surface goes on across it
+  bool sharp = true;      // an edge of the body; otherwise the smooth surface continues across it
   bool doubtful = false;  // could as well be the other
-  int straight = -1;      // 0 or 1: the face on this side is a plane (or a straight strip) beside a curved part, and keeps its normal here
+  int straight = -1;      // 0 or 1: the face on this side is a plane (or a straight strip) next to a curved part, and keeps its normal here
 };
 
 struct Bends {

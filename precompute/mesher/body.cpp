@@ -81,8 +81,8 @@ DelaunaySizes calc_sizes(const Body& body, const SurfaceOptions& options, double
   // Far more than any body needs at this edge length, so that only a runaway meets it.
   // Without a target, a thin body takes what its thickness needs.
   const double effective = options.nodes ? edge_m : std::min(edge_m, kEdgePerThickness * body.thickness_m);
-  const double most = 3000 + 5 * std::max(body.model.calc_nodes(effective), static_cast<double>(options.nodes.value_or(0)));
-  return {edge_m, distance, static_cast<std::size_t>(std::min(most, 3 * kMostNodes))};
+  const double max_nodes = 3000 + 5 * std::max(body.model.calc_nodes(effective), static_cast<double>(options.nodes.value_or(0)));
+  return {edge_m, distance, static_cast<std::size_t>(std::min(max_nodes, 3 * kMaxNodes))};
 }
 
 Vec3 project(const Body& body, Vec3 p) {

@@ -15,7 +15,7 @@
 
 namespace carillon::mesher {
 
-constexpr double kMostNodes = 2e7;
+constexpr double kMaxNodes = 2e7;
 // Edges longer than the body is thick do not make the mesh coarser: on plates and cubes its count levels out at what the model gives for
 // this multiple of the mean thickness.
 constexpr double kEdgePerThickness = 1.4;

@@ -1,6 +1,6 @@
 // Method: secant steps on a model of the count, scaled to the last mesh, inside the bracket known so far. Where the count no longer falls
-// as
-//   edges grow, the body's own thickness sets it and the search ends. Counts of coarse meshes jump, so a row of edges is tried there too.
+//   as edges grow, the body's own thickness sets it and the search ends. Counts of coarse meshes jump, so a row of edges is tried there
+//   too.
 // Source: our own.
 // Deviations: none.
 #include "precompute/mesher/count_search.hpp"
@@ -15,7 +15,7 @@
 namespace carillon::mesher {
 namespace {
 
-constexpr int kMostSteps = 10;
+constexpr int kMaxSteps = 10;
 // Below this target a mesh costs a few hundredths of a second, and the row of edges is tried.
 constexpr double kCheapTarget = 3000;
 constexpr int kRow = 24;
@@ -53,7 +53,7 @@ double CountModel::find_edge(double nodes) const {
 }
 
 std::int64_t count_nodes(const mesh::TetMesh& linear, int order) {
-  return static_cast<std::int64_t>(linear.nodes.size()) + (order == 2 ? count_edges(linear) : 0);
+  return static_cast<std::int64_t>(linear.nodes_m.size()) + (order == 2 ? count_edges(linear) : 0);
 }
 
 mesh::TetMesh search_edge(const CountSearch& search, CountModel model, double& edge_m, int& attempts,
@@ -85,7 +85,7 @@ mesh::TetMesh search_edge(const CountSearch& search, CountModel model, double& e
   const auto is_met = [&](double tolerance) { return best && std::abs(best->count / target - 1) <= tolerance; };
 
   double edge = std::min(edge_m, search.longest_m), low = 0, high = 1e300;
-  for (int step = 0; step < kMostSteps && !is_met(search.contented); ++step) {
+  for (int step = 0; step < kMaxSteps && !is_met(search.contented); ++step) {
     const std::optional<double> count = attempt(edge);
     if (is_level(trials, target)) break;
     if (!count || *count < target)

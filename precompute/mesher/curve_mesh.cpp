@@ -31,11 +31,11 @@ struct BoundaryEdge {
 /// The boundary edges, in the order of their ends.
 std::vector<BoundaryEdge> find_boundary_edges(const mesh::TetMesh& mesh) {
   mesh::TetMesh linear;  // the corners alone, numbered as they are
-  linear.nodes = mesh.nodes;
+  linear.nodes_m = mesh.nodes_m;
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e) linear.tets.insert(linear.tets.end(), mesh.tet(e).begin(), mesh.tet(e).begin() + 4);
   std::map<std::array<std::int32_t, 2>, BoundaryEdge> edges;
   for (const Triangle& t : find_boundary(linear)) {
-    const Vec3 area = cross(mesh.nodes[t[1]] - mesh.nodes[t[0]], mesh.nodes[t[2]] - mesh.nodes[t[0]]);
+    const Vec3 area = cross(mesh.nodes_m[t[1]] - mesh.nodes_m[t[0]], mesh.nodes_m[t[2]] - mesh.nodes_m[t[0]]);
     const Vec3 normal = (1 / norm(area)) * area;
     for (int c = 0; c < 3; ++c) {
       const auto [a, b] = std::minmax(t[c], t[(c + 1) % 3]);
@@ -74,7 +74,7 @@ std::pair<Vec3, double> find_on_curves(const std::vector<Polyline>& curves, cons
 CurvedEdges curve_mesh(mesh::TetMesh& mesh, const std::vector<Polyline>& curves, const SkinPlace& find_place) {
   CurvedEdges out;
   for (const BoundaryEdge& edge : find_boundary_edges(mesh)) {
-    const Vec3 &a = mesh.nodes[edge.a], &b = mesh.nodes[edge.b];
+    const Vec3 &a = mesh.nodes_m[edge.a], &b = mesh.nodes_m[edge.b];
     const double length = norm(b - a), reach = kReach * length;
     const Vec3 middle = 0.5 * (a + b), sum = edge.normals[0] + edge.normals[1];
     std::optional<Vec3> place;
@@ -87,7 +87,7 @@ CurvedEdges curve_mesh(mesh::TetMesh& mesh, const std::vector<Polyline>& curves,
     if (!place) {
       ++out.left;
     } else if (norm(*place - middle) > 1e-6 * length) {
-      mesh.nodes[edge.middle] = *place;
+      mesh.nodes_m[edge.middle] = *place;
       ++out.curved;
     }
   }

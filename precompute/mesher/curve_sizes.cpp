@@ -14,7 +14,7 @@ namespace {
 // The edge length is the radius of the balls, so two balls face to face need twice of it between their middles.
 constexpr double kSizePerGap = 0.45;
 constexpr double kGrowth = 0.5;
-constexpr double kMostSamples = 4000;
+constexpr double kMaxSamples = 4000;
 // Two places on one curve hinder each other if the way along it is this many times the straight one.
 constexpr double kHairpin = 4;
 
@@ -51,7 +51,7 @@ std::vector<SizedPoint> calc_curve_sizes(const std::vector<Polyline>& curves, do
     lengths.push_back(length);
     total += length;
   }
-  const double spacing = std::max(0.5 * edge_m, total / kMostSamples);
+  const double spacing = std::max(0.5 * edge_m, total / kMaxSamples);
   std::vector<char> apart(curves.size());
   std::vector<SizedPoint> narrow;
   std::size_t next = 0;

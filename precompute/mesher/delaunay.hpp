@@ -13,12 +13,12 @@ namespace carillon::mesher {
 
 /// What the elements must satisfy, in metres.
 struct DelaunaySizes {
-  double edge_m = 0;           // about the length of the edges
-  double distance_m = 0;       // farthest that a boundary face's middle may lie from the true surface
-  std::size_t most_nodes = 0;  // refinement stops there with whatever it has
+  double edge_m = 0;          // about the length of the edges
+  double distance_m = 0;      // farthest that a boundary face's middle may lie from the true surface
+  std::size_t max_nodes = 0;  // refinement stops there with whatever it has
 };
 
-/// One mesh in the making: refine makes it anew for given sizes, optimise removes its slivers.
+/// One mesh in the making: refine makes it again for given sizes, optimise removes its slivers.
 class DelaunayBody {
  public:
   virtual ~DelaunayBody() = default;

@@ -42,7 +42,7 @@ void dump_c3t3_edges(const Complex&, const std::string&) {}
 
 namespace carillon::mesher {
 
-/// Sets `stop` once the thread that made it has computed for `limit_s` more. CGAL's refinement can turn on the spot for ever where skins
+/// Sets `stop` once the thread that made it has computed for `limit_s` more. CGAL's refinement can loop without end where skins
 /// touch at a point; only this ends it. A sound body takes a tenth of the limit, so that meshes do not depend on it.
 class Watchdog {
  public:
@@ -136,10 +136,10 @@ class BoundedCurves : public Base {
   using Base::Base;
   explicit BoundedCurves(Base base) : Base(std::move(base)) {}
 
-  std::size_t most_balls = 0;
+  std::size_t max_balls = 0;
   typename Base::Point_3 construct_point_on_curve(const typename Base::Point_3& start, const typename Base::Curve_index& curve,
                                                   typename Base::FT distance) const {
-    if (++balls_ > most_balls) throw std::runtime_error("the sharp edges lie too close to each other");
+    if (++balls_ > max_balls) throw std::runtime_error("the sharp edges lie too close to each other");
     return Base::construct_point_on_curve(start, curve, distance);
   }
 
@@ -147,6 +147,8 @@ class BoundedCurves : public Base {
   mutable std::size_t balls_ = 0;
 };
 
+/// DelaunayBody for one kind of CGAL domain. refine() restarts CGAL's random numbers and makes the domain again, so that a mesh depends on
+/// its sizes alone.
 template <class Domain, class Index>
 class Mesh3Body : public DelaunayBody {
   using Triangulation = typename CGAL::Mesh_triangulation_3<Domain, CGAL::Default, CGAL::Sequential_tag>::type;
@@ -162,9 +164,9 @@ class Mesh3Body : public DelaunayBody {
     // The random numbers restart, so that the same sizes give the same mesh whatever was made before.
     CGAL::get_default_random() = CGAL::Random(0);
     stop_ = nullptr;
-    make_domain(sizes.most_nodes);
-    // The nodes on the sharp edges and twice as many more: they are part of a fifth of most_nodes.
-    domain_->most_balls = 2000 + sizes.most_nodes / 8;
+    make_domain(sizes.max_nodes);
+    // The nodes on the sharp edges and twice as many more: they are part of a fifth of max_nodes.
+    domain_->max_balls = 2000 + sizes.max_nodes / 8;
     complex_ = Complex();
     const double radius = kRadiusPerEdge * sizes.edge_m;
     narrow_ = calc_curve_sizes(polylines_, sizes.edge_m);
@@ -173,19 +175,19 @@ class Mesh3Body : public DelaunayBody {
     };
     const Criteria criteria(p::edge_size = calc_edge, p::facet_angle = 25, p::facet_size = radius, p::facet_distance = sizes.distance_m,
                             p::cell_radius_edge_ratio = 2, p::cell_size = radius);
-    // A bound on the nodes ends what would otherwise go on for ever: balls between curves that nearly touch.
+    // A bound on the nodes ends what would otherwise never end: balls between curves that nearly touch.
     CGAL::Mesh_error_code unused = CGAL::CGAL_MESH_3_NO_ERROR;
-    if (!curves_.empty()) CGAL::Mesh_3::internal::init_c3t3_with_features(complex_, *domain_, criteria, false, sizes.most_nodes, &unused);
+    if (!curves_.empty()) CGAL::Mesh_3::internal::init_c3t3_with_features(complex_, *domain_, criteria, false, sizes.max_nodes, &unused);
     insert_first_points(sizes.edge_m);
-    Watchdog watchdog(2 + 1.5e-4 * static_cast<double>(sizes.most_nodes));
+    Watchdog watchdog(2 + 1.5e-4 * static_cast<double>(sizes.max_nodes));
     stop_ = &watchdog.stop;
     CGAL::refine_mesh_3(complex_, *domain_, criteria, p::no_perturb(), p::no_exude(), p::manifold(),
-                        p::mesh_3_options(p::maximal_number_of_vertices = sizes.most_nodes, p::pointer_to_error_code = &unused,
+                        p::mesh_3_options(p::maximal_number_of_vertices = sizes.max_nodes, p::pointer_to_error_code = &unused,
                                           p::pointer_to_stop_atomic_boolean = &watchdog.stop));
     stop_ = nullptr;
     if (watchdog.stop) throw std::runtime_error("parts of the surface touch, or nearly so");
     // Faces are refined before cells: where they alone met the bound there is no cell, and that is no sign of too few nodes.
-    if (complex_.number_of_cells_in_complex() == 0 && complex_.triangulation().number_of_vertices() >= sizes.most_nodes)
+    if (complex_.number_of_cells_in_complex() == 0 && complex_.triangulation().number_of_vertices() >= sizes.max_nodes)
       throw std::runtime_error("its faces meet in angles too sharp for elements of this size");
     return extract();
   }
@@ -208,8 +210,8 @@ class Mesh3Body : public DelaunayBody {
   void add_curves() {
     if (!curves_.empty()) domain_->add_features(curves_.begin(), curves_.end());
   }
-  /// Sets domain_, which may end a refinement that does not by an exception; `most_nodes` says how much work to expect.
-  virtual void make_domain(std::size_t most_nodes) = 0;
+  /// Sets domain_, which may end a refinement that does not by an exception; `max_nodes` says how much work to expect.
+  virtual void make_domain(std::size_t max_nodes) = 0;
   /// Points on the boundary about three edges apart, on every part of it, each with its index in the domain.
   virtual std::vector<std::pair<Vec3, Index>> find_first_points(double spacing_m) = 0;
 
@@ -251,8 +253,9 @@ class Mesh3Body : public DelaunayBody {
     for (auto cell = complex_.cells_in_complex_begin(); cell != complex_.cells_in_complex_end(); ++cell)
       for (int c = 0; c < 4; ++c) {
         const auto v = cell->vertex(c);
-        const auto [found, fresh] = number.try_emplace(static_cast<const void*>(&*v), static_cast<std::int32_t>(out.nodes.size()));
-        if (fresh) out.nodes.push_back({CGAL::to_double(v->point().x()), CGAL::to_double(v->point().y()), CGAL::to_double(v->point().z())});
+        const auto [found, fresh] = number.try_emplace(static_cast<const void*>(&*v), static_cast<std::int32_t>(out.nodes_m.size()));
+        if (fresh)
+          out.nodes_m.push_back({CGAL::to_double(v->point().x()), CGAL::to_double(v->point().y()), CGAL::to_double(v->point().z())});
         out.tets.push_back(found->second);
       }
     out.regions.assign(out.tets.size() / 4, 0);

@@ -21,14 +21,14 @@ class FieldBody final : public Mesh3Body<Domain, Domain::Index> {
       : Mesh3Body(curves), field_(field), wall_m_(wall_m) {}
 
  private:
-  void make_domain(std::size_t most_nodes) override {
-    most_refining_ = kEvaluationsAtLeast + kEvaluationsPerNode * most_nodes;
-    most_evaluations_ = most_refining_ + kEvaluationsToOptimise * most_nodes;
-    // Refinement can try for ever to part what touches at a point; no node comes of it, so their bound does not end it.
+  void make_domain(std::size_t max_nodes) override {
+    max_refining_ = kEvaluationsAtLeast + kEvaluationsPerNode * max_nodes;
+    max_evaluations_ = max_refining_ + kEvaluationsToOptimise * max_nodes;
+    // Refinement can try without end to separate what touches at a point; no node comes of it, so their bound does not end it.
     evaluations_ = 0;
     const auto body = [this](const Kernel::Point_3& p) {
       // stop_ is set while elements are refined.
-      if (++evaluations_ > (stop_ ? most_refining_ : most_evaluations_) || (stop_ && *stop_))
+      if (++evaluations_ > (stop_ ? max_refining_ : max_evaluations_) || (stop_ && *stop_))
         throw std::runtime_error("parts of its surface touch, or nearly so");
       return calc_body(field_, wall_m_, {p.x(), p.y(), p.z()});
     };
@@ -75,7 +75,7 @@ class FieldBody final : public Mesh3Body<Domain, Domain::Index> {
 
   const DistanceField& field_;
   double wall_m_;
-  std::size_t evaluations_ = 0, most_refining_ = 0, most_evaluations_ = 0;
+  std::size_t evaluations_ = 0, max_refining_ = 0, max_evaluations_ = 0;
 };
 
 }  // namespace

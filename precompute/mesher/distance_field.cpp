@@ -1,6 +1,5 @@
 // Method: the distance in a band around the surface by handing the nearest triangle on from sample to sample (nearest_triangle.hpp); the
-// sign
-//   from the winding number, found by crossing the surface with one line along x per row of samples. A flood fill would fill a body's
+//   sign from the winding number, found by crossing the surface with one line along x per row of samples. A flood fill would fill a body's
 //   closed cavities and needs a watertight surface; the winding number needs neither and takes overlapping parts as one body.
 // Source: the tie rule of the crossings is the "simulation of simplicity" of Edelsbrunner and Muecke 1990 (the line is moved by an
 //   infinitesimal).
@@ -104,7 +103,7 @@ double DistanceField::calc_distance(const Vec3& p) const {
 
 DistanceField calc_distance_field(const TriangleSurface& surface, double voxel_m, const FieldReach& reach, double offset_m) {
   constexpr float kFar = 1e9f;  // in voxels
-  constexpr double kMostSamples = 4e8;
+  constexpr double kMaxSamples = 4e8;
   const Box box = calc_box(surface.points);
   DistanceField field;
   field.voxel_m = voxel_m;
@@ -115,11 +114,11 @@ DistanceField calc_distance_field(const TriangleSurface& surface, double voxel_m
   for (int c = 0; c < 3; ++c) {
     const double cells = std::ceil(box.extent()[c] / voxel_m) + 2 * kMargin;
     count *= cells + 1;
-    if (!(count <= kMostSamples))
+    if (!(count <= kMaxSamples))
       throw InputError(
           fmt::format("a distance field of {:.3g} m voxels over a body of {:.3g} m diagonal has more than {:.0f} million samples; "
                       "ask for longer edges (--edge), fewer nodes or a thicker wall",
-                      voxel_m, box.diagonal(), kMostSamples / 1e6));
+                      voxel_m, box.diagonal(), kMaxSamples / 1e6));
     field.size[c] = static_cast<std::int32_t>(cells) + 1;
     // The grid is off the box by an odd fraction, so that flat faces do not lie on samples.
     field.origin[c] = 0.5 * (box.low[c] + box.high[c]) - voxel_m * (0.5 * cells + 0.0137 * (c + 1));

@@ -93,11 +93,11 @@ std::vector<std::vector<std::int32_t>> join_curves(const TriangleSurface& surfac
 /// The mean normal, by area, of the faces reached from `seed` within `radius` of p without crossing a sharp edge.
 Vec3 calc_mean_normal(const TriangleSurface& surface, const EdgeMap& edges, std::int32_t seed, const Vec3& p, double radius,
                       double sharp_angle_deg) {
-  constexpr std::size_t kMostFaces = 500;
+  constexpr std::size_t kMaxFaces = 500;
   std::vector<std::int32_t> reached{seed};
   std::set<std::int32_t> seen{seed};
   Vec3 sum{};
-  for (std::size_t next = 0; next < reached.size() && next < kMostFaces; ++next) {
+  for (std::size_t next = 0; next < reached.size() && next < kMaxFaces; ++next) {
     const Triangle& t = surface.triangles[reached[next]];
     sum = sum + cross(surface.points[t[1]] - surface.points[t[0]], surface.points[t[2]] - surface.points[t[0]]);
     for (int c = 0; c < 3; ++c) {

@@ -8,7 +8,7 @@ namespace carillon::mesher {
 /// What is being done to which file. Nothing unless guard_program() was called, as the others here.
 void set_guarded_step(std::string_view file, std::string_view step);
 
-/// While it lives, the process ends after this much more processor time.
+/// During its lifetime, the process ends after this much more processor time.
 class CpuLimit {
  public:
   explicit CpuLimit(double seconds);

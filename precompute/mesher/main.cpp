@@ -6,9 +6,9 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <map>
-#include <new>
 #include <optional>
 #include <set>
 #include <string>
@@ -21,7 +21,9 @@
 #include "precompute/shapes/shapes.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/file.hpp"
+#include "runtime/base/json.hpp"
 #include "runtime/base/printable.hpp"
+#include "runtime/base/result.hpp"
 #include "runtime/base/standard_output.hpp"
 #include "runtime/version/version.hpp"
 
@@ -32,7 +34,7 @@ using Clock = std::chrono::steady_clock;
 
 /// The command line as it was given.
 struct Order {
-  std::string surface, shape, out, json;
+  std::string surface, shape, out, json, result;
   std::map<std::string, double> lengths;  // --wall, --height and the dimensions of shapes, by name without dashes
   std::optional<double> scale, edge, close_holes;
   std::optional<long long> nodes;
@@ -44,7 +46,7 @@ struct Order {
 };
 
 /// What came out, for both ways of making a mesh.
-struct Result {
+struct Meshed {
   mesh::TetMesh mesh;
   std::vector<std::string> notes;
   std::vector<std::pair<std::string, double>> seconds;
@@ -88,7 +90,7 @@ std::string describe_shapes() {
          "  carillon-mesh --shape tube --length 0.4 --outer-radius 0.0125 --wall 0.001 --order 2 -o chime.msh\n";
 }
 
-/// A tube and a bowl have one radius to speak of, the outer one: --radius means that.
+/// A tube and a bowl are described by one radius, the outer one: --radius means that.
 void complete_radius(Order& order) {
   if (order.shape != "tube" && order.shape != "bowl") return;
   if (!order.lengths.contains("radius")) return;
@@ -149,7 +151,7 @@ void check_options(const Order& order) {
   }
 }
 
-Result make_from_surface(const Order& order, const mesher::Progress& progress) {
+Meshed make_from_surface(const Order& order, const mesher::Progress& progress) {
   mesher::SurfaceOptions options;
   options.surface = order.surface;
   if (order.lengths.contains("wall")) options.wall_m = order.lengths.at("wall");
@@ -164,7 +166,7 @@ Result make_from_surface(const Order& order, const mesher::Progress& progress) {
   options.facets = order.facets;
   if (order.method == "delaunay") options.method = mesher::Method::kDelaunay;
   if (order.method == "stuffing") options.method = mesher::Method::kStuffing;
-  Result result;
+  Meshed result;
   mesher::SurfaceReport report;
   result.mesh = mesher::mesh_surface(options, report, progress);
   result.notes = report.notes;
@@ -173,7 +175,7 @@ Result make_from_surface(const Order& order, const mesher::Progress& progress) {
   return result;
 }
 
-Result make_from_shape(const Order& order, const mesher::Progress& progress) {
+Meshed make_from_shape(const Order& order, const mesher::Progress& progress) {
   progress(fmt::format("making the {}", order.shape));
   const auto start = Clock::now();
   shapes::ShapeOptions options;
@@ -182,7 +184,7 @@ Result make_from_shape(const Order& order, const mesher::Progress& progress) {
   options.order = order.order;
   options.target_nodes = order.nodes;
   options.edge_m = order.edge;
-  Result result;
+  Meshed result;
   result.mesh = shapes::make_shape(options);
   if (order.straight) mesh::straighten(result.mesh);
   result.seconds.emplace_back("mesh", calc_seconds(start));
@@ -190,69 +192,56 @@ Result make_from_shape(const Order& order, const mesher::Progress& progress) {
 }
 
 /// What the count fell short of, or nothing.
-void note_count(const Order& order, Result& result) {
+void note_count(const Order& order, Meshed& result) {
   if (!order.nodes) return;
-  const double ratio = static_cast<double>(result.mesh.nodes.size()) / static_cast<double>(*order.nodes);
+  const double ratio = static_cast<double>(result.mesh.nodes_m.size()) / static_cast<double>(*order.nodes);
   if (std::abs(ratio - 1.0) <= 0.1) return;
   result.notes.push_back(fmt::format("{} nodes were asked for and {} made: the body has no lattice of that count nearer by; ask for more",
-                                     *order.nodes, result.mesh.nodes.size()));
+                                     *order.nodes, result.mesh.nodes_m.size()));
 }
 
-std::string quote(const std::string& text) {
-  std::string quoted = "\"";
-  for (char c : text) {
-    if (c == '"' || c == '\\') quoted += '\\';
-    if (static_cast<unsigned char>(c) < 0x20) {
-      quoted += fmt::format("\\u{:04x}", static_cast<int>(c));
-    } else {
-      quoted += c;
-    }
-  }
-  return quoted + '"';
-}
-
-std::string format_json(const Order& order, const Result& result, const mesh::CheckReport& check, double total_s) {
-  std::vector<std::string> seconds, sets, notes;
-  for (const auto& [phase, value] : result.seconds) seconds.push_back(fmt::format("{}: {:.4f}", quote(phase), value));
-  for (const auto& [name, nodes] : result.mesh.node_sets) sets.push_back(fmt::format("{}: {}", quote(name), nodes.size()));
-  for (const std::string& note : result.notes) notes.push_back(quote(note));
-  std::string text = "{\n";
-  text += fmt::format("  \"output\": {},\n  \"source\": {},\n", quote(order.out), quote(order.shape.empty() ? order.surface : order.shape));
-  text += fmt::format("  \"order\": {},\n  \"nodes\": {},\n  \"tets\": {},\n", result.mesh.order, result.mesh.nodes.size(),
-                      result.mesh.tet_count());
-  if (order.nodes) text += fmt::format("  \"nodes_asked\": {},\n", *order.nodes);
-  text += fmt::format("  \"components\": {},\n  \"boundary_faces\": {},\n", check.components, check.boundary_faces);
-  text += fmt::format("  \"volume_m3\": {:.12g},\n  \"box_low_m\": [{:.12g}],\n  \"box_high_m\": [{:.12g}],\n", check.volume_m3,
-                      fmt::join(check.box_low, ", "), fmt::join(check.box_high, ", "));
-  text += fmt::format("  \"min_dihedral_deg\": {:.4f},\n  \"max_dihedral_deg\": {:.4f},\n", check.min_dihedral_deg, check.max_dihedral_deg);
-  text += fmt::format("  \"curved_tets\": {},\n  \"straightened_tets\": {},\n", check.curved,
-                      check.straightened + (result.surface ? result.surface->straightened_tets : 0));
-  text += fmt::format("  \"mean_ratio_min\": {:.5f},\n  \"mean_ratio_mean\": {:.5f},\n", check.mean_ratio_min, check.mean_ratio_mean);
+std::string format_json(const Order& order, const Meshed& result, const mesh::CheckReport& check, double total_s) {
+  const auto exact = [](double value) { return base::finite_or_null(value, base::significant, 12); };
+  const auto rounded = [](double value, int digits) { return base::finite_or_null(value, base::significant, digits); };
+  const auto list = [&](const auto& values) {
+    base::Json array = base::Json::array();
+    for (const double value : values) array.add(exact(value));
+    return array;
+  };
+  base::Json root = base::Json::object();
+  root.set("output", order.out).set("source", order.shape.empty() ? order.surface : order.shape);
+  root.set("order", result.mesh.order).set("nodes", result.mesh.nodes_m.size()).set("tets", result.mesh.tet_count());
+  if (order.nodes) root.set("nodes_asked", *order.nodes);
+  root.set("components", check.components).set("boundary_faces", check.boundary_faces).set("volume_m3", exact(check.volume_m3));
+  root.set("box_low_m", list(check.box_low)).set("box_high_m", list(check.box_high));
+  root.set("min_dihedral_deg", base::decimals(check.min_dihedral_deg, 4))
+      .set("max_dihedral_deg", base::decimals(check.max_dihedral_deg, 4));
+  root.set("curved_tets", check.curved);
+  root.set("straightened_tets", check.straightened + (result.surface ? result.surface->straightened_tets : 0));
+  root.set("mean_ratio_min", base::decimals(check.mean_ratio_min, 5)).set("mean_ratio_mean", base::decimals(check.mean_ratio_mean, 5));
   if (result.surface) {
     const mesher::SurfaceReport& s = *result.surface;
-    text +=
-        fmt::format("  \"method\": {},\n  \"input_triangles\": {},\n  \"scale\": {:.12g},\n  \"input_volume_m3\": {:.12g},\n",
-                    quote(s.method == mesher::Method::kStuffing ? "stuffing" : "delaunay"), s.input_triangles, s.scale, s.input_volume_m3);
-    text += fmt::format("  \"facet_pieces\": {},\n", s.facet_pieces);
-    text += fmt::format(
-        "  \"holes_closed\": {},\n  \"largest_hole_m\": {:.9g},\n  \"largest_hole_part\": {:.6g},\n  \"holes_area_part\": {:.6g},\n",
-        s.holes_closed, s.largest_hole_m, s.largest_hole_part, s.holes_area_part);
-    text += fmt::format("  \"shells\": {},\n  \"farthest_outside_m\": {:.9g},\n", s.shells, s.farthest_outside_m);
-    text += fmt::format(
-        "  \"expected_volume_m3\": {:.12g},\n  \"wall_min_m\": {:.9g},\n  \"wall_mean_m\": {:.9g},\n  \"wall_max_m\": {:.9g},\n",
-        s.expected_volume_m3, s.wall_min_m, s.wall_mean_m, s.wall_max_m);
+    root.set("method", s.method == mesher::Method::kStuffing ? "stuffing" : "delaunay").set("input_triangles", s.input_triangles);
+    root.set("scale", exact(s.scale)).set("input_volume_m3", exact(s.input_volume_m3)).set("facet_pieces", s.facet_pieces);
+    root.set("holes_closed", s.holes_closed).set("largest_hole_m", rounded(s.largest_hole_m, 9));
+    root.set("largest_hole_part", rounded(s.largest_hole_part, 6)).set("holes_area_part", rounded(s.holes_area_part, 6));
+    root.set("shells", s.shells).set("farthest_outside_m", rounded(s.farthest_outside_m, 9));
+    root.set("expected_volume_m3", exact(s.expected_volume_m3)).set("wall_min_m", rounded(s.wall_min_m, 9));
+    root.set("wall_mean_m", rounded(s.wall_mean_m, 9)).set("wall_max_m", rounded(s.wall_max_m, 9));
   }
-  text += fmt::format("  \"node_sets\": {{{}}},\n  \"seconds\": {{{}}},\n  \"seconds_total\": {:.4f},\n  \"notes\": [{}]\n}}\n",
-                      fmt::join(sets, ", "), fmt::join(seconds, ", "), total_s, fmt::join(notes, ", "));
-  return text;
+  root.set("node_sets", base::Json::object()).set("seconds", base::Json::object());
+  for (const auto& [name, nodes] : result.mesh.node_sets) root.member("node_sets").set(name, nodes.size());
+  for (const auto& [phase, value] : result.seconds) root.member("seconds").set(phase, base::decimals(value, 4));
+  root.set("seconds_total", base::decimals(total_s, 4)).set("notes", base::Json::array(result.notes));
+  return root.text();
 }
 
-std::string format_report(const Order& order, const Result& result, const mesh::CheckReport& check, double total_s) {
+std::string format_report(const Order& order, const Meshed& result, const mesh::CheckReport& check, double total_s) {
   std::string text;
   if (result.surface) text += mesher::describe(*result.surface);
   if (!text.empty() && text.back() != '\n') text += '\n';
   text += fmt::format("{}: {} nodes, {} tetrahedra of {} nodes\n", base::is_standard_output(order.out) ? "standard output" : order.out,
-                      result.mesh.nodes.size(), result.mesh.tet_count(), result.mesh.nodes_per_tet());
+                      result.mesh.nodes_m.size(), result.mesh.tet_count(), result.mesh.nodes_per_tet());
   text += fmt::format("  size      {:.6g} x {:.6g} x {:.6g} m, volume {:.6g} m3\n", check.box_high[0] - check.box_low[0],
                       check.box_high[1] - check.box_low[1], check.box_high[2] - check.box_low[2], check.volume_m3);
   text += fmt::format("  quality   dihedral angles {:.1f} to {:.1f} degrees, mean ratio {:.3f} on average, {:.3f} at worst\n",
@@ -293,11 +282,11 @@ void make_mesh(const Order& order) {
     throw InputError(fmt::format("--json {}: the report would overwrite the mesh; give it another name", order.json));
   }
 
-  Result result;
+  Meshed result;
   try {
     result = order.shape.empty() ? make_from_surface(order, progress) : make_from_shape(order, progress);
   } catch (const mesher::CountRefusal& refusal) {
-    if (order.estimate) fmt::print(stderr, "instead {{\"nodes\": {}}}\n", refusal.nodes);  // for programs
+    if (order.estimate) fmt::print(stderr, "instead {}\n", base::Json::object().set("nodes", refusal.nodes).line());  // for programs
     throw;
   }
   note_count(order, result);
@@ -318,9 +307,10 @@ void make_mesh(const Order& order) {
   if (!order.json.empty()) base::write_file(order.json, format_json(order, result, check, total_s));
   std::FILE* const to = is_piped || order.quiet ? stderr : stdout;
   if (!order.quiet) fmt::print(to, "{}", base::printable_lines(format_report(order, result, check, total_s)));
-  std::set<std::string> told;
+  std::set<std::string> printed;
   for (const std::string& note : result.notes) {
-    if (told.insert(note).second) fmt::print(to, "{}{}\n", order.quiet ? "carillon-mesh: note: " : "  note      ", base::printable(note));
+    if (printed.insert(note).second)
+      fmt::print(to, "{}{}\n", order.quiet ? "carillon-mesh: note: " : "  note      ", base::printable(note));
   }
   if (std::fflush(to) != 0) throw SystemError("the report cannot be written");
 }
@@ -342,8 +332,7 @@ void make_mesh(const Order& order) {
   throw InputError(message);
 }
 
-int run(int argc, char** argv) {
-  Order order;
+void make(int argc, char** argv, Order& order) {
   CLI::App app("Meshes a closed surface, or a parametric body, with tetrahedra.");
   app.name("carillon-mesh");
   app.footer(describe_shapes());
@@ -364,6 +353,7 @@ int run(int argc, char** argv) {
          "Surface: closes holes up to this part of the body's diagonal (a hole counts as the diameter of a circle of its area) [0.15]")
       ->check(CLI::Range(0.0, 1.0));
   app.add_option("--json", order.json, "Writes the report as JSON to this file too");
+  app.add_option("--result", order.result, "Write how the program ended to this file, a JSON object (docs/howto/when-jobs-die.md)");
   app.add_flag(
       "--estimate", order.estimate,
       "Surface: says on standard error volume, area, thickness and about how many nodes there will be, in JSON, of the surface as it "
@@ -385,33 +375,30 @@ int run(int argc, char** argv) {
   } catch (const CLI::ExtrasError& error) {
     throw_unknown(app, error.what());
   } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);
+    if (error.get_exit_code() == 0) std::exit(app.exit(error));  // --help or --version
     throw InputError(fmt::format("{}; see carillon-mesh --help", error.what()));
   }
   complete_radius(order);
   make_mesh(order);
-  return 0;
 }
 
-int fail(const char* what, int code) {
+/// Prints an error, writes the result file and returns the exit code.
+int end(const Order& order, const base::Result& result) {
   std::fflush(stdout);
-  fmt::print(stderr, "carillon-mesh: {}\n", carillon::base::printable(what));
-  return code;
+  if (result.kind != base::ResultKind::done) fmt::print(stderr, "carillon-mesh: {}\n", base::printable(result.message));
+  if (!order.result.empty()) base::write_result(order.result, result);
+  return base::get_exit_code(result.kind);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  carillon::mesher::guard_program("carillon-mesh");
+  mesher::guard_program("carillon-mesh");
+  Order order;
   try {
-    return run(argc, argv);
-  } catch (const carillon::InputError& error) {
-    return fail(error.what(), carillon::kExitInput);
-  } catch (const carillon::SolveError& error) {
-    return fail(error.what(), carillon::kExitSolve);
-  } catch (const std::bad_alloc&) {
-    return fail("out of memory; ask for fewer nodes", carillon::kExitSystem);
-  } catch (const std::exception& error) {
-    return fail(error.what(), carillon::kExitSystem);
+    make(argc, argv, order);
+    return end(order, {});
+  } catch (...) {
+    return end(order, base::describe_error(std::current_exception(), "out of memory; ask for fewer nodes"));
   }
 }

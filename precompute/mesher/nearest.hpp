@@ -9,6 +9,7 @@
 
 namespace carillon::mesher {
 
+/// A tree of the triangles of a surface. It holds copies, so that the surface may go; find() is exact up to rounding.
 class NearestPoint {
  public:
   explicit NearestPoint(const TriangleSurface& surface);

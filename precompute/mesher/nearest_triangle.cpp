@@ -1,8 +1,7 @@
 // Method: grid points within a voxel of a triangle get their exact distance to it; then every point hands its triangle on to its 26
 //   neighbours, which take it if it is nearer than theirs, first come first served until nothing changes.
 // Source: the closest point on a triangle by its Voronoi regions: Ericson, Real-Time Collision Detection, 2005, section 5.1.5. Handing on
-// the
-//   nearest feature: Danielsson, "Euclidean distance mapping", CGIP 14, 1980, with triangles for his vectors.
+//   the nearest feature: Danielsson, "Euclidean distance mapping", CGIP 14, 1980, with triangles for his vectors.
 // Deviations: a queue in place of his sweeps, since only a band of the grid is filled. A point whose nearest triangle is none of its
 //   neighbours' gets the distance to another one; on the hollow bunny the largest error is a thousandth of a voxel.
 #include "precompute/mesher/nearest_triangle.hpp"
@@ -15,7 +14,7 @@ namespace {
 
 // Triangles are taken apart until their boxes are at most this many voxels wide, so that a large one fills no box of its diagonal.
 constexpr double kBox = 4;
-// A nearer triangle is taken if it is nearer by more than this, in squared voxels: rounding must not make neighbours swap for ever.
+// A nearer triangle is taken if it is nearer by more than this, in squared voxels: rounding must not make neighbours swap without end.
 constexpr float kNearer = 1e-6f;
 
 struct Corners {
@@ -86,7 +85,7 @@ class Filler {
 
   /// Hands the triangles on to the points nearer than reach[inside].
   void spread(const std::vector<char>& inside, const std::array<double, 2>& reach) {
-    const std::array<float, 2> most{static_cast<float>(reach[0] * reach[0]), static_cast<float>(reach[1] * reach[1])};
+    const std::array<float, 2> max{static_cast<float>(reach[0] * reach[0]), static_cast<float>(reach[1] * reach[1])};
     std::vector<std::array<std::int32_t, 3>> queue, next;
     std::vector<char> queued(square_.size(), 0);
     for (std::int32_t k = 0; k < size_[2]; ++k)
@@ -107,10 +106,10 @@ class Filler {
               if (nearest_[to] == f) continue;
               // By the triangle inequality the triangle is at least this far from there.
               const int steps = std::abs(x - i) + std::abs(y - j) + std::abs(z - k);
-              const float least = own - kStep[steps];
-              if (least > 0 && least * least >= square_[to]) continue;
+              const float min = own - kStep[steps];
+              if (min > 0 && min * min >= square_[to]) continue;
               const float square = calc_square(triangle, {static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)});
-              if (!(square < square_[to] - kNearer) || square > most[inside[to]]) continue;
+              if (!(square < square_[to] - kNearer) || square > max[inside[to]]) continue;
               square_[to] = square;
               nearest_[to] = f;
               if (!queued[to]) next.push_back({x, y, z});
@@ -140,10 +139,10 @@ class Filler {
     std::array<std::int32_t, 3> low, high;
     double widest = 0;
     for (int c = 0; c < 3; ++c) {
-      const auto [least, most] = std::minmax({part[0][c], part[1][c], part[2][c]});
-      widest = std::max(widest, most - least);
-      low[c] = std::max(static_cast<std::int32_t>(std::floor(least)), 0);
-      high[c] = std::min(static_cast<std::int32_t>(std::ceil(most)), size_[c] - 1);
+      const auto [min, max] = std::minmax({part[0][c], part[1][c], part[2][c]});
+      widest = std::max(widest, max - min);
+      low[c] = std::max(static_cast<std::int32_t>(std::floor(min)), 0);
+      high[c] = std::min(static_cast<std::int32_t>(std::ceil(max)), size_[c] - 1);
     }
     if (widest > kBox) {
       const Vec3 ab = 0.5 * (part[0] + part[1]), bc = 0.5 * (part[1] + part[2]), ca = 0.5 * (part[2] + part[0]);

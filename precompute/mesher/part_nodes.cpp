@@ -17,13 +17,13 @@ namespace {
 
 // The flattest element that may be added; smoothing opens it further.
 constexpr double kFlattestDeg = 4;
-constexpr int kMostPasses = 8;
+constexpr int kMaxPasses = 8;
 
 using Fan = std::vector<std::array<std::int32_t, 2>>;  // the other two nodes of each face, counter-clockwise seen from outside
 
 /// The fans of the boundary faces around each node that has more than one.
 std::map<std::int32_t, std::vector<Fan>> find_pinched(const mesh::TetMesh& mesh) {
-  std::vector<std::vector<std::array<std::int32_t, 2>>> around(mesh.nodes.size());
+  std::vector<std::vector<std::array<std::int32_t, 2>>> around(mesh.nodes_m.size());
   for (const Triangle& t : find_boundary(mesh))
     for (int c = 0; c < 3; ++c) around[t[c]].push_back({t[(c + 1) % 3], t[(c + 2) % 3]});
   std::map<std::int32_t, std::vector<Fan>> pinched;
@@ -50,7 +50,7 @@ std::map<std::int32_t, std::vector<Fan>> find_pinched(const mesh::TetMesh& mesh)
 bool is_inside(const mesh::TetMesh& mesh, std::int32_t e, const Vec3& x) {
   const auto tet = mesh.tet(e);
   for (const auto& face : mesh::kFaces) {
-    const Vec3 &a = mesh.nodes[tet[face[0]]], &b = mesh.nodes[tet[face[1]]], &c = mesh.nodes[tet[face[2]]];
+    const Vec3 &a = mesh.nodes_m[tet[face[0]]], &b = mesh.nodes_m[tet[face[1]]], &c = mesh.nodes_m[tet[face[2]]];
     if (dot(cross(b - a, c - a), x - a) >= 0) return false;  // the faces' normals point outward
   }
   return true;
@@ -64,13 +64,13 @@ struct Place {
 /// The place over the fan that gives the best elements.
 Place find_place(const mesh::TetMesh& mesh, std::int32_t v, const Fan& fan, const std::function<Vec3(const Vec3&)>& project,
                  const std::function<bool(const Vec3&)>& is_on_skin) {
-  const Vec3 middle = mesh.nodes[v];
+  const Vec3 middle = mesh.nodes_m[v];
   Vec3 normal{}, centre{};
   double length = 0;
   for (const auto& [a, b] : fan) {
-    normal = normal + cross(mesh.nodes[a] - middle, mesh.nodes[b] - middle);
-    centre = centre + (1.0 / static_cast<double>(fan.size())) * mesh.nodes[a];
-    length += norm(mesh.nodes[a] - middle) / static_cast<double>(fan.size());
+    normal = normal + cross(mesh.nodes_m[a] - middle, mesh.nodes_m[b] - middle);
+    centre = centre + (1.0 / static_cast<double>(fan.size())) * mesh.nodes_m[a];
+    length += norm(mesh.nodes_m[a] - middle) / static_cast<double>(fan.size());
   }
   std::vector<Vec3> places{centre};
   if (norm(normal) > 0)
@@ -80,7 +80,7 @@ Place find_place(const mesh::TetMesh& mesh, std::int32_t v, const Fan& fan, cons
     const Vec3 x = project(place);
     if (!is_on_skin(x)) continue;
     double worst = 180;
-    for (const auto& [a, b] : fan) worst = std::min(worst, calc_flatness({middle, mesh.nodes[a], mesh.nodes[b], x}));
+    for (const auto& [a, b] : fan) worst = std::min(worst, calc_flatness({middle, mesh.nodes_m[a], mesh.nodes_m[b], x}));
     if (worst > best.flatness) best = {worst, x};
   }
   return best;
@@ -91,13 +91,13 @@ Place find_place(const mesh::TetMesh& mesh, std::int32_t v, const Fan& fan, cons
 std::int64_t part_pinched_nodes(mesh::TetMesh& mesh, std::int64_t components, const std::function<Vec3(const Vec3&)>& project,
                                 const std::function<bool(const Vec3&)>& is_on_skin) {
   std::int64_t repaired = 0;
-  for (int pass = 0; pass < kMostPasses; ++pass) {
+  for (int pass = 0; pass < kMaxPasses; ++pass) {
     const auto pinched = find_pinched(mesh);
     if (pinched.empty()) break;
-    std::vector<std::vector<std::int32_t>> around(mesh.nodes.size());
+    std::vector<std::vector<std::int32_t>> around(mesh.nodes_m.size());
     for (std::int32_t e = 0; e < mesh.tet_count(); ++e)
       for (const std::int32_t v : mesh.tet(e)) around[v].push_back(e);
-    std::vector<char> touched(mesh.nodes.size(), 0);
+    std::vector<char> touched(mesh.nodes_m.size(), 0);
     std::vector<char> remove(static_cast<std::size_t>(mesh.tet_count()), 0);
     for (const auto& [v, fans] : pinched) {
       // Fans of neighbours change with each other: they wait for the next pass.
@@ -119,12 +119,12 @@ std::int64_t part_pinched_nodes(mesh::TetMesh& mesh, std::int64_t components, co
       touched[v] = 1;
       for (const Fan& fan : fans)
         for (const auto& face : fan) touched[face[0]] = 1;
-      if (over == nullptr || best.flatness < kFlattestDeg || pass + 2 >= kMostPasses) {
+      if (over == nullptr || best.flatness < kFlattestDeg || pass + 2 >= kMaxPasses) {
         for (const std::int32_t e : around[v]) remove[e] = 1;
         continue;
       }
-      const auto fresh = static_cast<std::int32_t>(mesh.nodes.size());
-      mesh.nodes.push_back(best.at);
+      const auto fresh = static_cast<std::int32_t>(mesh.nodes_m.size());
+      mesh.nodes_m.push_back(best.at);
       for (const auto& [a, b] : *over) {
         mesh.tets.insert(mesh.tets.end(), {v, a, b, fresh});
         mesh.regions.push_back(0);

@@ -17,14 +17,14 @@ namespace carillon::mesher {
 namespace {
 
 // An element keeps at least this part of its volume.
-constexpr double kLeastVolume = 0.3;
+constexpr double kMinVolume = 0.3;
 // Of the spacing of the samples: farther off a skin a node is not by their interpolation.
-constexpr double kMostOff = 0.25;
+constexpr double kMaxOff = 0.25;
 
 double calc_volume(const mesh::TetMesh& mesh, std::int64_t e) {
   const auto tet = mesh.tet(e);
-  const Vec3& origin = mesh.nodes[tet[0]];
-  return dot(cross(mesh.nodes[tet[1]] - origin, mesh.nodes[tet[2]] - origin), mesh.nodes[tet[3]] - origin) / 6;
+  const Vec3& origin = mesh.nodes_m[tet[0]];
+  return dot(cross(mesh.nodes_m[tet[1]] - origin, mesh.nodes_m[tet[2]] - origin), mesh.nodes_m[tet[3]] - origin) / 6;
 }
 
 }  // namespace
@@ -32,9 +32,9 @@ double calc_volume(const mesh::TetMesh& mesh, std::int64_t e) {
 std::int64_t place_on_smooth_surface(mesh::TetMesh& mesh, const Body& body, bool straight) {
   if (!body.round) return 0;
   mesh::TetMesh linear;  // the corners alone, numbered as they are
-  linear.nodes = mesh.nodes;
+  linear.nodes_m = mesh.nodes_m;
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e) linear.tets.insert(linear.tets.end(), mesh.tet(e).begin(), mesh.tet(e).begin() + 4);
-  std::vector<char> on_skin(mesh.nodes.size(), 0);
+  std::vector<char> on_skin(mesh.nodes_m.size(), 0);
   std::set<std::array<std::int32_t, 2>> edges;  // of the skin
   const auto make_edge = [](std::int32_t a, std::int32_t b) { return std::array{std::min(a, b), std::max(a, b)}; };
   for (const Triangle& t : find_boundary(linear))
@@ -42,21 +42,21 @@ std::int64_t place_on_smooth_surface(mesh::TetMesh& mesh, const Body& body, bool
       on_skin[t[c]] = 1;
       edges.insert(make_edge(t[c], t[(c + 1) % 3]));
     }
-  std::vector<Vec3> way(mesh.nodes.size(), Vec3{});
+  std::vector<Vec3> way(mesh.nodes_m.size(), Vec3{});
   // The part of the way from the surface by which a node lies off the skin that it belongs to.
   const auto calc_off = [&](const Vec3& inward) {
     const double depth = norm(inward);
     if (!body.field || body.wall_m <= 0 || depth == 0) return 0.0;
     const double off = depth < body.wall_m / 2 ? depth : depth - body.wall_m;
-    return std::abs(off) < kMostOff * body.field->voxel_m ? off / depth : 0.0;
+    return std::abs(off) < kMaxOff * body.field->voxel_m ? off / depth : 0.0;
   };
   const auto find_way = [&](std::int32_t v) {
-    const auto [at, triangle] = body.nearest->find_on(mesh.nodes[v]);
-    const Vec3 inward = mesh.nodes[v] - at;
+    const auto [at, triangle] = body.nearest->find_on(mesh.nodes_m[v]);
+    const Vec3 inward = mesh.nodes_m[v] - at;
     way[v] = body.round->find(triangle, at) - at - calc_off(inward) * inward;
     if (!mesh.doubt_m.empty()) mesh.doubt_m[v] = body.round->find_doubt(triangle, at);
   };
-  if (body.round->is_doubtful()) mesh.doubt_m.assign(mesh.nodes.size(), Vec3{});
+  if (body.round->is_doubtful()) mesh.doubt_m.assign(mesh.nodes_m.size(), Vec3{});
   for (std::size_t v = 0; v < on_skin.size(); ++v)
     if (on_skin[v] != 0) find_way(static_cast<std::int32_t>(v));
   // Corners first.
@@ -64,9 +64,9 @@ std::int64_t place_on_smooth_surface(mesh::TetMesh& mesh, const Body& body, bool
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e) volumes.push_back(calc_volume(linear, e));
   for (bool again = true; again;) {
     again = false;
-    for (std::size_t v = 0; v < mesh.nodes.size(); ++v) linear.nodes[v] = mesh.nodes[v] + way[v];
+    for (std::size_t v = 0; v < mesh.nodes_m.size(); ++v) linear.nodes_m[v] = mesh.nodes_m[v] + way[v];
     for (std::int64_t e = 0; e < mesh.tet_count(); ++e) {
-      if (calc_volume(linear, e) > kLeastVolume * volumes[e]) continue;
+      if (calc_volume(linear, e) > kMinVolume * volumes[e]) continue;
       for (int c = 0; c < 4; ++c) {
         const std::int32_t v = linear.tets[4 * e + c];
         again = again || norm(way[v]) > 0;
@@ -75,10 +75,10 @@ std::int64_t place_on_smooth_surface(mesh::TetMesh& mesh, const Body& body, bool
     }
   }
   if (mesh.order == 1) {
-    mesh.nodes = linear.nodes;
+    mesh.nodes_m = linear.nodes_m;
     return 0;
   }
-  std::vector<char> done(mesh.nodes.size(), 0);
+  std::vector<char> done(mesh.nodes_m.size(), 0);
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
     for (int m = 0; m < 6; ++m) {
       const std::int32_t a = mesh.tet(e)[mesh::kEdges[m][0]], b = mesh.tet(e)[mesh::kEdges[m][1]], middle = mesh.tet(e)[4 + m];
@@ -89,7 +89,7 @@ std::int64_t place_on_smooth_surface(mesh::TetMesh& mesh, const Body& body, bool
       else
         way[middle] = 0.5 * (way[a] + way[b]);
     }
-  for (std::size_t v = 0; v < mesh.nodes.size(); ++v) mesh.nodes[v] = mesh.nodes[v] + way[v];
+  for (std::size_t v = 0; v < mesh.nodes_m.size(); ++v) mesh.nodes_m[v] = mesh.nodes_m[v] + way[v];
   return straight ? 0 : mesh::straighten_folded_elements(mesh);
 }
 

@@ -95,7 +95,7 @@ void PlyReader::read_element_line() {
   if (*count < 0 || *count > static_cast<std::int64_t>(bytes_.size()))
     text_.refuse("the header promises {} {}, but the file has only {} bytes; it is cut off or damaged, export it again", *count,
                  quote_excerpt(words_[1]), bytes_.size());
-  if (*count > kMostPoints) text_.refuse("{} of {} are too many; reduce the surface first", *count, quote_excerpt(words_[1]));
+  if (*count > kMaxPoints) text_.refuse("{} of {} are too many; reduce the surface first", *count, quote_excerpt(words_[1]));
   for (const Element& element : elements_)
     if (element.name == words_[1]) text_.refuse("a second element {}; export the surface again", quote_excerpt(words_[1]));
   elements_.push_back({words_[1], *count, text_.number(), {}});
@@ -124,11 +124,11 @@ void PlyReader::read_property_line() {
 }
 
 void PlyReader::read_header() {
-  constexpr int kMostLines = 10000;
+  constexpr int kMaxLines = 10000;
   if (!text_.next(words_) || words_.size() != 1 || words_[0] != "ply") text_.refuse("line 1 is not 'ply'; this is no PLY file");
   bool has_format = false;
   for (int line = 0;; ++line) {
-    if (line > kMostLines || !text_.next(words_)) text_.refuse("the header has no end_header; the file is cut off, export it again");
+    if (line > kMaxLines || !text_.next(words_)) text_.refuse("the header has no end_header; the file is cut off, export it again");
     if (words_.empty() || words_[0] == "comment" || words_[0] == "obj_info") continue;
     if (words_[0] == "end_header") break;
     if (words_[0] == "format") {
@@ -236,10 +236,10 @@ double PlyReader::read_binary_number(const Type& type, const char* what) {
 }
 
 void PlyReader::read_binary(const Element& element) {
-  std::size_t least = 0;
+  std::size_t row_bytes = 0;
   for (const Property& property : element.properties)
-    least += static_cast<std::size_t>(property.count_type ? property.count_type->bytes : property.type->bytes);
-  if (element.count > 0 && static_cast<std::uint64_t>(element.count) > (bytes_.size() - at_) / least)
+    row_bytes += static_cast<std::size_t>(property.count_type ? property.count_type->bytes : property.type->bytes);
+  if (element.count > 0 && static_cast<std::uint64_t>(element.count) > (bytes_.size() - at_) / row_bytes)
     refuse_byte(
         at_, fmt::format("the header promises {} {}, but only {} bytes are left for them; the file is cut off or damaged, export it again",
                          element.count, quote_excerpt(element.name), bytes_.size() - at_));

@@ -48,7 +48,7 @@ PolygonSoup parse_binary(std::string_view bytes, const std::string& name) {
     throw InputError(fmt::format(
         "{}: byte 80: the header promises {} triangles, but the file has only {} bytes; it is cut off or damaged, export it again", name,
         count, bytes.size()));
-  if (count > kMostPoints / 3) throw InputError(fmt::format("{}: {} triangles are too many; reduce the surface first", name, count));
+  if (count > kMaxPoints / 3) throw InputError(fmt::format("{}: {} triangles are too many; reduce the surface first", name, count));
   PolygonSoup soup;
   soup.points.reserve(3 * static_cast<std::size_t>(count));
   soup.counts.reserve(count);
@@ -84,8 +84,8 @@ PolygonSoup parse_text(std::string_view bytes, const std::string& name) {
     if (word == "vertex") {
       if (words.size() != 4) text.refuse("a vertex has {} coordinates in place of three; export the surface again", words.size() - 1);
       if (!in_facet || corners == 3) text.refuse("a vertex that belongs to no triangle; export the surface again");
-      if (static_cast<std::int64_t>(soup.points.size()) >= kMostPoints)
-        text.refuse("more than {} corners are too many; reduce the surface first", kMostPoints);
+      if (static_cast<std::int64_t>(soup.points.size()) >= kMaxPoints)
+        text.refuse("more than {} corners are too many; reduce the surface first", kMaxPoints);
       soup.points.push_back({text.read_coordinate(words[1]), text.read_coordinate(words[2]), text.read_coordinate(words[3])});
       ++corners;
     } else if (word == "facet") {

@@ -15,7 +15,7 @@ namespace carillon::mesher {
 namespace {
 
 /// No surface that could be meshed here is larger; what is, is no surface.
-constexpr std::uint64_t kMostBytes = 16ULL << 30;
+constexpr std::uint64_t kMaxBytes = 16ULL << 30;
 
 /// "obj", "stl", "ply" or "off".
 std::string find_format(const std::filesystem::path& path) {
@@ -39,13 +39,13 @@ Vec3 calc_normal(const std::vector<Vec3>& points, const Polygon& polygon) {
 /// Cuts a polygon into triangles, ear by ear: first the corner that is convex, holds no other corner, and is least acute.
 /// `work` counts the looks at corners; past a bound, what is left of polygons becomes fans, so that no file takes minutes.
 void add_polygon(const std::vector<Vec3>& points, Polygon polygon, std::vector<Triangle>& triangles, double& work) {
-  constexpr std::size_t kMostCornersCutByEars = 1000;
-  constexpr double kMostWork = 3e9;
+  constexpr std::size_t kMaxCornersCutByEars = 1000;
+  constexpr double kMaxWork = 3e9;
   const Vec3 normal = calc_normal(points, polygon);
   const auto turn = [&](std::size_t a, std::size_t b, std::size_t c) {
     return dot(normal, cross(points[b] - points[a], points[c] - points[a]));
   };
-  while (polygon.size() > 3 && polygon.size() <= kMostCornersCutByEars && work < kMostWork) {
+  while (polygon.size() > 3 && polygon.size() <= kMaxCornersCutByEars && work < kMaxWork) {
     const std::size_t n = polygon.size();
     work += static_cast<double>(n) * static_cast<double>(n);
     std::size_t best = n;
@@ -108,7 +108,7 @@ TriangleSurface read_surface(const std::filesystem::path& path) {
   if (!std::filesystem::exists(path, error)) throw InputError(fmt::format("{}: there is no such file", name));
   if (!std::filesystem::is_regular_file(path, error))
     throw InputError(fmt::format("{}: this is a folder or a device, not a file; give the file of a surface", name));
-  const std::string bytes = base::read_file(path, "surface", kMostBytes);
+  const std::string bytes = base::read_file(path, "surface", kMaxBytes);
   if (bytes.empty()) throw InputError(fmt::format("{}: the file is empty", name));
   return parse_surface(bytes, name, format);
 }

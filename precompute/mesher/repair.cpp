@@ -41,8 +41,8 @@ std::vector<Triangle> fill_polygon(const Polyline& polygon) {
   if (polygon.size() < 3) return {};
   if (polygon.size() == 3) return {{0, 1, 2}};
   // The time grows with the cube of the corners where the Delaunay triangulation offers no filling.
-  constexpr std::size_t kMostCorners = 1500;
-  if (polygon.size() > kMostCorners) return {};
+  constexpr std::size_t kMaxCorners = 1500;
+  if (polygon.size() > kMaxCorners) return {};
   struct Face {
     int a, b, c;
     Face(int i, int j, int k) : a(i), b(j), c(k) {}

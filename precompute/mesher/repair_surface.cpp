@@ -26,7 +26,7 @@ constexpr double kLargestHole = 0.15;
 constexpr double kLargestHolesTogether = 0.3;  // of the closed surface's area
 // Points closer than this part of the diagonal are one: coordinates in single precision differ by more.
 constexpr double kSamePoint = 1e-9;
-constexpr std::size_t kMostComponentsNested = 2000;
+constexpr std::size_t kMaxComponentsNested = 2000;
 
 using Edge = std::array<std::int32_t, 2>;
 struct EdgeHash {
@@ -157,7 +157,7 @@ std::vector<std::vector<std::int32_t>> find_loops(const std::vector<Triangle>& t
   std::vector<std::vector<std::int32_t>> loops;
   for (auto& [start, ends] : next)
     while (!ends.empty()) {
-      // Walk until a vertex comes back; what lies between is a loop, the walk goes on from there.
+      // Walk until a vertex comes back; what lies between is a loop, the walk continues from there.
       std::vector<std::int32_t> walk{start};
       std::unordered_map<std::int32_t, std::size_t> place{{start, 0}};
       while (!next[walk.back()].empty()) {
@@ -187,9 +187,9 @@ struct Holes {
 
 /// The largest distance of two points; of many points, twice that of the farthest from their middle.
 double calc_across(const Polyline& polygon) {
-  constexpr std::size_t kMostCompared = 1000;
+  constexpr std::size_t kMaxCompared = 1000;
   double farthest = 0;
-  if (polygon.size() <= kMostCompared) {
+  if (polygon.size() <= kMaxCompared) {
     for (const Vec3& p : polygon)
       for (const Vec3& q : polygon) farthest = std::max(farthest, norm(p - q));
     return farthest;
@@ -254,7 +254,7 @@ void orient_outward(TriangleSurface& surface, SurfaceReport& report) {
   for (std::size_t p = 0; p < parts.size(); ++p) {
     // The largest part around this one decides; without one it decides for itself.
     std::size_t outermost = p;
-    if (parts.size() <= kMostComponentsNested)
+    if (parts.size() <= kMaxComponentsNested)
       for (std::size_t q = 0; q < parts.size(); ++q)
         if (std::abs(volume[q]) > std::abs(volume[outermost]) && std::abs(calc_winding(parts[q], parts[p].points.front())) > 0.5)
           outermost = q;
@@ -390,8 +390,8 @@ RepairedSurface repair_surface(TriangleSurface surface, const SurfaceOptions& op
   // triangles and much area has no detail that is worth a fine wrap. Bodies have an area of one or two squares of their diagonal: above
   // some 900 triangles they may have the finest wrap, below 200 the coarsest, which bridges gaps of a seventh of the diagonal.
   const auto count = static_cast<double>(surface.triangles.size());
-  const double most_area = std::min(0.2 + 2.5e-3 * count, 1.5 + 1e-3 * count) * diagonal * diagonal;  // for the finest
-  std::erase_if(parts, [&](double part) { return part > kCoarsest && part * part * area > kFinest * kFinest * most_area; });
+  const double max_area = std::min(0.2 + 2.5e-3 * count, 1.5 + 1e-3 * count) * diagonal * diagonal;  // for the finest
+  std::erase_if(parts, [&](double part) { return part > kCoarsest && part * part * area > kFinest * kFinest * max_area; });
   const auto slips = [&](double part) {
     return calc_area(wrap(surface, diagonal / part, kProbeOffset * diagonal / part)) > kBothSidesOfProbe * area;
   };

@@ -1,6 +1,6 @@
 // Method: a cubic patch over each triangle from its corners and the normals there. Normals are estimated from the facets of one side of the
 //   sharp edges, with weights that are exact on a sphere; at the rim of a smooth part, where half of the facets is missing, the normal is
-//   tilted until the curve to its inner neighbours is an arc. A plane beside a curved part keeps its normal up to the common edge. Edges
+//   tilted until the curve to its inner neighbours is an arc. A plane next to a curved part keeps its normal up to the common edge. Edges
 //   get the cubics that are circles where the normals at both ends say so; sharp edges those along the tangent of the circle through their
 //   points. At the tip of a cone the patch is ruled.
 // Source: Vlachos, Peters, Boyd and Mitchell, "Curved PN triangles", I3D 2001, section 3 (the patch); Max, "Weights for computing vertex
@@ -22,12 +22,12 @@
 namespace carillon::mesher {
 namespace {
 
-constexpr double kMostBulge = 0.15;   // of an edge's length; more is no estimate of a smooth surface
-constexpr double kUsualPart = 0.95;   // of the edges that bulge at all
-constexpr double kSameNormal = 3e-3;  // radians
-constexpr double kMostTilt = 0.35;    // of the normal at a rim, radians
-constexpr double kOnSide = 1e-8;      // barycentric
-constexpr int kMostPieces = 16;
+constexpr double kMaxBulge = 0.15;     // of an edge's length; more is no estimate of a smooth surface
+constexpr double kDefaultPart = 0.95;  // of the edges that bulge at all
+constexpr double kSameNormal = 3e-3;   // radians
+constexpr double kMaxTilt = 0.35;      // of the normal at a rim, radians
+constexpr double kOnSide = 1e-8;       // barycentric
+constexpr int kMaxPieces = 16;
 
 using Weights = std::array<double, 3>;  // barycentric
 
@@ -65,7 +65,7 @@ struct RoundSurface::Patches {
       while (root[c] != c) c = root[c] = root[root[c]];
       return c;
     };
-    std::vector<char> rules(corner.size(), 0), beside(corner.size(), 0);  // its face keeps its normal at this point, or gives way
+    std::vector<char> rules(corner.size(), 0), yields(corner.size(), 0);  // its face keeps its normal at this point, or yields
     for (const Bend& edge : bends.edges) {
       if (edge.sharp) continue;
       for (const std::int32_t v : edge.ends) {
@@ -74,7 +74,7 @@ struct RoundSurface::Patches {
         if (edge.straight < 0) continue;
         for (const std::int32_t c : bends.corners_at[v]) {
           if (bends.pane[c / 3] == bends.pane[edge.faces[edge.straight]]) rules[c] = 1;
-          if (bends.pane[c / 3] == bends.pane[edge.faces[1 - edge.straight]]) beside[c] = 1;
+          if (bends.pane[c / 3] == bends.pane[edge.faces[1 - edge.straight]]) yields[c] = 1;
         }
       }
     }
@@ -86,7 +86,7 @@ struct RoundSurface::Patches {
       if (!(squares > 0)) continue;
       const Vec3 part = (1 / squares) * cross(a, b);
       all[find(c)] = all[find(c)] + part;
-      if (rules[c] != 0 && beside[c] == 0) sum[find(c)] = sum[find(c)] + part;
+      if (rules[c] != 0 && yields[c] == 0) sum[find(c)] = sum[find(c)] + part;
     }
     for (std::int32_t c = 0; c < static_cast<std::int32_t>(corner.size()); ++c) {
       const std::int32_t r = find(c);
@@ -142,7 +142,7 @@ struct RoundSurface::Patches {
       }
       if (!(squares > 1e-6)) continue;
       const double tilt = std::atan2(-gap, squares);
-      if (std::abs(tilt) < kMostTilt) turned[r] = std::cos(tilt) * normal + std::sin(tilt) * sideways;
+      if (std::abs(tilt) < kMaxTilt) turned[r] = std::cos(tilt) * normal + std::sin(tilt) * sideways;
     }
     for (std::size_t c = 0; c < corner.size(); ++c)
       if (norm(turned[root[c]]) > 0) corner[c] = turned[root[c]];
@@ -172,7 +172,7 @@ struct RoundSurface::Patches {
       if (bends.edges[e].sharp)
         for (const std::int32_t v : bends.edges[e].ends) along[v].push_back(static_cast<std::int32_t>(e));
     const auto is_line = [&](const Bend& edge) { return edge.count == 2 && is_straight(edge); };
-    // The tangent at point v of the sharp curve that goes on along `edge`: that of the circle through three points. Zero where it ends or
+    // The tangent at point v of the sharp curve that continues along `edge`: that of the circle through three points. Zero where it ends or
     // bends.
     const auto calc_tangent = [&](std::int32_t v, std::int32_t e) {
       const auto& others = along.at(v);
@@ -217,8 +217,7 @@ struct RoundSurface::Patches {
         if (tips[0] != tips[1]) mirror(tips[0] ? 0 : 1);
       }
       control[e] = {a + (1.0 / 3) * step[0], b - (1.0 / 3) * step[1]};
-      if (norm(calc_on_edge(e, 0.5) - 0.5 * (a + b)) > kMostBulge * norm(chord))
-        control[e] = {a + (1.0 / 3) * chord, b - (1.0 / 3) * chord};
+      if (norm(calc_on_edge(e, 0.5) - 0.5 * (a + b)) > kMaxBulge * norm(chord)) control[e] = {a + (1.0 / 3) * chord, b - (1.0 / 3) * chord};
     }
   }
 
@@ -300,7 +299,7 @@ double RoundSurface::get_usual_bulge() const {
     if (bulge > 0.01 * largest) bulges.push_back(bulge);
   }
   if (bulges.empty()) return 0;
-  const auto place = bulges.begin() + static_cast<std::ptrdiff_t>(kUsualPart * static_cast<double>(bulges.size() - 1));
+  const auto place = bulges.begin() + static_cast<std::ptrdiff_t>(kDefaultPart * static_cast<double>(bulges.size() - 1));
   std::nth_element(bulges.begin(), place, bulges.end());
   return *place;
 }
@@ -333,7 +332,7 @@ double RoundSurface::calc_volume() const {
 }
 
 TriangleSurface RoundSurface::cut(int pieces) {
-  pieces_ = std::clamp(pieces, 1, kMostPieces);
+  pieces_ = std::clamp(pieces, 1, kMaxPieces);
   pieces = pieces_;
   TriangleSurface out;
   out.points = facets_->points;

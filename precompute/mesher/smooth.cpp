@@ -16,7 +16,7 @@
 namespace carillon::mesher {
 namespace {
 
-constexpr int kMostPasses = 12;
+constexpr int kMaxPasses = 12;
 constexpr std::size_t kMany = 100;
 constexpr double kHardly = 0.95;  // of what they lacked before the pass
 // A boundary node whose faces turn away from their mean by more than this lies on an edge (cosine of 25 degrees).
@@ -25,17 +25,17 @@ constexpr double kSmooth = 0.906;
 /// Of element e of a linear mesh.
 double calc_element_flatness(const mesh::TetMesh& mesh, std::int32_t e) {
   const auto tet = mesh.tet(e);
-  return calc_flatness({mesh.nodes[tet[0]], mesh.nodes[tet[1]], mesh.nodes[tet[2]], mesh.nodes[tet[3]]});
+  return calc_flatness({mesh.nodes_m[tet[0]], mesh.nodes_m[tet[1]], mesh.nodes_m[tet[2]], mesh.nodes_m[tet[3]]});
 }
 
 enum class Place : char { kInside, kSkin, kEdge };
 
 std::vector<Place> find_places(const mesh::TetMesh& mesh) {
-  std::vector<Place> places(mesh.nodes.size(), Place::kInside);
-  std::vector<Vec3> mean(mesh.nodes.size(), Vec3{});
+  std::vector<Place> places(mesh.nodes_m.size(), Place::kInside);
+  std::vector<Vec3> mean(mesh.nodes_m.size(), Vec3{});
   const auto boundary = find_boundary(mesh);
   const auto calc_normal = [&](const Triangle& t) {
-    return cross(mesh.nodes[t[1]] - mesh.nodes[t[0]], mesh.nodes[t[2]] - mesh.nodes[t[0]]);
+    return cross(mesh.nodes_m[t[1]] - mesh.nodes_m[t[0]], mesh.nodes_m[t[2]] - mesh.nodes_m[t[0]]);
   };
   for (const Triangle& t : boundary)
     for (const std::int32_t v : t) mean[v] = mean[v] + calc_normal(t), places[v] = Place::kSkin;
@@ -51,24 +51,24 @@ std::vector<Place> find_places(const mesh::TetMesh& mesh) {
 
 std::int64_t better_flat_elements(mesh::TetMesh& mesh, double angle_deg, const std::function<Vec3(const Vec3&)>& project) {
   const auto places = find_places(mesh);
-  std::vector<std::vector<std::int32_t>> around(mesh.nodes.size());
+  std::vector<std::vector<std::int32_t>> around(mesh.nodes_m.size());
   for (std::int32_t e = 0; e < mesh.tet_count(); ++e)
     for (const std::int32_t v : mesh.tet(e)) around[v].push_back(e);
-  // Of the elements around a node; one that is not above `least` is enough to know.
-  const auto calc_worst = [&](std::int32_t v, double least) {
+  // Of the elements around a node; one that is not above `min` is enough to know.
+  const auto calc_worst = [&](std::int32_t v, double min) {
     double worst = 180;
     for (const std::int32_t e : around[v]) {
       worst = std::min(worst, calc_element_flatness(mesh, e));
-      if (worst <= least) break;
+      if (worst <= min) break;
     }
     return worst;
   };
   const auto climb = [&](std::int32_t v) {
-    const Vec3 start = mesh.nodes[v];
+    const Vec3 start = mesh.nodes_m[v];
     double length = 1e300;
     for (const std::int32_t e : around[v])
       for (const std::int32_t w : mesh.tet(e))
-        if (w != v) length = std::min(length, norm(mesh.nodes[w] - start));
+        if (w != v) length = std::min(length, norm(mesh.nodes_m[w] - start));
     const double before = calc_worst(v, -1e9);
     double best = before + 0.01;
     Vec3 best_place = start;
@@ -79,14 +79,14 @@ std::int64_t better_flat_elements(mesh::TetMesh& mesh, double angle_deg, const s
         Vec3 place = start + (step * length / norm(direction)) * direction;
         if (places[v] == Place::kSkin) place = project(place);
         if (norm(place - start) > 0.5 * length) continue;
-        mesh.nodes[v] = place;
+        mesh.nodes_m[v] = place;
         if (const double worst = calc_worst(v, best); worst > best) best = worst, best_place = place;
       }
-    mesh.nodes[v] = best_place;
+    mesh.nodes_m[v] = best_place;
     return best_place != start;
   };
   // A node that found no better place finds none until one next to it has moved.
-  std::vector<char> is_stuck(mesh.nodes.size(), 0);
+  std::vector<char> is_stuck(mesh.nodes_m.size(), 0);
   const auto move = [&](std::int32_t v) {
     if (is_stuck[v]) return false;
     if (!climb(v)) {
@@ -99,7 +99,7 @@ std::int64_t better_flat_elements(mesh::TetMesh& mesh, double angle_deg, const s
   };
   std::int64_t moved = 0;
   double last = std::numeric_limits<double>::infinity();  // degrees that flat elements lack, summed
-  for (int pass = 0; pass < kMostPasses; ++pass) {
+  for (int pass = 0; pass < kMaxPasses; ++pass) {
     std::vector<std::pair<double, std::int32_t>> flat;
     for (std::int32_t e = 0; e < mesh.tet_count(); ++e)
       if (const double angle = calc_element_flatness(mesh, e); angle < angle_deg) flat.emplace_back(angle, e);

@@ -133,19 +133,19 @@ class Stuffer {
   }
 
   std::int32_t number_point(const Cell& p) {
-    const auto [found, fresh] = corners_.try_emplace(lattice_.get_slot(p), static_cast<std::int32_t>(out_.nodes.size()));
-    if (fresh) out_.nodes.push_back(get_place(p));
+    const auto [found, fresh] = corners_.try_emplace(lattice_.get_slot(p), static_cast<std::int32_t>(out_.nodes_m.size()));
+    if (fresh) out_.nodes_m.push_back(get_place(p));
     return found->second;
   }
   std::int32_t number_cut(const Cell& inside, const Cell& outside) {
     const std::array<std::size_t, 2> key{lattice_.get_slot(inside), lattice_.get_slot(outside)};
-    const auto [found, fresh] = cuts_.try_emplace(key, static_cast<std::int32_t>(out_.nodes.size()));
-    if (fresh) out_.nodes.push_back(lattice_.find_root(lattice_.get_place(inside), lattice_.get_place(outside)));
+    const auto [found, fresh] = cuts_.try_emplace(key, static_cast<std::int32_t>(out_.nodes_m.size()));
+    if (fresh) out_.nodes_m.push_back(lattice_.find_root(lattice_.get_place(inside), lattice_.get_place(outside)));
     return found->second;
   }
 
   void add_tet(std::int32_t a, std::int32_t b, std::int32_t c, std::int32_t d) {
-    const auto& x = out_.nodes;
+    const auto& x = out_.nodes_m;
     if (dot(x[b] - x[a], cross(x[c] - x[a], x[d] - x[a])) < 0) std::swap(c, d);
     out_.tets.insert(out_.tets.end(), {a, b, c, d});
   }
@@ -197,7 +197,7 @@ class Stuffer {
     } else if (plus.size() == 2) {  // a wedge
       const std::int32_t a0 = cut(0, 0), a1 = cut(0, 1), b0 = cut(1, 0), b1 = cut(1, 1);
       add_tet(p[0], p[1], b0, b1);
-      const auto& x = out_.nodes;
+      const auto& x = out_.nodes_m;
       if (norm(x[a0] - x[b1]) < norm(x[a1] - x[b0])) {
         add_tet(p[0], a0, b1, a1);
         add_tet(p[0], a0, b1, b0);

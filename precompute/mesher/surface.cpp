@@ -26,6 +26,7 @@
 #include "precompute/mesher/triangle_surface.hpp"
 #include "precompute/mesher/verify.hpp"
 #include "runtime/base/error.hpp"
+#include "runtime/base/json.hpp"
 
 namespace carillon::mesher {
 namespace {
@@ -33,21 +34,21 @@ namespace {
 constexpr double kCountTolerance = 0.10;  // promised
 constexpr double kCountAim = 0.08;        // where the search is content; half of it for small meshes, which cost nothing
 constexpr double kSmallTarget = 5000;
-constexpr int kMostFinishes = 4;                     // meshes that are finished, as what that changes in the count is learned
+constexpr int kMaxFinishes = 4;                      // meshes that are finished, as what that changes in the count is learned
 constexpr double kSmallest = 1e-10, kLargest = 1e9;  // bodies, in metres
 constexpr double kFlatDeg = 12;                      // elements flatter than this are improved one by one at the end
 constexpr double kVisible = 0.02;                    // of a linear element's edge: bulges below this are lost in its own chords
 // Of the body's diagonal and of its mean thickness: facets that bulge less are as good as round.
 constexpr double kRoundness = 1e-4, kThinRoundness = 2e-4;
-constexpr std::size_t kMostRounded = 100'000;  // triangles
+constexpr std::size_t kMaxRounded = 100'000;  // triangles
 // A target under this part of the count that the body's thickness needs is refused at once.
 constexpr double kHopeless = 0.4;
 // Processor seconds after which the program gives up (guard_program), of the repair and of what follows. The hollow bunny of 37,000 nodes
 // takes 7 s and is given 670 s.
-constexpr double kLeastCpuOfRepair = 10, kLeastCpu = 12, kCpuPerTriangle = 2e-3, kCpuPerNode = 5e-3;
-constexpr double kMostLostByRounding = 0.04;  // of the volume, should sharp edges have to be rounded to meet a count
+constexpr double kMinCpuOfRepair = 10, kMinCpu = 12, kCpuPerTriangle = 2e-3, kCpuPerNode = 5e-3;
+constexpr double kMaxLostByRounding = 0.04;  // of the volume, should sharp edges have to be rounded to meet a count
 
-/// Tells the user of a phase and keeps its time.
+/// Shows the user a phase and keeps its time.
 class Phases {
  public:
   Phases(SurfaceReport& report, const Progress& progress, std::string file)
@@ -59,8 +60,8 @@ class Phases {
     const Clock clock{report_, name};
     return work();
   }
-  /// A word on the way that is no phase.
-  void tell(const std::string& text) {
+  /// A message that is not a phase.
+  void show(const std::string& text) {
     if (progress_) progress_(text);
   }
 
@@ -98,8 +99,8 @@ void check_options(const SurfaceOptions& o) {
   if (o.height_m && o.scale) throw InputError("height and scale exclude each other; give one of them");
   if (o.edge_m && o.nodes) throw InputError("edge and nodes exclude each other; give one of them");
   if (o.order != 1 && o.order != 2) throw InputError(fmt::format("order is {}; it must be 1 or 2", o.order));
-  if (o.nodes && !(*o.nodes >= (o.order == 1 ? 8 : 27) && static_cast<double>(*o.nodes) <= kMostNodes))
-    throw InputError(fmt::format("nodes is {}; it must be from {} to {:.0f}", *o.nodes, o.order == 1 ? 8 : 27, kMostNodes));
+  if (o.nodes && !(*o.nodes >= (o.order == 1 ? 8 : 27) && static_cast<double>(*o.nodes) <= kMaxNodes))
+    throw InputError(fmt::format("nodes is {}; it must be from {} to {:.0f}", *o.nodes, o.order == 1 ? 8 : 27, kMaxNodes));
   if (!(o.sharp_angle_deg > 0 && o.sharp_angle_deg <= 180))
     throw InputError(fmt::format("the sharp angle is {} degrees; it must be in (0, 180]", o.sharp_angle_deg));
   if (!(o.sliver_deg >= 0 && o.sliver_deg <= 30))
@@ -178,7 +179,7 @@ mesh::TetMesh meet_count(const Body& body, const SurfaceOptions& options, double
                                    options.surface.string(), edge_m));
   };
   const double longest = calc_box(body.repaired.surface.points).diagonal();
-  // A finished mesh that is not the body is made anew with slightly shorter edges: which elements lie across a thin wall changes then.
+  // A finished mesh that is not the body is made again with slightly shorter edges: which elements lie across a thin wall changes then.
   constexpr double kShorter = 0.97;
   Comparison comparison;
   const auto is_the_body = [&](const mesh::TetMesh& mesh) {
@@ -190,7 +191,7 @@ mesh::TetMesh meet_count(const Body& body, const SurfaceOptions& options, double
     return comparison.fault.empty();
   };
   if (!options.nodes) {
-    for (int n = 0; n < kMostFinishes; ++n, edge_m *= kShorter) {
+    for (int n = 0; n < kMaxFinishes; ++n, edge_m *= kShorter) {
       ++report.attempts;
       mesh::TetMesh mesh = phases.run("refining", [&] { return refine(edge_m); });
       refuse_empty(mesh);
@@ -203,7 +204,7 @@ mesh::TetMesh meet_count(const Body& body, const SurfaceOptions& options, double
   }
   const auto asked = static_cast<double>(*options.nodes);
   double target = asked, nearest = 0;
-  for (int n = 0; n < kMostFinishes; ++n) {
+  for (int n = 0; n < kMaxFinishes; ++n) {
     mesh::TetMesh mesh = phases.run("refining", [&] {
       return search_edge({target, options.order, longest, kCountTolerance, target < kSmallTarget ? kCountAim / 2 : kCountAim}, body.model,
                          edge_m, report.attempts, refine);
@@ -236,9 +237,9 @@ mesh::TetMesh meet_count(const Body& body, const SurfaceOptions& options, double
 
 [[noreturn]] void throw_count(const SurfaceOptions& options, const CountError& failure) {
   const auto asked = static_cast<double>(options.nodes.value_or(0));
-  if (failure.fewest > 0.9 * kMostNodes)
+  if (failure.fewest > 0.9 * kMaxNodes)
     throw InputError(fmt::format("{}: the {} is so thin that about {:.2g} nodes are needed, more than {:.0g}; give a thicker {}",
-                                 options.surface.string(), options.wall_m ? "wall" : "body", failure.fewest, kMostNodes,
+                                 options.surface.string(), options.wall_m ? "wall" : "body", failure.fewest, kMaxNodes,
                                  options.wall_m ? "wall" : "body"));
   if (failure.fewest > asked)
     throw CountRefusal(
@@ -294,7 +295,7 @@ mesh::TetMesh make_delaunay_mesh(Body& body, const SurfaceOptions& options, doub
       "The sharp edges lie too close to each other for this element size and were rounded; ask for more nodes to keep them.");
   try {
     mesh::TetMesh mesh = make(false);
-    if (with_sharp && std::abs(measure(mesh).volume_m3 / report.expected_volume_m3 - 1) > kMostLostByRounding)
+    if (with_sharp && std::abs(measure(mesh).volume_m3 / report.expected_volume_m3 - 1) > kMaxLostByRounding)
       throw_count(options, *with_sharp);
     return mesh;
   } catch (const std::bad_alloc&) {
@@ -314,7 +315,7 @@ mesh::TetMesh make_delaunay_mesh(Body& body, const SurfaceOptions& options, doub
 
 void measure_mesh(const mesh::TetMesh& linear, const Body& body, SurfaceReport& report) {
   const TetMeasures measures = measure(linear);
-  report.corner_nodes = static_cast<std::int64_t>(linear.nodes.size());
+  report.corner_nodes = static_cast<std::int64_t>(linear.nodes_m.size());
   report.tets = linear.tet_count();
   report.volume_m3 = measures.volume_m3;
   report.min_dihedral_deg = measures.min_dihedral_deg;
@@ -330,7 +331,7 @@ void measure_mesh(const mesh::TetMesh& linear, const Body& body, SurfaceReport& 
   double sum = 0, low = 1e300, high = 0;
   std::int64_t count = 0;
   for (const std::int32_t v : skin) {
-    const Vec3& p = linear.nodes[static_cast<std::size_t>(v)];
+    const Vec3& p = linear.nodes_m[static_cast<std::size_t>(v)];
     if (body.field->calc_distance(p) > -0.5 * body.wall_m) continue;
     const double depth = norm(body.nearest->find(p) - p) - body.repaired.offset_m;
     sum += depth;
@@ -353,7 +354,7 @@ void curve(mesh::TetMesh& mesh, const Body& body, SurfaceReport& report) {
   report.straightened_tets = edges.straightened;
 }
 
-/// Puts the nodes of the skins on the smooth surface and sums the volume anew.
+/// Puts the nodes of the skins on the smooth surface and sums the volume again.
 void place_nodes(mesh::TetMesh& mesh, const Body& body, const SurfaceOptions& options, SurfaceReport& report) {
   report.straightened_tets += place_on_smooth_surface(mesh, body, options.straight);
   for (const Vec3& way : mesh.doubt_m) report.doubt_m = std::max(report.doubt_m, norm(way));
@@ -393,17 +394,17 @@ void add_notes(const SurfaceOptions& options, const Body& body, SurfaceReport& r
 /// Takes the smooth surface through the corners in place of the facets, unless it runs through itself where they do not.
 void round(Body& body, const SurfaceOptions& options, SurfaceReport& report) {
   RepairedSurface& repaired = body.repaired;
-  if (4 * repaired.surface.triangles.size() > kMostRounded) return;
+  if (4 * repaired.surface.triangles.size() > kMaxRounded) return;
   RoundSurface round(repaired.surface, options.sharp_angle_deg);
   const double diagonal = calc_box(repaired.surface.points).diagonal();
   const double thickness = 2 * std::abs(calc_volume(repaired.surface)) / calc_area(repaired.surface);
   if (!round.is_doubtful() && round.get_largest_bulge() < std::min(kRoundness * diagonal, kThinRoundness * thickness)) return;
-  // So fine that the nodes hardly have to move from the cut to the smooth surface; for linear elements, that cannot tell, coarser.
+  // So fine that the nodes hardly have to move from the cut to the smooth surface; for linear elements, which show no difference, coarser.
   const double nodes = static_cast<double>(options.nodes.value_or(10000));
   const double shortest = options.edge_m.value_or(std::sqrt(calc_area(repaired.surface) / nodes));
   const double tolerance = options.order == 1 ? std::max(kRoundness * diagonal, kVisible * shortest) : kRoundness * diagonal;
   int pieces = std::max(1, static_cast<int>(std::ceil(std::sqrt(round.get_usual_bulge() / tolerance))));
-  while (pieces > 1 && repaired.surface.triangles.size() * pieces * pieces > kMostRounded) --pieces;
+  while (pieces > 1 && repaired.surface.triangles.size() * pieces * pieces > kMaxRounded) --pieces;
   TriangleSurface rounded = round.cut(pieces);
   report.facet_pieces = pieces;
   if (repaired.clean && pieces > 1 && !is_clean(rounded)) {
@@ -451,34 +452,36 @@ double find_first_edge(const Body& body, const SurfaceOptions& options) {
 }
 
 /// The fewest nodes that the thickness allows.
-double calc_least_nodes(const Body& body) { return body.model.calc_nodes(kEdgePerThickness * body.thickness_m); }
+double calc_min_nodes(const Body& body) { return body.model.calc_nodes(kEdgePerThickness * body.thickness_m); }
 
 std::string format_estimate(const char* word, const Body& body, double edge_m) {
-  return fmt::format("{} {{\"volume_m3\": {:.12g}, \"area_m2\": {:.12g}, \"thickness_m\": {:.12g}, \"nodes\": {}}}", word,
-                     body.model.volume_m3, body.model.area_m2, body.thickness_m,
-                     std::llround(std::min(std::max(body.model.calc_nodes(edge_m), calc_least_nodes(body)), 1e15)));
+  const double nodes = std::min(std::max(body.model.calc_nodes(edge_m), calc_min_nodes(body)), 1e15);
+  base::Json estimate = base::Json::object();
+  estimate.set("volume_m3", base::significant(body.model.volume_m3, 12)).set("area_m2", base::significant(body.model.area_m2, 12));
+  estimate.set("thickness_m", base::significant(body.thickness_m, 12)).set("nodes", std::llround(nodes));
+  return fmt::format("{} {}", word, estimate.line());
 }
 
-/// Says what the surface as it was read tells of the body: its repair may take long.
-void tell_roughly(const TriangleSurface& raw, const SurfaceOptions& options, Phases& phases) {
+/// Shows an estimate from the surface as it was read: its repair may take long.
+void show_rough_estimate(const TriangleSurface& raw, const SurfaceOptions& options, Phases& phases) {
   const double volume = std::abs(calc_volume(raw)), area = calc_area(raw);
   if (!(volume > 0 && area > 0)) return;
   Body body;
   set_model(body, options, volume, area);
-  phases.tell(format_estimate("rough", body, find_first_edge(body, options)));
+  phases.show(format_estimate("rough", body, find_first_edge(body, options)));
 }
 
 mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Phases& phases) {
   Body body;
   TriangleSurface raw = phases.run("reading", [&] { return read_surface(options.surface); });
   report.input_triangles = static_cast<std::int64_t>(raw.triangles.size());
-  const auto calc_limit = [&](double least, double nodes) {
-    return least + kCpuPerTriangle * static_cast<double>(report.input_triangles) + kCpuPerNode * nodes;
+  const auto calc_limit = [&](double start, double nodes) {
+    return start + kCpuPerTriangle * static_cast<double>(report.input_triangles) + kCpuPerNode * nodes;
   };
   const double asked = static_cast<double>(options.nodes.value_or(0));
-  std::optional<CpuLimit> cpu_limit(std::in_place, calc_limit(kLeastCpuOfRepair, asked));
+  std::optional<CpuLimit> cpu_limit(std::in_place, calc_limit(kMinCpuOfRepair, asked));
   scale_surface(raw, options, report);
-  tell_roughly(raw, options, phases);
+  show_rough_estimate(raw, options, phases);
   body.repaired = phases.run("repairing", [&] { return repair_surface(std::move(raw), options, report); });
   phases.run("rounding", [&] { return round_to_height(body, options, report), 0; });
   const TriangleSurface& surface = body.repaired.surface;
@@ -490,18 +493,18 @@ mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Ph
   if (options.edge_m && edge > diagonal)
     throw InputError(fmt::format("{}: edges of {:.3g} m are longer than the body ({:.3g} m); ask for shorter ones",
                                  options.surface.string(), edge, diagonal));
-  if (const double nodes = body.model.calc_nodes(edge); nodes > 1.5 * kMostNodes)
+  if (const double nodes = body.model.calc_nodes(edge); nodes > 1.5 * kMaxNodes)
     throw InputError(fmt::format("{}: edges of {:.3g} m would give about {:.3g} nodes, more than {:.0g}; ask for longer ones",
-                                 options.surface.string(), edge, nodes, kMostNodes));
-  const double least = calc_least_nodes(body);
-  cpu_limit.emplace(calc_limit(kLeastCpu, options.nodes ? asked : std::max(body.model.calc_nodes(edge), least)));
-  if (!options.nodes && least > 1.5 * kMostNodes) throw_count(options, CountError("", least, least));
-  if (options.nodes && options.method != Method::kStuffing && static_cast<double>(*options.nodes) < kHopeless * least)
-    throw_count(options, CountError("", least, least));
+                                 options.surface.string(), edge, nodes, kMaxNodes));
+  const double min_nodes = calc_min_nodes(body);
+  cpu_limit.emplace(calc_limit(kMinCpu, options.nodes ? asked : std::max(body.model.calc_nodes(edge), min_nodes)));
+  if (!options.nodes && min_nodes > 1.5 * kMaxNodes) throw_count(options, CountError("", min_nodes, min_nodes));
+  if (options.nodes && options.method != Method::kStuffing && static_cast<double>(*options.nodes) < kHopeless * min_nodes)
+    throw_count(options, CountError("", min_nodes, min_nodes));
   if (!options.edge_m && !options.nodes)
     report.notes.push_back("Neither nodes nor edge was given: about 10,000 corner nodes (order 2: 30,000 nodes in all) were aimed at.");
 
-  phases.tell(format_estimate("estimate", body, edge));
+  phases.show(format_estimate("estimate", body, edge));
 
   report.method = options.method == Method::kStuffing ? Method::kStuffing : Method::kDelaunay;
   body.nearest.emplace(surface);
@@ -556,8 +559,8 @@ mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Ph
   mesh::TetMesh out = options.order == 2 ? mesh::to_quadratic(linear) : std::move(linear);
   if (options.order == 2 && !options.straight) phases.run("curving", [&] { return curve(out, body, report), 0; });
   if (body.round || options.order == 2) phases.run("placing nodes", [&] { return place_nodes(out, body, options, report), 0; });
-  report.nodes = static_cast<std::int64_t>(out.nodes.size());
-  report.mesh_extent_m = calc_box(out.nodes).extent();
+  report.nodes = static_cast<std::int64_t>(out.nodes_m.size());
+  report.mesh_extent_m = calc_box(out.nodes_m).extent();
   add_notes(options, body, report);
   return out;
 }

@@ -58,7 +58,7 @@ struct SurfaceReport {
   double largest_hole_m = 0;           // across; as a part of the body's diagonal (the diameter of a circle of its area); and the area
   double largest_hole_part = 0, holes_area_part = 0;  // of all holes over that of the closed surface
   int facet_pieces = 1;              // into how many each facet's sides were cut to follow the smooth surface through its corners
-  double doubt_m = 0;                // how far apart the facets and the smooth surface are where it cannot be told which is the body
+  double doubt_m = 0;                // how far apart the facets and the smooth surface are where it is not known which is the body
   bool wrapped = false;              // the surface could not be repaired: its alpha wrap was meshed
   std::int64_t components = 0;       // of the input surface after repairing
   double scale = 1;                  // metres per unit of the file, as applied

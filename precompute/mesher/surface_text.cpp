@@ -100,12 +100,12 @@ PolygonSoup parse_obj(std::string_view bytes, const std::string& name) {
     const auto vertices = static_cast<std::int64_t>(soup.points.size());
     if (words[0] == "v") {
       if (words.size() < 4) text.refuse("a vertex has fewer than three coordinates; export the surface again");
-      if (vertices >= kMostPoints) text.refuse("more than {} vertices are too many; reduce the surface first", kMostPoints);
+      if (vertices >= kMaxPoints) text.refuse("more than {} vertices are too many; reduce the surface first", kMaxPoints);
       soup.points.push_back({text.read_coordinate(words[1]), text.read_coordinate(words[2]), text.read_coordinate(words[3])});
     } else if (words[0] == "f") {
       for (std::size_t c = 1; c < words.size(); ++c) {
         const auto index = read_reference(words[c], vertices);
-        if (!index || *index > kMostPoints)
+        if (!index || *index > kMaxPoints)
           text.refuse("the face names the vertex {}, which does not exist ({} were given before it); export the surface again",
                       quote_excerpt(words[c]), vertices);
         if (*index > largest) largest = *index, line_of_largest = text.number();
@@ -125,7 +125,7 @@ PolygonSoup parse_off(std::string_view bytes, const std::string& name) {
   PolygonSoup soup;
   std::vector<std::string_view> words;
   if (!text.next_filled(words)) text.refuse("the file holds only blanks and comments; export it again");
-  // The word may be left out, and the counts may stand beside it.
+  // The word may be left out, and the counts may stand next to it.
   std::string_view kind = "OFF";
   if (!read_whole(words[0])) {
     kind = words[0];
@@ -148,8 +148,8 @@ PolygonSoup parse_off(std::string_view bytes, const std::string& name) {
       text.refuse("found {} where the number of {} should be; export the surface again", quote_excerpt(words[static_cast<std::size_t>(n)]),
                   what);
     // A vertex takes six bytes at least ("0 0 0\n"), a face two.
-    const std::int64_t most = std::min(static_cast<std::int64_t>(bytes.size()) / (n == 0 ? 5 : 2) + 1, kMostPoints);
-    if (*count < 0 || *count > most)
+    const std::int64_t max = std::min(static_cast<std::int64_t>(bytes.size()) / (n == 0 ? 5 : 2) + 1, kMaxPoints);
+    if (*count < 0 || *count > max)
       text.refuse("the header promises {} {}, but the file has only {} bytes; it is cut off or damaged, export it again", *count, what,
                   bytes.size());
     counts[n] = *count;

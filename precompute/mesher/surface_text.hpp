@@ -70,7 +70,7 @@ struct PolygonSoup {
 };
 
 /// More points or corners than this are refused: indices are of 32 bits.
-constexpr std::int64_t kMostPoints = 400'000'000;
+constexpr std::int64_t kMaxPoints = 400'000'000;
 
 /// The readers of one format each. They throw InputError naming the line or byte for whatever is not as the format has it, and take no
 /// more memory than a small multiple of the file.

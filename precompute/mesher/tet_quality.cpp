@@ -44,7 +44,7 @@ std::vector<std::array<std::int32_t, 4>> find_neighbours(const mesh::TetMesh& me
     std::int32_t middle, high, element;
     int face;
   };
-  std::vector<std::size_t> begin(mesh.nodes.size() + 1, 0);
+  std::vector<std::size_t> begin(mesh.nodes_m.size() + 1, 0);
   for (std::int32_t e = 0; e < mesh.tet_count(); ++e)
     for (int f = 0; f < 4; ++f) ++begin[static_cast<std::size_t>(sorted(get_face(mesh, e, f))[0]) + 1];
   for (std::size_t v = 1; v < begin.size(); ++v) begin[v] += begin[v - 1];
@@ -100,7 +100,7 @@ std::vector<char> find_pinching(const mesh::TetMesh& mesh, const std::vector<std
   any = false;
   // Only nodes and edges on the boundary can pinch.
   std::unordered_map<Edge, int, KeyHash> boundary_edges;
-  std::vector<char> on_boundary(mesh.nodes.size(), 0);
+  std::vector<char> on_boundary(mesh.nodes_m.size(), 0);
   for (std::int32_t e = 0; e < mesh.tet_count(); ++e)
     for (int f = 0; f < 4; ++f) {
       if (neighbours[e][f] >= 0) continue;
@@ -110,7 +110,7 @@ std::vector<char> find_pinching(const mesh::TetMesh& mesh, const std::vector<std
         on_boundary[face[c]] = 1;
       }
     }
-  std::vector<std::vector<std::int32_t>> at_node(mesh.nodes.size());
+  std::vector<std::vector<std::int32_t>> at_node(mesh.nodes_m.size());
   for (std::int32_t e = 0; e < mesh.tet_count(); ++e)
     for (const std::int32_t v : mesh.tet(e).first(4))
       if (on_boundary[v]) at_node[v].push_back(e);
@@ -128,7 +128,7 @@ std::vector<char> find_pinching(const mesh::TetMesh& mesh, const std::vector<std
     remove_small(find_groups(mesh, neighbours, around, edge));
   }
   if (any) return remove;
-  for (std::int32_t v = 0; v < static_cast<std::int32_t>(mesh.nodes.size()); ++v)
+  for (std::int32_t v = 0; v < static_cast<std::int32_t>(mesh.nodes_m.size()); ++v)
     if (on_boundary[v]) remove_small(find_groups(mesh, neighbours, at_node[v], std::array{v}));
   return remove;
 }
@@ -165,7 +165,7 @@ TetMeasures measure(const mesh::TetMesh& mesh) {
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e) {
     const auto tet = mesh.tet(e);
     std::array<Vec3, 4> p, normal;
-    for (int c = 0; c < 4; ++c) p[c] = mesh.nodes[tet[c]];
+    for (int c = 0; c < 4; ++c) p[c] = mesh.nodes_m[tet[c]];
     for (int f = 0; f < 4; ++f) {
       const auto& corner = mesh::kFaces[f];
       normal[f] = cross(p[corner[1]] - p[corner[0]], p[corner[2]] - p[corner[0]]);
@@ -202,19 +202,19 @@ std::int64_t count_edges(const mesh::TetMesh& mesh) {
 }
 
 void drop_elements(mesh::TetMesh& mesh, const std::vector<char>& remove) {
-  std::vector<std::int32_t> number(mesh.nodes.size(), -1), tets;
+  std::vector<std::int32_t> number(mesh.nodes_m.size(), -1), tets;
   std::vector<Vec3> nodes;
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e) {
     if (remove[static_cast<std::size_t>(e)]) continue;
     for (const std::int32_t v : mesh.tet(e)) {
       if (number[v] < 0) {
         number[v] = static_cast<std::int32_t>(nodes.size());
-        nodes.push_back(mesh.nodes[v]);
+        nodes.push_back(mesh.nodes_m[v]);
       }
       tets.push_back(number[v]);
     }
   }
-  mesh.nodes = std::move(nodes);
+  mesh.nodes_m = std::move(nodes);
   mesh.tets = std::move(tets);
   mesh.regions.assign(static_cast<std::size_t>(mesh.tet_count()), 0);
 }
@@ -238,13 +238,13 @@ double calc_flatness(const std::array<Vec3, 4>& corners) {
     normal[f] = cross(p[mesh::kFaces[f][1]] - p[mesh::kFaces[f][0]], p[mesh::kFaces[f][2]] - p[mesh::kFaces[f][0]]);
   std::array<double, 4> square;
   for (int f = 0; f < 4; ++f) square[f] = dot(normal[f], normal[f]);
-  double most = 0;  // the square of the cosine of the flattest angle
+  double max = 0;  // the square of the cosine of the flattest angle
   for (int i = 0; i < 4; ++i)
     for (int j = i + 1; j < 4; ++j) {
       const double product = dot(normal[i], normal[j]);
-      most = std::max(most, product * product / (square[i] * square[j]));
+      max = std::max(max, product * product / (square[i] * square[j]));
     }
-  return std::acos(std::sqrt(std::min(most, 1.0))) * 180 / std::numbers::pi;
+  return std::acos(std::sqrt(std::min(max, 1.0))) * 180 / std::numbers::pi;
 }
 
 }  // namespace carillon::mesher

@@ -19,9 +19,9 @@ namespace carillon::mesher {
 namespace {
 
 // Parts thinner than this many edges, or shorter than the second, may be lost in elements of that size.
-constexpr double kLeastThickness = 1.0, kLeastLength = 3;
+constexpr double kMinThickness = 1.0, kMinLength = 3;
 // Of an extent of the body, and in edges: what coarse elements may lack of its tips.
-constexpr double kMostLost = 0.1, kMostLostEdges = 2;
+constexpr double kMaxLost = 0.1, kMaxLostEdges = 2;
 constexpr double kHopelessWalls = 3;  // edges this many times as long as the wall is thick do not bring a lost hollow back
 
 /// A region of the field: where the body is, or where it is not.
@@ -124,7 +124,7 @@ std::string describe_lost(const Body& body, const Vec3& made, double edge_m, con
   std::string text;
   for (int c = 0; c < 3; ++c) {
     const double extent = wanted[c] - 2 * body.repaired.offset_m, lost = extent - made[c];
-    if (lost > kMostLost * extent && lost > kMostLostEdges * edge_m)
+    if (lost > kMaxLost * extent && lost > kMaxLostEdges * edge_m)
       text = fmt::format("{} {:.3g} m long along {} where the body is {:.3g} m: parts thinner than its elements are missing", is, made[c],
                          "xyz"[c], extent);
   }
@@ -154,13 +154,13 @@ Shells count_shells(const Body& body, double edge_m) {
   if (!body.field) {
     for (const TriangleSurface& part : split_parts(body.repaired.surface)) {
       const double thickness = 2 * std::abs(calc_volume(part)) / calc_area(part);
-      ++shells.most;
-      shells.least += thickness >= kLeastThickness * edge_m && calc_box(part.points).diagonal() >= kLeastLength * edge_m;
+      ++shells.max;
+      shells.min += thickness >= kMinThickness * edge_m && calc_box(part.points).diagonal() >= kMinLength * edge_m;
     }
   } else {
     const double voxel = body.field->voxel_m;
     // Parts that touch may come out joined or apart.
-    shells.most = static_cast<std::int64_t>(find_regions(*body.field, body.wall_m, false).size());
+    shells.max = static_cast<std::int64_t>(find_regions(*body.field, body.wall_m, false).size());
     const auto regions = find_regions(*body.field, body.wall_m, true);
     for (const Region& region : regions) {
       // A surface of samples' faces has about one and a half times the area of the smooth one.
@@ -168,16 +168,16 @@ Shells count_shells(const Body& body, double edge_m) {
       double diagonal = 0;
       for (int c = 0; c < 3; ++c) diagonal = std::hypot(diagonal, voxel * (region.high[c] - region.low[c] + 1));
       const bool is_space = &region == regions.data();  // the field begins outside the body
-      shells.least += is_space || (thickness >= std::min(kLeastThickness * edge_m, body.wall_m > 0 ? 0.6 * body.wall_m : edge_m) &&
-                                   diagonal >= kLeastLength * edge_m);
+      shells.min += is_space || (thickness >= std::min(kMinThickness * edge_m, body.wall_m > 0 ? 0.6 * body.wall_m : edge_m) &&
+                                 diagonal >= kMinLength * edge_m);
     }
-    --shells.most;
-    --shells.least;
+    --shells.max;
+    --shells.min;
     // Who asks for a wall has a hollow, however small.
-    if (body.wall_m > 0 && shells.most >= 2) shells.least = std::max<std::int64_t>(shells.least, 2);
+    if (body.wall_m > 0 && shells.max >= 2) shells.min = std::max<std::int64_t>(shells.min, 2);
   }
-  shells.least = std::max<std::int64_t>(shells.least, 1);
-  shells.most = std::max(shells.most, shells.least);
+  shells.min = std::max<std::int64_t>(shells.min, 1);
+  shells.max = std::max(shells.max, shells.min);
   return shells;
 }
 
@@ -186,41 +186,41 @@ Comparison compare(const mesh::TetMesh& linear, const Body& body, const Expectat
   const double edge = expectation.edge_m;
   result.volume_m3 = measure(linear).volume_m3;
   const auto boundary = find_boundary(linear);
-  result.shells = count_parts(boundary, linear.nodes.size());
-  std::vector<char> seen(linear.nodes.size(), 0);
+  result.shells = count_parts(boundary, linear.nodes_m.size());
+  std::vector<char> seen(linear.nodes_m.size(), 0);
   std::int64_t outside = 0;
-  const double most_outside = 0.1 * edge + (body.field ? 0.5 * body.field->voxel_m : 0);
+  const double max_outside = 0.1 * edge + (body.field ? 0.5 * body.field->voxel_m : 0);
   for (const Triangle& t : boundary)
     for (const std::int32_t v : t) {
       if (seen[v]++) continue;
-      const double way = calc_outside(body, linear.nodes[v]);
+      const double way = calc_outside(body, linear.nodes_m[v]);
       result.farthest_outside_m = std::max(result.farthest_outside_m, way);
-      outside += way > most_outside;
+      outside += way > max_outside;
     }
 
   const double part =
       0.1 * edge * (body.wall_m > 0 ? calc_area(body.repaired.surface) / 3 : calc_area(body.repaired.surface)) / expectation.volume_m3;
-  const double most_off = (body.wall_m > 0 ? 0.08 : 0.03) + part;
+  const double max_off = (body.wall_m > 0 ? 0.08 : 0.03) + part;
   const double off = result.volume_m3 / expectation.volume_m3 - 1;
   const std::int64_t flat = mesh::count_flat(linear);
   if (flat > 0)
     result.fault = fmt::format("has {} element{} without volume", flat, flat == 1 ? "" : "s");
-  else if (!(std::abs(off) <= most_off))
+  else if (!(std::abs(off) <= max_off))
     result.fault = fmt::format("has {:+.1f} % of the body's volume too {}, where {:.1f} % are the most that its facets explain",
-                               100 * std::abs(off), off > 0 ? "much" : "little", 100 * most_off);
+                               100 * std::abs(off), off > 0 ? "much" : "little", 100 * max_off);
   else if (outside > 0)
     result.fault = fmt::format("has {} node{} outside the body, by up to {:.3g} mm", outside, outside == 1 ? "" : "s",
                                1000 * result.farthest_outside_m);
-  else if (result.shells < expectation.shells.least || result.shells > expectation.shells.most)
+  else if (result.shells < expectation.shells.min || result.shells > expectation.shells.max)
     result.fault = fmt::format("has {} closed surface{} where the body has {}", result.shells, result.shells == 1 ? "" : "s",
-                               expectation.shells.least == expectation.shells.most
-                                   ? fmt::format("{}", expectation.shells.most)
-                                   : fmt::format("{} to {}", expectation.shells.least, expectation.shells.most));
+                               expectation.shells.min == expectation.shells.max
+                                   ? fmt::format("{}", expectation.shells.max)
+                                   : fmt::format("{} to {}", expectation.shells.min, expectation.shells.max));
 
   // Of a hollow that was filled where elements are as long as the wall is thick several times over.
-  result.is_hopeless = flat > 0 || (!result.fault.empty() && result.shells < expectation.shells.least && body.wall_m > 0 &&
+  result.is_hopeless = flat > 0 || (!result.fault.empty() && result.shells < expectation.shells.min && body.wall_m > 0 &&
                                     edge > kHopelessWalls * body.wall_m);
-  if (std::string lost = describe_lost(body, calc_box(linear.nodes).extent(), edge, "is"); !lost.empty()) {
+  if (std::string lost = describe_lost(body, calc_box(linear.nodes_m).extent(), edge, "is"); !lost.empty()) {
     result.is_hopeless = true;
     result.fault = std::move(lost);
   }

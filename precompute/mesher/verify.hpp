@@ -10,7 +10,7 @@ namespace carillon::mesher {
 
 /// How many closed surfaces the body's boundary has: those that elements of this length must show, and all there are.
 struct Shells {
-  std::int64_t least = 0, most = 0;
+  std::int64_t min = 0, max = 0;
 };
 Shells count_shells(const Body& body, double edge_m);
 

@@ -5,9 +5,9 @@
 #include <cstdlib>
 #include <vector>
 
-#include "precompute/petsc/blas_kernels.hpp"
+#include "precompute/launch/blas_kernels.hpp"
 #include "precompute/petsc/session.hpp"
-#include "runtime/base/error.hpp"
+#include "runtime/base/failure.hpp"
 
 namespace carillon::petsc {
 namespace {
@@ -42,6 +42,33 @@ std::string find_blas_maker(const std::string& file) {
   return "reference BLAS";
 }
 
+std::string find_kernels() {
+  auto* name = find_symbol<char* (*)()>("openblas_get_corename");
+  return name == nullptr ? "" : name();
+}
+
+/// What OpenBLAS would run without the launcher's choice; empty: the launcher chose nothing.
+std::string find_default_kernels() {
+  const char* kernels = std::getenv(launch::kDefaultKernelsVariable);
+  return kernels == nullptr ? "" : kernels;
+}
+
+bool is_chosen_by_user() { return std::getenv(launch::kKernelsVariable) != nullptr && find_default_kernels().empty(); }
+
+/// ", kernels SkylakeX, OpenBLAS's own choice": the kernels and why these; empty when the BLAS is not OpenBLAS.
+std::string describe_kernels() {
+  const std::string kernels = find_kernels();
+  if (kernels.empty()) return {};
+  const bool is_old = launch::are_older_than_processor(kernels);
+  const std::string fitting = launch::find_fitting_kernels();
+  if (is_chosen_by_user())
+    return fmt::format(", kernels {}, named by {}{}", kernels, launch::kKernelsVariable,
+                       is_old ? fmt::format(" ({} would fit this processor)", fitting) : "");
+  if (is_old) return fmt::format(", kernels {}, older than this processor ({} would fit it)", kernels, fitting);
+  if (find_default_kernels().empty()) return fmt::format(", kernels {}, OpenBLAS's own choice", kernels);
+  return fmt::format(", kernels {}, which fit this processor (OpenBLAS alone took {})", kernels, find_default_kernels());
+}
+
 }  // namespace
 
 std::string blas_name() {
@@ -51,18 +78,22 @@ std::string blas_name() {
 
 bool blas_is_reference() { return find_blas_maker(find_blas_file()) == "reference BLAS"; }
 
-void pin_blas_threads() {
-  if (auto* set = find_symbol<void (*)(int)>("openblas_set_num_threads"); set != nullptr) set(1);
-  if (auto* set = find_symbol<void (*)(int)>("omp_set_num_threads"); set != nullptr) set(1);
+std::string describe_slow_kernels() {
+  const std::string kernels = find_kernels();
+  if (!launch::are_older_than_processor(kernels) || launch::find_age(kernels) != launch::KernelAge::older) return {};
+  const std::string fitting = launch::find_fitting_kernels();
+  const char* correction = is_chosen_by_user() ? "unset {0}, or set it to {1}" : "set {0} to {1}";
+  return fmt::format("OpenBLAS runs its kernels {}, which are for older processors and slow on this one; {}", kernels,
+                     fmt::format(fmt::runtime(correction), launch::kKernelsVariable, fitting));
 }
 
 void reserve_blas_memory(MPI_Comm comm) {
   constexpr std::size_t kBytes = std::size_t{160} << 20;  // OpenBLAS 0.3 takes 128 MB
   constexpr int kSize = 128;                              // beyond its kernels for small matrices, which need no such memory
-  run_agreed(comm, [&] {
+  comm::Communicator(comm).agree([&] {
     void* room = std::malloc(kBytes);
     if (room == nullptr)
-      throw SystemError("Out of memory at the start: OpenBLAS alone needs 0.13 GB of address space. Raise the limit (ulimit -v).");
+      throw MemoryError("Out of memory at the start: OpenBLAS alone needs 0.13 GB of address space. Raise the limit (ulimit -v).");
     std::free(room);
     using Gemm = void (*)(const char*, const char*, const int*, const int*, const int*, const double*, const double*, const int*,
                           const double*, const int*, const double*, double*, const int*);

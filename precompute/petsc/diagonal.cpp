@@ -6,15 +6,14 @@
 namespace carillon::petsc {
 
 std::vector<double> read_diagonal(Mat matrix) {
-  MPI_Comm comm = MPI_COMM_NULL;
-  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(matrix), &comm));
+  const comm::Communicator comm = get_communicator(matrix);
   VecHandle diagonal;
   check(MatCreateVecs(matrix, nullptr, diagonal.out()));
   check(MatGetDiagonal(matrix, diagonal));
   PetscInt rows = 0;
   check(VecGetLocalSize(diagonal, &rows));
   std::vector<double> copy;
-  run_agreed(comm, [&] { copy.reserve(static_cast<std::size_t>(rows)); });
+  comm.agree([&] { copy.reserve(static_cast<std::size_t>(rows)); });
   const PetscScalar* values = nullptr;
   check(VecGetArrayRead(diagonal, &values));
   copy.assign(values, values + rows);

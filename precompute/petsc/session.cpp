@@ -16,7 +16,7 @@
 #include <string_view>
 #include <vector>
 
-#include "runtime/base/error.hpp"
+#include "runtime/base/failure.hpp"
 
 namespace carillon::petsc {
 namespace {
@@ -36,68 +36,18 @@ PetscErrorCode record_error(MPI_Comm, int line, const char* function, const char
 }
 
 bool is_system_error(PetscErrorCode code) {
-  return code == PETSC_ERR_MEM || code == PETSC_ERR_SYS || code == PETSC_ERR_FILE_OPEN || code == PETSC_ERR_FILE_READ ||
-         code == PETSC_ERR_FILE_WRITE || code == PETSC_ERR_FILE_UNEXPECTED;
+  return code == PETSC_ERR_SYS || code == PETSC_ERR_FILE_OPEN || code == PETSC_ERR_FILE_READ || code == PETSC_ERR_FILE_WRITE ||
+         code == PETSC_ERR_FILE_UNEXPECTED;
 }
-
-enum ErrorKind : int { kNone = 0, kInput = 1, kSolve = 2, kSystem = 3 };
-
-[[noreturn]] void throw_kind(int kind, const std::string& text) {
-  switch (kind) {
-    case kInput:
-      throw InputError(text);
-    case kSolve:
-      throw SolveError(text);
-    default:
-      throw SystemError(text);
-  }
-}
-
-// All ranks learn the lowest failing rank's kind and text.
-void agree_on(MPI_Comm comm, int kind, const std::string& text) {
-  int rank = 0;
-  int size = 1;
-  MPI_Comm_rank(comm, &rank);
-  MPI_Comm_size(comm, &size);
-  int mine = kind == kNone ? size : rank;
-  int first = size;
-  MPI_Allreduce(&mine, &first, 1, MPI_INT, MPI_MIN, comm);
-  if (first == size) return;
-  std::array<int, 2> header{kind, static_cast<int>(text.size())};
-  MPI_Bcast(header.data(), 2, MPI_INT, first, comm);
-  std::string shared = text;
-  shared.resize(static_cast<std::size_t>(header[1]));
-  MPI_Bcast(shared.data(), header[1], MPI_CHAR, first, comm);
-  throw_kind(header[0], shared);
-}
-
-// Ranks that all run on this machine, as their launcher says.
-bool is_on_one_host() {
-  const char* all = std::getenv("OMPI_COMM_WORLD_SIZE");
-  const char* here = std::getenv("OMPI_COMM_WORLD_LOCAL_SIZE");
-  if (all != nullptr || here != nullptr) return all != nullptr && here != nullptr && std::string_view(all) == here;
-  // Started alone, without a launcher.
-  return std::getenv("PMIX_RANK") == nullptr && std::getenv("PMI_RANK") == nullptr && std::getenv("SLURM_PROCID") == nullptr;
-}
-
-// Open MPI asks every library for networks what it could do, 0.2 s by the clock; on one machine its own way through shared memory is
-// what it takes in the end.
-void spare_the_search_for_networks() {
-  if (is_on_one_host()) setenv("OMPI_MCA_pml", "ob1", 0);
-}
-
-// hwloc, which Open MPI asks for cores and caches, opens every X display from :0 to :9 to list graphics cards, and Xlib ends the process
-// when such a server ends in between.
-void spare_the_search_for_displays() { setenv("HWLOC_COMPONENTS", "-gl", 0); }
 
 // SuperLU_DIST, which PETSc brings along, forbids malloc when it is loaded to take pages of its own for large pieces, and to give any back:
 // what is freed stays with the process, and calloc writes zeros over it. Large pieces get their pages again; smaller ones, which come and
 // go in every step, stay in the heap.
 void let_malloc_give_back() {
-  constexpr int kMostMaps = 65536;  // glibc's own
+  constexpr int kMaxMaps = 65536;  // glibc's own
   constexpr int kLarge = 4 << 20;
   constexpr int kKept = 64 << 20;
-  (void)mallopt(M_MMAP_MAX, kMostMaps);
+  (void)mallopt(M_MMAP_MAX, kMaxMaps);
   (void)mallopt(M_MMAP_THRESHOLD, kLarge);
   (void)mallopt(M_TRIM_THRESHOLD, kKept);
 }
@@ -135,12 +85,10 @@ Session::Session(int& argc, char**& argv, const std::vector<std::string>& petsc_
   int is_initialized = 0;
   MPI_Initialized(&is_initialized);
   if (is_initialized == 0) {
-    spare_the_search_for_networks();
-    spare_the_search_for_displays();
     if (MPI_Init(&argc, &argv) != MPI_SUCCESS) throw SystemError("MPI does not start. Start the program with mpirun, or alone.");
     started_mpi_ = true;
   }
-  // PETSc reads these even when it is told to skip its option files.
+  // PETSc reads these even when it is set to skip its option files.
   unsetenv("PETSC_OPTIONS");
   unsetenv("PETSC_OPTIONS_YAML");
   // PETSc keeps the pointers for as long as it runs.
@@ -188,43 +136,15 @@ void check(PetscErrorCode code) {
   if (code == 0) return;
   std::string text = recorded_error.empty() ? fmt::format("PETSc error {}", static_cast<int>(code)) : recorded_error;
   recorded_error.clear();
+  if (code == PETSC_ERR_MEM) throw MemoryError(text);
   if (is_system_error(code)) throw SystemError(text);
   throw SolveError(text);
 }
 
-bool all_ok(MPI_Comm comm, bool ok) {
-  int mine = ok ? 1 : 0;
-  int every = 0;
-  MPI_Allreduce(&mine, &every, 1, MPI_INT, MPI_MIN, comm);
-  return every == 1;
-}
-
-void agree(MPI_Comm comm, const std::string& error_text) { agree_on(comm, error_text.empty() ? kNone : kInput, error_text); }
-
-void agree(MPI_Comm comm, std::exception_ptr error) {
-  int kind = kNone;
-  std::string text;
-  if (error) {
-    try {
-      std::rethrow_exception(error);
-    } catch (const InputError& e) {
-      kind = kInput;
-      text = e.what();
-    } catch (const SolveError& e) {
-      kind = kSolve;
-      text = e.what();
-    } catch (const std::bad_alloc&) {
-      kind = kSystem;
-      text = "Out of memory. Take a coarser mesh, a narrower band, or more ranks on more machines.";
-    } catch (const std::exception& e) {
-      kind = kSystem;
-      text = e.what();
-    } catch (...) {
-      kind = kSystem;
-      text = "An unknown exception was thrown.";
-    }
-  }
-  agree_on(comm, kind, text);
+comm::Communicator get_communicator(PetscObject object) {
+  MPI_Comm comm = MPI_COMM_NULL;
+  check(PetscObjectGetComm(object, &comm));
+  return comm;
 }
 
 PetscInt to_petsc_int(std::int64_t value) {

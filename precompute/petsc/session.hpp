@@ -1,4 +1,4 @@
-// MPI, PETSc and SLEPc for the life of a program; their errors as exceptions; agreement between ranks.
+// MPI, PETSc and SLEPc for the life of a program; their errors as exceptions.
 #pragma once
 
 #include <mpi.h>
@@ -9,6 +9,8 @@
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "precompute/comm/communicator.hpp"
 
 namespace carillon::petsc {
 
@@ -40,27 +42,11 @@ std::vector<std::string> find_unused_options();
 /// own words. Local: the other ranks do not know, so use it where an error is a defect or hits every rank alike.
 void check(PetscErrorCode code);
 
-/// True on every rank if `ok` was true on every rank. Collective.
-bool all_ok(MPI_Comm comm, bool ok);
-
-/// Throws InputError(text) on every rank if any rank brings a non-empty text; the lowest such rank's text wins. Collective.
-void agree(MPI_Comm comm, const std::string& error_text);
-
-/// The same for an exception caught on some ranks (null: none): the lowest such rank's InputError, SolveError or SystemError is thrown on
-/// every rank; any other exception arrives as SystemError. Collective.
-void agree(MPI_Comm comm, std::exception_ptr error);
-
-/// Runs `work` on every rank, then agrees: either all ranks return or all throw the same. `work` must not itself be collective unless it
-/// throws on all ranks alike. Collective.
-template <typename Work>
-void run_agreed(MPI_Comm comm, Work&& work) {
-  std::exception_ptr error;
-  try {
-    work();
-  } catch (...) {
-    error = std::current_exception();
-  }
-  agree(comm, error);
+/// The ranks of a Mat, Vec or another object of PETSc's.
+comm::Communicator get_communicator(PetscObject object);
+template <typename Struct>
+comm::Communicator get_communicator(Struct* object) {
+  return get_communicator(reinterpret_cast<PetscObject>(object));
 }
 
 /// Narrows a count to PETSc's (32-bit) index type. Throws SystemError when it does not fit.
@@ -69,19 +55,16 @@ PetscInt to_petsc_int(std::int64_t value);
 /// Gives the memory of the whole pages between two addresses back to the system; what is read there afterwards is zero. Local.
 void give_back_pages(void* begin, void* end);
 
-/// Starts the program again, once, with OPENBLAS_CORETYPE set, when OpenBLAS took kernels for older instructions than this processor has:
-/// its releases know the processors of their day by number, and every later one is a Pentium 4 to them. Call it first in main, before MPI
-/// starts; returns where nothing is to be corrected: the kernels fit, the user has set OPENBLAS_CORETYPE, or the BLAS is another. Local.
-void restart_with_fitting_kernels(char** argv);
 /// The BLAS behind dgemm in this process, and why it has the kernels that it has: "OpenBLAS 0.3.21 ... (/usr/lib/...), kernels SkylakeX,
 /// OpenBLAS's own choice", "reference BLAS (/usr/lib/...)". Local.
 std::string blas_name();
 /// True if it is the unoptimised reference BLAS (in DGEMM about 14 times slower than OpenBLAS on one core).
 bool blas_is_reference();
-/// One BLAS thread and one OpenMP thread per rank: the panels of the factor are too small for more, and spinning threads slow other ranks.
-void pin_blas_threads();
+/// A warning where OpenBLAS runs kernels without the vector instructions of this processor (AVX2 on), two to eight times slower in what the
+/// BLAS does, with the correction; empty where there is nothing to say. Local.
+std::string describe_slow_kernels();
 
-/// Has OpenBLAS take its working memory (128 MB of address space) now: later, when there is none left, it asks for it for ever instead of
+/// Has OpenBLAS take its working memory (128 MB of address space) now: later, when there is none left, it retries without end instead of
 /// failing. Collective. Throws SystemError on every rank where there is not so much.
 void reserve_blas_memory(MPI_Comm comm);
 

@@ -1,4 +1,4 @@
-// What a run does, in numbers that do not depend on the machine's mood: operations, messages, bytes.
+// What a run does, in numbers that do not depend on the machine's load: operations, messages, bytes; and in seconds.
 #pragma once
 
 #include <mpi.h>
@@ -6,9 +6,14 @@
 #include <array>
 #include <cstddef>
 
+#include "precompute/comm/communicator.hpp"
+
 namespace carillon::petsc {
 
-/// Of one rank or summed over all.
+/// Do we know the messages of this run? Only under the profiling library (precompute/mpi_profile): carillon-precompute --profile.
+bool is_profiled();
+
+/// Of one rank or summed over all. Messages and collectives are 0 where they are not counted.
 struct Work {
   double flops = 0;             // floating-point operations of the factorisation, the solves, products of blocks, and what PETSc counts
   double messages = 0;          // sent from one rank to another
@@ -17,11 +22,11 @@ struct Work {
   double collective_bytes = 0;  // what the ranks put into them
 };
 
-/// What it took, which does depend on the machine's mood. Seconds summed over the ranks, where there are several.
+/// Seconds, summed over the ranks where there are several.
 struct Effort {
   double cpu_seconds = 0;  // user and system
   double wall_seconds = 0;
-  double mpi_seconds = 0;  // of wall_seconds: inside MPI, transfers and waiting for others
+  double mpi_seconds = 0;  // of wall_seconds: inside MPI, transfers and waiting; 0 where it is not measured
 };
 
 enum class WorkPhase { kOther, kRead, kPartition, kAssemble, kFactor, kSolve, kOrthogonalise, kErrors, kWrite };
@@ -44,7 +49,7 @@ class WorkScope {
   WorkPhase before_;
 };
 
-/// Operations of this process that PETSc does not know of.
+/// Adds operations that PETSc does not count.
 void add_flops(double flops);
 
 struct PhaseWork {
@@ -53,11 +58,10 @@ struct PhaseWork {
 };
 using WorkTable = std::array<PhaseWork, kWorkPhases>;
 
-/// Of this process so far, by phase. Messages are counted where the program calls MPI, through its profiling interface: calls from Fortran
-/// (MUMPS) and on several threads are not seen. Local.
+/// Of this process so far, by phase. Local.
 WorkTable find_work();
 
 /// The same of all ranks together, on every rank. Collective.
-WorkTable sum_work(MPI_Comm comm);
+WorkTable sum_work(const comm::Communicator& comm);
 
 }  // namespace carillon::petsc

@@ -39,7 +39,7 @@ void add_face_sets(mesh::TetMesh& mesh, const std::vector<Cells>& indices, const
 }
 
 void raise_straight(mesh::TetMesh& mesh) {
-  raise_order(mesh, [&mesh](std::int32_t a, std::int32_t b) { return calc_middle(mesh.nodes[a], mesh.nodes[b]); });
+  raise_order(mesh, [&mesh](std::int32_t a, std::int32_t b) { return calc_middle(mesh.nodes_m[a], mesh.nodes_m[b]); });
 }
 
 long long multiply(const Cells& n) { return static_cast<long long>(n[0]) * n[1] * n[2]; }
@@ -95,7 +95,7 @@ mesh::TetMesh make_tube(double length, double outer_radius, double wall, int alo
   add_end_sets(mesh, indices, 1, layers, "inner", "outer");
   if (order == 2) {
     raise_order(mesh, [&](std::int32_t a, std::int32_t b) {
-      Vec3 middle = calc_middle(mesh.nodes[a], mesh.nodes[b]);
+      Vec3 middle = calc_middle(mesh.nodes_m[a], mesh.nodes_m[b]);
       const double stretch = 0.5 * (radius(indices[a][1]) + radius(indices[b][1])) / std::hypot(middle[1], middle[2]);
       middle[1] *= stretch;
       middle[2] *= stretch;
@@ -163,7 +163,7 @@ Body plan_tube(double length_m, double outer_radius_m, double wall_m, int order)
   Body body;
   // Cells around come in pairs, so that the mirrored lattice closes on itself.
   body.lengths = {length_m, mean_radius * std::log(outer_radius_m / inner_radius), std::numbers::pi * mean_radius, 0.0};
-  body.least = {1, 1, 4, 1};
+  body.coarsest = {1, 1, 4, 1};
   body.wanted = {2, order == 1 ? 2 : 1, 6, 1};
   body.calc_counts = [](const Divisions& d) {
     const long long along = d[0], layers = d[1], around = 2LL * d[2];

@@ -1,7 +1,6 @@
 // Method: A cell of a lattice is cut into the six tetrahedra of Kuhn, the monotone paths from one corner to the opposite one, and the cut
-// is
-//   mirrored from cell to cell by the parity of its index (the J1 triangulation). Neighbours then share the diagonals of their faces, and
-//   an evenly divided box keeps its three mirror planes, so bending modes of a square bar stay degenerate. A prism is cut along the
+//   is mirrored from cell to cell by the parity of its index (the J1 triangulation). Neighbours then share the diagonals of their faces,
+//   and an evenly divided box keeps its three mirror planes, so bending modes of a square bar stay degenerate. A prism is cut along the
 //   diagonals that start at the smallest index, which conforms by construction.
 // Source: Kuhn 1960, IBM J. Res. Dev. 4; Todd 1976, "The Computation of Fixed Points and Applications" (J1); Dompierre et al. 1999,
 //   "How to subdivide pyramids, prisms and hexahedra into tetrahedra".
@@ -29,7 +28,7 @@ double calc_det(const Vec3& a, const Vec3& b, const Vec3& c) {
 
 void append_tet(mesh::TetMesh& mesh, std::int32_t a, std::int32_t b, std::int32_t c, std::int32_t d) {
   const auto from_a = [&](std::int32_t n) {
-    return Vec3{mesh.nodes[n][0] - mesh.nodes[a][0], mesh.nodes[n][1] - mesh.nodes[a][1], mesh.nodes[n][2] - mesh.nodes[a][2]};
+    return Vec3{mesh.nodes_m[n][0] - mesh.nodes_m[a][0], mesh.nodes_m[n][1] - mesh.nodes_m[a][1], mesh.nodes_m[n][2] - mesh.nodes_m[a][2]};
   };
   if (calc_det(from_a(b), from_a(c), from_a(d)) < 0.0) std::swap(c, d);
   mesh.tets.insert(mesh.tets.end(), {a, b, c, d});
@@ -41,7 +40,7 @@ void append_octahedron(mesh::TetMesh& mesh, const std::array<std::int32_t, 6>& o
   int best = 0;
   double best_length = HUGE_VAL;
   for (int i = 0; i < 3; ++i) {
-    const double length = calc_distance(mesh.nodes[o[i]], mesh.nodes[o[i + 3]]);
+    const double length = calc_distance(mesh.nodes_m[o[i]], mesh.nodes_m[o[i + 3]]);
     if (length < best_length * (1.0 - 1e-9)) {
       best_length = length;
       best = i;
@@ -94,8 +93,8 @@ mesh::TetMesh make_lattice(const Lattice& lattice, const std::function<Vec3(int,
       for (int i = 0; i < points[0]; ++i) {
         std::int32_t& node = node_of[slot({i, j, k})];
         if (node < 0) continue;
-        node = static_cast<std::int32_t>(mesh.nodes.size());
-        mesh.nodes.push_back(place(i, j, k));
+        node = static_cast<std::int32_t>(mesh.nodes_m.size());
+        mesh.nodes_m.push_back(place(i, j, k));
         if (indices) indices->push_back({i, j, k});
       }
     }
@@ -151,11 +150,11 @@ void append_refined(mesh::TetMesh& mesh, int frequency, const std::function<std:
 
 void raise_order(mesh::TetMesh& mesh, const std::function<Vec3(std::int32_t, std::int32_t)>& place) {
   std::unordered_map<std::uint64_t, std::int32_t> middle_of;
-  middle_of.reserve(mesh.nodes.size() * 7);
+  middle_of.reserve(mesh.nodes_m.size() * 7);
   std::vector<std::array<std::int32_t, 2>> edges;
   std::vector<std::int32_t> tets;
   const std::int64_t count = mesh.tet_count();
-  const std::int32_t corners = static_cast<std::int32_t>(mesh.nodes.size());
+  const std::int32_t corners = static_cast<std::int32_t>(mesh.nodes_m.size());
   tets.reserve(count * 10);
   for (std::int64_t e = 0; e < count; ++e) {
     const auto tet = mesh.tet(e);
@@ -169,7 +168,7 @@ void raise_order(mesh::TetMesh& mesh, const std::function<Vec3(std::int32_t, std
       tets.push_back(entry->second);
     }
   }
-  for (const auto& [a, b] : edges) mesh.nodes.push_back(place(a, b));
+  for (const auto& [a, b] : edges) mesh.nodes_m.push_back(place(a, b));
   for (auto& [name, set] : mesh.node_sets) {
     std::vector<bool> in_set(corners, false);
     for (std::int32_t node : set) in_set[node] = true;

@@ -16,13 +16,13 @@
 namespace carillon::shapes {
 namespace {
 
-constexpr long long kMostNodes = 20'000'000;
-constexpr double kMostCells = 1e5;  // along one direction; keeps products inside 64 bits
+constexpr long long kMaxNodes = 20'000'000;
+constexpr double kMaxCells = 1e5;  // along one direction; keeps products inside 64 bits
 
 Divisions divide(const Body& body, const Divisions& fewest, double edge_m) {
   Divisions divisions = fewest;
   for (int axis = 0; axis < 4; ++axis) {
-    const double cells = std::min(body.lengths[axis] / edge_m, kMostCells);
+    const double cells = std::min(body.lengths[axis] / edge_m, kMaxCells);
     divisions[axis] = std::max(fewest[axis], static_cast<int>(std::lround(cells)));
   }
   return divisions;
@@ -31,7 +31,7 @@ Divisions divide(const Body& body, const Divisions& fewest, double edge_m) {
 // The edge at which the node count passes the target.
 double find_edge(const Body& body, const Divisions& fewest, int order, long long target) {
   const double longest = *std::max_element(body.lengths.begin(), body.lengths.end());
-  double small = std::log(longest / kMostCells);
+  double small = std::log(longest / kMaxCells);
   double large = std::log(longest * 2.0);
   for (int step = 0; step < 60; ++step) {
     const double middle = 0.5 * (small + large);
@@ -60,7 +60,7 @@ struct Choice {
 
 Choice choose_divisions(const Body& body, int order, long long target) {
   const bool good_fits = calc_node_count(body.calc_counts(body.wanted), order) <= target;
-  const Divisions fewest = good_fits ? body.wanted : body.least;
+  const Divisions fewest = good_fits ? body.wanted : body.coarsest;
   const double edge_0 = find_edge(body, fewest, order, target);
   Choice best;
   std::set<Divisions> seen;
@@ -93,18 +93,18 @@ long long calc_node_count(const Counts& counts, int order) {
 mesh::TetMesh make_best(const std::vector<Body>& bodies, int order, std::optional<long long> target_nodes, std::optional<double> edge_m) {
   if (edge_m) {
     const Divisions divisions = divide(bodies[0], bodies[0].wanted, *edge_m);
-    if (calc_node_count(bodies[0].calc_counts(divisions), order) > kMostNodes) {
-      throw InputError(fmt::format("an edge of {:g} m would make more than {} nodes; give a longer edge", *edge_m, kMostNodes));
+    if (calc_node_count(bodies[0].calc_counts(divisions), order) > kMaxNodes) {
+      throw InputError(fmt::format("an edge of {:g} m would make more than {} nodes; give a longer edge", *edge_m, kMaxNodes));
     }
     return bodies[0].make(divisions);
   }
   const long long target = *target_nodes;
-  if (target > kMostNodes) throw InputError(fmt::format("{} nodes are too many; give at most {}", target, kMostNodes));
+  if (target > kMaxNodes) throw InputError(fmt::format("{} nodes are too many; give at most {}", target, kMaxNodes));
   const Body* best_body = nullptr;
   Choice best;
-  long long fewest_nodes = kMostNodes;
+  long long fewest_nodes = kMaxNodes;
   for (const Body& body : bodies) {
-    const long long count = calc_node_count(body.calc_counts(body.least), order);
+    const long long count = calc_node_count(body.calc_counts(body.coarsest), order);
     fewest_nodes = std::min(fewest_nodes, count);
     if (static_cast<double>(count) > 1.1 * static_cast<double>(target)) continue;
     const Choice choice = choose_divisions(body, order, target);

@@ -27,11 +27,11 @@ using Divisions = std::array<int, 4>;
 /// A body before its lattice is chosen.
 struct Body {
   std::array<double, 4> lengths{};  // [m] along each direction; 0 for an unused direction
-  Divisions least{1, 1, 1, 1};      // the fewest cells that make a valid mesh
+  Divisions coarsest{1, 1, 1, 1};   // the fewest cells that make a valid mesh
   Divisions wanted{1, 1, 1, 1};     // the fewest cells that make a good one, where the count permits
   std::function<Counts(const Divisions&)> calc_counts;
   std::function<mesh::TetMesh(const Divisions&)> make;  // the mesh, of the wanted order
-  double reluctance = 0.0;  // what this construction costs beside others of the same body; 0.1 weighs as a node count 1 % further off
+  double reluctance = 0.0;  // what this construction costs relative to others of the same body; 0.1 weighs as a node count 1 % further off
 };
 
 /// Chooses among constructions of one body and their divisions for a wanted edge length (the first construction) or node count (one of

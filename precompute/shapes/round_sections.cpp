@@ -110,7 +110,7 @@ Built make_point(const Sweep& sweep, double height, int rings, int levels) {
     for (int p = level == 0 ? 0 : count_points(sweep.sectors, outer - 1); p < count_points(sweep.sectors, outer); ++p)
       built.round.push_back(first_of_level.back() + p);
   }
-  for (const Local& node : built.nodes) built.mesh.nodes.push_back(sweep.place(node));  // the refinement looks at lengths
+  for (const Local& node : built.nodes) built.mesh.nodes_m.push_back(sweep.place(node));  // the refinement looks at lengths
   for (int sector = 0; sector < sweep.sectors; ++sector) {
     append_refined(built.mesh, rings, [&](int centre, int a, int b) {
       return first_of_level[static_cast<std::size_t>(centre + a + b)] + find_point(sweep.sectors, a + b, sector, b);
@@ -136,8 +136,8 @@ Local find_middle(const Sweep& sweep, Local p, Local q) {
 }
 
 mesh::TetMesh finish(const Sweep& sweep, Built built, int order, const std::array<std::string, 3>& names) {
-  built.mesh.nodes.clear();
-  for (const Local& node : built.nodes) built.mesh.nodes.push_back(sweep.place(node));
+  built.mesh.nodes_m.clear();
+  for (const Local& node : built.nodes) built.mesh.nodes_m.push_back(sweep.place(node));
   if (!names[0].empty()) built.mesh.node_sets[names[0]] = built.first;
   if (!names[1].empty()) built.mesh.node_sets[names[1]] = built.last;
   built.mesh.node_sets[names[2]] = built.round;
@@ -244,7 +244,7 @@ std::vector<Body> plan_ring(double radius_m, double thickness_m, int order) {
   return plan_sectors(ring, [&](const Sweep& sweep) {
     Body body;
     body.lengths = {section, 2.0 * kPi * radius_m, 0.0, 0.0};
-    body.least = {1, 6, 1, 1};
+    body.coarsest = {1, 6, 1, 1};
     body.wanted = {2, 12, 1, 1};
     body.calc_counts = [sectors = sweep.sectors](const Divisions& d) {
       const long long n = d[0], around = d[1];

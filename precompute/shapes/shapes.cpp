@@ -15,11 +15,11 @@
 namespace carillon::shapes {
 namespace {
 
-constexpr double kLeastLength = 1e-6;                         // [m]
-constexpr double kMostLength = 1e4;                           // [m]
-constexpr double kLeastConeRatio = 1e-3;                      // of the radii of a cone that is cut off
-constexpr double kMostRingThickness = 0.9;                    // of a ring, over the diameter of its centre line
-constexpr double kLeastOpening = 20.0, kMostOpening = 340.0;  // [degrees]
+constexpr double kMinLength = 1e-6;                        // [m]
+constexpr double kMaxLength = 1e4;                         // [m]
+constexpr double kMinConeRatio = 1e-3;                     // of the radii of a cone that is cut off
+constexpr double kMaxRingThickness = 0.9;                  // of a ring, over the diameter of its centre line
+constexpr double kMinOpening = 20.0, kMaxOpening = 340.0;  // [degrees]
 
 std::vector<std::string> list_names(const Shape& shape) {
   std::vector<std::string> names;
@@ -60,14 +60,14 @@ class Dimensions {
  private:
   void check(const std::string& name, double value) const {
     if (name == "opening-angle") {
-      if (!(value >= kLeastOpening && value <= kMostOpening)) {
-        fail(name, fmt::format("give {} to {} degrees (180 is a hemisphere)", kLeastOpening, kMostOpening));
+      if (!(value >= kMinOpening && value <= kMaxOpening)) {
+        fail(name, fmt::format("give {} to {} degrees (180 is a hemisphere)", kMinOpening, kMaxOpening));
       }
       return;
     }
     if (!(value > 0.0) || !std::isfinite(value)) fail(name, "give a positive length in metres");
-    if (value < kLeastLength || value > kMostLength) {
-      fail(name, fmt::format("lengths are metres, from {:g} to {:g}", kLeastLength, kMostLength));
+    if (value < kMinLength || value > kMaxLength) {
+      fail(name, fmt::format("lengths are metres, from {:g} to {:g}", kMinLength, kMaxLength));
     }
   }
 
@@ -76,7 +76,7 @@ class Dimensions {
 };
 
 void check_wall(const Dimensions& dimensions, double room, const std::string& of_what, const std::string& solid) {
-  // A cavity thinner than a ten-thousandth of the body has no mesh that anybody wants.
+  // A cavity thinner than a ten-thousandth of the body has no useful mesh.
   if (dimensions["wall"] > (1.0 - 1e-4) * room) {
     dimensions.fail("wall", fmt::format("it has to be less than {} ({:g} m); give a thinner wall{}", of_what, room, solid));
   }
@@ -100,16 +100,16 @@ std::vector<Body> plan_shape(const Shape& shape, const Dimensions& d, int order)
   if (shape.name == "cylinder") return plan_cylinder(d["length"], d["radius"], order);
   if (shape.name == "disc") return plan_disc(d["radius"], d["thickness"], order);
   if (shape.name == "ring") {
-    if (d["thickness"] > kMostRingThickness * 2.0 * d["radius"])
+    if (d["thickness"] > kMaxRingThickness * 2.0 * d["radius"])
       d.fail("thickness", fmt::format("it has to be less than {:g} times the diameter of the centre line ({:g} m), or the hole closes",
-                                      kMostRingThickness, 2.0 * d["radius"]));
+                                      kMaxRingThickness, 2.0 * d["radius"]));
     return plan_ring(d["radius"], d["thickness"], order);
   }
   if (shape.name == "cone") {
     const double top = d["top-radius"];
-    if (top > 0.0 && (top < kLeastConeRatio * d["radius"] || d["radius"] < kLeastConeRatio * top))
+    if (top > 0.0 && (top < kMinConeRatio * d["radius"] || d["radius"] < kMinConeRatio * top))
       d.fail("top-radius",
-             fmt::format("the two radii have to be within a factor of {:g}; give no top-radius for a point", 1.0 / kLeastConeRatio));
+             fmt::format("the two radii have to be within a factor of {:g}; give no top-radius for a point", 1.0 / kMinConeRatio));
     return plan_cone(d["radius"], top, d["height"], order);
   }
   if (d["wall"] == 0.0) return plan_ball(d["radius"], order);

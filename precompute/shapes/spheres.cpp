@@ -1,8 +1,7 @@
 // The round bodies: the solid ball, the bowl and the closed spherical shell.
 //
 // Method: Ball: the icosahedron's 20 tetrahedra (centre and a face) are nearly regular; each is refined into frequency^3 parts, the nodes
-// of
-//   equal weight of the centre go to a sphere, and layers of prisms may follow outside, so that the radial and tangential divisions are
+//   of equal weight of the centre go to a sphere, and layers of prisms may follow outside, so that the radial and tangential divisions are
 //   chosen apart. No edge of a cube is folded flat, hence no slivers. Octahedra of the refinement are cut along their shortest diagonal.
 //   Shell: rings of points round a pole, six sectors; a ring takes as many points as its circumference asks for, neighbouring rings are
 //   joined by the shorter diagonal, the triangles are extruded through the wall into prisms. Radii grow geometrically.
@@ -81,14 +80,14 @@ class Core {
     }
     std::sort(parts.begin(), parts.end());
     const std::uint64_t key = (parts[0] << 42) | (parts[1] << 21) | parts[2];
-    const auto [entry, is_new] = node_of_.try_emplace(key, static_cast<std::int32_t>(mesh.nodes.size()));
+    const auto [entry, is_new] = node_of_.try_emplace(key, static_cast<std::int32_t>(mesh.nodes_m.size()));
     if (is_new) {
       Vec3 sum{};
       for (int i = 0; i < 3; ++i) {
         for (int axis = 0; axis < 3; ++axis) sum[axis] += weights[i] * solid_.vertices[face[i]][axis];
       }
       const int level = weights[0] + weights[1] + weights[2];
-      mesh.nodes.push_back(level == 0 ? Vec3{} : ((radius_ * level / frequency_ / norm(sum)) * sum));
+      mesh.nodes_m.push_back(level == 0 ? Vec3{} : ((radius_ * level / frequency_ / norm(sum)) * sum));
     }
     return entry->second;
   }
@@ -122,8 +121,8 @@ mesh::TetMesh make_ball(double radius, int sides, int frequency, int levels, int
   for (int level = frequency + 1; level <= levels; ++level) {
     std::vector<std::int32_t> above;
     for (std::int32_t node : skin_nodes) {
-      above.push_back(static_cast<std::int32_t>(mesh.nodes.size()));
-      mesh.nodes.push_back((static_cast<double>(level) / frequency) * mesh.nodes[node]);
+      above.push_back(static_cast<std::int32_t>(mesh.nodes_m.size()));
+      mesh.nodes_m.push_back((static_cast<double>(level) / frequency) * mesh.nodes_m[node]);
     }
     for (const auto& triangle : core.skin) {
       std::array<std::int32_t, 3> bottom{}, top{};
@@ -135,12 +134,12 @@ mesh::TetMesh make_ball(double radius, int sides, int frequency, int levels, int
     }
     below = std::move(above);
   }
-  for (std::int32_t node : below) mesh.nodes[node] = (radius / norm(mesh.nodes[node])) * mesh.nodes[node];
+  for (std::int32_t node : below) mesh.nodes_m[node] = (radius / norm(mesh.nodes_m[node])) * mesh.nodes_m[node];
   mesh.node_sets["surface"] = below;
   if (order == 2) {
     raise_order(mesh, [&](std::int32_t a, std::int32_t b) {
-      const Vec3 straight = calc_middle(mesh.nodes[a], mesh.nodes[b]);
-      const double mean = 0.5 * (norm(mesh.nodes[a]) + norm(mesh.nodes[b]));
+      const Vec3 straight = calc_middle(mesh.nodes_m[a], mesh.nodes_m[b]);
+      const double mean = 0.5 * (norm(mesh.nodes_m[a]) + norm(mesh.nodes_m[b]));
       const double fraction = mean / radius;
       const double bulge = mean / norm(straight) - 1.0;
       const double weight = fraction > 1.0 - 1e-9 ? 1.0 : fraction * fraction;
@@ -234,11 +233,11 @@ mesh::TetMesh make_shell(double outer_radius, double wall, double half_angle, in
   const auto on_rim = [&](std::int32_t node) { return cap.first_of_rim >= 0 && node % per_layer >= cap.first_of_rim; };
   for (int layer = 0; layer <= layers; ++layer) {
     for (std::int32_t p = 0; p < per_layer; ++p) {
-      const auto node = static_cast<std::int32_t>(mesh.nodes.size());
+      const auto node = static_cast<std::int32_t>(mesh.nodes_m.size());
       if (layer == 0) mesh.node_sets["inner"].push_back(node);
       if (layer == layers) mesh.node_sets["outer"].push_back(node);
       if (on_rim(node)) mesh.node_sets["rim"].push_back(node);
-      mesh.nodes.push_back(radius(layer) * cap.directions[p]);
+      mesh.nodes_m.push_back(radius(layer) * cap.directions[p]);
     }
   }
   for (int layer = 0; layer < layers; ++layer) {
@@ -287,7 +286,7 @@ Body plan_shell(double outer_radius_m, double wall_m, double half_angle_rad, int
   Body body;
   body.lengths = {mean_radius * half_angle_rad, mean_radius * std::log(outer_radius_m / (outer_radius_m - wall_m)),
                   2.0 * std::numbers::pi / kSectors * mean_radius * widest, 0.0};
-  body.least = {closed ? 4 : 2, 1, closed ? 1 : 1, 1};
+  body.coarsest = {closed ? 4 : 2, 1, closed ? 1 : 1, 1};
   body.wanted = {closed ? 6 : 3, order == 1 ? 2 : 1, 2, 1};
   body.calc_counts = [=](const Divisions& d) {
     long long points = 1, triangles = 0;

@@ -22,8 +22,8 @@
 #include "runtime/bank/nearest.hpp"
 #include "runtime/base/chance.hpp"
 #include "runtime/base/error.hpp"
+#include "runtime/events/events.hpp"
 #include "runtime/radiation/gains.hpp"
-#include "runtime/stream/events.hpp"
 #include "runtime/support/losses.hpp"
 #include "runtime/synth/load_keeper.hpp"
 #include "runtime/synth/model.hpp"
@@ -96,7 +96,7 @@ carillon_status refuse(const char* text, char* message, size_t message_size) {
 
 /// The sizes that structures had first: no caller's is smaller. Once one has grown, its first size stands here.
 template <typename T>
-constexpr std::size_t kLeastSize = sizeof(T);
+constexpr std::size_t kMinSize = sizeof(T);
 
 template <typename T>
 T make_default() {
@@ -106,7 +106,7 @@ T make_default() {
 /// Writes the defaults of as many fields as the caller's structure has.
 template <typename T>
 void init(T* given, size_t size) {
-  if (given == nullptr || size < kLeastSize<T>) return;
+  if (given == nullptr || size < kMinSize<T>) return;
   T ours = make_default<T>();
   ours.size = static_cast<uint32_t>(std::min(size, sizeof(T)));
   std::memcpy(given, &ours, ours.size);
@@ -115,7 +115,7 @@ void init(T* given, size_t size) {
 /// A structure of the caller's with the defaults of the fields that it has not; nothing when it was not initialised.
 template <typename T>
 std::optional<T> read(const T* given) {
-  if (given == nullptr || given->size < kLeastSize<T>) return std::nullopt;
+  if (given == nullptr || given->size < kMinSize<T>) return std::nullopt;
   T ours = make_default<T>();
   std::memcpy(&ours, given, std::min<std::size_t>(given->size, sizeof(T)));
   return ours;
@@ -221,7 +221,7 @@ static_assert(CARILLON_EFFECT_COUNT == synth::kEffectCount && CARILLON_TWO_EARS 
               CARILLON_ACCELERATION_NOISE == 1 << static_cast<int>(synth::Effect::kAccelerationNoise));
 
 carillon::Vec3 to_vector(const double* x) { return {x[0], x[1], x[2]}; }
-stream::Quaternion to_quaternion(const double* x) { return {x[0], x[1], x[2], x[3]}; }
+events::Quaternion to_quaternion(const double* x) { return {x[0], x[1], x[2], x[3]}; }
 
 /// For the click of the body; 0, which a body without clicks may have, when the surface has no inside.
 double find_sphere_radius_m(const bank::Bank& bank) {
@@ -232,19 +232,19 @@ double find_sphere_radius_m(const bank::Bank& bank) {
   }
 }
 
-stream::Impulse to_event(const carillon_impulse& impulse) {
+events::Impulse to_event(const carillon_impulse& impulse) {
   return {.time_s = impulse.time_s,
           .body = impulse.body,
           .other = impulse.other,
           .triangle = impulse.triangle,
-          .shape = impulse.gaussian != 0 ? stream::PulseShape::kGaussian : stream::PulseShape::kHertz,
+          .shape = impulse.gaussian != 0 ? events::PulseShape::kGaussian : events::PulseShape::kHertz,
           .barycentric = to_vector(impulse.barycentric),
           .impulse_n_s = to_vector(impulse.impulse_n_s),
           .duration_s = impulse.duration_s};
 }
 
-carillon_status push(carillon_synth* synth, const stream::Event& event) noexcept {
-  if (stream::find_fault(event) != nullptr) {
+carillon_status push(carillon_synth* synth, const events::Event& event) noexcept {
+  if (events::find_fault(event) != nullptr) {
     (void)synth->synthesiser.push(event);  // counts it
     return CARILLON_BAD_INPUT;
   }
@@ -497,7 +497,7 @@ carillon_status carillon_push_impulse(carillon_synth* synth, const carillon_impu
 carillon_status carillon_push_force(carillon_synth* synth, const carillon_force* force) {
   const auto ours = read(force);
   if (synth == nullptr || !ours || ours->impulse_n_s == nullptr || ours->count < 1) return CARILLON_BAD_ARGUMENT;
-  stream::Force piece{.time_s = ours->time_s,
+  events::Force piece{.time_s = ours->time_s,
                       .step_s = ours->step_s,
                       .body = ours->body,
                       .other = ours->other,
@@ -506,16 +506,16 @@ carillon_status carillon_push_force(carillon_synth* synth, const carillon_force*
                       .barycentric = to_vector(ours->barycentric)};
   // Nothing of it is played unless all of it can be.
   for (int pass = 0; pass < 2; ++pass) {
-    for (std::int32_t done = 0; done < ours->count; done += stream::kMostForceSteps) {
-      std::array<carillon::Vec3, stream::kMostForceSteps> impulses{};
-      const std::int32_t count = std::min(stream::kMostForceSteps, ours->count - done);
+    for (std::int32_t done = 0; done < ours->count; done += events::kMaxForceSteps) {
+      std::array<carillon::Vec3, events::kMaxForceSteps> impulses{};
+      const std::int32_t count = std::min(events::kMaxForceSteps, ours->count - done);
       for (std::int32_t k = 0; k < count; ++k) impulses[static_cast<std::size_t>(k)] = to_vector(ours->impulse_n_s[done + k]);
-      stream::Force first = piece;
+      events::Force first = piece;
       first.time_s += done * piece.step_s;
       first.continues = piece.continues || done > 0;
       carillon_status status = CARILLON_OK;
-      stream::split_force(first, std::span(impulses).first(static_cast<std::size_t>(count)), [&](const stream::Force& part) {
-        if (pass > 0 || stream::find_fault(part) != nullptr) status = push(synth, part);
+      events::split_force(first, std::span(impulses).first(static_cast<std::size_t>(count)), [&](const events::Force& part) {
+        if (pass > 0 || events::find_fault(part) != nullptr) status = push(synth, part);
       });
       if (status != CARILLON_OK) return status;
     }
@@ -528,8 +528,8 @@ carillon_status carillon_vary_impulse(const carillon_bank* bank, double variatio
   auto ours = read(impulse);
   if (bank == nullptr || !ours) return CARILLON_BAD_ARGUMENT;
   return run(nullptr, 0, [&] {
-    stream::Impulse event = to_event(*ours);
-    if (!(variation >= 0.0 && variation <= 1.0) || stream::find_fault(event) != nullptr || event.triangle < 0 ||
+    events::Impulse event = to_event(*ours);
+    if (!(variation >= 0.0 && variation <= 1.0) || events::find_fault(event) != nullptr || event.triangle < 0 ||
         static_cast<std::size_t>(event.triangle) >= bank->bank.triangles.size())
       throw InputError("no strike that can be varied");
     if (variation == 0.0) return;
@@ -549,43 +549,43 @@ carillon_status carillon_push_contact(carillon_synth* synth, const carillon_cont
   const auto ours = read(contact);
   if (synth == nullptr || !ours) return CARILLON_BAD_ARGUMENT;
   if (ours->state < CARILLON_CONTACT_BEGIN || ours->state > CARILLON_CONTACT_END) return CARILLON_BAD_INPUT;
-  return push(synth, stream::Contact{.time_s = ours->time_s,
-                                     .id = ours->id,
-                                     .body = ours->body,
-                                     .other = ours->other,
-                                     .triangle = ours->triangle,
-                                     .state = static_cast<stream::ContactState>(ours->state),
-                                     .barycentric = to_vector(ours->barycentric),
-                                     .normal = to_vector(ours->normal),
-                                     .slip_m_s = to_vector(ours->slip_m_s),
-                                     .force_n = ours->force_n,
-                                     .sweep_m_s = ours->sweep_m_s,
-                                     .other_sweep_m_s = ours->other_sweep_m_s,
-                                     .spin_rad_s = ours->spin_rad_s,
-                                     .patch_radius_m = ours->patch_radius_m,
-                                     .impedance_n_s_m = ours->impedance_n_s_m});
+  return push(synth, events::LastingContact{.time_s = ours->time_s,
+                                            .id = ours->id,
+                                            .body = ours->body,
+                                            .other = ours->other,
+                                            .triangle = ours->triangle,
+                                            .state = static_cast<events::ContactState>(ours->state),
+                                            .barycentric = to_vector(ours->barycentric),
+                                            .normal = to_vector(ours->normal),
+                                            .slip_m_s = to_vector(ours->slip_m_s),
+                                            .force_n = ours->force_n,
+                                            .sweep_m_s = ours->sweep_m_s,
+                                            .other_sweep_m_s = ours->other_sweep_m_s,
+                                            .spin_rad_s = ours->spin_rad_s,
+                                            .patch_radius_m = ours->patch_radius_m,
+                                            .impedance_n_s_m = ours->impedance_n_s_m});
 }
 
 carillon_status carillon_push_motion(carillon_synth* synth, const carillon_motion* motion) {
   const auto ours = read(motion);
   if (synth == nullptr || !ours) return CARILLON_BAD_ARGUMENT;
-  return push(synth, stream::Motion{.time_s = ours->time_s,
-                                    .body = ours->body,
-                                    .position_m = to_vector(ours->position_m),
-                                    .velocity_m_s = to_vector(ours->velocity_m_s),
-                                    .rotation = to_quaternion(ours->rotation)});
+  return push(synth, events::BodyMotion{.time_s = ours->time_s,
+                                        .body = ours->body,
+                                        .position_m = to_vector(ours->position_m),
+                                        .velocity_m_s = to_vector(ours->velocity_m_s),
+                                        .rotation = to_quaternion(ours->rotation)});
 }
 
 carillon_status carillon_push_listener(carillon_synth* synth, const carillon_listener* listener) {
   const auto ours = read(listener);
   if (synth == nullptr || !ours) return CARILLON_BAD_ARGUMENT;
-  return push(synth, stream::Listener{
+  return push(synth, events::Listener{
                          .time_s = ours->time_s, .position_m = to_vector(ours->position_m), .velocity_m_s = to_vector(ours->velocity_m_s)});
 }
 
 carillon_status carillon_push_mark(carillon_synth* synth, double time_s) {
   if (synth == nullptr) return CARILLON_BAD_ARGUMENT;
-  return push(synth, stream::Mark{time_s});
+  return push(synth, events::TimeWatermark{time_s});
 }
 
 void carillon_process(carillon_synth* synth, float* const* out, int32_t channels, int32_t frames) {

@@ -1,9 +1,9 @@
 /* Carillon for programs in C, and for those of other languages and compilers: a scene of bodies that ring, played block by block.
  *
- * Every structure begins with its own size: set it with the *_init macro, and programs built against this header go on working with later
- * libraries, which add fields at the end only. (Other languages call the *_init_sized function with the size of the structure as they know
- * it.) Functions that can fail return a status, and write a message of at most message_size bytes, zero included, when `message` is not
- * NULL; what they were to make is then NULL and nothing has changed. Pointers must not be NULL unless it says so; NULL gives
+ * Every structure begins with its own size: set it with the *_init macro, and programs built against this header continue to work with
+ * later libraries, which add fields at the end only. (Other languages call the *_init_sized function with the size of the structure as they
+ * know it.) Functions that can fail return a status, and write a message of at most message_size bytes, zero included, when `message` is
+ * not NULL; what they were to make is then NULL and nothing has changed. Pointers must not be NULL unless it says so; NULL gives
  * CARILLON_BAD_ARGUMENT.
  *
  * Threads: [main] one thread at a time; [audio] one thread at a time, never waits, takes no memory, makes no system call; [any] any thread
@@ -69,7 +69,7 @@ CARILLON_API const double* carillon_bank_vertices_m(const carillon_bank* bank);
 CARILLON_API const int32_t* carillon_bank_triangles(const carillon_bank* bank);
 /* The centre of mass in that frame, which carillon_motion moves about the world. Zeros for a NULL bank. */
 CARILLON_API void carillon_bank_centre_m(const carillon_bank* bank, double centre_m[3]);
-/* The place on the surface that is nearest to a point [m], as carillon_impulse and carillon_contact want it: the triangle and the
+/* The place on the surface that is nearest to a point [m], as carillon_impulse and carillon_contact take it: the triangle and the
  * barycentric coordinates of its corners. closest_m, the place itself, and distance_m may be NULL. O(log triangles). [any], several at
  * once; the first call of a bank makes a tree, which takes memory and 0.2 to 0.5 ms for 1,000 triangles, and others wait for it:
  * call it once before an audio thread does, and from then on it never waits and takes no memory. CARILLON_BAD_INPUT for a point that is
@@ -189,8 +189,9 @@ CARILLON_API carillon_status carillon_set_effects(carillon_synth* synth, int32_t
                                                   size_t message_size);
 /* [main] 0 for a body that is not there. */
 CARILLON_API uint32_t carillon_get_effects(const carillon_synth* synth, int32_t body);
-/* [main] The body goes on ringing with another model, that of an edited bank as a rule: every mode keeps its energy and its phase and goes
- * on at its new frequency and decay, without a click. The body keeps the model; the old one's memory comes back with carillon_collect. */
+/* [main] The body continues to ring with another model, usually that of an edited bank: every mode keeps its energy and its phase and
+ * continues at its new frequency and decay, without a click. The body keeps the model; the old one's memory comes back with
+ * carillon_collect. */
 CARILLON_API carillon_status carillon_swap_model(carillon_synth* synth, int32_t body, const carillon_model* model, char* message,
                                                  size_t message_size);
 /* [main] It falls silent; its number is free once carillon_collect has given its memory back. */

@@ -67,13 +67,13 @@ struct Proof {
   std::vector<double> cut_hz;                     // (C), ascending; the first and the last enclose the band
   std::vector<std::int64_t> below;                // (C) eigenvalues below the cut, rigid ones included
   std::vector<double> margin;                     // (C) relative distance in lambda to the nearest mode found
-  std::vector<std::int64_t> rigid_per_component;  // (P) rigid motions, 6 where nothing is held
+  std::vector<std::int64_t> rigid_per_component;  // (P) rigid motions, 6 where no node is fixed
   std::int64_t found = 0;                         // modes found between the first and the last cut
   double orthonormality = 0.0;                    // max |phi_i^T M phi_j - delta_ij|
   double backward_error = 0.0;                    // of the worst factorisation behind a count
-  std::vector<std::int64_t> cluster_first;        // groups of modes equal to the tolerance: their shapes are one subspace, in which the
-  std::vector<std::int64_t> cluster_count;        // basis is canonical; first mode and how many
-  std::string method;                             // in words
+  std::vector<std::int64_t> cluster_first;  // groups of degenerate modes, to the tolerance: their shapes are one subspace, in which the
+  std::vector<std::int64_t> cluster_count;  // basis is canonical; first mode and how many
+  std::string method;                       // in words
 };
 
 /// What the modes do to that which fixes the body. S supports: patches of fixed nodes that belong together.
@@ -94,7 +94,7 @@ struct Counts {
   std::int64_t nodes = 0;  // of the volume mesh as solved (mid-side nodes included)
   std::int64_t tets = 0;
   std::int64_t components = 0;   // connected
-  std::int64_t rigid_modes = 0;  // deflated: six per free component, fewer where nodes are held
+  std::int64_t rigid_modes = 0;  // deflated: six per free component, fewer where nodes are fixed
 };
 
 /// A mode bank. V vertices, T triangles, m modes; rows of `shape` are (V, m, 3) so that all modes of a vertex are adjacent.
@@ -126,7 +126,7 @@ struct Bank {
   bool complete = true;    // every mode of the band is here (false only when max_modes or calc_reduced cut the list)
   std::string element;     // "T4" or "T10"
   std::string mass;        // "consistent" or "lumped"
-  std::string provenance;  // JSON text: resolved job, versions, ranks, seconds and peak memory per station
+  std::string provenance;  // JSON text: resolved job, versions, ranks, seconds and peak memory per phase
 
   std::size_t mode_count() const { return eigenvalue_rad2_s2.size(); }
   std::size_t vertex_count() const { return vertices_m.size(); }
@@ -193,7 +193,7 @@ std::array<int, 2> read_version(const std::filesystem::path& file);
 /// checksum is not (that would read it all). Throws InputError as read_bank does, and when there is no such vertex.
 std::vector<Vec3> read_shape_row(const std::filesystem::path& file, std::size_t vertex);
 
-/// Writes a bank: temporary file beside `file`, fsync, rename, fsync of the folder. Throws InputError when find_faults() is not empty or
+/// Writes a bank: temporary file next to `file`, fsync, rename, fsync of the folder. Throws InputError when find_faults() is not empty or
 /// `file` cannot name a bank (nothing is written), SystemError when the disk refuses (nothing is left behind). A link is followed.
 void write_bank(const Bank& bank, const std::filesystem::path& file);
 

@@ -103,10 +103,10 @@ Check check_completeness(const Bank& bank, const Proof& proof) {
           faults.take()};
 }
 
-/// Cuts must be clear of the modes' error bars, by the margins that are told.
+/// Cuts must be clear of the modes' error bars, by the margins that are recorded.
 Check check_margins(const Bank& bank, const Proof& proof) {
   Faults faults;
-  double least = 1.0, least_hz = proof.cut_hz.front();
+  double min = 1.0, min_hz = proof.cut_hz.front();
   for (std::size_t i = 0; i < proof.cut_hz.size(); ++i) {
     const double sigma = calc_lambda(proof.cut_hz[i]);
     double nearest = 1.0;
@@ -119,23 +119,23 @@ Check check_margins(const Bank& bank, const Proof& proof) {
         faults.add("the cut at {:.9g} Hz lies inside the error bar of mode {} at {:.9g} Hz: its count is not sure", proof.cut_hz[i], mode,
                    bank.freq_hz(mode));
     }
-    const double told = proof.margin[i];
-    const bool agrees = told <= nearest * (1.0 + kMarginTolerance) + 1e-12;  // a mode outside the list may be nearer
-    if (!(told > 0.0 && agrees))
-      faults.add("margin[{}] is {:.6g}, and the nearest mode is {:.6g} of lambda from the cut", i, told, nearest);
-    if (told < least) {
-      least = told;
-      least_hz = proof.cut_hz[i];
+    const double recorded = proof.margin[i];
+    const bool agrees = recorded <= nearest * (1.0 + kMarginTolerance) + 1e-12;  // a mode outside the list may be nearer
+    if (!(recorded > 0.0 && agrees))
+      faults.add("margin[{}] is {:.6g}, and the nearest mode is {:.6g} of lambda from the cut", i, recorded, nearest);
+    if (recorded < min) {
+      min = recorded;
+      min_hz = proof.cut_hz[i];
     }
   }
-  return {"cuts", fmt::format("clear of every mode: the nearest is {:.2g} of lambda away, at {:.6g} Hz", least, least_hz), faults.take()};
+  return {"cuts", fmt::format("clear of every mode: the nearest is {:.2g} of lambda away, at {:.6g} Hz", min, min_hz), faults.take()};
 }
 
 Check check_rigid(const Bank& bank, const Proof& proof) {
   Faults faults;
   const auto& rigid = proof.rigid_per_component;
   if (rigid.size() != static_cast<std::size_t>(std::max<std::int64_t>(bank.counts.components, 0)))
-    faults.add("rigid motions are told of {} components, and there are {}", rigid.size(), bank.counts.components);
+    faults.add("rigid motions are recorded for {} components, and there are {}", rigid.size(), bank.counts.components);
   std::int64_t sum = 0;
   for (std::size_t i = 0; i < rigid.size(); ++i) {
     if (rigid[i] < 0 || rigid[i] > 6) faults.add("component {} has {} rigid motions", i, rigid[i]);
@@ -171,24 +171,25 @@ Check check_clusters(const Bank& bank, const Proof& proof) {
   Faults faults;
   const auto modes = static_cast<std::int64_t>(bank.mode_count());
   if (proof.cluster_first.size() != proof.cluster_count.size()) {
-    faults.add("groups of equal modes: {} begin and {} have a size", proof.cluster_first.size(), proof.cluster_count.size());
-    return {"equal modes", "", faults.take()};
+    faults.add("groups of degenerate modes: {} begin and {} have a size", proof.cluster_first.size(), proof.cluster_count.size());
+    return {"degenerate modes", "", faults.take()};
   }
   std::int64_t next = 0, largest = 0;
   for (std::size_t i = 0; i < proof.cluster_first.size(); ++i) {
     const std::int64_t first = proof.cluster_first[i], count = proof.cluster_count[i];
     if (first < next || count < 2 || count > modes || first > modes - count) {
-      faults.add("group {} of {} equal modes from mode {} cannot be", i, count, first);
+      faults.add("group {} of {} degenerate modes from mode {} cannot be", i, count, first);
       break;
     }
     next = first + count;
     largest = std::max(largest, count);
     const double low = bank.eigenvalue_rad2_s2[static_cast<std::size_t>(first)],
                  high = bank.eigenvalue_rad2_s2[static_cast<std::size_t>(next - 1)];
-    if (!(high - low <= kClusterSpread * high)) faults.add("group {} of equal modes spreads over {:.2g} of lambda", i, (high - low) / high);
+    if (!(high - low <= kClusterSpread * high))
+      faults.add("group {} of degenerate modes spreads over {:.2g} of lambda", i, (high - low) / high);
   }
   const std::size_t groups = proof.cluster_first.size();
-  return {"equal modes",
+  return {"degenerate modes",
           groups == 0 ? std::string("none: every shape stands for itself")
                       : fmt::format("{} group{} of up to {}: shapes of one subspace, in its canonical basis", groups,
                                     groups == 1 ? "" : "s", largest),
@@ -248,12 +249,13 @@ std::string describe_completeness(const Bank& bank) {
 }
 
 std::string describe_accuracy(const Bank& bank) {
-  const auto tell = [](const std::vector<double>& cents, const char* known, const char* kind, const char* unknown) {
+  const auto describe_largest = [](const std::vector<double>& cents, const char* known, const char* kind, const char* unknown) {
     return cents.empty() ? std::string(unknown)
                          : fmt::format("{} {:.2g} cent ({})", known, *std::max_element(cents.begin(), cents.end()), kind);
   };
-  return tell(bank.algebraic_error_cents, "frequencies are those of the mesh to", "a bound", "no bounds against the mesh") +
-         tell(bank.discretisation_error_cents, " and those of the body to about", "an estimate", ", no estimates against the body");
+  return describe_largest(bank.algebraic_error_cents, "frequencies are those of the mesh to", "a bound", "no bounds against the mesh") +
+         describe_largest(bank.discretisation_error_cents, " and those of the body to about", "an estimate",
+                          ", no estimates against the body");
 }
 
 }  // namespace carillon::bank

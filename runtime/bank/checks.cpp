@@ -29,20 +29,20 @@ constexpr double kLawTolerance = 1e-9;   // of quantities that were computed by 
 constexpr double kMassTolerance = 0.01;  // mass against density times volume
 constexpr double kShareTolerance = 1e-6;
 // Bounds that no body reaches. Lengths: from a nanometre to a small planet. Frequency and damping: what a job may ask for at most.
-constexpr double kLeastLengthM = 1e-9, kMostLengthM = 1e7, kFarthestM = 1e12;  // sizes; how far from the origin
-constexpr double kMostHz = 1e12;
-constexpr double kMostDecayPerS = 1e32;  // alpha1 of 1e6 s at that frequency
-constexpr double kMostAlpha1S = 1e6, kMostAlpha2PerS = 1e12;
+constexpr double kMinLengthM = 1e-9, kMaxLengthM = 1e7, kFarthestM = 1e12;  // sizes; how far from the origin
+constexpr double kMaxHz = 1e12;
+constexpr double kMaxDecayPerS = 1e32;  // alpha1 of 1e6 s at that frequency
+constexpr double kMaxAlpha1S = 1e6, kMaxAlpha2PerS = 1e12;
 // A mode of unit modal mass that moves only the share s of the body's mass has |phi| = 1 / sqrt(s m) there.
-constexpr double kLeastShare = 1e-12;
+constexpr double kMinShare = 1e-12;
 constexpr double kGainSlack = 10.0;  // gains above the pulsating sphere's that has the largest motion everywhere
 
 double calc_size(const Vec3& v) { return std::hypot(v[0], v[1], v[2]); }
 
-constexpr double kMostSteps = 32767.0;  // of a component of two bytes
+constexpr double kMaxSteps = 32767.0;  // of a component of two bytes
 
 /// The largest |phi| that so many steps of a mode can stand for.
-double calc_most_motion(const Bank& bank, std::size_t mode, double steps) { return std::numbers::sqrt3 * bank.shape_scale[mode] * steps; }
+double calc_max_motion(const Bank& bank, std::size_t mode, double steps) { return std::numbers::sqrt3 * bank.shape_scale[mode] * steps; }
 
 Check check_arrays(const Bank& bank) {
   Faults faults;
@@ -128,8 +128,8 @@ Check check_eigenvalues(const Bank& bank) {
   const auto& lambda = bank.eigenvalue_rad2_s2;
   for (std::size_t i = 0; i < lambda.size(); ++i) {
     if (!(lambda[i] > 0.0)) faults.add("eigenvalue[{}] is {:.6g} rad^2/s^2, not positive", i, lambda[i]);
-    if (bank.freq_hz(i) > kMostHz)
-      faults.add("mode {} is at {:.3g} Hz, beyond the {:.0e} Hz that any solid has", i, bank.freq_hz(i), kMostHz);
+    if (bank.freq_hz(i) > kMaxHz)
+      faults.add("mode {} is at {:.3g} Hz, beyond the {:.0e} Hz that any solid has", i, bank.freq_hz(i), kMaxHz);
     if (i > 0 && !(lambda[i] >= lambda[i - 1])) faults.add("eigenvalue[{}] is below the one before it: not ascending", i);
   }
   const auto figure = lambda.empty() ? std::string("no modes")
@@ -177,7 +177,7 @@ Check check_decay(const Bank& bank) {
   for (std::size_t i = 0; i < bank.mode_count(); ++i) {
     const double d = bank.decay_per_s[i];
     if (!(d >= 0.0)) faults.add("decay[{}] is {:.6g} 1/s, negative", i, d);
-    if (d > kMostDecayPerS) faults.add("decay[{}] is {:.3g} 1/s, more than any damping makes ({:.0e})", i, d, kMostDecayPerS);
+    if (d > kMaxDecayPerS) faults.add("decay[{}] is {:.3g} 1/s, more than any damping makes ({:.0e})", i, d, kMaxDecayPerS);
     if (!has_law) continue;
     const double law = calc_decay(bank.damping, bank.material, bank.eigenvalue_rad2_s2[i]);
     if (!(std::abs(d - law) <= kLawTolerance * law)) faults.add("decay[{}] is {:.9g} 1/s, and the damping law gives {:.9g}", i, d, law);
@@ -203,7 +203,7 @@ Check check_residuals(const Bank& bank) {
   return {"residuals", figure, faults.take()};
 }
 
-/// Of all triangles; infinite where one names a vertex that there is not, which is told elsewhere.
+/// Of all triangles; infinite where one names a vertex that does not exist, which is reported elsewhere.
 double calc_area(const Bank& bank) {
   double twice = 0.0;
   const auto count = static_cast<std::int64_t>(bank.vertex_count());
@@ -223,10 +223,10 @@ Check check_gains(const Bank& bank) {
     if (!(bank.radiation_gain[i] >= 0.0)) faults.add("radiation_gain[{}] is {:.6g}, negative", i, bank.radiation_gain[i]);
     // A pulsating sphere of the surface's area (docs/equations.md), all of it at the largest motion that the mode has anywhere.
     const double omega = 2.0 * std::numbers::pi * bank.freq_hz(i), ka = omega / kSoundSpeedMs * radius;
-    const double most =
-        kAirDensityKgM3 * omega / (4.0 * std::numbers::pi * std::hypot(1.0, ka)) * area * calc_most_motion(bank, i, kMostSteps);
-    if (most >= 0.0 && bank.radiation_gain[i] > kGainSlack * most)  // a negative scale is told elsewhere
-      faults.add("radiation_gain[{}] is {:.3g}, and a surface of this size and motion has {:.3g} at most", i, bank.radiation_gain[i], most);
+    const double max =
+        kAirDensityKgM3 * omega / (4.0 * std::numbers::pi * std::hypot(1.0, ka)) * area * calc_max_motion(bank, i, kMaxSteps);
+    if (max >= 0.0 && bank.radiation_gain[i] > kGainSlack * max)  // a negative scale is reported elsewhere
+      faults.add("radiation_gain[{}] is {:.3g}, and a surface of this size and motion has {:.3g} at most", i, bank.radiation_gain[i], max);
     largest = std::max(largest, bank.radiation_gain[i]);
   }
   return {"radiation", fmt::format("largest gain {:.4g} Pa s m^-1 kg^-1/2", largest), faults.take()};
@@ -235,13 +235,13 @@ Check check_gains(const Bank& bank) {
 Check check_shapes(const Bank& bank) {
   Faults faults;
   double step = 0.0;
-  const double most = 1.0 / std::sqrt(kLeastShare * bank.rigid.mass_kg);
+  const double max = 1.0 / std::sqrt(kMinShare * bank.rigid.mass_kg);
   for (std::size_t i = 0; i < bank.mode_count(); ++i) {
     if (!(bank.shape_scale[i] >= 0.0)) faults.add("shape_scale[{}] is {:.6g}, negative", i, bank.shape_scale[i]);
-    const double motion = calc_most_motion(bank, i, bank.shape_bytes == 1 ? 127.0 : kMostSteps);
-    if (motion > most) {
+    const double motion = calc_max_motion(bank, i, bank.shape_bytes == 1 ? 127.0 : kMaxSteps);
+    if (motion > max) {
       faults.add("shape_scale[{}] is {:.3g}, with which the mode moves by {:.3g} kg^-1/2, more than {:.3g} for a body of {:.3g} kg", i,
-                 bank.shape_scale[i], motion, most, bank.rigid.mass_kg);
+                 bank.shape_scale[i], motion, max, bank.rigid.mass_kg);
     }
     step = std::max(step, bank.shape_scale[i]);
   }
@@ -335,9 +335,9 @@ Check check_rigid_body(const Bank& bank) {
       high = std::max(high, vertex[k] - rigid.centre_m[k]);
     }
     const double reach = std::max(-low, high);
-    if (!(high - low >= kLeastLengthM && high - low <= kMostLengthM) || !(std::abs(rigid.centre_m[k]) <= kFarthestM)) {
+    if (!(high - low >= kMinLengthM && high - low <= kMaxLengthM) || !(std::abs(rigid.centre_m[k]) <= kFarthestM)) {
       faults.add("the body measures {:.3g} m along axis {} about {:.3g} m; bodies have {:.0e} to {:.0e} m", high - low, k,
-                 rigid.centre_m[k], kLeastLengthM, kMostLengthM);
+                 rigid.centre_m[k], kMinLengthM, kMaxLengthM);
     }
     if (!(low < 0.0 && high > 0.0)) faults.add("centre_m[{}] is {:.6g} m, outside the surface", k, rigid.centre_m[k]);
     if (!(s[k][k] <= 1.1 * rigid.mass_kg * reach * reach)) faults.add("inertia_kg_m2 is too large for a surface of this size and mass");
@@ -409,14 +409,14 @@ Check check_material(const Bank& bank) {
   if (!(m.density_kg_m3 > 0.0)) faults.add("density_kg_m3 is {:.6g}, not positive", m.density_kg_m3);
   if (!(m.alpha1_s >= 0.0)) faults.add("alpha1_s is {:.6g}, negative", m.alpha1_s);
   if (!(m.alpha2_per_s >= 0.0)) faults.add("alpha2_per_s is {:.6g}, negative", m.alpha2_per_s);
-  const auto expect = [&](const char* name, double value, double least, double most) {
-    if (value > 0.0 && !(value >= least && value <= most))
-      faults.add("{} is {:.3g}, outside the {:.0e} to {:.0e} of any solid", name, value, least, most);
+  const auto expect = [&](const char* name, double value, double min, double max) {
+    if (value > 0.0 && !(value >= min && value <= max))
+      faults.add("{} is {:.3g}, outside the {:.0e} to {:.0e} of any solid", name, value, min, max);
   };
-  expect("young_modulus_pa", m.young_modulus_pa, material::kLeastStiffnessPa, material::kMostStiffnessPa);
-  expect("density_kg_m3", m.density_kg_m3, material::kLeastDensityKgM3, material::kMostDensityKgM3);
-  expect("alpha1_s", m.alpha1_s, 0.0, kMostAlpha1S);
-  expect("alpha2_per_s", m.alpha2_per_s, 0.0, kMostAlpha2PerS);
+  expect("young_modulus_pa", m.young_modulus_pa, material::kMinStiffnessPa, material::kMaxStiffnessPa);
+  expect("density_kg_m3", m.density_kg_m3, material::kMinDensityKgM3, material::kMaxDensityKgM3);
+  expect("alpha1_s", m.alpha1_s, 0.0, kMaxAlpha1S);
+  expect("alpha2_per_s", m.alpha2_per_s, 0.0, kMaxAlpha2PerS);
   return {"material", fmt::format("E {:.4g} Pa, nu {:.4g}, rho {:.4g} kg/m^3", m.young_modulus_pa, m.poisson_ratio, m.density_kg_m3),
           faults.take()};
 }

@@ -1,8 +1,7 @@
 // Method:     K is linear in the Lame constants and M in the density; with all lengths times g, K grows with g and M with g^3. So with s,
-// k, g
-//             the scales of density, stiffness and size: lambda' = lambda k / (s g^2), phi' = phi / sqrt(s g^3). Of the radiation gain
+//             k, g the scales of density, stiffness and size: lambda' = lambda k / (s g^2), phi' = phi / sqrt(s g^3). Of the radiation gain
 //             the flow, the integral of |phi . n| over the surface, is proportional to phi' g^2; what depends on the frequency is written
-//             anew.
+//             again.
 // Source:     docs/equations.md E6, E7.
 // Deviations: none.
 #include "runtime/bank/edits.hpp"
@@ -18,14 +17,14 @@
 namespace carillon::bank {
 namespace {
 
-constexpr double kMostPower = 8.0;
-constexpr double kMostLossFactor = 2.0;  // d = omega eta / 2: from here on no mode swings, whatever its frequency
+constexpr double kMaxPower = 8.0;
+constexpr double kMaxLossFactor = 2.0;  // d = omega eta / 2: from here on no mode swings, whatever its frequency
 
 void check_loss(double loss) {
-  if (!(loss >= 0.0 && loss < kMostLossFactor))
+  if (!(loss >= 0.0 && loss < kMaxLossFactor))
     throw InputError(
         fmt::format("a loss factor is 0 or more and below {:g}, and this one is {:g}; steel has 1e-4, wood 0.01, soft rubber up to 1",
-                    kMostLossFactor, loss));
+                    kMaxLossFactor, loss));
 }
 
 /// Throws InputError unless the law is one that says how a mode of any frequency decays.
@@ -33,9 +32,9 @@ void check_law(const Damping& law) {
   if (law.law == "internal_friction" && law.coefficient.size() == 1) return check_loss(law.coefficient[0]);
   if (law.law == "caughey" && !law.coefficient.empty() && law.coefficient.size() == law.power.size()) {
     for (std::size_t j = 0; j < law.power.size(); ++j) {
-      if (!std::isfinite(law.coefficient[j]) || !(std::abs(law.power[j]) <= kMostPower))
+      if (!std::isfinite(law.coefficient[j]) || !(std::abs(law.power[j]) <= kMaxPower))
         throw InputError(fmt::format("a term of the damping is {:g} lambda^{:g}; powers lie within +-{:g}", law.coefficient[j],
-                                     law.power[j], kMostPower));
+                                     law.power[j], kMaxPower));
     }
     return;
   }

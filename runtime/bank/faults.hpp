@@ -16,16 +16,16 @@ class Faults {
  public:
   template <class... Values>
   void add(fmt::format_string<Values...> text, Values&&... values) {
-    if (++count_ <= 3) told_.push_back(fmt::format(text, std::forward<Values>(values)...));
+    if (++count_ <= 3) reported_.push_back(fmt::format(text, std::forward<Values>(values)...));
   }
   bool empty() const { return count_ == 0; }
   std::vector<std::string> take() {
-    if (count_ > 3) told_.back() += fmt::format(" (and {} more)", count_ - 3);
-    return std::move(told_);
+    if (count_ > 3) reported_.back() += fmt::format(" (and {} more)", count_ - 3);
+    return std::move(reported_);
   }
 
  private:
-  std::vector<std::string> told_;
+  std::vector<std::string> reported_;
   std::size_t count_ = 0;
 };
 

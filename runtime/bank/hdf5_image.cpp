@@ -37,7 +37,7 @@ void require(herr_t status, const char* what) {
   if (status < 0) throw SystemError(fmt::format("HDF5 cannot {}", what));
 }
 
-/// HDF5 prints every error to stderr by itself unless told not to; this tells it, for as long as it lives.
+/// HDF5 prints every error to stderr by default; an object of this class disables that during its lifetime.
 class Silence {
  public:
   Silence() {
@@ -111,7 +111,7 @@ Extent write_field(hid_t file, const Field& field) {
   if (extent.bytes > 0) {
     require(H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, field.data), "write an array");
     const haddr_t offset = H5Dget_offset(dataset);
-    if (offset == HADDR_UNDEF) throw SystemError(fmt::format("HDF5 does not tell where {} lies", field.name));
+    if (offset == HADDR_UNDEF) throw SystemError(fmt::format("HDF5 does not report where {} lies", field.name));
     extent.offset = offset;
   }
   write_text_attribute(dataset, "units", field.units);

@@ -71,7 +71,8 @@ void add_later_fields(const Bank& bank, const FileForm& form, std::vector<Field>
        {"proof/found", "<i8", {}, "1", "modes found between the first and the last cut", &proof.found},
        {"proof/orthonormality", "<f8", {}, "1", "max |phi_i^T M phi_j - delta_ij|", &proof.orthonormality},
        {"proof/backward_error", "<f8", {}, "1", "of the worst factorisation", &proof.backward_error},
-       {"proof/cluster_first", "<i8", find_shape(proof.cluster_first), "1", "first of a group of equal modes", proof.cluster_first.data()},
+       {"proof/cluster_first", "<i8", find_shape(proof.cluster_first), "1", "first of a group of degenerate modes",
+        proof.cluster_first.data()},
        {"proof/cluster_count", "<i8", find_shape(proof.cluster_count), "1", "modes of the group", proof.cluster_count.data()},
        {"proof/method", text_type(form.proof_method), {}, "1", "how it was counted", form.proof_method.data()}});
 }

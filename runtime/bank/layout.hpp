@@ -19,9 +19,9 @@ struct Field {
   const void* data = nullptr;
 };
 
-/// What a file holds beside the members of Bank, or in another form.
+/// What a file holds in addition to the members of Bank, or in another form.
 struct FileForm {
-  std::vector<double> freq_hz;            // (m), sqrt(lambda) / 2 pi: for readers who want no arithmetic
+  std::vector<double> freq_hz;            // (m), sqrt(lambda) / 2 pi: for readers that do no arithmetic
   std::uint8_t complete = 1;              // Bank::complete
   std::vector<std::int8_t> narrow_shape;  // (V, m, 3), Bank::shape where Bank::shape_bytes is 1 (since 1.2); else empty
   // Texts of Bank, at least one byte long, perhaps padded with NUL; empty where the file has none.

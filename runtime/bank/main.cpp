@@ -85,7 +85,7 @@ void add_options(CLI::App& editing, Wishes& wishes) {
   editing
       .add_option("--shape-bits", wishes.reduction.shape_bits,
                   "Bits of a component of a mode's shape; up to 8 the bank has one byte for it instead of two")
-      ->check(CLI::Range(bank::kLeastShapeBits, bank::kMostShapeBits))
+      ->check(CLI::Range(bank::kMinShapeBits, bank::kMaxShapeBits))
       ->capture_default_str();
 }
 
@@ -144,7 +144,7 @@ void check_bank_name(const std::filesystem::path& out) {
                     out.string()));
 }
 
-constexpr double kMostAudibleHz = 20000.0;
+constexpr double kMaxAudibleHz = 20000.0;
 
 void edit(const std::string& file, const std::string& out, Wishes& wishes) {
   const bool is_piped = base::is_standard_output(out);
@@ -155,7 +155,7 @@ void edit(const std::string& file, const std::string& out, Wishes& wishes) {
   read_damping(wishes);
   wishes.reduction.keep = wishes.keep == "lowest" ? bank::Keep::kLowest : bank::Keep::kLoudest;
   const bank::Edits& e = wishes.edits;
-  const bool is_reduced = wishes.reduction.modes || wishes.reduction.shape_bits < bank::kMostShapeBits;
+  const bool is_reduced = wishes.reduction.modes || wishes.reduction.shape_bits < bank::kMaxShapeBits;
   const bool is_edited = e.density_scale != 1.0 || e.stiffness_scale != 1.0 || e.size_scale != 1.0 || e.alphas || e.damping;
   bank::Bank bank = bank::read_bank(file);
   const double old_end_hz = bank.band_hz[1];
@@ -167,12 +167,12 @@ void edit(const std::string& file, const std::string& out, Wishes& wishes) {
     base::write_standard_output(bank::make_bank_bytes(bank));
   else
     bank::write_bank(bank, out);
-  if (bank.band_hz[1] < std::min(old_end_hz, kMostAudibleHz))
+  if (bank.band_hz[1] < std::min(old_end_hz, kMaxAudibleHz))
     fmt::print(is_piped ? stderr : stdout,
                "band      now {:.5g} to {:.5g} Hz: nothing above is in the bank; for more, compute the job again with a \"band_hz\" up to "
                "{:.5g} Hz and "
                "edit that\n",
-               bank.band_hz[0], bank.band_hz[1], kMostAudibleHz * old_end_hz / bank.band_hz[1]);
+               bank.band_hz[0], bank.band_hz[1], kMaxAudibleHz * old_end_hz / bank.band_hz[1]);
 }
 
 int run(int argc, char** argv) {

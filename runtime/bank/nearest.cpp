@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::int32_t kLeaf = 6;       // triangles
 constexpr int kDeepest = 64;            // halving 2^31 triangles takes 31 levels
-constexpr double kLeastArea = 1e-14;    // of a triangle: its height over its length, squared
+constexpr double kMinArea = 1e-14;      // of a triangle: its height over its length, squared
 constexpr double kSlack = 1.0 - 1e-12;  // of a squared distance: more than its rounding
 
 /// How far along (a, b), 0 to 1, the point nearest to p lies.
@@ -31,14 +31,14 @@ double find_along(const Vec3& p, const Vec3& a, const Vec3& b) {
 /// The same as find_nearest_barycentric() by the three edges alone, for triangles without area.
 Vec3 find_on_edges(const Vec3& p, const std::array<Vec3, 3>& corner) {
   Vec3 best{1.0, 0.0, 0.0};
-  double least = std::numeric_limits<double>::infinity();
+  double min = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < 3; ++i) {
     const std::size_t j = (i + 1) % 3;
     const double t = find_along(p, corner[i], corner[j]);
     Vec3 way{};
     for (std::size_t k = 0; k < 3; ++k) way[k] = corner[i][k] + t * (corner[j][k] - corner[i][k]) - p[k];
-    if (!(dot(way, way) < least)) continue;
-    least = dot(way, way);
+    if (!(dot(way, way) < min)) continue;
+    min = dot(way, way);
     best = {};
     best[i] = 1.0 - t;
     best[j] += t;
@@ -51,7 +51,7 @@ bool is_a_place(const Vec3& point_m) {
 }
 
 /// Takes a triangle for the best place where it is nearer, or as near and earlier.
-void try_triangle(const Bank& bank, std::int32_t triangle, const Vec3& p, double& least, NearestPlace& best) {
+void try_triangle(const Bank& bank, std::int32_t triangle, const Vec3& p, double& min, NearestPlace& best) {
   const auto& corner = bank.triangles[static_cast<std::size_t>(triangle)];
   const Vec3 &a = bank.vertices_m[static_cast<std::size_t>(corner[0])], &b = bank.vertices_m[static_cast<std::size_t>(corner[1])],
              &c = bank.vertices_m[static_cast<std::size_t>(corner[2])];
@@ -60,8 +60,8 @@ void try_triangle(const Bank& bank, std::int32_t triangle, const Vec3& p, double
   for (std::size_t k = 0; k < 3; ++k) place[k] = weight[0] * a[k] + weight[1] * b[k] + weight[2] * c[k];
   const Vec3 way = place - p;
   const double square = dot(way, way);
-  if (!(square < least || (square == least && triangle < best.triangle))) return;
-  least = square;
+  if (!(square < min || (square == min && triangle < best.triangle))) return;
+  min = square;
   best = {triangle, weight, place, 0.0};
 }
 
@@ -80,7 +80,7 @@ Vec3 find_nearest_barycentric(const Vec3& p, const Vec3& a, const Vec3& b, const
   const Vec3 ab = b - a, ac = c - a;
   // A triangle without area has no regions that rounding leaves standing.
   const double square_ab = dot(ab, ab), square_ac = dot(ac, ac), along = dot(ab, ac);
-  if (!(square_ab * square_ac - along * along > kLeastArea * std::max(square_ab, square_ac) * std::max(square_ab, square_ac)))
+  if (!(square_ab * square_ac - along * along > kMinArea * std::max(square_ab, square_ac) * std::max(square_ab, square_ac)))
     return find_on_edges(p, {a, b, c});
   const Vec3 ap = p - a, bp = p - b, cp = p - c;
   const double d1 = dot(ab, ap), d2 = dot(ac, ap), d3 = dot(ab, bp), d4 = dot(ac, bp), d5 = dot(ab, cp), d6 = dot(ac, cp);
@@ -92,9 +92,9 @@ Vec3 find_nearest_barycentric(const Vec3& p, const Vec3& a, const Vec3& b, const
 NearestPlace find_nearest(const Bank& bank, const Vec3& point_m) noexcept {
   NearestPlace best;
   if (!is_a_place(point_m)) return best;
-  double least = std::numeric_limits<double>::infinity();
-  for (std::size_t t = 0; t < bank.triangles.size(); ++t) try_triangle(bank, static_cast<std::int32_t>(t), point_m, least, best);
-  best.distance_m = best.triangle < 0 ? 0.0 : std::sqrt(least);
+  double min = std::numeric_limits<double>::infinity();
+  for (std::size_t t = 0; t < bank.triangles.size(); ++t) try_triangle(bank, static_cast<std::int32_t>(t), point_m, min, best);
+  best.distance_m = best.triangle < 0 ? 0.0 : std::sqrt(min);
   return best;
 }
 
@@ -152,17 +152,17 @@ NearestPlace SurfaceTree::find(const Vec3& point_m) const noexcept {
     const Box& box = boxes_[static_cast<std::size_t>(at)];
     return Waiting{at, calc_square(point_m, box.low, box.high)};
   };
-  double least = std::numeric_limits<double>::infinity();
+  double min = std::numeric_limits<double>::infinity();
   std::array<Waiting, kDeepest> stack;
   int depth = 0;
   stack[static_cast<std::size_t>(depth++)] = weigh(0);
   while (depth > 0) {
     const Waiting next = stack[static_cast<std::size_t>(--depth)];
-    if (next.square * kSlack > least) continue;
+    if (next.square * kSlack > min) continue;
     const Box& box = boxes_[static_cast<std::size_t>(next.box)];
     if (box.count > 0) {
       for (std::int32_t i = box.first; i < box.first + box.count; ++i)
-        try_triangle(*bank_, order_[static_cast<std::size_t>(i)], point_m, least, best);
+        try_triangle(*bank_, order_[static_cast<std::size_t>(i)], point_m, min, best);
       continue;
     }
     Waiting near = weigh(next.box + 1), far = weigh(box.first);
@@ -170,7 +170,7 @@ NearestPlace SurfaceTree::find(const Vec3& point_m) const noexcept {
     stack[static_cast<std::size_t>(depth++)] = far;
     stack[static_cast<std::size_t>(depth++)] = near;
   }
-  best.distance_m = best.triangle < 0 ? 0.0 : std::sqrt(least);
+  best.distance_m = best.triangle < 0 ? 0.0 : std::sqrt(min);
   return best;
 }
 

@@ -1,9 +1,8 @@
 // Reading banks from untrusted bytes.
-// Method: the seal tells where each array lies; the file is read once from front to back, its arrays straight to where they belong, and
+// Method: the seal says where each array lies; the file is read once from front to back, its arrays straight to where they belong, and
 //   hashed on the way. Only then is the digest compared and the content looked at.
 // Deviations: HDF5 is not asked. libhdf5 1.10.8 was seen to crash (and to hang) on files with one changed byte, so its parser does not
-// belong
-//   between an untrusted file and a running game; the HDF5 structure of a bank is there for other programs.
+//   belong between an untrusted file and a running game; the HDF5 structure of a bank is there for other programs.
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/stat.h>
@@ -164,7 +163,7 @@ void allocate_later(const Seal& seal, const std::string& name, Loaded& loaded, c
   make_text("proof/method", loaded.form.proof_method);
 }
 
-/// Gives the arrays the sizes that the seal tells. The seal bounds their sum by the length of the file.
+/// Gives the arrays the sizes that the seal states. The seal bounds their sum by the length of the file.
 void allocate(const Seal& seal, const std::string& name, Loaded& loaded) {
   Bank& bank = loaded.bank;
   const std::uint64_t modes = get_rows(seal, "modes/eigenvalue", name);
@@ -279,7 +278,7 @@ Bank finish(Loaded&& loaded, const std::string& name) {
   for (std::size_t i = 0; i < bank.mode_count(); ++i) {
     const double freq_hz = std::sqrt(bank.eigenvalue_rad2_s2[i]) / (2.0 * std::numbers::pi);
     const bool agrees = std::abs(form.freq_hz[i] - freq_hz) <= 1e-9 * std::abs(freq_hz);
-    // An eigenvalue that has no frequency is a fault of its own, told in better words by calc_checks().
+    // An eigenvalue that has no frequency is a fault of its own, reported in better words by calc_checks().
     if (!agrees && std::isfinite(freq_hz)) {
       throw InputError(fmt::format("{}: modes/frequency_hz[{}] is {} Hz, and its eigenvalue says {} Hz; write the bank again", name, i,
                                    form.freq_hz[i], freq_hz));

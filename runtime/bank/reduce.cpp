@@ -1,11 +1,9 @@
 // Method:     a mode that a blow leaves with the pressure p at 1 m and the decay d has the exposure p^2 / (2 (2 d + 1 / T)) within the
-// ear's
-//             time T. Modes are ranked by it, their squared shapes averaged over the surface; equal ones keep the order of their
-//             frequencies.
-//             The blow's spectrum is that of the Gaussian of a Hertz pulse's variance, which has no zeros that would favour one mode of
-//             two.
+//             ear's time T. Modes are ranked by it, their squared shapes averaged over the surface; equal ones keep the order of their
+//             frequencies. The blow's spectrum is that of the Gaussian of a Hertz pulse's variance, which has no zeros that would favour
+//             one mode of two.
 // Source:     A-weighting: IEC 61672-1:2013, E.4.2; T: Zwislocki 1969.
-// Deviations: modes do not mask each other; the gains are the bank's own, which know no cancellation (docs/decisions/radiation-gain.md).
+// Deviations: modes do not mask each other; the gains are the bank's own, which leave out cancellation (docs/decisions/radiation-gain.md).
 #include "runtime/bank/reduce.hpp"
 
 #include <fmt/format.h>
@@ -89,7 +87,7 @@ void keep_modes(Bank& bank, const std::vector<std::size_t>& kept) {
   bank.complete = false;
 }
 
-/// The counts stay true; groups of equal modes end where the list ends.
+/// The counts stay true; groups of degenerate modes end where the list ends.
 void cut_groups(Proof& proof, std::int64_t modes) {
   std::size_t groups = 0;
   for (; groups < proof.cluster_first.size(); ++groups) {
@@ -106,12 +104,12 @@ void round_shapes(Bank& bank, int bits) {
   const std::size_t modes = bank.mode_count();
   std::vector<int> largest(modes, 0);
   for (std::size_t i = 0; i < bank.shape.size(); ++i) {
-    int& most = largest[i / 3 % modes];
-    most = std::max(most, std::abs(static_cast<int>(bank.shape[i])));
+    int& max = largest[i / 3 % modes];
+    max = std::max(max, std::abs(static_cast<int>(bank.shape[i])));
   }
   for (std::size_t i = 0; i < bank.shape.size(); ++i) {
-    const int most = largest[i / 3 % modes];
-    if (most > steps) bank.shape[i] = find_step(bank.shape[i], static_cast<double>(most) / steps);
+    const int max = largest[i / 3 % modes];
+    if (max > steps) bank.shape[i] = find_step(bank.shape[i], static_cast<double>(max) / steps);
   }
   for (std::size_t m = 0; m < modes; ++m) {
     if (largest[m] > steps) bank.shape_scale[m] *= static_cast<double>(largest[m]) / steps;
@@ -141,8 +139,8 @@ std::vector<double> calc_audibility(const Bank& bank) {
 
 Bank calc_reduced(const Bank& bank, const Reduction& reduction) {
   if (reduction.modes && *reduction.modes == 0) throw InputError("a bank of 0 modes is silent; keep 1 or more");
-  if (reduction.shape_bits < kLeastShapeBits || reduction.shape_bits > kMostShapeBits) {
-    throw InputError(fmt::format("shapes of {} bits; give {} to {}", reduction.shape_bits, kLeastShapeBits, kMostShapeBits));
+  if (reduction.shape_bits < kMinShapeBits || reduction.shape_bits > kMaxShapeBits) {
+    throw InputError(fmt::format("shapes of {} bits; give {} to {}", reduction.shape_bits, kMinShapeBits, kMaxShapeBits));
   }
   Bank reduced = bank;
   const std::vector<std::size_t> kept = find_kept(bank, reduction);
@@ -154,7 +152,7 @@ Bank calc_reduced(const Bank& bank, const Reduction& reduction) {
       cut_groups(*reduced.proof, static_cast<std::int64_t>(kept.size()));
     }
   }
-  if (reduction.shape_bits < kMostShapeBits) round_shapes(reduced, reduction.shape_bits);
+  if (reduction.shape_bits < kMaxShapeBits) round_shapes(reduced, reduction.shape_bits);
   reduced.provenance = fmt::format(R"({{"reduced": {{"modes": {}, "of_modes": {}, "keep": "{}", "shape_bits": {}}})", kept.size(),
                                    bank.mode_count(), reduction.keep == Keep::kLoudest ? "loudest" : "lowest", reduction.shape_bits);
   reduced.provenance += bank.provenance.empty() ? "}" : fmt::format(R"(, "of": {}}})", bank.provenance);

@@ -23,18 +23,18 @@ std::vector<double> calc_audibility(const Bank& bank);
 /// Modes that a reduced bank keeps: the most audible ones by calc_audibility(), or the lowest ones as `max_modes` of a job does.
 enum class Keep : std::uint8_t { kLoudest, kLowest };
 
-inline constexpr int kLeastShapeBits = 2, kMostShapeBits = 16;
+inline constexpr int kMinShapeBits = 2, kMaxShapeBits = 16;
 
 struct Reduction {
   std::optional<std::size_t> modes{};  // at least 1; all where it is nothing or more than there are
   Keep keep = Keep::kLoudest;
-  int shape_bits = kMostShapeBits;  // of a component of a shape, its sign included; up to 8 the file has one byte for it instead of two
+  int shape_bits = kMaxShapeBits;  // of a component of a shape, its sign included; up to 8 the file has one byte for it instead of two
 };
 
 /// The bank with the modes that are kept, in their order, and shapes rounded to the nearest of 2^bits - 1 steps. A mode that is kept is as
-/// it was but for that. A bank that lost modes is no longer complete; the proof stays with the lowest modes, which it still speaks for, and
-/// goes with any others. The provenance says what was done. Throws InputError for no modes and for bits out of range. Not for an audio
-/// thread.
+/// it was but for that. A bank that lost modes is no longer complete; the proof stays with the lowest modes, for which it still holds, and
+/// is dropped with any others. The provenance says what was done. Throws InputError for no modes and for bits out of range. Not for an
+/// audio thread.
 Bank calc_reduced(const Bank& bank, const Reduction& reduction);
 
 }  // namespace carillon::bank

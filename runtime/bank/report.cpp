@@ -82,7 +82,7 @@ void append_tree(const Json::Value& tree, std::size_t depth, std::string& text) 
   }
 }
 
-/// "0.012", or "-" where the bank does not tell.
+/// "0.012", or "-" where the bank does not say.
 std::string format_cents(const std::vector<double>& cents, std::size_t mode) {
   return mode < cents.size() ? fmt::format("{:.2g}", cents[mode]) : "-";
 }

@@ -14,7 +14,7 @@ std::string format_info(const Bank& bank, const std::filesystem::path& file, std
 /// All of a bank but its mesh and shapes as JSON, numbers to full double precision.
 std::string format_info_json(const Bank& bank, const std::filesystem::path& file);
 
-/// The two properties that the library, which knows no JSON, does not look at.
+/// The two properties that the library, which cannot read JSON, does not check.
 Check calc_regions_check(const Bank& bank);
 Check calc_provenance_check(const Bank& bank);
 

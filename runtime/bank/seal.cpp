@@ -46,18 +46,18 @@ std::optional<std::pair<std::string, Extent>> parse_extent(const std::vector<std
   extent.dtype = words[2];
   const auto offset = parse_number<std::uint64_t>(words[3]);
   const std::uint64_t item = find_item_bytes(extent.dtype);
-  if (!offset || item == 0) return std::nullopt;
   // An extent beyond the file's length is refused even where another extent is zero: nothing is ever larger than the file.
-  std::optional<std::uint64_t> bytes = item <= length ? std::optional(item) : std::nullopt;
-  for (std::size_t i = 4; i < words.size() && bytes; ++i) {
+  if (!offset || item == 0 || item > length) return std::nullopt;
+  extent.offset = *offset;
+  extent.bytes = item;
+  for (std::size_t i = 4; i < words.size(); ++i) {
     const auto size = parse_number<std::uint64_t>(words[i]);
     if (!size || *size > length) return std::nullopt;
     extent.shape.push_back(*size);
-    bytes = multiply(*bytes, *size, length);
+    const auto bytes = multiply(extent.bytes, *size, length);
+    if (!bytes) return std::nullopt;
+    extent.bytes = *bytes;
   }
-  if (!bytes) return std::nullopt;
-  extent.offset = *offset;
-  extent.bytes = *bytes;
   if (extent.bytes > 0 && (extent.offset < kSealBytes || extent.offset > length - extent.bytes)) return std::nullopt;
   return std::pair(std::string(words[1]), extent);
 }
@@ -98,11 +98,11 @@ Seal parse_seal(std::string_view head, std::uint64_t length, const std::string& 
     return InputError(fmt::format("{}: damaged seal: line {} {}; copy or write the bank again", name, line + 1, what));
   };
   if (lines.size() < 2 || !lines[1].starts_with("length ")) throw damaged(1, "does not give the length of the file");
-  const auto told = parse_number<std::uint64_t>(lines[1].substr(7));
-  if (!told) throw damaged(1, "does not give the length of the file");
-  if (*told != length) {
+  const auto stated = parse_number<std::uint64_t>(lines[1].substr(7));
+  if (!stated) throw damaged(1, "does not give the length of the file");
+  if (*stated != length) {
     throw InputError(fmt::format("{}: {}: {} bytes, sealed with {}; copy or write the bank again (or seal it again: docs/bank-format.md)",
-                                 name, length < *told ? "truncated" : "bytes were added", length, *told));
+                                 name, length < *stated ? "truncated" : "bytes were added", length, *stated));
   }
   seal.length = length;
 

@@ -1,5 +1,5 @@
 // Method:     triangles that share an edge are joined into shells (union-find); the sign of the volume that a shell encloses, by the
-//             divergence theorem, tells skin from cavity.
+//             divergence theorem, distinguishes skin from cavity.
 // Source:     textbook.
 // Deviations: none.
 #include "runtime/bank/surface.hpp"

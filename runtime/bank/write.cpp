@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 fs::path resolve_target(const fs::path& file) {
   if (file.empty() || !file.has_filename()) throw InputError(fmt::format("\"{}\" names no file; give the bank a file name", file.string()));
   std::error_code error;
-  const fs::path target = fs::exists(file, error) ? fs::canonical(file, error) : file;
+  fs::path target = fs::exists(file, error) ? fs::canonical(file, error) : file;
   const fs::file_status status = fs::status(target, error);
   if (fs::is_directory(status)) throw InputError(fmt::format("{}: is a folder; give the bank a file name inside it", file.string()));
   if (fs::exists(status) && !fs::is_regular_file(status)) {

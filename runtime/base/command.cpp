@@ -1,5 +1,5 @@
 // Method: vfork() and exec, with all signals blocked in between; poll() on the pipes until the program has closed them or its time is over,
-//   then waitpid() without blocking: a program may go on without outputs, and one that waits for a dead disk cannot even be killed.
+//   then waitpid() without blocking: a program may continue without outputs, and one that waits for a dead disk cannot even be killed.
 // Source: POSIX; Linux vfork(2), prctl(2) (PR_SET_PDEATHSIG), proc(5) (oom_score_adj).
 // Deviations: between vfork() and exec the child does more than POSIX allows, and nothing that Linux does not: system calls and writes to
 //   `Plan`, which the parent waits for.
@@ -11,16 +11,19 @@
 #include <signal.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
-#include <time.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <utility>
+
+#include "runtime/base/clock.hpp"
+#include "runtime/base/descriptor.hpp"
 
 extern "C" char** environ;
 
@@ -29,31 +32,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr long kLookNs = 2'000'000;       // between two looks whether a program has ended
-constexpr double kAskS = 0.1;             // between two questions to may_stop
-constexpr double kLateS = 1.0;            // for what a late program has printed
-constexpr double kKillPatienceS = 5.0;    // for a program that was killed
+constexpr long kLookNs = 2'000'000;     // between two looks whether a program has ended
+constexpr double kAskS = 0.1;           // between two questions to may_stop
+constexpr double kLateS = 1.0;          // for what a late program has printed
+constexpr double kKillPatienceS = 5.0;  // for a program that was killed
+constexpr const char* kHelperFolder = "libexec/carillon";
 constexpr const char* kOomScore = "500";  // of 1,000
-
-class Descriptor {
- public:
-  explicit Descriptor(int value = -1) : value_(value) {}
-  ~Descriptor() { close(); }
-  Descriptor(Descriptor&& other) noexcept : value_(std::exchange(other.value_, -1)) {}
-  Descriptor& operator=(Descriptor&& other) noexcept {
-    close();
-    value_ = std::exchange(other.value_, -1);
-    return *this;
-  }
-  int get() const { return value_; }
-  void close() {
-    if (value_ >= 0) ::close(value_);
-    value_ = -1;
-  }
-
- private:
-  int value_;
-};
 
 struct Pipe {
   Descriptor read, write;
@@ -83,12 +67,6 @@ class IgnoredPipeSignal {
   struct sigaction before_ {};
 };
 
-double get_seconds() {
-  timespec now{};
-  ::clock_gettime(CLOCK_BOOTTIME, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
 std::vector<char*> to_pointers(const std::vector<std::string>& texts) {
   std::vector<char*> pointers;
   for (const std::string& text : texts) pointers.push_back(const_cast<char*>(text.c_str()));
@@ -112,7 +90,7 @@ struct Plan {
 };
 
 /// In the child, whose memory is that of the parent.
-[[noreturn]] void become(Plan& plan) {
+[[noreturn]] void execute(Plan& plan) {
   if (plan.group == Command::Group::own) ::setpgid(0, 0);
   if (plan.group == Command::Group::session) ::setsid();
   if (plan.signal_at_end != 0) ::prctl(PR_SET_PDEATHSIG, plan.signal_at_end);
@@ -138,9 +116,9 @@ struct Plan {
 }
 
 /// A frame of its own: what the caller has in registers is safe from the child.
-[[gnu::noinline]] pid_t fork_and_become(Plan& plan) {
+[[gnu::noinline]] pid_t fork_and_execute(Plan& plan) {
   const pid_t child = ::vfork();
-  if (child == 0) become(plan);
+  if (child == 0) execute(plan);
   return child;
 }
 
@@ -164,19 +142,22 @@ bool give(int descriptor, std::string_view& input) {
 /// process may have been stopped meanwhile.
 void talk(Descriptor& in, Descriptor& out, Descriptor& errors, const RunOptions& options, double deadline_s, Finished& finished) {
   std::string_view input = options.input;
+  double asked_s = get_boot_s();
   if (in.get() >= 0) ::fcntl(in.get(), F_SETFL, O_NONBLOCK);
   while (in.get() >= 0 || out.get() >= 0 || errors.get() >= 0) {
     std::array<pollfd, 3> all{{{in.get(), POLLOUT, 0}, {out.get(), POLLIN, 0}, {errors.get(), POLLIN, 0}}};
-    const double wait_s = std::clamp(deadline_s - get_seconds(), 0.0, options.may_stop ? kAskS : 1e3);
-    const int ready = ::poll(all.data(), all.size(), static_cast<int>(wait_s * 1e3 + 0.5));
+    const double wait_s = std::clamp(deadline_s - get_boot_s(), 0.0, options.may_stop ? kAskS : 1e3);
+    const int ready = ::poll(all.data(), all.size(), static_cast<int>(std::lround(wait_s * 1e3)));
     if (ready < 0) {
       if (errno != EINTR) throw SystemError(fmt::format("cannot wait for a program: {}", std::strerror(errno)));
       continue;
     }
-    const double late_s = get_seconds() - deadline_s;
+    const double late_s = get_boot_s() - deadline_s;
     finished.was_slow = ready == 0 ? late_s >= 0.0 : late_s > kLateS;
     finished.was_long = !options.keeps_tail && std::max(finished.output.size(), finished.errors.size()) > options.max_bytes;
-    finished.was_stopped = ready == 0 && options.may_stop && options.may_stop(finished);
+    const bool is_asked = options.may_stop && (ready == 0 || get_boot_s() - asked_s >= kAskS);
+    if (is_asked) asked_s = get_boot_s();
+    finished.was_stopped = is_asked && options.may_stop(finished);
     if (finished.was_slow || finished.was_long || finished.was_stopped) return;
     if (all[0].revents != 0 && !give(in.get(), input)) in.close();
     if (all[1].revents != 0 && !take(out.get(), finished.output, options)) out.close();
@@ -190,8 +171,8 @@ std::optional<int> await(pid_t child, double deadline_s, const std::function<boo
     int status = 0;
     const pid_t ended = ::waitpid(child, &status, WNOHANG);
     if (ended == child) return status;
-    if (ended < 0 && errno != EINTR) return 0;  // it was waited for elsewhere
-    if (get_seconds() >= deadline_s || (may_stop && may_stop())) return std::nullopt;
+    if (ended < 0 && errno != EINTR) return W_EXITCODE(kExitSystem, 0);  // waited for elsewhere: its status is lost
+    if (get_boot_s() >= deadline_s || (may_stop && may_stop())) return std::nullopt;
     const timespec pause{0, kLookNs};
     ::nanosleep(&pause, nullptr);
   }
@@ -204,7 +185,7 @@ class Reaper {
   ~Reaper() {
     if (child_ <= 0) return;
     ::kill(child_, SIGKILL);
-    await(child_, get_seconds() + kKillPatienceS, {});
+    await(child_, get_boot_s() + kKillPatienceS, {});
   }
   Reaper(const Reaper&) = delete;
   Reaper& operator=(const Reaper&) = delete;
@@ -234,6 +215,12 @@ std::string find_path(const std::string& word) {
   return program ? program->string() : std::string();
 }
 
+/// The folder that has bin and libexec.
+fs::path find_prefix(const fs::path& program) {
+  const fs::path folder = program.parent_path();
+  return folder.parent_path().filename() == "libexec" ? folder.parent_path().parent_path() : folder.parent_path();
+}
+
 }  // namespace
 
 fs::path find_self() {
@@ -251,11 +238,35 @@ bool is_program(const fs::path& file) {
 std::optional<fs::path> find_program(const std::string& name) {
   std::error_code error;
   const fs::path self = fs::read_symlink("/proc/self/exe", error);
-  if (!error && is_program(self.parent_path() / name)) return self.parent_path() / name;
+  if (!error) {
+    for (const fs::path& folder : {self.parent_path(), find_prefix(self) / "bin"})
+      if (is_program(folder / name)) return folder / name;
+  }
   return find_along_path(name);
 }
 
+fs::path find_helper(const std::string& name) {
+  fs::path file = find_prefix(find_self()) / kHelperFolder / name;
+  std::error_code error;
+  if (!fs::is_regular_file(file, error)) throw SystemError(fmt::format("{} is missing; install Carillon again", file.string()));
+  return file;
+}
+
+fs::path require_program(const std::string& name) {
+  if (const auto program = find_program(name)) return *program;
+  throw SystemError(fmt::format("{} is neither next to this program nor in PATH; install it, or put its folder in PATH", name));
+}
+
+void become(const std::vector<std::string>& words) {
+  std::fflush(nullptr);
+  ::execv(words.at(0).c_str(), to_pointers(words).data());
+  throw StartError(fmt::format("{}: cannot be started: {}", words[0], std::strerror(errno)), errno);
+}
+
 pid_t start(const Command& command) {
+  // Inherited as ignored, it would have the kernel drop the status of every child.
+  struct sigaction child_signal {};
+  if (::sigaction(SIGCHLD, nullptr, &child_signal) == 0 && child_signal.sa_handler == SIG_IGN) ::signal(SIGCHLD, SIG_DFL);
   const auto refuse = [&](int error) {
     throw StartError(fmt::format("{}: cannot be started: {}", command.words.at(0), std::strerror(error)), error);
   };
@@ -290,7 +301,7 @@ pid_t start(const Command& command) {
   sigset_t all, before;
   ::sigfillset(&all);
   ::pthread_sigmask(SIG_SETMASK, &all, &before);
-  const pid_t child = fork_and_become(plan);
+  const pid_t child = fork_and_execute(plan);
   const int error = child < 0 ? errno : plan.error;
   ::pthread_sigmask(SIG_SETMASK, &before, nullptr);
   if (error == 0) return child;
@@ -307,7 +318,7 @@ Finished run(Command command, const RunOptions& options) {
   if (command.output == kCapture) command.output = out.emplace().write.get();
   if (command.errors == kCapture) command.errors = errors.emplace().write.get();
   if (command.signal_at_end == 0) command.signal_at_end = SIGKILL;
-  const double deadline_s = get_seconds() + options.patience_s;
+  const double deadline_s = get_boot_s() + options.patience_s;
   const pid_t child = start(command);
   Reaper reaper(child);
   if (options.started) options.started(child);
@@ -322,9 +333,9 @@ Finished run(Command command, const RunOptions& options) {
   const bool is_judged = finished.was_slow || finished.was_long || finished.was_stopped;
   std::optional<int> status = await(child, is_judged ? 0.0 : deadline_s, may_stop);  // it may have ended by now
   if (!status) {
-    if (!is_judged) (get_seconds() >= deadline_s ? finished.was_slow : finished.was_stopped) = true;
+    if (!is_judged) (get_boot_s() >= deadline_s ? finished.was_slow : finished.was_stopped) = true;
     ::kill(child, SIGKILL);
-    status = await(child, get_seconds() + kKillPatienceS, {}).value_or(SIGKILL);
+    status = await(child, get_boot_s() + kKillPatienceS, {}).value_or(SIGKILL);
   } else if (!finished.was_long) {
     finished.was_slow = finished.was_stopped = false;
   }

@@ -18,8 +18,14 @@ namespace carillon::base {
 
 /// The file of this program. SystemError where /proc does not show it.
 std::filesystem::path find_self();
-/// A program by its name: next to this one, else along PATH. None if there is no executable of that name.
+/// A program by its name: in this installation (next to this one; bin, seen from libexec/carillon), else along PATH. None if there is no
+/// executable of that name.
 std::optional<std::filesystem::path> find_program(const std::string& name);
+/// A program or library that only the programs of this installation use: PREFIX/libexec/carillon/NAME, for programs in PREFIX/bin and
+/// PREFIX/libexec/carillon. Throws SystemError where there is none.
+std::filesystem::path find_helper(const std::string& name);
+/// The same as find_program(). Throws SystemError where there is none.
+std::filesystem::path require_program(const std::string& name);
 /// Is it a file that may be run?
 bool is_program(const std::filesystem::path& file);
 
@@ -56,6 +62,9 @@ class StartError : public SystemError {
 /// Starts it. Throws StartError "WORD: cannot be started: why". Does not fork, so that no
 /// handler of pthread_atfork() runs (MPI has some) and no memory is copied. kCapture is /dev/null here.
 pid_t start(const Command& command);
+
+/// This process becomes the program words[0], a path. Throws StartError where it cannot.
+[[noreturn]] void become(const std::vector<std::string>& words);
 
 /// What became of a program.
 struct Finished {

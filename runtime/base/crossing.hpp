@@ -7,12 +7,12 @@
 namespace carillon::base {
 
 /// A place between `a` and `b` where the values `at_a` and `at_b` of a continuous function have opposite signs: where a value is at most
-/// `least_value` in size, or what is left of the bracket is no longer than `least_way`, or after `most` values.
+/// `min_value` in size, or what is left of the bracket is no longer than `min_way`, or after `max` values.
 template <class Function>
-double find_crossing(Function&& calc, double a, double at_a, double b, double at_b, double least_value, double least_way, int most) {
-  for (int n = 0; n < most && std::abs(b - a) > least_way; ++n) {
+double find_crossing(Function&& calc, double a, double at_a, double b, double at_b, double min_value, double min_way, int max) {
+  for (int n = 0; n < max && std::abs(b - a) > min_way; ++n) {
     const double x = b - at_b * (b - a) / (at_b - at_a), at_x = calc(x);
-    if (std::abs(at_x) <= least_value) return x;
+    if (std::abs(at_x) <= min_value) return x;
     // The value of an end that stays is halved, so that both ends come closer.
     if ((at_x > 0) != (at_b > 0))
       a = b, at_a = at_b;

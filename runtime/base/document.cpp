@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "runtime/base/failure.hpp"
 #include "runtime/base/file.hpp"
 
 namespace carillon::base {
@@ -31,7 +32,7 @@ struct DocumentData {
     return first_line + static_cast<int>(std::lower_bound(line_ends.begin(), line_ends.end(), end) - line_ends.begin());
   }
   [[noreturn]] void fail(std::ptrdiff_t offset, const std::string& message) const {
-    throw InputError(fmt::format("{}:{}: {}", file.string(), line_at(offset), message));
+    throw PlacedError(fmt::format("{}:{}", file.string(), line_at(offset)), message);
   }
 };
 
@@ -81,8 +82,8 @@ std::ptrdiff_t find_key_offset(const DocumentData& data, const Json::Value& valu
     reason = report.substr(start, report.find('\n', start + 1) - start);
   }
   reason.erase(0, reason.find_first_not_of(" \n"));
-  throw InputError(fmt::format("{}:{}: this is not JSON (column {}): {}; correct the text there", data.file.string(),
-                               line - 1 + data.first_line, column, reason.substr(0, 200)));
+  throw PlacedError(fmt::format("{}:{}", data.file.string(), line - 1 + data.first_line),
+                    fmt::format("this is not JSON (column {}): {}; correct the text there", column, reason.substr(0, 200)));
 }
 
 /// What is wrong with a word that begins like a number, as part of a sentence; nullptr when it is one by the grammar of JSON.
@@ -172,7 +173,8 @@ Document parse_document(std::string_view text, const std::filesystem::path& file
   data->text = std::string(text);
   if (const std::size_t at = text.find('\0'); at != std::string_view::npos) {
     const auto line = first_line + static_cast<int>(std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n'));
-    throw InputError(fmt::format("{}:{}: there is a zero byte, which no text has; check that this is the right file", file.string(), line));
+    throw PlacedError(fmt::format("{}:{}", file.string(), line),
+                      "there is a zero byte, which no text has; check that this is the right file");
   }
   check_text(*data);
   Json::CharReaderBuilder builder;
@@ -186,7 +188,7 @@ Document parse_document(std::string_view text, const std::filesystem::path& file
   try {
     if (!reader->parse(data->text.data(), data->text.data() + data->text.size(), &data->root, &report)) fail_syntax(*data, report);
   } catch (const Json::Exception& error) {
-    throw InputError(fmt::format("{}:{}: this is not JSON: {}; correct the text", file.string(), first_line, error.what()));
+    throw PlacedError(fmt::format("{}:{}", file.string(), first_line), fmt::format("this is not JSON: {}; correct the text", error.what()));
   }
   if (!data->root.isObject())
     throw InputError(
@@ -284,7 +286,7 @@ std::string Object::string(std::string_view key) {
 std::string Object::string_or(std::string_view key, std::string_view fallback) { return has(key) ? string(key) : std::string(fallback); }
 
 std::string Object::choice(std::string_view key, const std::vector<std::string>& choices) {
-  const std::string word = string(key);
+  std::string word = string(key);
   if (std::find(choices.begin(), choices.end(), word) != choices.end()) return word;
   const std::string near = find_nearest(word, choices);
   fail(key, fmt::format("\"{}\" is none of {}{}", word, join(choices), near.empty() ? "" : fmt::format("; did you mean \"{}\"?", near)));
@@ -325,19 +327,19 @@ void Object::copy_numbers(std::string_view key, double* values, std::size_t coun
   for (std::size_t i = 0; i < count; ++i) values[i] = to_number(*this, list[static_cast<Json::ArrayIndex>(i)], key, {});
 }
 
-std::vector<double> Object::number_list(std::string_view key, std::size_t most) {
+std::vector<double> Object::number_list(std::string_view key, std::size_t max) {
   const Json::Value& list = json(require_value(key));
-  if (!list.isArray() || list.empty() || list.size() > most)
-    fail(key, fmt::format("must be a list of 1 to {} numbers, and is {}", most, kind_of(list)));
+  if (!list.isArray() || list.empty() || list.size() > max)
+    fail(key, fmt::format("must be a list of 1 to {} numbers, and is {}", max, kind_of(list)));
   std::vector<double> values(list.size());
   copy_numbers(key, values.data(), values.size());
   return values;
 }
 
-std::vector<std::vector<double>> Object::number_rows(std::string_view key, std::size_t columns, std::size_t most) {
+std::vector<std::vector<double>> Object::number_rows(std::string_view key, std::size_t columns, std::size_t max) {
   const Json::Value& list = json(require_value(key));
-  if (!list.isArray() || list.empty() || list.size() > most)
-    fail(key, fmt::format("must be a list of 1 to {} lists of {} numbers, and is {}", most, columns, kind_of(list)));
+  if (!list.isArray() || list.empty() || list.size() > max)
+    fail(key, fmt::format("must be a list of 1 to {} lists of {} numbers, and is {}", max, columns, kind_of(list)));
   std::vector<std::vector<double>> rows;
   for (Json::ArrayIndex i = 0; i < list.size(); ++i) {
     if (!list[i].isArray() || list[i].size() != columns)
@@ -348,7 +350,7 @@ std::vector<std::vector<double>> Object::number_rows(std::string_view key, std::
   return rows;
 }
 
-std::vector<Entry> Object::entries(std::string_view key, std::size_t most) {
+std::vector<Entry> Object::entries(std::string_view key, std::size_t max) {
   if (!has(key)) return {};
   const Json::Value& value = json(value_)[std::string(key)];
   std::vector<Entry> list;
@@ -365,7 +367,7 @@ std::vector<Entry> Object::entries(std::string_view key, std::size_t most) {
     add(value, full_name(name_, key));
     return list;
   }
-  if (value.size() > most) fail(key, fmt::format("must have at most {} entries, and has {}", most, value.size()));
+  if (value.size() > max) fail(key, fmt::format("must have at most {} entries, and has {}", max, value.size()));
   for (Json::ArrayIndex i = 0; i < value.size(); ++i) add(value[i], fmt::format("{}[{}]", full_name(name_, key), i));
   return list;
 }
@@ -413,7 +415,7 @@ std::vector<std::string> Object::keys() const {
 }
 
 void Object::finish() {
-  // A key that is not there yet is likelier meant than one that is: alpha2_s beside alpha1_s is alpha2_per_s.
+  // A key that is not there yet is likelier meant than one that is: alpha2_s next to alpha1_s is alpha2_per_s.
   std::vector<std::string> open;
   for (const std::string& key : *asked_)
     if (!json(value_).isMember(key)) open.push_back(key);
@@ -443,21 +445,6 @@ std::string find_nearest(std::string_view word, const std::vector<std::string>& 
     if (contained || (candidate.size() >= 4 && word.find(candidate) != std::string_view::npos)) return candidate;
   }
   return nearest;
-}
-
-std::string quote(std::string_view text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') {
-      out += '\\';
-      out += c;
-    } else if (static_cast<unsigned char>(c) < 0x20) {
-      out += fmt::format("\\u{:04x}", static_cast<unsigned>(c));
-    } else {
-      out += c;
-    }
-  }
-  return out + '"';
 }
 
 }  // namespace carillon::base

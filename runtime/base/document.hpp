@@ -75,12 +75,12 @@ class Object {
   /// A list of objects; a missing key gives an empty list.
   std::vector<Object> objects(std::string_view key);
 
-  /// A list of finite numbers of any length from 1 to `most`.
-  std::vector<double> number_list(std::string_view key, std::size_t most);
-  /// A list of lists of `columns` finite numbers each, row by row; from 1 to `most` rows.
-  std::vector<std::vector<double>> number_rows(std::string_view key, std::size_t columns, std::size_t most);
-  /// One text or object, or a list of at most `most` texts and objects; a missing key gives an empty list.
-  std::vector<Entry> entries(std::string_view key, std::size_t most);
+  /// A list of finite numbers of any length from 1 to `max`.
+  std::vector<double> number_list(std::string_view key, std::size_t max);
+  /// A list of lists of `columns` finite numbers each, row by row; from 1 to `max` rows.
+  std::vector<std::vector<double>> number_rows(std::string_view key, std::size_t columns, std::size_t max);
+  /// One text or object, or a list of at most `max` texts and objects; a missing key gives an empty list.
+  std::vector<Entry> entries(std::string_view key, std::size_t max);
 
   /// A file named by `key`, made absolute: relative paths start at the document's folder. The file need not exist.
   std::filesystem::path path(std::string_view key);
@@ -142,8 +142,5 @@ Document parse_document(std::string_view text, const std::filesystem::path& file
 
 /// The entry of `known` with the smallest Damerau-Levenshtein distance to `word`; empty when none is within half of the word's length.
 std::string find_nearest(std::string_view word, const std::vector<std::string>& known);
-
-/// A text as JSON writes it, in quotation marks; what is no UTF-8 stays as it is.
-std::string quote(std::string_view text);
 
 }  // namespace carillon::base

@@ -23,6 +23,6 @@ class SystemError : public std::runtime_error {
 inline constexpr int kExitInput = 2;
 inline constexpr int kExitSolve = 3;
 inline constexpr int kExitSystem = 4;
-inline constexpr int kExitCheckpointed = 85;  // stopped as it was asked to; the same command goes on from the checkpoint
+inline constexpr int kExitCheckpointed = 85;  // stopped on request; the same command resumes from the checkpoint
 
 }  // namespace carillon

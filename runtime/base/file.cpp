@@ -12,29 +12,17 @@
 #include <cstring>
 #include <utility>
 
+#include "runtime/base/descriptor.hpp"
+#include "runtime/base/failure.hpp"
+
 namespace carillon::base {
 namespace {
 
 namespace fs = std::filesystem;
 
-/// A POSIX file descriptor that closes itself.
-class Descriptor {
- public:
-  explicit Descriptor(int value) : value_(value) {}
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  ~Descriptor() {
-    if (value_ >= 0) ::close(value_);
-  }
-  int get() const { return value_; }
-
- private:
-  int value_ = -1;
-};
-
 fs::path folder_of(const fs::path& file) { return file.has_parent_path() ? file.parent_path() : fs::path("."); }
 
-/// Beside `file`, hidden, of this process and call alone: two threads that write one name must not share a temporary file. Never longer
+/// Next to `file`, hidden, of this process and call alone: two threads that write one name must not share a temporary file. Never longer
 /// than the name of `file` and some forty bytes, cut where a file system's 255 would end.
 fs::path make_temporary_name(const fs::path& file) {
   static std::atomic<unsigned> count{0};
@@ -169,9 +157,10 @@ void WholeFile::refuse(int error) {
   if (descriptor_ >= 0) ::close(descriptor_);
   descriptor_ = -1;
   ::unlink(temporary_.c_str());
-  throw SystemError(fmt::format(
-      "{}: cannot write: {}; {}", file_.string(), std::strerror(error),
-      is_full_error(error) ? "the disk or quota is full: make room on it" : "check the folder's rights and the space on the disk"));
+  const bool is_full = is_full_error(error);
+  throw_system_error(
+      error, fmt::format("{}: cannot write: {}; {}", file_.string(), std::strerror(error),
+                         is_full ? "the disk or quota is full: make room on it" : "check the folder's rights and the space on the disk"));
 }
 
 void WholeFile::append(std::string_view bytes) {
@@ -181,7 +170,7 @@ void WholeFile::append(std::string_view bytes) {
 void WholeFile::commit() {
   if (::fsync(descriptor_) != 0) refuse(errno);
   {
-    // Whoever is killed by a signal that can be caught leaves no temporary name behind.
+    // A process killed by a signal that can be caught leaves no temporary name behind.
     const SignalPause pause;
     if (is_nameless_) {
       if (const int error = link_nameless(descriptor_, temporary_); error != 0) refuse(error);

@@ -1,4 +1,4 @@
-// Files that somebody else wrote, and files that must appear whole or not at all.
+// Files that another program wrote, and files that must appear whole or not at all.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +23,7 @@ std::string read_file(const std::filesystem::path& file, std::string_view what, 
 void read_pieces(const std::filesystem::path& file, std::string_view what, std::size_t piece_bytes,
                  const std::function<void(std::string_view)>& take);
 
-/// Writes the bytes to a temporary file beside `file`, fsyncs, renames it to `file` and fsyncs the folder: readers see the old content
+/// Writes the bytes to a temporary file next to `file`, fsyncs, renames it to `file` and fsyncs the folder: readers see the old content
 /// or the new. The temporary file has no name until it is whole, where the file system can do that (not on NFS): a process that is ended in
 /// the middle leaves nothing. Throws SystemError when the disk refuses; nothing is left behind then.
 void write_file(const std::filesystem::path& file, std::string_view bytes);

@@ -1,7 +1,7 @@
 // Method:     The least of what machine and control groups say, from the group of this process up to the root.
 // Source:     Linux sched_getaffinity(2), getrlimit(2), proc(5) (meminfo, self/cgroup, self/status),
-// Documentation/admin-guide/cgroup-v2.rst (cpu.max, memory.max),
-//             cgroup-v1/memory.rst, scheduler/sched-bwc.rst (cpu.cfs_quota_us).
+//             Documentation/admin-guide/cgroup-v2.rst (cpu.max, memory.max), cgroup-v1/memory.rst, scheduler/sched-bwc.rst
+//             (cpu.cfs_quota_us).
 // Deviations: none.
 #include "runtime/base/host.hpp"
 
@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <limits>
@@ -31,16 +32,20 @@ std::optional<double> read_number(const std::string& file) {
   return std::nullopt;
 }
 
-/// The number after `name` in a file of lines "name number"; 0 when it is not there.
-double read_entry(const std::string& file, const std::string& name) {
+/// The numbers after `names` in a file of lines "name number"; 0 for those that are not there.
+template <std::size_t n>
+std::array<double, n> read_entries(const std::string& file, const std::array<const char*, n>& names) {
+  std::array<double, n> values{};
   std::ifstream stream(file);
   std::string word;
   double value = 0.0;
   for (std::string line; std::getline(stream, line);) {
     std::istringstream fields(line);
-    if (fields >> word >> value && word == name) return value;
+    if (!(fields >> word >> value)) continue;
+    for (std::size_t i = 0; i < n; ++i)
+      if (word == names[i]) values[i] = value;
   }
-  return 0.0;
+  return values;
 }
 
 /// The folders of this process's group and of those above it; `controller` "" is version 2.
@@ -86,29 +91,30 @@ int find_cores() {
 /// Lessens total and available by what the groups allow.
 void heed_groups(bool is_v2, double& total, double& available) {
   for (const std::string& group : find_groups(is_v2 ? "" : "memory")) {
-    const double most = read_number(group + (is_v2 ? "/memory.max" : "/memory.limit_in_bytes")).value_or(kUnlimited);
-    if (most >= kUnlimited) continue;
+    const double max = read_number(group + (is_v2 ? "/memory.max" : "/memory.limit_in_bytes")).value_or(kUnlimited);
+    if (max >= kUnlimited) continue;
     const double used = read_number(group + (is_v2 ? "/memory.current" : "/memory.usage_in_bytes")).value_or(0.0);
-    const double cached = read_entry(group + "/memory.stat", is_v2 ? "inactive_file" : "total_inactive_file");
-    total = std::min(total, most);
-    available = std::min(available, std::max(most - used + cached, 0.0));
+    const auto [cached] = read_entries<1>(group + "/memory.stat", {is_v2 ? "inactive_file" : "total_inactive_file"});
+    total = std::min(total, max);
+    available = std::min(available, std::max(max - used + cached, 0.0));
   }
 }
 
 }  // namespace
 
 Host find_host() {
-  double total = read_entry("/proc/meminfo", "MemTotal:") * 1024.0, available = read_entry("/proc/meminfo", "MemAvailable:") * 1024.0;
-  if (!(total > 0.0)) total = kUnlimited;  // it does not say
-  if (!(available > 0.0)) available = total;
+  const auto [total_kb, available_kb] = read_entries<2>("/proc/meminfo", {"MemTotal:", "MemAvailable:"});
+  double total = total_kb > 0.0 ? 1024.0 * total_kb : kUnlimited;
+  double available = available_kb > 0.0 ? 1024.0 * available_kb : total;
   heed_groups(true, total, available);
   heed_groups(false, total, available);
   return {find_cores(), 1e-9 * total, 1e-9 * std::min(total, available)};
 }
 
 Memory find_memory() {
-  const auto read = [](const char* name) { return static_cast<std::int64_t>(read_entry("/proc/self/status", name)) * 1024; };
-  Memory memory{.address_space = read("VmSize:"), .resident = read("VmRSS:"), .peak = read("VmHWM:")};
+  const auto kb = read_entries<3>("/proc/self/status", {"VmSize:", "VmRSS:", "VmHWM:"});
+  const auto to_bytes = [](double size_kb) { return static_cast<std::int64_t>(size_kb) * 1024; };
+  Memory memory{.address_space = to_bytes(kb[0]), .resident = to_bytes(kb[1]), .peak = to_bytes(kb[2])};
   if (memory.peak > 0) return memory;
   rusage used{};  // of the process that started this one, too
   ::getrusage(RUSAGE_SELF, &used);

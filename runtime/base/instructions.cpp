@@ -1,5 +1,6 @@
 #include "runtime/base/instructions.hpp"
 
+#include <algorithm>
 #include <cstdlib>
 #include <string_view>
 
@@ -25,7 +26,7 @@ Instructions find_allowed() noexcept {
 }  // namespace
 
 Instructions find_instructions() noexcept {
-  static const Instructions instructions = find_best() < find_allowed() ? find_best() : find_allowed();
+  static const Instructions instructions = std::min(find_best(), find_allowed());
   return instructions;
 }
 

@@ -28,9 +28,9 @@ Character decode(std::string_view text) {
     if ((next & 0xC0U) != 0x80U) return {};
     code = code << 6U | (next & 0x3FU);
   }
-  constexpr std::array<std::uint32_t, 5> kLeast{0, 0, 0x80, 0x800, 0x10000};
+  constexpr std::array<std::uint32_t, 5> kMin{0, 0, 0x80, 0x800, 0x10000};
   const bool is_surrogate = code >= 0xD800 && code <= 0xDFFF;
-  if (code < kLeast[bytes] || is_surrogate || code > 0x10FFFF) return {};
+  if (code < kMin[bytes] || is_surrogate || code > 0x10FFFF) return {};
   return {code, bytes};
 }
 
@@ -64,5 +64,25 @@ std::string escape(std::string_view text, bool keeps_lines) {
 
 std::string printable(std::string_view text) { return escape(text, false); }
 std::string printable_lines(std::string_view text) { return escape(text, true); }
+
+std::string quote(std::string_view text) {
+  std::string out = "\"";
+  out.reserve(text.size() + 2);
+  while (!text.empty()) {
+    const auto [code, bytes] = decode(text);
+    if (bytes == 1 && (code == '"' || code == '\\')) {
+      out += '\\';
+      out += text[0];
+    } else if (bytes == 0 || !is_hidden(code)) {
+      out += text.substr(0, std::max<std::size_t>(bytes, 1));
+    } else if (code <= 0xFFFF) {
+      fmt::format_to(std::back_inserter(out), "\\u{:04x}", code);
+    } else {  // a surrogate pair
+      fmt::format_to(std::back_inserter(out), "\\u{:04x}\\u{:04x}", 0xD7C0 + (code >> 10U), 0xDC00 + (code & 0x3FFU));
+    }
+    text.remove_prefix(std::max<std::size_t>(bytes, 1));
+  }
+  return out + '"';
+}
 
 }  // namespace carillon::base

@@ -1,4 +1,4 @@
-// Text of strangers on a terminal.
+// Text of strangers on a terminal and in JSON.
 #pragma once
 
 #include <string>
@@ -13,5 +13,9 @@ std::string printable(std::string_view text);
 
 /// The same with line feeds and tabs as they are: for texts of several lines.
 std::string printable_lines(std::string_view text);
+
+/// A text as JSON writes it, in quotation marks. The characters above become \uNNNN, so that a terminal shows JSON as it is; each byte that
+/// is no UTF-8 stays as it is.
+std::string quote(std::string_view text);
 
 }  // namespace carillon::base

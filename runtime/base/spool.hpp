@@ -1,4 +1,4 @@
-// What is too long for memory and read again in the same run: a list that goes on in a file without a name.
+// What is too long for memory and read again in the same run: a list that continues in a file without a name.
 #pragma once
 
 #include <algorithm>

@@ -18,6 +18,15 @@ inline Vec3 cross(const Vec3& a, const Vec3& b) {
 }
 inline double norm(const Vec3& a) { return std::sqrt(dot(a, a)); }
 inline Vec3 normalise(const Vec3& a) { return (1.0 / norm(a)) * a; }
+/// The unit vector of the axis that n is least along; the first of several.
+inline Vec3 find_least_axis(const Vec3& n) {
+  std::size_t k = 0;
+  for (std::size_t i = 1; i < 3; ++i)
+    if (std::abs(n[i]) < std::abs(n[k])) k = i;
+  Vec3 axis{};
+  axis[k] = 1.0;
+  return axis;
+}
 /// A unit vector at right angles to n.
 inline Vec3 find_across(const Vec3& n) {
   const Vec3 axis = std::abs(n[0]) < 0.6 ? Vec3{1, 0, 0} : Vec3{0, 1, 0};

@@ -76,7 +76,7 @@ void check_joints(const WorldSpec& spec) {
   const auto is_fixed = [&](int body) { return body < 0 || spec.bodies[static_cast<std::size_t>(body)].fixed; };
   const auto check_ends = [&](const std::string& place, const char* what, int body, int to) {
     if (body < 0 || body >= count || to < -1 || to >= count) throw InputError(fmt::format("{}: a {} names no body", place, what));
-    const std::string who = describe(spec, place, what, body, to);
+    std::string who = describe(spec, place, what, body, to);
     if (body == to) throw InputError(who + " ties a body to itself; name another one, or \"world\"");
     if (is_fixed(body) && is_fixed(to)) throw InputError(who + " has nothing to hold: neither of them moves");
     return who;

@@ -6,17 +6,17 @@
 #include <limits>
 #include <vector>
 
-#include "runtime/stream/events.hpp"
+#include "runtime/events/events.hpp"
 
 namespace carillon::contact {
 
-using stream::Impulse;
+using events::Impulse;
 
 /// A rigid pose: x_world = R(q) x_body + p.
 struct Pose {
   double time_s = 0.0;
   Vec3 position_m{};                          // of the origin of the mesh frame
-  stream::Quaternion rotation{1.0, 0, 0, 0};  // unit quaternion w x y z
+  events::Quaternion rotation{1.0, 0, 0, 0};  // unit quaternion w x y z
 };
 
 /// How a world is run.
@@ -28,7 +28,7 @@ struct WorldOptions {
   bool islands = true;                                     // false: all bodies in one problem, for comparison
   bool modes = true;                                       // false: impacts do not look at modes, as if banks had none
   bool masks_hits = false;                                 // hits that are not heard after others are left out: Masks (pulses.hpp)
-  bool lasting_contacts = true;                            // false: no stream::Contact records, and none of their cost
+  bool lasting_contacts = true;                            // false: no events::LastingContact records, and none of their cost
   bool audits_energy = false;                              // Statistics::energy
 };
 
@@ -38,14 +38,14 @@ struct EnergyAudit {
   double hit_rise_j = 0.0;  // the most that a hit has added; they only take
   double kinetic_j = 0.0;   // the largest there has been
   double weight_n = 0.0;    // of all bodies that move; rise_j over it is a height
-  // Now; start = motion + modes + lost + error. What is radiated is taken from the modes by whoever plays them, and is in `lost`.
-  double start_j = 0.0;       // all there was at the beginning; gravity counts from the origin
-  double motion_j = 0.0;      // kinetic and of gravity
-  double modes_j = 0.0;       // in the modes
-  double most_modes_j = 0.0;  // the largest there has been
-  double modes_share = 0.0;   // the largest there has been, of what the motion had lost by then; above 1 modes have more than was lost
-  double lost_j = 0.0;        // by friction, in contacts, in the modes' damping
-  double error_j = 0.0;       // the largest there has been
+  // Now; start = motion + modes + lost + error. What is radiated is taken from the modes by the player, and is in `lost`.
+  double start_j = 0.0;      // all there was at the beginning; gravity counts from the origin
+  double motion_j = 0.0;     // kinetic and of gravity
+  double modes_j = 0.0;      // in the modes
+  double max_modes_j = 0.0;  // the largest there has been
+  double modes_share = 0.0;  // the largest there has been, of what the motion had lost by then; above 1 modes have more than was lost
+  double lost_j = 0.0;       // by friction, in contacts, in the modes' damping
+  double error_j = 0.0;      // the largest there has been
 };
 
 /// What a world has cost so far.

@@ -107,7 +107,7 @@ double LastingContacts::calc_impedance(int body, double patch_m) const {
   return std::sqrt(modulus * m.density_kg_m3) * std::numbers::pi * patch_m * patch_m;
 }
 
-void LastingContacts::record(const rigid::Space& space, const Group& g, Spot& spot, std::vector<stream::Event>& events) {
+void LastingContacts::record(const rigid::Space& space, const Group& g, Spot& spot, std::vector<events::Event>& events) {
   const double time_s = space.get_time();
   const bool is_new = spot.begun_s < 0.0;
   if (is_new) {
@@ -131,13 +131,13 @@ void LastingContacts::record(const rigid::Space& space, const Group& g, Spot& sp
     const Mat3 back = transpose(rigid::make_rotation(state.rotation));
     const Spotted place =
         find_place(space.solid(body), state, g.where, (-sign) * g.normal, is_new ? -1 : spot.last[static_cast<std::size_t>(side)].triangle);
-    stream::Contact c;
+    events::LastingContact c;
     c.time_s = time_s;
     c.id = spot.id;
     c.body = body;
     c.other = other;
     c.triangle = place.triangle;
-    c.state = is_new ? stream::ContactState::kBegin : stream::ContactState::kHold;
+    c.state = is_new ? events::ContactState::kBegin : events::ContactState::kHold;
     c.barycentric = place.barycentric;
     c.normal = back * (sign * g.normal);
     c.slip_m_s = back * (sign * slip);
@@ -169,19 +169,19 @@ std::uint64_t LastingContacts::make_id(const Spot& spot) {
   return id;
 }
 
-void LastingContacts::update(const rigid::Space& space, std::vector<stream::Event>& events) {
+void LastingContacts::update(const rigid::Space& space, std::vector<events::Event>& events) {
   const double time_s = space.get_time();
   make_groups(space);
   for (const Group& g : groups_) {
     Spot* nearest = nullptr;
-    double least = 2.0 * calc_spot_radius(space, g.a, g.b);
+    double min = 2.0 * calc_spot_radius(space, g.a, g.b);
     std::vector<Spot>& spots = spots_[{g.a, g.b}];
     for (Spot& spot : spots) {
       if (spot.seen_s >= time_s) continue;
       const double distance = norm(spot.where - g.where);
-      if (distance >= least) continue;
+      if (distance >= min) continue;
       nearest = &spot;
-      least = distance;
+      min = distance;
     }
     if (nearest == nullptr) {
       Spot spot;
@@ -191,7 +191,7 @@ void LastingContacts::update(const rigid::Space& space, std::vector<stream::Even
       spot.features = g.features;
       spot.load_n = g.push_n;
       spot.quiet_s = spot.seen_s = time_s;
-      spots.push_back(std::move(spot));
+      spots.push_back(spot);
       continue;
     }
     Spot& spot = *nearest;
@@ -218,7 +218,7 @@ void LastingContacts::update(const rigid::Space& space, std::vector<stream::Even
 }
 
 /// The spots of a pair that were not seen, or lie still.
-void LastingContacts::end_or_keep(const rigid::Space& space, std::vector<Spot>& spots, std::vector<stream::Event>& events) {
+void LastingContacts::end_or_keep(const rigid::Space& space, std::vector<Spot>& spots, std::vector<events::Event>& events) {
   const double time_s = space.get_time();
   for (Spot& spot : spots) {
     // Where both lie still the contact lasts, and after one record of that nothing changes.
@@ -226,10 +226,10 @@ void LastingContacts::end_or_keep(const rigid::Space& space, std::vector<Spot>& 
     if (lies) {
       spot.seen_s = time_s;
       for (const int side : {0, 1}) {
-        stream::Contact& c = spot.last[static_cast<std::size_t>(side)];
+        events::LastingContact& c = spot.last[static_cast<std::size_t>(side)];
         if (spot.lies || spot.begun_s < 0.0 || (side == 0 ? spot.a : spot.b) < 0) continue;
         c.time_s = time_s;
-        c.state = stream::ContactState::kHold;
+        c.state = events::ContactState::kHold;
         c.slip_m_s = {};
         c.sweep_m_s = c.other_sweep_m_s = c.spin_rad_s = 0.0;
         c.force_n = spot.load_n;
@@ -240,10 +240,10 @@ void LastingContacts::end_or_keep(const rigid::Space& space, std::vector<Spot>& 
     if (lies) continue;
     if (time_s - spot.seen_s <= kGone || spot.begun_s < 0.0) continue;
     for (const int side : {0, 1}) {
-      stream::Contact c = spot.last[static_cast<std::size_t>(side)];
+      events::LastingContact c = spot.last[static_cast<std::size_t>(side)];
       if ((side == 0 ? spot.a : spot.b) < 0) continue;
       c.time_s = time_s;
-      c.state = stream::ContactState::kEnd;
+      c.state = events::ContactState::kEnd;
       c.force_n = 0.0;
       events.push_back(c);
     }

@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "runtime/events/events.hpp"
 #include "runtime/rigid/space.hpp"
-#include "runtime/stream/events.hpp"
 
 namespace carillon::contact {
 
@@ -30,13 +30,15 @@ struct Spotted {
 };
 Spotted find_place(const rigid::Solid& solid, const rigid::State& state, const Vec3& where, const Vec3& outward, std::int32_t hint = -1);
 
+/// The places where bodies touch, followed from step to step. A contact has one id, from kBegin over any number of kHold to kEnd; its
+/// records come in the order of time, and no two open contacts have the same id.
 class LastingContacts {
  public:
   /// One a body, and one for the ground at the end.
   explicit LastingContacts(std::vector<Matter> matter) : matter_(std::move(matter)) {}
 
   /// After a step: what touches now. Appends events.
-  void update(const rigid::Space& space, std::vector<stream::Event>& events);
+  void update(const rigid::Space& space, std::vector<events::Event>& events);
   /// An impact at a place: what follows there is no lasting contact for the next moments.
   void note_impact(const rigid::Space& space, int a, int b, const Vec3& where, double time_s);
 
@@ -48,7 +50,7 @@ class LastingContacts {
     Vec3 carried{};  // the velocity of the surface whose points carry
     double push_n = 0.0, curvature_per_m = 0.0;
     bool smooth = false;
-    std::uint64_t features = 0;  // tells which of them carry
+    std::uint64_t features = 0;  // which of them carry
   };
   /// A place where two bodies touch, followed while they do.
   struct Spot {
@@ -60,11 +62,11 @@ class LastingContacts {
     double quiet_s = 0.0;        // time of the first touch, or of the last impact since
     double seen_s = 0.0;         // when it last touched
     double recorded_s = 0.0;
-    double begun_s = -1.0;                // time of its first record; below 0: none yet
-    double load_n = 0.0;                  // smoothed
-    bool lies = false;                    // both bodies lie still
-    double radius_m = 0.0;                // of the Hertz contact of both surfaces there
-    std::array<stream::Contact, 2> last;  // of both bodies
+    double begun_s = -1.0;                       // time of its first record; below 0: none yet
+    double load_n = 0.0;                         // smoothed
+    bool lies = false;                           // both bodies lie still
+    double radius_m = 0.0;                       // of the Hertz contact of both surfaces there
+    std::array<events::LastingContact, 2> last;  // of both bodies
   };
 
   /// A contact that carries.
@@ -76,8 +78,8 @@ class LastingContacts {
 
   void make_groups(const rigid::Space& space);
   Group make_group(const rigid::Space& space, std::span<Carrier> carriers);
-  void record(const rigid::Space& space, const Group& group, Spot& spot, std::vector<stream::Event>& events);
-  void end_or_keep(const rigid::Space& space, std::vector<Spot>& spots, std::vector<stream::Event>& events);
+  void record(const rigid::Space& space, const Group& group, Spot& spot, std::vector<events::Event>& events);
+  void end_or_keep(const rigid::Space& space, std::vector<Spot>& spots, std::vector<events::Event>& events);
   std::uint64_t make_id(const Spot& spot);
   std::uint64_t hash_name(int body) const;
   const Matter& get_matter(int body) const { return body < 0 ? matter_.back() : matter_[static_cast<std::size_t>(body)]; }

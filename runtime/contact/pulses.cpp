@@ -36,7 +36,7 @@ double calc_inverse_mass(const rigid::Space& space, const rigid::Strike& strike,
 }
 
 void add_spot(const rigid::Space& space, const rigid::Strike& strike, const std::vector<const rigid::Hit*>& hits, double touch_s,
-              double most_push, LastingContacts& lasting, Masks* masks, std::vector<stream::Event>& events) {
+              double max_push, LastingContacts& lasting, Masks* masks, std::vector<events::Event>& events) {
   const rigid::Hit& first = *hits.front();
   Vec3 impulse{}, where{}, normal{};
   double push = 0.0, approach = 0.0, curvature = 0.0;
@@ -54,14 +54,14 @@ void add_spot(const rigid::Space& space, const rigid::Strike& strike, const std:
   const double inverse_mass =
       first.linked_mass_kg > 0.0 ? 1.0 / first.linked_mass_kg : calc_inverse_mass(space, strike, first, where, normal);
   // A resting spot that the impact elsewhere hardly moved, or next to nothing of what sounds at the same instant.
-  if (!(inverse_mass > 0.0) || push * inverse_mass < 0.2 * kSlowest || push < kMasked * most_push) return;
+  if (!(inverse_mass > 0.0) || push * inverse_mass < 0.2 * kSlowest || push < kMasked * max_push) return;
   const double speed = approach > kSlowest ? approach : push * inverse_mass;
   const double mass = std::min(push / ((1.0 + first.restitution) * speed), 1.0 / inverse_mass);
   lasting.note_impact(space, first.a, first.b, where, strike.time_s);
   rigid::Hit mean = first;
   mean.touch.curvature_a_per_m = curvature / push;
   mean.touch.curvature_b_per_m = 0.0;
-  stream::Impulse pulse;
+  events::Impulse pulse;
   pulse.duration_s = space.calc_contact_time(mean, mass, speed);
   pulse.time_s = touch_s + 0.5 * pulse.duration_s;
   for (const int side : {0, 1}) {
@@ -97,13 +97,13 @@ bool Masks::take(int body, double time_s, double impulse_n_s, double duration_s)
 }
 
 void add_pulses(const rigid::Space& space, const rigid::Strike& strike, LastingContacts& lasting, Masks* masks,
-                std::vector<stream::Event>& events) {
+                std::vector<events::Event>& events) {
   std::vector<const rigid::Hit*> order;
   for (const rigid::Hit& hit : strike.hits)
     if (!hit.is_cord && dot(hit.impulse, hit.touch.normal) > 0.0) order.push_back(&hit);
   std::stable_sort(order.begin(), order.end(),
                    [](const auto* x, const auto* y) { return dot(x->impulse, x->impulse) > dot(y->impulse, y->impulse); });
-  const double most_push = order.empty() ? 0.0 : norm(order.front()->impulse);
+  const double max_push = order.empty() ? 0.0 : norm(order.front()->impulse);
   std::vector<char> taken(order.size(), 0);
   for (std::size_t seed = 0; seed < order.size(); ++seed) {
     if (taken[seed]) continue;
@@ -117,7 +117,7 @@ void add_pulses(const rigid::Space& space, const rigid::Strike& strike, LastingC
       spot.push_back(&hit);
       wait_s = std::min(wait_s, hit.approach_m_s > kSlowest ? hit.touch.gap_m / hit.approach_m_s : 0.0);
     }
-    add_spot(space, strike, spot, strike.time_s + std::clamp(wait_s, -rigid::kTogether, strike.together_s), most_push, lasting, masks,
+    add_spot(space, strike, spot, strike.time_s + std::clamp(wait_s, -rigid::kTogether, strike.together_s), max_push, lasting, masks,
              events);
   }
 }

@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "runtime/contact/lasting.hpp"
+#include "runtime/events/events.hpp"
 #include "runtime/rigid/space.hpp"
-#include "runtime/stream/events.hpp"
 
 namespace carillon::contact {
 
@@ -26,8 +26,8 @@ class Masks {
 };
 
 /// Gathers the points of an impact into spots, strongest first, and appends one pulse a spot and body; with masks only
-/// where it is heard. `lasting` is told of it.
+/// where it is heard. `lasting` is notified of it.
 void add_pulses(const rigid::Space& space, const rigid::Strike& strike, LastingContacts& lasting, Masks* masks,
-                std::vector<stream::Event>& events);
+                std::vector<events::Event>& events);
 
 }  // namespace carillon::contact

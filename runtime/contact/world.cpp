@@ -10,7 +10,7 @@
 #include <utility>
 #include <variant>
 
-#include "runtime/base/cpu_clock.hpp"
+#include "runtime/base/clock.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/contact/check.hpp"
 #include "runtime/contact/lasting.hpp"
@@ -99,7 +99,7 @@ void add_stops(const JointSpec& j, const std::vector<rigid::Solid>& solids, cons
     stop.lever_b = get_turn(b) * lever;
     stop.arm_m = arm;
     stop.is_lower = is_lower;
-    stop.most = turned ? -(*j.limits)[is_lower ? 1 : 0] : (*j.limits)[is_lower ? 0 : 1];
+    stop.max = turned ? -(*j.limits)[is_lower ? 1 : 0] : (*j.limits)[is_lower ? 0 : 1];
     links.cords.push_back({.a = a, .b = b, .restitution = j.stop_restitution, .stop = stop});
   }
 }
@@ -222,7 +222,7 @@ class World::Course {
   int count() const { return static_cast<int>(space_.states().size()); }
   bool is_over() const { return options_.end_s - reached_s_ <= kShortest; }
 
-  stream::Motion make_motion(int body, const rigid::State& state, double time_s) const {
+  events::BodyMotion make_motion(int body, const rigid::State& state, double time_s) const {
     return {time_s, body, state.centre, state.velocity, state.rotation};
   }
 
@@ -285,7 +285,7 @@ class World::Course {
         for (const Vec3& impulse : impulses) given = given + impulse;
         masks_->take(body, forces.time_s, norm(given), forces.step_s * static_cast<double>(impulses.size()));
       }
-      stream::Force first;
+      events::Force first;
       first.time_s = forces.time_s;
       first.step_s = forces.step_s;
       first.body = body;
@@ -293,7 +293,7 @@ class World::Course {
       first.triangle = place.triangle;
       first.barycentric = place.barycentric;
       first.continues = forces.continues;
-      stream::split_force(first, impulses, [&](const stream::Force& force) { events_.push_back(force); });
+      events::split_force(first, impulses, [&](const events::Force& force) { events_.push_back(force); });
     }
   }
 
@@ -306,13 +306,13 @@ class World::Course {
     if (!has_books_) energy_.start_j = now, has_books_ = true;
     energy_.motion_j = books.motion_j;
     energy_.modes_j = books.modes_j;
-    energy_.most_modes_j = std::max(energy_.most_modes_j, books.modes_j);
+    energy_.max_modes_j = std::max(energy_.max_modes_j, books.modes_j);
     if (books.modes_j > 0.0) energy_.modes_share = std::max(energy_.modes_share, books.modes_j / (energy_.start_j - books.motion_j));
     energy_.lost_j = books.lost_j;
     energy_.error_j = std::max(energy_.error_j, std::abs(now + books.lost_j - energy_.start_j));
-    energy_.rise_j = std::max(energy_.rise_j, now + taken_j_ - least_j_);
+    energy_.rise_j = std::max(energy_.rise_j, now + taken_j_ - min_j_);
     energy_.kinetic_j = std::max(energy_.kinetic_j, kinetic);
-    least_j_ = std::min(least_j_, now + taken_j_);
+    min_j_ = std::min(min_j_, now + taken_j_);
   }
 
   /// What is earlier than any that may still come, in order of time; a Mark at the end.
@@ -320,7 +320,7 @@ class World::Course {
     const double mark_s = is_over() ? options_.end_s : std::max(0.0, reached_s_ - kEarliest);
     // Events are large: their order is found by times and places alone.
     order_.clear();
-    for (std::size_t n = 0; n < events_.size(); ++n) order_.emplace_back(stream::get_time_s(events_[n]), n);
+    for (std::size_t n = 0; n < events_.size(); ++n) order_.emplace_back(events::get_time_s(events_[n]), n);
     std::sort(order_.begin(), order_.end());
     later_.clear();
     for (const auto& [time_s, n] : order_) {
@@ -330,7 +330,7 @@ class World::Course {
         later_.push_back(events_[n]);
     }
     events_.swap(later_);
-    sink(stream::Mark{mark_s});
+    sink(events::TimeWatermark{mark_s});
   }
 
   std::vector<std::vector<int>> find_near() const;
@@ -341,15 +341,15 @@ class World::Course {
   rigid::Space space_;
   LastingContacts lasting_;
   std::optional<Masks> masks_;
-  std::vector<stream::Event> events_, later_;  // of this window; of those, what is not told yet
+  std::vector<events::Event> events_, later_;  // of this window; of those, what is not reported yet
   std::vector<std::pair<double, std::size_t>> order_;
   std::vector<char> still_;
   bool begun_ = false;
   double reached_s_ = 0.0, seconds_cpu_ = 0.0;
   EnergyAudit energy_;
   bool has_books_ = false;
-  double taken_j_ = 0.0;                                      // by hits
-  double least_j_ = std::numeric_limits<double>::infinity();  // energy there has been, with what hits took
+  double taken_j_ = 0.0;                                    // by hits
+  double min_j_ = std::numeric_limits<double>::infinity();  // energy there has been, with what hits took
 };
 
 /// Which bodies each body shares some of its box with; of a pair, only the later one, and none of two that are fixed. In order.
@@ -466,7 +466,7 @@ std::vector<std::string> ask_about_links(const WorldSpec& spec) {
   return questions;
 }
 
-Pose calc_pose(const stream::Motion& motion, const Vec3& c) {
+Pose calc_pose(const events::BodyMotion& motion, const Vec3& c) {
   const auto& q = motion.rotation;
   const Vec3 u{q[1], q[2], q[3]};
   const Vec3 t = cross(u, c), s = cross(u, t);
@@ -475,14 +475,14 @@ Pose calc_pose(const stream::Motion& motion, const Vec3& c) {
   return pose;
 }
 
-Simulation collect(const std::vector<stream::Event>& events, const std::vector<Vec3>& centres_m) {
+Simulation collect(const std::vector<events::Event>& events, const std::vector<Vec3>& centres_m) {
   Simulation all;
   all.poses.resize(centres_m.size());
   const auto is_known = [&](std::int32_t body) { return body >= 0 && static_cast<std::size_t>(body) < centres_m.size(); };
-  for (const stream::Event& event : events) {
+  for (const events::Event& event : events) {
     if (const auto* impulse = std::get_if<Impulse>(&event); impulse != nullptr && is_known(impulse->body)) {
       all.impulses.push_back(*impulse);
-    } else if (const auto* motion = std::get_if<stream::Motion>(&event); motion != nullptr && is_known(motion->body)) {
+    } else if (const auto* motion = std::get_if<events::BodyMotion>(&event); motion != nullptr && is_known(motion->body)) {
       const auto body = static_cast<std::size_t>(motion->body);
       auto& path = all.poses[body];
       if (!path.empty() && path.back().time_s >= motion->time_s) continue;  // after an impact it is where it was before
@@ -498,11 +498,11 @@ Simulation simulate(const WorldSpec& spec, double duration_s, const std::functio
   if (!(duration_s >= 0.0 && std::isfinite(duration_s)))
     throw InputError(fmt::format("the duration {} s must be a finite number, 0 or more", duration_s));
   World world(spec, {.end_s = duration_s, .lasting_contacts = false});
-  std::vector<stream::Event> events;
+  std::vector<events::Event> events;
   constexpr int kParts = 100;
   for (int part = 1; part <= kParts; ++part) {
     world.advance(duration_s * part / kParts, std::numeric_limits<double>::infinity(),
-                  [&](const stream::Event& event) { events.push_back(event); });
+                  [&](const events::Event& event) { events.push_back(event); });
     if (progress) progress(static_cast<double>(part) / kParts);
   }
   std::vector<Vec3> centres_m;

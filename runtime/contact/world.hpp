@@ -24,7 +24,7 @@ struct BodySpec {
   Vec3 angular_velocity_rad_s{};     // in the world
   double restitution = 0.5;          // 0..1; a contact of two bodies takes the geometric mean of theirs
   double friction = 0.4;             // Coulomb, >= 0; a contact of two bodies takes the geometric mean of theirs
-  double roughness_m = 2e-6;         // rms height of the surface; for whoever plays the contacts, the world does not look at it
+  double roughness_m = 2e-6;         // rms height of the surface; for the player of the contacts; the world does not use it
 };
 
 /// The floor: the half space z <= height_m. It is hard ground and makes no sound of its own. Its `body` index in impulses is -1.
@@ -72,8 +72,9 @@ struct WorldSpec {
   std::vector<CordSpec> cords;
 };
 
-/// A world on its way. Bodies that cannot touch each other for the moment are integrated apart, each group with steps of its own
-/// (docs/decisions/contact.md). All of it [main-thread]: it allocates and throws.
+/// A world of bodies, ground, joints and cords, and its time. Invariant: all events up to the time that advance() returned have been passed
+/// to its sink, and none depends on how the calls divide time. Bodies that cannot touch each other for the moment are integrated apart,
+/// each group with its own steps (docs/decisions/contact.md). All of it [main-thread]: it allocates and throws.
 class World {
  public:
   /// Copies the spec; its banks must outlive the world. Throws InputError for a spec that cannot be simulated (the message names the body:
@@ -84,14 +85,14 @@ class World {
   World(World&&) noexcept;
   World& operator=(World&&) noexcept;
 
-  /// Goes on until at least `until_s` [s], or until `cpu_s` seconds of CPU are spent, which is looked at after every step; at least one
+  /// Continues until at least `until_s` [s], or until `cpu_s` seconds of CPU are spent, which is looked at after every step; at least one
   /// step is made. Returns the time reached: it lies on a grid of 2 ms, or is the end of the world. Events come to `sink` grid interval by
   /// grid interval, each in order of time and ended by a Mark: where all bodies are at 0; the impulses; the contacts that have lasted for
   /// 5 ms, each at most every 1 ms and not while its bodies lie still; where the moving bodies are at every 2 ms, and right before and
   /// right after every impact (two with one time); at the end, all again. A pulse may be centred up to half its duration beyond the Mark
   /// that follows it. The same spec gives the same bits, in whatever slices of time and CPU it is asked for. Throws SolveError when the
   /// integration breaks down.
-  using Sink = std::function<void(const stream::Event&)>;
+  using Sink = std::function<void(const events::Event&)>;
   double advance(double until_s, double cpu_s, const Sink& sink);
 
   Statistics get_statistics() const;
@@ -105,11 +106,11 @@ class World {
 std::vector<std::string> ask_about_links(const WorldSpec& spec);
 
 /// The pose of the mesh frame of a body whose centre of mass lies at `centre_m` in it: x - R(q) c.
-Pose calc_pose(const stream::Motion& motion, const Vec3& centre_m);
+Pose calc_pose(const events::BodyMotion& motion, const Vec3& centre_m);
 
 /// Puts the stream of a world together again. `centres_m[i]`: centre of mass of body i in the frame of its mesh; as many as there are
 /// bodies. Events of other bodies are left out.
-Simulation collect(const std::vector<stream::Event>& events, const std::vector<Vec3>& centres_m);
+Simulation collect(const std::vector<events::Event>& events, const std::vector<Vec3>& centres_m);
 
 /// Lets the world run from 0 to `duration_s` and returns every contact pulse and the path of every body.
 /// Two calls with the same spec give the same bits. `progress` (may be empty) is called now and then with the finished fraction, 0..1.

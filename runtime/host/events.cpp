@@ -13,7 +13,7 @@
 namespace carillon::host {
 namespace {
 
-stream::SurfaceMark mark_surface(const bank::Bank& bank) {
+events::SurfaceMark mark_surface(const bank::Bank& bank) {
   Vec3 low = bank.vertices_m.front(), high = low, sum{};
   for (const Vec3& vertex : bank.vertices_m) {
     for (std::size_t k = 0; k < 3; ++k) {
@@ -29,7 +29,7 @@ stream::SurfaceMark mark_surface(const bank::Bank& bank) {
       for (std::size_t k = 0; k < 3; ++k) sum[k] += weight / 3.0 * bank.vertices_m[static_cast<std::size_t>(corner)][k];
     }
   }
-  stream::SurfaceMark mark;
+  events::SurfaceMark mark;
   for (std::size_t k = 0; k < 3; ++k) {
     mark.size_m[k] = high[k] - low[k];
     mark.order_m[k] = sum[k] / weights;
@@ -37,8 +37,8 @@ stream::SurfaceMark mark_surface(const bank::Bank& bank) {
   return mark;
 }
 
-std::vector<stream::RecordedBody> list_bodies(const Scene& scene) {
-  std::vector<stream::RecordedBody> bodies;
+std::vector<events::RecordedBody> list_bodies(const Scene& scene) {
+  std::vector<events::RecordedBody> bodies;
   for (const SceneBody& body : scene.bodies) {
     const bank::Bank& bank = *body.spec.bank;
     bodies.push_back({body.name, static_cast<std::int64_t>(bank.triangles.size()), mark_surface(bank)});
@@ -49,11 +49,11 @@ std::vector<stream::RecordedBody> list_bodies(const Scene& scene) {
 std::string format_size(const Vec3& size_m) { return fmt::format("{:.4g} x {:.4g} x {:.4g} m", size_m[0], size_m[1], size_m[2]); }
 
 /// Where no body can move there is no physics: every body stays where the scene puts it.
-std::vector<stream::Event> make_still(const Scene& scene) {
-  std::vector<stream::Event> events;
+std::vector<events::Event> make_still(const Scene& scene) {
+  std::vector<events::Event> events;
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
     const contact::BodySpec& spec = scene.bodies[i].spec;
-    stream::Motion motion;
+    events::BodyMotion motion;
     motion.body = static_cast<std::int32_t>(i);
     motion.position_m = calc_world_point(spec.initial, spec.bank->rigid.centre_m);
     motion.rotation = spec.initial.rotation;
@@ -65,11 +65,11 @@ std::vector<stream::Event> make_still(const Scene& scene) {
 /// Puts what a world says in order of time, and strikes between it: of what happens at one time, first what the world says, as it came.
 class InOrder {
  public:
-  InOrder(std::vector<stream::Event> strikes, Events& out) : strikes_(std::move(strikes)), out_(&out) {}
+  InOrder(std::vector<events::Event> strikes, Events& out) : strikes_(std::move(strikes)), out_(&out) {}
 
-  void take(const stream::Event& event) {
-    waiting_.push({stream::get_time_s(event), order_++, event});
-    if (const auto* mark = std::get_if<stream::Mark>(&event)) release(mark->time_s);
+  void take(const events::Event& event) {
+    waiting_.push({events::get_time_s(event), order_++, event});
+    if (const auto* mark = std::get_if<events::TimeWatermark>(&event)) release(mark->time_s);
   }
   void finish() {
     release(std::numeric_limits<double>::infinity());
@@ -80,19 +80,19 @@ class InOrder {
   struct Waiting {
     double time_s = 0.0;
     std::int64_t order = 0;
-    stream::Event event;
+    events::Event event;
     bool operator>(const Waiting& other) const { return time_s != other.time_s ? time_s > other.time_s : order > other.order; }
   };
 
   /// Nothing before that time will come.
   void release(double until_s) {
     for (; !waiting_.empty() && waiting_.top().time_s < until_s; waiting_.pop()) {
-      for (; next_ < strikes_.size() && stream::get_time_s(strikes_[next_]) < waiting_.top().time_s; ++next_) out_->append(strikes_[next_]);
+      for (; next_ < strikes_.size() && events::get_time_s(strikes_[next_]) < waiting_.top().time_s; ++next_) out_->append(strikes_[next_]);
       out_->append(waiting_.top().event);
     }
   }
 
-  std::vector<stream::Event> strikes_;
+  std::vector<events::Event> strikes_;
   Events* out_;
   std::size_t next_ = 0;
   std::int64_t order_ = 0;
@@ -100,7 +100,7 @@ class InOrder {
 };
 
 void run_physics(const Scene& scene, bool has_contacts, bool audits, const std::function<void(double)>& progress, InOrder& events,
-                 Course& course) {
+                 SceneEvents& happened) {
   contact::World world(make_world(scene), {.contact_step_s = scene.quality.contact_step_s,
                                            .joint_tolerance = scene.quality.joint_tolerance,
                                            .end_s = scene.duration_s,
@@ -111,16 +111,16 @@ void run_physics(const Scene& scene, bool has_contacts, bool audits, const std::
   constexpr int kParts = 100;
   for (int part = 1; part <= kParts; ++part) {
     world.advance(scene.duration_s * part / kParts, std::numeric_limits<double>::infinity(),
-                  [&](const stream::Event& event) { events.take(event); });
+                  [&](const events::Event& event) { events.take(event); });
     if (progress) progress(static_cast<double>(part) / kParts);
   }
-  course.steps = world.get_statistics().steps;
-  course.energy = world.get_statistics().energy;
+  happened.steps = world.get_statistics().steps;
+  happened.energy = world.get_statistics().energy;
 }
 
 /// Throws InputError unless the file's bodies are the scene's.
-void check_bodies(const std::filesystem::path& file, const std::vector<stream::RecordedBody>& theirs,
-                  const std::vector<stream::RecordedBody>& ours, std::vector<std::string>& warnings) {
+void check_bodies(const std::filesystem::path& file, const std::vector<events::RecordedBody>& theirs,
+                  const std::vector<events::RecordedBody>& ours, std::vector<std::string>& warnings) {
   if (theirs.size() != ours.size()) {
     throw InputError(fmt::format("{}: is of {} bodies, and the scene has {}; play it with the scene that it was made for", file.string(),
                                  theirs.size(), ours.size()));
@@ -135,18 +135,18 @@ void check_bodies(const std::filesystem::path& file, const std::vector<stream::R
           fmt::format("{}: was made for a bank of \"{}\" with {} triangles, and the scene's has {}; use banks of the same mesh",
                       file.string(), ours[i].name, theirs[i].triangles, ours[i].triangles));
     }
-    if (theirs[i].surface && !stream::is_same_surface(*theirs[i].surface, *ours[i].surface)) {
+    if (theirs[i].surface && !events::is_same_surface(*theirs[i].surface, *ours[i].surface)) {
       const std::string were = format_size(theirs[i].surface->size_m), are = format_size(ours[i].surface->size_m);
       throw InputError(were == are
                            ? fmt::format("{}: was made for another surface of \"{}\", of the same size and number of triangles; use "
                                          "a bank of the same mesh",
                                          file.string(), ours[i].name)
                            : fmt::format("{}: was made for a body \"{}\" of {}, and the scene's bank measures {}; use a bank of the "
-                                         "same mesh and size, or record the contacts anew",
+                                         "same mesh and size, or record the contacts again",
                                          file.string(), ours[i].name, were, are));
     }
   }
-  const auto is_unmarked = [](const stream::RecordedBody& body) { return !body.surface; };
+  const auto is_unmarked = [](const events::RecordedBody& body) { return !body.surface; };
   if (std::any_of(theirs.begin(), theirs.end(), is_unmarked)) {
     warnings.push_back(fmt::format(
         "{}: does not say how large its bodies are (\"size_m\", \"order_m\"); that they have as many triangles as the scene's is all "
@@ -157,17 +157,17 @@ void check_bodies(const std::filesystem::path& file, const std::vector<stream::R
 
 }  // namespace
 
-Events make_events(const std::vector<stream::Event>& events) {
+Events make_events(const std::vector<events::Event>& events) {
   Events records;
   records.append(std::span(events));
   return records;
 }
 
-void write_recording(const Course& course, const std::function<void(std::string_view)>& sink) {
+void write_recording(const SceneEvents& happened, const std::function<void(std::string_view)>& sink) {
   constexpr std::size_t kPiece = 1 << 16;
-  std::string text = stream::format_header(course.bodies, course.events.size());
-  course.events.for_each([&](const stream::Event& event) {
-    stream::append_line(text, event);
+  std::string text = events::format_header(happened.bodies, happened.events.size());
+  happened.events.for_each([&](const events::Event& event) {
+    events::append_line(text, event);
     if (text.size() < kPiece) return;
     sink(text);
     text.clear();
@@ -178,15 +178,15 @@ void write_recording(const Course& course, const std::function<void(std::string_
 Tally count_impulses(const Events& events, std::size_t bodies) {
   Tally tally;
   tally.body_impulses.assign(bodies, 0);
-  events.for_each([&](const stream::Event& event) {
+  events.for_each([&](const events::Event& event) {
     const auto count = [&](std::int32_t body, std::int32_t other) {
       if (body < 0 || static_cast<std::size_t>(body) >= bodies) return;
       ++tally.impulses;
       ++tally.body_impulses[static_cast<std::size_t>(body)];
       if (other < 0 || body < other) ++tally.contacts;
     };
-    if (const auto* impulse = std::get_if<stream::Impulse>(&event)) count(impulse->body, impulse->other);
-    if (const auto* force = std::get_if<stream::Force>(&event); force != nullptr && !force->continues) count(force->body, force->other);
+    if (const auto* impulse = std::get_if<events::Impulse>(&event)) count(impulse->body, impulse->other);
+    if (const auto* force = std::get_if<events::Force>(&event); force != nullptr && !force->continues) count(force->body, force->other);
   });
   return tally;
 }
@@ -205,20 +205,20 @@ contact::WorldSpec make_world(const Scene& scene) {
   return spec;
 }
 
-Course simulate(const Scene& scene, bool has_contacts, bool audits, const std::function<void(double)>& progress, base::Spool spool) {
-  Course course{.bodies = list_bodies(scene), .events = Events(std::move(spool))};
+SceneEvents simulate(const Scene& scene, bool has_contacts, bool audits, const std::function<void(double)>& progress, base::Spool spool) {
+  SceneEvents happened{.bodies = list_bodies(scene), .events = Events(std::move(spool))};
   std::vector<const bank::Bank*> banks;
   for (const SceneBody& body : scene.bodies) banks.push_back(body.spec.bank);
   Strikes strikes = make_strikes(scene, banks);  // they are refused before the physics, if at all
-  course.blows = std::move(strikes.blows);
-  course.warnings = std::move(strikes.warnings);
-  InOrder events(std::move(strikes.events), course.events);
+  happened.blows = std::move(strikes.blows);
+  happened.warnings = std::move(strikes.warnings);
+  InOrder events(std::move(strikes.events), happened.events);
   if (!has_physics(scene)) {
-    for (const stream::Event& event : make_still(scene)) events.take(event);
+    for (const events::Event& event : make_still(scene)) events.take(event);
   } else {
     try {
-      for (std::string& question : contact::ask_about_links(make_world(scene))) course.warnings.push_back(std::move(question));
-      run_physics(scene, has_contacts, audits, progress, events, course);
+      for (std::string& question : contact::ask_about_links(make_world(scene))) happened.warnings.push_back(std::move(question));
+      run_physics(scene, has_contacts, audits, progress, events, happened);
     } catch (const InputError& error) {
       if (std::string_view(error.what()).starts_with(scene.file.string() + ":")) throw;  // of a key, with its line
       throw InputError(fmt::format("{}: {}", scene.file.string(), error.what()));
@@ -227,15 +227,15 @@ Course simulate(const Scene& scene, bool has_contacts, bool audits, const std::f
     }
   }
   events.finish();
-  return course;
+  return happened;
 }
 
-Course read_course(const std::filesystem::path& file, const Scene& scene, base::Spool spool) {
-  Course course{.bodies = list_bodies(scene), .events = Events(std::move(spool))};
-  (void)stream::read_recording(
-      file, [&](const stream::Event& event) { course.events.append(event); },
-      [&](const std::vector<stream::RecordedBody>& theirs) { check_bodies(file, theirs, course.bodies, course.warnings); });
-  return course;
+SceneEvents read_scene_events(const std::filesystem::path& file, const Scene& scene, base::Spool spool) {
+  SceneEvents happened{.bodies = list_bodies(scene), .events = Events(std::move(spool))};
+  (void)events::read_recording(
+      file, [&](const events::Event& event) { happened.events.append(event); },
+      [&](const std::vector<events::RecordedBody>& theirs) { check_bodies(file, theirs, happened.bodies, happened.warnings); });
+  return happened;
 }
 
 }  // namespace carillon::host

@@ -9,22 +9,22 @@
 #include <vector>
 
 #include "runtime/base/spool.hpp"
+#include "runtime/events/file.hpp"
 #include "runtime/host/mallets.hpp"
 #include "runtime/host/scene.hpp"
-#include "runtime/stream/file.hpp"
 
 namespace carillon::host {
 
 /// What happens, in order of time, however much it is.
-using Events = base::Records<stream::Event>;
+using Events = base::Records<events::Event>;
 
 /// A list as events, for scenes that are made by hand.
-Events make_events(const std::vector<stream::Event>& events);
+Events make_events(const std::vector<events::Event>& events);
 
 /// Everything that happens in a scene. The bodies are those of the scene, in its order. Events of a contacts file stay in the order of the
 /// file.
-struct Course {
-  std::vector<stream::RecordedBody> bodies;
+struct SceneEvents {
+  std::vector<events::RecordedBody> bodies;
   Events events;
   std::int64_t steps = 0;  // of the physics
   contact::EnergyAudit energy{};
@@ -32,10 +32,10 @@ struct Course {
   std::vector<std::string> warnings{};
 };
 
-/// The course as the text of a contacts file, in pieces, in order.
-void write_recording(const Course& course, const std::function<void(std::string_view)>& sink);
+/// The events as the text of a contacts file, in pieces, in order.
+void write_recording(const SceneEvents& happened, const std::function<void(std::string_view)>& sink);
 
-/// How many impulses bodies get; a pulse of several stream::Forces is one.
+/// How many impulses bodies get; a pulse of several events::Forces is one.
 struct Tally {
   std::vector<std::int64_t> body_impulses;  // per body
   std::int64_t impulses = 0;
@@ -52,12 +52,12 @@ contact::WorldSpec make_world(const Scene& scene);
 /// Runs the physics, if any body can move, and adds the strikes. Every body's spec has its bank. `has_contacts`: with records of contacts
 /// that last; `audits`: with the books of energy. `progress` (may be empty) is called with the finished fraction. `spool` takes the events.
 /// Throws InputError and SolveError, which name the scene.
-Course simulate(const Scene& scene, bool has_contacts, bool audits, const std::function<void(double)>& progress,
-                base::Spool spool = base::Spool());
+SceneEvents simulate(const Scene& scene, bool has_contacts, bool audits, const std::function<void(double)>& progress,
+                     base::Spool spool = base::Spool());
 
 /// The events of a contacts file. Throws InputError when it is none, or was made for other bodies than the scene's: as many, of the same
 /// names, with the same surface in their banks, in the same order. A file that does not say which surfaces it was made for is compared by
 /// their numbers of triangles, with a warning.
-Course read_course(const std::filesystem::path& file, const Scene& scene, base::Spool spool = base::Spool());
+SceneEvents read_scene_events(const std::filesystem::path& file, const Scene& scene, base::Spool spool = base::Spool());
 
 }  // namespace carillon::host

@@ -1,7 +1,6 @@
 // Method:     an impact of runtime/impact in the frame of the mesh: the head is a body without spin or modes, what it strikes a body with
-// the
-//             bank's modes, and its mass and inertia unless it is fixed. Springs: Hertz of head and body, or the felt's power law. Forces
-//             go out as samples.
+//             the bank's modes, and its mass and inertia unless it is fixed. Springs: Hertz of head and body, or the felt's power law.
+//             Forces go out as samples.
 // Source:     runtime/impact/impact.hpp; docs/equations.md E5a.
 // Deviations: the struck surface is taken as flat within the head's contact. A body that moves is struck as if it did not: speeds are
 //             relative to it.
@@ -12,6 +11,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <utility>
 
@@ -21,9 +21,9 @@
 namespace carillon::host {
 namespace {
 
-constexpr double kLongestS = 1.0;      // of one blow, and of what overlaps with it
-constexpr double kLeastCosine = 0.05;  // of the way to the surface: flatter is past it
-constexpr double kDeepM = 0.05;        // that a felt goes in
+constexpr double kLongestS = 1.0;    // of one blow, and of what overlaps with it
+constexpr double kMinCosine = 0.05;  // of the way to the surface: flatter is past it
+constexpr double kDeepM = 0.05;      // that a felt goes in
 
 double calc_energy(double mass_kg, const Vec3& v) { return 0.5 * mass_kg * dot(v, v); }
 
@@ -74,7 +74,7 @@ Head make_head(const Mallets::Strike& strike, const bank::Bank& bank, int index)
   const Mallet& mallet = *strike.from->mallet;
   Head head{.strike = &strike, .spot = find_spot(bank, strike.triangle, strike.barycentric)};
   const double towards = -dot(head.spot.normal, strike.velocity_m_s), speed = norm(strike.velocity_m_s);
-  if (!(towards > kLeastCosine * speed)) {
+  if (!(towards > kMinCosine * speed)) {
     throw InputError(
         fmt::format("{}: the mallet does not move towards the surface, whose normal there is [{:.4g}, {:.4g}, {:.4g}]; turn "
                     "\"direction\" round, or leave it out",
@@ -103,9 +103,72 @@ double calc_rigid_energy(const impact::Body& body) {
   return calc_energy(body.mass_kg, body.velocity_m_s) + 0.5 * dot(body.spin_rad_s, body.inertia_kg_m2 * body.spin_rad_s);
 }
 
+std::span<const double> find_shape(const Head& head, const impact::Modes* modes) {
+  return modes != nullptr ? std::span<const double>(head.spot.shape) : std::span<const double>();
+}
+
+/// Lets the impact run to its end. A blow that comes meanwhile joins it: its head is so far away as it flies until its time. `next`: of the
+/// strikes, sorted by time. False when a head still presses after kLongestS.
+bool run_to_end(impact::Impact& impact, std::vector<Head>& heads, const std::vector<Mallets::Strike>& strikes, std::size_t& next,
+                const bank::Bank& bank, const impact::Modes* modes) {
+  const double begin_s = heads[0].strike->from->time_s;
+  while (true) {
+    const double until_s = next < strikes.size() ? strikes[next].from->time_s - begin_s : kLongestS;
+    const bool ended = impact.advance(std::min(until_s - impact.get_step_length(), kLongestS));
+    if (ended || next == strikes.size() || until_s > kLongestS) return ended;
+    Head head = make_head(strikes[next++], bank, static_cast<int>(heads.size()) + 1);
+    head.contact.gap_m = std::max(0.0, until_s - impact.get_time()) * -dot(head.spot.normal, head.body.velocity_m_s);
+    head.contact.shape_b = find_shape(head, modes);
+    (void)impact.join(head.body);
+    impact.join(head.contact);
+    heads.push_back(std::move(head));
+  }
+}
+
+/// What came of the blow of one head; `after`: the bodies of the impact, the struck one first.
+Blow make_blow(const std::string& body, const impact::Impact& impact, const std::vector<Head>& heads, std::size_t i,
+               const std::vector<impact::Body>& after, std::vector<std::string>& warnings) {
+  const Head& head = heads[i];
+  const double came_m_s = -dot(head.spot.normal, head.body.velocity_m_s);
+  const impact::ElasticPulse pulse = impact::calc_elastic_pulse(head.contact.spring, head.body.mass_kg, came_m_s);
+  const Mallet& mallet = *head.strike->from->mallet;
+  if (const double deep_m = mallet.felt ? kDeepM : mallet.radius_m; pulse.compression_m > deep_m) {
+    warnings.push_back(fmt::format("{}: on something rigid the head would be pressed in by {:.3g} m; make it stiffer, lighter or slower",
+                                   head.strike->from->place, pulse.compression_m));
+  }
+  return {.body = body,
+          .time_s = head.strike->from->time_s,
+          .impulse_n_s = impact.get_impulse(static_cast<int>(i)),
+          .restitution = calc_parting(after[i + 1], after[0], head.spot) / came_m_s,
+          .before_j = calc_rigid_energy(head.body),
+          .after_j = calc_rigid_energy(after[i + 1]),
+          .together = static_cast<int>(heads.size())};
+}
+
+/// The forces of the impact as events, and what they say of the blows, one for each head.
+void add_forces(impact::Impact& impact, const std::vector<Head>& heads, std::span<Blow> blows, std::vector<events::Event>& events) {
+  for (const impact::Pulse& pulse : impact.take_pulses()) {
+    const Head& head = heads[static_cast<std::size_t>(pulse.contact)];
+    Blow& blow = blows[static_cast<std::size_t>(pulse.contact)];
+    std::vector<Vec3> impulses;
+    for (const Vec3& j : pulse.impulse_n_s) {
+      impulses.push_back(-1.0 * j);
+      blow.peak_n = std::max(blow.peak_n, dot(j, head.spot.normal) / pulse.step_s);
+    }
+    const double start_s = heads[0].strike->from->time_s + pulse.start_s;
+    blow.contact_s = start_s + static_cast<double>(impulses.size()) * pulse.step_s - head.strike->from->time_s;
+    events::split_force({.time_s = start_s,
+                         .step_s = pulse.step_s,
+                         .body = static_cast<std::int32_t>(head.strike->body),
+                         .triangle = head.strike->triangle,
+                         .barycentric = head.strike->barycentric},
+                        impulses, [&](const events::Force& piece) { events.emplace_back(piece); });
+  }
+}
+
 }  // namespace
 
-void Mallets::play(const SceneBody& body, const bank::Bank& bank, std::vector<Strike> strikes, std::vector<stream::Event>& events,
+void Mallets::play(const SceneBody& body, const bank::Bank& bank, std::vector<Strike> strikes, std::vector<events::Event>& events,
                    std::vector<Blow>& blows, std::vector<std::string>& warnings) {
   std::stable_sort(strikes.begin(), strikes.end(), [](const Strike& a, const Strike& b) { return a.from->time_s < b.from->time_s; });
   const impact::Modes* modes = modes_.find(bank).get();
@@ -122,66 +185,20 @@ void Mallets::play(const SceneBody& body, const bank::Bank& bank, std::vector<St
       struck.q_dot = q_dot;
     }
     const double rang_j = q.empty() ? 0.0 : modes->calc_energy(q, q_dot);
-    heads[0].contact.shape_b = modes != nullptr ? std::span<const double>(heads[0].spot.shape) : std::span<const double>();
+    heads[0].contact.shape_b = find_shape(heads[0], modes);
     impact::Impact impact({struck, heads[0].body}, {heads[0].contact});
-    bool ended = false;
-    while (true) {
-      const double until_s = next < strikes.size() ? strikes[next].from->time_s - begin_s : kLongestS;
-      ended = impact.advance(std::min(until_s - impact.get_step_length(), kLongestS));
-      if (ended || next == strikes.size() || until_s > kLongestS) break;
-      // Another comes meanwhile: it is so far away as it flies until its time.
-      Head head = make_head(strikes[next++], bank, static_cast<int>(heads.size()) + 1);
-      head.contact.gap_m = std::max(0.0, until_s - impact.get_time()) * -dot(head.spot.normal, head.body.velocity_m_s);
-      head.contact.shape_b = modes != nullptr ? std::span<const double>(head.spot.shape) : std::span<const double>();
-      (void)impact.join(head.body);
-      impact.join(head.contact);
-      heads.push_back(std::move(head));
-    }
-    if (!ended) {
+    if (!run_to_end(impact, heads, strikes, next, bank, modes)) {
       warnings.push_back(fmt::format("{}: the mallet still presses on \"{}\" after {:g} s; the rest is left out",
                                      heads[0].strike->from->place, body.name, kLongestS));
     }
     const std::vector<impact::Body> after = impact.get_bodies();
     const impact::Books books = impact.get_books();
     const std::size_t first = blows.size();
-    for (std::size_t i = 0; i < heads.size(); ++i) {
-      const Head& head = heads[i];
-      const double came = -dot(head.spot.normal, head.body.velocity_m_s);
-      blows.push_back({.body = body.name,
-                       .time_s = head.strike->from->time_s,
-                       .impulse_n_s = impact.get_impulse(static_cast<int>(i)),
-                       .restitution = calc_parting(after[i + 1], after[0], head.spot) / came,
-                       .before_j = calc_rigid_energy(head.body),
-                       .after_j = calc_rigid_energy(after[i + 1]),
-                       .together = static_cast<int>(heads.size())});
-      const impact::ElasticPulse pulse = impact::calc_elastic_pulse(head.contact.spring, head.body.mass_kg, came);
-      const Mallet& mallet = *head.strike->from->mallet;
-      if (const double deep_m = mallet.felt ? kDeepM : mallet.radius_m; pulse.compression_m > deep_m) {
-        warnings.push_back(
-            fmt::format("{}: on something rigid the head would be pressed in by {:.3g} m; make it stiffer, lighter or slower",
-                        head.strike->from->place, pulse.compression_m));
-      }
-    }
+    for (std::size_t i = 0; i < heads.size(); ++i) blows.push_back(make_blow(body.name, impact, heads, i, after, warnings));
     blows[first].motion_j = calc_rigid_energy(after[0]);
     blows[first].modes_j = books.modal - rang_j;
     blows[first].lost_j = books.dissipated_modes + books.dissipated_contact + books.dissipated_friction + books.above_band;
-    for (const impact::Pulse& pulse : impact.take_pulses()) {
-      const Head& head = heads[static_cast<std::size_t>(pulse.contact)];
-      Blow& blow = blows[first + static_cast<std::size_t>(pulse.contact)];
-      std::vector<Vec3> impulses;
-      for (const Vec3& j : pulse.impulse_n_s) {
-        impulses.push_back(-1.0 * j);
-        blow.peak_n = std::max(blow.peak_n, dot(j, head.spot.normal) / pulse.step_s);
-      }
-      const double start_s = begin_s + pulse.start_s;
-      blow.contact_s = start_s + static_cast<double>(impulses.size()) * pulse.step_s - head.strike->from->time_s;
-      stream::split_force({.time_s = start_s,
-                           .step_s = pulse.step_s,
-                           .body = static_cast<std::int32_t>(head.strike->body),
-                           .triangle = head.strike->triangle,
-                           .barycentric = head.strike->barycentric},
-                          impulses, [&](const stream::Force& piece) { events.emplace_back(piece); });
-    }
+    add_forces(impact, heads, std::span(blows).subspan(first), events);
     q = after[0].q;
     q_dot = after[0].q_dot;
     state_s = begin_s + impact.get_time();

@@ -7,9 +7,9 @@
 
 #include "runtime/bank/bank.hpp"
 #include "runtime/contact/mode_sets.hpp"
+#include "runtime/events/events.hpp"
 #include "runtime/host/scene.hpp"
 #include "runtime/impact/impact.hpp"
-#include "runtime/stream/events.hpp"
 
 namespace carillon::host {
 
@@ -41,7 +41,7 @@ class Mallets {
 
   /// Strikes on one body, in any order. `bank` is the body's and outlives this. Appends the forces and what came of the blows, in order of
   /// time. Throws InputError "file:line: ..." where the head does not move towards the surface.
-  void play(const SceneBody& body, const bank::Bank& bank, std::vector<Strike> strikes, std::vector<stream::Event>& events,
+  void play(const SceneBody& body, const bank::Bank& bank, std::vector<Strike> strikes, std::vector<events::Event>& events,
             std::vector<Blow>& blows, std::vector<std::string>& warnings);
 
  private:

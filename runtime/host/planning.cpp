@@ -10,12 +10,12 @@
 
 namespace carillon::host {
 
-synth::Surface make_surface(const SceneBody& body) {
+synth::ContactSurface make_surface(const SceneBody& body) {
   return {.roughness_m = body.spec.roughness_m, .friction = body.spec.friction, .seed = base::hash_name(body.name)};
 }
 
-synth::Surface make_ground(const Scene& scene) {
-  synth::Surface surface = synth::kGroundSurface;
+synth::ContactSurface make_ground(const Scene& scene) {
+  synth::ContactSurface surface = synth::kGroundSurface;
   if (!scene.ground) return surface;
   surface.roughness_m = scene.ground->roughness_m;
   surface.friction = scene.ground->friction;
@@ -23,13 +23,13 @@ synth::Surface make_ground(const Scene& scene) {
   return surface;
 }
 
-plan::SceneFacts make_facts(const Scene& scene, const Microphones& microphones, bool moves) {
-  plan::SceneFacts facts;
+effect_selection::SceneFacts make_facts(const Scene& scene, const Microphones& microphones, bool moves) {
+  effect_selection::SceneFacts facts;
   facts.rate_hz = scene.sample_rate_hz;
   facts.duration_s = scene.duration_s;
   facts.microphones_m = microphones.offset_m;
   facts.moves = moves;
-  facts.strictness = scene.quality.planner;
+  facts.thresholds = scene.quality.thresholds;
   facts.ground = make_ground(scene);
   if (scene.microphones_m.empty()) {
     facts.listener = scene.listener.path;
@@ -45,45 +45,45 @@ plan::SceneFacts make_facts(const Scene& scene, const Microphones& microphones, 
                             .fixed = body.spec.fixed,
                             .struck = struck,
                             .position_m = calc_world_point(body.spec.initial, body.spec.bank->rigid.centre_m),
-                            .wish = body.wish,
+                            .overrides = body.overrides,
                             .surface = make_surface(body)});
   }
   return facts;
 }
 
-Plan make_plan(plan::SceneFacts facts, const Events& events, const plan::Costs& costs) {
-  // The planner may decide about what no event can change any more: a strike calls for effects half its pulse before it, and so much
+Plan make_plan(effect_selection::SceneFacts facts, const Events& events, const effect_selection::Costs& costs) {
+  // The selector may decide about what no event can change any more: a strike calls for effects half its pulse before it, and so much
   // earlier as its click takes to cross the body.
-  constexpr double kDisorderS = 1.0;  // Feed
+  constexpr double kDisorderS = 1.0;  // EventPlayback
   constexpr double kLargestCrossingS = 1.0;
   constexpr double kEveryS = 0.1;
   double longest_s = 0.0;
-  std::optional<stream::Event> first_listener;
-  events.for_each([&](const stream::Event& event) {
-    if (!first_listener && std::holds_alternative<stream::Listener>(event)) first_listener = event;
-    const auto* impulse = std::get_if<stream::Impulse>(&event);
-    if (impulse == nullptr || stream::find_fault(event) != nullptr) return;
+  std::optional<events::Event> first_listener;
+  events.for_each([&](const events::Event& event) {
+    if (!first_listener && std::holds_alternative<events::Listener>(event)) first_listener = event;
+    const auto* impulse = std::get_if<events::Impulse>(&event);
+    if (impulse == nullptr || events::find_fault(event) != nullptr) return;
     longest_s = std::max(longest_s, 0.5 * synth::calc_pulse_length(impulse->shape, impulse->duration_s));
   });
   const double behind_s = longest_s + kDisorderS + kLargestCrossingS;
-  Plan plan{.facts = facts, .planner = plan::Planner(std::move(facts), costs)};
+  Plan plan{.facts = facts, .selector = effect_selection::EffectSelector(std::move(facts), costs)};
   std::size_t switches = 0;
   const auto decide = [&](double known_s) {
-    for (plan::Change& change : plan.planner.advance(known_s)) {
+    for (effect_selection::EffectChange& change : plan.selector.advance(known_s)) {
       plan.steps.append({change.time_s, change.body, change.effects});
-      if (switches >= kMostReported) continue;
+      if (switches >= kMaxReported) continue;
       switches += change.switches.size();
       plan.changes.push_back(std::move(change));
     }
   };
-  if (first_listener) plan.planner.watch(*first_listener);  // that the listener walks holds from the beginning
+  if (first_listener) plan.selector.watch(*first_listener);  // that the listener walks holds from the beginning
   double decided_s = 0.0;
-  events.for_each([&](const stream::Event& event) {
-    if (first_listener && std::holds_alternative<stream::Listener>(event))
+  events.for_each([&](const events::Event& event) {
+    if (first_listener && std::holds_alternative<events::Listener>(event))
       first_listener.reset();  // seen
     else
-      plan.planner.watch(event);
-    const double known_s = stream::get_time_s(event) - behind_s;
+      plan.selector.watch(event);
+    const double known_s = events::get_time_s(event) - behind_s;
     if (!(known_s > decided_s + kEveryS)) return;
     decide(known_s);
     decided_s = known_s;

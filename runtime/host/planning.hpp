@@ -5,22 +5,22 @@
 #include <vector>
 
 #include "runtime/base/spool.hpp"
+#include "runtime/effect_selection/effect_selector.hpp"
+#include "runtime/events/events.hpp"
 #include "runtime/host/events.hpp"
 #include "runtime/host/microphones.hpp"
 #include "runtime/host/scene.hpp"
-#include "runtime/plan/planner.hpp"
-#include "runtime/stream/events.hpp"
 
 namespace carillon::host {
 
 /// A body and the ground as those feel them who slide on them. The seed of a body's surface comes from its name: other bodies of the scene
 /// change nothing of it.
-synth::Surface make_surface(const SceneBody& body);
-synth::Surface make_ground(const Scene& scene);
+synth::ContactSurface make_surface(const SceneBody& body);
+synth::ContactSurface make_ground(const Scene& scene);
 
 /// What is known before anything moves. Every body's spec has its bank, and the scene outlives the result. `moves`: bodies that are not
 /// fixed may move.
-plan::SceneFacts make_facts(const Scene& scene, const Microphones& microphones, bool moves);
+effect_selection::SceneFacts make_facts(const Scene& scene, const Microphones& microphones, bool moves);
 
 /// From that time on a body has these effects.
 struct PlanStep {
@@ -29,16 +29,16 @@ struct PlanStep {
   synth::EffectSet effects;
 };
 
-/// A planner that has seen all of a scene, and what it decided.
+/// A selector that has seen all of a scene, and what it decided.
 struct Plan {
-  plan::SceneFacts facts;
-  plan::Planner planner;
-  base::Records<PlanStep> steps{};      // in order of time; the first of every body at 0
-  std::vector<plan::Change> changes{};  // the same with reasons, as many as a report lists
+  effect_selection::SceneFacts facts;
+  effect_selection::EffectSelector selector;
+  base::Records<PlanStep> steps{};                        // in order of time; the first of every body at 0
+  std::vector<effect_selection::EffectChange> changes{};  // the same with reasons, as many as a report lists
 };
-inline constexpr std::size_t kMostReported = 10000;  // switches of effects
+inline constexpr std::size_t kMaxReported = 10000;  // switches of effects
 
-/// `events` as Feed takes them.
-Plan make_plan(plan::SceneFacts facts, const Events& events, const plan::Costs& costs);
+/// `events` as EventPlayback takes them.
+Plan make_plan(effect_selection::SceneFacts facts, const Events& events, const effect_selection::Costs& costs);
 
 }  // namespace carillon::host

@@ -12,10 +12,12 @@
 #include <ctime>
 #include <memory>
 
-#include "runtime/base/cpu_clock.hpp"
+#include "runtime/base/clock.hpp"
 #include "runtime/base/file.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/base/standard_output.hpp"
+#include "runtime/effect_selection/costs.hpp"
+#include "runtime/effect_selection/table.hpp"
 #include "runtime/host/banks.hpp"
 #include "runtime/host/events.hpp"
 #include "runtime/host/microphones.hpp"
@@ -25,8 +27,6 @@
 #include "runtime/host/scene.hpp"
 #include "runtime/host/sound_file.hpp"
 #include "runtime/host/spectrogram.hpp"
-#include "runtime/plan/costs.hpp"
-#include "runtime/plan/table.hpp"
 
 namespace carillon::host {
 namespace {
@@ -34,7 +34,7 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-constexpr double kMostAudibleHz = 20000.0;
+constexpr double kMaxAudibleHz = 20000.0;
 
 double get_seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -148,7 +148,7 @@ void check_outputs(const ProgramOptions& options, const Scene& scene) {
 void print_bands(std::FILE* notes, const Scene& scene, double rate_hz) {
   for (const SceneBody& body : scene.bodies) {
     const double end_hz = body.spec.bank->band_hz[1];
-    if (end_hz < std::min(kMostAudibleHz, 0.5 * rate_hz))
+    if (end_hz < std::min(kMaxAudibleHz, 0.5 * rate_hz))
       fmt::print(notes, "  {:<16} nothing above {:.5g} Hz, where its bank ends; compute one with a higher \"band_hz\" to hear more\n",
                  base::printable(body.name), end_hz);
   }
@@ -169,14 +169,14 @@ void print_summary(std::FILE* notes, const Scene& scene, const Sound& sound, con
     fmt::print(notes, "joints             {}{}, {} cords\n", scene.joints.size(), scene.joints.empty() ? "" : " (Simbody)",
                scene.cords.size());
   fmt::print(notes, "contacts           {}\n", figures.tally.contacts);
-  constexpr std::size_t kMostPrinted = 8;
-  for (std::size_t i = 0; i < std::min(figures.blows.size(), kMostPrinted); ++i) {
+  constexpr std::size_t kMaxPrinted = 8;
+  for (std::size_t i = 0; i < std::min(figures.blows.size(), kMaxPrinted); ++i) {
     const Blow& blow = figures.blows[i];
     fmt::print(notes, "mallet             at {:g} s on {}: {:.3g} ms, {:.3g} N s, {:.3g} N at most, leaves with {:.2g} of its speed\n",
                blow.time_s, base::printable(blow.body), 1e3 * blow.contact_s, blow.impulse_n_s, blow.peak_n, blow.restitution);
   }
-  if (figures.blows.size() > kMostPrinted)
-    fmt::print(notes, "mallet             and {} more (--report)\n", figures.blows.size() - kMostPrinted);
+  if (figures.blows.size() > kMaxPrinted)
+    fmt::print(notes, "mallet             and {} more (--report)\n", figures.blows.size() - kMaxPrinted);
   fmt::print(notes, "physics            {:.2f} s\n", figures.physics_s);
   fmt::print(notes, "sound              {:.2f} s for {:g} s at {} Hz\n", figures.sound_s, scene.duration_s, sound.rate_hz);
   fmt::print(notes, "real-time factor   {:.3f} (below 1 is faster than real time)\n", figures.real_time_factor);
@@ -185,11 +185,11 @@ void print_summary(std::FILE* notes, const Scene& scene, const Sound& sound, con
     fmt::print(notes, "energy of bodies   rises by {:.2g} J at most, and by {:.2g} J at a hit; the largest of motion is {:.3g} J\n",
                bodies.rise_j, bodies.hit_rise_j, bodies.kinetic_j);
     fmt::print(notes, "books              {:.4g} J = motion {:.4g} + modes {:.4g} + lost {:.4g}, to {:.2g}; modes had {:.3g} J at most\n",
-               bodies.start_j, bodies.motion_j, bodies.modes_j, bodies.lost_j, bodies.error_j, bodies.most_modes_j);
+               bodies.start_j, bodies.motion_j, bodies.modes_j, bodies.lost_j, bodies.error_j, bodies.max_modes_j);
     fmt::print(notes, "energy of modes    rises by a share of {:.2g} at most while nothing acts\n", figures.audit->modes_rise);
     fmt::print(notes, "energy books       at the start {:.4g} J; at the end, of that:\n", bodies.start_j);
     fmt::print(notes, "  motion           {:.4g} J, kinetic and of gravity\n", bodies.motion_j);
-    fmt::print(notes, "  modes            {:.4g} J, and {:.4g} J at most\n", bodies.modes_j, bodies.most_modes_j);
+    fmt::print(notes, "  modes            {:.4g} J, and {:.4g} J at most\n", bodies.modes_j, bodies.max_modes_j);
     fmt::print(notes, "  lost             {:.4g} J, by friction, in contacts and by the damping of modes\n", bodies.lost_j);
     fmt::print(notes, "  difference       {:.2g} J at most\n", bodies.error_j);
     fmt::print(notes, "  radiated         {:.4g} J of what damping takes from modes, by their radiation gains\n",
@@ -215,13 +215,14 @@ void print_warnings(const Scene& scene, const Sound& sound, const Figures& figur
     fmt::print(stderr, "warning: the gain {:g} would clip ({:.1f} dB over full scale at a peak of {:.4g} Pa); {:.4g} is used instead\n",
                *scene.output.gain_per_pa, 20.0 * std::log10(*scene.output.gain_per_pa * sound.peak_pa), sound.peak_pa, figures.gain.per_pa);
   }
-  if (sound.refused > 0) fmt::print(stderr, "warning: {} contact pulses could not be played (too many at once)\n", sound.refused);
+  if (sound.refused > 0) fmt::print(stderr, "warning: {} events could not be played: too many at once\n", sound.refused);
+  if (sound.faults > 0)
+    fmt::print(stderr, "warning: {} events could not be played: their numbers are not finite or out of range\n", sound.faults);
   if (sound.resets > 0) fmt::print(stderr, "warning: {} times a body's state was no number and was cleared\n", sound.resets);
 }
 
-}  // namespace
-
-void run(const ProgramOptions& options) {
+/// The scene with what the command line says instead of the file. Throws InputError.
+Scene prepare_scene(const ProgramOptions& options) {
   Scene scene = read_scene(options.scene);
   if (options.rate_hz) scene.sample_rate_hz = *options.rate_hz;
   if (options.format) {
@@ -231,79 +232,119 @@ void run(const ProgramOptions& options) {
   if (options.plan && (options.spectrogram || options.trajectory || options.report || options.record || !options.wav.empty())) {
     throw InputError("--plan makes no sound and writes no files; leave the options that name files away");
   }
-  const bool to_standard_output = is_standard_output(options.wav);
-  if (to_standard_output) base::check_standard_output("sound");
-  std::FILE* notes = to_standard_output ? stderr : stdout;
-  check_outputs(options, scene);
-  if (!options.plan) check_room(scene, options.wav);
-  const auto make_spool = [&](const char* what) { return base::Spool(find_spool_folder(options.wav), what); };
-  const Banks banks = read_banks(scene);
-  plan::SceneFacts facts = make_facts(scene, make_microphones(scene), options.contacts.has_value() || has_physics(scene));
-  std::vector<const bank::Bank*> body_banks;
-  for (const SceneBody& body : scene.bodies) body_banks.push_back(body.spec.bank);
+  return scene;
+}
 
-  Figures figures;
-  figures.bodies = scene.bodies.size();
-  auto started = Clock::now();
-  const double cpu_s = base::get_process_cpu_s();
-  const bool has_contacts = options.record.has_value() || plan::Planner(facts).needs_contacts();
-  const Course course = options.contacts
-                            ? read_course(*options.contacts, scene, make_spool("contacts"))
-                            : simulate(scene, has_contacts, options.audit, Progress("physics", options.quiet), make_spool("contacts"));
-  figures.physics_s = get_seconds_since(started);
-  scene.warnings.insert(scene.warnings.end(), course.warnings.begin(), course.warnings.end());
-  for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", base::printable(warning));
-  figures.physics_cpu_s = base::get_process_cpu_s() - cpu_s;
-  const bool measures = options.plan || options.report.has_value();
-  const Plan plan = make_plan(std::move(facts), course.events, measures ? plan::measure_costs() : plan::Costs{});
-  if (options.plan) {
-    fmt::print("{}", base::printable_lines(plan::format_plan(plan.planner, plan.facts)));
-    for (const SceneBody& body : scene.bodies) {
-      if (!body.mounting.text.empty()) fmt::print("{}: {}\n", base::printable(body.name), base::printable(body.mounting.text));
-      if (const std::string text = describe_limited(body); !text.empty()) fmt::print("{}: {}\n", base::printable(body.name), text);
+void print_plan(const Scene& scene, const Plan& plan) {
+  fmt::print("{}", base::printable_lines(effect_selection::format_plan(plan.selector, plan.facts)));
+  for (const SceneBody& body : scene.bodies) {
+    if (!body.mounting.text.empty()) fmt::print("{}: {}\n", base::printable(body.name), base::printable(body.mounting.text));
+    if (const std::string text = describe_limited(body); !text.empty()) fmt::print("{}: {}\n", base::printable(body.name), text);
+  }
+}
+
+/// A run of the program: a scene, what happens in it, and its sound, each made from the one before.
+class Run {
+ public:
+  explicit Run(const ProgramOptions& options) : options_(&options), scene_(prepare_scene(options)) {
+    if (is_standard_output(options.wav)) base::check_standard_output("sound");
+    check_outputs(options, scene_);
+    if (!options.plan) check_room(scene_, options.wav);
+    banks_ = read_banks(scene_);
+    for (const SceneBody& body : scene_.bodies) body_banks_.push_back(body.spec.bank);
+    figures_.bodies = scene_.bodies.size();
+  }
+
+  /// What happens, and which effects the bodies need for it.
+  Plan find_events() {
+    effect_selection::SceneFacts facts =
+        make_facts(scene_, make_microphones(scene_), options_->contacts.has_value() || has_physics(scene_));
+    const auto started = Clock::now();
+    const double cpu_s = base::get_process_cpu_s();
+    const bool has_contacts = options_->record.has_value() || effect_selection::EffectSelector(facts).needs_contacts();
+    happened_ = options_->contacts
+                    ? read_scene_events(*options_->contacts, scene_, make_spool("contacts"))
+                    : simulate(scene_, has_contacts, options_->audit, Progress("physics", options_->quiet), make_spool("contacts"));
+    figures_.physics_s = get_seconds_since(started);
+    scene_.warnings.insert(scene_.warnings.end(), happened_.warnings.begin(), happened_.warnings.end());
+    for (const std::string& warning : scene_.warnings) fmt::print(stderr, "warning: {}\n", base::printable(warning));
+    figures_.physics_cpu_s = base::get_process_cpu_s() - cpu_s;
+    figures_.tally = count_impulses(happened_.events, scene_.bodies.size());
+    figures_.physics_steps = happened_.steps;
+    figures_.blows = happened_.blows;
+    return make_plan(std::move(facts), happened_.events, measures() ? effect_selection::measure_costs() : effect_selection::Costs{});
+  }
+
+  /// Renders the sound and writes all outputs: everything is made before anything is seen.
+  void render(const Plan& plan) {
+    const auto started = Clock::now();
+    SoundStore store(scene_.sample_rate_hz, count_channels(scene_), make_spool("sound"));
+    const Sound sound = calc_sound(scene_, body_banks_, happened_.events,
+                                   {.rate_hz = scene_.sample_rate_hz,
+                                    .plan = &plan,
+                                    .measures = measures(),
+                                    .audits = options_->audit,
+                                    .fades_end = scene_.output.fade_end,
+                                    .progress = Progress("sound", options_->quiet)},
+                                   store);
+    figures_.sound_s = get_seconds_since(started);
+    if (options_->audit) figures_.audit = EnergyBooks{happened_.energy, sound.energy_rise, sound.radiated_j};
+    figures_.real_time_factor = (figures_.physics_s + figures_.sound_s) / scene_.duration_s;
+    figures_.modes = sound.modes;
+    figures_.gain = calc_gain(scene_.output, sound.peak_pa);
+    write(plan, sound, store);
+  }
+
+  const Scene& get_scene() const { return scene_; }
+
+ private:
+  bool measures() const { return options_->plan || options_->report.has_value(); }
+  base::Spool make_spool(const char* what) const { return base::Spool(find_spool_folder(options_->wav), what); }
+
+  void write(const Plan& plan, const Sound& sound, const SoundStore& store) {
+    const bool to_standard_output = is_standard_output(options_->wav);
+    std::FILE* notes = to_standard_output ? stderr : stdout;
+    Outputs outputs;
+    const auto append_to = [](base::WholeFile& file) { return [&file](std::string_view bytes) { file.append(bytes); }; };
+    if (options_->spectrogram) {
+      const std::string title =
+          fmt::format("{}: {} contacts, {} modes", scene_.file.stem().string(), figures_.tally.contacts, figures_.modes);
+      outputs.add(*options_->spectrogram, "spectrogram").append(make_spectrogram_png(store, title));
     }
-    return;
+    if (options_->trajectory) {
+      write_trajectory(scene_, body_banks_, happened_.events, make_spool("paths"),
+                       append_to(outputs.add(*options_->trajectory, "trajectory")));
+    }
+    if (options_->report) outputs.add(*options_->report, "report").append(make_report_json(scene_, sound, plan, figures_));
+    if (options_->record) write_recording(happened_, append_to(outputs.add(*options_->record, "contacts file")));
+    const auto write_sound = [&](auto&& sink) { write_wav(store, figures_.gain.per_pa, scene_.output.format, sink); };
+    if (!to_standard_output) write_sound(append_to(outputs.add(options_->wav, "sound")));
+    if (!options_->quiet) print_summary(notes, scene_, sound, figures_);
+    print_warnings(scene_, sound, figures_);
+    if (to_standard_output) {
+      std::signal(SIGPIPE, SIG_IGN);  // a reader that goes is an error with a name
+      write_sound(base::write_standard_output);
+    }
+    outputs.commit(options_->quiet ? nullptr : notes);
   }
-  figures.tally = count_impulses(course.events, scene.bodies.size());
-  figures.physics_steps = course.steps;
-  figures.blows = course.blows;
-  started = Clock::now();
-  SoundStore store(scene.sample_rate_hz, count_channels(scene), make_spool("sound"));
-  const Sound sound = calc_sound(scene, body_banks, course.events,
-                                 {.rate_hz = scene.sample_rate_hz,
-                                  .plan = &plan,
-                                  .measures = measures,
-                                  .audits = options.audit,
-                                  .fades_end = scene.output.fade_end,
-                                  .progress = Progress("sound", options.quiet)},
-                                 store);
-  figures.sound_s = get_seconds_since(started);
-  if (options.audit) figures.audit = EnergyBooks{course.energy, sound.energy_rise, sound.radiated_j};
-  figures.real_time_factor = (figures.physics_s + figures.sound_s) / scene.duration_s;
-  figures.modes = sound.modes;
-  figures.gain = calc_gain(scene.output, sound.peak_pa);
 
-  // Everything is made before anything is seen.
-  Outputs outputs;
-  const auto append_to = [](base::WholeFile& file) { return [&file](std::string_view bytes) { file.append(bytes); }; };
-  if (options.spectrogram) {
-    outputs.add(*options.spectrogram, "spectrogram")
-        .append(make_spectrogram_png(
-            store, fmt::format("{}: {} contacts, {} modes", scene.file.stem().string(), figures.tally.contacts, figures.modes)));
-  }
-  if (options.trajectory) {
-    write_trajectory(scene, body_banks, course.events, make_spool("paths"), append_to(outputs.add(*options.trajectory, "trajectory")));
-  }
-  if (options.report) outputs.add(*options.report, "report").append(make_report_json(scene, sound, plan, figures));
-  if (options.record) write_recording(course, append_to(outputs.add(*options.record, "contacts file")));
-  if (!to_standard_output) write_wav(store, figures.gain.per_pa, scene.output.format, append_to(outputs.add(options.wav, "sound")));
-  if (!options.quiet) print_summary(notes, scene, sound, figures);
-  print_warnings(scene, sound, figures);
-  if (to_standard_output) {
-    std::signal(SIGPIPE, SIG_IGN);  // a reader that goes is an error with a name
-    write_wav(store, figures.gain.per_pa, scene.output.format, base::write_standard_output);
-  }
-  outputs.commit(options.quiet ? nullptr : notes);
+  const ProgramOptions* options_;
+  Scene scene_;
+  Banks banks_;
+  std::vector<const bank::Bank*> body_banks_;
+  SceneEvents happened_;
+  Figures figures_;
+};
+
+}  // namespace
+
+void run(const ProgramOptions& options) {
+  Run run(options);
+  const Plan plan = run.find_events();
+  if (options.plan)
+    print_plan(run.get_scene(), plan);
+  else
+    run.render(plan);
 }
 
 }  // namespace carillon::host

@@ -1,24 +1,21 @@
-// Method:     the bodies of the scene in a synthesiser, which is fed with what happens period by period; what it gives first, while the
-//             sound is still in its ears' filters, is cut off.
+// Method:     the bodies of the scene in a synthesiser, to which the events are pushed block by block; its latency is cut off the
+//             beginning.
 // Source:     OCE01 (two receivers 20 cm apart or a list of them).
 // Deviations: heads do not shade; the ground does not reflect.
 #include "runtime/host/render.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
-#include <limits>
-#include <map>
 #include <memory>
 #include <numbers>
 #include <numeric>
 #include <optional>
 
-#include "runtime/base/cpu_clock.hpp"
-#include "runtime/host/feed.hpp"
+#include "runtime/base/clock.hpp"
+#include "runtime/host/event_playback.hpp"
 #include "runtime/host/microphones.hpp"
 #include "runtime/host/pose.hpp"
-#include "runtime/radiation/gains.hpp"
+#include "runtime/host/session.hpp"
 #include "runtime/synth/cpu_ticks.hpp"
 #include "runtime/synth/texture.hpp"
 
@@ -27,62 +24,65 @@ namespace {
 
 using synth::Effect;
 
-constexpr std::size_t kBlock = synth::kPeriod;
+constexpr std::size_t kBlock = synth::kBlock;
 constexpr double kReferencePa = 20e-6;
 constexpr double kFastS = 0.125;
 constexpr double kFarthestHeardM = 15e3;  // what a body sends from further away is not heard (84 dB down, and memory has an end)
-constexpr int kMostStrikes = 256;         // of a body, waiting or acting at once
-constexpr int kMostForces = 512;          // of a body that gets any
+constexpr int kMaxStrikes = 256;          // of a body, waiting or acting at once
+constexpr int kMaxForces = 512;           // of a body that gets any
 
 double calc_distance(const Vec3& a, const Vec3& b) { return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]); }
 
 /// What the events say about one body.
-struct BodyCourse {
-  bool is_played = false;   // something happens to it
-  bool is_touched = false;  // by a contact that lasts
-  bool is_pushed = false;   // by forces known step by step
-  stream::Motion first;     // where it is at the beginning
-  double reach_m = 0.0;     // how far from the first microphone's place it ever gets
+struct BodySummary {
+  bool is_played = false;    // something happens to it
+  bool is_touched = false;   // by a contact that lasts
+  bool is_pushed = false;    // by forces known step by step
+  events::BodyMotion first;  // where it is at the beginning
+  double reach_m = 0.0;      // how far from the first microphone's place it ever gets
 };
 
-std::vector<BodyCourse> survey(const Scene& scene, const std::vector<const bank::Bank*>& banks, const Events& events, const Vec3& base) {
-  std::vector<BodyCourse> courses(scene.bodies.size());
+std::vector<BodySummary> summarise(const Scene& scene, const std::vector<const bank::Bank*>& banks, const Events& events,
+                                   const Vec3& base) {
+  std::vector<BodySummary> summaries(scene.bodies.size());
   std::vector<bool> is_placed(scene.bodies.size());
-  const auto find = [&](std::int32_t body) { return body >= 0 && static_cast<std::size_t>(body) < courses.size(); };
-  events.for_each([&](const stream::Event& event) {
-    if (const auto* motion = std::get_if<stream::Motion>(&event); motion != nullptr && find(motion->body)) {
+  const auto find = [&](std::int32_t body) -> BodySummary* {
+    return body >= 0 && static_cast<std::size_t>(body) < summaries.size() ? &summaries[static_cast<std::size_t>(body)] : nullptr;
+  };
+  events.for_each([&](const events::Event& event) {
+    if (const auto* motion = std::get_if<events::BodyMotion>(&event); motion != nullptr && find(motion->body) != nullptr) {
       const auto i = static_cast<std::size_t>(motion->body);
-      if (!is_placed[i]) courses[i].first = *motion;
-      if (!is_placed[i] || !scene.bodies[i].spec.fixed)
-        courses[i].reach_m = std::max(courses[i].reach_m, calc_distance(motion->position_m, base));
+      BodySummary& body = summaries[i];
+      if (!is_placed[i]) body.first = *motion;
+      if (!is_placed[i] || !scene.bodies[i].spec.fixed) body.reach_m = std::max(body.reach_m, calc_distance(motion->position_m, base));
       is_placed[i] = true;
+    } else if (const auto* impulse = std::get_if<events::Impulse>(&event)) {
+      if (BodySummary* body = find(impulse->body)) body->is_played = true;
+    } else if (const auto* force = std::get_if<events::Force>(&event)) {
+      if (BodySummary* body = find(force->body)) body->is_played = body->is_pushed = true;
+    } else if (const auto* contact = std::get_if<events::LastingContact>(&event)) {
+      if (BodySummary* body = find(contact->body)) body->is_played = body->is_touched = true;
     }
-    if (const auto* impulse = std::get_if<stream::Impulse>(&event); impulse != nullptr && find(impulse->body))
-      courses[static_cast<std::size_t>(impulse->body)].is_played = true;
-    if (const auto* force = std::get_if<stream::Force>(&event); force != nullptr && find(force->body))
-      courses[static_cast<std::size_t>(force->body)].is_played = courses[static_cast<std::size_t>(force->body)].is_pushed = true;
-    if (const auto* contact = std::get_if<stream::Contact>(&event); contact != nullptr && find(contact->body))
-      courses[static_cast<std::size_t>(contact->body)].is_played = courses[static_cast<std::size_t>(contact->body)].is_touched = true;
   });
-  for (std::size_t i = 0; i < courses.size(); ++i) {
+  for (std::size_t i = 0; i < summaries.size(); ++i) {
     if (is_placed[i]) continue;
     const contact::Pose& initial = scene.bodies[i].spec.initial;
-    courses[i].first.position_m = calc_world_point(initial, banks[i]->rigid.centre_m);
-    courses[i].first.rotation = initial.rotation;
-    courses[i].reach_m = calc_distance(courses[i].first.position_m, base);
+    summaries[i].first.position_m = calc_world_point(initial, banks[i]->rigid.centre_m);
+    summaries[i].first.rotation = initial.rotation;
+    summaries[i].reach_m = calc_distance(summaries[i].first.position_m, base);
   }
-  return courses;
+  return summaries;
 }
 
-/// The changes of a plan, made when their time has come. A body to which nothing happens has no effects, one that no contact touches for
-/// long none of those of contacts.
-class Changes {
+/// The effects of each body over time, by a plan or by the scene, sent to the synthesiser when their time has come. A body to which nothing
+/// happens has no effects, one that no contact touches for long none of those of contacts.
+class EffectTimeline {
  public:
-  Changes(const Scene& scene, const std::vector<BodyCourse>& courses, const Plan* plan)
-      : scene_(&scene), courses_(&courses), first_(courses.size(), scene.effects), all_(first_) {
+  EffectTimeline(const Scene& scene, const std::vector<BodySummary>& summaries, const Plan* plan)
+      : scene_(&scene), summaries_(&summaries), first_(summaries.size(), scene.effects), all_(first_) {
     if (plan == nullptr) return;
     steps_.emplace(plan->steps);
-    std::vector<bool> is_known(courses.size());
+    std::vector<bool> is_known(summaries.size());
     plan->steps.for_each([&](const PlanStep& step) {
       const auto body = static_cast<std::size_t>(step.body);
       all_[body] = is_known[body] ? all_[body].with(step.effects) : step.effects;
@@ -105,14 +105,14 @@ class Changes {
 
  private:
   synth::EffectSet find(std::size_t body, synth::EffectSet effects) const {
-    const BodyCourse& course = (*courses_)[body];
-    if (!course.is_played) return {};
-    if (!course.is_touched) effects = effects.without(synth::kContactEffects);
+    const BodySummary& summary = (*summaries_)[body];
+    if (!summary.is_played) return {};
+    if (!summary.is_touched) effects = effects.without(synth::kContactEffects);
     return find_effects(*scene_, body, effects);
   }
 
   const Scene* scene_;
-  const std::vector<BodyCourse>* courses_;
+  const std::vector<BodySummary>* summaries_;
   std::vector<synth::EffectSet> first_, all_;  // per body
   std::optional<base::Records<PlanStep>::Reader> steps_;
 };
@@ -135,7 +135,7 @@ class Outlet {
   }
   void finish(Sound& sound) {
     pass_on();
-    const auto peak = std::accumulate(tail_.begin(), tail_.end(), 0.0F, [](float most, float p) { return std::max(most, std::abs(p)); });
+    const auto peak = std::accumulate(tail_.begin(), tail_.end(), 0.0F, [](float max, float p) { return std::max(max, std::abs(p)); });
     const std::size_t channels = store_->get_channels(), count = tail_.size() / channels;
     if (peak > 0.0F && peak >= kFadeShare * std::max(meter_.get_peak_pa(), static_cast<double>(peak))) {
       for (std::size_t i = 0; i < tail_.size(); ++i) {
@@ -179,136 +179,158 @@ class Outlet {
   double seconds_cpu_ = 0.0;
 };
 
-/// Below which pressure at 1 m a body sleeps: where the planner is free to choose, what is inaudible.
+/// Below which pressure at 1 m a body sleeps: where the selector is free to choose, what is inaudible.
 double find_silence_pa(const Scene& scene, std::size_t body, const Plan* plan) {
   if (scene.quality.silence_pa) return *scene.quality.silence_pa;
-  const bool is_planned = plan != nullptr && scene.bodies[body].wish.automatic && !scene.bodies[body].wish.on.has(Effect::kModal);
-  return is_planned ? plan->planner.calc_silence_pa(static_cast<int>(body)) : synth::BodySettings{}.silence_pa;
+  const bool is_planned = plan != nullptr && scene.bodies[body].overrides.automatic && !scene.bodies[body].overrides.on.has(Effect::kModal);
+  return is_planned ? plan->selector.calc_silence_pa(static_cast<int>(body)) : synth::BodySettings{}.silence_pa;
 }
 
 /// How far the microphones ever get from where the first of them starts.
 double calc_reach_m(const Scene& scene, const Microphones& microphones, const Vec3& base) {
-  double walk = 0.0, offset = 0.0;
-  for (const synth::Place& place : scene.listener.path) walk = std::max(walk, calc_distance(place.position_m, base));
-  for (const Vec3& x : microphones.offset_m) offset = std::max(offset, std::hypot(x[0], x[1], x[2]));
-  return walk + offset + 1.0;
+  double path_m = 0.0, offset_m = 0.0;
+  for (const synth::PathPoint& place : scene.listener.path) path_m = std::max(path_m, calc_distance(place.position_m, base));
+  for (const Vec3& x : microphones.offset_m) offset_m = std::max(offset_m, std::hypot(x[0], x[1], x[2]));
+  return path_m + offset_m + 1.0;
 }
+
+/// A scene whose events are all known, rendered block by block.
+class Rendering {
+ public:
+  Rendering(const Scene& scene, const std::vector<const bank::Bank*>& banks, const Events& events, const RenderOptions& options)
+      : scene_(&scene),
+        options_(&options),
+        session_(scene, banks, options.rate_hz, options.plan != nullptr || scene.effects.has(Effect::kAccelerationNoise)),
+        path_(list_listener_path(session_.get_microphones())),
+        base_(session_.get_microphones().centre.find(0.0).position_m),
+        summaries_(summarise(scene, banks, events, base_)),
+        effects_(scene, summaries_, options.plan),
+        playback_(events, list_scheduled_bodies(), path_),
+        synthesiser_(&open()) {}
+
+  /// What is known before anything is rendered.
+  void describe(Sound& sound) const {
+    sound.rate_hz = options_->rate_hz;
+    sound.channels = session_.get_microphones().offset_m.size();
+    for (std::size_t i = 0; i < scene_->bodies.size(); ++i) {
+      sound.body_effects.push_back(effects_.find_all(i));
+      sound.body_modes.push_back(session_.get_model(i).get_mode_count());
+      sound.modes += sound.body_modes.back();
+    }
+  }
+
+  /// Renders so many samples, without those of the latency at the beginning, into the outlet.
+  void render(std::size_t samples, Outlet& outlet) {
+    constexpr std::size_t kLatency = synth::Synthesiser::kLatency;
+    const auto rate_hz = static_cast<double>(options_->rate_hz);
+    std::vector<std::array<float, kBlock>> blocks(session_.get_microphones().offset_m.size());
+    std::vector<const float*> heard(blocks.size());
+    std::vector<float*> out;
+    for (auto& block : blocks) out.push_back(block.data());
+    for (std::size_t start = 0; start < samples; start += kBlock) {
+      const std::size_t count = std::min(kBlock, samples - start);
+      effects_.apply(static_cast<double>(start + kBlock) / rate_hz, *synthesiser_);
+      playback_.push_until(static_cast<double>(start + kBlock) / rate_hz, *synthesiser_);
+      synthesiser_->process(out.data(), static_cast<int>(out.size()), static_cast<int>(count));
+      const std::size_t skipped = std::min(count, start < kLatency ? kLatency - start : 0);
+      for (std::size_t c = 0; c < out.size(); ++c) heard[c] = blocks[c].data() + skipped;
+      outlet.add(heard, count - skipped);
+      if (options_->progress) options_->progress(static_cast<double>(start + count) / static_cast<double>(samples));
+    }
+  }
+
+  /// What the synthesiser has counted.
+  void count(Sound& sound) const {
+    if (options_->measures) sound.seconds_per_tick = 1e-9;
+    const synth::SynthesiserCounters counters = synthesiser_->get_counters();
+    sound.strikes = counters.strikes;
+    sound.refused = counters.refused;
+    sound.faults = counters.faults + playback_.get_faults();
+    sound.resets = counters.resets;
+    for (std::size_t i = 0; i < scene_->bodies.size(); ++i) {
+      const int body = static_cast<int>(i);
+      sound.body_peak_pa.push_back(synthesiser_->get_peak_pa(body));
+      sound.energy_rise = std::max(sound.energy_rise, synthesiser_->get_energy_rise(body));
+      sound.radiated_j += synthesiser_->get_radiated_j(body);
+      sound.effect_counters.push_back(synthesiser_->get_effect_counters(body));
+    }
+  }
+
+ private:
+  std::vector<ScheduledBody> list_scheduled_bodies() const {
+    std::vector<ScheduledBody> bodies;
+    for (std::size_t i = 0; i < scene_->bodies.size(); ++i) {
+      const synth::EffectSet effects = effects_.find_all(i);
+      bodies.push_back({.number = static_cast<int>(i),
+                        .moves = !effects.is_empty() && !scene_->bodies[i].spec.fixed,
+                        .lead_s = calc_strike_lead_s(session_.get_model(i), effects)});
+    }
+    return bodies;
+  }
+
+  /// The synthesiser with its bodies and as much room as these events need.
+  synth::Synthesiser& open() {
+    const double ears_reach_m = calc_reach_m(*scene_, session_.get_microphones(), base_);
+    std::vector<double> longest_m, longest_s;
+    for (const BodySummary& summary : summaries_) {
+      longest_m.push_back(std::min(summary.reach_m + ears_reach_m, kFarthestHeardM));
+      longest_s.push_back(longest_m.back() / synth::kSoundSpeedMs);
+    }
+    const std::vector<int> waypoints = playback_.count_waypoints(longest_s);
+    synth::SynthesiserOptions room = session_.make_options();
+    room.max_strikes = kMaxStrikes;
+    room.max_waypoints = waypoints.back();
+    room.ticks = options_->measures ? &synth::get_cpu_ticks : nullptr;
+    synth::Synthesiser& synthesiser = session_.open(room);
+    for (std::size_t i = 0; i < summaries_.size(); ++i) {
+      // Once a process, and not while the sound plays.
+      if (effects_.find_all(i).has_any(synth::kContactEffects)) synth::Texture::make_tables();
+      synth::BodySettings settings = session_.make_settings(i, effects_.find_first(i));
+      settings.position_m = summaries_[i].first.position_m;
+      settings.rotation = summaries_[i].first.rotation;
+      settings.silence_pa = find_silence_pa(*scene_, i, options_->plan);
+      settings.longest_m = longest_m[i];
+      settings.max_waypoints = waypoints[i];
+      settings.max_forces = summaries_[i].is_pushed ? kMaxForces : 0;
+      settings.audits_energy = options_->audits;
+      session_.add_body(settings);
+    }
+    return synthesiser;
+  }
+
+  const Scene* scene_;
+  const RenderOptions* options_;
+  Session session_;
+  std::vector<events::Listener> path_;  // the listener's
+  Vec3 base_;                           // where the listener starts
+  std::vector<BodySummary> summaries_;  // per body
+  EffectTimeline effects_;
+  EventPlayback playback_;
+  synth::Synthesiser* synthesiser_;
+};
 
 }  // namespace
 
 Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks, const Events& events, const RenderOptions& options,
                  SoundStore& store) {
-  const double started = base::get_process_cpu_s();
-  const Microphones microphones = make_microphones(scene);
-  const std::vector<stream::Listener> walk = list_walk(microphones);
-  const Vec3 base = microphones.centre.find(0.0).position_m;
-  const double ears_reach_m = calc_reach_m(scene, microphones, base);
-  const std::vector<BodyCourse> courses = survey(scene, banks, events, base);
-  const auto rate_hz = static_cast<double>(options.rate_hz);
-
+  const double started_s = base::get_process_cpu_s();
   Sound sound;
-  sound.rate_hz = options.rate_hz;
-  Changes changes(scene, courses, options.plan);
-  std::vector<FedBody> fed(scene.bodies.size());
-  std::map<const bank::Bank*, std::shared_ptr<const synth::Model>> models;  // bodies of the same bank share its tables
-  std::vector<std::shared_ptr<const synth::Model>> body_models;
-  for (std::size_t i = 0; i < fed.size(); ++i) {
-    const synth::EffectSet effects = changes.find_all(i);
-    sound.body_effects.push_back(effects);
-    std::shared_ptr<const synth::Model>& model = models[banks[i]];
-    if (!model) {
-      const bool clicks = options.plan != nullptr || scene.effects.has(Effect::kAccelerationNoise);
-      double radius_m = clicks ? scene.bodies[i].sphere_radius_m : 0.0;
-      if (clicks && radius_m == 0.0) radius_m = radiation::calc_sphere_radius_m(*banks[i]);
-      model = synth::Model::make(*banks[i], {.rate_hz = rate_hz, .sphere_radius_m = radius_m});
-    }
-    body_models.push_back(model);
-    sound.body_modes.push_back(model->get_mode_count());
-    sound.modes += model->get_mode_count();
-    // Once a process, and not while the sound plays.
-    if (effects.has_any(synth::kContactEffects)) synth::Texture::make_tables();
-    const double lead_s = effects.has(Effect::kAccelerationNoise) ? model->get_sphere_radius_m() / synth::kSoundSpeedMs : 0.0;
-    fed[i] = {.number = static_cast<int>(i), .moves = !effects.is_empty() && !scene.bodies[i].spec.fixed, .lead_s = lead_s};
-  }
-  Feed feed(events, fed, walk);
-  std::vector<double> longest_m, longest_s;
-  for (const BodyCourse& course : courses) {
-    longest_m.push_back(std::min(course.reach_m + ears_reach_m, kFarthestHeardM));
-    longest_s.push_back(longest_m.back() / synth::kSoundSpeedMs);
-  }
-  const std::vector<int> waypoints = feed.count_waypoints(longest_s);
-  synth::Synthesiser synthesiser({.rate_hz = rate_hz,
-                                  .microphones_m = microphones.offset_m,
-                                  .listener_m = base,
-                                  .max_bodies = std::max(1, static_cast<int>(fed.size())),
-                                  .max_strikes = kMostStrikes,
-                                  .max_waypoints = waypoints.back(),
-                                  .budget = calc_budget(scene.quality, rate_hz),
-                                  .ground = make_ground(scene),
-                                  .ticks = options.measures ? &synth::get_cpu_ticks : nullptr});
-  for (std::size_t i = 0; i < fed.size(); ++i) {
-    synthesiser.add_body(body_models[i], {.position_m = courses[i].first.position_m,
-                                          .rotation = courses[i].first.rotation,
-                                          .effects = changes.find_first(i),
-                                          .silence_pa = find_silence_pa(scene, i, options.plan),
-                                          .surface = make_surface(scene.bodies[i]),
-                                          .longest_m = longest_m[i],
-                                          .max_waypoints = waypoints[i],
-                                          .max_forces = courses[i].is_pushed ? kMostForces : 0,
-                                          .isa = scene.quality.instructions,
-                                          .audits_energy = options.audits});
-  }
-
-  constexpr std::size_t kLatency = synth::Synthesiser::kLatency;
-  const std::size_t samples = count_frames(scene.duration_s, options.rate_hz) + kLatency;
-  const std::size_t channels = sound.channels = microphones.offset_m.size();
-  Outlet outlet(store, samples - kLatency, options.fades_end);
-  std::vector<const float*> heard(channels);
-  std::vector<std::array<float, kBlock>> blocks(channels);
-  std::vector<float*> out;
-  for (auto& block : blocks) out.push_back(block.data());
-  const double began = base::get_process_cpu_s();
-  const std::uint64_t asked_ns = synth::get_cpu_ticks_cost_ns();
-  for (std::size_t start = 0; start < samples; start += kBlock) {
-    const std::size_t count = std::min(kBlock, samples - start);
-    changes.apply(static_cast<double>(start + kBlock) / rate_hz, synthesiser);
-    feed.hand_on(static_cast<double>(start + kBlock) / rate_hz, synthesiser);
-    synthesiser.process(out.data(), static_cast<int>(channels), static_cast<int>(count));
-    const std::size_t skipped = std::min(count, start < kLatency ? kLatency - start : 0);
-    for (std::size_t c = 0; c < channels; ++c) heard[c] = blocks[c].data() + skipped;
-    outlet.add(heard, count - skipped);
-    if (options.progress) options.progress(static_cast<double>(start + count) / static_cast<double>(samples));
-  }
-  sound.seconds_playing_cpu = std::max(0.0, base::get_process_cpu_s() - began - outlet.get_seconds_cpu() -
-                                                1e-9 * static_cast<double>(synth::get_cpu_ticks_cost_ns() - asked_ns));
+  Rendering rendering(scene, banks, events, options);
+  rendering.describe(sound);
+  const std::uint64_t frames = count_frames(scene.duration_s, options.rate_hz);
+  Outlet outlet(store, frames, options.fades_end);
+  const double began_s = base::get_process_cpu_s();
+  const std::uint64_t ticks_ns = synth::get_cpu_ticks_cost_ns();
+  rendering.render(frames + synth::Synthesiser::kLatency, outlet);
+  sound.seconds_playing_cpu = std::max(0.0, base::get_process_cpu_s() - began_s - outlet.get_seconds_cpu() -
+                                                1e-9 * static_cast<double>(synth::get_cpu_ticks_cost_ns() - ticks_ns));
   outlet.finish(sound);
-  if (options.measures) sound.seconds_per_tick = 1e-9;
-  const synth::SynthesiserCounters counters = synthesiser.get_counters();
-  sound.strikes = counters.strikes;
-  sound.refused = counters.refused + counters.faults + counters.overflows;
-  sound.resets = counters.resets;
-  for (std::size_t i = 0; i < fed.size(); ++i) {
-    sound.body_peak_pa.push_back(synthesiser.get_peak_pa(static_cast<int>(i)));
-    sound.energy_rise = std::max(sound.energy_rise, synthesiser.get_energy_rise(static_cast<int>(i)));
-    sound.radiated_j += synthesiser.get_radiated_j(static_cast<int>(i));
-    sound.effect_counters.push_back(synthesiser.get_effect_counters(static_cast<int>(i)));
-  }
-  sound.seconds_cpu = base::get_process_cpu_s() - started;
+  rendering.count(sound);
+  sound.seconds_cpu = base::get_process_cpu_s() - started_s;
   return sound;
 }
 
 std::uint64_t count_frames(double duration_s, int rate_hz) { return static_cast<std::uint64_t>(std::llround(duration_s * rate_hz)); }
-
-double calc_budget(const Quality& quality, double rate_hz) {
-  return quality.modes ? static_cast<double>(*quality.modes) * rate_hz : std::numeric_limits<double>::infinity();
-}
-
-synth::EffectSet find_effects(const Scene& scene, std::size_t body, synth::EffectSet effects) {
-  effects = effects.common(synth::kCompiledEffects);
-  if (scene.bodies[body].spec.fixed) effects = effects.without(Effect::kAccelerationNoise);
-  if (!scene.microphones_m.empty()) effects = effects.with(synth::EffectSet{Effect::kTwoEars}.common(synth::kCompiledEffects));
-  return effects;
-}
 
 Meter::Meter(int rate_hz, std::size_t channels) : channels_(channels), window_(static_cast<std::size_t>(std::max(1.0, kFastS * rate_hz))) {}
 

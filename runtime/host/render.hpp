@@ -7,11 +7,11 @@
 #include <vector>
 
 #include "runtime/bank/bank.hpp"
+#include "runtime/events/events.hpp"
 #include "runtime/host/events.hpp"
 #include "runtime/host/planning.hpp"
 #include "runtime/host/scene.hpp"
 #include "runtime/host/sound_store.hpp"
-#include "runtime/stream/events.hpp"
 #include "runtime/synth/effects.hpp"
 #include "runtime/synth/synthesiser.hpp"
 
@@ -46,14 +46,15 @@ struct Sound {
   std::uint64_t frames = 0;
   double peak_pa = 0.0;
   Levels levels;
-  double faded_s = 0.0;                                // of its end; 0: it is silent there, or the scene wants it as it is
+  double faded_s = 0.0;                                // of its end; 0: it is silent there, or the scene sets no fade
   int modes = 0;                                       // of all bodies, below Nyquist
   std::vector<int> body_modes;                         // per body
   std::vector<double> body_peak_pa;                    // per body, at 1 m
   double energy_rise = 0.0;                            // Synthesiser::get_energy_rise, the most of any body; where it is audited
   double radiated_j = 0.0;                             // Synthesiser::get_radiated_j, of all bodies; where it is audited
   std::int64_t strikes = 0;                            // impulses that were played
-  std::int64_t refused = 0;                            // impulses that could not be (too many at once, not finite)
+  std::int64_t refused = 0;                            // events that could not be: too many at once
+  std::int64_t faults = 0;                             // events that no synthesiser plays: numbers that are not finite ...
   std::int64_t resets = 0;                             // bodies cleared because their state was no number
   std::vector<synth::EffectSet> body_effects;          // per body, what it had at any time
   std::vector<synth::EffectCounters> effect_counters;  // per body, at the end
@@ -77,18 +78,12 @@ inline constexpr double kFadeS = 0.01;
 inline constexpr double kFadeShare = 1.0 / 65536.0;
 
 /// Renders round(duration * rate) frames into `store`, which has the scene's channels and the rate. banks[i] belongs to scene.bodies[i];
-/// body i of the events (as Feed takes them) is the same. A body to which nothing happens gets no effects.
+/// body i of the events (as EventPlayback takes them) is the same. A body to which nothing happens gets no effects.
 Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks, const Events& events, const RenderOptions& options,
                  SoundStore& store);
 
 /// Of a sound of that length.
 std::uint64_t count_frames(double duration_s, int rate_hz);
-
-/// What of its effects a body of the scene can have: nothing pushes one that is fixed, and microphones stay where they are put.
-synth::EffectSet find_effects(const Scene& scene, std::size_t body, synth::EffectSet effects);
-
-/// Mode-samples that a second of sound may take: quality.modes at all times, or as many as there are.
-double calc_budget(const Quality& quality, double rate_hz);
 
 /// The gain [full scale per Pa] that goes into the file. A given gain that would clip is reduced to the one of "auto".
 struct Gain {

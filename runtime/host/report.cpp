@@ -2,15 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <optional>
 
-#include "runtime/base/document.hpp"
+#include "runtime/base/json.hpp"
 #include "runtime/base/printable.hpp"
+#include "runtime/effect_selection/table.hpp"
 #include "runtime/host/pose.hpp"
-#include "runtime/plan/table.hpp"
 #include "runtime/synth/kernels.hpp"
 
 namespace carillon::host {
@@ -19,17 +17,14 @@ namespace {
 constexpr double kPosesPerS = 200.0;
 constexpr std::size_t kPiece = 1 << 16;  // bytes that are handed on at once
 
-/// JSON has no infinity: silence has the level null.
-std::string make_level(double db) { return std::isfinite(db) ? fmt::format("{:.2f}", db) : "null"; }
-
 using Paths = base::RecordLists<contact::Pose>;
 
 /// Where each body has been. After an impact it is where it was before.
 Paths collect_paths(const std::vector<const bank::Bank*>& banks, const Events& events, base::Spool spool) {
   Paths paths(banks.size(), std::move(spool));
   std::vector<std::optional<double>> last_s(banks.size());
-  events.for_each([&](const stream::Event& event) {
-    const auto* motion = std::get_if<stream::Motion>(&event);
+  events.for_each([&](const events::Event& event) {
+    const auto* motion = std::get_if<events::BodyMotion>(&event);
     if (motion == nullptr || motion->body < 0 || static_cast<std::size_t>(motion->body) >= banks.size()) return;
     const auto body = static_cast<std::size_t>(motion->body);
     if (last_s[body] && *last_s[body] >= motion->time_s) return;
@@ -61,7 +56,7 @@ void for_kept_poses(const Paths& paths, std::size_t body, Work&& work) {
   if (!is_kept) work(*last);
 }
 
-/// Follows a path as time goes on.
+/// Follows a path as time advances.
 class PathCursor {
  public:
   PathCursor(const Paths& paths, std::size_t body) : reader_(paths, body) {
@@ -90,11 +85,11 @@ class PathCursor {
 };
 
 /// What an event pushes by; a piece of a pulse counts as one.
-std::optional<stream::Impulse> find_impulse(const stream::Event& event) {
-  if (const auto* impulse = std::get_if<stream::Impulse>(&event)) return *impulse;
-  const auto* force = std::get_if<stream::Force>(&event);
+std::optional<events::Impulse> find_impulse(const events::Event& event) {
+  if (const auto* impulse = std::get_if<events::Impulse>(&event)) return *impulse;
+  const auto* force = std::get_if<events::Force>(&event);
   if (force == nullptr) return std::nullopt;
-  stream::Impulse impulse = stream::to_impulse(*force);
+  events::Impulse impulse = events::to_impulse(*force);
   impulse.duration_s = force->calc_length_s();
   return impulse;
 }
@@ -108,152 +103,251 @@ Vec3 find_contact_point(const bank::Bank& bank, const contact::Impulse& impulse)
   return point;
 }
 
-/// What the effects of a body have done and cost, as members of a JSON object.
-plan::MoreJson list_measured(const Sound& sound, std::size_t body, double duration_s) {
-  plan::MoreJson more;
+/// JSON has no infinity: silence has the level null.
+base::Json make_level_json(double db) { return base::finite_or_null(db, base::decimals, 2); }
+
+base::Json make_figure(double value, int digits = 6) { return base::finite_or_null(value, base::significant, digits); }
+
+base::Json make_list_json(const std::vector<double>& values) {
+  base::Json list = base::Json::array();
+  for (const double value : values) list.add(make_figure(value, 8));
+  return list;
+}
+
+/// The plan of a body, with what its effects have done and cost.
+base::Json make_effects_json(const Plan& plan, const Sound& sound, std::size_t body, double duration_s) {
+  base::Json json = effect_selection::make_plan_json(plan.selector, plan.facts, static_cast<int>(body));
   const synth::EffectCounters& counters = sound.effect_counters[body];
   for (const synth::Effect effect : synth::EffectSet::all()) {
-    more[effect] =
-        fmt::format("\"measured_us_per_s\": {:.4g}, \"units\": {}",
-                    1e6 * static_cast<double>(counters.ticks[effect]) * sound.seconds_per_tick / duration_s, counters.units[effect]);
+    json.member(synth::get_name(effect))
+        .set("measured_us_per_s",
+             base::significant(1e6 * static_cast<double>(counters.ticks[effect]) * sound.seconds_per_tick / duration_s, 4))
+        .set("units", counters.units[effect]);
   }
-  return more;
+  return json;
 }
 
-/// What supports take of a body's modes, as a member of a JSON object with its comma; empty without losses.
-std::string make_mounting_json(const Mounting& mounting) {
-  if (mounting.text.empty()) return {};
-  std::string json = fmt::format("\"supports\": {{\"text\": {}, \"beyond_first_order\": {}, \"shared\": {}",
-                                 base::quote(base::printable(mounting.text)), mounting.beyond, mounting.mixed);
-  const auto add = [&](const char* name, const std::vector<double>& values) {
-    fmt::format_to(std::back_inserter(json), ",\n    \"{}\": [", name);
-    for (std::size_t i = 0; i < values.size(); ++i) fmt::format_to(std::back_inserter(json), "{}{:.8g}", i == 0 ? "" : ", ", values[i]);
-    json += "]";
+/// What supports take of a body's modes.
+base::Json make_mounting_json(const Mounting& mounting) {
+  return base::Json::object()
+      .set("text", base::printable(mounting.text))
+      .set("beyond_first_order", mounting.beyond)
+      .set("shared", mounting.mixed)
+      .set("frequencies_hz", make_list_json(mounting.freq_hz))
+      .set("decay_before_per_s", make_list_json(mounting.decay_before_per_s))
+      .set("decay_per_s", make_list_json(mounting.decay_per_s));
+}
+
+base::Json make_audit_json(const EnergyBooks& books) {
+  const contact::EnergyAudit& bodies = books.bodies;
+  return base::Json::object()
+      .set("rise_j", make_figure(bodies.rise_j))
+      .set("hit_rise_j", make_figure(bodies.hit_rise_j))
+      .set("largest_kinetic_j", make_figure(bodies.kinetic_j))
+      .set("weight_n", make_figure(bodies.weight_n))
+      .set("modes_rise", make_figure(books.modes_rise))
+      .set("start_j", make_figure(bodies.start_j, 9))
+      .set("motion_j", make_figure(bodies.motion_j, 9))
+      .set("modes_j", make_figure(bodies.modes_j))
+      .set("max_modes_j", make_figure(bodies.max_modes_j))
+      .set("modes_share", make_figure(bodies.modes_share))
+      .set("lost_j", make_figure(bodies.lost_j, 9))
+      .set("difference_j", make_figure(bodies.error_j))
+      .set("radiated_j", make_figure(books.radiated_j));
+}
+
+base::Json make_blow_json(const Blow& blow) {
+  return base::Json::object()
+      .set("body", blow.body)
+      .set("time_s", make_figure(blow.time_s, 9))
+      .set("contact_s", make_figure(blow.contact_s))
+      .set("impulse_n_s", make_figure(blow.impulse_n_s))
+      .set("peak_n", make_figure(blow.peak_n))
+      .set("restitution", make_figure(blow.restitution))
+      .set("before_j", make_figure(blow.before_j))
+      .set("after_j", make_figure(blow.after_j))
+      .set("together", blow.together)
+      .set("motion_j", make_figure(blow.motion_j))
+      .set("modes_j", make_figure(blow.modes_j))
+      .set("lost_j", make_figure(blow.lost_j));
+}
+
+base::Json make_body_json(const Scene& scene, const Sound& sound, const Plan& plan, const Figures& figures, std::size_t i) {
+  const SceneBody& body = scene.bodies[i];
+  base::Json json = base::Json::object();
+  json.set("name", body.name)
+      .set("modes", sound.body_modes[i])
+      .set("impulses", i < figures.tally.body_impulses.size() ? figures.tally.body_impulses[i] : std::int64_t{0})
+      .set("peak_pa_at_1m", make_figure(sound.body_peak_pa[i]));
+  if (!body.mounting.text.empty()) json.set("supports", make_mounting_json(body.mounting));
+  if (body.limited.modes != 0)
+    json.member("limited_gains").set("modes", body.limited.modes).set("max_db", make_figure(body.limited.max_db, 4));
+  json.set("effects", make_effects_json(plan, sound, i, scene.duration_s));
+  return json;
+}
+
+/// [time_s, x, y, z, w, x, y, z]
+base::Json describe_pose(const contact::Pose& pose) {
+  base::Json json = base::Json::array();
+  json.add(base::decimals(pose.time_s, 6));
+  for (const double x : pose.position_m) json.add(base::significant(x, 7));
+  for (const double x : pose.rotation) json.add(base::significant(x, 7));
+  return json;
+}
+
+base::Json describe_impulse(const events::Impulse& impulse, const Vec3& world_m) {
+  base::Json place = base::Json::array();
+  for (const double x : world_m) place.add(base::significant(x, 6));
+  return base::Json::object()
+      .set("time_s", base::decimals(impulse.time_s, 9))
+      .set("body", impulse.body)
+      .set("other", impulse.other)
+      .set("world_m", place)
+      .set("impulse_n_s", base::significant(std::hypot(impulse.impulse_n_s[0], impulse.impulse_n_s[1], impulse.impulse_n_s[2]), 6))
+      .set("duration_s", base::significant(impulse.duration_s, 6));
+}
+
+/// A JSON object of long lists, handed to a sink in pieces, so that memory does not grow with their lengths. Keeps which objects and lists
+/// are open; each member and element stands on a line of its own.
+class JsonPieces {
+ public:
+  explicit JsonPieces(const std::function<void(std::string_view)>& sink) : sink_(&sink) { open('{', '}'); }
+
+  void set(std::string_view key, const base::Json& value) {
+    place(base::quote(key) + ": ");
+    json_ += value.line();
+  }
+  void add(const base::Json& value) {
+    place("");
+    json_ += value.line();
+  }
+  void begin_list(std::string_view key) {
+    place(base::quote(key) + ": ");
+    open('[', ']');
+  }
+  void begin_object() {
+    place("");
+    open('{', '}');
+  }
+  /// Of what was begun last.
+  void end() {
+    const Level level = levels_.back();
+    levels_.pop_back();
+    if (!level.is_empty) start_line();
+    json_ += level.end;
+    if (!levels_.empty()) return;
+    json_ += '\n';
+    flush();
+  }
+
+ private:
+  struct Level {
+    char end = '}';
+    bool is_empty = true;
   };
-  add("frequencies_hz", mounting.freq_hz);
-  add("decay_before_per_s", mounting.decay_before_per_s);
-  add("decay_per_s", mounting.decay_per_s);
-  return json + "},\n   ";
-}
 
-/// As a member of a JSON object with its comma; empty where there are none.
-std::string make_limited_json(const radiation::Limited& limited) {
-  if (limited.modes == 0) return {};
-  return fmt::format("\"limited_gains\": {{\"modes\": {}, \"most_db\": {:.4g}}},\n   ", limited.modes, limited.most_db);
-}
+  void open(char begin, char end) {
+    json_ += begin;
+    levels_.push_back({end});
+  }
+  void place(std::string_view key) {
+    if (json_.size() >= kPiece) flush();
+    if (!std::exchange(levels_.back().is_empty, false)) json_ += ',';
+    start_line();
+    json_ += key;
+  }
+  void start_line() {
+    json_ += '\n';
+    json_.append(levels_.size(), ' ');
+  }
+  void flush() {
+    (*sink_)(json_);
+    json_.clear();
+  }
+
+  const std::function<void(std::string_view)>* sink_;
+  std::string json_;
+  std::vector<Level> levels_;
+};
 
 }  // namespace
 
 std::string describe_limited(const SceneBody& body) {
   if (body.limited.modes == 0) return {};
   return fmt::format("{} of {} modes would radiate more than their damping takes: softer by up to {:.1f} dB", body.limited.modes,
-                     body.spec.bank->mode_count(), body.limited.most_db);
+                     body.spec.bank->mode_count(), body.limited.max_db);
 }
 
 void write_trajectory(const Scene& scene, const std::vector<const bank::Bank*>& banks, const Events& events, base::Spool spool,
                       const std::function<void(std::string_view)>& sink) {
   const Paths paths = collect_paths(banks, events, std::move(spool));
-  std::string json = "{\n \"bodies\": [";
-  auto out = std::back_inserter(json);
-  const auto hand_on = [&](std::size_t least) {
-    if (json.size() < least) return;
-    sink(json);
-    json.clear();
-  };
+  JsonPieces json(sink);
+  json.begin_list("bodies");
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
     const SceneBody& body = scene.bodies[i];
-    fmt::format_to(out, "{}\n  {{\"name\": {}, \"bank\": {}, \"fixed\": {},\n   \"poses\": [", i == 0 ? "" : ",", base::quote(body.name),
-                   base::quote(body.bank.string()), body.spec.fixed);
-    bool first = true;
-    for_kept_poses(paths, i, [&](const contact::Pose& p) {
-      fmt::format_to(out, "{}\n    [{:.6f}, {:.7g}, {:.7g}, {:.7g}, {:.7g}, {:.7g}, {:.7g}, {:.7g}]", first ? "" : ",", p.time_s,
-                     p.position_m[0], p.position_m[1], p.position_m[2], p.rotation[0], p.rotation[1], p.rotation[2], p.rotation[3]);
-      first = false;
-      hand_on(kPiece);
-    });
-    json += "\n   ]}";
+    json.begin_object();
+    json.set("name", body.name);
+    json.set("bank", body.bank.string());
+    json.set("fixed", body.spec.fixed);
+    json.begin_list("poses");
+    for_kept_poses(paths, i, [&](const contact::Pose& pose) { json.add(describe_pose(pose)); });
+    json.end();
+    json.end();
   }
-  fmt::format_to(out, "\n ],\n \"ground\": {{\"height_m\": {}}},\n \"up\": \"z\",\n \"impulses\": [",
-                 scene.ground ? fmt::format("{:.9g}", scene.ground->height_m) : "null");
+  json.end();
+  const base::Json height = scene.ground ? make_figure(scene.ground->height_m, 9) : base::Json();
+  json.set("ground", base::Json::object().set("height_m", height));
+  json.set("up", "z");
+  json.begin_list("impulses");
   std::vector<PathCursor> cursors;
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) cursors.emplace_back(paths, i);
-  bool first = true;
-  events.for_each([&](const stream::Event& event) {
-    const std::optional<stream::Impulse> impulse = find_impulse(event);
+  events.for_each([&](const events::Event& event) {
+    const std::optional<events::Impulse> impulse = find_impulse(event);
     if (!impulse || impulse->body < 0 || static_cast<std::size_t>(impulse->body) >= scene.bodies.size()) return;
     const auto i = static_cast<std::size_t>(impulse->body);
     const contact::Pose pose = cursors[i].is_empty() ? scene.bodies[i].spec.initial : cursors[i].find(impulse->time_s);
-    const Vec3 x = calc_world_point(pose, find_contact_point(*banks[i], *impulse));
-    const double size = std::hypot(impulse->impulse_n_s[0], impulse->impulse_n_s[1], impulse->impulse_n_s[2]);
-    fmt::format_to(out,
-                   "{}\n  {{\"time_s\": {:.9f}, \"body\": {}, \"other\": {}, \"world_m\": [{:.6g}, {:.6g}, {:.6g}], \"impulse_n_s\": "
-                   "{:.6g}, \"duration_s\": {:.6g}}}",
-                   first ? "" : ",", impulse->time_s, impulse->body, impulse->other, x[0], x[1], x[2], size, impulse->duration_s);
-    first = false;
-    hand_on(kPiece);
+    json.add(describe_impulse(*impulse, calc_world_point(pose, find_contact_point(*banks[i], *impulse))));
   });
-  json += "\n ]\n}\n";
-  hand_on(0);
+  json.end();
+  json.end();
 }
 
 std::string make_report_json(const Scene& scene, const Sound& sound, const Plan& plan, const Figures& f) {
-  std::string json = "{\n";
-  auto out = std::back_inserter(json);
-  fmt::format_to(out, " \"scene\": {},\n \"duration_s\": {},\n \"sample_rate_hz\": {},\n \"samples\": {},\n \"channels\": {},\n",
-                 base::quote(scene.file.string()), scene.duration_s, sound.rate_hz, sound.frames, sound.channels);
-  fmt::format_to(
-      out,
-      " \"instructions\": \"{}\",\n \"bodies\": {},\n \"modes\": {},\n \"contacts\": {},\n \"impulses\": {},\n \"impulses_played\": {},\n "
-      "\"impulses_refused\": {},\n \"resets\": {},\n",
-      synth::get_name(synth::get_kernels(scene.quality.instructions).isa), f.bodies, f.modes, f.tally.contacts, f.tally.impulses,
-      sound.strikes, sound.refused, sound.resets);
-  fmt::format_to(out,
-                 " \"physics_steps\": {},\n \"physics_s\": {:.4f},\n \"physics_cpu_s\": {:.5f},\n \"sound_s\": {:.4f},\n \"sound_cpu_s\": "
-                 "{:.5f},\n \"playing_cpu_s\": {:.6f},\n "
-                 "\"real_time_factor\": {:.4f},\n",
-                 f.physics_steps, f.physics_s, f.physics_cpu_s, f.sound_s, sound.seconds_cpu, sound.seconds_playing_cpu,
-                 f.real_time_factor);
-  fmt::format_to(
-      out,
-      " \"peak_pa\": {:.6g},\n \"mean_db_spl\": {},\n \"loudest_db_spl\": {},\n \"gain_per_pa\": {:.6g},\n \"gain_reduced\": {},\n"
-      " \"faded_end_s\": {:.6g},\n",
-      sound.peak_pa, make_level(sound.levels.mean_db), make_level(sound.levels.loudest_db), f.gain.per_pa, f.gain.reduced, sound.faded_s);
-  if (f.audit) {
-    const contact::EnergyAudit& bodies = f.audit->bodies;
-    fmt::format_to(out,
-                   " \"energy\": {{\"rise_j\": {:.6g}, \"hit_rise_j\": {:.6g}, \"largest_kinetic_j\": {:.6g}, \"weight_n\": {:.6g}, "
-                   "\"modes_rise\": {:.6g},\n  \"start_j\": {:.9g}, \"motion_j\": {:.9g}, \"modes_j\": {:.6g}, \"most_modes_j\": {:.6g}, "
-                   "\"modes_share\": {:.6g}, "
-                   "\"lost_j\": {:.9g}, \"difference_j\": {:.6g}, \"radiated_j\": {:.6g}}},\n",
-                   bodies.rise_j, bodies.hit_rise_j, bodies.kinetic_j, bodies.weight_n, f.audit->modes_rise, bodies.start_j,
-                   bodies.motion_j, bodies.modes_j, bodies.most_modes_j, bodies.modes_share, bodies.lost_j, bodies.error_j,
-                   f.audit->radiated_j);
-  }
-  if (!f.blows.empty()) {
-    json += " \"mallets\": [";
-    for (std::size_t i = 0; i < f.blows.size(); ++i) {
-      const Blow& b = f.blows[i];
-      fmt::format_to(out,
-                     "{}\n  {{\"body\": {}, \"time_s\": {:.9g}, \"contact_s\": {:.6g}, \"impulse_n_s\": {:.6g}, \"peak_n\": {:.6g}, "
-                     "\"restitution\": {:.6g}, \"before_j\": {:.6g}, \"after_j\": {:.6g}, \"together\": {}, \"motion_j\": {:.6g}, "
-                     "\"modes_j\": {:.6g}, \"lost_j\": {:.6g}}}",
-                     i == 0 ? "" : ",", base::quote(b.body), b.time_s, b.contact_s, b.impulse_n_s, b.peak_n, b.restitution, b.before_j,
-                     b.after_j, b.together, b.motion_j, b.modes_j, b.lost_j);
-    }
-    json += "\n ],\n";
-  }
-  json += " \"warnings\": [";
-  for (std::size_t i = 0; i < scene.warnings.size(); ++i) json += (i == 0 ? "" : ", ") + base::quote(base::printable(scene.warnings[i]));
-  json += "],\n \"per_body\": [";
-  for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
-    const std::int64_t played = i < f.tally.body_impulses.size() ? f.tally.body_impulses[i] : 0;
-    fmt::format_to(out, "{}\n  {{\"name\": {}, \"modes\": {}, \"impulses\": {}, \"peak_pa_at_1m\": {:.6g},\n   {}{}\"effects\": {}}}",
-                   i == 0 ? "" : ",", base::quote(scene.bodies[i].name), sound.body_modes[i], played, sound.body_peak_pa[i],
-                   make_mounting_json(scene.bodies[i].mounting), make_limited_json(scene.bodies[i].limited),
-                   plan::make_plan_json(plan.planner, plan.facts, static_cast<int>(i), list_measured(sound, i, scene.duration_s)));
-  }
-  fmt::format_to(out, "\n ],\n \"changes\": {}\n}}\n", plan::make_changes_json(plan.changes, plan.facts, kMostReported));
-  return json;
+  base::Json json = base::Json::object();
+  json.set("scene", scene.file.string())
+      .set("duration_s", scene.duration_s)
+      .set("sample_rate_hz", sound.rate_hz)
+      .set("samples", sound.frames)
+      .set("channels", sound.channels)
+      .set("instructions", synth::get_name(synth::get_kernels(scene.quality.instructions).isa))
+      .set("bodies", f.bodies)
+      .set("modes", f.modes)
+      .set("contacts", f.tally.contacts)
+      .set("impulses", f.tally.impulses)
+      .set("impulses_played", sound.strikes)
+      .set("impulses_refused", sound.refused + sound.faults)
+      .set("resets", sound.resets)
+      .set("physics_steps", f.physics_steps)
+      .set("physics_s", base::decimals(f.physics_s, 4))
+      .set("physics_cpu_s", base::decimals(f.physics_cpu_s, 5))
+      .set("sound_s", base::decimals(f.sound_s, 4))
+      .set("sound_cpu_s", base::decimals(sound.seconds_cpu, 5))
+      .set("playing_cpu_s", base::decimals(sound.seconds_playing_cpu, 6))
+      .set("real_time_factor", base::decimals(f.real_time_factor, 4))
+      .set("peak_pa", make_figure(sound.peak_pa))
+      .set("mean_db_spl", make_level_json(sound.levels.mean_db))
+      .set("loudest_db_spl", make_level_json(sound.levels.loudest_db))
+      .set("gain_per_pa", make_figure(f.gain.per_pa))
+      .set("gain_reduced", f.gain.reduced)
+      .set("faded_end_s", make_figure(sound.faded_s));
+  if (f.audit) json.set("energy", make_audit_json(*f.audit));
+  for (const Blow& blow : f.blows) json.member("mallets").add(make_blow_json(blow));
+  base::Json warnings = base::Json::array(), bodies = base::Json::array();
+  for (const std::string& warning : scene.warnings) warnings.add(base::printable(warning));
+  for (std::size_t i = 0; i < scene.bodies.size(); ++i) bodies.add(make_body_json(scene, sound, plan, f, i));
+  json.set("warnings", warnings).set("per_body", bodies);
+  json.set("changes", effect_selection::make_changes_json(plan.changes, plan.facts, kMaxReported));
+  return json.text();
 }
 
 }  // namespace carillon::host

@@ -23,15 +23,15 @@ namespace {
 constexpr double kShortestS = 1e-3;
 constexpr double kLongestS = 3600.0;
 constexpr double kFarthestM = 1e4;  // of positions; sound takes half a minute from there
-constexpr std::size_t kMostBodies = 1000;
+constexpr std::size_t kMaxBodies = 1000;
 constexpr std::size_t kLongestName = 200;  // bytes
 constexpr double kMaxSpeedMs = 300.0;      // below the speed of sound in air
 constexpr double kMaxSpinRadS = 1e4;
 constexpr double kMaxEarDistanceM = 10.0;
-constexpr std::size_t kMostWaypoints = 100000;
-constexpr std::size_t kMostMicrophones = 16;
-constexpr std::size_t kMostHolders = 1000;
-constexpr std::size_t kMostStrikes = 100000;
+constexpr std::size_t kMaxWaypoints = 100000;
+constexpr std::size_t kMaxMicrophones = 16;
+constexpr std::size_t kMaxHolders = 1000;
+constexpr std::size_t kMaxStrikes = 100000;
 constexpr double kMaxImpulseNs = 1e6;  // a ton at 1000 m/s
 constexpr double kLongestPulseS = 1.0;
 constexpr double kSoftestGroundPa = 100.0;  // a jelly; the touch of a body lasts as long as a person's step on less
@@ -114,60 +114,62 @@ synth::EffectSet read_names(base::Object& object, std::string_view key) {
 }
 
 /// "auto"; a list: exactly these; or {"base": "auto", "on": [...], "off": [...]}.
-plan::Wish read_effects(base::Object& object) {
-  plan::Wish wish;
+effect_selection::EffectOverrides read_effects(base::Object& object) {
+  effect_selection::EffectOverrides overrides;
   if (object.has_string("effects")) {
     const std::string text = object.string("effects");
     if (text != "auto") {
       object.fail("effects", fmt::format("is \"{}\"; give \"auto\", a list of names, or {{\"on\": [...], \"off\": [...]}}", text));
     }
-    return wish;
+    return overrides;
   }
   if (!object.has_object("effects")) {
-    wish.automatic = false;
-    wish.on = read_names(object, "effects");
-    return wish;
+    overrides.automatic = false;
+    overrides.on = read_names(object, "effects");
+    return overrides;
   }
-  base::Object wishes = object.object("effects");
-  wishes.choice_or("base", {"auto"}, "auto");
-  if (wishes.has("on")) wish.on = read_names(wishes, "on");
-  if (wishes.has("off")) wish.off = read_names(wishes, "off");
-  for (const synth::Effect effect : wish.on.common(wish.off)) {
-    wishes.fail("off", fmt::format("names \"{}\", and so does \"on\"; keep one of them", synth::get_name(effect)));
+  base::Object keys = object.object("effects");
+  keys.choice_or("base", {"auto"}, "auto");
+  if (keys.has("on")) overrides.on = read_names(keys, "on");
+  if (keys.has("off")) overrides.off = read_names(keys, "off");
+  for (const synth::Effect effect : overrides.on.common(overrides.off)) {
+    keys.fail("off", fmt::format("names \"{}\", and so does \"on\"; keep one of them", synth::get_name(effect)));
   }
-  wishes.finish();
-  return wish;
+  keys.finish();
+  return overrides;
 }
 
-/// Exactly what a wish says where effects are not planned.
-synth::EffectSet find_usual(const plan::Wish& wish) { return wish.automatic ? kDefaultEffects.with(wish.on).without(wish.off) : wish.on; }
+/// Exactly the overrides, where effects are not selected.
+synth::EffectSet find_usual(const effect_selection::EffectOverrides& overrides) {
+  return overrides.automatic ? kDefaultEffects.with(overrides.on).without(overrides.off) : overrides.on;
+}
 
 /// What fixes or carries a body.
-support::Wish read_support(base::Object& body) {
-  support::Wish wish;
-  wish.all = material::read_fixing(body);
+support::MountingRequest read_support(base::Object& body) {
+  support::MountingRequest overrides;
+  overrides.all = material::read_fixing(body);
   if (auto supports = body.object_if("supports")) {
     for (const std::string& name : supports->keys()) {
       base::Object one = supports->object(name);
       const auto fixing = material::read_fixing(one);
       one.finish();
       if (!fixing) supports->fail(name, "says nothing; give \"on\", \"joint\" or \"loss\"");
-      wish.by_name.emplace(name, *fixing);
+      overrides.by_name.emplace(name, *fixing);
     }
   }
-  for (base::Entry& entry : body.entries("held", kMostHolders)) {
+  for (base::Entry& entry : body.entries("held", kMaxHolders)) {
     if (!entry.object)
       throw InputError(fmt::format("{}: \"held\": say where as well: {{\"by\": \"{}\", \"point_m\": [x, y, z]}}", entry.place, entry.text));
     support::Holder holder{.by = material::read_holder(*entry.object, "by")};
     if (!entry.object->has("point_m")) entry.object->numbers<3>("point_m");  // its message
     holder.point_m = read_vector(*entry.object, "point_m", {}, kFarthestM);
     entry.object->finish();
-    wish.held.push_back(holder);
+    overrides.held.push_back(holder);
   }
-  return wish;
+  return overrides;
 }
 
-SceneBody parse_body(base::Object& object, const plan::Wish& wish, double variation) {
+SceneBody parse_body(base::Object& object, const effect_selection::EffectOverrides& overrides, double variation) {
   SceneBody body;
   body.name = object.string("name");
   if (body.name.size() > kLongestName ||
@@ -196,7 +198,7 @@ SceneBody parse_body(base::Object& object, const plan::Wish& wish, double variat
   for (const char* key : {"on", "joint", "loss", "supports", "held"}) {
     if (body.support_place.empty() && object.has(key)) body.support_place = object.find_place(key);
   }
-  body.wish = object.has("effects") ? read_effects(object) : wish;
+  body.overrides = object.has("effects") ? read_effects(object) : overrides;
   object.finish();
   return body;
 }
@@ -286,9 +288,9 @@ contact::JointSpec parse_joint(base::Object& object, const Names& names) {
     if (!object.has(key)) continue;
     if (!is_meant) object.fail(key, fmt::format("a {} has none; a hinge has \"limits_deg\", a slider \"limits_m\"", kind));
     std::array<double, 2> limits = object.numbers<2>(key);
-    const double most = turns ? contact::kWidestHingeDeg : kFarthestM;
-    if (!(limits[0] <= 0.0 && limits[1] >= 0.0 && limits[0] >= -most && limits[1] <= most && limits[1] - limits[0] > 1e-3))
-      object.fail(key, fmt::format("must be [lowest, highest] with the start, 0, between them, within {:g}", most));
+    const double max = turns ? contact::kWidestHingeDeg : kFarthestM;
+    if (!(limits[0] <= 0.0 && limits[1] >= 0.0 && limits[0] >= -max && limits[1] <= max && limits[1] - limits[0] > 1e-3))
+      object.fail(key, fmt::format("must be [lowest, highest] with the start, 0, between them, within {:g}", max));
     for (double& limit : limits) limit *= turns ? std::numbers::pi / 180.0 : 1.0;
     joint.limits = limits;
   }
@@ -413,14 +415,14 @@ Vec3 read_place(const base::Object& object, std::string_view key, std::span<cons
 }
 
 /// Rows [t, x, y, z] in order of time, slower than sound.
-std::vector<synth::Place> read_path(base::Object& object, std::string_view key) {
-  std::vector<synth::Place> path;
-  for (const std::vector<double>& row : object.number_rows(key, 4, kMostWaypoints)) {
-    const synth::Place place{row[0], read_place(object, key, std::span(row).subspan(1))};
+std::vector<synth::PathPoint> read_path(base::Object& object, std::string_view key) {
+  std::vector<synth::PathPoint> path;
+  for (const std::vector<double>& row : object.number_rows(key, 4, kMaxWaypoints)) {
+    const synth::PathPoint place{row[0], read_place(object, key, std::span(row).subspan(1))};
     if (!(std::abs(place.time_s) <= kLongestS))
       object.fail(key, fmt::format("time {} is out of range; give {} s at most", row[0], kLongestS));
     if (!path.empty()) {
-      const synth::Place& last = path.back();
+      const synth::PathPoint& last = path.back();
       if (!(place.time_s > last.time_s)) {
         object.fail(key, fmt::format("time {} follows {}; give rows [t, x, y, z] in order of time", place.time_s, last.time_s));
       }
@@ -435,8 +437,8 @@ std::vector<synth::Place> read_path(base::Object& object, std::string_view key) 
   return path;
 }
 
-Listener parse_listener(base::Object& object) {
-  Listener listener;
+SceneListener parse_listener(base::Object& object) {
+  SceneListener listener;
   if (object.has("path")) {
     if (object.has("position_m")) object.fail("path", "says the same thing as \"position_m\"; keep one of them");
     listener.path = read_path(object, "path");
@@ -487,10 +489,10 @@ Output parse_output(base::Object& object) {
 
 Quality parse_quality(base::Object& object) {
   Quality quality;
-  plan::Strictness& planner = quality.planner;
-  if (object.has("planner_db")) planner.tellable_share = std::pow(10.0, 0.1 * read_within(object, "planner_db", 0.0, -150.0, -10.0));
-  planner.below_loudest_db = read_within(object, "quiet_db", planner.below_loudest_db, 20.0, 250.0);
-  planner.lead_s = read_within(object, "lead_s", planner.lead_s, 0.001, 1.0);
+  effect_selection::SelectionThresholds& thresholds = quality.thresholds;
+  if (object.has("planner_db")) thresholds.audible_share = std::pow(10.0, 0.1 * read_within(object, "planner_db", 0.0, -150.0, -10.0));
+  thresholds.below_loudest_db = read_within(object, "quiet_db", thresholds.below_loudest_db, 20.0, 250.0);
+  thresholds.lead_s = read_within(object, "lead_s", thresholds.lead_s, 0.001, 1.0);
   if (object.has("silence_pa")) quality.silence_pa = read_within(object, "silence_pa", 0.0, 1e-15, 1.0);
   quality.modes = object.integer_if("modes", synth::kGroup, std::numeric_limits<std::int32_t>::max());
   quality.contact_step_s = read_within(object, "contact_step_s", quality.contact_step_s, 1e-5, 2e-3);
@@ -505,7 +507,7 @@ Quality parse_quality(base::Object& object) {
 }  // namespace
 
 Scene read_scene(const std::filesystem::path& file) {
-  return parse_scene(base::read_document(file, fmt::format("a scene may hold {} bodies and {} strikes", kMostBodies, kMostStrikes)));
+  return parse_scene(base::read_document(file, fmt::format("a scene may hold {} bodies and {} strikes", kMaxBodies, kMaxStrikes)));
 }
 
 Scene parse_scene(const base::Document& document) {
@@ -528,15 +530,15 @@ Scene parse_scene(const base::Document& document) {
     root.finish();  // a mistyped key is the likeliest reason
     root.fail("bodies", "is missing or empty; list at least one body with a \"name\" and a \"bank\"");
   }
-  if (bodies.size() > kMostBodies)
-    root.fail("bodies", fmt::format("lists {} bodies; a scene may hold {}: leave some out, or make several scenes of it", bodies.size(),
-                                    kMostBodies));
-  if (root.has("effects")) scene.wish = read_effects(root);
-  scene.effects = find_usual(scene.wish);
+  if (bodies.size() > kMaxBodies)
+    root.fail("bodies",
+              fmt::format("lists {} bodies; a scene may hold {}: leave some out, or make several scenes of it", bodies.size(), kMaxBodies));
+  if (root.has("effects")) scene.overrides = read_effects(root);
+  scene.effects = find_usual(scene.overrides);
   const double variation = read_within(root, "variation", 0.0, 0.0, 1.0);
   Names names;
   for (base::Object& object : bodies) {
-    scene.bodies.push_back(parse_body(object, scene.wish, variation));
+    scene.bodies.push_back(parse_body(object, scene.overrides, variation));
     const std::string& name = scene.bodies.back().name;
     if (!names.emplace(name, names.size()).second)
       object.fail("name", fmt::format("there is a body called \"{}\" already; give this one another name", name));
@@ -544,14 +546,14 @@ Scene parse_scene(const base::Document& document) {
   for (base::Object& object : root.objects("joints")) scene.joints.push_back(parse_joint(object, names));
   for (base::Object& object : root.objects("cords")) scene.cords.push_back(parse_cord(object, names));
   std::vector<base::Object> strikes = root.objects("strikes");
-  if (strikes.size() > kMostStrikes) {
-    root.fail("strikes", fmt::format("lists {} strikes; a scene may hold {}", strikes.size(), kMostStrikes));
+  if (strikes.size() > kMaxStrikes) {
+    root.fail("strikes", fmt::format("lists {} strikes; a scene may hold {}", strikes.size(), kMaxStrikes));
   }
   for (base::Object& object : strikes) scene.strikes.push_back(parse_strike(object, scene, names));
   if (auto listener = root.object_if("listener")) scene.listener = parse_listener(*listener);
   if (root.has("microphones")) {
     if (root.has("listener")) root.fail("microphones", "takes the place of \"listener\"; keep one of them");
-    for (const std::vector<double>& row : root.number_rows("microphones", 3, kMostMicrophones)) {
+    for (const std::vector<double>& row : root.number_rows("microphones", 3, kMaxMicrophones)) {
       scene.microphones_m.push_back(read_place(root, "microphones", row));
     }
   }
@@ -564,7 +566,7 @@ Scene parse_scene(const base::Document& document) {
 
 std::size_t count_channels(const Scene& scene) { return scene.microphones_m.empty() ? 2 : scene.microphones_m.size(); }
 
-std::array<Vec3, 2> calc_ears(const Listener& listener) {
+std::array<Vec3, 2> calc_ears(const SceneListener& listener) {
   // Left is up x facing. Who looks straight up or down keeps the left ear towards -x.
   Vec3 left{-listener.facing[1], listener.facing[0], 0.0};
   const double length = norm(left);

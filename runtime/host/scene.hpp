@@ -12,12 +12,12 @@
 #include "runtime/base/document.hpp"
 #include "runtime/base/vector.hpp"
 #include "runtime/contact/world.hpp"
-#include "runtime/plan/planner.hpp"
+#include "runtime/effect_selection/effect_selector.hpp"
 #include "runtime/radiation/gains.hpp"
 #include "runtime/support/losses.hpp"
 #include "runtime/synth/effects.hpp"
 #include "runtime/synth/kernels.hpp"
-#include "runtime/synth/track.hpp"
+#include "runtime/synth/trajectory.hpp"
 
 namespace carillon::host {
 
@@ -33,7 +33,7 @@ inline const std::vector<std::string> kJointNames{"weld", "hinge", "slider", "un
 
 /// What carillon-render can play, and what it plays where effects are not planned.
 inline constexpr synth::EffectSet kPlayableEffects = synth::kCompiledEffects;
-inline constexpr synth::EffectSet kDefaultEffects = synth::kUsualEffects;
+inline constexpr synth::EffectSet kDefaultEffects = synth::kDefaultEffects;
 
 /// What supports take of a body's modes; filled when the banks are read, empty without losses.
 struct Mounting {
@@ -45,15 +45,15 @@ struct Mounting {
 
 struct SceneBody {
   std::string name;
-  std::filesystem::path bank;    // absolute
-  contact::BodySpec spec;        // spec.bank is filled when the banks are read
-  plan::Wish wish;               // its own key "effects", or the scene's
-  support::Wish support{};       // its keys "on", "joint", "loss", "supports" and "held"
-  std::string support_place;     // "file:line" of the first of them, for messages
-  Mounting mounting;             // what they, or the bank's own supports, take of its modes
-  double sphere_radius_m = 0.0;  // of its bank, when that is read: radiation::calc_sphere_radius_m()
-  radiation::Limited limited;    // gains of its modes that its damping would not allow
-  double variation = 0.0;        // its own key "variation", or the scene's: how much equal strikes differ, 0..1
+  std::filesystem::path bank;                   // absolute
+  contact::BodySpec spec;                       // spec.bank is filled when the banks are read
+  effect_selection::EffectOverrides overrides;  // its own key "effects", or the scene's
+  support::MountingRequest support{};           // its keys "on", "joint", "loss", "supports" and "held"
+  std::string support_place;                    // "file:line" of the first of them, for messages
+  Mounting mounting;                            // what they, or the bank's own supports, take of its modes
+  double sphere_radius_m = 0.0;                 // of its bank, when that is read: radiation::calc_sphere_radius_m()
+  radiation::Limited limited;                   // gains of its modes that its damping would not allow
+  double variation = 0.0;                       // its own key "variation", or the scene's: how much equal strikes differ, 0..1
 };
 
 /// F = K y^p of a felt that is pressed in by y.
@@ -84,11 +84,11 @@ struct SceneStrike {
   std::optional<Mallet> mallet{};  // in place of impulse and duration
 };
 
-struct Listener {
-  Vec3 position_m{0.0, -1.5, 0.5};  // between the ears; at the beginning
-  std::vector<synth::Place> path;   // of the listener when it moves
-  Vec3 facing{0.0, 1.0, 0.0};       // unit vector
-  double ear_distance_m = 0.2;      // OCE01
+struct SceneListener {
+  Vec3 position_m{0.0, -1.5, 0.5};     // between the ears; at the beginning
+  std::vector<synth::PathPoint> path;  // of the listener when it moves
+  Vec3 facing{0.0, 1.0, 0.0};          // unit vector
+  double ear_distance_m = 0.2;         // OCE01
 };
 
 struct Output {
@@ -103,8 +103,8 @@ inline const std::vector<std::string> kInstructionNames{"plain", "sse2", "avx2",
 
 /// What accuracy is bought with; the initialisers are the defaults that docs/accuracy.md chose.
 struct Quality {
-  plan::Strictness planner{};
-  std::optional<double> silence_pa{};   // below which a body sleeps; nothing: as the planner says
+  effect_selection::SelectionThresholds thresholds{};
+  std::optional<double> silence_pa{};   // below which a body sleeps; nothing: as the selector says
   std::optional<std::int64_t> modes{};  // of all bodies that may ring at once; nothing: all
   double contact_step_s = contact::WorldOptions{}.contact_step_s;
   double joint_tolerance = contact::WorldOptions{}.joint_tolerance;
@@ -124,11 +124,11 @@ struct Scene {
   std::vector<contact::JointSpec> joints;
   std::vector<contact::CordSpec> cords;
   std::vector<SceneStrike> strikes;  // in the order of the file
-  Listener listener;
+  SceneListener listener;
   std::vector<Vec3> microphones_m;  // places in the world, a channel each, instead of the listener's ears
   radiation::GainKind radiation = radiation::GainKind::kSphere;
-  plan::Wish wish;                             // the key "effects"
-  synth::EffectSet effects = kDefaultEffects;  // of all bodies where they are not planned
+  effect_selection::EffectOverrides overrides;  // the key "effects"
+  synth::EffectSet effects = kDefaultEffects;   // of all bodies where they are not planned
   Output output;
   Quality quality;
   std::vector<std::string> warnings;  // of numbers that may be meant, a line each
@@ -145,6 +145,6 @@ std::size_t count_channels(const Scene& scene);
 
 /// The places of the left and the right ear at the beginning: the line between them is level when the listener does not look straight up or
 /// down.
-std::array<Vec3, 2> calc_ears(const Listener& listener);
+std::array<Vec3, 2> calc_ears(const SceneListener& listener);
 
 }  // namespace carillon::host

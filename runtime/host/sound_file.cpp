@@ -14,7 +14,7 @@
 namespace carillon::host {
 namespace {
 
-constexpr std::uint64_t kMost32 = 0xffffffffU;
+constexpr std::uint64_t kMax32 = 0xffffffffU;
 
 struct Encoding {
   int subtype;  // of libsndfile
@@ -44,7 +44,7 @@ std::uint64_t calc_data_bytes(std::size_t channels, SampleFormat format, std::ui
   return frames * channels * (get_encoding(format).bits / 8);
 }
 
-/// What libsndfile writes goes on to the sink; what the sink throws waits here, since libsndfile is C.
+/// What libsndfile writes is passed on to the sink; what the sink throws waits here, since libsndfile is C.
 struct Passage {
   const std::function<void(std::string_view)>* sink = nullptr;
   sf_count_t at = 0;
@@ -54,7 +54,7 @@ struct Passage {
 sf_count_t get_length(void* user) { return static_cast<Passage*>(user)->at; }
 sf_count_t seek(sf_count_t, int, void* user) { return static_cast<Passage*>(user)->at; }
 sf_count_t read(void*, sf_count_t, void*) { return 0; }
-sf_count_t tell(void* user) { return static_cast<Passage*>(user)->at; }
+sf_count_t get_position(void* user) { return static_cast<Passage*>(user)->at; }
 
 sf_count_t write(const void* data, sf_count_t count, void* user) {
   auto& passage = *static_cast<Passage*>(user);
@@ -84,20 +84,20 @@ std::string make_wav_header(int rate_hz, std::size_t channels, SampleFormat form
   if (encoding.tag == 3) {
     rest += "fact";
     add(rest, 4, 4);
-    add(rest, std::min(frames, kMost32), 4);
+    add(rest, std::min(frames, kMax32), 4);
   }
   rest += "data";
   constexpr std::uint64_t kForm = 4, kSize = 4, kDs64 = 36;
   const std::uint64_t riff = kForm + rest.size() + kSize + data + data % 2;
   std::string header;
-  if (riff <= kMost32) {
+  if (riff <= kMax32) {
     header = "RIFF";
     add(header, riff, 4);
     header += "WAVE" + rest;
     add(header, data, 4);
   } else {
     header = "RF64";
-    add(header, kMost32, 4);
+    add(header, kMax32, 4);
     header += "WAVEds64";
     add(header, kDs64 - 8, 4);
     add(header, riff + kDs64, 8);
@@ -105,7 +105,7 @@ std::string make_wav_header(int rate_hz, std::size_t channels, SampleFormat form
     add(header, frames, 8);
     add(header, 0, 4);
     header += rest;
-    add(header, kMost32, 4);
+    add(header, kMax32, 4);
   }
   return header;
 }
@@ -118,7 +118,7 @@ std::uint64_t calc_wav_bytes(std::size_t channels, SampleFormat format, std::uin
 void write_wav(const SoundStore& sound, double gain_per_pa, SampleFormat format, const std::function<void(std::string_view)>& sink) {
   sink(make_wav_header(sound.get_rate_hz(), sound.get_channels(), format, sound.get_frames()));
   Passage passage{.sink = &sink};
-  SF_VIRTUAL_IO io{get_length, seek, read, write, tell};
+  SF_VIRTUAL_IO io{get_length, seek, read, write, get_position};
   SF_INFO info{};
   info.samplerate = sound.get_rate_hz();
   info.channels = static_cast<int>(sound.get_channels());

@@ -1,6 +1,7 @@
 // Method:     Hann-windowed Fourier transforms, mean square of all channels, scaled so that a steady tone shows its level; colour by level.
 // Source:     Harris 1978 (windows); the colour map is "magma" of matplotlib (van der Walt & Smith 2015, CC0), perceptually uniform, by
-// nine of its points. Deviations: none.
+//             nine of its points.
+// Deviations: none.
 #include "runtime/host/spectrogram.hpp"
 
 #include <cairo.h>
@@ -123,7 +124,7 @@ void draw_axes(cairo_t* cr, const SpectrogramLayout& at, double duration_s, doub
   const double bottom = at.top + at.plot_height;
   cairo_set_font_size(cr, 17);
   const TimeAxis time = make_time_axis(duration_s);
-  for (const Mark& mark : time.marks) {
+  for (const AxisTick& mark : time.marks) {
     const double x = std::round(at.left + mark.at_s / duration_s * at.plot_width) + 0.5;
     draw_line(cr, x, bottom, x, bottom + 7);
     draw_text(cr, x, bottom + 26, mark.text, Anchor::kCentre);

@@ -46,7 +46,7 @@ class Finder {
 };
 
 /// The triangle and the place on it that are nearest to the strike's point.
-void find_nearest_place(const Finder& finder, const SceneStrike& strike, const std::string& name, stream::Impulse& impulse) {
+void find_nearest_place(const Finder& finder, const SceneStrike& strike, const std::string& name, events::Impulse& impulse) {
   const bank::NearestPlace nearest = finder.find(*strike.point_m);
   if (nearest.triangle < 0) throw InputError(fmt::format("{}: \"point_m\" is too far away; its numbers are too large", strike.place));
   if (!(nearest.distance_m <= kFarthestShare * finder.get_extent_m())) {
@@ -74,7 +74,7 @@ Vec3 find_velocity(const Mallet& mallet, const bank::Bank& bank, std::int32_t tr
 
 /// A large impulse without length gives energy to all modes alike, which no blow does.
 std::optional<std::string> question_strike(const SceneStrike& strike, const std::string& name, const bank::Bank& bank,
-                                           const stream::Impulse& impulse) {
+                                           const events::Impulse& impulse) {
   if (strike.duration_s > 0.0) return std::nullopt;
   const double size = std::hypot(impulse.impulse_n_s[0], impulse.impulse_n_s[1], impulse.impulse_n_s[2]);
   const auto& corners = bank.triangles[static_cast<std::size_t>(impulse.triangle)];
@@ -110,7 +110,7 @@ Strikes make_strikes(const Scene& scene, const std::vector<const bank::Bank*>& b
   for (const SceneStrike& strike : scene.strikes) {
     const bank::Bank& bank = *banks[strike.body];
     const std::string& name = scene.bodies[strike.body].name;
-    stream::Impulse impulse{.time_s = strike.time_s,
+    events::Impulse impulse{.time_s = strike.time_s,
                             .body = static_cast<std::int32_t>(strike.body),
                             .barycentric = {1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0},
                             .impulse_n_s = strike.impulse_n_s,
@@ -143,7 +143,7 @@ Strikes make_strikes(const Scene& scene, const std::vector<const bank::Bank*>& b
   for (auto& [body, on_it] : by_mallet)
     mallets.play(scene.bodies[body], *banks[body], std::move(on_it), made.events, made.blows, made.warnings);
   std::stable_sort(made.events.begin(), made.events.end(),
-                   [](const stream::Event& a, const stream::Event& b) { return stream::get_time_s(a) < stream::get_time_s(b); });
+                   [](const events::Event& a, const events::Event& b) { return events::get_time_s(a) < events::get_time_s(b); });
   return made;
 }
 

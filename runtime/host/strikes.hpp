@@ -5,15 +5,15 @@
 #include <vector>
 
 #include "runtime/bank/bank.hpp"
+#include "runtime/events/events.hpp"
 #include "runtime/host/mallets.hpp"
 #include "runtime/host/scene.hpp"
-#include "runtime/stream/events.hpp"
 
 namespace carillon::host {
 
 /// What the strikes of a scene come to.
 struct Strikes {
-  std::vector<stream::Event> events;  // in order of time: an Impulse a strike, some Forces a mallet
+  std::vector<events::Event> events;  // in order of time: an Impulse a strike, some Forces a mallet
   std::vector<Blow> blows;            // of mallets, body by body
   std::vector<std::string> warnings;  // of strikes that may not be meant
 };

@@ -38,11 +38,7 @@ Mat3 invert_inertia(const Mat3& m) {
 
 /// A unit vector across `n`, along the axis that it is least along.
 Vec3 make_tangent(const Vec3& n) {
-  std::size_t least = 0;
-  for (std::size_t i = 1; i < 3; ++i)
-    if (std::abs(n[i]) < std::abs(n[least])) least = i;
-  Vec3 axis{};
-  axis[least] = 1.0;
+  const Vec3 axis = find_least_axis(n);
   const Vec3 t = axis - dot(axis, n) * n;
   return 1.0 / std::sqrt(dot(t, t)) * t;
 }
@@ -110,7 +106,7 @@ double Books::calc_error() const {
   return (start + given - end) / largest;
 }
 
-Impact::Impact(std::vector<Body> bodies, std::vector<Contact> contacts, const Options& options)
+Impact::Impact(std::vector<Body> bodies, const std::vector<Contact>& contacts, const Options& options)
     : above_band_(options.above_band), settling_s_(options.settling_s) {
   check(!contacts.empty(), "there is no contact");
   check(options.steps_per_pulse >= 1.0 && options.longest_step_s > 0.0 && options.part_s >= 0.0, "options out of range");
@@ -411,7 +407,7 @@ bool Impact::limit_forces() {
     const double left = limit - before, allowed = left > 0.0 ? before - left * std::expm1(-h_ / (kTaper * (pressed_s_[c] + h_))) : limit;
     const double over = (parting - allowed) / gain;
     if (over <= kOver * force_[row]) continue;
-    t.most_n = std::max(0.0, force_[row] - over);
+    t.max_n = std::max(0.0, force_[row] - over);
     any = true;
   }
   return any;
@@ -453,9 +449,9 @@ void Impact::step() {
     const auto row = static_cast<std::size_t>(t.row);
     const double before = t.compression_m;
     t.compression_m -= moved_[row];
-    // What is not let push gives way where it is pressed further: it takes up no energy, and gives back less than it has.
-    if (std::isfinite(t.most_n)) t.compression_m = std::min(t.compression_m, before);
-    t.most_n = std::numeric_limits<double>::infinity();
+    // What is not allowed to push yields where it is pressed further: it takes up no energy, and gives back less than it has.
+    if (std::isfinite(t.max_n)) t.compression_m = std::min(t.compression_m, before);
+    t.max_n = std::numeric_limits<double>::infinity();
     pressed_s_[c] = t.compression_m > 0.0 ? pressed_s_[c] + h_ : 0.0;
     books_.dissipated_contact -=
         force_[row] * moved_[row] + (calc_spring_energy(t.spring, t.compression_m) - calc_spring_energy(t.spring, before));

@@ -89,12 +89,14 @@ struct Books {
   double calc_error() const;  // start + given - all the rest, over the largest of them
 };
 
+/// All bodies, contacts and modes of one impact, integrated with one step length, which never changes. At any time get_books() closes to
+/// rounding: start + given = rigid + spring + modal + dissipated + above_band.
 class Impact {
  public:
   /// Throws std::invalid_argument where indices, sizes, signs or values are wrong. Meant for up to 8 contacts; cost grows with the cube.
-  Impact(std::vector<Body> bodies, std::vector<Contact> contacts, const Options& options = {});
+  Impact(std::vector<Body> bodies, const std::vector<Contact>& contacts, const Options& options = {});
 
-  /// Goes on until all have parted (true) or until the first step that ends at or after `until_s` since the beginning (false). What is
+  /// Continues until all have parted (true) or until the first step that ends at or after `until_s` since the beginning (false). What is
   /// pressed together by its accelerations never parts: give a time.
   bool advance(double until_s);
 
@@ -103,7 +105,7 @@ class Impact {
   void join(const Contact& contact);
   /// The same bodies and contacts, where they are now: takes centres, inertias and accelerations of `bodies` and places, normals and
   /// shape values of `contacts` (all others are ignored). Compressions, anchors, modal states and the step stay; moved_m and turned_rad
-  /// begin anew, and velocities of bodies on joints are taken; what a turned inertia does to the energy of an unchanged spin is booked as
+  /// begin again, and velocities of bodies on joints are taken; what a turned inertia does to the energy of an unchanged spin is booked as
   /// given. Throws as the constructor does.
   void update(std::span<const Body> bodies, std::span<const Contact> contacts);
 
@@ -128,7 +130,7 @@ class Impact {
   /// The bodies with their states of now.
   std::vector<Body> get_bodies() const;
   Books get_books() const;
-  /// The samples since the last call; a pulse that goes on comes in pieces.
+  /// The samples since the last call; a pulse that continues comes in pieces.
   std::vector<Pulse> take_pulses();
 
  private:

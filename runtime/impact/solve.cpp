@@ -25,7 +25,7 @@ constexpr double kFast = 1e-3;  // where a step leaves so little of the error, t
 /// The normal force of a step at whose end the compression is y1.
 StepForce calc_normal_force(const Touch& touch, double y1, double h_s) {
   const StepForce one = calc_step_force(touch.spring, touch.compression_m, y1, h_s);
-  return one.force > touch.most_n ? StepForce{touch.most_n, 0.0} : one;
+  return one.force > touch.max_n ? StepForce{touch.max_n, 0.0} : one;
 }
 
 }  // namespace

@@ -13,12 +13,12 @@ namespace carillon::impact {
 /// A contact's law and its state at the beginning of a step. It has one row of the step's unknowns (the normal), or three where it rubs.
 struct Touch {
   Spring spring;
-  double friction = 0.0;                                    // mu; 0: one row
-  double tangential_n_m = 0.0;                              // k_t of the anchor spring [N/m]
-  double compression_m = 0.0;                               // y
-  std::array<double, 2> stretch{};                          // u of the anchor spring [m]
-  double most_n = std::numeric_limits<double>::infinity();  // that it may push with in this step: its spring lets go of the rest
-  int row = 0;                                              // of the normal; the tangents follow
+  double friction = 0.0;                                   // mu; 0: one row
+  double tangential_n_m = 0.0;                             // k_t of the anchor spring [N/m]
+  double compression_m = 0.0;                              // y
+  std::array<double, 2> stretch{};                         // u of the anchor spring [m]
+  double max_n = std::numeric_limits<double>::infinity();  // that it may push with in this step: its spring lets go of the rest
+  int row = 0;                                             // of the normal; the tangents follow
   std::size_t count_rows() const { return friction > 0.0 ? 3 : 1; }
 };
 
@@ -28,6 +28,8 @@ struct Touch {
 /// anchor moves, and the loss -F_t.s - k_t (|P(u)|^2 - |u0|^2)/2 is never negative.
 std::array<double, 2> calc_shortened(const std::array<double, 2>& x, double longest);
 
+/// Solves the contact laws of one step. Normal forces are >= 0 and friction lies inside its cone, whatever the answer. Members are work
+/// memory: no call changes the result of the next.
 class StepSolver {
  public:
   /// Finds forces f (N, one per row: normal >= 0, then the two tangents) with f = law(moved), moved = free + A f; `moved` [m] is the

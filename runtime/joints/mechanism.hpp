@@ -61,6 +61,8 @@ struct Coordinates {
 /// The error that a step of the integration may leave in a coordinate [rad, m].
 inline constexpr double kTolerance = 1e-8;
 
+/// Members, joints and start, which never change. Coordinates belong to the caller; whatever their values, no joint is open. Results depend
+/// on the arguments of the call alone.
 class Mechanism {
  public:
   virtual ~Mechanism() = default;

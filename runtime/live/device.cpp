@@ -22,11 +22,11 @@
 namespace carillon::live {
 namespace {
 
-/// PortAudio, started once for as long as somebody needs it.
+/// PortAudio, started once for as long as it is used.
 class Library {
  public:
   Library() {
-    // Its back ends tell about every sound system that is not there, on standard error.
+    // Its back ends print a line on standard error for every sound system that is not there.
     const int kept = dup(STDERR_FILENO);
     const int nothing = open("/dev/null", O_WRONLY | O_CLOEXEC);
     if (kept >= 0 && nothing >= 0) dup2(nothing, STDERR_FILENO);

@@ -1,4 +1,4 @@
-// Method:     one thread runs the physics in slices until it is `look_ahead_s` ahead of the card and hands its events on in order of time;
+// Method:     one thread runs the physics in slices until it is `look_ahead_s` ahead of the card and pushes its events as they fall due;
 //             the card's thread plays them. Where physics falls behind, impulses act late, which is counted.
 // Source:     none.
 // Deviations: none.
@@ -9,29 +9,25 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <deque>
 #include <limits>
-#include <map>
 #include <memory>
 #include <thread>
 #include <vector>
 
-#include "runtime/base/cpu_clock.hpp"
+#include "runtime/base/clock.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/contact/world.hpp"
+#include "runtime/events/events.hpp"
 #include "runtime/host/banks.hpp"
+#include "runtime/host/event_scheduler.hpp"
 #include "runtime/host/events.hpp"
-#include "runtime/host/microphones.hpp"
 #include "runtime/host/planning.hpp"
-#include "runtime/host/pose.hpp"
-#include "runtime/host/render.hpp"
 #include "runtime/host/scene.hpp"
+#include "runtime/host/session.hpp"
 #include "runtime/host/strikes.hpp"
 #include "runtime/live/device.hpp"
 #include "runtime/live/schedule.hpp"
-#include "runtime/radiation/gains.hpp"
 #include "runtime/synth/load_keeper.hpp"
-#include "runtime/synth/model.hpp"
 #include "runtime/synth/synthesiser.hpp"
 
 namespace carillon::live {
@@ -39,20 +35,23 @@ namespace {
 
 constexpr double kSliceS = 0.01;   // of CPU time for physics, between two looks at the ring
 constexpr double kChangeS = 0.03;  // by which a change of effects is sent before the events that call for it
-// Events are handed on at most this long before they are heard, however far physics is in front: the synthesiser has room for what waits so
+constexpr double kMarginS = 0.01;  // by which waypoints and records of contacts are pushed earlier than strikes
+// Events are pushed at most this long before they are due, however far physics is in front: the synthesiser has room for what waits so
 // long.
-constexpr double kHandedS = 0.25;
-constexpr int kMostStrikes = 1024, kMostForces = 2048;  // of a body that wait or act
+constexpr double kPushedS = 0.25;
+constexpr int kMaxStrikes = 1024, kMaxForces = 2048;  // of a body that wait or act
+constexpr int kMaxWaypoints = 1024, kRingEvents = 1 << 14;
 
-/// Physics and strikes of a scene as one stream, in order of time.
-class Course {
+void warn(const std::vector<std::string>& warnings) {
+  for (const std::string& warning : warnings) fmt::print(stderr, "carillon-live: warning: {}\n", base::printable(warning));
+}
+
+/// The physics of a scene, advanced in slices ahead of the sound. Every event goes to the selector and the scheduler once, in order of
+/// time.
+class Physics {
  public:
-  /// The planner watches what is to be played as soon as it is known.
-  Course(const host::Scene& scene, const std::vector<const bank::Bank*>& banks, plan::Planner& planner) : planner_(&planner) {
-    host::Strikes strikes = host::make_strikes(scene, banks);
-    for (const std::string& warning : strikes.warnings) fmt::print(stderr, "carillon-live: warning: {}\n", base::printable(warning));
-    strikes_ = std::move(strikes.events);
-    for (const stream::Event& strike : strikes_) planner.watch(strike);
+  Physics(const host::Scene& scene, effect_selection::EffectSelector& selector, host::EventScheduler& scheduler)
+      : selector_(&selector), scheduler_(&scheduler), end_s_(scene.duration_s) {
     if (!host::has_physics(scene)) return;
     try {
       world_ =
@@ -61,11 +60,10 @@ class Course {
                                                                                           .end_s = scene.duration_s,
                                                                                           .modes = scene.quality.modes_in_impacts,
                                                                                           .masks_hits = scene.quality.masking,
-                                                                                          .lasting_contacts = planner.needs_contacts()});
+                                                                                          .lasting_contacts = selector.needs_contacts()});
     } catch (const InputError& error) {
       throw InputError(fmt::format("{}: {}", scene.file.string(), error.what()));
     }
-    end_s_ = scene.duration_s;
   }
 
   /// Advances towards a time, for a slice of CPU time. False when there is nothing to do: physics goes by whole windows, the last of which
@@ -73,10 +71,10 @@ class Course {
   bool advance(double until_s) {
     if (world_ == nullptr || time_s_ >= std::min(until_s, end_s_)) return false;
     const double began_s = counted_s_ = base::get_thread_cpu_s(), was_s = time_s_;
-    time_s_ = world_->advance(std::min(until_s, end_s_), kSliceS, [this](const stream::Event& event) {
-      waiting_.push_back(event);
-      planner_->watch(event);
-      if (std::holds_alternative<stream::Mark>(event)) end_window();
+    time_s_ = world_->advance(std::min(until_s, end_s_), kSliceS, [this](const events::Event& event) {
+      scheduler_->add(event);
+      selector_->watch(event);
+      if (std::holds_alternative<events::TimeWatermark>(event)) end_window();
     });
     const double now_s = base::get_thread_cpu_s();
     window_cpu_s_ += now_s - counted_s_;
@@ -84,60 +82,154 @@ class Course {
   }
   /// The most CPU time that a window of the physics, 2 ms of the scene, has taken.
   double get_worst_window_s() const { return worst_window_s_; }
-  /// Up to where it is known what happens.
+  /// Up to where all events are known.
   double get_time_s() const { return world_ == nullptr || time_s_ >= end_s_ ? std::numeric_limits<double>::infinity() : time_s_; }
-
-  /// Hands on what happens before a time, as far as there is room, and says how far physics has run.
-  void hand_on(double until_s, synth::Synthesiser& synthesiser) {
-    while (true) {
-      const bool has_strike = next_ < strikes_.size() && stream::get_time_s(strikes_[next_]) <= until_s;
-      const bool has_event = !waiting_.empty() && stream::get_time_s(waiting_.front()) <= until_s;
-      if (!has_strike && !has_event) break;
-      const bool takes_strike = has_strike && (!has_event || stream::get_time_s(strikes_[next_]) < stream::get_time_s(waiting_.front()));
-      if (!synthesiser.push(takes_strike ? strikes_[next_] : waiting_.front())) return;  // full: later
-      if (takes_strike)
-        ++next_;
-      else
-        waiting_.pop_front();
-    }
-    const double known_s = std::min(get_time_s(), until_s);
-    if (known_s > marked_s_ && synthesiser.push(stream::Mark{known_s})) marked_s_ = known_s;
-  }
 
  private:
   /// The physics marks the end of each window.
   void end_window() {
-    const double now = base::get_thread_cpu_s();
-    worst_window_s_ = std::max(worst_window_s_, window_cpu_s_ + now - counted_s_);
+    const double now_s = base::get_thread_cpu_s();
+    worst_window_s_ = std::max(worst_window_s_, window_cpu_s_ + now_s - counted_s_);
     window_cpu_s_ = 0.0;
-    counted_s_ = now;
+    counted_s_ = now_s;
   }
 
-  std::vector<stream::Event> strikes_;
-  plan::Planner* planner_;
-  std::size_t next_ = 0;
+  effect_selection::EffectSelector* selector_;
+  host::EventScheduler* scheduler_;
   std::unique_ptr<contact::World> world_;
-  std::deque<stream::Event> waiting_;
-  double time_s_ = 0.0, end_s_ = 0.0, marked_s_ = -1.0;
+  double time_s_ = 0.0, end_s_ = 0.0;
   double window_cpu_s_ = 0.0, worst_window_s_ = 0.0, counted_s_ = 0.0;
 };
 
-/// The way of a listener that walks, as events.
-class Walk {
+/// How far in front of the sound things are done. A body has its effects kChangeS before the first event that calls for them is pushed.
+struct Lead {
+  double look_ahead_s;  // physics
+  bool plans;           // physics is known so far ahead that the selector can decide; else all bodies have what they may ever need
+  double changed_s;     // effects: planned lead_s before the events that call for them, sent by so much ahead
+  double pushed_s;      // events
+
+  Lead(double look_ahead, double selector_lead_s)
+      : look_ahead_s(look_ahead),
+        plans(look_ahead >= selector_lead_s + effect_selection::kTickS + kChangeS + kMarginS),
+        changed_s(std::max(0.0, std::min(look_ahead - selector_lead_s, kPushedS + kChangeS + kMarginS - selector_lead_s))),
+        pushed_s(std::min(kPushedS, plans ? changed_s + selector_lead_s - kChangeS - kMarginS : look_ahead)) {}
+};
+
+/// A scene on its way to a device: physics, plan, events and sound, each so far in front of the next as Lead says.
+class Player {
  public:
-  explicit Walk(const synth::Track& way) : way_(&way), next_(way.is_still() ? std::numeric_limits<std::int64_t>::max() : 0) {}
-  void hand_on(double until_s, synth::Synthesiser& synthesiser) {
-    constexpr double kEveryS = 0.01;
-    for (; static_cast<double>(next_) * kEveryS <= until_s; ++next_) {
-      const synth::Waypoint at = way_->find(static_cast<double>(next_) * kEveryS);
-      if (!synthesiser.push(stream::Listener{.time_s = at.time_s, .position_m = at.position_m, .velocity_m_s = at.velocity_m_s})) return;
+  Player(const host::Scene& scene, const std::vector<const bank::Bank*>& banks, const PlayerOptions& options)
+      : scene_(&scene),
+        lead_(options.look_ahead_s, scene.quality.thresholds.lead_s),
+        session_(scene, banks, scene.sample_rate_hz, true),
+        selector_(host::make_facts(scene, session_.get_microphones(), host::has_physics(scene))),
+        scheduler_(list_scheduled_bodies(), kMarginS),
+        physics_(scene, selector_, scheduler_),
+        schedule_(scene.bodies.size()),
+        synthesiser_(&open()) {
+    synthesiser_->set_gain(options.gain_per_pa > 0.0 ? options.gain_per_pa : scene.output.gain_per_pa.value_or(1.0));
+    const host::Strikes strikes = host::make_strikes(scene, banks);
+    warn(strikes.warnings);
+    for (const events::Event& strike : strikes.events) {
+      selector_.watch(strike);
+      scheduler_.add(strike);
     }
+    const std::vector<events::Listener> path = host::list_listener_path(session_.get_microphones());
+    scheduler_.add_listener(path);
   }
 
+  synth::Synthesiser& get_synthesiser() { return *synthesiser_; }
+
+  /// Adds the bodies, with what they need at the start, and pushes the first events.
+  void begin() {
+    while (advance(lead_.look_ahead_s)) {
+    }
+    std::vector<synth::EffectSet> first;  // without time to plan, all that a body might call for
+    for (std::size_t i = 0; i < scene_->bodies.size(); ++i) first.push_back(selector_.get_possible(static_cast<int>(i)));
+    if (lead_.plans) schedule_.apply(0.0, lead_.changed_s, [&](std::size_t body, synth::EffectSet effects) { first[body] = effects; });
+    for (std::size_t i = 0; i < first.size(); ++i) session_.add_body(session_.make_settings(i, host::find_effects(*scene_, i, first[i])));
+    push(0.0);
+  }
+
+  /// What is to be done when the sound has come to a time. False when physics need not advance.
+  bool step(double now_s) {
+    const bool advanced = advance(now_s + lead_.look_ahead_s);
+    min_lead_s_ = std::min(min_lead_s_, physics_.get_time_s() - synthesiser_->get_time_s());
+    synthesiser_->collect();
+    if (lead_.plans)
+      schedule_.apply(now_s, now_s + lead_.changed_s, [&](std::size_t body, synth::EffectSet effects) {
+        synthesiser_->set_effects(static_cast<int>(body), host::find_effects(*scene_, body, effects));
+      });
+    push(now_s);
+    return advanced;
+  }
+
+  /// How far physics was in front of the sound at the worst; infinite for a scene without physics.
+  double get_min_lead_s() const { return min_lead_s_; }
+  double get_worst_window_s() const { return physics_.get_worst_window_s(); }
+  std::int64_t get_faults() const { return scheduler_.get_faults(); }
+
  private:
-  const synth::Track* way_;
-  std::int64_t next_;
+  std::vector<host::ScheduledBody> list_scheduled_bodies() const {
+    std::vector<host::ScheduledBody> bodies;
+    for (std::size_t i = 0; i < scene_->bodies.size(); ++i) {
+      const synth::EffectSet effects = host::find_effects(*scene_, i, selector_.get_possible(static_cast<int>(i)));
+      bodies.push_back({.number = static_cast<int>(i),
+                        .moves = !scene_->bodies[i].spec.fixed,
+                        .lead_s = host::calc_strike_lead_s(session_.get_model(i), effects)});
+    }
+    return bodies;
+  }
+
+  synth::Synthesiser& open() {
+    synth::SynthesiserOptions room = session_.make_options();
+    room.max_strikes = kMaxStrikes;
+    room.max_forces = kMaxForces;
+    room.max_waypoints = kMaxWaypoints;
+    room.ring_events = kRingEvents;
+    return session_.open(room);
+  }
+
+  /// The selector decides as the physics advances, so that it keeps few events.
+  bool advance(double until_s) {
+    const bool advanced = physics_.advance(until_s);
+    if (!lead_.plans) return advanced;
+    for (const effect_selection::EffectChange& change : selector_.advance(std::min(physics_.get_time_s(), until_s))) schedule_.add(change);
+    return advanced;
+  }
+
+  /// What does not fit into the ring waits.
+  void push(double now_s) {
+    scheduler_.push_until(now_s + lead_.pushed_s, physics_.get_time_s(),
+                          [this](const events::Event& event) { return synthesiser_->push(event); });
+  }
+
+  const host::Scene* scene_;
+  Lead lead_;
+  host::Session session_;
+  effect_selection::EffectSelector selector_;
+  host::EventScheduler scheduler_;
+  Physics physics_;
+  Schedule schedule_;
+  synth::Synthesiser* synthesiser_;
+  double min_lead_s_ = std::numeric_limits<double>::infinity();
 };
+
+void print_statistics(const DeviceStatistics& card, const synth::SynthesiserCounters& counters, const Player& player, double rate_hz) {
+  const double card_s = std::max(static_cast<double>(card.frames), 1.0) / rate_hz;
+  fmt::print("played             {:.2f} s in {} blocks, {} underflows, latency {:.1f} ms\n", static_cast<double>(card.frames) / rate_hz,
+             card.callbacks, card.underflows, 1e3 * card.latency_s);
+  fmt::print("strikes            {}, {} late, {} refused\n", counters.strikes, counters.late, counters.refused);
+  if (const std::int64_t faults = counters.faults + player.get_faults(); faults > 0)
+    fmt::print("faulty events      {}, not played\n", faults);
+  fmt::print("physics            {} times behind the sound", counters.underruns);
+  if (const double lead_s = player.get_min_lead_s(); std::isfinite(lead_s))
+    fmt::print(", {:.0f} ms {} at the worst; 2 ms of it took {:.1f} ms of CPU at most", 1e3 * std::abs(lead_s),
+               lead_s < 0.0 ? "behind" : "in front", 1e3 * player.get_worst_window_s());
+  fmt::print("\n");
+  fmt::print("work               {:.1f} % of a core, {:.3g} mode-samples/s, {} groups of modes faded\n", 100.0 * card.busy_s / card_s,
+             static_cast<double>(counters.mode_samples) / card_s, counters.faded);
+}
 
 }  // namespace
 
@@ -146,89 +238,21 @@ void play(const PlayerOptions& options) {
   const host::Banks banks = host::read_banks(scene);
   std::vector<const bank::Bank*> body_banks;
   for (const host::SceneBody& body : scene.bodies) body_banks.push_back(body.spec.bank);
-  for (const std::string& warning : scene.warnings) fmt::print(stderr, "carillon-live: warning: {}\n", base::printable(warning));
+  warn(scene.warnings);
+  Player player(scene, body_banks, options);
+  synth::Synthesiser& synthesiser = player.get_synthesiser();
   const double rate_hz = scene.sample_rate_hz;
-
-  const host::Microphones microphones = host::make_microphones(scene);
-  synth::Synthesiser synthesiser({.rate_hz = rate_hz,
-                                  .microphones_m = microphones.offset_m,
-                                  .listener_m = microphones.centre.find(0.0).position_m,
-                                  .max_bodies = static_cast<int>(scene.bodies.size()),
-                                  .max_strikes = kMostStrikes,
-                                  .max_forces = kMostForces,
-                                  .max_waypoints = 1024,
-                                  .ring_events = 1 << 14,
-                                  .budget = host::calc_budget(scene.quality, rate_hz),
-                                  .ground = host::make_ground(scene)});
-  synthesiser.set_gain(options.gain_per_pa > 0.0 ? options.gain_per_pa : scene.output.gain_per_pa.value_or(1.0));
   Device device(synthesiser, {.name = options.device, .null = options.null, .rate_hz = rate_hz, .frames = options.frames});
-  plan::Planner planner(host::make_facts(scene, microphones, host::has_physics(scene)));
-  // Physics must be known so far ahead that the planner can decide.
-  const bool plans = options.look_ahead_s >= scene.quality.planner.lead_s + plan::kTickS + kChangeS;
-  Course course(scene, body_banks, planner);
-  // An effect is planned lead_s before the events that call for it, and is there kChangeS before they are handed on.
-  const double lead_s = scene.quality.planner.lead_s;
-  const double changed_s = std::max(0.0, std::min(options.look_ahead_s - lead_s, kHandedS + kChangeS - lead_s));
-  const double handed_s = std::min(kHandedS, plans ? changed_s + lead_s - kChangeS : options.look_ahead_s);
-  Schedule schedule(scene.bodies.size());
-  // As the physics goes on, so that the planner keeps few events.
-  const auto advance_to = [&](double until_s) {
-    const bool advanced = course.advance(until_s);
-    if (!plans) return advanced;
-    for (const plan::Change& change : planner.advance(std::min(course.get_time_s(), until_s))) schedule.add(change);
-    return advanced;
-  };
-  while (advance_to(options.look_ahead_s)) {
-  }
-  std::vector<synth::EffectSet> first;  // without time to plan, all that a body might call for
-  for (std::size_t i = 0; i < scene.bodies.size(); ++i) first.push_back(planner.get_possible(static_cast<int>(i)));
-  if (plans) schedule.apply(0.0, changed_s, [&](std::size_t body, synth::EffectSet effects) { first[body] = effects; });
-  std::map<const bank::Bank*, std::shared_ptr<const synth::Model>> models;
-  for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
-    const contact::BodySpec& spec = scene.bodies[i].spec;
-    auto& model = models[spec.bank];
-    if (model == nullptr) model = synth::Model::make(*spec.bank, {.rate_hz = rate_hz, .sphere_radius_m = scene.bodies[i].sphere_radius_m});
-    synthesiser.add_body(model, {.position_m = host::calc_world_point(spec.initial, spec.bank->rigid.centre_m),
-                                 .rotation = spec.initial.rotation,
-                                 .effects = host::find_effects(scene, i, first[i]),
-                                 .silence_pa = scene.quality.silence_pa.value_or(synth::BodySettings{}.silence_pa),
-                                 .surface = host::make_surface(scene.bodies[i]),
-                                 .isa = scene.quality.instructions});
-  }
-  Walk walk(microphones.centre);
-  course.hand_on(handed_s, synthesiser);
-  walk.hand_on(kHandedS, synthesiser);
+  player.begin();
   device.start();
   synth::LoadKeeper keeper;
-  double least_lead_s = std::numeric_limits<double>::infinity();  // of physics to the sound
-  for (double now = 0.0; now < scene.duration_s; now = synthesiser.get_time_s()) {
-    const bool advanced = advance_to(now + options.look_ahead_s);
-    least_lead_s = std::min(least_lead_s, course.get_time_s() - synthesiser.get_time_s());
-    synthesiser.collect();
-    if (plans)
-      schedule.apply(now, now + changed_s, [&](std::size_t body, synth::EffectSet effects) {
-        synthesiser.set_effects(static_cast<int>(body), host::find_effects(scene, body, effects));
-      });
-    course.hand_on(now + handed_s, synthesiser);
-    walk.hand_on(now + kHandedS, synthesiser);
+  for (double now_s = 0.0; now_s < scene.duration_s; now_s = synthesiser.get_time_s()) {
+    const bool advanced = player.step(now_s);
     if (options.cpu_share > 0.0) keeper.keep(synthesiser, options.cpu_share, device.get_statistics().busy_s);
     if (!advanced) std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }
   device.stop();
-  const DeviceStatistics card = device.get_statistics();
-  const synth::SynthesiserCounters counters = synthesiser.get_counters();
-  if (options.quiet) return;
-  const double card_s = std::max(static_cast<double>(card.frames), 1.0) / rate_hz;
-  fmt::print("played             {:.2f} s in {} blocks, {} underflows, latency {:.1f} ms\n", static_cast<double>(card.frames) / rate_hz,
-             card.callbacks, card.underflows, 1e3 * card.latency_s);
-  fmt::print("strikes            {}, {} late, {} refused\n", counters.strikes, counters.late, counters.refused);
-  fmt::print("physics            {} times behind the sound", counters.underruns);
-  if (std::isfinite(least_lead_s))
-    fmt::print(", {:.0f} ms {} at the worst; 2 ms of it took {:.1f} ms of CPU at most", 1e3 * std::abs(least_lead_s),
-               least_lead_s < 0.0 ? "behind" : "in front", 1e3 * course.get_worst_window_s());
-  fmt::print("\n");
-  fmt::print("work               {:.1f} % of a core, {:.3g} mode-samples/s, {} groups of modes faded\n", 100.0 * card.busy_s / card_s,
-             static_cast<double>(counters.mode_samples) / card_s, counters.faded);
+  if (!options.quiet) print_statistics(device.get_statistics(), synthesiser.get_counters(), player, rate_hz);
 }
 
 }  // namespace carillon::live

@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "runtime/plan/planner.hpp"
+#include "runtime/effect_selection/effect_selector.hpp"
 #include "runtime/synth/effects.hpp"
 
 namespace carillon::live {
@@ -17,7 +17,9 @@ class Schedule {
  public:
   explicit Schedule(std::size_t bodies) : of_(bodies) {}
 
-  void add(const plan::Change& change) { of_[static_cast<std::size_t>(change.body)].steps.push_back({change.time_s, change.effects}); }
+  void add(const effect_selection::EffectChange& change) {
+    of_[static_cast<std::size_t>(change.body)].steps.push_back({change.time_s, change.effects});
+  }
 
   /// Calls `set(body, effects)` for each body whose effects from `now_s` to `until_s` are not what it was given last.
   template <typename Set>

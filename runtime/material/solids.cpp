@@ -17,10 +17,10 @@ namespace {
 
 constexpr double kSoftestPa = 4e3, kStiffestPa = 1.3e12;
 constexpr double kLightestKgM3 = 5.0, kHeaviestKgM3 = 23000.0;
-constexpr double kLeastSpeedMs = 30.0, kMostSpeedMs = 20000.0;
-constexpr double kLeastSoftSpeedMs = 1.0;  // a gel's or a soft rubber's
+constexpr double kMinSpeedMs = 30.0, kMaxSpeedMs = 20000.0;
+constexpr double kMinSoftSpeedMs = 1.0;  // a gel's or a soft rubber's
 // No foam, rubber or gel is so heavy, nor is anything so heavy as slow: metals and stones lie far above.
-constexpr double kHeavyKgM3 = 2000.0, kLeastHeavySpeedMs = 200.0;
+constexpr double kHeavyKgM3 = 2000.0, kMinHeavySpeedMs = 200.0;
 
 struct Unit {
   std::string_view name;
@@ -34,7 +34,7 @@ constexpr std::array kDensityUnits{Unit{"", 1.0}, Unit{"g/cm^3", 1e3}, Unit{"lb/
 bool is_solid(double e, double rho) {
   const double speed = std::sqrt(e / rho);
   return e >= kSoftestPa && e <= kStiffestPa && rho >= kLightestKgM3 && rho <= kHeaviestKgM3 &&
-         speed >= (rho > kHeavyKgM3 ? kLeastHeavySpeedMs : kLeastSpeedMs) && speed <= kMostSpeedMs;
+         speed >= (rho > kHeavyKgM3 ? kMinHeavySpeedMs : kMinSpeedMs) && speed <= kMaxSpeedMs;
 }
 
 /// What a bell, a table or a cup may be made of.
@@ -43,7 +43,7 @@ bool is_ordinary(double e, double rho) {
   return e >= 1e8 && e <= kStiffestPa && rho >= 100.0 && rho <= kHeaviestKgM3 && speed >= 300.0 && speed <= 13000.0;
 }
 
-bool is_soft(double e, double rho) { return e >= 1e2 && rho >= 500.0 && rho <= kHeavyKgM3 && std::sqrt(e / rho) >= kLeastSoftSpeedMs; }
+bool is_soft(double e, double rho) { return e >= 1e2 && rho >= 500.0 && rho <= kHeavyKgM3 && std::sqrt(e / rho) >= kMinSoftSpeedMs; }
 
 std::string ask(const std::string& key, double value, const Unit& unit, std::string_view si) {
   return fmt::format("{} is {:g}: was it given in {}? {:g} {} are {:.3g} {}", key, value, unit.name, value, unit.name, value * unit.factor,

@@ -7,8 +7,8 @@
 namespace carillon::material {
 
 /// Hard limits: every reader refuses values outside them.
-inline constexpr double kLeastStiffnessPa = 1e-6, kMostStiffnessPa = 1e16;
-inline constexpr double kLeastDensityKgM3 = 1e-6, kMostDensityKgM3 = 1e8;
+inline constexpr double kMinStiffnessPa = 1e-6, kMaxStiffnessPa = 1e16;
+inline constexpr double kMinDensityKgM3 = 1e-6, kMaxDensityKgM3 = 1e8;
 
 /// One line about implausible Young's modulus and density of one material, which names the unit that was probably meant, or, where none
 /// fits, says that no known solid has these values:

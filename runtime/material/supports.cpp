@@ -13,9 +13,9 @@
 namespace carillon::material {
 namespace {
 
-constexpr double kMostLoss = 1.0;  // d = omega eta / 2: a mode that loses more hardly swings
-constexpr double kMostThicknessM = 100.0;
-constexpr double kMostMassKg = 1e9, kMostDampingNsM = 1e12, kMostStiffnessNM = 1e15;
+constexpr double kMaxLoss = 1.0;  // d = omega eta / 2: a mode that loses more hardly swings
+constexpr double kMaxThicknessM = 100.0;
+constexpr double kMaxMassKg = 1e9, kMaxDampingNsM = 1e12, kMaxStiffnessNM = 1e15;
 
 struct Joint {
   const char* name;
@@ -47,19 +47,19 @@ const Base& find_base(const std::vector<Base>& list, const std::string& name) {
   return *std::find_if(list.begin(), list.end(), [&](const Base& base) { return base.name == name; });
 }
 
-/// A number from 0 to `most`.
-double read_amount(base::Object& object, std::string_view key, double fallback, double most) {
+/// A number from 0 to `max`.
+double read_amount(base::Object& object, std::string_view key, double fallback, double max) {
   const double value = object.number_or(key, fallback);
-  if (!(value >= 0.0 && value <= most)) object.fail(key, fmt::format("{:g} is out of range; give a number from 0 to {:g}", value, most));
+  if (!(value >= 0.0 && value <= max)) object.fail(key, fmt::format("{:g} is out of range; give a number from 0 to {:g}", value, max));
   return value;
 }
 
 Base read_lumped(base::Object& object) {
   Base base{.kind = BaseKind::kLumped};
-  base.mass_kg = read_amount(object, "mass_kg", 0.0, kMostMassKg);
-  base.damping_n_s_m = read_amount(object, "damping_n_s_m", 0.0, kMostDampingNsM);
-  base.stiffness_n_m = read_amount(object, "stiffness_n_m", 0.0, kMostStiffnessNM);
-  base.loss_factor = read_amount(object, "loss_factor", 0.0, kMostLoss);
+  base.mass_kg = read_amount(object, "mass_kg", 0.0, kMaxMassKg);
+  base.damping_n_s_m = read_amount(object, "damping_n_s_m", 0.0, kMaxDampingNsM);
+  base.stiffness_n_m = read_amount(object, "stiffness_n_m", 0.0, kMaxStiffnessNM);
+  base.loss_factor = read_amount(object, "loss_factor", 0.0, kMaxLoss);
   object.finish();
   return base;
 }
@@ -67,16 +67,16 @@ Base read_lumped(base::Object& object) {
 /// A wall of another thickness or material.
 Base read_wall(base::Object& object) {
   Base base{.kind = BaseKind::kPlate};
-  const auto read = [&](const char* key, double least, double most) {
+  const auto read = [&](const char* key, double min, double max) {
     const double value = object.number(key, base::kPositive);
-    if (!(value >= least && value <= most)) object.fail(key, fmt::format("{:g} is out of range; give {:g} to {:g}", value, least, most));
+    if (!(value >= min && value <= max)) object.fail(key, fmt::format("{:g} is out of range; give {:g} to {:g}", value, min, max));
     return value;
   };
-  base.young_modulus_pa = read("young_modulus_pa", kLeastStiffnessPa, kMostStiffnessPa);
-  base.density_kg_m3 = read("density_kg_m3", kLeastDensityKgM3, kMostDensityKgM3);
-  base.thickness_m = read("thickness_m", 1e-6, kMostThicknessM);
+  base.young_modulus_pa = read("young_modulus_pa", kMinStiffnessPa, kMaxStiffnessPa);
+  base.density_kg_m3 = read("density_kg_m3", kMinDensityKgM3, kMaxDensityKgM3);
+  base.thickness_m = read("thickness_m", 1e-6, kMaxThicknessM);
   base.poisson_ratio = object.number_or("poisson_ratio", 0.2, {-1.0, 0.5});
-  base.loss_factor = read_amount(object, "loss_factor", 0.01, kMostLoss);
+  base.loss_factor = read_amount(object, "loss_factor", 0.01, kMaxLoss);
   object.finish();
   return base;
 }
@@ -85,7 +85,7 @@ Base read_base(base::Object& object) {
   if (object.has_object("on")) {
     base::Object base = object.object("on");
     if (base.has("thickness_m") || base.has("young_modulus_pa") || base.has("density_kg_m3")) return read_wall(base);
-    const Base lumped = read_lumped(base);
+    Base lumped = read_lumped(base);
     if (lumped.mass_kg == 0.0 && lumped.damping_n_s_m == 0.0 && lumped.stiffness_n_m == 0.0)
       object.fail("on",
                   "an impedance of 0 holds nothing; give \"mass_kg\", \"damping_n_s_m\" or \"stiffness_n_m\", or compute the body without "
@@ -100,9 +100,12 @@ Base read_base(base::Object& object) {
   return find_base(kBases, object.choice("on", list_base_names()));
 }
 
-std::string write_lumped(const Base& base) {
-  return fmt::format(R"("mass_kg": {}, "damping_n_s_m": {}, "stiffness_n_m": {}, "loss_factor": {})", base.mass_kg, base.damping_n_s_m,
-                     base.stiffness_n_m, base.loss_factor);
+base::Json write_lumped(const Base& base) {
+  return base::Json::object()
+      .set("mass_kg", base.mass_kg)
+      .set("damping_n_s_m", base.damping_n_s_m)
+      .set("stiffness_n_m", base.stiffness_n_m)
+      .set("loss_factor", base.loss_factor);
 }
 
 }  // namespace
@@ -131,7 +134,7 @@ std::optional<Fixing> read_fixing(base::Object& object) {
     fixing.joint = object.choice("joint", list_joint_names());
     fixing.joint_loss = std::find_if(kJoints.begin(), kJoints.end(), [&](const Joint& joint) { return fixing.joint == joint.name; })->loss;
   } else {
-    fixing.joint_loss = read_amount(object, "loss", 0.0, kMostLoss);
+    fixing.joint_loss = read_amount(object, "loss", 0.0, kMaxLoss);
   }
   return fixing;
 }
@@ -142,24 +145,25 @@ Base read_holder(base::Object& object, std::string_view key) {
   return read_lumped(numbers);
 }
 
-std::string write_fixing(const Fixing& fixing) {
-  std::string text;
+base::Json write_fixing(const Fixing& fixing, base::Json json) {
   const Base& base = fixing.base;
   if (!base.name.empty() && base.kind != BaseKind::kRigid) {
-    text = fmt::format("\"on\": {}", base::quote(base.name));
+    json.set("on", base.name);
   } else if (base.kind == BaseKind::kPlate) {
-    text =
-        fmt::format(R"("on": {{"young_modulus_pa": {}, "poisson_ratio": {}, "density_kg_m3": {}, "thickness_m": {}, "loss_factor": {}}})",
-                    base.young_modulus_pa, base.poisson_ratio, base.density_kg_m3, base.thickness_m, base.loss_factor);
+    json.set("on", base::Json::object()
+                       .set("young_modulus_pa", base.young_modulus_pa)
+                       .set("poisson_ratio", base.poisson_ratio)
+                       .set("density_kg_m3", base.density_kg_m3)
+                       .set("thickness_m", base.thickness_m)
+                       .set("loss_factor", base.loss_factor));
   } else if (base.kind == BaseKind::kLumped) {
-    text = fmt::format("\"on\": {{{}}}", write_lumped(base));
+    json.set("on", write_lumped(base));
   }
-  const auto out = std::back_inserter(text);
   if (!fixing.joint.empty())
-    fmt::format_to(out, "{}\"joint\": {}", text.empty() ? "" : ", ", base::quote(fixing.joint));
+    json.set("joint", fixing.joint);
   else if (fixing.joint_loss > 0.0)
-    fmt::format_to(out, "{}\"loss\": {}", text.empty() ? "" : ", ", fixing.joint_loss);
-  return text;
+    json.set("loss", fixing.joint_loss);
+  return json;
 }
 
 std::string describe(const Base& base) {

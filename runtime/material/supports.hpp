@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "runtime/base/document.hpp"
+#include "runtime/base/json.hpp"
 
 namespace carillon::material {
 
@@ -51,8 +52,8 @@ std::optional<Fixing> read_fixing(base::Object& object);
 /// Reads what touches a point: a name of the table or {"mass_kg": ..., "damping_n_s_m": ..., "stiffness_n_m": ..., "loss_factor": ...}.
 Base read_holder(base::Object& object, std::string_view key);
 
-/// The members of a JSON object that read_fixing() reads back: `"on": "brick wall", "loss": 0.01`; empty when it is rigid without loss.
-std::string write_fixing(const Fixing& fixing);
+/// Adds to an object what read_fixing() reads back: {"on": "brick wall", "loss": 0.01}; nothing when it is rigid without loss.
+base::Json write_fixing(const Fixing& fixing, base::Json json = base::Json::object());
 
 /// For people: "on a brick wall, screwed".
 std::string describe(const Fixing& fixing);

@@ -27,7 +27,7 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr std::size_t kOrders = kMostLobes + 1;
+constexpr std::size_t kOrders = kMaxLobes + 1;
 constexpr std::size_t kHarmonics = kOrders * kOrders;
 
 /// The factors of the recurrences of calc_harmonics.
@@ -35,9 +35,9 @@ struct Recurrence {
   std::array<std::array<double, kOrders>, kOrders> a{}, b{};  // [m][l]
   std::array<double, kOrders> diagonal{};
   Recurrence() {
-    for (int m = 0; m <= kMostLobes; ++m) {
+    for (int m = 0; m <= kMaxLobes; ++m) {
       const double m2 = static_cast<double>(m) * m;
-      for (int l = m; l <= kMostLobes; ++l) {
+      for (int l = m; l <= kMaxLobes; ++l) {
         const double l1 = l + 1.0;
         a[m][l] = std::sqrt((4.0 * l1 * l1 - 1.0) / (l1 * l1 - m2));
         b[m][l] = l == m ? 0.0 : std::sqrt((static_cast<double>(l) * l - m2) / (4.0 * l * l - 1.0));
@@ -53,9 +53,9 @@ std::array<double, kHarmonics> calc_harmonics(const Recurrence& recurrence, cons
   std::array<double, kHarmonics> harmonics;
   double cosine = 1.0, sine = 0.0;         // sin(theta)^m times cos(m phi) and sin(m phi)
   double diagonal = std::sqrt(0.25 / pi);  // P_mm / sin(theta)^m
-  for (int m = 0; m <= kMostLobes; ++m) {
+  for (int m = 0; m <= kMaxLobes; ++m) {
     double before = 0.0, here = diagonal;
-    for (int l = m; l <= kMostLobes; ++l) {
+    for (int l = m; l <= kMaxLobes; ++l) {
       const double scale = m == 0 ? 1.0 : std::numbers::sqrt2;
       harmonics[l * l + l + m] = scale * here * cosine;
       if (m > 0) harmonics[l * l + l - m] = scale * here * sine;
@@ -71,7 +71,7 @@ std::array<double, kHarmonics> calc_harmonics(const Recurrence& recurrence, cons
   return harmonics;
 }
 
-/// 1 / |h_l'(x)| for l = 0 .. kMostLobes + 1, h_l the spherical Hankel function of x > 0: upward recurrence, which is stable for h.
+/// 1 / |h_l'(x)| for l = 0 .. kMaxLobes + 1, h_l the spherical Hankel function of x > 0: upward recurrence, which is stable for h.
 std::array<double, kOrders + 1> calc_radiation_factors(double x) {
   using Complex = std::complex<double>;
   std::array<Complex, kOrders + 1> h;
@@ -176,12 +176,12 @@ std::vector<Power> calc_powers(const bank::Bank& bank, const Skin& skin) {
   }
   std::vector<Power> powers(modes);
   for (std::size_t m = 0; m < modes; ++m) {
-    double told_apart = 0.0;
+    double resolved = 0.0;
     for (std::size_t l = 0; l < kOrders; ++l) {
       for (std::size_t i = l * l; i < (l + 1) * (l + 1); ++i) powers[m][l] += flow[m * kFlowColumns + i] * flow[m * kFlowColumns + i];
-      told_apart += powers[m][l];
+      resolved += powers[m][l];
     }
-    powers[m][kOrders] = std::max(0.0, squares[m] - told_apart);
+    powers[m][kOrders] = std::max(0.0, squares[m] - resolved);
     for (double& power : powers[m]) power *= bank.shape_scale[m] * bank.shape_scale[m];
   }
   return powers;
@@ -231,7 +231,7 @@ Limited limit_gains(std::span<double> gains, std::span<const double> decay_per_s
     if (!(decay_per_s[m] > 0.0) || !(share > 1.0)) continue;
     gains[m] /= std::sqrt(share);
     ++limited.modes;
-    limited.most_db = std::max(limited.most_db, 10.0 * std::log10(share));
+    limited.max_db = std::max(limited.max_db, 10.0 * std::log10(share));
   }
   return limited;
 }

@@ -14,11 +14,11 @@ enum class GainKind {
   kSphere  // spherical multipoles about the body's centre, with cancellation
 };
 
-/// Multipoles that are resolved; what moves in finer patterns radiates as one of order kMostLobes + 1.
-inline constexpr int kMostLobes = 8;
+/// Multipoles that are resolved; what moves in finer patterns radiates as one of order kMaxLobes + 1.
+inline constexpr int kMaxLobes = 8;
 
 /// The pressure amplitude at 1 m [Pa] for unit modal velocity (q' = 1 m kg^1/2 / s) of every mode, (m); for kSphere the root mean square
-/// over all directions of the far field, taken back to 1 m. kSphere is exact for a sphere that moves in patterns of order kMostLobes and
+/// over all directions of the far field, taken back to 1 m. kSphere is exact for a sphere that moves in patterns of order kMaxLobes and
 /// below, to what the 16-bit shapes hold: nothing below 1e-6 of the pressure of a pulsating sphere of the same velocity is to be trusted.
 /// Throws InputError when arrays of the bank disagree or its surface has no outside. Not for an audio thread; any other, several at once.
 std::vector<double> calc_gains(const bank::Bank& bank, GainKind kind);
@@ -33,7 +33,7 @@ Radiation calc_radiation(const bank::Bank& bank, GainKind kind);
 /// What limit_gains() has done.
 struct Limited {
   std::size_t modes = 0;  // whose gains came down
-  double most_db = 0.0;   // by at most so much
+  double max_db = 0.0;    // by at most so much
 };
 
 /// Brings every gain (m) down to that with which its mode radiates all that its damping takes, g^2 = rho c d / 2 pi: a decay (m) [1/s]

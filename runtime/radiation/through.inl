@@ -1,4 +1,4 @@
-// The flow of a row of modes through a triangle, kLanes modes at once; whoever includes this says how many. To be compiled without
+// The flow of a row of modes through a triangle, kLanes modes at once; the file that includes this says how many. To be compiled without
 // contraction, so that all instruction sets give the same numbers.
 #include <utility>
 

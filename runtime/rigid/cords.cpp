@@ -30,11 +30,11 @@ StopTouch calc_stop_touch(const Stop& stop, const Pose& a, const Pose& b) {
   const double sign = stop.is_lower ? 1.0 : -1.0;
   if (!stop.turns) {
     const double way = dot(axis, at_a - (b.centre + b.rotation * stop.at_b));
-    return {-sign * (stop.most - way), at_a, sign * axis};
+    return {-sign * (stop.max - way), at_a, sign * axis};
   }
   const Vec3 lever_a = a.rotation * stop.lever_a, lever_b = b.rotation * stop.lever_b;
   const double angle = std::atan2(dot(axis, cross(lever_b, lever_a)), dot(lever_b, lever_a));
-  return {-sign * stop.arm_m * (stop.most - angle), at_a + stop.arm_m * lever_a, sign * cross(axis, lever_a)};
+  return {-sign * stop.arm_m * (stop.max - angle), at_a + stop.arm_m * lever_a, sign * cross(axis, lever_a)};
 }
 
 }  // namespace
@@ -148,13 +148,13 @@ Point Space::make_cord_point(const Contact& c, double h) const {
   const Vec3 u = a.velocity - b.velocity;
   const double along = dot(u, p.normal), error = dot(u, c.touch.normal), gap = c.touch.gap_m;
   // Taut: as fast along the middle at the end as against it now, which keeps the length; what it stretches by now it does not keep.
-  double least = c.touching && gap <= kTouch ? error - along : -along - 2.0 * std::max(gap, 0.0) / h;
+  double speed = c.touching && gap <= kTouch ? error - along : -along - 2.0 * std::max(gap, 0.0) / h;
   // What is too long is taken in as what is too deep comes up, at half the power that the cord loses (step.cpp).
   if (gap < -kDeep) {
     const double pull = dot(c.impulse, c.touch.normal), paid = pull > 0.0 ? std::max(0.5 * c.lost_j / pull, 0.0) : 0.0;
-    least += std::min(0.02 * (-kDeep - gap) / h, gap < -kFarTooDeep ? 5e-3 : paid);
+    speed += std::min(0.02 * (-kDeep - gap) / h, gap < -kFarTooDeep ? 5e-3 : paid);
   }
-  p.wanted = least * p.normal - (a.beyond - b.beyond);
+  p.wanted = speed * p.normal - (a.beyond - b.beyond);
   p.impulse = (c.step_s > 0.0 ? h / c.step_s : 0.0) * c.impulse;
   return p;
 }
@@ -175,9 +175,9 @@ Point Space::make_stop_point(const Contact& c, double h) const {
   if (p.a >= 0) p.arm_a = end.where_m - free_centre_[static_cast<std::size_t>(p.a)];
   if (p.b >= 0) p.arm_b = end.where_m - free_centre_[static_cast<std::size_t>(p.b)];
   const double approach = calc_approach(c), gap = c.touch.gap_m;
-  double least = c.touching && gap <= kTouch ? 0.0 : approach - 2.0 * std::max(gap, 0.0) / h;
-  if (gap < -kDeep) least += std::min(0.02 * (-kDeep - gap) / h, 5e-3);
-  p.wanted = least * p.normal;
+  double speed = c.touching && gap <= kTouch ? 0.0 : approach - 2.0 * std::max(gap, 0.0) / h;
+  if (gap < -kDeep) speed += std::min(0.02 * (-kDeep - gap) / h, 5e-3);
+  p.wanted = speed * p.normal;
   p.impulse = (c.step_s > 0.0 ? h / c.step_s : 0.0) * c.impulse;
   return p;
 }

@@ -125,7 +125,7 @@ class System {
 
 }  // namespace
 
-bool Solver::solve_directly(std::vector<Mover>& movers, std::vector<Point>& points, int most_guesses, bool are_swept) {
+bool Solver::solve_directly(std::vector<Mover>& movers, std::vector<Point>& points, int max_guesses, bool are_swept) {
   if (std::any_of(movers.begin(), movers.end(), [](const Mover& m) { return m.linkage != nullptr; })) return false;
   prepare(movers, points);
   const std::vector<sweeps::Row>& rows = problem_.rows;
@@ -157,7 +157,7 @@ bool Solver::solve_directly(std::vector<Mover>& movers, std::vector<Point>& poin
   for (const Point& p : points) scale = std::max(scale, norm(p.wanted - calc_relative_velocity(free, p)));
   Eigen::VectorXd right(6 * bodies);
   System system(bodies, points);
-  for (int guess = 0; guess < most_guesses && !confirmed; ++guess) {
+  for (int guess = 0; guess < max_guesses && !confirmed; ++guess) {
     system.clear();
     for (int i = 0; i < bodies; ++i) {
       const Mover& m = free[static_cast<std::size_t>(i)];
@@ -260,7 +260,7 @@ bool Solver::solve_directly(std::vector<Mover>& movers, std::vector<Point>& poin
         const Vec3 short_of = p.wanted - calc_relative_velocity(movers, p);
         const Vec3 across = short_of - dot(short_of, p.normal) * p.normal;
         const double size = norm(across);
-        if (dot(across, sliding[i]) < 0.0 && guess < most_guesses / 2) {
+        if (dot(across, sliding[i]) < 0.0 && guess < max_guesses / 2) {
           now = Hold::kSticks;
         } else {
           const Vec3 next = size > 0.0 ? (p.friction * push / size) * across : sliding[i];
@@ -275,19 +275,19 @@ bool Solver::solve_directly(std::vector<Mover>& movers, std::vector<Point>& poin
       if (get_turning_mass(rows[i]) > 0.0) {
         // A couple that sticks and would have to be above its bound rolls from now on. One that rolls is at its bound against the spin as
         // it is now, and sticks again where less would stop that.
-        const double most = std::max(push, 0.0);
+        const double pressing = std::max(push, 0.0);
         const Vec3 free_couple = rolls[i] ? couples[i] - get_turning_mass(rows[i]) * calc_relative_spin(movers, p) : couples[i];
-        const Vec3 bounded = clamp_couple(p, free_couple, most);
+        const Vec3 bounded = clamp_couple(p, free_couple, pressing);
         const bool is_bound = norm(bounded - free_couple) > 1e-9 * norm(bounded);
         if (!rolls[i] && is_bound) {
           rolls[i] = 1;
           couples[i] = bounded;
           confirmed = false;
-        } else if (rolls[i] && !is_bound && guess < most_guesses / 2) {
+        } else if (rolls[i] && !is_bound && guess < max_guesses / 2) {
           rolls[i] = 0;
           confirmed = false;
         } else if (rolls[i]) {
-          if (norm(bounded - couples[i]) > 1e-3 * (p.rolling_m + p.twisting_m) * most) confirmed = false;
+          if (norm(bounded - couples[i]) > 1e-3 * (p.rolling_m + p.twisting_m) * pressing) confirmed = false;
           couples[i] = bounded;
         }
       }

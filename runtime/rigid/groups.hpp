@@ -9,6 +9,7 @@
 
 namespace carillon::rigid {
 
+/// Disjoint groups of the numbers 0 ... count - 1 (union-find). A group is represented by its smallest number.
 class Groups {
  public:
   explicit Groups(int count) : parent_(static_cast<std::size_t>(count)) { std::iota(parent_.begin(), parent_.end(), 0); }

@@ -9,7 +9,7 @@ inline constexpr double kTouch = 1e-7;       // m; nearer than this is in touch
 inline constexpr double kDeep = 2e-6;        // m; what is deeper comes up
 inline constexpr double kFarTooDeep = 5e-5;  // m; from here on it comes up at any price
 inline constexpr double kBalanced = 1e-4;    // of gravity: what a solution with zero velocity may leave
-inline constexpr int kMostGuesses = 12;      // of a factorised problem, where it is small or rest is to be proven
+inline constexpr int kMaxGuesses = 12;       // of a factorised problem, where it is small or rest is to be proven
 inline constexpr double kSharpest = 5e-4;    // m; the least radius of a contact
 
 }  // namespace carillon::rigid

@@ -9,6 +9,7 @@
 
 namespace carillon::rigid {
 
+/// The mobility of one mechanism at one configuration. A column is calculated when it is first asked for, and stays valid until set().
 class Linkage {
  public:
   /// Forgets what it knew of another configuration.

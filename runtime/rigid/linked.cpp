@@ -1,8 +1,7 @@
 // Method: bodies on joints are moved in the coordinates of their mechanism. Free motion is the mechanism's; what the contacts of a step
-// give
-//   is a change of its velocities, which acts all along the step, as for free bodies; so joints stay closed to rounding, and a contact that
-//   neither slides nor strikes does no work to the order of the step. Impulses act where the mechanism is at the end of the step without
-//   contacts, at the place where they press half a step on.
+//   give is a change of its velocities, which acts all along the step, as for free bodies; so joints stay closed to rounding, and a contact
+//   that neither slides nor strikes does no work to the order of the step. Impulses act where the mechanism is at the end of the step
+//   without contacts, at the place where they press half a step on.
 // Source: J. J. Moreau, "Unilateral contact and dry friction in finite freedom dynamics" (1988), in generalised coordinates.
 // Deviations: none.
 #include <fmt/format.h>
@@ -19,7 +18,7 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr double kRight = 0.01;  // of the kinetic energy: the most that a step of an impact is put right by
+constexpr double kRight = 0.01;  // of the kinetic energy: the most that a step of an impact is corrected by
 
 }  // namespace
 
@@ -138,10 +137,10 @@ void Space::fly_windows_of_linked(const std::vector<char>& active, double length
 double Space::calc_linked_pull(const Linked& linked) const {
   std::vector<joints::Spatial> rates;
   linked.mechanism->find_accelerations(linked.now, rates);
-  double most = 0.0;
+  double max = 0.0;
   for (std::size_t k = 0; k < rates.size(); ++k)
-    most = std::max(most, norm(rates[k].linear) + norm(rates[k].angular) * solid(linked.bodies[k]).radius_m);
-  return 2.0 * most;
+    max = std::max(max, norm(rates[k].linear) + norm(rates[k].angular) * solid(linked.bodies[k]).radius_m);
+  return 2.0 * max;
 }
 
 /// Would it stay where it is if it had no velocity, without contacts?
@@ -212,7 +211,7 @@ void Space::push_linked(const Island& island) {
 
 /// A part of the step on: what the contacts gave it acts all along.
 joints::Coordinates Space::calc_linked_moved(const Linked& linked, double part_s, double step_s) const {
-  const joints::Coordinates flown = part_s == step_s ? linked.free : fly_linked(linked, linked.now, part_s);
+  joints::Coordinates flown = part_s == step_s ? linked.free : fly_linked(linked, linked.now, part_s);
   if (linked.push.empty()) return flown;
   return linked.mechanism->move(flown, linked.push, part_s / step_s, 0.5 * part_s * part_s / step_s);
 }
@@ -255,8 +254,8 @@ void Space::advance_linked_ringing(Linked& linked, const impact::Body& struck, d
   linked.now = std::move(moved);
   place_linked(linked);
   if (!linked.push.empty() || !linked.hangs) return;
-  // The impact has taken its mobility for constant: what the motion has more or less than the contacts' work is put right, as a change of
-  // all its velocities by the same part.
+  // The impact has taken its mobility for constant: the difference of the motion's energy from the contacts' work is corrected, as a change
+  // of all its velocities by the same part.
   const auto [kinetic, after] = calc();
   const double gained = after - before - struck.work_j;
   if (!(std::abs(gained) < kRight * kinetic)) return;

@@ -15,15 +15,15 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr double kSlow = 5e-3;          // m/s; of what may be about to rest
-constexpr double kPatience = 0.02;      // s; for so long
-constexpr double kLong = 0.3;           // s; what was slow for so long is no faster than kSlow: less balance is enough
-constexpr double kApart = 0.1;          // s; slow for so long, a body may sleep among others that move,
-constexpr double kCalm = 0.05;          // s; if those that it touches have been slow for so long
-constexpr double kStill = 5e-4;         // m/s; and nothing is faster where it touches
-constexpr double kShift = 0.05;         // of its weight: change of the forces on it that wakes it
-constexpr int kProofSweeps = 120;       // that look for rest,
-constexpr int kMostProofSweeps = 1200;  // of what was slow for kLong
+constexpr double kSlow = 5e-3;         // m/s; of what may be about to rest
+constexpr double kPatience = 0.02;     // s; for so long
+constexpr double kLong = 0.3;          // s; what was slow for so long is no faster than kSlow: less balance is enough
+constexpr double kApart = 0.1;         // s; slow for so long, a body may sleep among others that move,
+constexpr double kCalm = 0.05;         // s; if those that it touches have been slow for so long
+constexpr double kStill = 5e-4;        // m/s; and nothing is faster where it touches
+constexpr double kShift = 0.05;        // of its weight: change of the forces on it that wakes it
+constexpr int kProofSweeps = 120;      // that look for rest,
+constexpr int kMaxProofSweeps = 1200;  // of what was slow for kLong
 
 /// That a contact gave a in its last step [N].
 Vec3 calc_force(const Contact& c) { return c.touching && c.step_s > 0.0 ? (1.0 / c.step_s) * c.impulse : Vec3{}; }
@@ -80,24 +80,27 @@ bool Space::is_balanced(Island& island, double h, const std::vector<joints::Spat
     return true;
   };
   ++costs_.solves;
-  const bool balanced = solver_.solve_directly(movers_, points_, kMostGuesses) && holds();
+  const bool balanced = solver_.solve_directly(movers_, points_, kMaxGuesses) && holds();
   // By sweeps from the impulses of the motion, and from none.
-  const auto sweep_from = [&](const std::vector<Point>& from, int most_sweeps) {
+  const auto sweep_from = [&](const std::vector<Point>& from, int max_sweeps) {
     movers_ = free;
     points_ = from;
-    solver_.solve(movers_, points_, 1e-2 * bound * g * h, most_sweeps);
+    solver_.solve(movers_, points_, 1e-2 * bound * g * h, max_sweeps);
     costs_.sweeps += solver_.get_sweeps();
     return holds();
   };
-  return balanced || sweep_from(moving, kProofSweeps) || sweep_from(unloaded, slow_s > kLong ? kMostProofSweeps : kProofSweeps);
+  return balanced || sweep_from(moving, kProofSweeps) || sweep_from(unloaded, slow_s > kLong ? kMaxProofSweeps : kProofSweeps);
+}
+
+bool Space::Pair::has_closed_gap() const {
+  return std::any_of(contacts.begin(), contacts.end(), [](const Contact& c) { return c.touch.gap_m <= kDeep; });
 }
 
 /// Puts the group to sleep if it is balanced at rest.
 Space::Rest Space::rest(Island& island, double h, const std::vector<joints::Spatial>& pulls) {
   bool touches = !pulls.empty();
   double slow_s = std::numeric_limits<double>::infinity();
-  for (const Pair* pair : island.pairs)
-    touches = touches || std::any_of(pair->contacts.begin(), pair->contacts.end(), [](const Contact& c) { return c.touch.gap_m <= kDeep; });
+  for (const Pair* pair : island.pairs) touches = touches || pair->has_closed_gap();
   for_linked(island, [&](const Linked& linked) { touches = touches || linked.hangs; });
   if (!touches) return Rest::none;
   std::vector<State> kept;
@@ -154,9 +157,7 @@ Space::Rest Space::rest(Island& island, double h, const std::vector<joints::Spat
 }
 
 /// Is one of its gaps so small that it counts as closed when the other body sleeps?
-bool Space::is_close(const Pair& pair) {
-  return pair.touches() || std::any_of(pair.contacts.begin(), pair.contacts.end(), [](const Contact& c) { return c.touch.gap_m <= kDeep; });
-}
+bool Space::is_close(const Pair& pair) { return pair.touches() || pair.has_closed_gap(); }
 
 /// Puts bodies to sleep whose group keeps moving elsewhere. At the beginning of a window, on the contacts of the last step.
 void Space::rest_apart() {
@@ -204,7 +205,7 @@ void Space::rest_apart() {
   for (int i = 0; i < static_cast<int>(solids_.size()); ++i)
     if (is_one(i)) parts[groups.find(i)].island.bodies.push_back(i);
   for (auto& [first, part] : parts) {
-    if (part.bounds.empty()) continue;  // a group of its own: step_island() sees to that
+    if (part.bounds.empty()) continue;  // a group of its own: step_island() handles it
     stepped_ = &part.island.bodies;
     std::vector<joints::Spatial> pulls(part.island.bodies.size());
     for (std::size_t n = 0; n < part.island.bodies.size(); ++n)

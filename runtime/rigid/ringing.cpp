@@ -1,8 +1,7 @@
 // Impacts with modes from their prediction to their end, all of it on the same Ringings; longer than most files.
 // Method: an impact whose bodies ring is integrated with their modes inside (runtime/impact), over as many small steps as it takes. Its
-// bodies take
-//   their motion from it; what gravity and other contacts do to them enters it as accelerations, a small step at a time. Where the modes
-//   would get less than 2 % of the energy, the rigid impact and the Hertz pulse stand.
+//   bodies take their motion from it; what gravity and other contacts do to them enters it as accelerations, a small step at a time. Where
+//   the modes would get less than 2 % of the energy, the rigid impact and the Hertz pulse stand.
 // Source: runtime/impact/impact.hpp; docs/decisions/impact.md.
 // Deviations: none.
 #include <algorithm>
@@ -18,8 +17,8 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr int kMostPresses = 8;     // of one impact
-constexpr int kMostTogether = 12;   // with those that rest
+constexpr int kMaxPresses = 8;      // of one impact
+constexpr int kMaxTogether = 12;    // with those that rest
 constexpr double kLongest = 50e-3;  // s; what presses for longer rests
 
 /// (n) along a direction.
@@ -225,7 +224,7 @@ bool Space::add_resting(const std::vector<Ref>& taken, const std::vector<Hit>& h
       grows = true;
     }
   std::sort(order.begin(), order.end());
-  return order.size() == hit || order.size() <= kMostTogether;
+  return order.size() == hit || order.size() <= kMaxTogether;
 }
 
 /// Begins an impact with modes, or lets the hits join one that is on its way. False where there are too many points: the rigid impact
@@ -267,16 +266,16 @@ bool Space::begin_ringing(const std::vector<Ref>& taken, std::vector<Hit>& hits,
     }
   const bool leans = std::any_of(order.begin(), order.end(), [&](std::size_t n) { return rests[n] != 0; });
   const std::size_t together = order.size() + (joined != nullptr ? joined->presses.size() : 0);
-  if (leans && together > kMostTogether) return false;
-  if (!leans && together > kMostPresses) {
+  if (leans && together > kMaxTogether) return false;
+  if (!leans && together > kMaxPresses) {
     if (joined != nullptr) {
       end_ringing(*joined, time_s);
       joined = nullptr;
     }
-    if (order.size() > kMostPresses) {
+    if (order.size() > kMaxPresses) {
       std::stable_sort(order.begin(), order.end(),
                        [&](std::size_t x, std::size_t y) { return hits[x].approach_m_s > hits[y].approach_m_s; });
-      order.resize(kMostPresses);
+      order.resize(kMaxPresses);
       std::sort(order.begin(), order.end());
     }
   }
@@ -387,7 +386,7 @@ void Space::advance_ringings(const Island& island, double to_s, double part_s, d
     });
     if (!is_here || !(part_s > 0.0)) continue;
     std::vector<impact::Body> bodies = ringing.impact->get_bodies();
-    // A body that slept when it was struck has come to move, or belongs to another group: the impact cannot go on as it was.
+    // A body that slept when it was struck has come to move, or belongs to another group: the impact cannot continue as it was.
     bool is_whole = true;
     for (std::size_t k = 0; k < bodies.size(); ++k) {
       const int body = ringing.bodies[k];
@@ -409,7 +408,7 @@ void Space::advance_ringings(const Island& island, double to_s, double part_s, d
       b.acceleration_m_s2 = gravity_;
       b.spin_acceleration_rad_s2 = placed_[i].inverse_inertia * cross(states_[i].momentum, placed_[i].spin);
       put_on_joints(body, b);
-      // What cords and other contacts do acts as long as the impact goes on in this part, whose own steps may be longer.
+      // What cords and other contacts do acts as long as the impact continues in this part, whose own steps may be longer.
       const Vec3 free = b.on_joints ? free_velocity_[static_cast<std::size_t>(index_[i])] : states_[i].velocity + step_s * gravity_;
       pulls[k] = {(1.0 / step_s) * (mover.velocity - free),
                   (1.0 / step_s) * (mover.spin - free_spin_[static_cast<std::size_t>(index_[i])])};
@@ -502,7 +501,7 @@ void Space::keep_pulses(Ringing& ringing) {
     Press& press = ringing.presses[static_cast<std::size_t>(pulse.contact)];
     Forces& forces = press.waiting;
     const double start_s = ringing.start_s + pulse.start_s;
-    // A contact that was open for a while begins anew.
+    // A contact that was open for a while begins again.
     if (!forces.on_a.empty() &&
         std::abs(start_s - forces.time_s - forces.step_s * static_cast<double>(forces.on_a.size())) > 0.5 * forces.step_s)
       hand_out_forces(press);
@@ -554,7 +553,7 @@ void Space::release(Ringing& ringing, double time_s) {
         const bool same = (press.a == key.first && press.b == key.second) || (press.b == key.first && press.a == key.second);
         if (!same || !c.presses) continue;
         c.presses = c.touching = false;
-        // Where its modes gave way the body stands lower than it would on what is rigid.
+        // Where its modes yielded the body stands lower than it would on what is rigid.
         pair.sag_m = std::max(pair.sag_m, -c.touch.gap_m);
       }
   ringing.impact = nullptr;

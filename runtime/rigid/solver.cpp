@@ -1,7 +1,8 @@
 // Method: projected Gauss-Seidel over points, each a block of three: the impulse that stops the point if it lies in the cone, otherwise
 //   the normal one and a tangential one brought back to the cone. Sweeps go to and fro and begin at the impulses of the step before, so
-//   that what rests is found in a sweep or two. Between pairs of sweeps the impulses go on along the conjugate direction of the last pairs:
-//   towers and unequal masses take tens of sweeps, not thousands. The last thing done is a sweep, which leaves all inside their cones.
+//   that what rests is found in a sweep or two. Between pairs of sweeps the impulses continue along the conjugate direction of the last
+//   pairs: towers and unequal masses take tens of sweeps, not thousands. The last thing done is a sweep, which leaves all inside their
+//   cones.
 // Source: J. J. Moreau, "Some numerical methods in multibody dynamics" (1999); M. Jean, "The non-smooth contact dynamics method" (1999);
 //   M. Silcowitz-Hansen, S. Niebe, K. Erleben, "A nonsmooth nonlinear conjugate gradient method for interactive contact force problems"
 //   (2010).
@@ -72,8 +73,8 @@ void add_linked_mobility(Mat3& k, const Mover& of, const Vec3& arm_of, const Mov
   }
 }
 
-/// The inverse of a symmetric matrix where it is more than `least`, and the projector on where that is.
-Mat3 calc_pseudo_inverse(const Mat3& m, Mat3& range, double least) {
+/// The inverse of a symmetric matrix where it is more than `min`, and the projector on where that is.
+Mat3 calc_pseudo_inverse(const Mat3& m, Mat3& range, double min) {
   Eigen::Matrix3d k;
   for (std::size_t i = 0; i < 3; ++i)
     for (std::size_t j = 0; j < 3; ++j) k(static_cast<int>(i), static_cast<int>(j)) = 0.5 * (m[i][j] + m[j][i]);
@@ -81,7 +82,7 @@ Mat3 calc_pseudo_inverse(const Mat3& m, Mat3& range, double least) {
   Mat3 inverse{};
   range = {};
   for (int n = 0; n < 3; ++n) {
-    if (!(found.eigenvalues()[n] > least)) continue;
+    if (!(found.eigenvalues()[n] > min)) continue;
     const Eigen::Vector3d axis = found.eigenvectors().col(n);
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) {
@@ -278,18 +279,18 @@ void Solver::add_turning(const std::vector<Mover>& movers, const Point& p, const
   turning.arm_m = norm(p.a >= 0 ? p.arm_a : p.arm_b);
   turning.couple = to_four(axes * p.couple);
   turning.turned.begin = static_cast<int>(problem_.responses.size());
-  double most = 0.0;
+  double mobility = 0.0;
   const auto add = [&](int body, double sign, Four(&spun)[3]) {
     if (body < 0) return;
     const Mover& m = movers[static_cast<std::size_t>(body)];
-    most += m.inverse_inertia[0][0] + m.inverse_inertia[1][1] + m.inverse_inertia[2][2];  // on joints a body turns more slowly
+    mobility += m.inverse_inertia[0][0] + m.inverse_inertia[1][1] + m.inverse_inertia[2][2];  // on joints a body turns more slowly
     for (std::size_t j = 0; j < 3 && m.linkage == nullptr; ++j) spun[j] = to_four(sign * (m.inverse_inertia * axes[j]));
     add_responses(movers, body, {}, sign, false, axes);
   };
   add(p.a, 1.0, turning.spun_a);
   add(p.b, -1.0, turning.spun_b);
   turning.turned.end = static_cast<int>(problem_.responses.size());
-  turning.mass = 1.0 / most;
+  turning.mass = 1.0 / mobility;
 }
 
 /// Writes the answer.
@@ -306,7 +307,7 @@ void Solver::take(std::vector<Mover>& movers, std::vector<Point>& points) const 
   }
 }
 
-double Solver::solve(std::vector<Mover>& movers, std::vector<Point>& points, double tolerance_m_s, int most_sweeps) {
+double Solver::solve(std::vector<Mover>& movers, std::vector<Point>& points, double tolerance_m_s, int max_sweeps) {
   prepare(movers, points);
   for (Row& row : problem_.rows) {
     // The part of the old impulse along the normal of now stays normal.
@@ -316,22 +317,22 @@ double Solver::solve(std::vector<Mover>& movers, std::vector<Point>& points, dou
     if (size > limit) impulse[1] *= limit / size, impulse[2] *= limit / size;
   }
   functions_->begin(problem_);
-  const double left = run(tolerance_m_s, most_sweeps);
+  const double left = run(tolerance_m_s, max_sweeps);
   take(movers, points);
   return left;
 }
 
-double Solver::solve_evenly(std::vector<Mover>& movers, std::vector<Point>& points, int shares, double tolerance_m_s, int most_sweeps) {
+double Solver::solve_evenly(std::vector<Mover>& movers, std::vector<Point>& points, int shares, double tolerance_m_s, int max_sweeps) {
   for (Point& p : points) p.impulse = p.couple = {};
   prepare(movers, points);
   const double part = 1.0 / static_cast<double>(std::max<std::size_t>(points.size(), 2));
   for (int n = 0; n < shares; ++n) functions_->share(problem_, part);
-  const double left = run(tolerance_m_s, most_sweeps);
+  const double left = run(tolerance_m_s, max_sweeps);
   take(movers, points);
   return left;
 }
 
-double Solver::run(double tolerance_m_s, int most_sweeps) {
+double Solver::run(double tolerance_m_s, int max_sweeps) {
   sweeps_ = 0;
   std::vector<Row>& rows = problem_.rows;
   before_.resize(rows.size());
@@ -341,12 +342,12 @@ double Solver::run(double tolerance_m_s, int most_sweeps) {
     ++sweeps_;
     return std::sqrt(functions_->sweep(problem_, onward));
   };
-  while (sweeps_ < most_sweeps) {
+  while (sweeps_ < max_sweeps) {
     for (std::size_t i = 0; i < rows.size(); ++i) before_[i].by = rows[i].impulse;
     largest = sweep(true);
     if (largest <= tolerance_m_s) break;
     largest = sweep(false);
-    if (largest <= tolerance_m_s || sweeps_ >= most_sweeps) break;
+    if (largest <= tolerance_m_s || sweeps_ >= max_sweeps) break;
     // What both sweeps changed is minus a gradient, conjugate to the one before.
     double now = 0.0;
     for (std::size_t i = 0; i < rows.size(); ++i) {

@@ -30,22 +30,25 @@ struct Point {
   Vec3 impulse{}, couple{};  // on a [N s, N m s]; in: where the iteration begins
 };
 
-/// Changes the points' impulses and couples, and velocities and spins with them, until the largest change of a velocity by a sweep is below
-/// `tolerance_m_s`, in at most `most_sweeps` sweeps to and fro over the points as they are ordered. Every normal impulse pushes, every
-/// tangential one is inside the cone, and couples are inside their bounds. Returns the change of the last sweep [m/s].
+/// Solves the complementarity problem of all points of a step. Invariant: after every call the normal impulses push, the tangential ones
+/// lie inside the cone, and the couples inside their bounds, converged or not. Members are work memory: no call changes the result of the
+/// next.
 class Solver {
  public:
   explicit Solver(const sweeps::Functions& functions = sweeps::get_functions()) : functions_(&functions) {}
-  double solve(std::vector<Mover>& movers, std::vector<Point>& points, double tolerance_m_s, int most_sweeps);
+  /// Changes the points' impulses and couples, and velocities and spins with them, until the largest change of a velocity by a sweep is
+  /// below `tolerance_m_s`, in at most `max_sweeps` sweeps to and fro over the points as they are ordered. Returns the change of the last
+  /// sweep [m/s].
+  double solve(std::vector<Mover>& movers, std::vector<Point>& points, double tolerance_m_s, int max_sweeps);
   /// The same from zero impulses, and the load shared evenly first between points that are redundant: `shares` times all points change at
   /// once, damped by their number. A box that lands flat keeps its symmetry.
-  double solve_evenly(std::vector<Mover>& movers, std::vector<Point>& points, int shares, double tolerance_m_s, int most_sweeps);
+  double solve_evenly(std::vector<Mover>& movers, std::vector<Point>& points, int shares, double tolerance_m_s, int max_sweeps);
   /// The same problem by factorisation, for what sweeps take too long for (towers, unequal masses): guesses which points carry and stick,
-  /// solves, corrects the guess from the answer, in at most `most_guesses`. Redundant points share their load evenly. True where the guess
+  /// solves, corrects the guess from the answer, in at most `max_guesses`. Redundant points share their load evenly. True where the guess
   /// was confirmed; the impulses obey all bounds in any case. False where bodies are on joints.
   /// `are_swept`: the impulses given are an answer of sweeps or of the step before, and points at their bound slide in the first guess;
   /// otherwise all that carry stick in it.
-  bool solve_directly(std::vector<Mover>& movers, std::vector<Point>& points, int most_guesses, bool are_swept = false);
+  bool solve_directly(std::vector<Mover>& movers, std::vector<Point>& points, int max_guesses, bool are_swept = false);
   int get_sweeps() const { return sweeps_; }
 
  private:
@@ -53,7 +56,7 @@ class Solver {
   void lock(const std::vector<Mover>& movers, const Point& point, const Mat3& axes, sweeps::Row& row);
   void add_turning(const std::vector<Mover>& movers, const Point& point, const Mat3& axes, sweeps::Row& row);
   void add_responses(const std::vector<Mover>& movers, int body, const Vec3& arm, double sign, bool are_impulses, const Mat3& axes);
-  double run(double tolerance_m_s, int most_sweeps);
+  double run(double tolerance_m_s, int max_sweeps);
   void take(std::vector<Mover>& movers, std::vector<Point>& points) const;
   double get_turning_mass(const sweeps::Row& row) const {
     return row.turning >= 0 ? problem_.turnings[static_cast<std::size_t>(row.turning)].mass : 0.0;

@@ -19,7 +19,7 @@ namespace carillon::rigid {
 namespace {
 
 constexpr double kReach = 0.3;            // of the size of the smaller body: from so far touches are found
-constexpr double kMostSteps = 1024;       // of a window
+constexpr double kMaxSteps = 1024;        // of a window
 constexpr double kThin = 0.15;            // of the thickness of the thinner body: what moves as far in a long step takes short ones
 constexpr double kSag = 5e-6;             // m; a point on an arc may leave its chord by this in a step,
 constexpr double kSagOfThickness = 5e-4;  // or by so much of the thickness of its body
@@ -234,8 +234,8 @@ void Space::choose_steps(double length_s) {
   const double g = norm(gravity_);
   std::vector<double> steps(solids_.size(), std::max(1.0, length_s / (kFlatSteps * options_.step_s)));
   const auto ask = [&](int body, double asked) {
-    double& most = steps[static_cast<std::size_t>(groups.find(body))];
-    most = std::max(most, asked);
+    double& max = steps[static_cast<std::size_t>(groups.find(body))];
+    max = std::max(max, asked);
   };
   for (const Pair* pair : near_) {
     const int body = moves(pair->a) ? pair->a : pair->b;
@@ -256,7 +256,7 @@ void Space::choose_steps(double length_s) {
   }
   // Powers of two: then the steps of a group are the same whatever others ask for.
   const auto round = [](double n) {
-    return static_cast<int>(std::bit_ceil(static_cast<unsigned>(std::ceil(std::min(n, kMostSteps) - 1e-6))));
+    return static_cast<int>(std::bit_ceil(static_cast<unsigned>(std::ceil(std::min(n, kMaxSteps) - 1e-6))));
   };
   steps_in_window_ = 1;
   for (int i = 0; i < count; ++i)

@@ -35,7 +35,7 @@ struct Stop {
   Vec3 axis{};                // of b
   Vec3 lever_a{}, lever_b{};  // across the axis, alike at the start; of a hinge
   double arm_m = 0.0;         // of the lever at whose end the stop is; of a hinge
-  double most = 0.0;          // rad or m from the start that a may turn or move against b; negative where is_lower
+  double max = 0.0;           // rad or m from the start that a may turn or move against b; negative where is_lower
   bool is_lower = false;
 };
 
@@ -64,10 +64,10 @@ struct Ground {
 struct Options {
   double step_s = 2.5e-4;   // the longest small step where a curved surface may touch; flat ones take twice as long ones
   double tolerance = 1e-5;  // of gravity times the step: when the sweeps over the contacts end
-  int most_sweeps = 30;
-  int most_direct = 3;                          // bodies of a group whose problem is factorised in every step
+  int max_sweeps = 30;
+  int max_direct = 3;                           // bodies of a group whose problem is factorised in every step
   bool islands = true;                          // false: all bodies in one problem, for comparison
-  int most_settling = 200;                      // the same of a group that is about to rest
+  int max_settling = 200;                       // the same of a group that is about to rest
   double rolling_resistance = 1e-3;             // c: couple c R F against rolling, of hard on hard
   double joint_tolerance = joints::kTolerance;  // of a step of a mechanism's free motion [rad, m]
 };
@@ -137,6 +137,8 @@ struct Costs {
 
 class Groups;
 
+/// All bodies of a simulation and their contacts. At the start of a window all bodies are at its time. What is fixed or asleep does not
+/// move, bodies on joints never leave them, and the energies of calc_books() have a constant sum. Islands are stepped apart.
 class Space {
  public:
   static constexpr double kWindow = 2e-3;  // s
@@ -194,7 +196,8 @@ class Space {
     bool touches() const {
       return std::any_of(contacts.begin(), contacts.end(), [](const Contact& c) { return c.touching; });
     }
-    double sag_m = 0.0;  // so deep an impact with modes left it: what it rests on has given way, and need not bring it up
+    bool has_closed_gap() const;  // within kDeep, with or without a force
+    double sag_m = 0.0;           // so deep an impact with modes left it: what it rests on has given way, and need not bring it up
   };
   /// Bodies on joints. What of it is of a step stands below the line.
   struct Linked {

@@ -22,18 +22,18 @@ constexpr double kShortest = 1e-9;                           // s; what is left 
 constexpr double kDrilling = 3.0 * std::numbers::pi / 16.0;  // of friction times patch radius: arm of the couple against drilling
 constexpr double kSettling = 0.02;                           // m/s; a group that is slower is about to rest
 constexpr double kAtRest = 1e-6;                             // m/s
-constexpr std::size_t kMostDirect = 24;                      // points of a small group
+constexpr std::size_t kMaxDirect = 24;                       // points of a small group
 constexpr std::size_t kTurns = 16;                           // points that take turns by their pairs
-constexpr int kMostAtOnce = 12;                              // bodies that are about to rest and are factorised without sweeps before
+constexpr int kMaxAtOnce = 12;                               // bodies that are about to rest and are factorised without sweeps before
 constexpr double kLoose = 1000.0;                            // times the tolerance
 constexpr double kLooseOfSpeed = 1e-3;                       // of the fastest of its bodies, where that is more,
 constexpr double kLoosest = 0.3 * kSlowest;                  // and no more than this: what stands must not strike
 constexpr int kGuesses = 6;                                  // of a factorised problem in a step
 constexpr double kRetry = 4e-3;                              // s; a group whose guesses failed goes by sweeps for so long,
 constexpr double kRetrySmall = 1e-3;                         // s; a small one for so long
-constexpr int kMostMissed = 30;                              // in a step: instants at which nothing struck after all
-constexpr int kMostImpacts = 4;                              // of a group in a step, each at its instant; a group with more is crowded
-constexpr int kLeastImpacts = 2;                             // the same of the largest groups, each of whose impacts costs more
+constexpr int kMaxMissed = 30;                               // in a step: instants at which nothing struck after all
+constexpr int kMaxImpacts = 4;                               // of a group in a step, each at its instant; a group with more is crowded
+constexpr int kMinImpacts = 2;                               // the same of the largest groups, each of whose impacts costs more
 constexpr int kStruckBodies = 48;                            // bodies of a group times its impacts in a step
 constexpr double kCrowded = 2e-3;                            // s; for so long after
 
@@ -48,10 +48,10 @@ void Space::step_island(Island& island, double start_s, double step_s) {
   const double g = norm(gravity_);
   const bool is_crowded = std::any_of(island.bodies.begin(), island.bodies.end(),
                                       [&](int body) { return paces_[static_cast<std::size_t>(body)].crowded_until_s > start_s; });
-  const int most_impacts = std::clamp(kStruckBodies / static_cast<int>(island.bodies.size()), kLeastImpacts, kMostImpacts);
+  const int max_impacts = std::clamp(kStruckBodies / static_cast<int>(island.bodies.size()), kMinImpacts, kMaxImpacts);
   if (is_crowded) {
     strike_at_once(island, start_s, step_s);
-    impacts = most_impacts;
+    impacts = max_impacts;
   }
   while (step_s - done > kShortest) {
     const double h = step_s - done;
@@ -59,7 +59,7 @@ void Space::step_island(Island& island, double start_s, double step_s) {
     if (!std::exchange(begun, true) && may_rest(island, h) && rest(island, h) != Rest::none) break;
     release_what_rests(island);
     predict(island, h, false);
-    make_points(island, h, impacts < most_impacts);
+    make_points(island, h, impacts < max_impacts);
     const double tolerance = options_.tolerance * std::max(g, 1.0) * h;
     const double energy_before = calc_energy(island);
     solve(tolerance);
@@ -68,7 +68,7 @@ void Space::step_island(Island& island, double start_s, double step_s) {
     double at = h;
     std::vector<Ref> first;
     together_s_ = kTogether;
-    const bool struck = impacts < most_impacts && find_impact(island, h, at, first);
+    const bool struck = impacts < max_impacts && find_impact(island, h, at, first);
     keep_impulses(at, h);
     for (Pair* pair : island.pairs) pair->travelled_m += (calc_pair_speed(pair->a, pair->b) + g * h) * at + 1e-12;
     move_bodies(island, start_s + done + at, at, h, energy_before);
@@ -80,9 +80,9 @@ void Space::step_island(Island& island, double start_s, double step_s) {
       if (confirm_impact(first, step_s - done, kDeep * (1 + missed))) {
         strike(island, first, time_s_);
         ++costs_.impacts;
-        if (++impacts == most_impacts) note_crowd(island, start_s + step_s);
-      } else if (++missed > kMostMissed) {
-        impacts = most_impacts;
+        if (++impacts == max_impacts) note_crowd(island, start_s + step_s);
+      } else if (++missed > kMaxMissed) {
+        impacts = max_impacts;
       }
     }
     if (step_s - done > kShortest)
@@ -213,14 +213,14 @@ Point Space::make_lasting_point(Pair& pair, const Contact& c, double h) const {
   const bool rests = t.gap_m <= kTouch && c.touching && std::abs(approach) < kAtRest;
   // What is too deep and parts may come back to where it is now: a push that ends its parting would do work.
   const double free_way = t.gap_m < -kDeep ? 0.0 : t.gap_m;
-  double least = rests ? 0.0 : std::min(0.0, approach - 2.0 * free_way / h);
+  double speed = rests ? 0.0 : std::min(0.0, approach - 2.0 * free_way / h);
   // What is too deep comes up, at half the power that the contact loses, so that no energy comes of it.
   if (t.gap_m < -kDeep) {
     const double push = dot(c.impulse, t.normal), paid = push > 0.0 ? 0.5 * c.lost_j / push : 0.0;
     const double up = std::min(0.02 * (-kDeep - t.gap_m) / h, t.gap_m < -kFarTooDeep - pair.sag_m ? 0.005 : paid);
-    if (approach > -up) least = up;
+    if (approach > -up) speed = up;
   }
-  p.wanted = least * t.normal - beyond;
+  p.wanted = speed * t.normal - beyond;
   const double curvature = t.curvature_a_per_m + t.curvature_b_per_m;
   if (t.smooth && curvature > 0.0) {
     p.rolling_m = options_.rolling_resistance / std::max(curvature, t.steepest_per_m);
@@ -242,7 +242,7 @@ void Space::make_points(Island& island, double h, bool leaves_impacts) {
       const shape::Touch& t = c.touch;
       const double approach = calc_approach(c);
       if (c.presses || (leaves_impacts && is_fast(c, h))) continue;
-      // The impact has these bodies; what stands still and rings goes on carrying others.
+      // The impact has these bodies; what stands still and rings continues to carry others.
       if (c.cord < 0 && (has_impact(pair->a) || has_impact(pair->b))) continue;
       if (t.gap_m > kTouch + 2.0 * h * std::max(approach, 0.0) + 4.0 * norm(gravity_) * h * h && !c.touching) continue;
       const Point p = c.cord >= 0 ? make_cord_point(c, h) : make_lasting_point(*pair, c, h);
@@ -312,33 +312,33 @@ void Space::solve(double tolerance_m_s) {
   }
   const int count = static_cast<int>(movers_.size());
   const bool settles = fastest < kSettling;
-  const bool is_small = count <= options_.most_direct && points_.size() <= kMostDirect;
+  const bool is_small = count <= options_.max_direct && points_.size() <= kMaxDirect;
   const bool rolls = std::any_of(points_.begin(), points_.end(), [](const Point& p) { return p.rolling_m > 0.0; });
   const auto factorise = [&](bool are_swept) {
-    if (solver_.solve_directly(movers_, points_, is_small ? kMostGuesses : kGuesses, are_swept) && !gains()) return true;
+    if (solver_.solve_directly(movers_, points_, is_small ? kMaxGuesses : kGuesses, are_swept) && !gains()) return true;
     // What rolls keeps its energy better that way, even where a guess fails now and then.
     const double pause_s = !is_small ? kRetry : rolls ? 0.0 : kRetrySmall;
     for (const int body : *stepped_) paces_[static_cast<std::size_t>(body)].next_guess_s = time_s_ + pause_s;
     return false;
   };
-  const auto sweep = [&](int most) {
+  const auto sweep = [&](int max) {
     const bool is_loose = !settles && !is_small;  // what moves fast needs less than what is about to stand still
     const double tolerance = is_loose ? std::max(kLoose * tolerance_m_s, std::min(kLooseOfSpeed * fastest, kLoosest)) : tolerance_m_s,
-                 left = solver_.solve(movers_, points_, tolerance, most);
+                 left = solver_.solve(movers_, points_, tolerance, max);
     costs_.sweeps += solver_.get_sweeps();
     return left <= tolerance && !gains();
   };
   const bool may_guess = std::all_of(stepped_->begin(), stepped_->end(),
                                      [&](int body) { return time_s_ >= paces_[static_cast<std::size_t>(body)].next_guess_s; });
-  const bool at_once = is_small || (settles && count <= kMostAtOnce);
+  const bool at_once = is_small || (settles && count <= kMaxAtOnce);
   if (at_once && may_guess) {
-    // What slid in the last step is guessed to slide; what rolls is guessed anew.
+    // What slid in the last step is guessed to slide; what rolls is guessed again.
     if (factorise(is_small && !rolls)) return;
     movers_ = free;
     points_ = begun;
   }
-  if (sweep(options_.most_sweeps)) return;
-  if (!at_once && may_guess && settles && count <= options_.most_settling) {
+  if (sweep(options_.max_sweeps)) return;
+  if (!at_once && may_guess && settles && count <= options_.max_settling) {
     // From the guess that the sweeps have made; they would let a pile tremble for long.
     const std::vector<Point> swept = points_;
     movers_ = free;
@@ -352,7 +352,7 @@ void Space::solve(double tolerance_m_s) {
   movers_ = free;
   points_ = begun;
   for (Point& p : points_) p.impulse = p.couple = {};
-  sweep(options_.most_sweeps);
+  sweep(options_.max_sweeps);
 }
 
 /// The angular impulses of all points on each body.

@@ -1,5 +1,5 @@
-// The velocity problem of a step as sweeps want it: points in their own axes (along the normal and twice across), bodies without their
-// geometry, all of it in groups of four numbers.
+// The velocity problem of a step in the form that sweeps need: points in their own axes (along the normal and twice across), bodies without
+// their geometry, all of it in groups of four numbers.
 #pragma once
 
 #include <cstddef>
@@ -12,7 +12,7 @@ namespace carillon::rigid::sweeps {
 
 typedef double Four __attribute__((vector_size(32), aligned(32)));  // a vector of three and a zero
 
-/// A matrix, by its columns, times a vector, and the scalar product; compiled anew for every set of instructions.
+/// A matrix, by its columns, times a vector, and the scalar product; compiled once for every set of instructions.
 [[gnu::always_inline]] static inline Four combine(const Four (&columns)[3], const Four& by) {
   return by[0] * columns[0] + (by[1] * columns[1] + by[2] * columns[2]);
 }

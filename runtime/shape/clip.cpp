@@ -32,10 +32,10 @@ struct Axis {
   Vec3 normal{};  // from b to a, frame of a
 };
 
-double find_least(const std::vector<Vec3>& points, const Vec3& n) {
-  double least = Box::kFar;
-  for (const Vec3& x : points) least = std::min(least, dot(n, x));
-  return least;
+double find_min(const std::vector<Vec3>& points, const Vec3& n) {
+  double min = Box::kFar;
+  for (const Vec3& x : points) min = std::min(min, dot(n, x));
+  return min;
 }
 
 struct Vertex {
@@ -66,7 +66,7 @@ class Pair {
 
   /// The gap along one axis; a quick look at the one of last time.
   double calc_gap(int kind, int i) const {
-    return kind == 0 ? find_least(t_.corners, a_.normals[i]) - a_.offsets_m[i] : find_least(a_.corners, t_.normals[i]) - t_.offsets[i];
+    return kind == 0 ? find_min(t_.corners, a_.normals[i]) - a_.offsets_m[i] : find_min(a_.corners, t_.normals[i]) - t_.offsets[i];
   }
 
   Axis find_facet_axis(int kind, double enough) const {
@@ -223,7 +223,7 @@ class Pair {
 
   /// The closest points of two bodies whose nearest features are edges or corners that do not face each other.
   void find_closest(double margin, std::vector<Touch>& out) const {
-    double least = margin * margin;
+    double min = margin * margin;
     Vec3 at_a{}, at_b{};
     int which_a = -1, which_b = -1;
     for (std::size_t i = 0; i < a_.edges.size(); ++i) {
@@ -238,15 +238,15 @@ class Pair {
           s = std::clamp((de * u - dr) / dd, 0.0, 1.0);
         }
         const Vec3 x = p + s * d, y = q + u * e;
-        if (norm2(x - y) >= least) continue;
-        least = norm2(x - y);
+        if (norm2(x - y) >= min) continue;
+        min = norm2(x - y);
         at_a = x, at_b = y;
         which_a = static_cast<int>(i), which_b = static_cast<int>(j);
       }
     }
-    if (which_a < 0 || !(least > 1e-24 * size_ * size_)) return;
+    if (which_a < 0 || !(min > 1e-24 * size_ * size_)) return;
     Touch t;
-    t.gap_m = std::sqrt(least);
+    t.gap_m = std::sqrt(min);
     const Vec3 n = (1.0 / t.gap_m) * (at_a - at_b);
     t.normal = axis_world(n);
     t.station_a = at_a;
@@ -308,11 +308,10 @@ void find_polyhedra_touches(const Shape& a, const Frame& fa, const Shape& b, con
   const bool crossed = edges.i >= 0 && edges.gap > facet.gap + prefer && dot(edges.normal, facet.normal) < kFlush;
   if (!crossed) pair.clip(facet, margin, out);
   if (out.empty() && edges.i >= 0 && (crossed || edges.gap > facet.gap - prefer)) pair.cross_edges(edges, out);
-  double least = margin;
-  for (const Touch& t : out) least = std::min(least, t.gap_m);
+  double min = margin;
+  for (const Touch& t : out) min = std::min(min, t.gap_m);
   // Apart, and the facets do not face each other where they are nearest.
-  if (out.empty() || (facet.gap > 0.0 && !crossed && least > facet.gap + prefer))
-    pair.find_closest(out.empty() ? margin : least - prefer, out);
+  if (out.empty() || (facet.gap > 0.0 && !crossed && min > facet.gap + prefer)) pair.find_closest(out.empty() ? margin : min - prefer, out);
   reduce(out, Box::kFar);
 }
 

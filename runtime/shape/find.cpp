@@ -1,11 +1,12 @@
+// One search for all pairs of shapes: its steps (candidates, corners, ridges, nearest places) share the same margins and slack; longer than
+// most files.
 // Method: convex polyhedra by clipping. Of any other pair, the samples of each that the other's grid does not show to be further than the
 //   margin; of those, corners and ridge points that no neighbour is lower than, and samples of curved parts that are the nearest among
 //   their neighbours; each against the nearest place of the other's fine mesh, and settled there. Ridges against ridges by two trees and
 //   the arcs on the Gauss map. The candidates are kept with a slack, so that a pair that has moved less than it is answered from memory.
 // Source: C. Ericson, "Real-Time Collision Detection" (2005), 5.1.9; Gauss map of edges: D. Gregorius (GDC 2013).
 // Deviations: estimates from the grid's face by way of neighbours, not the nearest face of all, decide which sample is the nearest among
-// its neighbours, but for bodies with
-//   walls thinner than four cells.
+//   its neighbours, but for bodies with walls thinner than four cells.
 #include "runtime/shape/grid.hpp"
 #include "runtime/shape/mesh.hpp"
 #include "runtime/shape/polyhedron.hpp"
@@ -21,7 +22,7 @@ constexpr double kFlush = 0.01;   // slope of a skin that is not at its lowest p
 constexpr double kBrim = 1e-4;    // of the size: a corner may stand out so far beyond the brim of a face that it still stands on
 constexpr double kEnd = 1e-6;     // of an edge: two that cross where the next one begins must not be missed
 constexpr double kEdge = 1e-3;    // rad; the edges of two faces that lie on each other cross as well
-constexpr double kBend = 4.0;     // over the thickness: the curvature, halved, that is reckoned with between samples
+constexpr double kBend = 4.0;     // over the thickness: the curvature, halved, that is allowed for between samples
 constexpr double kThinCells = 4;  // a wall thinner than so many cells is thin: a node of the grid may look to its far side
 
 /// Distances of samples of one body to another, found once in a search.
@@ -54,17 +55,17 @@ class Ground {
   }
 
   /// No face is nearer than this.
-  double find_bound(const Vec3& x) const { return body_ != nullptr ? find_outside(x) : grid_->find_near(x).at_least_m; }
+  double find_bound(const Vec3& x) const { return body_ != nullptr ? find_outside(x) : grid_->find_near(x).min_m; }
   /// Signed, good enough to compare neighbours; beyond `limit` a bound will do.
   double estimate(const Vec3& x, double limit) const {
     if (body_ != nullptr) {
-      int outside = 0;  // of how many facets: next to an edge or a corner, the facets do not tell how far
+      int outside = 0;  // of how many facets: next to an edge or a corner, the facets do not say how far
       for (std::size_t i = 0; i < body_->normals.size() && outside < 2; ++i)
         outside += dot(body_->normals[i], x) > body_->offsets_m[i] ? 1 : 0;
       return outside < 2 ? find_outside(x) : std::sqrt(shape_.mesh().find_nearest(x, Box::kFar, -1).distance2);
     }
     const Grid::Near near = grid_->find_near(x);
-    if (near.face < 0 || near.at_least_m > limit) return near.at_least_m;
+    if (near.face < 0 || near.min_m > limit) return near.min_m;
     const Mesh& mesh = shape_.mesh();
     Nearest on = mesh.walk_nearest(x, near.face);
     bool inside = mesh.is_inside(x, on);
@@ -80,9 +81,9 @@ class Ground {
 
  private:
   double find_outside(const Vec3& x) const {
-    double most = -Box::kFar;
-    for (std::size_t i = 0; i < body_->normals.size(); ++i) most = std::max(most, dot(body_->normals[i], x) - body_->offsets_m[i]);
-    return most;
+    double max = -Box::kFar;
+    for (std::size_t i = 0; i < body_->normals.size(); ++i) max = std::max(max, dot(body_->normals[i], x) - body_->offsets_m[i]);
+    return max;
   }
   const Shape& shape_;
   const Polyhedron* body_ = nullptr;
@@ -301,7 +302,7 @@ class Pass {
 
   /// A place of a curved part.
   void add_smooth(const Sample& sample) {
-    constexpr int kMost = 4;  // looks at what it faces
+    constexpr int kMax = 4;  // looks at what it faces
     const Mesh& mesh = theirs_.mesh();
     const double reach = std::max(1.5 * sample.reach_m, 2.0 * mine_.samples().spacing_m), brim = kBrim * mine_.get_size_m();
     Spot spot = mine_.skin().locate(sample.point, sample.face);
@@ -313,7 +314,7 @@ class Pass {
     Touch t;
     Facing facing = describe(mesh, theirs_.skin(), at);
     if (inside && facing.side != Side::skin) facing = {Side::plane, mesh.normals[at.face], -1};
-    for (int i = 0; i < kMost; ++i) {
+    for (int i = 0; i < kMax; ++i) {
       Vec3 n = mesh.normals[at.face];
       if (facing.side == Side::skin) {
         n = theirs_.skin().calc_normal(at.face, at.weights);
@@ -348,14 +349,14 @@ class Pass {
             if (other.side == Side::line && std::abs(dot(other.axis, facing.axis)) > 0.99) return;
           }
           facing = describe(mesh, theirs_.skin(), at);
-          if (i + 1 == kMost) return;
+          if (i + 1 == kMax) return;
           continue;
         }
       }
       if (facing.side == Side::point) {
         const Nearest other = ground_.find_nearest(to_theirs(t.station_a));
         const Facing beyond = describe(mesh, theirs_.skin(), other);
-        if (beyond.side != Side::point && i + 1 < kMost) {
+        if (beyond.side != Side::point && i + 1 < kMax) {
           at = other;
           facing = beyond;
           spot = mine_.skin().locate(t.station_a, t.face_a);

@@ -1,7 +1,6 @@
-// Method: nodes in bricks of 4^3 near the surface keep a distance and a near face, other bricks the distance of their middle.
-// A
-//   distance changes by no more than the way, so both give a bound that holds everywhere. The search at a node begins with the face of the
-//   node before.
+// Method: nodes in bricks of 4^3 near the surface keep a distance and a near face, other bricks the distance of their middle. A distance
+//   changes by no more than the way, so both give a bound that holds everywhere. The search at a node begins with the face of the node
+//   before.
 // Source: none.
 // Deviations: the grid only finds; distances and signs come from the mesh, so that walls thinner than a cell are safe.
 #include "runtime/shape/grid.hpp"
@@ -67,15 +66,15 @@ Grid::Near Grid::find_near(const Vec3& x) const {
   }
   const Brick& brick = bricks_[(cell[0] / kBrick * bricks_along_[1] + cell[1] / kBrick) * bricks_along_[2] + cell[2] / kBrick];
   Near near;
-  near.at_least_m = std::sqrt(box_.calc_distance2(x));
+  near.min_m = std::sqrt(box_.calc_distance2(x));
   if (brick.first < 0) {
     Vec3 middle{};
     for (int k = 0; k < 3; ++k) middle[k] = low_[k] + (cell[k] / kBrick + 0.5) * kBrick * cell_m_;
-    near.at_least_m = std::max(near.at_least_m, brick.distance_m - norm(x - middle));
+    near.min_m = std::max(near.min_m, brick.distance_m - norm(x - middle));
     return near;
   }
   const Node& node = nodes_[brick.first + ((cell[0] % kBrick) * kBrick + cell[1] % kBrick) * kBrick + cell[2] % kBrick];
-  near.at_least_m = std::max(near.at_least_m, node.distance_m - norm(x - inside));
+  near.min_m = std::max(near.min_m, node.distance_m - norm(x - inside));
   near.face = node.face;
   return near;
 }

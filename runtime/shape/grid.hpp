@@ -1,4 +1,4 @@
-// A sparse grid about a mesh that tells how far it is at least, and which face is near.
+// A sparse grid about a mesh that gives a lower bound of the distance and a face that is near.
 #pragma once
 
 #include <cstdint>
@@ -8,13 +8,14 @@
 
 namespace carillon::shape {
 
+/// A lower bound of the distance to a mesh, at any point. `at_least_m` is never more than the true distance, rounding included.
 class Grid {
  public:
   explicit Grid(const Mesh& mesh);
 
   struct Near {
-    double at_least_m = 0.0;  // no face is nearer
-    int face = -1;            // one that is near; -1 far away
+    double min_m = 0.0;  // no face is nearer
+    int face = -1;       // one that is near; -1 far away
   };
   Near find_near(const Vec3& x) const;
   double get_cell_m() const { return cell_m_; }

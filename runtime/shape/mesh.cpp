@@ -197,9 +197,9 @@ Nearest Mesh::find_nearest(const Vec3& x, double within2, int hint, double slack
 }
 
 Nearest Mesh::walk_nearest(const Vec3& x, int face) const {
-  constexpr int kMost = 100;
+  constexpr int kMax = 100;
   Nearest best = find_nearest_on_face(x, face);
-  for (int step = 0; step < kMost; ++step) {
+  for (int step = 0; step < kMax; ++step) {
     Nearest better = best;
     for (int k = 0; k < 3; ++k) {
       if (best.weights[k] > 0.0) continue;

@@ -18,6 +18,8 @@ struct Nearest {
   Vec3 place{};
 };
 
+/// A closed, oriented triangle mesh: every half-edge has exactly one opposite, every vertex one fan of triangles, and normals point
+/// outwards. Never changes once it is made.
 class Mesh {
  public:
   /// Throws InputError when the surface is empty, open, has more than two triangles at an edge, is degenerate or inside out. Vertices in

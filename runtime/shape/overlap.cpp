@@ -20,7 +20,7 @@ double calc_depth(const Mesh& mesh, const Vec3& x) {
 /// The first crossing of a ray with the surface; false where there is none within `length`.
 bool find_crossing(const Mesh& mesh, const Vec3& origin, const Vec3& way, double length, double& distance, bool& leaves) {
   constexpr double kBeyond = 1e-12;  // of a triangle: a ray through an edge must not slip between two
-  double least = length;
+  double min = length;
   bool found = false;
   mesh.for_ray(origin, way, length, [&](int f) {
     const Vec3& a = mesh.corner(f, 0);
@@ -32,12 +32,12 @@ bool find_crossing(const Mesh& mesh, const Vec3& origin, const Vec3& way, double
     if (u < -kBeyond || u > 1.0 + kBeyond) return;
     const Vec3 q = cross(s, ab);
     const double v = dot(way, q) / det, t = dot(ac, q) / det;
-    if (v < -kBeyond || u + v > 1.0 + kBeyond || t < 0.0 || t > least) return;
-    least = t;
+    if (v < -kBeyond || u + v > 1.0 + kBeyond || t < 0.0 || t > min) return;
+    min = t;
     leaves = dot(mesh.normals[f], way) > 0.0;
     found = true;
   });
-  distance = least;
+  distance = min;
   return found;
 }
 

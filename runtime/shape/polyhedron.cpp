@@ -8,9 +8,9 @@
 
 namespace carillon::shape {
 
-std::optional<Polyhedron> make_polyhedron(const Mesh& mesh, const Skin& skin, int most) {
+std::optional<Polyhedron> make_polyhedron(const Mesh& mesh, const Skin& skin, int max) {
   constexpr double kConvex = 1e-6;  // of the size
-  if (skin.count_regions() > most || skin.count_smooth_edges() > 0) return std::nullopt;
+  if (skin.count_regions() > max || skin.count_smooth_edges() > 0) return std::nullopt;
   Polyhedron body;
   const double slack = kConvex * norm(mesh.box.high - mesh.box.low);
   std::vector<int> corner_of(mesh.vertices.size(), -1);

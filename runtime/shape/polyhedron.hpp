@@ -24,7 +24,7 @@ struct Polyhedron {
   Vec3 middle{};
 };
 
-/// Nothing where the body is not convex, has curved parts, or more than `most` facets.
-std::optional<Polyhedron> make_polyhedron(const Mesh& mesh, const Skin& skin, int most);
+/// Nothing where the body is not convex, has curved parts, or more than `max` facets.
+std::optional<Polyhedron> make_polyhedron(const Mesh& mesh, const Skin& skin, int max);
 
 }  // namespace carillon::shape

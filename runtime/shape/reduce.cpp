@@ -1,6 +1,5 @@
 // Method: patches by single linkage; of each patch the deepest point, the one furthest from it, the one furthest from their line, and the
-// one
-//   that adds most area on the other side. Names by nearness of the stations.
+//   one that adds most area on the other side. Names by nearness of the stations.
 // Source: textbook.
 // Deviations: none.
 #include "runtime/shape/reduce.hpp"
@@ -22,11 +21,11 @@ void keep_four(const std::vector<Touch>& t, const std::vector<int>& patch, std::
   }
   const auto best = [&](auto&& value) {
     int which = patch[0];
-    double most = -Box::kFar;
+    double max = -Box::kFar;
     for (const int i : patch) {
       const double v = value(i);
-      if (v > most) {
-        most = v;
+      if (v > max) {
+        max = v;
         which = i;
       }
     }
@@ -97,15 +96,15 @@ void name(std::vector<Touch>& touches, double reach_m, PairMemory& memory) {
   std::vector<char> taken(memory.last.size(), 0);
   for (Touch& t : touches) {
     if (!t.smooth) continue;
-    double least = reach_m * reach_m;
+    double min = reach_m * reach_m;
     int which = -1;
     for (std::size_t i = 0; i < memory.last.size(); ++i) {
       const Touch& old = memory.last[i];
       if (taken[i] != 0 || !old.smooth || dot(old.normal, t.normal) < 0.8) continue;
       const double d =
           std::min(norm2(old.where_m - t.where_m), std::min(norm2(old.station_a - t.station_a), norm2(old.station_b - t.station_b)));
-      if (d < least) {
-        least = d;
+      if (d < min) {
+        min = d;
         which = static_cast<int>(i);
       }
     }

@@ -1,7 +1,6 @@
 // Method: a point on a plane by its distance; the lowest place of a skin over a plane by walking its patches; two curved sides as the
-// minimum
-//   of their gap over the common tangent plane, by Newton's method with slopes from the patches and curvatures of the smooth bodies. The
-//   normal is that of the patches, so that height and normal belong together.
+//   minimum of their gap over the common tangent plane, by Newton's method with slopes from the patches and curvatures of the smooth
+//   bodies. The normal is that of the patches, so that height and normal belong together.
 // Source: none.
 // Deviations: none.
 #include "runtime/shape/mesh.hpp"
@@ -139,14 +138,14 @@ double step(Half& a, Half& b, Vec3& n, double reach) {
   return moved;
 }
 
-bool settle_curved(Touch& touch, Half& a, Half& b, double reach, int most) {
+bool settle_curved(Touch& touch, Half& a, Half& b, double reach, int max) {
   a.begin();
   b.begin();
   Vec3 n = touch.normal;
   const Vec3 start_a = a.point, start_b = b.point;
   const double close = 1e-5 * reach;
   bool settled = false;
-  for (int i = 0; i < most && !settled; ++i) settled = step(a, b, n, reach) < close;
+  for (int i = 0; i < max && !settled; ++i) settled = step(a, b, n, reach) < close;
   touch.normal = n;
   touch.gap_m = dot(n, a.point - b.point);
   touch.where_m = 0.5 * (a.point + b.point);

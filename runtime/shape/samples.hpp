@@ -32,6 +32,8 @@ struct Ball {
   int child = -1;  // the other is the next; -1: a leaf
 };
 
+/// Never changes once it is made. Every corner of the mesh is a sample, convex sharp edges are covered by ridges, and every place of the
+/// curved skin lies within `reach_m` of its sample.
 class Samples {
  public:
   Samples(const Mesh& mesh, const Skin& skin);

@@ -22,7 +22,7 @@ bool carries(const Mesh& mesh, int vertex, const Vec3& normal);
 inline constexpr int kFirst = 12, kAgain = 2;  // iterations between two curved sides, in a search and near a place known
 
 /// Moves the touch to where its two sides face each other, from where they are now, and fills gap, where, normal and stations. False where
-/// the touch left its features (the end of a line, a skin that goes on falling beyond `reach_m`).
+/// the touch left its features (the end of a line, a skin that continues to fall beyond `reach_m`).
 bool settle(Touch& touch, const Shape& a, const Frame& frame_a, const Shape* b, const Frame& frame_b, double reach_m,
             int iterations = kAgain);
 

@@ -21,13 +21,13 @@ constexpr double kFaces = -0.2;   // unless it looks away from the way asked: co
 
 Shape::Shape(std::span<const Vec3> vertices, std::span<const std::array<std::int32_t, 3>> triangles)
     : mesh_(std::make_unique<const Mesh>(vertices, triangles)), skin_(std::make_unique<const Skin>(*mesh_)) {
-  constexpr int kMostFacets = 26;
+  constexpr int kMaxFacets = 26;
   const Vec3 side = mesh_->box.high - mesh_->box.low;
   size_m_ = norm(side);
   thickness_m_ = std::min({side[0], side[1], side[2]});
   middle_m_ = 0.5 * (mesh_->box.low + mesh_->box.high);
   radius_m_ = calc_radius_m(middle_m_);
-  if (std::optional<Polyhedron> made = make_polyhedron(*mesh_, *skin_, kMostFacets)) {
+  if (std::optional<Polyhedron> made = make_polyhedron(*mesh_, *skin_, kMaxFacets)) {
     polyhedron_ = std::make_unique<const Polyhedron>(std::move(*made));
   }
 }
@@ -35,9 +35,9 @@ Shape::Shape(std::span<const Vec3> vertices, std::span<const std::array<std::int
 Shape::~Shape() = default;
 
 double Shape::calc_radius_m(const Vec3& centre) const {
-  double most = 0.0;
-  for (const Vec3& x : mesh_->vertices) most = std::max(most, norm2(x - centre));
-  return std::sqrt(most) + skin_->get_sag_m();
+  double max = 0.0;
+  for (const Vec3& x : mesh_->vertices) max = std::max(max, norm2(x - centre));
+  return std::sqrt(max) + skin_->get_sag_m();
 }
 
 Box Shape::calc_box(const Frame& frame) const {
@@ -64,13 +64,13 @@ Place Shape::find_place(const Vec3& point, const Vec3& outward, std::int32_t hin
   // At an edge or a corner, and under a curved skin, several faces are near: the one that looks the way asked.
   const double reach = std::sqrt(nearest.distance2) + 1e-6 * size_m_;
   Nearest best = nearest;
-  double most = dot(mesh_->normals[nearest.face], outward);
+  double max = dot(mesh_->normals[nearest.face], outward);
   mesh_->for_ball(point, reach, [&](int f) {
     const double along = dot(mesh_->normals[f], outward);
-    if (along <= most) return;
+    if (along <= max) return;
     const Nearest on = mesh_->find_nearest_on_face(point, f);
     if (on.distance2 > reach * reach) return;
-    most = along;
+    max = along;
     best = on;
   });
   return {best.face, best.weights, skin_->calc_mean_curvature(best.face, best.weights)};
@@ -80,10 +80,10 @@ Place Shape::find_place(const Vec3& point, const Vec3& outward, std::int32_t hin
 Place Shape::choose_face(const Nearest& on, const Vec3& point, const Vec3& outward) const {
   constexpr double kEdge = 1e-3;  // of a triangle's height
   int face = on.face, zeros = 0, whole = 0;
-  double most = dot(mesh_->normals[face], outward);
+  double max = dot(mesh_->normals[face], outward);
   const auto look = [&](int f) {
     const double along = dot(mesh_->normals[f], outward);
-    if (along > most) most = along, face = f;
+    if (along > max) max = along, face = f;
   };
   for (int k = 0; k < 3; ++k) {
     if (on.weights[k] > kEdge) {

@@ -28,6 +28,8 @@ struct Place {
   double curvature_per_m = 0.0;
 };
 
+/// The collision geometry of one surface, shared by all bodies that have it. Its answers never change; samples and grid are made when they
+/// are first asked for, which only takes time.
 class Shape {
  public:
   /// Throws InputError for what is empty, open, not a manifold, without area or inside out; the message names the place.

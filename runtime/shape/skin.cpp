@@ -198,12 +198,12 @@ void Skin::make_fans() {
 }
 
 bool Skin::is_tip(const std::vector<int>& corners, const Vec3& mean) const {
-  double most = 0.0, edges = 0.0;
+  double max = 0.0, edges = 0.0;
   for (const int c : corners) {
-    most = std::max(most, calc_angle(mesh_.normals[c / 3], mean));
+    max = std::max(max, calc_angle(mesh_.normals[c / 3], mean));
     edges += calc_angle(mesh_.normals[c / 3], mesh_.normals[mesh_.opposite[c] / 3]);
   }
-  return most > kSharp || (most > kBlunt && most > kSharper * edges / static_cast<double>(corners.size()));
+  return max > kSharp || (max > kBlunt && max > kSharper * edges / static_cast<double>(corners.size()));
 }
 
 void Skin::fit_tensor(int v, const std::vector<int>& corners, int fan) {
@@ -351,10 +351,10 @@ Spot Skin::find_lowest(const Vec3& up, int face, const Vec3& centre, double spri
 }
 
 Spot Skin::walk_lowest(const Vec3& up, int face, const Vec3& centre, double reach, bool stays) const {
-  constexpr int kMost = 400;
+  constexpr int kMax = 400;
   const double spring = 0.5 * (stays ? kStays : kSpring) / size_m_;
   Spot best = find_lowest(up, face, centre, spring);
-  for (int step = 0; step < kMost; ++step) {
+  for (int step = 0; step < kMax; ++step) {
     if (norm2(best.point - centre) > reach * reach) {
       best.settled = false;
       return best;

@@ -39,6 +39,8 @@ struct Spot {
 
 enum class VertexKind : std::uint8_t { none, smooth, ridge, corner };  // none: amid a flat facet or a straight edge
 
+/// Regions, sharp edges and curvatures of a mesh, which must outlive it. Never changes once it is made; neighbouring patches meet without a
+/// gap.
 class Skin {
  public:
   explicit Skin(const Mesh& mesh);

@@ -24,7 +24,7 @@ struct Touch {
   double curvature_a_per_m = 0.0, curvature_b_per_m = 0.0;  // mean, for Hertz; 0 flat
   double steepest_per_m = 0.0;                              // the largest curvature of curved sides together: of what rolls; 0 flat
   bool smooth = false;                                      // the point travels over a curved surface while it rolls: refresh() moves it
-  // How refresh() goes on:
+  // What refresh() continues from:
   Side side_a = Side::point, side_b = Side::plane;
   Vec3 axis_a{}, axis_b{};       // outward normal of a plane, direction of a line; in the frame of its body (world for the ground)
   int face_a = -1, face_b = -1;  // of the fine mesh, where the skin search begins; -1: none

@@ -4,7 +4,7 @@
 // Source: thin plate: Cremer, Heckl and Petersson, Structure-Borne Sound (2005), chapter 5, for the force; couples and forces in the plane
 //   are worked out in docs/equations.md. Half space under a disc: Lysmer's analogue as in Richart, Hall and Woods, Vibrations of Soils and
 //   Foundations (1970), table 7-1 to 7-5.
-// Deviations: the plate is infinite and thin, and does not give way under the patch; of the analogue's couples the added mass is left out.
+// Deviations: the plate is infinite and thin, and does not yield under the patch; of the analogue's couples the added mass is left out.
 #include "runtime/support/losses.hpp"
 
 #include <fmt/format.h>
@@ -18,6 +18,8 @@
 
 #include "runtime/bank/nearest.hpp"
 #include "runtime/base/document.hpp"
+#include "runtime/base/json.hpp"
+#include "runtime/base/printable.hpp"
 #include "runtime/base/vector.hpp"
 
 namespace carillon::support {
@@ -26,10 +28,10 @@ namespace {
 using Complex = std::complex<double>;
 constexpr Complex kI{0.0, 1.0};
 constexpr double kEuler = std::numbers::egamma;
-constexpr double kLeastRadiusM = 1e-3;  // of a patch without area: a screw
-constexpr double kFew = 0.2;            // of the modes: so many beyond first order, not the lowest, are bounded without a warning
-constexpr double kNearness = 0.5;       // modes share their loss when what couples them is more than this part of their distance
-constexpr std::size_t kMostSupports = 100000;
+constexpr double kMinRadiusM = 1e-3;  // of a patch without area: a screw
+constexpr double kFew = 0.2;          // of the modes: so many beyond first order, not the lowest, are bounded without a warning
+constexpr double kNearness = 0.5;     // modes share their loss when what couples them is more than this part of their distance
+constexpr std::size_t kMaxSupports = 100000;
 
 /// How fast a support moves for a unit of force or couple: force along the normal, across it (two), couple about it, across it (two).
 using Admittance = std::array<Complex, 6>;
@@ -38,7 +40,7 @@ using Admittance = std::array<Complex, 6>;
 struct Patch {
   Vec3 normal{};
   bool has_normal = false;
-  double radius_m = kLeastRadiusM;  // of the disc of its area
+  double radius_m = kMinRadiusM;  // of the disc of its area
   double area_m2 = 0.0;
   double length_m = 0.0;  // of its long side
 };
@@ -114,12 +116,7 @@ Admittance calc_admittance(const material::Base& base, const Patch& patch, doubl
 
 /// Two unit vectors across a third one.
 std::array<Vec3, 2> find_across(const Vec3& n) {
-  const std::size_t least = std::abs(n[0]) <= std::abs(n[1]) && std::abs(n[0]) <= std::abs(n[2]) ? 0
-                            : std::abs(n[1]) <= std::abs(n[2])                                   ? 1
-                                                                                                 : 2;
-  Vec3 axis{};
-  axis[least] = 1.0;
-  Vec3 first = cross(n, axis);
+  Vec3 first = cross(n, find_least_axis(n));
   const double size = norm(first);
   for (double& x : first) x /= size;
   return {first, cross(n, first)};
@@ -150,7 +147,7 @@ std::vector<Given> read_given(const bank::Bank& bank) {
   if (bank.supports.count() == 0) return list;
   const base::Document document = base::parse_document(bank.supports.text, "supports/text of the bank");
   base::Object root = document.root();
-  for (base::Entry& entry : root.entries("supports", kMostSupports)) {
+  for (base::Entry& entry : root.entries("supports", kMaxSupports)) {
     if (!entry.object) throw InputError(fmt::format("{}: a support is no object; compute the bank again", entry.place));
     Given& given = list.emplace_back();
     given.name = entry.object->string("name");
@@ -175,7 +172,7 @@ void add_support(const bank::Bank& bank, std::size_t support, const material::Fi
   patch.has_normal = dot(patch.normal, patch.normal) > 0.5;
   patch.area_m2 = s.area_m2[support];
   if (s.thickness_m[support] > 0.0) patch.length_m = patch.area_m2 / s.thickness_m[support];
-  patch.radius_m = std::max(kLeastRadiusM, std::sqrt(patch.area_m2 / std::numbers::pi));
+  patch.radius_m = std::max(kMinRadiusM, std::sqrt(patch.area_m2 / std::numbers::pi));
   const auto get = [&](std::size_t m) { return find_components(&s.reaction[(m * s.count() + support) * 6], patch, fixing.base); };
   const std::size_t modes = bank.mode_count();
   for (std::size_t m = 0; m < modes; ++m) {
@@ -226,17 +223,17 @@ std::vector<std::string> list_names(const bank::Bank& bank) {
   return names;
 }
 
-Losses calc_losses(const bank::Bank& bank, const Wish& wish) {
+Losses calc_losses(const bank::Bank& bank, const MountingRequest& request) {
   Losses losses;
   const std::vector<Given> given = read_given(bank);
-  if (given.empty() && (wish.all || !wish.by_name.empty()))
+  if (given.empty() && (request.all || !request.by_name.empty()))
     throw InputError(
         "the bank has no supports: it was computed without fixed nodes, or by a version before banks had them; compute it with \"fixed\", "
         "or "
         "take \"held\"");
   std::vector<std::string> names;
   for (const Given& one : given) names.push_back(one.name);
-  for (const auto& [name, fixing] : wish.by_name) {
+  for (const auto& [name, fixing] : request.by_name) {
     if (std::find(names.begin(), names.end(), name) != names.end()) continue;
     const std::string nearest = base::find_nearest(name, names);
     throw InputError(
@@ -245,14 +242,14 @@ Losses calc_losses(const bank::Bank& bank, const Wish& wish) {
   }
   Sums sums{std::vector<Complex>(bank.mode_count()), std::vector<double>(bank.mode_count())};
   for (std::size_t s = 0; s < given.size(); ++s) {
-    const auto named = wish.by_name.find(given[s].name);
-    const material::Fixing& fixing = named != wish.by_name.end() ? named->second : wish.all ? *wish.all : given[s].fixing;
+    const auto named = request.by_name.find(given[s].name);
+    const material::Fixing& fixing = named != request.by_name.end() ? named->second : request.all ? *request.all : given[s].fixing;
     if (fixing.base.kind == material::BaseKind::kRigid && fixing.joint_loss == 0.0) continue;
     add_support(bank, s, fixing, sums);
     losses.supports.push_back(fmt::format("{} {}", given[s].name, material::describe(fixing)));
   }
-  if (!wish.held.empty()) {
-    for (const Holder& holder : wish.held) {
+  if (!request.held.empty()) {
+    for (const Holder& holder : request.held) {
       add_holder(bank, holder, sums);
       losses.supports.push_back(fmt::format("held by {}", material::describe(holder.by)));
     }
@@ -261,10 +258,10 @@ Losses calc_losses(const bank::Bank& bank, const Wish& wish) {
   for (std::size_t m = 0; m < bank.mode_count(); ++m) {
     const double omega = std::sqrt(bank.eigenvalue_rad2_s2[m]);
     const Complex shift = sums.own[m];
-    const bool is_beyond = !(std::abs(shift) <= kMostShift * omega);
+    const bool is_beyond = !(std::abs(shift) <= kMaxShift * omega);
     losses.beyond += is_beyond ? 1 : 0;
     losses.is_lowest_beyond = losses.is_lowest_beyond || (is_beyond && m == 0);
-    losses.decay_per_s.push_back(std::isfinite(shift.real()) ? std::clamp(shift.real(), 0.0, kMostDecay * omega) : kMostDecay * omega);
+    losses.decay_per_s.push_back(std::isfinite(shift.real()) ? std::clamp(shift.real(), 0.0, kMaxDecay * omega) : kMaxDecay * omega);
     losses.shift_rad_s.push_back(is_beyond ? 0.0 : -shift.imag());
     if (m + 1 < bank.mode_count() && sums.with_next[m] > kNearness * (std::sqrt(bank.eigenvalue_rad2_s2[m + 1]) - omega)) ++losses.mixed;
   }
@@ -285,12 +282,12 @@ void apply(const Losses& losses, bank::Bank& bank) {
   bank.proof.reset();  // it counts the modes of the body as it was solved
 }
 
-std::string write_key(const Wish& wish) {
+std::string write_key(const MountingRequest& request) {
   std::string text;
   const auto out = std::back_inserter(text);
-  if (wish.all) fmt::format_to(out, "{{{}}}", material::write_fixing(*wish.all));
-  for (const auto& [name, fixing] : wish.by_name) fmt::format_to(out, "{}: {{{}}}", base::quote(name), material::write_fixing(fixing));
-  for (const Holder& holder : wish.held) {
+  if (request.all) text += material::write_fixing(*request.all).line();
+  for (const auto& [name, fixing] : request.by_name) text += base::Json::object().set(name, material::write_fixing(fixing)).line();
+  for (const Holder& holder : request.held) {
     const material::Base& by = holder.by;
     fmt::format_to(out, "held {} {} {} {} {} {} {}", by.mass_kg, by.damping_n_s_m, by.stiffness_n_m, by.loss_factor, holder.point_m[0],
                    holder.point_m[1], holder.point_m[2]);
@@ -324,7 +321,7 @@ std::string describe_limits(const Losses& losses, const bank::Bank& before) {
       "{} of {} modes give their support more than first order can say (they would shift by more than {:g} % of their frequency): their "
       "frequency is left as it is, and they decay by {:g} of it at most; a stiffer support, or a solve without these fixed nodes and "
       "\"held\" in the scene, is exact",
-      losses.beyond, before.mode_count(), 100 * kMostShift, kMostDecay);
+      losses.beyond, before.mode_count(), 100 * kMaxShift, kMaxDecay);
 }
 
 }  // namespace carillon::support

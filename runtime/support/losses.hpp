@@ -24,7 +24,7 @@ struct Holder {
 };
 
 /// What a scene says of a body. Nothing: as the bank has it.
-struct Wish {
+struct MountingRequest {
   std::optional<material::Fixing> all{};              // behind every patch of fixed nodes
   std::map<std::string, material::Fixing> by_name{};  // behind one of them, in place of `all`
   std::vector<Holder> held{};
@@ -32,8 +32,8 @@ struct Wish {
   bool is_empty() const { return !all && by_name.empty() && held.empty(); }
 };
 
-/// Of every mode (m). Where first order does not hold (the shift is more than kMostShift of the frequency) the frequency stays, and the
-/// decay is kMostDecay of it at most.
+/// Of every mode (m). Where first order does not hold (the shift is more than kMaxShift of the frequency) the frequency stays, and the
+/// decay is kMaxDecay of it at most.
 struct Losses {
   std::vector<double> decay_per_s;    // added by the supports
   std::vector<double> shift_rad_s;    // of the angular frequency
@@ -44,17 +44,17 @@ struct Losses {
 
   bool is_empty() const { return decay_per_s.empty(); }
 };
-inline constexpr double kMostShift = 0.1, kMostDecay = 0.3;
+inline constexpr double kMaxShift = 0.1, kMaxDecay = 0.3;
 
-/// A text that differs for wishes that differ.
-std::string write_key(const Wish& wish);
+/// A text that differs for requests that differ.
+std::string write_key(const MountingRequest& request);
 
 /// The names of a bank's supports, in its order. Throws InputError for a bank whose text is damaged.
 std::vector<std::string> list_names(const bank::Bank& bank);
 
 /// Calculates d = r^T Re Y r / (2 omega^2) + eta s omega / 2 of every patch and d = phi^T Re Z phi / 2 of every holder. Empty when nothing
 /// takes anything. Throws InputError for fixings of a bank that has no supports, and for names that it has not.
-Losses calc_losses(const bank::Bank& bank, const Wish& wish);
+Losses calc_losses(const bank::Bank& bank, const MountingRequest& request);
 
 /// Puts the losses into the bank's decays and frequencies. The damping law is then "mixed": the decays are no longer of the material alone.
 void apply(const Losses& losses, bank::Bank& bank);

@@ -1,10 +1,10 @@
 // Method:     a histogram of all groups by the logarithm of their bound, filled from the loud end until the room is used up: one pass, no
 //             sorting. Modes that go do not come back, so a single strike must not cost any: work on top of what rings (strikes, what they
-//             wake, what fades) runs up a debt. Room is what is allowed for a period, less the running mean of that work in proportion to
-//             the debt, wholly at four periods' worth; beyond these, less an eighth of the rest as well. The floor for strikes is the
-//             threshold of the last choice, raised by a tenth a period while work on top takes more than half of what the first groups
-//             leave, and let down by half an octave a period when a tenth of the room is free.
-// Source:     none: the list is sorted by audibility, and its prefixes are cut as docs/decisions/budget.md tells.
+//             wake, what fades) runs up a debt. Room is what is allowed for a block, less the running mean of that work in proportion to
+//             the debt, wholly at four blocks' worth; beyond these, less an eighth of the rest as well. The floor for strikes is the
+//             threshold of the last choice, raised by a tenth a block while work on top takes more than half of what the first groups
+//             leave, and let down by half an octave a block when a tenth of the room is free.
+// Source:     none: the list is sorted by audibility, and its prefixes are cut as docs/decisions/budget.md says.
 // Deviations: none.
 #include "runtime/synth/budget.hpp"
 
@@ -17,12 +17,12 @@
 namespace carillon::synth {
 namespace {
 
-constexpr double kGroupCost = kGroup * kPeriod;    // mode-samples of a live group in a period
-constexpr double kSmoothing = 0.125;               // of the running mean: eight periods
-constexpr double kRepayment = 0.125;               // of the debt, a period
-constexpr double kMostDebt = 16.0, kCredit = 4.0;  // periods
+constexpr double kGroupCost = kGroup * kBlock;    // mode-samples of a live group in a block
+constexpr double kSmoothing = 0.125;              // of the running mean: eight blocks
+constexpr double kRepayment = 0.125;              // of the debt, a block
+constexpr double kMaxDebt = 16.0, kCredit = 4.0;  // blocks
 constexpr double kExtraShare = 0.5;
-constexpr float kStricter = 1.1F, kMostStrict = 1e6F;
+constexpr float kStricter = 1.1F, kMaxStrict = 1e6F;
 constexpr double kReleaseBelow = 0.9;  // of the room
 constexpr float kRelease = 0.7F;
 constexpr float kInaudible = 1e-12F;  // Pa
@@ -37,15 +37,15 @@ int Budget::find_bin(float pressure_pa) noexcept {
 
 bool Budget::begin(double allowed, double spent, std::int64_t live_groups, int awake_bodies) noexcept {
   extra_ += kSmoothing * (std::max(0.0, spent - planned_) - extra_);
-  debt_ = std::clamp(debt_ + spent - allowed_, 0.0, (kCredit + kMostDebt) * allowed);
+  debt_ = std::clamp(debt_ + spent - allowed_, 0.0, (kCredit + kMaxDebt) * allowed);
   allowed_ = allowed;
   const double overdrawn = std::max(0.0, debt_ - kCredit * allowed);
-  const double least = awake_bodies * kGroupCost;
-  const bool strikes_take_too_much = extra_ > kExtraShare * std::max(0.0, allowed - least) || overdrawn > 0.0;
-  strictness_ = strikes_take_too_much ? std::min(strictness_ * kStricter, kMostStrict) : std::max(1.0F, strictness_ / kStricter);
+  const double base_cost = awake_bodies * kGroupCost;
+  const bool strikes_take_too_much = extra_ > kExtraShare * std::max(0.0, allowed - base_cost) || overdrawn > 0.0;
+  strictness_ = strikes_take_too_much ? std::min(strictness_ * kStricter, kMaxStrict) : std::max(1.0F, strictness_ / kStricter);
   const double predicted = allowed > 0.0 ? extra_ * std::min(1.0, debt_ / (kCredit * allowed)) : 0.0;
   const double room = std::max(0.0, allowed - predicted - kRepayment * overdrawn);
-  planned_ = static_cast<double>(live_groups) * kGroupCost;  // what fades out takes as much for one period more
+  planned_ = static_cast<double>(live_groups) * kGroupCost;  // what fades out takes as much for one block more
   has_room_ = planned_ + extra_ < kReleaseBelow * allowed && debt_ < allowed;
   if (planned_ <= room) {
     if (planned_ < kReleaseBelow * room) threshold_pa_ *= kRelease;
@@ -61,7 +61,7 @@ bool Budget::begin(double allowed, double spent, std::int64_t live_groups, int a
   return true;
 }
 
-void Budget::tell(std::span<const float> bounds_pa) noexcept {
+void Budget::add(std::span<const float> bounds_pa) noexcept {
   for (std::size_t g = 1; g < bounds_pa.size(); ++g) ++count_[static_cast<std::size_t>(find_bin(bounds_pa[g]))];
 }
 

@@ -1,8 +1,8 @@
 // Which modes stay when there are more than the budget allows: the most audible ones, over all bodies.
 //
 //   synth::Budget budget;
-//   if (budget.begin(allowed, spent, live)) {              // at the start of a period
-//     for (each awake body) budget.tell(voice.measure(nearness));
+//   if (budget.begin(allowed, spent, live)) {              // at the start of a block
+//     for (each awake body) budget.add(voice.measure(nearness));
 //     budget.decide();
 //     for (each awake body) voice.cut(budget.find_limit(voice.get_measured()));
 //   }
@@ -16,27 +16,27 @@
 
 namespace carillon::synth {
 
-/// What it decides depends on what it is told and on nothing else: no clock, no order of threads. Takes no memory. One thread.
+/// What it decides depends on what was added and on nothing else: no clock, no order of threads. Takes no memory. One thread.
 class Budget {
  public:
-  /// At the start of a period: mode-samples that it may take, those that the last period took, and the groups that are live now, of how
+  /// At the start of a block: mode-samples that it may take, those that the last block took, and the groups that are live now, of how
   /// many bodies. True when some must go. Work on top of the live groups (strikes, what they wake, what fades out) is predicted from the
-  /// last periods; what was taken too much is given back over the next ones.
+  /// last blocks; what was taken too much is given back over the next ones.
   bool begin(double allowed, double spent, std::int64_t live_groups, int awake_bodies) noexcept;
 
   /// After begin(): whether a tenth of what is allowed is to spare, all work taken into account.
   bool has_room() const noexcept { return has_room_; }
 
-  /// The groups of one awake body: bounds on their pressure at the ears [Pa], never growing along the list.
-  void tell(std::span<const float> bounds_pa) noexcept;
+  /// The groups of one awake body: bounds on their pressure at the receivers [Pa], never growing along the list.
+  void add(std::span<const float> bounds_pa) noexcept;
 
-  /// Once all were told: finds the pressure below which groups go.
+  /// Once all were added: finds the pressure below which groups go.
   void decide() noexcept;
 
-  /// How many groups of a body stay, at least one. In the order of tell(), once a body.
+  /// How many groups of a body stay, at least one. In the order of add(), once a body.
   int find_limit(std::span<const float> bounds_pa) noexcept;
 
-  /// Strikes shall wake no group that they cannot lift to this pressure at the ears; 0: no such floor.
+  /// Strikes shall wake no group that they cannot lift to this pressure at the receivers; 0: no such floor.
   float get_floor_pa() const noexcept { return threshold_pa_ * strictness_; }
 
  private:
@@ -44,8 +44,8 @@ class Budget {
   static constexpr int kBins = 256 * kStepsPerOctave;
   static int find_bin(float pressure_pa) noexcept;
 
-  double planned_ = std::numeric_limits<double>::infinity();  // of the live groups of the last period, mode-samples
-  double allowed_ = std::numeric_limits<double>::infinity();  // in the last period
+  double planned_ = std::numeric_limits<double>::infinity();  // of the live groups of the last block, mode-samples
+  double allowed_ = std::numeric_limits<double>::infinity();  // in the last block
   double extra_ = 0.0;                                        // what came on top, smoothed
   double debt_ = 0.0;                                         // taken too much so far, mode-samples
   bool has_room_ = false;

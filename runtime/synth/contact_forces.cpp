@@ -1,14 +1,14 @@
-// Method:     every border of two quanta, each contact's values are found on the line between its records; from them its direction, gains
-//             and damping. In between, the force is worked out sample by sample and handed to the modes through the contact's rows at
-//             both borders, blended, so that nothing steps when the place or the direction changes.
+// Method:     every border of two sub-blocks, each contact's values are found on the line between its records; from them its
+//             direction, gains and damping. In between, the force is computed sample by sample and handed to the modes through the
+//             contact's rows at both borders, blended, so that nothing steps when the place or the direction changes.
 // Source:     K. Johnson, Contact Mechanics (1985), 4.2: k = dF/d delta = 2 E* a. Rough surfaces: B. Persson, Phys. Rev. Lett. 99 (2007)
 //             125502: load ~ exp(-separation / u0). Coulomb 1785.
 //             Rough bodies that slide: the level grows evenly with the logarithms of roughness and speed, the sound is that of shocks
-//             between asperities, and what gives way is small against the roughness: H. Ben Abdelounis, A. Le Bot, J. Perret-Liaudet and
+//             between asperities, and what yields is small against the roughness: H. Ben Abdelounis, A. Le Bot, J. Perret-Liaudet and
 //             H. Zahouani, Wear 268 (2010) 335.
-// Deviations: Persson's u0 is 0.4 h_rms or more for bodies that cannot give way; here it is h_rms for what rolls, and one length for what
+// Deviations: Persson's u0 is 0.4 h_rms or more for bodies that cannot yield; here it is h_rms for what rolls, and one length for what
 //             slides, by which the level keeps to that law. The weight is taken for what presses: of what something else presses the
-//             ride is too slow. The other body's and this body's modes do not give way to the heights.
+//             ride is too slow. The other body's and this body's modes do not yield to the heights.
 #include "runtime/synth/contact_forces.hpp"
 
 #include <algorithm>
@@ -37,7 +37,7 @@ double calc_smooth_step(double x) noexcept {
 
 double calc_motion(double speed_m_s) noexcept { return calc_smooth_step((speed_m_s - kAtRest) / (kMoving - kAtRest)); }
 
-/// Of the surface of one of the two bodies along the path of a contact: the same for whoever looks at it. `first`: two surfaces of the same
+/// Of the surface of one of the two bodies along the path of a contact: the same for every caller. `first`: two surfaces of the same
 /// seed are still two.
 std::uint64_t make_seed(std::uint64_t contact, std::uint64_t surface, bool first) noexcept {
   return contact * 0x9e3779b97f4a7c15U ^ (2U * surface + (first ? 1U : 2U)) * 0xc2b2ae3d27d4eb4fU;
@@ -94,9 +94,9 @@ ContactNoise calc_noise(const Press& press, const Texture& texture, const Textur
   const double blunt_m = (1.0 - noise.sliding) * press.patch_m;
   noise.gains = texture.calc_gains(noise.speed_m_s, blunt_m, ride_rad_s, press.rate_hz);
   noise.other_gains = other_texture.calc_gains(noise.other_speed_m_s, blunt_m, ride_rad_s, press.rate_hz);
-  noise.give_m = stiffness > 0.0 ? calc_give(noise.gains.rms_m, noise.other_gains.rms_m) : 0.0;
+  noise.decay_length_m = stiffness > 0.0 ? calc_give(noise.gains.rms_m, noise.other_gains.rms_m) : 0.0;
   // exp(s x - s^2 / 2) of a normal x has the mean 1 and the rms sqrt(exp(s^2) - 1) about it: that of the linear spring, up to one load.
-  if (noise.give_m > 0.0) noise.spread = 0.5 * std::log1p(std::pow(std::min(1.0, calc_moved(noise) / noise.give_m), 2.0));
+  if (noise.decay_length_m > 0.0) noise.spread = 0.5 * std::log1p(std::pow(std::min(1.0, calc_moved(noise) / noise.decay_length_m), 2.0));
   return noise;
 }
 
@@ -107,13 +107,14 @@ struct Shocks {
 
 Shocks calc_shocks(const ContactNoise& noise, double force_n) noexcept {
   const double moved_m = calc_moved(noise);
-  if (!(noise.spread > 0.0)) return {force_n, noise.give_m};
-  return {force_n * std::max(1.0, moved_m / noise.give_m), moved_m / std::sqrt(2.0 * noise.spread)};
+  if (!(noise.spread > 0.0)) return {force_n, noise.decay_length_m};
+  return {force_n * std::max(1.0, moved_m / noise.decay_length_m), moved_m / std::sqrt(2.0 * noise.spread)};
 }
 
 }  // namespace
 
-ContactNoise calc_contact_noise(const stream::Contact& contact, const Surface& own, const Surface& other, double rate_hz) noexcept {
+ContactNoise calc_contact_noise(const events::LastingContact& contact, const ContactSurface& own, const ContactSurface& other,
+                                double rate_hz) noexcept {
   Texture texture, other_texture;
   texture.start(own.roughness_m, 0);
   other_texture.start(other.roughness_m, 0);
@@ -139,7 +140,7 @@ double calc_spring_loss(const ContactSpring& spring, double omega_rad_s, double 
 }
 
 double calc_density(const ContactNoise& noise, double force_n, double freq_hz) noexcept {
-  if (!(noise.give_m > 0.0)) return 0.0;
+  if (!(noise.decay_length_m > 0.0)) return 0.0;
   const double own_m2 = Texture::calc_density(noise.gains, noise.speed_m_s, freq_hz),
                other_m2 = Texture::calc_density(noise.other_gains, noise.other_speed_m_s, freq_hz);
   const double moved_m2 = noise.motion * noise.motion * own_m2 + noise.other_motion * noise.other_motion * other_m2;
@@ -148,7 +149,7 @@ double calc_density(const ContactNoise& noise, double force_n, double freq_hz) n
   return std::exp(2.0 * noise.spread) * stiffness * stiffness * moved_m2;
 }
 
-const char* find_fault(const Surface& surface) noexcept {
+const char* find_fault(const ContactSurface& surface) noexcept {
   if (!is_amount(surface.roughness_m)) return "the roughness is negative or not finite";
   if (!is_amount(surface.friction)) return "the friction is negative or not finite";
   if (!is_amount(surface.modulus_pa)) return "the modulus is negative or not finite";
@@ -159,8 +160,8 @@ ContactForces::ContactForces(std::shared_ptr<const Model> model, ContactForcesOp
     : model_(std::move(model)), surface_(options.surface), effects_(options.effects) {
   if (model_ == nullptr) throw InputError("contacts need a model");
   if (const char* fault = find_fault(surface_); fault != nullptr) throw InputError(std::string("surface of a body: ") + fault);
-  if (options.max_contacts < 1 || options.max_contacts > kMostContacts)
-    throw InputError("a body needs room for 1 to " + std::to_string(kMostContacts) + " contacts");
+  if (options.max_contacts < 1 || options.max_contacts > kMaxContacts)
+    throw InputError("a body needs room for 1 to " + std::to_string(kMaxContacts) + " contacts");
   if (options.max_records < 2 || options.max_records > 1 << 20)
     throw InputError("a body needs room for 2 to 1,048,576 records of contacts");
   if (surface_.modulus_pa == 0.0) surface_.modulus_pa = model_->get_plane_strain_modulus_pa();
@@ -170,7 +171,7 @@ ContactForces::ContactForces(std::shared_ptr<const Model> model, ContactForcesOp
   records_.resize(static_cast<std::size_t>(options.max_records));
   for (std::size_t i = 0; i < records_.size(); ++i) records_[i].next = i + 1 < records_.size() ? static_cast<std::int32_t>(i + 1) : -1;
   free_ = 0;
-  damped_force_.resize(model_->damped_.size() * (kQuantum + 2));
+  damped_force_.resize(model_->damped_.size() * (kSubBlock + 2));
   // Integrals of 1 - u and u times T_j(2 u - 1) over 0..1, times the length of a sample.
   const auto area = [](int j) { return j % 2 == 0 ? 1.0 / (1.0 - static_cast<double>(j) * j) : 0.0; };
   for (int j = 0; j < kMoments; ++j) {
@@ -188,22 +189,22 @@ std::size_t ContactForces::calc_bytes() const noexcept {
 }
 
 /// The contact's own slot, or one that it may have.
-ContactForces::Slot* ContactForces::find_place(const stream::Contact& contact) noexcept {
+ContactForces::Slot* ContactForces::find_place(const events::LastingContact& contact) noexcept {
   Slot* empty = nullptr;
   Slot* weakest = nullptr;
-  double least = 0.0;
+  double min = 0.0;
   for (Slot& slot : slots_) {
-    if (slot.used && slot.id == contact.id && !(slot.ended && contact.state == stream::ContactState::kBegin)) return &slot;
+    if (slot.used && slot.id == contact.id && !(slot.ended && contact.state == events::ContactState::kBegin)) return &slot;
     if (!slot.used) empty = &slot;
     if (!slot.used || slot.ended) continue;
     const double force = slot.tail >= 0 ? records_[static_cast<std::size_t>(slot.tail)].force_n : slot.from.force_n;
-    if (weakest == nullptr || force < least) {
+    if (weakest == nullptr || force < min) {
       weakest = &slot;
-      least = force;
+      min = force;
     }
   }
-  if (contact.state == stream::ContactState::kEnd) return nullptr;  // of one that was dropped
-  if (empty == nullptr && weakest != nullptr && contact.force_n > kStronger * least) weakest->ended = true;
+  if (contact.state == events::ContactState::kEnd) return nullptr;  // of one that was dropped
+  if (empty == nullptr && weakest != nullptr && contact.force_n > kStronger * min) weakest->ended = true;
   return empty;
 }
 
@@ -224,8 +225,8 @@ std::int32_t ContactForces::take_free(Slot& slot) noexcept {
   return taken;
 }
 
-bool ContactForces::take(const stream::Contact& contact, const Surface& other) noexcept {
-  if (stream::find_fault(stream::Event(contact)) != nullptr || static_cast<std::size_t>(contact.triangle) >= model_->triangles_.size() ||
+bool ContactForces::take(const events::LastingContact& contact, const ContactSurface& other) noexcept {
+  if (events::find_fault(events::Event(contact)) != nullptr || static_cast<std::size_t>(contact.triangle) >= model_->triangles_.size() ||
       find_fault(other) != nullptr) {
     ++counters_.refused;
     return false;
@@ -264,7 +265,7 @@ bool ContactForces::take(const stream::Contact& contact, const Surface& other) n
   record.slip_m_s = contact.slip_m_s;
   record.barycentric = contact.barycentric;
   record.triangle = contact.triangle;
-  record.ends = contact.state == stream::ContactState::kEnd;
+  record.ends = contact.state == events::ContactState::kEnd;
   ++counters_.accepted;
   return true;
 }
@@ -354,7 +355,7 @@ bool ContactForces::find_values(Slot& slot, double time, Record& values) noexcep
     if (!slot.has_to && slot.head >= 0 && !slot.from.ends) {
       slot.to = pop();
       slot.has_to = true;
-      // What has been held until now goes on from now.
+      // What has been held until now continues from now.
       if (slot.holds) slot.from.time = std::max(slot.from.time, looked_);
       slot.to.time = std::max(slot.to.time, slot.from.time);
       slot.from.time = std::max(slot.from.time, slot.to.time - kLongestS * rate_hz_);
@@ -403,11 +404,11 @@ ContactForces::Node ContactForces::make_node(const Slot& slot, const Record& val
                             slot.texture, slot.other_texture);
     const Shocks shocks = calc_shocks(node.noise, values.force_n);
     node.values.force_n = shocks.load_n;
-    node.noise.give_m = shocks.over_m;
+    node.noise.decay_length_m = shocks.over_m;
   }
   const double drag = rough * slot.friction / (slip + kSticking);
-  const double brake = effects_.has(Effect::kContactDamping) ? std::sqrt(0.5 * node.level * values.impedance / rate_hz_) : 0.0;
-  if (brake > 0.0) {
+  const double damping = effects_.has(Effect::kContactDamping) ? std::sqrt(0.5 * node.level * values.impedance / rate_hz_) : 0.0;
+  if (damping > 0.0) {
     const ContactSpring spring = calc_contact_spring(values.patch_m, surface_.modulus_pa, slot.other_modulus_pa);
     // k phi_n^2 / omega^2 is k / (Z / (2 rate)) times the damping by Z, over the square of the mode's angle, in samples.
     node.give = static_cast<float>(std::min(1e30, 2.0 * spring.stiffness_n_m / (values.impedance * rate_hz_)));
@@ -418,7 +419,7 @@ ContactForces::Node ContactForces::make_node(const Slot& slot, const Record& val
     for (int axis = 0; axis < 3; ++axis) {
       const auto i = static_cast<std::size_t>(corner * 3 + axis), c = static_cast<std::size_t>(corner), k = static_cast<std::size_t>(axis);
       node.force[i] = static_cast<float>(values.barycentric[c] * (along * values.normal[k] - drag * values.slip_m_s[k]));
-      node.brake[i] = static_cast<float>(values.barycentric[c] * brake * values.normal[k]);
+      node.damping[i] = static_cast<float>(values.barycentric[c] * damping * values.normal[k]);
     }
   }
   return node;
@@ -426,36 +427,37 @@ ContactForces::Node ContactForces::make_node(const Slot& slot, const Record& val
 
 /// Adds what a contact does between two nodes to the drive.
 void ContactForces::add_push(Slot& slot, const Node& from, const Node& to) noexcept {
-  std::array<Push, 2>& push = drive_.push[drive_.contacts];
+  std::array<ContactEnd, 2>& push = drive_.push[drive_.contacts];
   ++drive_.contacts;
   const std::array<const Node*, 2> nodes{&from, &to};
   for (std::size_t end = 0; end < 2; ++end) {
     std::copy(nodes[end]->row.begin(), nodes[end]->row.end(), push[end].row);
     std::copy(nodes[end]->force.begin(), nodes[end]->force.end(), push[end].force);
-    std::copy(nodes[end]->brake.begin(), nodes[end]->brake.end(), push[end].brake);
+    std::copy(nodes[end]->damping.begin(), nodes[end]->damping.end(), push[end].damping);
     push[end].give = nodes[end]->give;
     push[end].half_loss = nodes[end]->half_loss;
     std::fill(std::begin(push[end].signal), std::end(push[end].signal), 0.0F);
   }
   bool damps = false;
-  for (std::size_t i = 0; i < kStrikeRows; ++i) damps = damps || from.brake[i] != 0.0F || to.brake[i] != 0.0F;
+  for (std::size_t i = 0; i < kStrikeRows; ++i) damps = damps || from.damping[i] != 0.0F || to.damping[i] != 0.0F;
   drive_.damps = drive_.damps || damps;
   push[0].forces = push[1].forces = false;
   const bool moves = from.noise.motion > 0.0 || to.noise.motion > 0.0,
              other_moves = from.noise.other_motion > 0.0 || to.noise.other_motion > 0.0;
   if (!(moves || other_moves) || !(from.values.force_n > 0.0 || to.values.force_n > 0.0)) return;
-  std::array<float, kQuantum + 1> height{}, other_height{};
+  std::array<float, kSubBlock + 1> height{}, other_height{};
   if (moves) slot.texture.render(from.noise.speed_m_s, to.noise.speed_m_s, rate_hz_, from.noise.gains, to.noise.gains, height);
   if (other_moves) {
     slot.other_texture.render(from.noise.other_speed_m_s, to.noise.other_speed_m_s, rate_hz_, from.noise.other_gains, to.noise.other_gains,
                               other_height);
   }
-  counters_.samples += kQuantum;
+  counters_.samples += kSubBlock;
   double largest = 0.0;
-  for (std::size_t n = 0; n <= kQuantum; ++n) {
-    const double share = static_cast<double>(n) / kQuantum;
+  for (std::size_t n = 0; n <= kSubBlock; ++n) {
+    const double share = static_cast<double>(n) / kSubBlock;
     const double load = blend(from.values.force_n, to.values.force_n, share);
-    const double give = blend(from.noise.give_m, to.noise.give_m, share), spread = blend(from.noise.spread, to.noise.spread, share);
+    const double give = blend(from.noise.decay_length_m, to.noise.decay_length_m, share),
+                 spread = blend(from.noise.spread, to.noise.spread, share);
     const double moved = blend(from.noise.motion, to.noise.motion, share) * static_cast<double>(height[n]) +
                          blend(from.noise.other_motion, to.noise.other_motion, share) * static_cast<double>(other_height[n]);
     const double force = give > 0.0 ? blend(from.level, to.level, share) * load * std::expm1(moved / give - spread) : 0.0;
@@ -465,16 +467,16 @@ void ContactForces::add_push(Slot& slot, const Node& from, const Node& to) noexc
   }
   push[0].forces = push[1].forces = largest > 0.0;
   // The direction's length is 1 with friction: sqrt(1 + mu^2).
-  drive_.strength_n_s += static_cast<float>(largest * std::hypot(1.0, slot.friction) * kQuantum / rate_hz_);
+  drive_.strength_n_s += static_cast<float>(largest * std::hypot(1.0, slot.friction) * kSubBlock / rate_hz_);
   drive_.forces = drive_.forces || push[0].forces;
 }
 
-const Drive* ContactForces::begin_quantum(std::int64_t sample) noexcept {
+const ContactBlock* ContactForces::begin_sub_block(std::int64_t sample) noexcept {
   if (live_ == 0) return nullptr;
   drive_.contacts = 0;
   drive_.forces = drive_.damps = false;
   drive_.strength_n_s = 0.0F;
-  const double start = static_cast<double>(sample), end = start + kQuantum, rise = kQuantum / (kRiseS * rate_hz_);
+  const double start = static_cast<double>(sample), end = start + kSubBlock, rise = kSubBlock / (kRiseS * rate_hz_);
   looked_ = start;
   for (Slot& slot : slots_) {
     if (!slot.used) continue;
@@ -490,7 +492,7 @@ const Drive* ContactForces::begin_quantum(std::int64_t sample) noexcept {
     if (is_new) {
       slot.node = to;
       slot.node.level = 0.0;
-      slot.node.brake = {};
+      slot.node.damping = {};
     }
     add_push(slot, slot.node, to);
     slot.node = to;
@@ -505,16 +507,16 @@ const Drive* ContactForces::begin_quantum(std::int64_t sample) noexcept {
 
 void ContactForces::calc_damped_force() noexcept {
   for (std::size_t i = 0; i < model_->damped_.size(); ++i) {
-    float* force = &damped_force_[i * (kQuantum + 2)];
-    force[0] = force[kQuantum];  // the last sample of the quantum before
-    std::fill(force + 1, force + kQuantum + 2, 0.0F);
+    float* force = &damped_force_[i * (kSubBlock + 2)];
+    force[0] = force[kSubBlock];  // the last sample of the sub-block before
+    std::fill(force + 1, force + kSubBlock + 2, 0.0F);
     const std::size_t column = model_->sound_.size() * kGroup + i;
     for (int c = 0; c < drive_.contacts; ++c) {
-      for (const Push& push : drive_.push[c]) {
+      for (const ContactEnd& push : drive_.push[c]) {
         double amplitude = 0.0;
         for (int r = 0; r < kStrikeRows; ++r) amplitude += static_cast<double>(push.force[r]) * push.row[r][column];
         amplitude *= model_->damped_[i].scale;
-        for (int n = 0; n <= kQuantum; ++n) force[n + 1] += static_cast<float>(amplitude) * push.signal[n];
+        for (int n = 0; n <= kSubBlock; ++n) force[n + 1] += static_cast<float>(amplitude) * push.signal[n];
       }
     }
   }

@@ -12,7 +12,7 @@
 #include <memory>
 #include <vector>
 
-#include "runtime/stream/events.hpp"
+#include "runtime/events/events.hpp"
 #include "runtime/synth/effects.hpp"
 #include "runtime/synth/kernels.hpp"
 #include "runtime/synth/model.hpp"
@@ -21,7 +21,7 @@
 namespace carillon::synth {
 
 /// What a surface is like to those who touch it.
-struct Surface {
+struct ContactSurface {
   double roughness_m = 2e-6;  // rms height: fine machined metal, N7 of ISO 1302 (Ra 1.6 um)
   double friction = 0.4;      // Coulomb; a contact of two takes the geometric mean
   double modulus_pa = 0.0;    // E / (1 - nu^2); 0: that of the model's bank
@@ -29,23 +29,24 @@ struct Surface {
 };
 
 /// What is wrong with a surface, as part of a sentence; nullptr: nothing.
-const char* find_fault(const Surface& surface) noexcept;
+const char* find_fault(const ContactSurface& surface) noexcept;
 
 /// The ground of scenes: concrete, smoothly trowelled.
-inline constexpr Surface kGroundSurface{.roughness_m = 20e-6, .friction = 0.5, .modulus_pa = 30e9 / (1.0 - 0.2 * 0.2)};
+inline constexpr ContactSurface kGroundSurface{.roughness_m = 20e-6, .friction = 0.5, .modulus_pa = 30e9 / (1.0 - 0.2 * 0.2)};
 
 /// The noise of a lasting contact at one moment: f = a F (exp(s h / h_rms - s^2 / 2) - 1), a = max(1, R), of the heights h.
 struct ContactNoise {
   double sliding = 0.0;                           // 0..1: share of the movement that is slip
   double speed_m_s = 0.0, other_speed_m_s = 0.0;  // with which each surface passes
   double motion = 0.0, other_motion = 0.0;        // 0..1: whether it does
-  double give_m = 0.0;                            // u; 0: no force
+  double decay_length_m = 0.0;                    // u; 0: no force
   double spread = 0.0;                            // s^2 / 2
   Texture::Gains gains, other_gains;
 };
 
 /// As ContactForces has it for a record that acts on a body of the surface `own`; both with their moduli. No throw; any thread.
-ContactNoise calc_contact_noise(const stream::Contact& contact, const Surface& own, const Surface& other, double rate_hz) noexcept;
+ContactNoise calc_contact_noise(const events::LastingContact& contact, const ContactSurface& own, const ContactSurface& other,
+                                double rate_hz) noexcept;
 
 /// The spring of a contact as a mode meets it, however little it moves.
 struct ContactSpring {
@@ -64,24 +65,24 @@ double calc_spring_loss(const ContactSpring& spring, double omega_rad_s, double 
 double calc_density(const ContactNoise& noise, double force_n, double freq_hz) noexcept;
 
 struct ContactForcesOptions {
-  Surface surface{};
+  ContactSurface surface{};
   EffectSet effects = kContactEffects;  // others are not looked at
-  int max_contacts = 8;                 // that act at once, 1 to kMostContacts
+  int max_contacts = 8;                 // that act at once, 1 to kMaxContacts
   int max_records = 512;                // that wait for their time
 };
 
 struct ContactCounters {
   std::int64_t accepted = 0;   // records taken
-  std::int64_t refused = 0;    // records that cannot be played (stream::find_fault, or no such triangle)
+  std::int64_t refused = 0;    // records that cannot be played (events::find_fault, or no such triangle)
   std::int64_t dropped = 0;    // records of contacts for which there was no place, being weaker than those there
-  std::int64_t thinned = 0;    // records that took the place of the one before, for want of room
+  std::int64_t thinned = 0;    // records that took the place of the one before, for lack of room
   std::int64_t underruns = 0;  // contacts that ended because nothing more came
   std::int64_t samples = 0;    // of force worked out, contact by contact
 };
 
-/// The lasting contacts of one body. Between two records of a contact its values change linearly; they are looked at every kQuantum
+/// The lasting contacts of one body. Between two records of a contact its values change linearly; they are looked at every kSubBlock
 /// samples and go linearly between. A gap of more than 50 ms is held and changed in its last 50 ms. A contact rises and falls within 5 ms
-/// beside what its records say. When its last record, and the last mark (reach), are 20 ms old it falls as if it had ended: an underrun.
+/// on top of what its records say. When its last record, and the last mark (reach), are 20 ms old it falls as if it had ended: an underrun.
 ///
 /// Force: the heights h of both surfaces, each read at the speed of the contact over it or at the slip, whichever is faster, press two
 /// springs in series: the contact's, k = 2 E* a, and the one of the rough skin. With u = F / k + skin the force has the rms of the linear
@@ -101,15 +102,15 @@ class ContactForces {
 
   /// A record, with what the other body's surface is like. Times are since the first sample of the voice; `body` is not looked at beyond
   /// which of two surfaces of the same seed comes first. False when it is not played (counted). [audio-thread]: no heap, no lock, no throw.
-  bool take(const stream::Contact& contact, const Surface& other = kGroundSurface) noexcept;
+  bool take(const events::LastingContact& contact, const ContactSurface& other = kGroundSurface) noexcept;
 
   /// Nothing earlier than this will come: contacts without newer records stay as they are until then. [audio-thread]
   void reach(double time_s) noexcept;
 
-  /// From the next quantum on, without a step. [audio-thread]
+  /// From the next sub-block on, without a step. [audio-thread]
   void set_effects(EffectSet effects) noexcept { effects_ = effects; }
 
-  /// Goes on in place of another one of the same options, of a voice that goes on likewise; that one is of no more use afterwards. Contacts
+  /// Takes the place of another one of the same options, of a voice that is taken over likewise; that one is not used afterwards. Contacts
   /// on triangles that the model has not are cut off. [audio-thread]
   void take_over(ContactForces& other) noexcept;
 
@@ -119,15 +120,15 @@ class ContactForces {
   /// Whether nothing acts and nothing waits.
   bool is_idle() const noexcept { return live_ == 0; }
 
-  /// Whether all that acts is at rest and nothing waits: a body without energy hears nothing of it, and may leave out begin_quantum().
+  /// Whether all that acts is at rest and nothing waits: a body without energy hears nothing of it, and may leave out begin_sub_block().
   bool is_resting() const noexcept;
 
-  /// What acts from this sample on for a quantum; nullptr: nothing. Called once a quantum, in order. [audio-thread]
-  const Drive* begin_quantum(std::int64_t sample) noexcept;
+  /// What acts from this sample on for a sub-block; nullptr: nothing. Called once a sub-block, in order. [audio-thread]
+  const ContactBlock* begin_sub_block(std::int64_t sample) noexcept;
 
-  /// Sum over the mode and the contacts of phi . f [N kg^-1/2] for mode `i` of those that do not ring, at the sample before the quantum
-  /// and its kQuantum + 1 samples. After begin_quantum() gave a drive with forces.
-  const float* get_damped_force(std::size_t i) const noexcept { return &damped_force_[i * (kQuantum + 2)]; }
+  /// Sum over the mode and the contacts of phi . f [N kg^-1/2] for mode `i` of those that do not ring, at the sample before the sub-block
+  /// and its kSubBlock + 1 samples. After begin_sub_block() gave a drive with forces.
+  const float* get_damped_force(std::size_t i) const noexcept { return &damped_force_[i * (kSubBlock + 2)]; }
 
   /// Moments of 1 - u and of u over a sample against the Chebyshev polynomials, times its length [s].
   const std::array<Moments, 2>& get_ramp() const noexcept { return ramp_; }
@@ -145,13 +146,13 @@ class ContactForces {
     bool ends = false;
     std::int32_t next = -1;
   };
-  /// A contact at the border of two quanta.
+  /// A contact at the border of two sub-blocks.
   struct Node {
     Record values;
     double level = 0.0;  // 0..1: its rise and its fall
     ContactNoise noise;
-    std::array<float, kStrikeRows> force{}, brake{};
-    float give = 0.0F, half_loss = 0.0F;  // as Push has them
+    std::array<float, kStrikeRows> force{}, damping{};
+    float give = 0.0F, half_loss = 0.0F;  // as ContactEnd has them
     std::array<const std::int16_t*, kStrikeRows> row{};
   };
   struct Slot {
@@ -164,10 +165,10 @@ class ContactForces {
     double level = 0.0;
     double friction = 0.0, modulus_pa = 0.0, other_modulus_pa = 0.0;
     Texture texture, other_texture;
-    Node node;  // at the start of the next quantum
+    Node node;  // at the start of the next sub-block
   };
 
-  Slot* find_place(const stream::Contact& contact) noexcept;
+  Slot* find_place(const events::LastingContact& contact) noexcept;
   std::int32_t take_free(Slot& slot) noexcept;
   void free(Slot& slot) noexcept;
   void find_modulus(Slot& slot) const noexcept;
@@ -178,18 +179,18 @@ class ContactForces {
   void calc_damped_force() noexcept;
 
   std::shared_ptr<const Model> model_;
-  Surface surface_;
+  ContactSurface surface_;
   EffectSet effects_;
   double rate_hz_ = 0.0;
   double reached_ = -1e300;  // sample
-  double looked_ = 0.0;      // the last border of quanta that was looked at
+  double looked_ = 0.0;      // the last border of sub-blocks that was looked at
   int live_ = 0;             // slots in use
   std::vector<Slot> slots_;
   std::vector<Record> records_;
   std::int32_t free_ = -1;  // first record without use
   std::vector<float> damped_force_;
   std::array<Moments, 2> ramp_{};
-  Drive drive_{};
+  ContactBlock drive_{};
   ContactCounters counters_;
 };
 

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <ctime>
 
-#include "runtime/base/cpu_clock.hpp"
+#include "runtime/base/clock.hpp"
 
 namespace carillon::synth {
 namespace {
@@ -17,14 +17,14 @@ struct Cost {
   std::uint64_t all_ns = 0;  // of all so far
   Cost() noexcept {
     constexpr int kCalls = 20, kRounds = 5;
-    std::uint64_t least = ~std::uint64_t{0};
+    std::uint64_t min = ~std::uint64_t{0};
     for (int round = 0; round < kRounds; ++round) {
-      const std::uint64_t begin = base::get_thread_cpu_ns();
+      const std::uint64_t begin = base::read_clock_ns(CLOCK_THREAD_CPUTIME_ID);
       std::uint64_t end = begin;
-      for (int i = 0; i < kCalls; ++i) end = base::get_thread_cpu_ns();
-      least = std::min(least, end - begin);
+      for (int i = 0; i < kCalls; ++i) end = base::read_clock_ns(CLOCK_THREAD_CPUTIME_ID);
+      min = std::min(min, end - begin);
     }
-    one_ns = least / kCalls;
+    one_ns = min / kCalls;
   }
 };
 
@@ -38,7 +38,7 @@ Cost& get_cost() noexcept {
 std::uint64_t get_cpu_ticks() noexcept {
   Cost& cost = get_cost();
   cost.all_ns += cost.one_ns;
-  return base::get_thread_cpu_ns() - cost.all_ns;
+  return base::read_clock_ns(CLOCK_THREAD_CPUTIME_ID) - cost.all_ns;
 }
 
 std::uint64_t get_cpu_ticks_cost_ns() noexcept { return get_cost().all_ns; }

@@ -34,6 +34,7 @@ inline constexpr int kEffectCount = 9;
 const char* get_name(Effect effect) noexcept;
 std::optional<Effect> find_effect(std::string_view name) noexcept;
 
+/// A set of effects, one bit each. Bits beyond kEffectCount are 0, so that equal sets have equal bits.
 class EffectSet {
  public:
   constexpr EffectSet() = default;
@@ -99,7 +100,7 @@ inline constexpr EffectSet kContactEffects{Effect::kRoughness, Effect::kRolling,
 
 /// Default effects: a body rings, struck by pulses that last, heard late, with Doppler shift, by every microphone at
 /// its own place.
-inline constexpr EffectSet kUsualEffects =
+inline constexpr EffectSet kDefaultEffects =
     EffectSet{Effect::kModal, Effect::kHertzPulse, Effect::kAirDelay, Effect::kDoppler, Effect::kTwoEars}.common(kCompiledEffects);
 
 /// Throws InputError that names the first effect of `effects` that this build was made without. [main-thread]

@@ -1,4 +1,4 @@
-// Method:     kernels_body.inl, kernels_driven.inl and kernels_ears.inl on AVX2 and FMA: 8 lanes, 16 registers.
+// Method:     kernels_body.inl and kernels_receiver.inl on AVX2 and FMA: 8 lanes, 16 registers.
 // Source:     Intel's intrinsics guide.
 // Deviations: none.
 #include <immintrin.h>
@@ -48,15 +48,12 @@ struct D {
 inline D more(D c, D a, D b) { return {_mm256_fmadd_pd(a.lo, b.lo, c.lo), _mm256_fmadd_pd(a.hi, b.hi, c.hi)}; }    // c + a b
 inline D less(D c, D a, D b) { return {_mm256_fnmadd_pd(a.lo, b.lo, c.lo), _mm256_fnmadd_pd(a.hi, b.hi, c.hi)}; }  // c - a b
 
-using H = F;
-
-constexpr int kVectors = 2, kColumns = 2, kAhead = 0, kRowSets = 2, kTapSets = 2;
+constexpr int kVectors = 2, kColumns = 2, kAhead = 0;
 #include "runtime/synth/kernels_body.inl"
-#include "runtime/synth/kernels_driven.inl"
-#include "runtime/synth/kernels_ears.inl"
+#include "runtime/synth/kernels_receiver.inl"
 
 }  // namespace
 
-const Kernels kAvx2Kernels{Isa::kAvx2, advance, emit, ring, strike, drive, filter, respond, convolve, read};
+const Kernels kAvx2Kernels{Isa::kAvx2, advance, emit, ring, strike, drive, convolve, read};
 
 }  // namespace carillon::synth

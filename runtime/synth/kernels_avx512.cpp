@@ -1,4 +1,4 @@
-// Method:     kernels_body.inl, kernels_driven.inl and kernels_ears.inl on AVX-512 (F, DQ, VL): 16 lanes, 32 registers.
+// Method:     kernels_body.inl and kernels_receiver.inl on AVX-512 (F, DQ, VL): 16 lanes, 32 registers.
 // Source:     Intel's intrinsics guide.
 // Deviations: none.
 #include <immintrin.h>
@@ -49,23 +49,12 @@ struct D {
 inline D more(D c, D a, D b) { return {_mm512_fmadd_pd(a.lo, b.lo, c.lo), _mm512_fmadd_pd(a.hi, b.hi, c.hi)}; }    // c + a b
 inline D less(D c, D a, D b) { return {_mm512_fnmadd_pd(a.lo, b.lo, c.lo), _mm512_fnmadd_pd(a.hi, b.hi, c.hi)}; }  // c - a b
 
-/// Half of F.
-struct H {
-  static constexpr int kWidth = 8;
-  __m256 v;
-  static H load(const float* at) { return {_mm256_loadu_ps(at)}; }
-  void store(float* at) const { _mm256_storeu_ps(at, v); }
-  friend H operator+(H a, H b) { return {_mm256_add_ps(a.v, b.v)}; }
-  friend H operator-(H a, H b) { return {_mm256_sub_ps(a.v, b.v)}; }
-};
-
-constexpr int kVectors = 2, kColumns = 4, kAhead = 512, kRowSets = 2, kTapSets = 4;
+constexpr int kVectors = 2, kColumns = 4, kAhead = 512;
 #include "runtime/synth/kernels_body.inl"
-#include "runtime/synth/kernels_driven.inl"
-#include "runtime/synth/kernels_ears.inl"
+#include "runtime/synth/kernels_receiver.inl"
 
 }  // namespace
 
-const Kernels kAvx512Kernels{Isa::kAvx512, advance, emit, ring, strike, drive, filter, respond, convolve, read};
+const Kernels kAvx512Kernels{Isa::kAvx512, advance, emit, ring, strike, drive, convolve, read};
 
 }  // namespace carillon::synth

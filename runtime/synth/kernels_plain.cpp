@@ -37,15 +37,12 @@ struct D {
 inline D more(D c, D a, D b) { return {c.v + a.v * b.v}; }  // c + a b
 inline D less(D c, D a, D b) { return {c.v - a.v * b.v}; }  // c - a b
 
-using H = F;
-
-constexpr int kVectors = 8, kColumns = 1, kAhead = 0, kRowSets = 1, kTapSets = 1;
+constexpr int kVectors = 8, kColumns = 1, kAhead = 0;
 #include "runtime/synth/kernels_body.inl"
-#include "runtime/synth/kernels_driven.inl"
-#include "runtime/synth/kernels_ears.inl"
+#include "runtime/synth/kernels_receiver.inl"
 
 }  // namespace
 
-const Kernels kPlainKernels{Isa::kPlain, advance, emit, ring, strike, drive, filter, respond, convolve, read};
+const Kernels kPlainKernels{Isa::kPlain, advance, emit, ring, strike, drive, convolve, read};
 
 }  // namespace carillon::synth

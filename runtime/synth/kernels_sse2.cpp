@@ -1,5 +1,6 @@
-// Method:     kernels_body.inl, kernels_driven.inl and kernels_ears.inl on x86-64 as every such processor has it: 4 lanes, no fused
-// multiply-add. Source:     Intel's intrinsics guide. Deviations: none.
+// Method:     kernels_body.inl and kernels_receiver.inl on SSE2, which every x86-64 processor has: 4 lanes, no fused multiply-add.
+// Source:     Intel's intrinsics guide.
+// Deviations: none.
 #include <immintrin.h>
 
 #include "runtime/synth/kernels.hpp"
@@ -47,15 +48,12 @@ struct D {
 inline D more(D c, D a, D b) { return {_mm_add_pd(c.lo, _mm_mul_pd(a.lo, b.lo)), _mm_add_pd(c.hi, _mm_mul_pd(a.hi, b.hi))}; }  // c + a b
 inline D less(D c, D a, D b) { return {_mm_sub_pd(c.lo, _mm_mul_pd(a.lo, b.lo)), _mm_sub_pd(c.hi, _mm_mul_pd(a.hi, b.hi))}; }  // c - a b
 
-using H = F;
-
-constexpr int kVectors = 4, kColumns = 1, kAhead = 0, kRowSets = 1, kTapSets = 1;
+constexpr int kVectors = 4, kColumns = 1, kAhead = 0;
 #include "runtime/synth/kernels_body.inl"
-#include "runtime/synth/kernels_driven.inl"
-#include "runtime/synth/kernels_ears.inl"
+#include "runtime/synth/kernels_receiver.inl"
 
 }  // namespace
 
-const Kernels kSse2Kernels{Isa::kSse2, advance, emit, ring, strike, drive, filter, respond, convolve, read};
+const Kernels kSse2Kernels{Isa::kSse2, advance, emit, ring, strike, drive, convolve, read};
 
 }  // namespace carillon::synth

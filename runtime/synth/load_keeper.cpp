@@ -1,7 +1,7 @@
-// Method:     load is a part that no budget changes (ears, strikes, what a body costs) and a part in proportion to the work. Neither is
-// known,
-//             so the work that was done is scaled by the load that is wanted over that which was, again and again: each step leaves of the
-//             error the fixed part's share. It goes down at once and up by at most a tenth a step, and not at all while within a tenth.
+// Method:     load is a part that no budget changes (receivers, strikes, what a body costs) and a part in proportion to the work. Neither
+//             is known, so the work that was done is scaled by the load that is wanted over that which was, again and again: each step
+//             leaves of the error the fixed part's share. It goes down at once and up by at most a tenth a step, and not at all while
+//             within a tenth.
 // Source:     none.
 // Deviations: none.
 #include "runtime/synth/load_keeper.hpp"
@@ -17,7 +17,7 @@ constexpr double kShortestS = 0.02;
 constexpr double kSlack = 0.9;      // of the share: below it there is room
 constexpr double kSteepest = 0.25;  // to which the budget falls in one step
 constexpr double kRise = 1.1;
-constexpr double kLeast = 1e5;     // mode-samples/s: two modes at 48 kHz; a floor from which 1.1 a step leads up again
+constexpr double kMin = 1e5;       // mode-samples/s: two modes at 48 kHz; a floor from which 1.1 a step leads up again
 constexpr double kUnbound = 64.0;  // times the work that is done: no budget any more
 
 }  // namespace
@@ -29,10 +29,10 @@ double LoadKeeper::calc_budget(double share, const LoadSample& now, double budge
   last_ = now;
   if (!(played_s > 0.0) || !(busy_s >= 0.0) || !(work >= 0.0) || !(share > 0.0)) return budget;
   const double load = busy_s / played_s;
-  if (load > share) return std::max(kLeast, std::min(budget, work) * std::max(kSteepest, share / load));
+  if (load > share) return std::max(kMin, std::min(budget, work) * std::max(kSteepest, share / load));
   if (load > kSlack * share) return budget;
   const double more = budget * kRise;
-  return more > kUnbound * std::max(work, kLeast) ? std::numeric_limits<double>::infinity() : more;
+  return more > kUnbound * std::max(work, kMin) ? std::numeric_limits<double>::infinity() : more;
 }
 
 void LoadKeeper::keep(Synthesiser& synthesiser, double share, double busy_s) noexcept {

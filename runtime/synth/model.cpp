@@ -94,7 +94,7 @@ std::shared_ptr<const Model> Model::make(const bank::Bank& bank, const ModelOpti
   model->plane_strain_modulus_pa_ = material.young_modulus_pa / (1.0 - material.poisson_ratio * material.poisson_ratio);
   model->triangles_ = bank.triangles;
   for (const Sorted& sorted : ringing) model->add_ringing_mode(sorted.mode);
-  model->add_damped_modes(std::move(damped));
+  model->add_damped_modes(damped);
   model->copy_shapes(bank);
   model->find_bounds();
   return model;
@@ -115,21 +115,21 @@ void Model::add_ringing_mode(const Mode& mode) {
   const double omega_d = std::sqrt((omega - d) * (omega + d));
   const auto answer = [&](double samples) { return std::exp(-d * samples * h) * std::polar(1.0, omega_d * samples * h); };
   const std::complex<double> out(mode.gain, mode.gain * d / omega_d);
-  for (int k = 0; k < kQuantum; ++k) {
+  for (int k = 0; k < kSubBlock; ++k) {
     const std::complex<double> wave = out * answer(k);
     sound_.back().wave[lane][0][k] = static_cast<float>(wave.real());
     sound_.back().wave[lane][1][k] = static_cast<float>(-wave.imag());
   }
-  TurnTable& turn = turn_.back();
-  // The angle of a period is repeated for as long as the mode sounds: half a unit of a double in it is heard after hours.
+  RotationTable& turn = turn_.back();
+  // The angle of a block is repeated for as long as the mode sounds: half a unit of a double in it is heard after hours.
   using Exact = long double;
-  const Exact exact_d = d, exact_omega = std::sqrt(static_cast<Exact>(mode.lambda)), period = kPeriod / static_cast<Exact>(rate_hz_);
+  const Exact exact_d = d, exact_omega = std::sqrt(static_cast<Exact>(mode.lambda)), period = kBlock / static_cast<Exact>(rate_hz_);
   const Exact angle = std::sqrt((exact_omega - exact_d) * (exact_omega + exact_d)) * period, size = std::exp(-exact_d * period);
-  turn.period_re[lane] = static_cast<double>(size * std::cos(angle));
-  turn.period_im[lane] = static_cast<double>(size * std::sin(angle));
-  for (int q = 1; q < kQuanta; ++q) {
-    turn.quanta_re[q - 1][lane] = static_cast<float>(answer(q * kQuantum).real());
-    turn.quanta_im[q - 1][lane] = static_cast<float>(answer(q * kQuantum).imag());
+  turn.block_re[lane] = static_cast<double>(size * std::cos(angle));
+  turn.block_im[lane] = static_cast<double>(size * std::sin(angle));
+  for (int q = 1; q < kSubBlocks; ++q) {
+    turn.sub_blocks_re[q - 1][lane] = static_cast<float>(answer(q * kSubBlock).real());
+    turn.sub_blocks_im[q - 1][lane] = static_cast<float>(answer(q * kSubBlock).imag());
   }
   StrikeTable& strike = strike_.back();
   strike.turn_re[lane] = static_cast<float>(answer(1.0).real());
@@ -152,7 +152,7 @@ void Model::add_ringing_mode(const Mode& mode) {
   }
 }
 
-void Model::add_damped_modes(std::vector<Mode> modes) {
+void Model::add_damped_modes(const std::vector<Mode>& modes) {
   std::vector<std::pair<Mode, DampedMode>> made;
   const double h = 1.0 / rate_hz_;
   for (const Mode& mode : modes) {
@@ -252,7 +252,7 @@ double Model::calc_projection(int mode, std::int32_t triangle, const Vec3& baryc
 }
 
 std::size_t Model::calc_bytes() const {
-  return sound_.size() * (sizeof(SoundTable) + sizeof(TurnTable) + sizeof(StrikeTable) + sizeof(weight_[0]) + sizeof(reach_[0])) +
+  return sound_.size() * (sizeof(SoundTable) + sizeof(RotationTable) + sizeof(StrikeTable) + sizeof(weight_[0]) + sizeof(reach_[0])) +
          damped_.size() * sizeof(DampedMode) + modes_.size() * sizeof(Mode) + triangles_.size() * sizeof(triangles_[0]) +
          shape_.size() * sizeof(shape_[0]);
 }

@@ -53,14 +53,6 @@ class Model {
   /// Memory of the tables, which all voices share.
   std::size_t calc_bytes() const;
 
- private:
-  friend class ContactForces;
-  friend class Voice;
-
-  struct Mode {
-    double lambda = 0.0, decay = 0.0, gain = 0.0, scale = 0.0;  // scale: kg^-1/2 per integer step of the shape
-    int bank_mode = 0;
-  };
   /// A mode at, near or above critical damping, as (q, q'). Stiff ones take several substeps a sample while a pulse acts; those whose fast
   /// root dies within a thousandth of a sample take none (0): that root follows the force, and force_q holds the answer of the slow one.
   struct DampedMode {
@@ -71,9 +63,29 @@ class Model {
     double fast = 0.0, slow = 0.0;  // roots [1/s], of those that follow
     int substeps = 1;
   };
+  /// The modes from get_ringing_mode_count() on; ascending in substeps, those that follow a force come first.
+  const std::vector<DampedMode>& get_damped_modes() const { return damped_; }
+  /// Where the shape of one of them stands in a row of find_rows().
+  std::size_t get_damped_column(std::size_t mode) const { return sound_.size() * kGroup + mode; }
+  bool has_triangle(std::int32_t triangle) const { return triangle >= 0 && static_cast<std::size_t>(triangle) < triangles_.size(); }
+  /// The shapes of all modes at the corners of a triangle along x, y and z: kStrikeRows rows, three for each corner.
+  void find_rows(std::int32_t triangle, const std::int16_t** row) const {
+    const auto& corners = triangles_[static_cast<std::size_t>(triangle)];
+    for (int corner = 0; corner < 3; ++corner) {
+      for (int axis = 0; axis < 3; ++axis) row[corner * 3 + axis] = get_row(corners[static_cast<std::size_t>(corner)], axis);
+    }
+  }
 
+ private:
+  friend class ContactForces;
+  friend class Voice;
+
+  struct Mode {
+    double lambda = 0.0, decay = 0.0, gain = 0.0, scale = 0.0;  // scale: kg^-1/2 per integer step of the shape
+    int bank_mode = 0;
+  };
   void add_ringing_mode(const Mode& mode);
-  void add_damped_modes(std::vector<Mode> modes);
+  void add_damped_modes(const std::vector<Mode>& modes);
   void copy_shapes(const bank::Bank& bank);
   void find_bounds();
   const std::int16_t* get_row(std::int32_t vertex, int axis) const {
@@ -86,7 +98,7 @@ class Model {
   std::vector<Mode> modes_;
   int ringing_ = 0;  // modes in groups, the first of modes_; the rest is damped_
   std::vector<SoundTable> sound_;
-  std::vector<TurnTable> turn_;
+  std::vector<RotationTable> turn_;
   std::vector<StrikeTable> strike_;
   std::vector<std::array<float, kGroup>> weight_;  // bound on the pressure of a mode is weight times the size of its state
   std::vector<float> largest_;                     // while it is made: largest squared motion of each mode, in integer steps

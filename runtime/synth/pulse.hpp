@@ -3,7 +3,7 @@
 
 #include <array>
 
-#include "runtime/stream/events.hpp"
+#include "runtime/events/events.hpp"
 
 namespace carillon::synth {
 
@@ -11,7 +11,7 @@ namespace carillon::synth {
 inline constexpr int kMoments = 12;
 using Moments = std::array<double, kMoments>;
 
-using stream::PulseShape;
+using events::PulseShape;
 
 /// How long the force of a contact of this duration differs from zero, in the same unit. kHertz: the duration itself. kGaussian: 1.57
 /// durations, with the same middle: eight standard deviations of the Gaussian that has the variance of the Hertz pulse. Pure; any thread.

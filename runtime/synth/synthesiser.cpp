@@ -1,8 +1,8 @@
 // One scene on two threads: what the main thread hands over, the audio thread takes here; longer than most files.
-// Method:     time is cut into periods of kPeriod samples from the first one; a host's block is served from as many whole quanta as it asks
-//             for, never across a period. Events are taken from the ring before each piece is made, and act at their own times. Bodies come
-//             and go at periods, and effects change, handed over by two queues with one writer and one reader. Of bodies that sleep only a
-//             bit is looked at, 64 at once.
+// Method:     time is cut into blocks of kBlock samples from the first one; a call of the host is served from as many whole sub-blocks as
+//             it asks for, never across a block. Events are taken from the ring before each piece is made, and act at their own times.
+//             Bodies come and go at blocks, and effects change, handed over by two queues with one writer and one reader. Of bodies that
+//             sleep only a bit is looked at, 64 at once.
 // Source:     Lamport 1983, Specifying concurrent program modules (the queue with one writer and one reader).
 // Deviations: none.
 #include "runtime/synth/synthesiser.hpp"
@@ -19,22 +19,22 @@
 namespace carillon::synth {
 namespace {
 
-constexpr double kMostModes = 1 << 24;
-constexpr int kMostBodies = 1 << 20;
-constexpr std::int64_t kGiveBackEvery = 8;  // periods: 21 ms at 48 kHz
-constexpr int kMostMicrophones = 256;
+constexpr double kMaxModes = 1 << 24;
+constexpr int kMaxBodies = 1 << 20;
+constexpr std::int64_t kGiveBackEvery = 8;  // blocks: 21 ms at 48 kHz
+constexpr int kMaxMicrophones = 256;
 
 SynthesiserOptions check(SynthesiserOptions options) {
   const auto refuse = [](const char* what) { throw InputError(std::string("a synthesiser needs ") + what); };
   if (!(options.rate_hz >= 1.0 && options.rate_hz <= 1e6)) refuse("a sample rate between 1 Hz and 1 MHz");
-  if (options.microphones_m.empty() || options.microphones_m.size() > kMostMicrophones) refuse("one to 256 microphones");
+  if (options.microphones_m.empty() || options.microphones_m.size() > kMaxMicrophones) refuse("one to 256 microphones");
   for (const Vec3& place : options.microphones_m)
     for (const double x : place)
       if (!std::isfinite(x)) refuse("microphones at finite places");
   for (const double x : options.listener_m)
     if (!std::isfinite(x)) refuse("a listener at a finite place");
   if (const char* fault = find_fault(options.ground); fault != nullptr) throw InputError(std::string("ground: ") + fault);
-  if (options.max_bodies < 1 || options.max_bodies > kMostBodies) refuse("room for one to 1,048,576 bodies");
+  if (options.max_bodies < 1 || options.max_bodies > kMaxBodies) refuse("room for one to 1,048,576 bodies");
   if (options.max_strikes < 1 || options.max_forces < 0 || options.max_waypoints < 2 || options.ring_events < 1)
     refuse("room for strikes, waypoints and events");
   if (!(options.longest_m > 0.0 && options.longest_m < 1e5)) refuse("a longest distance below 100 km");
@@ -98,7 +98,7 @@ void Synthesiser::check_model(const Model* model) const {
 
 int Synthesiser::add_body(std::shared_ptr<const Model> model, const BodySettings& settings) {
   check_model(model.get());
-  if (stream::find_fault(stream::Motion{.position_m = settings.position_m, .rotation = settings.rotation}) != nullptr)
+  if (events::find_fault(events::BodyMotion{.position_m = settings.position_m, .rotation = settings.rotation}) != nullptr)
     throw InputError("a body must be at a finite place, turned by a unit quaternion");
   if (!(settings.longest_m >= 0.0 && settings.longest_m < 1e5) || settings.max_waypoints < 0)
     throw InputError("a body needs a longest distance below 100 km and room for waypoints");
@@ -108,19 +108,19 @@ int Synthesiser::add_body(std::shared_ptr<const Model> model, const BodySettings
   if (free == owned_.size())
     throw InputError("there are " + std::to_string(options_.max_bodies) + " bodies already; raise max_bodies, or remove one");
   const auto number = static_cast<int>(free);
-  auto body =
-      std::make_unique<Body>(std::move(model),
-                             BodyFrame{.rate_hz = options_.rate_hz,
-                                       .microphones_m = options_.microphones_m,
-                                       .max_strikes = options_.max_strikes,
-                                       .max_forces = settings.max_forces >= 0 ? settings.max_forces : options_.max_forces,
-                                       .max_waypoints = settings.max_waypoints > 0 ? settings.max_waypoints : options_.max_waypoints,
-                                       .longest_m = settings.longest_m > 0.0 ? settings.longest_m : options_.longest_m,
-                                       .silence_pa = settings.silence_pa,
-                                       .isa = settings.isa,
-                                       .surface = settings.surface,
-                                       .audits_energy = settings.audits_energy},
-                             settings.position_m, settings.rotation);
+  auto body = std::make_unique<SoundingBody>(
+      std::move(model),
+      BodyFrame{.rate_hz = options_.rate_hz,
+                .microphones_m = options_.microphones_m,
+                .max_strikes = options_.max_strikes,
+                .max_forces = settings.max_forces >= 0 ? settings.max_forces : options_.max_forces,
+                .max_waypoints = settings.max_waypoints > 0 ? settings.max_waypoints : options_.max_waypoints,
+                .longest_m = settings.longest_m > 0.0 ? settings.longest_m : options_.longest_m,
+                .silence_pa = settings.silence_pa,
+                .isa = settings.isa,
+                .surface = settings.surface,
+                .audits_energy = settings.audits_energy},
+      settings.position_m, settings.rotation);
   auto change = body->make_change({}, settings.effects);
   Published& published = published_bodies_[free];
   for (const Effect effect : EffectSet::all()) {
@@ -163,7 +163,7 @@ void Synthesiser::set_effects(int body, EffectSet effects) {
   Owned& owned = owned_[check_owned(body)];
   // Refused here, whether it has to wait or not.
   if (owned.wanted_model != nullptr)
-    Body::check(effects, *owned.wanted_model);
+    SoundingBody::check(effects, *owned.wanted_model);
   else
     owned.body->check(effects);
   owned.wanted = effects;
@@ -174,7 +174,7 @@ void Synthesiser::swap_model(int body, std::shared_ptr<const Model> model) {
   check_model(model.get());
   collect();
   Owned& owned = owned_[check_owned(body)];
-  Body::check(owned.wanted, *model);
+  SoundingBody::check(owned.wanted, *model);
   owned.wanted_model = std::move(model);
   send_change(body);
 }
@@ -243,7 +243,7 @@ void Synthesiser::set_awake(int number) noexcept {
 void Synthesiser::apply_commands() noexcept {
   Command command;
   while (commands_->pop(command)) {
-    Body*& place = playing_[static_cast<std::size_t>(command.number)];
+    SoundingBody*& place = playing_[static_cast<std::size_t>(command.number)];
     if (command.removes) {
       place = nullptr;
       gone_->push(command);
@@ -261,7 +261,7 @@ void Synthesiser::for_awake(Work&& work) noexcept {
   for (std::size_t w = 0; w < awake_.size(); ++w) {
     for (std::uint64_t left = awake_[w]; left != 0; left &= left - 1) {
       const auto number = static_cast<int>(w * 64) + std::countr_zero(left);
-      Body* body = playing_[static_cast<std::size_t>(number)];
+      SoundingBody* body = playing_[static_cast<std::size_t>(number)];
       if (body == nullptr || !work(number, *body)) awake_[w] &= ~(left & (~left + 1));
     }
   }
@@ -269,7 +269,7 @@ void Synthesiser::for_awake(Work&& work) noexcept {
 
 /// Runs `work` on a body and adds to the totals what it has done.
 template <typename Work>
-void Synthesiser::count(const Body& body, Work&& work) noexcept {
+void Synthesiser::count(const SoundingBody& body, Work&& work) noexcept {
   const BodyWork& now = body.get_work();
   const std::int64_t strikes = now.strikes, refused = now.refused, late = now.late, resets = now.resets;
   const std::int64_t mode_samples = now.units[Effect::kModal];
@@ -281,27 +281,27 @@ void Synthesiser::count(const Body& body, Work&& work) noexcept {
   work_.mode_samples += now.units[Effect::kModal] - mode_samples;
 }
 
-Body* Synthesiser::find_body(std::int32_t number) noexcept {
-  Body* body = number >= 0 && number < options_.max_bodies ? playing_[static_cast<std::size_t>(number)] : nullptr;
+SoundingBody* Synthesiser::find_body(std::int32_t number) noexcept {
+  SoundingBody* body = number >= 0 && number < options_.max_bodies ? playing_[static_cast<std::size_t>(number)] : nullptr;
   if (body == nullptr) ++work_.refused;
   return body;
 }
 
-void Synthesiser::take(const stream::Mark& mark) noexcept {
+void Synthesiser::take(const events::TimeWatermark& mark) noexcept {
   marked_s_ = std::max(marked_s_, mark.time_s);
   has_marks_ = true;
 }
 
-/// At the start of a period: whether physics has run to its end. What is not known yet comes late, or not at all.
+/// At the start of a block: whether physics has run to its end. What is not known yet comes late, or not at all.
 void Synthesiser::watch_marks() noexcept {
-  const bool is_overtaken = has_marks_ && marked_s_ * options_.rate_hz < static_cast<double>(sample_ + kPeriod);
+  const bool is_overtaken = has_marks_ && marked_s_ * options_.rate_hz < static_cast<double>(sample_ + kBlock);
   work_.underruns += static_cast<std::int64_t>(is_overtaken && !is_overtaken_);
   is_overtaken_ = is_overtaken;
 }
 
 template <class Strike>
 void Synthesiser::take_strike(const Strike& strike) noexcept {
-  Body* body = find_body(strike.body);
+  SoundingBody* body = find_body(strike.body);
   if (body == nullptr) return;
   count(*body, [&] {
     if (!body->take(strike, sample_)) return;
@@ -311,10 +311,10 @@ void Synthesiser::take_strike(const Strike& strike) noexcept {
   publish(strike.body);
 }
 
-void Synthesiser::take(const stream::Contact& contact) noexcept {
-  Body* body = find_body(contact.body);
+void Synthesiser::take(const events::LastingContact& contact) noexcept {
+  SoundingBody* body = find_body(contact.body);
   if (body == nullptr) return;
-  const Body* other =
+  const SoundingBody* other =
       contact.other >= 0 && contact.other < options_.max_bodies ? playing_[static_cast<std::size_t>(contact.other)] : nullptr;
   count(*body, [&] {
     if (!body->take(contact, other != nullptr ? other->get_surface() : options_.ground, sample_)) return;
@@ -323,47 +323,47 @@ void Synthesiser::take(const stream::Contact& contact) noexcept {
   });
 }
 
-void Synthesiser::take(const stream::Motion& motion) noexcept {
-  Body* body = find_body(motion.body);
+void Synthesiser::take(const events::BodyMotion& motion) noexcept {
+  SoundingBody* body = find_body(motion.body);
   if (body != nullptr && !body->take(motion)) ++work_.refused;
 }
 
-void Synthesiser::take(const stream::Listener& listener) noexcept {
+void Synthesiser::take(const events::Listener& listener) noexcept {
   if (!listener_.push({listener.time_s, listener.position_m, listener.velocity_m_s})) ++work_.refused;
 }
 
 void Synthesiser::take_events() noexcept {
-  stream::Event event;
+  events::Event event;
   while (ring_.pop(event)) {
-    if (const auto* mark = std::get_if<stream::Mark>(&event)) take(*mark);
-    if (const auto* impulse = std::get_if<stream::Impulse>(&event)) take_strike(*impulse);
-    if (const auto* force = std::get_if<stream::Force>(&event)) take_strike(*force);
-    if (const auto* contact = std::get_if<stream::Contact>(&event)) take(*contact);
-    if (const auto* motion = std::get_if<stream::Motion>(&event)) take(*motion);
-    if (const auto* listener = std::get_if<stream::Listener>(&event)) take(*listener);
+    if (const auto* mark = std::get_if<events::TimeWatermark>(&event)) take(*mark);
+    if (const auto* impulse = std::get_if<events::Impulse>(&event)) take_strike(*impulse);
+    if (const auto* force = std::get_if<events::Force>(&event)) take_strike(*force);
+    if (const auto* contact = std::get_if<events::LastingContact>(&event)) take(*contact);
+    if (const auto* motion = std::get_if<events::BodyMotion>(&event)) take(*motion);
+    if (const auto* listener = std::get_if<events::Listener>(&event)) take(*listener);
   }
 }
 
-/// Changes of effects that are over go back, at the beginning of a period.
+/// Changes of effects that are over go back, at the beginning of a block.
 void Synthesiser::finish_changes() noexcept {
-  for_awake([this](int number, Body& body) {
+  for_awake([this](int number, SoundingBody& body) {
     if (BodyChange* change = body.finish_change(listener_, sample_)) gone_->push({.body = &body, .change = change, .number = number});
     return true;
   });
 }
 
-/// The floor for strikes in this period, whether the body is awake since its beginning or not; and no body wakes more modes than the whole
+/// The floor for strikes in this block, whether the body is awake since its beginning or not; and no body wakes more modes than the whole
 /// budget has room for: they would have to go at once, and take others with them for the work that they were.
-void Synthesiser::give_floor(Body& body) noexcept {
+void Synthesiser::give_floor(SoundingBody& body) noexcept {
   Voice* voice = body.get_voice();
   if (!limited_ || voice == nullptr) return;
   const double modes = allowed_.load(std::memory_order_relaxed) / options_.rate_hz;
-  voice->set_limit(modes > 0.0 ? static_cast<int>(std::min(modes, kMostModes)) : 0);
-  const std::int64_t begin = sample_ / kPeriod * kPeriod;
+  voice->set_limit(modes > 0.0 ? static_cast<int>(std::min(modes, kMaxModes)) : 0);
+  const std::int64_t begin = sample_ / kBlock * kBlock;
   voice->set_floor(budget_.get_floor_pa() / body.calc_nearness(listener_, begin));
 }
 
-/// At the start of a period: lets modes go that the budget has no room for.
+/// At the start of a block: lets modes go that the budget has no room for.
 void Synthesiser::keep_budget() noexcept {
   const double per_s = allowed_.load(std::memory_order_relaxed);
   const std::int64_t spent = work_.mode_samples - spent_before_;
@@ -372,10 +372,10 @@ void Synthesiser::keep_budget() noexcept {
     if (!limited_) return;
     limited_ = false;
     budget_ = Budget();
-    for (Body* body : playing_)
+    for (SoundingBody* body : playing_)
       if (body != nullptr && body->get_voice() != nullptr) {
         body->get_voice()->set_floor(0.0F);
-        body->get_voice()->set_limit(static_cast<int>(kMostModes));
+        body->get_voice()->set_limit(static_cast<int>(kMaxModes));
         body->get_voice()->allow_driven(body->get_voice()->get_group_count());
       }
     return;
@@ -383,24 +383,24 @@ void Synthesiser::keep_budget() noexcept {
   limited_ = true;
   std::int64_t groups = 0;
   int awake = 0;
-  for_awake([&](int, Body& body) {
+  for_awake([&](int, SoundingBody& body) {
     const Voice* voice = body.get_voice();
     const int live = voice == nullptr ? 0 : voice->get_live_group_count();
     groups += live;
     awake += static_cast<int>(live > 0);
     return true;
   });
-  const double allowed = per_s > 0.0 ? per_s * kPeriod / options_.rate_hz : 0.0;
+  const double allowed = per_s > 0.0 ? per_s * kBlock / options_.rate_hz : 0.0;
   const bool is_too_much = budget_.begin(allowed, static_cast<double>(spent), groups, awake);
-  const bool gives_back = budget_.has_room() && sample_ / kPeriod % kGiveBackEvery == 0;
+  const bool gives_back = budget_.has_room() && sample_ / kBlock % kGiveBackEvery == 0;
   if (is_too_much) {
-    for_awake([&](int, Body& body) {
-      if (Voice* voice = body.get_voice()) budget_.tell(voice->measure(body.calc_nearness(listener_, sample_)));
+    for_awake([&](int, SoundingBody& body) {
+      if (Voice* voice = body.get_voice()) budget_.add(voice->measure(body.calc_nearness(listener_, sample_)));
       return true;
     });
     budget_.decide();
   }
-  for_awake([&](int, Body& body) {
+  for_awake([&](int, SoundingBody& body) {
     Voice* voice = body.get_voice();
     give_floor(body);
     if (voice != nullptr && gives_back) voice->allow_driven(1);
@@ -412,9 +412,9 @@ void Synthesiser::keep_budget() noexcept {
   });
 }
 
-/// Fills mix_ with the next samples: whole quanta, all of one period.
+/// Fills mix_ with the next samples: whole sub-blocks, all of one block.
 void Synthesiser::render(int samples) noexcept {
-  const bool begins = sample_ % kPeriod == 0;
+  const bool begins = sample_ % kBlock == 0;
   if (begins) apply_commands();
   take_events();
   if (begins) {
@@ -423,7 +423,7 @@ void Synthesiser::render(int samples) noexcept {
     keep_budget();
   }
   for (auto& mix : mix_) std::fill_n(mix.begin(), samples, 0.0);
-  for_awake([&](int number, Body& body) {
+  for_awake([&](int number, SoundingBody& body) {
     if (body.is_asleep()) return false;
     body.reach(marked_s_);
     count(body, [&] { body.render(sample_, static_cast<std::size_t>(samples), listener_, scratch_, mix_, options_.ticks); });
@@ -441,13 +441,13 @@ void Synthesiser::process(float* const* out, int channels, int frames) noexcept 
   const int heard = std::min(channels, get_microphone_count());
   for (int c = heard; c < channels; ++c) std::fill_n(out[c], frames, 0.0F);
   if (frames <= 0) {
-    if (held_ == 0 && sample_ % kPeriod == 0) apply_commands();
+    if (held_ == 0 && sample_ % kBlock == 0) apply_commands();
     take_events();
   }
   for (int done = 0; done < frames;) {
     if (held_ == 0) {
-      const auto left = static_cast<int>(kPeriod - sample_ % kPeriod);
-      const int wanted = std::max(1, (frames - done) / kQuantum) * kQuantum;
+      const auto left = static_cast<int>(kBlock - sample_ % kBlock);
+      const int wanted = std::max(1, (frames - done) / kSubBlock) * kSubBlock;
       render(std::min(left, wanted));
     }
     const int count = std::min(held_, frames - done);

@@ -2,7 +2,7 @@
 //
 //   synth::Synthesiser synthesiser({.rate_hz = 48000.0});
 //   const int body = synthesiser.add_body(synth::Model::make(bank, {.rate_hz = 48000.0}), {.position_m = {0, 2, 0}});
-//   synthesiser.push(stream::Impulse{.time_s = 0.01, .body = body, .triangle = 12, .impulse_n_s = {0, 0, 0.01}, .duration_s = 1e-4});
+//   synthesiser.push(events::Impulse{.time_s = 0.01, .body = body, .triangle = 12, .impulse_n_s = {0, 0, 0.01}, .duration_s = 1e-4});
 //   synthesiser.process(channels, 2, 256);  // in the audio callback
 //
 // What a body costs is what its effects cost: an effect that it has not takes no memory and executes nothing.
@@ -20,13 +20,13 @@
 #include <span>
 #include <vector>
 
-#include "runtime/stream/events.hpp"
-#include "runtime/stream/ring.hpp"
-#include "runtime/synth/body.hpp"
+#include "runtime/events/events.hpp"
+#include "runtime/events/ring.hpp"
 #include "runtime/synth/budget.hpp"
-#include "runtime/synth/ears.hpp"
 #include "runtime/synth/effects.hpp"
 #include "runtime/synth/model.hpp"
+#include "runtime/synth/receiver.hpp"
+#include "runtime/synth/sounding_body.hpp"
 
 namespace carillon::synth {
 
@@ -37,22 +37,22 @@ struct SynthesiserOptions {
   Vec3 listener_m{};
   int max_bodies = 64;
   int max_strikes = 64;                                     // pulses that a body may have waiting or acting at once
-  int max_forces = 128;                                     // stream::Forces that it may
+  int max_forces = 128;                                     // events::Forces that it may
   int max_waypoints = 64;                                   // of a body's way that are remembered
   int ring_events = 4096;                                   // that may wait between two calls of process()
   double longest_m = 60.0;                                  // what is further away is not heard
   double budget = std::numeric_limits<double>::infinity();  // set_budget()
-  Surface ground = kGroundSurface;                          // what contacts touch whose other body is none
+  ContactSurface ground = kGroundSurface;                   // what contacts touch whose other body is none
   /// A counter of time, for what effects cost; nullptr: nothing is measured, and nothing paid for that.
   TickFunction ticks = nullptr;
 };
 
 struct BodySettings {
   Vec3 position_m{};                                // of the centre of mass until the first Motion
-  stream::Quaternion rotation{1.0, 0.0, 0.0, 0.0};  // of the frame of its mesh until then
-  EffectSet effects = kUsualEffects;
+  events::Quaternion rotation{1.0, 0.0, 0.0, 0.0};  // of the frame of its mesh until then
+  EffectSet effects = kDefaultEffects;
   double silence_pa = 1e-10;  // VoiceOptions
-  Surface surface{};          // what contacts that last touch
+  ContactSurface surface{};   // what contacts that last touch
   double longest_m = 0.0;     // as in SynthesiserOptions; 0: what it says there
   int max_waypoints = 0;
   int max_forces = -1;  // as there; -1: what it says there
@@ -76,18 +76,21 @@ struct EffectCounters {
 
 /// Since the beginning.
 struct SynthesiserCounters {
-  std::int64_t strikes = 0;       // played; a pulse of several stream::Forces is one
+  std::int64_t strikes = 0;       // played; a pulse of several events::Forces is one
   std::int64_t refused = 0;       // events for a body that is not there, strikes outside its surface or for which it has no room
   std::int64_t late = 0;          // strikes that began before the horizon and were moved there
-  std::int64_t faults = 0;        // events that cannot be played (stream::find_fault)
+  std::int64_t faults = 0;        // events that cannot be played (events::find_fault)
   std::int64_t overflows = 0;     // events for which the ring had no room
   std::int64_t resets = 0;        // bodies silenced because their state was no number
   std::int64_t mode_samples = 0;  // work: modes times samples
   std::int64_t faded = 0;         // groups of modes that had to go for the budget
-  std::int64_t underruns = 0;     // times that the sound overtook the last stream::Mark
+  std::int64_t underruns = 0;     // times that the sound overtook the last events::TimeWatermark
   std::int64_t zeroed = 0;        // numbers of the output that were none, and are 0
 };
 
+/// What it keeps true: body numbers name at most one body that sounds; all bodies have rendered the same samples, in blocks of kBlock from
+/// the first sample; an event acts in the order in which it was pushed; only process() touches what sounds, only the main thread takes and
+/// gives back memory.
 class Synthesiser {
  public:
   /// Takes all memory that does not belong to a body. Throws InputError for options out of range.
@@ -96,29 +99,29 @@ class Synthesiser {
   Synthesiser(const Synthesiser&) = delete;
   Synthesiser& operator=(const Synthesiser&) = delete;
 
-  /// A new body, heard from the next period on; its number, which events name. Takes its memory here. Throws InputError when max_bodies are
+  /// A new body, heard from the next block on; its number, which events name. Takes its memory here. Throws InputError when max_bodies are
   /// there, or when the model is for another rate. [main-thread]
   int add_body(std::shared_ptr<const Model> model, const BodySettings& settings = {});
 
   /// Gives a body another set of effects: makes what it lacks here, and lets the audio thread put it in and take out what is not needed any
-  /// more, at a period and without a click: what is heard goes over within a period, as soon as the new way of the air is filled. One
+  /// more, at a block and without a click: what is heard goes over within a block, as soon as the new way of the air is filled. One
   /// change of a body is on its way at a time: a later one waits, and begins with the first collect() (or call of this) after the earlier
   /// one is over. Throws InputError when there is no such body, or for an effect that this build or the body's model cannot have.
   /// [main-thread]
   void set_effects(int body, EffectSet effects);
 
-  /// The body goes on ringing as another, of the same shape: an edit of its bank (bank::calc_edited) or the same bank with other gains.
-  /// Modes of the same number in the bank are the same: each keeps its energy and its phase and goes on at its new frequency and decay, the
-  /// sound going over within a period; modes that only one of the two has begin at rest or fade. Strikes under way act on the new
-  /// model. Takes memory here; that of the old model and its voice is given back by collect() once the audio thread has let go. One that
-  /// comes before the last has been taken waits for it, and of those that wait only the last is played. Throws InputError for a body that
-  /// is not there, for a model of another rate, and for one that cannot have the body's effects. [main-thread]
+  /// The body continues to ring as another, of the same shape: an edit of its bank (bank::calc_edited) or the same bank with other gains.
+  /// Modes of the same number in the bank are the same: each keeps its energy and its phase and continues at its new frequency and decay,
+  /// the sound going over within a block; modes that only one of the two has begin at rest or fade. Strikes under way act on the new model.
+  /// Takes memory here; that of the old model and its voice is given back by collect() once the audio thread has let go. One that comes
+  /// before the last has been taken waits for it, and of those that wait only the last is played. Throws InputError for a body that is not
+  /// there, for a model of another rate, and for one that cannot have the body's effects. [main-thread]
   void swap_model(int body, std::shared_ptr<const Model> model);
 
   /// What was asked for last. Throws InputError when there is no such body. [main-thread]
   EffectSet get_effects(int body) const;
 
-  /// The body falls silent at the next period. Its number may be given to a new body after collect(). [main-thread]
+  /// The body falls silent at the next block. Its number may be given to a new body after collect(). [main-thread]
   void remove_body(int body);
 
   /// Whether add_body() would find no room. [main-thread]
@@ -133,7 +136,7 @@ class Synthesiser {
   }
 
   /// Mode-samples that a second of sound may take (modes times samples, as the counters count them); infinity: as many as there are. When
-  /// there are more, the modes that are least audible at the microphones fade out over a period, over all bodies, though never the first
+  /// there are more, the modes that are least audible at the microphones fade out over a block, over all bodies, though never the first
   /// kGroup of one that rings; they come back with the next strike. Not a number counts as 0. A pure function of the events: no clock.
   /// [any-thread]
   void set_budget(double mode_samples_per_s) noexcept { allowed_.store(mode_samples_per_s, std::memory_order_relaxed); }
@@ -141,7 +144,7 @@ class Synthesiser {
 
   /// Times of events are seconds since the first sample. False when the event is refused (counted). [any-thread]: no heap, no lock, no
   /// throw.
-  bool push(const stream::Event& event) noexcept { return ring_.push(event); }
+  bool push(const events::Event& event) noexcept { return ring_.push(event); }
 
   /// The next frames of up to as many channels as there are microphones; further channels are silent. out[c] has room for `frames` numbers.
   /// Frame n is what arrives at (n - kLatency) / rate. Any number of frames, in any order, gives the same bits, as long as events come
@@ -149,20 +152,20 @@ class Synthesiser {
   /// system call, no throw.
   void process(float* const* out, int channels, int frames) noexcept;
 
-  static constexpr int kLatency = Ear::kLatency;
+  static constexpr int kLatency = Receiver::kLatency;
   /// Events that fit into the ring between two calls of process(). [any-thread]
   std::size_t get_ring_room() const noexcept { return ring_.get_room(); }
   int get_microphone_count() const { return static_cast<int>(options_.microphones_m.size()); }
   /// Of the next frame. [any-thread]
   double get_time_s() const noexcept { return static_cast<double>(position_.load(std::memory_order_relaxed)) / options_.rate_hz; }
-  /// An event at or after this is in time: at most kPeriod frames after get_time_s(). [any-thread]
+  /// An event at or after this is in time: at most kBlock frames after get_time_s(). [any-thread]
   double get_horizon_s() const noexcept { return static_cast<double>(horizon_.load(std::memory_order_relaxed)) / options_.rate_hz; }
   SynthesiserCounters get_counters() const noexcept;
   /// Zeros for a number that is no body's. [any-thread]
   EffectCounters get_effect_counters(int body) const noexcept;
   /// The loudest that its modes have been so far [Pa at 1 m]. [any-thread]
   double get_peak_pa(int body) const noexcept;
-  /// Of a body that audits_energy: the largest share by which the energy of its modes rose over a period in which nothing acted on it.
+  /// Of a body that audits_energy: the largest share by which the energy of its modes rose over a block in which nothing acted on it.
   /// [any-thread]
   double get_energy_rise(int body) const noexcept;
   /// Of a body that audits_energy: what its modes have radiated, VoiceCounters::radiated_j. [any-thread]
@@ -171,14 +174,14 @@ class Synthesiser {
  private:
   /// What the main thread asks of the audio thread, and what comes back: a body that goes, or a change that is over.
   struct Command {
-    Body* body = nullptr;
+    SoundingBody* body = nullptr;
     BodyChange* change = nullptr;
     int number = -1;
     bool removes = false;
   };
   /// A body as the main thread sees it.
   struct Owned {
-    std::unique_ptr<Body> body;
+    std::unique_ptr<SoundingBody> body;
     std::unique_ptr<BodyChange> change;         // on its way
     std::shared_ptr<const Model> wanted_model;  // that waits; nullptr: none
     EffectSet effects, wanted;                  // with that change; after those that wait
@@ -202,44 +205,44 @@ class Synthesiser {
   void apply_commands() noexcept;
   void finish_changes() noexcept;
   void take_events() noexcept;
-  void take(const stream::Mark& mark) noexcept;
+  void take(const events::TimeWatermark& mark) noexcept;
   void watch_marks() noexcept;
   template <class Strike>
   void take_strike(const Strike& strike) noexcept;
-  void take(const stream::Contact& contact) noexcept;
-  void take(const stream::Motion& motion) noexcept;
-  void take(const stream::Listener& listener) noexcept;
+  void take(const events::LastingContact& contact) noexcept;
+  void take(const events::BodyMotion& motion) noexcept;
+  void take(const events::Listener& listener) noexcept;
   void render(int samples) noexcept;
-  Body* find_body(std::int32_t number) noexcept;
+  SoundingBody* find_body(std::int32_t number) noexcept;
   void set_awake(int number) noexcept;
   template <typename Work>
-  void count(const Body& body, Work&& work) noexcept;
+  void count(const SoundingBody& body, Work&& work) noexcept;
   template <typename Work>
   void for_awake(Work&& work) noexcept;
   void publish(int number) noexcept;
   void keep_budget() noexcept;
-  void give_floor(Body& body) noexcept;
+  void give_floor(SoundingBody& body) noexcept;
   void publish_counters() noexcept;
 
   SynthesiserOptions options_;
-  stream::EventRing ring_;
+  events::EventRing ring_;
   std::unique_ptr<Pipe<Command>> commands_;
   std::unique_ptr<Pipe<Command>> gone_;
   std::vector<Owned> owned_;  // by number; the main thread's
   std::unique_ptr<Published[]> published_bodies_;
-  std::vector<Body*> playing_;        // by number; the audio thread's
-  std::vector<std::uint64_t> awake_;  // bit i % 64 of word i / 64: body i has something to do
-  Track listener_;
+  std::vector<SoundingBody*> playing_;  // by number; the audio thread's
+  std::vector<std::uint64_t> awake_;    // bit i % 64 of word i / 64: body i has something to do
+  Trajectory listener_;
   Mix mix_;
   BodyScratch scratch_;
-  double marked_s_ = 0.0;  // of the last Mark: nothing earlier will come
+  double marked_s_ = 0.0;  // of the last TimeWatermark: nothing earlier will come
   bool has_marks_ = false, is_overtaken_ = false;
   int rendered_ = 0;         // samples in mix_
   int held_ = 0;             // of them not yet handed out: the last
   std::int64_t sample_ = 0;  // rendered so far
   Budget budget_;
   bool limited_ = false;           // voices have floors
-  std::int64_t spent_before_ = 0;  // mode-samples up to the last period
+  std::int64_t spent_before_ = 0;  // mode-samples up to the last block
   std::atomic<double> allowed_;
   SynthesiserCounters work_;  // the audio thread's
   std::atomic<float> gain_{1.0F};

@@ -32,7 +32,7 @@ constexpr int kPoints = 1 << kBits;
 constexpr int kWaves = 2048;                      // of the longest wavelength in the table
 constexpr double kFadeFrom = 0.4, kFadeTo = 0.5;  // of the rate: where the shortest wavelength of an octave fades out
 constexpr double kHighestM = 1.0;                 // rms height; keeps what follows within floats
-constexpr float kLeast = 1e-4F;                   // of an octave: below, it is left out
+constexpr float kMin = 1e-4F;                     // of an octave: below, it is left out
 constexpr float kFraction = 1.0F / static_cast<float>(1U << 24);
 
 /// x[n] = sum over k of X[k] e^{2 pi i k n / N}, in place; N a power of two (Cooley and Tukey 1965).
@@ -116,7 +116,7 @@ Texture::Gains Texture::calc_gains(double speed_m_s, double patch_radius_m, doub
     double gain = 1.0 / std::sqrt(1.0 + 0.25 * pi * qa * qa * qa);
     gain *= 1.0 - calc_smooth_step((highest - kFadeFrom) / (kFadeTo - kFadeFrom));
     if (give_rad_s > 0.0) gain *= omega * omega / (omega * omega + give_rad_s * give_rad_s);
-    gain = std::max(0.0, (gain * amplitude - kLeast) / (1.0 - kLeast));
+    gain = std::max(0.0, (gain * amplitude - kMin) / (1.0 - kMin));
     height = static_cast<float>(roughness_m_ * gain);
     square += static_cast<double>(height) * static_cast<double>(height);
     amplitude *= kStep;
@@ -139,24 +139,24 @@ double Texture::calc_density(const Gains& gains, double speed_m_s, double freq_h
     return kSteep * height * height / std::ldexp(lowest_hz, i);
   };
   const double own = calc_begin(octave) * (1.0 - (1.0 - kEnd) * share);
-  return octave == 0 ? own : std::max(own, kEnd * calc_begin(octave - 1) * (1.0 - (1.0 - kEnd) * share));  // filters know no borders
+  return octave == 0 ? own : std::max(own, kEnd * calc_begin(octave - 1) * (1.0 - (1.0 - kEnd) * share));  // filters have no sharp borders
 }
 
 void Texture::render(double from_m_s, double to_m_s, double rate_hz, const Gains& from, const Gains& to,
-                     std::array<float, kQuantum + 1>& height_m) noexcept {
+                     std::array<float, kSubBlock + 1>& height_m) noexcept {
   const Tables& tables = get_tables();
   height_m.fill(0.0F);
-  std::array<std::uint64_t, kQuantum + 1> place;
+  std::array<std::uint64_t, kSubBlock + 1> place;
   const double turns_per_m = 1.0 / (kLongestM * kWaves);
-  for (int n = 0; n <= kQuantum; ++n) {
-    const double t = n, way_m = (from_m_s * t + (to_m_s - from_m_s) * t * t / (2.0 * kQuantum)) / rate_hz;
+  for (int n = 0; n <= kSubBlock; ++n) {
+    const double t = n, way_m = (from_m_s * t + (to_m_s - from_m_s) * t * t / (2.0 * kSubBlock)) / rate_hz;
     place[static_cast<std::size_t>(n)] = place_ + to_place(way_m * turns_per_m);
   }
   place_ = place.back();
   for (std::size_t octave = 0; octave < kOctaves; ++octave) {
-    const float first = from.height_m[octave], step = (to.height_m[octave] - first) / kQuantum;
+    const float first = from.height_m[octave], step = (to.height_m[octave] - first) / kSubBlock;
     if (first == 0.0F && to.height_m[octave] == 0.0F) continue;
-    for (std::size_t n = 0; n <= kQuantum; ++n) {
+    for (std::size_t n = 0; n <= kSubBlock; ++n) {
       const std::uint64_t at = (place[n] << octave) + offset_[octave];
       const float* c = tables.coefficient.data() + (at >> (64 - kBits));
       const float t = static_cast<float>(static_cast<std::int32_t>((at >> (40 - kBits)) & 0xffffff)) * kFraction;

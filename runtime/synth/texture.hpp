@@ -15,7 +15,7 @@ namespace carillon::synth {
 
 /// A self-affine profile, octave of wavelength by octave, read at the distance that the contact has gone. Nothing of it moves faster than
 /// the Nyquist frequency. All surfaces have the same spectrum but for their height: roughness counts waves up to kCutoffM, and waviness
-/// goes on up to kLongestM by the same law. Deterministic: the same roughness and seed give the same surface.
+/// continues up to kLongestM by the same law. Deterministic: the same roughness and seed give the same surface.
 /// make_tables() takes memory and time, once; all the rest is [audio-thread]: no heap, no lock, no throw.
 class Texture {
  public:
@@ -38,13 +38,13 @@ class Texture {
   void start(double roughness_m, std::uint64_t seed) noexcept;
 
   /// For a contact that goes over the surface with speed_m_s and touches it with a patch of this radius; what moves slower than give_rad_s
-  /// is not felt, as the bodies give way to it: a high pass of the second order.
+  /// is not felt, as the bodies yield to it: a high pass of the second order.
   Gains calc_gains(double speed_m_s, double patch_radius_m, double give_rad_s, double rate_hz) const noexcept;
 
-  /// Heights [m] at the samples 0 to kQuantum, while speed and gains change linearly from the first to the last; the path goes on by
-  /// kQuantum samples.
+  /// Heights [m] at the samples 0 to kSubBlock, while speed and gains change linearly from the first to the last; the path advances by
+  /// kSubBlock samples.
   void render(double from_m_s, double to_m_s, double rate_hz, const Gains& from, const Gains& to,
-              std::array<float, kQuantum + 1>& height_m) noexcept;
+              std::array<float, kSubBlock + 1>& height_m) noexcept;
 
   /// One-sided density of the heights [m^2 / Hz] at a frequency, or a little more; below the lowest the one of the lowest.
   static double calc_density(const Gains& gains, double speed_m_s, double freq_hz) noexcept;

@@ -17,7 +17,7 @@ namespace {
 // Standard deviations of what strikes of a variation of 1 scatter by.
 constexpr double kEnergyScatter = 0.18;                             // 0.8 dB
 constexpr double kTiltScatter = 0.05;                               // rad, about each of two axes: 3 degrees
-constexpr double kLengthScatter = 0.05;                             // of the pulse, beside what goes with its energy
+constexpr double kLengthScatter = 0.05;                             // of the pulse, in addition to the effect of its energy
 constexpr double kPlaceScatterM = 2e-3, kPlaceScatterShare = 0.02;  // along the surface, each way; of the body's extent
 
 Vec3 calc_extent(const bank::Bank& bank) {
@@ -47,11 +47,7 @@ class Chance {
 
 /// Any two directions across a unit vector, and across each other.
 std::array<Vec3, 2> make_across(const Vec3& axis) {
-  const std::size_t least = std::abs(axis[0]) <= std::abs(axis[1]) ? (std::abs(axis[0]) <= std::abs(axis[2]) ? 0 : 2)
-                                                                   : (std::abs(axis[1]) <= std::abs(axis[2]) ? 1 : 2);
-  Vec3 other{};
-  other[least] = 1.0;
-  Vec3 u = cross(axis, other);
+  Vec3 u = cross(axis, find_least_axis(axis));
   const double length = std::sqrt(dot(u, u));
   for (double& x : u) x /= length;
   return {u, cross(axis, u)};
@@ -60,7 +56,7 @@ std::array<Vec3, 2> make_across(const Vec3& axis) {
 }  // namespace
 
 void vary_strike(const bank::Bank& bank, const std::function<bank::NearestPlace(const Vec3&)>& find, double variation, std::uint64_t seed,
-                 std::uint64_t strike, stream::Impulse& impulse) {
+                 std::uint64_t strike, events::Impulse& impulse) {
   if (!(variation > 0.0)) return;
   Chance chance(seed, strike);
   // The mean of the energy stays.

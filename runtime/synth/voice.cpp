@@ -1,8 +1,7 @@
-// One body's sound: all that acts on its modes acts on one state; longer than most files.
-// Method:     the modes ring by kernels.hpp, period by period. A strike is worked out as the answer of modes at rest, over the quanta that
-//             its pulse touches, and added to what rings: the modes are linear. Modes near and above critical damping are few and die at
-//             once; they go sample by sample in double precision. Groups of modes that cannot be heard any more are dropped from the
-//             end of the list, every eighth period.
+// Method:     the modes ring by kernels.hpp, block by block. A strike is worked out as the answer of modes at rest, over the sub-blocks
+//             that its pulse touches, and added to what rings: the modes are linear. Modes near and above critical damping are few and die
+//             at once (damped_modes.hpp). Groups of modes that cannot be heard any more are dropped from the end of the list, every eighth
+//             block.
 // Source:     OSG02 section 4 (impulses to modes), corrected by its missing factor 1/2 in eq. 16-18; docs/equations.md E4 and E5.
 // Deviations: none.
 #include "runtime/synth/voice.hpp"
@@ -15,7 +14,6 @@
 
 #include "runtime/bank/air.hpp"
 #include "runtime/base/error.hpp"
-#include "runtime/base/vector.hpp"
 #include "runtime/synth/fp_guard.hpp"
 
 namespace carillon::synth {
@@ -23,14 +21,12 @@ namespace {
 
 /// Whether this build has any effect of contacts that last.
 constexpr bool kHasContacts = kCompiledEffects.has_any(kContactEffects);
-constexpr std::int64_t kCullEvery = 8;  // periods
+constexpr std::int64_t kCullEvery = 8;  // blocks
 
-bool is_finite(const Vec3& v) { return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]); }
-Vec3 widen(const std::array<float, 3>& v) { return {v[0], v[1], v[2]}; }
-Vec3 subtract(const Vec3& a, double s, const Vec3& b) { return {a[0] - s * b[0], a[1] - s * b[1], a[2] - s * b[2]}; }
-
-// A direction that the samples of a force have no more of than this share of the largest is rounding of single precision.
-constexpr double kParallel = 3e-7;
+bool acts_in_sub_block(const QueuedPulse& pulse, std::int64_t sample) noexcept {
+  const double begin = pulse.begin - static_cast<double>(sample - 1);
+  return begin <= kSubBlock && begin + pulse.length > 0.0;
+}
 
 }  // namespace
 
@@ -40,138 +36,32 @@ double calc_radiated_share(double gain, double decay_per_s) noexcept {
 }
 
 Voice::Voice(std::shared_ptr<const Model> model, VoiceOptions options)
-    : model_(std::move(model)), kernels_(&get_kernels(options.isa)), silence_pa_(options.silence_pa), audits_(options.audits_energy) {
+    : model_(std::move(model)),
+      kernels_(&get_kernels(options.isa)),
+      silence_pa_(options.silence_pa),
+      audits_(options.audits_energy),
+      strikes_(*model_, options.max_strikes, options.max_forces),
+      damped_(*model_) {
   if (!(silence_pa_ > 0.0) || !std::isfinite(silence_pa_)) throw InputError("the pressure of silence must be a positive number of Pa");
   groups_ = static_cast<int>(model_->sound_.size());
   limit_ = cut_ = driven_ = groups_;
   state_.resize(model_->sound_.size());
   starts_.resize(model_->sound_.size());
-  damped_.resize(model_->damped_.size());
   bounds_.resize(model_->sound_.size());
-  damped_amplitude_.resize(model_->damped_.size());
-  pulses_.reserve(static_cast<std::size_t>(std::max(1, options.max_strikes)));
-  forces_.reserve(static_cast<std::size_t>(std::max(0, options.max_forces)));
   if (!audits_) return;
   radiation_.resize(static_cast<std::size_t>(model_->ringing_));
   for (std::size_t m = 0; m < radiation_.size(); ++m) {
     const Model::Mode& mode = model_->modes_[m];
-    radiation_[m].part = calc_radiated_share(mode.gain, mode.decay) * -std::expm1(-2.0 * mode.decay * kPeriod / model_->rate_hz_);
+    radiation_[m].part = calc_radiated_share(mode.gain, mode.decay) * -std::expm1(-2.0 * mode.decay * kBlock / model_->rate_hz_);
   }
-}
-
-bool Voice::strike(const stream::Impulse& impulse) noexcept {
-  const bool sane = std::isfinite(impulse.time_s) && std::isfinite(impulse.duration_s) && impulse.duration_s >= 0.0 &&
-                    is_finite(impulse.barycentric) && is_finite(impulse.impulse_n_s) && impulse.triangle >= 0 &&
-                    static_cast<std::size_t>(impulse.triangle) < model_->triangles_.size();
-  if (!sane || pulses_.size() == pulses_.capacity()) {
-    ++counters_.refused;
-    return false;
-  }
-  Pulse pulse;
-  pulse.shape = impulse.shape;
-  pulse.length = calc_pulse_length(impulse.shape, impulse.duration_s * model_->rate_hz_);
-  pulse.begin = impulse.time_s * model_->rate_hz_ - 0.5 * pulse.length;
-  begin_in_time(pulse.begin);
-  pulse.strength_n_s = static_cast<float>(std::hypot(impulse.impulse_n_s[0], impulse.impulse_n_s[1], impulse.impulse_n_s[2]));
-  pulse.triangle = impulse.triangle;
-  for (int corner = 0; corner < 3; ++corner) {
-    for (int axis = 0; axis < 3; ++axis) {
-      pulse.weight[corner * 3 + axis] = static_cast<float>(impulse.barycentric[corner] * impulse.impulse_n_s[axis]);
-    }
-  }
-  find_rows(pulse.triangle, pulse.row);
-  pulses_.push_back(pulse);
-  ++counters_.accepted;
-  return true;
-}
-
-/// The sample at the horizon is still to come: what happens after the one before it can still be heard. What is earlier moves there.
-void Voice::begin_in_time(double& begin) noexcept {
-  const double earliest = static_cast<double>(horizon_ - 1);
-  if (begin > earliest) return;
-  begin = std::nextafter(earliest, earliest + 1.0);
-  ++counters_.late;
-}
-
-bool Voice::push(const stream::Force& force) noexcept {
-  bool sane = std::isfinite(force.time_s) && std::isfinite(force.step_s) && force.step_s > 0.0 && force.count >= 1 &&
-              force.count <= stream::kMostForceSteps && is_finite(force.barycentric) && force.triangle >= 0 &&
-              static_cast<std::size_t>(force.triangle) < model_->triangles_.size();
-  for (std::size_t k = 0; sane && k < static_cast<std::size_t>(force.count); ++k) sane = is_finite(widen(force.impulse_n_s[k]));
-  if (!sane || forces_.size() == forces_.capacity()) {
-    ++counters_.refused;
-    return false;
-  }
-  Steps steps{};
-  steps.begin = force.time_s * model_->rate_hz_;
-  steps.step = std::max(force.step_s * model_->rate_hz_, kShortestStep);
-  begin_in_time(steps.begin);
-  steps.triangle = force.triangle;
-  steps.count = force.count;
-  for (std::size_t corner = 0; corner < 3; ++corner) steps.barycentric[corner] = static_cast<float>(force.barycentric[corner]);
-  // Directions one by one, each that of the largest sample of what is left.
-  std::array<Vec3, stream::kMostForceSteps> left{};
-  const auto count = static_cast<std::size_t>(force.count);
-  double strength = 0.0, largest = 0.0;
-  for (std::size_t k = 0; k < count; ++k) {
-    left[k] = widen(force.impulse_n_s[k]);
-    strength += std::sqrt(dot(left[k], left[k]));
-  }
-  steps.strength_n_s = static_cast<float>(strength);
-  for (; steps.axes < 3; ++steps.axes) {
-    const auto most =
-        std::max_element(left.begin(), left.begin() + force.count, [](const auto& a, const auto& b) { return dot(a, a) < dot(b, b); });
-    const double size = std::sqrt(dot(*most, *most));
-    if (steps.axes == 0) largest = size;
-    if (!(size > kParallel * largest)) break;
-    const Vec3 unit{(*most)[0] / size, (*most)[1] / size, (*most)[2] / size};
-    for (std::size_t axis = 0; axis < 3; ++axis) steps.axis[steps.axes][axis] = static_cast<float>(unit[axis]);
-    for (std::size_t k = 0; k < count; ++k) {
-      const double along = dot(left[k], unit);
-      steps.along[steps.axes][k] = static_cast<float>(along);
-      left[k] = subtract(left[k], along, unit);
-    }
-  }
-  if (steps.axes > 0) forces_.push_back(steps);
-  ++counters_.accepted;
-  return true;
-}
-
-void Voice::find_rows(std::int32_t triangle, const std::int16_t** row) const noexcept {
-  const auto& corners = model_->triangles_[static_cast<std::size_t>(triangle)];
-  for (int corner = 0; corner < 3; ++corner) {
-    for (int axis = 0; axis < 3; ++axis) row[corner * 3 + axis] = model_->get_row(corners[corner], axis);
-  }
-}
-
-/// Rows and weights of touch_ for a unit impulse along one direction of a force.
-void Voice::find_touch(const Steps& steps, int axis) noexcept {
-  find_rows(steps.triangle, touch_.row);
-  for (int corner = 0; corner < 3; ++corner) {
-    for (int k = 0; k < 3; ++k) touch_.weight[corner * 3 + k] = steps.barycentric[corner] * steps.axis[axis][k];
-  }
-}
-
-/// The moments of a force over one interval, in which its first step begins at `begin` and steps have the length `step`.
-Voice::StepMoments Voice::calc_moments(const Steps& steps, double begin, double step) {
-  StepMoments sum{};
-  const int first = static_cast<int>(std::clamp(std::floor(-begin / step), 0.0, static_cast<double>(steps.count)));
-  for (int k = first; k < steps.count && begin + k * step < 1.0; ++k) {
-    const Moments moments = calc_level_moments(begin + k * step, step);
-    for (int axis = 0; axis < steps.axes; ++axis) {
-      const double along = steps.along[axis][k];
-      for (int j = 0; j < kMoments; ++j) sum[axis][j] += along * moments[j];
-    }
-  }
-  return sum;
 }
 
 void Voice::process(std::span<float> pressure_pa) noexcept {
   const FpGuard guard;
   while (!pressure_pa.empty()) {
     if (held_ == 0) {
-      const auto left = static_cast<int>((kPeriod - horizon_ % kPeriod) / kQuantum);
-      const std::size_t wanted = std::max<std::size_t>(1, pressure_pa.size() / kQuantum);
+      const auto left = static_cast<int>((kBlock - horizon_ % kBlock) / kSubBlock);
+      const std::size_t wanted = std::max<std::size_t>(1, pressure_pa.size() / kSubBlock);
       render(static_cast<int>(std::min(static_cast<std::size_t>(left), wanted)));
     }
     const std::size_t count = std::min(static_cast<std::size_t>(held_), pressure_pa.size());
@@ -184,84 +74,85 @@ void Voice::process(std::span<float> pressure_pa) noexcept {
   }
 }
 
-/// Fills block_ with the next `quanta` quanta, all of one period.
-void Voice::render(int quanta) noexcept {
-  const auto first = static_cast<int>(horizon_ % kPeriod / kQuantum);
+/// Fills block_ with the next `sub_blocks` sub-blocks, all of one block.
+void Voice::render(int sub_blocks) noexcept {
   const std::int64_t start = horizon_;
-  horizon_ += quanta * kQuantum;
-  rendered_ = held_ = quanta * kQuantum;
-  if (first == 0) {
-    if (audits_) audit();
-    fading_ = std::exchange(inherits_, false);
-    if (const int stay = std::min(limit_, cut_); stay < live_) fade_out(stay);
-    cut_ = groups_;
-    if (start / kPeriod % kCullEvery == 0 && is_awake()) cull();
-  }
-  silent_ =
-      !is_awake() && !fading_ && pulses_.empty() && forces_.empty() && (!kHasContacts || contacts_ == nullptr || contacts_->is_resting());
+  if (start % kBlock == 0) begin_block();
+  horizon_ += sub_blocks * kSubBlock;
+  rendered_ = held_ = sub_blocks * kSubBlock;
+  silent_ = !is_awake() && !fading_ && strikes_.is_empty() && (!kHasContacts || contacts_ == nullptr || contacts_->is_resting());
   if (silent_) return;
   const bool touched = kHasContacts && contacts_ != nullptr && !contacts_->is_idle();
   std::fill(block_.begin(), block_.begin() + rendered_, 0.0F);
   bool struck_at_all = false;
-  for (int q = 0; q < quanta; ++q) struck_at_all = struck_at_all || is_struck(start + q * kQuantum);
+  for (int q = 0; q < sub_blocks; ++q) struck_at_all = struck_at_all || strikes_.acts(start + q * kSubBlock, kSubBlock);
   undisturbed_ = undisturbed_ && !struck_at_all && !touched;
-  const bool whole = quanta == kQuanta && !struck_at_all && !touched;
+  render_sub_blocks(start, sub_blocks, struck_at_all, touched);
+  strikes_.finish(horizon_);
+}
+
+/// Before the first sample of a block: what is decided for all of it.
+void Voice::begin_block() noexcept {
+  if (audits_) audit();
+  fading_ = std::exchange(inherits_, false);
+  if (const int stay = std::min(limit_, cut_); stay < live_) fade_out(stay);
+  cut_ = groups_;
+  if (horizon_ / kBlock % kCullEvery == 0 && is_awake()) cull();
+}
+
+/// Adds to block_ what rings and what acts on it. What rings is emitted up to the next sub-block that is struck or touched, which changes
+/// the starts after it.
+void Voice::render_sub_blocks(std::int64_t start, int sub_blocks, bool struck_at_all, bool touched) noexcept {
+  const auto first = static_cast<int>(start % kBlock / kSubBlock);
+  const bool whole = sub_blocks == kSubBlocks && !struck_at_all && !touched;
   if (live_ > 0 && whole) {
     kernels_->ring(model_->sound_.data(), model_->turn_.data(), state_.data(), live_, block_.data());
   } else if (live_ > 0 && first == 0) {
     kernels_->advance(model_->turn_.data(), state_.data(), starts_.data(), live_);
   }
-  for (int q = 0, made = whole ? quanta : 0; q < quanta; ++q) {
-    float* out = block_.data() + q * kQuantum;
-    const std::int64_t sample = start + q * kQuantum;
-    const bool struck = struck_at_all && is_struck(sample);
-    const Drive* drive = touched ? contacts_->begin_quantum(sample) : nullptr;
-    const bool driven = drive != nullptr && drive->forces, damped = drive != nullptr && drive->damps;
-    if (driven) wake(std::min(find_reach(drive->strength_n_s), driven_));
-    if (q == made) {  // what rings, up to the next quantum that is struck or touched: that changes the starts after it
+  for (int q = 0, made = whole ? sub_blocks : 0; q < sub_blocks; ++q) {
+    float* out = block_.data() + q * kSubBlock;
+    const std::int64_t sample = start + q * kSubBlock;
+    const bool struck = struck_at_all && strikes_.acts(sample, kSubBlock);
+    const ContactBlock* drive = touched ? contacts_->begin_sub_block(sample) : nullptr;
+    if (drive != nullptr && drive->forces) wake(std::min(find_reach(drive->strength_n_s), driven_));
+    if (q == made) {
       do ++made;
-      while (made < quanta && !touched && !struck && !is_struck(start + made * kQuantum));
-      if (live_ > 0 && !damped) kernels_->emit(model_->sound_.data(), starts_.data(), live_, first + q, made - q, out);
+      while (made < sub_blocks && !touched && !struck && !strikes_.acts(start + made * kSubBlock, kSubBlock));
+      if (live_ > 0 && !(drive != nullptr && drive->damps))
+        kernels_->emit(model_->sound_.data(), starts_.data(), live_, first + q, made - q, out);
     }
-    if (drive != nullptr && live_ > 0) {
-      kernels_->drive(model_->strike_.data(), model_->turn_.data(), *drive, first + q, state_.data(), starts_.data(), live_, out);
-      counters_.mode_samples += static_cast<std::int64_t>(live_) * kGroup * kQuantum;
-    }
-    if (struck) strike_quantum(sample, first + q, out);
-    counters_.mode_samples += static_cast<std::int64_t>(live_) * kGroup * kQuantum;
-    if (struck || driven || damped_live_) add_damped(sample, struck, driven, out);
-    if (fading_) {
-      for (int n = 0; n < kQuantum; ++n) out[n] += fade_[(first + q) * kQuantum + n];
-    }
+    add_acting(sample, first + q, drive, struck, out);
     int bad = 0;
-    for (int n = 0; n < kQuantum; ++n) bad |= static_cast<int>(!(std::abs(out[n]) <= std::numeric_limits<float>::max()));
+    for (int n = 0; n < kSubBlock; ++n) bad |= static_cast<int>(!(std::abs(out[n]) <= std::numeric_limits<float>::max()));
     if (bad != 0) {
       reset();
-      std::fill(block_.begin() + q * kQuantum, block_.begin() + rendered_, 0.0F);
+      std::fill(block_.begin() + q * kSubBlock, block_.begin() + rendered_, 0.0F);
       break;
     }
   }
-  const auto heard = static_cast<double>(horizon_ - 1);
-  std::erase_if(pulses_, [heard](const Pulse& pulse) { return pulse.begin + pulse.length <= heard; });
-  std::erase_if(forces_, [heard](const Steps& steps) { return steps.calc_end() <= heard; });
 }
 
-/// Whether a pulse acts in the quantum that begins at `sample`. The interval of sample n is (n - 1, n].
-bool Voice::is_struck(std::int64_t sample) const noexcept {
-  for (const Pulse& pulse : pulses_) {
-    if (pulse.begin <= static_cast<double>(sample + kQuantum - 1) && pulse.begin + pulse.length > static_cast<double>(sample - 1)) {
-      return true;
-    }
+/// What contacts and strikes add in one sub-block, with the damped modes and what fades out.
+void Voice::add_acting(std::int64_t sample, int sub_block, const ContactBlock* drive, bool struck, float* out) noexcept {
+  if (drive != nullptr && live_ > 0) {
+    kernels_->drive(model_->strike_.data(), model_->turn_.data(), *drive, sub_block, state_.data(), starts_.data(), live_, out);
+    count_work(live_, kSubBlock);
   }
-  for (const Steps& steps : forces_) {
-    if (steps.begin <= static_cast<double>(sample + kQuantum - 1) && steps.calc_end() > static_cast<double>(sample - 1)) return true;
+  if (struck) {
+    play_pulses(sample, sub_block, out);
+    play_forces(sample, sub_block, out);
   }
-  return false;
+  count_work(live_, kSubBlock);
+  const bool driven = drive != nullptr && drive->forces;
+  if (struck || driven || damped_.is_live()) damped_.add(sample, strikes_, struck, driven ? contacts_ : nullptr, out);
+  if (!fading_) return;
+  for (int n = 0; n < kSubBlock; ++n) out[n] += fade_[sub_block * kSubBlock + n];
 }
 
 /// Makes as many groups live as the limit allows; the starts of those that were not are out of date.
 void Voice::wake(int groups) noexcept {
-  for (const int last = std::min(groups, limit_); live_ < last; ++live_) starts_[static_cast<std::size_t>(live_)] = Starts{};
+  for (const int last = std::min(groups, limit_); live_ < last; ++live_) starts_[static_cast<std::size_t>(live_)] = SubBlockStates{};
 }
 
 /// Up to which group a strike can be heard above the floor.
@@ -272,182 +163,59 @@ int Voice::find_reach(float strength_n_s) const noexcept {
   return std::max(1, static_cast<int>(last - reach.begin()));
 }
 
-void Voice::strike_quantum(std::int64_t sample, int quantum, float* out) noexcept {
-  const auto find_begin = [sample](const Pulse& pulse) { return pulse.begin - static_cast<double>(sample - 1); };
-  const auto acts = [&](const Pulse& pulse) { return find_begin(pulse) <= kQuantum && find_begin(pulse) + pulse.length > 0.0; };
-  for (const Pulse& pulse : pulses_) {
-    if (acts(pulse)) wake(find_reach(pulse.strength_n_s));
+/// The samples of touch_: those of the sub-block in which a force is not zero. Times since the sample before the sub-block.
+void Voice::limit_touch(double begin, double end) noexcept {
+  touch_.first = std::clamp(static_cast<int>(std::ceil(begin)) - 1, 0, kSubBlock);
+  touch_.last = std::clamp(static_cast<int>(std::ceil(end)), touch_.first, kSubBlock);
+}
+
+void Voice::play_touch(int sub_block, float* out) noexcept {
+  kernels_->strike(model_->strike_.data(), model_->turn_.data(), touch_, sub_block, state_.data(), starts_.data(), live_, out);
+  count_work(live_, kSubBlock);
+}
+
+void Voice::play_pulses(std::int64_t sample, int sub_block, float* out) noexcept {
+  for (const QueuedPulse& pulse : strikes_.get_pulses()) {
+    if (acts_in_sub_block(pulse, sample)) wake(find_reach(pulse.strength_n_s));
   }
-  for (const Pulse& pulse : pulses_) {
-    if (!acts(pulse)) continue;
-    const double begin = find_begin(pulse);
-    touch_.first = std::clamp(static_cast<int>(std::ceil(begin)) - 1, 0, kQuantum);
-    touch_.last = std::clamp(static_cast<int>(std::ceil(begin + pulse.length)), touch_.first, kQuantum);
+  for (const QueuedPulse& pulse : strikes_.get_pulses()) {
+    if (!acts_in_sub_block(pulse, sample)) continue;
+    const double begin = pulse.begin - static_cast<double>(sample - 1);
+    limit_touch(begin, begin + pulse.length);
     for (int n = touch_.first; n < touch_.last; ++n) {
       const Moments moments = calc_pulse_moments(pulse.shape, begin - n, pulse.length);
       for (int j = 0; j < kTerms; ++j) touch_.moment[n][j] = static_cast<float>(moments[j]);
     }
     std::copy(std::begin(pulse.row), std::end(pulse.row), touch_.row);
     std::copy(std::begin(pulse.weight), std::end(pulse.weight), touch_.weight);
-    kernels_->strike(model_->strike_.data(), model_->turn_.data(), touch_, quantum, state_.data(), starts_.data(), live_, out);
-    counters_.mode_samples += static_cast<std::int64_t>(live_) * kGroup * kQuantum;
-  }
-  // Forces may be parts of one pulse, which only together lift a mode above the floor.
-  float strength = 0.0F;
-  for (const Steps& steps : forces_) strength += steps.strength_n_s;
-  for (const Steps& steps : forces_) {
-    if (steps.begin > static_cast<double>(sample - 1 + kQuantum) || steps.calc_end() <= static_cast<double>(sample - 1)) continue;
-    wake(find_reach(strength));
-    push_steps(steps, sample, quantum, out);
+    play_touch(sub_block, out);
   }
 }
 
-/// What a force makes in one quantum: a pulse along each of its directions.
-void Voice::push_steps(const Steps& steps, std::int64_t sample, int quantum, float* out) noexcept {
-  const double begin = steps.begin - static_cast<double>(sample - 1), end = steps.calc_end() - static_cast<double>(sample - 1);
-  touch_.first = std::clamp(static_cast<int>(std::ceil(begin)) - 1, 0, kQuantum);
-  touch_.last = std::clamp(static_cast<int>(std::ceil(end)), touch_.first, kQuantum);
-  std::array<StepMoments, kQuantum> moments;
-  for (int n = touch_.first; n < touch_.last; ++n) moments[static_cast<std::size_t>(n)] = calc_moments(steps, begin - n, steps.step);
-  for (int axis = 0; axis < steps.axes; ++axis) {
-    find_touch(steps, axis);
+/// Forces may be parts of one pulse, which only together lift a mode above the floor.
+void Voice::play_forces(std::int64_t sample, int sub_block, float* out) noexcept {
+  float strength_n_s = 0.0F;
+  for (const QueuedForce& force : strikes_.get_forces()) strength_n_s += force.strength_n_s;
+  for (const QueuedForce& force : strikes_.get_forces()) {
+    if (!force.get_interval().overlaps(sample, kSubBlock)) continue;
+    wake(find_reach(strength_n_s));
+    play_force(force, sample, sub_block, out);
+  }
+}
+
+/// A pulse along each direction of the force.
+void Voice::play_force(const QueuedForce& force, std::int64_t sample, int sub_block, float* out) noexcept {
+  const double begin = force.begin - static_cast<double>(sample - 1);
+  limit_touch(begin, force.calc_end() - static_cast<double>(sample - 1));
+  std::array<ForceMoments, kSubBlock> moments;
+  for (int n = touch_.first; n < touch_.last; ++n) moments[static_cast<std::size_t>(n)] = calc_force_moments(force, begin - n, force.step);
+  for (int axis = 0; axis < force.axes; ++axis) {
+    model_->find_rows(force.triangle, touch_.row);
+    force.find_weights(axis, touch_.weight);
     for (int n = touch_.first; n < touch_.last; ++n) {
       for (int j = 0; j < kTerms; ++j) touch_.moment[n][j] = static_cast<float>(moments[static_cast<std::size_t>(n)][axis][j]);
     }
-    kernels_->strike(model_->strike_.data(), model_->turn_.data(), touch_, quantum, state_.data(), starts_.data(), live_, out);
-    counters_.mode_samples += static_cast<std::int64_t>(live_) * kGroup * kQuantum;
-  }
-}
-
-/// phi . impulse of one of the modes that do not ring [N s kg^-1/2].
-double Voice::calc_amplitude(const std::int16_t* const* row, const float* weight, std::size_t mode) const noexcept {
-  const std::size_t column = static_cast<std::size_t>(groups_) * kGroup + mode;
-  double amplitude = 0.0;
-  for (int r = 0; r < kStrikeRows; ++r) amplitude += static_cast<double>(weight[r]) * row[r][column];
-  return amplitude * model_->damped_[mode].scale;
-}
-
-/// phi of one of them along the directions of a force.
-std::array<double, 3> Voice::calc_amplitudes(const Steps& steps, std::size_t mode) const noexcept {
-  const std::int16_t* row[kStrikeRows];
-  float weight[kStrikeRows];
-  find_rows(steps.triangle, row);
-  std::array<double, 3> amplitudes{};
-  for (int axis = 0; axis < steps.axes; ++axis) {
-    for (int r = 0; r < kStrikeRows; ++r) weight[r] = steps.barycentric[r / 3] * steps.axis[axis][r % 3];
-    amplitudes[static_cast<std::size_t>(axis)] = calc_amplitude(row, weight, mode);
-  }
-  return amplitudes;
-}
-
-/// A sample of a mode whose fast root f dies at once: with A the integral of the force times e^{-s age}, s the slow root, and B that of f
-/// e^{-f age}, q = (A - B / f) / (f - s), q' = (B - s A) / (f - s). B is the force 1 / f before, up to its second derivative over f
-/// squared. `n`: of the sample within the quantum that contacts drive, or -1.
-void Voice::follow_force(std::size_t mode, std::int64_t sample, int n) noexcept {
-  const auto& m = model_->damped_[mode];
-  DampedState& state = damped_[mode];
-  const double rate_hz = model_->rate_hz_, lag = rate_hz / m.fast;  // in samples
-  double slow = (m.fast * state.q + state.v) * std::exp(-m.slow / rate_hz), fast = 0.0;
-  if (n >= 0) {
-    const float* force = contacts_->get_damped_force(mode) + n;
-    const auto& ramp = contacts_->get_ramp();
-    const auto begin = static_cast<double>(force[0]), end = static_cast<double>(force[1]);
-    for (int j = 0; j < kMoments; ++j) slow += (begin * ramp[0][j] + end * ramp[1][j]) * m.force_q[j];
-    fast += end - lag * (end - begin);
-  }
-  for (const Pulse& pulse : pulses_) {
-    const double begin = pulse.begin - static_cast<double>(sample - 1);
-    if (begin > 1.0 || begin + pulse.length <= 0.0) continue;
-    const Moments moments = calc_pulse_moments(pulse.shape, begin, pulse.length);
-    const double amplitude = calc_amplitude(pulse.row, pulse.weight, mode);
-    for (int j = 0; j < kMoments; ++j) slow += amplitude * moments[j] * m.force_q[j];
-    if (pulse.length > 2.0 * lag) fast += amplitude * calc_pulse(pulse.shape, (1.0 - lag - begin) / pulse.length) * rate_hz / pulse.length;
-  }
-  for (const Steps& steps : forces_) {
-    const double begin = steps.begin - static_cast<double>(sample - 1);
-    if (begin > 1.0 || steps.calc_end() <= static_cast<double>(sample - 1)) continue;
-    const StepMoments moments = calc_moments(steps, begin, steps.step);
-    const std::array<double, 3> amplitudes = calc_amplitudes(steps, mode);
-    const double at = std::floor((1.0 - lag - begin) / steps.step);
-    for (int axis = 0; axis < steps.axes; ++axis) {
-      for (int j = 0; j < kMoments; ++j) slow += amplitudes[axis] * moments[axis][j] * m.force_q[j];
-      if (at >= 0.0 && at < steps.count) fast += amplitudes[axis] * steps.along[axis][static_cast<int>(at)] * rate_hz / steps.step;
-    }
-  }
-  const double width = m.fast - m.slow;
-  state = {(slow - fast / m.fast) / width, (fast - m.slow * slow) / width};
-}
-
-void Voice::add_damped(std::int64_t sample, bool struck, bool driven, float* out) noexcept {
-  const bool forced = struck || driven;
-  const auto& modes = model_->damped_;
-  damped_live_ = !modes.empty();
-  for (std::size_t first = 0; first < modes.size();) {
-    const int substeps = forced ? modes[first].substeps : 1;
-    std::size_t last = first + 1;
-    while (last < modes.size() && (!forced || modes[last].substeps == substeps)) ++last;
-    for (int n = 0; n < kQuantum; ++n) {
-      for (std::size_t i = first; forced && substeps == 0 && i < last; ++i) follow_force(i, sample + n, driven ? n : -1);
-      for (int step = 0; forced && step < substeps; ++step) {
-        for (std::size_t i = first; i < last; ++i) {
-          const auto& m = modes[i];
-          DampedState& s = damped_[i];
-          s = {m.sub_qq * s.q + m.sub_qv * s.v, m.sub_vq * s.q + m.sub_vv * s.v};
-        }
-        for (std::size_t i = first; driven && i < last; ++i) {
-          // From the sample before to this one, the force goes in a line.
-          const auto& m = modes[i];
-          const float* force = contacts_->get_damped_force(i) + n;
-          const auto& ramp = contacts_->get_ramp();
-          const double slope = (static_cast<double>(force[1]) - static_cast<double>(force[0])) / substeps;
-          const double begin = static_cast<double>(force[0]) + slope * step;
-          for (int j = 0; j < kMoments; ++j) {
-            const double impulse = (begin * ramp[0][j] + (begin + slope) * ramp[1][j]) / substeps;
-            damped_[i].q += impulse * m.force_q[j];
-            damped_[i].v += impulse * m.force_v[j];
-          }
-        }
-        for (const Pulse& pulse : pulses_) {
-          const double begin = pulse.begin - static_cast<double>(sample - 1 + n);
-          if (begin > 1.0 || begin + pulse.length <= 0.0) continue;
-          const Moments moments = calc_pulse_moments(pulse.shape, begin * substeps - step, pulse.length * substeps);
-          if (moments[0] == 0.0) continue;
-          for (std::size_t i = first; i < last; ++i) {
-            const auto& m = modes[i];
-            const double amplitude = calc_amplitude(pulse.row, pulse.weight, i);
-            for (int j = 0; j < kMoments; ++j) {
-              damped_[i].q += amplitude * moments[j] * m.force_q[j];
-              damped_[i].v += amplitude * moments[j] * m.force_v[j];
-            }
-          }
-        }
-        for (const Steps& steps : forces_) {
-          const double begin = steps.begin - static_cast<double>(sample - 1 + n),
-                       end = steps.calc_end() - static_cast<double>(sample - 1 + n);
-          if (begin * substeps - step > 1.0 || end * substeps - step <= 0.0) continue;
-          const StepMoments moments = calc_moments(steps, begin * substeps - step, steps.step * substeps);
-          for (std::size_t i = first; i < last; ++i) {
-            const auto& m = modes[i];
-            const std::array<double, 3> amplitudes = calc_amplitudes(steps, i);
-            for (int axis = 0; axis < steps.axes; ++axis) {
-              for (int j = 0; j < kMoments; ++j) {
-                damped_[i].q += amplitudes[axis] * moments[axis][j] * m.force_q[j];
-                damped_[i].v += amplitudes[axis] * moments[axis][j] * m.force_v[j];
-              }
-            }
-          }
-        }
-      }
-      double pressure = 0.0;
-      for (std::size_t i = first; i < last; ++i) {
-        const auto& m = modes[i];
-        DampedState& s = damped_[i];
-        if (!forced) s = {m.qq * s.q + m.qv * s.v, m.vq * s.q + m.vv * s.v};
-        pressure += m.gain * s.v;
-      }
-      out[n] += static_cast<float>(pressure);
-    }
-    first = last;
+    play_touch(sub_block, out);
   }
 }
 
@@ -465,13 +233,7 @@ void Voice::cull() noexcept {
     if (bound >= share) break;
     state = ModeState{};
   }
-  double bound = 0.0;
-  for (std::size_t i = 0; i < damped_.size(); ++i) {
-    // q' of an unforced mode never exceeds |q'| + 2 omega |q| from here on.
-    bound += (std::abs(damped_[i].v) + model_->damped_[i].bound * std::abs(damped_[i].q)) * std::abs(model_->damped_[i].gain);
-  }
-  damped_live_ = damped_live_ && bound >= share;
-  if (!damped_live_) std::fill(damped_.begin(), damped_.end(), DampedState{});
+  damped_.drop_below(share);
 }
 
 std::span<const float> Voice::measure(float nearness) noexcept {
@@ -492,14 +254,14 @@ std::span<const float> Voice::measure(float nearness) noexcept {
   return get_measured();
 }
 
-/// Renders the groups from `groups` on once more, on their way out, for the period that begins.
+/// Renders the groups from `groups` on once more, on their way out, for the block that begins.
 void Voice::fade_out(int groups) noexcept {
   const int gone = live_ - groups;
   if (!fading_) fade_.fill(0.0F);
   block_.fill(0.0F);  // not yet in use
   kernels_->ring(model_->sound_.data() + groups, model_->turn_.data() + groups, state_.data() + groups, gone, block_.data());
-  counters_.mode_samples += static_cast<std::int64_t>(gone) * kGroup * kPeriod;
-  for (int n = 0; n < kPeriod; ++n) fade_[n] += block_[n] * (1.0F - static_cast<float>(n) / kPeriod);
+  count_work(gone, kBlock);
+  for (int n = 0; n < kBlock; ++n) fade_[n] += block_[n] * (1.0F - static_cast<float>(n) / kBlock);
   std::fill(state_.begin() + groups, state_.begin() + live_, ModeState{});
   live_ = groups;
   fading_ = true;
@@ -507,7 +269,7 @@ void Voice::fade_out(int groups) noexcept {
 
 void Voice::set_limit(int modes) noexcept { limit_ = std::clamp((modes + kGroup - 1) / kGroup, std::min(1, groups_), groups_); }
 
-/// At the start of a period: holds the energy against that of the period before, when nothing acted in it.
+/// At the start of a block: holds the energy against that of the block before, when nothing acted in it.
 void Voice::audit() noexcept {
   constexpr double kSmallest = 1e-280;  // below, squares are flushed to zero one by one
   const double before = std::exchange(energy_j_, calc_energy_j());
@@ -522,23 +284,26 @@ void Voice::audit() noexcept {
 
 void Voice::reset() noexcept {
   std::fill(state_.begin(), state_.end(), ModeState{});
-  std::fill(damped_.begin(), damped_.end(), DampedState{});
+  damped_.reset();
   live_ = 0;
-  damped_live_ = false;
   fading_ = inherits_ = false;
-  pulses_.clear();
-  forces_.clear();
+  strikes_.clear();
   ++counters_.resets;
 }
 
 std::size_t Voice::calc_bytes() const {
-  return sizeof(Voice) + state_.capacity() * sizeof(ModeState) + starts_.capacity() * sizeof(Starts) +
-         damped_.capacity() * sizeof(DampedState) + damped_amplitude_.capacity() * sizeof(double) + pulses_.capacity() * sizeof(Pulse) +
-         forces_.capacity() * sizeof(Steps) + bounds_.capacity() * sizeof(float) + radiation_.capacity() * sizeof(Radiation);
+  return sizeof(Voice) + strikes_.calc_bytes() + damped_.calc_bytes() + state_.capacity() * sizeof(ModeState) +
+         starts_.capacity() * sizeof(SubBlockStates) + bounds_.capacity() * sizeof(float) + radiation_.capacity() * sizeof(Radiation);
+}
+
+VoiceCounters Voice::get_counters() const noexcept {
+  VoiceCounters counters = counters_;
+  static_cast<StrikeCounters&>(counters) = strikes_.get_counters();
+  return counters;
 }
 
 int Voice::get_live_mode_count() const {
-  return std::min(live_ * kGroup, model_->ringing_) + (damped_live_ ? static_cast<int>(damped_.size()) : 0);
+  return std::min(live_ * kGroup, model_->ringing_) + (damped_.is_live() ? static_cast<int>(damped_.get_count()) : 0);
 }
 
 double Voice::calc_ringing_energy_j(int m) const noexcept {
@@ -553,11 +318,7 @@ double Voice::calc_ringing_energy_j(int m) const noexcept {
 double Voice::calc_energy_j() const noexcept {
   double energy = 0.0;
   for (int m = 0; m < std::min(live_ * kGroup, model_->ringing_); ++m) energy += calc_ringing_energy_j(m);
-  for (std::size_t i = 0; i < damped_.size(); ++i) {
-    const double lambda = model_->modes_[static_cast<std::size_t>(model_->ringing_) + i].lambda;
-    energy += 0.5 * (damped_[i].v * damped_[i].v + lambda * damped_[i].q * damped_[i].q);
-  }
-  return energy;
+  return energy + damped_.calc_energy_j();
 }
 
 }  // namespace carillon::synth

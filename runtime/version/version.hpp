@@ -6,7 +6,7 @@
 
 namespace carillon::version {
 
-/// "carillon-mesh 0.1.0 (3f2a...)": name, version and commit of the build; without the brackets where the build knows no commit.
+/// "carillon-mesh 0.1.0 (3f2a...)": name, version and commit of the build; without the brackets where the commit is not known.
 std::string describe(std::string_view program);
 
 /// "0.1.0".

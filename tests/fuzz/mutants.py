@@ -3,8 +3,9 @@
 
 usage: mutants.py BIN_DIR KIND COUNT [--seed N] [--keep FOLDER]
 
-BIN_DIR holds the libFuzzer targets (preset fuzz). Every mutant goes through the target of its kind (fuzz_play_scene, fuzz_play_contacts, fuzz_job, fuzz_play_bank), which reads
-and plays it; under the sanitizers a fault ends the target, and so do 20 s on one input or 3 GB. Exit code 1 and the mutant's name when one does; it is kept in --keep.
+BIN_DIR holds the libFuzzer targets (preset fuzz). Every mutant goes through the target of its kind (fuzz_play_scene, fuzz_play_contacts,
+fuzz_job, fuzz_play_bank), which reads and plays it; under the sanitizers a fault ends the target, and so do 20 s on one input or 3 GB. Exit
+code 1 and the mutant's name when one does; it is kept in --keep.
 """
 import argparse
 import collections
@@ -25,9 +26,98 @@ import numpy
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BATCH = 250
-NUMBERS = [0, -0.0, 1, -1, 2, 3, 7, 0.1, 0.5, 0.25, 1e-3, 1e-6, 1e-9, 1e-12, 1e-300, 5e-324, 1e3, 1e6, 1e9, 1e12, 1e300, -1e-3, -1e9, 2**31 - 1, 2**31, 2**32, 2**53, 2**63, -(2**63), 48000, 8000, 0.4999999, 1.0000001]
-WORDS = ["", " ", "auto", "cube", "shelf", "modal", "roughness", "rolling", "two_ears", "begin", "hold", "end", "hertz", "gaussian", "x-min", "T4", "T10", "bar", "sphere", "\u001b[31m", "\u202e", "\u0000", "a" * 300, "../..", "/dev/zero", "nan", "1e5"]
-RAW = ["012", "-01", "+1", "1.", ".5", "0x10", "NaN", "Infinity", "1e999", "-1e999", "1e", "--1", "truefalse", "[[", "]]", "{", "}", ",", ":", "//", "/*", "\"", "\\u", "\x1b", "\x9b", "\xff"]
+NUMBERS = [
+    0,
+    -0.0,
+    1,
+    -1,
+    2,
+    3,
+    7,
+    0.1,
+    0.5,
+    0.25,
+    1e-3,
+    1e-6,
+    1e-9,
+    1e-12,
+    1e-300,
+    5e-324,
+    1e3,
+    1e6,
+    1e9,
+    1e12,
+    1e300,
+    -1e-3,
+    -1e9,
+    2**31 - 1,
+    2**31,
+    2**32,
+    2**53,
+    2**63,
+    -(2**63),
+    48000,
+    8000,
+    0.4999999,
+    1.0000001,
+]
+WORDS = [
+    "",
+    " ",
+    "auto",
+    "cube",
+    "shelf",
+    "modal",
+    "roughness",
+    "rolling",
+    "two_ears",
+    "begin",
+    "hold",
+    "end",
+    "hertz",
+    "gaussian",
+    "x-min",
+    "T4",
+    "T10",
+    "bar",
+    "sphere",
+    "\u001b[31m",
+    "\u202e",
+    "\u0000",
+    "a" * 300,
+    "../..",
+    "/dev/zero",
+    "nan",
+    "1e5",
+]
+RAW = [
+    "012",
+    "-01",
+    "+1",
+    "1.",
+    ".5",
+    "0x10",
+    "NaN",
+    "Infinity",
+    "1e999",
+    "-1e999",
+    "1e",
+    "--1",
+    "truefalse",
+    "[[",
+    "]]",
+    "{",
+    "}",
+    ",",
+    ":",
+    "//",
+    "/*",
+    '"',
+    "\\u",
+    "\x1b",
+    "\x9b",
+    "\xff",
+]
 
 
 def list_places(value, path=()):
@@ -117,18 +207,20 @@ def mutate_bytes(draw, data):
         if kind == 0 and at < len(data):
             data[at] = draw.randrange(256)
         elif kind == 1:
-            del data[at: at + draw.randint(1, 40)]
+            del data[at : at + draw.randint(1, 40)]
         elif kind == 2:
             data[at:at] = draw.choice(RAW).encode("latin-1")
         else:
-            data[at:at] = data[at: at + draw.randint(1, 80)]
+            data[at:at] = data[at : at + draw.randint(1, 80)]
     return bytes(data)
 
 
 def write_json(draw, value, share=0.1):
     text = json.dumps(value)
     if draw.random() < share:  # a number written as JSON does not have it
-        words = [i for i, letter in enumerate(text) if letter.isdigit() and (i == 0 or not text[i - 1].isalnum() and text[i - 1] not in ".-_")]
+        words = [
+            i for i, letter in enumerate(text) if letter.isdigit() and (i == 0 or not text[i - 1].isalnum() and text[i - 1] not in ".-_")
+        ]
         if words:
             at = draw.choice(words)
             text = text[:at] + draw.choice(RAW) + text[at:]
@@ -231,13 +323,22 @@ def change_array(draw, array):
                 flat[at] = flat[draw.randrange(flat.size)]
         else:
             limits = numpy.iinfo(values.dtype)
-            flat[at] = draw.choice([0, 1, limits.max, limits.min, min(max(int(flat[at]) + draw.randint(-3, 3), limits.min), limits.max), int(flat[draw.randrange(flat.size)])])
+            flat[at] = draw.choice(
+                [
+                    0,
+                    1,
+                    limits.max,
+                    limits.min,
+                    min(max(int(flat[at]) + draw.randint(-3, 3), limits.min), limits.max),
+                    int(flat[draw.randrange(flat.size)]),
+                ]
+            )
     array[()] = values
 
 
 def read_seeds(kind):
     if kind == "bank":
-        return [path.read_bytes() for path in sorted((ROOT / "tests/bank/pinned").iterdir())]
+        return [path.read_bytes() for path in sorted((ROOT / "tests/unit/runtime/bank/pinned").iterdir())]
     folder = ROOT / "tests/fuzz" / f"{kind}s" if kind != "contacts" else ROOT / "tests/fuzz/contacts"
     files = sorted(path for path in folder.iterdir() if path.is_file())
     if kind == "contacts":
@@ -245,14 +346,31 @@ def read_seeds(kind):
     return [json.loads(path.read_text()) for path in files]
 
 
-KINDS = {"scene": ("fuzz_play_scene", make_text), "contacts": ("fuzz_play_contacts", make_lines), "job": ("fuzz_job", make_text), "bank": ("fuzz_play_bank", make_bank)}
+KINDS = {
+    "scene": ("fuzz_play_scene", make_text),
+    "contacts": ("fuzz_play_contacts", make_lines),
+    "job": ("fuzz_job", make_text),
+    "bank": ("fuzz_play_bank", make_bank),
+}
 
 
 def run_batch(program, files):
-    environment = {**os.environ, "UBSAN_OPTIONS": "halt_on_error=1:print_stacktrace=1", "ASAN_OPTIONS": "detect_leaks=1:allocator_may_return_null=0", "OPENBLAS_NUM_THREADS": "1"}
+    environment = {
+        **os.environ,
+        "UBSAN_OPTIONS": "halt_on_error=1:print_stacktrace=1",
+        "ASAN_OPTIONS": "detect_leaks=1:allocator_may_return_null=0",
+        "OPENBLAS_NUM_THREADS": "1",
+    }
     with tempfile.TemporaryDirectory() as scratch:
-        return subprocess.run([str(program), "-timeout=20", "-rss_limit_mb=3000", "-close_fd_mask=1", f"-artifact_prefix={scratch}/", *map(str, files)], cwd=scratch, env=environment,
-                              capture_output=True, text=True, errors="replace", stdin=subprocess.DEVNULL)
+        return subprocess.run(
+            [str(program), "-timeout=20", "-rss_limit_mb=3000", "-close_fd_mask=1", f"-artifact_prefix={scratch}/", *map(str, files)],
+            cwd=scratch,
+            env=environment,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            stdin=subprocess.DEVNULL,
+        )
 
 
 def main():
@@ -287,10 +405,18 @@ def main():
                     faults += 1
                     options.keep.mkdir(parents=True, exist_ok=True)
                     shutil.copy(file, options.keep / file.name)
-                    print(f"{options.keep / file.name}: exit code {alone.returncode}\n" + "\n".join(line for line in alone.stderr.splitlines() if "ERROR" in line or "runtime error" in line or "#" in line)[:2000], flush=True)
+                    print(
+                        f"{options.keep / file.name}: exit code {alone.returncode}\n"
+                        + "\n".join(
+                            line for line in alone.stderr.splitlines() if "ERROR" in line or "runtime error" in line or "#" in line
+                        )[:2000],
+                        flush=True,
+                    )
             for file in files:
                 file.unlink()
-    print(f"{options.kind}: {options.count} mutants, {faults} faults" + "".join(f", {count} {what}" for what, count in sorted(tally.items())))
+    print(
+        f"{options.kind}: {options.count} mutants, {faults} faults" + "".join(f", {count} {what}" for what, count in sorted(tally.items()))
+    )
     return 1 if faults else 0
 
 

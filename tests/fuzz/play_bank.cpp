@@ -3,8 +3,8 @@
 
 #include "runtime/bank/edits.hpp"
 #include "runtime/bank/report.hpp"
-#include "tests/bank/seal_again.hpp"
 #include "tests/fuzz/play.hpp"
+#include "tests/unit/runtime/bank/seal_again.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace carillon;
@@ -21,7 +21,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     bank::format_info(bank, file, 100, true);
     bank::format_info_json(bank, file);
     if (bank.mode_count() > 200 || bank.triangles.size() > 2000) {
-      fuzz::tell("only read");
+      fuzz::report("only read");
       return 0;
     }
     bank::calc_edited(bank, {.density_scale = 2.0, .stiffness_scale = 0.5, .size_scale = 1.5});

@@ -11,11 +11,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const bool is_small =
         scene.duration_s <= 0.15 && scene.bodies.size() <= 4 && scene.strikes.size() <= 100 && scene.sample_rate_hz <= 96000;
     if (!is_small || scene.quality.contact_step_s < 1e-4) {
-      fuzz::tell("only read");
+      fuzz::report("only read");
       return 0;
     }
   } catch (const InputError&) {
-    fuzz::tell("refused");
+    fuzz::report("refused");
     return 0;
   }
   fuzz::play({.scene = file});

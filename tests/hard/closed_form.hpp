@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "runtime/synth/voice.hpp"
-#include "tests/synth/cube_bank.hpp"
+#include "tests/unit/runtime/synth/cube_bank.hpp"
 
 namespace carillon::hard {
 

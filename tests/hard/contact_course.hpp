@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "runtime/contact/world.hpp"
-#include "tests/contact/bodies.hpp"
-#include "tests/shape/solids.hpp"
+#include "tests/unit/runtime/contact/bodies.hpp"
+#include "tests/unit/runtime/shape/solids.hpp"
 
 namespace carillon::hard {
 
@@ -51,19 +51,19 @@ inline BodySpec make_body(const bank::Bank& bank, Vec3 position, double restitut
 
 /// What a world did until its end.
 struct Course {
-  std::vector<stream::Motion> middle, end;
+  std::vector<events::BodyMotion> middle, end;
   contact::EnergyAudit energy;
   int hits = 0;
 };
 
 /// Calls `look` (may be empty) with every motion.
-inline Course run(const WorldSpec& spec, double middle_s, double end_s, const std::function<void(const stream::Motion&)>& look = {}) {
+inline Course run(const WorldSpec& spec, double middle_s, double end_s, const std::function<void(const events::BodyMotion&)>& look = {}) {
   World world(spec, {.end_s = end_s, .lasting_contacts = false, .audits_energy = true});
   Course course;
   course.end.resize(spec.bodies.size());
-  const auto take = [&](const stream::Event& e) {
-    if (std::holds_alternative<stream::Impulse>(e)) ++course.hits;
-    const auto* m = std::get_if<stream::Motion>(&e);
+  const auto take = [&](const events::Event& e) {
+    if (std::holds_alternative<events::Impulse>(e)) ++course.hits;
+    const auto* m = std::get_if<events::BodyMotion>(&e);
     if (m == nullptr) return;
     course.end[static_cast<std::size_t>(m->body)] = *m;
     if (look) look(*m);
@@ -86,7 +86,7 @@ inline double calc_drift(const Course& course) {
 inline double calc_rise(const Course& course) { return std::max(course.energy.rise_j, course.energy.hit_rise_j) / course.energy.weight_n; }
 
 /// How far the lowest corner of a body is below z = 0 [m].
-inline double calc_depth(const bank::Bank& bank, const stream::Motion& motion) {
+inline double calc_depth(const bank::Bank& bank, const events::BodyMotion& motion) {
   double depth = -1.0;
   for (const auto& x : bank.vertices_m)
     depth = std::max(depth, -(motion.position_m[2] + contact::tests::rotate(motion.rotation, x - bank.rigid.centre_m)[2]));

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""The same matrices solved by others: K and M of `carillon-precompute --matrices`, by scipy's eigsh (ARPACK on SuperLU) and by Spectra (on Eigen's L D L^T).
+"""The same matrices solved by others: K and M of `carillon-precompute --matrices`, by scipy's eigsh (ARPACK on SuperLU) and by Spectra (on
+Eigen's L D L^T).
 
 usage: cross.py CASE      holds the largest relative difference of a frequency of the band, from either, to 1e-8; the counts must be equal
 """
@@ -21,9 +22,19 @@ import figure
 BIN = pathlib.Path(os.environ.get("CARILLON_BIN_DIR", "build/release/bin")).resolve()
 STEEL = {"young_modulus_pa": 200e9, "poisson_ratio": 0.3, "density_kg_m3": 7850}
 CERAMIC = {"young_modulus_pa": 5.454e9, "poisson_ratio": 0.33, "density_kg_m3": 2700}
-ALUMINIUM, RUBBER = {"young_modulus_pa": 70e9, "poisson_ratio": 0.33, "density_kg_m3": 2700}, {"young_modulus_pa": 10e6, "poisson_ratio": 0.4999, "density_kg_m3": 1100}
-SPRUCE = {"orthotropic": {"young_modulus_pa": [10.8e9, 0.84e9, 0.46e9], "shear_modulus_pa": [0.69e9, 0.032e9, 0.66e9], "poisson_ratio": [0.372, 0.435, 0.467]},
-          "density_kg_m3": 400}
+ALUMINIUM, RUBBER = {"young_modulus_pa": 70e9, "poisson_ratio": 0.33, "density_kg_m3": 2700}, {
+    "young_modulus_pa": 10e6,
+    "poisson_ratio": 0.4999,
+    "density_kg_m3": 1100,
+}
+SPRUCE = {
+    "orthotropic": {
+        "young_modulus_pa": [10.8e9, 0.84e9, 0.46e9],
+        "shear_modulus_pa": [0.69e9, 0.032e9, 0.66e9],
+        "poisson_ratio": [0.372, 0.435, 0.467],
+    },
+    "density_kg_m3": 400,
+}
 DAMPING = {"damping": {"rayleigh": {"alpha1_s": 1e-7, "alpha2_per_s": 1}}}
 BUNNY = "/usr/share/glmark2/models/bunny.obj"  # of Debian's glmark2-data
 
@@ -50,23 +61,74 @@ def write_two_halves(path, cells=(8, 2, 2), size_m=(0.3, 0.03, 0.02)):
     path.write_text("\n".join([*lines, "$EndElements", ""]))
 
 
-# Of each body: element, band [Hz], and what else its job says. "write" writes the job's mesh, "mesh" are the words with which carillon-mesh makes it.
+# Of each body: element, band [Hz], and what else its job says. "write" writes the job's mesh, "mesh" are the words with which carillon-mesh
+# makes it.
 BODIES = {
-    "matrices_bar": {"element": "T4", "band_hz": [20, 40e3], "body": {"shape": "bar", "length_m": 0.3, "width_m": 0.02, "thickness_m": 0.01, "nodes": 500}},
-    "matrices_tube": {"element": "T10", "band_hz": [20, 9e3], "material": ALUMINIUM,
-                      "body": {"shape": "tube", "length_m": 0.3, "outer_radius_m": 0.0125, "wall_m": 0.001, "nodes": 800}},
+    "matrices_bar": {
+        "element": "T4",
+        "band_hz": [20, 40e3],
+        "body": {"shape": "bar", "length_m": 0.3, "width_m": 0.02, "thickness_m": 0.01, "nodes": 500},
+    },
+    "matrices_tube": {
+        "element": "T10",
+        "band_hz": [20, 9e3],
+        "material": ALUMINIUM,
+        "body": {"shape": "tube", "length_m": 0.3, "outer_radius_m": 0.0125, "wall_m": 0.001, "nodes": 800},
+    },
     "matrices_sphere": {"element": "T10", "band_hz": [20, 58e3], "body": {"shape": "sphere", "radius_m": 0.05, "nodes": 900}},
-    "matrices_plate": {"element": "T10", "band_hz": [20, 5e3], "body": {"shape": "plate", "length_m": 0.2, "width_m": 0.2, "thickness_m": 0.005, "nodes": 900}},
-    "matrices_cube": {"element": "T4", "band_hz": [20, 58e3], "body": {"shape": "box", "length_m": 0.05, "width_m": 0.05, "height_m": 0.05, "nodes": 700}},
-    "matrices_ring": {"element": "T10", "band_hz": [20, 20e3], "mass": "lumped",
-                      "body": {"shape": "tube", "length_m": 0.012, "outer_radius_m": 0.04, "wall_m": 0.01, "nodes": 900}},
-    "matrices_bowl": {"element": "T10", "band_hz": [20, 20e3], "material": CERAMIC, "body": {"shape": "bowl", "outer_radius_m": 0.062, "wall_m": 0.004, "nodes": 1200}},
-    "matrices_two_materials": {"element": "T10", "band_hz": [20, 20e3], "materials": {"1": STEEL, "2": ALUMINIUM}, "write": write_two_halves},
-    "matrices_orthotropic": {"element": "T10", "band_hz": [20, 20e3], "material": SPRUCE, "body": {"shape": "box", "length_m": 0.085, "width_m": 0.065, "height_m": 0.05, "nodes": 700}},
-    "matrices_near_incompressible": {"element": "T10", "band_hz": [20, 1.2e3], "material": RUBBER, "body": {"shape": "sphere", "radius_m": 0.05, "nodes": 900}},
-    "matrices_fixed": {"element": "T10", "band_hz": [20, 20e3], "material": ALUMINIUM, "fixed": "x-min",
-                      "body": {"shape": "bar", "length_m": 0.3, "width_m": 0.03, "thickness_m": 0.012, "nodes": 900}},
-    "matrices_bunny": {"element": "T4", "band_hz": [20, 20e3], "material": CERAMIC, "mesh": ["--height", 0.13, "--wall", 0.012, "--nodes", 1500]},
+    "matrices_plate": {
+        "element": "T10",
+        "band_hz": [20, 5e3],
+        "body": {"shape": "plate", "length_m": 0.2, "width_m": 0.2, "thickness_m": 0.005, "nodes": 900},
+    },
+    "matrices_cube": {
+        "element": "T4",
+        "band_hz": [20, 58e3],
+        "body": {"shape": "box", "length_m": 0.05, "width_m": 0.05, "height_m": 0.05, "nodes": 700},
+    },
+    "matrices_ring": {
+        "element": "T10",
+        "band_hz": [20, 20e3],
+        "mass": "lumped",
+        "body": {"shape": "tube", "length_m": 0.012, "outer_radius_m": 0.04, "wall_m": 0.01, "nodes": 900},
+    },
+    "matrices_bowl": {
+        "element": "T10",
+        "band_hz": [20, 20e3],
+        "material": CERAMIC,
+        "body": {"shape": "bowl", "outer_radius_m": 0.062, "wall_m": 0.004, "nodes": 1200},
+    },
+    "matrices_two_materials": {
+        "element": "T10",
+        "band_hz": [20, 20e3],
+        "materials": {"1": STEEL, "2": ALUMINIUM},
+        "write": write_two_halves,
+    },
+    "matrices_orthotropic": {
+        "element": "T10",
+        "band_hz": [20, 20e3],
+        "material": SPRUCE,
+        "body": {"shape": "box", "length_m": 0.085, "width_m": 0.065, "height_m": 0.05, "nodes": 700},
+    },
+    "matrices_near_incompressible": {
+        "element": "T10",
+        "band_hz": [20, 1.2e3],
+        "material": RUBBER,
+        "body": {"shape": "sphere", "radius_m": 0.05, "nodes": 900},
+    },
+    "matrices_fixed": {
+        "element": "T10",
+        "band_hz": [20, 20e3],
+        "material": ALUMINIUM,
+        "fixed": "x-min",
+        "body": {"shape": "bar", "length_m": 0.3, "width_m": 0.03, "thickness_m": 0.012, "nodes": 900},
+    },
+    "matrices_bunny": {
+        "element": "T4",
+        "band_hz": [20, 20e3],
+        "material": CERAMIC,
+        "mesh": ["--height", 0.13, "--wall", 0.012, "--nodes", 1500],
+    },
 }
 
 
@@ -103,8 +165,19 @@ def solve_by_scipy(stiffness, mass, modes, sigma):
 
     inverse = scipy.sparse.linalg.LinearOperator(stiffness.shape, matvec=solve, dtype=float)
     start = np.random.default_rng(1).standard_normal(stiffness.shape[0])
-    return np.sort(scipy.sparse.linalg.eigsh(stiffness, k=modes, M=mass, sigma=sigma, OPinv=inverse, tol=1e-13, v0=start, ncv=min(3 * modes + 20, len(start)),
-                                             return_eigenvectors=False))
+    return np.sort(
+        scipy.sparse.linalg.eigsh(
+            stiffness,
+            k=modes,
+            M=mass,
+            sigma=sigma,
+            OPinv=inverse,
+            tol=1e-13,
+            v0=start,
+            ncv=min(3 * modes + 20, len(start)),
+            return_eigenvectors=False,
+        )
+    )
 
 
 def solve_by_spectra(folder, modes, sigma):
@@ -133,8 +206,16 @@ def check(case):
         modes = len(freq_hz) + rigid + 4
         sigma = -0.3 * (2 * np.pi * freq_hz[0]) ** 2  # below all of them
         assert len(freq_hz) >= 8, f"{len(freq_hz)} modes prove little"
-        for solver, lambdas in (("scipy", solve_by_scipy(stiffness, mass, modes, sigma)), ("Spectra", solve_by_spectra(folder, modes, sigma))):
-            figure.hold(case, find_difference(lambdas, body["band_hz"], rigid, freq_hz), 1e-8, f"{solver}, {len(freq_hz)} modes of {stiffness.shape[0]} unknowns")
+        for solver, lambdas in (
+            ("scipy", solve_by_scipy(stiffness, mass, modes, sigma)),
+            ("Spectra", solve_by_spectra(folder, modes, sigma)),
+        ):
+            figure.hold(
+                case,
+                find_difference(lambdas, body["band_hz"], rigid, freq_hz),
+                1e-8,
+                f"{solver}, {len(freq_hz)} modes of {stiffness.shape[0]} unknowns",
+            )
 
 
 if __name__ == "__main__":

@@ -1,7 +1,9 @@
-"""Frequencies of tetrahedral bodies by an assembly of our own and LAPACK or ARPACK: an oracle that shares no code with the programs under test.
+"""Frequencies of tetrahedral bodies by an assembly of our own and LAPACK or ARPACK: an oracle that shares no code with the programs under
+test.
 
-T4 and straight T10, by quadrature; consistent mass, or lumped by HRZ (Hinton, Rock and Zienkiewicz 1976). C is (6, 6) in Voigt's order xx yy zz yz xz xy.
-Where the rounding of K is too much for the truth, `refine_frequencies` takes the strain energy element by element in long double, K being only its guide.
+T4 and straight T10, by quadrature; consistent mass, or lumped by HRZ (Hinton, Rock and Zienkiewicz 1976). C is (6, 6) in Voigt's order xx
+yy zz yz xz xy. Where the rounding of K is too much for the truth, `refine_frequencies` takes the strain energy element by element in long
+double, K being only its guide.
 """
 import itertools
 
@@ -32,6 +34,7 @@ def orthotropic(young, shear, nu):
 def find_rule(n=4):
     """Barycentric points (q, 4) and weights (q) of the collapsed Gauss-Jacobi rule: exact to degree 2 n - 1."""
     from scipy.special import roots_jacobi
+
     rules = [roots_jacobi(n, power, 0) for power in (2, 1, 0)]
     points, weights = [], []
     for (a, wa), (b, wb), (c, wc) in itertools.product(*(list(zip(*r)) for r in rules)):
@@ -93,7 +96,11 @@ def assemble(solid, c, density, lumped=False):
 
 def find_frequencies(stiffness, mass, count, high_hz, held=()):
     """The `count` lowest frequencies [Hz] at all, the zeros among them, near the band that ends at high_hz."""
-    keep = np.setdiff1d(np.arange(stiffness.shape[0]), (3 * np.asarray(held, int)[:, None] + np.arange(3)).ravel()) if len(held) else slice(None)
+    keep = (
+        np.setdiff1d(np.arange(stiffness.shape[0]), (3 * np.asarray(held, int)[:, None] + np.arange(3)).ravel())
+        if len(held)
+        else slice(None)
+    )
     k, m = stiffness[keep][:, keep], mass[keep][:, keep]
     if k.shape[0] <= 600:
         values = scipy.linalg.eigh(k.toarray(), m.toarray(), eigvals_only=True, driver="gvd")[:count]
@@ -104,8 +111,8 @@ def find_frequencies(stiffness, mass, count, high_hz, held=()):
 
 
 class Strain:
-    """What `assemble` calls K, never assembled: forces (3 N, m) of displacements (3 N, m), in long double and of differences within each element, so that
-    nearly rigid motions of stiff elements cost no digits."""
+    """What `assemble` calls K, never assembled: forces (3 N, m) of displacements (3 N, m), in long double and of differences within each
+    element, so that nearly rigid motions of stiff elements cost no digits."""
 
     def __init__(self, solid, c):
         self.tets = solid.tets
@@ -127,7 +134,9 @@ class Strain:
         for inner, weight in zip(self.inner, self.weights):
             g = np.einsum("nl,elr->enr", inner, self.gradient)
             h = np.einsum("enr,endm->edrm", g, moved)
-            strain = np.stack([h[:, 0, 0], h[:, 1, 1], h[:, 2, 2], h[:, 1, 2] + h[:, 2, 1], h[:, 0, 2] + h[:, 2, 0], h[:, 0, 1] + h[:, 1, 0]], 1)
+            strain = np.stack(
+                [h[:, 0, 0], h[:, 1, 1], h[:, 2, 2], h[:, 1, 2] + h[:, 2, 1], h[:, 0, 2] + h[:, 2, 0], h[:, 0, 1] + h[:, 1, 0]], 1
+            )
             stress = np.einsum("eij,ejm->eim", self.c, strain) * weight[:, None, None]
             tensor = stress[:, [[0, 5, 4], [5, 1, 3], [4, 3, 2]]]
             force += np.einsum("enr,edrm->endm", g, tensor)
@@ -137,8 +146,8 @@ class Strain:
 
 
 def refine_frequencies(solid, c, density, lumped, count, band_hz):
-    """The frequencies [Hz] within the band, of the `count` lowest at all, without the rounding of K and of its factors: inverse iteration on each mode,
-    written as a correction whose residual is of `Strain`, until its Rayleigh quotient stands still."""
+    """The frequencies [Hz] within the band, of the `count` lowest at all, without the rounding of K and of its factors: inverse iteration
+    on each mode, written as a correction whose residual is of `Strain`, until its Rayleigh quotient stands still."""
     k, m = assemble(solid, c, density, lumped)
     exact, m_long = Strain(solid, c), m.tocoo()
 
@@ -146,6 +155,7 @@ def refine_frequencies(solid, c, density, lumped, count, band_hz):
         out = np.zeros_like(x)
         np.add.at(out, m_long.row, m_long.data.astype(np.longdouble)[:, None] * x[m_long.col])
         return out
+
     low, high = ((2 * np.pi * f) ** 2 for f in band_hz)
     values, modes = scipy.sparse.linalg.eigsh(k, count, m, sigma=-1e-3 * high, which="LM", tol=1e-13)
     assert values.max() > high, "the band holds more modes than were asked for"

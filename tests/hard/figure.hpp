@@ -1,4 +1,4 @@
-// The figure of a hard case: held to its bound, and written down for the table of docs/stability.md.
+// The figure of a hard case: held to its bound, and written down for the table of docs/reports/stability.md.
 #pragma once
 
 #include <gtest/gtest.h>

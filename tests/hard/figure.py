@@ -1,4 +1,4 @@
-"""The figure of a hard case: held to its bound, and written down for the table of docs/stability.md. The same as figure.hpp."""
+"""The figure of a hard case: held to its bound, and written down for the table of docs/reports/stability.md. The same as figure.hpp."""
 import json
 import math
 import os
@@ -32,4 +32,4 @@ def hold_refusal(case, message, words, part="", ranks=1):
     record(case, part, "refused", "refused", ranks)
     for word in words:
         if word not in message:
-            raise Missed(f"{case} {part}: no \"{word}\" in: {message}")
+            raise Missed(f'{case} {part}: no "{word}" in: {message}')

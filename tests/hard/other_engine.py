@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""The same drop by Bullet and by our own physics: the same contacts make the same sound, live or from the file, and both engines agree on the first hit.
+"""The same drop by Bullet and by our own physics: the same contacts make the same sound, live or from the file, and both engines agree on
+the first hit.
 
 usage: other_engine.py other_engine
 """
@@ -32,8 +33,8 @@ def read_float_wav(file):
     """(frames, 2) of a WAV file of 32-bit floats."""
     data = file.read_bytes()
     at = data.index(b"data")
-    size = int.from_bytes(data[at + 4:at + 8], "little")
-    return np.frombuffer(data[at + 8:at + 8 + size], dtype="<f4").reshape(-1, 2)
+    size = int.from_bytes(data[at + 4 : at + 8], "little")
+    return np.frombuffer(data[at + 8 : at + 8 + size], dtype="<f4").reshape(-1, 2)
 
 
 def read_hits(file):
@@ -53,10 +54,18 @@ def read_hits(file):
 
 
 def write_scene(file, **body):
-    file.write_text(json.dumps({
-        "duration_s": 1.5, "ground": {"height_m": 0.0, "restitution": RESTITUTION, "friction": 0.6}, "listener": {"position_m": [0, -1, 0.2]},
-        "effects": ["modal", "hertz_pulse", "air_delay", "doppler", "two_ears"], "output": {"format": "float", "gain": 1e-3, "fade_end": False},
-        "bodies": [{"name": "body", "bank": "cube.h5", "restitution": RESTITUTION, "friction": 0.6, **body}]}))
+    file.write_text(
+        json.dumps(
+            {
+                "duration_s": 1.5,
+                "ground": {"height_m": 0.0, "restitution": RESTITUTION, "friction": 0.6},
+                "listener": {"position_m": [0, -1, 0.2]},
+                "effects": ["modal", "hertz_pulse", "air_delay", "doppler", "two_ears"],
+                "output": {"format": "float", "gain": 1e-3, "fade_end": False},
+                "bodies": [{"name": "body", "bank": "cube.h5", "restitution": RESTITUTION, "friction": 0.6, **body}],
+            }
+        )
+    )
 
 
 def turn(v, angle):
@@ -65,8 +74,11 @@ def turn(v, angle):
 
 
 def predict_first_hit():
-    """Time and impulse of the lowest corner's hit by Newton's restitution and a contact that sticks, in the world: J = M^-1 (change of velocity)."""
-    corners = [turn(np.array([x, y, z]), ANGLE) for x in (-SIDE / 2, SIDE / 2) for y in (-SIDE / 2, SIDE / 2) for z in (-SIDE / 2, SIDE / 2)]
+    """Time and impulse of the lowest corner's hit by Newton's restitution and a contact that sticks, in the world: J = M^-1 (change of
+    velocity)."""
+    corners = [
+        turn(np.array([x, y, z]), ANGLE) for x in (-SIDE / 2, SIDE / 2) for y in (-SIDE / 2, SIDE / 2) for z in (-SIDE / 2, SIDE / 2)
+    ]
     arm = min(corners, key=lambda corner: corner[2])
     time = math.sqrt(2 * (HEIGHT + arm[2]) / 9.81)
     cross = np.array([[0, -arm[2], arm[1]], [arm[2], 0, -arm[0]], [-arm[1], arm[0], 0]])
@@ -93,22 +105,33 @@ def main():
         write_scene(root / "own.json", position_m=[0, 0, HEIGHT], rotation_deg=degrees)
         run(BIN / "carillon-render", "-q", root / "own.json", "-o", root / "own.wav", "--record", root / "own.jsonl")
         run(BIN / "carillon-render", "-q", root / "own.json", "-o", root / "again.wav", "--contacts", root / "own.jsonl")
-        hold(CASE, float((root / "own.wav").read_bytes() != (root / "again.wav").read_bytes()), 0.0, "our own contacts again, bytes that differ")
+        hold(
+            CASE,
+            float((root / "own.wav").read_bytes() != (root / "again.wav").read_bytes()),
+            0.0,
+            "our own contacts again, bytes that differ",
+        )
 
         time, impulse = predict_first_hit()
         size = np.linalg.norm(impulse)
-        for engine, most_s, most in (("bullet", 1.0 / 2000.0, 0.03), ("own", 2e-6, None)):
+        for engine, max_s, most in (("bullet", 1.0 / 2000.0, 0.03), ("own", 2e-6, None)):
             hits = read_hits(root / f"{engine}.jsonl")
             assert len(hits) > 5, engine
             start, given = hits[0]
-            hold(CASE, abs(start - time), most_s, f"{engine}: time of the first hit against the closed form [s]")
+            hold(CASE, abs(start - time), max_s, f"{engine}: time of the first hit against the closed form [s]")
             there = turn(given, ANGLE)
             if engine == "bullet":
                 hold(CASE, np.linalg.norm(there - impulse) / size, most, f"{engine}: its impulse against the closed form")
             else:
-                # The body rings while it is struck: its corner gives way and pushes back; an elastic rigid impact is the most that it can get.
+                # The body rings while it is struck: its corner yields and pushes back; an elastic rigid impact is the most that it can
+                # get.
                 assert there[2] > 0
-                hold(CASE, max(0.0, there[2] / impulse[2] * (1 + RESTITUTION) / 2 - 1.0), 1e-3, f"{engine}: its impulse beyond an elastic one")
+                hold(
+                    CASE,
+                    max(0.0, there[2] / impulse[2] * (1 + RESTITUTION) / 2 - 1.0),
+                    1e-3,
+                    f"{engine}: its impulse beyond an elastic one",
+                )
 
 
 def find_fixed_angles():

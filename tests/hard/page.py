@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
-"""The tables of docs/stability.md against the cases (cases/*.json), the tests (CTest's label hard) and the figures of the last run.
+"""The tables of docs/reports/stability.md against the cases (cases/*.json), the tests (CTest's label hard) and the figures of the last run.
 
-usage: page.py BUILD_DIR            exit 1 and one line a fault: a case that is missing somewhere, one that is there twice, a bound that is not the one held
+usage: page.py BUILD_DIR            exit 1 and one line a fault: a case that is missing somewhere, one that is there twice, a bound that is
+                                    not the one held
        page.py BUILD_DIR --update   runs the cases (ctest -L hard), then writes the tables
        page.py --self-test          proves that faults are found
 
-Figures are lines {"case", "part", "value", "bound", "ranks"} in BUILD_DIR/hard-figures/<case>.jsonl, as figure.hpp and figure.py write them.
+Figures are lines {"case", "part", "value", "bound", "ranks"} in BUILD_DIR/hard-figures/<case>.jsonl, as figure.hpp and figure.py write
+them.
 """
 import json
 import math
@@ -15,7 +17,7 @@ import subprocess
 import sys
 
 HERE = pathlib.Path(__file__).resolve().parent
-PAGE = HERE.parents[1] / "docs/stability.md"
+PAGE = HERE.parents[1] / "docs/reports/stability.md"
 GROUPS = ["meshes", "materials", "spectra", "time", "cross"]
 KEYS = {"id", "title", "risk", "method", "figure"}
 HEAD = "| case | what could go wrong | what we do | figure | measured | bound |\n|---|---|---|---|---|---|\n"
@@ -38,17 +40,22 @@ def read_figures(folder):
 
 def read_tests(build):
     """The names of the tests with label hard."""
-    listed = subprocess.run(["ctest", "--test-dir", build, "-L", "hard", "-FA", "hard_figures", "--show-only=json-v1"], capture_output=True, text=True, check=True)
+    listed = subprocess.run(
+        ["ctest", "--test-dir", build, "-L", "hard", "-FA", "hard_figures", "--show-only=json-v1"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     return [test["name"] for test in json.loads(listed.stdout)["tests"]]
 
 
 def read_rows(page):
-    """[(group, id, measured, bound), ...] as they stand between the markers of the page."""
+    """[(group, id, words, measured, bound), ...] as they stand between the markers of the page; words are the cells of the case."""
     rows = []
     for group, table in re.findall(r"<!-- begin (\w+) -->\n(.*?)<!-- end \1 -->", page, re.S):
         for line in table.splitlines()[2:]:
             cells = [cell.strip() for cell in line.strip("|").split(" | ")]
-            rows.append((group, re.search(r"`(\w+)`", cells[0]).group(1), cells[-2], cells[-1]))
+            rows.append((group, re.search(r"`(\w+)`", cells[0]).group(1), cells[:4], cells[-2], cells[-1]))
     return rows
 
 
@@ -59,7 +66,7 @@ def show(value):
 
 
 def is_beyond(measured, bound):
-    """Whether the words of a row tell of a figure that missed its bound."""
+    """Whether a row shows a figure that missed its bound."""
     if measured.startswith("not finite"):
         return True
     number, limit = (re.match(r"[-+]?[0-9][-+0-9.e]*", text) for text in (measured, bound))
@@ -68,6 +75,7 @@ def is_beyond(measured, bound):
 
 def find_worst(figures):
     """The figure that comes nearest to its bound; those that are only refused last."""
+
     def nearness(figure):
         if figure["value"] is None:
             return math.inf
@@ -76,6 +84,7 @@ def find_worst(figures):
         if figure["bound"] == 0:
             return math.inf if figure["value"] > 0 else 0
         return figure["value"] / figure["bound"] if figure["bound"] > 0 else figure["value"] - figure["bound"]
+
     return max(figures, key=nearness)
 
 
@@ -90,12 +99,17 @@ def describe(figures):
     return measured, bound
 
 
+def make_words(case):
+    """The cells of a row that do not depend on a run."""
+    cells = [f"{case['title']} `{case['id']}`", case["risk"], case["method"], case["figure"]]
+    return [cell.replace("|", "\\|") for cell in cells]
+
+
 def make_table(cases, figures):
     rows = []
     for case in cases:
-        measured, bound = describe(figures[case["id"]]) if case["id"] in figures else ("-", "-")
-        cells = [f"{case['title']} `{case['id']}`", case["risk"], case["method"], case["figure"], measured, bound]
-        rows.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+        results = describe(figures[case["id"]]) if case["id"] in figures else ("-", "-")
+        rows.append("| " + " | ".join([*make_words(case), *(cell.replace("|", "\\|") for cell in results)]) + " |")
     return HEAD + "\n".join(rows) + "\n"
 
 
@@ -103,7 +117,8 @@ def find_faults(cases, tests, rows, figures):
     """What does not agree, one sentence each."""
     faults = []
     known = [(group, case["id"]) for group in cases for case in cases[group]]
-    shown = [(group, id) for group, id, _, _ in rows]
+    shown = [(group, id) for group, id, _, _, _ in rows]
+    texts = {(group, case["id"]): make_words(case) for group in cases for case in cases[group] if set(case) == KEYS}
     tested = {tuple(name.split(".")[1:3]) for name in tests if not name.startswith("hard.page")}
     for group in cases:
         for case in cases[group]:
@@ -116,23 +131,27 @@ def find_faults(cases, tests, rows, figures):
         if pair not in tested:
             faults.append(f"{name} has no test hard.{name}")
         if shown.count(pair) != 1:
-            faults.append(f"{name} stands {shown.count(pair)} times in docs/stability.md")
+            faults.append(f"{name} stands {shown.count(pair)} times in docs/reports/stability.md")
     faults += [f"hard.{'.'.join(pair)} is a test without a case in cases/{pair[0]}.json" for pair in sorted(tested - set(known))]
-    faults += [f"{'.'.join(pair)} stands in docs/stability.md and is no case" for pair in sorted(set(shown) - set(known))]
+    faults += [f"{'.'.join(pair)} stands in docs/reports/stability.md and is no case" for pair in sorted(set(shown) - set(known))]
     faults += [f"a figure is recorded for {id}, which is no case" for id in sorted(set(figures) - {id for _, id in known})]
-    for group, id, measured, bound in rows:
+    for group, id, words, measured, bound in rows:
+        if words != texts.get((group, id), words):
+            faults.append(f"{group}.{id}: docs/reports/stability.md has other words than cases/{group}.json")
         if is_beyond(measured, bound):
-            faults.append(f"{group}.{id}: docs/stability.md has {measured}, beyond its bound {bound}")
+            faults.append(f"{group}.{id}: docs/reports/stability.md has {measured}, beyond its bound {bound}")
         held = {show(figure["bound"]) for figure in figures.get(id, [])}
         if held and bound not in held:
-            faults.append(f"{group}.{id}: docs/stability.md has the bound {bound}, held was {', '.join(sorted(held))}")
+            faults.append(f"{group}.{id}: docs/reports/stability.md has the bound {bound}, held was {', '.join(sorted(held))}")
         elif bound == "-":
-            faults.append(f"{group}.{id}: docs/stability.md has no figure")
+            faults.append(f"{group}.{id}: docs/reports/stability.md has no figure")
     return faults
 
 
 def update(build):
-    subprocess.run(["ctest", "--test-dir", build, "-L", "hard", "-E", "^hard.page", "-FC", "hard_figures", "--output-on-failure", "-j2"], check=True)
+    subprocess.run(
+        ["ctest", "--test-dir", build, "-L", "hard", "-E", "^hard.page", "-FC", "hard_figures", "--output-on-failure", "-j2"], check=True
+    )
     figures, page = read_figures(pathlib.Path(build) / "hard-figures"), PAGE.read_text()
     for group, cases in read_cases().items():
         marked = re.compile(rf"(<!-- begin {group} -->\n).*?(<!-- end {group} -->)", re.S)
@@ -144,23 +163,31 @@ def update(build):
 
 def self_test():
     case = {"id": "a", "title": "A", "risk": "r | s", "method": "m", "figure": "f"}
-    figures = {"a": [{"case": "a", "part": "T4", "value": 2e-3, "bound": 1e-2, "ranks": 1}, {"case": "a", "part": "", "value": "refused", "bound": "refused", "ranks": 1}]}
+    figures = {
+        "a": [
+            {"case": "a", "part": "T4", "value": 2e-3, "bound": 1e-2, "ranks": 1},
+            {"case": "a", "part": "", "value": "refused", "bound": "refused", "ranks": 1},
+        ]
+    }
     cases, tests = {"time": [case]}, ["hard.time.a.np2", "hard.page"]
     page = "<!-- begin time -->\n" + make_table([case], figures) + "<!-- end time -->\n"
     assert find_faults(cases, tests, read_rows(page), figures) == [], find_faults(cases, tests, read_rows(page), figures)
     assert "0.002 (T4), others refused" in page
-    spoilt = [({"time": [case, case]}, tests, page, figures, "twice"),
-              (cases, ["hard.page"], page, figures, "no test"),
-              (cases, tests + ["hard.time.b"], page, figures, "without a case"),
-              (cases, tests, "", figures, "stands 0 times"),
-              (cases, tests, page + page, figures, "stands 2 times"),
-              (cases, tests, page.replace("`a`", "`c`"), figures, "is no case"),
-              (cases, tests, page.replace("| 0.01 |", "| 0.02 |"), figures, "has the bound 0.02"),
-              (cases, tests, page.replace("| 0.01 |", "| - |").replace("| 0.002 (T4), others refused |", "| - |"), {}, "no figure"),
-              (cases, tests, page.replace("| 0.002 (T4)", "| 0.0101 (T4)"), figures, "beyond its bound"),
-              (cases, tests, page.replace("| 0.002 (T4)", "| not finite (T4)"), figures, "beyond its bound"),
-              (cases, tests, page, {"b": figures["a"]}, "figure is recorded"),
-              ({"time": [{"id": "a"}]}, tests, page, figures, "keys")]
+    spoilt = [
+        ({"time": [case, case]}, tests, page, figures, "twice"),
+        (cases, ["hard.page"], page, figures, "no test"),
+        (cases, tests + ["hard.time.b"], page, figures, "without a case"),
+        (cases, tests, "", figures, "stands 0 times"),
+        (cases, tests, page + page, figures, "stands 2 times"),
+        (cases, tests, page.replace("`a`", "`c`"), figures, "is no case"),
+        (cases, tests, page.replace("| 0.01 |", "| 0.02 |"), figures, "has the bound 0.02"),
+        (cases, tests, page.replace("| 0.01 |", "| - |").replace("| 0.002 (T4), others refused |", "| - |"), {}, "no figure"),
+        (cases, tests, page.replace("| 0.002 (T4)", "| 0.0101 (T4)"), figures, "beyond its bound"),
+        (cases, tests, page.replace("| 0.002 (T4)", "| not finite (T4)"), figures, "beyond its bound"),
+        (cases, tests, page, {"b": figures["a"]}, "figure is recorded"),
+        ({"time": [{"id": "a"}]}, tests, page, figures, "keys"),
+        ({"time": [case | {"risk": "another"}]}, tests, page, figures, "other words"),
+    ]
     for cases, tests, page, figures, word in spoilt:
         found = find_faults(cases, tests, read_rows(page), figures)
         assert any(word in fault for fault in found), (word, found)
@@ -173,6 +200,8 @@ if __name__ == "__main__":
     else:
         if sys.argv[2:] == ["--update"]:
             update(sys.argv[1])
-        faults = find_faults(read_cases(), read_tests(sys.argv[1]), read_rows(PAGE.read_text()), read_figures(pathlib.Path(sys.argv[1]) / "hard-figures"))
+        faults = find_faults(
+            read_cases(), read_tests(sys.argv[1]), read_rows(PAGE.read_text()), read_figures(pathlib.Path(sys.argv[1]) / "hard-figures")
+        )
         print("\n".join(faults) or "cases, tests and page agree")
         sys.exit(bool(faults))

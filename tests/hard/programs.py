@@ -1,4 +1,5 @@
-"""Runs carillon-precompute on a hard case, as a user would: files in, exit code, words and bank out. CARILLON_BIN_DIR says where the programs are."""
+"""Runs carillon-precompute on a hard case, as a user would: files in, exit code, words and bank out. CARILLON_BIN_DIR says where the
+programs are."""
 import json
 import math
 import os
@@ -15,7 +16,7 @@ TIMEOUT_S = 110 * int(os.environ.get("CARILLON_PATIENCE", "1"))  # of one run: w
 
 
 class Outcome:
-    """code, text (both streams), and of a run that ended well: freq_hz, the bank as a dictionary of arrays, the record beside it."""
+    """code, text (both streams), and of a run that ended well: freq_hz, the bank as a dictionary of arrays, the record next to it."""
 
     def __init__(self, code, text):
         self.code, self.text, self.freq_hz, self.bank, self.record = code, text, None, {}, {}
@@ -39,7 +40,9 @@ class Folder:
         words = [str(BIN / command[0]), *map(str, command[1:])]
         if ranks > 1:
             words = ["mpirun", "-np", str(ranks), "--oversubscribe", "--bind-to", "none", *words]
-        done = subprocess.run(words, cwd=self.path, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=TIMEOUT_S)
+        done = subprocess.run(
+            words, cwd=self.path, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=TIMEOUT_S
+        )
         return Outcome(done.returncode, done.stdout)
 
     def solve(self, solid, element, ranks=1, material=STEEL, band_hz=(20, 20000), **keys):

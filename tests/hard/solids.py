@@ -44,14 +44,16 @@ class Solid:
             out.write(f"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n{len(self.nodes)}\n")
             out.writelines(f"{i + 1} {x!r} {y!r} {z!r}\n" for i, (x, y, z) in enumerate(self.nodes.tolist()))
             out.write(f"$EndNodes\n$Elements\n{len(self.tets)}\n")
-            out.writelines(f"{e + 1} {kind} 2 {region} {region} {' '.join(str(n + 1) for n in tet)}\n"
-                           for e, (tet, region) in enumerate(zip(self.tets[:, order].tolist(), self.regions.tolist())))
+            out.writelines(
+                f"{e + 1} {kind} 2 {region} {region} {' '.join(str(n + 1) for n in tet)}\n"
+                for e, (tet, region) in enumerate(zip(self.tets[:, order].tolist(), self.regions.tolist()))
+            )
             out.write("$EndElements\n")
 
 
 def make_lattice(x, y, z, mirror=None):
-    """The planes x, y, z [m] as cells of six tetrahedra that share a diagonal, mirrored from cell to cell so that faces match; `mirror(i, j, k)` says
-    otherwise which of the three axes of a cell are turned round."""
+    """The planes x, y, z [m] as cells of six tetrahedra that share a diagonal, mirrored from cell to cell so that faces match; `mirror(i,
+    j, k)` says otherwise which of the three axes of a cell are turned round."""
     x, y, z = (np.asarray(a, float) for a in (x, y, z))
     count = [len(a) for a in (x, y, z)]
     nodes = np.array([[a, b, c] for a in x for b in y for c in z])
@@ -95,7 +97,11 @@ def of_order(solid, order):
 def join(*solids):
     """Several bodies in one file, sharing nothing."""
     first = np.cumsum([0] + [len(s.nodes) for s in solids])
-    return Solid(np.vstack([s.nodes for s in solids]), np.vstack([s.tets + n for s, n in zip(solids, first)]), np.concatenate([s.regions for s in solids]))
+    return Solid(
+        np.vstack([s.nodes for s in solids]),
+        np.vstack([s.tets + n for s, n in zip(solids, first)]),
+        np.concatenate([s.regions for s in solids]),
+    )
 
 
 def merge(solid, tolerance=1e-9):
@@ -111,12 +117,14 @@ def burst(solid):
 
 
 def make_slivers(cells, size, angle_deg, planes):
-    """A box with a layer of slivers on each lattice plane x = planes[i]: the squares there are cut along one diagonal on one side and along the other on the
-    other side, and a sliver lies between. The nodes of the plane are shifted by turns so that the least dihedral angle is angle_deg."""
+    """A box with a layer of slivers on each lattice plane x = planes[i]: the squares there are cut along one diagonal on one side and along
+    the other on the other side, and a sliver lies between. The nodes of the plane are shifted by turns so that the least dihedral angle is
+    angle_deg."""
     planes = sorted(planes)
 
     def mirror(i, j, k):
         return (i % 2, (j + sum(p <= i for p in planes)) % 2, k % 2)
+
     grid = [size[d] * np.arange(cells[d] + 1) / cells[d] for d in range(3)]
     box = make_lattice(*grid, mirror)
     number = np.arange(len(box.nodes)).reshape([c + 1 for c in cells])
@@ -133,6 +141,7 @@ def make_slivers(cells, size, angle_deg, planes):
                 # On its left the plane is cut along the diagonals between nodes of even (j + n + k).
                 solid.nodes[number[p, j, k], 0] += -shift if (j + n + k) % 2 == 0 else shift
         return solid
+
     low, high = 0.0, 0.05 * size[0] / cells[0]
     for _ in range(60):
         middle = (low + high) / 2
@@ -154,8 +163,8 @@ def make_caps(solid, tets, height):
 
 
 def make_needles(solid, edges, part):
-    """Each of `edges` (pairs of nodes of which no two touch one element) gets a node at `part` of its length from its first end; all elements about it
-    become two, one of them with an edge that short."""
+    """Each of `edges` (pairs of nodes of which no two touch one element) gets a node at `part` of its length from its first end; all
+    elements about it become two, one of them with an edge that short."""
     nodes, tets, regions = list(solid.nodes), solid.tets.tolist(), list(solid.regions)
     for a, b in edges:
         n = len(nodes)

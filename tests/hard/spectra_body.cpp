@@ -7,7 +7,8 @@
 #include <limits>
 #include <numbers>
 
-#include "precompute/eigen/local_columns.hpp"
+#include "partition/distribute.hpp"
+#include "precompute/la/local_columns.hpp"
 #include "precompute/petsc/session.hpp"
 #include "tests/hard/figure.hpp"
 #include "tests/support/ranks.hpp"
@@ -23,10 +24,10 @@ double to_lambda(double freq_hz) { return std::pow(2 * std::numbers::pi * freq_h
 
 /// All modes on every rank: rows 3 node + direction by the number of the node in the mesh.
 Eigen::MatrixXd gather(const Answer& answer, std::size_t nodes) {
-  const fem::LocalMesh& local = answer.pieces.local;
+  const partition::LocalMesh& local = answer.pieces.local;
   Eigen::MatrixXd all = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(3 * nodes), static_cast<Eigen::Index>(answer.freq_hz.size()));
   if (all.cols() == 0) return all;
-  const eigen::LocalColumns shapes(answer.modes.shapes);
+  const la::LocalColumns shapes(answer.modes.shapes);
   for (Eigen::Index j = 0; j < all.cols(); ++j)
     for (std::int32_t i = 0; i < local.free_nodes; ++i)
       for (int d = 0; d < 3; ++d)
@@ -34,12 +35,12 @@ Eigen::MatrixXd gather(const Answer& answer, std::size_t nodes) {
   return all;
 }
 
-/// The largest sine of an angle between what equal modes of both span; groups by the frequencies of `alone`.
+/// The largest sine of an angle between what degenerate modes of both span; groups by the frequencies of `alone`.
 double find_largest_angle(const Answer& alone, const Answer& together, std::size_t nodes) {
   Eigen::MatrixXd a = gather(alone, nodes), b = gather(together, nodes);
   MPI_Allreduce(MPI_IN_PLACE, b.data(), static_cast<int>(b.size()), MPI_DOUBLE, MPI_SUM, PETSC_COMM_WORLD);
   // M by the nodes of the mesh.
-  const fem::LocalMesh& local = alone.pieces.local;
+  const partition::LocalMesh& local = alone.pieces.local;
   const tests::SparseMatrix mass = tests::copy(alone.system.mass);
   std::vector<Eigen::Triplet<double>> entries;
   const auto find = [&](Eigen::Index row) { return static_cast<int>(3 * local.node_in_mesh[static_cast<std::size_t>(row / 3)] + row % 3); };
@@ -68,8 +69,8 @@ job::Material make_solid(double young_modulus_pa, double poisson_ratio, double d
 
 Body join(const Body& a, const Body& b) {
   Body both = a;
-  const auto shift = static_cast<std::int32_t>(a.mesh.nodes.size());
-  both.mesh.nodes.insert(both.mesh.nodes.end(), b.mesh.nodes.begin(), b.mesh.nodes.end());
+  const auto shift = static_cast<std::int32_t>(a.mesh.nodes_m.size());
+  both.mesh.nodes_m.insert(both.mesh.nodes_m.end(), b.mesh.nodes_m.begin(), b.mesh.nodes_m.end());
   for (const std::int32_t node : b.mesh.tets) both.mesh.tets.push_back(node + shift);
   for (const std::int32_t region : b.mesh.regions) both.mesh.regions.push_back(region + static_cast<std::int32_t>(a.materials.size()));
   both.materials.insert(both.materials.end(), b.materials.begin(), b.materials.end());
@@ -79,17 +80,17 @@ Body join(const Body& a, const Body& b) {
 
 Answer solve(MPI_Comm comm, const Body& body, const eigen::Options& options) {
   Answer answer;
-  answer.pieces = fem::distribute(comm, body.mesh, {}, {.elimination_order = true});
-  const fem::LocalMesh& local = answer.pieces.local;
+  answer.pieces = partition::distribute(comm, body.mesh, {}, {.elimination_order = true});
+  const partition::LocalMesh& local = answer.pieces.local;
   fem::Materials materials;
   materials.list = body.materials;
   if (body.materials.size() > 1) materials.of_tet = local.region;
   answer.system = fem::assemble(comm, local, materials, job::Mass::consistent);
   eigen::NodeLayout layout;
-  layout.position.assign(local.nodes_m.begin(), local.nodes_m.begin() + local.free_nodes);
+  layout.nodes_m.assign(local.nodes_m.begin(), local.nodes_m.begin() + local.free_nodes);
   layout.component.assign(local.component.begin(), local.component.begin() + local.free_nodes);
   layout.component_count = answer.pieces.components;
-  layout.held = answer.pieces.held_m;
+  layout.fixed = answer.pieces.fixed_m;
   layout.elimination_position = answer.pieces.elimination_position;
   answer.modes = eigen::solve_modes({answer.system.stiffness, answer.system.mass, layout}, options);
   for (const double lambda : answer.modes.lambda) answer.freq_hz.push_back(std::sqrt(lambda) / (2 * std::numbers::pi));
@@ -140,7 +141,7 @@ Answer hold_every_way(const std::string& id, const std::string& part, const Body
   if (tests::get_ranks() > 1) {
     hold(id, find_largest_difference(together.freq_hz, alone.freq_hz), 1e-9, part + " ranks");
     if (together.freq_hz.size() == alone.freq_hz.size())
-      hold(id, find_largest_angle(alone, together, body.mesh.nodes.size()), 1e-6, part + " subspaces");
+      hold(id, find_largest_angle(alone, together, body.mesh.nodes_m.size()), 1e-6, part + " subspaces");
   }
   return together;
 }

@@ -28,12 +28,12 @@ Body join(const Body& a, const Body& b);
 /// All nodes, mid-side nodes too, go where `place` says.
 template <class Place>
 mesh::TetMesh move_nodes(mesh::TetMesh mesh, Place&& place) {
-  for (Vec3& x : mesh.nodes) x = place(x);
+  for (Vec3& x : mesh.nodes_m) x = place(x);
   return mesh;
 }
 
 struct Answer {
-  fem::Distribution pieces;
+  partition::DistributedMesh pieces;
   fem::System system;
   eigen::Modes modes;
   std::vector<double> freq_hz;
@@ -50,7 +50,7 @@ std::int64_t count_below(const fem::System& alone, double freq_hz);
 double find_largest_difference(const std::vector<double>& a, const std::vector<double>& b);
 
 /// Solves the body by block Lanczos, Krylov-Schur and, while that is quick, densely, on all ranks and on one, and holds under `id`:
-///   count       modes that the inertia of Eigen's L D L^T counts in the band, beside those found: equal
+///   count       modes that the inertia of Eigen's L D L^T counts in the band, against those found: equal
 ///   methods     frequencies of the other methods, relative, to 1e-9
 ///   ranks       frequencies of all ranks against one rank, relative, to 1e-9
 ///   subspaces   sine of the angle between the modes of all ranks and of one, group by group, to 1e-6
@@ -61,7 +61,7 @@ Answer hold_every_way(const std::string& id, const std::string& part, const Body
 void hold_bars(const std::string& id, const std::string& part, const Body& body, const Answer& answer, const eigen::Options& options,
                const std::vector<double>& true_hz);
 
-/// Holds what modes of one group differ by, relative, at most `bound`. sizes: how many are equal, from mode `first` on.
+/// Holds what modes of one group differ by, relative, at most `bound`. sizes: how many are degenerate, from mode `first` on.
 void hold_groups(const std::string& id, const std::string& part, const std::vector<double>& freq_hz, std::size_t first,
                  const std::vector<int>& sizes, double bound);
 

@@ -1,4 +1,4 @@
-// Modes that are nearly equal, nearly zero, at the end of the band, or not there.
+// Modes that are nearly degenerate, nearly zero, at the end of the band, or not there.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -102,10 +102,10 @@ TEST(spectra, almost_equal_components) {
 Body make_dumbbell(int order, double soft_e_pa) {
   mesh::TetMesh rod = shapes::make_box({0.22, 0.1, 0.1}, {5, 1, 1}, 1);
   const std::array<double, 6> planes{-0.11, -0.06, -0.01, 0.01, 0.06, 0.11};
-  for (Vec3& x : rod.nodes) x[0] = planes[static_cast<std::size_t>(std::lround((x[0] + 0.11) / 0.044))];
+  for (Vec3& x : rod.nodes_m) x[0] = planes[static_cast<std::size_t>(std::lround((x[0] + 0.11) / 0.044))];
   for (std::size_t e = 0; e < rod.regions.size(); ++e) {
     double middle = 0;
-    for (std::size_t i = 0; i < 4; ++i) middle += rod.nodes[static_cast<std::size_t>(rod.tets[4 * e + i])][0] / 4;
+    for (std::size_t i = 0; i < 4; ++i) middle += rod.nodes_m[static_cast<std::size_t>(rod.tets[4 * e + i])][0] / 4;
     rod.regions[e] = std::abs(middle) < 0.01 ? 1 : 0;
   }
   rod.node_sets.clear();
@@ -150,7 +150,7 @@ void hold_dumbbell(const std::string& id, int order, const eigen::Options& optio
 
 TEST(spectra, tenth_hz) {
   const std::string id = "tenth_hz";
-  // All of the body soft: E such that the lowest mode of the sphere-like brick is at 0.1 Hz, six zeros beside it, and nothing stiff.
+  // All of the body soft: E such that the lowest mode of the sphere-like brick is at 0.1 Hz, in addition to six zeros, and nothing stiff.
   for (const int order : {1, 2}) {
     const std::string part = order == 1 ? "T4 soft" : "T10 soft";
     const double stiff_hz = solve(PETSC_COMM_SELF, make_brick(order), make_band(20, 20e3)).freq_hz.at(0);
@@ -162,7 +162,7 @@ TEST(spectra, tenth_hz) {
       hold(id, std::abs(static_cast<double>(answer.modes.count_below_low) - 6), 0, part + " zeros");
     }
   }
-  // Stiff blocks on a soft layer: six modes near 0.1 Hz beside the six zeros, and beside what rings at some kHz, in one band.
+  // Stiff blocks on a soft layer: six modes near 0.1 Hz in addition to the six zeros, and what rings at some kHz, in one band.
   for (const int order : {1, 2})
     for (const double high_hz : {20.0, 20e3})
       for (const double low_hz : {0.05, 1e-4}) hold_dumbbell(id, order, make_band(low_hz, high_hz));
@@ -186,7 +186,7 @@ TEST(spectra, below_20_hz) {
 }
 
 TEST(spectra, edge_in_cluster) {
-  // Three equal modes of a cube at either end of the band: all of them or none, whichever way rounding falls.
+  // Three degenerate modes of a cube at either end of the band: all of them or none, whichever way rounding falls.
   const std::string id = "edge_in_cluster";
   for (const int order : {1, 2}) {
     const std::string part = order == 1 ? "T4" : "T10";

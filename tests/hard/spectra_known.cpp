@@ -1,4 +1,5 @@
-// Bodies whose symmetry makes modes equal, against frequencies that no mesh gave (tests/estimate/data/known_frequencies.csv).
+// Bodies whose symmetry makes modes degenerate, against frequencies that no mesh gave
+// (tests/unit/precompute/estimate/data/known_frequencies.csv).
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,9 +9,9 @@
 #include "precompute/mesh/check.hpp"
 #include "precompute/petsc/session.hpp"
 #include "precompute/shapes/shapes.hpp"
-#include "tests/estimate/bodies.hpp"
 #include "tests/hard/figure.hpp"
 #include "tests/hard/spectra_body.hpp"
+#include "tests/unit/precompute/estimate/bodies.hpp"
 
 namespace carillon::hard {
 namespace {
@@ -35,8 +36,8 @@ Body make_cube(int cells, int order) {
 }
 
 TEST(spectra, cube_triples) {
-  // 2, 3, 3, 3, 3 and 3 equal modes. The mesh, though mirrored from cell to cell, has not all of the symmetry: it parts the fourth group,
-  // Lame's.
+  // 2, 3, 3, 3, 3 and 3 degenerate modes. The mesh, though mirrored from cell to cell, has not all of the symmetry: it parts the fourth
+  // group, Lame's.
   const std::string id = "cube_triples";
   const std::vector<double> known = read_known("cube", 17);
   const Body coarse = make_cube(4, 1), fine = make_cube(4, 2);
@@ -51,7 +52,7 @@ TEST(spectra, cube_triples) {
 }
 
 TEST(spectra, sphere_multiplets) {
-  // 5, 5, 3, 7, 7 equal modes and more, up to 13; a mesh of tetrahedra has less symmetry and parts them, within their bars.
+  // 5, 5, 3, 7, 7 degenerate modes and more, up to 13; a mesh of tetrahedra has less symmetry and parts them, within their bars.
   const std::string id = "sphere_multiplets";
   for (const int order : {1, 2}) {
     const std::string part = order == 1 ? "T4" : "T10";
@@ -68,7 +69,7 @@ TEST(spectra, sphere_multiplets) {
 }
 
 TEST(spectra, plate_pairs) {
-  // A square plate of a tenth of its edge: a pair at the fourth mode, single modes beside them.
+  // A square plate of a tenth of its edge: a pair at the fourth mode, single modes next to them.
   const std::string id = "plate_pairs";
   for (const int order : {1, 2}) {
     const std::string part = order == 1 ? "T4" : "T10";

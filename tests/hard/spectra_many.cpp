@@ -1,4 +1,4 @@
-// Very many modes, up to eighteen of them equal, of which every one is known.
+// Very many modes, up to eighteen of them degenerate, of which every one is known.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,14 +9,14 @@
 #include <vector>
 
 #include "precompute/eigen/solve_modes.hpp"
-#include "tests/eigen/spring_network.hpp"
 #include "tests/hard/figure.hpp"
+#include "tests/unit/precompute/eigen/spring_network.hpp"
 
 namespace carillon::hard {
 namespace {
 
-/// side^3 masses between held walls, coupled to their neighbours alike in x, y and z: lambda = 4 k/m sum_d sin^2(pi j_d / (2 (side + 1))),
-/// each three times and for every order of j: up to eighteen equal.
+/// side^3 masses between fixed walls, coupled to their neighbours alike in x, y and z: lambda = 4 k/m sum_d sin^2(pi j_d / (2 (side + 1))),
+/// each three times and for every order of j: up to eighteen degenerate.
 eigen::test::Network make_lattice(int side) {
   eigen::test::Network network;
   const int width = side + 2;
@@ -28,7 +28,7 @@ eigen::test::Network make_lattice(int side) {
         network.nodes.push_back({0.1 * x, 0.1 * y, 0.1 * z});
         network.mass_kg.push_back(0.5);
         network.component.push_back(0);
-        if (is_wall(x) || is_wall(y) || is_wall(z)) network.held.push_back(index(x, y, z));
+        if (is_wall(x) || is_wall(y) || is_wall(z)) network.fixed.push_back(index(x, y, z));
         if (x + 1 < width) network.springs.push_back({index(x, y, z), index(x + 1, y, z), 4e6, true});
         if (y + 1 < width) network.springs.push_back({index(x, y, z), index(x, y + 1, z), 4e6, true});
         if (z + 1 < width) network.springs.push_back({index(x, y, z), index(x, y, z + 1), 4e6, true});

@@ -8,8 +8,8 @@
 
 #include "runtime/contact/world.hpp"
 #include "runtime/synth/synthesiser.hpp"
-#include "tests/contact/bodies.hpp"
 #include "tests/hard/figure.hpp"
+#include "tests/unit/runtime/contact/bodies.hpp"
 
 namespace carillon::hard {
 namespace {
@@ -26,7 +26,7 @@ constexpr double kGravity = 9.81;
 
 /// What a world did until its end.
 struct Course {
-  std::vector<stream::Event> events;
+  std::vector<events::Event> events;
   contact::Statistics at_half, at_end;
   int impulses = 0;
   double last_s = 0.0;          // of the impulses
@@ -37,9 +37,10 @@ Course run(const WorldSpec& spec, double end_s, double half_s, bool keeps = fals
   World world(spec, {.end_s = end_s, .audits_energy = true});
   Course course;
   course.end.resize(spec.bodies.size());
-  const auto take = [&](const stream::Event& event) {
-    if (const auto* impulse = std::get_if<stream::Impulse>(&event)) ++course.impulses, course.last_s = impulse->time_s;
-    if (const auto* motion = std::get_if<stream::Motion>(&event)) course.end[static_cast<std::size_t>(motion->body)] = motion->position_m;
+  const auto take = [&](const events::Event& event) {
+    if (const auto* impulse = std::get_if<events::Impulse>(&event)) ++course.impulses, course.last_s = impulse->time_s;
+    if (const auto* motion = std::get_if<events::BodyMotion>(&event))
+      course.end[static_cast<std::size_t>(motion->body)] = motion->position_m;
     if (keeps) course.events.push_back(event);
   };
   const double forever = std::numeric_limits<double>::infinity();
@@ -90,7 +91,7 @@ TEST(time, twenty_at_rest) {
   };
   for (int block = 0; block < 200; ++block) {
     if (block == 20) count(before);
-    for (; next < heard.events.size() && stream::get_time_s(heard.events[next]) < 0.1 * (block + 2); ++next)
+    for (; next < heard.events.size() && events::get_time_s(heard.events[next]) < 0.1 * (block + 2); ++next)
       synthesiser.push(heard.events[next]);
     synthesiser.process(out, 2, 4800);
     if (block < 20) continue;
@@ -134,9 +135,9 @@ TEST(time, gap) {
     spec.bodies[1].fixed = spec.bodies[2].fixed = true;
     const Course course = run(spec, 0.6, 0.5, true);
     const auto first = std::find_if(course.events.begin(), course.events.end(),
-                                    [](const auto& event) { return std::holds_alternative<stream::Impulse>(event); });
+                                    [](const auto& event) { return std::holds_alternative<events::Impulse>(event); });
     ASSERT_NE(first, course.events.end());
-    const auto& hit = std::get<stream::Impulse>(*first);
+    const auto& hit = std::get<events::Impulse>(*first);
     const double fall = gap > 1.0 ? 0.975 : 0.465, wanted = std::sqrt(2.0 * fall / kGravity);
     const std::string part = gap > 1.0 ? "0.1 mm wider" : "0.1 mm narrower";
     hold("gap", std::abs(hit.time_s - 0.5 * hit.duration_s - wanted), 1e-6, part + ", time of the first hit [s]");
@@ -182,8 +183,8 @@ double calc_modes_rise(const WorldSpec& spec, const Course& course, double end_s
   std::size_t next = 0;
   double peak = 0.0;
   for (int block = 0; block < static_cast<int>(100 * end_s); ++block) {
-    for (; next < course.events.size() && stream::get_time_s(course.events[next]) < 0.01 * (block + 2); ++next) {
-      if (std::holds_alternative<stream::Impulse>(course.events[next])) synthesiser.push(course.events[next]);
+    for (; next < course.events.size() && events::get_time_s(course.events[next]) < 0.01 * (block + 2); ++next) {
+      if (std::holds_alternative<events::Impulse>(course.events[next])) synthesiser.push(course.events[next]);
     }
     synthesiser.process(out, 2, 480);
     for (const float p : left) peak = std::max(peak, std::abs(static_cast<double>(p)));

@@ -6,9 +6,9 @@
 #include <string>
 #include <utility>
 
-#include "tests/contact/plate_bank.hpp"
 #include "tests/hard/contact_course.hpp"
 #include "tests/hard/figure.hpp"
+#include "tests/unit/runtime/contact/plate_bank.hpp"
 
 namespace carillon::hard {
 namespace {
@@ -50,8 +50,8 @@ TEST(time, contact_thin_plate) {
     std::vector<double> modes_j(1, 0.0);  // after each window
     double share = 0.0, error = 0.0;
     for (int window = 1; window <= 500; ++window) {
-      world.advance(2e-3 * window, 1e9, [&](const stream::Event& e) {
-        const auto* m = std::get_if<stream::Motion>(&e);  // comes up to a window later
+      world.advance(2e-3 * window, 1e9, [&](const events::Event& e) {
+        const auto* m = std::get_if<events::BodyMotion>(&e);  // comes up to a window later
         const auto k = m == nullptr ? 0 : static_cast<std::size_t>(std::lround(m->time_s / 2e-3));
         if (k == 0 || k >= modes_j.size() || std::abs(m->time_s - 2e-3 * static_cast<double>(k)) > 1e-9) return;
         const double v = norm(m->velocity_m_s), lost = weight * (0.6 - m->position_m[2]) - 0.5 * plate.rigid.mass_kg * v * v;
@@ -93,9 +93,9 @@ TEST(time, contact_sleeps_apart) {
   World world(spec, {.end_s = 60.0, .lasting_contacts = false, .audits_energy = true});
   double way = 0.0;
   int hits = 0;
-  world.advance(60.0, std::numeric_limits<double>::infinity(), [&](const stream::Event& e) {
-    if (const auto* i = std::get_if<stream::Impulse>(&e)) hits += i->body >= 4 ? 1 : 0;
-    if (const auto* m = std::get_if<stream::Motion>(&e); m != nullptr && m->body >= 4)
+  world.advance(60.0, std::numeric_limits<double>::infinity(), [&](const events::Event& e) {
+    if (const auto* i = std::get_if<events::Impulse>(&e)) hits += i->body >= 4 ? 1 : 0;
+    if (const auto* m = std::get_if<events::BodyMotion>(&e); m != nullptr && m->body >= 4)
       way = std::max(way, norm(m->position_m - spec.bodies[static_cast<std::size_t>(m->body)].initial.position_m));
   });
   const auto statistics = world.get_statistics();
@@ -167,7 +167,7 @@ TEST(time, contact_bar_in_gap) {
     spec.bodies = {make_body(bar, {0, 0, 0.2}), make_fixed(plate, {-0.05505, 0, 0}), make_fixed(plate, {0.05505, 0, 0})};
     spec.bodies[0].initial.rotation = make_turn_about_y(lean);
     double deepest = 0.0;
-    const auto look = [&](const stream::Motion& m) {
+    const auto look = [&](const events::BodyMotion& m) {
       if (m.body != 0) return;
       for (int k = 0; k < 4 * 601; ++k) {  // places along the long edges of the bar
         const Vec3 x = m.position_m + rotate(m.rotation, {k & 1 ? 0.005 : -0.005, k & 2 ? 0.005 : -0.005, 0.3 * ((k / 4) / 600.0 - 0.5)});
@@ -199,7 +199,7 @@ TEST(time, contact_pressed_start) {
   for (std::size_t i = 0; i < blocks.size(); ++i)
     spec.bodies.push_back(make_body(blocks[i], {0, 0, 0.025 - inside + (0.05 - inside) * static_cast<double>(i)}));
   double fastest = 0.0;
-  const Course course = run(spec, 2.0, 20.0, [&](const stream::Motion& m) { fastest = std::max(fastest, norm(m.velocity_m_s)); });
+  const Course course = run(spec, 2.0, 20.0, [&](const events::BodyMotion& m) { fastest = std::max(fastest, norm(m.velocity_m_s)); });
   hold("contact_pressed_start", fastest, 0.1, "fastest [m/s]");
   hold("contact_pressed_start", calc_drift(course), 1e-9, "way after 2 s [m]");
   hold("contact_pressed_start", std::abs(course.end[4].position_m[2] - 0.225), 5 * inside, "height of the uppermost [m]");
@@ -223,7 +223,7 @@ TEST(time, contact_spinning_top) {
     b.angular_velocity_rad_s = (spin - W * std::cos(a)) * axis + Vec3{0, 0, W};
     b.velocity_m_s = {0, W * l * std::sin(a), 0};
     double turned = 0.0, before = 0.0;
-    const auto look = [&](const stream::Motion& motion) {
+    const auto look = [&](const events::BodyMotion& motion) {
       const Vec3 now = rotate(motion.rotation, {0, 0, 1});
       const double angle = std::atan2(now[1], now[0]);
       turned += std::remainder(angle - before, 2.0 * M_PI);
@@ -332,7 +332,7 @@ TEST(time, contact_seam) {
     spec.bodies[0].velocity_m_s = {speed, 0, 0};
     if (is_ball) spec.bodies[0].angular_velocity_rad_s = {0, speed / 0.02, 0};
     double farthest = 0.0;
-    const auto look = [&](const stream::Motion& m) {
+    const auto look = [&](const events::BodyMotion& m) {
       if (m.body == 0) farthest = std::max(farthest, std::abs(m.position_m[2] - 0.02 - height));
     };
     const Course course = run(spec, 0.3, 0.5, look);
@@ -354,7 +354,7 @@ TEST(time, contact_cone_on_tip) {
     spec.bodies[0].friction = 10.0;
     spec.bodies[0].initial.rotation = make_turn_about_y(lean);
     double angle_before = lean, time_before = 0.0;
-    return run(spec, 0.5 * end_s, end_s, [&](const stream::Motion& motion) {
+    return run(spec, 0.5 * end_s, end_s, [&](const events::BodyMotion& motion) {
       const double angle = std::acos(std::clamp(rotate(motion.rotation, {0, 0, 1})[2], -1.0, 1.0));
       if (when == 0.0 && angle >= until)
         when = time_before + (motion.time_s - time_before) * (until - angle_before) / (angle - angle_before);
@@ -449,7 +449,7 @@ TEST(time, contact_inside) {
     spec.bodies[0].angular_velocity_rad_s = {0, 10.0 * turn, 5};
     double farthest = 0.0;
     std::array<Vec3, 2> at{};
-    const Course course = run(spec, 1.0, 2.0, [&](const stream::Motion& m) {
+    const Course course = run(spec, 1.0, 2.0, [&](const events::BodyMotion& m) {
       at[static_cast<std::size_t>(m.body)] = m.position_m;
       if (m.body == 1 && m.time_s > 0.0) farthest = std::max(farthest, norm(at[1] - at[0]));
     });

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "tests/hard/figure.hpp"
-#include "tests/impact/scenes.hpp"
+#include "tests/unit/runtime/impact/scenes.hpp"
 
 namespace carillon::hard {
 namespace {
@@ -128,7 +128,7 @@ TEST(time, impact_modes) {
 }
 
 TEST(time, impact_points) {
-  // More points than a rigid body can tell from each other, on a body that turns, slips and rings.
+  // More points than the motion of a rigid body determines, on a body that turns, slips and rings.
   const auto plate = make_plate(0.3, 0.2, 0.002, 20e3, 0.13, 0.07);
   const Modes modes(plate.omega, plate.decay, 2.0 * impact::tests::kPi * 20e3);
   for (const double friction : {0.0, 0.1, 1.0, 1e3})
@@ -157,7 +157,7 @@ TEST(time, impact_points) {
 }
 
 TEST(time, impact_coarse) {
-  // Steps far too long: the books close all the same, and a ball on a plate never comes back faster than it went.
+  // Steps far too long: the energy balance still closes, and a ball on a plate never comes back faster than it went.
   const auto plate = make_plate(0.5, 0.4, 0.002, 20e3, 0.2, 0.17);
   for (const double steps : {1.0, 1.5, 2.0, 3.0, 5.0})
     for (const double law : {1.0, 1.5, 3.5}) {

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "runtime/contact/world.hpp"
-#include "tests/contact/checks.hpp"
-#include "tests/contact/solids.hpp"
 #include "tests/hard/figure.hpp"
+#include "tests/unit/runtime/contact/checks.hpp"
+#include "tests/unit/runtime/contact/solids.hpp"
 
 namespace carillon::hard {
 namespace {
@@ -41,7 +41,7 @@ BodySpec make_body(const bank::Bank& bank, const Vec3& position) {
 }
 
 struct Course {
-  std::vector<stream::Motion> middle, end;  // of each body
+  std::vector<events::BodyMotion> middle, end;  // of each body
   contact::Statistics statistics;
 };
 
@@ -49,8 +49,8 @@ Course run(const WorldSpec& spec, double middle_s, double end_s) {
   World world(spec, {.end_s = end_s, .audits_energy = true});
   Course course;
   course.end.resize(spec.bodies.size());
-  const auto keep = [&](const stream::Event& event) {
-    if (const auto* motion = std::get_if<stream::Motion>(&event)) course.end[static_cast<std::size_t>(motion->body)] = *motion;
+  const auto keep = [&](const events::Event& event) {
+    if (const auto* motion = std::get_if<events::BodyMotion>(&event)) course.end[static_cast<std::size_t>(motion->body)] = *motion;
   };
   world.advance(middle_s, std::numeric_limits<double>::infinity(), keep);
   course.middle = course.end;
@@ -60,9 +60,9 @@ Course run(const WorldSpec& spec, double middle_s, double end_s) {
 }
 
 double calc_drift(const Course& course) {
-  double most = 0.0;
-  for (std::size_t i = 0; i < course.end.size(); ++i) most = std::max(most, norm(course.end[i].position_m - course.middle[i].position_m));
-  return most;
+  double max = 0.0;
+  for (std::size_t i = 0; i < course.end.size(); ++i) max = std::max(max, norm(course.end[i].position_m - course.middle[i].position_m));
+  return max;
 }
 
 /// Links on ball joints from the origin along x, and what hangs at their end.
@@ -104,7 +104,7 @@ TEST(time, joints_whip) {
 }
 
 TEST(time, joints_both_rest) {
-  // Two boxes on a hinge lie on the ground: their joint and six points that carry are more than the motion can tell.
+  // Two boxes on a hinge lie on the ground: their joint and six points that carry are more than the motion determines.
   const bank::Bank box = make_box({0.1, 0.06, 0.03});
   WorldSpec spec;
   spec.ground = GroundSpec{};

@@ -16,8 +16,8 @@
 namespace carillon::hard {
 namespace {
 
+using events::ContactState;
 using std::numbers::pi;
-using stream::ContactState;
 using synth::Effect;
 using synth::Model;
 using synth::Synthesiser;
@@ -40,7 +40,7 @@ void play_million_hits_with_little_room() {
   for (int block = 0; block < 375; ++block) {
     for (; hits < kMillion && 1e-6 * static_cast<double>(hits) < (block + 1) * 128 / kRate; ++hits) {
       synthesiser.push(
-          stream::Impulse{.time_s = 1e-6 * static_cast<double>(hits), .body = body, .impulse_n_s = {0.0, 0.0, 1e-3}, .duration_s = 1e-4});
+          events::Impulse{.time_s = 1e-6 * static_cast<double>(hits), .body = body, .impulse_n_s = {0.0, 0.0, 1e-3}, .duration_s = 1e-4});
     }
     synthesiser.process(out, 2, 128);
     const std::int64_t spent = synthesiser.get_counters().mode_samples;
@@ -88,25 +88,25 @@ TEST(time, million_hits) {
 }
 
 /// Three bodies that are struck, slide and fly past.
-std::vector<stream::Event> make_scene() {
-  std::vector<stream::Event> events;
+std::vector<events::Event> make_scene() {
+  std::vector<events::Event> events;
   for (int k = 0; k < 60; ++k) {
     const double t = 7.3e-3 * k + 1.3e-4;
     events.emplace_back(
-        stream::Motion{.time_s = t, .body = 0, .position_m = {3.0 - 10.0 * t, 1.0, 0.2}, .velocity_m_s = {-10.0, 0.0, 0.0}});
+        events::BodyMotion{.time_s = t, .body = 0, .position_m = {3.0 - 10.0 * t, 1.0, 0.2}, .velocity_m_s = {-10.0, 0.0, 0.0}});
     events.emplace_back(
-        stream::Impulse{.time_s = t, .body = k % 3, .triangle = k % 12, .impulse_n_s = {1e-3, 0.0, 2e-3}, .duration_s = 1e-5 * (k % 40)});
-    events.emplace_back(stream::Contact{.time_s = t,
-                                        .id = 9,
-                                        .body = 1,
-                                        .triangle = 4,
-                                        .state = k == 0 ? ContactState::kBegin : ContactState::kHold,
-                                        .normal = {0.0, 0.0, 1.0},
-                                        .slip_m_s = {0.3, 0.0, 0.0},
-                                        .force_n = 2.0,
-                                        .sweep_m_s = 0.3 + 0.01 * k,
-                                        .patch_radius_m = 1e-4,
-                                        .impedance_n_s_m = 2.0});
+        events::Impulse{.time_s = t, .body = k % 3, .triangle = k % 12, .impulse_n_s = {1e-3, 0.0, 2e-3}, .duration_s = 1e-5 * (k % 40)});
+    events.emplace_back(events::LastingContact{.time_s = t,
+                                               .id = 9,
+                                               .body = 1,
+                                               .triangle = 4,
+                                               .state = k == 0 ? ContactState::kBegin : ContactState::kHold,
+                                               .normal = {0.0, 0.0, 1.0},
+                                               .slip_m_s = {0.3, 0.0, 0.0},
+                                               .force_n = 2.0,
+                                               .sweep_m_s = 0.3 + 0.01 * k,
+                                               .patch_radius_m = 1e-4,
+                                               .impedance_n_s_m = 2.0});
   }
   return events;
 }
@@ -115,11 +115,11 @@ std::vector<float> play_scene(int block) {
   const auto model = Model::make(testing::make_cube_bank(testing::make_many_modes(40)), {.rate_hz = kRate});
   Synthesiser synthesiser({.rate_hz = kRate, .max_strikes = 128});
   for (int body = 0; body < 3; ++body) {
-    synthesiser.add_body(model,
-                         {.position_m = {0.5 * body, 1.0, 0.0},
-                          .effects = synth::kUsualEffects.with({Effect::kRoughness, Effect::kContactDamping, Effect::kAccelerationNoise})});
+    synthesiser.add_body(
+        model, {.position_m = {0.5 * body, 1.0, 0.0},
+                .effects = synth::kDefaultEffects.with({Effect::kRoughness, Effect::kContactDamping, Effect::kAccelerationNoise})});
   }
-  for (const stream::Event& event : make_scene()) EXPECT_TRUE(synthesiser.push(event));
+  for (const events::Event& event : make_scene()) EXPECT_TRUE(synthesiser.push(event));
   std::vector<float> left(24576), right(24576);
   for (int n = 0; n < 24576; n += block) {
     float* const out[2] = {left.data() + n, right.data() + n};
@@ -164,12 +164,12 @@ TEST(time, sample_rate_change) {
     for (const float p : play(above, 4800)) loudest = std::max(loudest, std::abs(p));
     hold("sample_rate_change", static_cast<double>(loudest), 0.0, to_json(rate) + " Hz, modes beyond half of it [Pa]");
   }
-  // While it plays: a model of another rate is refused, and the sound goes on to the same bits.
+  // While it plays: a model of another rate is refused, and the sound continues with the same bits.
   std::vector<std::vector<float>> heard;
   for (const bool asks : {false, true}) {
     Synthesiser synthesiser({.rate_hz = kRate});
     const int body = synthesiser.add_body(Model::make(make_bank(modes), {.rate_hz = kRate}));
-    synthesiser.push(stream::Impulse{.time_s = 0.001, .body = body, .impulse_n_s = {0.0, 0.0, 1.0}, .duration_s = 1e-4});
+    synthesiser.push(events::Impulse{.time_s = 0.001, .body = body, .impulse_n_s = {0.0, 0.0, 1.0}, .duration_s = 1e-4});
     std::vector<float> left(9600), right(9600);
     for (int n = 0; n < 9600; n += 480) {
       if (asks && n == 4800) {
@@ -194,15 +194,15 @@ TEST(time, one_step_contact) {
   const double freq = 9000.0;
   const auto model = Model::make(make_bank({{to_lambda(freq), 0.0}}), {.rate_hz = kRate});
   const auto make = [&](double t, ContactState state) {
-    return stream::Contact{.time_s = t,
-                           .id = 3,
-                           .state = state,
-                           .normal = {0.0, 0.0, 1.0},
-                           .slip_m_s = {0.5, 0.0, 0.0},
-                           .force_n = 3.0,
-                           .sweep_m_s = 0.5,
-                           .patch_radius_m = 1e-4,
-                           .impedance_n_s_m = 2.0 * rate_of_loss};
+    return events::LastingContact{.time_s = t,
+                                  .id = 3,
+                                  .state = state,
+                                  .normal = {0.0, 0.0, 1.0},
+                                  .slip_m_s = {0.5, 0.0, 0.0},
+                                  .force_n = 3.0,
+                                  .sweep_m_s = 0.5,
+                                  .patch_radius_m = 1e-4,
+                                  .impedance_n_s_m = 2.0 * rate_of_loss};
   };
   // It damps: within the step it comes and goes as a triangle of step / 5 ms, so that exp(-loss step^2 / 5 ms) of the wave stays.
   Voice voice(model, {.silence_pa = 1e-30});
@@ -210,7 +210,7 @@ TEST(time, one_step_contact) {
   voice.attach(&brake);
   strike(voice);
   const double begin = 4800 / kRate;
-  const synth::Surface other{};  // of no stiffness: no spring of the contact next to the impedance
+  const synth::ContactSurface other{};  // of no stiffness: no spring of the contact next to the impedance
   ASSERT_TRUE(brake.take(make(begin, ContactState::kBegin), other) && brake.take(make(begin + step_s, ContactState::kEnd), other));
   brake.reach(1.0);
   play(voice, 128 * 25);
@@ -219,16 +219,16 @@ TEST(time, one_step_contact) {
   const double lost = -0.5 * std::log(voice.calc_energy_j() / before), wanted = rate_of_loss * step_s * step_s / 5e-3;
   hold("one_step_contact", std::abs(lost / wanted - 1.0), 2e-3, "damping against the closed form");
   // It makes noise, and nothing stays of any of its forms: one step, no time at all, a begin without an end, an end without a begin.
-  const std::vector<std::vector<stream::Contact>> forms{{make(0.01, ContactState::kBegin), make(0.01 + step_s, ContactState::kEnd)},
-                                                        {make(0.01, ContactState::kBegin), make(0.01, ContactState::kEnd)},
-                                                        {make(0.01, ContactState::kBegin)},
-                                                        {make(0.01, ContactState::kEnd)},
-                                                        {make(0.01, ContactState::kEnd), make(0.01, ContactState::kBegin)}};
+  const std::vector<std::vector<events::LastingContact>> forms{{make(0.01, ContactState::kBegin), make(0.01 + step_s, ContactState::kEnd)},
+                                                               {make(0.01, ContactState::kBegin), make(0.01, ContactState::kEnd)},
+                                                               {make(0.01, ContactState::kBegin)},
+                                                               {make(0.01, ContactState::kEnd)},
+                                                               {make(0.01, ContactState::kEnd), make(0.01, ContactState::kBegin)}};
   for (const auto& records : forms) {
     Voice touched(model);
     synth::ContactForces contacts(model, {});
     touched.attach(&contacts);
-    for (const stream::Contact& record : records) contacts.take(record);
+    for (const events::LastingContact& record : records) contacts.take(record);
     contacts.reach(0.02);
     const std::vector<float> heard = play(touched, 4800);
     const auto bad = std::count_if(heard.begin(), heard.end(), [](float p) { return !(std::abs(p) < 1e3F); });
@@ -249,7 +249,7 @@ TEST(time, sliding) {
     Voice voice(model, {.silence_pa = 1e-30});
     synth::ContactForces contacts(model, {.surface = {.roughness_m = 0.0, .modulus_pa = 70e9}});
     voice.attach(&contacts);
-    const synth::Surface floor{.roughness_m = floor_m, .friction = 0.5, .modulus_pa = 70e9};
+    const synth::ContactSurface floor{.roughness_m = floor_m, .friction = 0.5, .modulus_pa = 70e9};
     for (const double t : {0.0, 2.2}) {
       contacts.take({.time_s = t,
                      .id = 5,

@@ -3,15 +3,16 @@
 
 #include <cmath>
 
+#include "runtime/base/printable.hpp"
 #include "runtime/support/losses.hpp"
-#include "tests/bank/example_bank.hpp"
 #include "tests/hard/figure.hpp"
+#include "tests/unit/runtime/bank/example_bank.hpp"
 
 namespace carillon::hard {
 namespace {
 
 TEST(time, support_extremes) {
-  double most_decay = 0.0, most_shift = 0.0, wrong = 0.0;
+  double max_decay = 0.0, max_shift = 0.0, wrong = 0.0;
   for (const double softer : {1.0, 1e3, 1e6, 1e12}) {
     for (const double area : {0.0, 1e-30, 2e-4, 1e6}) {
       for (const double normal : {1.0, 0.0}) {
@@ -30,8 +31,8 @@ TEST(time, support_extremes) {
             const bool is_number =
                 std::isfinite(losses.decay_per_s[m]) && std::isfinite(losses.shift_rad_s[m]) && losses.decay_per_s[m] >= 0.0;
             wrong += is_number ? 0.0 : 1.0;
-            most_decay = std::max(most_decay, losses.decay_per_s[m] / omega);
-            most_shift = std::max(most_shift, std::abs(losses.shift_rad_s[m]) / omega);
+            max_decay = std::max(max_decay, losses.decay_per_s[m] / omega);
+            max_shift = std::max(max_shift, std::abs(losses.shift_rad_s[m]) / omega);
           }
           support::apply(losses, bank);
           wrong += static_cast<double>(bank::find_faults(bank).size());
@@ -40,8 +41,8 @@ TEST(time, support_extremes) {
     }
   }
   hold("support_extremes", wrong, 0.0, "numbers that are none, faults of the bank");
-  hold("support_extremes", most_decay, support::kMostDecay * (1.0 + 1e-12), "decay over the frequency");
-  hold("support_extremes", most_shift, support::kMostShift * (1.0 + 1e-12), "shift over the frequency");
+  hold("support_extremes", max_decay, support::kMaxDecay * (1.0 + 1e-12), "decay over the frequency");
+  hold("support_extremes", max_shift, support::kMaxShift * (1.0 + 1e-12), "shift over the frequency");
 }
 
 }  // namespace

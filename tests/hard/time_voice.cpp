@@ -1,5 +1,5 @@
 // Hard cases of one ringing body: the ends of the band, all regimes of damping, hours without damping, numbers too small and too large.
-// Closed forms in long double, and the table of 40-digit values in tests/synth/data.
+// Closed forms in long double, and the table of 40-digit values in tests/unit/runtime/synth/data.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 #include "runtime/synth/voice.hpp"
 #include "tests/hard/closed_form.hpp"
 #include "tests/hard/figure.hpp"
-#include "tests/synth/reference.hpp"
+#include "tests/unit/runtime/synth/reference.hpp"
 
 namespace carillon::hard {
 namespace {
@@ -98,7 +98,7 @@ TEST(time, over_damping) {
     for (int k = 0; k < 100; ++k) {
       ASSERT_TRUE(contacts.take({.time_s = 1e-3 * k,
                                  .id = 5,
-                                 .state = k == 0 ? stream::ContactState::kBegin : stream::ContactState::kHold,
+                                 .state = k == 0 ? events::ContactState::kBegin : events::ContactState::kHold,
                                  .normal = {0.0, 0.0, 1.0},
                                  .slip_m_s = {0.4, 0.0, 0.0},
                                  .force_n = 5.0,
@@ -129,14 +129,14 @@ TEST(time, ten_hours) {
   std::vector<float> block(1 << 16);
   play(voice, 128);
   const double energy = voice.calc_energy_j();
-  double most = energy;
+  double max = energy;
   while (voice.get_position() + static_cast<std::int64_t>(block.size()) < samples) {
     voice.process(block);
-    if (voice.get_position() % synth::kPeriod == 0) most = std::max(most, voice.calc_energy_j());
+    if (voice.get_position() % synth::kBlock == 0) max = std::max(max, voice.calc_energy_j());
   }
   const std::int64_t first = voice.get_position();
   hold("ten_hours", calc_error(play(voice, static_cast<std::size_t>(samples - first)), first, kRate, modes), 1e-6, "wave at the end");
-  hold("ten_hours", most / energy - 1.0, 1e-8, "energy gained");
+  hold("ten_hours", max / energy - 1.0, 1e-8, "energy gained");
   hold("ten_hours", 1.0 - voice.calc_energy_j() / energy, 1e-8, "energy lost");
 }
 

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Every header of ours compiles by itself: what a source file of its own folder includes before anything else has done so in the build; the others are compiled here.
+"""Every header of ours compiles by itself: what a source file of its own folder includes before anything else has done so in the build; the
+others are compiled here.
 
 usage: headers_stand_alone.py SOURCE_DIR BUILD_DIR COMPILER
 """

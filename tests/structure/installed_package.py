@@ -1,58 +1,138 @@
 #!/usr/bin/python3
-"""Installs what has been built, builds docs/examples/embed against what was installed alone, and runs both programs on the
-pinned bank: they must hear the same.
+"""Makes the Debian packages of what has been built, unpacks them into an empty root, and builds docs/examples/embed against that root
+alone: by find_package(Carillon), and the C examples by pkg-config. All programs play the same pinned bank.
 
 usage: installed_package.py SOURCE_DIR BUILD_DIR WORK_DIR
 """
+import os
 import pathlib
 import re
 import shutil
 import subprocess
 import sys
 
-source, build, work = (pathlib.Path(word) for word in sys.argv[1:4])
-shutil.rmtree(work, ignore_errors=True)
-work.mkdir(parents=True)
+# Of each package: what it contains, and whom it may and may not need.
+RUNTIME = {
+    "files": ["bin/carillon-render", "bin/carillon-live", "bin/carillon-bank", "lib/libcarillon.so.2", "lib/carillon/carillon-joints.so"],
+    "needs": "libhdf5-",
+    "free_of": "mpi|petsc|slepc|metis|mumps|libcgal|libgmp",
+}
+DEV = {
+    "files": ["include/carillon.h", "lib/libcarillon.so", "lib/pkgconfig/carillon.pc", "lib/cmake/carillon/carillon-config.cmake"],
+    "needs": "carillon-runtime",
+    "free_of": "mpi|petsc",
+}
+PRECOMPUTE = {
+    "files": ["bin/carillon", "bin/carillon-precompute", "bin/carillon-mesh", "bin/carillon-draw", "bin/carillon-study"],
+    "needs": "libpetsc-real",
+    "free_of": "nothing",
+}
+PACKAGES = {"carillon-runtime": RUNTIME, "carillon-runtime-dev": DEV, "carillon-precompute": PRECOMPUTE}
+
+source, build, work = (pathlib.Path(word).resolve() for word in sys.argv[1:4])
+quiet = {"stdout": subprocess.DEVNULL}
 
 
 def run(*command, **options):
     return subprocess.run([str(word) for word in command], check=True, text=True, **options)
 
 
-quiet = {"stdout": subprocess.DEVNULL}
-prefix = work / "installed"
-run("cmake", "--install", build, "--prefix", prefix, **quiet)
+def read(*command, **options):
+    return run(*command, capture_output=True, **options).stdout
 
-# Nothing but the C interface is visible.
-library = next(prefix.glob("lib*/**/libcarillon.so"))
-symbols = re.findall(r" T (\w+)$", run("nm", "-D", "--defined-only", library, capture_output=True).stdout, re.M)
-wrong = [name for name in symbols if not name.startswith("carillon_")]
-if wrong or "carillon_process" not in symbols:
-    sys.exit(f"{library}: visible beside the interface, or missing from it: {wrong[:5] or 'carillon_process'}")
 
-example = shutil.copytree(source / "docs/examples/embed", work / "example")  # where no header of the sources can be found by chance
-run("cmake", "-S", example, "-B", work / "example-build", "-G", "Ninja", f"-DCMAKE_PREFIX_PATH={prefix}",
-    "-DCMAKE_C_FLAGS=-std=c99 -pedantic -Wall -Wextra -Werror", "-DCMAKE_CXX_FLAGS=-Wall -Wextra -Werror", **quiet)
-run("cmake", "--build", work / "example-build", "--", "--quiet")
-bank = source / "tests/bank/pinned/version_1_0.hdf"
-heard = {}
-for program in ("strike_c", "strike_cpp"):
-    line = run(work / "example-build" / program, bank, capture_output=True).stdout
-    print(program, line.strip())
-    heard[program] = re.fullmatch(r"(\d+) modes, peak (\S+) Pa at the left ear\n", line).groups()
-if heard["strike_c"][0] != heard["strike_cpp"][0] or not all(float(peak) > 0 for _, peak in heard.values()):
-    sys.exit("the two programs do not play the same bank")
-lines = []
-for program in ("slide_c", "edit_cpp"):
-    line = run(work / "example-build" / program, bank, capture_output=True).stdout
-    print(program, line.strip())
-    lines.append(re.fullmatch(r"peak (\S+) Pa, (\S+) Pa after the edit; (\d+) -> (\d+) Hz(?:; 0 underruns)?\n", line).groups())
-if lines[0][2:] != lines[1][2:]:
-    sys.exit("the two programs do not edit the same bank")
-line = run(work / "example-build/click_c", bank, capture_output=True).stdout
-print("click_c", line.strip())
-if not re.fullmatch(r"triangle \d+ of \d+, peak \S+ Pa at the left ear\n", line):
-    sys.exit("a click does not strike")
-bad = subprocess.run([work / "example-build/strike_c", __file__], capture_output=True, text=True)
-if bad.returncode != 1 or "installed_package.py" not in bad.stderr:
-    sys.exit(f"no clear error for a file that is no bank: {bad.stderr}")
+def make_packages():
+    """{name of a package: its file}; one package a component of the build."""
+    run("cpack", "--config", build / "CPackConfig.cmake", "-G", "DEB", "-B", work / "packages", cwd=work, **quiet)
+    files = {read("dpkg-deb", "-f", file, "Package").strip(): file for file in (work / "packages").glob("*.deb")}
+    wanted = set(PACKAGES) if (build / "bin/carillon-precompute").exists() else {"carillon-runtime", "carillon-runtime-dev"}
+    assert set(files) == wanted, files
+    return files
+
+
+def check_package(name, file):
+    """Its files, and that its dependencies are right: packages of this machine, which has what the build linked, or of ours."""
+    fields = PACKAGES[name]
+    paths = [line.split()[5] for line in read("dpkg-deb", "-c", file).splitlines()]
+    missing = [path for path in fields["files"] if f"./usr/{path}" not in paths]
+    assert not missing, f"{name}: {missing} is not in it"
+    depends = [re.split(r"[ :]", word.strip())[0] for word in read("dpkg-deb", "-f", file, "Depends").split(",")]
+    assert any(word.startswith(fields["needs"]) for word in depends), (name, depends)
+    assert not [word for word in depends if re.search(fields["free_of"], word)], (name, depends)
+    for word in depends:
+        if word not in PACKAGES:
+            state = subprocess.run(["dpkg-query", "-W", "-f=${db:Status-Status}", word], capture_output=True, text=True).stdout
+            assert state == "installed", f"{name} depends on {word}, which is not installed here"
+    print(f"{name}: {file.stat().st_size / 1e6:.1f} MB, {len(depends)} dependencies")
+    return [path for path in paths if not path.endswith("/")]
+
+
+def check_symbols(library):
+    """Nothing but the C interface is visible."""
+    symbols = re.findall(r" T (\w+)$", read("nm", "-D", "--defined-only", library), re.M)
+    wrong = [name for name in symbols if not name.startswith("carillon_")]
+    assert not wrong and "carillon_process" in symbols, f"{library}: visible in addition to the interface, or missing from it: {wrong[:5]}"
+
+
+def build_by_cmake(example, usr):
+    warnings = "-Wall -Wextra -Werror"
+    flags = [f"-DCMAKE_PREFIX_PATH={usr}", f"-DCMAKE_C_FLAGS=-std=c99 -pedantic {warnings}", f"-DCMAKE_CXX_FLAGS={warnings}"]
+    run("cmake", "-S", example, "-B", work / "by-cmake", "-G", "Ninja", *flags, **quiet)
+    run("cmake", "--build", work / "by-cmake", "--", "--quiet")
+    return work / "by-cmake"
+
+
+def build_by_pkg_config(example, usr):
+    folder = work / "by-pkg-config"
+    folder.mkdir()
+    paths = {**os.environ, "PKG_CONFIG_PATH": str(usr / "lib/pkgconfig")}
+    words = read("pkg-config", "--cflags", "--libs", "carillon", env=paths).split()
+    for name in ("strike", "slide", "click"):
+        run("cc", "-std=c99", "-pedantic", example / f"{name}.c", *words, f"-Wl,-rpath,{usr}/lib", "-lm", "-o", folder / f"{name}_c")
+    return folder
+
+
+def play(programs, pattern, bank):
+    """The groups of what each program prints."""
+    found = []
+    for program in programs:
+        line = read(program, bank)
+        print(program.name, line.strip())
+        match = re.fullmatch(pattern, line)
+        assert match, (program, line)
+        found.append(match.groups())
+    return found
+
+
+def main():
+    shutil.rmtree(work, ignore_errors=True)
+    work.mkdir(parents=True)
+    root = work / "root"
+    packages = make_packages()
+    listed = [path for name, file in packages.items() for path in check_package(name, file)]
+    assert len(listed) == len(set(listed)), "two packages have one file"
+    for file in packages.values():
+        run("dpkg-deb", "-x", file, root)
+    usr = root / "usr"
+    check_symbols(usr / "lib/libcarillon.so")
+    for name in ("carillon-render", "carillon-bank", "carillon", "carillon-precompute", "carillon-mesh"):
+        if (build / "bin" / name).exists():
+            assert read(usr / "bin" / name, "--version") == read(build / "bin" / name, "--version"), name
+
+    example = shutil.copytree(source / "docs/examples/embed", work / "example")  # where no header of the sources can be found by chance
+    by_cmake, by_pkg_config = build_by_cmake(example, usr), build_by_pkg_config(example, usr)
+    bank = source / "tests/unit/runtime/bank/pinned/version_1_0.hdf"
+    strikes = [by_cmake / "strike_c", by_cmake / "strike_cpp", by_pkg_config / "strike_c"]
+    heard = play(strikes, r"(\d+) modes, peak (\S+) Pa at the left ear\n", bank)
+    assert len({modes for modes, _ in heard}) == 1 and all(float(peak) > 0 for _, peak in heard), "they do not play the same bank"
+    assert heard[0] == heard[2], "one program by CMake and by pkg-config sounds differently"
+    edits = [by_cmake / "slide_c", by_cmake / "edit_cpp", by_pkg_config / "slide_c"]
+    edited = play(edits, r"peak (\S+) Pa, (\S+) Pa after the edit; (\d+) -> (\d+) Hz(?:; 0 underruns)?\n", bank)
+    assert len({groups[2:] for groups in edited}) == 1, "they do not edit the same bank"
+    play([by_cmake / "click_c", by_pkg_config / "click_c"], r"triangle \d+ of \d+, peak \S+ Pa at the left ear\n", bank)
+    bad = subprocess.run([by_cmake / "strike_c", __file__], capture_output=True, text=True)
+    assert bad.returncode == 1 and "installed_package.py" in bad.stderr, f"no clear error for a file that is no bank: {bad.stderr}"
+
+
+if __name__ == "__main__":
+    main()

@@ -30,9 +30,13 @@ with tempfile.TemporaryDirectory() as folder:
         done = run(program, "--version")
         match = re.fullmatch(rf"{re.escape(program.name)} {re.escape(VERSION)}( \([0-9a-f]{{40}}(-dirty)?\))?\n", done.stdout)
         expect(done.returncode == 0 and done.stderr == "" and match, f"{program.name} --version: {done}")
-    mpirun = run("mpirun", "-np", 2, "--oversubscribe", BIN / "carillon-precompute", "--version") if (BIN / "carillon-precompute").exists() else None
+    mpirun = (
+        run("mpirun", "-np", 2, "--oversubscribe", BIN / "carillon-precompute", "--version")
+        if (BIN / "carillon-precompute").exists()
+        else None
+    )
     expect(mpirun is None or mpirun.stdout.count("carillon-precompute") == 1, f"under mpirun: {mpirun}")
-    bank = SOURCE / "tests/bank/pinned/version_1_2.hdf"
+    bank = SOURCE / "tests/unit/runtime/bank/pinned/version_1_2.hdf"
     file = run(BIN / "carillon-bank", "edit", bank, "edited.hdf", "--density", "0.5")
     piped = run(BIN / "carillon-bank", "edit", bank, "-", "--density", "0.5", text=False)
     expect(file.returncode == 0 and piped.returncode == 0 and piped.stderr == b"", f"carillon-bank edit: {file} {piped.stderr}")

@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 """Builds and tests the runtime in a mount namespace in which MPI, PETSc, SLEPc, METIS, MUMPS, CGAL and OpenVDB do not exist.
 
-The runtime is configured there anew, at the path of the whole build, and takes over what the whole build has made: ninja makes again whatever would be
-made by another command or of other files. What is taken over may have read, and its programs may load, no file of those packages. Every program
-is then tried by some of its tests; all of them run on the same bytes elsewhere.
+The runtime is configured there again, at the path of the whole build, and takes over what the whole build has made: ninja makes again
+whatever would be made by another command or of other files. What is taken over may have read, and its programs may load, no file of those
+packages. Every program is then tried by some of its tests; all of them run on the same bytes elsewhere.
 
-With --from-nothing, or where the whole build is none of ninja's, everything is compiled there, and all tests of the runtime run there. So it is too where
-the machine allows no mount namespace (an ordinary container), with everything in sight and the same look at what was read and what is loaded.
+With --from-nothing, or where the whole build is none of ninja's, everything is compiled there, and all tests of the runtime run there. So
+it is too where the machine allows no mount namespace (an ordinary container), with everything in sight and the same look at what was read
+and what is loaded.
 
 usage: runtime_alone.py SOURCE_DIR BUILD_DIR WORK_DIR [--from-nothing]        WORK_DIR is removed at the end
 """
@@ -19,8 +20,10 @@ import subprocess
 import sys
 import tempfile
 
-HIDDEN = re.compile(r"^(libopenmpi|openmpi|mpi-default|libpetsc|petsc|libslepc|slepc|libmetis|libmumps|libptscotch|libscotch|libscalapack|libhypre|"
-                    r"libhdf5-openmpi|libhdf5-mpi|libcgal|libopenvdb|libsuitesparse)")
+HIDDEN = re.compile(
+    r"^(libopenmpi|openmpi|mpi-default|libpetsc|petsc|libslepc|slepc|libmetis|libmumps|libptscotch|libscotch|libscalapack|libhypre|"
+    r"libhdf5-openmpi|libhdf5-mpi|libcgal|libopenvdb|libsuitesparse)"
+)
 # An ordinary machine has these of some of the packages above as dependencies of light libraries; hiding them would not be fair.
 SHARED = re.compile(r"/lib(blas|lapack|openblas|hwloc|event|gomp)")
 LEFT_OUT = "structure|docs|bench"
@@ -38,7 +41,11 @@ def hide(packages):
     for name in files:
         path = pathlib.Path(name)
         # Folders that belong to a hidden package as a whole are covered by an empty file system: three levels below /usr are enough.
-        if path.is_dir() and re.search(r"/(petscdir|slepcdir|CGAL|openvdb|openmpi|mumps_seq|petsc|slepc|hdf5/openmpi)$", name) and not path.is_symlink():
+        if (
+            path.is_dir()
+            and re.search(r"/(petscdir|slepcdir|CGAL|openvdb|openmpi|mumps_seq|petsc|slepc|hdf5/openmpi)$", name)
+            and not path.is_symlink()
+        ):
             roots.add(name)
     roots = {root for root in roots if not any(root.startswith(other + "/") for other in roots)}
     for root in sorted(roots):
@@ -46,7 +53,11 @@ def hide(packages):
     hidden = 0
     for name in files:
         path = pathlib.Path(name)
-        if not re.search(r"(/bin/|/include/|/pkgconfig/|/cmake/|\.so|\.a$)", name) or SHARED.search(name) or any(name.startswith(r + "/") for r in roots):
+        if (
+            not re.search(r"(/bin/|/include/|/pkgconfig/|/cmake/|\.so|\.a$)", name)
+            or SHARED.search(name)
+            or any(name.startswith(r + "/") for r in roots)
+        ):
             continue
         real = path.resolve()
         if real.is_file() and str(real) != "/dev/null":
@@ -57,12 +68,16 @@ def hide(packages):
 
 def read_settings(build):
     """What the whole build was configured with, as far as it reaches the compiler."""
-    kept = r"CMAKE_(BUILD_TYPE|(C|CXX)_(COMPILER|FLAGS|COMPILER_LAUNCHER)):[A-Z]+=.*"
+    kept = r"CMAKE_(BUILD_TYPE|COMPILE_WARNING_AS_ERROR|(C|CXX)_(COMPILER|FLAGS|COMPILER_LAUNCHER)):[A-Z]+=.*"
     return [f"-D{line}" for line in (build / "CMakeCache.txt").read_text().splitlines() if re.fullmatch(kept, line)]
 
 
 def configure(source, build, settings):
-    subprocess.run(["cmake", "-S", source, "-B", build, "-G", "Ninja", "-DCARILLON_PRECOMPUTE=OFF", "-DCARILLON_TESTS=ON", *settings], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run(
+        ["cmake", "-S", source, "-B", build, "-G", "Ninja", "-DCARILLON_PRECOMPUTE=OFF", "-DCARILLON_TESTS=ON", *settings],
+        check=True,
+        stdout=subprocess.DEVNULL,
+    )
 
 
 def take_over(whole, build):
@@ -78,7 +93,11 @@ def take_over(whole, build):
 
 def find_sample(build):
     """A regular expression of some tests of every program: one of each suite of GoogleTest, and every script."""
-    listed = json.loads(subprocess.run(["ctest", "--test-dir", build, "-LE", LEFT_OUT, "--show-only=json-v1"], capture_output=True, text=True, check=True).stdout)
+    listed = json.loads(
+        subprocess.run(
+            ["ctest", "--test-dir", build, "-LE", LEFT_OUT, "--show-only=json-v1"], capture_output=True, text=True, check=True
+        ).stdout
+    )
     sample = {}
     for test in listed["tests"]:
         program = test["command"][0]
@@ -88,14 +107,19 @@ def find_sample(build):
 
 
 def run_tests(build, *choice):
-    return subprocess.run(["ctest", "--test-dir", build, "-j2", "--output-on-failure", "--no-tests=error", "-LE", LEFT_OUT, *choice]).returncode
+    return subprocess.run(
+        ["ctest", "--test-dir", build, "-j2", "--output-on-failure", "--no-tests=error", "-LE", LEFT_OUT, *choice]
+    ).returncode
 
 
 def find_traces(build):
     """Files of hidden packages that a compile read or a program loads."""
-    forbidden = re.compile(r"/(openmpi|petscdir|slepcdir|CGAL|openvdb|mumps_seq)/|/(mpi|metis|dmumps_c)\.h$|lib(mpi|petsc|slepc|metis|dmumps|openvdb|CGAL)[_.-]")
+    forbidden = re.compile(
+        r"/(openmpi|petscdir|slepcdir|CGAL|openvdb|mumps_seq)/|/(mpi|metis|dmumps_c)\.h$|"
+        r"lib(mpi|petsc|slepc|metis|dmumps|openvdb|CGAL)[_.-]"
+    )
     read = subprocess.run(["ninja", "-C", build, "-t", "deps"], capture_output=True, text=True, check=True).stdout.split()
-    assert len(read) > 1000, "ninja does not tell what was read"
+    assert len(read) > 1000, "ninja does not report what was read"
     loaded = []
     for program in (build / "bin").iterdir():
         loaded += subprocess.run(["ldd", program], capture_output=True, text=True).stdout.split()
@@ -111,7 +135,14 @@ def build_and_test(source, build, whole=None):
         same = sum((build / name).stat().st_mtime_ns == (whole / name).stat().st_mtime_ns for name in taken)
         print(f"{same} files of the whole build serve as they are, {len(taken) - same} were made again", flush=True)
     traces = find_traces(build)
-    print("\n".join(traces) if traces else "no compiled file read, and no program loads, a file of MPI, PETSc, SLEPc, METIS, MUMPS, CGAL or OpenVDB", flush=True)
+    print(
+        (
+            "\n".join(traces)
+            if traces
+            else "no compiled file read, and no program loads, a file of MPI, PETSc, SLEPc, METIS, MUMPS, CGAL or OpenVDB"
+        ),
+        flush=True,
+    )
     if traces or not whole:
         return run_tests(build) or len(traces) > 0
     pattern, count = find_sample(build)
@@ -124,8 +155,12 @@ def test_hidden(source, build, work, whole):
     hide(installed())
     # The tree is hidden for real: the compiler can use no type of these headers.
     for header, name in (("mpi.h", "MPI_Comm"), ("petsc.h", "PetscInt"), ("metis.h", "idx_t")):
-        probe = subprocess.run(["g++", "-x", "c++", "-", "-fsyntax-only", "-I/usr/lib/x86_64-linux-gnu/openmpi/include"],
-                               input=f"#include <{header}>\nint x = sizeof({name});", text=True, capture_output=True)
+        probe = subprocess.run(
+            ["g++", "-x", "c++", "-", "-fsyntax-only", "-I/usr/lib/x86_64-linux-gnu/openmpi/include"],
+            input=f"#include <{header}>\nint x = sizeof({name});",
+            text=True,
+            capture_output=True,
+        )
         if probe.returncode == 0:
             print(f"{header} can still be used; the namespace proves nothing")
             return 1
@@ -150,7 +185,9 @@ def main():
             print("no mount namespace can be made here: building in plain sight, and looking at what was read and what is loaded")
             return build_and_test(source, work)
         with tempfile.TemporaryDirectory(prefix="carillon-whole-") as whole:
-            return subprocess.run(["unshare", *flags, "--propagation", "private", sys.executable, *sys.argv], env={**os.environ, "CARILLON_INSIDE": whole}).returncode
+            return subprocess.run(
+                ["unshare", *flags, "--propagation", "private", sys.executable, *sys.argv], env={**os.environ, "CARILLON_INSIDE": whole}
+            ).returncode
     finally:
         shutil.rmtree(work, ignore_errors=True)
 

@@ -8,7 +8,11 @@ import re
 import subprocess
 import sys
 
-FORBIDDEN = re.compile(r"lib(mpi|open-rte|petsc|slepc|metis|dmumps|mumps|cholmod|CGAL|gmp|mpfr|openvdb|hdf5_openmpi|vtk|umfpack|spqr|fftw|scotch|gsl|readline)", re.I)
+FORBIDDEN = re.compile(
+    r"lib(mpi|open-rte|petsc|slepc|metis|dmumps|mumps|cholmod|CGAL|gmp|mpfr|openvdb|hdf5_openmpi|vtk|"
+    r"umfpack|spqr|fftw|scotch|gsl|readline)",
+    re.I,
+)
 
 
 def list_libraries(file):

@@ -19,7 +19,7 @@ inline mesh::TetMesh make_box(std::array<int, 3> cells, std::array<double, 3> si
   for (int k = 0; k <= cells[2]; ++k)
     for (int j = 0; j <= cells[1]; ++j)
       for (int i = 0; i <= cells[0]; ++i)
-        box.nodes.push_back(
+        box.nodes_m.push_back(
             {origin_m[0] + size_m[0] * i / cells[0], origin_m[1] + size_m[1] * j / cells[1], origin_m[2] + size_m[2] * k / cells[2]});
   std::map<std::pair<std::int32_t, std::int32_t>, std::int32_t> middle;
   box.order = order;
@@ -41,10 +41,10 @@ inline mesh::TetMesh make_box(std::array<int, 3> cells, std::array<double, 3> si
           if (order == 1) continue;
           for (const auto& edge : mesh::kEdges) {
             const auto key = std::minmax(tet[edge[0]], tet[edge[1]]);
-            const auto [found, is_new] = middle.try_emplace(key, static_cast<std::int32_t>(box.nodes.size()));
+            const auto [found, is_new] = middle.try_emplace(key, static_cast<std::int32_t>(box.nodes_m.size()));
             if (is_new) {
-              const auto a = box.nodes[key.first], b = box.nodes[key.second];
-              box.nodes.push_back({(a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2});
+              const auto a = box.nodes_m[key.first], b = box.nodes_m[key.second];
+              box.nodes_m.push_back({(a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2});
             }
             box.tets.push_back(found->second);
           }

@@ -10,7 +10,8 @@ ALPHA1, ALPHA2 = 8e-6, 50.0
 
 
 def enlarge(scene, times, speeds):
-    """The scene ten times as large, with `times` and `speeds` as factors of its seconds and its metres per second, heard with the same ears."""
+    """The scene ten times as large, with `times` and `speeds` as factors of its seconds and its metres per second, heard with the same
+    ears."""
     scene = copy.deepcopy(scene)
     scene["duration_s"] *= times
     for part in [*scene["bodies"], *scene.get("strikes", []), scene["listener"]]:
@@ -39,8 +40,8 @@ def play(stage):
     _, large, _ = stage.render("box-struck", enlarge(struck, 10.0, 1.0), picture=False)
     rows = [("peak", "block [Hz]", "box [Hz]", "block / box")]
     for index, begin in enumerate((0.05, 0.13, 0.21)):  # each strike alone
-        of_block = small[int(begin * rate):int((begin + 0.08) * rate)]
-        of_box = large[int(10 * begin * rate):int(10 * (begin + 0.08) * rate)]
+        of_block = small[int(begin * rate) : int((begin + 0.08) * rate)]
+        of_box = large[int(10 * begin * rate) : int(10 * (begin + 0.08) * rate)]
         for hz, level in measure.find_peaks(of_block, rate, 500, 5000, 3, 20.0):
             near = measure.find_peak(of_box, rate, 0.1 * hz, 0.05)
             rows.append((f"strike {index + 1}, {level:.0f} dB", f"{hz:.1f}", f"{near:.2f}", f"{hz / near:.4f}"))
@@ -52,7 +53,7 @@ def play(stage):
     print()
     rows = [("body", "in the sound [Hz]", "OSG02 [Hz]", "decay [1/s]", "by its alphas", "OSG02 printed", "corrected")]
     for name, samples, scale, paper in (("block", small, 1, (1596.2, 428.1, 428.1)), ("box", large, 10, (159.1, 49.0, 29.0))):
-        ring = samples[int(0.05 * scale * rate):int(0.13 * scale * rate)]
+        ring = samples[int(0.05 * scale * rate) : int(0.13 * scale * rate)]
         base = measure.find_peak(ring, rate, 1030 / scale, 0.1)
         decay = measure.calc_decay(ring, rate, base, 180 / scale, 40.0)
         law = 0.5 * (ALPHA1 * (2 * math.pi * base) ** 2 + ALPHA2)

@@ -7,7 +7,10 @@ import numpy
 import measure
 import stage as tools
 
-PAPER = {"aluminium": (551.3, 15.6, 15.6), "oak": (216.7, 22.4, 32.4)}  # OSG02 Table 1: base frequency, decay as printed, decay by its own alphas
+PAPER = {
+    "aluminium": (551.3, 15.6, 15.6),
+    "oak": (216.7, 22.4, 32.4),
+}  # OSG02 Table 1: base frequency, decay as printed, decay by its own alphas
 ALPHAS = {"aluminium": (1e-7, 30.0), "oak": (8e-6, 50.0)}
 LATER_S = 1.5
 
@@ -22,8 +25,8 @@ def play(stage):
     base = {}
     rows = [("bowl", "in the sound [Hz]", "OSG02 [Hz]", "decay [1/s]", "by its alphas", "OSG02 printed", "corrected")]
     for name, (paper_hz, printed, corrected) in PAPER.items():
-        begin = (0.1 if name == "aluminium" else 0.1 + LATER_S)
-        ring = samples[int(begin * rate):int((begin + 0.39) * rate)]  # the first blow, on the rim
+        begin = 0.1 if name == "aluminium" else 0.1 + LATER_S
+        ring = samples[int(begin * rate) : int((begin + 0.39) * rate)]  # the first blow, on the rim
         base[name] = measure.find_peak(ring, rate, paper_hz, 0.1)
         decay = measure.calc_decay(ring, rate, base[name], 0.5 * base[name], 30.0)
         alpha1, alpha2 = ALPHAS[name]
@@ -31,7 +34,9 @@ def play(stage):
         rows.append((name, f"{base[name]:.2f}", f"{paper_hz:.1f}", f"{decay:.2f}", f"{law:.2f}", f"{printed:.1f}", f"{corrected:.1f}"))
         stage.compare(f"decay of the {name} bowl in the sound against its damping law [1/s]", decay, law, 5.0)
         stage.compare(f"decay of the {name} bowl against Table 1, corrected [1/s]", decay, corrected, 10.0)
-    stage.compare("base frequency of the aluminium bowl, whose size was chosen for it [Hz]", base["aluminium"], 551.3, 3.0 if stage.quick else 1.0)
+    stage.compare(
+        "base frequency of the aluminium bowl, whose size was chosen for it [Hz]", base["aluminium"], 551.3, 3.0 if stage.quick else 1.0
+    )
     stage.compare("base frequency of the oak bowl, which then follows, against OSG02 [Hz]", base["oak"], 216.7, 7.0 if stage.quick else 5.0)
     print()
     tools.print_table(rows)
@@ -46,7 +51,9 @@ def play(stage):
     drop["bodies"][0]["bank"] = "bowl_oak.hdf"
     stage.render("oak-falls", drop, "--contacts", "fall.jsonl")
     falls = [json.loads((stage.out / f"{name}-falls-trajectory.json").read_text()) for name in PAPER]
-    stage.expect(f"both bowls fall through the same {len(falls[0]['impulses'])} contacts", falls[0]["impulses"] == falls[1]["impulses"] != [])
+    stage.expect(
+        f"both bowls fall through the same {len(falls[0]['impulses'])} contacts", falls[0]["impulses"] == falls[1]["impulses"] != []
+    )
     stage.expect("both bowls move alike", numpy.allclose(falls[0]["bodies"][0]["poses"], falls[1]["bodies"][0]["poses"], rtol=0, atol=2e-6))
     stage.draw("bowl-path.png", "scene", "aluminium-falls-trajectory.json")
     stage.draw("bowl-modes.png", "modes", "bowl_aluminium.hdf", "--modes", "1,3,5")

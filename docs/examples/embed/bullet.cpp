@@ -88,7 +88,7 @@ class World {
     hull_.setMargin(0);
     world_.setGravity(btVector3(0, 0, btScalar(-9.81)));
     world_.getSolverInfo().m_solverMode |= SOLVER_USE_2_FRICTION_DIRECTIONS;
-    world_.getSolverInfo().m_splitImpulsePenetrationThreshold = 1;  // depth is undone beside the velocities, or every hit bounces too high
+    world_.getSolverInfo().m_splitImpulsePenetrationThreshold = 1;  // depth is corrected apart from velocities, or hits bounce too high
     world_.getSolverInfo().m_restitutionVelocityThreshold = btScalar(0.02);
     btRigidBody::btRigidBodyConstructionInfo ground(0, nullptr, &floor_);
     ground.m_restitution = ground.m_friction = 1;  // Bullet takes the product of both

@@ -23,7 +23,7 @@ std::shared_ptr<const synth::Model> make_model(const bank::Bank& bank) {
   return synth::Model::make(bank, {.rate_hz = kRateHz, .gains = gains});
 }
 
-stream::Contact make_contact(int body, double time_s, stream::ContactState state) {
+events::LastingContact make_contact(int body, double time_s, events::ContactState state) {
   return {.time_s = time_s,
           .id = 1,
           .body = body,
@@ -44,11 +44,11 @@ int main(int argc, char** argv) {
     const bank::Bank edited = bank::calc_edited(bank, {.density_scale = 0.5, .size_scale = 0.8});
     synth::Synthesiser synthesiser({.rate_hz = kRateHz});
     const int body = synthesiser.add_body(make_model(bank), {.position_m = {0.0, 1.0, 0.0}});
-    synthesiser.push(stream::Impulse{.time_s = 0.01, .body = body, .triangle = 0, .impulse_n_s = {0.0, 0.0, 0.01}, .duration_s = 1e-4});
-    synthesiser.push(make_contact(body, 0.02, stream::ContactState::kBegin));
-    synthesiser.push(make_contact(body, 0.48, stream::ContactState::kHold));
-    synthesiser.push(make_contact(body, 0.50, stream::ContactState::kEnd));
-    synthesiser.push(stream::Mark{2.0});  // nothing else happens
+    synthesiser.push(events::Impulse{.time_s = 0.01, .body = body, .triangle = 0, .impulse_n_s = {0.0, 0.0, 0.01}, .duration_s = 1e-4});
+    synthesiser.push(make_contact(body, 0.02, events::ContactState::kBegin));
+    synthesiser.push(make_contact(body, 0.48, events::ContactState::kHold));
+    synthesiser.push(make_contact(body, 0.50, events::ContactState::kEnd));
+    synthesiser.push(events::TimeWatermark{2.0});  // nothing else happens
 
     std::array<float, 480> left, right;
     const std::array<float*, 2> out{left.data(), right.data()};

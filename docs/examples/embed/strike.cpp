@@ -21,9 +21,9 @@ int main(int argc, char** argv) {
 
     synth::Synthesiser synthesiser({.rate_hz = kRateHz});
     const int body = synthesiser.add_body(model, {.position_m = {-1.0, 2.0, 0.0}});
-    synthesiser.push(stream::Motion{.time_s = 0.0, .body = body, .position_m = {-1.0, 2.0, 0.0}, .velocity_m_s = {2.0, 0.0, 0.0}});
-    synthesiser.push(stream::Motion{.time_s = 1.0, .body = body, .position_m = {1.0, 2.0, 0.0}, .velocity_m_s = {2.0, 0.0, 0.0}});
-    synthesiser.push(stream::Impulse{.time_s = 0.01, .body = body, .triangle = 0, .impulse_n_s = {0.0, 0.0, 0.01}, .duration_s = 1e-4});
+    synthesiser.push(events::BodyMotion{.time_s = 0.0, .body = body, .position_m = {-1.0, 2.0, 0.0}, .velocity_m_s = {2.0, 0.0, 0.0}});
+    synthesiser.push(events::BodyMotion{.time_s = 1.0, .body = body, .position_m = {1.0, 2.0, 0.0}, .velocity_m_s = {2.0, 0.0, 0.0}});
+    synthesiser.push(events::Impulse{.time_s = 0.01, .body = body, .triangle = 0, .impulse_n_s = {0.0, 0.0, 0.01}, .duration_s = 1e-4});
 
     std::array<float, 128> left, right;
     const std::array<float*, 2> out{left.data(), right.data()};

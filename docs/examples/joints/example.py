@@ -1,4 +1,5 @@
-"""What hangs and swings: a wind chime on cords, a pendulum that strikes a bell, a bar that falls into its cords and a mallet on a hinged stick."""
+"""What hangs and swings: a wind chime on cords, a pendulum that strikes a bell, a bar that falls into its cords and a mallet on a hinged
+stick."""
 import json
 import math
 
@@ -53,7 +54,11 @@ def play_chime(stage):
 
 def play_bell(stage):
     bank = stage.solve("bell.json", "bell", quick={"body.nodes": 2500, "band_hz": [20, 6000]})
-    stage.solve("ball.json", "steel", {"body.radius_m": 0.015, "material.young_modulus_pa": 200e9, "material.density_kg_m3": 7800, "band_hz": [20, 150000]})
+    stage.solve(
+        "ball.json",
+        "steel",
+        {"body.radius_m": 0.015, "material.young_modulus_pa": 200e9, "material.density_kg_m3": 7800, "band_hz": [20, 150000]},
+    )
     scene = tools.read_json(stage.folder / "bell-scene.json")
     rate, samples, report = stage.render("bell", scene)
     times, places, hits = read_path(stage, "bell", "pendulum")
@@ -64,10 +69,13 @@ def play_bell(stage):
     reached = numpy.interp(first, times, angles)
     before = times < first - 2e-3
     spin = numpy.gradient(angles[before], times[before])
-    w2 = G * arm / (arm ** 2 + 0.4 * r ** 2)
+    w2 = G * arm / (arm**2 + 0.4 * r**2)
     predicted = numpy.sqrt(2 * w2 * numpy.maximum(numpy.cos(angles[before]) - math.cos(start), 0))
     off = abs(spin[2:-2] - predicted[2:-2]).max() / predicted.max()
-    print(f"  the pendulum falls from {math.degrees(start):.1f} degrees and strikes at {first:.4f} s and {math.degrees(reached):.2f} degrees; {count_blows(hits)} blows")
+    print(
+        f"  the pendulum falls from {math.degrees(start):.1f} degrees and strikes at {first:.4f} s and {math.degrees(reached):.2f} degrees;"
+        f" {count_blows(hits)} blows"
+    )
     stage.expect(f"its speed until then is that of its energy to 1 % (off by {100 * off:.2f} %)", off < 0.01)
     stage.expect(f"the pendulum strikes the bell 2 to 60 times ({count_blows(hits)})", 2 <= count_blows(hits) <= 60)
     swing = read_path(stage, "bell", "bell")[1]
@@ -90,7 +98,7 @@ def play_bar(stage):
     stage.expect(f"they hold it where they are taut ({1e6 * abs(caught[:, 2]).max():.1f} um off)", abs(caught[:, 2]).max() < 2e-5)
     print(f"  the mallet strikes at {first:.4f} s, {count_blows(hits)} blows")
     stage.expect(f"the mallet strikes the bar 1 to 60 times ({count_blows(hits)})", 1 <= count_blows(hits) <= 60)
-    hear(stage, "the bar", samples[int(first * rate):], rate, bank["frequencies_hz"][0], 0.3)
+    hear(stage, "the bar", samples[int(first * rate) :], rate, bank["frequencies_hz"][0], 0.3)
     return report
 
 
@@ -98,6 +106,14 @@ def play(stage):
     reports = {"wind chime": play_chime(stage), "pendulum and bell": play_bell(stage), "bar and mallet": play_bar(stage)}
     rows = [("scene", "seconds", "physics [CPU s]", "a second of it", "contacts")]
     for name, report in reports.items():
-        rows.append((name, f"{report['duration_s']:g}", f"{report['physics_cpu_s']:.3f}", f"{report['physics_cpu_s'] / report['duration_s']:.3f}", report["contacts"]))
+        rows.append(
+            (
+                name,
+                f"{report['duration_s']:g}",
+                f"{report['physics_cpu_s']:.3f}",
+                f"{report['physics_cpu_s'] / report['duration_s']:.3f}",
+                report["contacts"],
+            )
+        )
     print()
     tools.print_table(rows)

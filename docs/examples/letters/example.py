@@ -24,11 +24,24 @@ def make_scene(word, duration_s):
     for index, (letter, width) in enumerate(zip(word, widths)):
         if letter != " ":
             place = [round(x + 0.5 * width * SQUARE_M, 4), 0, round(2.5 * SQUARE_M + 0.07 + 0.05 * index, 4)]
-            bodies.append({"name": f"{letter}{index}", "bank": f"{letter}.hdf", "position_m": place, "rotation_deg": TURNS_DEG[index], "restitution": 0.4,
-                           "friction": 0.5})
+            bodies.append(
+                {
+                    "name": f"{letter}{index}",
+                    "bank": f"{letter}.hdf",
+                    "position_m": place,
+                    "rotation_deg": TURNS_DEG[index],
+                    "restitution": 0.4,
+                    "friction": 0.5,
+                }
+            )
         x += (width + 1.5) * SQUARE_M
-    return {"radiation": "osg02", "duration_s": duration_s, "ground": {"height_m": -0.06}, "bodies": bodies,
-            "listener": {"position_m": [0, -1.6, 0.6], "look_at_m": [0, 0, 0.1]}}
+    return {
+        "radiation": "osg02",
+        "duration_s": duration_s,
+        "ground": {"height_m": -0.06},
+        "bodies": bodies,
+        "listener": {"position_m": [0, -1.6, 0.6], "look_at_m": [0, 0, 0.1]},
+    }
 
 
 def play(stage):
@@ -41,18 +54,39 @@ def play(stage):
     stage.solve("slab.json", "slab", quick={"body.nodes": 1500, "band_hz": [20, 2000]})
 
     # Each letter alone, held in the air and struck on a foot; then what Table 1 has of it.
-    struck = {"radiation": "osg02", "duration_s": 0.6 * len(base) + 0.1, "listener": {"position_m": [0, -1.2, 0]},
-              "bodies": [{"name": letter, "bank": f"{letter}.hdf", "fixed": True} for letter in base],
-              "strikes": [{"time_s": 0.05 + 0.6 * i, "body": letter, "duration_s": 1e-3, "impulse_n_s": [0.03, 0.05, 0.02],
-                           "point_m": [SQUARE_M * (0.4 if letter == "T" else -1.9), -0.5 * SQUARE_M, -2.5 * SQUARE_M]} for i, letter in enumerate(base)]}
+    struck = {
+        "radiation": "osg02",
+        "duration_s": 0.6 * len(base) + 0.1,
+        "listener": {"position_m": [0, -1.2, 0]},
+        "bodies": [{"name": letter, "bank": f"{letter}.hdf", "fixed": True} for letter in base],
+        "strikes": [
+            {
+                "time_s": 0.05 + 0.6 * i,
+                "body": letter,
+                "duration_s": 1e-3,
+                "impulse_n_s": [0.03, 0.05, 0.02],
+                "point_m": [SQUARE_M * (0.4 if letter == "T" else -1.9), -0.5 * SQUARE_M, -2.5 * SQUARE_M],
+            }
+            for i, letter in enumerate(base)
+        ],
+    }
     rate, samples, _ = stage.render("letters-struck", struck, picture=False)
     rows = [("letter", "in the sound [Hz]", "OSG02 [Hz]", "decay [1/s]", "by its alphas", "OSG02 [1/s]")]
     for index, (letter, hz) in enumerate(base.items()):
-        ring = samples[int((0.055 + 0.6 * index) * rate):int((0.64 + 0.6 * index) * rate)]
+        ring = samples[int((0.055 + 0.6 * index) * rate) : int((0.64 + 0.6 * index) * rate)]
         heard = measure.find_peak(ring, rate, hz, 0.01)
         law = 0.5 * (ALPHA1 * (2 * math.pi * heard) ** 2 + ALPHA2)
         decay = measure.calc_decay(ring, rate, heard, 0.04 * heard + 6, 25.0)
-        rows.append((letter, f"{heard:.2f}", f"{PAPER_HZ:.1f}" if letter == "T" else "", f"{decay:.2f}", f"{law:.2f}", f"{PAPER_DECAY:.1f}" if letter == "T" else ""))
+        rows.append(
+            (
+                letter,
+                f"{heard:.2f}",
+                f"{PAPER_HZ:.1f}" if letter == "T" else "",
+                f"{decay:.2f}",
+                f"{law:.2f}",
+                f"{PAPER_DECAY:.1f}" if letter == "T" else "",
+            )
+        )
         stage.compare(f"{letter}: base frequency in the sound against its bank [Hz]", heard, hz, 0.3)
         stage.compare(f"{letter}: decay in the sound against its damping law [1/s]", decay, law, 8.0)
         if letter == "T":
@@ -61,7 +95,9 @@ def play(stage):
     print()
     tools.print_table(rows)
     ratio = linear["frequencies_hz"][0] / base["T"]
-    print(f"\n  the same mesh of the T with linear elements, as in the paper: {linear['frequencies_hz'][0]:.1f} Hz, {ratio:.2f} times as high")
+    print(
+        f"\n  the same mesh of the T with linear elements, as in the paper: {linear['frequencies_hz'][0]:.1f} Hz, {ratio:.2f} times as high"
+    )
     stage.expect(f"a coarse mesh of linear elements is sharp, as the paper says of its letters: {ratio:.2f}", ratio > 1.2)
 
     _, _, report = stage.render("letters", make_scene(WORDS, 0.7 if stage.quick else 2.0))

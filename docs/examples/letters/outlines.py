@@ -1,7 +1,7 @@
 """Coarse letters as tetrahedra: outlines of a few four-sided pieces on a grid, thickened by one layer.
 
-Each four-sided piece is cut along its shorter diagonal, each prism over a triangle into three tetrahedra by the numbers of its corners, which makes neighbours fit
-(Dompierre and others, "How to subdivide pyramids, prisms and hexahedra into tetrahedra", 1999).
+Each four-sided piece is cut along its shorter diagonal, each prism over a triangle into three tetrahedra by the numbers of its corners,
+which makes neighbours fit (Dompierre and others, "How to subdivide pyramids, prisms and hexahedra into tetrahedra", 1999).
 """
 
 GRIDS = {  # a square piece for every #; letters are five squares high
@@ -15,8 +15,12 @@ GRIDS = {  # a square piece for every #; letters are five squares high
 
 def make_squares(rows):
     """Counter-clockwise corners of the squares, (0, 0) at the bottom left."""
-    return [[(x, y), (x + 1, y), (x + 1, y + 1), (x, y + 1)]
-            for y, row in enumerate(reversed(rows)) for x, cell in enumerate(row) if cell == "#"]
+    return [
+        [(x, y), (x + 1, y), (x + 1, y + 1), (x, y + 1)]
+        for y, row in enumerate(reversed(rows))
+        for x, cell in enumerate(row)
+        if cell == "#"
+    ]
 
 
 def make_strip(left, right):
@@ -64,6 +68,15 @@ def make_mesh(letter, square_m):
 
 
 def write_medit(file, points, tetrahedra):
-    lines = ["MeshVersionFormatted 2", "Dimension 3", "Vertices", str(len(points)), *(f"{x:.17g} {y:.17g} {z:.17g} 0" for x, y, z in points),
-             "Tetrahedra", str(len(tetrahedra)), *(" ".join(str(i + 1) for i in t) + " 0" for t in tetrahedra), "End"]
+    lines = [
+        "MeshVersionFormatted 2",
+        "Dimension 3",
+        "Vertices",
+        str(len(points)),
+        *(f"{x:.17g} {y:.17g} {z:.17g} 0" for x, y, z in points),
+        "Tetrahedra",
+        str(len(tetrahedra)),
+        *(" ".join(str(i + 1) for i in t) + " 0" for t in tetrahedra),
+        "End",
+    ]
     file.write_text("\n".join(lines) + "\n")

@@ -3,7 +3,6 @@ import math
 
 import numpy
 
-import measure
 import stage as tools
 
 AIR_DENSITY, SOUND_SPEED = 1.21, 343.0
@@ -11,7 +10,7 @@ YOUNG, POISSON, DENSITY = 7e10, 0.3, 2700.0  # of the aluminium balls
 RESTITUTION = 0.9
 CASES = {"small": (0.04, 1.0), "soft": (0.04, 0.1), "large": (0.08, 1.0)}  # radius [m], speed at which they meet [m/s]
 DISTANCE_M = 1.0
-MICROPHONES = ((DISTANCE_M, 0), (0, DISTANCE_M))  # ahead: on the line through both centres; and beside it
+MICROPHONES = ((DISTANCE_M, 0), (0, DISTANCE_M))  # ahead: on the line through both centres; and next to it
 
 
 def calc_hertz(radius, speed):
@@ -27,13 +26,15 @@ def calc_reciprocal_gamma(x):
 
 
 def calc_pulse(freq, tau):
-    """Fourier transform of sin^1.5(pi t / tau) on (0, tau), of area 1, about its middle: Gamma functions (Gradshteyn and Ryzhik 3.631.8). Its first zero is at 1.75 / tau."""
+    """Fourier transform of sin^1.5(pi t / tau) on (0, tau), of area 1, about its middle: Gamma functions (Gradshteyn and Ryzhik 3.631.8).
+    Its first zero is at 1.75 / tau."""
     x = freq * tau
     return calc_reciprocal_gamma(1.75 + x) * calc_reciprocal_gamma(1.75 - x) * math.gamma(1.75) ** 2
 
 
 def calc_click(freq, radius, speed, tau, microphone):
-    """|p|(f) [Pa s] at a microphone: two rigid spheres beside each other along x that are pushed apart (Morse and Ingard 1968, 7.2, far field)."""
+    """|p|(f) [Pa s] at a microphone: two rigid spheres next to each other along x that are pushed apart (Morse and Ingard 1968, 7.2, far
+    field)."""
     mass, _ = calc_hertz(radius, speed)
     s = 2j * math.pi * freq
     unit = s * radius / SOUND_SPEED
@@ -66,15 +67,50 @@ def calc_hertz_heard(freq, magnitude, tau):
 
 def play(stage):
     stage.solve("ball.json", "ball-unit", quick={"body.nodes": 1200})
-    rows = [("balls", "meet at [m/s]", "Hertz time [us]", "in the sound [us]", "click [Pa]", "worst third octave ahead, beside [dB]", "modes in hearing", "modes alone [Pa]")]
+    rows = [
+        (
+            "balls",
+            "meet at [m/s]",
+            "Hertz time [us]",
+            "in the sound [us]",
+            "click [Pa]",
+            "worst third octave ahead, next to [dB]",
+            "modes in hearing",
+            "modes alone [Pa]",
+        )
+    ]
     for name, (radius, speed) in CASES.items():
-        stage.run("the edit", stage.bin / "carillon-bank", "edit", "ball-unit.hdf", f"ball-{name}.hdf", "--density", DENSITY, "--size", round(radius / 0.1, 6))
+        stage.run(
+            "the edit",
+            stage.bin / "carillon-bank",
+            "edit",
+            "ball-unit.hdf",
+            f"ball-{name}.hdf",
+            "--density",
+            DENSITY,
+            "--size",
+            round(radius / 0.1, 6),
+        )
         mass, tau = calc_hertz(radius, speed)
         gap = 0.005
-        bodies = [{"name": side, "bank": f"ball-{name}.hdf", "position_m": [sign * (radius + gap), 0, 0], "velocity_m_s": [-sign * speed / 2, 0, 0],
-                   "restitution": RESTITUTION} for side, sign in (("left", -1), ("right", 1))]
-        scene = {"duration_s": round(2 * gap / speed + 0.03, 4), "gravity_m_s2": [0, 0, 0], "sample_rate_hz": 192000, "bodies": bodies,
-                 "effects": ["hertz_pulse", "acceleration_noise", "air_delay", "doppler"], "microphones": [[*place, 0] for place in MICROPHONES]}
+        bodies = [
+            {
+                "name": side,
+                "bank": f"ball-{name}.hdf",
+                "position_m": [sign * (radius + gap), 0, 0],
+                "velocity_m_s": [-sign * speed / 2, 0, 0],
+                "restitution": RESTITUTION,
+            }
+            for side, sign in (("left", -1), ("right", 1))
+        ]
+        scene = {
+            "duration_s": round(2 * gap / speed + 0.03, 4),
+            "gravity_m_s2": [0, 0, 0],
+            "sample_rate_hz": 192000,
+            "bodies": bodies,
+            "effects": ["hertz_pulse", "acceleration_noise", "air_delay", "doppler"],
+            "microphones": [[*place, 0] for place in MICROPHONES],
+        }
         rate, samples, report = stage.render(f"spheres-{name}", scene, picture=name == "large")
         stage.expect(f"{name}: one contact", report["contacts"] == 1)
 
@@ -82,17 +118,39 @@ def play(stage):
         pressure = samples / report["gain_per_pa"]
         begin = int((2 * gap / speed + (DISTANCE_M - 3 * radius) / SOUND_SPEED) * rate)
         freq = numpy.maximum(numpy.fft.rfftfreq(1 << 17, 1 / rate), 1e-3)
-        heard = [abs(numpy.fft.rfft(column[begin:begin + int(0.004 * rate)], 1 << 17)) / rate for column in pressure.T]
+        heard = [abs(numpy.fft.rfft(column[begin : begin + int(0.004 * rate)], 1 << 17)) / rate for column in pressure.T]
         tau_heard = calc_hertz_heard(freq, heard[0], tau)
-        worst = [calc_worst(freq, spectrum, calc_click(freq, radius, speed, tau, place), min(1.5 / tau, 20000)) for spectrum, place in zip(heard, MICROPHONES)]
-        _, _, ringing = stage.render(f"spheres-{name}-modes", {**scene, "sample_rate_hz": 48000, "effects": ["modal", "hertz_pulse", "air_delay"]}, picture=False,
-                                     may_be_silent=True)
-        rows.append((f"{name}, radius {1000 * radius:.0f} mm", f"{speed:g}", f"{1e6 * tau:.1f}", f"{1e6 * tau_heard:.1f}", f"{abs(pressure).max():.3g}", f"{worst[0]:.2f}, {worst[1]:.2f}",
-                     ringing["modes"] // 2, f"{ringing['peak_pa']:.2g}"))
+        worst = [
+            calc_worst(freq, spectrum, calc_click(freq, radius, speed, tau, place), min(1.5 / tau, 20000))
+            for spectrum, place in zip(heard, MICROPHONES)
+        ]
+        _, _, ringing = stage.render(
+            f"spheres-{name}-modes",
+            {**scene, "sample_rate_hz": 48000, "effects": ["modal", "hertz_pulse", "air_delay"]},
+            picture=False,
+            may_be_silent=True,
+        )
+        rows.append(
+            (
+                f"{name}, radius {1000 * radius:.0f} mm",
+                f"{speed:g}",
+                f"{1e6 * tau:.1f}",
+                f"{1e6 * tau_heard:.1f}",
+                f"{abs(pressure).max():.3g}",
+                f"{worst[0]:.2f}, {worst[1]:.2f}",
+                ringing["modes"] // 2,
+                f"{ringing['peak_pa']:.2g}",
+            )
+        )
         stage.expect(f"{name}: the click is far louder than what rings", abs(pressure).max() > 10 * ringing["peak_pa"])
         stage.compare(f"{name}: the Hertz time in the sound against its closed form [us]", 1e6 * tau_heard, 1e6 * tau, 3.0)
         bound = 1.0 if stage.quick else 0.5
-        stage.expect(f"{name}: the click's third octaves are those of two pushed spheres to {bound} dB, ahead and beside: {worst[0]:.2f}, {worst[1]:.2f}",
-                     max(worst) < bound)
+        stage.expect(
+            (
+                f"{name}: the click's third octaves are those of two pushed spheres to {bound} dB, ahead and next to: {worst[0]:.2f},"
+                f" {worst[1]:.2f}"
+            ),
+            max(worst) < bound,
+        )
     print()
     tools.print_table(rows)

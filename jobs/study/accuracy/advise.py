@@ -27,20 +27,24 @@ from accuracy.lab import Case, Lab
 from errors import InputError, RunError, printable
 
 RANKS_FROM_S = 4.0  # CPU seconds from which a second rank saves more of the clock than its start takes
-PROBE_NODES, PROBE_GROWTH, MOST_PROBE_NODES = {"shape": 1000, "surface": 2500}, {"shape": 3, "surface": 2}, 60000
+PROBE_NODES, PROBE_GROWTH, MAX_PROBE_NODES = {"shape": 1000, "surface": 2500}, {"shape": 3, "surface": 2}, 60000
 TRIAL_TOLERANCE = 1e-6
-START_S = 0.15  # CPU seconds of starting, which no station of a run's record claims
+START_S = 0.15  # CPU seconds of starting, which no phase of a run's record claims
 BUDGET_MARGIN = 0.85  # of --seconds: what is aimed at
 CHECK_GROWTH = 2.5  # of the nodes, for --check
 PATIENCE_S = 6.0  # for a first look; what does not fit is estimated
-LONG_S, MANY_NODES = 10.0, 45000  # of a mesh file's solve, of a surface's coarsest mesh: from here on the first look is an answer of its own
-MOST_CENTS, MOST_SECONDS = 2400.0, 1e6
+LONG_S, MANY_NODES = (
+    10.0,
+    45000,
+)  # of a mesh file's solve, of a surface's coarsest mesh: from here on the first look is an answer of its own
+MAX_CENTS, MAX_SECONDS = 2400.0, 1e6
 PROGRAMS = ("carillon-precompute", "carillon-mesh", "carillon-bank")
 
 
 @dataclasses.dataclass
 class Outcome:
     """What the run came to. how: "known" frequencies, the study's "extrapolated" ones, a "finer" mesh, or error "bars"."""
+
     cents: float
     mode: int
     bar: float
@@ -62,7 +66,10 @@ class KnownTarget:
         self.how = "known" if body.truth else "extrapolated"
         self.doubt_cents = max((1200 * math.log2(1 + doubt) for doubt in truth.get("uncertainty", [])), default=0.0)
         if self.doubt_cents > 1:
-            self.notes.append(f"its frequencies are not known: errors are relative to the study's finest curved T10, extrapolated, which may be {show(self.doubt_cents)} cents wrong themselves")
+            self.notes.append(
+                "its frequencies are not known: errors are relative to the study's finest curved T10, extrapolated, which may be"
+                f" {show(self.doubt_cents)} cents wrong themselves"
+            )
 
     def list_files(self):
         return []
@@ -96,11 +103,15 @@ class Adviser:
         if self.target.kind != "study" or self.target.name not in advice.curves:
             for element in ("T4", "T10") if self.target.kind == "mesh" else ("T10",):
                 if len(advice.find_bar_ratios(element)) < 2:
-                    raise InputError(f"{options.advice}: it has too few meshes of {element} to predict {self.target.name} from; take the advice of a study of more bodies")
+                    raise InputError(
+                        f"{options.advice}: it has too few meshes of {element} to predict {self.target.name} from; take the advice of a"
+                        " study of more bodies"
+                    )
         self.lab = Lab(options.out, tools, repeats=1, surface=options.surface)
         self.lab.say = lambda text: None  # what there is to say is said here
         self.cores = len(os.sched_getaffinity(0))
         self.probe, self.probe_cpu_s = None, 0.0
+        self.predicted = {}  # CPU seconds by (element, nodes, modes)
         self.pace = 1.0  # CPU seconds of this machine over those of the study's
 
     def find_target(self, word):
@@ -127,12 +138,15 @@ class Adviser:
             if self.options.wall or self.options.height or self.options.band:
                 raise InputError(f"{word}: --wall, --height and --band are for bodies of your own; the study's has its own")
             if self.options.check:
-                raise InputError(f"{word}: --check is for bodies of your own; the study tells the frequencies of its own")
+                raise InputError(f"{word}: --check is for bodies of your own; the study gives the frequencies of its own bodies")
             return KnownTarget(bodies.choose([word], self.options.surface)[0], self.advice)
         target = targets.find_target(word, self.options.wall, self.options.height, self.options.band)
         if target is None:
             near = difflib.get_close_matches(word, [*known, *targets.SHAPES], 1)
-            raise InputError(f"{word}: there is no such file, and no body of the study ({', '.join(known)}) or shape ({', '.join(targets.SHAPES)})" + (f'; did you mean "{near[0]}"?' if near else ""))
+            raise InputError(
+                f"{word}: there is no such file, and no body of the study ({', '.join(known)}) or shape ({', '.join(targets.SHAPES)})"
+                + (f'; did you mean "{near[0]}"?' if near else "")
+            )
         return OwnTarget(target)
 
     # --- before
@@ -143,7 +157,7 @@ class Adviser:
 
     @contextlib.contextmanager
     def doing(self, text):
-        """Says so, and again while it goes on."""
+        """Says so, and again while it continues."""
         self.say(text)
         done, begin = threading.Event(), time.monotonic()
 
@@ -152,6 +166,7 @@ class Adviser:
                 if done.wait(3 if number < 5 else 15):
                     return
                 self.say(f"still {text}, {time.monotonic() - begin:.0f} s")
+
         thread = threading.Thread(target=beat, daemon=True)
         thread.start()
         try:
@@ -187,7 +202,7 @@ class Adviser:
         return json.loads(done.stdout)
 
     def calibrate(self):
-        """How fast this machine is beside the study's, by the study's small solve."""
+        """How fast this machine is relative to the study's, by the study's small solve."""
         known = self.advice.get_calibration()
         with self.doing("measuring the pace of this machine"):
             solve = self.lab.measure([Case("calibration", known["job"])], 2, is_fresh=True)["calibration"]
@@ -198,7 +213,11 @@ class Adviser:
         curves = self.advice.curves.get(self.target.name) if self.target.kind == "study" else None
         if curves is None:
             return [self.try_coarse().make_curve()]
-        return [forecast.Curve(curve.element, [dataclasses.replace(s, cpu_s=s.cpu_s * self.pace) for s in curve.samples]) for curve in curves.values() if curve.element != "T10 straight"]
+        return [
+            forecast.Curve(curve.element, [dataclasses.replace(s, cpu_s=s.cpu_s * self.pace) for s in curve.samples])
+            for curve in curves.values()
+            if curve.element != "T10 straight"
+        ]
 
     def try_mesh(self):
         """[(Setting, Solve, cents)] of a mesh file with both elements: it is what it is, and no finer one can be made of it here."""
@@ -210,28 +229,47 @@ class Adviser:
             if solve.freq_hz:
                 tried.append((setting, solve, max(find_bars(solve)) / self.advice.find_usual_ratio(element)))
         if not tried:
-            raise InputError(f"{self.target.name}: no mode was found in the band; give another band (--band LOW,HIGH, or \"band_hz\" of the job)")
+            raise InputError(
+                f'{self.target.name}: no mode was found in the band; give another band (--band LOW,HIGH, or "band_hz" of the job)'
+            )
         return tried
 
     def choose_for_mesh(self):
         cents, seconds = self.options.cents, self.options.seconds
-        tried = [forecast.Forecast(dataclasses.replace(setting, nodes=solve.nodes), worst, solve.cpu, min(solve.wall_s)) for setting, solve, worst in self.try_mesh()]
+        tried = [
+            forecast.Forecast(dataclasses.replace(setting, nodes=solve.nodes), worst, solve.cpu, min(solve.wall_s))
+            for setting, solve, worst in self.try_mesh()
+        ]
         affordable = [f for f in tried if seconds is None or f.cpu_s <= seconds]
         best = min(tried, key=lambda f: f.cents)
         if not affordable:
-            raise InputError(f"{self.target.name}: {seconds:g} CPU s are too few for this mesh: T4 takes {tried[0].cpu_s:.2g}; give more, or a coarser mesh")
+            raise InputError(
+                f"{self.target.name}: {seconds:g} CPU s are too few for this mesh: T4 takes {tried[0].cpu_s:.2g}; give more, or a coarser"
+                " mesh"
+            )
         enough = [f for f in affordable if cents is not None and f.cents <= cents]
         if enough:
             return min(enough, key=lambda f: f.cpu_s), ""
         if cents is not None and seconds is None:
-            raise InputError(f"{self.target.name}: {cents:g} cents are out of reach of this mesh file, which comes to about {best.cents:.2g} with {best.setting.element} ({best.cpu_s:.2g} CPU s); "
-                             f"give a finer mesh, the surface or shape itself, or --cents {math.ceil(best.cents * 110) / 100:g}")
+            raise InputError(
+                f"{self.target.name}: {cents:g} cents are out of reach of this mesh file, which comes to about {best.cents:.2g} with"
+                f" {best.setting.element} ({best.cpu_s:.2g} CPU s); give a finer mesh, the surface or shape itself, or --cents"
+                f" {math.ceil(best.cents * 110) / 100:g}"
+            )
         chosen = min(affordable, key=lambda f: f.cents)
-        return chosen, "" if cents is None else f"{cents:g} cents are out of reach of this mesh file within {seconds:g} CPU s; about {chosen.cents:.2g} can be had"
+        return (
+            chosen,
+            (
+                ""
+                if cents is None
+                else f"{cents:g} cents are out of reach of this mesh file within {seconds:g} CPU s; about {chosen.cents:.2g} can be had"
+            ),
+        )
 
     def try_coarse(self):
-        """Solves of a body that the study does not have, each on three times the nodes of the one before, until what is asked comes within reach."""
-        self.probe = forecast.Probe(self.advice, "T10")
+        """Solves of a body that the study does not have, each on three times the nodes of the one before, until what is asked comes within
+        reach."""
+        self.probe = forecast.Probe(self.advice, "T10", self.predict_seconds)
         kind = "surface" if self.target.has_surface else "shape"
         nodes, growth = PROBE_NODES[kind], PROBE_GROWTH[kind]
         while True:
@@ -245,29 +283,44 @@ class Adviser:
                 continue
             self.probe_cpu_s += trial.cpu_s
             self.probe.trials.append(trial)
-            if nodes * growth > MOST_PROBE_NODES or self.is_within_reach():
+            if nodes * growth > MAX_PROBE_NODES or self.is_within_reach():
                 break
             nodes *= growth
         if not trial.freq_hz:
-            raise InputError(f"{self.target.name}: no mode was found in the band on {trial.nodes:,} nodes; give another band (--band LOW,HIGH, or \"band_hz\" of the job)")
+            raise InputError(
+                f"{self.target.name}: no mode was found in the band on {trial.nodes:,} nodes; give another band (--band LOW,HIGH, or"
+                ' "band_hz" of the job)'
+            )
         return self.probe
 
+    def predict_seconds(self, element, nodes, modes):
+        """CPU seconds of one rank, by the cost model of carillon-precompute."""
+        key = (element, nodes, modes)
+        if key not in self.predicted:
+            size = json.dumps({"element": element, "nodes": nodes, "modes": modes})
+            command = [self.lab.find_program("carillon-precompute"), "--estimate", size]
+            done = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL)
+            if done.returncode != 0:
+                raise RunError(done.returncode, f"carillon-precompute --estimate failed: {printable(done.stderr.strip())}")
+            self.predicted[key] = json.loads(done.stdout)["cpu_seconds"]
+        return self.predicted[key]
+
     def is_within_reach(self):
-        """Whether the trials tell enough: the cents, or all that the seconds buy, are no more than a step away."""
+        """Whether the trials suffice: the cents, or all that the seconds buy, are no more than a step away."""
         trials, options = self.probe.trials, self.options
         if len(trials) < 2 or not trials[-2].freq_hz:
             return len(trials) > 2  # three times none: there is none
         curve = self.probe.make_curve()
         if options.cents is not None and curve.find_nodes(options.cents) is not None:
             return True
-        return options.seconds is not None and curve.predict_cpu(curve.get_most_nodes()) > options.seconds
+        return options.seconds is not None and curve.predict_cpu(curve.get_max_nodes()) > options.seconds
 
     def try_one(self, nodes):
         return self.make_trial(self.solve(forecast.Setting("T10", nodes, TRIAL_TOLERANCE), f"trial of {nodes} nodes"), nodes)
 
     def make_trial(self, solve, nodes):
-        stations = sum(station.get("cpu_seconds", station["seconds"]) for station in solve.record["stations"])
-        mesh_s = max(solve.cpu - stations - START_S, 0.0) if self.target.kind == "surface" else 0.0
+        phases_s = sum(phase.get("cpu_seconds", phase["seconds"]) for phase in solve.record["stations"])
+        mesh_s = max(solve.cpu - phases_s - START_S, 0.0) if self.target.kind == "surface" else 0.0
         return forecast.Trial(nodes, solve.unknowns, solve.freq_hz, find_bars(solve), solve.cpu, mesh_s)
 
     def solve(self, setting, name):
@@ -299,11 +352,16 @@ class Adviser:
                 raise InputError(self.describe_reach(curves, cents))
             if best is not None and (seconds is None or best.cpu_s <= seconds):
                 return best, ""
-        affordable = [self.make_forecast(curve, nodes) for curve in curves if (nodes := curve.find_affordable(BUDGET_MARGIN * seconds)) is not None]
+        affordable = [
+            self.make_forecast(curve, nodes) for curve in curves if (nodes := curve.find_affordable(BUDGET_MARGIN * seconds)) is not None
+        ]
         affordable = [f for f in affordable if f.cpu_s <= seconds] or affordable
         if not affordable:
             least = min((curve.predict_cpu(curve.samples[0].nodes) for curve in curves))
-            raise InputError(f"{self.target.name}: {seconds:g} CPU s are too few: the coarsest mesh takes about {least:.2g}; give --seconds {math.ceil(20 * least) / 10:g} or more")
+            raise InputError(
+                f"{self.target.name}: {seconds:g} CPU s are too few: the coarsest mesh takes about {least:.2g}; give --seconds"
+                f" {math.ceil(20 * least) / 10:g} or more"
+            )
         chosen = min(affordable, key=lambda f: f.cents)
         if cents is None:
             return chosen, ""
@@ -311,10 +369,13 @@ class Adviser:
         return chosen, f"{cents:g} cents {price}; in {seconds:g} CPU s about {chosen.cents:.2g} can be had"
 
     def describe_reach(self, curves, cents):
-        finest = min((self.make_forecast(curve, math.floor(curve.get_most_nodes())) for curve in curves), key=lambda f: f.cents)
+        finest = min((self.make_forecast(curve, math.floor(curve.get_max_nodes())) for curve in curves), key=lambda f: f.cents)
         least = math.ceil(finest.cents / forecast.GOAL * 100) / 100
-        return (f"{self.target.name}: {cents:g} cents are out of reach of what the study can predict: the finest mesh, {finest.setting.nodes:,} nodes, comes to about {finest.cents:.2g} cents in "
-                f"{finest.cpu_s:.0f} CPU s; give --cents {least:g} or more")
+        return (
+            f"{self.target.name}: {cents:g} cents are out of reach of what the study can predict: the finest mesh,"
+            f" {finest.setting.nodes:,} nodes, comes to about {finest.cents:.2g} cents in {finest.cpu_s:.0f} CPU s; give --cents"
+            f" {least:g} or more"
+        )
 
     # --- after
 
@@ -352,7 +413,12 @@ def find_bars(solve):
 
 # --- what is said
 
-HOW = {"known": "against frequencies that are known without a mesh", "extrapolated": "against the study's finest curved T10, extrapolated", "finer": "against a finer mesh, what that one is wrong itself made up for", "bars": "by its error bars over the factor by which such bars are too long"}
+HOW = {
+    "known": "against frequencies that are known without a mesh",
+    "extrapolated": "against the study's finest curved T10, extrapolated",
+    "finer": "against a finer mesh, what that one is wrong itself made up for",
+    "bars": "by its error bars over the factor by which such bars are too long",
+}
 
 
 def show(cents):
@@ -363,21 +429,33 @@ def describe_setting(setting, target):
     element, _, mass = setting.element.partition(" ")
     size = "" if target.kind == "mesh" else f", {setting.nodes:,} nodes"
     sides = " with curved sides" if element == "T10" and target.is_round else ""
-    return f"{element}{sides}, {mass or 'consistent'} mass{size}, tolerance {setting.tolerance:g}, {setting.ranks} rank{'s' if setting.ranks > 1 else ''}"
+    return (
+        f"{element}{sides}, {mass or 'consistent'} mass{size}, tolerance {setting.tolerance:g},"
+        f" {setting.ranks} rank{'s' if setting.ranks > 1 else ''}"
+    )
 
 
 def describe_prediction(adviser, found, remark):
     options = adviser.options
     asked = " and ".join(f"{value:g} {unit}" for value, unit in ((options.cents, "cents"), (options.seconds, "CPU s")) if value is not None)
-    lines = [f"{adviser.target.name}: {note}" for note in adviser.target.notes or [f"a {adviser.target.kind}, as the job has it"]] + [f"asked:     {asked}"]
+    lines = [f"{adviser.target.name}: {note}" for note in adviser.target.notes or [f"a {adviser.target.kind}, as the job has it"]] + [
+        f"asked:     {asked}"
+    ]
     if remark:
         lines.append(f"           {remark}")
     if adviser.probe_cpu_s:
-        tried = "both elements" if adviser.target.kind == "mesh" else "coarse meshes of this body, up to {:,} nodes".format(adviser.probe.trials[-1].nodes)
+        tried = (
+            "both elements"
+            if adviser.target.kind == "mesh"
+            else "coarse meshes of this body, up to {:,} nodes".format(adviser.probe.trials[-1].nodes)
+        )
         lines.append(f"tried:     {tried}, {adviser.probe_cpu_s:.2f} CPU s")
     wall = f", {found.wall_s:.2g} s by the clock" if found.setting.ranks > 1 else ""
     lines.append(f"use:       {describe_setting(found.setting, adviser.target)}")
-    lines.append(f"predicted: at most {show(found.cents)} cents, {found.cpu_s:.2g} CPU s{wall} (this machine takes {adviser.pace:.2f} times the study's seconds)")
+    lines.append(
+        f"predicted: at most {show(found.cents)} cents, {found.cpu_s:.2g} CPU s{wall} (this machine takes {adviser.pace:.2f} times the"
+        " study's seconds)"
+    )
     return lines
 
 
@@ -385,10 +463,24 @@ def describe_estimate(adviser, found, options):
     asked = " and ".join(f"{value:g} {unit}" for value, unit in ((options.cents, "cents"), (options.seconds, "CPU s")) if value is not None)
     memory = found["memory_bytes"]["1"] * 1e-9
     lines = [f"{adviser.target.name}: {note}" for note in adviser.target.notes or [f"a {adviser.target.kind}, as the job has it"]]
-    modes = "modes that are not known before it is read" if found["modes"]["how"] == "unknown" else f"{'' if found['modes']['how'] == 'counted' else 'about '}{found['modes']['count']} modes in the band"
-    what = "so many nodes take long to solve. The mesh has" if adviser.target.kind == "mesh" else "so thin a body takes long to mesh and to solve. Its coarsest mesh has"
+    modes = (
+        "modes that are not known before it is read"
+        if found["modes"]["how"] == "unknown"
+        else f"{'' if found['modes']['how'] == 'counted' else 'about '}{found['modes']['count']} modes in the band"
+    )
+    what = (
+        "so many nodes take long to solve. The mesh has"
+        if adviser.target.kind == "mesh"
+        else "so thin a body takes long to mesh and to solve. Its coarsest mesh has"
+    )
     by = "by its size alone and to a factor of two" if found["mesh"]["how"] == "estimated" else "without a solve"
-    lines += [f"asked:     {asked}", f"estimate:  {what} about {found['mesh']['nodes']:,} nodes (T10), {modes}, {found['cpu_seconds']:.0f} CPU s and {memory:.1f} GB, {by}"]
+    lines += [
+        f"asked:     {asked}",
+        (
+            f"estimate:  {what} about {found['mesh']['nodes']:,} nodes (T10), {modes}, {found['cpu_seconds']:.0f} CPU s and"
+            f" {memory:.1f} GB, {by}"
+        ),
+    ]
     if options.dry_run:
         lines.append("           cents are not predicted without a trial: leave --dry-run away for the trials")
     return lines
@@ -399,8 +491,16 @@ def is_met(outcome, options):
 
 
 def describe_outcome(outcome, options, found):
-    lines = [f"reached:   {show(outcome.cents)} cents (mode {outcome.mode} of {outcome.modes}), {HOW[outcome.how]}; error bars up to {show(outcome.bar)} cents",
-             f"           {outcome.cpu_s:.2f} CPU s, {outcome.cpu_s / found.cpu_s:.2f} times the prediction, {outcome.wall_s:.2f} s by the clock, {outcome.nodes:,} nodes"]
+    lines = [
+        (
+            f"reached:   {show(outcome.cents)} cents (mode {outcome.mode} of {outcome.modes}), {HOW[outcome.how]}; error bars up to"
+            f" {show(outcome.bar)} cents"
+        ),
+        (
+            f"           {outcome.cpu_s:.2f} CPU s, {outcome.cpu_s / found.cpu_s:.2f} times the prediction, {outcome.wall_s:.2f} s by the"
+            f" clock, {outcome.nodes:,} nodes"
+        ),
+    ]
     if options.cents is not None and outcome.cents > options.cents >= found.cents:
         lines.append(f"           more than was asked; ask for {show(0.7 * options.cents * options.cents / outcome.cents)} to be sure")
     if options.seconds is not None and outcome.cpu_s > options.seconds:
@@ -411,12 +511,36 @@ def describe_outcome(outcome, options, found):
 def make_document(adviser, found, remark, outcome, job, bank):
     options, setting = adviser.options, found.setting
     element, _, mass = setting.element.partition(" ")
-    document = {"body": adviser.target.name, "kind": adviser.target.kind, "notes": adviser.target.notes, "asked": {"cents": options.cents, "cpu_seconds": options.seconds}, "remark": remark or None,
-                "setting": {"element": element, "mass": mass or "consistent", "nodes": setting.nodes, "tolerance": setting.tolerance, "ranks": setting.ranks},
-                "predicted": {"cents": found.cents, "cpu_seconds": found.cpu_s, "wall_seconds": found.wall_s}, "probe_cpu_seconds": adviser.probe_cpu_s, "machine_pace": adviser.pace, "reached": None}
+    document = {
+        "body": adviser.target.name,
+        "kind": adviser.target.kind,
+        "notes": adviser.target.notes,
+        "asked": {"cents": options.cents, "cpu_seconds": options.seconds},
+        "remark": remark or None,
+        "setting": {
+            "element": element,
+            "mass": mass or "consistent",
+            "nodes": setting.nodes,
+            "tolerance": setting.tolerance,
+            "ranks": setting.ranks,
+        },
+        "predicted": {"cents": found.cents, "cpu_seconds": found.cpu_s, "wall_seconds": found.wall_s},
+        "probe_cpu_seconds": adviser.probe_cpu_s,
+        "machine_pace": adviser.pace,
+        "reached": None,
+    }
     if outcome:
-        document["reached"] = {"cents": outcome.cents, "mode": outcome.mode, "how": outcome.how, "worst_bar_cents": outcome.bar, "cpu_seconds": outcome.cpu_s, "wall_seconds": outcome.wall_s,
-                               "nodes": outcome.nodes, "modes": outcome.modes, "is_met": is_met(outcome, options)}
+        document["reached"] = {
+            "cents": outcome.cents,
+            "mode": outcome.mode,
+            "how": outcome.how,
+            "worst_bar_cents": outcome.bar,
+            "cpu_seconds": outcome.cpu_s,
+            "wall_seconds": outcome.wall_s,
+            "nodes": outcome.nodes,
+            "modes": outcome.modes,
+            "is_met": is_met(outcome, options),
+        }
         document |= {"job": str(job), "bank": str(bank)}
     return document
 
@@ -450,9 +574,16 @@ def run(options):
 
 def make_estimate_document(adviser, found):
     options = adviser.options
-    return {"body": adviser.target.name, "kind": adviser.target.kind, "notes": adviser.target.notes, "asked": {"cents": options.cents, "cpu_seconds": options.seconds},
-            "setting": {"element": "T10", "mass": "consistent", "nodes": found["mesh"]["nodes"], "ranks": 1},
-            "predicted": {"cents": None, "cpu_seconds": found["cpu_seconds"], "wall_seconds": found["wall_seconds"]["1"]}, "is_estimate": True, "reached": None}
+    return {
+        "body": adviser.target.name,
+        "kind": adviser.target.kind,
+        "notes": adviser.target.notes,
+        "asked": {"cents": options.cents, "cpu_seconds": options.seconds},
+        "setting": {"element": "T10", "mass": "consistent", "nodes": found["mesh"]["nodes"], "ranks": 1},
+        "predicted": {"cents": None, "cpu_seconds": found["cpu_seconds"], "wall_seconds": found["wall_seconds"]["1"]},
+        "is_estimate": True,
+        "reached": None,
+    }
 
 
 def advise(adviser, options):
@@ -481,6 +612,7 @@ def read_positive(most, unit):
         if not (math.isfinite(value) and 0 < value <= most):
             raise argparse.ArgumentTypeError(f"{text!r}: give a number of {unit} above 0, {most:g} at most")
         return value
+
     return read
 
 
@@ -495,21 +627,55 @@ def read_band(text):
 
 
 def add_command(commands):
-    one = commands.add_parser("advise", help="the setting to use for so many cents or seconds, what it will reach and cost, and afterwards what it did",
-                              description="Says which element, mass, mesh size, tolerance and ranks to use for a body, with the error and the CPU seconds to expect, then solves it so and says what "
-                              "they were. Bodies of the study are predicted from its measurements; others are tried on coarse meshes first.")
-    one.add_argument("body", metavar="BODY", help=f"a body of the study ({', '.join(bodies.make_bodies())}), a shape ({', '.join(name for name in targets.SHAPES if name not in bodies.make_bodies())}), a job (.json), a surface (.obj .stl .ply .off) or a mesh file; "
-                     "steel where no material is given")
-    one.add_argument("--cents", type=read_positive(MOST_CENTS, "cents"), metavar="C", help="the largest error that any frequency of the band may have")
-    one.add_argument("--seconds", type=read_positive(MOST_SECONDS, "CPU seconds"), metavar="S", help="CPU seconds, of all ranks, that the solve may take (trials and calibration beside it)")
-    one.add_argument("--dry-run", action="store_true", help="say what to use, and do not solve (a body of your own is tried on its coarse meshes all the same)")
-    one.add_argument("--check", action="store_true", help="a body of unknown frequencies: solve a mesh of 2.5 times the nodes as well, and compare")
-    one.add_argument("--wall", type=read_positive(1e4, "metres"), metavar="M", help="of a surface file: hollow, with a wall of so many metres")
+    one = commands.add_parser(
+        "advise",
+        help="the setting to use for so many cents or seconds, what it will reach and cost, and afterwards what it did",
+        description=(
+            "Says which element, mass, mesh size, tolerance and ranks to use for a body, with the error and the CPU seconds to expect, then"
+            " solves it so and says what they were. Bodies of the study are predicted from its measurements; others are tried on coarse"
+            " meshes first."
+        ),
+    )
+    one.add_argument(
+        "body",
+        metavar="BODY",
+        help=(
+            f"a body of the study ({', '.join(bodies.make_bodies())}), a shape"
+            f" ({', '.join(name for name in targets.SHAPES if name not in bodies.make_bodies())}), a job (.json), a surface (.obj .stl .ply"
+            " .off) or a mesh file; steel where no material is given"
+        ),
+    )
+    one.add_argument(
+        "--cents", type=read_positive(MAX_CENTS, "cents"), metavar="C", help="the largest error that any frequency of the band may have"
+    )
+    one.add_argument(
+        "--seconds",
+        type=read_positive(MAX_SECONDS, "CPU seconds"),
+        metavar="S",
+        help="CPU seconds, of all ranks, that the solve may take (in addition to trials and calibration)",
+    )
+    one.add_argument(
+        "--dry-run", action="store_true", help="say what to use, and do not solve (a body of your own is still tried on its coarse meshes)"
+    )
+    one.add_argument(
+        "--check", action="store_true", help="a body of unknown frequencies: solve a mesh of 2.5 times the nodes as well, and compare"
+    )
+    one.add_argument(
+        "--wall", type=read_positive(1e4, "metres"), metavar="M", help="of a surface file: hollow, with a wall of so many metres"
+    )
     one.add_argument("--height", type=read_positive(1e4, "metres"), metavar="M", help="of a surface file: scaled to this height")
     one.add_argument("--band", type=read_band, metavar="LOW,HIGH", help="Hz; default: the job's, else 20,20000")
-    one.add_argument("-o", "--out", metavar="FOLDER", default="advice", help="where the job, the bank and what was tried go (default: advice)")
-    one.add_argument("--surface", metavar="FILE", default=bodies.BUNNY_SURFACE, help="the bunny's surface (default: that of Debian's glmark2-data)")
-    one.add_argument("--advice", metavar="FILE", help="measurements of another study: carillon study accuracy --write-advice FILE (default: those in this program)")
-    one.add_argument("--bin", metavar="FOLDER", help="where the programs are (default: beside this one)")
+    one.add_argument(
+        "-o", "--out", metavar="FOLDER", default="advice", help="where the job, the bank and what was tried go (default: advice)"
+    )
+    one.add_argument(
+        "--surface", metavar="FILE", default=bodies.BUNNY_SURFACE, help="the bunny's surface (default: that of Debian's glmark2-data)"
+    )
+    one.add_argument(
+        "--advice",
+        metavar="FILE",
+        help="measurements of another study: carillon study accuracy --write-advice FILE (default: those in this program)",
+    )
+    one.add_argument("--bin", metavar="FOLDER", help="where the programs are (default: next to this one)")
     one.add_argument("--json", action="store_true", help="one JSON document on standard output; the rest on standard error")
     return one

@@ -1,4 +1,4 @@
-"""Errors of frequencies in cents, the truth that they are held against, rates, and what so many cents cost."""
+"""Errors of frequencies in cents, the truth they are compared with, rates, and what so many cents cost."""
 import dataclasses
 import math
 import statistics
@@ -13,8 +13,9 @@ def to_cents(freq_hz, true_hz):
 
 @dataclasses.dataclass
 class Point:
-    """One mesh of one kind: what it cost and how far its frequencies are from the truth. Cents: one for each mode, sorted lists held against
-    each other with their multiplicities."""
+    """One mesh of one kind: what it cost and how far its frequencies are from the truth. Cents: one for each mode, sorted lists compared
+    against each other with their multiplicities."""
+
     kind: str
     nodes: int
     unknowns: int
@@ -45,7 +46,15 @@ def make_point(kind, solve, truth):
     """None when the mesh is so coarse that it has fewer modes than are known."""
     if len(solve.freq_hz) < len(truth.freq_hz):
         return None
-    return Point(kind, solve.nodes, solve.unknowns, solve.elements, solve.cpu, solve.spread if len(solve.cpu_s) > 1 else None, [to_cents(f, true) for f, true in zip(solve.freq_hz, truth.freq_hz)])
+    return Point(
+        kind,
+        solve.nodes,
+        solve.unknowns,
+        solve.elements,
+        solve.cpu,
+        solve.spread if len(solve.cpu_s) > 1 else None,
+        [to_cents(f, true) for f, true in zip(solve.freq_hz, truth.freq_hz)],
+    )
 
 
 def fit_line(x, y):
@@ -58,8 +67,10 @@ def fit_line(x, y):
 def extrapolate(edges, freq_hz):
     """(Truth, order): the limit of three or more meshes, edges: their mean edge lengths, freq_hz: [mesh][mode].
 
-    f(h) = f0 + c h^p by least squares, f0 and c for each mode, one p from 2 to 4 for all (that with the least relative residuals): meshes without a common pattern scatter, and two of them say little of a
-    limit. The uncertainty of a mode is the most of: the distance to the limits by p - 1/2 and p + 1/2, the largest residual, the whole way from the finest mesh to the limit. After Richardson 1911."""
+    f(h) = f0 + c h^p by least squares, f0 and c for each mode, one p from 2 to 4 for all (that with the least relative residuals): meshes
+    without a common pattern scatter, and two of them say little of a limit. The uncertainty of a mode is the most of: the distance to the
+    limits by p - 1/2 and p + 1/2, the largest residual, the whole way from the finest mesh to the limit. After Richardson 1911.
+    """
     modes = list(zip(*freq_hz))
 
     def fit(power):
@@ -85,7 +96,8 @@ def extrapolate(edges, freq_hz):
 
 
 def find_rate(points, truth, find_error=lambda point: point.median):
-    """The power of the edge length with which the error falls over the three finest meshes whose error is clear of the truth's own; None with fewer than two."""
+    """The power of the edge length with which the error falls over the three finest meshes whose error is clear of the truth's own; None
+    with fewer than two."""
     doubt = to_cents(1 + statistics.median(truth.uncertainty), 1)
     clear = [point for point in sorted(points, key=lambda point: point.elements) if find_error(point) > 4 * doubt][-3:]
     fit = scaling.fit_power([point.edge for point in clear], [find_error(point) for point in clear])
@@ -94,7 +106,9 @@ def find_rate(points, truth, find_error=lambda point: point.median):
 
 @dataclasses.dataclass
 class Cost:
-    """CPU seconds for so many cents. how: "measured" (between two meshes), "at most" (the coarsest mesh is better), "extrapolated" (the finest is worse)."""
+    """CPU seconds for so many cents. how: "measured" (between two meshes), "at most" (the coarsest mesh is better), "extrapolated" (the
+    finest is worse)."""
+
     cpu_s: float
     how: str
 
@@ -104,16 +118,17 @@ class Cost:
 
 
 def is_known(truth, cents):
-    """Whether the truth is known well enough, in all its modes, to tell an error of so many cents."""
+    """Whether the truth is known well enough, in all its modes, to resolve an error of so many cents."""
     return to_cents(1 + max(truth.uncertainty), 1) <= cents
 
 
-LEAST_GROWTH = 1.2  # of CPU seconds with the number of elements; on small meshes the start of the program hides it
+MIN_GROWTH = 1.2  # of CPU seconds with the number of elements; on small meshes the start of the program hides it
 
 
 def find_cost(points, cents, find_error=lambda point: point.worst):
-    """What one kind of element costs for an error of no more than `cents`, by straight lines in logarithms; beyond the finest mesh with the last error's slope, and seconds that grow at least as
-    the elements to the power LEAST_GROWTH. None where it cannot be told: errors do not fall, or are thirty times as large."""
+    """What one kind of element costs for an error of no more than `cents`, by straight lines in logarithms; beyond the finest mesh with the
+    last error's slope, and seconds that grow at least as the elements to the power MIN_GROWTH. None where it cannot be known: errors do
+    not fall, or are thirty times as large."""
     curve = []
     for point in sorted(points, key=lambda point: point.cpu_s):
         if not curve or find_error(point) < find_error(curve[-1]):
@@ -129,5 +144,7 @@ def find_cost(points, cents, find_error=lambda point: point.worst):
     if len(curve) < 3 or find_error(curve[-1]) > 30 * cents:
         return None
     cheap, dear = curve[-2:]
-    growth = max(math.log(dear.cpu_s / cheap.cpu_s), LEAST_GROWTH * math.log(dear.elements / cheap.elements))
-    return Cost(dear.cpu_s * math.exp(growth * math.log(find_error(dear) / cents) / math.log(find_error(cheap) / find_error(dear))), "extrapolated")
+    growth = max(math.log(dear.cpu_s / cheap.cpu_s), MIN_GROWTH * math.log(dear.elements / cheap.elements))
+    return Cost(
+        dear.cpu_s * math.exp(growth * math.log(find_error(dear) / cents) / math.log(find_error(cheap) / find_error(dear))), "extrapolated"
+    )

@@ -1,4 +1,5 @@
-"""What the knobs of the physics cost and buy, against motions that have a closed form: the step of contacts, the triangles of a body, impacts with and without modes."""
+"""What the knobs of the physics cost and buy, against motions that have a closed form: the step of contacts, the triangles of a body,
+impacts with and without modes."""
 import json
 import math
 
@@ -17,9 +18,19 @@ USUAL_NODES = 1000
 GRAVITY = 9.81
 ROLLING_RESISTANCE = 1e-3  # of hard on hard, docs/decisions/contact.md
 STEEL = {"young_modulus_pa": 200e9, "poisson_ratio": 0.3, "density_kg_m3": 7800, "damping": {"internal_friction": {"tan_phi": 4e-4}}}
-TOP = {"body": {"shape": "cone", "radius_m": 0.04, "height_m": 0.04, "nodes": 1500}, "element": "T10", "band_hz": [20, 30000], "material": STEEL}
+TOP = {
+    "body": {"shape": "cone", "radius_m": 0.04, "height_m": 0.04, "nodes": 1500},
+    "element": "T10",
+    "band_hz": [20, 30000],
+    "material": STEEL,
+}
 BALL = {"body": {"shape": "sphere", "radius_m": 0.03}, "element": "T10", "band_hz": [20, 60000], "material": STEEL}
-PLATE = {"body": {"shape": "plate", "length_m": 0.2, "width_m": 0.2, "thickness_m": 0.002, "nodes": 3000}, "element": "T10", "band_hz": [20, 6000], "material": STEEL}
+PLATE = {
+    "body": {"shape": "plate", "length_m": 0.2, "width_m": 0.2, "thickness_m": 0.002, "nodes": 3000},
+    "element": "T10",
+    "band_hz": [20, 6000],
+    "material": STEEL,
+}
 LEAN, SPIN_RAD_S = 0.2, 200.0
 SLOPE = 0.05  # rad
 HEAD = ("error of the motion", "CPU of the physics, ms for 1 s", "spread")
@@ -34,8 +45,22 @@ def run(lab, scenes, repeats=None):
     for number in range(repeats or lab.repeats):
         for name in list(scenes) if number % 2 == 0 else reversed(list(scenes)):
             (folder / f"{name}.scene.json").write_text(json.dumps(scenes[name], indent=1) + "\n")
-            lab.call([lab.find_program("carillon-render"), f"{name}.scene.json", "-q", "--audit", "-o", f"{name}.wav", "--report", f"{name}.report.json", "--trajectory", f"{name}.path.json"],
-                     f"carillon-render {name}", cwd=folder)
+            lab.call(
+                [
+                    lab.find_program("carillon-render"),
+                    f"{name}.scene.json",
+                    "-q",
+                    "--audit",
+                    "-o",
+                    f"{name}.wav",
+                    "--report",
+                    f"{name}.report.json",
+                    "--trajectory",
+                    f"{name}.path.json",
+                ],
+                f"carillon-render {name}",
+                cwd=folder,
+            )
             report = json.loads((folder / f"{name}.report.json").read_text())
             poses = np.array(json.loads((folder / f"{name}.path.json").read_text())["bodies"][0]["poses"])
             found.setdefault(name, (report, poses, []))[2].append(1e3 * report["physics_cpu_s"] / report["duration_s"])
@@ -44,14 +69,22 @@ def run(lab, scenes, repeats=None):
 
 
 def make_scene(seconds, body, ground, step_s=USUAL_STEP_S, **more):
-    return {"duration_s": seconds, "ground": ground, "bodies": [body], "microphones": [[0.0, -1.0, 0.3]], "effects": ["modal"], "quality": {"contact_step_s": step_s}} | more
+    return {
+        "duration_s": seconds,
+        "ground": ground,
+        "bodies": [body],
+        "microphones": [[0.0, -1.0, 0.3]],
+        "effects": ["modal"],
+        "quality": {"contact_step_s": step_s},
+    } | more
 
 
 # --- a top on its tip
 
 
 def find_top(bank):
-    """(tip in the frame of the mesh, distance of the centre from it, inertia along the axis, inertia across it about the tip, mass) of a cone along z."""
+    """(tip in the frame of the mesh, distance of the centre from it, inertia along the axis, inertia across it about the tip, mass) of a
+    cone along z."""
     arrays = sounds.read_arrays(bank, {"mesh/vertices", "rigid/centre_m", "rigid/inertia_kg_m2", "rigid/mass_kg"})
     vertices, centre, inertia = arrays["mesh/vertices"], arrays["rigid/centre_m"].reshape(3), arrays["rigid/inertia_kg_m2"].reshape(3, 3)
     mass = float(arrays["rigid/mass_kg"].reshape(-1)[0])
@@ -74,8 +107,15 @@ def make_top(bank, step_s, seconds=1.0):
     at = tip[2] * np.array([math.sin(turn), 0.0, math.cos(turn)])
     axis = np.array([math.sin(LEAN), 0.0, math.cos(LEAN)])
     spin = (SPIN_RAD_S - precession * math.cos(LEAN)) * axis + np.array([0.0, 0.0, precession])
-    body = {"name": "top", "bank": str(bank), "position_m": list(map(float, -at)), "rotation_deg": [0, math.degrees(turn), 0], "friction": 2.0, "velocity_m_s": [0, precession * arm * math.sin(LEAN), 0],
-            "angular_velocity_rad_s": list(map(float, spin))}
+    body = {
+        "name": "top",
+        "bank": str(bank),
+        "position_m": list(map(float, -at)),
+        "rotation_deg": [0, math.degrees(turn), 0],
+        "friction": 2.0,
+        "velocity_m_s": [0, precession * arm * math.sin(LEAN), 0],
+        "angular_velocity_rad_s": list(map(float, spin)),
+    }
     return make_scene(seconds, body, {"friction": 2.0}, step_s)
 
 
@@ -92,7 +132,15 @@ def calc_top_error(bank, poses):
 
 def make_roll(bank, step_s=USUAL_STEP_S, seconds=1.0):
     radius = float(np.abs(sounds.read_arrays(bank, {"mesh/vertices"})["mesh/vertices"]).max())
-    body = {"name": "ball", "bank": str(bank), "position_m": [0, 0, radius], "rotation_deg": [17, 31, 5], "friction": 0.5, "velocity_m_s": [0.2, 0, 0], "angular_velocity_rad_s": [0, 0.2 / radius, 0]}
+    body = {
+        "name": "ball",
+        "bank": str(bank),
+        "position_m": [0, 0, radius],
+        "rotation_deg": [17, 31, 5],
+        "friction": 0.5,
+        "velocity_m_s": [0.2, 0, 0],
+        "angular_velocity_rad_s": [0, 0.2 / radius, 0],
+    }
     return make_scene(seconds, body, {"friction": 0.5}, step_s, gravity_m_s2=[GRAVITY * math.sin(SLOPE), 0, -GRAVITY * math.cos(SLOPE)])
 
 
@@ -108,14 +156,37 @@ def calc_roll_error(poses):
 
 def add_table(section, name, rows, caption):
     """rows: (setting, is it the usual one, error, [CPU ms])"""
-    section.add_table(name, [(name, *HEAD), *((setting + (" (default)" if usual else ""), f"{error:.2g}", f"{measuring.find_median(cpu):.1f}", f"{100 * sounds.find_spread(cpu):.0f} %") for setting, usual, error, cpu in rows)],
-                      caption, [(name, *DATA), *((setting, float(error), float(measuring.find_median(cpu)), float(sounds.find_spread(cpu))) for setting, _, error, cpu in rows)])
+    section.add_table(
+        name,
+        [
+            (name, *HEAD),
+            *(
+                (
+                    setting + (" (default)" if usual else ""),
+                    f"{error:.2g}",
+                    f"{measuring.find_median(cpu):.1f}",
+                    f"{100 * sounds.find_spread(cpu):.0f} %",
+                )
+                for setting, usual, error, cpu in rows
+            ),
+        ],
+        caption,
+        [
+            (name, *DATA),
+            *(
+                (setting, float(error), float(measuring.find_median(cpu)), float(sounds.find_spread(cpu)))
+                for setting, _, error, cpu in rows
+            ),
+        ],
+    )
 
 
 def describe(what, rows):
     best, usual = min(rows, key=lambda row: row[2]), next(row for row in rows if row[1])
-    return (f"{what}: the default, {usual[0]}, is {100 * usual[2]:.2g} % off and takes {measuring.find_median(usual[3]):.1f} ms of the physics for a second; the most accurate, {best[0]}, is {100 * best[2]:.2g} % off and takes "
-            f"{measuring.find_median(best[3]):.1f} ms.")
+    return (
+        f"{what}: the default, {usual[0]}, is {100 * usual[2]:.2g} % off and takes {measuring.find_median(usual[3]):.1f} ms of the physics"
+        f" for a second; the most accurate, {best[0]}, is {100 * best[2]:.2g} % off and takes {measuring.find_median(best[3]):.1f} ms."
+    )
 
 
 def to_points(rows):
@@ -128,36 +199,86 @@ def study(lab, bodies):
     nodes = QUICK_NODES if lab.quick else NODES
     jobs = {"top": TOP, "plate": PLATE} | {f"ball {count}": BALL | {"body": BALL["body"] | {"nodes": count}} for count in nodes}
     paths = banks.solve(lab, [banks.Sounding(name, name, job) for name, job in jobs.items()])
-    section.say(f"A top of steel on its tip leans by {LEAN:g} rad and spins at {SPIN_RAD_S:g} rad/s for a second: its precession has a closed form. A ball of steel rolls down {SLOPE:g} rad for a second: "
-                "its way is that of 5/7 of gravity along the slope, less the rolling resistance. A steel plate of 2 mm falls.")
-    scenes = {f"top-{n}": make_top(paths["top"], step) for n, step in enumerate(steps)} | {f"roll-{n}": make_roll(paths[f"ball {USUAL_NODES}"], step) for n, step in enumerate(steps)}
+    section.say(
+        f"A top of steel on its tip leans by {LEAN:g} rad and spins at {SPIN_RAD_S:g} rad/s for a second: its precession has a closed form."
+        f" A ball of steel rolls down {SLOPE:g} rad for a second: its way is that of 5/7 of gravity along the slope, less the rolling"
+        " resistance. A steel plate of 2 mm falls."
+    )
+    scenes = {f"top-{n}": make_top(paths["top"], step) for n, step in enumerate(steps)} | {
+        f"roll-{n}": make_roll(paths[f"ball {USUAL_NODES}"], step) for n, step in enumerate(steps)
+    }
     scenes |= {f"nodes-{count}": make_roll(paths[f"ball {count}"]) for count in nodes}
-    falls = {name: make_scene(1.0, {"name": "plate", "bank": str(paths["plate"]), "position_m": [0, 0, 0.3], "rotation_deg": [20, 15, 0]}, {}) for name in ("with modes", "without")}
+    falls = {
+        name: make_scene(1.0, {"name": "plate", "bank": str(paths["plate"]), "position_m": [0, 0, 0.3], "rotation_deg": [20, 15, 0]}, {})
+        for name in ("with modes", "without")
+    }
     falls["without"]["quality"]["modes_in_impacts"] = False
     found = run(lab, scenes | {f"fall-{name.replace(' ', '-')}": scene for name, scene in falls.items()})
 
-    top = [(f"{step:g}", step == USUAL_STEP_S, calc_top_error(paths["top"], found[f"top-{n}"][1]), found[f"top-{n}"][2]) for n, step in enumerate(steps)]
-    roll = [(f"{step:g}", step == USUAL_STEP_S, calc_roll_error(found[f"roll-{n}"][1]), found[f"roll-{n}"][2]) for n, step in enumerate(steps)]
+    top = [
+        (f"{step:g}", step == USUAL_STEP_S, calc_top_error(paths["top"], found[f"top-{n}"][1]), found[f"top-{n}"][2])
+        for n, step in enumerate(steps)
+    ]
+    roll = [
+        (f"{step:g}", step == USUAL_STEP_S, calc_roll_error(found[f"roll-{n}"][1]), found[f"roll-{n}"][2]) for n, step in enumerate(steps)
+    ]
     add_table(section, "contact_step_s", top, "The longest step of bodies that touch. The top: error of its precession, relative.")
     section.conclude(describe("Step of contacts (`contact_step_s`), precession of a top", top))
-    add_table(section, "contact_step_s_ball", roll, "The same for the ball: error of its way, relative; what does not fall with the step is the shape of the ball.")
+    add_table(
+        section,
+        "contact_step_s_ball",
+        roll,
+        "The same for the ball: error of its way, relative; what does not fall with the step is the shape of the ball.",
+    )
     section.conclude(describe("Step of contacts (`contact_step_s`), way of a ball that rolls", roll))
 
     triangles = {count: len(sounds.read_arrays(paths[f"ball {count}"], {"mesh/triangles"})["mesh/triangles"]) for count in nodes}
-    shape = [(f"{triangles[count]}", count == USUAL_NODES, calc_roll_error(found[f"nodes-{count}"][1]), found[f"nodes-{count}"][2]) for count in nodes]
-    add_table(section, "triangles", shape, "Collision geometry: the triangles that the ball's bank has, by the nodes of its job; error of its way, relative. There is no other key: search and skin are made from these triangles.")
+    shape = [
+        (f"{triangles[count]}", count == USUAL_NODES, calc_roll_error(found[f"nodes-{count}"][1]), found[f"nodes-{count}"][2])
+        for count in nodes
+    ]
+    add_table(
+        section,
+        "triangles",
+        shape,
+        (
+            "Collision geometry: the triangles that the ball's bank has, by the nodes of its job; error of its way, relative. There is no"
+            " other key: search and skin are made from these triangles."
+        ),
+    )
     section.conclude(describe("Collision geometry, triangles of a ball that rolls", shape))
 
     (whole, _, whole_cpu), (rigid, _, rigid_cpu) = found["fall-with-modes"], found["fall-without"]
     energy = whole["energy"]
-    section.add_table("modes_in_impacts", [("modes_in_impacts", "loudest 125 ms, dB", "CPU of the physics, ms for 1 s"), ("true (default)", f"{whole['loudest_db_spl']:.1f}", f"{measuring.find_median(whole_cpu):.1f}"),
-                                           ("false", f"{rigid['loudest_db_spl']:.1f}", f"{measuring.find_median(rigid_cpu):.1f}")], "A steel plate of 200 x 200 x 2 mm falls 0.3 m: impacts with its modes inside, and as of a rigid body.")
-    section.conclude(f"Impacts with modes inside (`modes_in_impacts`): {measuring.find_median(whole_cpu):.1f} ms of the physics for a second of a falling plate instead of {measuring.find_median(rigid_cpu):.1f}; without them it is "
-                     f"{rigid['loudest_db_spl'] - whole['loudest_db_spl']:+.0f} dB. With them its modes have at most {100 * energy['modes_share']:.0f} % of what the motion lost. Steps per pulse are no key: 20 leave less than 0.003 of the "
-                     "restitution and cost 50 to 90 us an impact ([by how much](decisions/impact.md)), so that there is nothing to be won.")
-    panels = [plots.Panel(name, "physics, ms for a second", "error, relative", {"settings": to_points(rows)}, x_log=True, y_log=True)
-              for name, rows in (("contact_step_s, top", top), ("contact_step_s, ball", roll), ("triangles of the ball", shape))]
-    rows = [("knob", "setting", *DATA)] + [(name, setting, float(error), float(measuring.find_median(cpu)), float(sounds.find_spread(cpu)))
-                                           for name, table in (("contact_step_s, top", top), ("contact_step_s, ball", roll), ("triangles", shape)) for setting, _, error, cpu in table]
-    section.add_chart("errors", plots.draw_panels(panels, "Knobs of the physics", "error of a motion against its closed form, and the CPU of a second of it", 3), "Error of a motion against CPU, setting by setting.", rows)
+    section.add_table(
+        "modes_in_impacts",
+        [
+            ("modes_in_impacts", "loudest 125 ms, dB", "CPU of the physics, ms for 1 s"),
+            ("true (default)", f"{whole['loudest_db_spl']:.1f}", f"{measuring.find_median(whole_cpu):.1f}"),
+            ("false", f"{rigid['loudest_db_spl']:.1f}", f"{measuring.find_median(rigid_cpu):.1f}"),
+        ],
+        "A steel plate of 200 x 200 x 2 mm falls 0.3 m: impacts with its modes inside, and as of a rigid body.",
+    )
+    section.conclude(
+        f"Impacts with modes inside (`modes_in_impacts`): {measuring.find_median(whole_cpu):.1f} ms of the physics for a second of a"
+        f" falling plate instead of {measuring.find_median(rigid_cpu):.1f}; without them it is"
+        f" {rigid['loudest_db_spl'] - whole['loudest_db_spl']:+.0f} dB. With them its modes have at most"
+        f" {100 * energy['modes_share']:.0f} % of what the motion lost. Steps per pulse are no key: 20 leave less than 0.003 of the"
+        " restitution and cost 50 to 90 us an impact ([by how much](../decisions/impact.md)), so that there is nothing to be won."
+    )
+    panels = [
+        plots.Panel(name, "physics, ms for a second", "error, relative", {"settings": to_points(rows)}, x_log=True, y_log=True)
+        for name, rows in (("contact_step_s, top", top), ("contact_step_s, ball", roll), ("triangles of the ball", shape))
+    ]
+    rows = [("knob", "setting", *DATA)] + [
+        (name, setting, float(error), float(measuring.find_median(cpu)), float(sounds.find_spread(cpu)))
+        for name, table in (("contact_step_s, top", top), ("contact_step_s, ball", roll), ("triangles", shape))
+        for setting, _, error, cpu in table
+    ]
+    section.add_chart(
+        "errors",
+        plots.draw_panels(panels, "Knobs of the physics", "error of a motion against its closed form, and the CPU of a second of it", 3),
+        "Error of a motion against CPU, setting by setting.",
+        rows,
+    )
     return section

@@ -11,7 +11,8 @@ LEVELS = ((1, "one cent"), (10, "ten cents"), (100, "a semitone"))
 
 
 def measure(lab, bodies, kinds=None):
-    """{body's name: [(kind, Solve)]}, meshes from coarse to fine; two sizes that give the same mesh count once. kinds: names, all without them."""
+    """{body's name: [(kind, Solve)]}, meshes from coarse to fine; two sizes that give the same mesh count once. kinds: names, all without
+    them."""
     cases, order = {}, collections.defaultdict(list)
     for body in bodies:
         lab.say(f"meshing: {body.name}")
@@ -36,9 +37,15 @@ def find_truth(body, solves):
     truth, power = cents.extrapolate([solve.elements ** (-1 / 3) for solve in finest], [solve.freq_hz[:count] for solve in finest])
     doubts = [cents.to_cents(1 + doubt, 1) for doubt in truth.uncertainty]
     steps = [abs(cents.to_cents(f, limit)) for f, limit in zip(finest[-1].freq_hz, truth.freq_hz)]
-    return truth, (f"The frequencies of the {body.name} are not known. Its reference here is the limit of all its curved T10 ({', '.join(f'{solve.nodes:,}' for solve in finest)} nodes; order {power:.1f}), "
-                   f"{statistics.median(steps):.1f} cents (median; {max(steps):.1f} at most) below the finest; it is itself uncertain by {statistics.median(doubts):.1f} cents (median; {max(doubts):.1f} at most). "
-                   "Errors near that are no errors.")
+    return (
+        truth,
+        (
+            f"The frequencies of the {body.name} are not known. Its reference here is the limit of all its curved T10"
+            f" ({', '.join(f'{solve.nodes:,}' for solve in finest)} nodes; order {power:.1f}), {statistics.median(steps):.1f} cents"
+            f" (median; {max(steps):.1f} at most) below the finest; it is itself uncertain by {statistics.median(doubts):.1f} cents"
+            f" (median; {max(doubts):.1f} at most). Errors near that are no errors."
+        ),
+    )
 
 
 def make_points(body, solves, truth):
@@ -47,29 +54,96 @@ def make_points(body, solves, truth):
 
 
 def draw(section, body, points, command):
-    curves = lambda find_x, find_y: {kind.name: [(find_x(point), find_y(point)) for point in points if point.kind == kind.name] for kind in body.get_kinds()}
+    curves = lambda find_x, find_y: {
+        kind.name: [(find_x(point), find_y(point)) for point in points if point.kind == kind.name] for kind in body.get_kinds()
+    }
     panels = []
     cpu = lambda point: point.cpu_s
     levels = [(level, text) for level, text in LEVELS]
-    for title, find in (("mode 1", lambda point: point.first), ("median of the band", lambda point: point.median), ("worst of the band", lambda point: point.worst)):
+    for title, find in (
+        ("mode 1", lambda point: point.first),
+        ("median of the band", lambda point: point.median),
+        ("worst of the band", lambda point: point.worst),
+    ):
         front = [pair for pair in plots.find_front([(cpu(point), find(point)) for point in points])]
         panels.append(plots.Panel(title, "CPU seconds", "error, cents", curves(cpu, find), front=front, levels=levels))
     rates = curves(lambda point: point.edge, lambda point: point.median)
-    guides = {f"slope {power}": plots.draw_slope(rates.get(name, []), power, 0.6) for name, power in (("T4 consistent", 2), ("T10 curved" if body.round else "T10 straight", 4))}
-    panels.append(plots.Panel("median against edge length", "edge length (elements to the power -1/3)", "error, cents", rates, guides=guides))
-    rows = [("body", "element", "nodes", "unknowns", "elements", "cpu_s", "cpu_spread", "error_mode_1_cents", "error_median_cents", "error_worst_cents")]
-    rows += [(body.name, point.kind, point.nodes, point.unknowns, point.elements, point.cpu_s, "" if point.spread is None else point.spread, point.cents[0], point.median, point.worst) for point in points]
-    section.add_chart(body.name, plots.draw_panels(panels, f"{body.name}: {body.summary}", f"error of the frequencies of {body.modes} modes against CPU seconds"),
-                      f"{body.name[0].upper()}{body.name[1:]}, {body.summary}: errors against CPU seconds, and against the edge length.", rows, command)
+    guides = {
+        f"slope {power}": plots.draw_slope(rates.get(name, []), power, 0.6)
+        for name, power in (("T4 consistent", 2), ("T10 curved" if body.round else "T10 straight", 4))
+    }
+    panels.append(
+        plots.Panel("median against edge length", "edge length (elements to the power -1/3)", "error, cents", rates, guides=guides)
+    )
+    rows = [
+        (
+            "body",
+            "element",
+            "nodes",
+            "unknowns",
+            "elements",
+            "cpu_s",
+            "cpu_spread",
+            "error_mode_1_cents",
+            "error_median_cents",
+            "error_worst_cents",
+        )
+    ]
+    rows += [
+        (
+            body.name,
+            point.kind,
+            point.nodes,
+            point.unknowns,
+            point.elements,
+            point.cpu_s,
+            "" if point.spread is None else point.spread,
+            point.cents[0],
+            point.median,
+            point.worst,
+        )
+        for point in points
+    ]
+    section.add_chart(
+        body.name,
+        plots.draw_panels(panels, f"{body.name}: {body.summary}", f"error of the frequencies of {body.modes} modes against CPU seconds"),
+        f"{body.name[0].upper()}{body.name[1:]}, {body.summary}: errors against CPU seconds, and against the edge length.",
+        rows,
+        command,
+    )
 
 
 def add_table(section, body, points, command):
     rows = [("element", "nodes", "unknowns", "CPU s", "spread", "mode 1, cents", "median", "worst")]
     for point in points:
-        rows.append((point.kind, f"{point.nodes:,}", f"{point.unknowns:,}", f"{point.cpu_s:.2f}", "-" if point.spread is None else f"{100 * point.spread:.0f} %", f"{point.cents[0]:+.3g}", f"{point.median:.3g}", f"{point.worst:.3g}"))
+        rows.append(
+            (
+                point.kind,
+                f"{point.nodes:,}",
+                f"{point.unknowns:,}",
+                f"{point.cpu_s:.2f}",
+                "-" if point.spread is None else f"{100 * point.spread:.0f} %",
+                f"{point.cents[0]:+.3g}",
+                f"{point.median:.3g}",
+                f"{point.worst:.3g}",
+            )
+        )
     data = [("element", "nodes", "unknowns", "cpu_s", "mode", "error_cents")]
-    data += [(point.kind, point.nodes, point.unknowns, point.cpu_s, index + 1, value) for point in points for index, value in enumerate(point.cents)]
-    section.add_table(f"{body.name}-modes", rows, f"The same as numbers; the CSV has every mode. Spread: half the distance of the extremes over the median; - where there was one run.", data, command)
+    data += [
+        (point.kind, point.nodes, point.unknowns, point.cpu_s, index + 1, value)
+        for point in points
+        for index, value in enumerate(point.cents)
+    ]
+    section.add_table(
+        f"{body.name}-modes",
+        rows,
+        (
+            "The same as numbers; the CSV has every mode. Spread: half the distance of the extremes over the median; - where there was one"
+            " run."
+        ),
+        data,
+        command,
+    )
 
 
 def expect_rate(body, kind):
@@ -80,7 +154,7 @@ def expect_rate(body, kind):
 
 
 def describe_cost(points, kinds, truth):
-    """The cheapest element for each level that the truth can tell, as a sentence; "" without one."""
+    """The cheapest element for each level that the truth can resolve, as a sentence; "" without one."""
     parts = []
     for level, text in reversed([(level, text) for level, text in LEVELS if cents.is_known(truth, level)]):
         costs = {kind.name: cents.find_cost([point for point in points if point.kind == kind.name], level) for kind in kinds}
@@ -102,7 +176,10 @@ def study_body(section, lab, body, solves):
     add_table(section, body, points, command)
     cost = describe_cost(points, body.get_kinds(), truth)
     if cost:
-        section.say(f"{body.name[0].upper()}{body.name[1:]}: the worst of {len(points[0].cents)} modes within {cost}. (≤: its coarsest mesh is better than that; ~: its finest is worse, by its trend.)")
+        section.say(
+            f"{body.name[0].upper()}{body.name[1:]}: the worst of {len(points[0].cents)} modes within {cost}. (≤: its coarsest mesh is"
+            " better than that; ~: its finest is worse, by its trend.)"
+        )
     return points, truth
 
 
@@ -121,10 +198,20 @@ def add_rates(section, lab, results):
                 data.append((body.name, kind.name, rate, expect_rate(body, kind)))
                 gaps[kind.name].append(rate - expect_rate(body, kind))
         rows.append((body.name, *cells))
-    section.add_table("rates", rows, "Rates of convergence: the power of the edge length with which the median error falls over the three finest meshes. On bodies with flat faces straight and curved T10 are "
-                      "the same mesh. Theory holds where the solution is smooth and meshes are similar; bodies with thin walls reach it late.", data, lab.make_command("elements"))
+    section.add_table(
+        "rates",
+        rows,
+        (
+            "Rates of convergence: the power of the edge length with which the median error falls over the three finest meshes. On bodies"
+            " with flat faces straight and curved T10 are the same mesh. Theory holds where the solution is smooth and meshes are similar;"
+            " bodies with thin walls reach it late."
+        ),
+        data,
+        lab.make_command("elements"),
+    )
     for name, values in gaps.items():
-        section.say(f"{name}: rates {min(values):+.1f} to {max(values):+.1f} beside theory, median {statistics.median(values):+.1f}.")
+        low, high, middle = min(values), max(values), statistics.median(values)
+        section.say(f"{name}: rates {low:+.1f} to {high:+.1f} compared with theory, median {middle:+.1f}.")
 
 
 def add_costs(section, lab, results):
@@ -138,7 +225,16 @@ def add_costs(section, lab, results):
         for kind in body.get_kinds():
             own = [point for point in points if point.kind == kind.name]
             costs = [cents.find_cost(own, level) if cents.is_known(truth, level) else None for level, _ in LEVELS]
-            rows.append((body.name, kind.name, *(str(cost) if cost else "out of reach" if cents.is_known(truth, level) else "not told" for cost, (level, _) in zip(costs, LEVELS))))
+            rows.append(
+                (
+                    body.name,
+                    kind.name,
+                    *(
+                        str(cost) if cost else "out of reach" if cents.is_known(truth, level) else "unknown"
+                        for cost, (level, _) in zip(costs, LEVELS)
+                    ),
+                )
+            )
             for (level, _), cost in zip(LEVELS, costs):
                 if cost:
                     data.append((body.name, kind.name, level, cost.cpu_s, cost.how))
@@ -147,29 +243,62 @@ def add_costs(section, lab, results):
                         best[level] = (cost.cpu_s, kind.name)
         for level, (_, name) in best.items():
             cheapest[level][name] += 1
-    section.add_table("costs", rows, "CPU seconds for the worst mode of the band to be as near as that (≤: the coarsest mesh is better; ~: the finest is worse, by its trend; out of reach: more than thirty times "
-                      "as wrong, or errors that do not fall; not told: the truth itself is less certain than that).", data, lab.make_command("elements"))
+    section.add_table(
+        "costs",
+        rows,
+        (
+            "CPU seconds for the worst mode of the band to be as near as that (≤: the coarsest mesh is better; ~: the finest is worse, by"
+            " its trend; out of reach: more than thirty times as wrong, or errors that do not fall; unknown: the truth itself is less"
+            " certain than that)."
+        ),
+        data,
+        lab.make_command("elements"),
+    )
     names = [body.name for body, _, _ in results]
     for level, text in LEVELS:
-        least = [min(costs, key=lambda cost: cost.cpu_s) for name in names if (costs := [cost for key, cost in table.items() if key[0] == name and key[2] == level])]
+        least = [
+            min(costs, key=lambda cost: cost.cpu_s)
+            for name in names
+            if (costs := [cost for key, cost in table.items() if key[0] == name and key[2] == level])
+        ]
         if least:
             section.conclude(describe_level(text, least, cheapest[level], len(names)))
 
 
 def describe_level(text, least, cheapest, count):
-    """What so many cents cost, over all bodies. least: the lowest Cost of each body that has one; cheapest: how often each element has it."""
+    """What so many cents cost, over all bodies. least: the lowest Cost of each body that has one; cheapest: how often each element has
+    it."""
     seconds = [cost.cpu_s for cost in least]
-    spread = f"{min(seconds):.2g} to {max(seconds):.2g} CPU s (median {statistics.median(seconds):.2g} s over {len(seconds)} of {count} bodies)" if len(seconds) > 1 else f"{seconds[0]:.2g} CPU s"
+    spread = (
+        f"{min(seconds):.2g} to {max(seconds):.2g} CPU s (median {statistics.median(seconds):.2g} s over {len(seconds)} of {count} bodies)"
+        if len(seconds) > 1
+        else f"{seconds[0]:.2g} CPU s"
+    )
     by_trend = sum(cost.how == "extrapolated" for cost in least)
-    trend = (", by the trend of the finest meshes" if len(least) == 1 else f", {by_trend} of them by the trend of the finest meshes") if by_trend else ""
-    return f"**{text[0].upper()}{text[1:]}** for the worst mode of the band costs {spread}{trend}; cheapest is {', '.join(f'{kind} on {number}' for kind, number in cheapest.most_common())}."
+    trend = (
+        (", by the trend of the finest meshes" if len(least) == 1 else f", {by_trend} of them by the trend of the finest meshes")
+        if by_trend
+        else ""
+    )
+    return (
+        f"**{text[0].upper()}{text[1:]}** for the worst mode of the band costs {spread}{trend}; cheapest is"
+        f" {', '.join(f'{kind} on {number}' for kind, number in cheapest.most_common())}."
+    )
 
 
 def study(lab, bodies):
-    section = Section("elements", "Element and mesh", lab.make_command("elements", *(["--on", *(body.name for body in bodies)] if len(bodies) < len(make_bodies()) - 1 else [])))
+    section = Section(
+        "elements",
+        "Element and mesh",
+        lab.make_command("elements", *(["--on", *(body.name for body in bodies)] if len(bodies) < len(make_bodies()) - 1 else [])),
+    )
     measured = measure(lab, bodies)
-    section.say(f"Frequencies of {len(bodies)} bod{'ies' if len(bodies) > 1 else 'y'} on meshes of several sizes, one rank, tolerance and method by default; CPU seconds of `carillon-precompute`, which reads the mesh and writes "
-                "the bank with its proof and error bars. Truth: no finite element gave it (Ritz, Lamb, Fourier-Ritz; `known.csv` names the source), but for the bunny. Meshing is not in the CPU seconds.")
+    section.say(
+        f"Frequencies of {len(bodies)} bod{'ies' if len(bodies) > 1 else 'y'} on meshes of several sizes, one rank, tolerance and method by"
+        " default; CPU seconds of `carillon-precompute`, which reads the mesh and writes the bank with its proof and error bars. Truth: no"
+        " finite element gave it (Ritz, Lamb, Fourier-Ritz; `known.csv` names the source), but for the bunny. Meshing is not in the CPU"
+        " seconds."
+    )
     results = []
     for body in bodies:
         points, truth = study_body(section, lab, body, measured[body.name])

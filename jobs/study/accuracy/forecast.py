@@ -10,12 +10,16 @@ import math
 
 FORMAT = 1
 GOAL = 0.75  # of what was asked: aimed at, for meshes come in steps and rates are not quite steady
-MOST_FINER = 10.0  # times the nodes of the finest mesh that was measured: no prediction goes further
-MOST_FINER_TRIAL = 4.0  # times those of a body's finest trial
+MAX_FINER = 10.0  # times the nodes of the finest mesh that was measured: no prediction goes further
+MAX_FINER_TRIAL = 4.0  # times those of a body's finest trial
 START_S, STEEPEST_CPU = 0.1, 1.8  # CPU seconds of starting, and the power of the nodes by which what follows grows at most
-TRUST, STEEPEST_BEYOND = 0.85, 4 / 3  # of the power at the end of a curve, beyond it: meshes that are coarse for their walls gain faster than those that follow
+TRUST, STEEPEST_BEYOND = (
+    0.85,
+    4 / 3,
+)  # of the power at the end of a curve, beyond it: meshes that are coarse for their walls gain faster than those that follow
 DISTRUST = 0.9  # of a power that coarse meshes show: the next step is seldom as steep
-LEAST_STEEP, STEEPEST = 0.3, 4 / 2  # powers of the nodes by which errors fall: order four, and bodies that are refined in two directions
+# Powers of the nodes by which errors fall: order four, and bodies that are refined in two directions.
+MIN_STEEPNESS, MAX_STEEPNESS = 0.3, 4 / 2
 LOOSEST_TOLERANCE, STRICTEST_TOLERANCE = 1e-6, 1e-12
 CENTS_OF_RESIDUAL = 600 / math.log(2)  # of a frequency, for a relative residual of lambda
 
@@ -43,6 +47,7 @@ class Forecast:
 @dataclasses.dataclass(frozen=True)
 class Sample:
     """One mesh of a curve. Errors and bars are the largest of the band, in cents."""
+
     nodes: int  # asked of the mesher
     unknowns: int
     modes: int
@@ -51,8 +56,9 @@ class Sample:
     cpu_s: float  # of one rank, on the machine of the study
 
 
-def interpolate(points, x, least_slope, most_slope, trust=1.0):
-    """points: [(x, y)] by x, both positive: y as powers of x between them; beyond the last the slope there times `trust`, before the first the slope there; both held between two limits."""
+def interpolate(points, x, min_slope, max_slope, trust=1.0):
+    """points: [(x, y)] by x, both positive: y as powers of x between them; beyond the last the slope there times `trust`, before the first
+    the slope there; both kept between two limits."""
     if len(points) == 1:
         return points[0][1]
     index = next((i for i in range(1, len(points) - 1) if x < points[i][0]), len(points) - 1)
@@ -61,7 +67,7 @@ def interpolate(points, x, least_slope, most_slope, trust=1.0):
     if x > points[-1][0]:
         (x_0, y_0), slope = points[-1], trust * slope
     if not x_0 <= x <= x_1:
-        slope = min(max(slope, least_slope), most_slope)
+        slope = min(max(slope, min_slope), max_slope)
     return y_0 * (x / x_0) ** slope
 
 
@@ -81,8 +87,8 @@ class Curve:
             self.errors.append((sample.nodes, max(worst, 1e-9)))
         self.errors.reverse()
 
-    def get_most_nodes(self):
-        return self.samples[-1].nodes * (MOST_FINER if self.is_measured else 1.0)
+    def get_max_nodes(self):
+        return self.samples[-1].nodes * (MAX_FINER if self.is_measured else 1.0)
 
     def predict_cents(self, nodes):
         return interpolate(self.errors, nodes, -STEEPEST_BEYOND, 0.0, TRUST)
@@ -91,14 +97,15 @@ class Curve:
         return interpolate([(s.nodes, s.cpu_s) for s in self.samples], nodes, 0.3, 1.7)
 
     def find_nodes(self, cents):
-        """The fewest nodes predicted to be no more than `cents` wrong; a mesh that was measured to be so goes before one that is predicted. None: out of reach."""
+        """The fewest nodes predicted to be no more than `cents` wrong; a mesh that was measured to be so goes before one that is predicted.
+        None: out of reach."""
         for (nodes, error), after in zip(self.errors, [*self.errors[1:], None]):
             if error <= (0.95 if self.is_measured else GOAL) * cents:
                 return nodes
             if after and after[1] <= GOAL * cents:
                 found = bisect(lambda n: self.predict_cents(n) <= GOAL * cents, nodes, after[0])
                 return after[0] if self.is_measured and found > 0.85 * after[0] else math.ceil(found)
-        most = self.get_most_nodes()
+        most = self.get_max_nodes()
         if self.predict_cents(most) > GOAL * cents:
             return None
         return math.ceil(bisect(lambda n: self.predict_cents(n) <= GOAL * cents, self.samples[-1].nodes, most))
@@ -107,7 +114,7 @@ class Curve:
         """The most nodes for the CPU seconds; None when the coarsest mesh takes more."""
         if self.samples[0].cpu_s > cpu_s:
             return None
-        most = self.get_most_nodes()
+        most = self.get_max_nodes()
         if self.predict_cpu(most) <= cpu_s:
             return math.floor(most)
         found = bisect(lambda n: self.predict_cpu(n) > cpu_s, self.samples[0].nodes, most)
@@ -123,42 +130,6 @@ def bisect(is_beyond, low, high):
     return high
 
 
-class CpuModel:
-    """CPU seconds of one rank by unknowns and modes, fitted to all samples of an element: starting, reading and assembly, error bars and shapes, solves, factorisations."""
-
-    def __init__(self, samples):
-        self.weights = fit_positive([[term / s.cpu_s for term in self.list_terms(s.unknowns, s.modes)] for s in samples])
-
-    @staticmethod
-    def list_terms(unknowns, modes):
-        n = unknowns / 1e4
-        return [1.0, n, n * modes / 100, n ** (4 / 3) * (modes / 100 + 1), n**1.7]
-
-    def predict(self, unknowns, modes):
-        return sum(w * term for w, term in zip(self.weights, self.list_terms(unknowns, modes)))
-
-
-def fit_positive(rows):
-    """Weights, none negative, for which every row times the weights is as near to 1 as can be: coordinate descent (Lawson and Hanson's problem, convex)."""
-    weights = [0.0] * len(rows[0])
-    squares = [sum(row[j] ** 2 for row in rows) for j in range(len(weights))]
-    left = [1.0] * len(rows)
-    for _ in range(5000):
-        largest = 0.0
-        for j, square in enumerate(squares):
-            if square == 0.0:
-                continue
-            new = max(0.0, weights[j] + sum(row[j] * r for row, r in zip(rows, left)) / square)
-            step = new - weights[j]
-            if step:
-                left = [r - step * row[j] for row, r in zip(rows, left)]
-                weights[j] = new
-                largest = max(largest, abs(step) * math.sqrt(square))
-        if largest < 1e-9:
-            break
-    return weights
-
-
 def find_tolerance(cents):
     """The loosest power of ten whose residual is worth no more than a hundredth of what is asked, within what suits mode shapes."""
     power = math.floor(math.log10(max(0.01 * cents / CENTS_OF_RESIDUAL, STRICTEST_TOLERANCE)) + 1e-9)
@@ -166,25 +137,33 @@ def find_tolerance(cents):
 
 
 class Advice:
-    """What the study measured: curves by body and element, CPU models by element, bars over errors."""
+    """What the study measured: curves by body and element, bars over errors."""
 
     def __init__(self, content):
         self.content = content
         self.curves = {}
         for body, rows in content["bodies"].items():
             for element in {row["element"] for row in rows}:
-                samples = [Sample(row["nodes"], row["unknowns"], row["modes"], row["worst_cents"], row["bar_cents"], row["cpu_s"]) for row in rows if row["element"] == element]
+                samples = [
+                    Sample(row["nodes"], row["unknowns"], row["modes"], row["worst_cents"], row["bar_cents"], row["cpu_s"])
+                    for row in rows
+                    if row["element"] == element
+                ]
                 self.curves.setdefault(body, {})[element] = Curve(element, samples)
-        self.models = {}
-        for element in {element for curves in self.curves.values() for element in curves}:
-            self.models[element] = CpuModel([s for curves in self.curves.values() if element in curves for s in curves[element].samples])
 
     def get_calibration(self):
         return self.content["calibration"]
 
     def find_bar_ratios(self, element, without=None):
-        """Sorted largest bar over largest error of all samples that are neither all wrong nor rounding; `without`: a body that is left out."""
-        return sorted(s.bar / s.cents for body, curves in self.curves.items() if body != without and element in curves for s in curves[element].samples if 0.02 < s.cents < 300)
+        """Sorted largest bar over largest error of all samples that are neither all wrong nor rounding; `without`: a body that is left
+        out."""
+        return sorted(
+            s.bar / s.cents
+            for body, curves in self.curves.items()
+            if body != without and element in curves
+            for s in curves[element].samples
+            if 0.02 < s.cents < 300
+        )
 
     def find_usual_ratio(self, element="T10"):
         return find_quantile(self.find_bar_ratios(element), 0.25)
@@ -213,8 +192,18 @@ def read_advice(text):
     if not isinstance(content, dict) or content.get("format") != FORMAT or not isinstance(content.get("bodies"), dict):
         raise ValueError(f"no advice of format {FORMAT}")
     calibration = content["calibration"]
-    numbers = [calibration["cpu_s"], *(row[key] for rows in content["bodies"].values() for row in rows for key in ("nodes", "unknowns", "modes", "cpu_s", "worst_cents", "bar_cents"))]
-    if not isinstance(calibration["job"], dict) or not all(isinstance(number, (int, float)) and 0 < number < math.inf for number in numbers):
+    numbers = [
+        calibration["cpu_s"],
+        *(
+            row[key]
+            for rows in content["bodies"].values()
+            for row in rows
+            for key in ("nodes", "unknowns", "modes", "cpu_s", "worst_cents", "bar_cents")
+        ),
+    ]
+    if not isinstance(calibration["job"], dict) or not all(
+        isinstance(number, (int, float)) and 0 < number < math.inf for number in numbers
+    ):
         raise ValueError("what was measured is no number above 0")
     return Advice(content)
 
@@ -222,6 +211,7 @@ def read_advice(text):
 @dataclasses.dataclass
 class Trial:
     """One coarse solve of a body that the study does not have."""
+
     nodes: int
     unknowns: int
     freq_hz: list
@@ -236,10 +226,11 @@ def find_fall(coarse_hz, fine_hz):
 
 
 class Probe:
-    """A body unknown to the study, by trials with T10 from coarse to fine, two at least."""
+    """A body unknown to the study, by trials with T10 from coarse to fine, two at least.
+    predict_seconds(element, nodes, modes): CPU seconds by the cost model of carillon-precompute."""
 
-    def __init__(self, advice, element):
-        self.element, self.model, self.trials = element, advice.models[element], []
+    def __init__(self, advice, element, predict_seconds):
+        self.element, self.predict_seconds, self.trials = element, predict_seconds, []
         ratios = advice.find_bar_ratios(element)
         self.usual, self.least = find_quantile(ratios, 0.5), max(find_quantile(ratios, 0.02), 1.0)  # bars over errors
 
@@ -248,10 +239,11 @@ class Probe:
         count = min(len(coarse.bars), len(fine.bars))
         bars = max(coarse.bars[:count], default=1.0), max(fine.bars[:count], default=1.0)
         slope = DISTRUST * math.log(bars[0] / max(bars[1], 1e-9)) / math.log(fine.nodes / coarse.nodes)
-        return min(max(slope, LEAST_STEEP), STEEPEST)
+        return min(max(slope, MIN_STEEPNESS), MAX_STEEPNESS)
 
     def estimate(self, coarse, fine):
-        """Cents of the largest error of the fine one of two: what its frequencies fell by, continued at the rate of its bars, or what bars of that length usually mean, if that is more."""
+        """Cents of the largest error of the fine one of two: what its frequencies fell by, continued at the rate of its bars, or what bars
+        of that length usually mean, if that is more."""
         bar = max(fine.bars)
         by_fall = 0.0
         if coarse.freq_hz and fine.nodes > 1.3 * coarse.nodes:
@@ -259,24 +251,37 @@ class Probe:
         return min(max(by_fall, bar / self.usual), bar / self.least)
 
     def predict_cpu(self, nodes):
-        """By the study's model at the pace of the finest trial, and by the power between the last two trials: their geometric mean."""
+        """By the cost model at the pace of the finest trial, and by the power between the last two trials: their geometric mean."""
         coarse, fine = self.trials[-2:]
         factor, modes = nodes / fine.nodes, len(fine.freq_hz)
         spent = fine.cpu_s - fine.mesh_s
-        by_model = spent / self.model.predict(fine.unknowns, modes) * self.model.predict(fine.unknowns * factor, modes)
+        by_model = spent * self.predict_seconds(self.element, round(nodes), modes) / self.predict_seconds(self.element, fine.nodes, modes)
         grown = max(spent - START_S, 1e-3) / max(coarse.cpu_s - coarse.mesh_s - START_S, 1e-3)
         power = min(max(math.log(grown) / math.log(fine.nodes / coarse.nodes), 1.0), STEEPEST_CPU)
         by_power = START_S + max(spent - START_S, 0.0) * factor**power
         return math.sqrt(by_model * by_power) + fine.mesh_s * factor
 
     def make_curve(self):
-        """As if the study had it: the trials, and MOST_FINER_TRIAL times the nodes of the finest."""
+        """As if the study had it: the trials, and MAX_FINER_TRIAL times the nodes of the finest."""
         coarse, fine = self.trials[-2:]
         cents, slope, modes = self.estimate(coarse, fine), self.find_slope(coarse, fine), len(fine.freq_hz)
-        samples = [Sample(t.nodes, t.unknowns, len(t.freq_hz), cents + find_fall(t.freq_hz, fine.freq_hz), max(t.bars), t.cpu_s) for t in self.trials if t.freq_hz]
-        for factor in (1.5, 2.0, MOST_FINER_TRIAL):
+        samples = [
+            Sample(t.nodes, t.unknowns, len(t.freq_hz), cents + find_fall(t.freq_hz, fine.freq_hz), max(t.bars), t.cpu_s)
+            for t in self.trials
+            if t.freq_hz
+        ]
+        for factor in (1.5, 2.0, MAX_FINER_TRIAL):
             nodes = round(fine.nodes * factor)
-            samples.append(Sample(nodes, round(fine.unknowns * factor), modes, cents * factor**-slope, max(fine.bars) * factor**-slope, self.predict_cpu(nodes)))
+            samples.append(
+                Sample(
+                    nodes,
+                    round(fine.unknowns * factor),
+                    modes,
+                    cents * factor**-slope,
+                    max(fine.bars) * factor**-slope,
+                    self.predict_cpu(nodes),
+                )
+            )
         return Curve(self.element, samples, is_measured=False)
 
     def judge(self, final):

@@ -29,26 +29,26 @@ class MeshFile:
             raise RunError(4, f"{path}: {blocks} blocks of nodes instead of one")
         self.coordinates = start + 32 + 12 + 8 + 8 * count  # header, entity, number in the block, tags
         flat = struct.unpack_from(f"<{3 * count}d", self.content, self.coordinates)
-        self.nodes = [list(flat[3 * i:3 * i + 3]) for i in range(count)]
+        self.nodes = [list(flat[3 * i : 3 * i + 3]) for i in range(count)]
         self.tets = self.read_tets(find_section(self.content, b"Elements"))
 
     def read_tets(self, place):
-        blocks, = struct.unpack_from("<Q", self.content, place)
+        (blocks,) = struct.unpack_from("<Q", self.content, place)
         place += 32
         tets = []
         for _ in range(blocks):
             _, _, kind, count = struct.unpack_from("<iiiQ", self.content, place)
             place += 20
             width = 1 + (TET_NODES[kind] if kind in TET_NODES else 1)
-            words = array.array("Q", bytes(self.content[place:place + 8 * width * count]))
+            words = array.array("Q", bytes(self.content[place : place + 8 * width * count]))
             place += 8 * width * count
             if kind in TET_NODES:
-                tets += [tuple(node - 1 for node in words[width * i + 1:width * (i + 1)]) for i in range(count)]
+                tets += [tuple(node - 1 for node in words[width * i + 1 : width * (i + 1)]) for i in range(count)]
         return tets
 
     def move(self, find_parameters, find_place, periods=(0.0, 0.0, 0.0)):
-        """Corners from (x, y, z) to find_place(find_parameters(x, y, z)), mid-side nodes to the place of their corners' mean parameters: onto
-        the true surface where a parameter is constant on it. periods: those of the parameters, 0 where one does not come round."""
+        """Corners from (x, y, z) to find_place(find_parameters(x, y, z)), mid-side nodes to the place of their corners' mean parameters:
+        onto the true surface where a parameter is constant on it. periods: those of the parameters, 0 where one does not come round."""
         parameters = [find_parameters(*node) for node in self.nodes]
         corners = {corner for tet in self.tets for corner in tet[:4]}
         for corner in corners:

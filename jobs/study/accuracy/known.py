@@ -1,4 +1,4 @@
-"""Frequencies that no finite-element mesh gave: known.csv, beside this module, each with its source."""
+"""Frequencies that no finite-element mesh gave: known.csv, next to this module, each with its source."""
 import csv
 import dataclasses
 import io
@@ -8,6 +8,7 @@ import pkgutil
 @dataclasses.dataclass(frozen=True)
 class Truth:
     """Sorted frequencies with their multiplicities, and how far each may itself be wrong, relative."""
+
     freq_hz: tuple
     uncertainty: tuple
     source: str
@@ -21,6 +22,8 @@ def read_known():
         rows.setdefault(row["body"], []).append(row)
     known = {}
     for body, lines in rows.items():
-        modes = sorted((float(row["frequency_hz"]), float(row["relative_uncertainty"])) for row in lines for _ in range(int(row["multiplicity"])))
+        modes = sorted(
+            (float(row["frequency_hz"]), float(row["relative_uncertainty"])) for row in lines for _ in range(int(row["multiplicity"]))
+        )
         known[body] = Truth(tuple(f for f, _ in modes), tuple(u for _, u in modes), lines[0]["source"])
     return known

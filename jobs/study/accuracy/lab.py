@@ -1,5 +1,6 @@
-"""Where a study is done: makes meshes, runs jobs in turn, measures CPU seconds, and keeps what was measured in OUT/work, so that a study that
-was interrupted goes on where it was. What is kept is found by the hash of the job, the bytes of its mesh, ranks, options and the program."""
+"""Where a study is done: makes meshes, runs jobs in turn, measures CPU seconds, and keeps what was measured in OUT/work, so that a study
+that was interrupted continues where it was. What is kept is found by the hash of the job, the bytes of its mesh, ranks, options and the
+program."""
 import dataclasses
 import functools
 import hashlib
@@ -28,6 +29,7 @@ class Mesh:
 class Case:
     """One job to measure. job: as carillon-precompute takes it, without "bank"; "mesh" and "surface" are absolute paths.
     options: what follows "--" on the command line of the solver; environment: pairs (name, value)."""
+
     name: str
     job: dict = dataclasses.field(hash=False)
     ranks: int = 1
@@ -38,6 +40,7 @@ class Case:
 @dataclasses.dataclass
 class Solve:
     """What one case gave; one entry of cpu_s and wall_s for each repeat. Cents and residuals: one for each mode, as the bank has them."""
+
     cpu_s: list
     wall_s: list
     freq_hz: list
@@ -48,7 +51,7 @@ class Solve:
     unknowns: int
     elements: int
     bank: pathlib.Path
-    record: dict  # "run" of the resolved job: stations, solver, memory
+    record: dict  # "run" of the resolved job: phases, solver, memory
     error: str = ""  # of a case that may fail, and did; the lists above are empty then
 
     @property
@@ -93,7 +96,8 @@ def read_kept(path):
 
 class Lab:
     def __init__(self, out, programs, quick=False, repeats=None, surface=None, timeout_s=3600, on=None):
-        """out: the report's folder. programs: {name: path}, see programs.find_all(). repeats: of every case; default 1 when quick, else 2. on: names of --on, where it was given."""
+        """out: the report's folder. programs: {name: path}, see programs.find_all(). repeats: of every case; default 1 when quick, else 2.
+        on: names of --on, where it was given."""
         self.out, self.programs, self.quick = pathlib.Path(out).resolve(), programs, quick
         self.repeats = repeats or (1 if quick else 2)
         self.surface, self.timeout_s = surface, timeout_s
@@ -115,17 +119,32 @@ class Lab:
         """The line that makes a section or a part of it again."""
         on = ["--on", *self.on] if self.on and "--on" not in words else []
         repeats = ["--repeats", str(self.asked_repeats)] if self.asked_repeats else []
-        return shlex.join(["carillon", "study", "accuracy", "--only", section, *words, *on, *repeats, *(["--quick"] if self.quick else []), "-o", "REPORT"])
+        return shlex.join(
+            [
+                "carillon",
+                "study",
+                "accuracy",
+                "--only",
+                section,
+                *words,
+                *on,
+                *repeats,
+                *(["--quick"] if self.quick else []),
+                "-o",
+                "REPORT",
+            ]
+        )
 
     def find_program(self, name):
         if name not in self.programs:
-            raise InputError(f"{name} is not beside carillon-study; give its folder with --bin")
+            raise InputError(f"{name} is not next to carillon-study; give its folder with --bin")
         return self.programs[name]
 
     # --- meshes
 
     def make_mesh(self, words, change=None, name="", inputs=()):
-        """carillon-mesh with these words, kept by their hash. change(path): alters a copy of that file, `name` says how; inputs: files that the words name."""
+        """carillon-mesh with these words, kept by their hash. change(path): alters a copy of that file, `name` says how; inputs: files that
+        the words name."""
         program = self.find_program("carillon-mesh")
         words = [str(word) for word in words]
         key = calc_key([calc_digest(program), words, name, [calc_digest(path) for path in inputs]])
@@ -157,18 +176,21 @@ class Lab:
     # --- solves
 
     def measure(self, cases, repeats=None, may_fail=False, is_fresh=False):
-        """{name: Solve}: every case `repeats` times, all cases in turn and every other time backwards, so that what the machine does besides falls on all of them.
-        is_fresh: nothing that was kept is taken, for the machine may have another pace by now."""
+        """{name: Solve}: every case `repeats` times, all cases in turn and every other time backwards, so that other load on
+        the machine affects all of them. is_fresh: nothing that was kept is taken, for the machine may have another pace by now."""
         repeats = repeats or self.repeats
         keys = {case.name: self.find_key(case) for case in cases}
         if len(keys) != len(cases):
             raise ValueError("two cases have one name")
         find_kept = lambda case: None if is_fresh else read_kept(self.runs / keys[case.name] / "kept.json")
         kept = {case.name: find_kept(case) or {"cpu_s": [], "wall_s": []} for case in cases}
-        rounds = [[case for case in cases if len(kept[case.name]["cpu_s"]) <= repeat and not kept[case.name].get("error")] for repeat in range(repeats)]
+        rounds = [
+            [case for case in cases if len(kept[case.name]["cpu_s"]) <= repeat and not kept[case.name].get("error")]
+            for repeat in range(repeats)
+        ]
         missing = sum(map(len, rounds))
         if missing < repeats * len(cases) and missing:
-            self.say(f"{repeats * len(cases) - missing} of {repeats * len(cases)} solves are kept from before ({self.runs}); going on")
+            self.say(f"{repeats * len(cases) - missing} of {repeats * len(cases)} solves are kept from before ({self.runs}); continuing")
         weights = {case.name: self.find_weight(case) for case in cases}
         left, spent, done = sum(weights[case.name] for cases_now in rounds for case in cases_now), 0.0, 0
         all_weight, begin = left, time.monotonic()
@@ -206,7 +228,9 @@ class Lab:
         write_whole(folder / "job.json", json.dumps(case.job | {"bank": "bank.hdf"}, indent=1) + "\n")
         program = [self.find_program("carillon-precompute"), "-q", "job.json", *(["--", *case.options] if case.options else [])]
         try:
-            cost = self.call(["mpirun", "-np", case.ranks, *program] if case.ranks > 1 else program, case.name, dict(case.environment), folder)
+            cost = self.call(
+                ["mpirun", "-np", case.ranks, *program] if case.ranks > 1 else program, case.name, dict(case.environment), folder
+            )
         except RunError as error:
             if not may_fail or error.code not in (2, 3):
                 raise
@@ -221,24 +245,43 @@ class Lab:
 
     def read_bank(self, bank):
         """{"modes", "record", ...} of a fresh bank."""
-        child = subprocess.run([str(self.find_program("carillon-bank")), "info", "--json", str(bank)], capture_output=True, text=True, stdin=subprocess.DEVNULL)
+        child = subprocess.run(
+            [str(self.find_program("carillon-bank")), "info", "--json", str(bank)], capture_output=True, text=True, stdin=subprocess.DEVNULL
+        )
         if child.returncode != 0:
             raise RunError(4, f"{bank}: {child.stderr.strip()}")
         content = json.loads(child.stdout)
         record = json.loads(pathlib.Path(f"{bank}.resolved.json").read_text())["run"]
         columns = ("frequency_hz", "algebraic_error_cents", "discretisation_error_cents", "residual")
-        return {"modes": [[mode[column] for column in columns] for mode in content["modes"]], "record": record, "nodes": content["counts"]["nodes"], "elements": content["counts"]["tets"]}
+        return {
+            "modes": [[mode[column] for column in columns] for mode in content["modes"]],
+            "record": record,
+            "nodes": content["counts"]["nodes"],
+            "elements": content["counts"]["tets"],
+        }
 
     def make_solve(self, kept, key, repeats):
         if kept.get("error"):
             return Solve([], [], [], [], [], [], 0, 0, 0, self.runs / key / "bank.hdf", {}, kept["error"])
         columns = list(map(list, zip(*kept["modes"]))) or [[], [], [], []]
-        return Solve(kept["cpu_s"][:repeats], kept["wall_s"][:repeats], *columns, kept["nodes"], 3 * kept["record"]["mesh"]["free_nodes"], kept["elements"], self.runs / key / "bank.hdf", kept["record"])
+        return Solve(
+            kept["cpu_s"][:repeats],
+            kept["wall_s"][:repeats],
+            *columns,
+            kept["nodes"],
+            3 * kept["record"]["mesh"]["free_nodes"],
+            kept["elements"],
+            self.runs / key / "bank.hdf",
+            kept["record"],
+        )
 
     def describe_machine(self):
         processors = [line.split(":", 1)[1].strip() for line in open("/proc/cpuinfo") if line.startswith("model name")][:1]
         cores = len(os.sched_getaffinity(0))
         others = max(self.load_start, 0.0)
-        return (f"{processors[0] if processors else 'A processor without a name'}, {cores} core{'s' if cores > 1 else ''}; load of the machine when the study began {others:.1f}, at its end "
-                f"{os.getloadavg()[0]:.1f}. This call ran solves of {self.measured_s:.0f} CPU s in {(time.monotonic() - self.start) / 60:.1f} minutes; "
-                f"{self.repeats} repeat{'s' if self.repeats > 1 else ''} of every case, all cases in turn, medians of CPU seconds (user and system, all processes).")
+        return (
+            f"{processors[0] if processors else 'A processor without a name'}, {cores} core{'s' if cores > 1 else ''}; load of the machine"
+            f" when the study began {others:.1f}, at its end {os.getloadavg()[0]:.1f}. This call ran solves of {self.measured_s:.0f} CPU s"
+            f" in {(time.monotonic() - self.start) / 60:.1f} minutes; {self.repeats} repeat{'s' if self.repeats > 1 else ''} of every case,"
+            " all cases in turn, medians of CPU seconds (user and system, all processes)."
+        )

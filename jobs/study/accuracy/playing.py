@@ -1,4 +1,5 @@
-"""What the runtime's knobs cost and buy: each turned by itself, the error of the sound against the CPU of a second of it. The reference is the most accurate setting."""
+"""What the runtime's knobs cost and buy: each turned by itself, the error of the sound against the CPU of a second of it. The reference is
+the most accurate setting."""
 import dataclasses
 
 from accuracy import banks, plots, sounds
@@ -9,21 +10,50 @@ NAME, TITLE = "playing", "Playing: what each knob of the runtime costs and buys"
 PROGRAMS = banks.PROGRAMS
 EFFECTS = ("modal", "hertz_pulse", "roughness", "rolling", "contact_damping", "acceleration_noise", "air_delay", "doppler", "two_ears")
 INSTRUCTIONS = ("plain", "sse2", "avx2", "avx512")
-# The strictest that a scene may ask of the planner, and the most accurate of all: the reference of what a planner leaves out.
+# The strictest thresholds of effect selection that a scene may set, and the most accurate: the reference of what selection leaves out.
 STRICTEST = {"planner_db": -150, "quiet_db": 250, "silence_pa": 1e-15, "lead_s": 0.2}
 SOFT_DB = 40.0  # a blow that is just heard in a living room
-BALL = {"body": {"shape": "sphere", "radius_m": 0.05}, "element": "T10", "band_hz": [20, 30000],
-        "material": {"young_modulus_pa": 3e9, "poisson_ratio": 0.35, "density_kg_m3": 1200, "damping": {"internal_friction": {"tan_phi": 0.02}}}}
-TILE = {"body": {"shape": "plate", "length_m": 0.1, "width_m": 0.1, "thickness_m": 0.008}, "element": "T10", "band_hz": [20, 16000],
-        "material": {"young_modulus_pa": 60e9, "poisson_ratio": 0.22, "density_kg_m3": 2400, "damping": {"internal_friction": {"tan_phi": 0.004}}}}
-SHELF = {"body": {"shape": "plate", "length_m": 0.24, "width_m": 0.2, "thickness_m": 0.01}, "element": "T10", "band_hz": [20, 12000], "fixed": "y-max",
-         "material": {"young_modulus_pa": 34.05e9, "poisson_ratio": 0.33, "density_kg_m3": 2700, "damping": {"rayleigh": {"alpha1_s": 1e-6, "alpha2_per_s": 30}}}}
+BALL = {
+    "body": {"shape": "sphere", "radius_m": 0.05},
+    "element": "T10",
+    "band_hz": [20, 30000],
+    "material": {
+        "young_modulus_pa": 3e9,
+        "poisson_ratio": 0.35,
+        "density_kg_m3": 1200,
+        "damping": {"internal_friction": {"tan_phi": 0.02}},
+    },
+}
+TILE = {
+    "body": {"shape": "plate", "length_m": 0.1, "width_m": 0.1, "thickness_m": 0.008},
+    "element": "T10",
+    "band_hz": [20, 16000],
+    "material": {
+        "young_modulus_pa": 60e9,
+        "poisson_ratio": 0.22,
+        "density_kg_m3": 2400,
+        "damping": {"internal_friction": {"tan_phi": 0.004}},
+    },
+}
+SHELF = {
+    "body": {"shape": "plate", "length_m": 0.24, "width_m": 0.2, "thickness_m": 0.01},
+    "element": "T10",
+    "band_hz": [20, 12000],
+    "fixed": "y-max",
+    "material": {
+        "young_modulus_pa": 34.05e9,
+        "poisson_ratio": 0.33,
+        "density_kg_m3": 2700,
+        "damping": {"rayleigh": {"alpha1_s": 1e-6, "alpha2_per_s": 30}},
+    },
+}
 
 
 @dataclasses.dataclass(frozen=True)
 class Knob:
-    """A key of a scene's "quality" (or "sample_rate_hz"), its settings from accurate to cheap, the default, and the scene that it is turned in. physics: it changes what happens,
-    and its CPU is that of the physics."""
+    """A key of a scene's "quality" (or "sample_rate_hz"), its settings from accurate to cheap, the default, and the scene that it is turned
+    in. physics: it changes what happens, and its CPU is that of the physics."""
+
     key: str
     title: str
     settings: tuple
@@ -33,12 +63,30 @@ class Knob:
 
 
 KNOBS = (
-    Knob("silence_pa", "Culling: below this pressure at 1 m a body sleeps", (1e-15, 1e-10, 1e-8, "planned", 1e-6, 1e-5, 1e-4, 1e-3, 1e-2), "planned", "soft"),
+    Knob(
+        "silence_pa",
+        "Culling: below this pressure at 1 m a body sleeps",
+        (1e-15, 1e-10, 1e-8, "planned", 1e-6, 1e-5, 1e-4, 1e-3, 1e-2),
+        "planned",
+        "soft",
+    ),
     Knob("modes", "Budget: modes that may ring at once", (None, 400, 200, 100, 48, 16), None, "hang"),
     Knob("sample_rate_hz", "Sample rate", (192000, 96000, 48000, 44100, 32000, 22050), 48000, "hang"),
-    Knob("planner_db", "Planner: what changes a body's sound by less is left out", (-150, -100, -70, -50, -40, -30, -20, -10), -50, "chute"),
-    Knob("quiet_db", "Planner: what is so far below the loudest strike is not heard", (250, 120, 90, 70, 50, 40, 30), 70, "chute"),
-    Knob("lead_s", "Planner: look-ahead, by which an effect is on before it is needed", (0.2, 0.1, 0.05, 0.02, 0.01, 0.001), 0.05, "chute"),
+    Knob(
+        "planner_db",
+        "Effect selection: what changes a body's sound by less is left out",
+        (-150, -100, -70, -50, -40, -30, -20, -10),
+        -50,
+        "chute",
+    ),
+    Knob("quiet_db", "Effect selection: what is so far below the loudest strike is not heard", (250, 120, 90, 70, 50, 40, 30), 70, "chute"),
+    Knob(
+        "lead_s",
+        "Effect selection: look-ahead, by which an effect is on before it is needed",
+        (0.2, 0.1, 0.05, 0.02, 0.01, 0.001),
+        0.05,
+        "chute",
+    ),
     Knob("contact_step_s", "Physics: longest step while bodies touch and move", (1e-4, 2.5e-4, 5e-4, 1e-3, 2e-3), 2.5e-4, "roll", True),
 )
 
@@ -46,6 +94,7 @@ KNOBS = (
 @dataclasses.dataclass
 class Turn:
     """One setting of a knob."""
+
     setting: object
     cpu_ms: float
     spread: float
@@ -64,27 +113,67 @@ def make_hang(lab, bank):
 
 
 def make_soft(lab, bank):
-    """The same so softly that its loudest is SOFT_DB, and with the planner at work: what is culled is what is not heard of a soft sound; of a loud one anything could be."""
+    """The same so softly that its loudest is SOFT_DB, and with effect selection on: what is culled is what is not heard of a soft sound; of
+    a loud one anything could be."""
     scene = banks.make_scene(lab, bank)
     level = sounds.calc_loudest_db(sounds.play(lab, "soft-level", scene).sound)
     factor = 10 ** ((SOFT_DB - level) / 20)
-    return scene | {"effects": "auto", "strikes": [strike | {"impulse_n_s": [factor * x for x in strike["impulse_n_s"]]} for strike in scene["strikes"]]}
+    return scene | {
+        "effects": "auto",
+        "strikes": [strike | {"impulse_n_s": [factor * x for x in strike["impulse_n_s"]]} for strike in scene["strikes"]],
+    }
 
 
 def make_roll(lab, paths):
-    """A ball of plastic rolls up a slope (gravity is turned, the floor is level), and is struck meanwhile. Roughness is left out: it is random, and begins anew with every contact, so that another
-    step would be another draw."""
+    """A ball of plastic rolls up a slope (gravity is turned, the floor is level), and is struck meanwhile. Roughness is left out: it is
+    random, and begins again with every contact, so that another step would be another draw."""
     seconds = 0.5 if lab.quick else 0.8
-    return {"duration_s": seconds, "gravity_m_s2": [-1.0, 0, -9.76], "ground": {"friction": 0.6}, "listener": {"position_m": [0, -1, 0.4], "look_at_m": [0, 0, 0]},
-            "strikes": banks.make_strikes(paths["ball"], [seconds * share for share in (0.12, 0.44, 0.75)], "ball"), "effects": [name for name in EFFECTS if name not in ("roughness", "rolling")],
-            "bodies": [{"name": "ball", "bank": str(paths["ball"]), "position_m": [-0.2, 0, 0.05], "velocity_m_s": [0.6, 0.1, 0], "angular_velocity_rad_s": [-2, 12, 0], "friction": 0.6}]}
+    return {
+        "duration_s": seconds,
+        "gravity_m_s2": [-1.0, 0, -9.76],
+        "ground": {"friction": 0.6},
+        "listener": {"position_m": [0, -1, 0.4], "look_at_m": [0, 0, 0]},
+        "strikes": banks.make_strikes(paths["ball"], [seconds * share for share in (0.12, 0.44, 0.75)], "ball"),
+        "effects": [name for name in EFFECTS if name not in ("roughness", "rolling")],
+        "bodies": [
+            {
+                "name": "ball",
+                "bank": str(paths["ball"]),
+                "position_m": [-0.2, 0, 0.05],
+                "velocity_m_s": [0.6, 0.1, 0],
+                "angular_velocity_rad_s": [-2, 12, 0],
+                "friction": 0.6,
+            }
+        ],
+    }
 
 
 def make_chute(lab, paths):
     """The chute in short form: a tile falls on a slanting shelf, slides off it and onto the floor, and comes to rest."""
-    return {"duration_s": 1.2 if lab.quick else 2.0, "ground": {"restitution": 0.3}, "listener": {"position_m": [0, -1, 0.4], "look_at_m": [0, 0, 0.1]},
-            "bodies": [{"name": "tile", "bank": str(paths["tile"]), "position_m": [-0.02, 0, 0.32], "rotation_deg": [4, 17, 10], "restitution": 0.3, "friction": 0.2},
-                       {"name": "shelf", "bank": str(paths["shelf"]), "fixed": True, "position_m": [0, 0, 0.2], "rotation_deg": [0, 22, 0], "restitution": 0.3, "friction": 0.2}]}
+    return {
+        "duration_s": 1.2 if lab.quick else 2.0,
+        "ground": {"restitution": 0.3},
+        "listener": {"position_m": [0, -1, 0.4], "look_at_m": [0, 0, 0.1]},
+        "bodies": [
+            {
+                "name": "tile",
+                "bank": str(paths["tile"]),
+                "position_m": [-0.02, 0, 0.32],
+                "rotation_deg": [4, 17, 10],
+                "restitution": 0.3,
+                "friction": 0.2,
+            },
+            {
+                "name": "shelf",
+                "bank": str(paths["shelf"]),
+                "fixed": True,
+                "position_m": [0, 0, 0.2],
+                "rotation_deg": [0, 22, 0],
+                "restitution": 0.3,
+                "friction": 0.2,
+            },
+        ],
+    }
 
 
 def turn(scene, key, setting):
@@ -110,16 +199,28 @@ def measure_knob(lab, knob, scene, contacts=None):
     scenes = {f"{knob.key}-{number}": turn(scene, knob.key, setting) for number, setting in enumerate(settings)}
     played = list(sounds.play_all(lab, scenes, contacts=None if knob.physics else contacts).values())
     costs = [(one.physics_ms, one.physics_spread) if knob.physics else (one.cpu_ms, one.spread) for one in played]
-    return [Turn(setting, *costs[number], sounds.compare(played[0].sound, one.sound) if number else None) for number, (setting, one) in enumerate(zip(settings, played))]
+    return [
+        Turn(setting, *costs[number], sounds.compare(played[0].sound, one.sound) if number else None)
+        for number, (setting, one) in enumerate(zip(settings, played))
+    ]
 
 
 def measure_effects(lab, scene, contacts):
-    """{what: (Turn)}: everything on, each effect off by itself, and as the planner says, with the same contacts."""
-    wishes = {"all on": list(EFFECTS)} | {f"without {effect}": [name for name in EFFECTS if name != effect] for effect in (EFFECTS[1::3] if lab.quick else EFFECTS)} | {"auto": "auto"}
+    """{what: (Turn)}: everything on, each effect off by itself, and by effect selection, with the same contacts."""
+    wishes = (
+        {"all on": list(EFFECTS)}
+        | {f"without {effect}": [name for name in EFFECTS if name != effect] for effect in (EFFECTS[1::3] if lab.quick else EFFECTS)}
+        | {"auto": "auto"}
+    )
     quality = {"quality": {"silence_pa": 1e-15}}
-    scenes = {f"effects-{number}": scene | {"effects": wish} | (quality if wish != "auto" else {}) for number, wish in enumerate(wishes.values())}
+    scenes = {
+        f"effects-{number}": scene | {"effects": wish} | (quality if wish != "auto" else {}) for number, wish in enumerate(wishes.values())
+    }
     played = list(sounds.play_all(lab, scenes, contacts=contacts).values())
-    return {what: Turn(what, one.cpu_ms, one.spread, sounds.compare(played[0].sound, one.sound) if number else None) for number, (what, one) in enumerate(zip(wishes, played))}
+    return {
+        what: Turn(what, one.cpu_ms, one.spread, sounds.compare(played[0].sound, one.sound) if number else None)
+        for number, (what, one) in enumerate(zip(wishes, played))
+    }
 
 
 def measure_fall(lab, scene, steps=(2.5e-4, 1e-4)):
@@ -133,7 +234,8 @@ def measure_fall(lab, scene, steps=(2.5e-4, 1e-4)):
 
 
 def calc_closed_form(bank, strikes, rate_hz, samples):
-    """Pressure at 1 m of ideal blows in double precision, without the runtime's tables: sum g (phi . J) e^(-d t) (cos w_d t - d / w_d sin w_d t)."""
+    """Pressure at 1 m of ideal blows in double precision, without the runtime's tables: sum g (phi . J) e^(-d t) (cos w_d t - d / w_d sin
+    w_d t)."""
     names = ("mesh/triangles", "modes/eigenvalue", "modes/decay", "modes/radiation_gain", "modes/shape_scale", "modes/shape")
     arrays = sounds.read_arrays(bank, set(names))
     triangles, eigenvalue, decay, gain, scale, shape = (arrays[name] for name in names)
@@ -150,8 +252,11 @@ def calc_closed_form(bank, strikes, rate_hz, samples):
 
 
 def measure_kernels(lab, bank):
-    """[(instructions, Turn)], against the closed form; those that this processor has not are left out. The blows are between two samples, at the middle of the body's sphere of 1 m."""
-    scene = banks.make_scene(lab, bank, seconds=1.5 if lab.quick else 4.0, radiation="osg02", effects=["modal"], quality={"silence_pa": 1e-15})
+    """[(instructions, Turn)], against the closed form; those that this processor has not are left out. The blows are between two samples,
+    at the middle of the body's sphere of 1 m."""
+    scene = banks.make_scene(
+        lab, bank, seconds=1.5 if lab.quick else 4.0, radiation="osg02", effects=["modal"], quality={"silence_pa": 1e-15}
+    )
     centre = sounds.read_arrays(bank, {"rigid/centre_m"})["rigid/centre_m"]
     scene["microphones"] = [[float(x) for x in centre + np.array([0.0, 1.0, 0.0])]]
     for number, strike in enumerate(scene["strikes"]):
@@ -165,7 +270,9 @@ def measure_kernels(lab, bank):
         if one.report["instructions"] != name:
             continue
         if truth is None:
-            truth = sounds.Sound(one.sound.rate_hz, calc_closed_form(bank, scene["strikes"], one.sound.rate_hz, len(one.sound.pressure_pa))[:, None])
+            truth = sounds.Sound(
+                one.sound.rate_hz, calc_closed_form(bank, scene["strikes"], one.sound.rate_hz, len(one.sound.pressure_pa))[:, None]
+            )
         rows.append((name, Turn(name, one.cpu_ms, one.spread, sounds.compare(truth, one.sound))))
     return rows
 
@@ -197,8 +304,10 @@ def find_turn(turns, setting):
 def describe_difference(difference):
     if difference.error_db < sounds.NONE_DB:
         return "does not differ from it"
-    return (f"differs from it by {sounds.format_db(difference.error_db)} dB(A), {difference.distance_db:.2f} dB in bands and {sounds.format_change(difference.loudness_db)} dB in loudness "
-            f"({banks.describe_verdict(difference)})")
+    return (
+        f"differs from it by {sounds.format_db(difference.error_db)} dB(A), {difference.distance_db:.2f} dB in bands and"
+        f" {sounds.format_change(difference.loudness_db)} dB in loudness ({banks.describe_verdict(difference)})"
+    )
 
 
 def describe_knob(knob, turns):
@@ -206,46 +315,78 @@ def describe_knob(knob, turns):
     best, usual = turns[0], find_turn(turns, knob.default)
     cheap = None
     for one in turns[1:]:
-        if one.difference.is_told:
+        if one.difference.is_audible:
             break
         cheap = one
     what = "the physics" if knob.physics else "CPU"
     if usual is best:
         text = f"{knob.title} (`{knob.key}`): the default leaves nothing out, {best.cpu_ms:.2f} ms of {what} for a second"
     else:
-        text = (f"{knob.title} (`{knob.key}`): the default, {format_setting(knob.default)}, takes {usual.cpu_ms:.2f} ms of {what} for a second where the most accurate one, {format_setting(best.setting)}, takes "
-                f"{best.cpu_ms:.2f}, and {describe_difference(usual.difference)}")
+        text = (
+            f"{knob.title} (`{knob.key}`): the default, {format_setting(knob.default)}, takes {usual.cpu_ms:.2f} ms of {what} for a second"
+            f" where the most accurate one, {format_setting(best.setting)}, takes {best.cpu_ms:.2f}, and"
+            f" {describe_difference(usual.difference)}"
+        )
     if cheap is None:
         return text + "; every looser setting differs audibly."
     if cheap is usual:
         return text + "; it is the loosest that does not differ audibly."
-    return text + f"; the loosest that does not differ audibly is {format_setting(cheap.setting)}, {cheap.cpu_ms:.2f} ms, {sounds.format_db(cheap.difference.error_db)} dB(A)."
+    return (
+        text + f"; the loosest that does not differ audibly is {format_setting(cheap.setting)}, {cheap.cpu_ms:.2f} ms,"
+        f" {sounds.format_db(cheap.difference.error_db)} dB(A)."
+    )
 
 
 def add_knob(section, knob, turns):
-    section.add_table(knob.key, [(knob.key, *HEAD), *((format_setting(one.setting) + (" (default)" if one.setting == knob.default else ""), *to_cells(one)) for one in turns)],
-                      f"{knob.title}. Scene: {knob.scene}.", [(knob.key, *DATA), *((format_setting(one.setting), *to_data(one)) for one in turns)])
+    section.add_table(
+        knob.key,
+        [
+            (knob.key, *HEAD),
+            *((format_setting(one.setting) + (" (default)" if one.setting == knob.default else ""), *to_cells(one)) for one in turns),
+        ],
+        f"{knob.title}. Scene: {knob.scene}.",
+        [(knob.key, *DATA), *((format_setting(one.setting), *to_data(one)) for one in turns)],
+    )
     section.conclude(describe_knob(knob, turns))
 
 
 def add_effects(section, effects):
-    section.add_table("effects", [("effects", *HEAD), *((what, *to_cells(one)) for what, one in effects.items())],
-                      "Everything on against each effect left out by itself and against the planner's choice; the same contacts in all. Scene: chute.", [("effects", *DATA), *((what, *to_data(one)) for what, one in effects.items())])
-    told = [what.removeprefix("without ") for what, one in effects.items() if what.startswith("without") and one.difference.is_told]
-    silent = [what.removeprefix("without ") for what, one in effects.items() if what.startswith("without") and not one.difference.is_told]
+    section.add_table(
+        "effects",
+        [("effects", *HEAD), *((what, *to_cells(one)) for what, one in effects.items())],
+        "Everything on against each effect left out by itself and against the choice of effect selection; the same contacts in all."
+        " Scene: chute.",
+        [("effects", *DATA), *((what, *to_data(one)) for what, one in effects.items())],
+    )
+    audible = [what.removeprefix("without ") for what, one in effects.items() if what.startswith("without") and one.difference.is_audible]
+    inaudible = [
+        what.removeprefix("without ") for what, one in effects.items() if what.startswith("without") and not one.difference.is_audible
+    ]
     whole, auto = effects["all on"], effects["auto"]
-    parts = ([f"{', '.join(told)} {'is' if len(told) == 1 else 'are'} missed when left out"] if told else []) + ([f"{', '.join(silent)} {'is' if len(silent) == 1 else 'are'} not"] if silent else [])
-    section.conclude(f"In the chute {'; '.join(parts)}. What the planner chooses takes {100 * auto.cpu_ms / max(whole.cpu_ms, 1e-9):.0f} % of the CPU of everything on and differs by "
-                     f"{sounds.format_db(auto.difference.error_db)} dB(A) ({banks.describe_verdict(auto.difference)}).")
+    parts = ([f"{', '.join(audible)} {'is' if len(audible) == 1 else 'are'} missed when left out"] if audible else []) + (
+        [f"{', '.join(inaudible)} {'is' if len(inaudible) == 1 else 'are'} not"] if inaudible else []
+    )
+    section.conclude(
+        f"In the chute {'; '.join(parts)}. What effect selection chooses takes {100 * auto.cpu_ms / max(whole.cpu_ms, 1e-9):.0f} % of the"
+        f" CPU of everything on and differs by {sounds.format_db(auto.difference.error_db)} dB(A)"
+        f" ({banks.describe_verdict(auto.difference)})."
+    )
 
 
 def add_kernels(section, rows):
-    section.add_table("kernel", [("instructions", *HEAD), *((name, *to_cells(one)) for name, one in rows)],
-                      "Single-precision tables with a double-precision state against the closed form in double precision (numpy), by instruction set.", [("instructions", *DATA), *((name, *to_data(one)) for name, one in rows)])
+    section.add_table(
+        "kernel",
+        [("instructions", *HEAD), *((name, *to_cells(one)) for name, one in rows)],
+        "Single-precision tables with a double-precision state against the closed form in double precision (numpy), by instruction set.",
+        [("instructions", *DATA), *((name, *to_data(one)) for name, one in rows)],
+    )
     worst, fastest = max(rows, key=lambda row: row[1].difference.error_db), min(rows, key=lambda row: row[1].cpu_ms)
     slowest = max(rows, key=lambda row: row[1].cpu_ms)
-    section.conclude(f"Single precision in the kernel is {abs(worst[1].difference.error_db):.0f} dB(A) below the sound or better with every instruction set that this processor has ({', '.join(name for name, _ in rows)}); "
-                     f"{fastest[0]} takes {fastest[1].cpu_ms:.2f} ms for a second of sound, {slowest[0]} {slowest[1].cpu_ms:.2f} ms.")
+    section.conclude(
+        f"Single precision in the kernel is {abs(worst[1].difference.error_db):.0f} dB(A) below the sound or better with every instruction"
+        f" set that this processor has ({', '.join(name for name, _ in rows)}); {fastest[0]} takes {fastest[1].cpu_ms:.2f} ms for a second"
+        f" of sound, {slowest[0]} {slowest[1].cpu_ms:.2f} ms."
+    )
 
 
 def add_chart(section, measured):
@@ -253,9 +394,23 @@ def add_chart(section, measured):
     for knob, turns in measured:
         points = [(one.cpu_ms, one.difference.error_db) for one in turns[1:] if one.difference.error_db > sounds.NONE_DB]
         rows += [(knob.key, format_setting(one.setting), *to_data(one)) for one in turns]
-        panels.append(plots.Panel(knob.key, f"{'physics' if knob.physics else 'CPU'}, ms for a second", "error, dB(A)", {"settings": points},
-                                  levels=[(sounds.ERROR_LIMIT_DB, "-40 dB: inaudible below")], x_log=False, y_log=False))
-    section.add_chart("knobs", plots.draw_panels(panels, "Each knob by itself", "error against the most accurate setting, and the CPU of a second of sound", 3), "Error of the sound against CPU, setting by setting.", rows)
+        panels.append(
+            plots.Panel(
+                knob.key,
+                f"{'physics' if knob.physics else 'CPU'}, ms for a second",
+                "error, dB(A)",
+                {"settings": points},
+                levels=[(sounds.ERROR_LIMIT_DB, "-40 dB: inaudible below")],
+                x_log=False,
+                y_log=False,
+            )
+        )
+    section.add_chart(
+        "knobs",
+        plots.draw_panels(panels, "Each knob by itself", "error against the most accurate setting, and the CPU of a second of sound", 3),
+        "Error of the sound against CPU, setting by setting.",
+        rows,
+    )
 
 
 def study(lab, bodies):
@@ -263,11 +418,20 @@ def study(lab, bodies):
     soundings = banks.find_soundings(lab, bodies)
     paths = banks.solve(lab, soundings + [banks.Sounding(name, name, job) for name, job in find_jobs(lab).items()])
     hung = max(paths, key=lambda name: banks.count_modes(paths[name]))
-    scenes = {"hang": make_hang(lab, paths[hung]), "soft": make_soft(lab, paths[hung]), "roll": make_roll(lab, paths), "chute": make_chute(lab, paths)}
+    scenes = {
+        "hang": make_hang(lab, paths[hung]),
+        "soft": make_soft(lab, paths[hung]),
+        "roll": make_roll(lab, paths),
+        "chute": make_chute(lab, paths),
+    }
     contacts = lab.out / "work/sounds/chute.jsonl"
     sounds.play(lab, "record", scenes["chute"] | {"effects": list(EFFECTS)}, record=contacts)
-    section.say(f"Four scenes. hang: the {hung} hangs still, struck three times; soft: so softly that it is {SOFT_DB:.0f} dB(A). roll: a ball rolls up a slope, struck three times. chute: a tile falls on a slanting shelf, slides off it and onto the floor; what happens is "
-                "recorded once, and each setting plays the same contacts. Each knob is turned by itself; the reference is its most accurate setting.")
+    section.say(
+        f"Four scenes. hang: the {hung} hangs still, struck three times; soft: so softly that it is {SOFT_DB:.0f} dB(A). roll: a ball rolls"
+        " up a slope, struck three times. chute: a tile falls on a slanting shelf, slides off it and onto the floor; what happens is"
+        " recorded once, and each setting plays the same contacts. Each knob is turned by itself; the reference is its most accurate"
+        " setting."
+    )
     add_kernels(section, measure_kernels(lab, paths[hung]))
     measured = []
     for knob in KNOBS:
@@ -275,9 +439,12 @@ def study(lab, bodies):
         add_knob(section, *measured[-1])
     if not lab.quick:
         fall, usual_ms, finer_ms = measure_fall(lab, scenes["chute"])
-        section.conclude(f"Where bodies bounce and tumble: the chute simulated anew at 0.0001 s instead of 0.00025 s ({finer_ms:.0f} ms of the physics for a second instead of "
-                         f"{usual_ms:.0f}) differs by {sounds.format_db(fall.error_db)} dB(A), {fall.distance_db:.2f} dB in bands and {sounds.format_change(fall.loudness_db)} dB in loudness: "
-                         + ("another fall, as good as the first." if fall.is_told else "the same fall to the ear."))
+        section.conclude(
+            f"Where bodies bounce and tumble: the chute simulated again at 0.0001 s instead of 0.00025 s ({finer_ms:.0f} ms of the physics"
+            f" for a second instead of {usual_ms:.0f}) differs by {sounds.format_db(fall.error_db)} dB(A), {fall.distance_db:.2f} dB in"
+            f" bands and {sounds.format_change(fall.loudness_db)} dB in loudness: "
+            + ("another fall, as good as the first." if fall.is_audible else "the same fall to the ear.")
+        )
     add_effects(section, measure_effects(lab, scenes["chute"], contacts))
     add_chart(section, measured)
     section.say(describe_defaults(measured))
@@ -286,7 +453,7 @@ def study(lab, bodies):
 
 
 def make_base(knob, scene):
-    """What else is set while a knob is turned: effects of the planner where it is one of its knobs."""
+    """What else is set while a knob is turned: effects by effect selection where it is one of its knobs."""
     if knob.scene == "chute":
         return scene | {"quality": {key: value for key, value in STRICTEST.items() if key != knob.key}}
     if knob.physics:
@@ -304,6 +471,8 @@ def find_defaults(measured):
 
 
 def describe_defaults(measured):
-    told = [f"`{knob.key}`" for knob, turns in measured if (usual := find_turn(turns, knob.default).difference) and usual.is_told]
-    kept = [f"`{knob.key}` {format_setting(knob.default)}" for knob, turns in measured if f"`{knob.key}`" not in told]
-    return (f"Defaults that do not differ audibly from the most accurate setting: {', '.join(kept) or 'none'}." + (f" Defaults that do: {', '.join(told)}." if told else ""))
+    audible = [f"`{knob.key}`" for knob, turns in measured if (usual := find_turn(turns, knob.default).difference) and usual.is_audible]
+    kept = [f"`{knob.key}` {format_setting(knob.default)}" for knob, turns in measured if f"`{knob.key}`" not in audible]
+    return f"Defaults that do not differ audibly from the most accurate setting: {', '.join(kept) or 'none'}." + (
+        f" Defaults that do: {', '.join(audible)}." if audible else ""
+    )

@@ -15,6 +15,7 @@ WIDTH, HEIGHT, LEFT, TOP, GAP, FOOT = 360, 280, 84, 118, 100, 66
 class Panel:
     """curves: {name: [(x, y)]}; guides: {text: [(x, y)]}, dashed and grey; front: [(x, y)], drawn below the curves as a broad band;
     levels: [(y, text)], horizontal lines. Values that a logarithmic axis cannot show are left out."""
+
     title: str
     x_label: str
     y_label: str
@@ -59,7 +60,9 @@ def find_ticks(ends, is_log):
 
 
 def keep(points, panel):
-    return [(x, y) for x, y in points if math.isfinite(x) and math.isfinite(y) and (x > 0 or not panel.x_log) and (y > 0 or not panel.y_log)]
+    return [
+        (x, y) for x, y in points if math.isfinite(x) and math.isfinite(y) and (x > 0 or not panel.x_log) and (y > 0 or not panel.y_log)
+    ]
 
 
 def draw_panel(panel, left, top, colours):
@@ -75,10 +78,14 @@ def draw_panel(panel, left, top, colours):
     for level, text in panel.levels:
         if y_range[0] < level < y_range[1]:
             y = axes.place_y(level)
-            out.append(f'<line x1="{left}" x2="{left + WIDTH}" y1="{y:.1f}" y2="{y:.1f}" stroke="#8a8a8a" stroke-dasharray="2 4"/>'
-                       f'<text x="{left + WIDTH - 4}" y="{y - 4:.1f}" text-anchor="end" fill="#666" font-size="11">{measuring.escape(text)}</text>')
+            out.append(
+                f'<line x1="{left}" x2="{left + WIDTH}" y1="{y:.1f}" y2="{y:.1f}" stroke="#8a8a8a" stroke-dasharray="2 4"/>'
+                f'<text x="{left + WIDTH - 4}" y="{y - 4:.1f}" text-anchor="end" fill="#666" font-size="11">{measuring.escape(text)}</text>'
+            )
     clip = f"clip{left}-{top}"
-    out.append(f'<clipPath id="{clip}"><rect x="{left}" y="{top}" width="{WIDTH}" height="{HEIGHT}"/></clipPath><g clip-path="url(#{clip})">')
+    out.append(
+        f'<clipPath id="{clip}"><rect x="{left}" y="{top}" width="{WIDTH}" height="{HEIGHT}"/></clipPath><g clip-path="url(#{clip})">'
+    )
     front = keep(panel.front, panel)
     if len(front) > 1:
         steps = [front[0]] + [step for before, after in zip(front, front[1:]) for step in ((after[0], before[1]), after)]
@@ -89,7 +96,10 @@ def draw_panel(panel, left, top, colours):
             out.append(axes.draw_curve(guide, "#888888", 1.3, True))
             x, y = guide[-1] if inside(*guide[-1]) else guide[0]
             side, shift = ("end", -4) if axes.place_x(x) > left + WIDTH / 2 else ("start", 8)
-            out.append(f'<text x="{axes.place_x(x) + shift:.1f}" y="{axes.place_y(y) - 6:.1f}" text-anchor="{side}" fill="#666" font-size="11">{measuring.escape(text)}</text>')
+            out.append(
+                f'<text x="{axes.place_x(x) + shift:.1f}" y="{axes.place_y(y) - 6:.1f}" text-anchor="{side}" fill="#666"'
+                f' font-size="11">{measuring.escape(text)}</text>'
+            )
     for name, curve in curves.items():
         out.append(axes.draw_curve(curve, colours[name]))
         out += [axes.draw_point(x, y, colours[name], f"{name}: {x:.4g}, {y:.3g}", radius=3.2) for x, y in curve]
@@ -104,10 +114,18 @@ def draw_panels(panels, title, subtitle, columns=2):
     lines = -(-len(panels) // columns)
     width = columns * (LEFT + WIDTH) + 40
     entries = [(name, colours[name]) for name in names] + ([("Pareto front", "#cfcfcf")] if any(panel.front for panel in panels) else [])
-    out = charts.start(max(width, 40 + 9 * len(subtitle), 20 + round(sum(40 + 7.4 * len(name) for name, _ in entries))), TOP + lines * (HEIGHT + GAP) - GAP + FOOT, title, subtitle)
+    out = charts.start(
+        max(width, 40 + 9 * len(subtitle), 20 + round(sum(40 + 7.4 * len(name) for name, _ in entries))),
+        TOP + lines * (HEIGHT + GAP) - GAP + FOOT,
+        title,
+        subtitle,
+    )
     x = 16.0
     for name, colour in entries:
-        out.append(f'<rect x="{x:.0f}" y="62" width="13" height="13" fill="{colour}"/><text x="{x + 18:.0f}" y="73">{measuring.escape(name)}</text>')
+        out.append(
+            f'<rect x="{x:.0f}" y="62" width="13" height="13" fill="{colour}"/><text x="{x + 18:.0f}"'
+            f' y="73">{measuring.escape(name)}</text>'
+        )
         x += 40 + 7.4 * len(name)
     for index, panel in enumerate(panels):
         out += draw_panel(panel, LEFT + (index % columns) * (LEFT + WIDTH), TOP + (index // columns) * (HEIGHT + GAP), colours)

@@ -1,4 +1,5 @@
-"""What a study of accuracy writes: report.md, report.html with the pictures inside, report.json, and an SVG and a CSV for each chart and table."""
+"""What a study of accuracy writes: report.md, report.html with the pictures inside, report.json, and an SVG and a CSV for each chart and
+table."""
 import csv
 import html
 import json
@@ -7,8 +8,10 @@ import re
 from accuracy.lab import write_whole
 
 STYLE = """body { font: 15px/1.5 sans-serif; max-width: 980px; margin: 2em auto; padding: 0 1em; color: #222; }
-table { border-collapse: collapse; margin: 1em 0; font-size: 13px; } td, th { border-bottom: 1px solid #ddd; padding: 3px 9px; text-align: right; }
-td:first-child, th:first-child { text-align: left; } pre { background: #f4f4f4; padding: 8px 12px; } figure { margin: 1em 0; } figcaption { color: #555; }
+table { border-collapse: collapse; margin: 1em 0; font-size: 13px; }
+td, th { border-bottom: 1px solid #ddd; padding: 3px 9px; text-align: right; }
+td:first-child, th:first-child { text-align: left; }
+pre { background: #f4f4f4; padding: 8px 12px; } figure { margin: 1em 0; } figcaption { color: #555; }
 svg { max-width: 100%; height: auto; }"""
 
 
@@ -27,7 +30,10 @@ def write(lab, sections, setting):
     summary = ["## In words", "", *(f"- {finding}" for finding in findings), ""] if findings else []
     files["report.md"] = "\n".join([*head, *summary, *(line for section in sections for line in section.to_markdown())]).rstrip() + "\n"
     files["report.html"] = format_html(sections, setting, machine, findings)
-    files["report.json"] = json.dumps({"format": 1, "setting": setting, "machine": machine, "sections": [section.to_json() for section in sections]}, indent=1) + "\n"
+    files["report.json"] = (
+        json.dumps({"format": 1, "setting": setting, "machine": machine, "sections": [section.to_json() for section in sections]}, indent=1)
+        + "\n"
+    )
     for name, text in files.items():
         write_whole(lab.out / name, text)
     return lab.out / "report.md"
@@ -36,6 +42,7 @@ def write(lab, sections, setting):
 def format_csv(rows):
     class Lines(list):
         write = list.append
+
     lines = Lines()
     table = csv.writer(lines, lineterminator="\n")
     table.writerows([[f"{cell:.10g}" if isinstance(cell, float) else cell for cell in row] for row in rows])
@@ -51,8 +58,12 @@ def to_inline(text):
 
 
 def format_html(sections, setting, machine, findings):
-    out = ['<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>What accuracy costs in time</title>', f"<style>{STYLE}</style></head><body>",
-           "<h1>What accuracy costs in time</h1>", f"<pre>{html.escape(setting)}</pre><p>{to_inline(machine)}</p>"]
+    out = [
+        '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>What accuracy costs in time</title>',
+        f"<style>{STYLE}</style></head><body>",
+        "<h1>What accuracy costs in time</h1>",
+        f"<pre>{html.escape(setting)}</pre><p>{to_inline(machine)}</p>",
+    ]
     if findings:
         out.append("<h2>In words</h2><ul>" + "".join(f"<li>{to_inline(finding)}</li>" for finding in findings) + "</ul>")
     for section in sections:
@@ -71,6 +82,11 @@ def format_html(sections, setting, machine, findings):
                 out.append(f"<figure>{picture}<figcaption>{to_inline(item.text)}</figcaption></figure>")
             else:
                 head, *rows = item.rows
-                out.append(f"<p>{to_inline(item.text)}</p><table><tr>" + "".join(f"<th>{to_inline(cell)}</th>" for cell in head) + "</tr>"
-                           + "".join("<tr>" + "".join(f"<td>{to_inline(cell)}</td>" for cell in row) + "</tr>" for row in rows) + "</table>")
+                out.append(
+                    f"<p>{to_inline(item.text)}</p><table><tr>"
+                    + "".join(f"<th>{to_inline(cell)}</th>" for cell in head)
+                    + "</tr>"
+                    + "".join("<tr>" + "".join(f"<td>{to_inline(cell)}</td>" for cell in row) + "</tr>" for row in rows)
+                    + "</table>"
+                )
     return "\n".join(out) + "\n</body></html>\n"

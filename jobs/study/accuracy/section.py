@@ -1,4 +1,4 @@
-"""A section of the report: words, tables and charts in the order in which they were added; each table and chart has a CSV beside it."""
+"""A section of the report: words, tables and charts in the order in which they were added; each table and chart has a CSV next to it."""
 import dataclasses
 
 import measuring
@@ -7,6 +7,7 @@ import measuring
 @dataclasses.dataclass
 class Item:
     """kind: "text", "table" or "chart". rows[0] is the head of what a page shows, data[0] that of its CSV."""
+
     kind: str
     name: str = ""
     text: str = ""  # of a text; the caption of the others
@@ -33,10 +34,19 @@ class Section:
 
     def add_table(self, name, rows, caption, data=None, command=None):
         """rows: what the page shows, rows[0] the head; data: the same for the CSV with all digits (default: rows)."""
-        self.items.append(Item("table", name, caption, [list(map(str, row)) for row in rows], [list(row) for row in data or rows], command=command or self.command))
+        self.items.append(
+            Item(
+                "table",
+                name,
+                caption,
+                [list(map(str, row)) for row in rows],
+                [list(row) for row in data or rows],
+                command=command or self.command,
+            )
+        )
 
     def add_chart(self, name, svg, caption, rows, command=None):
-        """rows: what is drawn, rows[0] the head; it goes into the CSV beside the picture."""
+        """rows: what is drawn, rows[0] the head; it goes into the CSV next to the picture."""
         self.items.append(Item("chart", name, caption, data=[list(row) for row in rows], svg=svg, command=command or self.command))
 
     def file_name(self, item, ending):
@@ -59,7 +69,13 @@ class Section:
         return lines
 
     def to_json(self):
-        return {"name": self.name, "title": self.title, "command": self.command, "findings": self.findings, "items": [dataclasses.asdict(item) for item in self.items]}
+        return {
+            "name": self.name,
+            "title": self.title,
+            "command": self.command,
+            "findings": self.findings,
+            "items": [dataclasses.asdict(item) for item in self.items],
+        }
 
 
 def read_section(value):

@@ -1,12 +1,15 @@
 """Sounds as carillon-render makes them, and how far two of them are apart.
 
 Three measures, each of the whole of two sounds at the same places:
-  error_db      exposure of the difference over that of the reference, both A-weighted (IEC 61672-1:2013, E.4.2) from 20 Hz to 20 kHz, all channels. It knows phases: below -40 dB it is inaudible;
-                of two sounds that run out of step it says nothing.
-  distance_db   log-spectral distance: root mean square, over third-octave bands (IEC 61260-1) and frames of 43 ms, of the difference of levels in dB. Cells count that either sound lifts above a floor:
-                60 dB below the reference's loudest cell of all and not below 0 dB re 20 uPa; what is softer counts as the floor. It knows no phases. Below 1 dB, with no more than 2 % of the frames more than 2 dB off (outliers), it is inaudible (Paliwal & Atal 1993).
-  loudness_db   change of the loudest A-weighted level within the ear's own time, 0.2 s (Zwislocki 1969), in dB(A): the model of loudness is ISO 131's, sones = 2^((L - 40 dB) / 10) with L the A-weighted level,
-                so that 10 dB double the loudness. 1 dB is just heard (Jesteadt, Wier & Green 1977).
+  error_db      exposure of the difference over that of the reference, both A-weighted (IEC 61672-1:2013, E.4.2) from 20 Hz to 20 kHz, all
+                channels. It knows phases: below -40 dB it is inaudible; of two sounds that run out of step it says nothing.
+  distance_db   log-spectral distance: root mean square, over third-octave bands (IEC 61260-1) and frames of 43 ms, of the difference of
+                levels in dB. Cells count that either sound lifts above a floor: 60 dB below the reference's loudest cell of all and not
+                below 0 dB re 20 uPa; what is softer counts as the floor. It knows no phases. Below 1 dB, with no more than 2 % of the
+                frames more than 2 dB off (outliers), it is inaudible (Paliwal & Atal 1993).
+  loudness_db   change of the loudest A-weighted level within the ear's own time, 0.2 s (Zwislocki 1969), in dB(A): the model of loudness is
+                ISO 131's, sones = 2^((L - 40 dB) / 10) with L the A-weighted level, so that 10 dB double the loudness. 1 dB is just heard
+                (Jesteadt, Wier & Green 1977).
 """
 import dataclasses
 import json
@@ -48,6 +51,7 @@ class Sound:
 @dataclasses.dataclass
 class Played:
     """A scene that was played. Seconds: of CPU for a second of sound; playing_s: one entry for each repeat."""
+
     sound: Sound
     playing_s: list
     physics_s: list
@@ -80,8 +84,8 @@ class Difference:
     outliers: float = 0.0  # share of the frames that are more than OUTLIER_DB off
 
     @property
-    def is_told(self):
-        """Whether anybody would tell the two apart: by the waveform not below -40 dB, else by bands and loudness."""
+    def is_audible(self):
+        """Whether the difference is audible by the metric: by the waveform not below -40 dB, else by bands and loudness."""
         bands = self.distance_db > DISTANCE_LIMIT_DB or self.outliers > OUTLIER_LIMIT
         return self.error_db > ERROR_LIMIT_DB and (bands or abs(self.loudness_db) > LOUDNESS_LIMIT_DB)
 
@@ -89,11 +93,11 @@ class Difference:
         return format_db(self.error_db), f"{self.distance_db:.2f}", f"{100 * self.outliers:.0f} %", format_change(self.loudness_db)
 
     def to_data(self):
-        return self.error_db, self.distance_db, self.outliers, self.loudness_db, int(self.is_told)
+        return self.error_db, self.distance_db, self.outliers, self.loudness_db, int(self.is_audible)
 
 
 HEAD = ("error, dB(A)", "log-spectral distance, dB", "frames off", "loudness, dB(A)")
-DATA = ("error_dba", "log_spectral_distance_db", "frames_off", "loudness_change_dba", "told_apart")
+DATA = ("error_dba", "log_spectral_distance_db", "frames_off", "loudness_change_dba", "audible")
 NO_CELLS, NO_DATA = ("-",) * len(HEAD), (-300.0, 0.0, 0.0, 0.0, "")  # of the reference itself
 
 
@@ -115,8 +119,8 @@ def read_wav(data, name="the WAV"):
         raise ValueError(f"{name} is no WAV")
     chunks, at = {}, 12
     while at + 8 <= len(data):
-        size = int.from_bytes(data[at + 4:at + 8], "little")
-        chunks[data[at:at + 4]] = data[at + 8:at + 8 + size]
+        size = int.from_bytes(data[at + 4 : at + 8], "little")
+        chunks[data[at : at + 4]] = data[at + 8 : at + 8 + size]
         at += 8 + size + size % 2
     form = chunks.get(b"fmt ", b"")
     kind, channels, rate = (int.from_bytes(form[a:b], "little") for a, b in ((0, 2), (2, 4), (4, 8)))
@@ -128,7 +132,8 @@ def read_wav(data, name="the WAV"):
 
 
 def play(lab, name, scene, repeats=1, contacts=None, record=None):
-    """Played: the scene through carillon-render, in pascals. Banks and files of contacts by absolute paths. RunError when the program fails."""
+    """Played: the scene through carillon-render, in pascals. Banks and files of contacts by absolute paths. RunError when the program
+    fails."""
     folder = lab.out / "work/sounds"
     folder.mkdir(parents=True, exist_ok=True)
     scene = dict(scene) | {"output": {"gain": GAIN_PER_PA, "format": "float"}}
@@ -152,7 +157,8 @@ def play(lab, name, scene, repeats=1, contacts=None, record=None):
 
 
 def play_all(lab, scenes, repeats=None, contacts=None):
-    """{name: Played} of {name: scene}: all of them in turn, every other time backwards, so that what the machine does besides falls on all."""
+    """{name: Played} of {name: scene}: all of them in turn, every other time backwards, so that other load on the machine affects
+    all."""
     repeats = repeats or lab.repeats
     played = {}
     for number in range(repeats):
@@ -191,7 +197,13 @@ def read_arrays(path, names):
 def calc_a_weight(freq_hz):
     """A-weighting as a factor of the amplitude, 1 at 1 kHz; 0 outside of what is heard."""
     f2 = np.square(np.asarray(freq_hz, float))
-    weight = 1.2589254 * 12194.217**2 * f2 * f2 / ((f2 + 20.598997**2) * np.sqrt((f2 + 107.65265**2) * (f2 + 737.86223**2)) * (f2 + 12194.217**2))
+    weight = (
+        1.2589254
+        * 12194.217**2
+        * f2
+        * f2
+        / ((f2 + 20.598997**2) * np.sqrt((f2 + 107.65265**2) * (f2 + 737.86223**2)) * (f2 + 12194.217**2))
+    )
     return np.where((freq_hz >= LOW_HZ) & (freq_hz <= HIGH_HZ), weight, 0.0)
 
 
@@ -232,11 +244,14 @@ def calc_error_db(reference, other):
 
 
 def calc_bands(pressure, rate):
-    """(frames, bands): mean square [Pa^2] in third-octave bands, channels added. Bands narrower than three lines of the transform are left out."""
+    """(frames, bands): mean square [Pa^2] in third-octave bands, channels added. Bands narrower than three lines of the transform are left
+    out."""
     size = 2 ** round(math.log2(FRAME_S * rate))
     hop = size // 4
     phase = 2 * np.pi * np.arange(size) / size
-    window = 0.35875 - 0.48829 * np.cos(phase) + 0.14128 * np.cos(2 * phase) - 0.01168 * np.cos(3 * phase)  # Harris 1978: what leaks is below -92 dB
+    window = (
+        0.35875 - 0.48829 * np.cos(phase) + 0.14128 * np.cos(2 * phase) - 0.01168 * np.cos(3 * phase)
+    )  # Harris 1978: what leaks is below -92 dB
     padded = np.concatenate([np.zeros((size - hop, pressure.shape[1])), pressure, np.zeros((size, pressure.shape[1]))])
     frames = np.lib.stride_tricks.sliding_window_view(padded, size, axis=0)[::hop]  # (frames, channels, size)
     freq = np.fft.rfftfreq(size, 1 / rate)
@@ -246,8 +261,8 @@ def calc_bands(pressure, rate):
     members = np.array([(freq >= low) & (freq < high) for low, high in edges], float).reshape(len(edges), len(freq))
     out = np.empty((len(frames), len(edges)))
     for first in range(0, len(frames), 64):  # a little memory at a time
-        power = np.abs(np.fft.rfft(frames[first:first + 64] * window, axis=-1)) ** 2
-        out[first:first + 64] = power.sum(axis=1) @ members.T
+        power = np.abs(np.fft.rfft(frames[first : first + 64] * window, axis=-1)) ** 2
+        out[first : first + 64] = power.sum(axis=1) @ members.T
     return out * 2 / (size * np.square(window).sum())
 
 
@@ -270,7 +285,9 @@ def calc_loudest_db(sound):
     """The loudest A-weighted level within EAR_S, dB(A) re 20 uPa, of all channels' mean square; -300 of silence."""
     pressure = sound.pressure_pa
     size = 2 * len(pressure)
-    weighted = np.fft.irfft(np.fft.rfft(pressure, size, axis=0) * calc_a_weight(np.fft.rfftfreq(size, 1 / sound.rate_hz))[:, None], size, axis=0)[:len(pressure)]
+    weighted = np.fft.irfft(
+        np.fft.rfft(pressure, size, axis=0) * calc_a_weight(np.fft.rfftfreq(size, 1 / sound.rate_hz))[:, None], size, axis=0
+    )[: len(pressure)]
     square = np.square(weighted).mean(axis=1)
     count = min(max(1, round(EAR_S * sound.rate_hz)), len(square))
     running = np.concatenate([[0.0], np.cumsum(square)])

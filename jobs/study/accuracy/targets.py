@@ -7,7 +7,12 @@ from errors import InputError
 
 SURFACES, MESHES = (".obj", ".stl", ".ply", ".off"), (".msh", ".vtu", ".mesh", ".node", ".ele", ".vtk", ".vtkhdf", ".hdf", ".h5")
 SHAPES = ("bar", "tube", "plate", "sphere", "bowl", "box", "hollow-box", "cylinder", "disc", "ring", "cone")
-STEEL = {"young_modulus_pa": 200e9, "poisson_ratio": 0.3, "density_kg_m3": 7850, "damping": {"rayleigh": {"alpha1_s": 1e-7, "alpha2_per_s": 0.5}}}
+STEEL = {
+    "young_modulus_pa": 200e9,
+    "poisson_ratio": 0.3,
+    "density_kg_m3": 7850,
+    "damping": {"rayleigh": {"alpha1_s": 1e-7, "alpha2_per_s": 0.5}},
+}
 STEEL_TEXT = "steel (200 GPa, nu 0.3, 7850 kg/m^3), as no material was given"
 
 
@@ -36,7 +41,9 @@ def find_target(word, wall_m=None, height_m=None, band_hz=None):
     path = pathlib.Path(word)
     ending = path.suffix.lower()
     if not path.exists() and word in SHAPES:
-        target = Target(word, {"body": {"shape": word}, "material": STEEL}, "shape", [f"shape {word} with its default dimensions; {STEEL_TEXT}"])
+        target = Target(
+            word, {"body": {"shape": word}, "material": STEEL}, "shape", [f"shape {word} with its default dimensions; {STEEL_TEXT}"]
+        )
     elif ending in SURFACES + MESHES + (".json",) or path.exists():
         target = find_file(path, ending)
     else:
@@ -61,14 +68,19 @@ def find_file(path, ending):
         return Target(path.name, {"body": {"surface": full}, "material": STEEL}, "surface", [STEEL_TEXT])
     if ending in MESHES:
         return Target(path.name, {"mesh": full, "material": STEEL}, "mesh", [STEEL_TEXT])
-    raise InputError(f"{path}: the ending tells what a file is, and {repr(ending) if ending else 'this one has none, which'} is none of a job (.json), a surface ({', '.join(SURFACES)}) or a mesh ({', '.join(MESHES[:4])} ...)")
+    raise InputError(
+        f"{path}: the ending says what a file is, and {repr(ending) if ending else 'this one has none, which'} is none of a job (.json), a"
+        f" surface ({', '.join(SURFACES)}) or a mesh ({', '.join(MESHES[:4])} ...)"
+    )
 
 
 def find_job(path):
     job = scaling.read_job(path)
     kinds = [key for key in ("body", "mesh") if key in job]
     if len(kinds) != 1:
-        raise InputError(f'{path}: the job has {"both" if kinds else "neither"} "body" {"and" if kinds else "nor"} "mesh"; give one of them')
+        raise InputError(
+            f'{path}: the job has {"both" if kinds else "neither"} "body" {"and" if kinds else "nor"} "mesh"; give one of them'
+        )
     folder = path.resolve().parent
     kind = "mesh"
     if kinds == ["mesh"]:
@@ -94,5 +106,8 @@ def resolve(job_file, folder, path):
         raise InputError(f"{job_file}: {path!r} is no path")
     found = (folder / path).resolve()
     if not found.is_file():
-        raise InputError(f"{job_file}: {path}: {'this is no regular file' if found.exists() else 'there is no such file'} (paths are from the job's folder)")
+        raise InputError(
+            f"{job_file}: {path}: {'this is no regular file' if found.exists() else 'there is no such file'} (paths are from the job's"
+            " folder)"
+        )
     return str(found)

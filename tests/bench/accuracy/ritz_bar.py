@@ -28,7 +28,11 @@ def tabulate(degree, points):
 
 def calc_matrices(along, across, through, parity_x, parity_y):
     """K and M of one symmetry class. parity: 0 when the transverse displacement is even in that coordinate."""
-    points = (numpy.polynomial.legendre.leggauss(2 * along + 24), numpy.polynomial.legendre.leggauss(across + 2), numpy.polynomial.legendre.leggauss(through + 2))
+    points = (
+        numpy.polynomial.legendre.leggauss(2 * along + 24),
+        numpy.polynomial.legendre.leggauss(across + 2),
+        numpy.polynomial.legendre.leggauss(through + 2),
+    )
     (u, wu), (v, wv), (w, ww) = points
     x = LENGTH / 2 * u
     bump = DEPTH * numpy.exp(-((x / REACH) ** 4))
@@ -40,10 +44,12 @@ def calc_matrices(along, across, through, parity_x, parity_y):
         odd_x = parity_x ^ (component == 0)
         odd_y = parity_y ^ (component == 1)
         blocks.append([(i, j, k) for i in range(odd_x, along + 1, 2) for j in range(odd_y, across + 1, 2) for k in range(through + 1)])
+
     # Integrals over u carry h and its slope; those over v and w are small constant matrices.
     def across_matrices(table, weights):
         values, slopes = table
         return {(a, b): (p * weights) @ q.T for a, p in (("v", values), ("d", slopes)) for b, q in (("v", values), ("d", slopes))}
+
     yv = across_matrices(tables[1], wv)
     values, slopes = tables[2]
     ramp = (1 - w) * slopes  # (1 - w) d/dw: what dw/dx multiplies
@@ -51,19 +57,29 @@ def calc_matrices(along, across, through, parity_x, parity_y):
     zv = {(a, b): (p * ww) @ q.T for a, p in parts.items() for b, q in parts.items()}
     pu, du = tables[0]
     jac = LENGTH / 2 * WIDTH / 2 * h / 2
+
     def along_matrix(a, b, weight):
         return (({"v": pu, "d": du}[a]) * (wu * jac * weight)) @ ({"v": pu, "d": du}[b]).T
+
     # Every derivative of a basis function is a sum of separable terms: (weight over u, kind in u, kind in v, kind in w).
     one = numpy.ones_like(u)
-    gradient = {0: [(2 / LENGTH * one, "d", "v", "v"), (dh / h, "v", "v", "r")], 1: [(2 / WIDTH * one, "v", "d", "v")], 2: [(2 / h, "v", "v", "d")]}
+    gradient = {
+        0: [(2 / LENGTH * one, "d", "v", "v"), (dh / h, "v", "v", "r")],
+        1: [(2 / WIDTH * one, "v", "d", "v")],
+        2: [(2 / h, "v", "v", "d")],
+    }
+
     def integrate(terms_a, rows, terms_b, columns):
         total = numpy.zeros((len(rows), len(columns)))
         ri, rj, rk = (numpy.array(c) for c in zip(*rows))
         ci, cj, ck = (numpy.array(c) for c in zip(*columns))
         for wa, ua, va, za in terms_a:
             for wb, ub, vb, zb in terms_b:
-                total += along_matrix(ua, ub, wa * wb)[numpy.ix_(ri, ci)] * yv[(va, vb)][numpy.ix_(rj, cj)] * zv[(za, zb)][numpy.ix_(rk, ck)]
+                total += (
+                    along_matrix(ua, ub, wa * wb)[numpy.ix_(ri, ci)] * yv[(va, vb)][numpy.ix_(rj, cj)] * zv[(za, zb)][numpy.ix_(rk, ck)]
+                )
         return total
+
     mu, lam = YOUNG / 2 / (1 + POISSON), YOUNG * POISSON / (1 + POISSON) / (1 - 2 * POISSON)
     plain = [(one, "v", "v", "v")]
     rows = []
@@ -71,7 +87,9 @@ def calc_matrices(along, across, through, parity_x, parity_y):
     for a in range(3):
         row = []
         for b in range(3):
-            block = lam * integrate(gradient[a], blocks[a], gradient[b], blocks[b]) + mu * integrate(gradient[b], blocks[a], gradient[a], blocks[b])
+            block = lam * integrate(gradient[a], blocks[a], gradient[b], blocks[b]) + mu * integrate(
+                gradient[b], blocks[a], gradient[a], blocks[b]
+            )
             if a == b:
                 block = block + mu * sum(integrate(gradient[c], blocks[a], gradient[c], blocks[b]) for c in range(3))
             row.append(block)
@@ -92,8 +110,13 @@ def main():
     found = []
     for parity_x in (0, 1):
         for parity_y in (0, 1):
-            fine, coarse = (solve(*(d - less for d, less in zip(degrees, lesser)), parity_x, parity_y, 8) for lesser in ((0, 0, 0), (4, 2, 1)))
-            found += [(f, abs(c / f - 1), f"{'odd' if parity_x else 'even'} along, {'odd' if parity_y else 'even'} across") for f, c in zip(fine, coarse)]
+            fine, coarse = (
+                solve(*(d - less for d, less in zip(degrees, lesser)), parity_x, parity_y, 8) for lesser in ((0, 0, 0), (4, 2, 1))
+            )
+            found += [
+                (f, abs(c / f - 1), f"{'odd' if parity_x else 'even'} along, {'odd' if parity_y else 'even'} across")
+                for f, c in zip(fine, coarse)
+            ]
     for f, difference, parity in sorted(found):
         print(f"{f:.9g},{difference:.1e},{parity}")
 

@@ -7,11 +7,22 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 ENVIRONMENT = ROOT / "deploy/environment"  # how mpirun starts as any user on a machine of any size
-WOOD = {"young_modulus_pa": 10e9, "poisson_ratio": 0.3, "density_kg_m3": 600, "damping": {"rayleigh": {"alpha1_s": 1e-6, "alpha2_per_s": 20}}}
+WOOD = {
+    "young_modulus_pa": 10e9,
+    "poisson_ratio": 0.3,
+    "density_kg_m3": 600,
+    "damping": {"rayleigh": {"alpha1_s": 1e-6, "alpha2_per_s": 20}},
+}
 
 
 def run(*command, folder):
-    done = subprocess.run(["bash", "-c", '. "$0"; exec "$@"', ENVIRONMENT, *map(str, command)], cwd=folder, capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    done = subprocess.run(
+        ["bash", "-c", '. "$0"; exec "$@"', ENVIRONMENT, *map(str, command)],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        stdin=subprocess.DEVNULL,
+    )
     if done.returncode != 0:
         sys.exit(f"{sys.argv[0]}: {command[0]} failed: {done.stdout}{done.stderr}".strip())
     return done.stdout
@@ -19,7 +30,11 @@ def run(*command, folder):
 
 def write_bank(bin_dir, folder):
     """box.hdf, of a box of 6 x 5 x 4 cm."""
-    job = {"body": {"shape": "plate", "length_m": 0.06, "width_m": 0.05, "thickness_m": 0.04, "nodes": 500}, "material": WOOD, "bank": "box.hdf"}
+    job = {
+        "body": {"shape": "plate", "length_m": 0.06, "width_m": 0.05, "thickness_m": 0.04, "nodes": 500},
+        "material": WOOD,
+        "bank": "box.hdf",
+    }
     (folder / "box.json").write_text(json.dumps(job))
     run(bin_dir / "carillon-precompute", "box.json", folder=folder)
 
@@ -29,10 +44,23 @@ def write_scene(folder, name, count, seconds, quality={}):
     bodies = []
     for i in range(count):
         angle = 0.5 * (0.3 + 0.7 * i)
-        bodies.append({"name": f"box {i}", "bank": "box.hdf", "restitution": 0.3, "friction": 0.4,
-                       "position_m": [0.045 * (1 if i % 2 else -1), 0.045 * (1 if i // 2 % 2 else -1), 0.06 + 0.09 * (i // 4)],
-                       "quaternion": [math.cos(angle), 0.6 * math.sin(angle), 0.0, 0.8 * math.sin(angle)]})
-    scene = {"duration_s": seconds, "ground": {"height_m": 0.0, "restitution": 0.3, "friction": 0.4}, "bodies": bodies, "listener": {"position_m": [0, -1, 0.3]}, "quality": quality}
+        bodies.append(
+            {
+                "name": f"box {i}",
+                "bank": "box.hdf",
+                "restitution": 0.3,
+                "friction": 0.4,
+                "position_m": [0.045 * (1 if i % 2 else -1), 0.045 * (1 if i // 2 % 2 else -1), 0.06 + 0.09 * (i // 4)],
+                "quaternion": [math.cos(angle), 0.6 * math.sin(angle), 0.0, 0.8 * math.sin(angle)],
+            }
+        )
+    scene = {
+        "duration_s": seconds,
+        "ground": {"height_m": 0.0, "restitution": 0.3, "friction": 0.4},
+        "bodies": bodies,
+        "listener": {"position_m": [0, -1, 0.3]},
+        "quality": quality,
+    }
     (folder / name).write_text(json.dumps(scene, indent=1))
     return name
 
@@ -43,4 +71,4 @@ def write_into(page, mark, table):
     begin, end = f"<!-- begin {mark} -->\n", f"<!-- end {mark} -->"
     if begin not in text or end not in text:
         sys.exit(f"{page}: the marks '{begin.strip()}' and '{end}' are missing")
-    page.write_text(text[:text.index(begin) + len(begin)] + table + text[text.index(end):])
+    page.write_text(text[: text.index(begin) + len(begin)] + table + text[text.index(end) :])

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The table and the picture of docs/error-bars.md.
+"""The table and the picture of docs/reports/error-bars.md.
 
 usage: table.py MODES.csv [PICTURE.svg]      MODES.csv: from  error_bars --modes MODES.csv
 """
@@ -38,18 +38,24 @@ def print_table(groups):
         total, good = total + 1, good + (sum(inside) >= 0.95 * len(inside) and not median >= 10)
         modes, held = modes + len(inside), held + sum(inside)
         name = body + (" (training)" if kind == "training" else "")
-        print(f"| {name} | {element} | {unknowns} | {len(rows)} | {statistics.median(map(error, rows)):.3g} | {max(map(error, rows)):.3g} "
-              f"| {100 * sum(inside) / len(inside):.0f} % | {median:.2g} |")
-    print(f"\n{good} of {total} meshes have at least 95 % of the modes within their bars and a median bar less than ten times the error; "
-          f"of all {modes} modes {100 * held / modes:.2f} % lie within.")
+        print(
+            f"| {name} | {element} | {unknowns} | {len(rows)} | {statistics.median(map(error, rows)):.3g} | {max(map(error, rows)):.3g} "
+            f"| {100 * sum(inside) / len(inside):.0f} % | {median:.2g} |"
+        )
+    print(
+        f"\n{good} of {total} meshes have at least 95 % of the modes within their bars and a median bar less than ten times the error; "
+        f"of all {modes} modes {100 * held / modes:.2f} % lie within."
+    )
 
 
 def draw(groups, file):
     low, high, size, left = -2, 4, 620, 60
     scale = size / (high - low)
     place = lambda x, y: (left + (x - low) * scale, 20 + size - (y - low) * scale)
-    out = [f'<svg xmlns="http://www.w3.org/2000/svg" width="{size + 220}" height="{size + 80}" font-family="sans-serif" font-size="13">',
-           '<rect width="100%" height="100%" fill="white"/>']
+    out = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{size + 220}" height="{size + 80}" font-family="sans-serif" font-size="13">',
+        '<rect width="100%" height="100%" fill="white"/>',
+    ]
     for decade in range(low, high + 1):
         for a, b, c, d in ((decade, low, decade, high), (low, decade, high, decade)):
             (x0, y0), (x1, y1) = place(a, b), place(c, d)
@@ -60,20 +66,31 @@ def draw(groups, file):
         out.append(f'<text x="{x - 8:.0f}" y="{y + 4:.0f}" text-anchor="end">{10.0 ** decade:g}</text>')
     for shift, text in ((0, "bar = error"), (1, "ten times the error")):
         (x0, y0), (x1, y1) = place(low, low + shift), place(high - shift, high)
-        out.append(f'<line x1="{x0:.0f}" y1="{y0:.0f}" x2="{x1:.0f}" y2="{y1:.0f}" stroke="#444" stroke-dasharray="{"4 3" if shift else "none"}"/>')
+        out.append(
+            f'<line x1="{x0:.0f}" y1="{y0:.0f}" x2="{x1:.0f}" y2="{y1:.0f}" stroke="#444" stroke-dasharray="{"4 3" if shift else "none"}"/>'
+        )
         x, y = place(low + 0.35, low + shift + 0.42)
         out.append(f'<text x="{x:.0f}" y="{y:.0f}" transform="rotate(-45 {x:.0f} {y:.0f})">{text}</text>')
+    points = {element: {} for element in COLOURS}
     for (_, _, element, _), rows in groups.items():
         for row in rows:
             e, b = math.log10(max(error(row), 1e-9)), math.log10(max(bar(row), 1e-9))
             if low <= e <= high and low <= b <= high:
-                x, y = place(e, b)
-                out.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="1.6" fill="{COLOURS[element]}" fill-opacity="0.6"/>')
+                points[element]["M{:.1f} {:.1f}h0".format(*place(e, b))] = True
+    for element, dots in points.items():  # one path an element: a tenth of the bytes of as many circles
+        out.append(
+            f'<path d="{"".join(dots)}" stroke="{COLOURS[element]}" stroke-width="3.2" stroke-linecap="round" stroke-opacity="0.6"/>'
+        )
     for i, (element, colour) in enumerate(COLOURS.items()):
         y = 40 + 22 * i
-        out.append(f'<circle cx="{left + size + 24}" cy="{y}" r="5" fill="{colour}"/><text x="{left + size + 36}" y="{y + 4}">{element}</text>')
+        out.append(
+            f'<circle cx="{left + size + 24}" cy="{y}" r="5" fill="{colour}"/><text x="{left + size + 36}" y="{y + 4}">{element}</text>'
+        )
     out.append(f'<text x="{left + size / 2}" y="{size + 62}" text-anchor="middle">true error of a mode, cents</text>')
-    out.append(f'<text x="16" y="{20 + size / 2}" text-anchor="middle" transform="rotate(-90 16 {20 + size / 2})">its error bar, cents</text></svg>')
+    out.append(
+        f'<text x="16" y="{20 + size / 2}" text-anchor="middle" transform="rotate(-90 16 {20 + size / 2})">its error bar,'
+        " cents</text></svg>"
+    )
     open(file, "w").write("\n".join(out) + "\n")
 
 

@@ -1,9 +1,11 @@
 #!/usr/bin/python3
 """Meshes of strips and plates with triangles in no order, in layers: what lattices and the program's own shapes do not try.
 
-usage: unstructured.py FOLDER BODY [ACROSSxLAYERS]...        BODY: strip-thin, ..., plate-thin, ruler, plate, bar, slender-bar of tests/estimate/bodies.cpp
+usage: unstructured.py FOLDER BODY [ACROSSxLAYERS]...        BODY: strip-thin, ..., plate-thin, ruler, plate, bar, slender-bar of
+                                                             tests/unit/precompute/estimate/bodies.cpp
 
-Writes FOLDER/BODY-ACROSSxLAYERS.msh: about ACROSS triangles' edges across the body. For  error_bars --body BODY --element T10 --mesh FILE.msh
+Writes FOLDER/BODY-ACROSSxLAYERS.msh: about ACROSS triangles' edges across the body. For  error_bars --body BODY --element T10 --mesh
+FILE.msh
 """
 import os
 import sys
@@ -11,9 +13,19 @@ import sys
 import numpy
 import scipy.spatial
 
-EDGES_M = {"strip-thin": (0.3, 0.03, 0.001), "strip-thick": (0.3, 0.03, 0.003), "strip-nu0": (0.2, 0.025, 0.002), "strip-nu045": (0.1, 0.01, 0.001),
-           "strip-spruce": (0.3, 0.04, 0.003), "strip-fixed": (0.2, 0.02, 0.001), "plate-thin": (0.1, 0.09, 0.002), "ruler": (0.3, 0.025, 0.001),
-           "plate": (0.2, 0.2, 0.005), "bar": (0.3, 0.03, 0.012), "slender-bar": (0.3, 0.02, 0.01)}
+EDGES_M = {
+    "strip-thin": (0.3, 0.03, 0.001),
+    "strip-thick": (0.3, 0.03, 0.003),
+    "strip-nu0": (0.2, 0.025, 0.002),
+    "strip-nu045": (0.1, 0.01, 0.001),
+    "strip-spruce": (0.3, 0.04, 0.003),
+    "strip-fixed": (0.2, 0.02, 0.001),
+    "plate-thin": (0.1, 0.09, 0.002),
+    "ruler": (0.3, 0.025, 0.001),
+    "plate": (0.2, 0.2, 0.005),
+    "bar": (0.3, 0.03, 0.012),
+    "slender-bar": (0.3, 0.02, 0.01),
+}
 
 
 def make_triangles(length, width, edge, random):
@@ -31,18 +43,20 @@ def make_triangles(length, width, edge, random):
     points = numpy.array(points)
     triangles = scipy.spatial.Delaunay(points).simplices
     a, b, c = (points[triangles[:, i]].T for i in range(3))
-    return points, triangles[abs((b - a)[0] * (c - a)[1] - (b - a)[1] * (c - a)[0]) > 2e-4 * edge ** 2]
+    return points, triangles[abs((b - a)[0] * (c - a)[1] - (b - a)[1] * (c - a)[0]) > 2e-4 * edge**2]
 
 
 def write_mesh(path, edges_m, across, layers):
     length, width, thickness = edges_m
     points, triangles = make_triangles(length, width, width / across, numpy.random.default_rng(10 * across + layers))
-    nodes = numpy.array([(x - length / 2, y - width / 2, thickness * (layer / layers - 0.5)) for layer in range(layers + 1) for x, y in points])
+    nodes = numpy.array(
+        [(x - length / 2, y - width / 2, thickness * (layer / layers - 0.5)) for layer in range(layers + 1) for x, y in points]
+    )
     tets = []
     for layer in range(layers):
         low, high = layer * len(points), (layer + 1) * len(points)
         for triangle in numpy.sort(triangles):
-            tets += [[*(low + triangle[:k + 1]), *(high + triangle[k:])] for k in range(3)]
+            tets += [[*(low + triangle[: k + 1]), *(high + triangle[k:])] for k in range(3)]
     tets = numpy.array(tets)
     corners = nodes[tets]
     a, b, c = (corners[:, i] - corners[:, 0] for i in (1, 2, 3))

@@ -9,11 +9,11 @@
 #include <string>
 #include <vector>
 
-#include "runtime/base/cpu_clock.hpp"
+#include "runtime/base/clock.hpp"
 #include "runtime/impact/predict.hpp"
-#include "tests/impact/free_plate.hpp"
-#include "tests/impact/scenes.hpp"
-#include "tests/impact/zener.hpp"
+#include "tests/unit/runtime/impact/free_plate.hpp"
+#include "tests/unit/runtime/impact/scenes.hpp"
+#include "tests/unit/runtime/impact/zener.hpp"
 
 namespace carillon::impact::tests {
 namespace {
@@ -24,13 +24,13 @@ bool quick = false;
 template <class Work>
 double time_us(Work&& work) {
   const int rounds = quick ? 1 : 15, repeats = quick ? 1 : 40;
-  double least = 1e300;
+  double min = 1e300;
   for (int round = 0; round < rounds; ++round) {
     const double begin = 1e6 * base::get_thread_cpu_s();
     for (int i = 0; i < repeats; ++i) work();
-    least = std::min(least, (1e6 * base::get_thread_cpu_s() - begin) / repeats);
+    min = std::min(min, (1e6 * base::get_thread_cpu_s() - begin) / repeats);
   }
-  return least;
+  return min;
 }
 
 /// A ball on a simply supported plate of 1.00 x 0.93 m whose bank ends at 20 kHz.

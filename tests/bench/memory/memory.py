@@ -3,10 +3,10 @@
 
 usage: memory.py BIN_DIR [--mesh FILE | --nodes N] [--ranks 1 2 4] [--element T4|T10] [--max-modes N] [--band LOW HIGH] [--limit RATIO]
 
-The floor is the peak of the same job on a mesh of some hundred nodes, on as many ranks: MPI, PETSc, the program and its libraries. Without --mesh
-a solid bar of --nodes nodes (100000) is made. The table's last column is (peak - floor) of the fullest rank over (peak - floor on one rank) / ranks:
-1 is perfect. With --limit the exit code is 1 if that column exceeds it. Peaks are VmHWM, as the kernel counts it: pages shared between the ranks
-count in each of them.
+The floor is the peak of the same job on a mesh of some hundred nodes, on as many ranks: MPI, PETSc, the program and its libraries. Without
+--mesh a solid bar of --nodes nodes (100000) is made. The table's last column is (peak - floor) of the fullest rank over (peak - floor on
+one rank) / ranks: 1 is perfect. With --limit the exit code is 1 if that column exceeds it. Peaks are VmHWM, as the kernel counts it: pages
+shared between the ranks count in each of them.
 """
 import argparse
 import json
@@ -28,9 +28,22 @@ def measure_rank():
 
 
 def find_peaks(program, job, ranks):
-    """Peak of each rank [MB], and the stations with their peaks of the fullest rank."""
+    """Peak of each rank [MB], and the phases with their peaks of the fullest rank."""
     with tempfile.TemporaryDirectory(prefix="carillon-memory-") as folder:
-        command = ["mpirun", "-np", str(ranks), "--oversubscribe", "--bind-to", "none", sys.executable, __file__, "--rank", folder, str(program), str(job)]
+        command = [
+            "mpirun",
+            "-np",
+            str(ranks),
+            "--oversubscribe",
+            "--bind-to",
+            "none",
+            sys.executable,
+            __file__,
+            "--rank",
+            folder,
+            str(program),
+            str(job),
+        ]
         run = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
         if run.returncode != 0:
             sys.exit(f"{' '.join(command)} fails:\n{run.stdout}")
@@ -56,13 +69,28 @@ def main():
 
         def make_bar(nodes, name):
             order = "2" if options.element == "T10" else "1"
-            subprocess.run([options.bin.resolve() / "carillon-mesh", "--shape", "bar", "--length", "0.6", "--width", "0.12", "--thickness", "0.12", "--nodes",
-                            str(nodes), "--order", order, "-o", folder / name, "--quiet"], check=True, stdout=subprocess.DEVNULL)
+            subprocess.run(
+                [
+                    options.bin.resolve() / "carillon-mesh",
+                    *f"--shape bar --length 0.6 --width 0.12 --thickness 0.12 --nodes {nodes} --order {order}".split(),
+                    "-o",
+                    folder / name,
+                    "--quiet",
+                ],
+                check=True,
+                stdout=subprocess.DEVNULL,
+            )
             return folder / name
 
         def write_job(mesh, name):
-            job = {"mesh": str(mesh), "bank": str(folder / f"{name}.hdf"), "element": options.element, "band_hz": options.band,
-                   "material": {"young_modulus_pa": 5e9, "poisson_ratio": 0.33, "density_kg_m3": 2700, "damping": {"rayleigh": {}}}, **json.loads(options.job)}
+            job = {
+                "mesh": str(mesh),
+                "bank": str(folder / f"{name}.hdf"),
+                "element": options.element,
+                "band_hz": options.band,
+                "material": {"young_modulus_pa": 5e9, "poisson_ratio": 0.33, "density_kg_m3": 2700, "damping": {"rayleigh": {}}},
+                **json.loads(options.job),
+            }
             if options.max_modes:
                 job["max_modes"] = options.max_modes
             (folder / f"{name}.json").write_text(json.dumps(job))

@@ -1,5 +1,6 @@
 #!/usr/bin/python3
-"""The bench's own functions: medians, tables, phases, pictures, the system that the rivals get. Oracles: closed forms and hand-made records."""
+"""The bench's own functions: medians, tables, phases, pictures, the system that the rivals get. Oracles: closed forms and hand-made
+records."""
 import pathlib
 import subprocess
 import sys
@@ -40,9 +41,14 @@ class Measuring(unittest.TestCase):
     def test_kernels_fit_the_processor(self):
         """The flags of real processors, shortened: Sapphire Rapids, Zen 3, Zen 4, Haswell, Nehalem, and a processor that is no x86."""
         wide = "flags\t\t: fpu sse2 fma avx avx2 avx512f avx512dq avx512cd avx512bw avx512vl\n"
-        for vendor, flags, kernels in (("GenuineIntel", wide, "SkylakeX"), ("AuthenticAMD", "flags : sse2 fma avx avx2\n", "Zen"),
-                                       ("AuthenticAMD", wide, "SkylakeX"), ("GenuineIntel", "flags : sse2 fma avx avx2\n", "Haswell"),
-                                       ("GenuineIntel", "flags : sse2 ssse3\n", ""), ("ARM", "Features : fp asimd\n", "")):
+        for vendor, flags, kernels in (
+            ("GenuineIntel", wide, "SkylakeX"),
+            ("AuthenticAMD", "flags : sse2 fma avx avx2\n", "Zen"),
+            ("AuthenticAMD", wide, "SkylakeX"),
+            ("GenuineIntel", "flags : sse2 fma avx avx2\n", "Haswell"),
+            ("GenuineIntel", "flags : sse2 ssse3\n", ""),
+            ("ARM", "Features : fp asimd\n", ""),
+        ):
             self.assertEqual(measuring.find_fitting_kernels(f"vendor_id\t: {vendor}\n{flags}")[0], kernels)
 
     def test_every_program_gets_the_kernels_that_the_bench_names(self):
@@ -50,14 +56,19 @@ class Measuring(unittest.TestCase):
         environment = measuring.make_environment()
         self.assertEqual(environment.get("OPENBLAS_CORETYPE", ""), kernels, why)
         if kernels:
-            taken = subprocess.run([sys.executable, "-c", measuring.ASK_KERNELS], env=environment, capture_output=True, text=True, check=True)
+            taken = subprocess.run(
+                [sys.executable, "-c", measuring.ASK_KERNELS], env=environment, capture_output=True, text=True, check=True
+            )
             self.assertEqual(taken.stdout.strip().lower(), kernels.lower())
 
-    def test_a_failing_program_tells_its_last_words(self):
+    def test_the_last_output_of_a_failing_program_is_shown(self):
         with self.assertRaisesRegex(RuntimeError, "exit code 3\nno such mesh"):
             measuring.run_measured(["sh", "-c", "echo no such mesh >&2; exit 3"], ".")
-        for command, code, text in (("echo error: no such key; exit 2", 2, "^bar: error: no such key$"), ("echo error: no such key; exit 7", 4, "^bar: sh ended with exit code 7 and said: error: no such key$"),
-                                    ("kill -9 $$", 4, "^bar: sh ended with exit code -9$")):
+        for command, code, text in (
+            ("echo error: no such key; exit 2", 2, "^bar: error: no such key$"),
+            ("echo error: no such key; exit 7", 4, "^bar: sh ended with exit code 7 and said: error: no such key$"),
+            ("kill -9 $$", 4, "^bar: sh ended with exit code -9$"),
+        ):
             with self.assertRaisesRegex(RunError, text) as caught:
                 measuring.run_part(["sh", "-c", command], ".", "bar")
             self.assertEqual(caught.exception.code, code)
@@ -69,11 +80,17 @@ class Measuring(unittest.TestCase):
 
     def test_phases_of_a_record_add_up_to_the_total(self):
         solver = {"seconds": {"analyse": 0.5, "factor": 1.5, "solve": 4.0, "iterate": 7.0, "check": 1.0}, "factorisations": 3}
-        stations = [{"name": "read", "seconds": 1.0, "cpu_seconds": 0.5}, {"name": "modes", "seconds": 10.0, "cpu_seconds": 5.0},
-                    {"name": "prayer", "seconds": 9.0, "cpu_seconds": 0.25}]
-        phases = measuring.to_phases({"stations": stations, "solver": solver}, 8.0)
-        self.assertEqual({name: value for name, value in phases.items() if value}, {"read": 0.5, "factor": 1.0, "solve": 2.0, "orthogonalise": 2.0, "other": 2.5})
-        extras = measuring.find_extras({"stations": stations, "solver": solver}, 8.0)
+        recorded = [
+            {"name": "read", "seconds": 1.0, "cpu_seconds": 0.5},
+            {"name": "modes", "seconds": 10.0, "cpu_seconds": 5.0},
+            {"name": "prayer", "seconds": 9.0, "cpu_seconds": 0.25},
+        ]
+        phases = measuring.to_phases({"stations": recorded, "solver": solver}, 8.0)
+        self.assertEqual(
+            {name: value for name, value in phases.items() if value},
+            {"read": 0.5, "factor": 1.0, "solve": 2.0, "orthogonalise": 2.0, "other": 2.5},
+        )
+        extras = measuring.find_extras({"stations": recorded, "solver": solver}, 8.0)
         self.assertEqual([row[1] for row in extras[1:]], ["0.50", "0.50", "0.00"])
 
     def test_frequencies_that_differ_in_number_never_agree(self):
@@ -86,6 +103,7 @@ class Measuring(unittest.TestCase):
         rows = measuring.make_rows(results, "carillon1")
         self.assertEqual([row[0] for row in rows[1:]], ["ours", "theirs"])
         self.assertEqual(rows[2][3], "6.50")
+        self.assertEqual([row[2] for row in rows[1:]], ["25 %", "-"])  # one run has no spread
         self.assertIn("| theirs | 13.0 |", measuring.format_table(rows, True))
 
     def test_the_picture_is_well_formed_and_to_scale(self):
@@ -99,9 +117,8 @@ class Measuring(unittest.TestCase):
         with self.assertRaises(ValueError):
             measuring.replace_between("x", "t", "new")
 
-
     def test_the_page_has_a_place_for_everything_that_is_renewed(self):
-        page = (pathlib.Path(__file__).resolve().parents[3] / "docs/performance.md").read_text()
+        page = (pathlib.Path(__file__).resolve().parents[3] / "docs/reports/performance.md").read_text()
         for name in ("table", "goals", "phases", "proof", "table-800", "goals-800"):
             self.assertIn("x", measuring.replace_between(page, name, "x"))
 
@@ -140,6 +157,7 @@ class System(unittest.TestCase):
             system.write_matrix(f"{folder}/K", stiffness)
             self.assertEqual(abs(system.read_matrix(f"{folder}/K") - stiffness).max(), 0)
             import scipy.linalg
+
             values, vectors = scipy.linalg.eigh(stiffness.toarray(), mass.toarray())
             system.write_answer(f"{folder}/x", values[::-1], vectors[:, ::-1])
             read_values, read_vectors = system.read_answer(f"{folder}/x")

@@ -25,8 +25,9 @@ def main():
 
     stiffness, mass = system.read_matrix(stiffness_file), system.read_matrix(mass_file)
     end("read")
-    factor = scipy.sparse.linalg.splu((stiffness - sigma * mass).tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
-                                      options={"SymmetricMode": True})
+    factor = scipy.sparse.linalg.splu(
+        (stiffness - sigma * mass).tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+    )
 
     def solve(right):
         end("orthogonalise")

@@ -48,6 +48,7 @@ def assemble(nodes, tets, lame_lambda, lame_mu, density, mass):
 def read_mesh(path):
     """By Gmsh's own reader: nodes (n, 3) that a tetrahedron uses, by their tags, and linear tetrahedra (e, 4)."""
     import gmsh
+
     gmsh.initialize()
     try:
         gmsh.option.setNumber("General.Verbosity", 0)
@@ -107,7 +108,9 @@ def read_answer(path):
 def measure_answer(stiffness, mass, values, vectors, rigid=6):
     """Of the elastic modes: the residuals ||K x - lambda M x|| / (lambda ||M x||), and of all: max |X' M X - I|."""
     images = mass @ vectors
-    residual = numpy.linalg.norm(stiffness @ vectors - images * values, axis=0)[rigid:] / (values * numpy.linalg.norm(images, axis=0))[rigid:]
+    residual = (
+        numpy.linalg.norm(stiffness @ vectors - images * values, axis=0)[rigid:] / (values * numpy.linalg.norm(images, axis=0))[rigid:]
+    )
     gram = vectors.T @ images
     norms = numpy.sqrt(numpy.diag(gram))
     return residual, abs(gram / numpy.outer(norms, norms) - numpy.eye(len(values))).max()

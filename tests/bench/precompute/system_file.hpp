@@ -114,7 +114,7 @@ class Phases {
            1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
   }
 
-  /// Of this program alone; what wait4() tells is at least the size of the process that started it.
+  /// Of this program alone; what wait4() gives is at least the size of the process that started it.
   static double find_peak_bytes() {
     double kilobytes = 0;
     std::FILE* stream = std::fopen("/proc/self/status", "r");

@@ -1,6 +1,6 @@
 // How long a block takes when it hails: Synthesiser::process against the time that a sound card gives.
 //
-// usage: bench_deadline [--quick]       prints the table of docs/performance-runtime.md
+// usage: bench_deadline [--quick]       prints the table of docs/reports/performance-runtime.md
 //
 // Method:     bodies of 200 modes that share a bank, two microphones, blocks of 64 frames at 48 kHz (1.333 ms); every body is struck 200
 //             times a second, by pulses of 0.05 to 0.5 ms at random times; every second body moves. Each call is timed by the clock, which
@@ -19,7 +19,7 @@
 #include <vector>
 
 #include "runtime/synth/synthesiser.hpp"
-#include "tests/synth/cube_bank.hpp"
+#include "tests/unit/runtime/synth/cube_bank.hpp"
 
 namespace {
 
@@ -52,7 +52,7 @@ void run(int bodies, double budget, double seconds) {
     const double ahead_s = synthesiser.get_time_s() + 0.02;
     for (; next_s < ahead_s; next_s += gap(random)) {
       const auto body = static_cast<int>(unit(random) * bodies);
-      synthesiser.push(stream::Impulse{.time_s = next_s,
+      synthesiser.push(events::Impulse{.time_s = next_s,
                                        .body = body,
                                        .triangle = static_cast<int>(12 * unit(random)),
                                        .impulse_n_s = {0.0, 1e-4 * unit(random), 1e-3 * unit(random)},
@@ -60,7 +60,8 @@ void run(int bodies, double budget, double seconds) {
     }
     for (; next_move_s < ahead_s; next_move_s += 0.01) {
       for (int b = 0; b < bodies; b += 2)
-        synthesiser.push(stream::Motion{next_move_s, b, {0.1 * b + std::sin(next_move_s), 2.0, 0.0}, {std::cos(next_move_s), 0.0, 0.0}});
+        synthesiser.push(
+            events::BodyMotion{next_move_s, b, {0.1 * b + std::sin(next_move_s), 2.0, 0.0}, {std::cos(next_move_s), 0.0, 0.0}});
     }
     const auto started = std::chrono::steady_clock::now();
     synthesiser.process(out.data(), 2, kFrames);

@@ -1,13 +1,11 @@
-// What one microphone costs for one source: Ear::process in blocks of 128 samples.
+// What one microphone costs for one source: Receiver::process in blocks of 128 samples.
 //
-// usage: bench_ears [--quick]       prints the table of docs/performance-runtime.md
+// usage: bench_ears [--quick]       prints the table of docs/reports/performance-runtime.md
 //
 // Method:     a source that stands still or swings with up to 6 m/s two metres away, with what it sends all round alone or with its three
 //             dipoles, noise in all; CPU time, medians of the rounds, the instruction sets in turns.
 // Source:     none.
 // Deviations: none.
-#include "runtime/synth/ears.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -17,7 +15,8 @@
 #include <span>
 #include <vector>
 
-#include "runtime/base/cpu_clock.hpp"
+#include "runtime/base/clock.hpp"
+#include "runtime/synth/receiver.hpp"
 #include "tests/bench/runtime/fma_limit.hpp"
 
 namespace {
@@ -28,23 +27,23 @@ constexpr double kRate = 48000.0;
 constexpr int kBlock = 128;
 constexpr int kBlocks = 375;  // one second
 
-synth::Track make_path(bool moves) {
-  std::vector<synth::Place> places;
+synth::Trajectory make_path(bool moves) {
+  std::vector<synth::PathPoint> places;
   for (int i = 0; i <= (moves ? 100 : 0); ++i) {
     const double t = i / 100.0;
     places.push_back({t, {2.0 + std::sin(6.0 * t), 0.5, 0.2 * std::cos(9.0 * t)}});
   }
-  return synth::make_track(places);
+  return synth::make_trajectory(places);
 }
 
 /// CPU time of a block and ear [s].
-double measure(synth::Isa isa, const synth::Track& path, bool dipoles, const std::vector<float>& noise) {
-  synth::Track listener(1);
+double measure(synth::Isa isa, const synth::Trajectory& path, bool dipoles, const std::vector<float>& noise) {
+  synth::Trajectory listener(1);
   listener.push({});
-  std::vector<synth::History> sent(dipoles ? 4 : 1, synth::History(10.0, kRate, kBlock));
+  std::vector<synth::DelayLine> sent(dipoles ? 4 : 1, synth::DelayLine(10.0, kRate, kBlock));
   synth::Source source{.track = &path, .monopole = sent.data()};
   for (std::size_t k = 0; k < 3 && dipoles; ++k) source.dipole[k] = &sent[k + 1];
-  synth::Ear ear({0.0, 0.1, 0.0}, kRate, {synth::Effect::kAirDelay, synth::Effect::kDoppler}, isa);
+  synth::Receiver ear({0.0, 0.1, 0.0}, kRate, {synth::Effect::kAirDelay, synth::Effect::kDoppler}, isa);
   std::array<double, kBlock> heard{};
   double spent = 0.0;
   for (int block = 0; block < kBlocks; ++block) {
@@ -78,7 +77,7 @@ int main(int argc, char** argv) {
     if (synth::get_kernels(isa).isa == isa) sets.push_back(isa);
   }
   std::vector<std::array<std::vector<double>, 4>> seconds(sets.size());
-  const std::array<synth::Track, 2> paths{make_path(false), make_path(true)};
+  const std::array<synth::Trajectory, 2> paths{make_path(false), make_path(true)};
   for (int round = 0; round < rounds; ++round) {
     for (std::size_t s = 0; s < sets.size(); ++s) {
       for (std::size_t c = 0; c < 4; ++c) seconds[s][c].push_back(measure(sets[s], paths[c / 2], c % 2 == 1, noise) - empty);

@@ -7,7 +7,7 @@
 
 #include <algorithm>
 
-#include "runtime/base/cpu_clock.hpp"
+#include "runtime/base/clock.hpp"
 
 namespace carillon::bench {
 namespace {

@@ -16,9 +16,9 @@
 #include <string>
 #include <vector>
 
-#include "runtime/base/cpu_clock.hpp"
+#include "runtime/base/clock.hpp"
 #include "runtime/synth/voice.hpp"
-#include "tests/synth/cube_bank.hpp"
+#include "tests/unit/runtime/synth/cube_bank.hpp"
 
 namespace {
 
@@ -84,15 +84,15 @@ int main(int argc, char** argv) {
             if (c.steps == 0) {
               voice.strike({.time_s = time_s + 0.5 * c.length_s, .impulse_n_s = {0.0, 0.0, 1e-3}, .duration_s = c.length_s});
             } else {
-              stream::split_force({.time_s = time_s, .step_s = c.length_s / c.steps}, steps,
-                                  [&](const stream::Force& piece) { voice.push(piece); });
+              events::split_force({.time_s = time_s, .step_s = c.length_s / c.steps}, steps,
+                                  [&](const events::Force& piece) { voice.push(piece); });
             }
           },
           c.length_s, blocks, rounds);
     }
     const std::string steps = c.steps > 0 ? std::to_string(c.steps) : "Hertz";
     std::printf("| %g | %s | %d | %.1f | %.1f | %.1f | %.1f |\n", 1e3 * c.length_s, steps.c_str(),
-                std::max(1, (c.steps + stream::kMostForceSteps - 1) / stream::kMostForceSteps), us[0], us[1], us[2], us[3]);
+                std::max(1, (c.steps + events::kMaxForceSteps - 1) / events::kMaxForceSteps), us[0], us[1], us[2], us[3]);
   }
   return 0;
 }

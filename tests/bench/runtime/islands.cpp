@@ -9,7 +9,7 @@
 #include <limits>
 
 #include "runtime/contact/world.hpp"
-#include "tests/contact/solids.hpp"
+#include "tests/unit/runtime/contact/solids.hpp"
 
 namespace {
 
@@ -32,7 +32,7 @@ contact::WorldSpec make_rain(const bank::Bank& box, int count) {
 
 contact::Statistics run(const contact::WorldSpec& spec, double end_s, bool islands) {
   contact::World world(spec, {.end_s = end_s, .islands = islands});
-  world.advance(end_s, std::numeric_limits<double>::infinity(), [](const stream::Event&) {});
+  world.advance(end_s, std::numeric_limits<double>::infinity(), [](const events::Event&) {});
   return world.get_statistics();
 }
 

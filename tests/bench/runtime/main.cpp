@@ -1,10 +1,9 @@
 // How fast modes ring: voices in blocks of 128 frames against what the processor's multiply-adds allow, measured in the same run.
 //
-// usage: bench_runtime [--quick]       prints the tables of docs/performance-runtime.md
+// usage: bench_runtime [--quick]       prints the tables of docs/reports/performance-runtime.md
 //
 // Method:     a mode-sample is one mode advanced and summed for one sample; an exact linear form takes at least two multiply-adds for it,
-// so
-//             the limit is half the lanes of multiply-adds per second. Limit and voices alternate, CPU time of the thread, medians.
+//             so the limit is half the lanes of multiply-adds per second. Limit and voices alternate, CPU time of the thread, medians.
 // Source:     docs/decisions/resonator-kernel.md.
 // Deviations: none.
 #include <algorithm>
@@ -16,10 +15,10 @@
 #include <string>
 #include <vector>
 
-#include "runtime/base/cpu_clock.hpp"
+#include "runtime/base/clock.hpp"
 #include "runtime/synth/voice.hpp"
 #include "tests/bench/runtime/fma_limit.hpp"
-#include "tests/synth/cube_bank.hpp"
+#include "tests/unit/runtime/synth/cube_bank.hpp"
 
 namespace {
 
@@ -118,7 +117,7 @@ int main(int argc, char** argv) {
       double bytes = 0.0;
       for (int i = 0; i < shared; ++i) {
         models.push_back(make_model(1000, i));
-        bytes += 63.0 * (sizeof(synth::SoundTable) + sizeof(synth::TurnTable));
+        bytes += 63.0 * (sizeof(synth::SoundTable) + sizeof(synth::RotationTable));
       }
       bytes += 63.0 * sizeof(synth::ModeState) * bodies;
       const Result r = compare(isa, models, bodies, rounds, seconds);

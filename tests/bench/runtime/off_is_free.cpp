@@ -1,6 +1,6 @@
 // What effects cost that are compiled in but not called for: the same scene in a build with all of them and in one without.
 //
-// usage: bench_off_is_free [--quick]       prints the figures of docs/performance-runtime.md
+// usage: bench_off_is_free [--quick]       prints the figures of docs/reports/performance-runtime.md
 //
 // Method:     bodies that ring, struck now and then, with no effect but modal and hertz_pulse. The two builds are libraries of their own,
 //             loaded side by side; they play the same seconds of the scene in turns, and each round gives a ratio of CPU time; a second

@@ -9,10 +9,10 @@
 #include <string>
 #include <vector>
 
-#include "runtime/base/cpu_clock.hpp"
+#include "runtime/base/clock.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/synth/synthesiser.hpp"
-#include "tests/synth/cube_bank.hpp"
+#include "tests/unit/runtime/synth/cube_bank.hpp"
 
 namespace {
 
@@ -55,7 +55,7 @@ CARILLON_VISIBLE double carillon_bench_play(int blocks, std::uint64_t* sum) {
   double spent = 0.0;
   for (int block = 0; block < blocks; ++block) {
     for (const double ahead_s = scene.synthesiser.get_time_s() + 0.01; scene.next_s < ahead_s; scene.next_s += scene.gap(scene.random)) {
-      scene.synthesiser.push(stream::Impulse{.time_s = scene.next_s,
+      scene.synthesiser.push(events::Impulse{.time_s = scene.next_s,
                                              .body = static_cast<int>(scene.unit(scene.random) * kBodies),
                                              .triangle = static_cast<int>(12 * scene.unit(scene.random)),
                                              .impulse_n_s = {0.0, 1e-4, 1e-3 * scene.unit(scene.random)},

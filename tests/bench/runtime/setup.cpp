@@ -1,4 +1,4 @@
-// What a body costs before the first sample: CPU time of each part, beside that of playing all its modes for a second.
+// What a body costs before the first sample: CPU time of each part, against that of playing all its modes for a second.
 //
 // usage: bench_setup [--quick] [BANK...]     without banks: a sphere of 81,920 triangles with 250 modes (--quick: 1,280 and 25)
 #include <fmt/format.h>
@@ -9,12 +9,12 @@
 #include <string>
 #include <vector>
 
-#include "runtime/base/cpu_clock.hpp"
+#include "runtime/base/clock.hpp"
 #include "runtime/contact/world.hpp"
 #include "runtime/radiation/gains.hpp"
 #include "runtime/synth/model.hpp"
 #include "runtime/synth/voice.hpp"
-#include "tests/radiation/sphere_bank.hpp"
+#include "tests/unit/runtime/radiation/sphere_bank.hpp"
 
 namespace {
 
@@ -23,13 +23,13 @@ using namespace carillon;
 /// The least of three.
 template <class Work>
 double time_ms(Work&& work) {
-  double least = 1e300;
+  double min = 1e300;
   for (int round = 0; round < 3; ++round) {
     const double begin = 1e3 * base::get_thread_cpu_s();
     work();
-    least = std::min(least, 1e3 * base::get_thread_cpu_s() - begin);
+    min = std::min(min, 1e3 * base::get_thread_cpu_s() - begin);
   }
-  return least;
+  return min;
 }
 
 bank::Bank make_sphere(int level, int modes) {
@@ -58,7 +58,7 @@ void print_row(const std::string& name, bank::Bank& bank, double read_ms) {
   for (int round = 0; round < 3; ++round) {
     synth::Voice voice(model, {.silence_pa = 1e-30});
     voice.strike({.time_s = 1e-4, .impulse_n_s = {0.3, 0.5, 1}});
-    std::array<float, synth::kPeriod> block{};
+    std::array<float, synth::kBlock> block{};
     const double begin = 1e3 * base::get_thread_cpu_s();
     for (int i = 0; i < 375; ++i) {
       block.fill(0.0F);

@@ -4,16 +4,34 @@ import collections
 import subprocess
 
 # The first rule whose text stands in the name of a function on the way, from the innermost outwards, says the phase.
-RULES = (("ldlt::Factor::solve", "solve"), ("ldlt::solve_columns", "solve"), ("ldlt::(anonymous namespace)::Solver", "solve"), ("ldlt::", "factor"),
-         ("MumpsFactor", "factor"), ("fem::assemble", "assemble"), ("fem::Assembl", "assemble"), ("calc_rigid_body", "assemble"), ("fem::distribute", "partition"),
-         ("slabs::", "read"), ("partition::", "partition"), ("mesh::", "read"), ("estimate::", "error bars"), ("calc_surface_modes", "write"), ("gather", "write"),
-         ("write_outputs", "write"), ("collect_bank", "write"), ("eigen::", "orthogonalise"))
+RULES = (
+    ("ldlt::Factor::solve", "solve"),
+    ("ldlt::solve_columns", "solve"),
+    ("ldlt::(anonymous namespace)::Solver", "solve"),
+    ("ldlt::", "factor"),
+    ("MumpsFactor", "factor"),
+    ("fem::assemble", "assemble"),
+    ("fem::Assembl", "assemble"),
+    ("calc_rigid_body", "assemble"),
+    ("partition::distribute", "partition"),
+    ("parallel_mesh::", "read"),
+    ("partition::", "partition"),
+    ("mesh::", "read"),
+    ("estimate::", "error bars"),
+    ("calc_surface_modes", "write"),
+    ("gather", "write"),
+    ("write_outputs", "write"),
+    ("collect_bank", "write"),
+    ("eigen::", "orthogonalise"),
+)
 
 
 def read_symbols(program):
     """(addresses ascending, names) of the program's functions."""
     text = subprocess.run(["nm", "-C", "--defined-only", program], capture_output=True, text=True, check=True).stdout
-    symbols = sorted((int(address, 16), name) for address, kind, name in (line.split(" ", 2) for line in text.splitlines()) if kind in "tTwWu")
+    symbols = sorted(
+        (int(address, 16), name) for address, kind, name in (line.split(" ", 2) for line in text.splitlines()) if kind in "tTwWu"
+    )
     return [address for address, _ in symbols], [name for _, name in symbols]
 
 

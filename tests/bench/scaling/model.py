@@ -1,6 +1,7 @@
 """How long carillon-precompute takes on p ranks, phase by phase: a model from measured times, sizes and message counts.
 
-Every line of the model is a function here and a row of the table of assumptions in docs/scaling.md. Pure; measure reads, runs and draws.
+Every line of the model is a function here and a row of the table of assumptions in docs/reports/scaling.md. Pure; measure reads, runs and
+draws.
 Symbols: N unknowns, n = N / 3 nodes, p ranks, m modes, b columns per block, k basis size, s order (unknowns) of a separator.
 """
 import dataclasses
@@ -12,6 +13,7 @@ PHASES = ("read", "partition", "assemble", "factor", "solve", "orthogonalise", "
 @dataclasses.dataclass(frozen=True)
 class Machine:
     """Rates of one rank while all ranks of its node work."""
+
     name: str
     dense_gflops: float  # DGEMM
     memory_gb_s: float
@@ -22,12 +24,15 @@ class Machine:
 
 # A cluster node of two 32-core processors, one rank a core: DGEMM at the clock that all cores hold together, 300 GB/s of memory and one
 # 100 Gbit/s link shared by 64 ranks; 2 us between any two nodes.
-CLUSTER = Machine("64 ranks a node, 100 Gbit/s", dense_gflops=30.0, memory_gb_s=300 / 64, latency_s=2e-6, transfer_gb_s=12.5 / 64, disk_gb_s=5.0)
+CLUSTER = Machine(
+    "64 ranks a node, 100 Gbit/s", dense_gflops=30.0, memory_gb_s=300 / 64, latency_s=2e-6, transfer_gb_s=12.5 / 64, disk_gb_s=5.0
+)
 
 
 @dataclasses.dataclass(frozen=True)
 class Body:
     """What is solved, and how. Measured at one size; grow() makes a finer mesh of the same body."""
+
     unknowns: float
     modes: float
     entries: float  # of the factor
@@ -42,8 +47,8 @@ class Body:
     columns: float = 1000  # of all unknowns that are in memory at the peak: the basis, its copies, the modes
     shrink: float = 2 ** (-2 / 3)  # separators of a level over those of the level above
     neighbours: float = 14  # ranks that a rank has to do with
-    groups: float = 12  # of interface nodes that a rank is near to
-    more_flops: float = 0.0  # of a factorisation, per level of ranks: the interface last is no nested dissection
+    groups: float = 12  # of separator nodes that a rank is near to
+    more_flops: float = 0.0  # of a factorisation, per level of ranks: the separator last is no nested dissection
     more_entries: float = 0.0  # of L
     mass_entries_per_row: float = 1.0  # 1: lumped
 
@@ -52,13 +57,21 @@ class Body:
         surface grow as the area, N^(2/3)."""
         ratio = unknowns / self.unknowns
         area = ratio ** (2 / 3)
-        return dataclasses.replace(self, unknowns=unknowns, entries=self.entries * ratio**entries_power, factor_flops=self.factor_flops * ratio**flops_power,
-                                   separator=self.separator * area, surface_nodes=self.surface_nodes * area, file_bytes=self.file_bytes * ratio)
+        return dataclasses.replace(
+            self,
+            unknowns=unknowns,
+            entries=self.entries * ratio**entries_power,
+            factor_flops=self.factor_flops * ratio**flops_power,
+            separator=self.separator * area,
+            surface_nodes=self.surface_nodes * area,
+            file_bytes=self.file_bytes * ratio,
+        )
 
 
 @dataclasses.dataclass(frozen=True)
 class Rates:
     """What the code reaches on the measuring machine, one rank. Seconds per unit of work, from the run on one rank."""
+
     dense_gflops: float  # of that machine, to carry the others over
     memory_gb_s: float
     read_s_per_unknown: float
@@ -69,7 +82,7 @@ class Rates:
     solve_gflops: float
     orthogonalise_gflops: float
     write_s_per_value: float  # surface node x mode
-    plan_s: float  # order of the interface, on every rank alike: plan_s ranks^plan_power
+    plan_s: float  # order of the separator, on every rank alike: plan_s ranks^plan_power
     plan_power: float
 
 
@@ -79,23 +92,26 @@ def find_levels(ranks):
 
 
 def find_fronts(body, ranks):
-    """[(pivots, order)] of the largest front of each level above the subtrees, root first. A front other than the root has the separators around
-    it for a border: in all about 2.5 times its pivots."""
-    return [(body.separator * body.shrink**level, body.separator * body.shrink**level * (1.0 if level == 0 else 2.5)) for level in range(find_levels(ranks))]
+    """[(pivots, order)] of the largest front of each level above the subtrees, root first. A front other than the root has the separators
+    around it for a border: in all about 2.5 times its pivots."""
+    return [
+        (body.separator * body.shrink**level, body.separator * body.shrink**level * (1.0 if level == 0 else 2.5))
+        for level in range(find_levels(ranks))
+    ]
 
 
-def find_interface_unknowns(body, ranks):
+def find_separator_unknowns(body, ranks):
     """Unknowns between the ranks: level l has 2^l separators."""
     return min(sum(body.separator * (2 * body.shrink) ** level for level in range(find_levels(ranks))), body.unknowns)
 
 
 def find_halo_unknowns(body, ranks):
     """Unknowns that one rank gets from its neighbours for a product with K or M: every separator has two sides."""
-    return 0.0 if ranks == 1 else 2 * find_interface_unknowns(body, ranks) / ranks
+    return 0.0 if ranks == 1 else 2 * find_separator_unknowns(body, ranks) / ranks
 
 
 def count_meetings(body, ranks):
-    """Fronts of the interface at which one rank meets others: one for two ranks, in the end those of all groups near it."""
+    """Fronts of the separator at which one rank meets others: one for two ranks, in the end those of all groups near it."""
     return 0 if ranks == 1 else min(ranks - 1, body.groups)
 
 
@@ -133,8 +149,8 @@ class Model:
     def calc(self, ranks, parallel_reading=True, spread_fronts=False):
         """{phase: (computing shared by all ranks, computing that does not shrink, messages)}, seconds on the critical path.
 
-        spread_fronts: what is not built: a front of level l belongs to the p / 2^l ranks below it, which reach half of their rate together, in panels of
-        64 columns; and the interface is ordered by nested dissection, in time that grows with its size alone."""
+        spread_fronts: what is not built: a front of level l belongs to the p / 2^l ranks below it, which reach half of their rate together,
+        in panels of 64 columns; and the separator is ordered by nested dissection, in time that grows with its size alone."""
         body, rates, machine, p = self.body, self.rates, self.machine, ranks
         n = body.unknowns
         levels = find_levels(p)
@@ -143,16 +159,28 @@ class Model:
         slow = 1 / self.speed
         out = {}
 
-        # Reading and cutting: on rank 0 (METIS), or by slabs of the file with recursive bisection (about 70 collective steps a level) and
+        # Reading and cutting: on rank 0 (METIS), or by blocks of the file with recursive bisection (about 70 collective steps a level) and
         # the elements sent to their ranks once.
         if parallel_reading and p > 4:
-            out["read"] = (rates.read_s_per_unknown * n / p * slow, 0.0, body.file_bytes / (1e9 * machine.disk_gb_s) + self.send_s(4 * p, 3 * body.file_bytes / p))
-            out["partition"] = (rates.partition_s_per_unknown * n / p * slow, 0.0, 70 * levels * self.reduce_s(p, 8 * p) + self.send_s(2 * p, 2 * body.file_bytes / p))
+            out["read"] = (
+                rates.read_s_per_unknown * n / p * slow,
+                0.0,
+                body.file_bytes / (1e9 * machine.disk_gb_s) + self.send_s(4 * p, 3 * body.file_bytes / p),
+            )
+            out["partition"] = (
+                rates.partition_s_per_unknown * n / p * slow,
+                0.0,
+                70 * levels * self.reduce_s(p, 8 * p) + self.send_s(2 * p, 2 * body.file_bytes / p),
+            )
         else:
             out["read"] = (0.0, rates.read_s_per_unknown * n * slow, 0.0)
             out["partition"] = (0.0, rates.partition_s_per_unknown * n * slow, self.send_s(p - 1, body.file_bytes * (p - 1) / p))
         halo = find_halo_unknowns(body, p)
-        out["assemble"] = (rates.assemble_s_per_unknown * n / p * slow, 0.0, 0.0 if p == 1 else self.send_s(body.neighbours, 8 * 9 * 15 * halo / 3))
+        out["assemble"] = (
+            rates.assemble_s_per_unknown * n / p * slow,
+            0.0,
+            0.0 if p == 1 else self.send_s(body.neighbours, 8 * 9 * 15 * halo / 3),
+        )
 
         # Factor: the subtrees run side by side; above them one rank after the other, each front where it stands.
         fronts = find_fronts(body, p)
@@ -165,17 +193,24 @@ class Model:
         if spread_fronts:
             shares = [max(1.0, 0.5 * p / 2**level) for level in range(levels)]
             path = sum(count_front_flops(*front) / share for front, share in zip(fronts, shares)) / (1e9 * rates.front_gflops * self.speed)
-            updates = sum(self.send_s(order / 64 * 2 * math.log2(2 * share), 8 * pivots * order / math.sqrt(share)) for (pivots, order), share in zip(fronts, shares))
-            plan = ORDERING_S_PER_NODE * find_interface_unknowns(body, p) / 3 * slow
+            updates = sum(
+                self.send_s(order / 64 * 2 * math.log2(2 * share), 8 * pivots * order / math.sqrt(share))
+                for (pivots, order), share in zip(fronts, shares)
+            )
+            plan = ORDERING_S_PER_NODE * find_separator_unknowns(body, p) / 3 * slow
         out["factor"] = (shared, body.factorisations * path + plan, body.factorisations * updates)
 
         # Solve: L is read twice per block of columns; fronts on the path wait for one another twice, down and up.
         top_entries = sum(2**level * (pivots * order - pivots**2 / 2) for level, (pivots, order) in enumerate(fronts))
         own = max(body.entries * (1 + body.more_entries * levels) - top_entries, 0.0) / p
         shared = blocks * self.compute_s(4 * own * body.block, rates.solve_gflops, 16 * own)
-        path_entries = sum((pivots * order - pivots**2 / 2) / (shares[level] if spread_fronts else 1.0) for level, (pivots, order) in enumerate(fronts))
+        path_entries = sum(
+            (pivots * order - pivots**2 / 2) / (shares[level] if spread_fronts else 1.0) for level, (pivots, order) in enumerate(fronts)
+        )
         path = blocks * self.compute_s(4 * path_entries * body.block, rates.solve_gflops, 16 * path_entries)
-        exchange = blocks * (2 * count_meetings(body, p) * machine.latency_s + sum(2 * self.send_s(1, small * order) for _, order in fronts))
+        exchange = blocks * (
+            2 * count_meetings(body, p) * machine.latency_s + sum(2 * self.send_s(1, small * order) for _, order in fronts)
+        )
         out["solve"] = (shared, path, exchange)
 
         # Orthogonalise: per block one recurrence and one pass against the whole basis (half of its final size on average), Ritz vectors at
@@ -183,7 +218,9 @@ class Model:
         flops = blocks * 4 * n * (body.basis / 2) * body.block + 2 * n * body.basis * body.modes
         shared = self.compute_s(flops / p, rates.orthogonalise_gflops, 0.0)
         projected = count_projected_flops(body) / (1e9 * PROJECTED_SHARE * rates.dense_gflops * self.speed)
-        sums = blocks * (8 * self.reduce_s(p, small * body.block) + self.reduce_s(p, small * body.basis / 2)) + self.reduce_s(p, 8 * body.basis * body.modes)
+        sums = blocks * (8 * self.reduce_s(p, small * body.block) + self.reduce_s(p, small * body.basis / 2)) + self.reduce_s(
+            p, 8 * body.basis * body.modes
+        )
         products = 0.0 if body.mass_entries_per_row <= 1 or p == 1 else blocks * 4 * self.send_s(body.neighbours, small * halo)
         out["orthogonalise"] = (shared, projected, sums + products)
 
@@ -196,7 +233,8 @@ class Model:
         return {phase: sum(parts) for phase, parts in self.calc(ranks, **options).items()}
 
     def calc_memory_bytes(self, ranks, spread_fronts=False):
-        """Of the largest rank: MPI, PETSc and the program, its share of L and of the columns, the largest front above the subtrees and its child's."""
+        """Of the largest rank: MPI, PETSc and the program, its share of L and of the columns, the largest front above the subtrees and its
+        child's."""
         body = self.body
         fronts = find_fronts(body, ranks)
         shares = [ranks / 2**level if spread_fronts else 1.0 for level in range(len(fronts))]
@@ -211,13 +249,17 @@ class Model:
             return {}
         blocks = body.right_sides / body.block
         meetings = count_meetings(body, p)
-        return {"orthogonalise": (9 * blocks, 0), "solve": (0, blocks * meetings), "factor": (50 + 3 * body.factorisations, body.factorisations * (3 + 2 * meetings))}
+        return {
+            "orthogonalise": (9 * blocks, 0),
+            "solve": (0, blocks * meetings),
+            "factor": (50 + 3 * body.factorisations, body.factorisations * (3 + 2 * meetings)),
+        }
 
     def calc_work_s(self, ranks):
         """{phase: seconds of computing summed over the ranks}."""
         body, rates = self.body, self.rates
         work = {phase: ranks * shared + serial for phase, (shared, serial, _) in self.calc(ranks).items()}
-        # The fronts beside the path are somebody's work, too; together the factor and a solve cost what they cost one rank.
+        # The fronts off the path are work of other ranks; together the factor and a solve cost what they cost one rank.
         levels = find_levels(ranks)
         work["factor"] = body.factorisations * body.factor_flops * (1 + body.more_flops * levels) / (1e9 * rates.factor_gflops * self.speed)
         work["solve"] = 4 * body.entries * (1 + body.more_entries * levels) * body.right_sides / (1e9 * rates.solve_gflops * self.speed)

@@ -9,10 +9,33 @@ sys.path[:0] = [str(pathlib.Path(__file__).resolve().parent)]
 import messages
 import model
 
-BODY = model.Body(unknowns=1e5, modes=200, entries=3e7, factor_flops=3e10, factorisations=4, right_sides=480, block=16, basis=480, separator=900,
-                  surface_nodes=2e4, file_bytes=8e6)
-RATES = model.Rates(dense_gflops=50, memory_gb_s=30, read_s_per_unknown=2e-6, partition_s_per_unknown=3e-6, assemble_s_per_unknown=4e-6, factor_gflops=25,
-                    front_gflops=30, solve_gflops=20, orthogonalise_gflops=25, write_s_per_value=2e-8, plan_s=1e-6, plan_power=2)
+BODY = model.Body(
+    unknowns=1e5,
+    modes=200,
+    entries=3e7,
+    factor_flops=3e10,
+    factorisations=4,
+    right_sides=480,
+    block=16,
+    basis=480,
+    separator=900,
+    surface_nodes=2e4,
+    file_bytes=8e6,
+)
+RATES = model.Rates(
+    dense_gflops=50,
+    memory_gb_s=30,
+    read_s_per_unknown=2e-6,
+    partition_s_per_unknown=3e-6,
+    assemble_s_per_unknown=4e-6,
+    factor_gflops=25,
+    front_gflops=30,
+    solve_gflops=20,
+    orthogonalise_gflops=25,
+    write_s_per_value=2e-8,
+    plan_s=1e-6,
+    plan_power=2,
+)
 HERE = model.Machine("here", dense_gflops=50, memory_gb_s=30, latency_s=5e-7, transfer_gb_s=6, disk_gb_s=1)
 
 
@@ -63,7 +86,6 @@ class Model(unittest.TestCase):
         self.assertGreater(sizes[0], 3 * sizes[1])
         self.assertGreater(sizes[2], 2 * 8 * (2.5 * 900 * 2 ** (-2 / 3)) ** 2 / 2)
 
-
     def test_spread_fronts_shrink_with_the_ranks_and_the_chain_does_not(self):
         big = model.Model(BODY.grow(1e7, 4 / 3, 2), RATES, HERE)
         times = [[big.calc(p, spread_fronts=spread)["factor"][1] for p in (64, 512)] for spread in (False, True)]
@@ -74,23 +96,32 @@ class Model(unittest.TestCase):
 
 class Messages(unittest.TestCase):
     def test_the_innermost_known_function_says_the_phase(self):
-        self.assertEqual(messages.find_phase(["PetscSFBcastBegin", "carillon::eigen::NodeMatrix::multiply", "carillon::io::run_job"]), "orthogonalise")
-        self.assertEqual(messages.find_phase(["carillon::ldlt::Factor::solve(double*, int, int)", "carillon::eigen::run_krylov_schur"]), "solve")
-        self.assertEqual(messages.find_phase(["carillon::ldlt::(anonymous namespace)::Solver::send", "carillon::ldlt::Factor::factorise(double)"]), "factor")
+        self.assertEqual(
+            messages.find_phase(["PetscSFBcastBegin", "carillon::eigen::NodeMatrix::multiply", "carillon::run::run_job"]), "orthogonalise"
+        )
+        self.assertEqual(
+            messages.find_phase(["carillon::ldlt::Factor::solve(double*, int, int)", "carillon::eigen::run_krylov_schur"]), "solve"
+        )
+        self.assertEqual(
+            messages.find_phase(["carillon::ldlt::(anonymous namespace)::Solver::send", "carillon::ldlt::Factor::factorise(double)"]),
+            "factor",
+        )
         self.assertEqual(messages.find_phase(["main"]), "other")
 
     def test_a_rank_s_file_is_summed_by_phase_and_kind(self):
         symbols = ([0x1000, 0x2000], ["carillon::ldlt::Factor::solve(double*, int, int)", "carillon::fem::assemble"])
         with tempfile.TemporaryDirectory() as folder:
             path = pathlib.Path(folder) / "messages.0"
-            path.write_text("send 3 2400 0.5 1.0 1010 2020\nsend 1 100 0.25 0.0 1040\nallreduce 2 16 0.125 2.0 2010\nwait 9 0 1.0 0.0 1010\n")
+            path.write_text(
+                "send 3 2400 0.5 1.0 1010 2020\nsend 1 100 0.25 0.0 1040\nallreduce 2 16 0.125 2.0 2010\nwait 9 0 1.0 0.0 1010\n"
+            )
             phases = messages.read_rank(path, symbols)
         self.assertEqual(phases["solve"], {"compute_s": 1.0, "mpi_s": 1.75, "send": [4, 2500.0]})
         self.assertEqual(phases["assemble"], {"compute_s": 2.0, "mpi_s": 0.125, "allreduce": [2, 16.0]})
 
     def test_an_address_belongs_to_the_function_that_begins_before_it(self):
         symbols = ([0x1000, 0x2000], ["a", "b"])
-        self.assertEqual([messages.find_function(symbols, at) for at in (0x500, 0x1000, 0x1fff, 0x2000)], ["?", "a", "a", "b"])
+        self.assertEqual([messages.find_function(symbols, at) for at in (0x500, 0x1000, 0x1FFF, 0x2000)], ["?", "a", "a", "b"])
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-// How long every rank takes to order the interface: carillon::ldlt::order_interface on the interface of a cut mesh.
+// How long every rank takes to order the separator: carillon::ldlt::order_separator on the separator of a cut mesh.
 // usage: time_planning FILE   (int32: nodes, ranks, then per node the count and the list of its links, then of its near ranks) -> seconds
 #include <cstdint>
 #include <cstdio>
@@ -6,18 +6,18 @@
 #include <exception>
 #include <stdexcept>
 
-#include "precompute/ldlt/interface.hpp"
+#include "precompute/ldlt/separator.hpp"
 
 namespace {
 
 std::int32_t read_int(std::FILE* file) {
   std::int32_t value = 0;
-  if (std::fread(&value, sizeof value, 1, file) != 1 || value < 0) throw std::runtime_error("the file ends too early or is no interface");
+  if (std::fread(&value, sizeof value, 1, file) != 1 || value < 0) throw std::runtime_error("the file ends too early or is no separator");
   return value;
 }
 
-carillon::ldlt::Lists read_lists(std::FILE* file, std::int32_t count) {
-  carillon::ldlt::Lists lists;
+carillon::ldlt::Ragged read_lists(std::FILE* file, std::int32_t count) {
+  carillon::ldlt::Ragged lists;
   for (std::int32_t i = 0; i < count; ++i) {
     for (std::int32_t left = read_int(file); left > 0; --left) lists.items.push_back(read_int(file));
     lists.close();
@@ -33,15 +33,15 @@ int main(int argc, char** argv) try {
     std::fputs("usage: time_planning FILE\n", stderr);
     return 1;
   }
-  carillon::ldlt::Interface interface;
+  carillon::ldlt::Separator separator;
   const std::int32_t nodes = read_int(file);
-  for (std::int32_t i = 0; i < nodes; ++i) interface.nodes.push_back(i);
-  interface.first_of_rank.assign(static_cast<std::size_t>(read_int(file)) + 1, 0);
-  interface.links = read_lists(file, nodes);
-  interface.near_ranks = read_lists(file, nodes);
+  for (std::int32_t i = 0; i < nodes; ++i) separator.nodes.push_back(i);
+  separator.first_of_rank.assign(static_cast<std::size_t>(read_int(file)) + 1, 0);
+  separator.links = read_lists(file, nodes);
+  separator.adjacent_ranks = read_lists(file, nodes);
   std::fclose(file);
   const std::clock_t start = std::clock();
-  order_interface(interface);
+  order_separator(separator);
   std::printf("%.6f\n", static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC);
 } catch (const std::exception& error) {
   std::fprintf(stderr, "time_planning: %s\n", error.what());

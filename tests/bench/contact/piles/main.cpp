@@ -1,10 +1,10 @@
 // What bodies that touch cost: a scene, in contact::World or in Bullet from the same start.
 //
-// usage: bench_piles SCENE carillon|bullet SECONDS [TRIANGLES]     prints one line of JSON: CPU seconds (clock of the thread) for a second
-// of
-//                                                                 the scene, the worst 100 ms and the worst 2 ms of it, when all slept [s]
-//        bench_piles steps                                        what the longest step costs, and how far two motions are from their
-//        solutions
+// usage: bench_piles SCENE carillon|bullet SECONDS [TRIANGLES]
+//          prints one line of JSON: CPU seconds (clock of the thread) for a second of the scene, the worst 100 ms and the worst 2 ms of it,
+//          when all slept [s]
+//        bench_piles steps
+//          prints what the longest step costs, and how far two motions are from their solutions
 //   SCENE: pile10 pile20 pile50 bars stack dominoes ball coin bottle cards bunnies2 bunnies3
 //   TRIANGLES: of a box of a pile; 12, 512 or 8384
 #include <btBulletDynamicsCommon.h>
@@ -23,11 +23,11 @@
 #include <string>
 #include <vector>
 
-#include "runtime/base/cpu_clock.hpp"
+#include "runtime/base/clock.hpp"
 #include "runtime/contact/world.hpp"
-#include "tests/contact/leaning_train.hpp"
-#include "tests/contact/solids.hpp"
-#include "tests/shape/solids.hpp"
+#include "tests/unit/runtime/contact/leaning_train.hpp"
+#include "tests/unit/runtime/contact/solids.hpp"
+#include "tests/unit/runtime/shape/solids.hpp"
 
 namespace {
 
@@ -185,7 +185,7 @@ Scene make_scene(const std::string& name, int triangles) {
     body.velocity_m_s = {1.0, 0, 0};
     body.angular_velocity_rad_s = {0, 1.0 / 0.03, 0};
   } else if (name == "coin") {
-    // About its centre, which rests: tests/contact/known_motions.cpp.
+    // About its centre, which rests: tests/unit/runtime/contact/known_motions_test.cpp.
     const double radius = 0.012, e = 0.0009, a = 0.5, s = std::sin(a), c = std::cos(a);
     const bank::Bank* coin = scene.keep(make_coin(radius, 2 * e));
     contact::BodySpec& body = scene.add(coin, {0, 0, radius * s + e * c});
@@ -262,7 +262,7 @@ Cost run_ours(const Scene& scene, double end_s) {
   std::int64_t steps = 0;
   Cost cost = measure(end_s, [&](double until_s) {
     world.advance(until_s, std::numeric_limits<double>::infinity(),
-                  [&](const stream::Event& event) { hits += std::holds_alternative<stream::Impulse>(event); });
+                  [&](const events::Event& event) { hits += std::holds_alternative<events::Impulse>(event); });
     // Where all sleeps no step is made.
     return std::exchange(steps, world.get_statistics().steps) != steps;
   });
@@ -321,12 +321,12 @@ Cost run_bullet(const Scene& scene, double end_s) {
 }
 
 /// Where each body is on the way, every 2 ms.
-std::vector<std::vector<stream::Motion>> follow(const contact::WorldSpec& spec, double end_s, double step_s, double& cpu_s_per_s) {
+std::vector<std::vector<events::BodyMotion>> follow(const contact::WorldSpec& spec, double end_s, double step_s, double& cpu_s_per_s) {
   contact::World world(spec, {.contact_step_s = step_s, .end_s = end_s});
-  std::vector<std::vector<stream::Motion>> motions(spec.bodies.size());
+  std::vector<std::vector<events::BodyMotion>> motions(spec.bodies.size());
   const double begin = base::get_thread_cpu_s();
-  world.advance(end_s, std::numeric_limits<double>::infinity(), [&](const stream::Event& event) {
-    if (const auto* motion = std::get_if<stream::Motion>(&event)) motions[static_cast<std::size_t>(motion->body)].push_back(*motion);
+  world.advance(end_s, std::numeric_limits<double>::infinity(), [&](const events::Event& event) {
+    if (const auto* motion = std::get_if<events::BodyMotion>(&event)) motions[static_cast<std::size_t>(motion->body)].push_back(*motion);
   });
   cpu_s_per_s = (base::get_thread_cpu_s() - begin) / end_s;
   return motions;

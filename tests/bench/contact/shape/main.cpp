@@ -5,8 +5,8 @@
 #include <cstring>
 #include <string>
 
-#include "runtime/base/cpu_clock.hpp"
-#include "tests/shape/solids.hpp"
+#include "runtime/base/clock.hpp"
+#include "tests/unit/runtime/shape/solids.hpp"
 
 namespace carillon::shape::tests {
 namespace {
@@ -17,13 +17,13 @@ bool quick = false;
 template <class Work>
 double time_us(Work&& work, int repeats = 200) {
   const int rounds = quick ? 1 : 7;
-  double least = 1e300;
+  double min = 1e300;
   for (int round = 0; round < rounds; ++round) {
     const double begin = 1e6 * base::get_thread_cpu_s();
     for (int i = 0; i < repeats; ++i) work(i);
-    least = std::min(least, (1e6 * base::get_thread_cpu_s() - begin) / repeats);
+    min = std::min(min, (1e6 * base::get_thread_cpu_s() - begin) / repeats);
   }
-  return least;
+  return min;
 }
 
 /// Searches between b and a, which moves sideways by `step` a query: again and again from memory, or from nothing.

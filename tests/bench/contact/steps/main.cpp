@@ -1,8 +1,7 @@
 // What a small step of a body costs in the physics, by what the body does.
 //
-// usage: bench_body_steps [SECONDS]     prints the table of docs/effects.md: CPU of the thread a second of the scene, steps of bodies, us
-// for
-//                                       each
+// usage: bench_body_steps [SECONDS]     prints a table of docs/reports/effects.md: CPU time of the thread per second of the scene, steps of
+//                                       bodies, microseconds per step
 #include <fmt/format.h>
 
 #include <cstdlib>
@@ -10,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/base/cpu_clock.hpp"
+#include "runtime/base/clock.hpp"
 #include "tests/hard/contact_course.hpp"
 
 namespace {
@@ -24,7 +23,7 @@ void print_row(const std::string& what, const WorldSpec& spec, double seconds) {
   for (int round = 0; round < 5; ++round) {
     World world(spec, {.end_s = seconds});
     const double begin = base::get_thread_cpu_s();
-    world.advance(seconds, std::numeric_limits<double>::infinity(), [](const stream::Event&) {});
+    world.advance(seconds, std::numeric_limits<double>::infinity(), [](const events::Event&) {});
     costs.push_back(base::get_thread_cpu_s() - begin);
     cost = world.get_statistics();
   }

@@ -1,0 +1,41 @@
+# Debian packages of what has been built: cpack --config build/release/CPackConfig.cmake -G DEB. docs/howto/packages.md
+# One install component is one package: runtime, dev (what other projects build against) and precompute.
+set(CPACK_GENERATOR DEB)
+set(CPACK_PACKAGE_NAME carillon)
+set(CPACK_PACKAGE_VENDOR "The Carillon maintainers")
+set(CPACK_PACKAGE_CONTACT "The Carillon maintainers <maintainers@carillon.invalid>")
+set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_STRIP_FILES ON)
+set(CPACK_VERBATIM_VARIABLES ON)
+set(CPACK_COMPONENTS_ALL runtime dev)
+if(CARILLON_PRECOMPUTE)
+  list(APPEND CPACK_COMPONENTS_ALL precompute)
+endif()
+set(CPACK_DEB_COMPONENT_INSTALL ON)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_COMPRESSION_TYPE zstd)
+set(CPACK_DEBIAN_PACKAGE_SECTION science)
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_NAME carillon-runtime)
+set(CPACK_COMPONENT_RUNTIME_DESCRIPTION "Sound of solid objects from mode banks: carillon-render, carillon-live, carillon-bank, libcarillon")
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_DEPENDS fonts-dejavu-core)
+
+set(CPACK_DEBIAN_DEV_PACKAGE_NAME carillon-runtime-dev)
+set(CPACK_COMPONENT_DEV_DESCRIPTION "Headers and libraries of Carillon's runtime, for C (carillon.h, pkg-config) and C++ (CMake)")
+set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
+set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "carillon-runtime (= ${PROJECT_VERSION}), libfmt-dev, libjsoncpp-dev, libhdf5-dev, libssl-dev")
+
+set(CPACK_DEBIAN_PRECOMPUTE_PACKAGE_NAME carillon-precompute)
+set(CPACK_COMPONENT_PRECOMPUTE_DESCRIPTION "Vibration modes of solid objects: carillon-precompute, carillon-mesh, carillon-draw and the queue carillon")
+set(CPACK_DEBIAN_PRECOMPUTE_PACKAGE_DEPENDS
+  "carillon-runtime (= ${PROJECT_VERSION}), openmpi-bin, libopenblas0-serial, python3, python3-numpy, python3-h5py")
+set(CPACK_DEBIAN_PRECOMPUTE_PACKAGE_RECOMMENDS python3-vtk9)
+
+foreach(component ${CPACK_COMPONENTS_ALL})
+  string(TOUPPER ${component} upper)
+  set(doc ${CMAKE_INSTALL_DATAROOTDIR}/doc/${CPACK_DEBIAN_${upper}_PACKAGE_NAME})
+  install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${doc} COMPONENT ${component} RENAME copyright)
+  install(FILES ${PROJECT_SOURCE_DIR}/docs/licences.md ${PROJECT_SOURCE_DIR}/CHANGELOG.md DESTINATION ${doc} COMPONENT ${component})
+endforeach()
+include(CPack)

@@ -1,0 +1,153 @@
+// Source: MPI 3.1.
+#include "precompute/comm/communicator.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <new>
+#include <numeric>
+
+#include "precompute/comm/messages.hpp"
+#include "runtime/base/failure.hpp"
+
+namespace carillon::comm {
+namespace {
+
+enum ErrorKind : int { kNone, kInput, kSolve, kSystem, kMemory, kDiskFull };
+
+/// An error on its way between ranks.
+struct Failure {
+  int kind = kNone;
+  std::string text = {};
+  std::size_t place = 0;    // length of the place that the text begins with (PlacedError)
+  double need_bytes = 0.0;  // MemoryError
+};
+
+[[noreturn]] void throw_kind(const Failure& failure) {
+  switch (failure.kind) {
+    case kInput:
+      if (failure.place > 0) throw PlacedError(failure.text.substr(0, failure.place), failure.text.substr(failure.place + 2));
+      throw InputError(failure.text);
+    case kSolve:
+      throw SolveError(failure.text);
+    case kMemory:
+      throw MemoryError(failure.text, failure.need_bytes);
+    case kDiskFull:
+      throw DiskFullError(failure.text);
+    default:
+      throw SystemError(failure.text);
+  }
+}
+
+Failure describe(const std::exception_ptr& error) {
+  if (!error) return {};
+  try {
+    std::rethrow_exception(error);
+  } catch (const PlacedError& e) {
+    return {kInput, e.what(), e.get_place().size()};
+  } catch (const InputError& e) {
+    return {kInput, e.what()};
+  } catch (const SolveError& e) {
+    return {kSolve, e.what()};
+  } catch (const MemoryError& e) {
+    return {kMemory, e.what(), 0, e.get_need_bytes()};
+  } catch (const DiskFullError& e) {
+    return {kDiskFull, e.what()};
+  } catch (const std::bad_alloc&) {
+    return {kMemory, "Out of memory. Take a coarser mesh, a narrower band, or more ranks on more machines."};
+  } catch (const std::exception& e) {
+    return {kSystem, e.what()};
+  } catch (...) {
+    return {kSystem, "An unknown exception was thrown."};
+  }
+}
+
+/// Throws the error of the lowest failing rank on every rank.
+void agree_on(const Communicator& comm, Failure failure) {
+  const int first = comm.min(std::int32_t{failure.kind == kNone ? comm.size() : comm.rank()});
+  if (first == comm.size()) return;
+  std::array<double, 4> header{static_cast<double>(failure.kind), static_cast<double>(failure.text.size()),
+                               static_cast<double>(failure.place), failure.need_bytes};
+  MPI_Bcast(header.data(), 4, MPI_DOUBLE, first, comm);
+  failure.kind = static_cast<int>(header[0]);
+  failure.text.resize(static_cast<std::size_t>(header[1]));
+  failure.place = static_cast<std::size_t>(header[2]);
+  failure.need_bytes = header[3];
+  MPI_Bcast(failure.text.data(), static_cast<int>(failure.text.size()), MPI_CHAR, first, comm);
+  throw_kind(failure);
+}
+
+}  // namespace
+
+Communicator::Communicator(MPI_Comm comm) : comm_(comm) {
+  MPI_Comm_rank(comm, &rank_);
+  MPI_Comm_size(comm, &size_);
+}
+
+bool Communicator::all(bool ok) const { return min(std::int32_t{ok}) == 1; }
+
+void Communicator::agree(const std::string& error_text) const { agree_on(*this, {error_text.empty() ? kNone : kInput, error_text}); }
+
+void Communicator::agree(std::exception_ptr error) const { agree_on(*this, describe(error)); }
+
+void Communicator::reduce(void* values, std::size_t count, MPI_Datatype type, MPI_Op operation) const {
+  MPI_Allreduce(MPI_IN_PLACE, values, static_cast<int>(count), type, operation, comm_);
+}
+
+void Communicator::broadcast_bytes(void* data, std::size_t bytes) const {
+  auto* at = static_cast<char*>(data);
+  for_blocks(bytes, kBlockBytes, [&](std::size_t begin, int count) { MPI_Bcast(at + begin, count, MPI_BYTE, 0, comm_); });
+}
+
+std::string Communicator::broadcast(std::string text) const {
+  const auto count = broadcast(static_cast<std::int64_t>(text.size()));
+  agree([&] { text.resize(static_cast<std::size_t>(count)); });
+  broadcast_bytes(text.data(), text.size());
+  return text;
+}
+
+std::vector<std::string> Communicator::broadcast(std::vector<std::string> texts) const {
+  auto [lengths, joined] = agree([&] {
+    std::pair<std::vector<std::int64_t>, std::string> packed;
+    for (const std::string& text : texts) {
+      packed.first.push_back(static_cast<std::int64_t>(text.size()));
+      packed.second += text;
+    }
+    return packed;
+  });
+  lengths = broadcast(std::move(lengths));
+  joined = broadcast(std::move(joined));
+  return agree([&, &lengths = lengths, &joined = joined] {
+    std::vector<std::string> all;
+    std::size_t at = 0;
+    for (const std::int64_t length : lengths) {
+      all.push_back(joined.substr(at, static_cast<std::size_t>(length)));
+      at += static_cast<std::size_t>(length);
+    }
+    return all;
+  });
+}
+
+Communicator::Gathering Communicator::plan_gathering(std::size_t own_bytes) const {
+  Gathering gathering;
+  agree([&] {
+    gathering.bytes.resize(static_cast<std::size_t>(size_));
+    gathering.begin.assign(static_cast<std::size_t>(size_) + 1, 0);
+    if (own_bytes > INT32_MAX) throw SystemError(fmt::format("{} bytes are too many to bring to every rank; start more ranks", own_bytes));
+  });
+  const int own = static_cast<int>(own_bytes);
+  MPI_Allgather(&own, 1, MPI_INT, gathering.bytes.data(), 1, MPI_INT, comm_);
+  agree([&] {
+    const auto total = std::accumulate(gathering.bytes.begin(), gathering.bytes.end(), std::int64_t{0});
+    if (total > INT32_MAX) throw SystemError(fmt::format("{} bytes are too many to bring to every rank; start fewer ranks", total));
+    std::partial_sum(gathering.bytes.begin(), gathering.bytes.end(), gathering.begin.begin() + 1);
+  });
+  return gathering;
+}
+
+void Communicator::all_gather_bytes(const void* own, const Gathering& gathering, void* all) const {
+  MPI_Allgatherv(own, gathering.bytes[static_cast<std::size_t>(rank_)], MPI_BYTE, all, gathering.bytes.data(), gathering.begin.data(),
+                 MPI_BYTE, comm_);
+}
+
+}  // namespace carillon::comm

@@ -1,0 +1,198 @@
+// Items from every rank to every rank, and questions to the ranks that can answer them.
+//
+//   const auto find_owner = [&](std::int32_t node) { return owners.find_owner(node); };
+//   const auto arrived = comm::all_to_all(comm, [&] { return list_faces(mesh); }, [&](const Face& face) { return find_owner(face.a); });
+//   const auto x = comm::query_owners<Vec3>(comm, nodes, find_owner, [&](std::int32_t node) { return own_m[owners.to_local(node)]; });
+//
+// All functions are collective. What the caller passes to make, sort or answer items is local work: when it throws on one rank, all ranks
+// throw the same.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <numeric>
+#include <span>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "precompute/comm/communicator.hpp"
+#include "precompute/comm/messages.hpp"
+
+namespace carillon::comm {
+
+/// Items in the order of the ranks that they go to or come from, and of one rank in the order in which they were made.
+template <typename T>
+struct ByRank {
+  std::vector<T> items;
+  std::vector<std::int64_t> begin;  // (ranks + 1) into items
+
+  int rank_count() const { return static_cast<int>(begin.size()) - 1; }
+  std::span<const T> of(int rank) const {
+    const auto r = static_cast<std::size_t>(rank);
+    return std::span(items).subspan(static_cast<std::size_t>(begin[r]), static_cast<std::size_t>(begin[r + 1] - begin[r]));
+  }
+};
+
+/// An all-to-all whose counts are known on both sides: it can be repeated, and reversed, without counting again. Each item goes to one
+/// rank.
+class Exchange {
+ public:
+  Exchange() = default;  // of one rank, without items
+  /// sent_begin: (ranks + 1) first item for each rank, from 0. Collective.
+  Exchange(const Communicator& comm, std::vector<std::int64_t> sent_begin, std::size_t block_bytes = kBlockBytes);
+
+  std::int64_t sent_count() const { return sent_begin_.back(); }
+  std::int64_t received_count() const { return received_begin_.back(); }
+  const std::vector<std::int64_t>& received_begin() const { return received_begin_; }
+
+  /// Makes room for items of so many bytes, so that what follows does not allocate. Local.
+  void reserve(std::size_t item_bytes);
+  /// sent: (sent_count, width), received: (received_count, width). Collective.
+  template <Plain T>
+  void forward(const T* sent, T* received, std::size_t width = 1) {
+    run(sent_begin_, sent, received_begin_, received, width * sizeof(T));
+  }
+  /// The other way: answers go back to where the items came from.
+  template <Plain T>
+  void backward(const T* answers, T* returned, std::size_t width = 1) {
+    run(received_begin_, answers, sent_begin_, returned, width * sizeof(T));
+  }
+
+ private:
+  void run(const std::vector<std::int64_t>& from, const void* sent, const std::vector<std::int64_t>& to, void* received,
+           std::size_t item_bytes);
+
+  MPI_Comm comm_ = MPI_COMM_NULL;
+  int rank_ = 0;
+  std::vector<std::int64_t> sent_begin_{0, 0}, received_begin_{0, 0};
+  Messages messages_;
+};
+
+/// Items in the order of their receivers; `source`, if wanted, becomes the place that each had before. Local.
+template <Plain T, typename FindReceiver>
+ByRank<T> sort_by_receiver(int ranks, const std::vector<T>& items, FindReceiver&& find_receiver,
+                           std::vector<std::size_t>* source = nullptr) {
+  ByRank<T> sorted;
+  std::vector<int> receiver(items.size());
+  sorted.begin.assign(static_cast<std::size_t>(ranks) + 1, 0);
+  for (std::size_t i = 0; i < items.size(); ++i) ++sorted.begin[static_cast<std::size_t>(receiver[i] = find_receiver(items[i])) + 1];
+  std::partial_sum(sorted.begin.begin(), sorted.begin.end(), sorted.begin.begin());
+  std::vector<std::int64_t> next(sorted.begin.begin(), sorted.begin.end() - 1);
+  sorted.items.resize(items.size());
+  if (source != nullptr) source->resize(items.size());
+  for (std::size_t i = 0; i < items.size(); ++i) {
+    const auto place = static_cast<std::size_t>(next[static_cast<std::size_t>(receiver[i])]++);
+    sorted.items[place] = items[i];
+    if (source != nullptr) (*source)[place] = i;
+  }
+  return sorted;
+}
+
+/// Sends items that are in the order of their receivers.
+template <Plain T>
+ByRank<T> all_to_all(const Communicator& comm, const ByRank<T>& sent) {
+  Exchange exchange(comm, sent.begin);
+  auto received = comm.agree([&] {
+    exchange.reserve(sizeof(T));
+    return ByRank<T>{std::vector<T>(static_cast<std::size_t>(exchange.received_count())), exchange.received_begin()};
+  });
+  exchange.forward(sent.items.data(), received.items.data());
+  return received;
+}
+
+/// Sends the ByRank that `make` returns.
+template <std::invocable Make>
+auto all_to_all(const Communicator& comm, Make&& make) {
+  return all_to_all(comm, comm.agree(std::forward<Make>(make)));
+}
+
+/// Sends every item to the rank that find_receiver(item) names. `items`: a vector, or what returns one.
+template <typename Items, typename FindReceiver>
+auto all_to_all(const Communicator& comm, Items&& items, FindReceiver&& find_receiver) {
+  return all_to_all(comm, [&] {
+    if constexpr (std::is_invocable_v<Items>) {
+      return sort_by_receiver(comm.size(), items(), find_receiver);
+    } else {
+      return sort_by_receiver(comm.size(), items, find_receiver);
+    }
+  });
+}
+
+/// All items on rank 0, in the order of the ranks; empty elsewhere. `items`: a vector, or what returns one.
+template <typename Items>
+auto gather(const Communicator& comm, Items&& items) {
+  return all_to_all(comm, std::forward<Items>(items), [](const auto&) { return 0; }).items;
+}
+
+/// Asks for every question the rank that find_owner(question) names. There answer(question) returns an Answer, or answer(questions), which
+/// takes the ByRank of all that was asked there, a vector of answers in that order. Returns the answers in the order of the questions.
+template <Plain Answer, Plain Question, typename FindOwner, typename FindAnswer>
+std::vector<Answer> query_owners(const Communicator& comm, const std::vector<Question>& questions, FindOwner&& find_owner,
+                                 FindAnswer&& answer) {
+  std::vector<std::size_t> source;
+  auto sent = comm.agree([&] { return sort_by_receiver(comm.size(), questions, find_owner, &source); });
+  Exchange exchange(comm, sent.begin);
+  auto asked = comm.agree([&] {
+    exchange.reserve(std::max(sizeof(Question), sizeof(Answer)));
+    return ByRank<Question>{std::vector<Question>(static_cast<std::size_t>(exchange.received_count())), exchange.received_begin()};
+  });
+  exchange.forward(sent.items.data(), asked.items.data());
+  std::vector<Answer> replies, returned, answers;
+  comm.agree([&] {
+    sent = {};
+    if constexpr (std::is_invocable_v<FindAnswer, const ByRank<Question>&>) {
+      replies = answer(std::as_const(asked));
+    } else {
+      replies.reserve(asked.items.size());
+      for (const Question& question : asked.items) replies.push_back(answer(question));
+    }
+    asked = {};
+    returned.resize(questions.size());
+    answers.resize(questions.size());
+  });
+  exchange.backward(replies.data(), returned.data());
+  for (std::size_t i = 0; i < source.size(); ++i) answers[source[i]] = returned[i];
+  return answers;
+}
+
+/// Which rank owns each of the wanted numbers, of which every rank names those that it owns; numbers are not negative. Every wanted number
+/// has one owner. By a meeting place for each number (rank = number modulo ranks).
+std::vector<std::int32_t> find_owners(const Communicator& comm, const std::vector<std::int32_t>& owned,
+                                      const std::vector<std::int32_t>& wanted);
+
+namespace detail {
+/// Sends the bytes in three steps, so that neither side waits for one that ran out of memory: their number (null: there are none, because
+/// this side failed), the answer whether there is room for them, and the bytes themselves.
+void send_with_handshake(const Communicator& comm, const std::vector<std::byte>* bytes, int to);
+/// The other side. False if the sender failed. Throws std::bad_alloc after it has said that it has no room.
+bool receive_with_handshake(const Communicator& comm, std::vector<std::byte>& bytes, int from);
+}  // namespace detail
+
+/// Rank 0 calls make(rank) for one rank after the other, its own last, and sends what serialise(result) returns; deserialise(bytes) makes
+/// the result of it again. Rank 0 never has more than one rank's result. Returns this rank's. Throws the same on every rank when any of the
+/// three throws or memory runs out on either side.
+template <typename Make, typename Serialise, typename Deserialise>
+auto scatter_in_turn(const Communicator& comm, Make&& make, Serialise&& serialise, Deserialise&& deserialise) {
+  using Result = std::invoke_result_t<Make, int>;
+  return comm.agree([&]() -> Result {
+    if (!comm.is_root()) {
+      std::vector<std::byte> bytes;
+      return detail::receive_with_handshake(comm, bytes, 0) ? deserialise(bytes) : Result();  // rank 0 names the error
+    }
+    std::exception_ptr error;
+    for (int to = 1; to < comm.size(); ++to) {
+      std::vector<std::byte> bytes;
+      try {
+        if (!error) bytes = serialise(make(to));
+      } catch (...) {
+        error = std::current_exception();
+      }
+      detail::send_with_handshake(comm, error ? nullptr : &bytes, to);
+    }
+    if (error) std::rethrow_exception(error);
+    return make(0);
+  });
+}
+
+}  // namespace carillon::comm

@@ -1,0 +1,42 @@
+// Numbers 0 ... total - 1 in one run per rank.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <vector>
+
+#include "precompute/comm/communicator.hpp"
+
+namespace carillon::comm {
+
+/// Which rank owns which numbers: rank r owns begin(r) ... begin(r + 1) - 1, and ranks follow each other from 0 to total(). The same on
+/// every rank but for what is called "own".
+class IndexPartition {
+ public:
+  IndexPartition() = default;  // no number and no rank
+  /// Runs of the lengths that the ranks bring. Collective.
+  IndexPartition(const Communicator& comm, std::int64_t own_count);
+  /// Runs of equal length, to one; longer ones first. Local.
+  static IndexPartition make_even(const Communicator& comm, std::int64_t total);
+
+  std::int64_t total() const { return begin_.empty() ? 0 : begin_.back(); }
+  /// 0 <= rank <= ranks.
+  std::int64_t begin(int rank) const { return begin_[static_cast<std::size_t>(rank)]; }
+  /// Pre: 0 <= number < total().
+  int find_owner(std::int64_t number) const {
+    return static_cast<int>(std::upper_bound(begin_.begin(), begin_.end(), number) - begin_.begin()) - 1;
+  }
+
+  std::int64_t own_begin() const { return begin(rank_); }
+  std::int64_t own_end() const { return begin(rank_ + 1); }
+  std::int64_t own_count() const { return own_end() - own_begin(); }
+  bool is_own(std::int64_t number) const { return number >= own_begin() && number < own_end(); }
+  /// Place of an own number in this rank's run.
+  std::size_t to_local(std::int64_t number) const { return static_cast<std::size_t>(number - own_begin()); }
+
+ private:
+  std::vector<std::int64_t> begin_;  // (ranks + 1), ascending from 0
+  int rank_ = 0;
+};
+
+}  // namespace carillon::comm

@@ -1,0 +1,81 @@
+// Method:     Counts of what grows (elements, entries and operations of the factor, columns of the basis) times the rates of the table,
+//             fitted by least squares to the runs of tests/bench/predict; another machine is scaled by one number, the time of a kernel.
+// Source:     none. Deviations: none.
+#include "precompute/cost/seconds.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <ctime>
+#include <vector>
+
+#include "precompute/cost/calibration.hpp"
+
+namespace carillon::cost {
+namespace {
+
+double to_double(std::int64_t value) { return static_cast<double>(value); }
+
+double calc_factorisation(const ProblemSize& size) {
+  return kFactorFlop * size.factor_flops + kFactorEntry * to_double(size.factor_entries);
+}
+
+}  // namespace
+
+double predict_factorisation_seconds(const ProblemSize& known) { return calc_factorisation(complete(known)); }
+
+PhaseSeconds predict_seconds(const ProblemSize& known) {
+  const ProblemSize size = complete(known);
+  const bool is_quadratic = size.is_quadratic;
+  const double tets = to_double(size.tets);
+  const double unknowns = to_double(size.unknowns);
+  const double modes = to_double(*size.modes);
+  const double shapes = unknowns * modes;
+  const double surface = 3 * to_double(size.surface_nodes) * modes;
+  PhaseSeconds seconds;
+  seconds.read = kStart + (size.read_seconds > 0 ? size.read_seconds : (is_quadratic ? kReadQuadraticTet : kReadTet) * tets);
+  seconds.partition = kPartitionTet * tets;
+  seconds.assemble = (is_quadratic ? kAssembleQuadraticTet : kAssembleTet) * tets;
+  seconds.errors = (is_quadratic ? kErrorQuadraticMode : kErrorMode) * tets * modes + kErrorTet * tets;
+  seconds.collect = kCollectNumber * surface;
+  seconds.write = kWriteNumber * surface;
+  if (size.unknowns <= kDenseRows) return seconds;
+  const double solves = to_double(predict_solves(*size.modes));
+  const double columns = solves / to_double(count_slices(*size.modes));  // of one basis
+  const double factorisation = calc_factorisation(size);
+  seconds.analyse = (is_quadratic ? kAnalyseQuadraticRow : kAnalyseRow) * unknowns;
+  seconds.factor = to_double(predict_factorisations(*size.modes)) * factorisation;
+  seconds.solve = kSolveEntry * to_double(size.factor_entries) * solves;
+  seconds.orthogonalise = kBasisNumber * unknowns * columns * solves + kSmallNumber * columns * columns * solves;
+  seconds.check = kCheckNumber * shapes + kCheckPair * shapes * modes;
+  if (size.is_thin && *size.modes > 0) seconds.check += factorisation + kThinCorrection * (seconds.solve + seconds.orthogonalise);
+  return seconds;
+}
+
+PhaseSeconds calc_wall(const PhaseSeconds& cpu, const ProblemSize& size, int ranks) {
+  PhaseSeconds wall = cpu;
+  for (double PhaseSeconds::*phase :
+       {&PhaseSeconds::partition, &PhaseSeconds::assemble, &PhaseSeconds::analyse, &PhaseSeconds::factor, &PhaseSeconds::solve,
+        &PhaseSeconds::orthogonalise, &PhaseSeconds::check, &PhaseSeconds::errors, &PhaseSeconds::collect})
+    wall.*phase /= ranks;
+  if (size.is_read_by_all) wall.read /= ranks;
+  return wall;
+}
+
+double measure_speed() {
+  constexpr std::size_t kNumbers = 1024;
+  constexpr int kPasses = 4000;
+  std::vector<double> x(kNumbers, 1.0), y(kNumbers, 0.0);
+  double best = 1e300;
+  for (int attempt = 0; attempt < 8; ++attempt) {
+    const std::clock_t start = std::clock();
+    for (int pass = 0; pass < kPasses; ++pass) {
+      const double by = 1e-9 * pass;
+      for (std::size_t i = 0; i < kNumbers; ++i) y[i] += by * x[i];
+      x[static_cast<std::size_t>(pass) % kNumbers] += 1e-12 * y[0];
+    }
+    best = std::min(best, static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC);
+  }
+  return std::clamp(kNumbers * static_cast<double>(kPasses) / std::max(best, 1e-6) / kMultiplyAddsPerSecond, 0.05, 20.0);
+}
+
+}  // namespace carillon::cost

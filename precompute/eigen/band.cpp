@@ -1,0 +1,91 @@
+// Source: Parlett, The symmetric eigenvalue problem, 1998, section 3.3 (inertia).
+#include "precompute/eigen/band.hpp"
+
+#include <fmt/core.h>
+
+#include "precompute/eigen/memory.hpp"
+#include "precompute/eigen/rigid_modes.hpp"
+#include "precompute/eigen/solve_estimate.hpp"
+#include "precompute/petsc/session.hpp"
+#include "runtime/base/error.hpp"
+
+namespace carillon::eigen {
+namespace {
+
+using petsc::check;
+
+constexpr double kDenseRounding = 1e4;       // Of epsilon times the largest ratio of the diagonals: far above what LAPACK leaves of it.
+constexpr double kMechanismTolerance = 1e2;  // Of the same: eigenvalues below are zero as far as a count by inertia can resolve.
+constexpr double kMechanismRatio = 1e-4;     // Of the band's lower end: no mechanism is faster.
+
+// Collective.
+double find_fastest(const Operators& operators) {
+  double fastest = 0;
+  for (std::size_t i = 0; i < operators.stiffness_diagonal.size(); ++i)
+    fastest = std::max(fastest, operators.stiffness_diagonal[i] / operators.mass_diagonal[i]);
+  return operators.comm.max(fastest);
+}
+
+// What follows copies K and M.
+std::vector<petsc::VecHandle> make_rigid(const comm::Communicator& comm, const Problem& problem, const Options& options,
+                                         const la::Pencil& pencil, std::vector<std::int64_t>& per_component) {
+  check_memory(comm, calc_copies_bytes(problem), options.memory_limit_bytes, "The eigensolver's copy of K and M");
+  return make_rigid_modes(pencil, problem.nodes, per_component);
+}
+
+}  // namespace
+
+BandProblem::BandProblem(const Problem& given, const Options& given_options)
+    : problem(given),
+      options(given_options),
+      comm(petsc::get_communicator(given.stiffness)),
+      scaling(given.mass, find_ends(given_options).high),
+      pencil(scaling.scale(given.stiffness, given.mass)),
+      asked{scaling.to_scaled(find_ends(given_options).low), scaling.to_scaled(find_ends(given_options).high)},
+      rigid(make_rigid(comm, given, given_options, pencil, rigid_per_component)),
+      operators(pencil),
+      fastest(find_fastest(operators)) {
+  check(MatGetSize(problem.stiffness, &n, nullptr));
+  check(MatGetLocalSize(problem.stiffness, &rows, nullptr));
+}
+
+double BandProblem::rounding() const { return PETSC_MACHINE_EPSILON * fastest; }
+
+bool is_dense_exact(const BandProblem& body, const BandLimits& limits) { return limits.low > kDenseRounding * body.rounding(); }
+
+std::string explain_rounding(const BandProblem& body, const BandLimits& limits) {
+  constexpr double kSafe = 30;  // times that rounding, squared frequencies keep their digits
+  if (limits.low > kSafe * body.rounding()) return {};
+  return fmt::format(
+      " Rounding of K alone moves the squared frequencies of this body by ({:.2g} Hz)^2, because it is so thin or its elements are so "
+      "small: let the band begin at {:.2g} Hz or above.",
+      body.to_hz(body.rounding()), body.to_hz(kSafe * body.rounding()));
+}
+
+BandCounts count_band(const BandProblem& body, const std::function<Inertia(double, double, ShiftRule)>& count_below,
+                      const std::function<void(double)>& forget) {
+  BandCounts counts;
+  counts.limits = body.asked;
+  counts.band = count_between(count_below, body.asked.low, body.asked.high);
+  const Slice& band = counts.band;
+  counts.band_count = band.count();
+  counts.count_below_low = band.below_low;
+  counts.limits.low = std::max(counts.limits.low, band.low);
+  if (band.below_low < body.rigid_count() || band.count() < 0) {
+    throw SolveError(
+        fmt::format("The inertia counts {} eigenvalues below {:.6g} Hz and {} below {:.6g} Hz, with {} rigid modes: K or M is not "
+                    "what a body has. Look for inverted elements.",
+                    band.below_low, body.to_hz(band.low), band.below_high, body.to_hz(band.high), body.rigid_count()));
+  }
+  if (band.below_low > body.rigid_count()) {
+    constexpr double kReach = 1e-6;
+    const double limit = kMechanismRatio * counts.limits.low;
+    const Inertia zeros = count_below(std::min(limit, kMechanismTolerance * body.rounding()), kReach, ShiftRule::kMayMoveUp);
+    // Where rounding hides what is so slow, slow modes would be taken for mechanisms.
+    if (zeros.lambda <= limit * (1 + kReach)) counts.mechanism_count = std::max<std::int64_t>(0, zeros.below - body.rigid_count());
+    if (zeros.lambda != band.low) forget(zeros.lambda);
+  }
+  return counts;
+}
+
+}  // namespace carillon::eigen

@@ -1,0 +1,50 @@
+// The M inner product on blocks of columns.
+#pragma once
+
+#include <petscmat.h>
+
+#include <array>
+
+#include "precompute/comm/communicator.hpp"
+#include "precompute/la/block_kernels.hpp"
+#include "precompute/petsc/handle.hpp"
+
+namespace carillon::eigen {
+
+using la::Columns;
+
+/// A block W of `width` columns in memory that others own, and Z. Keeps Z = M W from multiply() on, until W changes or is
+/// placed elsewhere.
+class InnerProduct {
+ public:
+  /// mass: M (n, n) with `rows` rows on this rank; null: the identity. Collective.
+  InnerProduct(const comm::Communicator& comm, Mat mass, PetscInt rows, PetscInt n, int width);
+  ~InnerProduct();
+  InnerProduct(const InnerProduct&) = delete;
+  InnerProduct& operator=(const InnerProduct&) = delete;
+
+  /// W is from now on what stands in `memory`, `width` columns one right after the other.
+  void place(const Columns& memory);
+  /// Z = M W. Collective.
+  void multiply();
+
+  const Columns& w() const { return w_; }
+  const Columns& z() const { return z_; }
+  Mat w_mat() const { return w_mat_; }
+  Mat z_mat() const { return z_mat_; }
+  const comm::Communicator& comm() const { return comm_; }
+
+  /// A^T B of all ranks, (a.count, b.count). Collective.
+  la::Matrix calc_products(const Columns& a, const Columns& b) const { return la::multiply_transposed(comm_, a, b); }
+  /// The same; `sums` of all ranks go in the same message. Collective.
+  la::Matrix calc_products(const Columns& a, const Columns& b, std::array<double, 2>& sums) const;
+
+ private:
+  comm::Communicator comm_;
+  int width_;
+  petsc::MatHandle mass_, w_mat_, z_mat_;
+  Columns w_, z_;
+  bool is_placed_ = false;
+};
+
+}  // namespace carillon::eigen

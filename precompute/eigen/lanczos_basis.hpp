@@ -1,0 +1,61 @@
+// The basis of a block Lanczos iteration and the operator projected on it.
+#pragma once
+
+#include <utility>
+
+#include "precompute/la/block_kernels.hpp"
+
+namespace carillon::eigen {
+
+using la::Columns;
+
+/// Keeps the Krylov relation A^-1 M V = V T + V_next R E^T, E: the last width() columns of the identity. T is symmetric and block
+/// tridiagonal (after a restart: an arrow and then block tridiagonal), R is upper triangular until a restart, V_next is the block that
+/// stands behind V. set_diagonal() and set_coupling() complete the relation for the last block; append() and restart() keep it.
+class LanczosBasis {
+ public:
+  /// memory: `fixed` columns that the basis is kept orthogonal to, then room + block columns, all one right after the other.
+  LanczosBasis(const Columns& memory, int fixed, int room, int block);
+
+  int room() const { return room_; }
+  int block() const { return block_; }
+  int size() const { return size_; }          // columns of V
+  int width() const { return width_; }        // of its last block
+  int previous() const { return previous_; }  // first column of what the last block is coupled to
+  int next_width() const { return static_cast<int>(coupling_.rows()); }
+  bool is_full() const { return size_ + next_width() > room_; }
+
+  /// Columns of V and of what stands behind it.
+  Columns columns(int first, int count) const { return memory_.part(fixed_ + first, count); }
+  Columns fixed() const { return memory_.part(0, fixed_); }
+  /// The fixed columns and V.
+  Columns fixed_and_basis() const { return memory_.part(0, fixed_ + size_); }
+
+  const la::Matrix& t() const { return t_; }                // (room, room), of which the first size() rows and columns count
+  const la::Matrix& coupling() const { return coupling_; }  // R, (next_width, width)
+
+  /// V is its first block, `width` columns.
+  void start(int width);
+  /// The block of T that belongs to the last block of V: the symmetric part of alpha, (width, width).
+  void set_diagonal(const la::Matrix& alpha);
+  void set_coupling(la::Matrix r) { coupling_ = std::move(r); }
+  /// V_next becomes the last block of V.
+  void append();
+  /// V becomes V Y, T diag(theta): Y (size, kept) are eigenvectors of T, theta their eigenvalues. V_next follows it.
+  void restart(const la::Vector& theta, const la::Matrix& y);
+  /// V, `size` columns that stand in place, was saved with T (size, size) between two steps.
+  void resume(int size, int width, int previous, const la::Matrix& t);
+
+ private:
+  Columns memory_;
+  int fixed_;
+  int room_;
+  int block_;
+  int size_ = 0;
+  int width_ = 0;
+  int previous_ = 0;
+  la::Matrix t_;
+  la::Matrix coupling_;
+};
+
+}  // namespace carillon::eigen

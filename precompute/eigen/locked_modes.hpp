@@ -1,0 +1,40 @@
+// Eigenvectors that are known already and that an iteration stays orthogonal to.
+#pragma once
+
+#include <mpi.h>
+
+#include <vector>
+
+#include "precompute/comm/communicator.hpp"
+#include "precompute/la/block_kernels.hpp"
+
+namespace carillon::eigen {
+
+using la::Columns;
+
+/// Columns [first, first + count) of the locked modes.
+struct LockedRange {
+  int first = 0;
+  int count = 0;
+};
+
+/// Keeps nothing but references: M-orthonormal columns of this rank's rows that others own, and the eigenvalue of each.
+struct LockedModes {
+  std::vector<Columns> sets;
+  std::vector<double> lambda;  // of all columns, set by set
+
+  int count() const { return static_cast<int>(lambda.size()); }
+  LockedRange all() const { return {0, count()}; }
+  /// L^T B of all ranks for a range of columns of L, (range.count, b.count). Collective.
+  la::Matrix multiply_transposed(const comm::Communicator& comm, LockedRange range, const Columns& b) const;
+  /// B <- B - L S for that range, S: (range.count, b.count). Local.
+  void subtract_product(LockedRange range, const la::Matrix& s, const Columns& b) const;
+  /// B <- B - L (L^T Z), Z = M B; returns what was in the brackets. Collective.
+  la::Matrix project_out(const comm::Communicator& comm, LockedRange range, const Columns& b, const Columns& z) const;
+
+ private:
+  template <class Visit>
+  void for_parts(LockedRange range, const Visit& visit) const;
+};
+
+}  // namespace carillon::eigen

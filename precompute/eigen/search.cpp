@@ -1,0 +1,243 @@
+// Method:     Block Lanczos with a shift inside each slice finds its modes; copies of repeated eigenvalues that a run leaves out are sought
+//             again with everything found deflated. What is missing between two counts is then sought with a shift between them.
+// Source:     Grimes, Lewis, Simon, A shifted block Lanczos algorithm, SIAM J. Matrix Anal. Appl. 15(1), 1994 (counts and slices).
+//             Block Lanczos: block_lanczos.cpp.
+// Deviations: none.
+#include "precompute/eigen/search.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "precompute/eigen/memory.hpp"
+#include "precompute/eigen/proof.hpp"
+#include "precompute/eigen/solve_estimate.hpp"
+#include "precompute/eigen/timer.hpp"
+#include "precompute/petsc/session.hpp"
+#include "runtime/base/error.hpp"
+
+namespace carillon::eigen {
+namespace {
+
+constexpr double kEdge = BandLimits::kTolerance;
+constexpr int kMaxRounds = 60;            // Krylov runs per interval at most until its count is met,
+constexpr int kMaxIdleRounds = 2;         // and so many without a new mode.
+constexpr double kLockedMargin = 1;       // Of a slice's width: modes found that near are locked.
+constexpr double kKrylovTolerance = 0.1;  // Of the tolerance: Ritz residuals of the inverse leave out what K does to high frequencies.
+
+}  // namespace
+
+void ProgressReport::operator()(Phase phase, std::int64_t modes_done, std::int64_t more_solves) const {
+  const Options& options = body.options;
+  if (!options.progress || !body.comm.is_root()) return;
+  options.progress({phase, modes_done, std::min(band_count, options.max_modes.value_or(band_count)), factor.flops, factor.entries,
+                    factor.factorisations, factor.solves + more_solves});
+}
+
+Search::Search(const BandProblem& body, const ProgressReport& report, FactorStatistics& factor, Seconds& seconds)
+    : body_(body),
+      report_(report),
+      factor_(factor),
+      seconds_(seconds),
+      checkpoint_(body.comm, body.options.checkpoint, {&found_, &factor, nullptr}),
+      counter_(body.pencil, body.problem, body.options, body.rigid, seconds, factor,
+               [&body](double lambda) { return body.to_hz(lambda); }) {
+  checkpoint_.load(body.n, body.scaling.get_powers());
+  checkpoint_.set_counter(&counter_);
+}
+
+Inertia Search::count_below(double lambda, double reach, ShiftRule rule) {
+  SearchStep step;
+  step.asked = {lambda, reach, rule == ShiftRule::kMayMoveUp ? 1.0 : 0.0};
+  if (const SearchStep* known = checkpoint_.replay(step)) {
+    const Inertia count{known->answer[0], static_cast<std::int64_t>(known->answer[1])};
+    counter_.restore(count);
+    return count;
+  }
+  const Inertia count = counter_.count_below(lambda, reach, rule);
+  step.answer = {count.lambda, static_cast<double>(count.below)};
+  checkpoint_.record(step);
+  return count;
+}
+
+Slice Search::cut_to_wanted(const Slice& band) {
+  if (!body_.options.max_modes) return band;
+  return cut_to_lowest(band, *body_.options.max_modes, [this](double lambda) { return count_below(lambda).below; });
+}
+
+KrylovRequest Search::make_request(const Slice& slice, double sigma, Missing missing, int round) const {
+  KrylovRequest request;
+  request.pencil = body_.pencil;
+  request.mass_blocks = &body_.operators.mass;
+  request.sigma = sigma;
+  request.low = slice.low * (1 - kEdge);
+  request.high = slice.high * (1 + kEdge);
+  request.count = petsc::to_petsc_int(missing.count);
+  request.is_count_known = missing.is_known;
+  // Those below the slice are nearer the shift than its upper end when it starts at the bottom. Copies that rounding alone brings in come
+  // late: later runs ask for some more, beyond the slice.
+  const bool is_below = sigma - slice.low * 0.5 > slice.high - sigma || sigma < slice.low;
+  const std::int64_t below = slice.below_low - body_.rigid_count();
+  request.nearest = petsc::to_petsc_int(missing.count + (is_below || 5 * below <= slice.count() ? below : 0) + std::min(round, 4) * 10);
+  request.method = body_.options.method;
+  request.tolerance = kKrylovTolerance * body_.options.tolerance;
+  request.nodes_m = &body_.problem.nodes.nodes_m;
+  request.round = round;
+  // Vectors far from the slice are orthogonal to it by their residuals; those near its ends or in it must be locked, and fewer neighbours
+  // make the iteration shorter.
+  request.locked_above = slice.low - kLockedMargin * (slice.high - slice.low);
+  return request;
+}
+
+// One Krylov run; adds to the modes found what lies in the slice and was not there. Returns up to where from sigma on it left nothing out.
+double Search::run_round(const Slice& slice, ShiftedFactor* cholmod, double sigma, Missing missing, int round) {
+  SearchStep step;
+  step.kind = SearchStep::kRound;
+  step.asked = {sigma, slice.low, slice.high, static_cast<double>(missing.count), round + (missing.is_known ? 0.0 : 0.5)};
+  if (const SearchStep* known = checkpoint_.replay(step)) {
+    checkpoint_.restore_found(*known);
+    return known->answer[0];
+  }
+  ShiftedFactor& factor = cholmod != nullptr ? *cholmod : counter_.factor_at(sigma);
+  const Timer timer(seconds_.iterate);
+  KrylovRequest request = make_request(slice, sigma, missing, round);
+  request.factor = &factor;
+  const std::int64_t before = count();
+  request.progress = [&](std::int64_t converged, std::int64_t solves) { report_(Phase::kIterate, before + converged, solves); };
+  request.checkpoint = checkpoint_.begin_round(step);
+  const KrylovStatistics statistics = run_krylov(request, found_);
+  factor_.solves += statistics.solves;
+  seconds_.solve += statistics.solve_seconds;
+  checkpoint_.end_round();
+  step.answer = {statistics.solved_to};
+  checkpoint_.record(step);
+  return statistics.solved_to;
+}
+
+// Runs with the factor at sigma until the slice holds what it was counted to hold, or runs find nothing new.
+void Search::run_rounds(const Slice& slice, ShiftedFactor* cholmod, double sigma, int first) {
+  int idle = 0;
+  for (int round = first; round < kMaxRounds && idle < kMaxIdleRounds; ++round) {
+    const std::int64_t missing = slice.count() - count_found(found_.lambda, slice.low * (1 - kEdge), slice.high * (1 + kEdge));
+    if (missing <= 0) break;
+    const std::int64_t before = count();
+    run_round(slice, cholmod, sigma, {missing, true}, round);
+    idle = count() > before ? 0 : idle + 1;
+  }
+}
+
+std::unique_ptr<ShiftedFactor> Search::factorise_with_cholmod(double sigma) {
+  counter_.release();  // Two factors at a time would double the memory.
+  const Timer timer(seconds_.factor);
+  std::unique_ptr<ShiftedFactor> cholmod = make_cholmod_factor(body_.pencil, body_.problem.nodes.elimination_position);
+  ++factor_.factorisations;
+  (void)cholmod->factorise(sigma);
+  factor_.solver = cholmod->get_solver();
+  factor_.ordering = cholmod->get_ordering();
+  factor_.entries = cholmod->get_entries();
+  return cholmod;
+}
+
+// Runs around sigma, where the factor is or will be, until the slice holds what it was counted to hold.
+void Search::find_missing(const Slice& slice, double sigma) {
+  std::unique_ptr<ShiftedFactor> cholmod;
+  if (body_.options.factorisation == Factorisation::kCholmod) {
+    sigma = -2.5e-3 * slice.high;
+    cholmod = factorise_with_cholmod(sigma);
+  } else {
+    report_(Phase::kFactor, count());
+    sigma = count_below(sigma, 1e-5).lambda;
+  }
+  run_rounds(slice, cholmod.get(), sigma, 0);
+}
+
+void Search::run(const Slice& wanted) {
+  searched_to_ = wanted.high;
+  check_memory(body_.comm, calc_search_bytes(body_.rows, wanted.count(), body_.rigid_count()), body_.options.memory_limit_bytes,
+               fmt::format("The search for {} modes", wanted.count()));
+  found_.reset(body_.problem.stiffness, petsc::to_petsc_int(wanted.count()), body_.rigid);
+  checkpoint_.load_found();
+  // CHOLMOD cannot shift into the band.
+  const std::int64_t max_modes = body_.options.factorisation == Factorisation::kCholmod ? wanted.count() : kSliceModes;
+  Sweep sweep(wanted, max_modes, [this](double lambda) {
+    report_(Phase::kFactor, count());
+    return count_below(lambda).below;
+  });
+  Slice counted = wanted;  // between shifts, where counts are exact
+  while (!sweep.is_last()) {
+    const Sweep::Part part = sweep.take();
+    counted.high = part.sigma;
+    counted.below_high = part.below_sigma;
+    const double solved_to = run_round(part.slice, nullptr, part.sigma, {part.slice.count(), false}, 0);
+    if (count_found(found_.lambda, counted.low, counted.high) >= counted.count()) {
+      sweep.advance(solved_to, wanted.below_low + count_found(found_.lambda, wanted.low * (1 - kEdge), solved_to));
+    } else {
+      // Copies are missing below the shift, and above it no doubt too. Left for later they would count as modes of the slices to come.
+      run_rounds(counted, nullptr, part.sigma, 1);
+      sweep.advance(part.sigma, part.below_sigma);
+    }
+    counted.low = part.sigma;
+    counted.below_low = part.below_sigma;
+  }
+  const Slice& rest = sweep.get_rest();
+  if (rest.count() > 0) find_missing(rest, std::midpoint(rest.low, rest.high));
+}
+
+double Search::find_end() const { return find_end_of_search(found_.lambda, body_.options.max_modes, searched_to_); }
+
+void Search::move_doubtful_counts(const BandLimits& limits) {
+  const std::vector<Inertia> counts = counter_.counts();
+  for (const Inertia& old : counts) {
+    const std::optional<double> shift = find_safer_shift(found_.lambda, old.lambda, limits);
+    if (!shift) continue;
+    counter_.forget(old.lambda);
+    (void)count_below(*shift);
+  }
+}
+
+// Seeks what is missing between two counts once more. True if nothing was.
+bool Search::search_gaps() {
+  const std::vector<Inertia> counts = sort_counts(counter_.counts());
+  bool is_complete = true;
+  for (std::size_t i = 1; i < counts.size() && counts[i - 1].lambda < find_end(); ++i) {
+    const Slice part{counts[i - 1].lambda, counts[i - 1].below, counts[i].lambda, counts[i].below};
+    const std::int64_t found = count_found(found_.lambda, part.low, part.high);
+    if (found == part.count()) continue;
+    if (found > part.count()) verify_found();
+    is_complete = false;
+    find_missing(part, std::midpoint(part.low, part.high));
+  }
+  return is_complete;
+}
+
+// A mode between an end of the band and its count would be counted and is not of the band: the count is taken again between them. True if
+// one was.
+bool Search::move_counts_to_band(BandCounts& counts) {
+  const BandLimits& limits = counts.limits;
+  bool has_moved = false;
+  for (const bool is_high : {false, true}) {
+    const std::vector<Inertia> sorted = sort_counts(counter_.counts());
+    const Inertia old = is_high ? sorted.back() : sorted.front();
+    const double nearest = find_mode_outside(found_.lambda, old.lambda, limits, is_high);
+    if (nearest == old.lambda) continue;
+    counter_.forget(old.lambda);
+    const std::int64_t below = count_below(std::midpoint(nearest, is_high ? limits.high : limits.low), kEdge / 10).below;
+    counts.band_count -= std::abs(below - old.below);
+    if (!is_high) counts.count_below_low = below;
+    has_moved = true;
+  }
+  return has_moved;
+}
+
+void Search::verify_found() const {
+  verify(counter_.counts(), found_.lambda, find_end(), [this](double lambda) { return body_.to_hz(lambda); });
+}
+
+void Search::complete(BandCounts& counts) {
+  move_doubtful_counts(counts.limits);
+  for (bool is_complete = search_gaps(); !is_complete || move_counts_to_band(counts); is_complete = true) verify_found();
+}
+
+}  // namespace carillon::eigen

@@ -1,0 +1,110 @@
+// Method:     The analysis of the factorisation says what it takes; Sylvester's law of inertia counts the modes (inertia.cpp).
+// Source:     Parlett, The symmetric eigenvalue problem, 1998, section 3.3. Deviations: none.
+#include "precompute/eigen/solve_estimate.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <numbers>
+
+#include "precompute/eigen/check_input.hpp"
+#include "precompute/eigen/krylov.hpp"
+#include "precompute/eigen/rigid_modes.hpp"
+#include "precompute/eigen/scaling.hpp"
+#include "precompute/petsc/session.hpp"
+#include "runtime/base/clock.hpp"
+
+namespace carillon::eigen {
+namespace {
+
+using petsc::check;
+
+constexpr double kZeroFraction = 1e-7;  // Of high_hz: what is below is lost in the rounding of what is up there.
+
+double calc_lambda(double freq_hz) {
+  const double omega_rad_s = 2 * std::numbers::pi * freq_hz;
+  return omega_rad_s * omega_rad_s;
+}
+
+}  // namespace
+
+BandEnds find_ends(const Options& options) {
+  return {calc_lambda(options.low_hz > 0 ? options.low_hz : kZeroFraction * options.high_hz), calc_lambda(options.high_hz)};
+}
+
+Slice count_between(const TakeCount& take, double low, double high) {
+  const Inertia above = take(high * (1 + kEdgeNudge), kEdgeNudge, ShiftRule::kExact);
+  const Inertia below = take(low * (1 - 2 * kEdgeNudge), kEdgeNudge, ShiftRule::kMayMoveUp);
+  return {below.lambda, below.below, above.lambda, above.below};
+}
+
+std::int64_t calc_copies_bytes(const Problem& problem) {
+  double entries = 0;
+  for (const Mat matrix : {problem.stiffness, problem.mass}) {
+    MatInfo info;
+    check(MatGetInfo(matrix, MAT_LOCAL, &info));
+    entries += 3 * info.nz_used;
+  }
+  PetscInt rows = 0;
+  check(MatGetLocalSize(problem.stiffness, &rows, nullptr));
+  entries += 18.0 * rows;
+  return static_cast<std::int64_t>(8 * entries);
+}
+
+std::int64_t calc_kept_bytes(const Problem& problem) {
+  // Blocks of nine numbers, or one number, and the place of each.
+  MatInfo k, m;
+  check(MatGetInfo(problem.stiffness, MAT_LOCAL, &k));
+  check(MatGetInfo(problem.mass, MAT_LOCAL, &m));
+  PetscInt rows = 0;
+  check(MatGetLocalSize(problem.stiffness, &rows, nullptr));
+  return static_cast<std::int64_t>(8.5 * k.nz_used + 1.5 * m.nz_used + 8 * 12.0 * rows);
+}
+
+std::int64_t calc_search_bytes(std::int64_t rows, std::int64_t modes, std::int64_t rigid_count) {
+  const bool is_cut = modes > kSliceModes;
+  const std::int64_t locked = rigid_count + (is_cut ? kSliceModes : 0);  // They are where they were found.
+  const std::int64_t basis = calc_basis_size(std::min(modes, kSliceModes), locked, !is_cut);
+  return rows * 8 * (modes + rigid_count + basis);
+}
+
+std::int64_t calc_dense_bytes(std::int64_t unknowns, bool is_root) {
+  return static_cast<std::int64_t>(8 * (cost::kDenseCopies + (is_root ? cost::kDenseWork : 0))) * unknowns * unknowns;
+}
+
+SolveEstimate estimate_solve(const Problem& problem, const Options& options, const std::function<bool(const SolveEstimate&)>& may_count) {
+  check_input(problem, options);
+  SolveEstimate estimate;
+  PetscInt n = 0;
+  check(MatGetSize(problem.stiffness, &n, nullptr));
+  const BandEnds ends = find_ends(options);
+  const Scaling scaling(problem.mass, ends.high);
+  const la::Pencil pencil = scaling.scale(problem.stiffness, problem.mass);
+  std::vector<std::int64_t> per_component;
+  const std::vector<petsc::VecHandle> rigid = make_rigid_modes(pencil, problem.nodes, per_component);
+  estimate.rigid_count = static_cast<std::int64_t>(rigid.size());
+  estimate.is_dense = n <= kDenseRows || options.method == Method::kDense;
+  estimate.copies_bytes = calc_copies_bytes(problem);
+  estimate.copies_kept_bytes = calc_kept_bytes(problem);
+  Options unlimited = options;
+  unlimited.memory_limit_bytes = 0;
+  if (unlimited.factorisation == Factorisation::kCholmod) unlimited.factorisation = Factorisation::kAutomatic;
+  Seconds seconds;
+  FactorStatistics statistics;
+  InertiaCounter counter(pencil, problem, unlimited, rigid, seconds, statistics,
+                         [&](double lambda) { return std::sqrt(std::max(scaling.from_scaled(lambda), 0.0)) / (2 * std::numbers::pi); });
+  const ShiftedFactor& factor = counter.analyse();
+  estimate.entries = factor.get_entries();
+  estimate.flops = factor.get_flops();
+  estimate.factor_bytes = factor.get_peak_bytes();
+  estimate.factor_kept_bytes = 8 * estimate.entries;
+  if (!may_count(estimate)) return estimate;
+  const double start = base::get_process_cpu_s();
+  const Slice band = count_between([&](double lambda, double reach, ShiftRule rule) { return counter.count_below(lambda, reach, rule); },
+                                   scaling.to_scaled(ends.low), scaling.to_scaled(ends.high));
+  estimate.factor_seconds = (base::get_process_cpu_s() - start) / static_cast<double>(std::max<std::int64_t>(statistics.factorisations, 1));
+  estimate.modes = std::min(band.count(), options.max_modes.value_or(band.count()));
+  return estimate;
+}
+
+}  // namespace carillon::eigen

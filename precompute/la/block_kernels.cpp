@@ -1,0 +1,314 @@
+// Method:     The narrow block is packed, a panel of rows at a time that stays in the second-level cache; the wide block streams past it, a
+//             few columns at a time, in strips that stay in the first level and are fetched one strip ahead. Sums and
+//             coefficients live in registers (6 x 4 tiles).
+// Source:     Goto, van de Geijn, Anatomy of high-performance matrix multiplication, ACM TOMS 34(3), 2008 (panels, register tiles).
+// Deviations: the wide block is not packed: it is used once, and packing it costs BLAS half its speed for 16 columns (figures:
+//             docs/decisions/block-lanczos.md). Processors without AVX-512 use BLAS on the same panels.
+#include "precompute/la/block_kernels.hpp"
+
+#include <algorithm>
+#include <cstdint>
+#include <cstring>
+#include <vector>
+
+#include "precompute/petsc/work.hpp"
+#include "runtime/base/instructions.hpp"
+
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
+
+namespace carillon::la {
+namespace {
+
+constexpr std::ptrdiff_t kRowsTransposed = 4096;  // of a panel for A^T B: 16 columns of B are half a megabyte
+constexpr std::ptrdiff_t kStripTransposed = 256;  // of a strip of it
+constexpr std::ptrdiff_t kRowsProduct = 2048;     // of a panel for B - A S, which is written too
+constexpr std::ptrdiff_t kStripProduct = 128;     // of a strip of it
+constexpr std::ptrdiff_t kRowsCombined = 256;     // of a panel for A S
+constexpr int kTile = 4;                          // columns of the narrow block in registers
+constexpr int kWide = 6;                          // columns of the wide block with them
+
+int round_up(int n, int to) { return (n + to - 1) / to * to; }
+
+#if defined(__x86_64__)
+#define CARILLON_AVX512 __attribute__((target("avx512f")))
+
+bool has_avx512() { return base::has_instructions(base::Instructions::kAvx512); }
+
+// Loops over what shall stay in registers are unrolled, all of them: one that is not sends the others' values through memory.
+
+// What a tile prefetches while it works: the same rows of some columns of the wide block, one strip ahead.
+struct Prefetch {
+  const double* first = nullptr;
+  int columns = 0;
+};
+
+// The share of tile `j` of `tiles` in prefetching the next strip of columns [i, i + wide).
+Prefetch find_prefetch(const Columns& a, int i, int wide, std::ptrdiff_t row, int j, int tiles) {
+  const int from = j * wide / tiles;
+  return {a.column(i + from) + row, (j + 1) * wide / tiles - from};
+}
+
+// sum (kCount x 4 vectors of lanes) += a^T b over `rows`, any number; b is packed: aligned, zero beyond the rows.
+template <int kCount>
+CARILLON_AVX512 void add_transposed_tile(const double* a, std::ptrdiff_t lda, const double* b, std::ptrdiff_t ldb, std::ptrdiff_t rows,
+                                         double* lanes, Prefetch next) {
+  __m512d sum[kCount][kTile];
+#pragma GCC unroll 6
+  for (int i = 0; i < kCount; ++i) {
+#pragma GCC unroll 4
+    for (int j = 0; j < kTile; ++j) sum[i][j] = _mm512_load_pd(lanes + 8 * (i * kTile + j));
+  }
+  for (std::ptrdiff_t r = 0; r < rows; r += 8) {
+    const __mmask8 mask = r + 8 <= rows ? 0xff : static_cast<__mmask8>((1 << (rows - r)) - 1);
+    const __m512d b0 = _mm512_load_pd(b + r), b1 = _mm512_load_pd(b + ldb + r);
+    const __m512d b2 = _mm512_load_pd(b + 2 * ldb + r), b3 = _mm512_load_pd(b + 3 * ldb + r);
+    for (int i = 0; i < next.columns; ++i) _mm_prefetch(reinterpret_cast<const char*>(next.first + i * lda + r), _MM_HINT_T0);
+#pragma GCC unroll 6
+    for (int i = 0; i < kCount; ++i) {
+      const __m512d x = _mm512_maskz_loadu_pd(mask, a + i * lda + r);
+      sum[i][0] = _mm512_fmadd_pd(x, b0, sum[i][0]);
+      sum[i][1] = _mm512_fmadd_pd(x, b1, sum[i][1]);
+      sum[i][2] = _mm512_fmadd_pd(x, b2, sum[i][2]);
+      sum[i][3] = _mm512_fmadd_pd(x, b3, sum[i][3]);
+    }
+  }
+#pragma GCC unroll 6
+  for (int i = 0; i < kCount; ++i) {
+#pragma GCC unroll 4
+    for (int j = 0; j < kTile; ++j) _mm512_store_pd(lanes + 8 * (i * kTile + j), sum[i][j]);
+  }
+}
+
+// b (rows x 4, packed) -= a (rows x kCount) s (kCount x 4).
+template <int kCount>
+CARILLON_AVX512 void subtract_tile(const double* a, std::ptrdiff_t lda, const double* s, std::ptrdiff_t lds, double* b, std::ptrdiff_t ldb,
+                                   std::ptrdiff_t rows, Prefetch next) {
+  __m512d c[kCount][kTile];
+#pragma GCC unroll 6
+  for (int i = 0; i < kCount; ++i) {
+#pragma GCC unroll 4
+    for (int j = 0; j < kTile; ++j) c[i][j] = _mm512_set1_pd(s[j * lds + i]);
+  }
+  for (std::ptrdiff_t r = 0; r < rows; r += 8) {
+    const __mmask8 mask = r + 8 <= rows ? 0xff : static_cast<__mmask8>((1 << (rows - r)) - 1);
+    __m512d b0 = _mm512_load_pd(b + r), b1 = _mm512_load_pd(b + ldb + r);
+    __m512d b2 = _mm512_load_pd(b + 2 * ldb + r), b3 = _mm512_load_pd(b + 3 * ldb + r);
+    for (int i = 0; i < next.columns; ++i) _mm_prefetch(reinterpret_cast<const char*>(next.first + i * lda + r), _MM_HINT_T0);
+#pragma GCC unroll 6
+    for (int i = 0; i < kCount; ++i) {
+      const __m512d x = _mm512_maskz_loadu_pd(mask, a + i * lda + r);
+      b0 = _mm512_fnmadd_pd(x, c[i][0], b0);
+      b1 = _mm512_fnmadd_pd(x, c[i][1], b1);
+      b2 = _mm512_fnmadd_pd(x, c[i][2], b2);
+      b3 = _mm512_fnmadd_pd(x, c[i][3], b3);
+    }
+    _mm512_store_pd(b + r, b0);
+    _mm512_store_pd(b + ldb + r, b1);
+    _mm512_store_pd(b + 2 * ldb + r, b2);
+    _mm512_store_pd(b + 3 * ldb + r, b3);
+  }
+}
+
+using TransposedTile = void (*)(const double*, std::ptrdiff_t, const double*, std::ptrdiff_t, std::ptrdiff_t, double*, Prefetch);
+using SubtractTile = void (*)(const double*, std::ptrdiff_t, const double*, std::ptrdiff_t, double*, std::ptrdiff_t, std::ptrdiff_t,
+                              Prefetch);
+constexpr TransposedTile kTransposedTile[] = {nullptr,
+                                              add_transposed_tile<1>,
+                                              add_transposed_tile<2>,
+                                              add_transposed_tile<3>,
+                                              add_transposed_tile<4>,
+                                              add_transposed_tile<5>,
+                                              add_transposed_tile<6>};
+constexpr SubtractTile kSubtractTile[] = {nullptr,          subtract_tile<1>, subtract_tile<2>, subtract_tile<3>,
+                                          subtract_tile<4>, subtract_tile<5>, subtract_tile<6>};
+
+// Panels of columns, on cache lines, zero beyond the rows and columns that are filled.
+class PackedPanel {
+ public:
+  PackedPanel(std::ptrdiff_t rows, int columns)
+      : stride_(rows), space_(static_cast<std::size_t>(rows) * round_up(columns, kTile) + 8, 0.0) {
+    const auto misfit = reinterpret_cast<std::uintptr_t>(space_.data()) % 64;
+    values_ = space_.data() + (misfit == 0 ? 0 : (64 - misfit) / sizeof(double));
+  }
+  double* get() { return values_; }
+  std::ptrdiff_t stride() const { return stride_; }
+  void load(const Columns& from, std::ptrdiff_t first, std::ptrdiff_t rows) {
+    const std::ptrdiff_t rounded = std::min((rows + 7) / 8 * 8, stride_);
+    for (int j = 0; j < from.count; ++j) {
+      double* to = values_ + j * stride_;
+      std::memcpy(to, from.column(j) + first, static_cast<std::size_t>(rows) * sizeof(double));
+      std::fill(to + rows, to + rounded, 0.0);
+    }
+  }
+  void store(const Columns& to, std::ptrdiff_t first, std::ptrdiff_t rows) const {
+    for (int j = 0; j < to.count; ++j)
+      std::memcpy(to.column(j) + first, values_ + j * stride_, static_cast<std::size_t>(rows) * sizeof(double));
+  }
+
+ private:
+  std::ptrdiff_t stride_;
+  std::vector<double> space_;
+  double* values_ = nullptr;
+};
+
+void multiply_transposed_avx512(const Columns& a, const Columns& b, double* small, int small_stride) {
+  constexpr int kLanes = 8 * kWide * kTile;  // of one tile's sums
+  const int tiles = round_up(b.count, kTile) / kTile;
+  for (int j = 0; j < b.count; ++j) std::fill_n(small + static_cast<std::ptrdiff_t>(j) * small_stride, a.count, 0.0);
+  PackedPanel panel(kRowsTransposed, b.count);
+  PackedPanel sums(kLanes, tiles);
+  for (std::ptrdiff_t first = 0; first < a.rows; first += kRowsTransposed) {
+    const std::ptrdiff_t rows = std::min(kRowsTransposed, a.rows - first);
+    panel.load(b, first, rows);
+    for (int i = 0; i < a.count; i += kWide) {
+      const int wide = std::min(kWide, a.count - i);
+      std::fill_n(sums.get(), static_cast<std::ptrdiff_t>(tiles) * kLanes, 0.0);
+      for (std::ptrdiff_t r = 0; r < rows; r += kStripTransposed) {
+        const std::ptrdiff_t strip = std::min(kStripTransposed, rows - r);
+        for (int j = 0; j < tiles; ++j) {
+          kTransposedTile[wide](a.column(i) + first + r, a.stride, panel.get() + j * kTile * panel.stride() + r, panel.stride(), strip,
+                                sums.get() + j * kLanes, find_prefetch(a, i, wide, first + r + kStripTransposed, j, tiles));
+        }
+      }
+      for (int j = 0; j < b.count; ++j) {
+        for (int k = 0; k < wide; ++k) {
+          const double* lane = sums.get() + (j / kTile) * kLanes + 8 * (k * kTile + j % kTile);
+          small[static_cast<std::ptrdiff_t>(j) * small_stride + i + k] +=
+              ((lane[0] + lane[4]) + (lane[1] + lane[5])) + ((lane[2] + lane[6]) + (lane[3] + lane[7]));
+        }
+      }
+    }
+  }
+}
+
+void subtract_product_avx512(const Columns& a, const double* small, int small_stride, const Columns& b) {
+  const int tiles = round_up(b.count, kTile) / kTile;
+  std::vector<double> coefficients(static_cast<std::size_t>(a.count) * static_cast<std::size_t>(tiles * kTile), 0.0);
+  for (int j = 0; j < b.count; ++j)
+    std::copy_n(small + static_cast<std::ptrdiff_t>(j) * small_stride, a.count,
+                coefficients.data() + static_cast<std::ptrdiff_t>(j) * a.count);
+  PackedPanel panel(kRowsProduct, b.count);
+  for (std::ptrdiff_t first = 0; first < a.rows; first += kRowsProduct) {
+    const std::ptrdiff_t rows = std::min(kRowsProduct, a.rows - first);
+    panel.load(b, first, rows);
+    for (int i = 0; i < a.count; i += kWide) {
+      const int wide = std::min(kWide, a.count - i);
+      for (std::ptrdiff_t r = 0; r < rows; r += kStripProduct) {
+        const std::ptrdiff_t strip = std::min(kStripProduct, rows - r);
+        for (int j = 0; j < tiles; ++j) {
+          kSubtractTile[wide](a.column(i) + first + r, a.stride, coefficients.data() + static_cast<std::ptrdiff_t>(j * kTile) * a.count + i,
+                              a.count, panel.get() + j * kTile * panel.stride() + r, panel.stride(), strip,
+                              find_prefetch(a, i, wide, first + r + kStripProduct, j, tiles));
+        }
+      }
+    }
+    panel.store(b, first, rows);
+  }
+}
+
+constexpr int kRowTile = 24;    // rows and
+constexpr int kColumnTile = 8;  // columns of A S in registers
+constexpr int kStripTiles = 4;  // row tiles that share a packed tile of S in the first-level cache
+
+// c (24 x 8) = a s; a: packed (count x 24), s: packed (count x 8). Stores `columns` columns of `rows` rows.
+CARILLON_AVX512 void combine_tile(const double* a, const double* s, int count, double* c, std::ptrdiff_t ldc, int rows, int columns) {
+  __m512d sum[3][kColumnTile];
+#pragma GCC unroll 3
+  for (int i = 0; i < 3; ++i) {
+#pragma GCC unroll 8
+    for (int j = 0; j < kColumnTile; ++j) sum[i][j] = _mm512_setzero_pd();
+  }
+  for (int k = 0; k < count; ++k) {
+    const __m512d a0 = _mm512_loadu_pd(a + k * kRowTile), a1 = _mm512_loadu_pd(a + k * kRowTile + 8),
+                  a2 = _mm512_loadu_pd(a + k * kRowTile + 16);
+#pragma GCC unroll 8
+    for (int j = 0; j < kColumnTile; ++j) {
+      const __m512d x = _mm512_set1_pd(s[k * kColumnTile + j]);
+      sum[0][j] = _mm512_fmadd_pd(a0, x, sum[0][j]);
+      sum[1][j] = _mm512_fmadd_pd(a1, x, sum[1][j]);
+      sum[2][j] = _mm512_fmadd_pd(a2, x, sum[2][j]);
+    }
+  }
+#pragma GCC unroll 3
+  for (int i = 0; i < 3; ++i) {
+    const int left = std::clamp(rows - 8 * i, 0, 8);
+    const auto mask = static_cast<__mmask8>((1 << left) - 1);
+#pragma GCC unroll 8
+    for (int j = 0; j < kColumnTile; ++j) {
+      if (j < columns) _mm512_mask_storeu_pd(c + j * ldc + 8 * i, mask, sum[i][j]);
+    }
+  }
+}
+
+void combine_columns_avx512(const Columns& a, const double* small, int kept) {
+  const int groups = (kept + kColumnTile - 1) / kColumnTile;
+  const auto count = static_cast<std::ptrdiff_t>(a.count);
+  std::vector<double> packed(static_cast<std::size_t>(groups) * static_cast<std::size_t>(count) * kColumnTile, 0.0);
+  for (int j = 0; j < kept; ++j) {
+    double* to = packed.data() + (j / kColumnTile) * count * kColumnTile + j % kColumnTile;
+    for (std::ptrdiff_t k = 0; k < count; ++k) to[k * kColumnTile] = small[j * count + k];
+  }
+  std::vector<double> panel(static_cast<std::size_t>(kStripTiles * kRowTile) * static_cast<std::size_t>(count), 0.0);
+  for (std::ptrdiff_t first = 0; first < a.rows; first += kStripTiles * kRowTile) {
+    const std::ptrdiff_t rows = std::min<std::ptrdiff_t>(kStripTiles * kRowTile, a.rows - first);
+    for (std::ptrdiff_t k = 0; k < count; ++k) {
+      const double* from = a.values + k * a.stride + first;
+      for (std::ptrdiff_t r = 0; r < rows; r += kRowTile)
+        std::copy_n(from + r, std::min<std::ptrdiff_t>(kRowTile, rows - r), panel.data() + (r * count) + k * kRowTile);
+    }
+    for (int g = 0; g < groups; ++g) {
+      for (std::ptrdiff_t r = 0; r < rows; r += kRowTile) {
+        combine_tile(panel.data() + r * count, packed.data() + g * count * kColumnTile, a.count, a.column(g * kColumnTile) + first + r,
+                     a.stride, static_cast<int>(std::min<std::ptrdiff_t>(kRowTile, rows - r)),
+                     std::min(kColumnTile, kept - g * kColumnTile));
+      }
+    }
+  }
+}
+#else
+bool has_avx512() { return false; }
+void multiply_transposed_avx512(const Columns&, const Columns&, double*, int) {}
+void subtract_product_avx512(const Columns&, const double*, int, const Columns&) {}
+void combine_columns_avx512(const Columns&, const double*, int) {}
+#endif
+
+constexpr int kNarrow = 32;  // dgemm is as fast for wider blocks.
+
+}  // namespace
+
+void multiply_transposed(const Columns& a, const Columns& b, double* small, int small_stride) {
+  if (a.count == 0 || b.count == 0) return;
+  petsc::add_flops(2.0 * static_cast<double>(a.rows) * a.count * b.count);
+  if (b.count <= kNarrow && has_avx512()) return multiply_transposed_avx512(a, b, small, small_stride);
+  gemm(Transpose::kYes, a.count, b.count, a.rows, 1.0, a.values, a.stride, b.values, b.stride, 0.0, small, small_stride);
+}
+
+Matrix multiply_transposed(const comm::Communicator& comm, const Columns& a, const Columns& b) {
+  Matrix products = Matrix::Zero(a.count, b.count);
+  multiply_transposed(a, b, products.data(), a.count);
+  comm.sum(entries(products));
+  return products;
+}
+
+void subtract_product(const Columns& a, const double* small, int small_stride, const Columns& b) {
+  if (a.count == 0 || b.count == 0) return;
+  petsc::add_flops(2.0 * static_cast<double>(a.rows) * a.count * b.count);
+  if (b.count <= kNarrow && has_avx512()) return subtract_product_avx512(a, small, small_stride, b);
+  gemm(Transpose::kNo, a.rows, b.count, a.count, -1.0, a.values, a.stride, small, small_stride, 1.0, b.values, b.stride);
+}
+
+void combine_columns(const Columns& a, const double* small, int kept) {
+  if (a.count == 0 || kept == 0) return;
+  petsc::add_flops(2.0 * static_cast<double>(a.rows) * a.count * kept);
+  if (has_avx512()) return combine_columns_avx512(a, small, kept);
+  std::vector<double> panel(static_cast<std::size_t>(kRowsCombined) * static_cast<std::size_t>(a.count));
+  for (std::ptrdiff_t first = 0; first < a.rows; first += kRowsCombined) {
+    const std::ptrdiff_t rows = std::min(kRowsCombined, a.rows - first);
+    for (int j = 0; j < a.count; ++j) std::copy_n(a.column(j) + first, rows, panel.data() + j * kRowsCombined);
+    gemm(Transpose::kNo, rows, kept, a.count, 1.0, panel.data(), kRowsCombined, small, a.count, 0.0, a.values + first, a.stride);
+  }
+}
+
+}  // namespace carillon::la

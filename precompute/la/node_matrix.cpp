@@ -1,0 +1,292 @@
+// Method:     Compressed rows of node blocks; sixteen right-hand sides in row-major order, so that every product with an entry is a vector
+//             operation and a node's values are one stretch of memory.
+//             A matrix of blocks is a stiffness, which answers to differences of displacement alone: y_i = sum_j K_ij (x_j - x_i) + (sum_j
+//             K_ij) x_i, where the last sum is zero but for rounding unless the node has a fixed neighbour. Written so, the rounding of K
+//             and of the product is that of the differences, and motions that are nearly rigid, the low modes of thin bodies, keep digits.
+// Source:     Im, Yelick, Vuduc, Sparsity: optimization framework for sparse matrix kernels, 2004 (register blocks, multiple vectors).
+// Deviations: none.
+#include "precompute/la/node_matrix.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "precompute/petsc/session.hpp"
+#include "precompute/petsc/work.hpp"
+
+namespace carillon::la {
+namespace {
+
+using petsc::check;
+
+constexpr int kStrip = NodeMatrix::kStrip;
+using Row = NodeMatrix::Row;
+#if defined(__x86_64__)
+#define CARILLON_CLONES __attribute__((target_clones("avx512f", "arch=haswell", "default")))
+#else
+#define CARILLON_CLONES
+#endif
+
+constexpr std::size_t kNodes = 32;  // whose products are put back at a time, while the first-level cache has them
+
+typedef double Vector __attribute__((vector_size(64), may_alias));
+constexpr int kVectors = kStrip / 8;
+
+// One row of nodes: y (3 x 16) = rest (3 x 3) times its own x (3 x 16) + sum of blocks (3 x 3) times differences from it. All loops over
+// the sums are unrolled: GCC 12 sends them through memory otherwise.
+CARILLON_CLONES void multiply_blocks(const std::int64_t* start, const std::int32_t* neighbour, const double* values, const double* rest,
+                                     std::size_t nodes, const Row* own_rows, const Row* x, Row* y) {
+  auto* out = reinterpret_cast<Vector*>(y);
+  const auto* own_row = reinterpret_cast<const Vector*>(own_rows);
+  for (std::size_t node = 0; node < nodes; ++node, out += 3 * kVectors, own_row += 3 * kVectors, rest += 9) {
+    Vector sum[3][kVectors];
+    Vector own[3 * kVectors];
+#pragma GCC unroll 6
+    for (int v = 0; v < 3 * kVectors; ++v) own[v] = own_row[v];
+#pragma GCC unroll 3
+    for (int d = 0; d < 3; ++d)
+#pragma GCC unroll 2
+      for (int v = 0; v < kVectors; ++v)
+        sum[d][v] = rest[3 * d] * own[v] + rest[3 * d + 1] * own[kVectors + v] + rest[3 * d + 2] * own[2 * kVectors + v];
+    for (std::int64_t k = start[node]; k < start[node + 1]; ++k) {
+      const double* a = values + 9 * k;
+      const auto* from = reinterpret_cast<const Vector*>(x + 3 * static_cast<std::ptrdiff_t>(neighbour[k]));
+#pragma GCC unroll 3
+      for (int d = 0; d < 3; ++d)
+#pragma GCC unroll 2
+        for (int v = 0; v < kVectors; ++v)
+          sum[d][v] += a[3 * d] * (from[v] - own[v]) + a[3 * d + 1] * (from[kVectors + v] - own[kVectors + v]) +
+                       a[3 * d + 2] * (from[2 * kVectors + v] - own[2 * kVectors + v]);
+    }
+#pragma GCC unroll 3
+    for (int d = 0; d < 3; ++d)
+#pragma GCC unroll 2
+      for (int v = 0; v < kVectors; ++v) out[d * kVectors + v] = sum[d][v];
+  }
+}
+
+CARILLON_CLONES void multiply_scalars(const std::int64_t* start, const std::int32_t* neighbour, const double* values, std::size_t nodes,
+                                      const Row* x, Row* y) {
+  constexpr int kAll = 3 * kVectors;
+  auto* out = reinterpret_cast<Vector*>(y);
+  for (std::size_t node = 0; node < nodes; ++node, out += kAll) {
+    Vector sum[kAll];
+#pragma GCC unroll 6
+    for (int v = 0; v < kAll; ++v) sum[v] = Vector{};
+    for (std::int64_t k = start[node]; k < start[node + 1]; ++k) {
+      const auto* from = reinterpret_cast<const Vector*>(x + 3 * static_cast<std::ptrdiff_t>(neighbour[k]));
+#pragma GCC unroll 6
+      for (int v = 0; v < kAll; ++v) sum[v] += values[k] * from[v];
+    }
+#pragma GCC unroll 6
+    for (int v = 0; v < kAll; ++v) out[v] = sum[v];
+  }
+}
+
+// Sixteen columns at most.
+void to_rows(const Columns& x, Row* out) {
+  constexpr std::ptrdiff_t kRows = 64;
+  for (std::ptrdiff_t r = 0; r < x.rows; r += kRows) {
+    const std::ptrdiff_t last = std::min(r + kRows, x.rows);
+    for (int c = 0; c < kStrip; ++c) {
+      if (c < x.count) {
+        const double* column = x.column(c);
+        for (std::ptrdiff_t i = r; i < last; ++i) out[i].column[c] = column[i];
+      } else {
+        for (std::ptrdiff_t i = r; i < last; ++i) out[i].column[c] = 0;
+      }
+    }
+  }
+}
+
+struct Block {
+  PetscInt node = 0;
+  std::array<double, 9> values{};
+};
+
+// Three rows of a node as blocks, ascending by node. The rows of an elastic body share their pattern, so inserting is rare.
+void read_node_row(Mat matrix, double factor, PetscInt row, std::vector<Block>& blocks) {
+  blocks.clear();
+  for (PetscInt d = 0; d < 3; ++d) {
+    PetscInt count = 0;
+    const PetscInt* columns = nullptr;
+    const PetscScalar* values = nullptr;
+    check(MatGetRow(matrix, row + d, &count, &columns, &values));
+    std::size_t at = 0;
+    for (PetscInt k = 0; k < count; ++k) {
+      const PetscInt node = columns[k] / 3;
+      while (at < blocks.size() && blocks[at].node < node) ++at;
+      if (at == blocks.size() || blocks[at].node != node) blocks.insert(blocks.begin() + static_cast<std::ptrdiff_t>(at), Block{node, {}});
+      blocks[at].values[static_cast<std::size_t>(3 * d + columns[k] % 3)] = factor * values[k];
+    }
+    check(MatRestoreRow(matrix, row + d, &count, &columns, &values));
+  }
+}
+
+bool is_scalar(const std::array<double, 9>& block) {
+  for (const std::size_t i : {1, 2, 3, 5, 6, 7}) {
+    if (block[i] != 0) return false;
+  }
+  return block[0] == block[4] && block[0] == block[8];
+}
+
+bool is_diagonal_block(const std::array<double, 9>& block) {
+  return std::all_of(block.begin(), block.end(), [&](const double& v) { return v == 0 || (&v - block.data()) % 4 == 0; });
+}
+
+}  // namespace
+
+NodeMatrix::NodeMatrix(Mat matrix, double factor) { read(matrix, factor); }
+
+void NodeMatrix::read(Mat matrix, double factor) {
+  const comm::Communicator comm = petsc::get_communicator(matrix);
+  PetscInt first = 0;
+  PetscInt last = 0;
+  check(MatGetOwnershipRange(matrix, &first, &last));
+  nodes_ = static_cast<std::size_t>((last - first) / 3);
+  bool only_diagonal = true;
+  bool only_scalars = true;
+  std::vector<PetscInt> global;
+  start_.push_back(0);
+  std::vector<Block> blocks;
+  for (PetscInt row = first; row < last; row += 3) {
+    read_node_row(matrix, factor, row, blocks);
+    for (const auto& [node, block] : blocks) {
+      if (std::all_of(block.begin(), block.end(), [](double v) { return v == 0; })) continue;
+      only_diagonal = only_diagonal && 3 * node == row && is_diagonal_block(block);
+      only_scalars = only_scalars && is_scalar(block);
+      global.push_back(node);
+      values_.insert(values_.end(), block.begin(), block.end());
+    }
+    start_.push_back(static_cast<std::int64_t>(global.size()));
+  }
+  kind_ = comm::Communicator(comm).all(only_diagonal)  ? Kind::kDiagonal
+          : comm::Communicator(comm).all(only_scalars) ? Kind::kScalars
+                                                       : Kind::kBlocks;
+  if (kind_ == Kind::kDiagonal) {
+    diagonal_.assign(3 * nodes_, 0.0);
+    for (std::size_t node = 0; node < nodes_; ++node) {
+      if (start_[node] == start_[node + 1]) continue;
+      for (std::size_t d = 0; d < 3; ++d) diagonal_[3 * node + d] = values_[9 * static_cast<std::size_t>(start_[node]) + 4 * d];
+    }
+    start_ = {};
+    values_ = {};
+    return;
+  }
+  if (kind_ == Kind::kScalars) {
+    for (std::size_t k = 0; k < global.size(); ++k) values_[k] = values_[9 * k];
+    values_.resize(global.size());
+    values_.shrink_to_fit();
+  }
+  if (kind_ == Kind::kBlocks) sum_rows();
+  const PetscInt first_node = first / 3;
+  std::vector<PetscInt> ghosts;
+  for (const PetscInt node : global) {
+    if (node < first_node || node >= last / 3) ghosts.push_back(node);
+  }
+  std::sort(ghosts.begin(), ghosts.end());
+  ghosts.erase(std::unique(ghosts.begin(), ghosts.end()), ghosts.end());
+  ghosts_ = ghosts.size();
+  for (const PetscInt node : global) {
+    if (node >= first_node && node < last / 3) {
+      neighbour_.push_back(static_cast<std::int32_t>(node - first_node));
+    } else {
+      const auto at = std::lower_bound(ghosts.begin(), ghosts.end(), node) - ghosts.begin();
+      neighbour_.push_back(static_cast<std::int32_t>(nodes_) + static_cast<std::int32_t>(at));
+    }
+  }
+  plan_exchange(matrix, ghosts);
+}
+
+void NodeMatrix::sum_rows() {
+  constexpr long double kRoundings = 256 * std::numeric_limits<double>::epsilon();  // a node has some tens of elements
+  rest_.assign(9 * nodes_, 0.0);
+  for (std::size_t node = 0; node < nodes_; ++node) {
+    std::array<long double, 9> sum{};
+    long double size = 0;
+    for (auto k = static_cast<std::size_t>(start_[node]); k < static_cast<std::size_t>(start_[node + 1]); ++k)
+      for (std::size_t i = 0; i < 9; ++i) {
+        sum[i] += values_[9 * k + i];
+        size = std::max(size, std::abs(static_cast<long double>(values_[9 * k + i])));
+      }
+    for (std::size_t i = 0; i < 9; ++i)
+      if (std::abs(sum[i]) > kRoundings * size) rest_[9 * node + i] = static_cast<double>(sum[i]);
+  }
+}
+
+void NodeMatrix::plan_exchange(Mat matrix, const std::vector<PetscInt>& ghosts) {
+  const comm::Communicator comm = petsc::get_communicator(matrix);
+  if (comm.size() == 1) return;
+  const PetscInt* ranges = nullptr;
+  check(MatGetOwnershipRanges(matrix, &ranges));
+  std::vector<PetscSFNode> remote(ghosts.size());
+  for (std::size_t i = 0; i < ghosts.size(); ++i) {
+    const PetscInt row = 3 * ghosts[i];
+    const auto owner = std::upper_bound(ranges, ranges + comm.size() + 1, row) - ranges - 1;
+    remote[i].rank = static_cast<PetscInt>(owner);
+    remote[i].index = (row - ranges[owner]) / 3;
+  }
+  check(PetscSFCreate(comm, exchange_.out()));
+  check(PetscSFSetGraph(exchange_, static_cast<PetscInt>(nodes_), static_cast<PetscInt>(ghosts.size()), nullptr, PETSC_COPY_VALUES,
+                        remote.data(), PETSC_COPY_VALUES));
+  check(PetscSFSetUp(exchange_));
+}
+
+void NodeMatrix::pack(const Columns& x, int first, std::vector<Row>& packed) const {
+  // What is packed is multiplied once.
+  if (kind_ != Kind::kDiagonal) petsc::add_flops((kind_ == Kind::kScalars ? 6.0 : 18.0) * kStrip * static_cast<double>(neighbour_.size()));
+  packed.resize(3 * (nodes_ + ghosts_));
+  to_rows(x.part(first, std::min(kStrip, x.count - first)), packed.data());
+  if (exchange_.get() == nullptr) return;
+  MPI_Datatype node_values = MPI_DATATYPE_NULL;
+  MPI_Type_contiguous(3 * kStrip, MPI_DOUBLE, &node_values);
+  MPI_Type_commit(&node_values);
+  Row* ghosts = packed.data() + 3 * nodes_;
+  check(PetscSFBcastBegin(exchange_, node_values, packed.data(), ghosts, MPI_REPLACE));
+  check(PetscSFBcastEnd(exchange_, node_values, packed.data(), ghosts, MPI_REPLACE));
+  MPI_Type_free(&node_values);
+}
+
+void NodeMatrix::multiply_rows(const Row* packed, std::size_t begin, std::size_t nodes, Row* y) const {
+  if (kind_ == Kind::kDiagonal) {
+    for (std::size_t i = 0; i < 3 * nodes; ++i) {
+      const double by = diagonal_[3 * begin + i];
+      for (std::size_t c = 0; c < kStrip; ++c) y[i].column[c] = by * packed[3 * begin + i].column[c];
+    }
+    return;
+  }
+  if (kind_ == Kind::kScalars) return multiply_scalars(start_.data() + begin, neighbour_.data(), values_.data(), nodes, packed, y);
+  multiply_blocks(start_.data() + begin, neighbour_.data(), values_.data(), rest_.data() + 9 * begin, nodes, packed + 3 * begin, packed, y);
+}
+
+void NodeMatrix::unpack(const Row* rows, std::size_t begin, std::size_t nodes, const Columns& y) {
+  for (int c = 0; c < y.count; ++c) {
+    double* column = y.column(c) + 3 * begin;
+    for (std::size_t i = 0; i < 3 * nodes; ++i) column[i] = rows[i].column[c];
+  }
+}
+
+void NodeMatrix::multiply(const Columns& x, const Columns& y) const {
+  if (kind_ == Kind::kDiagonal) {
+    for (int j = 0; j < x.count; ++j) {
+      const double* from = x.column(j);
+      double* to = y.column(j);
+      for (std::ptrdiff_t i = 0; i < x.rows; ++i) to[i] = diagonal_[static_cast<std::size_t>(i)] * from[i];
+    }
+    return;
+  }
+  std::vector<Row> packed;
+  Row rows[3 * kNodes];
+  for (int first = 0; first < x.count; first += kStrip) {
+    pack(x, first, packed);
+    const Columns part = y.part(first, std::min(kStrip, x.count - first));
+    for (std::size_t node = 0; node < nodes_; node += kNodes) {
+      const std::size_t count = std::min(kNodes, nodes_ - node);
+      multiply_rows(packed.data(), node, count, rows);
+      unpack(rows, node, count, part);
+    }
+  }
+}
+
+}  // namespace carillon::la

@@ -1,0 +1,40 @@
+// Where the arrays of a VTKHDF file lie. HDF5 is only asked for that, and in a process of its own.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace carillon::parallel_mesh {
+
+/// Where a contiguous array of numbers lies in the file, row-major.
+struct ArrayPlace {
+  std::int64_t offset = 0;  // [byte] from the beginning of the file
+  std::int64_t rows = 0;
+  std::int64_t columns = 1;
+  int bytes = 0;  // of one number: 4 or 8 (floating point), 1, 2, 4 or 8 (integers)
+  bool is_floating = false;
+  bool is_signed = true;
+  bool is_big_endian = false;
+};
+
+struct Array : ArrayPlace {
+  std::string name = {};
+};
+
+struct Layout {
+  Array points;                   // (N, 3) floating point [m]
+  Array connectivity;             // (C) integers
+  Array offsets;                  // (E + 1) integers
+  Array types;                    // (E) integers
+  std::vector<Array> point_data;  // integer arrays (N) of PointData
+  std::vector<Array> cell_data;   // integer arrays (E) of CellData
+};
+
+/// Reads the layout of a VTKHDF file in a child process, which may crash or spin on a damaged file without harm to this one.
+/// Not collective. Throws InputError for what is no VTKHDF 1.0 UnstructuredGrid in one piece with contiguous arrays, all inside the file;
+/// SystemError when no child can be started.
+Layout find_layout(const std::filesystem::path& file);
+
+}  // namespace carillon::parallel_mesh

@@ -1,0 +1,120 @@
+// Method: find the arrays (layout), read blocks (read_block), cut (partition::bisect), move elements and number nodes
+//   (partition::redistribute), bring faces together (boundary).
+// Source: the steps name theirs.
+// Deviations: none.
+#include "precompute/parallel_mesh/read_parallel.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <fstream>
+#include <system_error>
+
+#include "partition/bisect.hpp"
+#include "partition/redistribute.hpp"
+#include "precompute/mesh/check_parts.hpp"
+#include "precompute/parallel_mesh/boundary.hpp"
+#include "precompute/parallel_mesh/layout.hpp"
+#include "precompute/parallel_mesh/read_block.hpp"
+#include "runtime/base/error.hpp"
+
+namespace carillon::parallel_mesh {
+namespace {
+
+template <typename Layout, typename Visit>
+void for_each_array(Layout& layout, const Visit& visit) {
+  for (auto* array : {&layout.points, &layout.connectivity, &layout.offsets, &layout.types}) visit(*array);
+  for (auto* list : {&layout.point_data, &layout.cell_data})
+    for (auto& array : *list) visit(array);
+}
+
+/// Rank 0 finds the layout, all get it. Collective.
+Layout broadcast_layout(const comm::Communicator& comm, const std::filesystem::path& file) {
+  Layout layout;
+  const auto names = comm.broadcast([&] {
+    layout = find_layout(file);
+    std::vector<std::string> list;
+    for_each_array(layout, [&](const Array& array) { list.push_back(array.name); });
+    return list;
+  });
+  const auto places = comm.broadcast([&] {
+    std::vector<ArrayPlace> list;
+    for_each_array(layout, [&](const Array& array) { list.push_back(array); });
+    return list;
+  });
+  const auto point_arrays = comm.broadcast(static_cast<std::int64_t>(layout.point_data.size()));
+  comm.agree([&] {
+    layout.point_data.resize(static_cast<std::size_t>(point_arrays));
+    layout.cell_data.resize(names.size() - 4 - layout.point_data.size());
+    std::size_t i = 0;
+    for_each_array(layout, [&](Array& array) {
+      array = {places[i], names[i]};
+      ++i;
+    });
+  });
+  return layout;
+}
+
+/// The quality of all elements from that of each rank's. Collective.
+void calc_quality(const comm::Communicator& comm, const partition::LocalMesh& local, mesh::CheckReport& report) {
+  const auto own = comm.agree([&] {
+    mesh::CheckReport quality;
+    mesh::TetMesh part;
+    part.order = local.order;
+    part.nodes_m = local.nodes_m;
+    part.tets = local.tets;
+    mesh::calc_quality(part, quality);
+    return quality;
+  });
+  std::array<double, 4> lowest{own.min_dihedral_deg, own.mean_ratio_min, own.mean_ratio_1_percent, own.shortest_edge_m};
+  std::array<double, 3> sum{own.volume_m3, own.mean_ratio_mean * local.tet_count(), static_cast<double>(own.slivers)};
+  comm.min(lowest);
+  comm.sum(sum);
+  report.max_dihedral_deg = comm.max(own.max_dihedral_deg);
+  report.min_dihedral_deg = lowest[0];
+  report.mean_ratio_min = lowest[1];
+  report.mean_ratio_1_percent = lowest[2];
+  report.shortest_edge_m = lowest[3];
+  report.volume_m3 = sum[0];
+  report.mean_ratio_mean = sum[1] / static_cast<double>(report.tets);
+  report.slivers = static_cast<std::int64_t>(sum[2]);
+}
+
+void collect_warnings(mesh::CheckReport& report) {
+  mesh::warn_of_elements(report);
+  if (report.touching_nodes > 0)
+    report.warnings.push_back(
+        fmt::format("{} nodes of the boundary lie in the place of another: cracks are not closed in meshes that are read in parallel, so "
+                    "the body may be in more parts than it seems ({} here)",
+                    report.touching_nodes, report.components));
+}
+
+}  // namespace
+
+bool is_parallel_format(const std::filesystem::path& file) {
+  constexpr char kSignature[] = "\x89HDF\r\n\x1a\n";
+  std::array<char, 8> begin{};
+  std::error_code error;  // A pipe without a writer would keep us waiting.
+  if (!std::filesystem::is_regular_file(file, error)) return false;
+  std::ifstream(file, std::ios::binary).read(begin.data(), begin.size());
+  return std::equal(begin.begin(), begin.end(), kSignature);
+}
+
+ParallelMesh read_parallel(const comm::Communicator& comm, const std::filesystem::path& file, const ReadOptions& options) {
+  const std::string name = file.string();
+  ParallelMesh result;
+  const Layout layout = broadcast_layout(comm, file);
+  partition::MeshBlock block = read_block(comm, file, name, layout, options, result.check);
+  result.fixed_nodes = comm.sum(std::int64_t{std::ranges::count_if(block.fixed, [](std::int32_t fixed) { return fixed != 0; })});
+  const auto part = partition::bisect(comm, block.centres_m, block.elements.own_begin());
+  std::vector<char> on_seam;
+  result.mesh = partition::redistribute(comm, name, block, part, !options.fixed.empty(), on_seam);
+  result.check.components = result.mesh.components;
+  result.boundary = find_boundary(comm, name, block.corners, on_seam, result.mesh, result.check);
+  calc_quality(comm, result.mesh.local, result.check);
+  comm.agree([&] { collect_warnings(result.check); });
+  return result;
+}
+
+}  // namespace carillon::parallel_mesh

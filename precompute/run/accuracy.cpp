@@ -1,0 +1,506 @@
+// Method:     A coarse solve gives every mode's error bar in parts whose rates of convergence are known. They say how much finer the mesh
+//             must be; its cost follows from the last trial's by the cost model, or by the exponent between two trials. What is predicted
+//             is then solved and its own error bars decide; where they fall short the rate that was measured between two trials slows a
+//             known one that is faster.
+// Source:     estimate::predict_cents (docs/error-bars.md); precompute/cost.
+// Deviations: none.
+#include "precompute/run/accuracy.hpp"
+
+#include <fmt/core.h>
+#include <json/json.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <type_traits>
+
+#include "precompute/cost/memory.hpp"
+#include "precompute/cost/seconds.hpp"
+#include "precompute/eigen/memory.hpp"
+#include "precompute/io/checkpoint_file.hpp"
+#include "precompute/parallel_mesh/read_parallel.hpp"
+#include "precompute/petsc/session.hpp"
+#include "runtime/base/failure.hpp"
+
+namespace carillon::run {
+namespace {
+
+constexpr std::size_t kMaxTrials = 7;
+constexpr std::int64_t kCoarseShapeNodes = 1500, kCoarseSurfaceNodes = 6000;
+constexpr double kGoal = 0.85;        // of what was asked: aimed at, so that the next trial is the last
+constexpr double kFinestStep = 0.25;  // the rates hold for edges so much shorter, see predict_cents()
+constexpr double kMinStep = 0.9;      // at most this: a trial with nearly the same edges gives no new information
+constexpr double kLinearFrom = 20e3;  // nodes with T10 above which T4 is tried, too
+constexpr int kMaxCounts = 4;         // asked of the mesher for one trial
+constexpr int kMaxRefinements = 4;    // of a mesh file: 4,096 elements of each
+
+/// What all ranks do next; decided on rank 0.
+struct Decision {
+  int is_done = 0;
+  Setting setting;
+};
+
+static_assert(std::is_trivially_copyable_v<Decision>, "Decisions are sent as bytes.");
+
+double calc_mean_edge(const comm::Communicator& comm, const partition::LocalMesh& local) {
+  std::array<double, 2> sum{};  // of lengths, of edges
+  for (auto tet = local.tets.begin(); tet != local.tets.end(); tet += local.nodes_per_tet())
+    for (const auto& [a, b] : mesh::kEdges) {
+      const Vec3 &p = local.nodes_m[tet[a]], &q = local.nodes_m[tet[b]];
+      sum[0] += std::hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]);
+      sum[1] += 1;
+    }
+  comm.sum(sum);
+  return sum[0] / sum[1];
+}
+
+/// The largest part of a bar that no mesh makes smaller: the facets of the surface leave it open what the body is.
+double calc_doubt(const estimate::ErrorBars& bars) {
+  double worst = 0.0;
+  for (const estimate::ErrorBars::Parts& parts : bars.parts) {
+    estimate::ErrorBars::Parts doubt;
+    doubt.doubt = parts.doubt;
+    doubt.doubt_noise = parts.doubt_noise;
+    worst = std::max(worst, estimate::predict_cents(doubt, bars.kind));
+  }
+  return worst;
+}
+
+/// The largest predicted bar on a mesh with edges `ratio` times as long. A refined mesh file keeps its facets.
+double predict_worst(const estimate::ErrorBars& bars, bool keeps_geometry, double ratio) {
+  double worst = 0.0, widest = 0.0, own = 0.0, own_then = 0.0;
+  for (std::size_t k = 0; k < bars.parts.size(); ++k) {
+    estimate::ErrorBars::Parts parts = bars.parts[k];
+    if (keeps_geometry) {
+      const double rate = std::pow(ratio, bars.kind == estimate::Kind::kT10Curved ? 4 : 2);
+      parts.geometry /= rate;
+      parts.geometry_noise /= rate;
+    }
+    // What the bar holds beyond its parts (modes that change places) shrinks with them.
+    const double now = estimate::predict_cents(bars.parts[k], bars.kind), then = estimate::predict_cents(parts, bars.kind, ratio);
+    worst = std::max(worst, std::clamp(bars.discretisation_cents[k] / std::max(now, 1e-300), 1.0, 10.0) * then);
+    widest = std::max(widest, bars.discretisation_cents[k]);
+    own = std::max(own, now);
+    own_then = std::max(own_then, then);
+  }
+  // The bars of the last modes follow from the widest, not from their own parts.
+  return own > 0.0 ? std::max(worst, widest / own * own_then) : worst;
+}
+
+/// The longest edges, as a part of those now, that are predicted to meet the goal; `least` if none above it does.
+double find_ratio(const estimate::ErrorBars& bars, double goal_cents, double min) {
+  if (predict_worst(bars, false, min) > goal_cents) return min;
+  double low = min, high = 1.0;
+  for (int i = 0; i < 40; ++i) {
+    const double middle = std::sqrt(low * high);
+    (predict_worst(bars, false, middle) <= goal_cents ? low : high) = middle;
+  }
+  return low;
+}
+
+class Search {
+ public:
+  explicit Search(Run& run) : run_(run), asked_(*run.job.accuracy_cents) {
+    report_.asked_cents = asked_;
+    tolerance_ = find_first_setting(run).tolerance;
+  }
+  AccurateBody solve();
+
+ private:
+  void attempt(const Setting& setting);
+  Trial judge(const Setting& setting, std::size_t first_phase);
+  Decision decide();
+  Decision decide_on_body();
+  Decision decide_on_file();
+  Setting make_setting(job::Element element, double ratio) const;
+  const Trial* find_before(const Trial& trial) const;
+  double measure_exponent(double Trial::*quantity, double fallback, double min, double max) const;
+  double find_dimension() const;
+  Forecast forecast(const Setting& setting, double ratio) const;
+  Forecast forecast_next() const;
+  std::string describe_surface(double cents) const;
+  void check_forecast(const Setting& setting);
+  std::string describe_reached() const;
+  [[noreturn]] void give_up(const std::string& why) const;
+
+  Run& run_;
+  double asked_;
+  double tolerance_;
+  bool is_refinable_ = false;       // the mesh file can be refined: rank 0 reads it
+  std::optional<Trial> quadratic_;  // while the linear trial is looked at: what ten nodes are predicted to need
+  Forecast quadratic_forecast_;
+  AccuracyReport report_;
+  AccurateBody current_;
+};
+
+/// The trial before, of the same element.
+const Trial* Search::find_before(const Trial& trial) const {
+  for (auto before = report_.trials.rbegin(); before != report_.trials.rend(); ++before)
+    if (before->setting.element == trial.setting.element && before->nodes < trial.nodes) return &*before;
+  return nullptr;
+}
+
+double Search::measure_exponent(double Trial::*quantity, double fallback, double min, double max) const {
+  const Trial& last = report_.trials.back();
+  const Trial* before = find_before(last);
+  if (before == nullptr || static_cast<double>(last.nodes) < 1.5 * static_cast<double>(before->nodes)) return fallback;
+  const double nodes = std::log(static_cast<double>(last.nodes) / static_cast<double>(before->nodes));
+  return std::clamp(std::log(last.*quantity / before->*quantity) / nodes, min, max);
+}
+
+/// The power of 1 / edges by which nodes grow: thin bodies refine in two directions.
+double Search::find_dimension() const { return -1.0 / measure_exponent(&Trial::edge_m, -1.0 / 3, -1.0 / 2, -1.0 / 3.3); }
+
+/// Peak of memory of all ranks for `size`, from that of a trial.
+double calc_bytes(const Trial& trial, const cost::ProblemSize& size) {
+  return static_cast<double>(trial.peak_bytes) * cost::predict_bytes(size, 1) / cost::predict_bytes(trial.size, 1);
+}
+
+/// From the last trial to edges `ratio` times as long.
+Forecast Search::forecast(const Setting& setting, double ratio) const {
+  const Trial& last = report_.trials.back();
+  Forecast next;
+  next.setting = setting;
+  const double growth = std::pow(ratio, -find_dimension());
+  next.nodes = static_cast<double>(last.nodes) * growth;
+  next.worst_cents =
+      predict_worst(current_.solved.errors.bars, setting.refinements > last.setting.refinements, ratio) + last.algebraic_cents;
+  const cost::ProblemSize finer = cost::refine(last.size, growth);
+  const double slower = cost::predict_seconds(finer).sum() / cost::predict_seconds(last.size).sum();
+  const double predicted = growth == 1.0 ? 1.0 : std::log(slower) / std::log(growth);
+  next.cpu_seconds = last.cpu_seconds * std::pow(growth, measure_exponent(&Trial::cpu_seconds, predicted, 1.0, 2.2));
+  next.bytes = calc_bytes(last, finer);
+  return next;
+}
+
+Setting Search::make_setting(job::Element element, double ratio) const {
+  const Trial& last = report_.trials.back();
+  Setting setting = last.setting;
+  setting.element = element;
+  setting.tolerance = tolerance_;
+  setting.nodes = std::llround(static_cast<double>(last.nodes) * std::pow(ratio, -find_dimension()));
+  return setting;
+}
+
+std::string Search::describe_reached() const {
+  std::string text = fmt::format("{:g} cents were asked for", asked_);
+  const Trial* best = nullptr;
+  for (const Trial& trial : report_.trials)
+    if (trial.modes > 0 && (best == nullptr || trial.worst_cents < best->worst_cents)) best = &trial;
+  if (best == nullptr) return text + ", and no mode was found in the band";
+  return text + fmt::format(", and {:.3g} reached (at {:.1f} Hz, {}, {} nodes, {:.1f} CPU s)", best->worst_cents, best->worst_hz,
+                            run::describe(best->setting), best->nodes, best->cpu_seconds);
+}
+
+std::string describe_forecast(const Forecast& next) {
+  return fmt::format("next stricter: {}, about {:.0f} nodes, {}, {:.1f} CPU s, {:.2g} GB",
+                     next.needs_new_mesh ? "a mesh file with edges half as long" : run::describe(next.setting), next.nodes,
+                     next.worst_cents > 0 ? fmt::format("{:.2g} cents", next.worst_cents) : std::string("cents unknown before it is tried"),
+                     next.cpu_seconds, next.bytes / 1e9);
+}
+
+void Search::give_up(const std::string& why) const {
+  throw SolveError(fmt::format("{}: key 'accuracy_cents': {}; {}; {}", run_.job.file.string(), describe_reached(), why,
+                               describe_forecast(forecast_next())));
+}
+
+/// Why a mesh file whose surface is not that of the body ends at `cents`, and what would correct it.
+std::string Search::describe_surface(double cents) const {
+  const mesh::CheckReport& check = current_.body.check;
+  const std::string end =
+      fmt::format("refined without end this mesh would come to {:.3g}, because its surface is not that of the body", cents);
+  if (check.straightened > 0)
+    return end + fmt::format(
+                     ": it is of second order, but {} of its {} elements folded over and were made straight-sided, which leaves "
+                     "their faces flat; make the elements smaller where the surface bends, or give the surface itself (\"body\")",
+                     check.straightened, check.tets);
+  if (check.order == 2 && check.curved == 0)
+    return end +
+           ": it is of second order, but all its edges are straight; move the mid-side nodes onto the true surface, or give the surface "
+           "itself (\"body\")";
+  if (check.order == 2)
+    return end + " between its nodes, although it is of second order; take a finer mesh of second order, or the surface itself (\"body\")";
+  return end + "; take a finer mesh, one of second order on the true surface, or the surface itself (\"body\")";
+}
+
+/// Rank 0 decides on a body that is meshed here.
+Decision Search::decide_on_body() {
+  const Trial& last = report_.trials.back();
+  const estimate::ErrorBars& bars = current_.solved.errors.bars;
+  if (last.modes == 0) return {0, make_setting(last.setting.element, 0.5)};
+  if (last.setting.element == job::Element::T4 && quadratic_) {
+    // Ten nodes were tried first; the cheaper of the two forecasts is used.
+    const double ratio = find_ratio(bars, kGoal * asked_, kFinestStep / 4);
+    const Forecast linear = forecast(make_setting(job::Element::T4, ratio), ratio);
+    const bool is_linear_cheaper = linear.worst_cents <= asked_ && linear.cpu_seconds < quadratic_forecast_.cpu_seconds;
+    run_.log.print(fmt::format("T4 needs about {:.0f} nodes, T10 {:.0f}: {} is cheaper", linear.nodes, quadratic_forecast_.nodes,
+                               is_linear_cheaper ? "T4" : "T10"));
+    quadratic_.reset();
+    return {0, is_linear_cheaper ? linear.setting : quadratic_forecast_.setting};
+  }
+  double ratio = find_ratio(bars, kGoal * asked_, kFinestStep);
+  constexpr double kMinRateStep = 4.0 / 3;  // of edges: less says nothing of a rate
+  if (const Trial* before = find_before(last);
+      before != nullptr && before->modes > 0 && before->worst_cents > last.worst_cents && before->edge_m > kMinRateStep * last.edge_m) {
+    // A rate measured on coarse meshes is slower than what follows: half way between it and the known one.
+    const double order = std::log(before->worst_cents / last.worst_cents) / std::log(before->edge_m / last.edge_m);
+    const double measured = std::pow(kGoal * asked_ / last.worst_cents, 1.0 / std::clamp(order, 0.5, 6.0));
+    if (measured < ratio) ratio = std::sqrt(measured * ratio);
+  }
+  ratio = std::clamp(ratio, kFinestStep, kMinStep);
+  const Forecast next = forecast(make_setting(last.setting.element, ratio), ratio);
+  if (report_.trials.size() == 1 && next.nodes > kLinearFrom) {
+    quadratic_ = last;
+    quadratic_forecast_ = next;
+    Setting linear = last.setting;
+    linear.element = job::Element::T4;
+    return {0, linear};
+  }
+  return {0, next.setting};
+}
+
+/// Rank 0 decides on a mesh file: T4, T10, T10 refined.
+Decision Search::decide_on_file() {
+  const Trial& last = report_.trials.back();
+  Setting setting = last.setting;
+  setting.tolerance = tolerance_;
+  if (last.setting.element == job::Element::T4) {
+    setting.element = job::Element::T10;
+    return {0, setting};
+  }
+  if (!is_refinable_) give_up("this mesh file is read by all ranks in parts and is not refined; make a finer one");
+  const estimate::ErrorBars& bars = current_.solved.errors.bars;
+  int more = 1;
+  while (more < kMaxRefinements && predict_worst(bars, true, std::pow(0.5, more)) > asked_) ++more;
+  const double facets = predict_worst(bars, true, 1e-3);
+  if (last.modes > 0 && facets > asked_) give_up(describe_surface(facets));
+  setting.refinements += more;
+  if (setting.refinements > kMaxRefinements)
+    give_up(
+        fmt::format("{} uniform refinements would not do; take a finer mesh where the body is thin or has sharp corners", kMaxRefinements));
+  return {0, setting};
+}
+
+Decision Search::decide() {
+  const Trial& last = report_.trials.back();
+  if (last.modes > 0 && last.worst_cents <= asked_) return {1, last.setting};
+  if (const Trial* before = find_before(last); last.modes == 0 && before != nullptr && before->modes == 0)
+    return {1, last.setting};  // twice none: there is none
+  if (const double doubt = calc_doubt(current_.solved.errors.bars); doubt > asked_)
+    give_up(fmt::format(
+        "{:.3g} cents of it cannot be reduced by any mesh: the facets of the surface are so coarse that they may be planes or samples of "
+        "a smooth surface; give a surface in finer facets, or, if the facets are the body, mesh it with carillon-mesh --facets "
+        "and give the mesh",
+        doubt));
+  if (last.modes > 0 && last.algebraic_cents > 0.2 * asked_) tolerance_ = std::max(tolerance_ * 1e-2, 1e-12);
+  if (report_.trials.size() >= kMaxTrials) give_up(fmt::format("{} settings were tried; ask for less, or give the mesh", kMaxTrials));
+  return run_.job.body ? decide_on_body() : decide_on_file();
+}
+
+/// Refuses what the machine cannot hold before it is begun.
+void Search::check_forecast(const Setting& setting) {
+  double bytes = 0.0;
+  if (run_.comm.is_root()) {
+    const Trial& last = report_.trials.back();
+    double ratio = 1.0;
+    if (setting.element == last.setting.element && setting.nodes)
+      ratio = std::pow(static_cast<double>(*setting.nodes) / static_cast<double>(last.nodes), -1.0 / find_dimension());
+    if (setting.refinements > last.setting.refinements) ratio = std::pow(0.5, setting.refinements - last.setting.refinements);
+    bytes = ratio < 1.0 ? forecast(setting, ratio).bytes - static_cast<double>(last.peak_bytes) : 0.0;
+  }
+  bytes = run_.comm.broadcast(bytes);
+  eigen::check_memory(run_.comm, static_cast<std::int64_t>(std::clamp(bytes, 0.0, 1e18) / run_.comm.size()), 0,
+                      "The next setting (" + run::describe(setting) + ")");
+}
+
+Trial Search::judge(const Setting& setting, std::size_t first_phase) {
+  const SolvedBody& solved = current_.solved;
+  Trial trial;
+  trial.setting = setting;
+  trial.nodes = current_.body.pieces.nodes;
+  trial.tets = current_.body.pieces.tets;
+  trial.edge_m = calc_mean_edge(run_.comm, current_.body.pieces.local);
+  trial.modes = solved.modes.lambda.size();
+  trial.size = find_problem_size(run_, setting, current_.body);
+  trial.size.factor_flops = solved.modes.factor.flops;
+  trial.size.factor_entries = solved.modes.factor.entries;
+  trial.size.modes = static_cast<std::int64_t>(trial.modes);
+  for (std::size_t k = 0; k < trial.modes; ++k) {
+    const double cents = solved.errors.bars.algebraic_cents[k] + solved.errors.bars.discretisation_cents[k];
+    trial.algebraic_cents = std::max(trial.algebraic_cents, solved.errors.bars.algebraic_cents[k]);
+    if (cents <= trial.worst_cents) continue;
+    trial.worst_cents = cents;
+    trial.worst_hz = std::sqrt(solved.modes.lambda[k]) / (2 * std::numbers::pi);
+  }
+  const auto& phases = run_.log.get_phases();
+  for (std::size_t i = first_phase; i < phases.size(); ++i) trial.cpu_seconds += phases[i].cpu_seconds;
+  trial.peak_bytes = phases.back().peak_sum_bytes;
+  return trial;
+}
+
+void Search::attempt(const Setting& setting) {
+  current_ = {};  // before the next body needs the room
+  const std::size_t first_phase = run_.log.get_phases().size();
+  current_.setting = setting;
+  current_.body = make_trial_body(run_, current_.setting);
+  current_.solved = solve_body(run_, current_.setting, current_.body);
+  const Trial trial = judge(current_.setting, first_phase);
+  report_.trials.push_back(trial);
+  run_.log.print(trial.modes == 0 ? std::string("no mode in the band")
+                                  : fmt::format("error bars up to {:.3g} cents (at {:.1f} Hz); {:g} are asked", trial.worst_cents,
+                                                trial.worst_hz, asked_));
+}
+
+Forecast Search::forecast_next() const {
+  const Trial& last = report_.trials.back();
+  constexpr double kHalf = 0.5;  // of the edges, where the error bars do not say how much finer
+  if (run_.job.body) {
+    const double ratio =
+        last.modes == 0 ? kHalf : std::min(find_ratio(current_.solved.errors.bars, 0.5 * last.worst_cents, kFinestStep), kMinStep);
+    return forecast(make_setting(last.setting.element, ratio), ratio);
+  }
+  Setting setting = last.setting;
+  if (last.setting.element == job::Element::T4) {
+    setting.element = job::Element::T10;
+    const cost::ProblemSize quadratic = cost::make_quadratic(last.size);
+    const double slower = cost::predict_seconds(quadratic).sum() / cost::predict_seconds(last.size).sum();
+    return {setting, false, static_cast<double>(quadratic.nodes), 0.0, slower * last.cpu_seconds, calc_bytes(last, quadratic)};
+  }
+  const bool is_refined = is_refinable_ && setting.refinements < kMaxRefinements;
+  if (is_refined) ++setting.refinements;  // keeps the facets, which forecast() knows
+  Forecast next = forecast(setting, kHalf);
+  next.needs_new_mesh = !is_refined;
+  return next;
+}
+
+AccurateBody Search::solve() {
+  if (run_.progress) run_.progress->begin_trials();
+  const Setting setting = find_first_setting(run_);
+  if (!run_.job.body) {
+    run_.comm.agree([&] { is_refinable_ = run_.comm.is_root() && !parallel_mesh::is_parallel_format(run_.job.mesh); });
+  }
+  for (Decision decision{0, setting}; decision.is_done == 0;) {
+    const std::string reached = report_.trials.empty() ? "" : describe_reached() + ". ";
+    try {
+      if (!report_.trials.empty()) check_forecast(decision.setting);
+      attempt(decision.setting);
+    } catch (const std::exception&) {
+      rethrow_after(reached);
+    }
+    run_.comm.agree([&] {
+      if (run_.comm.is_root()) decision = decide();
+      // The decision depends on CPU seconds, which differ from run to run; a resumed run takes the mesh of the interrupted one.
+      if (const Setting* kept = run_.checkpoint ? run_.checkpoint->find_setting(report_.trials.size()) : nullptr;
+          kept != nullptr && decision.is_done == 0)
+        decision.setting = *kept;
+    });
+    decision = run_.comm.broadcast(decision);
+  }
+  if (run_.comm.is_root()) {
+    report_.next = forecast_next();
+    const Trial& last = report_.trials.back();
+    const std::string reached = last.modes == 0 ? std::string("no mode in the band, and none on the coarser meshes")
+                                                : fmt::format("error bars up to {:.3g} cents of {:g} asked", last.worst_cents, asked_);
+    run_.log.print(
+        fmt::format("chosen: {}, {} nodes: {}, {:.1f} CPU s", run::describe(last.setting), last.nodes, reached, last.cpu_seconds));
+    run_.log.print(describe_forecast(report_.next));
+  }
+  current_.report = report_;
+  return std::move(current_);
+}
+
+Json::Value describe_setting(const Setting& setting) {
+  Json::Value value;
+  value["element"] = job::to_text(setting.element);
+  value["tolerance"] = setting.tolerance;
+  if (setting.nodes) value["body_nodes"] = Json::Int64(*setting.nodes);
+  if (setting.edge_m) value["body_edge_m"] = *setting.edge_m;
+  if (setting.refinements > 0) value["refinements"] = setting.refinements;
+  return value;
+}
+
+}  // namespace
+
+Setting find_first_setting(const Run& run) {
+  Setting setting;
+  setting.tolerance = std::clamp(2e-8 * run.job.accuracy_cents.value_or(0), 1e-10, 1e-6);
+  setting.element = run.job.body ? job::Element::T10 : job::Element::T4;
+  if (run.job.body) setting.nodes = run.job.body->shape.empty() ? kCoarseSurfaceNodes : kCoarseShapeNodes;
+  return setting;
+}
+
+namespace {
+
+/// Refuses a count of the mesher's own that this machine surely cannot solve, before the mesh is made.
+void check_count(const Run& run, const Setting& setting) {
+  constexpr double kSurely = 0.5;  // of a factor that is estimated by a power of the unknowns, to a factor of two
+  const cost::ProblemSize size = cost::estimate_meshed_size(setting.nodes.value_or(0), setting.element == job::Element::T10);
+  const auto bytes = static_cast<std::int64_t>(kSurely * cost::predict_parts(size).factor);
+  eigen::check_memory(run.comm, bytes / run.comm.size(), 0, fmt::format("The coarsest mesh of this body ({} nodes)", size.nodes));
+}
+
+}  // namespace
+
+Body make_trial_body(Run& run, Setting& setting, Patience* patience) {
+  const bool is_body = run.job.body.has_value();
+  for (int count = 1;; ++count) {
+    Patience endless;
+    Patience& left = patience != nullptr ? *patience : endless;
+    left.possible_nodes = 0;
+    const auto start = std::chrono::steady_clock::now();
+    try {
+      return make_body(run, setting, is_body ? &left : nullptr);
+    } catch (const InputError&) {
+      const std::chrono::duration<double> gone = std::chrono::steady_clock::now() - start;
+      left.seconds = std::max(left.seconds - gone.count(), 0.0);
+      const std::int64_t nodes = run.comm.broadcast(left.possible_nodes);
+      if (nodes == 0 || nodes == setting.nodes || count == kMaxCounts) throw;
+      run.log.print(fmt::format("{} nodes cannot be met on this body; {} are tried", setting.nodes.value_or(0), nodes));
+      setting.nodes = nodes;
+      if (patience == nullptr) check_count(run, setting);
+    }
+  }
+}
+
+AccurateBody solve_to_accuracy(Run& run) { return Search(run).solve(); }
+
+std::string describe(const Setting& setting) {
+  std::string text = job::to_text(setting.element);
+  if (setting.nodes) text += fmt::format(", meshed with {} nodes", *setting.nodes);
+  if (setting.edge_m) text += fmt::format(", meshed with edges of {:.3g} m", *setting.edge_m);
+  if (setting.refinements > 0) text += fmt::format(", refined {} time{}", setting.refinements, setting.refinements == 1 ? "" : "s");
+  return text + fmt::format(", tolerance {:.0e}", setting.tolerance);
+}
+
+Json::Value describe_accuracy(const AccuracyReport& report) {
+  Json::Value root;
+  root["asked_cents"] = report.asked_cents;
+  for (const Trial& trial : report.trials) {
+    Json::Value entry = describe_setting(trial.setting);
+    entry["nodes"] = Json::Int64(trial.nodes);
+    entry["tets"] = Json::Int64(trial.tets);
+    entry["mean_edge_m"] = trial.edge_m;
+    entry["modes"] = Json::UInt64(trial.modes);
+    entry["worst_cents"] = trial.worst_cents;
+    entry["worst_hz"] = trial.worst_hz;
+    entry["algebraic_cents"] = trial.algebraic_cents;
+    entry["cpu_seconds"] = trial.cpu_seconds;
+    entry["peak_bytes_all_ranks"] = Json::Int64(trial.peak_bytes);
+    root["trials"].append(entry);
+  }
+  if (!report.trials.empty()) root["chosen"] = root["trials"][static_cast<Json::ArrayIndex>(report.trials.size() - 1)];
+  if (report.next.nodes > 0) {
+    Json::Value& next = root["next_stricter"] = describe_setting(report.next.setting);
+    if (report.next.needs_new_mesh) next["needs_new_mesh"] = true;
+    next["nodes"] = std::round(report.next.nodes);
+    next["worst_cents"] = report.next.worst_cents > 0 ? Json::Value(report.next.worst_cents) : Json::Value();
+    next["cpu_seconds"] = report.next.cpu_seconds;
+    next["peak_bytes_all_ranks"] = std::round(report.next.bytes);
+  }
+  return root;
+}
+
+}  // namespace carillon::run

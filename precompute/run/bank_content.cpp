@@ -1,0 +1,145 @@
+#include "precompute/run/bank_content.hpp"
+
+#include <fmt/core.h>
+#include <json/json.h>
+
+#include <algorithm>
+#include <map>
+#include <utility>
+
+#include "precompute/run/describe_run.hpp"
+#include "precompute/run/modes.hpp"
+#include "runtime/base/json.hpp"
+
+namespace carillon::run {
+namespace {
+
+bank::Damping make_damping(const fem::Materials& materials) {
+  bank::Damping damping;
+  if (materials.list.size() > 1) {
+    damping.law = "mixed";
+    return damping;
+  }
+  const job::Material& material = materials.list[0];
+  switch (material.law) {
+    case job::DampingLaw::rayleigh:
+      damping.law = "rayleigh";
+      break;
+    case job::DampingLaw::internal_friction:
+      damping.law = "internal_friction";
+      damping.coefficient = {material.tan_phi};
+      break;
+    case job::DampingLaw::caughey:
+      damping.law = "caughey";
+      for (const job::CaugheyTerm& term : material.caughey) {
+        damping.coefficient.push_back(term.coefficient);
+        damping.power.push_back(term.power);
+      }
+      break;
+    case job::DampingLaw::loss_table:
+      damping.law = "loss_table";
+      for (const job::LossRow& row : material.loss_table) {
+        damping.freq_hz.push_back(row.freq_hz);
+        damping.loss_factor.push_back(row.loss_factor);
+      }
+      break;
+  }
+  return damping;
+}
+
+/// One material as it is, several or an orthotropic one as their isotropic equivalent. The density is that of the whole.
+bank::Material make_material(const SolvedBody& solved) {
+  const auto& list = solved.properties.materials.list;
+  bank::Material material;
+  if (list.size() == 1) {
+    material = {list[0].young_modulus_pa, list[0].poisson_ratio, list[0].density_kg_m3, 0.0, 0.0};
+    if (list[0].law == job::DampingLaw::rayleigh) {
+      material.alpha1_s = list[0].alpha1_s;
+      material.alpha2_per_s = list[0].alpha2_per_s;
+    }
+  } else {
+    const job::Equivalent equivalent = job::calc_equivalent(list, solved.properties.volume_m3);
+    material = {equivalent.young_modulus_pa, equivalent.poisson_ratio, equivalent.density_kg_m3, 0.0, 0.0};
+  }
+  return material;
+}
+
+std::string make_regions(const SolvedBody& solved) {
+  const auto& materials = solved.properties.materials;
+  const bool is_plain = materials.list.size() == 1 && !materials.list[0].orthotropic;
+  return is_plain ? std::string() : write_json(describe_materials(materials, solved.properties.volume_m3));
+}
+
+/// Names are those of the job, or what the nodes are; of several patches of one entry each has a number.
+bank::Supports make_supports(const job::JobSpec& job, const fem::Supports& found) {
+  bank::Supports supports;
+  base::Json supports_json = base::Json::object();
+  std::map<std::int32_t, int> patches, seen;
+  for (const fem::Support& support : found.list) ++patches[support.entry];
+  for (const fem::Support& support : found.list) {
+    const job::Fixed& fixed = job.fixed[static_cast<std::size_t>(support.entry)];
+    std::string name = !fixed.name.empty() ? fixed.name : fixed.node_set ? *fixed.node_set : fmt::format("box {}", support.entry + 1);
+    if (patches[support.entry] > 1) name += fmt::format(":{}", ++seen[support.entry]);
+    supports_json.member("supports").add(material::write_fixing(fixed.fixing, base::Json::object().set("name", name)));
+    supports.centre_m.push_back(support.centre_m);
+    supports.normal.push_back(support.normal);
+    supports.area_m2.push_back(support.area_m2);
+    supports.thickness_m.push_back(support.thickness_m);
+  }
+  if (!found.list.empty()) supports.text = supports_json.line();
+  supports.reaction = found.reaction;
+  supports.energy = found.energy;
+  return supports;
+}
+
+bank::Proof make_proof(const eigen::Modes& modes) {
+  bank::Proof proof;
+  for (const eigen::Count& count : modes.proof.counts) {
+    proof.cut_hz.push_back(count.freq_hz);
+    proof.below.push_back(count.below);
+    proof.margin.push_back(std::min(count.margin, 1.0));
+  }
+  proof.rigid_per_component = modes.proof.rigid_per_component;
+  proof.found = modes.proof.found;
+  proof.orthonormality = modes.orthonormality_error;
+  proof.backward_error = modes.proof.factor_backward_error;
+  for (const eigen::Cluster& cluster : modes.proof.clusters) {
+    proof.cluster_first.push_back(cluster.first);
+    proof.cluster_count.push_back(cluster.count);
+  }
+  proof.method = modes.proof.method;
+  return proof;
+}
+
+}  // namespace
+
+bank::Bank make_bank(const job::JobSpec& job, const Setting& setting, Body& body, const SolvedBody& solved,
+                     io::SurfaceModes& surface_modes) {
+  const eigen::Modes& modes = solved.modes;
+  bank::Bank bank;
+  bank.vertices_m = std::move(body.surface.vertices_m);
+  bank.triangles = std::move(body.surface.triangles);
+  bank.eigenvalue_rad2_s2 = modes.lambda;
+  bank.residual = modes.residual;
+  bank.decay_per_s = solved.errors.decay_per_s;
+  bank.radiation_gain = std::move(surface_modes.radiation_gain);
+  bank.shape_scale = std::move(surface_modes.shape_scale);
+  bank.shape = std::move(surface_modes.shape);
+  bank.algebraic_error_cents = solved.errors.bars.algebraic_cents;
+  bank.discretisation_error_cents = solved.errors.bars.discretisation_cents;
+  bank.rigid = {solved.properties.rigid.mass_kg, solved.properties.rigid.centre_m, solved.properties.rigid.inertia_kg_m2,
+                solved.properties.rigid.volume_m3};
+  bank.material = make_material(solved);
+  bank.damping = make_damping(solved.properties.materials);
+  bank.regions = make_regions(solved);
+  bank.supports = make_supports(job, solved.errors.supports);
+  bank.proof = make_proof(modes);
+  bank.counts = {body.pieces.nodes, body.pieces.tets, body.pieces.components, modes.rigid_count};
+  bank.band_hz = {find_low_hz(job, modes), job.band_hz[1]};
+  bank.complete = modes.band_count == static_cast<std::int64_t>(modes.lambda.size());
+  bank.element = job::to_text(setting.element);
+  bank.mass = job::to_text(job.mass);
+  return bank;
+}
+
+}  // namespace carillon::run

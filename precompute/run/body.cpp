@@ -1,0 +1,219 @@
+#include "precompute/run/body.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "partition/distribute.hpp"
+#include "precompute/cost/calibration.hpp"
+#include "precompute/mesh/read.hpp"
+#include "precompute/parallel_mesh/read_parallel.hpp"
+#include "precompute/petsc/session.hpp"
+#include "precompute/run/meshing.hpp"
+#include "precompute/run/refine_mesh.hpp"
+
+namespace carillon::run {
+namespace {
+
+/// A fixed node, and the first entry of the job's "fixed" that names it.
+struct FixedNode {
+  std::int32_t node, entry;
+};
+
+/// The nodes of all sets and boxes that the job fixes, each once, ascending.
+std::vector<FixedNode> find_fixed_nodes(const mesh::TetMesh& mesh, const job::JobSpec& job) {
+  std::vector<FixedNode> list;
+  for (std::size_t entry = 0; entry < job.fixed.size(); ++entry) {
+    const job::Fixed& fixed = job.fixed[entry];
+    try {
+      const auto nodes = fixed.node_set ? mesh::find_fixed_nodes(mesh, *fixed.node_set)
+                                        : mesh::find_fixed_nodes(mesh, (*fixed.box_m)[0], (*fixed.box_m)[1]);
+      for (const std::int32_t node : nodes) list.push_back({node, static_cast<std::int32_t>(entry)});
+    } catch (const InputError& error) {
+      throw InputError(fmt::format("{}: key 'fixed': {}", fixed.place.empty() ? job.file.string() : fixed.place, error.what()));
+    }
+  }
+  std::sort(list.begin(), list.end(),
+            [](const FixedNode& a, const FixedNode& b) { return std::pair(a.node, a.entry) < std::pair(b.node, b.entry); });
+  list.erase(std::unique(list.begin(), list.end(), [](const FixedNode& a, const FixedNode& b) { return a.node == b.node; }), list.end());
+  return list;
+}
+
+/// Sets on every rank which entry of the job fixes its nodes. `list` is read on rank 0. Collective.
+void broadcast_fixed_nodes(const comm::Communicator& comm, std::vector<FixedNode> list, partition::LocalMesh& local) {
+  list = comm.broadcast(std::move(list));
+  if (list.empty()) return;
+  comm.agree([&] { local.fixed_by.assign(local.nodes_m.size(), -1); });
+  for (std::size_t i = 0; i < local.node_in_mesh.size(); ++i) {
+    const std::int32_t node = local.node_in_mesh[i];
+    const auto at = std::lower_bound(list.begin(), list.end(), node, [](const FixedNode& a, std::int32_t b) { return a.node < b; });
+    if (at != list.end() && at->node == node) local.fixed_by[i] = at->entry;
+  }
+}
+
+/// What the check of the mesh found; of an odd size, with the key of the job that corrects it. Rank 0.
+void warn_of_mesh(Run& run, const Body& body) {
+  const std::vector<std::string>& warnings = body.check.warnings;
+  for (std::size_t i = 0; i < warnings.size(); ++i)
+    run.log.warn(i == 0 && body.check.has_odd_size ? warnings[i] + "; " + describe_scale_key(run.job) : warnings[i]);
+}
+
+/// Rank 0 only: the mesh of the element's order, checked, and what stays of it on this rank.
+mesh::TetMesh read_checked_mesh(Run& run, const Setting& setting, Body& body, Patience* patience) {
+  const bool quadratic = setting.element == job::Element::T10;
+  const job::JobSpec& job = run.job;
+  mesh::TetMesh mesh =
+      job.body ? make_body_mesh(*job.body, quadratic ? 2 : 1, {setting.nodes, setting.edge_m}, patience) : mesh::read_mesh(job.mesh);
+  if (patience != nullptr && patience->estimate) return {};
+  if (job.mesh_scale != 1.0) {
+    for (std::vector<Vec3>* lengths : {&mesh.nodes_m, &mesh.doubt_m}) {
+      for (Vec3& length : *lengths) {
+        for (double& x : length) x *= job.mesh_scale;
+      }
+    }
+  }
+  body.check = mesh::check_mesh(mesh, body.source);
+  body.region_names = mesh.region_names;
+  warn_of_mesh(run, body);
+  if (!mesh.doubt_m.empty())
+    run.log.warn(
+        "some facets of the surface are so coarse that they may be planes of the body or samples of a smooth surface; the error bars "
+        "contain both: a surface in finer facets settles it, or carillon-mesh --facets if the facets are the body");
+  for (int i = 0; i < setting.refinements; ++i) mesh = refine_mesh(mesh);
+  if (quadratic && mesh.order == 1) mesh = mesh::to_quadratic(mesh);
+  if (!quadratic && mesh.order == 2) mesh = mesh::to_linear(mesh);
+  mesh::Surface boundary = mesh::extract_boundary(mesh);
+  body.surface.vertices_m.reserve(boundary.nodes.size());
+  for (const std::int32_t node : boundary.nodes) body.surface.vertices_m.push_back(mesh.nodes_m[node]);
+  body.surface.triangles = std::move(boundary.triangles);
+  body.surface.row = std::move(boundary.nodes);  // nodes here; make_body() turns them into rows
+  return mesh;
+}
+
+void log_size(const Run& run, std::int64_t nodes, std::int64_t tets, int components, std::int64_t fixed_nodes) {
+  run.log.print(fmt::format("{} nodes, {} tetrahedra, {} component{}, {} fixed nodes", nodes, tets, components, components == 1 ? "" : "s",
+                            fixed_nodes));
+}
+
+/// CHOLMOD and MUMPS want the elimination order of the whole graph, which costs rank 0 time and memory; the factorisation of this project
+/// orders by itself, and MUMPS does so with more fill where it replaces it.
+bool wants_elimination_order(const job::JobSpec& job) {
+  return job.factorisation == job::Factorisation::mumps || job.factorisation == job::Factorisation::cholmod;
+}
+
+/// Every rank reads its part of the file.
+Body read_in_parallel(Run& run, const Setting& setting) {
+  Body body;
+  body.source = run.job.mesh.string();
+  run.log.begin("read", body.source + ", by all ranks");
+  parallel_mesh::ReadOptions options;
+  options.scale = run.job.mesh_scale;
+  options.order = setting.element == job::Element::T10 ? 2 : 1;
+  for (const job::Fixed& fixed : run.job.fixed)
+    options.fixed.push_back({fixed.node_set, fixed.box_m, (fixed.place.empty() ? run.job.file.string() : fixed.place) + ": key 'fixed'"});
+  parallel_mesh::ParallelMesh mesh = parallel_mesh::read_parallel(run.comm, run.job.mesh, options);
+  body.pieces = std::move(mesh.mesh);
+  body.check = std::move(mesh.check);
+  body.fixed_nodes = mesh.fixed_nodes;
+  body.surface = {std::move(mesh.boundary.vertices_m), std::move(mesh.boundary.triangles), std::move(mesh.boundary.row)};
+  warn_of_mesh(run, body);
+  log_size(run, body.pieces.nodes, body.pieces.tets, body.pieces.components, body.fixed_nodes);
+  run.log.print(partition::describe(body.pieces.report));
+  run.log.end();
+  return body;
+}
+
+bool is_parallel_format(const Run& run) {
+  return run.comm.broadcast([&] { return !run.job.body && parallel_mesh::is_parallel_format(run.job.mesh); });
+}
+
+Body make_pieces(Run& run, const Setting& setting, Patience* patience) {
+  if (run.progress) run.progress->set_size(estimate_size(run.job, setting));
+  if (is_parallel_format(run)) return read_in_parallel(run, setting);
+  Body body;
+  body.source = run.job.body ? describe(*run.job.body, {setting.nodes, setting.edge_m}) : run.job.mesh.string();
+  run.log.begin("read", body.source);
+  mesh::TetMesh mesh;
+  std::vector<FixedNode> fixed;
+  std::vector<std::int32_t> fixed_nodes;
+  comm::Communicator(run.comm).agree([&] {
+    if (!run.comm.is_root()) return;
+    mesh = read_checked_mesh(run, setting, body, patience);
+    if (patience != nullptr && patience->estimate) return;
+    fixed = find_fixed_nodes(mesh, run.job);
+    for (const FixedNode& one : fixed) fixed_nodes.push_back(one.node);
+    body.fixed_nodes = static_cast<std::int64_t>(fixed_nodes.size());
+    log_size(run, static_cast<std::int64_t>(mesh.nodes_m.size()), mesh.tet_count(), body.check.components, body.fixed_nodes);
+  });
+  run.log.end();
+  if (patience != nullptr && patience->estimate) {
+    body.estimate = patience->estimate;
+    return body;
+  }
+
+  run.log.begin("partition", "METIS k-way on the dual graph");
+  body.pieces = name_errors(body.source, run, [&] {
+    return partition::distribute(run.comm, mesh, fixed_nodes, {.elimination_order = wants_elimination_order(run.job)});
+  });
+  broadcast_fixed_nodes(run.comm, std::move(fixed), body.pieces.local);
+  mesh = {};
+  for (std::int32_t& row : body.surface.row) row = body.pieces.row_of_node[row];
+  body.pieces.row_of_node = {};
+  run.log.print(partition::describe(body.pieces.report));
+  run.log.end();
+  return body;
+}
+
+}  // namespace
+
+std::string describe_scale_key(const job::JobSpec& job) {
+  if (!job.body)
+    return job.mesh_scale == 1.0 ? "\"mesh_scale\": 0.001 in the job takes the mesh file's numbers for millimetres"
+                                 : fmt::format("\"mesh_scale\" of the job, metres per unit of the mesh file, is {:g}: {:g} for that",
+                                               job.mesh_scale, 0.001 * job.mesh_scale);
+  if (!job.body->shape.empty()) return "the dimensions of a shape are metres";
+  if (job.body->height_m) return fmt::format("\"height_m\" inside \"body\" is {:g}, in metres", *job.body->height_m);
+  const double scale = job.body->scale.value_or(1.0);
+  if (scale == 1.0) return "\"scale\": 0.001 inside \"body\" takes the surface's numbers for millimetres, and \"height_m\" gives it a size";
+  return fmt::format("\"scale\" inside \"body\", metres per unit of the surface, is {:g}: {:g} for that", scale, 0.001 * scale);
+}
+
+cost::ProblemSize estimate_size(const job::JobSpec& job, const Setting& setting) {
+  const bool is_quadratic = setting.element == job::Element::T10;
+  cost::ProblemSize size;
+  if (job.body) {
+    size = cost::estimate_meshed_size(setting.nodes.value_or(cost::kDefaultNodes), is_quadratic);
+    if (job.body->shape.empty()) size.read_seconds = cost::kSurfaceMeshSeconds;
+  } else {
+    std::error_code error;
+    const auto bytes = static_cast<std::int64_t>(std::filesystem::file_size(job.mesh, error));
+    size = cost::estimate_file_size(error ? 0 : bytes, is_quadratic, setting.refinements);
+  }
+  size.modes = job.max_modes;
+  return size;
+}
+
+cost::ProblemSize find_problem_size(const Run& run, const Setting& setting, const Body& body) {
+  cost::ProblemSize size;
+  size.is_quadratic = setting.element == job::Element::T10;
+  size.modes = run.job.max_modes;
+  size.nodes = body.pieces.nodes;
+  size.tets = body.pieces.tets;
+  size.unknowns = 3 * body.pieces.free_nodes;
+  size.surface_nodes = static_cast<std::int64_t>(body.surface.vertices_m.size());
+  for (const RunPhase& phase : run.log.get_phases())
+    if (phase.name == "read") size.read_seconds = phase.seconds;
+  return size;
+}
+
+Body make_body(Run& run, const Setting& setting, Patience* patience) {
+  Body body = make_pieces(run, setting, patience);
+  if (run.progress) run.progress->set_size(find_problem_size(run, setting, body));
+  return body;
+}
+
+}  // namespace carillon::run

@@ -1,0 +1,197 @@
+#include "precompute/run/meshing.hpp"
+
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <functional>
+#include <string_view>
+#include <vector>
+
+#include "precompute/mesh/read.hpp"
+#include "precompute/run/interrupt.hpp"
+#include "precompute/shapes/shapes.hpp"
+#include "runtime/base/command.hpp"
+#include "runtime/base/document.hpp"
+#include "runtime/base/failure.hpp"
+#include "runtime/base/result.hpp"
+
+namespace carillon::run {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Beyond the time for the mesh: for the surface as it was read, should its repair not end, and for its reading.
+constexpr double kLonger = 1.2, kRoughSeconds = 1.5, kReadSeconds = 2.5, kMinReadSeconds = 8;
+
+constexpr std::size_t kKeptBytes = 4096;  // of what carillon-mesh prints on standard error
+
+/// Runs carillon-mesh and keeps the end of its standard error. Once `may_stop` says so it is killed.
+base::Finished run_mesher(const std::vector<std::string>& words, Cleanup& cleanup,
+                          const std::function<bool(const std::string& errors)>& may_stop) {
+  base::RunOptions options{.max_bytes = kKeptBytes, .keeps_tail = true};
+  options.started = [&](pid_t child) { cleanup.set_child(child); };
+  if (may_stop) options.may_stop = [&](const base::Finished& now) { return may_stop(now.errors); };
+  base::Finished finished;
+  try {
+    finished = base::run({.words = words, .errors = base::kCapture}, options);
+  } catch (const base::StartError& error) {
+    throw SystemError(fmt::format("{}; it belongs next to this program", error.what()));
+  }
+  cleanup.set_child(0);
+  while (!finished.errors.empty() && finished.errors.back() == '\n') finished.errors.pop_back();
+  return finished;
+}
+
+std::string format_length(double metres) { return fmt::format("{:.17g}", metres); }
+
+// What carillon-mesh --estimate prints, each on a line of its own, before an object.
+constexpr std::string_view kRoughWord = "rough {", kEstimateWord = "estimate {", kInsteadWord = "instead {";
+
+bool has_line(const std::string& errors, std::string_view word) {
+  return errors.starts_with(word) || errors.find("\n" + std::string(word)) != std::string::npos;
+}
+
+/// The object of the line that begins with `word`, which is taken away.
+std::optional<base::Document> take_object(std::string& errors, std::string_view word) {
+  if (!has_line(errors, word)) return std::nullopt;
+  const std::size_t begin = errors.starts_with(word) ? 0 : errors.find("\n" + std::string(word)) + 1;
+  const std::size_t end = std::min(errors.find('\n', begin), errors.size());
+  const std::size_t brace = begin + word.size() - 1;
+  const std::string text = errors.substr(brace, end - brace);
+  errors.erase(begin, end + 1 - begin);
+  return base::parse_document(text, "carillon-mesh --estimate");
+}
+
+constexpr std::int64_t kMaxCount = 1'000'000'000'000'000;
+
+std::optional<BodyEstimate> take_estimate(std::string& errors, std::string_view word) {
+  std::optional<base::Document> object = take_object(errors, word);
+  if (!object) return std::nullopt;
+  base::Object root = object->root();
+  BodyEstimate estimate;
+  estimate.volume_m3 = root.number("volume_m3", base::kPositive);
+  estimate.area_m2 = root.number("area_m2", base::kPositive);
+  estimate.thickness_m = root.number("thickness_m", base::kPositive);
+  estimate.nodes = root.integer("nodes", 1, kMaxCount);
+  estimate.is_rough = word == kRoughWord;
+  return estimate;
+}
+
+[[noreturn]] void throw_failure(base::ResultKind kind, const std::string& message) {
+  switch (kind) {
+    case base::ResultKind::bad_input:
+      throw InputError(message);
+    case base::ResultKind::memory:
+      throw MemoryError(message);
+    case base::ResultKind::disk_full:
+      throw DiskFullError(message);
+    default:
+      throw SystemError(message);
+  }
+}
+
+mesh::TetMesh mesh_surface(const job::Body& body, int order, const Fineness& fineness, Patience* patience) {
+  std::string folder = (fs::temp_directory_path() / "carillon-mesh-XXXXXX").string();
+  if (::mkdtemp(folder.data()) == nullptr)
+    throw SystemError(fmt::format("{}: cannot make a temporary folder: {}", folder, std::strerror(errno)));
+  const std::string file = folder + "/body.msh";
+  Cleanup cleanup(file);
+  std::vector<std::string> words{
+      base::require_program("carillon-mesh").string(), body.surface.string(), "-o", file, "--order", std::to_string(order), "--quiet"};
+  const auto add = [&](const char* option, const std::string& value) {
+    words.push_back(option);
+    words.push_back(value);
+  };
+  if (body.wall_m) add("--wall", format_length(*body.wall_m));
+  if (body.height_m) add("--height", format_length(*body.height_m));
+  if (body.scale) add("--scale", format_length(*body.scale));
+  if (body.close_holes) add("--close-holes", format_length(*body.close_holes));
+  const std::string result_file = file + ".result";
+  add("--result", result_file);
+  add("--up", std::string(1, body.up));
+  add("--method", body.method);
+  if (fineness.nodes) add("--nodes", std::to_string(*fineness.nodes));
+  if (fineness.edge_m) add("--edge", format_length(*fineness.edge_m));
+  std::function<bool(const std::string&)> may_stop;
+  double max_s = 0;
+  if (patience != nullptr) {
+    words.push_back("--estimate");
+    max_s = std::max(kLonger * patience->seconds + kReadSeconds, kMinReadSeconds);
+    may_stop = [seconds = patience->seconds, max_s, start = std::chrono::steady_clock::now()](const std::string& errors) {
+      const double taken = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+      if (taken > seconds && has_line(errors, kEstimateWord)) return true;
+      return taken > max_s || (taken > kLonger * seconds + kRoughSeconds && has_line(errors, kRoughWord));
+    };
+  }
+  base::Finished ended = run_mesher(words, cleanup, may_stop);
+  const std::optional<base::Result> result = base::read_result(result_file);
+  ::unlink(result_file.c_str());
+  if (patience != nullptr) {
+    const std::optional<BodyEstimate> rough = take_estimate(ended.errors, kRoughWord), good = take_estimate(ended.errors, kEstimateWord);
+    if (std::optional<base::Document> instead = take_object(ended.errors, kInsteadWord))
+      patience->possible_nodes = instead->root().integer("nodes", 1, kMaxCount);
+    if (ended.was_stopped) {
+      if (!good && !rough)
+        throw InputError(fmt::format(
+            "{}: the surface is not even read after {:.0f} s; give more time (--patience), decimate it, or mesh it beforehand by "
+            "carillon-mesh and name the \"mesh\"",
+            body.place, max_s));
+      patience->estimate = good ? good : rough;
+      return {};
+    }
+  }
+  if (ended.exit_code == 0) return mesh::read_mesh(file);
+  const std::string failed = fmt::format("{}: the body cannot be meshed", body.place);
+  const bool has_reason = result && !result->message.empty();
+  if (ended.signal == 0)
+    throw_failure(result                          ? result->kind
+                  : ended.exit_code == kExitInput ? base::ResultKind::bad_input
+                                                  : base::ResultKind::system,
+                  fmt::format("{}: {}", failed,
+                              has_reason             ? result->message
+                              : ended.errors.empty() ? "carillon-mesh gave no reason"
+                                                     : ended.errors));
+  const int signal = ended.signal;
+  // It says itself where it broke down, if it still can; a signal that it sends itself comes from the surface, one from outside does not.
+  const bool is_own =
+      signal == SIGSEGV || signal == SIGBUS || signal == SIGABRT || signal == SIGFPE || signal == SIGILL || signal == SIGXCPU;
+  const std::string said = ended.errors.empty() ? "" : fmt::format(" after it wrote '{}'", ended.errors);
+  if (is_own)
+    throw InputError(
+        fmt::format("{}: carillon-mesh crashed on {}, by signal {} ({}){}; ask for another number of nodes, try \"method\": "
+                    "\"stuffing\", or repair the surface in a modeller",
+                    failed, body.surface.string(), signal, ::strsignal(signal), said));
+  throw SystemError(fmt::format("{}: carillon-mesh was ended from outside, by signal {} ({}){}; did memory run out?", failed, signal,
+                                ::strsignal(signal), said));
+}
+
+}  // namespace
+
+mesh::TetMesh make_body_mesh(const job::Body& body, int order, const Fineness& fineness, Patience* patience) {
+  if (body.shape.empty()) return mesh_surface(body, order, fineness, patience);
+  shapes::ShapeOptions options{.shape = body.shape, .dimensions = body.dimensions, .order = order};
+  options.target_nodes = fineness.nodes;
+  options.edge_m = fineness.edge_m;
+  try {
+    return shapes::make_shape(options);
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("{}: key 'body': {}", body.place, error.what()));
+  }
+}
+
+std::string describe(const job::Body& body, const Fineness& fineness) {
+  const std::string name = body.shape.empty() ? body.surface.string() : body.shape;
+  if (fineness.nodes) return fmt::format("{}, {} nodes wanted", name, *fineness.nodes);
+  if (fineness.edge_m) return fmt::format("{}, edges of {:.4g} m", name, *fineness.edge_m);
+  return name;
+}
+
+}  // namespace carillon::run

@@ -1,0 +1,46 @@
+// Meshes that a job asks for without a mesh file: parametric shapes, and surfaces by way of carillon-mesh.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+
+#include "precompute/job/job_spec.hpp"
+#include "precompute/mesh/tet_mesh.hpp"
+
+namespace carillon::run {
+
+/// How fine: at most one of them; neither means the mesher's default.
+struct Fineness {
+  std::optional<std::int64_t> nodes;  // of the mesh, mid-side nodes among them
+  std::optional<double> edge_m;
+};
+
+/// What the mesher says of a surface before it meshes.
+struct BodyEstimate {
+  double volume_m3 = 0;
+  double area_m2 = 0;  // of all skins
+  double thickness_m = 0;
+  std::int64_t nodes = 0;
+  bool is_rough = false;  // of the surface as it was read, before its repair
+};
+
+/// How long a mesher may take, and what it found out before it ended.
+struct Patience {
+  double seconds = std::numeric_limits<double>::infinity();  // of the clock
+  std::optional<BodyEstimate> estimate{};                    // set when they were too few: there is no mesh then
+  std::int64_t possible_nodes = 0;  // set when the count asked for cannot be met: one that can, about. InputError was thrown then
+};
+
+/// Meshes the body with tetrahedra of four (order 1) or ten nodes (order 2), the mid-side ones on the true surface. A surface is meshed by
+/// the program carillon-mesh next to this one, started without a shell, in a temporary folder that is gone afterwards.
+/// Not collective. Throws InputError naming the job's line for what cannot be meshed, SystemError when carillon-mesh does not start or
+/// dies. With `patience`, a surface that is not meshed in time gives an empty mesh and patience->estimate; InputError when not even that
+/// is known some seconds later.
+mesh::TetMesh make_body_mesh(const job::Body& body, int order, const Fineness& fineness, Patience* patience = nullptr);
+
+/// "bar, 20000 nodes" or "bunny.obj, edges of 0.002 m", for people.
+std::string describe(const job::Body& body, const Fineness& fineness);
+
+}  // namespace carillon::run

@@ -1,0 +1,138 @@
+#include "precompute/run/modes.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "precompute/io/checkpoint_file.hpp"
+#include "precompute/run/phase_names.hpp"
+#include "runtime/base/error.hpp"
+
+namespace carillon::run {
+namespace {
+
+/// A line of the log whenever the phase changes or another tenth of the modes is done; all to the progress file.
+class ProgressLines {
+ public:
+  explicit ProgressLines(const Run& run) : log_(&run.log), reporter_(run.progress.get()) {}
+  void operator()(const eigen::Progress& progress) {
+    if (reporter_ != nullptr) reporter_->advance(progress);
+    const std::int64_t tenth = progress.modes_wanted > 0 ? 10 * progress.modes_done / progress.modes_wanted : 0;
+    if (progress.phase == phase_ && tenth == tenth_) return;
+    phase_ = progress.phase;
+    tenth_ = tenth;
+    log_->print(describe(progress));
+  }
+
+ private:
+  const RunLog* log_;
+  ProgressReporter* reporter_;
+  std::optional<eigen::Phase> phase_;
+  std::int64_t tenth_ = 0;
+};
+
+eigen::Modes solve(Run& run, const Setting& setting, const fem::System& matrices, eigen::NodeLayout layout) {
+  eigen::Options options = make_options(run, setting);
+  if (run.checkpoint) options.checkpoint = &run.checkpoint->get();
+  options.progress = ProgressLines(run);
+  run.log.begin("modes", fmt::format("{:g} Hz to {:g} Hz", options.low_hz, options.high_hz));
+  eigen::Modes modes = eigen::solve_modes({matrices.stiffness, matrices.mass, std::move(layout)}, options);
+  const double worst = modes.residual.empty() ? 0.0 : *std::max_element(modes.residual.begin(), modes.residual.end());
+  run.log.print(fmt::format("{} modes, {} rigid ones deflated, worst residual {:.1e}, {}", modes.lambda.size(), modes.rigid_count, worst,
+                            modes.factor.solver));
+  run.log.end();
+  return modes;
+}
+
+/// The user's options of PETSc and SLEPc that can change the result.
+std::string list_changes(const Run& run) {
+  std::string text;
+  bool counts = false;
+  for (const std::string& word : run.options.solver_options) {
+    const bool is_name = word.size() > 1 && word[0] == '-' && std::isdigit(static_cast<unsigned char>(word[1])) == 0;
+    if (is_name) counts = word.find("_view") == std::string::npos && word.find("_monitor") == std::string::npos;
+    if (counts) text += (text.empty() ? "" : " ") + word;
+  }
+  return text;
+}
+
+/// A failure under options of the user is blamed on them, not on the body.
+eigen::Modes solve_named(Run& run, const Setting& setting, const Body& body, const AssembledSystem& system, eigen::NodeLayout layout) {
+  const std::string changes = list_changes(run);
+  const auto step = [&] { return solve(run, setting, system.matrices, std::move(layout)); };
+  if (changes.empty()) return name_errors(body.source, run, step);
+  try {
+    return step();
+  } catch (const SolveError& error) {
+    throw InputError(
+        fmt::format("the solve failed under the solver options \"{}\": {} Without the options it may not.", changes, error.what()));
+  }
+}
+
+double calc_diagonal(const mesh::CheckReport& check) {
+  return std::hypot(check.box_high[0] - check.box_low[0], check.box_high[1] - check.box_low[1], check.box_high[2] - check.box_low[2]);
+}
+
+/// A band without the fundamental is seldom intended; often the mesh is in millimetres.
+void warn_of_low_modes(Run& run, const Body& body, const eigen::Modes& modes) {
+  const std::int64_t below = modes.count_below_low - modes.rigid_count - modes.mechanism_count;
+  if (below <= 0 || find_low_hz(run.job, modes) > run.job.band_hz[0]) return;
+  run.log.warn(
+      fmt::format("the fundamental is out of the band: {} mode{} below the band, which begins at {:g} Hz; the body measures {:.3g} m "
+                  "across: if it was made in millimetres, {}",
+                  below, below == 1 ? " lies" : "s lie", run.job.band_hz[0], calc_diagonal(body.check), describe_scale_key(run.job)));
+}
+
+void warn_of_band(Run& run, const Body& body, const eigen::Modes& modes) {
+  warn_of_low_modes(run, body, modes);
+  if (const double low_hz = find_low_hz(run.job, modes); low_hz > run.job.band_hz[0]) {
+    run.log.warn(fmt::format("the band begins at {:.3g} Hz: {} elastic modes below it cannot be resolved in double precision on this mesh",
+                             low_hz, modes.count_below_low - modes.rigid_count));
+  } else if (modes.mechanism_count > 0) {
+    run.log.warn(
+        fmt::format("the body has {} motions without stiffness in addition to the rigid ones (parts that hang on a point, on an edge or on "
+                    "next to nothing)",
+                    modes.mechanism_count));
+  }
+  if (modes.lambda.empty()) run.log.warn("no mode lies in the band: the bank will be silent");
+}
+
+}  // namespace
+
+double find_low_hz(const job::JobSpec& job, const eigen::Modes& modes) {
+  return modes.proof.counts.empty() ? job.band_hz[0] : std::max(job.band_hz[0], modes.proof.counts.front().freq_hz);
+}
+
+eigen::Options make_options(const Run& run, const Setting& setting) {
+  eigen::Options options;
+  options.low_hz = run.job.band_hz[0];
+  options.high_hz = run.job.band_hz[1];
+  if (run.job.max_modes) options.max_modes = *run.job.max_modes;
+  options.tolerance = setting.tolerance;
+  options.factorisation = to_eigen(run.job.factorisation);
+  options.method = to_eigen(run.job.method);
+  return options;
+}
+
+eigen::NodeLayout make_layout(partition::DistributedMesh& pieces) {
+  eigen::NodeLayout layout;
+  const auto free_nodes = pieces.local.free_nodes;
+  layout.nodes_m.assign(pieces.local.nodes_m.begin(), pieces.local.nodes_m.begin() + free_nodes);
+  layout.component.assign(pieces.local.component.begin(), pieces.local.component.begin() + free_nodes);
+  layout.component_count = pieces.components;
+  layout.fixed = pieces.fixed_m;
+  layout.elimination_position = std::move(pieces.elimination_position);
+  return layout;
+}
+
+eigen::Modes find_modes(Run& run, const Setting& setting, Body& body, const AssembledSystem& system) {
+  eigen::Modes modes = solve_named(run, setting, body, system, make_layout(body.pieces));
+  warn_of_band(run, body, modes);
+  return modes;
+}
+
+}  // namespace carillon::run

@@ -1,0 +1,49 @@
+#include "precompute/run/open_job.hpp"
+
+#include <fmt/core.h>
+
+#include <cstdint>
+#include <string>
+
+#include "precompute/eigen/solver_options.hpp"
+#include "precompute/petsc/session.hpp"
+#include "runtime/base/file.hpp"
+
+namespace carillon::run {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::uint64_t kMaxJobBytes = 16 << 20;
+
+/// Rank 0 reads the text; all ranks parse it, so that all fail alike.
+job::JobSpec read_shared_job(const Run& run, const fs::path& file, job::BankKey bank) {
+  const std::string text = run.comm.broadcast([&] { return base::read_file(file, "job file", kMaxJobBytes); });
+  return run.comm.agree([&] { return job::parse_job(text, fs::absolute(file), bank); });
+}
+
+void check_job(const Run& run) {
+  comm::Communicator(run.comm).agree([&] {
+    eigen::check_solver_options();
+    if (run.comm.size() > 1 && run.job.factorisation == job::Factorisation::cholmod) {
+      throw InputError(
+          fmt::format("{}: \"solver.factorisation\": cholmod works on one rank, and there are {}; take \"mumps\" or \"automatic\"",
+                      run.job.file.string(), run.comm.size()));
+    }
+    if (!run.comm.is_root() || run.job.bank.empty()) return;
+    const fs::path bank = run.options.bank.empty() ? run.job.bank : run.options.bank;  // as it is opened
+    base::check_writable(bank, "bank");
+    base::check_writable(job::find_resolved_path(bank), "resolved job");
+  });
+}
+
+}  // namespace
+
+void open_job(Run& run, const fs::path& file, job::BankKey bank) {
+  run.job = read_shared_job(run, file, run.options.bank.empty() ? bank : job::BankKey::optional);
+  if (!run.options.bank.empty()) run.job.bank = fs::absolute(run.options.bank).lexically_normal();
+  check_job(run);
+  for (const std::string& warning : run.job.warnings) run.log.warn(warning);
+}
+
+}  // namespace carillon::run

@@ -1,0 +1,46 @@
+// One run of carillon-precompute as its steps see it.
+#pragma once
+
+#include <mpi.h>
+
+#include <memory>
+#include <string>
+
+#include "precompute/comm/communicator.hpp"
+#include "precompute/job/job_spec.hpp"
+#include "precompute/run/progress_reporter.hpp"
+#include "precompute/run/run_log.hpp"
+#include "precompute/run/run_options.hpp"
+#include "runtime/base/error.hpp"
+
+namespace carillon::io {
+class CheckpointFile;
+}
+
+namespace carillon::run {
+
+struct Run {
+  Run(const comm::Communicator& communicator, const RunOptions& run_options)
+      : comm(communicator), options(run_options), log(communicator, run_options.quiet) {}
+
+  comm::Communicator comm;
+  job::JobSpec job;  // the same on every rank
+  RunOptions options;
+  RunLog log;
+  std::unique_ptr<ProgressReporter> progress;      // on rank 0, if it is asked for
+  std::shared_ptr<io::CheckpointFile> checkpoint;  // if it is asked for
+};
+
+/// Runs a collective step whose errors cannot know what it works on, and names it in them. All ranks throw alike.
+template <class Step>
+auto name_errors(const std::string& source, const Run& run, Step&& step) {
+  try {
+    return step();
+  } catch (const InputError& error) {
+    throw InputError(source + ": " + error.what());
+  } catch (const SolveError& error) {
+    throw SolveError(source + " (job " + run.job.file.string() + "): " + error.what());
+  }
+}
+
+}  // namespace carillon::run

@@ -1,0 +1,201 @@
+#include "precompute/run/run_job.hpp"
+
+#include <fmt/core.h>
+#include <json/json.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "precompute/eigen/solver_options.hpp"
+#include "precompute/io/checkpoint_file.hpp"
+#include "precompute/io/fingerprint.hpp"
+#include "precompute/io/matrices.hpp"
+#include "precompute/io/surface_modes.hpp"
+#include "precompute/petsc/session.hpp"
+#include "precompute/run/accuracy.hpp"
+#include "precompute/run/bank_content.hpp"
+#include "precompute/run/body.hpp"
+#include "precompute/run/describe_run.hpp"
+#include "precompute/run/interrupt.hpp"
+#include "precompute/run/open_job.hpp"
+#include "precompute/run/run.hpp"
+#include "precompute/run/solve_body.hpp"
+#include "runtime/base/file.hpp"
+
+namespace carillon::run {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Opens the progress file; from now on every phase is reported to it.
+void open_progress(Run& run) {
+  comm::Communicator(run.comm).agree([&] {
+    const fs::path& file = run.options.progress;
+    if (!run.comm.is_root() || file.empty()) return;
+    for (const fs::path& other : {run.job.file, run.job.mesh, run.job.bank, job::find_resolved_path(run.job.bank)}) {
+      std::error_code error;  // One of them that does not exist is none of the others.
+      if (!other.empty() && (file == other || fs::equivalent(file, other, error)))
+        throw InputError(
+            fmt::format("{}: progress would be appended to a file of the job's own; give another with --progress", file.string()));
+    }
+    run.progress = std::make_unique<ProgressReporter>(file, run.comm.size());
+    run.log.set_listener([progress = run.progress.get()](const std::string& name) { progress->begin(name); });
+  });
+}
+
+/// An option that nothing asked for is misspelt, or belongs to a solver that did not run.
+void check_options_used(const comm::Communicator& comm) {
+  comm::Communicator(comm).agree([] {
+    const std::vector<std::string> unused = petsc::find_unused_options();
+    if (!unused.empty())
+      throw InputError(
+          fmt::format("the solver option \"{}\" was not used: it is misspelt, or belongs to a solver that did not run", unused[0]));
+  });
+}
+
+/// The bank of the solved body; rank 0 only has it. The shapes of all nodes are gone afterwards.
+bank::Bank collect_bank(Run& run, AccurateBody& found) {
+  SolvedBody& solved = found.solved;
+  run.log.begin("collect", "shapes on the surface, radiation gains");
+  std::vector<double> omega;
+  for (const double lambda : solved.modes.lambda) omega.push_back(std::sqrt(lambda));
+  io::SurfaceModes surface_modes = io::calc_surface_modes(run.comm, solved.modes.shapes, omega, found.body.surface);
+  solved.modes.shapes.reset();
+  bank::Bank bank;
+  comm::Communicator(run.comm).agree([&] {
+    if (run.comm.is_root()) bank = make_bank(run.job, found.setting, found.body, solved, surface_modes);
+  });
+  run.log.end();
+  return bank;
+}
+
+constexpr double kAudibleCents = 50.0;
+
+/// What to say of error bars against the body that are wide, with the correction; empty when they are not. `is_asked`: the job has
+/// accuracy_cents, and got what it asked for.
+std::string describe_wide_bars(const bank::Bank& bank, const Setting& setting, bool is_asked) {
+  const std::vector<double>& cents = bank.discretisation_error_cents;
+  if (cents.empty() || is_asked) return {};
+  const auto worst = std::max_element(cents.begin(), cents.end());
+  if (!(*worst > kAudibleCents)) return {};
+  const auto wide = std::count_if(cents.begin(), cents.end(), [](double c) { return c > kAudibleCents; });
+  return fmt::format(
+      "frequencies can be wrong by {:.0f} cents (estimate, mode {}; {} of {} modes by more than {:g}): {}a finer mesh, or "
+      "\"accuracy_cents\" in the job, improves them",
+      *worst, worst - cents.begin() + 1, wide, cents.size(), kAudibleCents,
+      setting.element == job::Element::T4 ? "\"element\": \"T10\" (--order 2), " : "");
+}
+
+std::string describe_result(const bank::Bank& bank) {
+  std::string text = fmt::format("{}\n{}", bank::describe_completeness(bank), bank::describe_accuracy(bank));
+  if (bank.mode_count() > 0) text += fmt::format("\n{:.2f} Hz to {:.2f} Hz", bank.freq_hz(0), bank.freq_hz(bank.mode_count() - 1));
+  return text;
+}
+
+/// The time of writing the bank is in <bank>.resolved.json only: the record in the bank is made before.
+RunSummary write_outputs(Run& run, const AccurateBody& found, bank::Bank bank) {
+  RunSummary summary;
+  summary.bank = run.job.bank;
+  summary.resolved = job::find_resolved_path(run.job.bank);
+  if (run.comm.is_root()) summary.warning = describe_wide_bars(bank, found.setting, run.job.accuracy_cents.has_value());
+  const fs::path folder = fs::absolute(summary.bank).parent_path();
+  const auto make_record = [&](const Measured& measured) {
+    Json::Value record = describe_run(run, found.setting, found.body, found.solved, measured);
+    if (run.job.accuracy_cents) record["accuracy"] = describe_accuracy(found.report);
+    if (!summary.warning.empty()) record["warnings"].append(summary.warning);
+    return job::resolved_json(run.job, folder, write_json(record));
+  };
+  // A name without a folder stays one: it means the folder that this process is in, even if that folder was renamed.
+  const fs::path written = run.options.bank.empty() ? run.job.bank : run.options.bank;
+  run.log.begin("write", summary.bank.string());
+  Measured measured = measure(run.comm);
+  comm::Communicator(run.comm).agree([&] {
+    if (!run.comm.is_root()) return;
+    bank.provenance = make_record(measured);
+    bank::write_bank(bank, written);
+    run.log.print(fmt::format("{} bytes", fs::file_size(written)));
+    summary.result = describe_result(bank);
+  });
+  run.log.end();
+  measured = measure(run.comm);
+  comm::Communicator(run.comm).agree([&] {
+    if (run.comm.is_root()) base::write_file(job::find_resolved_path(written), make_record(measured));
+  });
+  return summary;
+}
+
+/// The files of the job itself must outlive the checkpoint.
+void check_checkpoint(const Run& run) {
+  const fs::path& file = run.options.checkpoint;
+  base::check_writable(file, "checkpoint");
+  std::vector<fs::path> others{run.job.file, run.job.bank, job::find_resolved_path(run.job.bank), run.options.progress};
+  others.push_back(run.job.body ? run.job.body->surface : run.job.mesh);
+  for (const fs::path& other : others) {
+    std::error_code ignored;
+    if (other.empty()) continue;
+    if (fs::absolute(file).lexically_normal() == fs::absolute(other).lexically_normal() || fs::equivalent(file, other, ignored))
+      throw InputError(fmt::format("{}: the checkpoint would overwrite a file of this job; give it a name of its own", file.string()));
+  }
+}
+
+void open_checkpoint(Run& run) {
+  if (run.options.checkpoint.empty()) return;
+  comm::Communicator(run.comm).agree([&] {
+    if (run.comm.is_root()) check_checkpoint(run);
+  });
+  io::CheckpointHost host{[&run](const std::string& text) { run.log.print(text); }, [&run](const std::string& text) { run.log.warn(text); },
+                          is_stop_asked, set_news};
+  run.checkpoint = std::make_shared<io::CheckpointFile>(run.comm, run.options.checkpoint, run.options.checkpoint_every_s,
+                                                        io::find_job_fingerprint(run.job, run.options.solver_options), std::move(host));
+}
+
+/// In the setting that the job gives.
+AccurateBody solve_once(Run& run) {
+  AccurateBody found;
+  found.setting = job::get_setting(run.job);
+  found.body = make_body(run, found.setting);
+  found.solved = solve_body(run, found.setting, found.body);
+  return found;
+}
+
+RunSummary carry_out(Run& run, const fs::path& job_file) {
+  open_job(run, job_file);
+  io::check_matrices(run.comm, run.options.matrices);
+  open_progress(run);
+  open_checkpoint(run);
+  AccurateBody found = run.job.accuracy_cents ? solve_to_accuracy(run) : solve_once(run);
+  check_options_used(run.comm);
+  if (run.checkpoint) run.checkpoint->finish();
+  bank::Bank bank = collect_bank(run, found);
+  RunSummary summary = write_outputs(run, found, std::move(bank));
+  if (run.checkpoint) run.checkpoint->remove();
+  if (run.progress) run.progress->finish();
+  return summary;
+}
+
+/// The summary of a run that a signal stopped.
+RunSummary describe_stop(const Run& run) {
+  RunSummary summary;
+  summary.is_stopped = true;
+  summary.result = fmt::format("stopped by {}; {}", find_stop_name(),
+                               run.checkpoint->was_saved() ? "the same command resumes from " + run.options.checkpoint.string()
+                                                           : "the run can be resumed from the checkpoint there was before, if any");
+  return summary;
+}
+
+}  // namespace
+
+RunSummary run_job(const comm::Communicator& comm, const fs::path& job_file, const RunOptions& options) {
+  Run run(comm, options);
+  try {
+    return carry_out(run, job_file);
+  } catch (const eigen::Stopped&) {
+    return describe_stop(run);
+  }
+}
+
+}  // namespace carillon::run

@@ -1,0 +1,52 @@
+#include "precompute/run/solve_body.hpp"
+
+#include <utility>
+
+#include "precompute/eigen/search_checkpoint.hpp"
+#include "precompute/io/checkpoint_file.hpp"
+#include "precompute/io/fingerprint.hpp"
+#include "precompute/io/matrices.hpp"
+#include "precompute/run/modes.hpp"
+
+namespace carillon::run {
+namespace {
+
+void write_matrices(Run& run, const Body& body, const AssembledSystem& system) {
+  const auto& folder = run.options.matrices;
+  if (folder.empty()) return;
+  run.log.begin("matrices", folder.string());
+  io::write_matrices(run.comm, folder, body.pieces.local, system.matrices);
+  run.log.end();
+}
+
+void begin_checkpoint(Run& run, const Setting& setting, const Body& body) {
+  if (!run.checkpoint) return;
+  const io::Fingerprint job = io::find_job_fingerprint(run.job, run.options.solver_options);
+  run.checkpoint->begin(setting, io::find_system_fingerprint(run.comm, job, setting, body.pieces.local), body.pieces.local);
+}
+
+/// Between two stages, with all modes. Throws eigen::Stopped when the run was asked to stop.
+void save_if_requested(Run& run, const eigen::Modes& modes) {
+  if (!run.checkpoint) return;
+  const eigen::CheckpointRequest request = run.checkpoint->vote();
+  if (request.stop || request.save) eigen::save_modes(modes, run.checkpoint->get());
+  if (request.stop) throw eigen::Stopped();
+}
+
+}  // namespace
+
+SolvedBody solve_body(Run& run, const Setting& setting, Body& body) {
+  AssembledSystem system = assemble_system(run, setting, body);
+  write_matrices(run, body, system);
+  begin_checkpoint(run, setting, body);
+  SolvedBody solved;
+  solved.modes = find_modes(run, setting, body, system);
+  save_if_requested(run, solved.modes);
+  solved.errors = calc_errors(run, body, system, solved.modes);
+  save_if_requested(run, solved.modes);
+  if (run.checkpoint) run.checkpoint->end();
+  solved.properties = std::move(system.properties);
+  return solved;
+}
+
+}  // namespace carillon::run

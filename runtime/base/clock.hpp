@@ -1,0 +1,36 @@
+// Clocks in seconds.
+// Source: POSIX.1-2008, clock_gettime, getrusage; Linux clock_gettime(2), CLOCK_BOOTTIME.
+#pragma once
+
+#include <sys/resource.h>
+#include <time.h>
+
+#include <cstdint>
+
+namespace carillon::base {
+
+inline std::uint64_t read_clock_ns(clockid_t clock) noexcept {
+  timespec now{};
+  ::clock_gettime(clock, &now);
+  return static_cast<std::uint64_t>(now.tv_sec) * 1'000'000'000U + static_cast<std::uint64_t>(now.tv_nsec);
+}
+inline double read_clock(clockid_t clock) noexcept { return 1e-9 * static_cast<double>(read_clock_ns(clock)); }
+
+/// Processor time of the calling thread: what others do on a busy machine is not in it.
+inline double get_thread_cpu_s() noexcept { return read_clock(CLOCK_THREAD_CPUTIME_ID); }
+/// Of this process, all its threads.
+inline double get_process_cpu_s() noexcept { return read_clock(CLOCK_PROCESS_CPUTIME_ID); }
+/// Of the programs that this process started and that have ended.
+inline double get_children_cpu_s() noexcept {
+  rusage used{};
+  ::getrusage(RUSAGE_CHILDREN, &used);
+  return static_cast<double>(used.ru_utime.tv_sec + used.ru_stime.tv_sec) +
+         1e-6 * static_cast<double>(used.ru_utime.tv_usec + used.ru_stime.tv_usec);
+}
+
+/// Since some moment; stands still while the machine is suspended.
+inline double get_steady_s() noexcept { return read_clock(CLOCK_MONOTONIC); }
+/// Since the boot, suspended time included. Changes of the wall clock do not affect it.
+inline double get_boot_s() noexcept { return read_clock(CLOCK_BOOTTIME); }
+
+}  // namespace carillon::base

@@ -1,0 +1,168 @@
+// One body of a Synthesiser: the modules that its effects need, and the change from one set of effects to another while it plays.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "runtime/events/events.hpp"
+#include "runtime/synth/acceleration_noise.hpp"
+#include "runtime/synth/contact_forces.hpp"
+#include "runtime/synth/delay_line.hpp"
+#include "runtime/synth/effects.hpp"
+#include "runtime/synth/kernels.hpp"
+#include "runtime/synth/model.hpp"
+#include "runtime/synth/receiver.hpp"
+#include "runtime/synth/trajectory.hpp"
+#include "runtime/synth/voice.hpp"
+
+namespace carillon::synth {
+
+/// What a body is made for, in addition to its model.
+struct BodyFrame {
+  double rate_hz = 0.0;
+  std::vector<Vec3> microphones_m;  // from the listener
+  int max_strikes = 0, max_forces = 0;
+  int max_waypoints = 0;
+  double longest_m = 0.0;
+  double silence_pa = 1e-10;
+  Isa isa = Isa::kBest;
+  ContactSurface surface{};
+  bool audits_energy = false;
+};
+
+/// Memory that belongs to effects. What lasting contacts need counts as that of roughness here, whichever of the three effects need it.
+using EffectBytes = PerEffect<std::int64_t>;
+
+/// The acceleration noise of a body with its attitude.
+struct BodyAccelerationNoise {
+  AccelerationNoise noise;
+  Attitude attitude;
+  std::int64_t first = 0;  // sample of the scene with which it began
+};
+
+/// The propagation of a body's sound: what it emitted, and the receivers that read it.
+struct Propagation {
+  EffectSet effects;
+  std::unique_ptr<DelayLine> monopole;               // with modes
+  std::array<std::unique_ptr<DelayLine>, 3> dipole;  // with acceleration noise
+  std::vector<Receiver> ears;                        // one a microphone, or one for all without two ears
+  std::int64_t first = 0;                            // sample of the scene with which it began
+  Source source;
+
+  bool is_silent() const noexcept;
+};
+
+/// Modules on their way into a body, and what they took the place of on its way out. Made and destroyed on the main thread.
+struct BodyChange {
+  EffectSet effects;
+  std::unique_ptr<Voice> voice;
+  std::unique_ptr<BodyAccelerationNoise> acceleration_noise;
+  std::unique_ptr<Propagation> propagation;
+  std::unique_ptr<ContactForces> contacts;
+  double modulus_pa = 0.0;                  // of the surface
+  bool inherits = false;                    // voice, contacts and acceleration_noise take the place of those there
+  std::unique_ptr<VoiceHandover> handover;  // for the voice
+
+  EffectBytes calc_bytes() const;
+};
+
+/// What a body has done: work by effect, in the units of EffectCounters, and ticks if they are measured.
+struct BodyWork {
+  PerEffect<std::int64_t> units{};
+  PerEffect<std::int64_t> ticks{};
+  std::int64_t strikes = 0, refused = 0, late = 0, resets = 0;
+  float peak_pa = 0.0F;
+  double energy_rise = 0.0, radiated_j = 0.0;  // VoiceCounters
+};
+
+using TickFunction = std::uint64_t (*)() noexcept;
+
+/// Room for one block of a body's sound, shared by all bodies.
+struct BodyScratch {
+  std::array<float, kBlock> mono{};
+  std::array<std::array<float, kBlock>, 3> dipole{};
+  std::array<double, kBlock> heard{};
+};
+
+using Mix = std::vector<std::array<double, kBlock>>;  // per microphone
+
+/// What it keeps true: it has the modules of its effects and no others; every module has done the same samples (rendered_); while a change
+/// is under way the old and the new propagation sound together, and one fades into the other within one block. [main-thread] makes modules,
+/// [audio-thread] puts them in.
+class SoundingBody {
+ public:
+  /// Without any effects: apply() brings them. Takes memory for its way. [main-thread]
+  SoundingBody(std::shared_ptr<const Model> model, BodyFrame frame, const Vec3& position_m, const events::Quaternion& rotation);
+
+  /// The modules that a body of effects `from` lacks for `to`, and with another model those that take the place of all that know the old
+  /// one; `model` is what the body has from then on. Throws as check() does. [main-thread]
+  std::unique_ptr<BodyChange> make_change(EffectSet from, EffectSet to, std::shared_ptr<const Model> model);
+  std::unique_ptr<BodyChange> make_change(EffectSet from, EffectSet to) { return make_change(from, to, model_); }
+  /// Throws InputError for effects that this build or a body of this model cannot have. [main-thread]
+  static void check(EffectSet effects, const Model& model);
+  void check(EffectSet effects) const { check(effects, *model_); }
+
+  /// All that follows: [audio-thread], no heap, no lock, no throw.
+
+  /// The change begins with this sample, the first of a block; it is over when finish_change() says so.
+  void apply(BodyChange& change, const Trajectory& listener, std::int64_t sample) noexcept;
+  /// At the first sample of a block: the change that is over now, with the modules that are not needed any more; or nullptr.
+  BodyChange* finish_change(const Trajectory& listener, std::int64_t sample) noexcept;
+
+  /// `sample`: the first that is not rendered. False when no effect could take it.
+  bool take(const events::Impulse& impulse, std::int64_t sample) noexcept;
+  bool take(const events::Force& force, std::int64_t sample) noexcept;
+  /// `other`: the surface of the other body.
+  bool take(const events::LastingContact& contact, const ContactSurface& other, std::int64_t sample) noexcept;
+  bool take(const events::BodyMotion& motion) noexcept;
+
+  /// Adds to `mix` what is heard of it in samples `sample` to `sample + count`, all of one block.
+  void render(std::int64_t sample, std::size_t count, const Trajectory& listener, BodyScratch& scratch, Mix& mix,
+              TickFunction ticks) noexcept;
+
+  /// Nothing sounds, nothing is under way, nothing is to come: until the next event render() would add nothing.
+  bool is_asleep() const noexcept;
+  /// Nothing earlier will come. For bodies that are awake, before render().
+  void reach(double time_s) noexcept;
+  const ContactSurface& get_surface() const noexcept { return surface_; }  // as others feel it
+  const BodyWork& get_work() const { return work_; }
+  /// Its modes; nullptr without.
+  Voice* get_voice() noexcept { return voice_.get(); }
+  /// How many pascals 1 Pa at 1 m is at the nearest microphone, at a sample.
+  float calc_nearness(const Trajectory& listener, std::int64_t sample) const noexcept;
+
+ private:
+  template <class Strike>
+  bool play(const Strike& strike, bool has_length, bool is_new, std::int64_t sample) noexcept;
+  void wake(std::int64_t sample) noexcept;
+  void put_contacts(BodyChange& change) noexcept;
+  Effect make_modal_sound(std::span<float> mono) noexcept;
+  void make_acceleration_noise(const std::array<std::span<float>, 3>& dipole) noexcept;
+  void make_sound(std::size_t count, BodyScratch& scratch, TickFunction ticks) noexcept;
+  void hear(Propagation& propagation, std::int64_t sample, std::size_t count, const Trajectory& listener, int fade, BodyScratch& scratch,
+            Mix& mix, TickFunction ticks) noexcept;
+  bool is_filled(const Propagation& propagation, const Trajectory& listener, std::int64_t sample) const noexcept;
+
+  std::shared_ptr<const Model> model_;  // the main thread's
+  BodyFrame frame_;
+  Trajectory track_;
+  double turned_s_ = 0.0;  // of rotation_
+  events::Quaternion rotation_{1.0, 0.0, 0.0, 0.0};
+  EffectSet effects_;
+  std::unique_ptr<Voice> voice_;
+  std::unique_ptr<BodyAccelerationNoise> acceleration_noise_;
+  std::unique_ptr<ContactForces> contacts_;  // attached to voice_
+  ContactSurface surface_;                   // with the modulus of the model
+  std::unique_ptr<Propagation> propagation_, next_propagation_;
+  BodyChange* change_ = nullptr;
+  bool fading_ = false;        // from air_ to next_air_, in this block
+  std::int64_t first_ = 0;     // sample of the scene with which the voice began
+  std::int64_t rendered_ = 0;  // samples of the scene that all modules have done
+  BodyWork work_;
+};
+
+}  // namespace carillon::synth

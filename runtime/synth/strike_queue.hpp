@@ -1,0 +1,103 @@
+// The strikes of a voice that wait or act: contact pulses of a known shape, and forces known step by step.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "runtime/events/events.hpp"
+#include "runtime/synth/kernels.hpp"
+#include "runtime/synth/model.hpp"
+#include "runtime/synth/pulse.hpp"
+
+namespace carillon::synth {
+
+/// The time in which a force is not zero, in samples of its voice. The interval of sample n is (n - 1, n].
+struct ForceInterval {
+  double begin = 0.0, end = 0.0;
+  /// Whether it has a part in the intervals of `count` samples from `sample` on.
+  bool overlaps(std::int64_t sample, int count) const noexcept {
+    return begin <= static_cast<double>(sample + count - 1) && end > static_cast<double>(sample - 1);
+  }
+};
+
+/// A contact pulse.
+struct QueuedPulse {
+  double begin = 0.0, length = 0.0;  // samples
+  events::PulseShape shape = events::PulseShape::kHertz;
+  const std::int16_t* row[kStrikeRows];  // of the model's shapes
+  float weight[kStrikeRows];
+  float strength_n_s = 0.0F;  // size of the impulse
+  std::int32_t triangle = 0;
+
+  ForceInterval get_interval() const noexcept { return {begin, begin + length}; }
+};
+
+/// A force in steps of equal length. Its directions are those that its steps need: one where all are parallel.
+struct QueuedForce {
+  double begin = 0.0, step = 0.0;  // samples
+  std::int32_t triangle = 0;
+  int count = 0, axes = 0;
+  float strength_n_s = 0.0F;  // no more than this impulse reaches the body
+  float barycentric[3];
+  float axis[3][3];                        // unit
+  float along[3][events::kMaxForceSteps];  // impulse of each step along each [N s]
+
+  double calc_end() const noexcept { return begin + count * step; }
+  ForceInterval get_interval() const noexcept { return {begin, calc_end()}; }
+  /// Weights of the rows of its triangle for a unit impulse along one of its directions.
+  void find_weights(int direction, float* weight) const noexcept;
+};
+
+/// Moments of a force along each of its directions.
+using ForceMoments = std::array<Moments, 3>;
+
+/// Over one interval, the unit of time, in which the first step of the force begins at `begin` and steps have the length `step`.
+ForceMoments calc_force_moments(const QueuedForce& force, double begin, double step) noexcept;
+
+/// What a voice has taken and what not.
+struct StrikeCounters {
+  std::int64_t accepted = 0;  // strikes taken
+  std::int64_t refused = 0;   // not finite, outside the surface, or no room
+  std::int64_t late = 0;      // began before the horizon and were moved there
+};
+
+/// Every strike in it is finite, acts on a triangle of the model and had not begun at the horizon when it came. Memory is taken in the
+/// constructor only. One thread at a time; nothing throws but the constructor.
+class StrikeQueue {
+ public:
+  /// The model must outlive the queue.
+  StrikeQueue(const Model& model, int max_pulses, int max_forces);
+
+  /// Takes a strike. `horizon`: the first sample that is still to come; what would act before it is moved there. False when it is refused.
+  bool push(const events::Impulse& impulse, std::int64_t horizon) noexcept;
+  bool push(const events::Force& force, std::int64_t horizon) noexcept;
+
+  /// Takes the strikes and counters of the queue of another model. A strike on a triangle that this model has not is refused.
+  void take_over(const StrikeQueue& other) noexcept;
+
+  std::span<const QueuedPulse> get_pulses() const noexcept { return pulses_; }
+  std::span<const QueuedForce> get_forces() const noexcept { return forces_; }
+  bool is_empty() const noexcept { return pulses_.empty() && forces_.empty(); }
+  /// Whether a strike acts in `count` samples from `sample` on.
+  bool acts(std::int64_t sample, int count) const noexcept;
+  /// Forgets the strikes that are over before a sample.
+  void finish(std::int64_t sample) noexcept;
+  void clear() noexcept;
+
+  const StrikeCounters& get_counters() const noexcept { return counters_; }
+  /// Without the queue itself.
+  std::size_t calc_bytes() const noexcept { return pulses_.capacity() * sizeof(QueuedPulse) + forces_.capacity() * sizeof(QueuedForce); }
+
+ private:
+  void begin_in_time(double& begin, std::int64_t horizon) noexcept;
+
+  const Model* model_;
+  std::vector<QueuedPulse> pulses_;  // capacity max_pulses, never grown
+  std::vector<QueuedForce> forces_;  // capacity max_forces, never grown
+  StrikeCounters counters_;
+};
+
+}  // namespace carillon::synth

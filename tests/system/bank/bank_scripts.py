@@ -1,0 +1,412 @@
+"""Banks in the eyes of others: h5py by the words of docs/bank-format.md, VTK, and files that h5py made bad and sealed again.
+
+bank_scripts.py doc|vtk|bad|program. Finds the programs in $CARILLON_BIN_DIR and the page in $CARILLON_SOURCE_DIR.
+"""
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+
+import h5py
+import numpy as np
+
+BIN = os.environ["CARILLON_BIN_DIR"]
+PAGE = os.path.join(os.environ["CARILLON_SOURCE_DIR"], "docs", "bank-format.md")
+
+
+def make_bank(path, squares=2, modes=5):
+    subprocess.run([f"{BIN}/make_example_bank", path, str(squares), str(modes)], check=True)
+
+
+def get_snippet(name):
+    """The code block of the page that begins with a comment of that name."""
+    blocks = re.findall(r"```python\n(.*?)```", open(PAGE).read(), re.S)
+    (block,) = [b for b in blocks if b.startswith(f"# {name} ")]
+    return block
+
+
+def run_snippet(name, path):
+    """Runs the code as a stranger would, with BANK as its argument; returns its variables."""
+    kept, sys.argv = sys.argv, [name, path]
+    variables = {"__name__": "__main__"}
+    try:
+        exec(compile(get_snippet(name), name, "exec"), variables)
+    finally:
+        sys.argv = kept
+    return variables
+
+
+def bank_program(*arguments):
+    return subprocess.run([f"{BIN}/carillon-bank", *arguments], capture_output=True, text=True, timeout=60)
+
+
+def check_doc(folder):
+    path = f"{folder}/a.hdf"
+    make_bank(path, 3, 12)
+    code = [line for line in get_snippet("read_bank.py").splitlines() if line and not line.startswith("#")]
+    assert len(code) <= 10, f"the reader on the page has {len(code)} lines"
+    got = run_snippet("read_bank.py", path)
+    assert got["vertices"].shape == (56, 3) and got["triangles"].shape == (108, 3) and got["phi_at_7"].shape == (12, 3)
+    # The example is made from formulas: tests/unit/runtime/bank/example_bank.hpp.
+    freq = 574.44 + 19000.0 * np.arange(12) / 12
+    assert np.allclose(got["freq_hz"], freq, rtol=1e-13), got["freq_hz"]
+    assert np.allclose(got["decay_per_s"], (1e-7 * (2 * np.pi * freq) ** 2 + 5.0) / 2, rtol=1e-13)
+    x = got["vertices"][7]
+    k = np.arange(1, 13)
+    phase = 20 * k * x[0] + 7 * x[1] * k**2 + 3 * x[2]
+    phi = np.stack([2 * np.sin(phase), 3 * np.cos(1.3 * phase), 0.01 * k * np.sin(0.7 * phase + 1)], axis=1)
+    assert np.all(abs(got["phi_at_7"] - phi) <= 0.5000001 * got["scale"][:, None])
+    assert got["young_modulus_pa"] == 200e9 and got["provenance"]["run"]["ranks"] == 2
+    # The surface is closed and outward also in the eyes of numpy (divergence theorem): 0.3 x 0.02 x 0.01 m.
+    a, b, c = (got["vertices"][got["triangles"][:, i]] for i in range(3))
+    assert np.isclose(np.einsum("ij,ij->", a, np.cross(b, c)) / 6, 6e-5, rtol=1e-9)
+
+    with h5py.File(path) as bank:
+        datasets = []
+        bank.visititems(lambda name, item: datasets.append((name, item)) if isinstance(item, h5py.Dataset) else None)
+        page = open(PAGE).read()
+        for name, item in datasets:
+            if name.startswith("VTKHDF"):
+                continue
+            assert item.attrs["units"] and item.attrs["meaning"], name
+            assert name in page or name.split("/")[-1] in page, f"{name} is not on the page"
+
+    # The seal by the words of the page, and its table against what HDF5 knows.
+    sealed = open(path, "rb").read()
+    run_snippet("seal_bank.py", path)
+    again = open(path, "rb").read()
+    lines = lambda b: sorted(b[:4032].decode().split("\n"))
+    assert lines(sealed) == lines(again), "the seal on the page differs from that of the program"
+    assert sealed[4096:] == again[4096:]
+    assert bank_program("check", path).returncode == 0
+
+    # A stranger's own bank: every array copied by h5py into a new file of his.
+    other = f"{folder}/stranger.hdf"
+    with h5py.File(path) as bank, h5py.File(other, "w", userblock_size=4096) as copy:
+        copy.attrs["version"] = "1.1"
+        for name, item in datasets_of(bank):
+            copy[name] = item[()]
+    run_snippet("seal_bank.py", other)
+    done = bank_program("check", other)
+    assert done.returncode == 0, done.stderr
+
+
+def datasets_of(bank):
+    found = []
+    bank.visititems(lambda name, item: found.append((name, item)) if isinstance(item, h5py.Dataset) and "VTKHDF" not in name else None)
+    return found
+
+
+def check_vtk(folder):
+    try:
+        from vtkmodules.util.numpy_support import vtk_to_numpy
+        from vtkmodules.vtkIOHDF import vtkHDFReader
+    except ImportError as error:  # Debian's VTK needs MPI, which a machine for the runtime alone lacks; CTest calls 77 skipped only there
+        print(error)
+        sys.exit(77)
+
+    for squares, modes in ((3, 12), (40, 120)):
+        path = f"{folder}/vtk.hdf"
+        make_bank(path, squares, modes)
+        reader = vtkHDFReader()
+        assert reader.CanReadFile(path)
+        reader.SetFileName(path)
+        reader.Update()
+        grid = reader.GetOutput()
+        with h5py.File(path) as bank:
+            vertices, triangles = bank["mesh/vertices"][:], bank["mesh/triangles"][:]
+            shape, freq = bank["modes/shape"][:], bank["modes/frequency_hz"][:]
+        assert np.array_equal(vtk_to_numpy(grid.GetPoints().GetData()), vertices)
+        assert grid.GetNumberOfCells() == len(triangles) and grid.GetCellType(0) == 5
+        assert np.array_equal(vtk_to_numpy(grid.GetCells().GetConnectivityArray()).reshape(-1, 3), triangles)
+        arrays = grid.GetPointData()
+        assert arrays.GetNumberOfArrays() == modes
+        for k in range(modes):
+            array = arrays.GetArray(f"mode_{k + 1:03d}_{freq[k]:.1f}Hz")
+            assert array is not None, f"mode {k} has no view"
+            assert np.array_equal(vtk_to_numpy(array), shape[:, k, :]), k
+
+
+def put(name, value):
+    """Changes values of an array in place."""
+
+    def change(bank):
+        bank[name][...] = value(bank[name][...]) if callable(value) else value
+
+    return change
+
+
+def replace(name, value):
+    """Puts another array in the place of one."""
+
+    def change(bank):
+        old = bank[name][()]
+        del bank[name]
+        bank[name] = value(old)
+
+    return change
+
+
+def at(index, value):
+    def change(array):
+        array[index] = value
+        return array
+
+    return change
+
+
+def set_version(version):
+    return lambda bank: bank.attrs.__setitem__("version", version)
+
+
+# What was done to a good bank before it was sealed again, and words of the message of `carillon-bank info`.
+BAD = [
+    ("newer major", set_version("2.0"), "written as version 2.0, this reader knows 1.x: update Carillon or write the bank again"),
+    ("much newer major", set_version("17.4"), "written as version 17.4"),
+    ("version zero", set_version("0.9"), "never a version 0.9"),
+    ("no version", set_version("one"), "line 1 names no version"),
+    ("negative version", set_version("-1.0"), "line 1 names no version"),
+    ("NaN vertex", put("mesh/vertices", at((3, 1), np.nan)), "vertices[10] is nan"),
+    ("triangle out of range", put("mesh/triangles", at((5, 0), 26)), "triangle 5 names vertex 26, and there are 26"),
+    ("negative vertex", put("mesh/triangles", at((5, 0), -2147483648)), "triangle 5 names vertex -2147483648"),
+    ("inside out", put("mesh/triangles", lambda t: t[:, ::-1]), "face inward"),
+    ("open surface", replace("mesh/triangles", lambda t: t[:-1]), "the surface is open"),
+    ("negative eigenvalue", put("modes/eigenvalue", at(0, -1.0)), "eigenvalue[0] is -1 rad^2/s^2, not positive"),
+    ("infinite eigenvalue", put("modes/eigenvalue", at(4, np.inf)), "eigenvalue[4] is inf"),
+    ("wrong frequency", put("modes/frequency_hz", at(2, 440.0)), "modes/frequency_hz[2] is 440 Hz, and its eigenvalue says"),
+    ("NaN frequency", put("modes/frequency_hz", at(2, np.nan)), "modes/frequency_hz[2] is nan"),
+    ("negative decay", put("modes/decay", at(1, -3.0)), "decay[1] is -3 1/s, negative"),
+    ("other decay", put("modes/decay", lambda d: 2 * d), "the damping law gives"),
+    ("unsolved mode", put("modes/residual", at(1, 0.5)), "residual[1] is 0.5"),
+    ("NaN gain", put("modes/radiation_gain", at(0, np.nan)), "radiation_gain[0] is nan"),
+    ("negative scale", put("modes/shape_scale", at(0, -1.0)), "shape_scale[0] is -1, negative"),
+    ("shape of fewer modes", replace("modes/shape", lambda s: s[:, :-1]), "modes/shape is <i2 (26, 4, 3), and <i2 (26, 5, 3) is wanted"),
+    ("shape of other type", replace("modes/shape", lambda s: s.astype("<f8")), "modes/shape is <f8 (26, 5, 3), and <i2"),
+    ("flat shape", replace("modes/shape", lambda s: s.reshape(-1)), "modes/shape is <i2 (390), and"),
+    ("one decay too few", replace("modes/decay", lambda d: d[:-1]), "modes/decay is <f8 (4), and <f8 (5) is wanted"),
+    ("scalar eigenvalue", replace("modes/eigenvalue", lambda e: e[0]), "modes/eigenvalue is a single number"),
+    ("two-dimensional vertices", replace("mesh/vertices", lambda v: v[:, :2]), "mesh/vertices is <f8 (26, 2), and <f8 (26, 3) is wanted"),
+    ("no residuals", lambda bank: bank.__delitem__("modes/residual"), "the array modes/residual is missing"),
+    ("no mass", lambda bank: bank.__delitem__("rigid/mass_kg"), "the array rigid/mass_kg is missing"),
+    ("negative mass", put("rigid/mass_kg", -1.0), "mass_kg is -1, not positive"),
+    ("impossible inertia", put("rigid/inertia_kg_m2", np.diag([1e-5, 1e-5, 1e-4])), "not that of a solid"),
+    ("incompressible", put("material/poisson_ratio", 0.5), "poisson_ratio is 0.5"),
+    ("unknown element", put("solve/element", b"H8"), "neither T4 nor T10"),
+    ("neither complete nor not", put("solve/complete", 7), "solve/complete is 7, neither 0 nor 1"),
+    ("rigid modes without a body", put("solve/rigid_modes", 2**62), "rigid modes of 1 components"),
+    ("provenance of numbers", replace("provenance", lambda p: np.arange(3.0)), "provenance is not text"),
+    ("long element", replace("solve/element", lambda e: np.bytes_(b"T" * 17)), "neither T4 nor T10"),
+    ("proof of one array", lambda bank: bank.__delitem__("proof/below"), "the array proof/below is missing"),
+    ("proof without a cut", lambda bank: bank.__delitem__("proof/cut_hz"), "the array proof/cut_hz is missing"),
+    ("a mode is missing", put("proof/below", at(2, 12)), "modes lie between 7000 and 20000 Hz by the counts, and the bank holds"),
+    ("counts of a matrix", replace("proof/below", lambda b: b.reshape(3, 1)), "proof/below is <i8 (3, 1), and <i8 (3) is wanted"),
+    ("counts without end", put("proof/below", at(2, 2**63 - 1)), "modes lie between 7000 and 20000 Hz"),
+    ("negative counts", put("proof/below", at(0, -(2**63))), "counts cannot fall"),
+    ("found another number", put("proof/found", 2**62), "modes were found"),
+    ("error bars of other modes", replace("modes/algebraic_error_cents", lambda e: e[:-1]), "algebraic_error_cents holds 4 values"),
+    ("negative error bar", put("modes/discretisation_error_cents", at(0, -1.0)), "discretisation_error_cents[0] is -1, negative"),
+    ("law of numbers", replace("damping/law", lambda p: np.arange(3.0)), "damping/law is not text"),
+    ("unknown law", replace("damping/law", lambda p: np.bytes_(b"magic")), "none that is known"),
+    ("law without numbers", lambda bank: bank.__delitem__("damping/power"), "the array damping/power is missing"),
+    ("chunked shape", lambda bank: recreate_chunked(bank, "modes/shape"), "gives an array that cannot be in this file"),
+]
+
+
+def recreate_chunked(bank, name):
+    values = bank[name][()]
+    del bank[name]
+    bank.create_dataset(name, data=values, chunks=True, compression="gzip")
+
+
+def check_bad(folder):
+    path = f"{folder}/bad.hdf"
+    for title, change, words in BAD:
+        make_bank(path)
+        with h5py.File(path, "r+") as bank:
+            change(bank)
+        assert bank_program("info", path).returncode == 2, f"{title}: read although it was not sealed again"
+        run_snippet("seal_bank.py", path)
+        for arguments in (["info", path], ["info", "--json", path], ["check", path]):
+            done = bank_program(*arguments)
+            text = done.stderr if arguments[0] == "info" else done.stdout + done.stderr
+            assert done.returncode == 2, f"{title}: exit code {done.returncode} of {arguments}"
+            assert words in text, f"{title}: {words!r} is not in {text!r}"
+            assert done.stderr.startswith("carillon-bank: " + path + ": ") and done.stderr.count("\n") == 1, done.stderr
+            assert arguments[0] == "check" or done.stdout == "", done.stdout
+    # A newer minor version is read, with an array and a line that this reader does not know.
+    make_bank(path)
+    with h5py.File(path, "r+") as bank:
+        bank.attrs["version"] = "1.7"
+        bank["modes/sparkle"] = np.arange(5.0)
+    run_snippet("seal_bank.py", path)
+    done = bank_program("info", path)
+    assert done.returncode == 0 and "format 1.7" in done.stdout, done.stderr
+
+
+def check_reduced(path, small):
+    """Fewer modes and coarser shapes by `carillon-bank edit`, in the eyes of h5py."""
+
+    def edit(*words):
+        done = bank_program("edit", path, small, *words)
+        assert done.returncode == 0 and done.stdout == "" == done.stderr, done
+        assert bank_program("check", small).returncode == 0
+        return bank_program("info", small).stdout
+
+    assert "the lowest 7 of 30 modes" in edit("--modes", "7", "--keep", "lowest", "--shape-bits", "8")
+    with h5py.File(path) as whole, h5py.File(small) as bank:
+        assert bank["modes/shape"].dtype == np.int8 and bank["modes/shape"].shape[1] == 7 and bank["solve/complete"][()] == 0
+        assert bank.attrs["version"] == "1.2" and np.array_equal(bank["modes/eigenvalue"][:], whole["modes/eigenvalue"][:7])
+        phi, coarse = (b["modes/shape"][:, :7] * b["modes/shape_scale"][:7][:, None] for b in (whole, bank))
+        assert np.all(np.abs(coarse - phi) <= 0.5001 * (bank["modes/shape_scale"][:] + whole["modes/shape_scale"][:7])[:, None])
+        assert np.array_equal(bank["VTKHDF/PointData"][list(bank["VTKHDF/PointData"])[3]][:], bank["modes/shape"][:, 3].astype("f4"))
+        assert json.loads(bank["provenance"][()])["reduced"] == {"modes": 7, "of_modes": 30, "keep": "lowest", "shape_bits": 8}
+    assert "5 modes of the band were kept, not all" in edit("--modes", "5")
+    with h5py.File(small) as bank:
+        assert "proof" not in bank and bank["modes/shape"].dtype == np.int16 and bank.attrs["version"] == "1.1"
+    assert "30 modes in 20 .. 20000 Hz and no more" in edit("--modes", "30", "--size", "1.0")
+    os.remove(small)
+    for words in (
+        ["--modes", "0"],
+        ["--modes", "-3"],
+        ["--modes", "x"],
+        ["--keep", "lowest"],
+        ["--modes", "3", "--keep", "best"],
+        ["--shape-bits", "1"],
+        ["--shape-bits", "17"],
+    ):
+        done = bank_program("edit", path, small, *words)
+        assert done.returncode == 2 and done.stderr and not os.path.exists(small), (words, done)
+
+
+def check_program(folder):
+    path = f"{folder}/a.hdf"
+    make_bank(path, 2, 30)
+    done = bank_program("info", "--json", path)
+    info = json.loads(done.stdout, parse_constant=lambda word: sys.exit(f"{word} is no JSON"))
+    with h5py.File(path) as bank:
+        for k, mode in enumerate(info["modes"]):
+            # To the last bit: 17 digits.
+            assert mode["eigenvalue_rad2_s2"] == bank["modes/eigenvalue"][k] and mode["decay_per_s"] == bank["modes/decay"][k]
+            assert mode["algebraic_error_cents"] == bank["modes/algebraic_error_cents"][k]
+            assert mode["residual"] == bank["modes/residual"][k] and mode["radiation_gain"] == bank["modes/radiation_gain"][k]
+            assert np.isclose(mode["frequency_hz"], bank["modes/frequency_hz"][k], rtol=1e-14)
+            assert np.isclose(mode["t60_s"], np.log(1000) / bank["modes/decay"][k], rtol=1e-12) and mode["regime"] == "under"
+        assert np.array_equal(info["rigid"]["inertia_kg_m2"], bank["rigid/inertia_kg_m2"][:])
+    assert info["mode_count"] == 30 and len(info["frequencies_hz"]) == 30 and info["counts"]["rigid_modes"] == 6
+    assert info["provenance"]["run"]["stations"][1]["seconds"] == 12.25 and info["bytes"] == os.path.getsize(path)
+
+    page = bank_program("info", "--modes", "3", path).stdout
+    assert "provenance" not in page and "peak_bytes" not in page and "--all" in page and len(page.splitlines()) <= 22, page
+    page = bank_program("info", "--all", "--modes", "3", path).stdout
+    assert (
+        max(map(len, page.splitlines())) <= 140
+        and "574.44" in page
+        and "27 more" in page
+        and "+-body" in page
+        and "solve: peak_bytes_largest_rank 900.00 MB, seconds 12.25" in page
+    ), page
+    check = bank_program("check", path)
+    assert check.returncode == 0 and check.stderr == ""
+    done = bank_program("check", f"{os.environ['CARILLON_SOURCE_DIR']}/tests/unit/runtime/bank/pinned/version_1_0.hdf")
+    assert done.returncode == 0 and "nothing shows that the band holds no more than these 2 modes" in done.stdout, done
+    for words in (
+        "30 modes in 20 .. 20000 Hz and no more: 6 below 20 Hz and 36 below 20000 Hz by inertia, 6 rigid",
+        "36 - 6 = 30 modes, all of them found",
+        "6 of the one component, and nothing else below",
+        "phi_i^T M phi_j = delta_ij to 2.0e-13",
+        "discretisation at most 30 cent",
+        "seal",
+        "version",
+        "arrays",
+        "worst 3.00e-09",
+        "closed, outward",
+        "ascending from 574.44",
+        "20 to 20000 Hz",
+        "whole and sane",
+    ):
+        assert words in check.stdout, words
+
+    for words, law in (
+        (("--tan-phi", "0.02"), "internal_friction, tan(phi) 0.02"),
+        (("--loss", "100:0.01", "1000:0.02"), "loss_table, 2 rows"),
+        (("--caughey", "0:5", "1:1e-9"), "caughey, c = 5 lambda^0"),
+        (("--alphas", "1e-9", "3"), "rayleigh, alpha1 1e-09 s"),
+    ):
+        done = bank_program("edit", path, f"{folder}/edited.hdf", *words)
+        assert (done.returncode, done.stdout) == (0, ""), done
+        assert law in bank_program("info", f"{folder}/edited.hdf").stdout and bank_program("check", f"{folder}/edited.hdf").returncode == 0
+    done = bank_program("edit", path, f"{folder}/edited.hdf", "--size", "2")
+    assert done.returncode == 0 and "10 to 10000 Hz" in done.stdout and "nothing above" in done.stdout, done
+    for words, error in (
+        (("--tan-phi", "3"), "below 2"),
+        (("--loss", "100"), "HZ:FACTOR"),
+        (("--loss", "100:0.1", "50:0.1"), "ascend"),
+        (("--tan-phi", "0.1", "--alphas", "0", "1"), "one of"),
+        (("--caughey", "0:-5"), "decay"),
+    ):
+        done = bank_program("edit", path, f"{folder}/bad.hdf", *words)
+        assert done.returncode == 2 and error in done.stderr and not os.path.exists(f"{folder}/bad.hdf"), done
+    done = bank_program("edit", path, f"{folder}/bad.mp3")
+    assert done.returncode == 2 and ".hdf" in done.stderr and not os.path.exists(f"{folder}/bad.mp3"), done
+
+    check_reduced(path, f"{folder}/small.hdf")
+
+    # Over-damped and undamped modes, and provenance that is no JSON or hostile to a terminal.
+    def spoil(change):
+        with h5py.File(path, "r+") as bank:
+            change(bank)
+        run_snippet("seal_bank.py", path)
+
+    def damp(bank):
+        bank["material/alpha1_s"][...] = 2e-4
+        bank["modes/decay"][...] = (2e-4 * bank["modes/eigenvalue"][:] + 5) / 2
+
+    spoil(damp)
+    regimes = [m["regime"] for m in json.loads(bank_program("info", "--json", path).stdout)["modes"]]
+    assert regimes[0] == "under" and regimes[-1] == "over", regimes
+
+    def quiet(bank):
+        bank["material/alpha1_s"][...] = bank["material/alpha2_per_s"][...] = 0.0
+        bank["modes/decay"][...] = 0.0
+        del bank["provenance"]
+        bank["provenance"] = np.bytes_(b'{"run": {"a": "\\u001b[31m"}, "b": ' + b"[" * 5000)
+
+    spoil(quiet)
+    done = subprocess.run([f"{BIN}/carillon-bank", "info", "--json", path], capture_output=True)
+    assert json.loads(done.stdout)["modes"][0]["t60_s"] is None
+    assert bank_program("info", path).returncode == 0
+    done = bank_program("check", path)
+    assert done.returncode == 2 and "provenance is not JSON text" in done.stdout
+
+    def coloured(bank):
+        del bank["provenance"]
+        bank["provenance"] = np.bytes_(b'{"run": {"\\u001b[31m": "\\u001b[32m red \x7f \xff", "list": [{"name": "\\u001b[33m", "a": 1}]}}')
+
+    spoil(coloured)
+    done = subprocess.run([f"{BIN}/carillon-bank", "info", "--all", path], capture_output=True)
+    assert done.returncode == 0 and b"red" in done.stdout and b"\x1b" not in done.stdout and b"\x7f" not in done.stdout, done
+
+    # What is no bank at all must neither hang nor crash.
+    os.mkfifo(f"{folder}/fifo")
+    open(f"{folder}/empty", "w").close()
+    for path, words in (
+        ("/dev/zero", "not a regular file"),
+        (f"{folder}/fifo", "not a regular file"),
+        (folder, "is a folder"),
+        (f"{folder}/empty", "is empty"),
+        (f"{folder}/none", "no such file"),
+        (sys.executable, "not a Carillon bank"),
+    ):
+        for command in ("info", "check"):
+            done = bank_program(command, path)
+            assert done.returncode == 2 and words in done.stderr and done.stderr.count("\n") == 1, (path, done)
+    for arguments in ([], ["info"], ["sing", path], ["check", "--loud", path]):
+        assert bank_program(*arguments).returncode == 2, arguments
+    assert bank_program("--help").returncode == 0
+
+
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory() as scratch:
+        {"doc": check_doc, "vtk": check_vtk, "bad": check_bad, "program": check_program}[sys.argv[1]](scratch)

@@ -1,0 +1,173 @@
+#!/usr/bin/python3
+"""The headline figures of the one-screen pages of docs/, taken from the generated reports in docs/reports/.
+
+usage: headlines.py SOURCE_DIR            exit 1 and one line per page whose figures are not those of its report
+       headlines.py SOURCE_DIR --update   writes them
+"""
+import json
+import pathlib
+import re
+import statistics
+import sys
+
+GOALS = ((100, "a semitone (100 cents)"), (10, "10 cents"), (1, "1 cent"))
+GROUPS = {
+    "meshes": "bad, extreme and odd meshes",
+    "materials": "extreme materials",
+    "spectra": "dense, clustered and wide spectra",
+    "time": "long times, contacts, joints, sound",
+    "cross": "answers of other solvers and engines",
+}
+
+
+def read_between(page, name):
+    found = re.search(rf"<!-- (?:begin )?{re.escape(name)} -->\n(.*?)<!-- (?:/|end ){re.escape(name)} -->", page, re.S)
+    if not found:
+        raise ValueError(f"no place between <!-- {name} --> and <!-- /{name} -->")
+    return found[1]
+
+
+def read_rows(text, columns):
+    """The rows of all Markdown tables of so many columns, without heads."""
+    rows = [[cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]] for line in text.splitlines() if line.startswith("|")]
+    heads = [k for k, row in enumerate(rows) if set("".join(row)) <= set("-:")]
+    dropped = {*heads, *(k - 1 for k in heads)}
+    return [row for k, row in enumerate(rows) if k not in dropped and len(row) == columns]
+
+
+def write_table(head, rows):
+    rule = "|---|" + "--:|" * (len(head) - 1)
+    return "\n".join([f"| {' | '.join(head)} |", rule, *(f"| {' | '.join(row)} |" for row in rows)]) + "\n"
+
+
+def say_range(values, form):
+    """Median, and the extremes in brackets."""
+    return f"{form(statistics.median(values))} ({form(min(values))} to {form(max(values))})"
+
+
+def make_goals(source):
+    """Of each body the cheapest measured mesh whose worst mode is within the goal. Bodies whose true frequencies are less certain than
+    the goal are left out."""
+    bodies = json.loads((source / "jobs/study/accuracy/advice.json").read_text())["bodies"]
+    rows = []
+    for cents, text in GOALS:
+        for element in ("T10", "T4"):
+            reached, asked = [], 0
+            for points in bodies.values():
+                own = [point for point in points if point["element"] == element and point["truth_cents"] <= cents]
+                good = [point for point in own if point["worst_cents"] <= cents]
+                asked += bool(own)
+                reached += [min(good, key=lambda point: point["cpu_s"])] if good else []
+            nodes = say_range([point["nodes"] for point in reached], lambda value: f"{value:,.0f}") if reached else "-"
+            seconds = say_range([point["cpu_s"] for point in reached], lambda value: f"{value:.2g}") if reached else "-"
+            rows.append([text, element, f"{len(reached)} of {asked}", nodes, seconds])
+    default = next(row for row in read_rows((source / "docs/reports/accuracy.md").read_text(), 6) if row[0] == "nodes of a body")
+    table = write_table(["worst mode of the band within", "element", "bodies that reach it", "nodes", "CPU s"], rows)
+    return f"{table}\nThe default, {default[1]} nodes: {default[2]}.\n"
+
+
+def make_bars(source):
+    rows = read_rows((source / "docs/reports/error-bars.md").read_text(), 8)
+    table = []
+    for element in ("T10", "T10 curved", "T10 lumped", "T4", "T4 lumped"):
+        own = [row for row in rows if row[1] == element]
+        modes = sum(int(row[3]) for row in own)
+        held = sum(round(int(row[3]) * float(row[6].rstrip(" %")) / 100) for row in own)
+        widths = say_range([float(row[7]) for row in own if row[7] != "nan"], lambda value: f"{value:.2g}")
+        table.append([element, str(len(own)), str(modes), str(modes - held), widths])
+    return write_table(["element", "meshes", "modes", "modes outside their bars", "bar / error: median of a mesh"], table)
+
+
+def make_cases(source):
+    page = (source / "docs/reports/stability.md").read_text()
+    table = []
+    for group, text in GROUPS.items():
+        rows = read_rows(read_between(page, group), 6)
+        refused = sum(row[4] == "refused" for row in rows)
+        table.append([text, f"`ctest --preset release -R hard.{group}`", str(len(rows) - refused), str(refused)])
+    return write_table(["group", "command", "cases held to a bound", "cases refused with one error"], table)
+
+
+def make_prediction(source):
+    page = (source / "docs/reports/scaling.md").read_text()
+    now, spread = ({row[0]: row for row in read_rows(read_between(page, name), 11)} for name in ("prediction", "spread"))
+    pairs = [(now[ranks], spread[ranks]) for ranks in ("64", "512", "4,096")]
+    rows = [[one[0], one[4], one[8], one[10], two[8], two[10]] for one, two in pairs]
+    prediction = write_table(["ranks", "factor, s", "whole run, s", "GB on the fullest rank", "2-D fronts: run, s", "2-D fronts: GB"], rows)
+    return f"{prediction}\n{make_check(page)}"
+
+
+def make_check(page):
+    """How far the model of scaling is from what was measured on several ranks, at most."""
+    check = [row for row in read_rows(read_between(page, "check"), 9) if row[0] != "1"]
+    large = ("factor", "solve", "orthogonalise")
+    percent = {row: abs(int(check[row][4].rstrip(" %"))) for row in range(len(check))}
+    memory = [row for row in read_rows(read_between(page, "memory"), 5) if row[0] != "1"]
+    rows = [
+        [", ".join(large), f"{max(percent[k] for k, row in enumerate(check) if row[1] in large)} %"],
+        ["the other phases, tenths of a second each", f"{max(percent[k] for k, row in enumerate(check) if row[1] not in large)} %"],
+        ["memory of the fullest rank", f"{max(abs(100 * (float(row[4]) / float(row[1]) - 1)) for row in memory):.0f} %"],
+    ]
+    return write_table(["quantity, on 2 to 4 ranks", "largest deviation of the model"], rows)
+
+
+def make_rivals(source):
+    page = (source / "docs/reports/performance.md").read_text()
+    tables = []
+    for name in ("table", "table-800"):
+        text = read_between(page, name)
+        facts = re.search(r"([\d,]+) unknowns, (\d+) modes.*?(\d+|one) runs? each.*?(\d{4}-\d\d-\d\d)", text, re.S)
+        runs = "one run of each program" if facts[3] == "one" else f"medians of {facts[3]} interleaved runs"
+        rows = [row[:6] for row in read_rows(text, 9)]
+        head = ["program", "CPU s", "spread", "times ours", "wall s", "peak GB"]
+        tables.append(f"{facts[2]} modes, {facts[1]} unknowns, {runs}, {facts[4]}:\n\n{write_table(head, rows)}")
+    return "\n".join(tables)
+
+
+def make_voices(source):
+    page = (source / "docs/reports/performance-runtime.md").read_text()
+    text = read_between(page, "table")
+    one = {row[0]: row for row in read_rows(text, 6) if row[1] == "1024"}
+    many = {row[0]: row for row in read_rows(text, 5) if row[2] == "4"}
+    rows = [[name, one[name][4], f"{int(one[name][5]):,}", f"{int(many[name][4]):,}"] for name in one]
+    return write_table(
+        ["instructions", "of the machine's limit", "modes in real time, one voice of 1,024", "512 voices of 1,000, four banks"], rows
+    )
+
+
+def make_effects(source):
+    rows = read_rows(read_between((source / "docs/reports/effects.md").read_text(), "study"), 9)
+    return write_table(["scene", "difference, dB(A)", "CPU, auto : all on"], [[row[0].split(":")[0], row[2], row[5]] for row in rows])
+
+
+PAGES = {
+    "accuracy": make_goals,
+    "error-bars": make_bars,
+    "stability": make_cases,
+    "scaling": make_prediction,
+    "performance": make_rivals,
+    "performance-runtime": make_voices,
+    "effects": make_effects,
+}
+
+
+def main():
+    source = pathlib.Path(sys.argv[1])
+    faults = []
+    for name, make in PAGES.items():
+        page = source / f"docs/{name}.md"
+        text, table = page.read_text(), make(source)
+        if read_between(text, "headline") == table:
+            continue
+        if sys.argv[2:] == ["--update"]:
+            page.write_text(
+                re.sub(r"(<!-- headline -->\n).*?(<!-- /headline -->)", lambda found: found[1] + table + found[2], text, flags=re.S)
+            )
+        else:
+            faults.append(f"docs/{name}.md: its figures are not those of its report: tests/system/docs/headlines.py . --update renews them")
+    print("\n".join(faults) if faults else f"{len(PAGES)} pages have the figures of their reports")
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

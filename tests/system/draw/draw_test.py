@@ -1,0 +1,228 @@
+#!/usr/bin/python3
+"""Draws small banks and a small scene, and reads the pictures back: they have to show what was put into them."""
+import json
+import os
+import pathlib
+import shutil
+import struct
+import subprocess
+import sys
+import tempfile
+import zlib
+
+import h5py
+import numpy
+
+import make_bank
+
+PROGRAM = pathlib.Path(os.environ["CARILLON_BIN_DIR"]) / "carillon-draw"
+faults = []
+
+
+def expect(true, what):
+    if not true:
+        faults.append(what)
+        print("FAULT:", what)
+
+
+def run(*arguments, folder):
+    environment = {key: value for key, value in os.environ.items() if key != "DISPLAY"}
+    return subprocess.run([PROGRAM, *arguments], cwd=folder, capture_output=True, text=True, timeout=200, env=environment)
+
+
+def read_png(path):
+    """An 8-bit RGB picture as (height, width, 3), read by the PNG specification alone."""
+    data = path.read_bytes()
+    assert data[:8] == b"\x89PNG\r\n\x1a\n"
+    at, packed = 8, b""
+    while at < len(data):
+        length, kind = struct.unpack_from(">I4s", data, at)
+        if kind == b"IHDR":
+            width, height, depth, colour = struct.unpack_from(">IIBB", data, at + 8)
+            assert (depth, colour) == (8, 2), "not 8-bit RGB"
+        if kind == b"IDAT":
+            packed += data[at + 8 : at + 8 + length]
+        at += 12 + length
+    lines = numpy.frombuffer(zlib.decompress(packed), dtype=numpy.uint8).reshape(height, 1 + 3 * width)
+    image = numpy.zeros((height, 3 * width), dtype=numpy.uint8)
+    for y, line in enumerate(lines):
+        kind, row = line[0], line[1:].reshape(-1, 3).astype(int)
+        above = image[y - 1].reshape(-1, 3).astype(int) if y else numpy.zeros_like(row)
+        if kind in (0, 2):
+            row = row + (above if kind == 2 else 0)
+        elif kind == 1:
+            row = numpy.cumsum(row, axis=0)
+        else:
+            out = numpy.zeros_like(row)
+            left, corner = numpy.zeros(3, int), numpy.zeros(3, int)
+            for x in range(width):
+                if kind == 3:
+                    guess = (left + above[x]) // 2
+                else:
+                    p = left + above[x] - corner
+                    d = numpy.abs(numpy.stack([p - left, p - above[x], p - corner]))
+                    guess = numpy.where((d[0] <= d[1]) & (d[0] <= d[2]), left, numpy.where(d[1] <= d[2], above[x], corner))
+                out[x] = (row[x] + guess) & 255
+                left, corner = out[x], above[x]
+            row = out
+        image[y] = (row & 255).astype(numpy.uint8).ravel()
+    return image.reshape(height, width, 3)
+
+
+def count_like(image, colour, reach=0.06):
+    """Pixels whose hue is that of `colour`: the direction from grey agrees and is strong."""
+    chroma = image.astype(float) - image.mean(axis=2, keepdims=True)
+    wanted = numpy.array(colour, float) - numpy.mean(colour)
+    strength = numpy.linalg.norm(chroma, axis=2)
+    cosine = (chroma @ wanted) / (numpy.maximum(strength, 1e-9) * numpy.linalg.norm(wanted))
+    return int(((cosine > 1 - reach) & (strength > 40)).sum())
+
+
+def spoil(source, target, change):
+    """A copy of a bank with `change` made to its HDF5 part, sealed again."""
+    shutil.copy(folder / source, folder / target)
+    with h5py.File(folder / target, "r+") as bank:
+        change(bank)
+    make_bank.seal(folder / target)
+
+
+with tempfile.TemporaryDirectory() as name:
+    folder = pathlib.Path(name)
+    make_bank.write_ball_bank(folder / "ball.hdf")
+    make_bank.write_box_bank(folder / "shelf.hdf", (0.3, 0.2, 0.005))
+
+    # The first three modes: three bodies in three columns, purple where they rest and yellow where they move most.
+    done = run("modes", "ball.hdf", "-o", "modes.png", folder=folder)
+    expect(done.returncode == 0, f"modes: exit code {done.returncode}: {done.stderr}")
+    if done.returncode == 0:
+        image = read_png(folder / "modes.png")
+        height, width, _ = image.shape
+        expect(width >= 1600 and height >= 500, f"modes: the picture has {width} x {height} pixels")
+        for column in range(3):
+            part = image[: height - 200, column * width // 3 : (column + 1) * width // 3]
+            expect(part.std() > 20, f"modes: column {column} is blank")
+            inked = (part.min(axis=2) < 235).mean()
+            expect(0.15 < inked < 0.9, f"modes: the body of column {column} covers {inked:.0%}")
+            expect(count_like(part, (253, 231, 37)) > 1000, f"modes: nothing moves much in column {column}")
+        edges = numpy.concatenate([image[0], image[-1], image[:, 0], image[:, -1]])
+        expect(edges.min() > 240, "modes: something is cut off at the edge of the picture")
+
+    # A ball that falls on a shelf above the ground.
+    poses = [[t, 0.0, 0.0, 0.5 - 4.9 * t * t, 1, 0, 0, 0] for t in numpy.linspace(0, 0.3, 40)]
+    scene = {
+        "up": "z",
+        "ground": {"height_m": -0.05},
+        "bodies": [
+            {"name": "ball", "bank": "ball.hdf", "fixed": False, "poses": poses},
+            {"name": "shelf", "bank": str(folder / "shelf.hdf"), "fixed": True, "poses": [[0, 0, 0, 0, 1, 0, 0, 0]]},
+        ],
+        "impulses": [{"time_s": 0.3, "body": "ball", "world_m": [0, 0, 0.005], "impulse_n_s": 0.4}],
+    }
+    (folder / "fall.json").write_text(json.dumps(scene))
+    done = run("scene", "fall.json", "-o", "fall.png", folder=folder)
+    expect(done.returncode == 0, f"scene: exit code {done.returncode}: {done.stderr}")
+    if done.returncode == 0:
+        image = read_png(folder / "fall.png")
+        height, width, _ = image.shape
+        expect(width >= 1600 and height >= 900, f"scene: the picture has {width} x {height} pixels")
+        body = image[: height - 150]
+        ball = count_like(body, (217, 107, 51))
+        expect(ball > 5000, f"scene: the falling ball has {ball} pixels")
+        expect(count_like(body, (242, 191, 26), 0.02) > 300, "scene: there is no path")
+        expect(count_like(body, (204, 26, 41), 0.02) > 100, "scene: there is no contact")
+        scene["impulses"] = []
+        (folder / "fall.json").write_text(json.dumps(scene))
+        run("scene", "fall.json", "-o", "silent.png", folder=folder)
+        piped = subprocess.run([PROGRAM, "scene", "fall.json", "-o", "-"], cwd=folder, capture_output=True, timeout=200)
+        expect(piped.stdout == (folder / "silent.png").read_bytes(), "scene: the picture on standard output is another one")
+        expect(
+            b"pixels" in piped.stderr and not (folder / "-").exists(), f"scene: what is printed in addition to a picture: {piped.stderr}"
+        )
+        expect(count_like(read_png(folder / "silent.png")[: height - 150], (204, 26, 41), 0.02) < 20, "scene: a contact without an impulse")
+
+    # A mode that does not move the surface is drawn at rest.
+    spoil("ball.hdf", "still.hdf", lambda bank: bank["modes/shape"].__setitem__(slice(None), 0))
+    done = run("modes", "still.hdf", "-o", "still.png", "--modes", "1", folder=folder)
+    expect(done.returncode == 0, f"modes at rest: exit code {done.returncode}: {done.stderr}")
+    if done.returncode == 0:
+        part = read_png(folder / "still.png")[:-200]
+        expect(part.std() > 15, "modes at rest: the picture is blank")
+        expect(count_like(part, (253, 231, 37)) < 100, "modes at rest: something moves")
+
+    # What cannot be drawn.
+    spoil("ball.hdf", "nan.hdf", lambda bank: bank["mesh/vertices"].__setitem__((0, 0), numpy.nan))
+    spoil("ball.hdf", "far.hdf", lambda bank: bank["mesh/vertices"].__setitem__((0, 0), 1e300))
+    spoil("ball.hdf", "wild.hdf", lambda bank: bank["mesh/triangles"].__setitem__((0, 0), 10**6))
+    spoil("ball.hdf", "point.hdf", lambda bank: bank["mesh/vertices"].__setitem__(slice(None), 0.0))
+    spoil("ball.hdf", "endless.hdf", lambda bank: bank["modes/shape_scale"].__setitem__(0, numpy.inf))
+
+    def replace(bank, key, value):
+        del bank[key]
+        bank[key] = value
+
+    spoil("ball.hdf", "few.hdf", lambda bank: replace(bank, "modes/shape", numpy.zeros((3, 4, 3), "<i2")))
+    spoil("ball.hdf", "words.hdf", lambda bank: replace(bank, "modes/frequency_hz", numpy.array([b"a"] * 4)))
+    spoil("ball.hdf", "flat.hdf", lambda bank: replace(bank, "mesh/triangles", numpy.zeros(9, "<i4")))
+    (folder / "infinite.json").write_text(json.dumps(scene | {"ground": {"height_m": 1e999}}))
+    (folder / "remote.json").write_text(
+        json.dumps(scene | {"bodies": [{"name": "a", "bank": "ball.hdf", "fixed": True, "poses": [[0, 1e300, 0, 0, 1, 0, 0, 0]]}]})
+    )
+    (folder / "deep.json").write_text("[" * 100000)
+    (folder / "escape.json").write_text(
+        '{"bodies": [{"name": "\\u001b]0;x\\u0007\\u009b\\u202e", "bank": "ball.hdf", "fixed": true, "poses": []}]}'
+    )
+    (folder / "text.hdf").write_text("hello")
+    data = (folder / "ball.hdf").read_bytes()
+    (folder / "short.hdf").write_bytes(data[:-100])
+    (folder / "newer.hdf").write_bytes(data.replace(b"CARILLON BANK 1.0", b"CARILLON BANK 2.0", 1))
+    (folder / "broken.json").write_text('{\n  "bodies": [,]\n}')
+    (folder / "empty.json").write_text('{"bodies": []}')
+    (folder / "poor.json").write_text('{"bodies": [{"name": "a", "bank": "ball.hdf", "fixed": true, "poses": []}]}')
+    (folder / "list.json").write_text("[]")
+    (folder / "far.json").write_text('{"bodies": [{"name": "a", "bank": "absent.hdf", "fixed": true, "poses": [[0,0,0,0,1,0,0,0]]}]}')
+    before = sorted(folder.iterdir())
+    for arguments, words in [
+        (["modes", "absent.hdf", "-o", "x.png"], ["absent.hdf", "No such file"]),
+        (["modes", "text.hdf", "-o", "x.png"], ["text.hdf", "no mode bank"]),
+        (["modes", "short.hdf", "-o", "x.png"], ["short.hdf", "SHA-256"]),
+        (["modes", "newer.hdf", "-o", "x.png"], ["newer.hdf", "version 2.0"]),
+        (["modes", "ball.hdf", "-o", "x.png", "--modes", "1,5"], ["no mode 5", "which has 4", "1 to 4"]),
+        (["modes", "ball.hdf", "-o", "x.png", "--modes", "0"], ["no mode 0", "1 to 4"]),
+        (["modes", "ball.hdf", "-o", "x.png", "--modes", "first"], ["'first'", "1 to 4"]),
+        (["modes", "ball.hdf", "-o", "x.jpg"], ["x.jpg", ".png"]),
+        (["modes", "ball.hdf", "-o", "nowhere/x.png"], ["nowhere", "no such folder"]),
+        (["modes", "ball.hdf"], ["-o/--output", "--help"]),
+        (["modes", "ball.hdf", "-o", "x.png", "--mode", "1"], ["--mode", "--help"]),
+        (["scene", "absent.json", "-o", "x.png"], ["absent.json", "No such file"]),
+        (["scene", "broken.json", "-o", "x.png"], ["broken.json", "line 2"]),
+        (["scene", "empty.json", "-o", "x.png"], ["empty.json", "no bodies"]),
+        (["scene", "poor.json", "-o", "x.png"], ["poor.json", "body 'a'", "poses"]),
+        (["scene", "list.json", "-o", "x.png"], ["list.json", "no trajectory"]),
+        (["scene", "far.json", "-o", "x.png"], ["absent.hdf", "No such file"]),
+        (["modes", "nan.hdf", "-o", "x.png"], ["nan.hdf", "finite"]),
+        (["modes", "far.hdf", "-o", "x.png"], ["far.hdf", "finite"]),
+        (["modes", "wild.hdf", "-o", "x.png"], ["wild.hdf", "vertex"]),
+        (["modes", "point.hdf", "-o", "x.png"], ["point.hdf", "no extent"]),
+        (["modes", "endless.hdf", "-o", "x.png"], ["endless.hdf", "mode 1"]),
+        (["modes", "few.hdf", "-o", "x.png"], ["few.hdf", "fit"]),
+        (["modes", "words.hdf", "-o", "x.png"], ["words.hdf", "numbers"]),
+        (["modes", "flat.hdf", "-o", "x.png"], ["flat.hdf", "triangles"]),
+        (["scene", "infinite.json", "-o", "x.png"], ["infinite.json", "finite"]),
+        (["scene", "remote.json", "-o", "x.png"], ["remote.json", "farther"]),
+        (["scene", "deep.json", "-o", "x.png"], ["deep.json"]),
+        (["scene", "escape.json", "-o", "x.png"], ["escape.json", "\\u001b]0;x"]),
+        (["scenes", "far.json", "-o", "x.png"], ["scenes", "--help"]),
+    ]:
+        done = run(*arguments, folder=folder)
+        expect(done.returncode == 2, f"{arguments}: exit code {done.returncode}, not 2: {done.stderr}")
+        expect(
+            done.stderr.count("\n") == 1
+            and not any(ord(letter) in [*range(10), *range(11, 32), *range(127, 160), 0x202E] for letter in done.stderr),
+            f"{arguments}: not one printable line: {done.stderr!r}",
+        )
+        for word in words:
+            expect(word in done.stderr, f"{arguments}: '{word}' is not in: {done.stderr}")
+    expect(sorted(folder.iterdir()) == before, "a command that failed left a file behind")
+
+print(f"{len(faults)} faults")
+sys.exit(1 if faults else 0)

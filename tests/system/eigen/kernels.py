@@ -1,0 +1,30 @@
+#!/usr/bin/python3
+"""The ways back and the orthogonality of the eigensolver with every set of OpenBLAS kernels that this processor can run: each rounds in its
+own way, and none may decide.
+
+usage: kernels.py TEST_EIGEN
+"""
+import os
+import re
+import subprocess
+import sys
+
+NEEDS = {
+    "Prescott": {"pni"},
+    "Nehalem": {"sse4_2"},
+    "Haswell": {"avx2", "fma"},
+    "Zen": {"avx2", "fma"},
+    "SkylakeX": {"avx512f", "avx512cd", "avx512bw", "avx512dq", "avx512vl"},
+}
+
+with open("/proc/cpuinfo") as file:
+    flags = set(re.search(r"^flags\s*:(.*)$|\Z", file.read(), re.M).group(0).split())
+for kernels in ["", *(name for name, needs in NEEDS.items() if needs <= flags)]:
+    environment = {name: value for name, value in os.environ.items() if name != "OPENBLAS_CORETYPE"}
+    if kernels:
+        environment["OPENBLAS_CORETYPE"] = kernels
+    run = subprocess.run([sys.argv[1], "--gtest_filter=Fallback.*:BlockLanczos.*"], env=environment, capture_output=True, text=True)
+    passed = re.search(r"PASSED.*?(\d+) test", run.stdout)
+    print(f"{kernels or 'not named'}: {passed.group(1) if passed else 'no'} tests passed")
+    if run.returncode != 0 or not passed or int(passed.group(1)) < 3:
+        sys.exit(run.stdout[-5000:] + run.stderr[-2000:])

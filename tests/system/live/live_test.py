@@ -1,0 +1,171 @@
+#!/usr/bin/python3
+"""carillon-live on a real sound server: jackd with its dummy driver, which keeps time and has no card. The count of underflows is printed;
+on a busy machine a few are the machine's, so what is asked for is that most blocks come in time, and that none is lost."""
+import json
+import os
+import pathlib
+import re
+import resource
+import subprocess
+import tempfile
+import time
+import unittest
+
+BIN = pathlib.Path(os.environ["CARILLON_BIN_DIR"])
+SERVER = f"carillon-{os.getpid()}"
+ENVIRONMENT = {**os.environ, "JACK_DEFAULT_SERVER": SERVER, "JACK_NO_AUDIO_RESERVATION": "1", "JACK_NO_START_SERVER": "1"}
+
+
+def live(*arguments, environment=ENVIRONMENT):
+    return subprocess.run([BIN / "carillon-live", *map(str, arguments)], capture_output=True, text=True, timeout=60, env=environment)
+
+
+class Live(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.root = pathlib.Path(cls.folder.name)
+        subprocess.run([BIN / "write_cube_bank", cls.root / "cube.h5"], check=True)
+        scene = {
+            "duration_s": 2.0,
+            "ground": {"height_m": 0.0},
+            "listener": {"path": [[0, 0, -1, 0.2], [2, 0, -2, 0.2]]},
+            "bodies": [
+                {"name": "cube", "bank": "cube.h5", "position_m": [0, 0, 0.15], "rotation_deg": [20, 30, 0]},
+                {"name": "gong", "bank": "cube.h5", "position_m": [1, 0, 0.5], "fixed": True},
+            ],
+            "strikes": [
+                {"body": "gong", "time_s": 0.1 + 0.2 * i, "triangle": 3, "impulse_n_s": [0, 0, 0.01], "duration_s": 1e-4} for i in range(9)
+            ],
+        }
+        cls.scene = cls.root / "scene.json"
+        cls.scene.write_text(json.dumps(scene))
+        cls.log = open(cls.root / "jackd.log", "w+")
+        cls.jack = subprocess.Popen(
+            ["jackd", "--no-realtime", "-n", SERVER, "-d", "dummy", "-r", "48000", "-p", "256"],
+            stdout=cls.log,
+            stderr=subprocess.STDOUT,
+            env=ENVIRONMENT,
+        )
+        for _ in range(100):
+            if "system" in live("--list").stdout:
+                return
+            time.sleep(0.1)
+        cls.log.seek(0)
+        raise RuntimeError("jackd does not start: " + cls.log.read())
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.jack.terminate()
+        cls.jack.wait()
+        cls.folder.cleanup()
+
+    def test_a_scene_is_played_to_its_end_while_it_happens(self):
+        started = time.monotonic()
+        run = live(self.scene, "--device", "system", "--look-ahead", "0.3")
+        seconds = time.monotonic() - started
+        self.assertEqual(run.returncode, 0, run.stderr)
+        print(run.stdout)
+        played = re.search(r"played +(\S+) s in (\d+) blocks, (\d+) underflows, latency (\S+) ms", run.stdout)
+        self.assertIsNotNone(played, run.stdout)
+        blocks, underflows = int(played[2]), int(played[3])
+        self.assertGreaterEqual(float(played[1]), 2.0)
+        self.assertLess(float(played[1]), 2.5)
+        self.assertAlmostEqual(float(played[1]) * 48000 / 256, blocks, delta=1)  # to the hundredth of a second that is printed
+        self.assertGreater(seconds, 1.9)  # at the pace of the card, not as fast as it can
+        self.assertLessEqual(underflows, blocks)  # How many there are is the machine's affair.
+        strikes = re.search(r"strikes +(\d+), (\d+) late, (\d+) refused", run.stdout)
+        self.assertGreater(int(strikes[1]), 10)  # nine on the gong, and the cube's
+        self.assertEqual(int(strikes[3]), 0)
+        self.assertRegex(run.stdout, r"physics +\d+ times behind the sound")
+        work = re.search(r"work +(\S+) % of a core, (\S+) mode-samples/s, (\d+) groups of modes faded", run.stdout)
+        self.assertGreater(float(work[2]), 0)
+        self.assertEqual(int(work[3]), 0)
+
+    def test_bad_input_is_one_clear_line_and_no_sound(self):
+        for arguments, code, words in [
+            ((self.scene, "--device", "no such card"), 2, ["no such card", "system"]),
+            ((self.root / "none.json",), 2, ["none.json"]),
+            ((self.scene, "--cpu", "7"), 2, ["--cpu"]),
+            ((), 2, ["scene"]),
+        ]:
+            run = live(*arguments)
+            self.assertEqual(run.returncode, code, run.stderr)
+            for word in words:
+                self.assertIn(word, run.stderr)
+
+    def test_without_a_sound_server_it_says_so(self):
+        run = live(self.scene, "--device", "system", environment={**ENVIRONMENT, "JACK_DEFAULT_SERVER": "carillon-nowhere"})
+        self.assertNotEqual(run.returncode, 0)
+        self.assertRegex(run.stderr, r"^carillon-live: .*(no sound card|no output is called)")
+        if "no sound card" in run.stderr:
+            self.assertRegex(run.stderr, "--null.*carillon-render")
+
+    def test_a_list_without_a_card_says_so(self):
+        run = live("--list", environment={**ENVIRONMENT, "JACK_DEFAULT_SERVER": "carillon-nowhere"})
+        self.assertEqual(run.returncode, 0, run.stderr)
+        self.assertTrue(run.stdout.strip())
+        if not any(pathlib.Path("/proc/asound").glob("card*")):
+            self.assertIn("there is no sound card", run.stdout)
+
+    def test_nothing_is_played_to_the_end_of_the_scene_without_a_card(self):
+        def get_cpu_s():
+            used = resource.getrusage(resource.RUSAGE_CHILDREN)
+            return used.ru_utime + used.ru_stime
+
+        started, cpu_s = time.monotonic(), get_cpu_s()
+        run = live(self.scene, "--null", "--look-ahead", "0.3", environment={**ENVIRONMENT, "JACK_DEFAULT_SERVER": "carillon-nowhere"})
+        seconds, cpu_s = time.monotonic() - started, get_cpu_s() - cpu_s
+        self.assertEqual((run.returncode, run.stderr), (0, ""))
+        played = re.search(r"played +(\S+) s in (\d+) blocks, (\d+) underflows, latency (\S+) ms", run.stdout)
+        self.assertGreaterEqual(float(played[1]), 2.0)
+        self.assertLess(float(played[1]), 2.5)
+        self.assertAlmostEqual(float(played[1]) * 48000 / 256, int(played[2]), delta=1)
+        self.assertGreater(seconds, 1.9)  # by the clock, not as fast as it can
+        self.assertLess(
+            cpu_s, 1.0
+        )  # the physics thread sleeps while it waits for the sound: it takes a twentieth of this, and 2 s if it does not
+        strikes = re.search(r"strikes +(\d+), (\d+) late, (\d+) refused", run.stdout)
+        self.assertGreater(int(strikes[1]), 10)
+        self.assertEqual(int(strikes[3]), 0)
+
+    def test_all_strikes_are_played_however_far_physics_is_in_front(self):
+        scene = {
+            "duration_s": 1.5,
+            "bodies": [{"name": "gong", "bank": "cube.h5", "position_m": [0, 0, 0.5], "fixed": True}],
+            "listener": {"position_m": [0, -1, 0.5]},
+            "strikes": [
+                {"body": "gong", "time_s": 0.5 + 4e-4 * i, "triangle": 3, "impulse_n_s": [0, 0, 0.01], "duration_s": 1e-4}
+                for i in range(2000)
+            ],
+        }
+        path = self.root / "roll.json"
+        path.write_text(json.dumps(scene))
+        run = live(path, "--null", "--look-ahead", "1.4")
+        self.assertEqual(run.returncode, 0, run.stderr)
+        strikes = re.search(r"strikes +(\d+), (\d+) late, (\d+) refused", run.stdout)
+        self.assertEqual((int(strikes[1]), int(strikes[3])), (2000, 0))
+
+    def test_what_is_rendered_is_played_however_long_the_look_ahead(self):
+        # Effects are planned long before they change: what rests at the end of the look-ahead is still falling now. On a busy machine some
+        # changes come late.
+        subprocess.run(
+            [BIN / "carillon-render", self.scene, "-o", self.root / "scene.wav", "--report", self.root / "report.json", "-q"], check=True
+        )
+        rendered = json.loads((self.root / "report.json").read_text())["impulses_played"]
+        for look_ahead in (0.2, 1.9):
+            run = live(self.scene, "--null", "--look-ahead", look_ahead)
+            strikes, refused = re.search(r"strikes +(\d+), \d+ late, (\d+) refused", run.stdout).groups()
+            self.assertEqual(refused, "0")
+            self.assertGreater(int(strikes), rendered / 2)
+
+    def test_null_takes_no_device_and_says_nothing_when_quiet(self):
+        run = live(self.scene, "--null", "--device", "system")
+        self.assertEqual(run.returncode, 2)
+        self.assertIn("--null", run.stderr)
+        run = live(self.scene, "--null", "--quiet", "--frames", "1024")
+        self.assertEqual((run.returncode, run.stdout, run.stderr), (0, "", ""))
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,160 @@
+#!/usr/bin/python3
+"""Accuracy as an input: the bank that the program chooses is as right as was asked, on bodies whose frequencies are known.
+
+Truth: Lamb modes of a solid ceramic sphere (radius 50 mm: 6937.16 and 7349.28 Hz, five of each: roots of the exact equations, Lamb 1882);
+torsion of a circular tube (c_T / 2 L, exact for any wall) and its bending in two directions (aluminium tube of OSG02 Table 2, 505 mm:
+587.88302 Hz by 3-D Fourier-Ritz, eight digits); a steel bar of 10 x 20 x 300 mm (574.44 and 1135.46 Hz, converged 3-D values to 0.01 Hz).
+
+usage: accuracy.py BIN_DIR
+"""
+import json
+import math
+import pathlib
+import re
+import struct
+import subprocess
+import sys
+import tempfile
+
+bin_dir = pathlib.Path(sys.argv[1]).resolve()
+RAYLEIGH = {"damping": {"rayleigh": {}}}
+STEEL = {"young_modulus_pa": 200e9, "poisson_ratio": 0.3, "density_kg_m3": 7850, **RAYLEIGH}
+CERAMIC = {"lame_lambda_pa": 3.99e9, "lame_mu_pa": 2.05e9, "density_kg_m3": 2700, **RAYLEIGH}
+ALUMINIUM = {"young_modulus_pa": 68.352e9, "poisson_ratio": 0.3298, "density_kg_m3": 2700, **RAYLEIGH}
+TORSION = math.sqrt(200e9 / 2.6 / 7850) / (2 * 0.12)
+
+
+def run(folder, name, job, code=0):
+    (folder / f"{name}.json").write_text(json.dumps({"bank": f"{name}.hdf", **job}))
+    done = subprocess.run(
+        ["mpirun", "-np", "2", "--oversubscribe", "--bind-to", "none", bin_dir / "carillon-precompute", f"{name}.json"],
+        cwd=folder,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == code, f"{name}: exit code {done.returncode}\n{done.stdout[-3000:]}{done.stderr[-3000:]}"
+    return done.stdout + done.stderr
+
+
+def info(folder, name):
+    done = subprocess.run(
+        [bin_dir / "carillon-bank", "info", "--json", f"{name}.hdf"], cwd=folder, capture_output=True, text=True, check=True
+    )
+    return json.loads(done.stdout)
+
+
+def check(folder, name, job, truth):
+    """truth: frequencies in ascending order from the first, or one to be found anywhere."""
+    text = run(folder, name, job)
+    bank = info(folder, name)
+    found = bank["frequencies_hz"]
+    nearest = found[: len(truth)] if len(truth) > 1 else [min(found, key=lambda f: abs(f - truth[0]))]
+    errors = [1200 * math.log2(f / t) for f, t in zip(nearest, truth)]
+    record = bank["provenance"]["run"]["accuracy"]
+    chosen = record["chosen"]
+    asked = job["accuracy_cents"]
+    print(
+        f"{name:8} asked {asked:5.1f} cents: {chosen['element']}, {chosen['nodes']} nodes after {len(record['trials'])} trials, error bars"
+        f" up to {chosen['worst_cents']:.2f}, true error {max(map(abs, errors)):.3f} cents; next stricter"
+        f" {record['next_stricter']['nodes']:.0f} nodes"
+    )
+    assert max(map(abs, errors)) <= asked, (name, errors)
+    bars = [m["algebraic_error_cents"] + m["discretisation_error_cents"] for m in bank["modes"]]
+    assert max(bars) <= asked and math.isclose(max(bars), chosen["worst_cents"], rel_tol=1e-9), (name, max(bars), chosen)
+    assert all(trial["worst_cents"] > asked for trial in record["trials"][:-1]), record  # no cheaper trial would have done
+    assert (
+        record["asked_cents"] == asked
+        and record["next_stricter"]["worst_cents"] < chosen["worst_cents"]
+        and record["next_stricter"]["cpu_seconds"] > 0
+    )
+    assert "chosen: " in text and "next stricter: " in text
+    return chosen
+
+
+def fold(source, target):
+    """Pulls every fifth mid-side node of the sphere's surface (radius 50 mm) far inwards, so that its elements fold over. Gmsh 4.1,
+    binary."""
+    data = bytearray(source.read_bytes())
+    elements = data.index(b"$Elements\n") + 10 + 4 * 8  # after the counts: one block (3 int32, a count), then tag and ten nodes each
+    (tets,) = struct.unpack_from("<Q", data, elements + 12)
+    middles = {node for e in range(tets) for node in struct.unpack_from("<6Q", data, elements + 20 + 88 * e + 40)}
+    nodes = data.index(b"$Nodes\n") + 7 + 4 * 8 + 12
+    (count,) = struct.unpack_from("<Q", data, nodes)
+    on_surface = 0
+    for node in sorted(middles):
+        place = nodes + 8 + 8 * count + 24 * (node - 1)
+        x = struct.unpack_from("<3d", data, place)
+        if abs(math.dist((0, 0, 0), x) - 0.05) < 1e-6:
+            on_surface += 1
+            if on_surface % 5 == 0:
+                struct.pack_into("<3d", data, place, *(0.3 * c for c in x))
+    assert on_surface >= 20, on_surface
+    target.write_bytes(data)
+
+
+with tempfile.TemporaryDirectory(prefix="carillon-accuracy-") as scratch:
+    folder = pathlib.Path(scratch)
+    bar = {"body": {"shape": "bar", "length_m": 0.3, "width_m": 0.02, "thickness_m": 0.01}, "material": STEEL, "band_hz": [20, 6000]}
+    loose = check(folder, "loose", {**bar, "accuracy_cents": 40}, [574.44, 1135.46])
+    strict = check(folder, "strict", {**bar, "accuracy_cents": 2}, [574.44, 1135.46])
+    assert strict["nodes"] >= loose["nodes"]
+    check(
+        folder,
+        "ball",
+        {"body": {"shape": "sphere", "radius_m": 0.05}, "material": CERAMIC, "band_hz": [20, 8000], "accuracy_cents": 3},
+        [6937.16] * 5 + [7349.28] * 5,
+    )
+    check(
+        folder,
+        "tube",
+        {
+            "body": {"shape": "tube", "length_m": 0.12, "outer_radius_m": 0.02, "wall_m": 0.008},
+            "material": STEEL,
+            "band_hz": [20, 15000],
+            "accuracy_cents": 5,
+        },
+        [TORSION],
+    )
+    check(
+        folder,
+        "chime",
+        {
+            "body": {"shape": "tube", "length_m": 0.505, "outer_radius_m": 0.0125, "wall_m": 0.001},
+            "material": ALUMINIUM,
+            "band_hz": [20, 800],
+            "accuracy_cents": 5,
+        },
+        [587.88302, 587.88302],
+    )
+
+    # A mesh file: a box is exact, so refinement gets there; a coarse ball of flat facets does not, and the run says why.
+    mesh = lambda *words: subprocess.run([bin_dir / "carillon-mesh", *words, "--quiet"], cwd=folder, check=True, stdout=subprocess.DEVNULL)
+    mesh("--shape", "bar", "--length", "0.3", "--width", "0.02", "--thickness", "0.01", "--edge", "0.02", "-o", "coarse.msh")
+    chosen = check(folder, "file", {"mesh": "coarse.msh", "material": STEEL, "band_hz": [20, 3000], "accuracy_cents": 3}, [574.44, 1135.46])
+    assert chosen["element"] == "T10", chosen
+    mesh("--shape", "sphere", "--radius", "0.05", "--nodes", "300", "-o", "facets.msh")
+    text = run(folder, "facets", {"mesh": "facets.msh", "material": CERAMIC, "band_hz": [20, 8000], "accuracy_cents": 0.5}, code=3)
+    assert "accuracy_cents" in text and "reached" in text and "surface" in text, text
+    assert (
+        "next stricter: T10, refined 1 time" in text
+        and "CPU s" in text.split("next stricter")[1]
+        and "second order on the true surface" in text
+    ), text
+    assert not (folder / "facets.hdf").exists()
+
+    # The same ball of second order is not advised to be of second order: its parabolas miss the sphere, or its folded elements are flat.
+    mesh("--shape", "sphere", "--radius", "0.05", "--nodes", "300", "--order", "2", "-o", "curved.msh")
+    text = run(folder, "curved", {"mesh": "curved.msh", "material": CERAMIC, "band_hz": [20, 8000], "accuracy_cents": 0.05}, code=3)
+    assert "although it is of second order" in text and "straight-sided" not in text and "next stricter: T10, refined 1 time" in text, text
+    fold(folder / "curved.msh", folder / "folded.msh")
+    text = run(folder, "folded", {"mesh": "folded.msh", "material": CERAMIC, "band_hz": [20, 8000], "accuracy_cents": 0.5}, code=3)
+    assert re.search(r"it is of second order, but \d+ of its \d+ elements folded over and were made straight-sided", text), text
+    assert "on the true surface" not in text and "next stricter: T10, refined 1 time" in text, text
+
+    # Where no mode is, none is said to be right to 0 cents.
+    text = run(folder, "silent", {**bar, "band_hz": [20, 300], "accuracy_cents": 10})
+    assert "no mode in the band" in text.split("chosen:")[1] and "error bars up to" not in text, text
+    text = run(folder, "silent-file", {"mesh": "coarse.msh", "material": STEEL, "band_hz": [20, 300], "accuracy_cents": 10})
+    assert "no mode in the band" in text.split("chosen: T10, refined 1 time,")[1], text
+    print("as right as was asked, each time")

@@ -1,0 +1,290 @@
+#!/usr/bin/python3
+"""Jobs of `carillon submit --on slurm` on a real Slurm of one node, which deploy/slurm/cluster starts.
+
+usage: jobs_in_slurm.py BIN_DIR CLUSTER_DIR CASE        exits 77 (skipped) when there is no cluster in CLUSTER_DIR
+"""
+import json
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+BIN, CLUSTER, CASE = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]).resolve(), sys.argv[3]
+SCRIPT = pathlib.Path(__file__).resolve().parents[3] / "deploy/slurm/cluster"
+os.environ["SLURM_CONF"] = str(CLUSTER / "slurm.conf")
+QUICK, SLOW = 300, 20000  # nodes: a second of work, and half a minute
+MANY = [20, 250000]  # a band of 310 modes of 4000 nodes, found in several parts that are saved one by one
+
+
+def check(holds, text):
+    """`text`: what to say when it does not hold, or what makes that."""
+    if not holds:
+        print(f"{CASE}: {text() if callable(text) else text}")
+        print(subprocess.run(["squeue", "--states=all"], capture_output=True, text=True).stdout)
+        sys.exit(1)
+
+
+class Store:
+    """A store in a folder whose name needs quotes."""
+
+    def __init__(self):
+        self.scratch = tempfile.TemporaryDirectory(prefix="carillon-slurm-")
+        self.folder = pathlib.Path(self.scratch.name) / 'it\'s a $HOME "store"'
+        self.folder.mkdir()
+        (self.folder / "profile.json").write_text(
+            json.dumps({"store": "store", "on": "slurm", "slurm": {"poll_s": 0.5, "signal_before_s": 60, "pictures": CASE == "submit"}})
+        )
+
+    def run(self, *words, code=0):
+        done = subprocess.run(
+            [BIN / "carillon", "--profile", self.folder / "profile.json", "--json", *words],
+            capture_output=True,
+            text=True,
+            timeout=120,
+            cwd=self.folder,
+        )
+        check(code is None or done.returncode == code, f"carillon {words}: exit code {done.returncode}\n{done.stdout}\n{done.stderr}")
+        return json.loads(done.stdout)
+
+    def write(self, name, nodes, number=0, **more):
+        """Each number is a job of its own."""
+        body = {"shape": "bar", "length_m": 0.2, "width_m": 0.02, "thickness_m": 0.004, "nodes": nodes}
+        material = {"young_modulus_pa": 200e9 + number, "poisson_ratio": 0.3, "density_kg_m3": 7850, "damping": {"rayleigh": {}}}
+        file = self.folder / name
+        file.write_text(json.dumps({"body": body, "material": material, "bank": "out.hdf", **more}))
+        return file
+
+    def submit(self, *words):
+        return self.run("submit", *words)["jobs"]
+
+    def status(self, job):
+        return next(row for row in self.run("status")["jobs"] if row["id"] == job["id"])
+
+    def wait(self, job, state, seconds=100):
+        deadline = time.monotonic() + seconds
+        while (row := self.status(job))["state"] != state:
+            check(time.monotonic() < deadline, lambda: f"not {state} after {seconds} s: {row}\n{self.log(job)}")
+            check(row["state"] not in ("done", "failed", "cancelled"), lambda: f"ended as {row} instead of {state}\n{self.log(job)}")
+            time.sleep(0.5)
+        return row
+
+    def log(self, job):
+        files = [*self.folder.glob(f"store/*/*/{job['id']}/log"), *self.folder.glob("store/slurm/*/*")]
+        return "\n".join(f"{file}:\n{file.read_text(errors='replace')}" for file in files if file.is_file())
+
+    def check_bank(self, job):
+        done = subprocess.run([BIN / "carillon-bank", "check", self.status(job)["bank"]], capture_output=True, text=True)
+        check(done.returncode == 0, f"the bank is not whole: {done.stdout}{done.stderr}")
+
+    def work(self, job):
+        return self.folder / "store/work" / job["id"][:2] / job["id"]
+
+    def wait_for_solver(self, job, count):
+        """The ranks of a job that runs, once there is something saved."""
+        deadline = time.monotonic() + 100
+        while True:
+            ranks = [
+                int(pid)
+                for pid in subprocess.run(["pgrep", "-f", "carillon-precompute job.json"], capture_output=True, text=True).stdout.split()
+                if os.path.exists(f"/proc/{pid}/cwd")
+                and os.readlink(f"/proc/{pid}/cwd") == str(self.work(job))
+                and program(pid) == "carillon-precompute"
+            ]
+            progress = self.work(job) / "progress.jsonl"
+            if len(ranks) == count and progress.exists() and progress.stat().st_size > 0:
+                return ranks
+            check(time.monotonic() < deadline, lambda: f"no {count} ranks at work but {ranks}: {self.status(job)}\n{self.log(job)}")
+            time.sleep(0.2)
+
+
+def program(pid):
+    try:
+        return os.path.basename(os.readlink(f"/proc/{pid}/exe"))
+    except OSError:
+        return ""
+
+
+def cluster(verb, daemon):
+    subprocess.run([SCRIPT, verb, CLUSTER, daemon], check=True)
+
+
+def submit(store):
+    """One job on two ranks, under a hostile name; its bank is in the store, and asking again asks nothing of Slurm."""
+    job = store.submit(store.write("a;b'$(touch harmed).json", QUICK), "--ranks", "2")[0]
+    check(job["slurm_job"], f"not with Slurm: {job}")
+    name = subprocess.run(
+        ["squeue", "--noheader", "--states=all", "--format=%j %k", f"--jobs={job['slurm_job']}"], capture_output=True, text=True
+    ).stdout.split()
+    check(name[:2] == [f"carillon-{job['id'][:12]}", job["id"]], f"Slurm calls it {name}")
+    store.wait(job, "done")
+    store.check_bank(job)
+    check(not list(store.folder.rglob("harmed")), "a job's name was run as a command")
+    again = store.submit(store.folder / "a;b'$(touch harmed).json")[0]
+    check(again["state"] == "done" and not again["new"], f"solved is not solved: {again}")
+    check(not list((store.folder / "store/slurm").iterdir()), "the batch has left its folder")
+
+
+def array(store):
+    """Ten jobs are one array; each has its bank. One of them cannot be solved, says why, and is not tried again."""
+    for number in range(9):
+        store.write(f"jobs{number}.json", QUICK, number)
+    bad = store.write("jobs9.json", QUICK, 9, fixed="no such set")
+    jobs = store.submit(*sorted(store.folder.glob("jobs*.json")), "--ranks", "1", "--memory-gb", "0.5")
+    arrays = {job["slurm_job"].split("_")[0] for job in jobs}
+    check(
+        len(jobs) == 10 and len(arrays) == 1 and {job["slurm_job"].split("_")[1] for job in jobs} == set(map(str, range(10))),
+        f"no array of ten: {jobs}",
+    )
+    for job in jobs:
+        if job["job_file"].endswith(bad.name):
+            continue
+        store.wait(job, "done")
+        store.check_bank(job)
+    row = [job for job in jobs if job["job_file"].endswith(bad.name)][0]
+    row = store.wait(row, "failed")
+    check("no such set" in row["reason"] and row["attempts"] == 1, f"not the true reason: {row}")
+
+
+def cancel(store):
+    """A job that runs and one that waits are cancelled; Slurm has neither any more. scancel is noticed too. retry asks again."""
+    one, two = (
+        store.submit(store.write("one.json", SLOW), "--ranks", "2")[0],
+        store.submit(store.write("two.json", SLOW, 1), "--ranks", "2")[0],
+    )
+    store.wait_for_solver(one, 2)
+    for job in (two, one):
+        store.run("cancel", job["id"])
+        row = store.wait(job, "cancelled", 40)
+        check("cancelled" in row["reason"], f"no reason: {row}")
+    alive = subprocess.run(["squeue", "--noheader", "--states=pending,running", "--format=%i"], capture_output=True, text=True).stdout
+    check(alive == "", f"still in Slurm: {alive}")
+    store.run("retry", two["id"])
+    row = store.status(two)
+    check(row["slurm_job"], f"not handed over again: {row}")
+    subprocess.run(["scancel", row["slurm_job"]], check=True)
+    check("scancel" in store.wait(two, "cancelled", 40)["reason"], "who cancelled is not reported")
+
+
+def time_limit(store):
+    """Slurm's signal before the time limit: the job saves, is queued again by itself, continues, and its bank is that of a run in one
+    piece."""
+    job = store.submit(store.write("slow.json", 4000, band_hz=MANY), "--ranks", "2", "--time-limit", "10m")[0]
+    store.wait_for_solver(job, 2)
+    deadline = time.monotonic() + 100
+    while not (store.status(job)["modes_done"] or 0) > 0:
+        check(time.monotonic() < deadline, lambda: f"nothing is found: {store.status(job)}\n{store.log(job)}")
+        time.sleep(0.1)
+    slurm_job = store.status(job)["slurm_job"]
+    limit = subprocess.run(["scontrol", "--oneliner", "show", "job", slurm_job], capture_output=True, text=True).stdout
+    check("TimeLimit=00:10:00" in limit, f"the limit is not Slurm's: {limit}")
+    subprocess.run(["scancel", "--batch", "--signal=USR1", slurm_job], check=True)
+    row = store.wait(job, "done", 150)
+    check(row["slurm_job"] is None or row["slurm_job"] == slurm_job, f"another job of Slurm did it: {row}")
+    check(
+        "Restarts=1" in subprocess.run(["scontrol", "--oneliner", "show", "job", slurm_job], capture_output=True, text=True).stdout,
+        "it was not queued again",
+    )
+    for words in ("time limit", "queued again in Slurm", "resumes from"):
+        check(words in store.log(job), lambda: f"the log does not say '{words}':\n{store.log(job)}")
+    store.check_bank(job)
+
+
+def killed_rank(store):
+    """kill -9 of one rank: Slurm queues the job again, with a back-off, and it is done in the end."""
+    job = store.submit(store.write("slow.json", SLOW), "--ranks", "2")[0]
+    os.kill(store.wait_for_solver(job, 2)[0], signal.SIGKILL)
+    store.wait(job, "done", 150)
+    check(
+        "queued again in Slurm" in store.log(job) and "killed" in store.log(job),
+        lambda: f"the log does not say that a rank was killed:\n{store.log(job)}",
+    )
+    store.check_bank(job)
+
+
+def wait_until_saved(number):
+    """slurmctld writes its jobs some seconds after a change; killed before that it forgets them, and gives their numbers away again."""
+    saved = pathlib.Path(os.environ["SLURM_CONF"]).parent / "state/job_state"
+    since = time.time()
+    subprocess.run(["scontrol", "update", f"JobId={number}", "TimeLimit+=1"], check=True)
+    deadline = time.monotonic() + 30
+    while not saved.exists() or saved.stat().st_mtime < since:
+        check(time.monotonic() < deadline, "slurmctld does not write its state")
+        time.sleep(0.2)
+
+
+def killed_daemon(store):
+    """kill -9 of the node's daemon and of the controller: the job continues, its state stays while there is no answer, and is right
+    afterwards."""
+    job = store.submit(store.write("slow.json", SLOW), "--ranks", "2")[0]
+    store.wait_for_solver(job, 2)
+    wait_until_saved(store.wait(job, "running", 20)["slurm_job"])
+    cluster("kill", "slurmd")
+    cluster("kill", "slurmctld")
+    check(store.status(job)["state"] == "running", lambda: f"a controller that does not answer changed the state: {store.status(job)}")
+    waiting = store.submit(store.write("quick.json", QUICK, 1), "--ranks", "1")[0]
+    check(waiting["state"] == "queued" and waiting["slurm_job"] is None, f"handed over to no Slurm: {waiting}")
+    cluster("revive", "slurmctld")
+    cluster("revive", "slurmd")
+    deadline = time.monotonic() + 30
+    while subprocess.run(["scontrol", "ping"], capture_output=True, text=True).stdout.find("UP") < 0 and time.monotonic() < deadline:
+        time.sleep(0.2)
+    store.submit(store.folder / "quick.json")
+    for ended in (job, waiting):
+        store.wait(ended, "done", 150)
+        store.check_bank(ended)
+
+
+def lost_registry(store):
+    """The registry is gone, and so is the number that Slurm gave: the job is found by its name, nothing is submitted twice, and --wait sees
+    its end."""
+    job = store.submit(store.write("slow.json", SLOW), "--ranks", "2")[0]
+    numbers = list((store.folder / "store/slurm").glob("*/number"))
+    check([file.read_text().strip() for file in numbers] == [job["slurm_job"]], f"the number is not written: {numbers}")
+    for file in [*numbers, *(store.folder / "store").glob("registry.sqlite*")]:
+        file.unlink()
+    row = store.status(job)
+    check(row["slurm_job"] == job["slurm_job"], f"not found again: {row}")
+    row = store.run("submit", store.folder / "slow.json", "--wait")["jobs"][0]
+    check(row["state"] == "done", f"not done: {row}")
+    store.check_bank(job)
+    later = subprocess.run(["scontrol", "show", "job", str(int(job["slurm_job"]) + 1)], capture_output=True, text=True)
+    check(later.returncode != 0, f"submitted twice: {later.stdout}")
+
+
+def memory_limit(store):
+    """More memory than asked for: failed, the reason says so and what to do, and it is not tried again and again."""
+    job = store.submit(store.write("big.json", 4 * SLOW), "--ranks", "1", "--memory-gb", "0.06")[0]
+    row = store.wait(job, "failed", 100)
+    check("memory" in row["reason"] and "memory_gb" in row["reason"], f"not the true reason: {row['reason']}")
+    check(row["attempts"] == 1, f"tried again: {row}")
+    refused = store.run("submit", store.write("huge.json", QUICK), "--ranks", "1", "--memory-gb", "100000", code=3)["jobs"][0]
+    check(refused["state"] == "failed" and "Slurm refuses" in refused["reason"], f"Slurm took it: {refused}")
+
+
+def main():
+    if not (CLUSTER / "control").exists():
+        print(f"SKIP: no cluster runs in {CLUSTER}; slurm.cluster_starts says why")
+        return 77
+    store = Store()
+    try:
+        {
+            "submit": submit,
+            "array": array,
+            "cancel": cancel,
+            "time_limit": time_limit,
+            "killed_rank": killed_rank,
+            "killed_daemon": killed_daemon,
+            "lost_registry": lost_registry,
+            "memory_limit": memory_limit,
+        }[CASE](store)
+    finally:
+        subprocess.run(["scancel", "--quiet", f"--user={os.getuid()}"], timeout=60)
+    print(f"{CASE}: ok")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

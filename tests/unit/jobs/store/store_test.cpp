@@ -1,0 +1,286 @@
+#include "jobs/store/store.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <functional>
+#include <iterator>
+
+#include "jobs/store/files.hpp"
+#include "runtime/base/file.hpp"
+#include "tests/support/folder.hpp"
+
+namespace {
+
+using namespace carillon;
+using carillon::tests::Folder;
+namespace fs = std::filesystem;
+
+const store::Id kId = *store::parse_id(std::string(64, 'a'));
+
+void write_bank(const fs::path& folder, const std::string& text) { std::ofstream(folder / store::kBankFile) << text; }
+
+unsigned mode_of(const fs::path& path) {
+  struct stat info {};
+  return ::stat(path.c_str(), &info) == 0 ? info.st_mode & 07777U : 0;
+}
+
+TEST(Store, a_bank_is_published_whole_and_read_only) {
+  const Folder folder;
+  const store::Store store = store::Store::open(folder / "store");
+  const store::Temporary made = store.make_temporary();
+  write_bank(made.path(), "bank");
+  fs::create_directory(made / "pictures");
+  std::ofstream(made / "pictures/a.png") << "png";
+  EXPECT_FALSE(store.has_bank(kId));
+  EXPECT_TRUE(store.publish(kId, made));
+  EXPECT_TRUE(store.has_bank(kId));
+  EXPECT_EQ(store.list_banks(), std::vector<store::Id>{kId});
+  EXPECT_EQ(mode_of(store.bank_folder(kId)) & 0222U, 0u);
+  EXPECT_EQ(mode_of(store.bank_folder(kId) / store::kBankFile), 0444u);
+  EXPECT_EQ(mode_of(store.bank_folder(kId) / "pictures") & 0222U, 0u);
+  store.remove_bank(kId);
+  EXPECT_FALSE(store.has_bank(kId));
+  EXPECT_TRUE(fs::is_empty(folder / "store/tmp"));
+}
+
+TEST(Store, the_second_of_two_publications_is_no_error_and_changes_nothing) {
+  const Folder folder;
+  const store::Store store = store::Store::open(folder / "store");
+  for (const char* text : {"first", "second"}) {
+    const store::Temporary made = store.make_temporary();
+    write_bank(made.path(), text);
+    EXPECT_EQ(store.publish(kId, made), std::string(text) == "first");
+  }
+  EXPECT_EQ(tests::read_all(store.bank_folder(kId) / store::kBankFile), "first");
+}
+
+TEST(Store, of_eight_processes_that_publish_at_once_one_wins_and_nothing_is_left) {
+  const Folder folder;
+  const store::Store store = store::Store::open(folder / "store");
+  std::vector<pid_t> children;
+  for (int n = 0; n < 8; ++n) {
+    const pid_t child = ::fork();
+    if (child == 0) {
+      int won = 0;
+      for (int round = 0; round < 20; ++round) {
+        const store::Temporary made = store.make_temporary();
+        write_bank(made.path(), std::string(1000, static_cast<char>('a' + n)));
+        won += store.publish(*store::parse_id(std::string(62, 'c') + (round < 10 ? "0" : "1") + std::to_string(round % 10)), made) ? 1 : 0;
+      }
+      ::_exit(won);
+    }
+    children.push_back(child);
+  }
+  int won = 0;
+  for (const pid_t child : children) {
+    int status = 0;
+    ::waitpid(child, &status, 0);
+    ASSERT_TRUE(WIFEXITED(status));
+    won += WEXITSTATUS(status);
+  }
+  EXPECT_EQ(won, 20);
+  EXPECT_EQ(store.list_banks().size(), 20u);
+  for (const store::Id& id : store.list_banks()) {
+    const std::string bank = tests::read_all(store.bank_folder(id) / store::kBankFile);
+    EXPECT_EQ(bank, std::string(1000, bank.at(0)));
+  }
+  EXPECT_TRUE(fs::is_empty(folder / "store/tmp"));
+}
+
+TEST(Store, a_file_with_another_name_elsewhere_stays_writable_there) {
+  const Folder folder;
+  const store::Store store = store::Store::open(folder / "store");
+  const store::Temporary made = store.make_temporary();
+  folder.write("log", "text");
+  write_bank(made.path(), "bank");
+  fs::create_hard_link(folder / "log", made / "log");
+  EXPECT_TRUE(store.publish(kId, made));
+  EXPECT_NE(mode_of(folder / "log") & 0200U, 0u);
+  EXPECT_EQ(tests::read_all(store.bank_folder(kId) / "log"), "text");
+}
+
+TEST(Store, another_folder_is_not_taken_for_a_store) {
+  const Folder folder;
+  folder.write("home/letter.txt", "dear");
+  EXPECT_THROW(store::Store::open(folder / "home"), InputError);
+  EXPECT_FALSE(fs::exists(folder / "home/banks"));
+  folder.write("file", "");
+  EXPECT_THROW(store::Store::open(folder / "file"), InputError);
+  EXPECT_THROW(store::Store::open(""), InputError);
+  store::Store::open(folder / "store");
+  folder.write("store/VERSION", "carillon store 2\n");
+  try {
+    store::Store::open(folder / "store");
+    ADD_FAILURE();
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("carillon store 2"), std::string::npos) << error.what();
+  }
+}
+
+TEST(Store, what_is_no_id_in_its_folders_is_passed_over) {
+  const Folder folder;
+  const store::Store store = store::Store::open(folder / "store");
+  fs::create_directories(folder / "store/banks/aa/not-an-id");
+  fs::create_directories(folder / ("store/banks/bb/" + kId.text()));  // in the wrong place
+  EXPECT_TRUE(store.list_banks().empty());
+}
+
+TEST(Store, a_store_of_a_group_is_writable_by_it_whatever_the_umask) {
+  const Folder folder;
+  fs::create_directory(folder / "store");
+  ::chmod((folder / "store").c_str(), 02775);
+  const pid_t child = ::fork();
+  if (child == 0) {
+    ::umask(077);
+    const store::Store store = store::Store::open(folder / "store");
+    const bool is_good = (mode_of(folder / "store/work") & 070U) == 070U && (mode_of(store.make_temporary().path()) & 070U) == 070U;
+    ::_exit(is_good ? 0 : 1);
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  EXPECT_EQ(status, 0);
+}
+
+TEST(Store, a_link_in_place_of_a_folder_of_its_own_is_refused) {
+  for (const char* name :
+       {"banks", "inputs", "work", "tmp", "damaged", "slurm", "lock", "VERSION", "submissions.jsonl", "registry.sqlite"}) {
+    const Folder folder;
+    fs::create_directory(folder / "victim");
+    store::Store::open(folder / "store");
+    fs::remove_all(folder / "store" / name);
+    fs::create_symlink(folder / "victim", folder / "store" / name);
+    EXPECT_THROW(store::Store::open(folder / "store"), InputError) << name;
+    EXPECT_TRUE(fs::is_empty(folder / "victim")) << name;
+  }
+}
+
+TEST(Store, folders_that_become_links_after_it_was_opened_are_not_followed) {
+  const std::string digits = kId.text().substr(0, 2);
+  for (const std::string& name : {std::string("banks"), std::string("work"), std::string("tmp"), "banks/" + digits, "work/" + digits,
+                                  "work/" + digits + "/" + kId.text(), "banks/" + digits + "/" + kId.text()}) {
+    const Folder folder;
+    const store::Store store = store::Store::open(folder / "store");
+    folder.write("victim/" + digits + "/" + kId.text() + "/thesis.tex", "important");
+    fs::create_directories((folder / ("store/" + name)).parent_path());
+    fs::remove_all(folder / ("store/" + name));
+    fs::create_symlink(folder / "victim", folder / ("store/" + name));
+    EXPECT_FALSE(name.starts_with("work") && store.has_work(kId)) << name;
+    EXPECT_FALSE(name.starts_with("banks") && store.has_bank_folder(kId)) << name;
+    for (const auto& act :
+         std::vector<std::function<void()>>{[&] { store.remove_work(kId); }, [&] { store.remove_bank(kId); }, [&] { store.open_work(kId); },
+                                            [&] {
+                                              const store::Temporary made = store.make_temporary();
+                                              write_bank(made.path(), "bank");
+                                              store.publish(kId, made);
+                                            }}) {
+      try {
+        act();
+      } catch (const SystemError&) {
+      }
+    }
+    EXPECT_EQ(tests::read_all(folder / ("victim/" + digits + "/" + kId.text() + "/thesis.tex")), "important") << name;
+    EXPECT_EQ(std::distance(fs::recursive_directory_iterator(folder / "victim"), fs::recursive_directory_iterator()), 3) << name;
+  }
+}
+
+TEST(Store, what_is_removed_follows_no_link_inside) {
+  const Folder folder;
+  const store::Store store = store::Store::open(folder / "store");
+  folder.write("victim/thesis.tex", "important");
+  const fs::path work = store.work_folder(kId);
+  fs::create_directories(work / "inner/deep");
+  fs::create_directory_symlink(folder / "victim", work / "inner/deep/link");
+  fs::create_symlink(folder / "victim/thesis.tex", work / "log");
+  fs::permissions(work / "inner", fs::perms::owner_read);
+  store.remove_work(kId);
+  EXPECT_FALSE(fs::exists(work));
+  EXPECT_EQ(tests::read_all(folder / "victim/thesis.tex"), "important");
+}
+
+TEST(Store, a_bank_that_is_no_longer_what_was_published_is_found) {
+  const auto spoil = [](const std::function<void(const fs::path&)>& act, store::Look look, bool keeps_time) {
+    const Folder folder;
+    const store::Store store = store::Store::open(folder / "store");
+    const store::Temporary made = store.make_temporary();
+    write_bank(made.path(), std::string(9000, 'x'));
+    EXPECT_TRUE(store.publish(kId, made));
+    EXPECT_FALSE(store.find_bank_fault(kId, store::Look::full));
+    const fs::path bank = store.bank_folder(kId) / store::kBankFile;
+    fs::permissions(bank.parent_path(), fs::perms::owner_all);
+    fs::permissions(bank, fs::perms::owner_all);
+    const auto time = fs::last_write_time(bank);
+    act(bank);
+    if (keeps_time) fs::last_write_time(bank, time);
+    const auto fault = store.find_bank_fault(kId, look);
+    // What a full look has found every later one finds.
+    return fault && store.find_bank_fault(kId, store::Look::quick);
+  };
+  const auto flip = [](const fs::path& bank) {
+    std::fstream file(bank, std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(8000);
+    file.put('y');
+  };
+  EXPECT_TRUE(spoil([](const fs::path& bank) { fs::remove(bank); }, store::Look::quick, false));
+  EXPECT_TRUE(spoil([](const fs::path& bank) { fs::resize_file(bank, 0); }, store::Look::quick, false));
+  EXPECT_TRUE(spoil([](const fs::path& bank) { fs::resize_file(bank, 8999); }, store::Look::quick, true));
+  EXPECT_TRUE(spoil([](const fs::path& bank) { std::ofstream(bank) << std::string(9000, 'z'); }, store::Look::quick, true));
+  EXPECT_TRUE(spoil(flip, store::Look::quick, false));
+  EXPECT_TRUE(spoil(flip, store::Look::full, true));
+}
+
+TEST(Store, a_quota_that_is_full_is_a_full_disk) {
+  for (const int error : {ENOSPC, EDQUOT}) {
+    EXPECT_TRUE(base::is_full_error(error));
+    try {
+      store::throw_errno("/some/file", "write", error);
+    } catch (const SystemError& refusal) {
+      const std::string what = refusal.what();
+      EXPECT_NE(what.find("/some/file: cannot write"), std::string::npos) << what;
+      EXPECT_NE(what.find("the disk or quota is full: make room"), std::string::npos) << what;
+      EXPECT_TRUE(store::is_disk_full("/proc", refusal)) << what;
+    }
+  }
+  EXPECT_FALSE(base::is_full_error(EACCES));
+  const Folder folder;
+  EXPECT_EQ(store::is_disk_full(folder.path(), SystemError(std::strerror(ENOSPC))),
+            store::is_disk_full(folder.path()));  // words decide nothing
+}
+
+TEST(Store, names_of_temporary_folders_are_known_again) {
+  const Folder folder;
+  const store::Store store = store::Store::open(folder / "store");
+  const store::Temporary made = store.make_temporary();
+  for (const auto& entry : fs::directory_iterator(folder / "store/tmp"))
+    EXPECT_TRUE(store::Store::is_temporary_name(entry.path().filename().string())) << entry.path();
+  for (const char* name : {"thesis.tex", ".ssh", "a,b,c,d,e", "host,0-1:2,12,34,0123456789ab,", "host,0-1:2,12,34,0123456789aX", ""})
+    EXPECT_FALSE(store::Store::is_temporary_name(name)) << name;
+}
+
+TEST(Store, another_user_without_rights_hears_whose_it_is) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root becomes another user";
+  const Folder folder;
+  ::chmod(folder.path().c_str(), 0755);
+  store::Store::open(folder / "store");
+  const pid_t child = ::fork();
+  if (child == 0) {
+    if (::setgid(65534) != 0 || ::setuid(65534) != 0) ::_exit(9);
+    try {
+      store::Store::open(folder / "store");
+    } catch (const InputError& error) {
+      const std::string what = error.what();
+      ::_exit(what.find("may not write") != std::string::npos && what.find("install -d -m 2775") != std::string::npos ? 0 : 2);
+    }
+    ::_exit(1);
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  EXPECT_EQ(status, 0);
+}
+
+}  // namespace

@@ -1,0 +1,171 @@
+#include "partition/partition.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <numeric>
+#include <random>
+#include <set>
+#include <thread>
+
+#include "tests/support/box_mesh.hpp"
+
+namespace carillon::partition {
+namespace {
+
+using testing::HasSubstr;
+
+/// Number of face-sharing pairs of a mesh by the definition: three common corners. Quadratic in the elements.
+std::set<std::pair<int, int>> slow_dual(const std::vector<std::int32_t>& corners) {
+  std::set<std::pair<int, int>> pairs;
+  const int n = static_cast<int>(corners.size() / 4);
+  for (int a = 0; a < n; ++a)
+    for (int b = 0; b < n; ++b) {
+      int common = 0;
+      for (int i = 0; i < 4; ++i)
+        for (int j = 0; j < 4; ++j) common += corners[4 * a + i] == corners[4 * b + j];
+      if (common == 3) pairs.emplace(a, b);
+    }
+  return pairs;
+}
+
+/// Fill-in of the Cholesky factor under an order, by symbolic elimination: the slow and sure way.
+std::size_t count_factor_entries(const Graph& graph, const std::vector<std::int32_t>& position) {
+  const int n = graph.vertex_count();
+  std::vector<std::set<std::int32_t>> later(n);  // by position
+  for (int v = 0; v < n; ++v)
+    for (int k = graph.offsets[v]; k < graph.offsets[v + 1]; ++k)
+      if (position[graph.neighbours[k]] > position[v]) later[position[v]].insert(position[graph.neighbours[k]]);
+  std::size_t entries = n;
+  for (int p = 0; p < n; ++p) {
+    entries += later[p].size();
+    if (later[p].empty()) continue;
+    const int parent = *later[p].begin();
+    later[parent].insert(std::next(later[p].begin()), later[p].end());
+  }
+  return entries;
+}
+
+TEST(DualGraph, joins_exactly_the_tetrahedra_that_share_three_corners) {
+  const auto box = tests::make_box({3, 2, 2}, {1, 1, 1});
+  const Graph dual = make_dual_graph(box.tets);
+  std::set<std::pair<int, int>> pairs;
+  for (int v = 0; v < dual.vertex_count(); ++v)
+    for (int k = dual.offsets[v]; k < dual.offsets[v + 1]; ++k) pairs.emplace(v, dual.neighbours[k]);
+  EXPECT_EQ(pairs, slow_dual(box.tets));
+}
+
+TEST(DualGraph, refuses_three_tetrahedra_on_one_face_and_names_them) {
+  const std::vector<std::int32_t> corners{0, 1, 2, 3, 0, 1, 2, 4, 0, 1, 2, 5};
+  try {
+    make_dual_graph(corners);
+    FAIL() << "accepted";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("tetrahedra 0, 1 and 2 share one face (nodes 0, 1, 2)"));
+  }
+}
+
+TEST(NodeGraph, joins_nodes_of_one_element_and_skips_negative_ones) {
+  const std::vector<std::int32_t> tets{0, 1, 2, 3, 1, 2, 3, -1};
+  const Graph graph = make_node_graph(tets, 4, 5);
+  EXPECT_EQ(graph.offsets, (std::vector<std::int32_t>{0, 3, 6, 9, 12, 12}));
+  EXPECT_EQ(graph.neighbours, (std::vector<std::int32_t>{1, 2, 3, 0, 2, 3, 0, 1, 3, 0, 1, 2}));
+}
+
+TEST(Partition, of_a_long_bar_is_balanced_contiguous_and_cuts_about_one_cross_section_per_seam) {
+  const auto bar = tests::make_box({60, 4, 4}, {60, 4, 4});
+  for (const int parts : {1, 2, 3, 4}) {
+    const Partition cut = partition_elements(bar.tets, parts);
+    EXPECT_EQ(std::accumulate(cut.quality.elements.begin(), cut.quality.elements.end(), std::int64_t{0}), bar.tet_count());
+    EXPECT_LT(cut.quality.balance, 1.04) << parts;
+    EXPECT_TRUE(cut.quality.contiguous) << parts;
+    // A flat seam across the bar crosses 4 x 4 cells with two faces each; METIS finds seams near that.
+    EXPECT_LE(cut.quality.edge_cut, 3 * 32 * (parts - 1)) << parts;
+    EXPECT_GE(cut.quality.edge_cut, 24 * (parts - 1)) << parts;
+  }
+}
+
+TEST(Partition, reports_the_edge_cut_that_counting_finds) {
+  const auto box = tests::make_box({4, 3, 2}, {1, 1, 1});
+  const Partition cut = partition_elements(box.tets, 3);
+  std::int64_t crossing = 0;
+  for (const auto& [a, b] : slow_dual(box.tets)) crossing += a < b && cut.part[a] != cut.part[b];
+  EXPECT_EQ(cut.quality.edge_cut, crossing);
+}
+
+TEST(Partition, is_the_same_every_time) {
+  const auto box = tests::make_box({6, 5, 4}, {1, 1, 1});
+  EXPECT_EQ(partition_elements(box.tets, 4).part, partition_elements(box.tets, 4).part);
+}
+
+TEST(Partition, of_two_separate_bodies_works_though_no_contiguous_one_may_exist) {
+  auto corners = tests::make_box({4, 4, 4}, {1, 1, 1}).tets;
+  const auto nodes = *std::max_element(corners.begin(), corners.end()) + 1;
+  const auto first = corners;
+  for (const auto corner : first) corners.push_back(corner + nodes);
+  for (const int parts : {2, 3}) {
+    const Partition cut = partition_elements(corners, parts);
+    EXPECT_LT(cut.quality.balance, 1.1);
+    EXPECT_EQ(static_cast<int>(cut.quality.elements.size()), parts);
+  }
+}
+
+TEST(Partition, leaves_no_part_empty_down_to_one_element_each) {
+  const auto cube = tests::make_box({1, 1, 1}, {1, 1, 1});
+  for (int parts = 1; parts <= 6; ++parts)
+    for (const auto size : partition_elements(cube.tets, parts).quality.elements) EXPECT_GT(size, 0) << parts << " parts";
+}
+
+TEST(Partition, refuses_more_parts_than_elements_and_says_how_many_ranks_to_start) {
+  const auto cube = tests::make_box({1, 1, 1}, {1, 1, 1});
+  try {
+    partition_elements(cube.tets, 7);
+    FAIL() << "accepted";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("6 tetrahedra, fewer than the 7 ranks; start at most 6"));
+  }
+  EXPECT_THROW(partition_elements(cube.tets, 0), InputError);
+}
+
+TEST(NestedDissection, is_a_permutation_with_far_less_fill_than_a_random_order) {
+  const auto box = tests::make_box({9, 9, 9}, {1, 1, 1});
+  const Graph graph = make_node_graph(box.tets, 4, static_cast<std::int32_t>(box.nodes_m.size()));
+  const auto position = order_nested_dissection(graph);
+  auto sorted = position;
+  std::sort(sorted.begin(), sorted.end());
+  std::vector<std::int32_t> natural(box.nodes_m.size());
+  std::iota(natural.begin(), natural.end(), 0);
+  ASSERT_EQ(sorted, natural);
+  auto random = natural;
+  std::shuffle(random.begin(), random.end(), std::mt19937(7));
+  EXPECT_LT(2 * count_factor_entries(graph, position), count_factor_entries(graph, random));
+  EXPECT_LT(count_factor_entries(graph, position), count_factor_entries(graph, natural));
+}
+
+TEST(NestedDissection, that_is_stopped_from_outside_ends_as_the_program_wants_it) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  const auto box = tests::make_box({28, 28, 28}, {1, 1, 1});
+  const Graph graph = make_node_graph(box.tets, 4, static_cast<std::int32_t>(box.nodes_m.size()));
+  EXPECT_EXIT(
+      {
+        std::signal(SIGTERM, [](int) { _exit(42); });
+        std::thread killer([] {
+          std::this_thread::sleep_for(std::chrono::milliseconds(60));
+          kill(getpid(), SIGTERM);
+        });
+        killer.detach();
+        for (int repeat = 0; repeat < 100; ++repeat) (void)order_nested_dissection(graph);
+      },
+      testing::ExitedWithCode(42), "");
+}
+
+TEST(NestedDissection, of_a_graph_without_edges_is_the_identity) {
+  EXPECT_EQ(order_nested_dissection(make_node_graph({}, 4, 3)), (std::vector<std::int32_t>{0, 1, 2}));
+  EXPECT_TRUE(order_nested_dissection(Graph{}).empty());
+}
+
+}  // namespace
+}  // namespace carillon::partition

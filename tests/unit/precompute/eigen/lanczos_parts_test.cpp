@@ -1,0 +1,316 @@
+// The parts of block Lanczos, each against dense matrices that every rank has.
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include "precompute/eigen/block_lanczos.hpp"
+#include "precompute/eigen/inner_product.hpp"
+#include "precompute/eigen/lanczos_basis.hpp"
+#include "precompute/eigen/locked_modes.hpp"
+#include "precompute/eigen/ritz.hpp"
+#include "precompute/eigen/shift_invert.hpp"
+#include "precompute/eigen/shifted_factor.hpp"
+#include "precompute/la/local_columns.hpp"
+#include "precompute/petsc/guard.hpp"
+#include "precompute/petsc/noise.hpp"
+#include "tests/unit/precompute/eigen/spring_network.hpp"
+
+namespace carillon::eigen {
+namespace {
+
+using la::Matrix;
+
+MPI_Comm world() { return PETSC_COMM_WORLD; }
+
+Matrix sum_over_ranks(Matrix matrix) {
+  MPI_Allreduce(MPI_IN_PLACE, matrix.data(), static_cast<int>(matrix.size()), MPI_DOUBLE, MPI_SUM, world());
+  return matrix;
+}
+
+Matrix gather(Mat sparse) {
+  PetscInt n = 0, first = 0, last = 0;
+  check(MatGetSize(sparse, &n, nullptr));
+  check(MatGetOwnershipRange(sparse, &first, &last));
+  Matrix dense = Matrix::Zero(n, n);
+  for (PetscInt row = first; row < last; ++row) {
+    PetscInt count = 0;
+    const PetscInt* columns = nullptr;
+    const PetscScalar* values = nullptr;
+    check(MatGetRow(sparse, row, &count, &columns, &values));
+    for (PetscInt k = 0; k < count; ++k) dense(row, columns[k]) = values[k];
+    check(MatRestoreRow(sparse, row, &count, &columns, &values));
+  }
+  return sum_over_ranks(dense);
+}
+
+double find_largest(const Matrix& a) { return a.size() == 0 ? 0 : a.cwiseAbs().maxCoeff(); }
+
+PetscErrorCode apply_factor(PC pc, Mat b, Mat x) {
+  return petsc::guard([&] {
+    ShiftedFactor* factor = nullptr;
+    check(PCShellGetContext(pc, &factor));
+    const la::LocalColumns from(b), to(x);
+    for (PetscInt j = 0; j < from.columns; ++j) factor->solve(from.column(j), to.column(j), std::max<PetscInt>(from.rows, 1), 1);
+  });
+}
+
+// A small free body, dense and distributed, its shift-invert operator, and memory for a basis.
+class Rig {
+ public:
+  static constexpr int kBlock = 4;
+
+  explicit Rig(int room) : system(test::make_system(make_block(2, 3, 4))), room_(room) {
+    k = gather(system.stiffness);
+    m = gather(system.mass);
+    const Eigen::GeneralizedSelfAdjointEigenSolver<Matrix> dense(k, m);
+    lambda = dense.eigenvalues();
+    vectors = dense.eigenvectors();
+    sigma = 0.5 * (lambda[20] + lambda[21]);
+    inverse = (k - sigma * m).partialPivLu().inverse();
+    check(MatGetOwnershipRange(system.stiffness, &first, &last));
+    rows = last - first;
+    make_transformation();
+    memory_.assign(static_cast<std::size_t>(rows * (room + kBlock)), 0.0);
+    fill_at_random(view().part(0, kBlock));
+  }
+  ~Rig() { (void)STDestroy(&st); }
+  Rig(const Rig&) = delete;
+  Rig& operator=(const Rig&) = delete;
+
+  Columns view() { return {memory_.data(), rows, rows, room_ + kBlock}; }
+  void fill_at_random(const Columns& columns) const {
+    for (int j = 0; j < columns.count; ++j)
+      for (PetscInt i = 0; i < rows; ++i)
+        columns.column(j)[i] = petsc::make_noise(static_cast<std::uint64_t>(first + i), static_cast<std::uint64_t>(j) + 1);
+  }
+  /// All rows of some columns, on every rank.
+  Matrix gather_columns(const Columns& columns) const {
+    Matrix all = Matrix::Zero(k.rows(), columns.count);
+    for (int j = 0; j < columns.count; ++j) std::copy_n(columns.column(j), rows, all.col(j).data() + first);
+    return sum_over_ranks(all);
+  }
+  /// This rank's rows of column j of a dense matrix, into a column.
+  void scatter(const Matrix& all, Eigen::Index j, double* column) const { std::copy_n(all.col(j).data() + first, rows, column); }
+  RitzGoal make_goal(double low, double high, int wanted) const {
+    RitzGoal goal;
+    goal.is_interval = true;
+    goal.low = low;
+    goal.high = high;
+    goal.wanted = wanted;
+    goal.sigma = sigma;
+    goal.tolerance = 1e-10;
+    goal.error = [](double theta, double residual) { return residual / std::abs(theta); };
+    goal.to_lambda = [this](double theta) { return sigma + 1 / theta; };
+    return goal;
+  }
+
+  test::System system;
+  Matrix k, m, vectors, inverse;
+  la::Vector lambda;
+  double sigma = 0;
+  PetscInt first = 0, last = 0, rows = 0;
+  ST st = nullptr;
+
+ private:
+  void make_transformation() {
+    Mat matrices[2] = {system.stiffness, system.mass};
+    KSP ksp = nullptr;
+    PC pc = nullptr;
+    check(STCreate(world(), &st));
+    check(STSetType(st, STSINVERT));
+    check(STSetMatrices(st, 2, matrices));
+    check(STSetShift(st, sigma));
+    check(STGetKSP(st, &ksp));
+    check(KSPSetType(ksp, KSPPREONLY));
+    check(KSPGetPC(ksp, &pc));
+    factor_ = make_ldlt_factor({system.stiffness, system.mass});
+    ASSERT_TRUE(factor_->factorise(sigma));
+    check(PCSetType(pc, PCSHELL));
+    check(PCShellSetContext(pc, factor_.get()));
+    check(PCShellSetMatApply(pc, apply_factor));
+    check(STSetUp(st));
+    check(MatDuplicate(system.stiffness, MAT_COPY_VALUES, shifted_.out()));
+    check(MatAXPY(shifted_, -sigma, system.mass, SUBSET_NONZERO_PATTERN));
+    check(KSPSetOperators(ksp, shifted_, shifted_));
+  }
+
+  int room_;
+  petsc::MatHandle shifted_;
+  std::unique_ptr<ShiftedFactor> factor_;
+  std::vector<double> memory_;
+};
+
+TEST(ShiftInvert, is_the_dense_inverse) {
+  Rig rig(Rig::kBlock);
+  InnerProduct inner(world(), rig.system.mass, rig.rows, static_cast<PetscInt>(rig.k.rows()), Rig::kBlock);
+  inner.place(rig.view());
+  inner.multiply();
+  const Matrix z = rig.gather_columns(inner.z());
+  const ShiftInvert inverse(rig.st);
+  EXPECT_EQ(inverse.get_sigma(), rig.sigma);
+  inverse.apply(inner.z_mat(), inner.w_mat());
+  const Matrix expected = rig.inverse * z;
+  EXPECT_LT(find_largest(rig.gather_columns(inner.w()) - expected), 1e-10 * find_largest(expected));
+}
+
+TEST(InnerProduct, multiplies_by_the_mass_wherever_its_block_is) {
+  Rig rig(2 * Rig::kBlock);
+  const auto n = static_cast<PetscInt>(rig.k.rows());
+  rig.fill_at_random(rig.view());
+  for (const bool is_identity : {false, true}) {
+    InnerProduct inner(world(), is_identity ? nullptr : rig.system.mass.get(), rig.rows, n, Rig::kBlock);
+    for (const int at : {0, 3, Rig::kBlock}) {
+      inner.place(rig.view().part(at, Rig::kBlock));
+      inner.multiply();
+      const Matrix v = rig.gather_columns(rig.view()), w = v.middleCols(at, Rig::kBlock);
+      const Matrix z = is_identity ? w : Matrix(rig.m * w);
+      EXPECT_LT(find_largest(rig.gather_columns(inner.z()) - z), 1e-14);
+      const Matrix products = v.transpose() * z;
+      EXPECT_LT(find_largest(inner.calc_products(rig.view(), inner.z()) - products), 1e-13);
+      std::array<double, 2> sums{1, 0.5};
+      EXPECT_LT(find_largest(inner.calc_products(rig.view(), inner.z(), sums) - products), 1e-13);
+      int ranks = 1;
+      MPI_Comm_size(world(), &ranks);
+      EXPECT_EQ(sums[0], ranks);
+      EXPECT_EQ(sums[1], 0.5 * ranks);
+    }
+  }
+}
+
+TEST(LockedModes, are_projected_out_by_range) {
+  Rig rig(Rig::kBlock);
+  std::vector<double> values(static_cast<std::size_t>(7 * rig.rows));
+  LockedModes locked;
+  for (int j = 0; j < 7; ++j) {
+    rig.scatter(rig.vectors, j, values.data() + j * rig.rows);
+    locked.lambda.push_back(rig.lambda[j]);
+  }
+  locked.sets = {{values.data(), rig.rows, rig.rows, 3}, {values.data() + 3 * rig.rows, rig.rows, rig.rows, 4}};
+  InnerProduct inner(world(), rig.system.mass, rig.rows, static_cast<PetscInt>(rig.k.rows()), Rig::kBlock);
+  inner.place(rig.view());
+  inner.multiply();
+  const Matrix w = rig.gather_columns(inner.w());
+  const Matrix parts = locked.project_out(world(), {2, 4}, inner.w(), inner.z());  // of both sets
+  const Matrix l = rig.vectors.middleCols(2, 4);
+  EXPECT_LT(find_largest(parts - l.transpose() * rig.m * w), 1e-13);
+  EXPECT_LT(find_largest(rig.gather_columns(inner.w()) - (w - l * parts)), 1e-13);
+}
+
+// A^-1 M V = V T + V_next R E^T, and V and V_next M-orthonormal.
+void expect_krylov_relation(const Rig& rig, const LanczosBasis& basis, const char* when) {
+  const int n = basis.size(), next = basis.next_width();
+  const Matrix v = rig.gather_columns(basis.columns(0, n));
+  const Matrix both = rig.gather_columns(basis.columns(0, n + next));
+  Matrix relation = rig.inverse * rig.m * v - v * basis.t().topLeftCorner(n, n);
+  relation.rightCols(basis.width()) -= both.rightCols(next) * basis.coupling();
+  const double scale = 1 / (rig.lambda.array() - rig.sigma).abs().minCoeff();
+  EXPECT_LT(find_largest(relation), 1e-8 * scale) << when;
+  EXPECT_LT(find_largest(both.transpose() * rig.m * both - Matrix::Identity(n + next, n + next)), 1e-9) << when;
+  EXPECT_LT(find_largest(basis.t() - basis.t().transpose()), 1e-12 * scale) << when;
+}
+
+TEST(LanczosBasis, keeps_the_krylov_relation_through_steps_and_restarts) {
+  constexpr int kRoom = 32;
+  Rig rig(kRoom);
+  const ShiftInvert inverse(rig.st);
+  const auto n = static_cast<PetscInt>(rig.k.rows());
+  InnerProduct inner(world(), rig.system.mass, rig.rows, n, Rig::kBlock);
+  LanczosBasis basis(rig.view(), 0, kRoom, Rig::kBlock);
+  const LockedModes none;
+  BlockLanczos lanczos({inverse, inner, basis, none, n, rig.first}, rig.make_goal(rig.lambda[15], rig.lambda[25], 11), 100, nullptr);
+  ASSERT_TRUE(lanczos.start());
+  int restarts = 0;
+  for (int step = 0; step < 16; ++step) {
+    ASSERT_TRUE(lanczos.step());
+    expect_krylov_relation(rig, basis, "after a step");
+    if (basis.is_full()) {
+      RitzPairs pairs = calc_ritz_pairs(world(), basis);
+      lanczos.restart(pairs, select(pairs, rig.make_goal(rig.lambda[15], rig.lambda[25], 11)));
+      expect_krylov_relation(rig, basis, "after a restart");
+      ++restarts;
+    }
+    basis.append();
+  }
+  EXPECT_GE(restarts, 2);
+}
+
+TEST(RitzStep, finds_what_a_dense_solver_finds_and_its_residuals_are_true) {
+  Rig rig(72 + Rig::kBlock);
+  const ShiftInvert inverse(rig.st);
+  const auto n = static_cast<PetscInt>(rig.k.rows());
+  InnerProduct inner(world(), rig.system.mass, rig.rows, n, Rig::kBlock);
+  LanczosBasis basis(rig.view(), 0, n, Rig::kBlock);
+  const LockedModes none;
+  BlockLanczos lanczos({inverse, inner, basis, none, n, rig.first}, rig.make_goal(0, 1, 1), 100, nullptr);
+  ASSERT_TRUE(lanczos.start());
+  for (int step = 0; lanczos.step(); ++step) {
+    if (step == 5) {
+      RitzPairs pairs = calc_ritz_pairs(world(), basis);
+      share_vectors(world(), pairs);
+      const Matrix x = rig.gather_columns(basis.columns(0, basis.size())) * pairs.vectors;
+      const Matrix r = rig.inverse * rig.m * x - x * pairs.theta.asDiagonal();
+      const double scale = pairs.theta.cwiseAbs().maxCoeff();
+      for (int j = 0; j < basis.size(); ++j)
+        EXPECT_NEAR(pairs.residual[static_cast<std::size_t>(j)], std::sqrt(r.col(j).dot(rig.m * r.col(j))), 1e-10 * scale) << j;
+    }
+    basis.append();
+  }
+  ASSERT_EQ(basis.size(), n) << "the whole space";
+  const RitzPairs pairs = calc_ritz_pairs(world(), basis);
+  std::vector<double> expected;
+  for (const double x : rig.lambda) expected.push_back(1 / (x - rig.sigma));
+  std::sort(expected.begin(), expected.end());
+  const double scale = std::max(std::abs(expected.front()), std::abs(expected.back()));
+  for (PetscInt j = 0; j < n; ++j) EXPECT_NEAR(pairs.theta[j], expected[static_cast<std::size_t>(j)], 1e-12 * scale) << j;
+}
+
+TEST(RitzStep, selects_an_interval_and_sees_when_it_is_complete) {
+  RitzGoal goal;
+  goal.is_interval = true;
+  goal.low = 2;
+  goal.high = 4;
+  goal.wanted = 3;
+  goal.sigma = 3.1;
+  goal.tolerance = 1e-8;
+  goal.error = [](double, double residual) { return residual; };
+  goal.to_lambda = [](double theta) { return 3.1 + 1 / theta; };
+  const std::vector<double> lambda{3.0, 2.2, 1.0, 9.0, 5.2, 3.6};  // by ascending theta
+  RitzPairs pairs;
+  pairs.theta.resize(6);
+  for (int i = 0; i < 6; ++i) pairs.theta[i] = 1 / (lambda[static_cast<std::size_t>(i)] - goal.sigma);
+  pairs.residual = {1e-15, 1e-15, 1e-15, 1e-15, 1e-15, 1e-3};
+  RitzSelection selection = select(pairs, goal);
+  EXPECT_EQ(selection.converged, 2);
+  EXPECT_EQ(selection.order, (std::vector<int>{0, 1, 5, 2, 4, 3})) << "converged, inside, then by nearness";
+  EXPECT_FALSE(selection.is_complete) << "3.6 is in the interval and has not converged";
+  pairs.residual[5] = 1e-15;
+  EXPECT_TRUE(select(pairs, goal).is_complete);
+  goal.wanted = 7;
+  EXPECT_TRUE(select(pairs, goal).is_complete) << "1.0 and 5.2 lie beyond the interval, and have settled";
+  pairs.residual = {1e-15, 1e-15, 1, 1, 1, 1e-15};
+  EXPECT_FALSE(select(pairs, goal).is_complete);
+}
+
+TEST(Orthogonaliser, replaces_dependent_columns_of_the_starting_block) {
+  Rig rig(20);
+  std::copy_n(rig.view().column(0), rig.rows, rig.view().column(2));
+  std::fill_n(rig.view().column(3), rig.rows, 0.0);
+  const ShiftInvert inverse(rig.st);
+  const auto n = static_cast<PetscInt>(rig.k.rows());
+  InnerProduct inner(world(), rig.system.mass, rig.rows, n, Rig::kBlock);
+  LanczosBasis basis(rig.view(), 0, 20, Rig::kBlock);
+  const LockedModes none;
+  BlockLanczos lanczos({inverse, inner, basis, none, n, rig.first}, rig.make_goal(0, 1, 1), 100, nullptr);
+  ASSERT_TRUE(lanczos.start());
+  ASSERT_EQ(basis.width(), Rig::kBlock);
+  const Matrix v = rig.gather_columns(basis.columns(0, Rig::kBlock));
+  EXPECT_LT(find_largest(v.transpose() * rig.m * v - Matrix::Identity(Rig::kBlock, Rig::kBlock)), 1e-12);
+}
+
+}  // namespace
+}  // namespace carillon::eigen

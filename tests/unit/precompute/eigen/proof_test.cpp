@@ -1,0 +1,159 @@
+// What the proof says, and that ranks, partitions and rounding have no say in the modes.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <vector>
+
+#include "precompute/eigen/solve_modes.hpp"
+#include "precompute/la/local_columns.hpp"
+#include "precompute/petsc/session.hpp"
+#include "runtime/base/error.hpp"
+#include "tests/unit/precompute/eigen/spring_network.hpp"
+
+namespace carillon::eigen {
+namespace {
+
+using la::LocalColumns;
+
+TEST(Proof, counts_what_dense_lapack_counts) {
+  const Network two = test::join(make_block(4, 4, 9), make_block(3, 4, 8, {50, 0, 0}));
+  const std::vector<double> all = test::calc_all_eigenvalues(two);
+  const test::System system = test::make_system(two);
+  Options options;
+  options.low_hz = 1;
+  options.high_hz = to_hz(0.5 * (all[90] + all[91]));
+  const Modes modes = solve_modes(system.problem, options);
+  const Proof& proof = modes.proof;
+  ASSERT_EQ(proof.counts.size(), 3u) << "both ends and the shift";
+  for (const Count& count : proof.counts) {
+    const auto below = std::count_if(all.begin(), all.end(), [&](double x) { return x < std::pow(count.freq_hz * 2 * M_PI, 2); });
+    EXPECT_EQ(count.below, below) << count.freq_hz;
+    double margin = 1e9;
+    const double lambda = std::pow(count.freq_hz * 2 * M_PI, 2);
+    for (const double found : modes.lambda) margin = std::min(margin, std::abs(found - lambda) / lambda);
+    EXPECT_NEAR(count.margin / margin, 1.0, 1e-6);
+  }
+  EXPECT_TRUE(
+      std::is_sorted(proof.counts.begin(), proof.counts.end(), [](const Count& a, const Count& b) { return a.freq_hz < b.freq_hz; }));
+  EXPECT_LE(proof.counts.front().freq_hz, options.low_hz);
+  EXPECT_GE(proof.counts.back().freq_hz, options.high_hz);
+  EXPECT_EQ(proof.found, 91 - 12);
+  EXPECT_EQ(proof.rigid_per_component, (std::vector<std::int64_t>{6, 6}));
+  EXPECT_TRUE(proof.clusters.empty());
+  EXPECT_LT(proof.factor_backward_error, 1e-10);
+  EXPECT_NE(proof.method.find("L D L^T"), std::string::npos) << proof.method;
+}
+
+TEST(Proof, counts_a_small_body_by_its_whole_spectrum) {
+  const test::System system = test::make_system(make_block(3, 3, 4));
+  Options options;
+  options.low_hz = 1;
+  options.high_hz = 1000;
+  const Modes modes = solve_modes(system.problem, options);
+  EXPECT_NE(modes.proof.method.find("dense"), std::string::npos);
+  EXPECT_EQ(modes.proof.counts.front().below, 6);
+  EXPECT_EQ(modes.proof.counts.back().below, 6 + modes.proof.found);
+}
+
+// Shapes of all modes on every rank, (nodes, 3, modes) by the network's first order of nodes.
+std::vector<double> gather_shapes(const Modes& modes, MPI_Comm comm, const std::vector<int>& place) {
+  const LocalColumns shapes(modes.shapes);
+  const auto nodes = place.size();
+  PetscInt first = 0;
+  check(MatGetOwnershipRange(modes.shapes, &first, nullptr));
+  std::vector<double> rows(3 * nodes * modes.lambda.size(), 0.0);
+  for (std::size_t j = 0; j < modes.lambda.size(); ++j) {
+    for (PetscInt i = 0; i < shapes.rows; ++i)
+      rows[j * 3 * nodes + static_cast<std::size_t>(first + i)] = shapes.column(static_cast<PetscInt>(j))[i];
+  }
+  MPI_Allreduce(MPI_IN_PLACE, rows.data(), static_cast<int>(rows.size()), MPI_DOUBLE, MPI_SUM, comm);
+  std::vector<double> ordered(rows.size());
+  for (std::size_t j = 0; j < modes.lambda.size(); ++j) {
+    for (std::size_t i = 0; i < nodes; ++i) {
+      for (std::size_t d = 0; d < 3; ++d) ordered[(j * nodes + i) * 3 + d] = rows[(j * nodes + static_cast<std::size_t>(place[i])) * 3 + d];
+    }
+  }
+  return ordered;
+}
+
+TEST(Canonical, modes_are_the_same_for_any_ranks_and_partition) {
+  // Three equal bodies: every mode three times; one more that differs by a billionth is degenerate with them.
+  Network network = test::join(test::join(make_block(4, 4, 6), make_block(4, 4, 6, {30, 0, 0})), make_block(4, 4, 6, {0, 40, 0}));
+  Options options;
+  options.low_hz = 1;
+  options.high_hz = to_hz(test::calc_all_eigenvalues(make_block(4, 4, 6))[36] * 1.0001);
+  std::vector<int> place(network.nodes.size());
+  std::iota(place.begin(), place.end(), 0);
+  const test::System alone = test::make_system(network, PETSC_COMM_SELF);
+  const Modes reference = solve_modes(alone.problem, options);
+  const std::vector<double> expected = gather_shapes(reference, PETSC_COMM_SELF, place);
+  ASSERT_EQ(reference.lambda.size(), 93u);
+  EXPECT_EQ(reference.proof.clusters.size(), 31u);
+
+  const auto count = static_cast<int>(place.size());
+  for (const int stride : {1, 7, 125}) {  // None divides 288.
+    if (stride == 125 && count % 5 == 0) continue;
+    for (int i = 0; i < count; ++i) place[static_cast<std::size_t>(i)] = static_cast<int>((static_cast<std::int64_t>(i) * stride) % count);
+    const test::System system = test::make_system(test::reorder(network, place));
+    const Modes modes = solve_modes(system.problem, options);
+    ASSERT_EQ(modes.lambda.size(), reference.lambda.size());
+    for (std::size_t j = 0; j < modes.lambda.size(); ++j) EXPECT_NEAR(modes.lambda[j] / reference.lambda[j], 1.0, 1e-10) << j;
+    const std::vector<double> shapes = gather_shapes(modes, PETSC_COMM_WORLD, place);
+    double largest = 0;
+    double difference = 0;
+    for (std::size_t i = 0; i < shapes.size(); ++i) {
+      largest = std::max(largest, std::abs(expected[i]));
+      difference = std::max(difference, std::abs(shapes[i] - expected[i]));
+    }
+    EXPECT_LT(difference, 1e-6 * largest) << "stride " << stride;
+    ASSERT_EQ(modes.proof.clusters.size(), reference.proof.clusters.size());
+    for (std::size_t c = 0; c < modes.proof.clusters.size(); ++c) EXPECT_EQ(modes.proof.clusters[c].count, 3);
+  }
+}
+
+TEST(Canonical, part_of_a_group_that_max_modes_cuts_is_the_same_as_in_the_whole_group) {
+  const Network three = test::join(test::join(make_block(4, 4, 6), make_block(4, 4, 6, {30, 0, 0})), make_block(4, 4, 6, {0, 40, 0}));
+  const test::System system = test::make_system(three);
+  Options options;
+  options.low_hz = 1;
+  options.high_hz = to_hz(test::calc_all_eigenvalues(make_block(4, 4, 6))[12] * 1.0001);
+  const Modes whole = solve_modes(system.problem, options);
+  options.max_modes = 4;  // one of the second group of three
+  const Modes part = solve_modes(system.problem, options);
+  ASSERT_EQ(part.lambda.size(), 4u);
+  ASSERT_EQ(part.proof.clusters.size(), 1u);
+  const LocalColumns expected(whole.shapes);
+  const LocalColumns shapes(part.shapes);
+  double difference = 0;
+  double largest = 0;
+  for (PetscInt i = 0; i < shapes.rows; ++i) {
+    difference = std::max(difference, std::abs(shapes.column(3)[i] - expected.column(3)[i]));
+    largest = std::max(largest, std::abs(expected.column(3)[i]));
+  }
+  MPI_Allreduce(MPI_IN_PLACE, &difference, 1, MPI_DOUBLE, MPI_MAX, PETSC_COMM_WORLD);
+  MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPI_DOUBLE, MPI_MAX, PETSC_COMM_WORLD);
+  EXPECT_LT(difference, 1e-6 * largest);
+}
+
+TEST(Memory, that_does_not_suffice_is_named_before_the_work) {
+  const test::System system = test::make_system(make_block(5, 5, 10));
+  Options options;
+  options.low_hz = 1;
+  options.high_hz = 100;
+  options.memory_limit_bytes = 1;
+  for (const auto how : {Factorisation::kAutomatic, Factorisation::kMumps}) {
+    options.factorisation = how;
+    try {
+      solve_modes(system.problem, options);
+      ADD_FAILURE();
+    } catch (const SystemError& error) {
+      EXPECT_NE(std::string(error.what()).find("GB"), std::string::npos) << error.what();
+      EXPECT_NE(std::string(error.what()).find("coarser mesh"), std::string::npos) << error.what();
+    }
+  }
+}
+
+}  // namespace
+}  // namespace carillon::eigen

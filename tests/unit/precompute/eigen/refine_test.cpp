@@ -1,0 +1,138 @@
+// The pieces behind solve_modes that a good solve hardly uses: correcting bad modes, cutting a band.
+#include "precompute/eigen/refine.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <vector>
+
+#include "precompute/eigen/slices.hpp"
+#include "precompute/petsc/session.hpp"
+#include "tests/unit/precompute/eigen/spring_network.hpp"
+
+namespace carillon::eigen {
+namespace {
+
+// Adds to every mode an error of this size relative to its largest entry, of all frequencies and the same on any number of ranks.
+void spoil(Mat shapes, double size) {
+  PetscInt first = 0;
+  PetscInt last = 0;
+  PetscInt modes = 0;
+  check(MatGetOwnershipRange(shapes, &first, &last));
+  check(MatGetSize(shapes, nullptr, &modes));
+  for (PetscInt j = 0; j < modes; ++j) {
+    Vec column = nullptr;
+    PetscReal largest = 0;
+    check(MatDenseGetColumnVec(shapes, j, &column));
+    check(VecNorm(column, NORM_INFINITY, &largest));
+    for (PetscInt i = first; i < last; ++i)
+      check(VecSetValue(column, i, size * largest * std::sin(12.9898 * (i + 1) + 78.233 * (j + 1)), ADD_VALUES));
+    check(VecAssemblyBegin(column));
+    check(VecAssemblyEnd(column));
+    check(MatDenseRestoreColumnVec(shapes, j, &column));
+  }
+}
+
+TEST(RefineModes, brings_spoiled_modes_back_within_the_tolerance) {
+  const test::Network block = test::make_block(4, 4, 8);
+  const std::vector<double> all = test::calc_all_eigenvalues(block);
+  const test::System system = test::make_system(block);
+  Options options;
+  options.low_hz = 1;
+  options.high_hz = to_hz(0.5 * (all[40] + all[41]));
+  Modes modes = solve_modes(system.problem, options);
+  ASSERT_EQ(modes.lambda.size(), 35u);
+  const la::Pencil pencil{system.stiffness, system.mass};
+  const Operators operators(pencil);
+  const auto factor = make_mumps_factor(pencil, {});
+  RefineRequest request;
+  request.operators = &operators;
+  request.tolerance = 1e-9;
+  request.get_factor = [&]() -> ShiftedFactor& { return *factor; };
+  ModeErrors errors;
+  EXPECT_EQ(refine_modes(request, modes.lambda, modes.shapes, errors).factorisations, 0) << "good modes cost nothing";
+
+  for (const double size : {1e-6, 1e-3}) {
+    spoil(modes.shapes, size);
+    for (double& lambda : modes.lambda) lambda *= 1 + size * size;
+    errors = normalise_and_measure(operators, modes.lambda, modes.shapes);
+    for (const double residual : errors.residual) ASSERT_GT(residual, request.tolerance);
+    refine_modes(request, modes.lambda, modes.shapes, errors);
+    EXPECT_LT(errors.orthonormality, 1e-11);
+    for (std::size_t j = 0; j < modes.lambda.size(); ++j) {
+      EXPECT_LE(errors.residual[j], request.tolerance) << j << " spoiled by " << size;
+      EXPECT_NEAR(modes.lambda[j] / all[j + 6], 1.0, 1e-9) << j << " spoiled by " << size;
+    }
+  }
+}
+
+// Goes through a band of these eigenvalues as a solver would that finds all of every slice; returns the modes per slice.
+std::vector<std::int64_t> sweep_through(const std::vector<double>& lambda, const Slice& band, std::int64_t max, int& counts) {
+  const CountBelow count = [&](double x) { return std::lower_bound(lambda.begin(), lambda.end(), x) - lambda.begin(); };
+  Sweep sweep(band, max, [&](double x) {
+    ++counts;
+    EXPECT_GT(x, band.low);
+    EXPECT_LT(x, band.high);
+    return count(x);
+  });
+  std::vector<std::int64_t> modes;
+  while (!sweep.is_last() && modes.size() < 100) {
+    const double low = sweep.get_rest().low;
+    const Sweep::Part part = sweep.take();
+    EXPECT_EQ(part.slice.low, low);
+    EXPECT_EQ(part.slice.below_low, count(low));
+    EXPECT_GT(part.sigma, low);
+    EXPECT_LT(part.sigma, part.slice.high);
+    EXPECT_LE(part.slice.high, band.high);
+    modes.push_back(count(part.slice.high) - count(low));
+    sweep.advance(part.slice.high, count(part.slice.high));
+  }
+  EXPECT_EQ(sweep.get_rest().high, band.high);
+  EXPECT_EQ(sweep.get_rest().below_high, band.below_high);
+  modes.push_back(sweep.get_rest().count());
+  return modes;
+}
+
+TEST(Sweep, covers_the_band_in_slices_of_about_equal_size_at_one_count_each) {
+  for (const double power : {1.0, 2.0, 0.5}) {  // of frequency: plates, half-way to solids, strings in bending
+    std::vector<double> lambda;
+    for (int j = 1; j <= 1000; ++j) lambda.push_back(std::pow(j, 2 / power));
+    int counts = 0;
+    const std::vector<std::int64_t> modes = sweep_through(lambda, {0.5, 0, 1.001 * lambda.back(), 1000}, 320, counts);
+    EXPECT_EQ(std::accumulate(modes.begin(), modes.end(), std::int64_t{0}), 1000);
+    EXPECT_LE(modes.size(), 5u) << "frequency to the " << power;
+    EXPECT_LE(counts, static_cast<int>(modes.size())) << "frequency to the " << power;
+    for (const std::int64_t count : modes) EXPECT_LE(count, 400) << "frequency to the " << power;
+  }
+}
+
+TEST(Sweep, takes_few_modes_at_once) {
+  std::vector<double> lambda(300);
+  std::iota(lambda.begin(), lambda.end(), 1.0);
+  int counts = 0;
+  EXPECT_EQ(sweep_through(lambda, {0.5, 0, 301, 300}, 320, counts), std::vector<std::int64_t>{300});
+  EXPECT_EQ(counts, 0);
+}
+
+TEST(Sweep, goes_past_a_cluster_too_narrow_to_cut) {
+  std::vector<double> lambda(1000, 1.0);
+  for (int j = 1; j <= 500; ++j) lambda.push_back(1 + 0.01 * j);
+  int counts = 0;
+  const std::vector<std::int64_t> modes = sweep_through(lambda, {0.1, 0, 6.5, 1500}, 320, counts);
+  EXPECT_EQ(std::accumulate(modes.begin(), modes.end(), std::int64_t{0}), 1500);
+  EXPECT_LE(counts, 25);
+}
+
+TEST(CutToLowest, keeps_a_few_modes_more_than_wanted) {
+  const CountBelow count = [](double x) { return static_cast<std::int64_t>(std::sqrt(x)); };
+  const Slice cut = cut_to_lowest({1, 1, 1e6, 1000}, 40, count);
+  EXPECT_EQ(cut.low, 1);
+  EXPECT_GE(cut.count(), 40);
+  EXPECT_LE(cut.count(), 50);
+  EXPECT_EQ(cut_to_lowest({1, 1, 1e6, 1000}, 999, count).high, 1e6);
+}
+
+}  // namespace
+}  // namespace carillon::eigen

@@ -1,0 +1,131 @@
+// What L D L^T costs on a body: mpirun -np N bench_ldlt MESH [--mumps]. The mesh is taken as it is (T4 or T10), ceramic, consistent mass;
+// seconds are CPU seconds of the slowest rank.
+#include <fmt/core.h>
+#include <petscksp.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <ctime>
+#include <exception>
+#include <memory>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "partition/distribute.hpp"
+#include "precompute/fem/assemble.hpp"
+#include "precompute/ldlt/factor.hpp"
+#include "precompute/mesh/check.hpp"
+#include "precompute/mesh/read.hpp"
+#include "precompute/petsc/session.hpp"
+
+namespace {
+
+using namespace carillon;
+
+double find_cpu_s() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+
+/// Runs `work` and gives the CPU seconds of the slowest rank. Collective.
+template <typename Work>
+double measure_s(Work&& work) {
+  MPI_Barrier(PETSC_COMM_WORLD);
+  const double start = find_cpu_s();
+  work();
+  double own = find_cpu_s() - start;
+  MPI_Allreduce(MPI_IN_PLACE, &own, 1, MPI_DOUBLE, MPI_MAX, PETSC_COMM_WORLD);
+  return own;
+}
+
+void run_own(const fem::System& system, double sigma, int rank) {
+  const auto say = [rank](const std::string& line) {
+    if (rank == 0) fmt::print("{}\n", line);
+  };
+  std::unique_ptr<ldlt::Factor> factor;
+  say(fmt::format("analysis      {:7.3f} s", measure_s([&] {
+                    factor = std::make_unique<ldlt::Factor>(la::Pencil{system.stiffness, system.mass});
+                  })));
+  const ldlt::Analysis& analysis = factor->get_analysis();
+  say(fmt::format("entries {:.4g}, flops {:.4g}, {} supernodes, {} separator nodes, peak {:.3f} GB", static_cast<double>(analysis.entries),
+                  analysis.flops, analysis.supernodes, analysis.separator_nodes, 1e-9 * static_cast<double>(analysis.peak_bytes)));
+  for (const ldlt::Analysis::Rank& part : analysis.ranks)
+    say(fmt::format("  a rank: entries {:.4g}, flops {:.4g}, peak {:.3f} GB", static_cast<double>(part.entries), part.flops,
+                    1e-9 * static_cast<double>(part.peak_bytes)));
+  for (int repeat = 0; repeat < 3; ++repeat) {
+    bool good = false;
+    const double seconds = measure_s([&] { good = factor->factorise(sigma); });
+    say(fmt::format("factorisation {:7.3f} s, {:.1f} GF/s, {}, {} negative pivots, backward error {:.2g}, growth {:.3g}", seconds,
+                    1e-9 * analysis.flops / seconds, good ? "good" : "BAD", factor->get_negative_pivots(), factor->get_backward_error(),
+                    factor->get_growth()));
+  }
+  PetscInt rows = 0;
+  petsc::check(MatGetLocalSize(system.stiffness, &rows, nullptr));
+  constexpr int kColumns = 64;
+  std::vector<double> x(static_cast<std::size_t>(rows) * kColumns);
+  for (const int width : {1, 8, 16, 32}) {
+    for (std::size_t i = 0; i < x.size(); ++i) x[i] = std::sin(static_cast<double>(i));
+    const double seconds = measure_s([&] {
+      for (int first = 0; first < kColumns; first += width) {
+        double* block = x.data() + static_cast<std::size_t>(rows) * first;
+        factor->solve(block, block, rows, width);
+      }
+    });
+    say(fmt::format("solve by {:2}   {:7.2f} ms a column", width, 1e3 * seconds / kColumns));
+  }
+}
+
+void run_mumps(const fem::System& system, double sigma, int rank) {
+  petsc::MatHandle shifted;
+  petsc::check(MatDuplicate(system.stiffness, MAT_COPY_VALUES, shifted.out()));
+  petsc::check(MatAXPY(shifted, -sigma, system.mass, SUBSET_NONZERO_PATTERN));
+  petsc::check(MatSetOption(shifted, MAT_SYMMETRIC, PETSC_TRUE));
+  petsc::MatHandle factor;
+  MatFactorInfo info;
+  petsc::check(MatFactorInfoInitialize(&info));
+  petsc::check(MatGetFactor(shifted, MATSOLVERMUMPS, MAT_FACTOR_CHOLESKY, factor.out()));
+  petsc::check(MatMumpsSetIcntl(factor, 13, 1));
+  const double analysis = measure_s([&] { petsc::check(MatCholeskyFactorSymbolic(factor, shifted, nullptr, &info)); });
+  const double numeric = measure_s([&] { petsc::check(MatCholeskyFactorNumeric(factor, shifted, &info)); });
+  PetscInt negative = 0;
+  PetscReal flops = 0;
+  petsc::check(MatMumpsGetInfog(factor, 12, &negative));
+  petsc::check(MatMumpsGetRinfog(factor, 3, &flops));
+  PetscInt entries = 0;
+  petsc::check(MatMumpsGetInfog(factor, 29, &entries));
+  if (rank == 0)
+    fmt::print("MUMPS (its own order): analysis {:.3f} s, factorisation {:.3f} s, entries {:.4g}, flops {:.4g}, {} negative pivots\n",
+               analysis, numeric, entries < 0 ? -1e6 * entries : 1.0 * entries, flops, negative);
+}
+
+void run(const std::string& file, bool with_mumps, int rank) {
+  mesh::TetMesh body;
+  comm::Communicator(PETSC_COMM_WORLD).agree([&] {
+    if (rank == 0) body = mesh::read_mesh(file);
+  });
+  const partition::DistributedMesh pieces = partition::distribute(PETSC_COMM_WORLD, body, {});
+  job::Material ceramic;
+  ceramic.young_modulus_pa = 5.4543e9;
+  ceramic.poisson_ratio = 0.3303;
+  ceramic.density_kg_m3 = 2700;
+  const fem::System system = fem::assemble(PETSC_COMM_WORLD, pieces.local, ceramic, job::Mass::consistent);
+  const double omega = 2 * std::numbers::pi * 12'000.0;
+  run_own(system, omega * omega, rank);
+  if (with_mumps) run_mumps(system, omega * omega, rank);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const petsc::Session session(argc, argv);
+  const bool with_mumps = argc == 3 && std::strcmp(argv[2], "--mumps") == 0;
+  if (argc < 2 || argv[1][0] == '-' || argc > 2 + with_mumps) {
+    if (session.rank() == 0) fmt::print(stderr, "usage: bench_ldlt MESH [--mumps]\n");
+    return 1;
+  }
+  try {
+    run(argv[1], with_mumps, session.rank());
+  } catch (const std::exception& error) {
+    if (session.rank() == 0) fmt::print(stderr, "bench_ldlt: {}\n", error.what());
+    return 1;
+  }
+}

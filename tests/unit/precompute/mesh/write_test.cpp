@@ -1,0 +1,87 @@
+// What we write must come back: through our own reader, through meshio, through Gmsh.
+#include "precompute/mesh/write.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <fstream>
+
+#include "precompute/mesh/check.hpp"
+#include "precompute/mesh/read.hpp"
+#include "tests/unit/precompute/mesh/truth.hpp"
+
+namespace carillon::mesh {
+namespace {
+
+class Written : public testing::TestWithParam<std::tuple<const char*, GmshEncoding>> {};
+
+TEST_P(Written, gmsh_file_is_read_back_bit_for_bit) {
+  const auto& [file, encoding] = GetParam();
+  const tests::Folder scratch;
+  TetMesh mesh = read_mesh(fixture(file));
+  EXPECT_TRUE(mesh.doubt_m.empty());
+  mesh.doubt_m.assign(mesh.nodes_m.size(), Vec3{});
+  for (std::size_t i = 0; i < mesh.nodes_m.size(); i += 3) mesh.doubt_m[i] = {1e-5 * static_cast<double>(i + 1), -0.25, 1.0 / 3};
+  write_gmsh(mesh, scratch / "out.msh", encoding);
+  const TetMesh back = read_mesh(scratch / "out.msh");
+  EXPECT_EQ(back.order, mesh.order);
+  EXPECT_EQ(back.nodes_m, mesh.nodes_m);
+  EXPECT_EQ(back.doubt_m, mesh.doubt_m);
+  EXPECT_EQ(back.tets, mesh.tets);
+  EXPECT_EQ(back.regions, mesh.regions);
+  for (const auto& [name, set] : mesh.node_sets) EXPECT_EQ(back.node_sets.at(name), set) << name;
+}
+
+/// Runs tests/unit/precompute/mesh/read_with_others.py; false when the reader is not installed.
+bool read_with(const std::string& reader, const std::filesystem::path& file, std::string& said) {
+  const std::string out = file.string() + ".said";
+  const std::string command = std::string("/usr/bin/python3 ") + CARILLON_SOURCE_DIR + "/tests/unit/precompute/mesh/read_with_others.py " +
+                              reader + " " + file.string() + " > " + out + " 2>&1";
+  const int status = std::system(command.c_str());
+  said = read_text(out);
+  return status == 0 || said.find("No module named") == std::string::npos;
+}
+
+TEST_P(Written, gmsh_file_is_read_by_meshio_with_volume_and_sets) {
+  const auto& [file, encoding] = GetParam();
+  const tests::Folder scratch;
+  write_gmsh(read_mesh(fixture(file)), scratch / "out.msh", encoding);
+  std::string said;
+  if (!read_with("meshio", scratch / "out.msh", said)) GTEST_SKIP() << "meshio is not installed";
+  EXPECT_NE(said.find("volume 0.006000 tets 89 mid-off 0"), std::string::npos) << said;
+}
+
+TEST_P(Written, gmsh_file_is_read_by_gmsh_with_volume_and_sets) {
+  const auto& [file, encoding] = GetParam();
+  const tests::Folder scratch;
+  TetMesh mesh = read_mesh(fixture(file));
+  mesh.doubt_m.assign(mesh.nodes_m.size(), Vec3{0, 0, 1e-3});  // data that others may do with what they like
+  write_gmsh(mesh, scratch / "out.msh", encoding);
+  std::string said;
+  if (!read_with("gmsh", scratch / "out.msh", said)) GTEST_SKIP() << "gmsh's Python module is not installed";
+  EXPECT_NE(said.find("volume 0.006000 tets 89 mid-off 0"), std::string::npos) << said;
+  const Truth truth = read_truth(read_mesh(fixture(file)).order);
+  if (!std::string(file).starts_with("gmsh")) return;
+  for (const char* set : {"clamp", "rim", "tip"}) {
+    EXPECT_NE(said.find("set " + std::string(set) + " " + std::to_string(truth.groups.at(set).size())), std::string::npos) << said;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(fixtures, Written,
+                         testing::Combine(testing::Values("gmsh41_text_1.msh", "gmsh41_binary_2.msh", "vtk_raw_1.vtu"),
+                                          testing::Values(GmshEncoding::kBinary, GmshEncoding::kText)));
+
+TEST(write, regions_and_names_survive_in_the_order_of_the_elements) {
+  TetMesh mesh = read_mesh(fixture("vtk_ascii_1.vtu"));
+  for (std::size_t e = 0; e < mesh.regions.size(); ++e) mesh.regions[e] = static_cast<std::int32_t>(e % 3);
+  mesh.node_sets = {{"two words", {3, 5}}, {"empty", {}}, {"overlap", {5, 6, 7}}};
+  const tests::Folder scratch;
+  write_gmsh(mesh, scratch / "out.msh");
+  const TetMesh back = read_mesh(scratch / "out.msh");
+  EXPECT_EQ(back.tets, mesh.tets);
+  EXPECT_EQ(back.regions, mesh.regions);
+  for (const auto& [name, set] : mesh.node_sets) EXPECT_EQ(back.node_sets.at(name), set) << name;
+}
+
+}  // namespace
+}  // namespace carillon::mesh

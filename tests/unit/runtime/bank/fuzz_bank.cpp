@@ -1,0 +1,39 @@
+// Bank bytes of any kind give a bank or an InputError. Every input is tried as it is, which tries the seal, and sealed again, which tries
+// everything behind the seal.
+#include <cstring>
+#include <string>
+
+#include "runtime/bank/bank.hpp"
+#include "runtime/bank/seal.hpp"
+#include "tests/unit/runtime/bank/seal_again.hpp"
+
+namespace {
+
+using namespace carillon;
+
+void read(std::span<const std::byte> bytes) {
+  try {
+    const bank::Bank bank = bank::parse_bank(bytes);
+    // What the reader calls sane can be used without looking.
+    double sum = 0.0;
+    for (std::size_t mode = 0; mode < bank.mode_count(); ++mode) {
+      sum += bank.freq_hz(mode);
+      for (std::size_t vertex = 0; vertex < bank.vertex_count(); ++vertex) sum += bank.shape_at(vertex, mode)[2];
+    }
+    for (const auto& triangle : bank.triangles) sum += bank.vertices_m[static_cast<std::size_t>(triangle[0])][0];
+    volatile double sink = sum;
+    (void)sink;
+  } catch (const InputError&) {
+  }
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  read(std::as_bytes(std::span(data, size)));
+  if (size >= bank::kSealBytes) {
+    const std::string sealed = bank::seal_again({reinterpret_cast<const char*>(data), size});
+    read(std::as_bytes(std::span(sealed)));
+  }
+  return 0;
+}

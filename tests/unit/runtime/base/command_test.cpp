@@ -1,0 +1,216 @@
+// Programs are started, fed, listened to, stopped, and never leave a zombie. With real programs.
+#include "runtime/base/command.hpp"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+
+namespace carillon::base {
+namespace {
+
+namespace fs = std::filesystem;
+
+Command make_shell(const std::string& script) { return {.words = {"sh", "-c", script}, .output = kCapture, .errors = kCapture}; }
+
+/// Descriptors that this process has open.
+std::ptrdiff_t count_descriptors() { return std::distance(fs::directory_iterator("/proc/self/fd"), fs::directory_iterator()); }
+
+TEST(Command, gives_what_a_program_prints_and_how_it_ended) {
+  const Finished finished = run(make_shell("echo out; echo err >&2; exit 3"));
+  EXPECT_EQ(finished.output, "out\n");
+  EXPECT_EQ(finished.errors, "err\n");
+  EXPECT_EQ(finished.exit_code, 3);
+  EXPECT_EQ(finished.signal, 0);
+  const Finished killed = run(make_shell("kill -SEGV $$"));
+  EXPECT_EQ(killed.signal, SIGSEGV);
+  EXPECT_EQ(killed.exit_code, 128 + SIGSEGV);
+}
+
+TEST(Command, words_reach_the_program_as_they_are) {
+  const std::string odd = "a b'c\"$HOME `x` * \\ \n;";
+  const Finished finished = run({.words = {"printf", "%s", odd}, .output = kCapture});
+  EXPECT_EQ(finished.output, odd);
+}
+
+TEST(Command, input_larger_than_a_pipe_comes_back_whole) {
+  std::string input(10 << 20, 'x');
+  for (std::size_t i = 0; i < input.size(); i += 1009) input[i] = static_cast<char>('a' + i % 26);
+  const Finished finished = run({.words = {"cat"}, .output = kCapture}, {.input = input});
+  EXPECT_EQ(finished.output, input);
+  EXPECT_EQ(run({.words = {"true"}, .output = kCapture}, {.input = input}).exit_code, 0) << "one that takes none";
+}
+
+TEST(Command, what_cannot_be_started_is_an_error_with_its_reason) {
+  const std::ptrdiff_t before = count_descriptors();
+  for (const std::string& program :
+       {std::string("/no/such/program"), std::string("no-such-program-anywhere"), std::string("/etc/passwd")}) {
+    try {
+      run({.words = {program}});
+      FAIL() << program;
+    } catch (const StartError& error) {
+      EXPECT_NE(std::string(error.what()).find(program + ": cannot be started: "), std::string::npos);
+    }
+  }
+  EXPECT_THROW(run({.words = {"true"}, .folder = "/no/such/folder"}), StartError);
+  EXPECT_EQ(count_descriptors(), before);
+  EXPECT_EQ(::waitpid(-1, nullptr, WNOHANG), -1) << "a zombie";
+}
+
+TEST(Command, slow_long_and_stopped_programs_are_killed) {
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_TRUE(run({.words = {"sleep", "60"}, .output = kCapture}, {.patience_s = 0.2}).was_slow);
+  EXPECT_TRUE(run(make_shell("exec >&- 2>&-; sleep 60"), {.patience_s = 0.2}).was_slow) << "it has closed its outputs";
+  EXPECT_TRUE(run(make_shell("yes"), {.max_bytes = 100000}).was_long);
+  int asked = 0;
+  const Finished stopped =
+      run(make_shell("echo now; sleep 60"), {.may_stop = [&](const Finished& now) { return ++asked > 1 && now.output == "now\n"; }});
+  EXPECT_TRUE(stopped.was_stopped);
+  EXPECT_EQ(stopped.signal, SIGKILL);
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(30));
+  EXPECT_EQ(::waitpid(-1, nullptr, WNOHANG), -1) << "a zombie";
+}
+
+TEST(Command, the_tail_is_kept_of_what_is_long) {
+  const Finished finished =
+      run(make_shell("i=0; while [ $i -lt 3000 ]; do echo line $i; i=$((i+1)); done"), {.max_bytes = 50, .keeps_tail = true});
+  EXPECT_EQ(finished.exit_code, 0);
+  EXPECT_EQ(finished.output.size(), 50u);
+  EXPECT_TRUE(finished.output.ends_with("line 2998\nline 2999\n"));
+}
+
+TEST(Command, folder_environment_session_and_signals_are_as_asked) {
+  Command command = make_shell("pwd; echo $WORD; echo $HOME; cut -d ' ' -f 6 /proc/$$/stat; echo $$");
+  command.folder = "/";
+  command.environment = {"WORD=given", "PATH=/usr/bin:/bin"};
+  command.group = Command::Group::session;
+  const Finished finished = run(command);
+  std::istringstream lines(finished.output);
+  std::string folder, word, home, session, own;
+  std::getline(lines, folder), std::getline(lines, word), std::getline(lines, home), std::getline(lines, session), std::getline(lines, own);
+  EXPECT_EQ(folder, "/");
+  EXPECT_EQ(word, "given");
+  EXPECT_EQ(home, "");
+  EXPECT_EQ(session, own);
+  const Finished mask = run({.words = {"grep", "SigBlk", "/proc/self/status"}, .output = kCapture, .blocked = {SIGUSR1}});
+  EXPECT_TRUE(mask.output.ends_with("0000000200\n")) << mask.output;
+}
+
+TEST(Command, signals_that_this_process_ignores_stay_ignored_unless_asked) {
+  ::signal(SIGTERM, SIG_IGN);
+  Command command = make_shell("kill -TERM $$; echo alive");
+  const Finished as_here = run(command);
+  command.default_signals = true;
+  const Finished by_default = run(command);
+  ::signal(SIGTERM, SIG_DFL);
+  EXPECT_EQ(as_here.output, "alive\n");
+  EXPECT_EQ(by_default.signal, SIGTERM);
+  EXPECT_EQ(by_default.output, "");
+}
+
+// As under a parent that ignores the ends of its children: the kernel would drop their status.
+TEST(Command, the_status_of_a_child_is_never_lost) {
+  ::signal(SIGCHLD, SIG_IGN);
+  const Finished failed = run(make_shell("exit 7"));
+  ::signal(SIGCHLD, SIG_DFL);
+  EXPECT_EQ(failed.exit_code, 7);
+}
+
+TEST(Command, a_program_that_prints_all_the_time_is_stopped_too) {
+  const auto begin = std::chrono::steady_clock::now();
+  const auto is_late = [&](const Finished&) { return std::chrono::steady_clock::now() - begin > std::chrono::milliseconds(300); };
+  const Finished stopped = run(make_shell("yes"), {.patience_s = 20.0, .max_bytes = 1000, .keeps_tail = true, .may_stop = is_late});
+  EXPECT_TRUE(stopped.was_stopped);
+  EXPECT_FALSE(stopped.was_slow);
+}
+
+TEST(Command, a_file_that_is_no_program_is_not_given_to_a_shell) {
+  const fs::path file = fs::temp_directory_path() / "carillon-no-program";
+  std::ofstream(file) << "exit 0\n";
+  fs::permissions(file, fs::perms::owner_all);
+  try {
+    run({.words = {file}});
+    ADD_FAILURE() << "it ran";
+  } catch (const StartError& error) {
+    EXPECT_EQ(error.get_error(), ENOEXEC);
+  }
+  fs::remove(file);
+}
+
+TEST(Command, input_is_taken_where_no_output_is_kept) {
+  const fs::path file = fs::temp_directory_path() / "carillon-input";
+  EXPECT_EQ(run({.words = {"sh", "-c", "exec >&- 2>&-; cat > " + file.string()}}, {.input = "all of it", .patience_s = 20.0}).exit_code, 0);
+  std::string text;
+  std::getline(std::ifstream(file), text);
+  EXPECT_EQ(text, "all of it");
+  fs::remove(file);
+}
+
+TEST(Command, an_exception_leaves_no_program_behind) {
+  pid_t child = 0;
+  EXPECT_THROW(run({.words = {"sleep", "60"}}, {.started = [&](pid_t pid) { child = pid, throw SystemError("stop"); }}), SystemError);
+  EXPECT_EQ(::kill(child, 0), -1);
+  EXPECT_EQ(::waitpid(-1, nullptr, WNOHANG), -1) << "a zombie";
+}
+
+TEST(Command, a_program_ends_with_the_one_that_started_it) {
+  // A child of this process starts one, and is killed.
+  int ends[2];
+  ASSERT_EQ(::pipe(ends), 0);
+  const pid_t middle = ::fork();
+  if (middle == 0) {
+    const pid_t last = start({.words = {"sleep", "60"}, .signal_at_end = SIGKILL});
+    (void)!::write(ends[1], &last, sizeof last);
+    ::pause();
+    ::_exit(0);
+  }
+  pid_t last = 0;
+  ASSERT_EQ(::read(ends[0], &last, sizeof last), static_cast<ssize_t>(sizeof last));
+  ::kill(middle, SIGKILL);
+  ::waitpid(middle, nullptr, 0);
+  bool is_gone = false;
+  for (int look = 0; look < 1000 && !is_gone; ++look) {
+    std::ifstream stat("/proc/" + std::to_string(last) + "/stat");
+    std::string number, name, state;
+    is_gone = !(stat >> number >> name >> state) || state == "Z";
+    if (!is_gone) ::usleep(10000);
+  }
+  EXPECT_TRUE(is_gone);
+  ::close(ends[0]);
+  ::close(ends[1]);
+}
+
+TEST(Command, a_closed_standard_stream_is_no_obstacle) {
+  const int kept = ::fcntl(0, F_DUPFD, 10);
+  ::close(0);
+  const Finished finished = run({.words = {"sh", "-c", "cat; echo done"}, .input = kInherit, .output = kCapture});
+  ::dup2(kept, 0);
+  ::close(kept);
+  EXPECT_EQ(finished.output, "done\n");
+}
+
+TEST(Command, programs_are_found_next_to_this_one_and_along_the_path) {
+  EXPECT_EQ(find_program(find_self().filename()), find_self());
+  EXPECT_TRUE(find_program("sh"));
+  EXPECT_FALSE(find_program("no-such-program-anywhere"));
+  EXPECT_FALSE(is_program("/etc/passwd"));
+}
+
+TEST(Command, a_missing_helper_is_named_with_its_place) {
+  try {
+    find_helper("no-such-helper");
+    FAIL();
+  } catch (const SystemError& error) {
+    EXPECT_EQ(error.what(), (find_self().parent_path().parent_path() / "libexec/carillon/no-such-helper").string() +
+                                " is missing; install Carillon again");
+  }
+}
+
+}  // namespace
+}  // namespace carillon::base

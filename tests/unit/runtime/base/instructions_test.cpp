@@ -1,0 +1,34 @@
+#include "runtime/base/instructions.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdio>
+
+#include "runtime/base/command.hpp"
+
+namespace carillon::base {
+namespace {
+
+/// What another process with this environment finds.
+int find_with(const std::string& entry) {
+  const Finished finished =
+      run({.words = {find_self(), "--gtest_filter=Instructions.DISABLED_are_printed", "--gtest_also_run_disabled_tests"},
+           .environment = std::vector<std::string>{entry},
+           .output = kCapture});
+  const std::size_t at = finished.output.find("found: ");
+  return at == std::string::npos ? -1 : finished.output[at + 7] - '0';
+}
+
+TEST(Instructions, DISABLED_are_printed) { std::printf("found: %d\n", static_cast<int>(find_instructions())); }
+
+TEST(Instructions, are_at_most_what_the_environment_allows) {
+  const int best = find_with("NOTHING=1");
+  ASSERT_GE(best, 0);
+  EXPECT_EQ(find_with("CARILLON_INSTRUCTIONS=plain"), static_cast<int>(Instructions::kPlain));
+  EXPECT_EQ(find_with("CARILLON_INSTRUCTIONS=avx2"), std::min(best, static_cast<int>(Instructions::kAvx2)));
+  EXPECT_EQ(find_with("CARILLON_INSTRUCTIONS=avx512"), best);
+}
+
+}  // namespace
+}  // namespace carillon::base

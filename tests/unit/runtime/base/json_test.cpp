@@ -1,0 +1,107 @@
+#include "runtime/base/json.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <random>
+
+#include "runtime/base/document.hpp"
+#include "runtime/base/printable.hpp"
+
+namespace {
+
+using carillon::base::Json;
+namespace base = carillon::base;
+
+base::Object parse(const std::string& text) { return base::parse_document(text, "written.json").root(); }
+
+TEST(Json, writes_members_in_the_order_in_which_they_were_set) {
+  Json value = Json::object();
+  value.set("b", 1).set("a", true).set("c", "text").set("d", Json());
+  value.member("list").add(1).add(2.5).add("x");
+  value.set("b", -3);
+  EXPECT_EQ(value.line(), R"({"b": -3, "a": true, "c": "text", "d": null, "list": [1, 2.5, "x"]})");
+  EXPECT_EQ(Json::object().line() + Json::array().line() + Json().line(), "{}[]null");
+}
+
+TEST(Json, breaks_only_what_does_not_fit_into_a_line) {
+  Json value = Json::object();
+  value.set("name", "bar").set("box_m", Json::array(std::vector{1.0, 2.0, 3.0}));
+  for (int i = 0; i < 3; ++i) value.member("modes").add(Json::object().set("freq_hz", 100 + i).set("is_rigid", false));
+  EXPECT_EQ(value.text(50), R"({
+  "name": "bar",
+  "box_m": [1, 2, 3],
+  "modes": [
+    {"freq_hz": 100, "is_rigid": false},
+    {"freq_hz": 101, "is_rigid": false},
+    {"freq_hz": 102, "is_rigid": false}
+  ]
+}
+)");
+  EXPECT_EQ(value.text(50), Json(value).text(50));
+}
+
+TEST(Json, numbers_are_read_back_as_they_were) {
+  std::mt19937_64 random(7);
+  for (int i = 0; i < 10000; ++i) {
+    const auto bits = random();
+    double value = 0.0;
+    static_assert(sizeof value == sizeof bits);
+    std::memcpy(&value, &bits, sizeof value);
+    if (!std::isfinite(value)) continue;
+    auto read = parse(Json::object().set("x", value).line());
+    ASSERT_EQ(read.number("x"), value);
+    auto rounded = parse(Json::object().set("x", base::significant(value, 6)).line());
+    ASSERT_NEAR(rounded.number("x") / value, 1.0, 5.1e-6) << value;
+  }
+  EXPECT_EQ(Json(std::numeric_limits<std::int64_t>::min()).line(), "-9223372036854775808");
+  EXPECT_EQ(Json(std::numeric_limits<std::uint64_t>::max()).line(), "18446744073709551615");
+}
+
+TEST(Json, numbers_have_the_digits_that_were_asked_for) {
+  EXPECT_EQ(base::significant(1234.5678, 6).line(), "1234.57");
+  EXPECT_EQ(base::significant(2.0, 6).line(), "2");
+  EXPECT_EQ(base::decimals(2.0 / 3.0, 4).line(), "0.6667");
+  EXPECT_EQ(Json(0.1).line(), "0.1");
+}
+
+TEST(Json, refuses_what_is_no_number) {
+  const double nan = std::nan(""), infinity = std::numeric_limits<double>::infinity();
+  for (const double value : {nan, infinity, -infinity}) {
+    EXPECT_THROW(Json{value}, std::invalid_argument);
+    EXPECT_THROW(base::significant(value, 6), std::invalid_argument);
+    EXPECT_THROW(base::decimals(value, 6), std::invalid_argument);
+    EXPECT_EQ(base::finite_or_null(value, base::significant, 6).line(), "null");
+  }
+  EXPECT_EQ(base::finite_or_null(1.25, base::decimals, 1).line(), "1.2");
+}
+
+TEST(Json, texts_are_read_back_as_they_were) {
+  std::string every;
+  for (int byte = 1; byte < 0x80; ++byte) every += static_cast<char>(byte);
+  for (const std::string& text : {every, std::string("\"\\\n\t"), std::string("Glöckchen \u202E\u009b \U000E0041 \U0001F514")}) {
+    const std::string line = Json::object().set("x", text).line();
+    auto read = parse(line);
+    EXPECT_EQ(read.string_or("x", ""), text);
+    EXPECT_EQ(base::printable(line), line);  // a terminal obeys nothing in it
+  }
+  EXPECT_EQ(base::quote("\x1b\u202E"), "\"\\u001b\\u202e\"");
+}
+
+TEST(Json, keys_are_escaped_too) { EXPECT_EQ(Json::object().set("a\"b", 1).line(), R"({"a\"b": 1})"); }
+
+TEST(Json, a_value_that_may_be_absent_is_null_then) {
+  Json value = Json::object();
+  value.set("some", std::optional<double>(0.5)).set("none", std::optional<double>());
+  EXPECT_EQ(value.line(), R"({"some": 0.5, "none": null})");
+}
+
+TEST(Json, only_objects_have_members_and_only_arrays_take_values) {
+  EXPECT_THROW(Json(1).set("a", 1), std::logic_error);
+  EXPECT_THROW(Json::array().member("a"), std::logic_error);
+  EXPECT_THROW(Json::object().add(1), std::logic_error);
+}
+
+}  // namespace

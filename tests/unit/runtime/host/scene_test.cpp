@@ -1,0 +1,470 @@
+#include "runtime/host/scene.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <sstream>
+#include <string>
+
+#include "runtime/host/pose.hpp"
+
+namespace carillon::host {
+namespace {
+
+std::string read_text(const std::string& file) {
+  std::ifstream in(file);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+Scene parse(const std::string& text) { return parse_scene(base::parse_document(text, "/somewhere/scene.json")); }
+
+const std::string kBody = R"("bodies": [{"name": "a", "bank": "a.h5"}])";
+std::string with_strike(const std::string& keys) { return "{\"duration_s\": 1, " + kBody + ",\n\"strikes\": [{" + keys + "}]}"; }
+const std::string kMalletPlace = R"("time_s": 0, "body": "a", "triangle": 0, )";
+
+TEST(Scene, AWholeSceneIsRead) {
+  const Scene scene = parse(read_text(std::string(CARILLON_SOURCE_DIR) + "/tests/unit/runtime/host/scenes/drop.json"));
+  EXPECT_EQ(scene.duration_s, 1.5);
+  EXPECT_EQ(scene.sample_rate_hz, 48000);
+  ASSERT_TRUE(scene.ground.has_value());
+  EXPECT_EQ(scene.ground->young_modulus_pa, 30e9);
+  ASSERT_EQ(scene.bodies.size(), 2u);
+  EXPECT_EQ(scene.bodies[0].bank, "/somewhere/cube.h5");
+  EXPECT_EQ(scene.bodies[0].spec.velocity_m_s[2], -0.5);
+  EXPECT_TRUE(scene.bodies[1].spec.fixed);
+  EXPECT_NEAR(scene.listener.facing[0], -0.3 / std::sqrt(0.09 + 1.0 + 0.09), 1e-12);
+  EXPECT_FALSE(scene.output.gain_per_pa.has_value());
+}
+
+TEST(Scene, StrikesAreRead) {
+  const Scene scene = parse("{\"duration_s\": 2, " + kBody + R"(, "strikes": [
+    {"time_s": 0.5, "body": "a", "point_m": [0.1, 0, 0], "impulse_n_s": [0, 0, -0.01], "duration_s": 1e-3},
+    {"time_s": 0, "body": "a", "triangle": 7, "impulse_n_s": [1, 2, 3]}]})");
+  ASSERT_EQ(scene.strikes.size(), 2u);
+  EXPECT_EQ(scene.strikes[0].body, 0u);
+  EXPECT_EQ(scene.strikes[0].time_s, 0.5);
+  EXPECT_EQ(scene.strikes[0].point_m, (Vec3{0.1, 0.0, 0.0}));
+  EXPECT_FALSE(scene.strikes[0].triangle.has_value());
+  EXPECT_EQ(scene.strikes[0].impulse_n_s[2], -0.01);
+  EXPECT_EQ(scene.strikes[0].duration_s, 1e-3);
+  EXPECT_EQ(scene.strikes[1].triangle, 7);
+  EXPECT_EQ(scene.strikes[1].duration_s, 0.0);
+  EXPECT_EQ(scene.strikes[1].place, "/somewhere/scene.json:3");
+  EXPECT_TRUE(parse("{\"duration_s\": 2, " + kBody + "}").strikes.empty());
+}
+
+TEST(Scene, MalletsAreRead) {
+  const Scene scene = parse("{\"duration_s\": 2, " + kBody + R"(, "strikes": [
+    {"time_s": 0.5, "body": "a", "triangle": 7, "mallet": {"mass_kg": 0.02, "speed_m_s": 2, "radius_m": 0.01, "young_modulus_pa": 3e9}},
+    {"time_s": 1, "body": "a", "triangle": 7, "mallet": {"mass_kg": 0.02, "speed_m_s": 2, "felt": {"stiffness_n_m_p": 1e8, "exponent": 3},
+      "restitution": 0.5, "friction": 0.3, "direction": [0, 3, -4]}}]})");
+  ASSERT_EQ(scene.strikes.size(), 2u);
+  const Mallet &hard = *scene.strikes[0].mallet, &felt = *scene.strikes[1].mallet;
+  EXPECT_TRUE(hard.mass_kg == 0.02 && hard.speed_m_s == 2.0 && hard.radius_m == 0.01 && hard.young_modulus_pa == 3e9 &&
+              hard.poisson_ratio == 0.3);
+  EXPECT_TRUE(!hard.felt && hard.restitution == 1.0 && hard.friction == 0.0 && !hard.direction);
+  EXPECT_TRUE(felt.felt->stiffness_n_m_p == 1e8 && felt.felt->exponent == 3.0 && felt.restitution == 0.5 && felt.friction == 0.3);
+  EXPECT_NEAR((*felt.direction)[1], 0.6, 1e-15);
+  EXPECT_NEAR((*felt.direction)[2], -0.8, 1e-15);
+  EXPECT_TRUE(scene.warnings.empty());
+  const Scene dense =
+      parse(with_strike(kMalletPlace + R"("mallet": {"mass_kg": 1, "speed_m_s": 2, "radius_m": 0.01, "young_modulus_pa": 3e9})"));
+  ASSERT_EQ(dense.warnings.size(), 1u);
+  EXPECT_NE(dense.warnings[0].find("denser than osmium"), std::string::npos);
+}
+
+const std::string kTwo = R"("bodies": [{"name": "a", "bank": "a.h5"}, {"name": "b", "bank": "b.h5"}])";
+std::string with_joint(const std::string& keys) { return "{\"duration_s\": 1, " + kTwo + ",\n\"joints\": [{" + keys + "}]}"; }
+std::string with_cord(const std::string& keys) { return "{\"duration_s\": 1, " + kTwo + ",\n\"cords\": [{" + keys + "}]}"; }
+
+TEST(Scene, JointsAndCordsAreRead) {
+  const Scene scene = parse("{\"duration_s\": 2, " + kTwo + R"(, "joints": [
+    {"kind": "hinge", "body": "a", "to": "world", "at_m": [0, 0, 1], "axis": [0, 2, 0], "damping": 0.01, "limits_deg": [-90, 45], "stop_restitution": 0.3},
+    {"kind": "universal", "body": "b", "to": "a", "at_m": [0, 0, 2], "axis": [1, 0, 0], "second_axis": [0, 3, 0]}],
+    "cords": [{"from": {"body": "b", "at_m": [0, 0, 1]}, "to": {"at_m": [0, 0, 3]}, "length_m": 2.5, "restitution": 0.2},
+              {"from": {"body": "b", "at_m": [0, 0, 1]}, "to": {"body": "a", "at_m": [0, 0, 3]}}]})");
+  ASSERT_EQ(scene.joints.size(), 2u);
+  EXPECT_EQ(scene.joints[0].kind, joints::Kind::kHinge);
+  EXPECT_EQ(scene.joints[0].body, 0);
+  EXPECT_EQ(scene.joints[0].to, -1);
+  EXPECT_EQ(scene.joints[0].axis, (Vec3{0, 1, 0}));
+  EXPECT_EQ(scene.joints[0].damping, 0.01);
+  ASSERT_TRUE(scene.joints[0].limits);
+  EXPECT_DOUBLE_EQ((*scene.joints[0].limits)[0], -0.5 * M_PI);
+  EXPECT_DOUBLE_EQ((*scene.joints[0].limits)[1], 0.25 * M_PI);
+  EXPECT_EQ(scene.joints[0].stop_restitution, 0.3);
+  EXPECT_FALSE(scene.joints[1].limits);
+  EXPECT_EQ(scene.joints[0].place, "/somewhere/scene.json:2");
+  EXPECT_EQ(scene.joints[1].to, 0);
+  EXPECT_EQ(scene.joints[1].second_axis, (Vec3{0, 1, 0}));
+  ASSERT_EQ(scene.cords.size(), 2u);
+  EXPECT_EQ(scene.cords[0].to, -1);
+  EXPECT_EQ(scene.cords[0].length_m, 2.5);
+  EXPECT_EQ(scene.cords[0].restitution, 0.2);
+  EXPECT_EQ(scene.cords[1].to, 0);
+  EXPECT_FALSE(scene.cords[1].length_m.has_value());
+}
+
+TEST(Scene, ManyStrikesAreReadInOnePassOfTheText) {
+  std::string text = "{\"duration_s\": 100,\n" + kBody + ", \"strikes\": [\n";
+  constexpr int kStrikes = 20000;
+  for (int i = 0; i < kStrikes; ++i) {
+    text += "{\"time_s\": 1, \"body\": \"a\", \"triangle\": 7, \"impulse_n_s\": [0, 0, 1]}";
+    text += i + 1 < kStrikes ? ",\n" : "\n";
+  }
+  text += "]}";
+  const base::Document document = base::parse_document(text, "/somewhere/scene.json");
+  const Scene scene = parse_scene(document);
+  ASSERT_EQ(scene.strikes.size(), static_cast<std::size_t>(kStrikes));
+  EXPECT_EQ(scene.strikes.back().place, "/somewhere/scene.json:" + std::to_string(kStrikes + 2));
+  EXPECT_LE(document.count_scanned_bytes(), text.size()) << "the lines of strikes are found by one pass, not by one for each strike";
+}
+
+TEST(Scene, WhatIsLeftOutHasItsDefault) {
+  const Scene scene = parse("{\"duration_s\": 2, " + kBody + "}");
+  EXPECT_EQ(scene.sample_rate_hz, 48000);
+  EXPECT_EQ(scene.gravity_m_s2[2], -9.81);
+  EXPECT_FALSE(scene.ground.has_value());
+  EXPECT_EQ(scene.listener.ear_distance_m, 0.2);
+  EXPECT_EQ(scene.output.format, SampleFormat::kPcm24);
+  EXPECT_EQ(scene.radiation, radiation::GainKind::kSphere);
+  EXPECT_EQ(parse("{\"duration_s\": 2, \"radiation\": \"osg02\", " + kBody + "}").radiation, radiation::GainKind::kOsg02);
+  EXPECT_EQ(parse("{\"duration_s\": 2, \"output\": {\"gain\": 0.25}, " + kBody + "}").output.gain_per_pa, 0.25);
+  EXPECT_EQ(parse("{\"duration_s\": 2, \"output\": {\"gain\": \"auto\"}, " + kBody + "}").output.gain_per_pa, std::nullopt);
+}
+
+TEST(Scene, AnglesTurnAboutTheFixedAxesXThenYThenZ) {
+  const Scene scene =
+      parse(R"({"duration_s": 1, "bodies": [{"name": "a", "bank": "a.h5", "rotation_deg": [90, 0, 90], "position_m": [1, 2, 3]}]})");
+  // y goes to z by the turn about x, and stays there; x goes to y by the turn about z; z goes to -y, then to x.
+  const auto check = [&](const Vec3& body, const Vec3& world) {
+    const Vec3 x = calc_world_point(scene.bodies[0].spec.initial, body);
+    for (int k = 0; k < 3; ++k) EXPECT_NEAR(x[k], world[k], 1e-12);
+  };
+  check({0, 1, 0}, {1, 2, 4});
+  check({1, 0, 0}, {1, 3, 3});
+  check({0, 0, 1}, {2, 2, 3});
+}
+
+TEST(Scene, AListenerMayMoveAndMicrophonesMayTakeItsPlace) {
+  const auto parse_root = [](const std::string& keys) { return parse("{\"duration_s\": 2, " + kBody + ", " + keys + "}"); };
+  const Scene moving = parse_root(R"("listener": {"path": [[0, 1, 2, 3], [0.5, 2, 2, 3]], "look_at_m": [1, 5, 3]})");
+  ASSERT_EQ(moving.listener.path.size(), 2u);
+  EXPECT_EQ(moving.listener.path[1].time_s, 0.5);
+  EXPECT_EQ(moving.listener.path[1].position_m, (Vec3{2, 2, 3}));
+  EXPECT_EQ(moving.listener.position_m, (Vec3{1, 2, 3}));
+  EXPECT_NEAR(moving.listener.facing[1], 1.0, 1e-12);
+  EXPECT_EQ(count_channels(moving), 2u);
+  const Scene scene = parse_root(R"("microphones": [[0, 0, 1], [0, 1, 1], [2, 0, 1]])");
+  EXPECT_EQ(count_channels(scene), 3u);
+  EXPECT_EQ(scene.microphones_m[2], (Vec3{2, 0, 1}));
+}
+
+TEST(Scene, EffectsAreThoseOfTheList) {
+  using synth::Effect;
+  const auto parse_effects = [](const std::string& list) {
+    return parse("{\"duration_s\": 2, " + kBody + ", \"effects\": " + list + "}").overrides;
+  };
+  const auto usual = parse("{\"duration_s\": 2, " + kBody + "}").overrides;
+  EXPECT_TRUE(usual.automatic);
+  EXPECT_EQ(usual.on.with(usual.off), synth::EffectSet{});
+  EXPECT_TRUE(parse_effects("\"auto\"").automatic);
+  const auto list =
+      parse_effects(R"(["modal", "hertz_pulse", "acceleration_noise", "air_delay", "doppler", "two_ears", "roughness", "rolling",
+    "contact_damping"])");
+  EXPECT_FALSE(list.automatic);
+  EXPECT_EQ(list.on, kPlayableEffects);
+  EXPECT_EQ(parse_effects(R"(["doppler"])").on, synth::EffectSet{Effect::kDoppler});
+  EXPECT_FALSE(parse_effects("[]").automatic);
+  const auto some = parse_effects(R"({"base": "auto", "on": ["acceleration_noise"], "off": ["doppler", "two_ears"]})");
+  EXPECT_TRUE(some.automatic);
+  EXPECT_EQ(some.on, synth::EffectSet{Effect::kAccelerationNoise});
+  EXPECT_EQ(some.off, (synth::EffectSet{Effect::kDoppler, Effect::kTwoEars}));
+  EXPECT_TRUE(parse_effects("{}").automatic);
+}
+
+TEST(Scene, ABodyMayHaveEffectsOfItsOwn) {
+  using synth::Effect;
+  const Scene scene = parse(R"({"duration_s": 2, "effects": {"off": ["two_ears"]}, "bodies": [
+    {"name": "a", "bank": "a.h5"}, {"name": "b", "bank": "a.h5", "effects": ["modal"]}, {"name": "c", "bank": "a.h5", "effects": "auto"}]})");
+  EXPECT_EQ(scene.bodies[0].overrides.off, synth::EffectSet{Effect::kTwoEars});
+  EXPECT_TRUE(scene.bodies[0].overrides.automatic);
+  EXPECT_EQ(scene.bodies[1].overrides.on, synth::EffectSet{Effect::kModal});
+  EXPECT_FALSE(scene.bodies[1].overrides.automatic);
+  EXPECT_EQ(scene.bodies[2].overrides.off, synth::EffectSet{});
+  EXPECT_TRUE(scene.bodies[2].overrides.automatic);
+}
+
+TEST(Scene, SurfacesAreAsRoughAsTheySay) {
+  const Scene usual = parse("{\"duration_s\": 2, \"ground\": {}, " + kBody + "}");
+  EXPECT_EQ(usual.bodies[0].spec.roughness_m, 2e-6);
+  EXPECT_EQ(usual.ground->roughness_m, 20e-6);
+  const Scene scene = parse(R"({"duration_s": 2, "ground": {"roughness_m": 0}, "bodies": [
+    {"name": "a", "bank": "a.h5", "roughness_m": 5e-7}]})");
+  EXPECT_EQ(scene.bodies[0].spec.roughness_m, 5e-7);
+  EXPECT_EQ(scene.ground->roughness_m, 0.0);
+  EXPECT_THROW(parse(R"({"duration_s": 2, "bodies": [{"name": "a", "bank": "a.h5", "roughness_m": 0.01}]})"), InputError);
+  EXPECT_THROW(parse(R"({"duration_s": 2, "ground": {"roughness_m": -1e-6}, "bodies": [{"name": "a", "bank": "a.h5"}]})"), InputError);
+}
+
+TEST(Scene, QualityIsReadAndWithoutItNothingChanges) {
+  const Quality usual = parse("{\"duration_s\": 2, " + kBody + "}").quality;
+  EXPECT_EQ(usual.thresholds.audible_share, effect_selection::kAudibleShare);
+  EXPECT_EQ(usual.thresholds.lead_s, effect_selection::kLeadS);
+  EXPECT_FALSE(usual.silence_pa.has_value() || usual.modes.has_value());
+  EXPECT_EQ(usual.contact_step_s, contact::WorldOptions{}.contact_step_s);
+  EXPECT_EQ(usual.instructions, synth::Isa::kBest);
+  const Quality quality = parse("{\"duration_s\": 2, " + kBody + R"(, "quality": {"planner_db": -70, "quiet_db": 90, "lead_s": 0.1,
+    "silence_pa": 1e-6, "modes": 320, "contact_step_s": 1e-4, "instructions": "avx2"}})")
+                              .quality;
+  EXPECT_NEAR(quality.thresholds.audible_share, 1e-7, 1e-16);
+  EXPECT_EQ(quality.thresholds.below_loudest_db, 90.0);
+  EXPECT_EQ(quality.thresholds.lead_s, 0.1);
+  EXPECT_EQ(quality.silence_pa, 1e-6);
+  EXPECT_EQ(quality.modes, 320);
+  EXPECT_EQ(quality.contact_step_s, 1e-4);
+  EXPECT_EQ(quality.instructions, synth::Isa::kAvx2);
+}
+
+TEST(Scene, TheLeftEarIsOnTheLeft) {
+  SceneListener listener;
+  listener.position_m = {1.0, 2.0, 3.0};
+  listener.facing = {0.0, 1.0, 0.0};
+  auto ears = calc_ears(listener);
+  EXPECT_NEAR(ears[0][0], 0.9, 1e-12);
+  EXPECT_NEAR(ears[1][0], 1.1, 1e-12);
+  EXPECT_NEAR(ears[0][2], 3.0, 1e-12);
+  listener.facing = {0.0, 0.0, -1.0};
+  ears = calc_ears(listener);
+  EXPECT_NEAR(std::hypot(ears[0][0] - ears[1][0], ears[0][1] - ears[1][1], ears[0][2] - ears[1][2]), 0.2, 1e-12);
+}
+
+struct BadScene {
+  const char* name;
+  std::string text;
+  std::vector<const char*> words;
+};
+
+void PrintTo(const BadScene& bad, std::ostream* out) { *out << bad.name; }
+
+class BadSceneTest : public ::testing::TestWithParam<BadScene> {};
+
+TEST_P(BadSceneTest, IsRefusedWithAMessageThatNamesThePlace) {
+  try {
+    parse(GetParam().text);
+    FAIL() << "it was accepted";
+  } catch (const InputError& error) {
+    const std::string message = error.what();
+    EXPECT_EQ(message.rfind("/somewhere/scene.json:", 0), 0u) << message;
+    for (const char* word : GetParam().words) EXPECT_NE(message.find(word), std::string::npos) << "no \"" << word << "\" in: " << message;
+  }
+}
+
+std::string with_body(const std::string& keys) {
+  return "{\"duration_s\": 1,\n \"bodies\": [{\"name\": \"a\", \"bank\": \"a.h5\",\n  " + keys + "}]}";
+}
+std::string with_root(const std::string& keys) { return "{\"duration_s\": 1, " + kBody + ",\n" + keys + "}"; }
+
+INSTANTIATE_TEST_SUITE_P(
+    Scene, BadSceneTest,
+    ::testing::Values(
+        BadScene{"empty", "", {"JSON"}}, BadScene{"cut_short", "{\"duration_s\": 1, \"bodies\": [", {"JSON"}},
+        BadScene{"a_list", "[1, 2]", {"object"}}, BadScene{"no_duration", "{" + kBody + "}", {"duration_s", "missing"}},
+        BadScene{"negative_duration", "{\"duration_s\": -1, " + kBody + "}", {":1:", "duration_s", "greater than 0"}},
+        BadScene{"duration_as_text", "{\"duration_s\": \"1\", " + kBody + "}", {"duration_s", "number"}},
+        BadScene{"endless", "{\"duration_s\": 1e9, " + kBody + "}", {"duration_s", "out of range", "3600"}},
+        BadScene{"an_instant", "{\"duration_s\": 1e-9, " + kBody + "}", {"duration_s", "out of range", "0.001"}},
+        BadScene{"low_rate", with_root("\"sample_rate_hz\": 100"), {":2:", "sample_rate_hz", "8000"}},
+        BadScene{"no_bodies", "{\"duration_s\": 1}", {"bodies", "at least one"}},
+        BadScene{"mistyped_bodies", "{\"duration_s\": 1,\n \"bodys\": []}", {":2:", "bodys", "did you mean \"bodies\"?"}},
+        BadScene{"empty_bodies", "{\"duration_s\": 1, \"bodies\": []}", {"bodies", "at least one"}},
+        BadScene{"misspelt_key", with_root("\"gravity_ms2\": [0, 0, 0]"), {":2:", "gravity_ms2", "gravity_m_s2"}},
+        BadScene{"misspelt_body_key", with_body("\"positon_m\": [0, 0, 0]"), {":3:", "positon_m", "position_m"}},
+        BadScene{"joint_of_no_kind", with_joint(R"("kind": "glue", "body": "a", "to": "b", "at_m": [0, 0, 0])"), {":2:", "kind", "hinge"}},
+        BadScene{"joint_of_an_unknown_body",
+                 with_joint(R"("kind": "ball", "body": "c", "to": "b", "at_m": [0, 0, 0])"),
+                 {":2:", "no body is called \"c\""}},
+        BadScene{"joint_without_end", with_joint(R"("kind": "ball", "body": "a", "at_m": [0, 0, 0])"), {":2:", "to", "missing"}},
+        BadScene{"joint_without_a_place", with_joint(R"("kind": "ball", "body": "a", "to": "b")"), {":2:", "at_m", "missing"}},
+        BadScene{
+            "hinge_without_axis", with_joint(R"("kind": "hinge", "body": "a", "to": "b", "at_m": [0, 0, 0])"), {":2:", "axis", "missing"}},
+        BadScene{"hinge_of_zero_axis",
+                 with_joint(R"("kind": "hinge", "body": "a", "to": "b", "at_m": [0, 0, 0], "axis": [0, 0, 0])"),
+                 {":2:", "axis", "no direction"}},
+        BadScene{"ball_with_axis",
+                 with_joint(R"("kind": "ball", "body": "a", "to": "b", "at_m": [0, 0, 0], "axis": [0, 0, 1])"),
+                 {":2:", "axis", "take it away"}},
+        BadScene{
+            "universal_with_parallel_axes",
+            with_joint(R"("kind": "universal", "body": "a", "to": "b", "at_m": [0, 0, 0], "axis": [0, 0, 1], "second_axis": [0, 0.1, 1])"),
+            {":2:", "second_axis", "right angles"}},
+        BadScene{"slider_with_limits_of_a_hinge",
+                 with_joint(R"("kind": "slider", "body": "a", "to": "b", "at_m": [0, 0, 0], "axis": [0, 0, 1], "limits_deg": [-1, 1])"),
+                 {":2:", "limits_deg", "limits_m"}},
+        BadScene{"hinge_that_starts_beyond_its_stop",
+                 with_joint(R"("kind": "hinge", "body": "a", "to": "b", "at_m": [0, 0, 0], "axis": [0, 0, 1], "limits_deg": [1, 2])"),
+                 {":2:", "limits_deg", "the start, 0, between them"}},
+        BadScene{"restitution_of_no_stop",
+                 with_joint(R"("kind": "hinge", "body": "a", "to": "b", "at_m": [0, 0, 0], "axis": [0, 0, 1], "stop_restitution": 0.5)"),
+                 {":2:", "stop_restitution", "limits_deg"}},
+        BadScene{"joint_that_drives",
+                 with_joint(R"("kind": "ball", "body": "a", "to": "b", "at_m": [0, 0, 0], "damping": -1)"),
+                 {":2:", "damping", "out of range"}},
+        BadScene{"cord_from_an_unknown_body",
+                 with_cord(R"("from": {"body": "c", "at_m": [0, 0, 0]}, "to": {"at_m": [0, 0, 1]})"),
+                 {":2:", "no body is called \"c\""}},
+        BadScene{"cord_without_a_place",
+                 with_cord(R"("from": {"body": "a", "at_m": [0, 0, 0]}, "to": {"body": "b"})"),
+                 {":2:", "at_m", "missing"}},
+        BadScene{"short_cord",
+                 with_cord(R"("from": {"body": "a", "at_m": [0, 0, 0]}, "to": {"at_m": [0, 0, 1]}, "length_m": 0.5)"),
+                 {":2:", "length_m", "at least"}},
+        BadScene{"body_without_bank", "{\"duration_s\": 1, \"bodies\": [{\"name\": \"a\"}]}", {"bank", "missing"}},
+        BadScene{"body_without_name", "{\"duration_s\": 1, \"bodies\": [{\"bank\": \"a.h5\"}]}", {"name", "missing"}},
+        BadScene{"twice_the_name",
+                 "{\"duration_s\": 1, \"bodies\": [{\"name\": \"a\", \"bank\": \"a.h5\"}, {\"name\": \"a\", \"bank\": \"b.h5\"}]}",
+                 {"already", "\"a\"", "another name"}},
+        BadScene{"two_numbers", with_body("\"position_m\": [0, 0]"), {":3:", "position_m", "3 numbers"}},
+        BadScene{"far_away", with_body("\"position_m\": [0, 0, 1e9]"), {"position_m", "out of range", "10000"}},
+        BadScene{"bent_quaternion", with_body("\"quaternion\": [1, 1, 0, 0]"), {"quaternion", "1.41421", "length 1"}},
+        BadScene{"two_rotations",
+                 with_body("\"quaternion\": [1, 0, 0, 0], \"rotation_deg\": [0, 0, 0]"),
+                 {"quaternion", "rotation_deg", "keep one"}},
+        BadScene{"moving_shelf", with_body("\"fixed\": true, \"velocity_m_s\": [1, 0, 0]"), {"velocity_m_s", "fixed"}},
+        BadScene{"too_bouncy", with_body("\"restitution\": 1.5"), {"restitution", "from 0 to 1"}},
+        BadScene{"negative_friction", with_body("\"friction\": -0.1"), {"friction", "out of range"}},
+        BadScene{"faster_than_sound", with_body("\"velocity_m_s\": [400, 0, 0]"), {"velocity_m_s", "300"}},
+        BadScene{"fixed_as_number", with_body("\"fixed\": 1"), {"fixed", "true or false"}},
+        BadScene{"soft_ground", with_root("\"ground\": {\"young_modulus_pa\": 0}"), {"young_modulus_pa", "greater than 0"}},
+        BadScene{"impossible_ground", with_root("\"ground\": {\"poisson_ratio\": 0.5}"), {"poisson_ratio", "0.5"}},
+        BadScene{"ground_as_number", with_root("\"ground\": 0"), {"ground", "object"}},
+        BadScene{"nowhere_to_look",
+                 with_root("\"listener\": {\"position_m\": [1, 1, 1], \"look_at_m\": [1, 1, 1]}"),
+                 {"look_at_m", "direction"}},
+        BadScene{"two_directions",
+                 with_root("\"listener\": {\"facing\": [1, 0, 0], \"look_at_m\": [1, 1, 1]}"),
+                 {"look_at_m", "facing", "keep one"}},
+        BadScene{"giant_head", with_root("\"listener\": {\"ear_distance_m\": 11}"), {"ear_distance_m", "from 0 to 10"}},
+        BadScene{"gain_word", with_root("\"output\": {\"gain\": \"loud\"}"), {"gain", "auto", "number"}},
+        BadScene{"gain_list", with_root("\"output\": {\"gain\": [1]}"), {"gain", "auto", "number"}},
+        BadScene{"gain_zero", with_root("\"output\": {\"gain\": 0}"), {"gain", "greater than 0"}},
+        BadScene{"unknown_format", with_root("\"output\": {\"format\": \"pcm25\"}"), {"format", "pcm24"}},
+        BadScene{"unknown_effect", with_root("\"effects\": [\"dopler\"]"), {":2:", "effects", "dopler", "did you mean \"doppler\"?"}},
+        BadScene{"effect_of_tomorrow", with_root("\"effects\": [\"reverberation\"]"), {"reverberation", "acceleration_noise"}},
+        BadScene{"effect_twice", with_root("\"effects\": [\"modal\", \"modal\"]"), {"effects", "twice"}},
+        BadScene{"object_in_effects", with_root("\"effects\": [{}]"), {":2:", "effects", "list of names"}},
+        BadScene{"effects_by_another_word", with_root("\"effects\": \"all\""), {"effects", "\"all\"", "\"auto\""}},
+        BadScene{"effects_as_number", with_root("\"effects\": 3"), {":2:", "effects"}},
+        BadScene{"effect_on_and_off",
+                 with_root("\"effects\": {\"on\": [\"doppler\"],\n\"off\": [\"modal\", \"doppler\"]}"),
+                 {":3:", "off", "doppler", "keep one"}},
+        BadScene{
+            "unknown_effect_on", with_root("\"effects\": {\n\"on\": [\"hertz_puls\"]}"), {":3:", "on", "did you mean \"hertz_pulse\"?"}},
+        BadScene{"unknown_key_of_effects", with_root("\"effects\": {\"onn\": []}"), {"onn", "\"on\""}},
+        BadScene{"unknown_base_of_effects", with_root("\"effects\": {\"base\": \"all\"}"), {"base", "auto"}},
+        BadScene{"unknown_effect_of_a_body",
+                 R"({"duration_s": 1, "bodies": [{"name": "a", "bank": "a.h5",
+  "effects": ["modl"]}]})",
+                 {":2:", "modl", "did you mean \"modal\"?"}},
+        BadScene{"path_and_position",
+                 with_root("\"listener\": {\"path\": [[0, 0, 0, 0]], \"position_m\": [1, 1, 1]}"),
+                 {":2:", "path", "position_m", "keep one"}},
+        BadScene{"path_without_rows", with_root("\"listener\": {\"path\": []}"), {"path", "lists of 4"}},
+        BadScene{"path_back_in_time", with_root("\"listener\": {\"path\": [[1, 0, 0, 0], [1, 0, 0, 1]]}"), {"path", "order of time"}},
+        BadScene{
+            "path_faster_than_sound", with_root("\"listener\": {\"path\": [[0, 0, 0, 0], [1, 0, 0, 400]]}"), {"path", "400 m/s", "300"}},
+        BadScene{"path_far_away", with_root("\"listener\": {\"path\": [[0, 0, 0, 1e6]]}"), {"path", "out of range"}},
+        BadScene{"path_for_ever", with_root("\"listener\": {\"path\": [[1e9, 0, 0, 0]]}"), {"path", "out of range"}},
+        BadScene{"no_microphones", with_root("\"microphones\": []"), {":2:", "microphones", "1 to 16"}},
+        BadScene{"flat_microphones", with_root("\"microphones\": [0, 0, 1]"), {"microphones", "list of 3 numbers"}},
+        BadScene{"microphones_and_listener",
+                 with_root("\"microphones\": [[0, 0, 1]], \"listener\": {}"),
+                 {"microphones", "listener", "keep one"}},
+        BadScene{"fade_as_number", with_root("\"output\": {\"fade_end\": 1}"), {":2:", "fade_end"}},
+        BadScene{"misspelt_quality", with_root("\"quality\": {\"silence\": 1e-3}"), {":2:", "silence", "silence_pa"}},
+        BadScene{"quality_that_is_a_number", with_root("\"quality\": 3"), {":2:", "quality", "object"}},
+        BadScene{"loud_silence", with_root("\"quality\": {\"silence_pa\": 2}"), {":2:", "silence_pa", "out of range"}},
+        BadScene{"coarse_contacts", with_root("\"quality\": {\"contact_step_s\": 0.1}"), {":2:", "contact_step_s", "0.002"}},
+        BadScene{"fewer_modes_than_a_group", with_root("\"quality\": {\"modes\": 1}"), {":2:", "modes", "16"}},
+        BadScene{"loud_effects", with_root("\"quality\": {\"planner_db\": 3}"), {":2:", "planner_db", "-10"}},
+        BadScene{"unknown_instructions", with_root("\"quality\": {\"instructions\": \"neon\"}"), {":2:", "instructions", "avx2"}},
+        BadScene{"unknown_radiation", with_root("\"radiation\": \"sfere\""), {":2:", "radiation", "sphere"}},
+        BadScene{"strikes_as_object", with_root("\"strikes\": {}"), {":2:", "strikes", "list"}},
+        BadScene{"strike_at_no_body",
+                 with_strike("\"time_s\": 0, \"body\": \"b\", \"triangle\": 0, \"impulse_n_s\": [0, 0, 1]"),
+                 {":2:", "body", "no body is called \"b\""}},
+        BadScene{"mallet_and_impulse",
+                 with_strike(kMalletPlace +
+                             R"("impulse_n_s": [0, 0, 1], "mallet": {"mass_kg": 1, "speed_m_s": 1, "felt": {"stiffness_n_m_p": 1e8}})"),
+                 {"impulse_n_s", "follows from the \"mallet\""}},
+        BadScene{
+            "mallet_and_duration",
+            with_strike(kMalletPlace + R"("duration_s": 0, "mallet": {"mass_kg": 1, "speed_m_s": 1, "felt": {"stiffness_n_m_p": 1e8}})"),
+            {"duration_s", "follows from the \"mallet\""}},
+        BadScene{"mallet_of_no_hardness",
+                 with_strike(kMalletPlace + R"("mallet": {"mass_kg": 1, "speed_m_s": 1})"),
+                 {"young_modulus_pa", "felt"}},
+        BadScene{"mallet_without_radius",
+                 with_strike(kMalletPlace + R"("mallet": {"mass_kg": 1, "speed_m_s": 1, "young_modulus_pa": 3e9})"),
+                 {"radius_m", "missing"}},
+        BadScene{
+            "mallet_hard_and_felt",
+            with_strike(kMalletPlace + R"("mallet": {"mass_kg": 1, "speed_m_s": 1, "radius_m": 0.01, "felt": {"stiffness_n_m_p": 1e8}})"),
+            {"radius_m", "felt", "keep one"}},
+        BadScene{"mallet_without_mass",
+                 with_strike(kMalletPlace + R"("mallet": {"mass_kg": 0, "speed_m_s": 1, "felt": {"stiffness_n_m_p": 1e8}})"),
+                 {"mass_kg", "out of range"}},
+        BadScene{"mallet_at_rest",
+                 with_strike(kMalletPlace + R"("mallet": {"mass_kg": 1, "speed_m_s": -2, "felt": {"stiffness_n_m_p": 1e8}})"),
+                 {"speed_m_s", "out of range"}},
+        BadScene{
+            "mallet_with_a_wild_exponent",
+            with_strike(kMalletPlace + R"("mallet": {"mass_kg": 1, "speed_m_s": 1, "felt": {"stiffness_n_m_p": 1e8, "exponent": 60}})"),
+            {"exponent", "out of range"}},
+        BadScene{"mallet_without_direction",
+                 with_strike(kMalletPlace +
+                             R"("mallet": {"mass_kg": 1, "speed_m_s": 1, "felt": {"stiffness_n_m_p": 1e8}, "direction": [0, 0, 0]})"),
+                 {"direction", "no direction"}},
+        BadScene{"mallet_mistyped",
+                 with_strike(kMalletPlace + R"("mallet": {"mass_kg": 1, "speed_m_s": 1, "felt": {"stifness": 1e8}})"),
+                 {"stiffness_n_m_p"}},
+        BadScene{"strike_without_time", with_strike("\"body\": \"a\", \"triangle\": 0, \"impulse_n_s\": [0, 0, 1]"), {"time_s", "missing"}},
+        BadScene{"strike_after_the_end",
+                 with_strike("\"time_s\": 1.5, \"body\": \"a\", \"triangle\": 0, \"impulse_n_s\": [0, 0, 1]"),
+                 {"time_s", "1.5", "out of range"}},
+        BadScene{"strike_before_the_beginning",
+                 with_strike("\"time_s\": 0.001, \"duration_s\": 0.003, \"body\": \"a\", \"triangle\": 0, "
+                             "\"impulse_n_s\": [0, 0, 1]"),
+                 {"time_s", "out of range", "beginning"}},
+        BadScene{
+            "strike_nowhere", with_strike("\"time_s\": 0, \"body\": \"a\", \"impulse_n_s\": [0, 0, 1]"), {"point_m", "triangle", "either"}},
+        BadScene{"strike_in_two_places",
+                 with_strike("\"time_s\": 0, \"body\": \"a\", \"triangle\": 0, \"point_m\": [0, 0, 0], "
+                             "\"impulse_n_s\": [0, 0, 1]"),
+                 {"point_m", "triangle", "either"}},
+        BadScene{"strike_without_impulse", with_strike("\"time_s\": 0, \"body\": \"a\", \"triangle\": 0"), {"impulse_n_s", "missing"}},
+        BadScene{"strike_with_a_number",
+                 with_strike("\"time_s\": 0, \"body\": \"a\", \"triangle\": 0, \"impulse_n_s\": 1"),
+                 {"impulse_n_s", "3 numbers"}},
+        BadScene{"strike_of_a_giant",
+                 with_strike("\"time_s\": 0, \"body\": \"a\", \"triangle\": 0, \"impulse_n_s\": [0, 0, 1e9]"),
+                 {"impulse_n_s", "out of range"}},
+        BadScene{"endless_strike",
+                 with_strike("\"time_s\": 0, \"body\": \"a\", \"triangle\": 0, \"impulse_n_s\": [0, 0, 1], \"duration_s\": 2"),
+                 {"duration_s", "from 0 to 1"}},
+        BadScene{"negative_triangle",
+                 with_strike("\"time_s\": 0, \"body\": \"a\", \"triangle\": -1, \"impulse_n_s\": [0, 0, 1]"),
+                 {"triangle", "-1"}},
+        BadScene{
+            "half_a_triangle", with_strike("\"time_s\": 0, \"body\": \"a\", \"triangle\": 0.5, \"impulse_n_s\": [0, 0, 1]"), {"triangle"}},
+        BadScene{"misspelt_strike_key",
+                 with_strike("\"time_s\": 0, \"body\": \"a\", \"triangle\": 0, \"impulse_n_s\": [0, 0, 1], \"durations\": 0"),
+                 {":2:", "durations", "duration_s"}},
+        BadScene{"key_twice", "{\"duration_s\": 1, \"duration_s\": 2, " + kBody + "}", {"duration_s"}}),
+    [](const auto& info) { return std::string(info.param.name); });
+
+}  // namespace
+}  // namespace carillon::host

@@ -1,0 +1,303 @@
+// Every instruction set against plain loops in double precision, for every count of modes around the widths of the vectors.
+#include "runtime/synth/kernels.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <complex>
+#include <cstring>
+#include <random>
+#include <vector>
+
+namespace carillon::synth {
+namespace {
+
+using Complex = std::complex<double>;
+
+std::vector<Isa> list_isas() {
+  std::vector<Isa> isas;
+  for (const Isa isa : {Isa::kPlain, Isa::kSse2, Isa::kAvx2, Isa::kAvx512}) {
+    if (get_kernels(isa).isa == isa) isas.push_back(isa);
+  }
+  return isas;
+}
+
+/// `modes` modes with random numbers in every table; lanes beyond are zero, as the kernels' contract wants it.
+struct Invented {
+  std::vector<SoundTable> sound;
+  std::vector<RotationTable> turn;
+  std::vector<StrikeTable> strike;
+  std::vector<ModeState> state;
+  std::vector<SubBlockStates> starts;
+  std::vector<std::int16_t> rows;
+  PulseBlock touch{};
+  int groups, modes;
+
+  explicit Invented(int count) : groups(std::max(1, (count + kGroup - 1) / kGroup)), modes(count) {
+    std::mt19937 random(7);
+    std::uniform_real_distribution<float> number(-1.0F, 1.0F);
+    const auto size = static_cast<std::size_t>(groups);
+    sound.resize(size), turn.resize(size), strike.resize(size), state.resize(size), starts.resize(size);
+    for (auto& table : sound) std::memset(&table, 0, sizeof(table));
+    for (auto& table : turn) std::memset(&table, 0, sizeof(table));
+    for (auto& table : strike) std::memset(&table, 0, sizeof(table));
+    for (auto& table : state) std::memset(&table, 0, sizeof(table));
+    rows.assign(static_cast<std::size_t>(kStrikeRows * groups * kGroup), 0);
+    for (int m = 0; m < modes; ++m) {
+      const std::size_t g = static_cast<std::size_t>(m / kGroup);
+      const int l = m % kGroup;
+      for (auto& part : sound[g].wave[l]) {
+        for (float& x : part) x = number(random);
+      }
+      turn[g].block_re[l] = number(random), turn[g].block_im[l] = number(random);
+      for (int q = 0; q < kSubBlocks - 1; ++q) turn[g].sub_blocks_re[q][l] = number(random), turn[g].sub_blocks_im[q][l] = number(random);
+      const float angle = number(random);
+      strike[g].turn_re[l] = std::cos(angle), strike[g].turn_im[l] = std::sin(angle);
+      strike[g].out_re[l] = number(random), strike[g].out_im[l] = number(random);
+      strike[g].scale[l] = 1e-4F * number(random);
+      for (int j = 0; j < kTerms; ++j) strike[g].force_re[j][l] = number(random), strike[g].force_im[j][l] = number(random);
+      state[g].re[l] = number(random), state[g].im[l] = number(random);
+      for (int r = 0; r < kStrikeRows; ++r) rows[row(r) + static_cast<std::size_t>(m)] = static_cast<std::int16_t>(32767 * number(random));
+    }
+    for (int r = 0; r < kStrikeRows; ++r) touch.row[r] = rows.data() + row(r), touch.weight[r] = number(random);
+    touch.first = 5, touch.last = 23;
+    for (auto& sample : touch.moment) {
+      for (float& x : sample) x = number(random);
+    }
+  }
+  std::size_t row(int r) const { return static_cast<std::size_t>(r * groups * kGroup); }
+};
+
+/// The state of a mode at the start of a sub-block; after the last one, at the start of the next block.
+Complex get_start(const Invented& of, std::size_t g, int l, int sub_block) {
+  if (sub_block == kSubBlocks) return {of.state[g].re[l], of.state[g].im[l]};
+  return {of.starts[g].re[sub_block][l], of.starts[g].im[sub_block][l]};
+}
+
+/// A state `sub_blocks` later, left to itself.
+Complex turn_on(const Invented& of, std::size_t g, int l, const Complex& x, int sub_blocks) {
+  return sub_blocks == 0 ? x : x * Complex(of.turn[g].sub_blocks_re[sub_blocks - 1][l], of.turn[g].sub_blocks_im[sub_blocks - 1][l]);
+}
+
+const std::array<int, 12> kCounts{0, 1, 2, 3, 4, 7, 8, 15, 16, 17, 33, 160};
+
+TEST(Kernels, TheBestIsOneThatThereIs) {
+  EXPECT_EQ(get_kernels(Isa::kBest).isa, find_best_isa());
+  EXPECT_EQ(list_isas().front(), Isa::kPlain);
+  EXPECT_EQ(list_isas().back(), find_best_isa());
+  EXPECT_STREQ(get_name(Isa::kAvx2), "avx2");
+}
+
+TEST(Kernels, AdvanceTurnsTheStateAndFillsTheStarts) {
+  for (const Isa isa : list_isas()) {
+    for (const int count : kCounts) {
+      Invented now(count);
+      const Invented before(count);
+      get_kernels(isa).advance(now.turn.data(), now.state.data(), now.starts.data(), now.groups);
+      for (int m = 0; m < now.groups * kGroup; ++m) {
+        const std::size_t g = static_cast<std::size_t>(m / kGroup);
+        const int l = m % kGroup;
+        const Complex z(before.state[g].re[l], before.state[g].im[l]);
+        const Complex turned = z * Complex(before.turn[g].block_re[l], before.turn[g].block_im[l]);
+        ASSERT_NEAR(now.state[g].re[l], turned.real(), 1e-15) << get_name(isa) << ", " << count << " modes";
+        ASSERT_NEAR(now.state[g].im[l], turned.imag(), 1e-15);
+        for (int q = 0; q < kSubBlocks; ++q) {
+          const Complex start = q == 0 ? z : z * Complex(before.turn[g].sub_blocks_re[q - 1][l], before.turn[g].sub_blocks_im[q - 1][l]);
+          ASSERT_NEAR(now.starts[g].re[q][l], start.real(), 3e-7);
+          ASSERT_NEAR(now.starts[g].im[q][l], start.imag(), 3e-7);
+        }
+      }
+    }
+  }
+}
+
+TEST(Kernels, EmitSumsTheSoundOfAllModes) {
+  for (const Isa isa : list_isas()) {
+    for (const int count : kCounts) {
+      Invented invented(count);
+      get_kernels(isa).advance(invented.turn.data(), invented.state.data(), invented.starts.data(), invented.groups);
+      for (int first = 0; first < kSubBlocks; ++first) {
+        for (int sub_blocks = 1; first + sub_blocks <= kSubBlocks; ++sub_blocks) {
+          std::vector<float> out(static_cast<std::size_t>(kBlock), 0.5F);
+          get_kernels(isa).emit(invented.sound.data(), invented.starts.data(), invented.groups, first, sub_blocks, out.data());
+          for (int n = 0; n < kBlock; ++n) {
+            double expected = 0.5, size = 1.0;
+            for (int m = 0; m < count && n < sub_blocks * kSubBlock; ++m) {
+              const std::size_t g = static_cast<std::size_t>(m / kGroup);
+              const int l = m % kGroup, q = first + n / kSubBlock;
+              const double a = static_cast<double>(invented.starts[g].re[q][l]) * invented.sound[g].wave[l][0][n % kSubBlock];
+              const double b = static_cast<double>(invented.starts[g].im[q][l]) * invented.sound[g].wave[l][1][n % kSubBlock];
+              expected += a + b;
+              size += std::abs(a) + std::abs(b);
+            }
+            ASSERT_NEAR(out[static_cast<std::size_t>(n)], expected, 2e-6 * size)
+                << get_name(isa) << ", " << count << " modes, " << sub_blocks;
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(Kernels, HowAPeriodIsCutDoesNotChangeABit) {
+  for (const Isa isa : list_isas()) {
+    const Kernels& kernels = get_kernels(isa);
+    for (const int count : {16, 33, 160, 400}) {
+      Invented whole(count), cut(count);
+      std::vector<float> rung(kBlock, 0.0F);
+      kernels.ring(whole.sound.data(), whole.turn.data(), whole.state.data(), whole.groups, rung.data());
+      kernels.advance(cut.turn.data(), cut.state.data(), cut.starts.data(), cut.groups);
+      for (const std::vector<int>& pieces : {std::vector<int>{4}, {1, 1, 1, 1}, {2, 2}, {3, 1}, {1, 3}, {1, 2, 1}}) {
+        std::vector<float> out(kBlock, 0.0F);
+        int first = 0;
+        for (const int sub_blocks : pieces) {
+          kernels.emit(cut.sound.data(), cut.starts.data(), cut.groups, first, sub_blocks, out.data() + first * kSubBlock);
+          first += sub_blocks;
+        }
+        ASSERT_EQ(std::memcmp(out.data(), rung.data(), sizeof(float) * kBlock), 0) << get_name(isa) << ", " << count << " modes";
+      }
+      ASSERT_EQ(std::memcmp(whole.state.data(), cut.state.data(), sizeof(ModeState) * whole.state.size()), 0);
+    }
+  }
+}
+
+TEST(Kernels, AStrikeAddsItsAnswerAndLeavesItToTheRestOfThePeriod) {
+  for (const Isa isa : list_isas()) {
+    for (const int count : kCounts) {
+      for (int sub_block = 0; sub_block < kSubBlocks; ++sub_block) {
+        Invented now(count);
+        const Invented before(count);
+        std::vector<float> out(kSubBlock, 0.25F);
+        get_kernels(isa).strike(now.strike.data(), now.turn.data(), now.touch, sub_block, now.state.data(), now.starts.data(), now.groups,
+                                out.data());
+        std::vector<double> expected(kSubBlock, 0.25);
+        double size = 1.0;
+        for (int m = 0; m < count; ++m) {
+          const std::size_t g = static_cast<std::size_t>(m / kGroup);
+          const int l = m % kGroup;
+          const StrikeTable& table = before.strike[g];
+          double amplitude = 0.0;
+          for (int r = 0; r < kStrikeRows; ++r) {
+            amplitude += static_cast<double>(before.touch.weight[r]) * before.rows[before.row(r) + static_cast<std::size_t>(m)];
+          }
+          amplitude *= table.scale[l];
+          const Complex turn(table.turn_re[l], table.turn_im[l]);
+          Complex x = 0.0;
+          for (int n = 0; n < kSubBlock; ++n) {
+            x *= turn;
+            for (int j = 0; j < kTerms && n >= before.touch.first && n < before.touch.last; ++j) {
+              x += amplitude * before.touch.moment[n][j] * Complex(table.force_re[j][l], table.force_im[j][l]);
+            }
+            expected[static_cast<std::size_t>(n)] += table.out_re[l] * x.real() + table.out_im[l] * x.imag();
+            size += std::abs(x);
+          }
+          x *= turn;
+          for (int q = sub_block + 1; q <= kSubBlocks; ++q) {
+            const Complex added = get_start(now, g, l, q) - get_start(before, g, l, q);
+            ASSERT_LT(std::abs(added - turn_on(before, g, l, x, q - sub_block - 1)), 2e-5 * (1.0 + std::abs(x)))
+                << get_name(isa) << ", " << count << " modes, sub_block " << sub_block;
+          }
+          for (int q = 0; q <= sub_block; ++q) ASSERT_EQ(now.starts[g].re[q][l], before.starts[g].re[q][l]);
+        }
+        for (std::size_t n = 0; n < expected.size(); ++n) ASSERT_NEAR(out[n], expected[n], 2e-6 * size) << get_name(isa) << ", " << count;
+      }
+    }
+  }
+}
+
+TEST(Kernels, ADriveAddsItsForcesAndTakesItsShareOfWhatRings) {
+  std::mt19937 random(11);
+  std::uniform_real_distribution<float> number(-1.0F, 1.0F);
+  for (const Isa isa : list_isas()) {
+    for (const int count : kCounts) {
+      for (const bool forces : {false, true}) {
+        for (const bool damps : {false, true}) {
+          Invented now(count);
+          for (auto& table : now.strike) std::fill(std::begin(table.angle), std::end(table.angle), 0.0F);
+          for (int m = 0; m < count; ++m) now.strike[static_cast<std::size_t>(m / kGroup)].angle[m % kGroup] = 1.0F + 0.5F * number(random);
+          get_kernels(isa).advance(now.turn.data(), now.state.data(), now.starts.data(), now.groups);
+          ContactBlock drive{};
+          drive.contacts = 3;
+          drive.forces = forces;
+          drive.damps = damps;
+          for (auto& ramp : drive.ramp) std::generate(std::begin(ramp), std::end(ramp), [&] { return number(random); });
+          for (int c = 0; c < drive.contacts; ++c) {
+            for (ContactEnd& push : drive.push[c]) {
+              push.forces = forces && c != 1;  // one of them dampings only
+              for (int r = 0; r < kStrikeRows; ++r) {
+                push.row[r] = now.rows.data() + now.row((r + c) % kStrikeRows);
+                push.force[r] = number(random);
+                push.damping[r] = damps ? 0.3F * number(random) : 0.0F;
+              }
+              for (float& x : push.signal) x = push.forces ? number(random) : 0.0F;
+            }
+          }
+          const int sub_block = count % kSubBlocks;
+          const Invented before = now;
+          std::vector<float> out(kSubBlock, 0.25F);
+          get_kernels(isa).drive(now.strike.data(), now.turn.data(), drive, sub_block, now.state.data(), now.starts.data(), now.groups,
+                                 out.data());
+          std::vector<double> expected(kSubBlock, 0.25);
+          double size = 1.0;
+          for (int m = 0; m < count; ++m) {
+            const std::size_t g = static_cast<std::size_t>(m / kGroup);
+            const int l = m % kGroup;
+            const StrikeTable& table = now.strike[g];
+            const auto calc_along = [&](const ContactEnd& push, const float* weight) {
+              double along = 0.0;
+              for (int r = 0; r < kStrikeRows; ++r) along += static_cast<double>(weight[r]) * push.row[r][m];
+              return along * static_cast<double>(table.scale[l]);
+            };
+            std::array<double, kSubBlock + 1> force{};
+            std::array<double, 2> loss{};
+            for (int end = 0; end < 2; ++end) {
+              double x = 0.0;
+              for (int c = 0; c < drive.contacts; ++c) {
+                const ContactEnd& push = drive.push[c][static_cast<std::size_t>(end)];
+                x += std::pow(calc_along(push, push.damping), 2.0);
+                for (int n = 0; n <= kSubBlock && push.forces; ++n) force[n] += calc_along(push, push.force) * push.signal[n];
+              }
+              x /= 1.0 + x / static_cast<double>(table.angle[l]);
+              loss[end] = 1.0 - 1.0 / (1.0 + x + x * x / 2.0 + x * x * x / 6.0);
+            }
+            const Complex turn(table.turn_re[l], table.turn_im[l]);
+            Complex first = 0.0, second = 0.0;
+            for (int j = 0; j < kTerms; ++j) {
+              first += static_cast<double>(drive.ramp[0][j]) * Complex(table.force_re[j][l], table.force_im[j][l]);
+              second += static_cast<double>(drive.ramp[1][j]) * Complex(table.force_re[j][l], table.force_im[j][l]);
+            }
+            Complex ringing = damps ? get_start(before, g, l, sub_block) : 0.0, made = 0.0;
+            double kept = 1.0;
+            for (int n = 0; n <= kSubBlock; ++n) {
+              if (n > 0) {
+                const double keep = 1.0 - (loss[0] + (n - 0.5) / kSubBlock * (loss[1] - loss[0]));
+                kept *= keep;
+                ringing *= turn * keep;
+                made = made * turn * keep + (forces ? force[n - 1] * first + force[n] * second : Complex(0.0));
+              }
+              const Complex z = ringing + made;
+              if (n < kSubBlock)
+                expected[n] += static_cast<double>(table.out_re[l]) * z.real() + static_cast<double>(table.out_im[l]) * z.imag();
+              size += std::abs(z);
+            }
+            for (int q = sub_block + 1; q <= kSubBlocks; ++q) {
+              const Complex expected_start = kept * get_start(before, g, l, q) + turn_on(before, g, l, made, q - sub_block - 1);
+              ASSERT_LT(std::abs(get_start(now, g, l, q) - expected_start), (forces           ? 2e-5
+                                                                             : q < kSubBlocks ? 3e-7
+                                                                                              : 1e-6) *
+                                                                                (1.0 + std::abs(made)))
+                  << get_name(isa) << ", " << count << " modes" << forces << damps;
+            }
+            for (int q = 0; q <= sub_block; ++q) ASSERT_EQ(now.starts[g].re[q][l], before.starts[g].re[q][l]);
+          }
+          for (std::size_t n = 0; n < expected.size(); ++n) ASSERT_NEAR(out[n], expected[n], 2e-6 * size) << get_name(isa) << ", " << count;
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace carillon::synth

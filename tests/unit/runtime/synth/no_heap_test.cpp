@@ -1,0 +1,208 @@
+// process() and strike() take no memory and make no system call: operator new is replaced by one that counts. A program of its own, so that
+// no other test is disturbed.
+#include <gtest/gtest.h>
+#include <linux/seccomp.h>
+#include <sys/prctl.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <cstdlib>
+#include <new>
+#include <vector>
+
+#include "runtime/synth/acceleration_noise.hpp"
+#include "runtime/synth/contact_forces.hpp"
+#include "runtime/synth/receiver.hpp"
+#include "runtime/synth/synthesiser.hpp"
+#include "runtime/synth/voice.hpp"
+#include "tests/unit/runtime/synth/cube_bank.hpp"
+
+namespace {
+std::atomic<long> g_allocations{0}, g_bytes{0};
+}
+
+[[gnu::noinline]] void* operator new(std::size_t size) {
+  ++g_allocations;
+  g_bytes += static_cast<long>(size);
+  if (void* memory = std::malloc(size)) return memory;
+  throw std::bad_alloc();
+}
+[[gnu::noinline]] void* operator new(std::size_t size, std::align_val_t align) {
+  ++g_allocations;
+  g_bytes += static_cast<long>(size);
+  const auto a = static_cast<std::size_t>(align);
+  if (void* memory = std::aligned_alloc(a, (size + a - 1) / a * a)) return memory;
+  throw std::bad_alloc();
+}
+[[gnu::noinline]] void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
+  ++g_allocations;
+  g_bytes += static_cast<long>(size);
+  return std::malloc(size);
+}
+[[gnu::noinline]] void operator delete(void* memory, const std::nothrow_t&) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory, std::align_val_t) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory, std::size_t, std::align_val_t) noexcept { std::free(memory); }
+
+namespace carillon::synth {
+namespace {
+
+TEST(NoHeap, TheCounterSeesAllocations) {
+  const long before = g_allocations;
+  auto* memory = new std::vector<double>(1000);
+  EXPECT_GE(g_allocations - before, 2);
+  delete memory;
+}
+
+TEST(NoHeap, StrikingAndProcessingTakeNoMemory) {
+  std::vector<testing::InventedMode> modes;
+  for (int m = 0; m < 50; ++m) modes.push_back({100.0 + 300.0 * m, 5.0 + (m % 7 == 0 ? 1e5 : 0.0)});
+  const bank::Bank bank = testing::make_cube_bank(modes);
+  Voice body(Model::make(bank), {.max_strikes = 8});
+  Trajectory path(4), listener(4);
+  listener.push({0.0, {0.0, 0.0, 0.0}, {}});
+  DelayLine delay_line(10.0, 48000.0, 128);
+  Receiver ear({0.1, 0.0, 0.0}, 48000.0);
+  std::vector<double> out(128);
+  std::vector<float> sent(128), x(128), y(128), z(128);
+  AccelerationNoise click(0.06, 1.0, 48000.0, 8);
+  ContactForces contacts(Model::make(bank), {.max_contacts = 2, .max_records = 8});
+  Voice touched(Model::make(bank));
+  touched.attach(&contacts);
+  const long before = g_allocations;
+  for (int i = 0; i < 300; ++i) {
+    for (int k = 0; k < (i % 10 == 0 ? 20 : 0); ++k) {  // more than there is room for
+      body.strike({.time_s = (static_cast<double>(body.get_position()) + 30.3) / 48000.0,
+                   .shape = k % 2 == 0 ? PulseShape::kHertz : PulseShape::kGaussian,
+                   .impulse_n_s = {0.0, 0.0, 1.0},
+                   .duration_s = k % 3 == 0 ? 2e-3 : 2e-4});
+    }
+    body.set_limit(i % 50 == 0 ? 16 : 1000);
+    body.process(sent);
+    path.push({i * 128 / 48000.0, {1.0 + 0.001 * i, 0.0, 0.0}, {0.375, 0.0, 0.0}});
+    delay_line.push(sent);
+    click.strike({.time_s = 1e-3 * i, .impulse_n_s = {0.0, 0.0, 1.0}, .duration_s = 1e-3}, {1.0, 0.0, 0.0, 0.0});
+    click.process({x, y, z});
+    for (std::uint64_t k = 0; k < 5; ++k) {  // more than there is room for
+      contacts.take({.time_s = static_cast<double>(touched.get_position()) / 48000.0 + 1e-3,
+                     .id = k + static_cast<std::uint64_t>(i / 50),
+                     .state = i % 50 == 49 ? events::ContactState::kEnd : events::ContactState::kHold,
+                     .normal = {0.0, 0.0, 1.0},
+                     .force_n = 1.0,
+                     .sweep_m_s = 0.1,
+                     .other_sweep_m_s = 0.2,
+                     .patch_radius_m = 1e-5,
+                     .impedance_n_s_m = 1.0});
+    }
+    contacts.reach(static_cast<double>(touched.get_position()) / 48000.0);
+    touched.process(sent);
+    ear.process({.track = &path, .monopole = &delay_line}, listener, 128 * i, out);
+  }
+  EXPECT_EQ(g_allocations - before, 0);
+  EXPECT_GT(body.get_counters().accepted, 0);
+  EXPECT_GT(body.get_counters().refused, 0);
+  EXPECT_GT(contacts.get_counters().samples, 0);
+  EXPECT_GT(contacts.get_counters().dropped, 0);
+}
+
+// What counters say that effects hold is what they took from the heap, to the small change of pointers; a body without effects takes as
+// good as nothing, and taking effects away gives all of it back.
+TEST(NoHeap, EffectsTakeTheMemoryThatTheirCountersSay) {
+  std::vector<testing::InventedMode> modes;
+  for (int m = 0; m < 300; ++m) modes.push_back({100.0 + 60.0 * m, 30.0});
+  const auto model = Model::make(testing::make_cube_bank(modes));
+  const auto sum = [](const Synthesiser& synthesiser, int body) {
+    std::int64_t bytes = 0;
+    for (const std::int64_t more : synthesiser.get_effect_counters(body).bytes) bytes += more;
+    return static_cast<double>(bytes);
+  };
+  Synthesiser synthesiser({.max_waypoints = 2});
+  synthesiser.add_body(model, {.effects = kCompiledEffects});  // and with it the tables that all share
+  long before = g_bytes;
+  const int silent = synthesiser.add_body(model, {.effects = {}});
+  EXPECT_LT(g_bytes - before, 2500);
+  EXPECT_EQ(sum(synthesiser, silent), 0.0);
+  for (int e = 0; e < kEffectCount; ++e) {
+    const auto effect = static_cast<Effect>(e);
+    if (!kCompiledEffects.has(effect)) continue;
+    const EffectSet effects = EffectSet{Effect::kModal}.with(effect);
+    before = g_bytes;
+    const int body = synthesiser.add_body(model, {.effects = effects});
+    EXPECT_NEAR(static_cast<double>(g_bytes - before), sum(synthesiser, body), 2500.0) << get_name(effect);
+  }
+}
+
+TEST(NoHeap, AWholeSceneTakesNoMemoryWhileItPlays) {
+  std::vector<testing::InventedMode> modes;
+  for (int m = 0; m < 30; ++m) modes.push_back({150.0 + 250.0 * m, 30.0});
+  const auto model = Model::make(testing::make_cube_bank(modes));
+  Synthesiser synthesiser({.max_bodies = 4, .max_strikes = 8, .ring_events = 64});
+  for (int b = 0; b < 4; ++b) synthesiser.add_body(model, {.position_m = {1.0, 2.0, 0.0}});
+  synthesiser.remove_body(3);
+  const auto other = Model::make(testing::make_cube_bank(modes, 500.0));
+  std::vector<float> left(300), right(300);
+  const std::array<float*, 2> out{left.data(), right.data()};
+  synthesiser.process(out.data(), 2, 128);
+  synthesiser.set_effects(0, kDefaultEffects.with(Effect::kAccelerationNoise));
+  synthesiser.set_effects(1, {Effect::kModal});
+  synthesiser.set_effects(2, {});
+  long before = g_allocations;
+  for (int i = 0; i < 300; ++i) {
+    if (i % 30 == 0) {  // the main thread may
+      const long until_now = g_allocations;
+      synthesiser.swap_model(i % 3, i % 60 == 0 ? other : model);
+      before += g_allocations - until_now;
+    }
+    for (int k = 0; k < 10; ++k) {
+      synthesiser.push(events::Impulse{.time_s = synthesiser.get_horizon_s() + 1e-4 * k, .body = k % 5, .impulse_n_s = {0.0, 0.0, 1.0}});
+      synthesiser.push(events::BodyMotion{synthesiser.get_horizon_s(), k % 4, {1.0, 2.0, 0.001 * i}, {}});
+      events::Force force{.time_s = synthesiser.get_horizon_s() + 1e-4 * k, .step_s = 7e-6, .body = k % 5, .count = events::kMaxForceSteps};
+      force.impulse_n_s.fill({0.1F, -0.01F * static_cast<float>(k), 1.0F});
+      synthesiser.push(force);
+    }
+    synthesiser.set_budget(i % 60 < 30 ? 20.0 * 48000.0 : 1e12);
+    synthesiser.process(out.data(), 2, 1 + i);
+    (void)synthesiser.get_counters();
+  }
+  EXPECT_EQ(g_allocations - before, 0);
+  EXPECT_GT(synthesiser.get_counters().strikes, 0);
+  EXPECT_GT(synthesiser.get_counters().faded, 0);
+}
+
+// In a child that the kernel kills at the first system call but read, write and exit.
+TEST(NoHeap, AWholeSceneMakesNoSystemCallWhileItPlays) {
+  std::vector<testing::InventedMode> modes;
+  for (int m = 0; m < 30; ++m) modes.push_back({150.0 + 250.0 * m, 30.0 + (m % 9 == 0 ? 1e5 : 0.0)});
+  Synthesiser synthesiser({.max_bodies = 4, .budget = 50.0 * 48000.0});
+  for (int b = 0; b < 4; ++b) synthesiser.add_body(Model::make(testing::make_cube_bank(modes)), {.position_m = {1.0, 2.0, 0.0}});
+  std::array<float, 256> left{}, right{};
+  const std::array<float*, 2> out{left.data(), right.data()};
+  const pid_t child = fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    if (prctl(PR_SET_SECCOMP, SECCOMP_MODE_STRICT) != 0) _exit(2);
+    float peak = 0.0F;
+    for (int i = 0; i < 400; ++i) {
+      const double time_s = synthesiser.get_horizon_s();
+      synthesiser.push(events::Impulse{.time_s = time_s, .body = i % 4, .impulse_n_s = {0.0, 0.0, 1e-3}, .duration_s = 1e-4});
+      synthesiser.push(events::BodyMotion{time_s, i % 4, {1.0, 2.0, 0.001 * i}, {}});
+      synthesiser.push(events::Listener{.time_s = time_s, .position_m = {0.001 * i, 0.0, 0.0}});
+      synthesiser.process(out.data(), 2, 1 + i % 256);
+      for (const float p : left) peak = std::max(peak, std::abs(p));
+    }
+    syscall(SYS_exit, peak > 0.0F ? 0 : 3);
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFEXITED(status)) << "killed by signal " << WTERMSIG(status);
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+}
+
+}  // namespace
+}  // namespace carillon::synth
