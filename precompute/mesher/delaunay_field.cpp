@@ -1,34 +1,29 @@
-// The Delaunay body of a distance field. Method and source: delaunay_body.hpp.
-#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+// The Delaunay body of a distance field. Method and source: delaunay.cpp.
 #include <CGAL/Labeled_mesh_domain_3.h>
-#include <CGAL/Mesh_domain_with_polyline_features_3.h>
 
 #include <cmath>
 #include <set>
 #include <stdexcept>
 
-#include "precompute/mesher/delaunay_body.hpp"
+#include "precompute/mesher/body_queries.hpp"
 
 namespace carillon::mesher {
 namespace {
 
-using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-using Domain = BoundedCurves<FiniteQueries<CGAL::Mesh_domain_with_polyline_features_3<CGAL::Labeled_mesh_domain_3<Kernel>>>>;
+using Domain = CGAL::Labeled_mesh_domain_3<Kernel>;
 
-class FieldBody final : public Mesh3Body<Domain, Domain::Index> {
+class FieldQueries final : public DomainQueries<Domain> {
  public:
-  FieldBody(const DistanceField& field, double wall_m, const std::vector<Polyline>& curves)
-      : Mesh3Body(curves), field_(field), wall_m_(wall_m) {}
+  FieldQueries(const DistanceField& field, double wall_m) : field_(field), wall_m_(wall_m) {}
 
- private:
-  void make_domain(std::size_t max_nodes) override {
+  void restart(std::size_t max_nodes) override {
     max_refining_ = kEvaluationsAtLeast + kEvaluationsPerNode * max_nodes;
     max_evaluations_ = max_refining_ + kEvaluationsToOptimise * max_nodes;
     // Refinement can try without end to separate what touches at a point; no node comes of it, so their bound does not end it.
     evaluations_ = 0;
     const auto body = [this](const Kernel::Point_3& p) {
-      // stop_ is set while elements are refined.
-      if (++evaluations_ > (stop_ ? max_refining_ : max_evaluations_) || (stop_ && *stop_))
+      // stop is set while elements are refined.
+      if (++evaluations_ > (stop ? max_refining_ : max_evaluations_) || (stop && *stop))
         throw std::runtime_error("parts of its surface touch, or nearly so");
       return calc_body(field_, wall_m_, {p.x(), p.y(), p.z()});
     };
@@ -40,14 +35,12 @@ class FieldBody final : public Mesh3Body<Domain, Domain::Index> {
     const double radius = 0.5 * norm(high - low);
     domain_ = std::make_unique<Domain>(
         Domain::create_implicit_mesh_domain(body, box, CGAL::parameters::relative_error_bound = 0.01 * field_.voxel_m / radius));
-    add_curves();
   }
 
-  std::vector<std::pair<Vec3, Domain::Index>> find_first_points(double spacing_m) override {
+  std::vector<Vec3> find_first_points(double spacing_m) override {
     // Where the rows of samples cross the skins, thinned to one in every cube of the spacing.
-    std::vector<std::pair<Vec3, Domain::Index>> points;
+    std::vector<Vec3> points;
     std::set<std::array<std::int32_t, 4>> taken;
-    const auto index = domain_->index_from_surface_patch_index({0, 1});
     const int skins = wall_m_ > 0 ? 2 : 1;
     for (std::int32_t k = 0; k < field_.size[2]; ++k)
       for (std::int32_t j = 0; j < field_.size[1]; ++j)
@@ -61,14 +54,15 @@ class FieldBody final : public Mesh3Body<Domain, Domain::Index> {
             for (int c = 0; c < 3; ++c) cube[c] = static_cast<std::int32_t>(std::floor((p[c] - field_.origin[c]) / spacing_m));
             if (taken.contains(cube)) continue;
             bool close = false;
-            for (const auto& [q, unused] : points) close = close || norm(q - p) < 0.5 * spacing_m;
+            for (const Vec3& q : points) close = close || norm(q - p) < 0.5 * spacing_m;
             if (close) continue;
             taken.insert(cube);
-            points.emplace_back(p, index);
+            points.push_back(p);
           }
     return points;
   }
 
+ private:
   // Sound bodies take 180 (the hollow bunny of 37,000 nodes) to 280 evaluations a node (a box with a wall of one element), to remove
   // slivers up to 900, and the bound on the nodes is at least four times what they have.
   static constexpr std::size_t kEvaluationsAtLeast = 1'000'000, kEvaluationsPerNode = 120, kEvaluationsToOptimise = 400;
@@ -81,7 +75,7 @@ class FieldBody final : public Mesh3Body<Domain, Domain::Index> {
 }  // namespace
 
 std::unique_ptr<DelaunayBody> make_field_body(const DistanceField& field, double wall_m, const std::vector<Polyline>& curves) {
-  return std::make_unique<FieldBody>(field, wall_m, curves);
+  return make_delaunay_body(std::make_unique<FieldQueries>(field, wall_m), curves);
 }
 
 }  // namespace carillon::mesher

@@ -1,6 +1,4 @@
-// The Delaunay body inside a clean triangle surface. Method and source: delaunay_body.hpp.
-#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <CGAL/Mesh_domain_with_polyline_features_3.h>
+// The Delaunay body inside a clean triangle surface. Method and source: delaunay.cpp.
 #include <CGAL/Polygon_mesh_processing/polygon_soup_to_polygon_mesh.h>
 #include <CGAL/Polyhedral_mesh_domain_3.h>
 #include <CGAL/Surface_mesh.h>
@@ -9,18 +7,17 @@
 #include <cmath>
 #include <set>
 
-#include "precompute/mesher/delaunay_body.hpp"
+#include "precompute/mesher/body_queries.hpp"
 
 namespace carillon::mesher {
 namespace {
 
-using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using Mesh = CGAL::Surface_mesh<Kernel::Point_3>;
-using Domain = BoundedCurves<FiniteQueries<CGAL::Mesh_domain_with_polyline_features_3<CGAL::Polyhedral_mesh_domain_3<Mesh, Kernel>>>>;
+using Domain = CGAL::Polyhedral_mesh_domain_3<Mesh, Kernel>;
 
-class SurfaceBody final : public Mesh3Body<Domain, Domain::Index> {
+class SurfaceQueries final : public DomainQueries<Domain> {
  public:
-  SurfaceBody(const TriangleSurface& surface, const std::vector<Polyline>& curves) : Mesh3Body(curves), surface_(surface) {
+  explicit SurfaceQueries(const TriangleSurface& surface) : surface_(surface) {
     std::vector<Kernel::Point_3> points;
     for (const Vec3& p : surface.points) points.emplace_back(p[0], p[1], p[2]);
     std::vector<std::vector<std::size_t>> polygons;
@@ -29,18 +26,13 @@ class SurfaceBody final : public Mesh3Body<Domain, Domain::Index> {
     CGAL::Polygon_mesh_processing::polygon_soup_to_polygon_mesh(points, polygons, mesh_);
   }
 
- private:
-  void make_domain(std::size_t) override {
-    domain_ = std::make_unique<Domain>(mesh_);
-    add_curves();
-  }
+  void restart(std::size_t) override { domain_ = std::make_unique<Domain>(mesh_); }
 
-  std::vector<std::pair<Vec3, Domain::Index>> find_first_points(double spacing_m) override {
+  std::vector<Vec3> find_first_points(double spacing_m) override {
     // Points inside the triangles: never on an edge, where the patch of a Delaunay edge's crossing would be in doubt.
-    std::vector<std::pair<Vec3, Domain::Index>> points;
+    std::vector<Vec3> points;
     // One per cube of the spacing and direction of the face, so that both sides of a thin plate get theirs.
     std::set<std::array<std::int64_t, 4>> taken;
-    const auto index = domain_->index_from_surface_patch_index({0, 1});
     for (const Triangle& t : surface_.triangles) {
       const Vec3 &a = surface_.points[t[0]], &b = surface_.points[t[1]], &c = surface_.points[t[2]];
       const Vec3 normal = cross(b - a, c - a);
@@ -55,12 +47,13 @@ class SurfaceBody final : public Mesh3Body<Domain, Domain::Index> {
           const Vec3 p = (1 - u - v) * a + (u * b + v * c);
           std::array<std::int64_t, 4> cube{0, 0, 0, normal[axis] > 0 ? axis : 3 + axis};
           for (int k = 0; k < 3; ++k) cube[k] = static_cast<std::int64_t>(std::floor(p[k] / spacing_m));
-          if (taken.insert(cube).second) points.emplace_back(p, index);
+          if (taken.insert(cube).second) points.push_back(p);
         }
     }
     return points;
   }
 
+ private:
   const TriangleSurface& surface_;
   Mesh mesh_;
 };
@@ -68,7 +61,7 @@ class SurfaceBody final : public Mesh3Body<Domain, Domain::Index> {
 }  // namespace
 
 std::unique_ptr<DelaunayBody> make_surface_body(const TriangleSurface& surface, const std::vector<Polyline>& curves) {
-  return std::make_unique<SurfaceBody>(surface, curves);
+  return make_delaunay_body(std::make_unique<SurfaceQueries>(surface), curves);
 }
 
 }  // namespace carillon::mesher

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "partition/partition.hpp"
+#include "precompute/comm/exchange.hpp"
 #include "precompute/petsc/session.hpp"
 #include "precompute/petsc/work.hpp"
 #include "runtime/base/clock.hpp"

@@ -75,7 +75,7 @@ TEST(JobSpec, the_resolved_job_is_a_job_again_and_resolves_to_itself) {
 
 TEST(JobSpec, a_bank_that_links_to_the_mesh_is_refused) {
   namespace fs = std::filesystem;
-  const tests::Folder folder;
+  const carillon::tests::Folder folder;
   std::ofstream(folder / "m.msh") << "mesh";
   fs::create_directory(folder / "out");
   fs::create_symlink(folder / "m.msh", folder / "out" / "b.bank");

@@ -2,9 +2,6 @@
 // Source: Boissonnat and Oudot 2005 (refinement); Cheng, Dey, Edelsbrunner, Facello and Teng 2000 (exudation); Tournois,
 //   Srinivasan and Alliez 2009 (perturbation); all as CGAL 5.5 Mesh_3 has them.
 // Deviations: the first points on the surface are ours (CGAL shoots random lines from a centre and can miss a part of the body).
-//
-// The template behind the two kinds of body; only delaunay_field.cpp and delaunay_surface.cpp include it.
-#pragma once
 
 // Where CGAL sees that a point is there already it throws, and before that it writes two files, dump-bug.mesh and dump-bug.binary.cgal,
 // into the folder where the program stands. Its header of that is taken as included, and what it would define does nothing.
@@ -19,13 +16,13 @@ void dump_c3t3_edges(const Complex&, const std::string&) {}
 
 #include <CGAL/Mesh_complex_3_in_triangulation_3.h>
 #include <CGAL/Mesh_criteria_3.h>
+#include <CGAL/Mesh_domain_with_polyline_features_3.h>
 #include <CGAL/Mesh_triangulation_3.h>
 #include <CGAL/exude_mesh_3.h>
 #include <CGAL/make_mesh_3.h>
 #include <CGAL/perturb_mesh_3.h>
 #include <CGAL/refine_mesh_3.h>
 #include <pthread.h>
-#include <time.h>
 
 #include <atomic>
 #include <chrono>
@@ -38,9 +35,11 @@ void dump_c3t3_edges(const Complex&, const std::string&) {}
 #include <unordered_map>
 #include <utility>
 
-#include "precompute/mesher/delaunay.hpp"
+#include "precompute/mesher/body_queries.hpp"
+#include "runtime/base/clock.hpp"
 
 namespace carillon::mesher {
+namespace {
 
 /// Sets `stop` once the thread that made it has computed for `limit_s` more. CGAL's refinement can loop without end where skins
 /// touch at a point; only this ends it. A sound body takes a tenth of the limit, so that meshes do not depend on it.
@@ -48,11 +47,11 @@ class Watchdog {
  public:
   explicit Watchdog(double limit_s) {
     ::pthread_getcpuclockid(::pthread_self(), &clock_);
-    const double end_s = read_clock() + limit_s;
+    const double end_s = base::read_clock(clock_) + limit_s;
     thread_ = std::thread([this, end_s] {
       std::unique_lock lock(mutex_);
       while (!wake_.wait_for(lock, std::chrono::milliseconds(100), [this] { return done_; }))
-        if (read_clock() > end_s) stop = true;
+        if (base::read_clock(clock_) > end_s) stop = true;
     });
   }
   ~Watchdog() {
@@ -69,12 +68,6 @@ class Watchdog {
   std::atomic<bool> stop{false};
 
  private:
-  double read_clock() const {
-    timespec now{};
-    ::clock_gettime(clock_, &now);
-    return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-  }
-
   clockid_t clock_{};
   std::mutex mutex_;
   std::condition_variable wake_;
@@ -82,40 +75,62 @@ class Watchdog {
   std::thread thread_;
 };
 
-/// A domain of CGAL that is asked only about what is finite: circumcentres of nearly flat tetrahedra may not be, and GMP ends the
-/// process where it is to compute exactly with what is not a number.
-template <class Base>
-class FiniteQueries : public Base {
+/// BodyQueries as CGAL's concept MeshDomain_3. A body is asked only about what is finite: circumcentres of nearly flat tetrahedra may not
+/// be, and GMP ends the process where it is to compute exactly with what is not a number.
+class QueriedDomain {
  public:
-  using Base::Base;
-  explicit FiniteQueries(Base base) : Base(std::move(base)) {}
+  using R = Kernel;
+  using FT = Kernel::FT;
+  using Point_3 = Kernel::Point_3;
+  using Segment_3 = Kernel::Segment_3;
+  using Ray_3 = Kernel::Ray_3;
+  using Line_3 = Kernel::Line_3;
+  using Vector_3 = Kernel::Vector_3;
+  using Sphere_3 = Kernel::Sphere_3;
+  using Has_features = CGAL::Tag_false;
+  using Subdomain_index = int;
+  using Subdomain = BodyQueries::Inside;
+  using Surface_patch_index = BodyQueries::PatchIndex;
+  using Surface_patch = BodyQueries::Patch;
+  using Index = BodyQueries::Index;
+  using Intersection = BodyQueries::Crossing;
+
+  explicit QueriedDomain(const BodyQueries* queries) : queries_(queries) {}
+
+  struct Construct_initial_points {  // the concept has it; the first points are ours
+    template <class Out>
+    Out operator()(Out out, int = 0) const {
+      return out;
+    }
+  };
+  Construct_initial_points construct_initial_points_object() const { return {}; }
+  CGAL::Bbox_3 bbox() const { return queries_->calc_box(); }
 
   struct Is_in_domain {
-    const Base& domain;
-    typename Base::Subdomain operator()(const typename Base::Point_3& point) const {
-      const bool is_number = std::isfinite(point.x() + point.y() + point.z());
-      return is_number ? domain.is_in_domain_object()(point) : typename Base::Subdomain();
+    const BodyQueries& queries;
+    Subdomain operator()(const Point_3& point) const {
+      return std::isfinite(point.x() + point.y() + point.z()) ? queries.find_inside(point) : Subdomain();
     }
   };
-  Is_in_domain is_in_domain_object() const { return {*this}; }
+  Is_in_domain is_in_domain_object() const { return {*queries_}; }
 
   struct Do_intersect_surface {
-    const Base& domain;
+    const BodyQueries& queries;
     template <class Query>
-    typename Base::Surface_patch operator()(const Query& query) const {
-      return is_finite(query) ? domain.do_intersect_surface_object()(query) : typename Base::Surface_patch();
+    Surface_patch operator()(const Query& query) const {
+      return is_finite(query) ? queries.find_patch(query) : Surface_patch();
     }
   };
-  Do_intersect_surface do_intersect_surface_object() const { return {*this}; }
+  Do_intersect_surface do_intersect_surface_object() const { return {*queries_}; }
 
   struct Construct_intersection {
-    const Base& domain;
+    const BodyQueries& queries;
     template <class Query>
-    typename Base::Intersection operator()(const Query& query) const {
-      return is_finite(query) ? domain.construct_intersection_object()(query) : typename Base::Intersection();
+    Intersection operator()(const Query& query) const {
+      return is_finite(query) ? queries.find_crossing(query) : Intersection();
     }
   };
-  Construct_intersection construct_intersection_object() const { return {*this}; }
+  Construct_intersection construct_intersection_object() const { return {*queries_}; }
 
  private:
   /// A segment, a ray or a line, by two of its points.
@@ -126,19 +141,20 @@ class FiniteQueries : public Base {
       for (int c = 0; c < 3; ++c) sum += query.point(n)[c];
     return std::isfinite(sum);
   }
+
+  const BodyQueries* queries_;
 };
 
-/// A domain of CGAL with a bound on the balls that are placed on its curves: where curves cannot be parted, CGAL places ever smaller ones,
-/// without a look at its own bound on the vertices.
-template <class Base>
-class BoundedCurves : public Base {
+/// The domain with its sharp curves, and a bound on the balls that are placed on them: where curves cannot be parted, CGAL places ever
+/// smaller ones, without a look at its own bound on the vertices.
+class BoundedCurves : public CGAL::Mesh_domain_with_polyline_features_3<QueriedDomain> {
+  using Base = CGAL::Mesh_domain_with_polyline_features_3<QueriedDomain>;
+
  public:
   using Base::Base;
-  explicit BoundedCurves(Base base) : Base(std::move(base)) {}
 
   std::size_t max_balls = 0;
-  typename Base::Point_3 construct_point_on_curve(const typename Base::Point_3& start, const typename Base::Curve_index& curve,
-                                                  typename Base::FT distance) const {
+  Point_3 construct_point_on_curve(const Point_3& start, const Curve_index& curve, FT distance) const {
     if (++balls_ > max_balls) throw std::runtime_error("the sharp edges lie too close to each other");
     return Base::construct_point_on_curve(start, curve, distance);
   }
@@ -147,24 +163,32 @@ class BoundedCurves : public Base {
   mutable std::size_t balls_ = 0;
 };
 
-/// DelaunayBody for one kind of CGAL domain. refine() restarts CGAL's random numbers and makes the domain again, so that a mesh depends on
-/// its sizes alone.
-template <class Domain, class Index>
-class Mesh3Body : public DelaunayBody {
-  using Triangulation = typename CGAL::Mesh_triangulation_3<Domain, CGAL::Default, CGAL::Sequential_tag>::type;
-  using Complex = CGAL::Mesh_complex_3_in_triangulation_3<Triangulation, typename Domain::Corner_index, typename Domain::Curve_index>;
+/// DelaunayBody by Mesh_3. Keeps true: a mesh depends on its sizes alone, because refine() restarts CGAL's random numbers and the queries.
+class Mesh3Body final : public DelaunayBody {
+  using Domain = BoundedCurves;
+  using Triangulation = CGAL::Mesh_triangulation_3<Domain, CGAL::Default, CGAL::Sequential_tag>::type;
+  using Complex = CGAL::Mesh_complex_3_in_triangulation_3<Triangulation, Domain::Corner_index, Domain::Curve_index>;
   using Criteria = CGAL::Mesh_criteria_3<Triangulation>;
-  using Point = typename Domain::Point_3;
-  using WeightedPoint = typename Triangulation::Weighted_point;
-  using TriangulationIndex = typename Triangulation::Vertex::Index;
+  using Point = Kernel::Point_3;
+  using WeightedPoint = Triangulation::Weighted_point;
+  using TriangulationIndex = Triangulation::Vertex::Index;
 
  public:
+  Mesh3Body(std::unique_ptr<BodyQueries> queries, const std::vector<Polyline>& curves) : queries_(std::move(queries)), polylines_(curves) {
+    for (const Polyline& curve : curves) {
+      curves_.emplace_back();
+      for (const Vec3& p : curve) curves_.back().emplace_back(p[0], p[1], p[2]);
+    }
+  }
+
   mesh::TetMesh refine(const DelaunaySizes& sizes) override {
     namespace p = CGAL::parameters;
     // The random numbers restart, so that the same sizes give the same mesh whatever was made before.
     CGAL::get_default_random() = CGAL::Random(0);
-    stop_ = nullptr;
-    make_domain(sizes.max_nodes);
+    queries_->stop = nullptr;
+    queries_->restart(sizes.max_nodes);
+    domain_ = std::make_unique<Domain>(queries_.get());
+    if (!curves_.empty()) domain_->add_features(curves_.begin(), curves_.end());
     // The nodes on the sharp edges and twice as many more: they are part of a fifth of max_nodes.
     domain_->max_balls = 2000 + sizes.max_nodes / 8;
     complex_ = Complex();
@@ -180,11 +204,11 @@ class Mesh3Body : public DelaunayBody {
     if (!curves_.empty()) CGAL::Mesh_3::internal::init_c3t3_with_features(complex_, *domain_, criteria, false, sizes.max_nodes, &unused);
     insert_first_points(sizes.edge_m);
     Watchdog watchdog(2 + 1.5e-4 * static_cast<double>(sizes.max_nodes));
-    stop_ = &watchdog.stop;
+    queries_->stop = &watchdog.stop;
     CGAL::refine_mesh_3(complex_, *domain_, criteria, p::no_perturb(), p::no_exude(), p::manifold(),
                         p::mesh_3_options(p::maximal_number_of_vertices = sizes.max_nodes, p::pointer_to_error_code = &unused,
                                           p::pointer_to_stop_atomic_boolean = &watchdog.stop));
-    stop_ = nullptr;
+    queries_->stop = nullptr;
     if (watchdog.stop) throw std::runtime_error("parts of the surface touch, or nearly so");
     // Faces are refined before cells: where they alone met the bound there is no cell, and that is no sign of too few nodes.
     if (complex_.number_of_cells_in_complex() == 0 && complex_.triangulation().number_of_vertices() >= sizes.max_nodes)
@@ -199,27 +223,9 @@ class Mesh3Body : public DelaunayBody {
     return extract();
   }
 
- protected:
-  explicit Mesh3Body(const std::vector<Polyline>& curves) : polylines_(curves) {
-    for (const Polyline& curve : curves) {
-      curves_.emplace_back();
-      for (const Vec3& p : curve) curves_.back().emplace_back(p[0], p[1], p[2]);
-    }
-  }
-  /// Hands the sharp curves to a domain that was just made.
-  void add_curves() {
-    if (!curves_.empty()) domain_->add_features(curves_.begin(), curves_.end());
-  }
-  /// Sets domain_, which may end a refinement that does not by an exception; `max_nodes` says how much work to expect.
-  virtual void make_domain(std::size_t max_nodes) = 0;
-  /// Points on the boundary about three edges apart, on every part of it, each with its index in the domain.
-  virtual std::vector<std::pair<Vec3, Index>> find_first_points(double spacing_m) = 0;
-
-  std::unique_ptr<Domain> domain_;
-  // Set while refinement runs: once it is true, the domain must throw, for CGAL's loop over facets does not look at it itself.
-  const std::atomic<bool>* stop_ = nullptr;
-
  private:
+  std::unique_ptr<BodyQueries> queries_;
+  std::unique_ptr<Domain> domain_;
   std::vector<Polyline> polylines_;         // the sharp curves,
   std::vector<std::vector<Point>> curves_;  // and the same for CGAL
 
@@ -232,7 +238,7 @@ class Mesh3Body : public DelaunayBody {
     std::vector<WeightedPoint> balls;
     for (auto v = triangulation.finite_vertices_begin(); v != triangulation.finite_vertices_end(); ++v)
       balls.push_back(triangulation.point(v));
-    for (const auto& [position, index] : find_first_points(3 * edge_m)) {
+    for (const Vec3& position : queries_->find_first_points(3 * edge_m)) {
       const Point point(position[0], position[1], position[2]);
       if (!balls.empty() && triangulation.dimension() == 3) {
         const auto nearest = triangulation.nearest_power_vertex(point);
@@ -240,9 +246,9 @@ class Mesh3Body : public DelaunayBody {
         if (CGAL::squared_distance(ball.point(), point) < 2 * ball.weight()) continue;
       }
       const auto v = triangulation.insert(WeightedPoint(point));
-      if (v == typename Triangulation::Vertex_handle()) continue;
+      if (v == Triangulation::Vertex_handle()) continue;
       complex_.set_dimension(v, 2);
-      complex_.set_index(v, index);
+      complex_.set_index(v, domain_->index_from_surface_patch_index(BodyQueries::kPatch));
     }
   }
 
@@ -265,5 +271,11 @@ class Mesh3Body : public DelaunayBody {
   Complex complex_;
   std::vector<SizedPoint> narrow_;  // where curves lie closer together than edges are long
 };
+
+}  // namespace
+
+std::unique_ptr<DelaunayBody> make_delaunay_body(std::unique_ptr<BodyQueries> queries, const std::vector<Polyline>& curves) {
+  return std::make_unique<Mesh3Body>(std::move(queries), curves);
+}
 
 }  // namespace carillon::mesher

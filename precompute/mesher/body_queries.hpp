@@ -1,0 +1,71 @@
+// What CGAL's Mesh_3 asks of a body, as an interface: its templates, which take a minute and a half to compile, are compiled for one domain
+// (delaunay.cpp) and not for each kind of body. Only the delaunay files include this.
+#pragma once
+
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+
+#include <atomic>
+#include <boost/optional.hpp>
+#include <boost/variant.hpp>
+#include <memory>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "precompute/mesher/delaunay.hpp"
+
+namespace carillon::mesher {
+
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+
+/// The surface of one body, for CGAL's refinement (its concept MeshDomain_3). Keeps true: the same body answers the same to the same
+/// query, or throws std::runtime_error when it was asked far more often than a sound body is.
+class BodyQueries {
+ public:
+  using Inside = boost::optional<int>;  // 1 inside, none outside
+  using PatchIndex = std::pair<int, int>;
+  using Patch = boost::optional<PatchIndex>;
+  using Index = boost::variant<int, PatchIndex>;
+  using Crossing = std::tuple<Kernel::Point_3, Index, int>;
+  static constexpr PatchIndex kPatch{0, 1};  // there is one: between outside and inside
+
+  virtual ~BodyQueries() = default;
+  /// Before each refinement; `max_nodes` says how much work to expect.
+  virtual void restart(std::size_t max_nodes) = 0;
+  /// Points on the boundary about `spacing_m` apart, on every part of it.
+  virtual std::vector<Vec3> find_first_points(double spacing_m) = 0;
+
+  virtual CGAL::Bbox_3 calc_box() const = 0;
+  virtual Inside find_inside(const Kernel::Point_3& point) const = 0;
+  virtual Patch find_patch(const Kernel::Segment_3& query) const = 0;
+  virtual Patch find_patch(const Kernel::Ray_3& query) const = 0;
+  virtual Patch find_patch(const Kernel::Line_3& query) const = 0;
+  virtual Crossing find_crossing(const Kernel::Segment_3& query) const = 0;
+  virtual Crossing find_crossing(const Kernel::Ray_3& query) const = 0;
+  virtual Crossing find_crossing(const Kernel::Line_3& query) const = 0;
+
+  /// Set while elements are refined: once it is true, queries must throw, for CGAL's loop over facets does not look at it itself.
+  const std::atomic<bool>* stop = nullptr;
+};
+
+/// Queries that a domain of CGAL answers, which restart() makes.
+template <class Domain>
+class DomainQueries : public BodyQueries {
+ public:
+  CGAL::Bbox_3 calc_box() const override { return domain_->bbox(); }
+  Inside find_inside(const Kernel::Point_3& point) const override { return domain_->is_in_domain_object()(point); }
+  Patch find_patch(const Kernel::Segment_3& query) const override { return domain_->do_intersect_surface_object()(query); }
+  Patch find_patch(const Kernel::Ray_3& query) const override { return domain_->do_intersect_surface_object()(query); }
+  Patch find_patch(const Kernel::Line_3& query) const override { return domain_->do_intersect_surface_object()(query); }
+  Crossing find_crossing(const Kernel::Segment_3& query) const override { return domain_->construct_intersection_object()(query); }
+  Crossing find_crossing(const Kernel::Ray_3& query) const override { return domain_->construct_intersection_object()(query); }
+  Crossing find_crossing(const Kernel::Line_3& query) const override { return domain_->construct_intersection_object()(query); }
+
+ protected:
+  std::unique_ptr<Domain> domain_;
+};
+
+/// The mesh of a body by Delaunay refinement. `curves` lie on its boundary and become edges of the mesh.
+std::unique_ptr<DelaunayBody> make_delaunay_body(std::unique_ptr<BodyQueries> queries, const std::vector<Polyline>& curves);
+
+}  // namespace carillon::mesher
