@@ -52,19 +52,17 @@ def read_png(path):
             row = row + (above if kind == 2 else 0)
         elif kind == 1:
             row = numpy.cumsum(row, axis=0)
-        else:
-            out = numpy.zeros_like(row)
-            left, corner = numpy.zeros(3, int), numpy.zeros(3, int)
-            for x in range(width):
+        else:  # each byte needs the one before it: plain integers are thirty times faster here than small arrays
+            out, top, packed_row = [0] * 3 + [0] * (3 * width), [0] * 3 + above.ravel().tolist(), line[1:].tolist()
+            for i, byte in enumerate(packed_row):
+                left, up, corner = out[i], top[i + 3], top[i]
                 if kind == 3:
-                    guess = (left + above[x]) // 2
+                    guess = (left + up) // 2
                 else:
-                    p = left + above[x] - corner
-                    d = numpy.abs(numpy.stack([p - left, p - above[x], p - corner]))
-                    guess = numpy.where((d[0] <= d[1]) & (d[0] <= d[2]), left, numpy.where(d[1] <= d[2], above[x], corner))
-                out[x] = (row[x] + guess) & 255
-                left, corner = out[x], above[x]
-            row = out
+                    far, near, across = abs(up - corner), abs(left - corner), abs(left + up - 2 * corner)
+                    guess = left if far <= near and far <= across else up if near <= across else corner
+                out[i + 3] = (byte + guess) & 255
+            row = numpy.array(out[3:])
         image[y] = (row & 255).astype(numpy.uint8).ravel()
     return image.reshape(height, width, 3)
 
@@ -106,6 +104,11 @@ with tempfile.TemporaryDirectory() as name:
             expect(count_like(part, (253, 231, 37)) > 1000, f"modes: nothing moves much in column {column}")
         edges = numpy.concatenate([image[0], image[-1], image[:, 0], image[:, -1]])
         expect(edges.min() > 240, "modes: something is cut off at the edge of the picture")
+        piped = subprocess.run([PROGRAM, "modes", "ball.hdf", "-o", "-"], cwd=folder, capture_output=True, timeout=200)
+        expect(piped.stdout == (folder / "modes.png").read_bytes(), "modes: the picture on standard output is another one")
+        expect(
+            b"pixels" in piped.stderr and not (folder / "-").exists(), f"modes: what is printed in addition to a picture: {piped.stderr}"
+        )
 
     # A ball that falls on a shelf above the ground.
     poses = [[t, 0.0, 0.0, 0.5 - 4.9 * t * t, 1, 0, 0, 0] for t in numpy.linspace(0, 0.3, 40)]
@@ -133,11 +136,6 @@ with tempfile.TemporaryDirectory() as name:
         scene["impulses"] = []
         (folder / "fall.json").write_text(json.dumps(scene))
         run("scene", "fall.json", "-o", "silent.png", folder=folder)
-        piped = subprocess.run([PROGRAM, "scene", "fall.json", "-o", "-"], cwd=folder, capture_output=True, timeout=200)
-        expect(piped.stdout == (folder / "silent.png").read_bytes(), "scene: the picture on standard output is another one")
-        expect(
-            b"pixels" in piped.stderr and not (folder / "-").exists(), f"scene: what is printed in addition to a picture: {piped.stderr}"
-        )
         expect(count_like(read_png(folder / "silent.png")[: height - 150], (204, 26, 41), 0.02) < 20, "scene: a contact without an impulse")
 
     # A mode that does not move the surface is drawn at rest.
