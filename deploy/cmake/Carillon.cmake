@@ -109,6 +109,12 @@ function(carillon_helper target)
   install(TARGETS ${target} RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/carillon)
 endfunction()
 
+# A TIMEOUT is what a test may take alone on an idle core. deploy/test runs two tests a core, on machines that may be half as fast.
+function(carillon_limit_time out seconds)
+  math(EXPR limit "3 * ${seconds}")
+  set(${out} ${limit} PARENT_SCOPE)
+endfunction()
+
 function(carillon_warnings target)
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wno-unknown-pragmas)
 endfunction()
@@ -121,6 +127,7 @@ function(carillon_test name)
   if(NOT arg_TIMEOUT)
     set(arg_TIMEOUT 120)
   endif()
+  carillon_limit_time(limit ${arg_TIMEOUT})
   string(REPLACE "." "_" target test_${name})
   add_executable(${target} ${arg_SOURCES})
   target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR})
@@ -134,14 +141,14 @@ function(carillon_test name)
     foreach(ranks ${arg_RANKS})
       carillon_mpi_command(command ${ranks})
       add_test(NAME ${name}.np${ranks} COMMAND ${command} $<TARGET_FILE:${target}>)
-      set_tests_properties(${name}.np${ranks} PROPERTIES PROCESSORS ${ranks} TIMEOUT ${arg_TIMEOUT} COST ${arg_TIMEOUT} LABELS "mpi;${labels}"
+      set_tests_properties(${name}.np${ranks} PROPERTIES PROCESSORS ${ranks} TIMEOUT ${limit} COST ${arg_TIMEOUT} LABELS "mpi;${labels}"
         ENVIRONMENT "${CARILLON_MPI_ENVIRONMENT}")
     endforeach()
   else()
     target_link_libraries(${target} PRIVATE ${arg_LINK} GTest::gtest_main)
     # Its PROPERTIES take no lists, so labels are set when CTest has the names of the cases.
     gtest_discover_tests(${target} TEST_PREFIX ${name}. TEST_LIST ${target}_cases DISCOVERY_TIMEOUT 60
-      PROPERTIES TIMEOUT ${arg_TIMEOUT} COST ${arg_TIMEOUT})
+      PROPERTIES TIMEOUT ${limit} COST ${arg_TIMEOUT})
     set(labels_file ${CMAKE_CURRENT_BINARY_DIR}/${target}_labels.cmake)
     file(WRITE ${labels_file} "if(${target}_cases)\n  set_tests_properties(\${${target}_cases} PROPERTIES LABELS \"${labels}\")\nendif()\n")
     set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES ${labels_file})
@@ -164,9 +171,10 @@ function(carillon_script_test name)
   if(NOT arg_TIMEOUT)
     set(arg_TIMEOUT 120)
   endif()
+  carillon_limit_time(limit ${arg_TIMEOUT})
   set(labels ${CARILLON_TEST_KIND} ${arg_LABELS})
   add_test(NAME ${name} COMMAND ${arg_COMMAND})
-  set_tests_properties(${name} PROPERTIES TIMEOUT ${arg_TIMEOUT} COST ${arg_TIMEOUT} LABELS "${labels}"
+  set_tests_properties(${name} PROPERTIES TIMEOUT ${limit} COST ${arg_TIMEOUT} LABELS "${labels}"
     ENVIRONMENT "${CARILLON_MPI_ENVIRONMENT};CARILLON_BIN_DIR=${CMAKE_BINARY_DIR}/bin;CARILLON_SOURCE_DIR=${PROJECT_SOURCE_DIR}")
 endfunction()
 
