@@ -5,8 +5,7 @@
 #include <cstdio>
 #include <optional>
 
-#include "jobs/cli/options.hpp"
-#include "jobs/cli/shared.hpp"
+#include "jobs/cli/commands.hpp"
 #include "jobs/cli/slurm.hpp"
 #include "jobs/queue/local.hpp"
 #include "jobs/queue/settle.hpp"
@@ -14,12 +13,6 @@
 
 namespace carillon::cli {
 namespace {
-
-struct Options {
-  std::vector<std::string> words;
-  ResourceOptions resources;
-  bool all_failed = false;
-};
 
 /// Does `act` to each job, and says what came of it. Exit code 1 when one of them was not as asked for.
 template <class Act>
@@ -44,7 +37,9 @@ int do_to_all(Shared& shared, const std::vector<registry::Job>& jobs, const Act&
   return is_done ? 0 : kExitNotYet;
 }
 
-int run_cancel(Shared& shared, const Options& options) {
+}  // namespace
+
+int run_cancel(Shared& shared, const CancelOptions& options) {
   shared.settle();
   return do_to_all(shared, find_jobs(shared, options.words), [&](const registry::Job& job) {
     return job.engine == store::JobEngine::slurm ? cancel_in_slurm(shared, job.id)
@@ -52,7 +47,7 @@ int run_cancel(Shared& shared, const Options& options) {
   });
 }
 
-int run_retry(Shared& shared, const Options& options) {
+int run_retry(Shared& shared, const RetryOptions& options) {
   shared.settle();
   if (options.words.empty() && !options.all_failed)
     throw InputError("which job? Name an id or a job file, or give --failed for all that failed");
@@ -71,27 +66,6 @@ int run_retry(Shared& shared, const Options& options) {
   };
   if (std::any_of(jobs.begin(), jobs.end(), is_for_slurm)) hand_over_to_slurm(shared);
   return code;
-}
-
-}  // namespace
-
-void add_cancel(CLI::App& app, Shared& shared, Run& run) {
-  auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand("cancel",
-                                         "Ends jobs that are queued, wait or run; what a running one has computed so far is kept for a "
-                                         "retry. Exit code 1: one was done already.");
-  command->add_option("ID", options->words, "Ids (or their beginnings) or job files")->required();
-  command->callback([&shared, &run, options] { run = [&shared, options] { return run_cancel(shared, *options); }; });
-}
-
-void add_retry(CLI::App& app, Shared& shared, Run& run) {
-  auto options = std::make_shared<Options>();
-  CLI::App* command =
-      app.add_subcommand("retry", "Queues failed and cancelled jobs again, from their checkpoints; waiting ones need wait no longer.");
-  command->add_option("ID", options->words, "Ids (or their beginnings) or job files");
-  command->add_flag("--failed", options->all_failed, "All jobs that failed");
-  options->resources.add(*command);
-  command->callback([&shared, &run, options] { run = [&shared, options] { return run_retry(shared, *options); }; });
 }
 
 }  // namespace carillon::cli

@@ -4,8 +4,8 @@
 #include <map>
 #include <sstream>
 
+#include "jobs/cli/commands.hpp"
 #include "jobs/cli/gather.hpp"
-#include "jobs/cli/shared.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::cli {
@@ -103,10 +103,13 @@ Explanation explain(Shared& shared, const store::Id& id, const std::optional<reg
   return {state, fmt::format("nothing new would run: it is {} already", state), false};
 }
 
-int run_explain(Shared& shared, const std::string& word) {
-  const Source source = gather_one(word, read_solver_version());
+}  // namespace
+
+int run_explain(Shared& shared, const ExplainOptions& options) {
+  shared.only_reads = true;
+  const Source source = gather_one(options.word, read_solver_version());
   shared.settle();
-  const store::Id id = store::require_id(source.request.id, word);
+  const store::Id id = store::require_id(source.request.id, options.word);
   const auto job = shared.registry().find(id);
   const auto last = shared.registry().find_last_submission(source.job_file);
   const Explanation explanation = explain(shared, id, job);
@@ -141,19 +144,6 @@ int run_explain(Shared& shared, const std::string& word) {
     fmt::print("since this job file was submitted last (as {}) these changed:\n", last->request.id.substr(0, 12));
   for (const Change& change : changes) fmt::print("  {}\n", format_change(change, source.request));
   return 0;
-}
-
-}  // namespace
-
-void add_explain(CLI::App& app, Shared& shared, Run& run) {
-  auto word = std::make_shared<std::string>();
-  CLI::App* command =
-      app.add_subcommand("explain", "Would this job run, and why: which part of it changed since it was submitted last. Changes nothing.");
-  command->add_option("JOB", *word, "Job file")->required();
-  command->callback([&shared, &run, word] {
-    shared.only_reads = true;
-    run = [&shared, word] { return run_explain(shared, *word); };
-  });
 }
 
 }  // namespace carillon::cli

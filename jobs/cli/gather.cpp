@@ -8,6 +8,7 @@
 #include <iostream>
 #include <iterator>
 #include <set>
+#include <string_view>
 
 #include "runtime/base/error.hpp"
 #include "runtime/base/file.hpp"

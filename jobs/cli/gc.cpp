@@ -15,7 +15,7 @@
 #include <sstream>
 #include <string_view>
 
-#include "jobs/cli/shared.hpp"
+#include "jobs/cli/commands.hpp"
 #include "jobs/process/process.hpp"
 #include "jobs/store/files.hpp"
 #include "jobs/store/open_folder.hpp"
@@ -259,21 +259,24 @@ void remove_items(Shared& shared, const References& references, std::vector<Item
   shared.registry().keep_submissions(references.submissions);
 }
 
-int run_gc(Shared& shared, bool is_deleting) {
+}  // namespace
+
+int run_gc(Shared& shared, const GcOptions& options) {
+  shared.works_when_full = true;
   shared.settle();
   std::vector<Item> items;
   std::set<fs::path> used_inputs;
   {
-    const store::Lock lock = is_deleting ? shared.store().lock_exclusive() : shared.store().lock_shared();
+    const store::Lock lock = options.is_deleting ? shared.store().lock_exclusive() : shared.store().lock_shared();
     const References references = find_references(shared);
     if (add_jobs(shared, references, items, used_inputs)) add_inputs(shared.store(), used_inputs, items);
     add_files(shared.store(), items);
-    if (is_deleting) remove_items(shared, references, items);
+    if (options.is_deleting) remove_items(shared, references, items);
   }
   double bytes = 0.0;
   bool has_failed = false;
   Json::Value root;
-  root["deleted"] = is_deleting;
+  root["deleted"] = options.is_deleting;
   root["items"] = Json::arrayValue;
   for (const Item& item : items) {
     has_failed = has_failed || !item.error.empty();
@@ -296,26 +299,10 @@ int run_gc(Shared& shared, bool is_deleting) {
     print_json(root);
   else
     fmt::print("{} thing{}, {} {}\n", items.size(), items.size() == 1 ? "" : "s", format_bytes(bytes),
-               items.empty() ? "to remove"
-               : is_deleting ? "removed"
-                             : "could be removed; carillon gc --delete does");
+               items.empty()         ? "to remove"
+               : options.is_deleting ? "removed"
+                                     : "could be removed; carillon gc --delete does");
   return has_failed ? kExitSystem : 0;
-}
-
-}  // namespace
-
-void add_gc(CLI::App& app, Shared& shared, Run& run) {
-  auto is_deleting = std::make_shared<bool>(false);
-  CLI::App* command = app.add_subcommand(
-      "gc",
-      "Lists what no job refers to: banks and failed jobs whose job file is gone or asks for something else by now, inputs of neither, and "
-      "what\n"
-      "processes that were killed left behind. Removes nothing without --delete, and nothing that is queued, waits or runs.");
-  command->add_flag("--delete", *is_deleting, "Remove it");
-  command->callback([&shared, &run, is_deleting] {
-    shared.works_when_full = true;
-    run = [&shared, is_deleting] { return run_gc(shared, *is_deleting); };
-  });
 }
 
 }  // namespace carillon::cli

@@ -5,8 +5,8 @@
 
 #include <cstdio>
 
+#include "jobs/cli/commands.hpp"
 #include "jobs/cli/gather.hpp"
-#include "jobs/cli/shared.hpp"
 #include "jobs/store/files.hpp"
 #include "jobs/store/identity.hpp"
 #include "runtime/base/error.hpp"
@@ -16,11 +16,6 @@ namespace carillon::cli {
 namespace {
 
 namespace fs = std::filesystem;
-
-struct Options {
-  std::string word;
-  std::string to;
-};
 
 /// Copies a file whole: it has no name before it is on the disk.
 void copy_to(const fs::path& from, const fs::path& wanted) {
@@ -47,7 +42,10 @@ void copy_to(const fs::path& from, const fs::path& wanted) {
   if (error) refuse(error.value());
 }
 
-int run_get(Shared& shared, const Options& options) {
+}  // namespace
+
+int run_get(Shared& shared, const GetOptions& options) {
+  shared.only_reads = true;
   shared.settle();
   const auto [id, job] = find_by_content(shared, options.word);
   const fs::path bank = shared.store().bank_folder(id) / store::kBankFile;
@@ -81,20 +79,6 @@ int run_get(Shared& shared, const Options& options) {
   }
   if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
   return is_done ? 0 : kExitNotYet;
-}
-
-}  // namespace
-
-void add_get(CLI::App& app, Shared& shared, Run& run) {
-  auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand(
-      "get", "Prints the path of the finished bank, read-only in the store. Exit code 1: not there yet, with its state.");
-  command->add_option("JOB", options->word, "Job file (what it holds now), or an id or its beginning")->required();
-  command->add_option("--to", options->to, "Copy the bank to this file or into this folder");
-  command->callback([&shared, &run, options] {
-    shared.only_reads = true;
-    run = [&shared, options] { return run_get(shared, *options); };
-  });
 }
 
 }  // namespace carillon::cli

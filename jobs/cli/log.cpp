@@ -4,12 +4,13 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <cstdio>
 #include <thread>
 
-#include "jobs/cli/shared.hpp"
+#include "jobs/cli/commands.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/printable.hpp"
 
@@ -20,11 +21,6 @@ namespace fs = std::filesystem;
 
 constexpr auto kPause = std::chrono::milliseconds(300);
 constexpr off_t kMaxJsonBytes = 16 << 20;
-
-struct Options {
-  std::string word;
-  bool follow = false;
-};
 
 /// The bytes from `from` on, at most `most`; `from` moves on. Empty when there are none.
 std::string read_from(const fs::path& file, off_t& from, off_t max) {
@@ -48,7 +44,10 @@ bool has_ended(const registry::Job& job) {
   return job.state == registry::JobState::done || job.state == registry::JobState::failed || job.state == registry::JobState::cancelled;
 }
 
-int run_log(Shared& shared, const Options& options) {
+}  // namespace
+
+int run_log(Shared& shared, const LogOptions& options) {
+  shared.only_reads = true;
   shared.settle();
   registry::Job job = find_job(shared, options.word);
   off_t at = 0;
@@ -85,20 +84,6 @@ int run_log(Shared& shared, const Options& options) {
   }
   if (at == 0) fmt::print(stderr, "carillon: {} has printed nothing yet; it is {}\n", job.id.short_text(), to_text(job.state));
   return at == 0 ? kExitNotYet : 0;
-}
-
-}  // namespace
-
-void add_log(CLI::App& app, Shared& shared, Run& run) {
-  auto options = std::make_shared<Options>();
-  CLI::App* command =
-      app.add_subcommand("log", "What the solver printed for a job, all attempts one after the other. Exit code 1: nothing yet.");
-  command->add_option("ID", options->word, "Id (or its beginning) or job file")->required();
-  command->add_flag("-f,--follow", options->follow, "Continue until the job has ended");
-  command->callback([&shared, &run, options] {
-    shared.only_reads = true;
-    run = [&shared, options] { return run_log(shared, *options); };
-  });
 }
 
 }  // namespace carillon::cli

@@ -3,7 +3,7 @@
 #include <fmt/core.h>
 
 #include <charconv>
-#include <cmath>
+#include <system_error>
 
 #include "jobs/cli/shared.hpp"
 #include "runtime/base/error.hpp"
@@ -11,8 +11,7 @@
 namespace carillon::cli {
 namespace {
 
-constexpr int kMaxRanks = 1'000'000;
-constexpr double kMaxGb = 1e9, kMaxSeconds = 1e9;
+constexpr double kMaxSeconds = 1e9;
 
 double find_unit(const std::string& unit) {
   if (unit.empty() || unit == "s") return 1;
@@ -30,23 +29,6 @@ double parse_seconds(const std::string& text) {
   if (!(unit > 0 && value > 0 && value * unit <= kMaxSeconds))
     throw InputError(fmt::format("--time-limit {}: give seconds, or a number with s, m, h or d: 90, 15m, 2h", show(text)));
   return value * unit;
-}
-
-CLI::Validator make_gb_check(double min) {
-  return {[min](const std::string& text) {
-            double value = 0.0;
-            const auto end = std::from_chars(text.data(), text.data() + text.size(), value);
-            if (end.ec == std::errc() && end.ptr == text.data() + text.size() && value >= min && value <= kMaxGb) return std::string();
-            return fmt::format("{}: give gigabytes, from {} to {}", show(text), min, kMaxGb);
-          },
-          fmt::format("FLOAT in [{} - {}]", min, kMaxGb)};
-}
-
-void ResourceOptions::add(CLI::App& command) {
-  command.add_option("--ranks", ranks, "MPI ranks of each job; without it, predicted from the mesh")->check(CLI::Range(1, kMaxRanks));
-  command.add_option("--memory-gb", memory_gb, "Memory of each job, all ranks together; without it, predicted")->check(make_gb_check(1e-6));
-  command.add_option("--time-limit", time_limit, "Of one attempt: seconds, or 15m, 2h; the next resumes from what is saved by then");
-  command.add_option("--on", engine, "Where they run: local (this machine) or slurm")->check(CLI::IsMember({"local", "slurm"}));
 }
 
 void ResourceOptions::apply(store::Request& request) const {

@@ -1,7 +1,6 @@
 // Options that several commands have.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
 
 #include "jobs/registry/registry.hpp"
@@ -16,15 +15,11 @@ struct ResourceOptions {
   std::string time_limit;  // "90", "90s", "15m", "2h"
   std::string engine;
 
-  void add(CLI::App& command);
   /// What was given takes the place of what the job file says.
   void apply(store::Request& request) const;
   /// The same for a row; false when nothing was given.
   bool apply(registry::Job& job) const;
 };
-
-/// Gigabytes of memory, `least` or more. Not-a-number lies outside, which CLI::Range does not see.
-CLI::Validator make_gb_check(double min);
 
 /// Seconds of "90", "90s", "15m", "2h" or "1d". InputError for anything else.
 double parse_seconds(const std::string& text);

@@ -5,8 +5,8 @@
 
 #include <cstdio>
 
+#include "jobs/cli/commands.hpp"
 #include "jobs/cli/gather.hpp"
-#include "jobs/cli/shared.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::cli {
@@ -14,14 +14,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
-  std::string word;
-  fs::path folder;  // empty: the report of the store
-  bool no_pictures = false;
-};
-
 /// Into options.folder.
-fs::path write(const Options& options, const fs::path& bank, const fs::path& resolved_job, const std::string& title) {
+fs::path write(const ReportOptions& options, const fs::path& bank, const fs::path& resolved_job, const std::string& title) {
   report::Options wanted;
   wanted.title = title;
   if (options.no_pictures) wanted.drawn_modes = 0;
@@ -63,7 +57,7 @@ void print(Shared& shared, Json::Value root, const fs::path& page) {
 }
 
 /// Of a file, which is no matter of the store.
-int report_file(Shared& shared, const Options& options) {
+int report_file(Shared& shared, const ReportOptions& options) {
   const fs::path bank = options.word;
   if (options.folder.empty()) throw InputError(fmt::format("{}: say with -o into which folder the report of a bank goes", bank.string()));
   std::error_code error;
@@ -76,7 +70,7 @@ int report_file(Shared& shared, const Options& options) {
   return 0;
 }
 
-int report_job(Shared& shared, const Options& options) {
+int report_job(Shared& shared, const ReportOptions& options) {
   shared.settle();
   const auto [id, job] = find_by_content(shared, options.word);
   const fs::path folder = shared.store().bank_folder(id);
@@ -106,25 +100,11 @@ int report_job(Shared& shared, const Options& options) {
 
 }  // namespace
 
-void add_report(CLI::App& app, Shared& shared, Run& run) {
-  auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand("report",
-                                         "Prints the path of a bank's report (HTML): mesh, modes and proof, error bars, time and memory, "
-                                         "pictures, which are drawn when it is asked for first. With -o, writes it again: of "
-                                         "a job that is done, or of any bank.\nExit code 1: not there yet.");
-  command->add_option("JOB|BANK", options->word, "Job file (what it holds now), an id or its beginning, or, with -o, the file of a bank")
-      ->required();
-  command->add_option("-o,--output", options->folder, "Write report.html and its pictures into this folder");
-  command->add_flag("--no-pictures", options->no_pictures, "Draw no pictures of the first modes");
-  command->callback([&shared, &run, options] {
-    shared.only_reads = true;
-    run = [&shared, options] {
-      std::error_code error;
-      const bool is_file =
-          !store::parse_id(options->word) && !options->word.ends_with(".json") && fs::is_regular_file(options->word, error);
-      return is_file ? report_file(shared, *options) : report_job(shared, *options);
-    };
-  });
+int run_report(Shared& shared, const ReportOptions& options) {
+  shared.only_reads = true;
+  std::error_code error;
+  const bool is_file = !store::parse_id(options.word) && !options.word.ends_with(".json") && fs::is_regular_file(options.word, error);
+  return is_file ? report_file(shared, options) : report_job(shared, options);
 }
 
 }  // namespace carillon::cli

@@ -4,9 +4,8 @@
 #include <fmt/core.h>
 
 #include "jobs/attempt/attempt.hpp"
+#include "jobs/cli/commands.hpp"
 #include "jobs/cli/follow.hpp"
-#include "jobs/cli/options.hpp"
-#include "jobs/cli/shared.hpp"
 #include "jobs/cli/slurm.hpp"
 #include "jobs/queue/local.hpp"
 #include "jobs/queue/settle.hpp"
@@ -47,66 +46,27 @@ int run_until_done(Shared& shared, const std::vector<store::Id>& ids, bool has_p
   return find_exit_code(jobs);
 }
 
-void add_run(CLI::App& app, Shared& shared, Run& run) {
-  auto options = std::make_shared<queue::RunOptions>();
-  CLI::App* command = app.add_subcommand("run",
-                                         "Works through the queue on this machine until it is empty: as many jobs at once as cores and "
-                                         "memory allow. Any number may run on one store.\n"
-                                         "Ctrl-C saves what runs and puts it back into the queue; once more ends it. Exit code 0: the "
-                                         "queue is empty, whatever became of single jobs.");
-  command->add_flag("--keep", options->runner.keep, "Stay and wait for more jobs when the queue is empty");
-  command->add_option("--cores", options->runner.cores, "Use at most so many")->check(CLI::Range(1, 1'000'000));
-  command->add_option("--memory-gb", options->runner.memory_gb, "Use at most so much")->check(make_gb_check(1e-3));
-  command->add_flag("-q,--quiet", options->quiet, "Print nothing");
-  command->add_flag("--pictures", options->attempt.has_pictures,
-                    "Draw the first modes of each bank for its report at once, not when the report is asked for");
-  auto engine = std::make_shared<std::string>("local");
-  command->add_option("--on", *engine, "local: the queue of this machine; slurm: hand over to Slurm and follow, until all have ended")
-      ->check(CLI::IsMember({"local", "slurm"}));
-  command->callback([&shared, &run, options, engine] {
-    run = [&shared, options, engine] {
-      if (*engine == "slurm") {
-        run_with_slurm(shared, *options);
-        return 0;
-      }
-      options->attempt.mpirun_options = shared.profile().mpirun_options;
-      options->attempt.program = base::find_self();
-      options->json = shared.json;
-      return queue::run(shared.store(), *options);
-    };
-  });
+int run_queue(Shared& shared, const QueueOptions& options) {
+  if (options.engine == "slurm") {
+    run_with_slurm(shared, options.queue);
+    return 0;
+  }
+  queue::RunOptions wanted = options.queue;
+  wanted.attempt.mpirun_options = shared.profile().mpirun_options;
+  wanted.attempt.program = base::find_self();
+  wanted.json = shared.json;
+  return queue::run(shared.store(), wanted);
 }
 
-void add_attempt(CLI::App& app, Run& run) {
-  auto options = std::make_shared<attempt::Options>();
-  auto launcher = std::make_shared<std::string>();
-  CLI::App* command =
-      app.add_subcommand("attempt", "One attempt at the job of a folder of work, for carillon run and the scripts of Slurm")->group("");
-  command->add_option("WORK", options->work, "work/ab/ID of a store")->required();
-  command->add_option("--ranks", options->ranks)->check(CLI::Range(1, 1'000'000));
-  command->add_option("--memory-gb", options->memory_gb);
-  command->add_option("--time-limit-s", options->time_limit_s);
-  command->add_option("--token", options->token);
-  command->add_option("--mpirun-option", options->mpirun_options, "A word for mpirun; can be given many times")->allow_extra_args(false);
-  auto engine = std::make_shared<std::string>("local");
-  command->add_option("--engine", *engine)->check(CLI::IsMember({"local", "slurm"}));
-  command->add_option("--launcher", *launcher)->check(CLI::IsMember({"alone", "mpirun", "srun"}));
-  command->add_flag("--predict", options->is_prediction);
-  command->add_flag("--pictures", options->has_pictures);
-  command->add_option("--grace-s", options->grace_s);
-  command->add_option("--hang-s", options->hang_s);
-  command->callback([&run, options, launcher, engine] {
-    run = [options, launcher, engine] {
-      if (*launcher == "alone") options->launcher = attempt::Launcher::alone;
-      if (*launcher == "mpirun") options->launcher = attempt::Launcher::mpirun;
-      if (*launcher == "srun") options->launcher = attempt::Launcher::srun;
-      if (!options->token.empty() &&
-          (options->token.size() != 32 || options->token.find_first_not_of("0123456789abcdef") != std::string::npos))
-        throw InputError("--token: 32 hex digits are needed");
-      const int code = attempt::run_attempt(*options);
-      return *engine == "slurm" ? slurm::end_attempt(options->work, code) : code;
-    };
-  });
+int run_attempt(const AttemptOptions& options) {
+  attempt::Options wanted = options.attempt;
+  if (options.launcher == "alone") wanted.launcher = attempt::Launcher::alone;
+  if (options.launcher == "mpirun") wanted.launcher = attempt::Launcher::mpirun;
+  if (options.launcher == "srun") wanted.launcher = attempt::Launcher::srun;
+  if (!wanted.token.empty() && (wanted.token.size() != 32 || wanted.token.find_first_not_of("0123456789abcdef") != std::string::npos))
+    throw InputError("--token: 32 hex digits are needed");
+  const int code = attempt::run_attempt(wanted);
+  return options.engine == "slurm" ? slurm::end_attempt(wanted.work, code) : code;
 }
 
 }  // namespace carillon::cli

@@ -3,9 +3,7 @@
 
 #include <json/json.h>
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -65,22 +63,6 @@ class Shared {
   bool is_disk_full_ = false, is_full_shown_ = false;
   bool fall_back(const SystemError& error);
 };
-
-/// Each adds its command to `app` and sets `run` when it is called; `run` gives the exit code.
-using Run = std::function<int()>;
-void add_submit(CLI::App& app, Shared& shared, Run& run);
-void add_status(CLI::App& app, Shared& shared, Run& run);
-void add_log(CLI::App& app, Shared& shared, Run& run);
-void add_cancel(CLI::App& app, Shared& shared, Run& run);
-void add_retry(CLI::App& app, Shared& shared, Run& run);
-void add_explain(CLI::App& app, Shared& shared, Run& run);
-void add_run(CLI::App& app, Shared& shared, Run& run);
-void add_get(CLI::App& app, Shared& shared, Run& run);
-void add_gc(CLI::App& app, Shared& shared, Run& run);
-void add_report(CLI::App& app, Shared& shared, Run& run);
-void add_verify(CLI::App& app, Shared& shared, Run& run);
-void add_validate(CLI::App& app, Shared& shared, Run& run);
-void add_study(CLI::App& app, Shared& shared, Run& run);
 
 /// A text of strangers for a terminal: no control characters, valid UTF-8, at most `most` bytes or so.
 std::string show(const std::string& text, std::size_t max = 200);

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 
+#include "jobs/cli/commands.hpp"
 #include "jobs/cli/follow.hpp"
 #include "jobs/process/process.hpp"
 #include "runtime/base/clock.hpp"
@@ -16,11 +17,6 @@ namespace carillon::cli {
 namespace {
 
 constexpr std::size_t kMaxRows = 50, kWideColumns = 1000, kBarWidth = 20;
-
-struct Options {
-  std::vector<std::string> words;
-  bool watch = false, all = false;
-};
 
 /// Running first, then what waits, what failed, what is done; the newest first among those that have ended.
 void sort_for_people(std::vector<registry::Job>& jobs) {
@@ -82,7 +78,10 @@ std::string cut(const std::string& text, std::size_t columns) {
   return text.substr(0, at);
 }
 
-int run_status(Shared& shared, const Options& options) {
+}  // namespace
+
+int run_status(Shared& shared, const StatusOptions& options) {
+  shared.only_reads = true;
   shared.settle();
   std::vector<registry::Job> jobs = options.words.empty() ? shared.registry().list() : find_jobs(shared, options.words);
   if (options.watch) {
@@ -123,8 +122,6 @@ int run_status(Shared& shared, const Options& options) {
   return 0;
 }
 
-}  // namespace
-
 std::vector<std::string> format_bars(Shared& shared, const std::vector<registry::Job>& unsorted, std::size_t rows, std::size_t columns) {
   std::vector<registry::Job> jobs = unsorted;
   sort_for_people(jobs);
@@ -148,21 +145,6 @@ std::vector<std::string> format_bars(Shared& shared, const std::vector<registry:
   if (shown < jobs.size()) lines.push_back(fmt::format("... and {} more; --all shows them", jobs.size() - shown));
   lines.push_back(cut(format_counts(jobs), columns));
   return lines;
-}
-
-void add_status(CLI::App& app, Shared& shared, Run& run) {
-  auto options = std::make_shared<Options>();
-  CLI::App* command =
-      app.add_subcommand("status", "Where jobs stand: state, phase, percent, modes, time left, and why one failed or waits.");
-  command->add_option("ID", options->words, "Ids (or their beginnings) or job files; without any, all jobs");
-  command->add_flag("--watch", options->watch,
-                    "Until they have ended: bars on a terminal, elsewhere one JSON object a line for every change. Exit code 0 when all "
-                    "are done, 3 when one failed or was cancelled, also earlier where no ID is given");
-  command->add_flag("--all", options->all, "Every job, however many there are");
-  command->callback([&shared, &run, options] {
-    shared.only_reads = true;
-    run = [&shared, options] { return run_status(shared, *options); };
-  });
 }
 
 }  // namespace carillon::cli

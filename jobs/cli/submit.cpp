@@ -6,10 +6,9 @@
 #include <cstdio>
 #include <map>
 
+#include "jobs/cli/commands.hpp"
 #include "jobs/cli/follow.hpp"
 #include "jobs/cli/gather.hpp"
-#include "jobs/cli/options.hpp"
-#include "jobs/cli/shared.hpp"
 #include "jobs/cli/slurm.hpp"
 #include "runtime/base/error.hpp"
 
@@ -17,13 +16,6 @@ namespace carillon::cli {
 namespace {
 
 constexpr std::size_t kMaxShown = 20;
-
-struct Options {
-  std::vector<std::string> words;
-  ResourceOptions resources;
-  bool has_pictures = false;
-  bool wait = false, run = false, keep_going = false;
-};
 
 /// One line of the result.
 struct SubmitResult {
@@ -33,7 +25,7 @@ struct SubmitResult {
 };
 
 /// A row that was there: cancelled and lost ones are wanted again, and what was asked for explicitly counts from now on.
-void renew(Shared& shared, const Options& options, const Source& source, bool was_made) {
+void renew(Shared& shared, const SubmitOptions& options, const Source& source, bool was_made) {
   shared.registry().update(store::require_id(source.request.id, "request"), [&](registry::Job& job) {
     if (job.state == registry::JobState::running || (job.state == registry::JobState::done && !was_made)) return false;
     const bool is_wanted = job.state == registry::JobState::done || is_submitted_again(job, !was_made);
@@ -47,7 +39,7 @@ void renew(Shared& shared, const Options& options, const Source& source, bool wa
   });
 }
 
-std::vector<SubmitResult> enter(Shared& shared, const Options& options, const std::vector<Source>& sources) {
+std::vector<SubmitResult> enter(Shared& shared, const SubmitOptions& options, const std::vector<Source>& sources) {
   shared.registry();  // brought up to date before there are new folders
   const store::Lock lock = shared.store().lock_shared();
   std::vector<registry::Submission> submissions;
@@ -169,7 +161,9 @@ void hand_over(Shared& shared, std::vector<SubmitResult>& results) {
   }
 }
 
-int run_submit(Shared& shared, const Options& options) {
+}  // namespace
+
+int run_submit(Shared& shared, const SubmitOptions& options) {
   const store::JobEngine engine = store::find_engine(options.resources.engine).value_or(shared.profile().engine);
   std::vector<Source> sources = gather(options.words, read_solver_version());
   bool is_bad = false, is_good = false;
@@ -221,24 +215,6 @@ int run_submit(Shared& shared, const Options& options) {
     }
   }
   return code;
-}
-
-}  // namespace
-
-void add_submit(CLI::App& app, Shared& shared, Run& run) {
-  auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand("submit",
-                                         "Asks for banks. JOB.json is a job, a folder stands for its *.json, any other file is a manifest: "
-                                         "one job file a line, or one job as JSON on one\n"
-                                         "line; \"-\" reads a manifest from standard input. What is in the store already is not computed "
-                                         "again. All jobs are read before any is submitted.");
-  command->add_option("JOB", options->words, "Job files, folders, manifests")->required();
-  options->resources.add(*command);
-  command->add_flag("--keep-going", options->keep_going, "Submit the others when some jobs cannot be used (the exit code is still 2)");
-  command->add_flag("--wait", options->wait, "Wait until they have ended; carillon run or Slurm has to work through the queue");
-  CLI::Option* runs = command->add_flag("--run", options->run, "Work through the queue here until they have ended");
-  command->add_flag("--pictures", options->has_pictures, "With --run: as carillon run --pictures")->needs(runs);
-  command->callback([&shared, &run, options] { run = [&shared, options] { return run_submit(shared, *options); }; });
 }
 
 }  // namespace carillon::cli

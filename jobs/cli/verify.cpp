@@ -6,7 +6,7 @@
 #include <set>
 
 #include "jobs/attempt/publish.hpp"
-#include "jobs/cli/shared.hpp"
+#include "jobs/cli/commands.hpp"
 #include "jobs/process/process.hpp"
 #include "jobs/queue/repair.hpp"
 #include "jobs/store/identity.hpp"
@@ -14,11 +14,6 @@
 
 namespace carillon::cli {
 namespace {
-
-struct Options {
-  std::vector<std::string> words;
-  bool repairs = false;
-};
 
 struct Finding {
   std::string kind;  // "bank", "record", "work", "input"
@@ -104,7 +99,10 @@ void repair_input(Shared& shared, Finding& finding) {
                                        : "the file that it was copied from has been removed or changed; submit a job with that file again";
 }
 
-int run_verify(Shared& shared, const Options& options) {
+}  // namespace
+
+int run_verify(Shared& shared, const VerifyOptions& options) {
+  shared.only_reads = !options.repairs;
   shared.settle();
   const store::Store& store = shared.store();
   std::set<store::Id> ids;
@@ -159,24 +157,6 @@ int run_verify(Shared& shared, const Options& options) {
                findings.size() == 1 ? "" : "s", findings.empty() || options.repairs ? "" : "; carillon verify --repair restores them");
   if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
   return is_whole ? 0 : kExitSolve;
-}
-
-}  // namespace
-
-void add_verify(CLI::App& app, Shared& shared, Run& run) {
-  auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand(
-      "verify",
-      "Reads every bank, input and folder of work of the store, or of the jobs named, and compares them with what was computed and "
-      "submitted. "
-      "Exit code 3:\n"
-      "something is damaged. With --repair, damaged banks are set aside and queued again, and damaged inputs copied again.");
-  command->add_option("ID", options->words, "Ids (or their beginnings) or job files; without any, the whole store");
-  command->add_flag("--repair", options->repairs, "Make again what is damaged");
-  command->callback([&shared, &run, options] {
-    shared.only_reads = !options->repairs;
-    run = [&shared, options] { return run_verify(shared, *options); };
-  });
 }
 
 }  // namespace carillon::cli

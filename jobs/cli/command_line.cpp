@@ -1,0 +1,288 @@
+// The command line: all commands with their options and help. No other file of this folder includes CLI11, which is slow to compile.
+#include "jobs/cli/command_line.hpp"
+
+#include <fmt/core.h>
+
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <vector>
+
+#include "jobs/cli/commands.hpp"
+#include "runtime/base/document.hpp"
+#include "runtime/base/error.hpp"
+#include "runtime/version/version.hpp"
+
+namespace carillon::cli {
+namespace {
+
+constexpr const char* kAbout =
+    "Jobs and their banks. A bank is kept under the hash of the job, the bytes of its mesh and the version of the solver: what was "
+    "computed once is\n"
+    "never computed again, from whatever folder it is asked for. Start with: carillon submit JOB.json --run";
+constexpr const char* kFooter =
+    "ID is an id or its beginning, or the job file. Exit codes: 0 done, 1 not done yet, 2 the input cannot be used, 3 a job failed, 4 the "
+    "machine\n"
+    "refused, 128 + n stopped by signal n. The store: --store, else \"store\" of the profile, else $XDG_DATA_HOME/carillon, else\n"
+    "~/.local/share/carillon. The profile: --profile, else ~/.config/carillon/profile.json, {\"store\": DIR, \"on\": \"local\" or "
+    "\"slurm\"}.";
+constexpr int kMaxRanks = 1'000'000;
+constexpr double kMaxGb = 1e9;
+
+/// Gigabytes of memory, `min` or more. Not-a-number lies outside, which CLI::Range does not see.
+CLI::Validator make_gb_check(double min) {
+  return {[min](const std::string& text) {
+            double value = 0.0;
+            const auto end = std::from_chars(text.data(), text.data() + text.size(), value);
+            if (end.ec == std::errc() && end.ptr == text.data() + text.size() && value >= min && value <= kMaxGb) return std::string();
+            return fmt::format("{}: give gigabytes, from {} to {}", show(text), min, kMaxGb);
+          },
+          fmt::format("FLOAT in [{} - {}]", min, kMaxGb)};
+}
+
+CLI::Validator make_engine_check() { return CLI::IsMember({"local", "slurm"}); }
+
+void add_resources(CLI::App& command, ResourceOptions& options) {
+  command.add_option("--ranks", options.ranks, "MPI ranks of each job; without it, predicted from the mesh")
+      ->check(CLI::Range(1, kMaxRanks));
+  command.add_option("--memory-gb", options.memory_gb, "Memory of each job, all ranks together; without it, predicted")
+      ->check(make_gb_check(1e-6));
+  command.add_option("--time-limit", options.time_limit,
+                     "Of one attempt: seconds, or 15m, 2h; the next resumes from what is saved by then");
+  command.add_option("--on", options.engine, "Where they run: local (this machine) or slurm")->check(make_engine_check());
+}
+
+/// When the words ask for `command`, `run` becomes `work` with the options that they have filled.
+template <class Options>
+void set_work(CLI::App& command, Shared& shared, Run& run, const std::shared_ptr<Options>& options, int (*work)(Shared&, const Options&)) {
+  command.callback([&shared, &run, options, work] { run = [&shared, options, work] { return work(shared, *options); }; });
+}
+
+void add_submit(CLI::App& app, Shared& shared, Run& run) {
+  auto options = std::make_shared<SubmitOptions>();
+  CLI::App* command = app.add_subcommand("submit",
+                                         "Asks for banks. JOB.json is a job, a folder stands for its *.json, any other file is a manifest: "
+                                         "one job file a line, or one job as JSON on one\n"
+                                         "line; \"-\" reads a manifest from standard input. What is in the store already is not computed "
+                                         "again. All jobs are read before any is submitted.");
+  command->add_option("JOB", options->words, "Job files, folders, manifests")->required();
+  add_resources(*command, options->resources);
+  command->add_flag("--keep-going", options->keep_going, "Submit the others when some jobs cannot be used (the exit code is still 2)");
+  command->add_flag("--wait", options->wait, "Wait until they have ended; carillon run or Slurm has to work through the queue");
+  CLI::Option* runs = command->add_flag("--run", options->run, "Work through the queue here until they have ended");
+  command->add_flag("--pictures", options->has_pictures, "With --run: as carillon run --pictures")->needs(runs);
+  set_work(*command, shared, run, options, run_submit);
+}
+
+void add_status(CLI::App& app, Shared& shared, Run& run) {
+  auto options = std::make_shared<StatusOptions>();
+  CLI::App* command =
+      app.add_subcommand("status", "Where jobs stand: state, phase, percent, modes, time left, and why one failed or waits.");
+  command->add_option("ID", options->words, "Ids (or their beginnings) or job files; without any, all jobs");
+  command->add_flag("--watch", options->watch,
+                    "Until they have ended: bars on a terminal, elsewhere one JSON object a line for every change. Exit code 0 when all "
+                    "are done, 3 when one failed or was cancelled, also earlier where no ID is given");
+  command->add_flag("--all", options->all, "Every job, however many there are");
+  set_work(*command, shared, run, options, run_status);
+}
+
+void add_log(CLI::App& app, Shared& shared, Run& run) {
+  auto options = std::make_shared<LogOptions>();
+  CLI::App* command =
+      app.add_subcommand("log", "What the solver printed for a job, all attempts one after the other. Exit code 1: nothing yet.");
+  command->add_option("ID", options->word, "Id (or its beginning) or job file")->required();
+  command->add_flag("-f,--follow", options->follow, "Continue until the job has ended");
+  set_work(*command, shared, run, options, run_log);
+}
+
+void add_cancel(CLI::App& app, Shared& shared, Run& run) {
+  auto options = std::make_shared<CancelOptions>();
+  CLI::App* command = app.add_subcommand("cancel",
+                                         "Ends jobs that are queued, wait or run; what a running one has computed so far is kept for a "
+                                         "retry. Exit code 1: one was done already.");
+  command->add_option("ID", options->words, "Ids (or their beginnings) or job files")->required();
+  set_work(*command, shared, run, options, run_cancel);
+}
+
+void add_retry(CLI::App& app, Shared& shared, Run& run) {
+  auto options = std::make_shared<RetryOptions>();
+  CLI::App* command =
+      app.add_subcommand("retry", "Queues failed and cancelled jobs again, from their checkpoints; waiting ones need wait no longer.");
+  command->add_option("ID", options->words, "Ids (or their beginnings) or job files");
+  command->add_flag("--failed", options->all_failed, "All jobs that failed");
+  add_resources(*command, options->resources);
+  set_work(*command, shared, run, options, run_retry);
+}
+
+void add_explain(CLI::App& app, Shared& shared, Run& run) {
+  auto options = std::make_shared<ExplainOptions>();
+  CLI::App* command =
+      app.add_subcommand("explain", "Would this job run, and why: which part of it changed since it was submitted last. Changes nothing.");
+  command->add_option("JOB", options->word, "Job file")->required();
+  set_work(*command, shared, run, options, run_explain);
+}
+
+void add_run(CLI::App& app, Shared& shared, Run& run) {
+  auto options = std::make_shared<QueueOptions>();
+  queue::RunOptions& queue = options->queue;
+  CLI::App* command = app.add_subcommand("run",
+                                         "Works through the queue on this machine until it is empty: as many jobs at once as cores and "
+                                         "memory allow. Any number may run on one store.\n"
+                                         "Ctrl-C saves what runs and puts it back into the queue; once more ends it. Exit code 0: the "
+                                         "queue is empty, whatever became of single jobs.");
+  command->add_flag("--keep", queue.runner.keep, "Stay and wait for more jobs when the queue is empty");
+  command->add_option("--cores", queue.runner.cores, "Use at most so many")->check(CLI::Range(1, kMaxRanks));
+  command->add_option("--memory-gb", queue.runner.memory_gb, "Use at most so much")->check(make_gb_check(1e-3));
+  command->add_flag("-q,--quiet", queue.quiet, "Print nothing");
+  command->add_flag("--pictures", queue.attempt.has_pictures,
+                    "Draw the first modes of each bank for its report at once, not when the report is asked for");
+  command
+      ->add_option("--on", options->engine, "local: the queue of this machine; slurm: hand over to Slurm and follow, until all have ended")
+      ->check(make_engine_check());
+  set_work(*command, shared, run, options, run_queue);
+}
+
+void add_get(CLI::App& app, Shared& shared, Run& run) {
+  auto options = std::make_shared<GetOptions>();
+  CLI::App* command = app.add_subcommand(
+      "get", "Prints the path of the finished bank, read-only in the store. Exit code 1: not there yet, with its state.");
+  command->add_option("JOB", options->word, "Job file (what it holds now), or an id or its beginning")->required();
+  command->add_option("--to", options->to, "Copy the bank to this file or into this folder");
+  set_work(*command, shared, run, options, run_get);
+}
+
+void add_gc(CLI::App& app, Shared& shared, Run& run) {
+  auto options = std::make_shared<GcOptions>();
+  CLI::App* command = app.add_subcommand(
+      "gc",
+      "Lists what no job refers to: banks and failed jobs whose job file is gone or asks for something else by now, inputs of neither, and "
+      "what\n"
+      "processes that were killed left behind. Removes nothing without --delete, and nothing that is queued, waits or runs.");
+  command->add_flag("--delete", options->is_deleting, "Remove it");
+  set_work(*command, shared, run, options, run_gc);
+}
+
+void add_verify(CLI::App& app, Shared& shared, Run& run) {
+  auto options = std::make_shared<VerifyOptions>();
+  CLI::App* command = app.add_subcommand(
+      "verify",
+      "Reads every bank, input and folder of work of the store, or of the jobs named, and compares them with what was computed and "
+      "submitted. "
+      "Exit code 3:\n"
+      "something is damaged. With --repair, damaged banks are set aside and queued again, and damaged inputs copied again.");
+  command->add_option("ID", options->words, "Ids (or their beginnings) or job files; without any, the whole store");
+  command->add_flag("--repair", options->repairs, "Make again what is damaged");
+  set_work(*command, shared, run, options, run_verify);
+}
+
+void add_validate(CLI::App& app, Shared& shared, Run& run) {
+  auto options = std::make_shared<ValidateOptions>();
+  CLI::App* command = app.add_subcommand("validate",
+                                         "Checks a job and its mesh without solving, and predicts its modes, its memory by ranks and its "
+                                         "time. Exit code 2: it cannot be used.");
+  command->add_option("JOB", options->word, "Job file")->required();
+  set_work(*command, shared, run, options, run_validate);
+}
+
+void add_study(CLI::App& app, Shared& shared, Run& run) {
+  CLI::App* command = app.add_subcommand(
+      "study", "Studies: scaling JOB.json, accuracy -o REPORT, advise BODY --cents 5; carillon study --help lists them and their options");
+  command->prefix_command();
+  command->set_help_flag();
+  command->callback(
+      [&shared, &run, command] { run = [&shared, options = StudyOptions{command->remaining()}] { return run_study(shared, options); }; });
+}
+
+void add_report(CLI::App& app, Shared& shared, Run& run) {
+  auto options = std::make_shared<ReportOptions>();
+  CLI::App* command = app.add_subcommand("report",
+                                         "Prints the path of a bank's report (HTML): mesh, modes and proof, error bars, time and memory, "
+                                         "pictures, which are drawn when it is asked for first. With -o, writes it again: of "
+                                         "a job that is done, or of any bank.\nExit code 1: not there yet.");
+  command->add_option("JOB|BANK", options->word, "Job file (what it holds now), an id or its beginning, or, with -o, the file of a bank")
+      ->required();
+  command->add_option("-o,--output", options->folder, "Write report.html and its pictures into this folder");
+  command->add_flag("--no-pictures", options->no_pictures, "Draw no pictures of the first modes");
+  set_work(*command, shared, run, options, run_report);
+}
+
+void add_attempt(CLI::App& app, Run& run) {
+  auto options = std::make_shared<AttemptOptions>();
+  attempt::Options& attempt = options->attempt;
+  CLI::App* command =
+      app.add_subcommand("attempt", "One attempt at the job of a folder of work, for carillon run and the scripts of Slurm")->group("");
+  command->add_option("WORK", attempt.work, "work/ab/ID of a store")->required();
+  command->add_option("--ranks", attempt.ranks)->check(CLI::Range(1, kMaxRanks));
+  command->add_option("--memory-gb", attempt.memory_gb);
+  command->add_option("--time-limit-s", attempt.time_limit_s);
+  command->add_option("--token", attempt.token);
+  command->add_option("--mpirun-option", attempt.mpirun_options, "A word for mpirun; can be given many times")->allow_extra_args(false);
+  command->add_option("--engine", options->engine)->check(make_engine_check());
+  command->add_option("--launcher", options->launcher)->check(CLI::IsMember({"alone", "mpirun", "srun"}));
+  command->add_flag("--predict", attempt.is_prediction);
+  command->add_flag("--pictures", attempt.has_pictures);
+  command->add_option("--grace-s", attempt.grace_s);
+  command->add_option("--hang-s", attempt.hang_s);
+  command->callback([&run, options] { run = [options] { return run_attempt(*options); }; });
+}
+
+/// Throws InputError for a word that is no command, with the nearest one.
+void check_command(CLI::App& app, int argc, char** argv) {
+  const int at = find_command(argc, argv);
+  if (at == argc) return;
+  std::vector<std::string> known;
+  for (const CLI::App* command : app.get_subcommands([](CLI::App*) { return true; })) {
+    if (command->get_name() == argv[at]) return;
+    if (!command->get_group().empty()) known.push_back(command->get_name());
+  }
+  const std::string near = base::find_nearest(argv[at], known);
+  throw InputError(fmt::format("\"{}\" is no command{}; carillon --help lists them", show(argv[at]),
+                               near.empty() ? "" : ", did you mean \"" + near + "\"?"));
+}
+
+}  // namespace
+
+int find_command(int argc, char** argv) {
+  for (int i = 1; i < argc; ++i) {
+    const std::string_view word = argv[i];
+    if (!word.starts_with('-')) return i;
+    if (word == "--store" || word == "--profile")
+      ++i;
+    else if (word != "--json" && !word.starts_with("--store=") && !word.starts_with("--profile="))
+      break;
+  }
+  return argc;
+}
+
+Run parse_command_line(int argc, char** argv, Shared& shared) {
+  CLI::App app(kAbout, "carillon");
+  app.footer(kFooter);
+  app.require_subcommand(1);
+  app.fallthrough();
+  Run run;
+  app.add_option("--store", shared.store_option, "Folder of the store; made when there is none");
+  app.add_option("--profile", shared.profile_option, "Profile file");
+  app.add_flag("--json", shared.json, "One JSON document (of commands that keep running: one object a line)");
+  app.set_version_flag("--version", version::describe("carillon"));
+  for (const auto add : {add_submit, add_status, add_log, add_cancel, add_retry, add_explain, add_run, add_get, add_gc, add_verify,
+                         add_validate, add_study, add_report})
+    add(app, shared, run);
+  add_attempt(app, run);
+  check_command(app, argc, argv);
+  const bool json = shared.json;
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    shared.json = json;
+    if (error.get_exit_code() != 0)
+      throw InputError(std::string(error.what()) + "; carillon --help, or --help after a command, lists the options");
+    app.exit(error);  // prints the text
+    return [] { return 0; };
+  }
+  return run;
+}
+
+}  // namespace carillon::cli
