@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 constexpr auto kPause = std::chrono::milliseconds(300);
 constexpr off_t kMaxJsonBytes = 16 << 20;
 
-/// The bytes from `from` on, at most `most`; `from` moves on. Empty when there are none.
+/// The bytes from `from` on, at most `max`; advances `from`. Empty when there are none.
 std::string read_from(const fs::path& file, off_t& from, off_t max) {
   std::string bytes;
   const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOFOLLOW);

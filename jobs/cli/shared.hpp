@@ -64,7 +64,7 @@ class Shared {
   bool fall_back(const SystemError& error);
 };
 
-/// A text of strangers for a terminal: no control characters, valid UTF-8, at most `most` bytes or so.
+/// A text of strangers for a terminal: no control characters, valid UTF-8, at most `max` bytes or so.
 std::string show(const std::string& text, std::size_t max = 200);
 /// A message of an error: as show(), and long ones whole.
 std::string show_message(const std::string& text);
