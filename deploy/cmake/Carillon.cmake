@@ -109,7 +109,8 @@ function(carillon_helper target)
   install(TARGETS ${target} RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/carillon)
 endfunction()
 
-# A TIMEOUT is what a test may take alone on an idle core. deploy/test runs two tests a core, on machines that may be half as fast.
+# A TIMEOUT is what a test may take alone on an idle core. Its limit is three times that: deploy/test runs two tests a core, and a machine
+# may be slower.
 function(carillon_limit_time out seconds)
   math(EXPR limit "3 * ${seconds}")
   set(${out} ${limit} PARENT_SCOPE)
@@ -121,7 +122,7 @@ endfunction()
 
 # carillon_test(NAME SOURCES ... LINK libs... [RANKS 1 2 3] [LABELS ...] [TIMEOUT s])
 # GoogleTest binary. Without RANKS every test case is a CTest test NAME.Suite.Case; with RANKS the whole binary runs under mpirun as
-# NAME.npN (its main is tests/support/mpi_main.cpp). CARILLON_TEST_KIND, the kind of the folder, is one more label. Every test has a TIMEOUT, by which CTest also takes the longest first (COST).
+# NAME.npN (its main is tests/support/mpi_main.cpp). CARILLON_TEST_KIND, the kind of the folder, is one more label. Every test has a TIMEOUT (carillon_limit_time), which is its COST, too: CTest takes the longest first.
 function(carillon_test name)
   cmake_parse_arguments(arg "" "TIMEOUT" "SOURCES;LINK;RANKS;LABELS" ${ARGN})
   if(NOT arg_TIMEOUT)

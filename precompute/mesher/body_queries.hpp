@@ -1,10 +1,9 @@
-// What CGAL's Mesh_3 asks of a body, as an interface: its templates, which take a minute and a half to compile, are compiled for one domain
-// (delaunay.cpp) and not for each kind of body. Only the delaunay files include this.
+// What CGAL's Mesh_3 asks of a body, as an interface: its templates compile slowly, and so they are compiled for one domain (delaunay.cpp),
+// not for each kind of body. Only the delaunay files include this.
 #pragma once
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 
-#include <atomic>
 #include <boost/optional.hpp>
 #include <boost/variant.hpp>
 #include <memory>
@@ -18,8 +17,9 @@ namespace carillon::mesher {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 
-/// The surface of one body, for CGAL's refinement (its concept MeshDomain_3). Keeps true: the same body answers the same to the same
-/// query, or throws std::runtime_error when it was asked far more often than a sound body is.
+/// The surface of one body, for CGAL's refinement (its concept MeshDomain_3). Keeps true: after restart() the same queries in the same
+/// order have the same answers. restart() comes before any query. A query may throw std::runtime_error when the body is queried far more
+/// often than a sound body is.
 class BodyQueries {
  public:
   using Inside = boost::optional<int>;  // 1 inside, none outside
@@ -40,12 +40,13 @@ class BodyQueries {
   virtual Patch find_patch(const Kernel::Segment_3& query) const = 0;
   virtual Patch find_patch(const Kernel::Ray_3& query) const = 0;
   virtual Patch find_patch(const Kernel::Line_3& query) const = 0;
+  /// A point where the query meets the boundary; only right after find_patch() gave a patch for the same query.
   virtual Crossing find_crossing(const Kernel::Segment_3& query) const = 0;
   virtual Crossing find_crossing(const Kernel::Ray_3& query) const = 0;
   virtual Crossing find_crossing(const Kernel::Line_3& query) const = 0;
 
-  /// Set while elements are refined: once it is true, queries must throw, for CGAL's loop over facets does not look at it itself.
-  const std::atomic<bool>* stop = nullptr;
+  /// Whether elements are refined; while sliver elements are removed, a body is queried more often.
+  bool is_refining = false;
 };
 
 /// Queries that a domain of CGAL answers, which restart() makes.

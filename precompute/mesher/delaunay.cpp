@@ -41,17 +41,19 @@ void dump_c3t3_edges(const Complex&, const std::string&) {}
 namespace carillon::mesher {
 namespace {
 
+constexpr const char* kTouching = "parts of the surface touch, or nearly so";
+
 /// Sets `stop` once the thread that made it has computed for `limit_s` more. CGAL's refinement can loop without end where skins
 /// touch at a point; only this ends it. A sound body takes a tenth of the limit, so that meshes do not depend on it.
 class Watchdog {
  public:
-  explicit Watchdog(double limit_s) {
+  Watchdog(double limit_s, std::atomic<bool>& stop) : stop_(stop) {
     ::pthread_getcpuclockid(::pthread_self(), &clock_);
     const double end_s = base::read_clock(clock_) + limit_s;
     thread_ = std::thread([this, end_s] {
       std::unique_lock lock(mutex_);
       while (!wake_.wait_for(lock, std::chrono::milliseconds(100), [this] { return done_; }))
-        if (base::read_clock(clock_) > end_s) stop = true;
+        if (base::read_clock(clock_) > end_s) stop_ = true;
     });
   }
   ~Watchdog() {
@@ -65,9 +67,8 @@ class Watchdog {
   Watchdog(const Watchdog&) = delete;
   Watchdog& operator=(const Watchdog&) = delete;
 
-  std::atomic<bool> stop{false};
-
  private:
+  std::atomic<bool>& stop_;
   clockid_t clock_{};
   std::mutex mutex_;
   std::condition_variable wake_;
@@ -95,7 +96,8 @@ class QueriedDomain {
   using Index = BodyQueries::Index;
   using Intersection = BodyQueries::Crossing;
 
-  explicit QueriedDomain(const BodyQueries* queries) : queries_(queries) {}
+  /// Once `stop` is true every query throws, because CGAL's loop over facets does not look at it itself.
+  QueriedDomain(const BodyQueries* queries, const std::atomic<bool>* stop) : queries_(queries), stop_(stop) {}
 
   struct Construct_initial_points {  // the concept has it; the first points are ours
     template <class Out>
@@ -107,30 +109,30 @@ class QueriedDomain {
   CGAL::Bbox_3 bbox() const { return queries_->calc_box(); }
 
   struct Is_in_domain {
-    const BodyQueries& queries;
+    const QueriedDomain& domain;
     Subdomain operator()(const Point_3& point) const {
-      return std::isfinite(point.x() + point.y() + point.z()) ? queries.find_inside(point) : Subdomain();
+      return std::isfinite(point.x() + point.y() + point.z()) ? domain.get_queries().find_inside(point) : Subdomain();
     }
   };
-  Is_in_domain is_in_domain_object() const { return {*queries_}; }
+  Is_in_domain is_in_domain_object() const { return {*this}; }
 
   struct Do_intersect_surface {
-    const BodyQueries& queries;
+    const QueriedDomain& domain;
     template <class Query>
     Surface_patch operator()(const Query& query) const {
-      return is_finite(query) ? queries.find_patch(query) : Surface_patch();
+      return is_finite(query) ? domain.get_queries().find_patch(query) : Surface_patch();
     }
   };
-  Do_intersect_surface do_intersect_surface_object() const { return {*queries_}; }
+  Do_intersect_surface do_intersect_surface_object() const { return {*this}; }
 
   struct Construct_intersection {
-    const BodyQueries& queries;
+    const QueriedDomain& domain;
     template <class Query>
     Intersection operator()(const Query& query) const {
-      return is_finite(query) ? queries.find_crossing(query) : Intersection();
+      return is_finite(query) ? domain.get_queries().find_crossing(query) : Intersection();
     }
   };
-  Construct_intersection construct_intersection_object() const { return {*queries_}; }
+  Construct_intersection construct_intersection_object() const { return {*this}; }
 
  private:
   /// A segment, a ray or a line, by two of its points.
@@ -142,7 +144,13 @@ class QueriedDomain {
     return std::isfinite(sum);
   }
 
+  const BodyQueries& get_queries() const {
+    if (*stop_) throw std::runtime_error(kTouching);
+    return *queries_;
+  }
+
   const BodyQueries* queries_;
+  const std::atomic<bool>* stop_;
 };
 
 /// The domain with its sharp curves, and a bound on the balls that are placed on them: where curves cannot be parted, CGAL places ever
@@ -185,9 +193,10 @@ class Mesh3Body final : public DelaunayBody {
     namespace p = CGAL::parameters;
     // The random numbers restart, so that the same sizes give the same mesh whatever was made before.
     CGAL::get_default_random() = CGAL::Random(0);
-    queries_->stop = nullptr;
+    stop_ = false;
+    queries_->is_refining = false;
     queries_->restart(sizes.max_nodes);
-    domain_ = std::make_unique<Domain>(queries_.get());
+    domain_ = std::make_unique<Domain>(queries_.get(), &stop_);
     if (!curves_.empty()) domain_->add_features(curves_.begin(), curves_.end());
     // The nodes on the sharp edges and twice as many more: they are part of a fifth of max_nodes.
     domain_->max_balls = 2000 + sizes.max_nodes / 8;
@@ -203,13 +212,13 @@ class Mesh3Body final : public DelaunayBody {
     CGAL::Mesh_error_code unused = CGAL::CGAL_MESH_3_NO_ERROR;
     if (!curves_.empty()) CGAL::Mesh_3::internal::init_c3t3_with_features(complex_, *domain_, criteria, false, sizes.max_nodes, &unused);
     insert_first_points(sizes.edge_m);
-    Watchdog watchdog(2 + 1.5e-4 * static_cast<double>(sizes.max_nodes));
-    queries_->stop = &watchdog.stop;
+    const Watchdog watchdog(2 + 1.5e-4 * static_cast<double>(sizes.max_nodes), stop_);
+    queries_->is_refining = true;
     CGAL::refine_mesh_3(complex_, *domain_, criteria, p::no_perturb(), p::no_exude(), p::manifold(),
                         p::mesh_3_options(p::maximal_number_of_vertices = sizes.max_nodes, p::pointer_to_error_code = &unused,
-                                          p::pointer_to_stop_atomic_boolean = &watchdog.stop));
-    queries_->stop = nullptr;
-    if (watchdog.stop) throw std::runtime_error("parts of the surface touch, or nearly so");
+                                          p::pointer_to_stop_atomic_boolean = &stop_));
+    queries_->is_refining = false;
+    if (stop_) throw std::runtime_error(kTouching);
     // Faces are refined before cells: where they alone met the bound there is no cell, and that is no sign of too few nodes.
     if (complex_.number_of_cells_in_complex() == 0 && complex_.triangulation().number_of_vertices() >= sizes.max_nodes)
       throw std::runtime_error("its faces meet in angles too sharp for elements of this size");
@@ -224,6 +233,7 @@ class Mesh3Body final : public DelaunayBody {
   }
 
  private:
+  std::atomic<bool> stop_{false};  // set by the watchdog
   std::unique_ptr<BodyQueries> queries_;
   std::unique_ptr<Domain> domain_;
   std::vector<Polyline> polylines_;         // the sharp curves,

@@ -22,8 +22,7 @@ class FieldQueries final : public DomainQueries<Domain> {
     // Refinement can try without end to separate what touches at a point; no node comes of it, so their bound does not end it.
     evaluations_ = 0;
     const auto body = [this](const Kernel::Point_3& p) {
-      // stop is set while elements are refined.
-      if (++evaluations_ > (stop ? max_refining_ : max_evaluations_) || (stop && *stop))
+      if (++evaluations_ > (is_refining ? max_refining_ : max_evaluations_))
         throw std::runtime_error("parts of its surface touch, or nearly so");
       return calc_body(field_, wall_m_, {p.x(), p.y(), p.z()});
     };

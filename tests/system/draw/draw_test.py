@@ -59,8 +59,8 @@ def read_png(path):
                 if kind == 3:
                     guess = (left + up) // 2
                 else:
-                    far, near, across = abs(up - corner), abs(left - corner), abs(left + up - 2 * corner)
-                    guess = left if far <= near and far <= across else up if near <= across else corner
+                    to_left, to_up, to_corner = abs(up - corner), abs(left - corner), abs(left + up - 2 * corner)
+                    guess = left if to_left <= to_up and to_left <= to_corner else up if to_up <= to_corner else corner
                 out[i + 3] = (byte + guess) & 255
             row = numpy.array(out[3:])
         image[y] = (row & 255).astype(numpy.uint8).ravel()

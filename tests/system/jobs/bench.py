@@ -67,7 +67,7 @@ class Bench(unittest.TestCase):
             cwd=self.folder,
             env=self.environment,
             stdin=subprocess.DEVNULL,
-            timeout=options.pop("timeout", 120),
+            timeout=options.pop("timeout", 360),
             **options,
         )
         if code is not None:
@@ -80,7 +80,7 @@ class Bench(unittest.TestCase):
 
     def refuse(self, *words, says, code=2):
         """One clear error: the words, one line, no control characters."""
-        done = self.run_it(*words, code=code, timeout=30)
+        done = self.run_it(*words, code=code, timeout=120)
         for word in says if isinstance(says, (list, tuple)) else [says]:
             self.assertIn(word, done.stderr)
         self.assertFalse([c for c in done.stderr if ord(c) < 32 and c != "\n"], repr(done.stderr))

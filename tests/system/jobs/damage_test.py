@@ -106,7 +106,7 @@ class Damage(Bench):
         before = sorted(path.name for path in victim.iterdir())
         shutil.rmtree(work)
         work.symlink_to(victim)
-        self.run_it("run", "--quiet", timeout=30)
+        self.run_it("run", "--quiet", timeout=120)
         self.assertEqual(sorted(path.name for path in victim.iterdir()), before)
         self.assertEqual(self.ask("status")["jobs"][0]["state"], "failed")
         self.run_it("submit", job)
@@ -132,13 +132,13 @@ class Damage(Bench):
         srun.chmod(0o755)
         environment = {**self.environment, "PATH": f"{programs}:/usr/bin:/bin", "WORK": str(work), "OMPI_MCA_ess_singleton_isolated": "1"}
         attempt = [BIN / "carillon", "attempt", work, "--ranks", "1", "--launcher", "srun"]
-        done = subprocess.run(attempt, capture_output=True, text=True, env={**environment, "VICTIM": str(victim)}, timeout=60)
+        done = subprocess.run(attempt, capture_output=True, text=True, env={**environment, "VICTIM": str(victim)}, timeout=180)
         self.assertNotEqual(done.returncode, 0)
         self.assertEqual({path.name: path.read_bytes() for path in victim.iterdir()}, before)
         self.assertIn("a link or a file is in its place: remove it", (work.with_name(work.name + ".aside") / "log").read_text())
         work.unlink()
         work.with_name(work.name + ".aside").rename(work)
-        subprocess.run(attempt, check=True, capture_output=True, env=environment, timeout=60)
+        subprocess.run(attempt, check=True, capture_output=True, env=environment, timeout=180)
         self.assertEqual(self.ask("status")["jobs"][0]["state"], "done")
 
     def test_gc_empties_no_folder_that_is_linked(self):
@@ -361,7 +361,7 @@ class Damage(Bench):
         job = self.write("body.json", make_job(body={"surface": "body.off", "nodes": 300}))
         command = [programs / "carillon", "--store", self.store]
         subprocess.run([*command, "submit", job], check=True, stdout=subprocess.DEVNULL, env=self.environment)
-        subprocess.run([*command, "run", "--quiet"], check=True, env=self.environment, timeout=60)
+        subprocess.run([*command, "run", "--quiet"], check=True, env=self.environment, timeout=180)
         state = self.ask("status")["jobs"][0]
         self.assertEqual((state["state"], state["attempts"]), ("failed", 1))
         self.assertIn("Segmentation fault", state["reason"])

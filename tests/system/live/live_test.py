@@ -17,7 +17,7 @@ ENVIRONMENT = {**os.environ, "JACK_DEFAULT_SERVER": SERVER, "JACK_NO_AUDIO_RESER
 
 
 def live(*arguments, environment=ENVIRONMENT):
-    return subprocess.run([BIN / "carillon-live", *map(str, arguments)], capture_output=True, text=True, timeout=60, env=environment)
+    return subprocess.run([BIN / "carillon-live", *map(str, arguments)], capture_output=True, text=True, timeout=180, env=environment)
 
 
 class Live(unittest.TestCase):

@@ -32,7 +32,7 @@ def run(folder, program, *words):
         cwd=folder,
         capture_output=True,
         stdin=subprocess.DEVNULL,
-        timeout=100,
+        timeout=300,
         env={**os.environ, "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"},
     )
 

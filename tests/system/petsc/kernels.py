@@ -38,7 +38,7 @@ def read_blas_line(environment, launcher=()):
     with tempfile.TemporaryDirectory() as folder:
         pathlib.Path(folder, "job.json").write_text(json.dumps(JOB))
         child = subprocess.run(
-            [*launcher, PROGRAM, "job.json"], env=RULES | environment, capture_output=True, text=True, timeout=100, cwd=folder
+            [*launcher, PROGRAM, "job.json"], env=RULES | environment, capture_output=True, text=True, timeout=300, cwd=folder
         )
         if child.returncode != 0:
             raise RuntimeError(f"exit code {child.returncode}\n{child.stdout}{child.stderr}")
