@@ -212,11 +212,13 @@ class Mesh3Body final : public DelaunayBody {
     CGAL::Mesh_error_code unused = CGAL::CGAL_MESH_3_NO_ERROR;
     if (!curves_.empty()) CGAL::Mesh_3::internal::init_c3t3_with_features(complex_, *domain_, criteria, false, sizes.max_nodes, &unused);
     insert_first_points(sizes.edge_m);
-    const Watchdog watchdog(2 + 1.5e-4 * static_cast<double>(sizes.max_nodes), stop_);
     queries_->is_refining = true;
-    CGAL::refine_mesh_3(complex_, *domain_, criteria, p::no_perturb(), p::no_exude(), p::manifold(),
-                        p::mesh_3_options(p::maximal_number_of_vertices = sizes.max_nodes, p::pointer_to_error_code = &unused,
-                                          p::pointer_to_stop_atomic_boolean = &stop_));
+    {
+      const Watchdog watchdog(2 + 1.5e-4 * static_cast<double>(sizes.max_nodes), stop_);
+      CGAL::refine_mesh_3(complex_, *domain_, criteria, p::no_perturb(), p::no_exude(), p::manifold(),
+                          p::mesh_3_options(p::maximal_number_of_vertices = sizes.max_nodes, p::pointer_to_error_code = &unused,
+                                            p::pointer_to_stop_atomic_boolean = &stop_));
+    }
     queries_->is_refining = false;
     if (stop_) throw std::runtime_error(kTouching);
     // Faces are refined before cells: where they alone met the bound there is no cell, and that is no sign of too few nodes.
