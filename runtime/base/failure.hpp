@@ -1,6 +1,7 @@
 // Errors that say to a program what their message says to a person.
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "runtime/base/error.hpp"
@@ -18,6 +19,17 @@ class PlacedError : public InputError {
 
  private:
   std::string place_;
+};
+
+/// A count of nodes that was asked for cannot be met, and another one can.
+class CountRefusal : public InputError {
+ public:
+  /// `possible_nodes`: what to ask for in its place, about; above 0.
+  CountRefusal(const std::string& message, std::int64_t possible_nodes) : InputError(message), possible_nodes_(possible_nodes) {}
+  std::int64_t get_possible_nodes() const { return possible_nodes_; }
+
+ private:
+  std::int64_t possible_nodes_;
 };
 
 /// There is not as much memory as the work needs.

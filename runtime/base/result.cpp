@@ -26,6 +26,8 @@ void rethrow_after(const std::string& before) {
     throw;
   } catch (const PlacedError& error) {
     throw PlacedError(error.get_place(), before + error.get_message());
+  } catch (const CountRefusal& error) {
+    throw CountRefusal(before + error.what(), error.get_possible_nodes());
   } catch (const InputError& error) {
     throw InputError(before + error.what());
   } catch (const SolveError& error) {
@@ -67,6 +69,8 @@ Result describe_error(const std::exception_ptr& error, const std::string& no_mem
     std::rethrow_exception(error);
   } catch (const PlacedError& e) {
     return {ResultKind::bad_input, e.what(), e.get_place()};
+  } catch (const CountRefusal& e) {
+    return {.kind = ResultKind::bad_input, .message = e.what(), .possible_nodes = e.get_possible_nodes()};
   } catch (const InputError& e) {
     return {ResultKind::bad_input, e.what()};
   } catch (const SolveError& e) {
@@ -79,6 +83,26 @@ Result describe_error(const std::exception_ptr& error, const std::string& no_mem
     return {ResultKind::memory, no_memory};
   } catch (const std::exception& e) {
     return {ResultKind::system, e.what()};
+  } catch (...) {
+    return {ResultKind::system, "an unknown exception was thrown"};
+  }
+}
+
+void throw_error(const Result& result) {
+  switch (result.kind) {
+    case ResultKind::bad_input:
+      if (!result.place.empty() && result.message.starts_with(result.place + ": "))
+        throw PlacedError(result.place, result.message.substr(result.place.size() + 2));
+      if (result.possible_nodes > 0) throw CountRefusal(result.message, result.possible_nodes);
+      throw InputError(result.message);
+    case ResultKind::no_solution:
+      throw SolveError(result.message);
+    case ResultKind::memory:
+      throw MemoryError(result.message, result.need_bytes);
+    case ResultKind::disk_full:
+      throw DiskFullError(result.message);
+    default:
+      throw SystemError(result.message);
   }
 }
 
@@ -88,6 +112,7 @@ bool write_result(const std::filesystem::path& file, const Result& result) {
   if (!result.message.empty()) root.set("message", result.message);
   if (!result.place.empty()) root.set("place", result.place);
   if (result.need_bytes > 0.0) root.set("need_bytes", decimals(result.need_bytes, 0));
+  if (result.possible_nodes > 0) root.set("possible_nodes", result.possible_nodes);
   root.set("resumable", result.is_resumable);
   try {
     write_file(file, root.text());
@@ -99,6 +124,7 @@ bool write_result(const std::filesystem::path& file, const Result& result) {
 
 std::optional<Result> read_result(const std::filesystem::path& file) {
   constexpr std::uint64_t kMaxBytes = 1 << 20;
+  constexpr std::int64_t kMaxCount = 1'000'000'000'000'000;
   try {
     Object root = parse_document(read_file(file, "result", kMaxBytes), file).root();
     const std::string word = root.string("kind");
@@ -109,6 +135,7 @@ std::optional<Result> read_result(const std::filesystem::path& file) {
     result.message = root.string_or("message", "");
     result.place = root.string_or("place", "");
     result.need_bytes = root.number_or("need_bytes", 0.0);
+    result.possible_nodes = root.has("possible_nodes") ? root.integer("possible_nodes", 1, kMaxCount) : 0;
     result.is_resumable = root.boolean_or("resumable", false);
     return result;
   } catch (const InputError&) {

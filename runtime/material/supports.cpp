@@ -6,15 +6,18 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 
 #include "runtime/material/solids.hpp"
+#include "runtime/material/table.hpp"
 
 namespace carillon::material {
 namespace {
 
 constexpr double kMaxLoss = 1.0;  // d = omega eta / 2: a mode that loses more hardly swings
 constexpr double kMaxThicknessM = 100.0;
+constexpr double kWallRad2S2 = 4e7;  // lambda at 1 kHz, where the loss of a wall is taken
 constexpr double kMaxMassKg = 1e9, kMaxDampingNsM = 1e12, kMaxStiffnessNM = 1e15;
 
 struct Joint {
@@ -66,17 +69,25 @@ Base read_lumped(base::Object& object) {
 
 /// A wall of another thickness or material.
 Base read_wall(base::Object& object) {
-  Base base{.kind = BaseKind::kPlate};
+  Base base{.kind = BaseKind::kPlate, .loss_factor = 0.01};
   const auto read = [&](const char* key, double min, double max) {
     const double value = object.number(key, base::kPositive);
     if (!(value >= min && value <= max)) object.fail(key, fmt::format("{:g} is out of range; give {:g} to {:g}", value, min, max));
     return value;
   };
-  base.young_modulus_pa = read("young_modulus_pa", kMinStiffnessPa, kMaxStiffnessPa);
-  base.density_kg_m3 = read("density_kg_m3", kMinDensityKgM3, kMaxDensityKgM3);
+  if (object.has("material")) {
+    const Material& material = MaterialTable::get().require(object.find_place("material"), object.string("material")).material;
+    base.young_modulus_pa = material.young_modulus_pa;
+    base.poisson_ratio = material.poisson_ratio;
+    base.density_kg_m3 = material.density_kg_m3;
+    base.loss_factor = 2.0 * material.calc_decay_per_s(kWallRad2S2) / std::sqrt(kWallRad2S2);
+  }
+  if (!object.has("material") || object.has("young_modulus_pa"))
+    base.young_modulus_pa = read("young_modulus_pa", kMinStiffnessPa, kMaxStiffnessPa);
+  if (!object.has("material") || object.has("density_kg_m3")) base.density_kg_m3 = read("density_kg_m3", kMinDensityKgM3, kMaxDensityKgM3);
   base.thickness_m = read("thickness_m", 1e-6, kMaxThicknessM);
-  base.poisson_ratio = object.number_or("poisson_ratio", 0.2, {-1.0, 0.5});
-  base.loss_factor = read_amount(object, "loss_factor", 0.01, kMaxLoss);
+  base.poisson_ratio = object.number_or("poisson_ratio", base.poisson_ratio, {-1.0, 0.5});
+  base.loss_factor = read_amount(object, "loss_factor", base.loss_factor, kMaxLoss);
   object.finish();
   return base;
 }
@@ -84,7 +95,8 @@ Base read_wall(base::Object& object) {
 Base read_base(base::Object& object) {
   if (object.has_object("on")) {
     base::Object base = object.object("on");
-    if (base.has("thickness_m") || base.has("young_modulus_pa") || base.has("density_kg_m3")) return read_wall(base);
+    if (base.has("material") || base.has("thickness_m") || base.has("young_modulus_pa") || base.has("density_kg_m3"))
+      return read_wall(base);
     Base lumped = read_lumped(base);
     if (lumped.mass_kg == 0.0 && lumped.damping_n_s_m == 0.0 && lumped.stiffness_n_m == 0.0)
       object.fail("on",
