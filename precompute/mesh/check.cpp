@@ -13,6 +13,7 @@
 
 #include "precompute/mesh/check_parts.hpp"
 #include "precompute/mesh/faces.hpp"
+#include "precompute/mesh/parts.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::mesh {

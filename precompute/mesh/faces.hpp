@@ -23,30 +23,4 @@ std::vector<Face> sort_faces(const TetMesh& mesh, const std::vector<std::int32_t
 /// The edge between the local corners i and j, as an index into kEdges.
 int find_edge(int i, int j);
 
-/// Things joined to parts (nodes, triangles); find() is cheap through path halving.
-class Parts {
- public:
-  explicit Parts(std::size_t count) : parent_(count) {
-    for (std::size_t i = 0; i < count; ++i) parent_[i] = static_cast<std::int32_t>(i);
-  }
-  std::int32_t find(std::int32_t i) {
-    while (parent_[static_cast<std::size_t>(i)] != i) {
-      auto& up = parent_[static_cast<std::size_t>(i)];
-      up = parent_[static_cast<std::size_t>(up)];
-      i = up;
-    }
-    return i;
-  }
-  /// The smaller number stands for both.
-  void join(std::int32_t i, std::int32_t j) {
-    i = find(i);
-    j = find(j);
-    if (i < j) parent_[static_cast<std::size_t>(j)] = i;
-    if (j < i) parent_[static_cast<std::size_t>(i)] = j;
-  }
-
- private:
-  std::vector<std::int32_t> parent_;
-};
-
 }  // namespace carillon::mesh

@@ -37,7 +37,8 @@ MeshFormat find_format(std::string_view bytes, const std::string& name, const st
   if (head.starts_with("# vtk DataFile")) throw InputError(fmt::format("{}:1: a legacy VTK file; {}: save as .vtu", name, kReadable));
   if (extension == ".mesh") return MeshFormat::kMedit;
   if (extension == ".msh") return MeshFormat::kGmsh;
-  if (extension == ".stl" || extension == ".obj" || extension == ".ply" || extension == ".off")
+  if (extension == ".stl" || extension == ".obj" || extension == ".ply" || extension == ".off" || extension == ".glb" ||
+      extension == ".gltf")
     throw InputError(
         fmt::format("{}: a surface ({}), not a volume mesh; make one with carillon-mesh {} -o OUT.msh", name, extension, name));
   throw InputError(fmt::format("{}:1: not a mesh file that is known (it begins with {}); {}", name,

@@ -40,7 +40,9 @@ DistanceField make_field(const Body& body, const SurfaceOptions& options, double
     try {
       // Outside, stuffing reads one edge away; the wrap's offset widens what is inside.
       return calc_distance_field(body.repaired.surface, voxel,
-                                 {std::max(4 * voxel, std::min(edge_m, diagonal / 20)), body.wall_m + 4 * voxel}, body.repaired.offset_m);
+                                 {std::max(4 * voxel, std::min(edge_m, diagonal / 20)),
+                                  std::max(body.wall_m + 4 * voxel, options.method == Method::kStuffing ? 2 * edge_m : 0.0)},
+                                 body.repaired.offset_m);
     } catch (const InputError& failure) {
       throw InputError(fmt::format("{}: {}", options.surface.string(), failure.what()));
     }
@@ -61,9 +63,9 @@ std::unique_ptr<DelaunayBody> make_delaunay(Body& body, const SurfaceOptions& op
   curves.clear();
   report.sharp_edges_m = 0;
   report.sharp_curves = 0;
-  if (keep_sharp && !report.wrapped) {
+  if (keep_sharp && !report.wrapped && !body.is_scan) {
     const double diagonal = calc_box(body.repaired.surface.points).diagonal();
-    curves = find_sharp_curves(body.repaired.surface, options.sharp_angle_deg, std::min(2 * edge_m, 0.1 * diagonal), 2 * edge_m);
+    curves = find_sharp_curves(body.repaired.surface, options.sharp_angle_deg, std::min(3 * edge_m, 0.1 * diagonal), 2 * edge_m);
     report.sharp_curves = static_cast<std::int64_t>(curves.size());
     for (const Polyline& curve : curves)
       for (std::size_t i = 1; i < curve.size(); ++i) report.sharp_edges_m += norm(curve[i] - curve[i - 1]);

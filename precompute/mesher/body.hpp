@@ -22,6 +22,7 @@ constexpr double kEdgePerThickness = 1.4;
 
 struct Body {
   RepairedSurface repaired;
+  bool is_scan = false;                // its sharp edges are noise
   std::optional<RoundSurface> round;   // the smooth surface of which repaired.surface is a cut
   std::optional<DistanceField> field;  // of a shell, a repaired surface, or for stuffing
   std::optional<NearestPoint> nearest;

@@ -80,6 +80,13 @@ std::vector<SizedPoint> calc_curve_sizes(const std::vector<Polyline>& curves, do
   return narrow;
 }
 
+double calc_distance(const std::vector<Polyline>& curves, const Vec3& p) {
+  double least = HUGE_VAL, along = 0;
+  for (const Polyline& curve : curves)
+    for (std::size_t i = 1; i < curve.size(); ++i) least = std::min(least, calc_distance(p, {curve[i - 1], curve[i], 0, 0}, along));
+  return least;
+}
+
 double calc_size(const std::vector<SizedPoint>& narrow, double edge_m, const Vec3& p) {
   double size = edge_m;
   for (const SizedPoint& n : narrow) {

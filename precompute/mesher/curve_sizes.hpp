@@ -17,6 +17,9 @@ struct SizedPoint {
 /// edge_m need. Curves that end in a common point do not hinder each other. Empty if all curves lie far enough apart.
 std::vector<SizedPoint> calc_curve_sizes(const std::vector<Polyline>& curves, double edge_m);
 
+/// How far p lies from the nearest curve; infinity if there is none.
+double calc_distance(const std::vector<Polyline>& curves, const Vec3& p);
+
 /// The longest edge at p: at most edge_m, and growing away from the narrow places by half the distance.
 double calc_size(const std::vector<SizedPoint>& narrow, double edge_m, const Vec3& p);
 

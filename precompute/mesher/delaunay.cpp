@@ -30,17 +30,21 @@ void dump_c3t3_edges(const Complex&, const std::string&) {}
 #include <condition_variable>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <stdexcept>
 #include <thread>
 #include <unordered_map>
 #include <utility>
 
 #include "precompute/mesher/body_queries.hpp"
+#include "precompute/mesher/tet_quality.hpp"
 #include "runtime/base/clock.hpp"
 
 namespace carillon::mesher {
 namespace {
 
+constexpr std::int64_t kMaxPinches = 10;
+constexpr double kPerturbed = 0.75;  // of the angle asked for: the rest is for smooth.cpp, in less time
 constexpr const char* kTouching = "parts of the surface touch, or nearly so";
 
 /// Sets `stop` once the thread that made it has computed for `limit_s` more. CGAL's refinement can loop without end where skins
@@ -171,7 +175,8 @@ class BoundedCurves : public CGAL::Mesh_domain_with_polyline_features_3<QueriedD
   mutable std::size_t balls_ = 0;
 };
 
-/// DelaunayBody by Mesh_3. Keeps true: a mesh depends on its sizes alone, because refine() restarts CGAL's random numbers and the queries.
+/// DelaunayBody by Mesh_3. Keeps true: a mesh depends on its sizes and on whether an earlier one touched itself, because refine() restarts
+/// CGAL's random numbers and the queries.
 class Mesh3Body final : public DelaunayBody {
   using Domain = BoundedCurves;
   using Triangulation = CGAL::Mesh_triangulation_3<Domain, CGAL::Default, CGAL::Sequential_tag>::type;
@@ -206,21 +211,20 @@ class Mesh3Body final : public DelaunayBody {
     const auto calc_edge = [this, edge_m = sizes.edge_m](const Point& at, int, const TriangulationIndex&) -> double {
       return calc_size(narrow_, edge_m, {at.x(), at.y(), at.z()});
     };
-    const Criteria criteria(p::edge_size = calc_edge, p::facet_angle = 25, p::facet_size = radius, p::facet_distance = sizes.distance_m,
-                            p::cell_radius_edge_ratio = 2, p::cell_size = radius);
+    criteria_.emplace(p::edge_size = calc_edge, p::facet_angle = 25, p::facet_size = radius, p::facet_distance = sizes.distance_m,
+                      p::cell_radius_edge_ratio = 2, p::cell_size = radius);
     // A bound on the nodes ends what would otherwise never end: balls between curves that nearly touch.
     CGAL::Mesh_error_code unused = CGAL::CGAL_MESH_3_NO_ERROR;
-    if (!curves_.empty()) CGAL::Mesh_3::internal::init_c3t3_with_features(complex_, *domain_, criteria, false, sizes.max_nodes, &unused);
+    if (!curves_.empty()) CGAL::Mesh_3::internal::init_c3t3_with_features(complex_, *domain_, *criteria_, false, sizes.max_nodes, &unused);
     insert_first_points(sizes.edge_m);
-    queries_->is_refining = true;
-    {
-      const Watchdog watchdog(2 + 1.5e-4 * static_cast<double>(sizes.max_nodes), stop_);
-      CGAL::refine_mesh_3(complex_, *domain_, criteria, p::no_perturb(), p::no_exude(), p::manifold(),
-                          p::mesh_3_options(p::maximal_number_of_vertices = sizes.max_nodes, p::pointer_to_error_code = &unused,
-                                            p::pointer_to_stop_atomic_boolean = &stop_));
+    max_nodes_ = sizes.max_nodes;
+    // To ask for a boundary that is a surface means to look at every edge again and again, and nearly all of it is one anyway. A few
+    // pinches are repaired for less; bodies that touch themselves have many, and then at every size.
+    refine_complex(touches_ ? p::manifold() : p::non_manifold());
+    if (!touches_ && count_pinches() > kMaxPinches) {
+      touches_ = true;
+      refine_complex(p::manifold());
     }
-    queries_->is_refining = false;
-    if (stop_) throw std::runtime_error(kTouching);
     // Faces are refined before cells: where they alone met the bound there is no cell, and that is no sign of too few nodes.
     if (complex_.number_of_cells_in_complex() == 0 && complex_.triangulation().number_of_vertices() >= sizes.max_nodes)
       throw std::runtime_error("its faces meet in angles too sharp for elements of this size");
@@ -229,7 +233,11 @@ class Mesh3Body final : public DelaunayBody {
 
   mesh::TetMesh optimise(double angle_deg) override {
     namespace p = CGAL::parameters;
-    CGAL::perturb_mesh_3(complex_, *domain_, p::time_limit = 0, p::sliver_bound = angle_deg);
+    if (angle_deg <= 0) return extract();
+    // Exudation removes nine slivers of ten in a tenth of the time; what is left is for perturbation, and what that makes for exudation
+    // again.
+    CGAL::exude_mesh_3(complex_, p::time_limit = 0, p::sliver_bound = angle_deg);
+    CGAL::perturb_mesh_3(complex_, *domain_, p::time_limit = 0, p::sliver_bound = kPerturbed * angle_deg);
     CGAL::exude_mesh_3(complex_, p::time_limit = 0, p::sliver_bound = angle_deg);
     return extract();
   }
@@ -243,6 +251,34 @@ class Mesh3Body final : public DelaunayBody {
 
   // Mesh_3 bounds circumradii; the mean edge of the tetrahedra it makes is about 1.1 times that bound.
   static constexpr double kRadiusPerEdge = 0.9;
+
+  void refine_complex(const CGAL::parameters::internal::Manifold_options& topology) {
+    namespace p = CGAL::parameters;
+    CGAL::Mesh_error_code unused = CGAL::CGAL_MESH_3_NO_ERROR;
+    queries_->is_refining = true;
+    {
+      const Watchdog watchdog(2 + 1.5e-4 * static_cast<double>(max_nodes_), stop_);
+      CGAL::refine_mesh_3(complex_, *domain_, *criteria_, p::no_perturb(), p::no_exude(), topology,
+                          p::mesh_3_options(p::maximal_number_of_vertices = max_nodes_, p::pointer_to_error_code = &unused,
+                                            p::pointer_to_stop_atomic_boolean = &stop_));
+    }
+    queries_->is_refining = false;
+    if (stop_) throw std::runtime_error(kTouching);
+  }
+
+  /// At how many edges and nodes the boundary touches itself.
+  std::int64_t count_pinches() const {
+    std::unordered_map<const void*, std::int32_t> number;
+    std::vector<Triangle> faces;
+    for (auto facet = complex_.facets_in_complex_begin(); facet != complex_.facets_in_complex_end(); ++facet) {
+      faces.emplace_back();
+      for (int c = 0; c < 3; ++c) {
+        const void* const v = &*facet->first->vertex((facet->second + 1 + c) % 4);
+        faces.back()[c] = number.try_emplace(v, static_cast<std::int32_t>(number.size())).first->second;
+      }
+    }
+    return mesher::count_pinches(faces);
+  }
 
   void insert_first_points(double edge_m) {
     auto& triangulation = complex_.triangulation();
@@ -281,6 +317,9 @@ class Mesh3Body final : public DelaunayBody {
   }
 
   Complex complex_;
+  std::optional<Criteria> criteria_;
+  std::size_t max_nodes_ = 0;
+  bool touches_ = false;            // parts of the boundary do, unless they are kept apart
   std::vector<SizedPoint> narrow_;  // where curves lie closer together than edges are long
 };
 

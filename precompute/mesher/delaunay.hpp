@@ -22,10 +22,10 @@ struct DelaunaySizes {
 class DelaunayBody {
  public:
   virtual ~DelaunayBody() = default;
-  /// Refines from the start. Returns the mesh as it is then, with slivers; linear. Throws std::runtime_error if curves or skins lie so
-  /// close to each other that it would not end.
+  /// Refines from the start. Returns the mesh as it is then, with slivers; linear, and its boundary may touch itself at a few nodes. Throws
+  /// std::runtime_error if curves or skins lie so close to each other that it would not end.
   virtual mesh::TetMesh refine(const DelaunaySizes& sizes) = 0;
-  /// Perturbs and exudes the last refined mesh until no dihedral angle is under `angle_deg`, or none can be raised.
+  /// Exudes and perturbs the last refined mesh until few dihedral angles are under `angle_deg`; 0: leaves them as they are.
   virtual mesh::TetMesh optimise(double angle_deg) = 0;
 };
 

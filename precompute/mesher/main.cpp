@@ -38,10 +38,11 @@ struct Order {
   std::map<std::string, double> lengths;  // --wall, --height and the dimensions of shapes, by name without dashes
   std::optional<double> scale, edge, close_holes;
   std::optional<long long> nodes;
-  std::string up, method;
-  int order = 1;
+  std::string up, method, side;
+  std::optional<int> order;
   bool straight = false, facets = false;
   bool estimate = false;
+  bool look = false;
   bool quiet = false;
 };
 
@@ -87,6 +88,7 @@ std::string describe_shapes() {
          "Exit codes: 0 done, 2 the input cannot be used, 4 the machine refused (disk, memory).\n"
          "Examples:\n"
          "  carillon-mesh bunny.obj -o bunny.msh --height 0.13 --wall 0.005 --nodes 37000\n"
+         "  carillon-mesh cup.obj -o cup.msh --wall 0.003\n"
          "  carillon-mesh --shape tube --length 0.4 --outer-radius 0.0125 --wall 0.001 --order 2 -o chime.msh\n";
 }
 
@@ -108,7 +110,8 @@ void check_options(const Order& order) {
     throw InputError(fmt::format("both a surface ({}) and --shape {} are given; give one of them", order.surface, order.shape));
   }
   if (order.nodes && order.edge) throw InputError("--nodes and --edge exclude each other; give one of them");
-  if (order.straight && order.order != 2) throw InputError("--straight is for tetrahedra of ten nodes; add --order 2");
+  if (order.straight && order.order.value_or(order.method == "extrude" ? 2 : 1) != 2)
+    throw InputError("--straight is for tetrahedra of ten nodes; add --order 2");
   if (!base::is_standard_output(order.out) && std::filesystem::path(order.out).extension() != ".msh") {
     throw InputError(
         fmt::format("{}: the mesh is written in Gmsh's format (.vtu, .mesh and .node are read but not written); give the output a name "
@@ -129,6 +132,7 @@ void check_options(const Order& order) {
     const char* foreign = order.scale             ? "--scale"
                           : !order.up.empty()     ? "--up"
                           : !order.method.empty() ? "--method"
+                          : !order.side.empty()   ? "--side"
                           : order.close_holes     ? "--close-holes"
                           : order.facets          ? "--facets"
                           : order.estimate        ? "--estimate"
@@ -145,6 +149,8 @@ void check_options(const Order& order) {
     if (!(value > 0.0) || !std::isfinite(value))
       throw InputError(fmt::format("--{} is {:g}; give a positive length in metres", name, value));
   }
+  if (!order.side.empty() && !order.lengths.contains("wall"))
+    throw InputError("--side says where a wall lies; give its thickness with --wall");
   if (order.scale && order.lengths.contains("height")) throw InputError("--height and --scale exclude each other; give one of them");
   if (order.scale && (!(*order.scale > 0.0) || !std::isfinite(*order.scale))) {
     throw InputError(fmt::format("--scale is {:g}; give a positive factor, metres per unit of the file", *order.scale));
@@ -161,11 +167,15 @@ Meshed make_from_surface(const Order& order, const mesher::Progress& progress) {
   options.close_holes = order.close_holes;
   options.edge_m = order.edge;
   options.nodes = order.nodes;
-  options.order = order.order;
+  options.order = order.order.value_or(0);
   options.straight = order.straight;
   options.facets = order.facets;
   if (order.method == "delaunay") options.method = mesher::Method::kDelaunay;
   if (order.method == "stuffing") options.method = mesher::Method::kStuffing;
+  if (order.method == "extrude") options.method = mesher::Method::kExtrusion;
+  if (order.side == "middle") options.side = mesher::Side::kMiddle;
+  if (order.side == "outside") options.side = mesher::Side::kOutside;
+  if (order.side == "inside") options.side = mesher::Side::kInside;
   Meshed result;
   mesher::SurfaceReport report;
   result.mesh = mesher::mesh_surface(options, report, progress);
@@ -181,7 +191,7 @@ Meshed make_from_shape(const Order& order, const mesher::Progress& progress) {
   shapes::ShapeOptions options;
   options.shape = order.shape;
   options.dimensions = order.lengths;
-  options.order = order.order;
+  options.order = order.order.value_or(1);
   options.target_nodes = order.nodes;
   options.edge_m = order.edge;
   Meshed result;
@@ -221,7 +231,11 @@ std::string format_json(const Order& order, const Meshed& result, const mesh::Ch
   root.set("mean_ratio_min", base::decimals(check.mean_ratio_min, 5)).set("mean_ratio_mean", base::decimals(check.mean_ratio_mean, 5));
   if (result.surface) {
     const mesher::SurfaceReport& s = *result.surface;
-    root.set("method", s.method == mesher::Method::kStuffing ? "stuffing" : "delaunay").set("input_triangles", s.input_triangles);
+    root.set("method", s.method == mesher::Method::kStuffing    ? "stuffing"
+                       : s.method == mesher::Method::kExtrusion ? "extrude"
+                                                                : "delaunay");
+    root.set("method_reason", s.reason).set("smoothed_m", rounded(s.smoothed_m, 6)).set("input_triangles", s.input_triangles);
+    root.set("layers", s.layers).set("edge_per_wall", rounded(s.edge_per_wall, 6));
     root.set("scale", exact(s.scale)).set("input_volume_m3", exact(s.input_volume_m3)).set("facet_pieces", s.facet_pieces);
     root.set("holes_closed", s.holes_closed).set("largest_hole_m", rounded(s.largest_hole_m, 9));
     root.set("largest_hole_part", rounded(s.largest_hole_part, 6)).set("holes_area_part", rounded(s.holes_area_part, 6));
@@ -282,13 +296,7 @@ void make_mesh(const Order& order) {
     throw InputError(fmt::format("--json {}: the report would overwrite the mesh; give it another name", order.json));
   }
 
-  Meshed result;
-  try {
-    result = order.shape.empty() ? make_from_surface(order, progress) : make_from_shape(order, progress);
-  } catch (const mesher::CountRefusal& refusal) {
-    if (order.estimate) fmt::print(stderr, "instead {}\n", base::Json::object().set("nodes", refusal.nodes).line());  // for programs
-    throw;
-  }
+  Meshed result = order.shape.empty() ? make_from_surface(order, progress) : make_from_shape(order, progress);
   note_count(order, result);
   progress("checking the mesh");
   auto phase = Clock::now();
@@ -332,20 +340,41 @@ void make_mesh(const Order& order) {
   throw InputError(message);
 }
 
+/// --look
+void print_look(const Order& order) {
+  if (order.surface.empty()) throw InputError("--look is for surfaces; give a SURFACE file");
+  const mesher::SurfaceLook look = mesher::look_at_surface(order.surface);
+  base::Json root = base::Json::object();
+  root.set("surface", order.surface).set("triangles", look.triangles).set("parts", look.parts).set("openings", look.openings);
+  root.set("extent", base::Json::array(look.extent));
+  root.set("thickness", look.thickness > 0.0 ? base::Json(look.thickness) : base::Json());
+  fmt::print("{}\n", root.line());
+}
+
 void make(int argc, char** argv, Order& order) {
-  CLI::App app("Meshes a closed surface, or a parametric body, with tetrahedra.");
+  CLI::App app("Meshes a surface, or a parametric body, with tetrahedra.");
   app.name("carillon-mesh");
   app.footer(describe_shapes());
-  app.add_option("SURFACE", order.surface, "Closed surface: OBJ, STL, PLY or OFF");
+  app.add_option("SURFACE", order.surface, "Closed surface, or with --wall an open one: OBJ, STL, PLY, OFF, glTF or GLB");
   app.add_option("--shape", order.shape, fmt::format("A parametric body in place of a surface: {}", fmt::join(list_shapes(), ", ")));
-  app.add_option("-o,--output", order.out, "The mesh to write, Gmsh 4.1 (.msh); - is standard output")->required();
+  app.add_option("-o,--output", order.out, "The mesh to write, Gmsh 4.1 (.msh); - is standard output");
+  app.add_flag(
+      "--look", order.look,
+      "Surface: meshes nothing and prints what the file holds, as JSON: triangles, extents in its own units, openings, parts, and the "
+      "thickness of a surface that is both sides of a wall");
   app.add_option("--scale", order.scale, "Surface: metres per unit of the file");
   app.add_option("--up", order.up, "Surface: the axis along which --height is measured [y]")->check(CLI::IsMember({"x", "y", "z"}));
-  app.add_option("--method", order.method, "Surface: delaunay (keeps sharp edges) or stuffing (fast, takes raw scans, rounds edges) [auto]")
-      ->check(CLI::IsMember({"auto", "delaunay", "stuffing"}));
+  app.add_option("--method", order.method,
+                 "Surface: delaunay (keeps sharp edges and tips), stuffing (fast, rounds edges, cuts thin tips) or extrude (thin walls: "
+                 "one layer of elements) [auto]")
+      ->check(CLI::IsMember({"auto", "delaunay", "stuffing", "extrude"}));
+  app.add_option("--side", order.side,
+                 "Surface with --wall: which side of the wall it is, middle, outside or inside [of an open surface middle, else outside]")
+      ->check(CLI::IsMember({"middle", "outside", "inside"}));
   app.add_option("--nodes", order.nodes, "About how many nodes, mid-side nodes among them (within 10 %)");
   app.add_option("--edge", order.edge, "Length of the edges in metres, in place of --nodes");
-  app.add_option("--order", order.order, "1: tetrahedra of four nodes, 2: of ten [1]")->check(CLI::IsMember({1, 2}));
+  app.add_option("--order", order.order, "1: tetrahedra of four nodes, 2: of ten [2 where a wall is extruded, else 1]")
+      ->check(CLI::IsMember({1, 2}));
   app.add_flag("--straight", order.straight, "Order 2: mid-side nodes in the middle of their edges, not on the true surface");
   app.add_flag("--facets", order.facets, "Surface: its facets are the body; without this a smooth surface through their corners is");
   app.add_option(
@@ -357,11 +386,14 @@ void make(int argc, char** argv, Order& order) {
   app.add_flag(
       "--estimate", order.estimate,
       "Surface: says on standard error volume, area, thickness and about how many nodes there will be, in JSON, of the surface as it "
-      "was read (rough) and repaired (estimate); and of a count that cannot be met, which can (instead)");
+      "was read (rough) and repaired (estimate)");
   app.add_flag("-q,--quiet", order.quiet, "Print nothing but notes on the mesh and errors, on standard error");
   app.set_version_flag("--version", version::describe("carillon-mesh"));
   std::map<std::string, std::string> help{
-      {"wall", "Surface: thickness of the hollow shell in metres, inward; solid without it. Also of tube, sphere, bowl and hollow-box"},
+      {"wall",
+       "Surface: thickness in metres of an open sheet, or of the shell inside a closed surface, solid without it. Also of tube, sphere, "
+       "bowl "
+       "and hollow-box"},
       {"height", "Surface: scales it to this extent in metres along --up. Also a dimension of box, hollow-box and cone"},
       {"radius", "Radius of sphere, cylinder, disc, ring and cone in metres, see below; for tube and bowl the same as --outer-radius"},
       {"opening-angle", "Of a bowl, in degrees; see below"}};
@@ -379,6 +411,8 @@ void make(int argc, char** argv, Order& order) {
     throw InputError(fmt::format("{}; see carillon-mesh --help", error.what()));
   }
   complete_radius(order);
+  if (order.look) return print_look(order);
+  if (order.out.empty()) throw InputError("-o is missing: say where the mesh goes, a file that ends in .msh");
   make_mesh(order);
 }
 

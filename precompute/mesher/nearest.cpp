@@ -44,4 +44,15 @@ std::pair<Vec3, std::int32_t> NearestPoint::find_on(const Vec3& p) const {
   return {{q.x(), q.y(), q.z()}, tree_->number[static_cast<std::size_t>(triangle - tree_->triangles.cbegin())]};
 }
 
+std::optional<std::pair<double, std::int32_t>> NearestPoint::find_hit(const Vec3& from, const Vec3& way, std::int32_t own) const {
+  const Kernel::Ray_3 ray(Kernel::Point_3(from[0], from[1], from[2]), Kernel::Vector_3(way[0], way[1], way[2]));
+  const auto number_of = [&](auto triangle) { return tree_->number[static_cast<std::size_t>(triangle - tree_->triangles.cbegin())]; };
+  const auto hit = tree_->tree.first_intersected_primitive(ray, [&](auto triangle) { return number_of(triangle) == own; });
+  if (!hit) return std::nullopt;
+  const Kernel::Triangle_3& t = **hit;
+  const auto normal = CGAL::cross_product(t[1] - t[0], t[2] - t[0]);
+  const double slope = normal * ray.to_vector();
+  return std::pair{slope != 0 ? normal * (t[0] - ray.source()) / slope : 0.0, number_of(*hit)};
+}
+
 }  // namespace carillon::mesher

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "precompute/mesher/triangle_surface.hpp"
@@ -18,6 +19,8 @@ class NearestPoint {
   Vec3 find(const Vec3& p) const;
   /// The same, and its triangle.
   std::pair<Vec3, std::int32_t> find_on(const Vec3& p) const;
+  /// The nearest triangle that a ray meets, but `own` (-1: none), and how far away along the unit vector `way`.
+  std::optional<std::pair<double, std::int32_t>> find_hit(const Vec3& from, const Vec3& way, std::int32_t own) const;
 
  private:
   struct Tree;

@@ -35,8 +35,7 @@ std::int64_t place_on_smooth_surface(mesh::TetMesh& mesh, const Body& body, bool
   linear.nodes_m = mesh.nodes_m;
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e) linear.tets.insert(linear.tets.end(), mesh.tet(e).begin(), mesh.tet(e).begin() + 4);
   std::vector<char> on_skin(mesh.nodes_m.size(), 0);
-  std::set<std::array<std::int32_t, 2>> edges;  // of the skin
-  const auto make_edge = [](std::int32_t a, std::int32_t b) { return std::array{std::min(a, b), std::max(a, b)}; };
+  std::set<Edge> edges;  // of the skin
   for (const Triangle& t : find_boundary(linear))
     for (int c = 0; c < 3; ++c) {
       on_skin[t[c]] = 1;

@@ -1,8 +1,9 @@
 // Reads a surface: picks the reader by the ending of the name and cuts what it found into triangles. The readers are our own
-// (surface_text.cpp, read_ply.cpp, read_stl.cpp), for files come from strangers.
+// (surface_text.cpp, read_ply.cpp, read_stl.cpp, read_gltf.cpp), for files come from strangers.
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cmath>
 
@@ -17,13 +18,14 @@ namespace {
 /// No surface that could be meshed here is larger; what is, is no surface.
 constexpr std::uint64_t kMaxBytes = 16ULL << 30;
 
-/// "obj", "stl", "ply" or "off".
+/// "obj", "stl", "ply", "off", "gltf" or "glb".
 std::string find_format(const std::filesystem::path& path) {
   std::string ending = path.extension().string();
   std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  if (ending != ".obj" && ending != ".stl" && ending != ".ply" && ending != ".off")
-    throw InputError(
-        fmt::format("{}: a surface is read from .obj, .stl, .ply or .off files, not from '{}'; convert it first", path.string(), ending));
+  constexpr std::array<std::string_view, 6> kEndings{".obj", ".stl", ".ply", ".off", ".gltf", ".glb"};
+  if (std::find(kEndings.begin(), kEndings.end(), ending) == kEndings.end())
+    throw InputError(fmt::format("{}: a surface is read from .obj, .stl, .ply, .off, .gltf or .glb files, not from '{}'; convert it first",
+                                 path.string(), ending));
   return ending.substr(1);
 }
 
@@ -77,10 +79,12 @@ void add_polygon(const std::vector<Vec3>& points, Polygon polygon, std::vector<T
 
 TriangleSurface parse_surface(std::string_view bytes, const std::string& name, const std::string& format) {
   if (bytes.starts_with("\xEF\xBB\xBF")) bytes.remove_prefix(3);  // a byte-order mark of UTF-8
-  PolygonSoup soup = format == "obj"   ? parse_obj(bytes, name)
-                     : format == "off" ? parse_off(bytes, name)
-                     : format == "ply" ? parse_ply(bytes, name)
-                                       : parse_stl(bytes, name);
+  PolygonSoup soup = format == "obj"    ? parse_obj(bytes, name)
+                     : format == "off"  ? parse_off(bytes, name)
+                     : format == "ply"  ? parse_ply(bytes, name)
+                     : format == "gltf" ? parse_gltf(bytes, name)
+                     : format == "glb"  ? parse_glb(bytes, name)
+                                        : parse_stl(bytes, name);
   TriangleSurface surface;
   surface.points = std::move(soup.points);
   std::size_t first = 0;
@@ -96,6 +100,8 @@ TriangleSurface parse_surface(std::string_view bytes, const std::string& name, c
     }
     first = last;
   }
+  if (static_cast<std::int64_t>(surface.triangles.size()) > kMaxTriangles)
+    throw InputError(fmt::format("{}: {} ({} are in it)", name, kTooManyTriangles, surface.triangles.size()));
   if (surface.triangles.empty())
     throw InputError(
         fmt::format("{}: no triangles in it ({} points were read); a closed triangle surface is needed", name, surface.points.size()));

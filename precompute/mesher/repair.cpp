@@ -12,6 +12,8 @@
 #include <CGAL/Surface_mesh.h>
 #include <CGAL/alpha_wrap_3.h>
 
+#include <algorithm>
+
 namespace carillon::mesher {
 namespace {
 
@@ -67,6 +69,18 @@ bool is_clean(const TriangleSurface& surface) {
     if (PMP::is_degenerate_triangle_face(face, mesh)) return false;
   // The nesting is looked at by ourselves: CGAL's own test crashes on surfaces of very different lengths.
   return CGAL::is_closed(mesh) && !PMP::does_self_intersect(mesh) && is_nested(surface);
+}
+
+std::optional<std::array<std::int32_t, 2>> find_crossing(const TriangleSurface& surface) {
+  const auto polygons = make_polygons(surface.triangles);
+  if (!PMP::is_polygon_soup_a_polygon_mesh(polygons)) return std::array{0, 0};
+  Mesh mesh;
+  PMP::polygon_soup_to_polygon_mesh(make_points(surface.points), polygons, mesh);
+  std::vector<std::pair<Mesh::Face_index, Mesh::Face_index>> crossing;
+  PMP::self_intersections<CGAL::Sequential_tag>(mesh, std::back_inserter(crossing));
+  if (crossing.empty()) return std::nullopt;
+  const auto first = std::min_element(crossing.begin(), crossing.end());
+  return std::array{static_cast<std::int32_t>(first->first), static_cast<std::int32_t>(first->second)};
 }
 
 TriangleSurface wrap(const TriangleSurface& surface, double alpha_m, double offset_m) {

@@ -8,12 +8,13 @@
 #include <cmath>
 #include <map>
 #include <numbers>
-#include <numeric>
 #include <optional>
 #include <unordered_map>
 
+#include "precompute/mesh/parts.hpp"
 #include "precompute/mesher/repair.hpp"
 #include "precompute/mesher/surface.hpp"
+#include "precompute/mesher/thin_wall.hpp"
 #include "precompute/mesher/triangle_surface.hpp"
 #include "runtime/base/error.hpp"
 
@@ -23,17 +24,13 @@ namespace {
 // A hole counts as the diameter of a circle of the area of the triangles over it, in parts of the body's diagonal: cracks of no width are
 // no holes. Raw scans of the kind of the Stanford bunny leave up to 0.11 open where the object stood; the mouth of a cup is 0.3 and more.
 constexpr double kLargestHole = 0.15;
+constexpr double kSmallestOpening = 0.02;      // of the diagonal, as kLargestHole
+constexpr double kOpeningTurn = 60;            // degrees, between what would fill it and the surface around it
 constexpr double kLargestHolesTogether = 0.3;  // of the closed surface's area
 // Points closer than this part of the diagonal are one: coordinates in single precision differ by more.
 constexpr double kSamePoint = 1e-9;
 constexpr std::size_t kMaxComponentsNested = 2000;
 
-using Edge = std::array<std::int32_t, 2>;
-struct EdgeHash {
-  std::size_t operator()(const Edge& e) const {
-    return static_cast<std::size_t>(e[0]) * 0x9E3779B97F4A7C15ull ^ (static_cast<std::size_t>(e[1]) * 0xC2B2AE3D27D4EB4Full >> 7);
-  }
-};
 struct PointHash {
   std::size_t operator()(const std::array<std::int64_t, 3>& c) const {
     std::size_t h = 0;
@@ -41,8 +38,6 @@ struct PointHash {
     return h ^ (h >> 29);
   }
 };
-
-Edge make_edge(std::int32_t a, std::int32_t b) { return a < b ? Edge{a, b} : Edge{b, a}; }
 
 /// The faces at each undirected edge; +f+1 where the face runs along it upward (low to high index), -f-1 downward.
 using EdgeFaces = std::unordered_map<Edge, std::vector<std::int32_t>, EdgeHash>;
@@ -59,23 +54,15 @@ EdgeFaces find_edge_faces(const std::vector<Triangle>& triangles) {
 
 /// Groups of faces joined by edges that have exactly two faces; with `any_edge` by all edges.
 std::vector<std::int32_t> find_patches(const EdgeFaces& edges, std::size_t face_count, bool any_edge, std::int32_t& count) {
-  std::vector<std::int32_t> root(face_count);
-  std::iota(root.begin(), root.end(), 0);
-  const auto find = [&](std::int32_t f) {
-    while (root[f] != f) f = root[f] = root[root[f]];
-    return f;
-  };
+  mesh::Parts parts(face_count);
   for (const auto& [edge, faces] : edges) {
     if (!any_edge && faces.size() != 2) continue;
-    for (std::size_t i = 1; i < faces.size(); ++i) {
-      const std::int32_t a = find(std::abs(faces[0]) - 1), b = find(std::abs(faces[i]) - 1);
-      root[std::max(a, b)] = std::min(a, b);
-    }
+    for (std::size_t i = 1; i < faces.size(); ++i) parts.join(std::abs(faces[0]) - 1, std::abs(faces[i]) - 1);
   }
   std::vector<std::int32_t> patch(face_count);
   count = 0;
   for (std::size_t f = 0; f < face_count; ++f) {
-    const std::int32_t r = find(static_cast<std::int32_t>(f));
+    const std::int32_t r = parts.find(static_cast<std::int32_t>(f));
     patch[f] = r == static_cast<std::int32_t>(f) ? count++ : patch[r];
   }
   return patch;
@@ -200,6 +187,47 @@ double calc_across(const Polyline& polygon) {
   return farthest;
 }
 
+/// The triangles of a polygon's points that fill it.
+std::vector<Triangle> fill_loop(const Polyline& polygon) {
+  std::vector<Triangle> fill = fill_polygon(polygon);
+  if (fill.empty())  // a crack of no width: any triangles between its sides do
+    for (std::int32_t c = 1; c + 1 < static_cast<std::int32_t>(polygon.size()); ++c) fill.push_back({0, c, c + 1});
+  return fill;
+}
+
+/// Whether one of the loops is an opening of a vessel or a tube rather than a hole: what would fill it is large enough, and turns away from
+/// the surface around it, in the mean along its border.
+bool has_opening(const TriangleSurface& surface, const std::vector<std::vector<std::int32_t>>& loops) {
+  const double diagonal = calc_box(surface.points).diagonal();
+  const auto calc_area_vector = [](const std::vector<Vec3>& points, const Triangle& t) {
+    return cross(points[static_cast<std::size_t>(t[1])] - points[static_cast<std::size_t>(t[0])],
+                 points[static_cast<std::size_t>(t[2])] - points[static_cast<std::size_t>(t[0])]);
+  };
+  const EdgeFaces edges = find_edge_faces(surface.triangles);
+  return std::any_of(loops.begin(), loops.end(), [&](const std::vector<std::int32_t>& loop) {
+    Polyline polygon;
+    for (const std::int32_t v : loop) polygon.push_back(surface.points[static_cast<std::size_t>(v)]);
+    if (loop.size() < 3) return false;
+    const std::vector<Triangle> fill = fill_loop(polygon);
+    if (2 * std::sqrt(calc_area({polygon, fill}) / std::numbers::pi) < kSmallestOpening * diagonal) return false;
+    double turn = 0, length = 0;
+    const auto count = static_cast<std::int32_t>(loop.size());
+    for (const Triangle& t : fill)
+      for (int c = 0; c < 3; ++c) {
+        const std::int32_t i = t[c], j = t[(c + 1) % 3];
+        if ((i + 1) % count != j && (j + 1) % count != i) continue;  // inside
+        const auto found = edges.find(make_edge(loop[static_cast<std::size_t>(i)], loop[static_cast<std::size_t>(j)]));
+        if (found == edges.end() || found->second.size() != 1) continue;
+        const Vec3 own = calc_area_vector(polygon, t);
+        const Vec3 other = calc_area_vector(surface.points, surface.triangles[static_cast<std::size_t>(std::abs(found->second[0]) - 1)]);
+        const double edge = norm(polygon[static_cast<std::size_t>(j)] - polygon[static_cast<std::size_t>(i)]);
+        turn += edge * std::atan2(norm(cross(own, other)), dot(own, other)) * 180 / std::numbers::pi;
+        length += edge;
+      }
+    return turn > kOpeningTurn * length;
+  });
+}
+
 /// Fills every loop. False, and nothing changed, if one is larger than `close_holes` (in parts of the diagonal; without it as far as
 /// kLargestHole and kLargestHolesTogether go).
 bool fill_loops(TriangleSurface& surface, const std::vector<std::vector<std::int32_t>>& loops, const std::optional<double>& close_holes,
@@ -211,9 +239,7 @@ bool fill_loops(TriangleSurface& surface, const std::vector<std::vector<std::int
     Polyline polygon;
     for (const std::int32_t v : loop) polygon.push_back(surface.points[static_cast<std::size_t>(v)]);
     if (loop.size() == 2) continue;  // an edge there and back closes itself
-    std::vector<Triangle> fill = fill_polygon(polygon);
-    if (fill.empty())  // a crack of no width: any triangles between its sides do
-      for (std::int32_t c = 1; c + 1 < static_cast<std::int32_t>(loop.size()); ++c) fill.push_back({0, c, c + 1});
+    const std::vector<Triangle> fill = fill_loop(polygon);
     const double area = calc_area({polygon, fill});
     ++holes.count;
     holes.area_m2 += area;
@@ -332,19 +358,67 @@ std::string describe_hole(double across_m, double part, double area_part) {
                                 : fmt::format("holes are closed up to {:.0f} % of the surface together, and these are {:.0f} %",
                                               100 * kLargestHolesTogether, 100 * holes.area_m2 / (holes.surface_m2 + holes.area_m2));
   throw InputError(fmt::format(
-      "{}: {} {}; a closed surface is needed, and {}: close it in a modeller, give the sheet a thickness, or have it closed with "
-      "--close-holes {:.2g} (of a job's body: \"close_holes\")",
+      "{}: {} {}; a closed surface is needed, and {}: close it in a modeller, give the sheet a thickness with --wall (of a job's body: "
+      "\"wall_m\"), or have it closed with --close-holes {:.2g} (\"close_holes\")",
       options.surface.string(), which, describe_hole(holes.largest_across_m, holes.largest_part, area_part), limit,
       std::min(1.0, std::ceil(100 * holes.largest_part + 1) / 100)));
 }
 
 }  // namespace
 
+std::optional<Sheet> find_sheet(const TriangleSurface& surface, const SurfaceOptions& options) {
+  Sheet sheet{.surface = surface};
+  weld(sheet.surface, kSamePoint * calc_box(surface.points).diagonal());
+  SurfaceReport& report = sheet.report;
+  report.removed_triangles = drop_useless(sheet.surface.triangles, false);
+  if (sheet.surface.triangles.empty()) return std::nullopt;
+  report.input_vertices = static_cast<std::int64_t>(sheet.surface.points.size());
+  bool whole = false;
+  if (find_loops(sheet.surface.triangles, whole).empty()) return std::nullopt;
+  report.flipped_triangles = orient_patches(sheet.surface.triangles);
+  const auto loops = find_loops(sheet.surface.triangles, whole);
+  if (loops.empty()) return std::nullopt;
+  Holes holes;
+  TriangleSurface closed = sheet.surface;
+  const bool is_closed = fill_loops(closed, loops, options.close_holes, holes);
+  if (is_closed && (options.close_holes || !has_opening(sheet.surface, loops))) return std::nullopt;
+  if (is_closed) closed = sheet.surface;
+  sheet.holes = holes.count;
+  // Facing out where it is a vessel; a sheet that is hardly bent stays as it is.
+  SurfaceOptions all = options;
+  all.close_holes = 1;
+  if (fill_loops(closed, loops, all.close_holes, holes)) {
+    constexpr double kHollow = 0.01;
+    const double volume = calc_volume(closed);
+    if (volume < -kHollow * std::pow(calc_area(sheet.surface), 1.5)) {
+      for (Triangle& t : sheet.surface.triangles) std::swap(t[1], t[2]);
+      report.flipped_triangles = static_cast<std::int64_t>(sheet.surface.triangles.size()) - report.flipped_triangles;
+    }
+  }
+  const auto describe_edge = [&](const Edge& e, std::size_t faces) {
+    const Vec3 p = 0.5 * (sheet.surface.points[static_cast<std::size_t>(e[0])] + sheet.surface.points[static_cast<std::size_t>(e[1])]);
+    return fmt::format("{} of its triangles meet in one edge at ({:.4g}, {:.4g}, {:.4g}) in the file's units", faces, p[0], p[1], p[2]);
+  };
+  std::optional<Edge> first;
+  for (const auto& [edge, faces] : find_edge_faces(sheet.surface.triangles)) {
+    if (faces.size() <= 2) continue;
+    if (first && *first < edge) continue;
+    first = edge;
+    sheet.fault = describe_edge(edge, faces.size());
+  }
+  std::int32_t parts = 0;
+  find_patches(find_edge_faces(sheet.surface.triangles), sheet.surface.triangles.size(), true, parts);
+  report.components = parts;
+  return sheet;
+}
+
 RepairedSurface repair_surface(TriangleSurface surface, const SurfaceOptions& options, SurfaceReport& report) {
   const double diagonal = calc_box(surface.points).diagonal();
   const auto refuse_open = [&](const std::string& what) {
-    throw InputError(fmt::format("{}: {}; a closed surface is needed: close its openings, or give the sheet a thickness, in a modeller",
-                                 options.surface.string(), what));
+    throw InputError(
+        fmt::format("{}: {}; a closed surface is needed: close its openings in a modeller, or give the sheet a thickness with --wall (of "
+                    "a job's body: \"wall_m\")",
+                    options.surface.string(), what));
   };
   // What is missing of a body is at most this part of its skin; a sheet lacks half of it.
   constexpr double kSheet = 0.4;

@@ -15,8 +15,8 @@
 #include <cmath>
 #include <map>
 #include <numbers>
-#include <numeric>
 
+#include "precompute/mesh/parts.hpp"
 #include "precompute/mesher/bends.hpp"
 
 namespace carillon::mesher {
@@ -59,18 +59,12 @@ struct RoundSurface::Patches {
 
   /// One normal for all corners at a point that hang together by edges which are not sharp.
   void find_corner_normals() {
-    std::vector<std::int32_t> root(corner.size());
-    std::iota(root.begin(), root.end(), 0);
-    const auto find = [&](std::int32_t c) {
-      while (root[c] != c) c = root[c] = root[root[c]];
-      return c;
-    };
+    mesh::Parts parts(corner.size());
     std::vector<char> rules(corner.size(), 0), yields(corner.size(), 0);  // its face keeps its normal at this point, or yields
     for (const Bend& edge : bends.edges) {
       if (edge.sharp) continue;
       for (const std::int32_t v : edge.ends) {
-        const std::int32_t a = find(get_corner(edge.faces[0], v)), b = find(get_corner(edge.faces[1], v));
-        root[std::max(a, b)] = std::min(a, b);
+        parts.join(get_corner(edge.faces[0], v), get_corner(edge.faces[1], v));
         if (edge.straight < 0) continue;
         for (const std::int32_t c : bends.corners_at[v]) {
           if (bends.pane[c / 3] == bends.pane[edge.faces[edge.straight]]) rules[c] = 1;
@@ -85,13 +79,14 @@ struct RoundSurface::Patches {
       const double squares = dot(a, a) * dot(b, b);
       if (!(squares > 0)) continue;
       const Vec3 part = (1 / squares) * cross(a, b);
-      all[find(c)] = all[find(c)] + part;
-      if (rules[c] != 0 && yields[c] == 0) sum[find(c)] = sum[find(c)] + part;
+      const std::int32_t r = parts.find(c);
+      all[r] = all[r] + part;
+      if (rules[c] != 0 && yields[c] == 0) sum[r] = sum[r] + part;
     }
+    std::vector<std::int32_t> root(corner.size());
     for (std::int32_t c = 0; c < static_cast<std::int32_t>(corner.size()); ++c) {
-      const std::int32_t r = find(c);
+      const std::int32_t r = root[c] = parts.find(c);
       corner[c] = calc_unit(norm(sum[r]) > 0 ? sum[r] : all[r]);
-      root[c] = r;
     }
     find_tips();
     tilt_rims(root);
@@ -373,6 +368,29 @@ TriangleSurface RoundSurface::cut(int pieces) {
       }
   }
   return out;
+}
+
+std::vector<std::array<std::int32_t, 2>> RoundSurface::list_folds() const {
+  std::vector<std::array<std::int32_t, 2>> folds;
+  for (const Bend& edge : patches_->bends.edges)
+    if (edge.sharp && edge.count == 2) folds.push_back(edge.ends);
+  return folds;
+}
+
+std::vector<std::array<std::int32_t, 2>> RoundSurface::list_lines() const {
+  std::vector<std::array<std::int32_t, 2>> lines;
+  for (std::size_t e = 0; e < patches_->bends.edges.size(); ++e) {
+    const Bend& edge = patches_->bends.edges[e];
+    if (!edge.sharp) continue;
+    std::int32_t last = edge.ends[0];
+    const auto first = static_cast<std::int32_t>(facets_->points.size() + e * static_cast<std::size_t>(pieces_ - 1));
+    for (int n = 1; n <= pieces_; ++n) {
+      const std::int32_t next = n == pieces_ ? edge.ends[1] : first + n - 1;
+      lines.push_back({last, next});
+      last = next;
+    }
+  }
+  return lines;
 }
 
 RoundSurface::Place RoundSurface::find_place(std::int32_t triangle, const Vec3& p) const {

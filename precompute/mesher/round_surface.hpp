@@ -1,8 +1,10 @@
 // The smooth surface through the corners of a triangle surface.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "precompute/mesher/triangle_surface.hpp"
 
@@ -30,6 +32,12 @@ class RoundSurface {
   /// A triangle surface on the patches: each edge is cut into `pieces`, at most 16. It stands for this surface from now on, and its
   /// triangles for the arguments of find() and find_doubt().
   TriangleSurface cut(int pieces);
+
+  /// The facets themselves; their edges (points, ascending) that are edges of the body and have two facets; and the pieces of those and of
+  /// the border in the last cut().
+  const TriangleSurface& get_facets() const { return *facets_; }
+  std::vector<std::array<std::int32_t, 2>> list_folds() const;
+  std::vector<std::array<std::int32_t, 2>> list_lines() const;
 
   /// The point of the surface that belongs to a point of a triangle of the last cut().
   Vec3 find(std::int32_t triangle, const Vec3& p) const;

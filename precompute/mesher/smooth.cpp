@@ -19,8 +19,6 @@ namespace {
 constexpr int kMaxPasses = 12;
 constexpr std::size_t kMany = 100;
 constexpr double kHardly = 0.95;  // of what they lacked before the pass
-// A boundary node whose faces turn away from their mean by more than this lies on an edge (cosine of 25 degrees).
-constexpr double kSmooth = 0.906;
 
 /// Of element e of a linear mesh.
 double calc_element_flatness(const mesh::TetMesh& mesh, std::int32_t e) {
@@ -28,29 +26,22 @@ double calc_element_flatness(const mesh::TetMesh& mesh, std::int32_t e) {
   return calc_flatness({mesh.nodes_m[tet[0]], mesh.nodes_m[tet[1]], mesh.nodes_m[tet[2]], mesh.nodes_m[tet[3]]});
 }
 
-enum class Place : char { kInside, kSkin, kEdge };
+enum class Place : char { kInside, kSkin, kFixed };
 
-std::vector<Place> find_places(const mesh::TetMesh& mesh) {
+std::vector<Place> find_places(const mesh::TetMesh& mesh, const std::function<bool(const Vec3&)>& is_fixed) {
   std::vector<Place> places(mesh.nodes_m.size(), Place::kInside);
-  std::vector<Vec3> mean(mesh.nodes_m.size(), Vec3{});
-  const auto boundary = find_boundary(mesh);
-  const auto calc_normal = [&](const Triangle& t) {
-    return cross(mesh.nodes_m[t[1]] - mesh.nodes_m[t[0]], mesh.nodes_m[t[2]] - mesh.nodes_m[t[0]]);
-  };
-  for (const Triangle& t : boundary)
-    for (const std::int32_t v : t) mean[v] = mean[v] + calc_normal(t), places[v] = Place::kSkin;
-  for (const Triangle& t : boundary) {
-    const Vec3 normal = calc_normal(t);
-    for (const std::int32_t v : t)
-      if (dot(normal, mean[v]) < kSmooth * norm(normal) * norm(mean[v])) places[v] = Place::kEdge;
-  }
+  for (const Triangle& t : find_boundary(mesh))
+    for (const std::int32_t v : t) places[v] = Place::kSkin;
+  for (std::size_t v = 0; v < places.size(); ++v)
+    if (places[v] == Place::kSkin && is_fixed(mesh.nodes_m[v])) places[v] = Place::kFixed;
   return places;
 }
 
 }  // namespace
 
-std::int64_t better_flat_elements(mesh::TetMesh& mesh, double angle_deg, const std::function<Vec3(const Vec3&)>& project) {
-  const auto places = find_places(mesh);
+std::int64_t better_flat_elements(mesh::TetMesh& mesh, double angle_deg, const std::function<std::optional<Vec3>(const Vec3&)>& project,
+                                  const std::function<bool(const Vec3&)>& is_fixed) {
+  const auto places = find_places(mesh, is_fixed);
   std::vector<std::vector<std::int32_t>> around(mesh.nodes_m.size());
   for (std::int32_t e = 0; e < mesh.tet_count(); ++e)
     for (const std::int32_t v : mesh.tet(e)) around[v].push_back(e);
@@ -72,16 +63,23 @@ std::int64_t better_flat_elements(mesh::TetMesh& mesh, double angle_deg, const s
     const double before = calc_worst(v, -1e9);
     double best = before + 0.01;
     Vec3 best_place = start;
-    for (const double step : {0.3, 0.15, 0.07, 0.03})
+    // Around the best place found so far, in ever smaller steps.
+    for (const double step : {0.3, 0.15, 0.07, 0.03}) {
+      const Vec3 from = best_place;
       for (int n = 0; n < 27; ++n) {
         const Vec3 direction{n % 3 - 1.0, n / 3 % 3 - 1.0, n / 9 - 1.0};
         if (n == 13) continue;
-        Vec3 place = start + (step * length / norm(direction)) * direction;
-        if (places[v] == Place::kSkin) place = project(place);
+        Vec3 place = from + (step * length / norm(direction)) * direction;
+        if (places[v] == Place::kSkin) {
+          const std::optional<Vec3> there = project(place);
+          if (!there) continue;
+          place = *there;
+        }
         if (norm(place - start) > 0.5 * length) continue;
         mesh.nodes_m[v] = place;
         if (const double worst = calc_worst(v, best); worst > best) best = worst, best_place = place;
       }
+    }
     mesh.nodes_m[v] = best_place;
     return best_place != start;
   };
@@ -110,9 +108,23 @@ std::int64_t better_flat_elements(mesh::TetMesh& mesh, double angle_deg, const s
     last = lacking;
     std::sort(flat.begin(), flat.end());
     std::int64_t moves = 0;
+    const auto is_flat = [&](std::int32_t e) { return calc_element_flatness(mesh, e) < angle_deg; };
     for (const auto& [angle, e] : flat)
       for (const std::int32_t v : mesh.tet(e))
-        if (places[v] != Place::kEdge && calc_element_flatness(mesh, e) < angle_deg && move(v)) ++moves;
+        if (places[v] != Place::kFixed && is_flat(e) && move(v)) ++moves;
+    // Where none of its own nodes finds a better place, the next ones make room.
+    if (flat.size() <= kMany)
+      for (const auto& [angle, e] : flat) {
+        if (!is_flat(e)) continue;
+        std::vector<std::int32_t> next;
+        for (const std::int32_t v : mesh.tet(e))
+          for (const std::int32_t other : around[v])
+            for (const std::int32_t w : mesh.tet(other)) next.push_back(w);
+        std::sort(next.begin(), next.end());
+        next.erase(std::unique(next.begin(), next.end()), next.end());
+        for (const std::int32_t w : next)
+          if (places[w] != Place::kFixed && is_flat(e) && move(w)) ++moves;
+      }
     moved += moves;
     if (moves == 0) break;
   }

@@ -14,6 +14,8 @@
 #include "precompute/mesh/curved.hpp"
 #include "precompute/mesher/body.hpp"
 #include "precompute/mesher/curve_mesh.hpp"
+#include "precompute/mesher/curve_sizes.hpp"
+#include "precompute/mesher/extrude.hpp"
 #include "precompute/mesher/guard.hpp"
 #include "precompute/mesher/part_nodes.hpp"
 #include "precompute/mesher/place_nodes.hpp"
@@ -23,17 +25,19 @@
 #include "precompute/mesher/smooth.hpp"
 #include "precompute/mesher/stuffing.hpp"
 #include "precompute/mesher/tet_quality.hpp"
+#include "precompute/mesher/thin_wall.hpp"
 #include "precompute/mesher/triangle_surface.hpp"
 #include "precompute/mesher/verify.hpp"
 #include "runtime/base/error.hpp"
+#include "runtime/base/failure.hpp"
 #include "runtime/base/json.hpp"
 
 namespace carillon::mesher {
 namespace {
 
-constexpr double kCountTolerance = 0.10;  // promised
-constexpr double kCountAim = 0.08;        // where the search is content; half of it for small meshes, which cost nothing
-constexpr double kSmallTarget = 5000;
+constexpr double kCountTolerance = 0.10;             // promised
+constexpr double kCountAim = 0.08;                   // where the search is content; half of it for small meshes, which cost nothing
+constexpr double kSmallTarget = 5000;                // corner nodes
 constexpr int kMaxFinishes = 4;                      // meshes that are finished, as what that changes in the count is learned
 constexpr double kSmallest = 1e-10, kLargest = 1e9;  // bodies, in metres
 constexpr double kFlatDeg = 12;                      // elements flatter than this are improved one by one at the end
@@ -46,6 +50,8 @@ constexpr double kHopeless = 0.4;
 // Processor seconds after which the program gives up (guard_program), of the repair and of what follows. The hollow bunny of 37,000 nodes
 // takes 7 s and is given 670 s.
 constexpr double kMinCpuOfRepair = 10, kMinCpu = 12, kCpuPerTriangle = 2e-3, kCpuPerNode = 5e-3;
+constexpr double kOnCurve = 1e-3;            // of an edge: nodes of sharp curves lie on them but for rounding
+constexpr double kSmoothedPerEdge = 0.1;     // boundary faces lie that far off the surface as it is
 constexpr double kMaxLostByRounding = 0.04;  // of the volume, should sharp edges have to be rounded to meet a count
 
 /// Shows the user a phase and keeps its time.
@@ -98,24 +104,26 @@ void check_options(const SurfaceOptions& o) {
     throw InputError(fmt::format("close_holes is {}; it must be a part of the body's diagonal, from 0 to 1", *o.close_holes));
   if (o.height_m && o.scale) throw InputError("height and scale exclude each other; give one of them");
   if (o.edge_m && o.nodes) throw InputError("edge and nodes exclude each other; give one of them");
-  if (o.order != 1 && o.order != 2) throw InputError(fmt::format("order is {}; it must be 1 or 2", o.order));
-  if (o.nodes && !(*o.nodes >= (o.order == 1 ? 8 : 27) && static_cast<double>(*o.nodes) <= kMaxNodes))
-    throw InputError(fmt::format("nodes is {}; it must be from {} to {:.0f}", *o.nodes, o.order == 1 ? 8 : 27, kMaxNodes));
+  if (o.order < 0 || o.order > 2) throw InputError(fmt::format("order is {}; it must be 1 or 2, or 0 for the method's own", o.order));
+  if (o.nodes && !(*o.nodes >= (o.order <= 1 ? 8 : 27) && static_cast<double>(*o.nodes) <= kMaxNodes))
+    throw InputError(fmt::format("nodes is {}; it must be from {} to {:.0f}", *o.nodes, o.order <= 1 ? 8 : 27, kMaxNodes));
   if (!(o.sharp_angle_deg > 0 && o.sharp_angle_deg <= 180))
     throw InputError(fmt::format("the sharp angle is {} degrees; it must be in (0, 180]", o.sharp_angle_deg));
   if (!(o.sliver_deg >= 0 && o.sliver_deg <= 30))
     throw InputError(fmt::format("the angle of slivers is {} degrees; it must be in [0, 30]", o.sliver_deg));
 }
 
-/// Scales the surface to metres.
-void scale_surface(TriangleSurface& surface, const SurfaceOptions& options, SurfaceReport& report) {
+/// Scales the surface to metres. A sheet may be flat, but not across the axis of its height.
+void scale_surface(TriangleSurface& surface, const SurfaceOptions& options, SurfaceReport& report, bool is_sheet) {
   const Box box = calc_used_box(surface);
   const Vec3 extent = box.extent();
   const int up = static_cast<int>(options.up);
   for (int c = 0; c < 3; ++c)
-    if (!(extent[c] > 1e-9 * box.diagonal()))
-      throw InputError(fmt::format("{}: the surface is flat: its extent along {} is {}; a closed surface that encloses a volume is needed",
-                                   options.surface.string(), "xyz"[c], extent[c]));
+    if (!(extent[c] > 1e-9 * box.diagonal()) && !(is_sheet && (c != up || !options.height_m)))
+      throw InputError(fmt::format(
+          "{}: the surface is flat: its extent along {} is {}; a closed surface that encloses a volume is needed, or --wall for the "
+          "thickness of a sheet (of a job's body: \"wall_m\")",
+          options.surface.string(), "xyz"[c], extent[c]));
   double farthest = 0;
   for (int c = 0; c < 3; ++c) farthest = std::max({farthest, std::abs(box.low[c]), std::abs(box.high[c])});
   if (std::max({extent[0], extent[1], extent[2]}) < 1e-10 * farthest)
@@ -157,11 +165,18 @@ double fit_height(RepairedSurface& repaired, const SurfaceOptions& options, Surf
 /// Makes the body of a fresh mesh sound: no pinched edges or nodes, no crumbs, no element flatter than need be.
 void finish_mesh(mesh::TetMesh& mesh, const Body& body, SurfaceReport& report) {
   const auto project_here = [&](const Vec3& p) { return project(body, p); };
+  peel_flat_elements(mesh);
   report.removed_tets = make_manifold(mesh, report.components);
   const double close = body.field ? 0.25 * body.field->voxel_m : 1e-6 * calc_box(body.repaired.surface.points).diagonal();
   const auto is_on_skin = [&](const Vec3& p) { return calc_off_skin(body, p) <= close; };
   report.parted_nodes = part_pinched_nodes(mesh, report.components, project_here, is_on_skin);
-  better_flat_elements(mesh, kFlatDeg, project_here);
+  const auto project_to_skin = [&](const Vec3& p) -> std::optional<Vec3> {
+    const Vec3 there = project_here(p);
+    return is_on_skin(there) ? std::optional(there) : std::nullopt;
+  };
+  const auto is_on_curve = [&](const Vec3& p) { return calc_distance(body.curves, p) < kOnCurve * report.mean_edge_m; };
+  report.mean_edge_m = measure(mesh).mean_edge_m;
+  better_flat_elements(mesh, kFlatDeg, project_to_skin, is_on_curve);
 }
 
 /// The finished mesh is not the body (verify.hpp); what() is the end of a sentence.
@@ -205,9 +220,15 @@ mesh::TetMesh meet_count(const Body& body, const SurfaceOptions& options, double
   const auto asked = static_cast<double>(*options.nodes);
   double target = asked, nearest = 0;
   for (int n = 0; n < kMaxFinishes; ++n) {
+    const double corners = options.order == 2 ? target / body.model.factor : target;
     mesh::TetMesh mesh = phases.run("refining", [&] {
-      return search_edge({target, options.order, longest, kCountTolerance, target < kSmallTarget ? kCountAim / 2 : kCountAim}, body.model,
-                         edge_m, report.attempts, refine);
+      return search_edge({.target = target,
+                          .order = options.order,
+                          .longest_m = longest,
+                          .tolerance = kCountTolerance,
+                          .contented = corners < kSmallTarget ? kCountAim / 2 : kCountAim,
+                          .is_uncertain = n == 0 && !calc_curve_sizes(body.curves, edge_m).empty()},
+                         body.model, edge_m, report.attempts, refine);
     });
     finish(mesh);
     const double count = std::max(static_cast<double>(count_nodes(mesh, options.order)), 1.0);
@@ -265,7 +286,7 @@ mesh::TetMesh make_delaunay_mesh(Body& body, const SurfaceOptions& options, doub
     auto delaunay = phases.run("finding sharp edges", [&] { return make_delaunay(body, options, edge_m, keep_sharp, report); });
     const auto refine = [&](double edge) { return delaunay->refine(calc_sizes(body, options, edge)); };
     const auto finish = [&](mesh::TetMesh& mesh) {
-      if (options.sliver_deg > 0) mesh = phases.run("removing slivers", [&] { return delaunay->optimise(options.sliver_deg); });
+      mesh = phases.run("removing slivers", [&] { return delaunay->optimise(options.sliver_deg); });
       phases.run("repairing the mesh", [&] { return finish_mesh(mesh, body, report), 0; });
     };
     return meet_count(body, options, edge_m, report, phases, refine, finish);
@@ -418,21 +439,6 @@ void round(Body& body, const SurfaceOptions& options, SurfaceReport& report) {
   body.round = std::move(round);
 }
 
-/// The smooth surface of the height asked for. The patches keep the facets that they were made of, so those are scaled, and rounded again.
-void round_to_height(Body& body, const SurfaceOptions& options, SurfaceReport& report) {
-  const bool is_rounded = !options.facets && !report.wrapped;
-  RepairedSurface facets;
-  if (is_rounded && options.height_m) facets = body.repaired;
-  if (is_rounded) round(body, options, report);
-  const double factor = fit_height(body.repaired, options, report);
-  if (!body.round || factor == 1) return;
-  for (Vec3& p : facets.surface.points) p = factor * p;
-  facets.offset_m *= factor;
-  body.repaired = std::move(facets);
-  body.round.reset();
-  round(body, options, report);
-}
-
 /// What counts the nodes of a body whose surface has this volume and area.
 void set_model(Body& body, const SurfaceOptions& options, double volume_m3, double area_m2) {
   body.wall_m = options.wall_m.value_or(0);
@@ -451,6 +457,38 @@ double find_first_edge(const Body& body, const SurfaceOptions& options) {
   return body.model.find_edge(options.nodes ? static_cast<double>(*options.nodes) : (options.order == 2 ? 30000 : 10000));
 }
 
+/// Takes the noise off a scan, as far as the elements cannot show it anyway.
+void smooth(Body& body, const SurfaceOptions& options, SurfaceReport& report) {
+  body.is_scan = !report.wrapped && is_scan(body.repaired.surface, options.sharp_angle_deg);
+  if (!body.is_scan) return;
+  if (options.facets) {
+    report.notes.push_back("The surface is as rough as a scan: none of its edges was kept sharp.");
+    return;
+  }
+  set_model(body, options, std::abs(calc_volume(body.repaired.surface)), calc_area(body.repaired.surface));
+  report.smoothed_m = smooth_scan(body.repaired.surface, kSmoothedPerEdge * find_first_edge(body, options));
+  body.repaired.clean = body.repaired.clean && is_clean(body.repaired.surface);
+  report.notes.push_back(
+      fmt::format("The surface is as rough as a scan: its noise was smoothed, by up to {:.3g} m, and none of its edges was kept sharp; "
+                  "--facets takes it as it is.",
+                  report.smoothed_m));
+}
+
+/// The smooth surface of the height asked for. The patches keep the facets that they were made of, so those are scaled, and rounded again.
+void round_to_height(Body& body, const SurfaceOptions& options, SurfaceReport& report) {
+  const bool is_rounded = !options.facets && !report.wrapped && !body.is_scan;
+  RepairedSurface facets;
+  if (is_rounded && options.height_m) facets = body.repaired;
+  if (is_rounded) round(body, options, report);
+  const double factor = fit_height(body.repaired, options, report);
+  if (!body.round || factor == 1) return;
+  for (Vec3& p : facets.surface.points) p = factor * p;
+  facets.offset_m *= factor;
+  body.repaired = std::move(facets);
+  body.round.reset();
+  round(body, options, report);
+}
+
 /// The fewest nodes that the thickness allows.
 double calc_min_nodes(const Body& body) { return body.model.calc_nodes(kEdgePerThickness * body.thickness_m); }
 
@@ -463,15 +501,127 @@ std::string format_estimate(const char* word, const Body& body, double edge_m) {
 }
 
 /// Shows an estimate from the surface as it was read: its repair may take long.
-void show_rough_estimate(const TriangleSurface& raw, const SurfaceOptions& options, Phases& phases) {
+void show_rough_estimate(const TriangleSurface& raw, const SurfaceOptions& options, bool is_sheet, Phases& phases) {
   const double volume = std::abs(calc_volume(raw)), area = calc_area(raw);
+  if (is_sheet) {
+    phases.show(fmt::format("rough {}", format_thin_estimate(area, *options.wall_m, options)));
+    return;
+  }
   if (!(volume > 0 && area > 0)) return;
   Body body;
   set_model(body, options, volume, area);
+  // So thin that it will probably be extruded.
+  constexpr double kThin = 0.03;
+  if (options.method == Method::kAutomatic && options.order != 1 && body.thickness_m < kThin * calc_box(raw.points).diagonal()) {
+    phases.show(fmt::format("rough {}", format_thin_estimate(options.wall_m ? area : area / 2, body.thickness_m, options)));
+    return;
+  }
   phases.show(format_estimate("rough", body, find_first_edge(body, options)));
 }
 
-mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Phases& phases) {
+/// Meshes a wall by extrusion. False, with the reason as the end of a sentence, where it cannot be.
+bool extrude_wall(const ThinBody& body, const SurfaceOptions& options, SurfaceReport& report, Phases& phases, mesh::TetMesh& out,
+                  std::string& fault) {
+  const SurfaceReport before = report;
+  try {
+    out = mesh_thin_wall(
+        body, options, report,
+        [&](const std::string& name, const std::function<void()>& work) { phases.run(name, [&] { return work(), 0; }); },
+        [&](const std::string& text) { phases.show(text); });
+    return true;
+  } catch (const WallError& failure) {
+    fault = failure.what();
+    auto seconds = std::move(report.seconds);
+    report = before;
+    report.seconds = std::move(seconds);
+    return false;
+  }
+}
+
+/// An open sheet with a wall.
+mesh::TetMesh make_sheet(Sheet sheet, const SurfaceOptions& options, SurfaceReport& report, Phases& phases) {
+  const auto refuse = [&](const std::string& fault) {
+    throw InputError(fmt::format("{}: it is an open sheet, and its wall {}; change that in a modeller, or give a thinner wall",
+                                 options.surface.string(), fault));
+  };
+  if (!sheet.fault.empty()) refuse("cannot branch: " + sheet.fault + " (a T-junction)");
+  if (options.method == Method::kDelaunay || options.method == Method::kStuffing)
+    throw InputError(fmt::format("{}: it is an open sheet, whose wall only the method extrude makes", options.surface.string()));
+  Body body;
+  body.repaired = {std::move(sheet.surface), 0, false};
+  phases.run("rounding", [&] { return round_to_height(body, options, report), 0; });
+  report.input_area_m2 = calc_area(body.repaired.surface);
+  report.input_volume_m3 = *options.wall_m * report.input_area_m2;
+  const Side side = options.side == Side::kAutomatic ? Side::kMiddle : options.side;
+  report.reason =
+      fmt::format("the surface is open ({} border{}): it is the {} of a wall of {:.3g} mm", sheet.holes, sheet.holes == 1 ? "" : "s",
+                  side == Side::kMiddle    ? "middle"
+                  : side == Side::kOutside ? "outside"
+                                           : "inside",
+                  1000 * *options.wall_m);
+  mesh::TetMesh out;
+  std::string fault;
+  if (!extrude_wall({.skin = body, .wall_m = *options.wall_m, .side = side}, options, report, phases, out, fault)) refuse(fault);
+  return out;
+}
+
+/// The wall of a closed body by extrusion, where that is asked for or its elements are longer than it is thick; nothing where it is left to
+/// the others, and the report says why.
+std::optional<mesh::TetMesh> make_thin(const Body& body, const SurfaceOptions& options, SurfaceReport& report, Phases& phases) {
+  const bool must = options.method == Method::kExtrusion || (options.side != Side::kAutomatic && options.side != Side::kOutside);
+  if (!must && (options.method != Method::kAutomatic || options.order == 1)) return std::nullopt;
+  const auto give_up = [&](const std::string& fault) {
+    if (must) throw InputError(fmt::format("{}: the wall cannot be extruded from this surface: it {}", options.surface.string(), fault));
+    report.reason.clear();
+    report.notes.push_back(
+        fmt::format("The wall is thin, but it {}: the volume was meshed instead of the skin, which takes more nodes.", fault));
+    return std::nullopt;
+  };
+  mesh::TetMesh out;
+  std::string fault;
+  if (options.wall_m) {
+    ThinBody thin{.skin = body, .wall_m = *options.wall_m, .side = options.side == Side::kAutomatic ? Side::kOutside : options.side};
+    const double edge = find_thin_edge(thin, options);
+    if (!must && edge <= *options.wall_m) {
+      report.reason =
+          fmt::format("elements of {:.3g} mm are not longer than the wall is thick ({:.3g} mm)", 1000 * edge, 1000 * *options.wall_m);
+      return std::nullopt;
+    }
+    if (report.wrapped) return give_up("has a surface that could not be closed and was wrapped");
+    report.reason =
+        must ? "it was asked for"
+             : fmt::format("the wall ({:.3g} mm) is thinner than the elements are long ({:.3g} mm)", 1000 * *options.wall_m, 1000 * edge);
+    if (extrude_wall(thin, options, report, phases, out, fault)) return out;
+    return give_up(fault);
+  }
+  std::optional<TwoSides> sides;
+  if (!report.wrapped && report.components <= 2)
+    phases.run("looking for a wall",
+               [&] { return sides = find_two_sides(body.round ? body.round->get_facets() : body.repaired.surface), 0; });
+  if (!sides) {
+    if (must)
+      throw InputError(
+          fmt::format("{}: it is a closed surface and no thin wall; give --wall for the thickness of one", options.surface.string()));
+    return std::nullopt;
+  }
+  Body outer, inner;
+  outer.repaired = {std::move(sides->outer), 0, false};
+  inner.repaired = {std::move(sides->inner), 0, false};
+  if (!options.facets) {
+    round(outer, options, report);
+    round(inner, options, report);
+  }
+  ThinBody thin{.skin = outer, .low = &inner, .wall_m = sides->thickness_m, .expected_volume_m3 = report.input_volume_m3};
+  const double edge = find_thin_edge(thin, options);
+  if (!must && edge <= thin.wall_m) return std::nullopt;
+  report.reason = fmt::format("the body is itself a wall, of {:.3g} mm, and thinner than the elements are long ({:.3g} mm)",
+                              1000 * thin.wall_m, 1000 * edge);
+  if (extrude_wall(thin, options, report, phases, out, fault)) return out;
+  return give_up(fault);
+}
+
+mesh::TetMesh make_mesh(const SurfaceOptions& given, SurfaceReport& report, Phases& phases) {
+  SurfaceOptions options = given;
   Body body;
   TriangleSurface raw = phases.run("reading", [&] { return read_surface(options.surface); });
   report.input_triangles = static_cast<std::int64_t>(raw.triangles.size());
@@ -480,13 +630,35 @@ mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Ph
   };
   const double asked = static_cast<double>(options.nodes.value_or(0));
   std::optional<CpuLimit> cpu_limit(std::in_place, calc_limit(kMinCpuOfRepair, asked));
-  scale_surface(raw, options, report);
-  show_rough_estimate(raw, options, phases);
-  body.repaired = phases.run("repairing", [&] { return repair_surface(std::move(raw), options, report); });
+  std::optional<Sheet> sheet;
+  if (options.wall_m) phases.run("repairing", [&] { return sheet = find_sheet(raw, options), 0; });
+  scale_surface(raw, options, report, sheet.has_value());
+  show_rough_estimate(raw, options, sheet.has_value(), phases);
+  if (sheet) {
+    for (Vec3& p : sheet->surface.points) p = report.scale * p;
+    const auto take = [&] {
+      report.removed_triangles = sheet->report.removed_triangles;
+      report.flipped_triangles = sheet->report.flipped_triangles;
+      report.input_vertices = sheet->report.input_vertices;
+      report.components = sheet->report.components;
+      return make_sheet(std::move(*sheet), options, report, phases);
+    };
+    if (options.method == Method::kExtrusion || (sheet->fault.empty() && sheet->report.components == 1)) return take();
+    try {  // many parts may be the soup of a closed body
+      body.repaired = phases.run("repairing", [&] { return repair_surface(raw, options, report); });
+    } catch (const InputError&) {
+      return take();
+    }
+  } else {
+    body.repaired = phases.run("repairing", [&] { return repair_surface(std::move(raw), options, report); });
+  }
+  phases.run("smoothing", [&] { return smooth(body, options, report), 0; });
   phases.run("rounding", [&] { return round_to_height(body, options, report), 0; });
   const TriangleSurface& surface = body.repaired.surface;
   report.input_area_m2 = calc_area(surface);
   report.input_volume_m3 = body.round ? body.round->calc_volume() : calc_volume(surface) - body.repaired.offset_m * report.input_area_m2;
+  if (std::optional<mesh::TetMesh> thin = make_thin(body, options, report, phases)) return std::move(*thin);
+  if (options.order == 0) options.order = 1;
   set_model(body, options, report.input_volume_m3, report.input_area_m2);
   const double diagonal = calc_box(surface.points).diagonal();
   double edge = find_first_edge(body, options);
@@ -507,6 +679,8 @@ mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Ph
   phases.show(format_estimate("estimate", body, edge));
 
   report.method = options.method == Method::kStuffing ? Method::kStuffing : Method::kDelaunay;
+  if (report.reason.empty())
+    report.reason = options.method != Method::kAutomatic ? "it was asked for" : "it keeps thin tips and sharp edges";
   body.nearest.emplace(surface);
   if (body.wall_m > 0 || !body.repaired.clean || report.method == Method::kStuffing)
     body.field = phases.run("computing distances", [&] { return make_field(body, options, edge); });
@@ -525,7 +699,15 @@ mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Ph
   const auto stuff_body = [&] {
     const auto refine = [&](double e) { return stuff(*body.field, body.wall_m, e); };
     try {
-      return meet_count(body, options, edge, report, phases, refine, [&](mesh::TetMesh& mesh) { finish_mesh(mesh, body, report); });
+      mesh::TetMesh mesh =
+          meet_count(body, options, edge, report, phases, refine, [&](mesh::TetMesh& made) { finish_mesh(made, body, report); });
+      if (const std::string cut = find_cut(mesh, body, edge); !cut.empty())
+        report.notes.push_back(
+            fmt::format("Stuffing needs three cells through the thinnest place, and the body's length within 0.2 %, but the mesh {}: thin "
+                        "places may be cut short, and the error bars of the frequencies do not contain that; take Delaunay refinement, or "
+                        "more nodes.",
+                        cut));
+      return mesh;
     } catch (const CountError& failure) {
       throw_count(options, failure);
     }
@@ -540,6 +722,10 @@ mesh::TetMesh make_mesh(const SurfaceOptions& options, SurfaceReport& report, Ph
     report.notes.push_back(
         "Delaunay refinement did not end on this surface, parts of which touch; isosurface stuffing was used in its place.");
     report.method = Method::kStuffing;
+    report.reason = "Delaunay refinement did not end";
+    SurfaceOptions deep = options;
+    deep.method = Method::kStuffing;
+    body.field = phases.run("computing distances", [&] { return make_field(body, deep, edge); });
     report.sharp_curves = 0;
     report.sharp_edges_m = 0;
     body.curves.clear();
@@ -577,6 +763,23 @@ mesh::TetMesh mesh_surface(const SurfaceOptions& options, SurfaceReport& report,
   } catch (const std::bad_alloc&) {
     throw SystemError(fmt::format("{}: memory ran out while meshing; ask for longer edges or fewer nodes", options.surface.string()));
   }
+}
+
+SurfaceLook look_at_surface(const std::filesystem::path& surface) {
+  const TriangleSurface raw = read_surface(surface);
+  SurfaceLook look;
+  look.triangles = static_cast<std::int64_t>(raw.triangles.size());
+  look.extent = calc_used_box(raw).extent();
+  look.parts = static_cast<std::int64_t>(split_parts(raw).size());
+  SurfaceOptions options;
+  options.surface = surface;
+  if (const std::optional<Sheet> sheet = find_sheet(raw, options)) {
+    look.openings = sheet->holes;
+    look.parts = sheet->report.components;
+  } else if (const std::optional<TwoSides> sides = find_two_sides(raw)) {
+    look.thickness = sides->thickness_m;
+  }
+  return look;
 }
 
 }  // namespace carillon::mesher

@@ -21,24 +21,30 @@ namespace carillon::mesher {
 
 /// How the volume is filled.
 enum class Method {
-  kAutomatic,  // kDelaunay
-  kDelaunay,   // CGAL Mesh_3: no dihedral angle under about 12 degrees, sharp edges kept; 10 to 20 s for 37,000 nodes
-  kStuffing,   // isosurface stuffing on the distance field: 1 to 2 s for 35,000 nodes, sharp edges are rounded
+  kAutomatic,  // kExtrusion of open sheets, and of walls that are thinner than the elements are long; else kDelaunay, and where that
+               // fails kStuffing, with a note if it cuts thin places
+  kDelaunay,   // CGAL Mesh_3: no dihedral angle under about 12 degrees, sharp edges and thin tips kept
+  kStuffing,   // isosurface stuffing on the distance field: faster, sharp edges are rounded, tips thinner than three cells are cut
+  kExtrusion,  // the skin in triangles, and one layer of prisms through the wall: a second or two, 12 nodes (order 2) a point of the skin
 };
 
 /// The axis along which `height_m` is measured.
 enum class Axis { kX = 0, kY = 1, kZ = 2 };
 
+/// Which side of a wall the given surface is.
+enum class Side { kAutomatic, kMiddle, kOutside, kInside };  // automatic: the middle of an open surface, the outside of a closed one
+
 /// What to make of which surface. At most one of height_m and scale, and at most one of edge_m and nodes.
 struct SurfaceOptions {
   std::filesystem::path surface = {};                // OBJ, STL (ASCII or binary), PLY (ASCII or binary), OFF
-  std::optional<double> wall_m = std::nullopt;       // hollow: thickness of the wall, inward from the given surface; without it solid
+  std::optional<double> wall_m = std::nullopt;       // thickness of the wall; without it a closed surface is solid, an open one refused
+  Side side = Side::kAutomatic;                      // of the wall, the given surface; others than the outside of a closed one are extruded
   std::optional<double> height_m = std::nullopt;     // scales the surface so that its extent along `up` is this
   Axis up = Axis::kY;                                // OBJ models stand along y by custom; the coordinates themselves are never turned
   std::optional<double> scale = std::nullopt;        // metres per unit of the file; without scale and height_m the file is in metres
   std::optional<double> edge_m = std::nullopt;       // length of the tetrahedra's edges
   std::optional<std::int64_t> nodes = std::nullopt;  // nodes of the final mesh (order 2: with the mid-side ones), met within 10 %
-  int order = 1;                                     // 1: four nodes a tetrahedron, 2: ten
+  int order = 1;                                     // 1: four nodes a tetrahedron, 2: ten; 0: ten where a wall is extruded, else four
   std::optional<double> close_holes = std::nullopt;  // largest hole that is closed, as a part of the body's diagonal; 0.15 without it
   bool facets = false;                               // the facets are the body, not samples of a smooth surface
   bool straight = false;                             // order 2: all mid-side nodes in the middle, none on the true surface
@@ -59,6 +65,7 @@ struct SurfaceReport {
   double largest_hole_part = 0, holes_area_part = 0;  // of all holes over that of the closed surface
   int facet_pieces = 1;              // into how many each facet's sides were cut to follow the smooth surface through its corners
   double doubt_m = 0;                // how far apart the facets and the smooth surface are where it is not known which is the body
+  double smoothed_m = 0;             // how far the farthest point of a scan was moved to take its noise off; 0: it is no scan
   bool wrapped = false;              // the surface could not be repaired: its alpha wrap was meshed
   std::int64_t components = 0;       // of the input surface after repairing
   double scale = 1;                  // metres per unit of the file, as applied
@@ -88,18 +95,16 @@ struct SurfaceReport {
   double wall_min_m = 0, wall_mean_m = 0, wall_max_m = 0;  // distance of the inner skin's nodes to the input surface
   double layers_mean = 0;                                  // wall over mean edge length: about how many elements lie through the wall
 
+  int layers = 0;            // of prisms through an extruded wall; 0: not extruded
+  double edge_per_wall = 0;  // mean length of the skin's edges over the mean thickness
+  std::string reason;        // why this method was chosen, where it was left open; the end of a sentence "by ... because"
+
   std::array<double, 3> mesh_extent_m{};  // of the mesh
   std::int64_t shells = 0;                // closed surfaces that the mesh's boundary consists of
   double farthest_outside_m = 0;          // a node's distance from the body
 
   std::vector<std::pair<std::string, double>> seconds;  // per phase, in the order they ran
   std::vector<std::string> notes;                       // sentences for the user: what was repaired, what fell short
-};
-
-/// The count asked for cannot be met. `nodes` is what to ask for in its place: the fewest that the thickness allows, or the nearest.
-struct CountRefusal : InputError {
-  CountRefusal(const std::string& what, std::int64_t count) : InputError(what), nodes(count) {}
-  std::int64_t nodes;
 };
 
 /// Called with a short sentence at the start of each phase. Two sentences are for programs, a word and a JSON object: "rough {...}" of the
@@ -122,5 +127,17 @@ void guard_program(const char* program);
 
 /// The report as lines for a person.
 std::string describe(const SurfaceReport& report);
+
+/// What a surface file holds, before it is meshed.
+struct SurfaceLook {
+  std::int64_t triangles = 0;
+  Vec3 extent{};              // in the file's units
+  std::int64_t openings = 0;  // borders of an open surface; 0: closed, but for holes that would be closed
+  std::int64_t parts = 0;     // that do not hang together
+  double thickness = 0.0;     // of a closed surface that is both sides of a wall, in the file's units; 0: it is none
+};
+
+/// Throws InputError as read_surface().
+SurfaceLook look_at_surface(const std::filesystem::path& surface);
 
 }  // namespace carillon::mesher

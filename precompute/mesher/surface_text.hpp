@@ -72,11 +72,19 @@ struct PolygonSoup {
 /// More points or corners than this are refused: indices are of 32 bits.
 constexpr std::int64_t kMaxPoints = 400'000'000;
 
+/// A surface of more triangles is refused: to repair one takes minutes, and what is heard is in far fewer.
+constexpr std::int64_t kMaxTriangles = 5'000'000;
+inline constexpr const char* kTooManyTriangles =
+    "more than 5,000,000 triangles; reduce it in a modeller: a few hundred thousand triangles sound the same";
+
 /// The readers of one format each. They throw InputError naming the line or byte for whatever is not as the format has it, and take no
 /// more memory than a small multiple of the file.
 PolygonSoup parse_obj(std::string_view bytes, const std::string& name);
 PolygonSoup parse_off(std::string_view bytes, const std::string& name);
 PolygonSoup parse_ply(std::string_view bytes, const std::string& name);
 PolygonSoup parse_stl(std::string_view bytes, const std::string& name);
+/// glTF 2: JSON, and one binary file. Buffers of other files lie next to `name`.
+PolygonSoup parse_gltf(std::string_view bytes, const std::string& name);
+PolygonSoup parse_glb(std::string_view bytes, const std::string& name);
 
 }  // namespace carillon::mesher

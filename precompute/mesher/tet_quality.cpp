@@ -5,16 +5,19 @@
 #include "precompute/mesher/tet_quality.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <numbers>
 #include <numeric>
+#include <set>
 #include <unordered_map>
+
+#include "precompute/mesh/check.hpp"
 
 namespace carillon::mesher {
 namespace {
-
-using Edge = std::array<std::int32_t, 2>;
 
 struct KeyHash {
   template <std::size_t N>
@@ -192,6 +195,48 @@ std::vector<Triangle> find_boundary(const mesh::TetMesh& mesh) {
   return out;
 }
 
+std::int64_t count_pinches(const std::vector<Triangle>& faces) {
+  struct Side {
+    Edge ends;
+    std::int32_t face;
+  };
+  std::vector<Side> sides;
+  sides.reserve(3 * faces.size());
+  std::int32_t top = 0;
+  for (std::size_t f = 0; f < faces.size(); ++f)
+    for (int c = 0; c < 3; ++c) {
+      sides.push_back({sorted(Edge{faces[f][c], faces[f][(c + 1) % 3]}), static_cast<std::int32_t>(f)});
+      top = std::max(top, faces[f][c] + 1);
+    }
+  std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) { return a.ends < b.ends; });
+  // The corners of faces that meet at a node, joined across common edges: one group a node.
+  std::vector<std::int32_t> leader(3 * faces.size());
+  std::iota(leader.begin(), leader.end(), 0);
+  const auto find_leader = [&](std::int32_t n) {
+    while (leader[n] != n) n = leader[n] = leader[leader[n]];
+    return n;
+  };
+  const auto find_corner = [&](std::int32_t f, std::int32_t v) {
+    return 3 * f + static_cast<std::int32_t>(std::find(faces[f].begin(), faces[f].end(), v) - faces[f].begin());
+  };
+  auto groups = static_cast<std::int64_t>(leader.size());
+  std::int64_t pinches = 0;
+  for (std::size_t n = 0, end = 0; n < sides.size(); n = end) {
+    for (end = n; end < sides.size() && sides[end].ends == sides[n].ends;) ++end;
+    pinches += end - n != 2;
+    // At an edge of several sheets any pairing will do, since it is a pinch already.
+    for (std::size_t k = n + 1; k < end; ++k)
+      for (const std::int32_t v : sides[n].ends) {
+        const std::int32_t a = find_leader(find_corner(sides[n].face, v)), b = find_leader(find_corner(sides[k].face, v));
+        if (a != b) leader[a] = b, --groups;
+      }
+  }
+  std::vector<char> used(static_cast<std::size_t>(top), 0);
+  for (const Triangle& face : faces)
+    for (const std::int32_t v : face) used[v] = 1;
+  return pinches + groups - std::count(used.begin(), used.end(), 1);
+}
+
 std::int64_t count_edges(const mesh::TetMesh& mesh) {
   std::vector<Edge> edges;
   edges.reserve(static_cast<std::size_t>(mesh.tet_count()) * 6);
@@ -245,6 +290,38 @@ double calc_flatness(const std::array<Vec3, 4>& corners) {
       max = std::max(max, product * product / (square[i] * square[j]));
     }
   return std::acos(std::sqrt(std::min(max, 1.0))) * 180 / std::numbers::pi;
+}
+
+std::int64_t peel_flat_elements(mesh::TetMesh& mesh) {
+  constexpr double kFlatDeg = 1e-3;
+  std::int64_t peeled = 0;
+  while (mesh::count_flat(mesh) > 0) {
+    std::set<Triangle> boundary;  // corners ascending
+    for (Triangle face : find_boundary(mesh)) {
+      std::sort(face.begin(), face.end());
+      boundary.insert(face);
+    }
+    std::vector<char> remove(static_cast<std::size_t>(mesh.tet_count()), 0);
+    std::int64_t count = 0;
+    for (std::int64_t e = 0; e < mesh.tet_count(); ++e) {
+      const auto tet = mesh.tet(e);
+      std::array<Vec3, 4> corners;
+      for (int c = 0; c < 4; ++c) corners[c] = mesh.nodes_m[static_cast<std::size_t>(tet[c])];
+      if (std::abs(calc_flatness(corners)) > kFlatDeg) continue;
+      const bool is_outer = std::any_of(std::begin(mesh::kFaces), std::end(mesh::kFaces), [&](const auto& face) {
+        Triangle key{tet[face[0]], tet[face[1]], tet[face[2]]};
+        std::sort(key.begin(), key.end());
+        return boundary.contains(key);
+      });
+      if (!is_outer) continue;
+      remove[static_cast<std::size_t>(e)] = 1;
+      ++count;
+    }
+    if (count == 0) break;
+    drop_elements(mesh, remove);
+    peeled += count;
+  }
+  return peeled;
 }
 
 }  // namespace carillon::mesher

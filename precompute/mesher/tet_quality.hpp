@@ -20,6 +20,10 @@ TetMeasures measure(const mesh::TetMesh& mesh);
 /// Faces that belong to one element, counter-clockwise seen from outside.
 std::vector<Triangle> find_boundary(const mesh::TetMesh& mesh);
 
+/// Of closed surfaces that may touch: the edges that do not belong to two faces, and the nodes at which the faces make several fans that
+/// share no edge. 0: a manifold.
+std::int64_t count_pinches(const std::vector<Triangle>& faces);
+
 /// Number of different edges, so corner nodes plus this is the count of the second-order mesh.
 std::int64_t count_edges(const mesh::TetMesh& mesh);
 
@@ -30,6 +34,10 @@ std::int64_t make_manifold(mesh::TetMesh& mesh, std::int64_t components);
 
 /// Removes the elements that are marked, and the nodes that nothing uses then. Linear meshes.
 void drop_elements(mesh::TetMesh& mesh, const std::vector<char>& remove);
+
+/// Removes elements without volume whose corners lie in a plane of the boundary, as refinement leaves them next to sharp edges: the
+/// boundary has the other diagonal then. Linear meshes. Returns how many elements went.
+std::int64_t peel_flat_elements(mesh::TetMesh& mesh);
 
 /// The smallest of all dihedral angles of a tetrahedron and of 180 degrees minus them, in degrees; negative if it is inverted.
 double calc_flatness(const std::array<Vec3, 4>& corners);

@@ -2,11 +2,14 @@
 // Source: winding number at a point: Van Oosterom and Strackee, "The solid angle of a plane triangle", IEEE Trans. Biomed. Eng. 30, 1983.
 #include "precompute/mesher/triangle_surface.hpp"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <numeric>
+
+#include "precompute/mesh/parts.hpp"
 
 namespace carillon::mesher {
 
@@ -45,6 +48,8 @@ double calc_area(const TriangleSurface& surface) {
   return sum / 2;
 }
 
+std::string format_place(const Vec3& p) { return fmt::format("({:.4g}, {:.4g}, {:.4g}) m", p[0], p[1], p[2]); }
+
 double calc_winding(const TriangleSurface& surface, const Vec3& p) {
   double sum = 0;
   for (const Triangle& t : surface.triangles) {
@@ -56,22 +61,14 @@ double calc_winding(const TriangleSurface& surface, const Vec3& p) {
 }
 
 std::vector<TriangleSurface> split_parts(const TriangleSurface& surface, std::vector<std::int32_t>* part_of) {
-  std::vector<std::int32_t> root(surface.points.size());
-  std::iota(root.begin(), root.end(), 0);
-  const auto find = [&](std::int32_t v) {
-    while (root[v] != v) v = root[v] = root[root[v]];
-    return v;
-  };
+  mesh::Parts joined(surface.points.size());
   for (const Triangle& t : surface.triangles)
-    for (int c = 1; c < 3; ++c) {
-      const std::int32_t a = find(t[0]), b = find(t[c]);
-      root[std::max(a, b)] = std::min(a, b);
-    }
+    for (int c = 1; c < 3; ++c) joined.join(t[0], t[c]);
   std::vector<TriangleSurface> parts;
   std::vector<std::int32_t> part(surface.points.size(), -1), number(surface.points.size(), -1);
   if (part_of) part_of->clear();
   for (const Triangle& t : surface.triangles) {
-    std::int32_t& own = part[find(t[0])];
+    std::int32_t& own = part[joined.find(t[0])];
     if (own < 0) {
       own = static_cast<std::int32_t>(parts.size());
       parts.emplace_back();

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -18,6 +19,14 @@ struct SurfaceOptions;
 using Triangle = std::array<std::int32_t, 3>;
 using Polyline = std::vector<Vec3>;
 
+using Edge = std::array<std::int32_t, 2>;  // the lower point first
+inline Edge make_edge(std::int32_t a, std::int32_t b) { return a < b ? Edge{a, b} : Edge{b, a}; }
+struct EdgeHash {
+  std::size_t operator()(const Edge& e) const {
+    return static_cast<std::size_t>(e[0]) * 0x9E3779B97F4A7C15ull ^ (static_cast<std::size_t>(e[1]) * 0xC2B2AE3D27D4EB4Full >> 7);
+  }
+};
+
 struct TriangleSurface {
   std::vector<Vec3> points;         // (P)
   std::vector<Triangle> triangles;  // (T), counter-clockwise seen from outside once repaired
@@ -33,6 +42,9 @@ Box calc_box(const std::vector<Vec3>& points);
 /// Of the points that a triangle has.
 Box calc_used_box(const TriangleSurface& surface);
 
+/// "(0.1, 0.2, 0.3) m", for messages.
+std::string format_place(const Vec3& p);
+
 /// The enclosed volume by the divergence theorem (signed: positive if the triangles face outward), and the area.
 double calc_volume(const TriangleSurface& surface);
 double calc_area(const TriangleSurface& surface);
@@ -47,10 +59,10 @@ std::vector<TriangleSurface> split_parts(const TriangleSurface& surface, std::ve
 /// outward in the open, those that face inward in one of them, and so on.
 bool is_nested(const TriangleSurface& surface);
 
-/// Reads OBJ, STL, PLY or OFF, chosen by the ending of the name. Polygons become triangles, points at one place become one.
+/// Reads OBJ, STL, PLY, OFF, glTF or GLB, chosen by the ending of the name. Polygons become triangles, points at one place become one.
 /// Throws InputError if there is no such file, no such format, no triangle, or a coordinate that is no finite number.
 TriangleSurface read_surface(const std::filesystem::path& path);
-/// The same of the bytes of such a file; `name` stands in messages, `format` is obj, stl, ply or off. Safe with any bytes.
+/// The same of the bytes of such a file; `name` stands in messages, `format` is obj, stl, ply, off, gltf or glb. Safe with any bytes.
 TriangleSurface parse_surface(std::string_view bytes, const std::string& name, const std::string& format);
 
 /// Makes a closed, consistently outward oriented surface of any heap of triangles: joins points closer than 1e-9 of its size, drops
@@ -67,8 +79,15 @@ RepairedSurface repair_surface(TriangleSurface surface, const SurfaceOptions& op
 
 /// The sharp edges of a repaired surface, joined to curves. An edge is sharp if its two faces turn by more than
 /// `sharp_angle_deg`, also when its sides are averaged over `radius`; curves shorter than `shortest_m` are left out
-/// unless they join the ends of longer ones.
+/// unless they are closed or join the ends of longer ones.
 /// A closed curve repeats its first point.
 std::vector<Polyline> find_sharp_curves(const TriangleSurface& surface, double sharp_angle_deg, double shortest_m, double radius);
+
+/// True if a good part of all edges turns by more than that and many of those end or meet anywhere: noise, of which no edge is one of the
+/// body.
+bool is_scan(const TriangleSurface& surface, double sharp_angle_deg);
+
+/// Takes the noise off a closed surface without shrinking it, no point farther than farthest_m. Returns how far the farthest one went.
+double smooth_scan(TriangleSurface& surface, double farthest_m);
 
 }  // namespace carillon::mesher

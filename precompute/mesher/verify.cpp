@@ -10,15 +10,19 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "precompute/mesh/check.hpp"
+#include "precompute/mesh/parts.hpp"
 #include "precompute/mesher/tet_quality.hpp"
 
 namespace carillon::mesher {
 namespace {
 
 // Parts thinner than this many edges, or shorter than the second, may be lost in elements of that size.
+// Cells through the least thickness, and how much longer or shorter the mesh may be, where stuffing is to show the body: with less
+// tips end short (the ears of the solid bunny by 1.2 mm of 130 with 20,000 nodes).
+constexpr double kCells = 3, kShort = 0.002;
+constexpr double kOpposite = 0.64;  // cosine of half the angle between two directions to the surface
 constexpr double kMinThickness = 1.0, kMinLength = 3;
 // Of an extent of the body, and in edges: what coarse elements may lack of its tips.
 constexpr double kMaxLost = 0.1, kMaxLostEdges = 2;
@@ -51,18 +55,10 @@ std::vector<Region> find_regions(const DistanceField& field, double wall_m, bool
     }
   }
   start[rows] = runs.size();
-  std::vector<std::int32_t> root(runs.size());
-  std::iota(root.begin(), root.end(), 0);
-  const auto find = [&](std::int32_t r) {
-    while (root[r] != r) r = root[r] = root[root[r]];
-    return r;
-  };
+  mesh::Parts parts(runs.size());
   std::vector<double> faces(runs.size(), 0);
   const std::int32_t reach = by_corners ? 1 : 0;
-  const auto join = [&](std::size_t a, std::size_t b) {
-    const std::int32_t x = find(static_cast<std::int32_t>(a)), y = find(static_cast<std::int32_t>(b));
-    root[std::max(x, y)] = std::min(x, y);
-  };
+  const auto join = [&](std::size_t a, std::size_t b) { parts.join(static_cast<std::int32_t>(a), static_cast<std::int32_t>(b)); };
   // Runs of two rows side by side (or, if `across`, only diagonally).
   const auto join_rows = [&](std::size_t one, std::size_t other, bool across) {
     std::size_t a = start[one], b = start[other];
@@ -92,7 +88,7 @@ std::vector<Region> find_regions(const DistanceField& field, double wall_m, bool
   std::vector<Region> regions;
   for (std::size_t row = 0; row < rows; ++row)
     for (std::size_t r = start[row]; r < start[row + 1]; ++r) {
-      std::int32_t& n = number[find(static_cast<std::int32_t>(r))];
+      std::int32_t& n = number[parts.find(static_cast<std::int32_t>(r))];
       if (n < 0) {
         n = static_cast<std::int32_t>(regions.size());
         regions.emplace_back();
@@ -147,6 +143,35 @@ std::string find_lost(const Body& body, double edge_m) {
     if (regions.size() > 1) made[c] = body.field->voxel_m * (high - low + 2);
   }
   return describe_lost(body, made, edge_m, "would be at most");
+}
+
+double calc_least_thickness(const DistanceField& field) {
+  double least = field.inside_m;
+  const double shallow = 1.5 * field.voxel_m, deep = field.inside_m - field.voxel_m;
+  for (std::int32_t k = 1; k + 1 < field.size[2]; ++k)
+    for (std::int32_t j = 1; j + 1 < field.size[1]; ++j)
+      for (std::int32_t i = 1; i + 1 < field.size[0]; ++i) {
+        const double depth = -field.sample(i, j, k);
+        if (depth < shallow || depth > deep || depth >= least) continue;
+        const Vec3 slope{field.sample(i + 1, j, k) - field.sample(i - 1, j, k), field.sample(i, j + 1, k) - field.sample(i, j - 1, k),
+                         field.sample(i, j, k + 1) - field.sample(i, j, k - 1)};
+        if (norm(slope) < 2 * field.voxel_m * kOpposite) least = depth;
+      }
+  return 2 * least;
+}
+
+std::string find_cut(const mesh::TetMesh& linear, const Body& body, double edge_m) {
+  const double thickness = body.wall_m > 0 ? body.wall_m : calc_least_thickness(*body.field);
+  if (thickness < kCells * edge_m)
+    return fmt::format("has edges of {:.3g} m where the body is {:.3g} m thick at its thinnest, {:.1f} of them", edge_m, thickness,
+                       thickness / edge_m);
+  const Vec3 made = calc_box(linear.nodes_m).extent(), wanted = calc_used_box(body.repaired.surface).extent();
+  for (int c = 0; c < 3; ++c) {
+    const double extent = wanted[c] - 2 * body.repaired.offset_m;
+    if (std::abs(made[c] / extent - 1) > kShort)
+      return fmt::format("is {:.4g} m long along {} where the body is {:.4g} m", made[c], "xyz"[c], extent);
+  }
+  return "";
 }
 
 Shells count_shells(const Body& body, double edge_m) {

@@ -18,6 +18,16 @@ Shells count_shells(const Body& body, double edge_m);
 /// sentence "the mesh ...". Empty if there is nothing, or no field.
 std::string find_lost(const Body& body, double edge_m);
 
+/// How thin the solid in a distance field is at its thinnest place: twice the depth of the least deep sample from which the surface is
+/// equally near in two directions more than 100 degrees apart. Places deeper than the field reaches count as that deep, those thinner than
+/// three samples as three. The edges of a box are no thin place.
+double calc_least_thickness(const DistanceField& field);
+
+/// Why stuffing with these edges does not show the body, as the end of a sentence "the mesh ..."; empty if it does: its cells must be a
+/// third of the least thickness, and the mesh as long as the body within 0.2 %. Else it ends short of tips, which no error bar knows.
+/// `field` reaches two edges into the body.
+std::string find_cut(const mesh::TetMesh& linear, const Body& body, double edge_m);
+
 /// What the mesh is compared with, beyond the body.
 struct Expectation {
   double edge_m = 0;

@@ -24,17 +24,8 @@ struct MidNode {
 std::vector<MidNode> list_boundary_mid_nodes(const mesh::TetMesh& m) {
   constexpr int kSides[4][3] = {{5, 9, 8}, {6, 9, 7}, {4, 8, 7}, {4, 5, 6}};  // mid nodes of the face opposite each corner
   constexpr int kEnds[6][2] = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}};
-  std::map<std::array<std::int32_t, 3>, std::vector<std::pair<std::int64_t, int>>> faces;
-  for (std::int64_t e = 0; e < m.tet_count(); ++e)
-    for (int f = 0; f < 4; ++f) {
-      std::array<std::int32_t, 3> key{};
-      for (int c = 0, n = 0; c < 4; ++c)
-        if (c != f) key[n++] = m.tet(e)[c];
-      std::sort(key.begin(), key.end());
-      faces[key].emplace_back(e, f);
-    }
   std::map<std::int32_t, MidNode> found;
-  for (const auto& [key, owners] : faces) {
+  for (const auto& [face, owners] : find_face_owners(m)) {
     if (owners.size() != 1) continue;
     const auto tet = m.tet(owners[0].first);
     for (const int side : kSides[owners[0].second])

@@ -11,10 +11,10 @@
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace carillon;
   if (size == 0) return 0;
-  constexpr const char* kFormats[] = {"obj", "off", "ply", "stl"};
+  constexpr const char* kFormats[] = {"obj", "off", "ply", "stl", "glb", "gltf"};
   const mesher::Quiet quiet;
   try {
-    auto surface = mesher::parse_surface({reinterpret_cast<const char*>(data) + 1, size - 1}, "fuzz", kFormats[data[0] % 4]);
+    auto surface = mesher::parse_surface({reinterpret_cast<const char*>(data) + 1, size - 1}, "fuzz", kFormats[data[0] % 6]);
     // What repair costs grows with the triangles; the readers have been through by now.
     if (surface.triangles.size() > 300) return 0;
     mesher::SurfaceReport report;

@@ -20,14 +20,6 @@ using Outline = std::vector<std::array<double, 2>>;
 
 constexpr double kSharpDeg = 40;
 
-TriangleSurface to_triangles(const Polygons& polygons) {
-  TriangleSurface out;
-  for (const auto& p : polygons.points) out.points.push_back({p[0], p[1], p[2]});
-  for (const auto& f : polygons.faces)
-    for (std::size_t i = 1; i + 1 < f.size(); ++i) out.triangles.push_back({f[0], f[i], f[i + 1]});
-  return out;
-}
-
 /// By the divergence theorem on a fine cut: shares nothing with RoundSurface::calc_volume.
 double calc_cut_volume(RoundSurface& round) {
   const double coarse = calc_volume(round.cut(6)), fine = calc_volume(round.cut(12));

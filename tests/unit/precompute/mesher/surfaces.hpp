@@ -11,8 +11,12 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <random>
 #include <string>
+#include <utility>
 #include <vector>
+
+#include "precompute/mesher/triangle_surface.hpp"
 
 namespace carillon::mesher::testing {
 
@@ -58,6 +62,30 @@ inline Polygons make_sphere(double radius, int levels) {
   for (auto& p : s.points)
     for (double& x : p) x *= radius;
   return s;
+}
+
+/// As a scanner leaves it: every point off its place by `roughness` times the mean edge, in the mean square along each axis.
+inline Polygons roughen(Polygons s, double roughness, unsigned seed = 1) {
+  double length = 0;
+  std::size_t edges = 0;
+  for (const auto& f : s.faces)
+    for (std::size_t c = 0; c < f.size(); ++c, ++edges) {
+      const auto &a = s.points[f[c]], &b = s.points[f[(c + 1) % f.size()]];
+      length += std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+    }
+  std::mt19937 random(seed);
+  std::normal_distribution<double> noise(0, roughness * length / static_cast<double>(edges));
+  for (auto& p : s.points)
+    for (double& x : p) x += noise(random);
+  return s;
+}
+
+inline TriangleSurface to_triangles(const Polygons& s) {
+  TriangleSurface out;
+  for (const auto& p : s.points) out.points.push_back({p[0], p[1], p[2]});
+  for (const auto& f : s.faces)
+    for (std::size_t c = 1; c + 1 < f.size(); ++c) out.triangles.push_back({f[0], f[c], f[c + 1]});
+  return out;
 }
 
 /// A torus around z, its ring of radius `large` in n steps, its tube of radius `small` in m.
@@ -180,6 +208,20 @@ std::vector<std::array<double, 2>> make_profile(int steps, const F& f) {
   std::vector<std::array<double, 2>> out;
   for (int i = 0; i <= steps; ++i) out.push_back(f(static_cast<double>(i) / steps));
   return out;
+}
+
+/// The elements of each face (corners ascending), each with the number of its corner that is opposite.
+inline std::map<std::array<std::int32_t, 3>, std::vector<std::pair<std::int64_t, int>>> find_face_owners(const mesh::TetMesh& m) {
+  std::map<std::array<std::int32_t, 3>, std::vector<std::pair<std::int64_t, int>>> owners;
+  for (std::int64_t e = 0; e < m.tet_count(); ++e)
+    for (int opposite = 0; opposite < 4; ++opposite) {
+      std::array<std::int32_t, 3> face{};
+      for (int c = 0, n = 0; c < 4; ++c)
+        if (c != opposite) face[n++] = m.tet(e)[c];
+      std::sort(face.begin(), face.end());
+      owners[face].emplace_back(e, opposite);
+    }
+  return owners;
 }
 
 /// In a folder of this process, which is removed at its end.

@@ -1,0 +1,36 @@
+// Union-find: things that hang together.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace carillon::mesh {
+
+/// Things joined to parts (nodes, triangles); find() is cheap through path halving.
+class Parts {
+ public:
+  explicit Parts(std::size_t count) : parent_(count) {
+    for (std::size_t i = 0; i < count; ++i) parent_[i] = static_cast<std::int32_t>(i);
+  }
+  std::int32_t find(std::int32_t i) {
+    while (parent_[static_cast<std::size_t>(i)] != i) {
+      auto& up = parent_[static_cast<std::size_t>(i)];
+      up = parent_[static_cast<std::size_t>(up)];
+      i = up;
+    }
+    return i;
+  }
+  /// The smaller number stands for both.
+  void join(std::int32_t i, std::int32_t j) {
+    i = find(i);
+    j = find(j);
+    if (i < j) parent_[static_cast<std::size_t>(j)] = i;
+    if (j < i) parent_[static_cast<std::size_t>(i)] = j;
+  }
+
+ private:
+  std::vector<std::int32_t> parent_;
+};
+
+}  // namespace carillon::mesh

@@ -1,0 +1,50 @@
+// A skin: triangles whose sharp edges are known, remeshed to even triangles of a wanted size. Std only.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "precompute/mesher/triangle_surface.hpp"
+
+namespace carillon::mesher {
+
+/// A triangle surface, open or closed, without an edge of three triangles. Folds are its sharp edges; its border is found by itself.
+struct Skin {
+  TriangleSurface surface;
+  std::vector<Edge> folds;
+};
+
+/// How long edges may be.
+struct SkinSizes {
+  double largest_m = 0;
+  double smallest_m = 0;     // where the surface bends more and more tightly
+  double per_radius = 0.35;  // of the smaller radius of curvature, as the remeshed surface has it
+  double reach_m = 0;        // how far a wall reaches from the surface: at folds edges span what its mitre takes, and margin_m more
+  double margin_m = 0;
+};
+
+/// What keeps the points where they belong.
+struct SkinPlaces {
+  std::function<Vec3(const Vec3&)> on_surface;  // the point of the surface for one near it
+  std::function<Vec3(const Vec3&)> on_fold;     // the same of its folds and borders
+};
+
+/// The unit normal of the skin at each corner of each triangle (T, 3): one for all corners at a point that no fold parts, by weights that
+/// are exact on spheres; at a fold or border, where one side of the point is missing, turned about it so that the edges inward are arcs.
+std::vector<std::array<Vec3, 3>> find_skin_normals(const Skin& skin);
+
+/// The same surface in triangles near those sizes. Folds and borders stay; points where they bend by more than 40 degrees, end or meet stay
+/// where they are. The same input gives the same triangles.
+Skin remesh(const Skin& skin, const SkinSizes& sizes, const SkinPlaces& places);
+
+/// Where edges leave a fold or border, a ring of narrow triangles follows it: each is cut at the distance from the fold that `distance_m`
+/// says for its point on it, its unit vector, and the sine of its angle with the fold. Where that is 0, or nearly the whole edge, it stays.
+using RingDistance = std::function<double(std::int32_t point, const Vec3& way, double sine)>;
+Skin add_rings(const Skin& skin, const SkinPlaces& places, const RingDistance& distance_m);
+
+/// The edges of one triangle.
+std::vector<Edge> find_border(const TriangleSurface& surface);
+
+}  // namespace carillon::mesher
