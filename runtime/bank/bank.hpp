@@ -18,7 +18,7 @@
 namespace carillon::bank {
 
 inline constexpr int kVersionMajor = 1;
-inline constexpr int kVersionMinor = 3;
+inline constexpr int kVersionMinor = 4;
 
 /// Air, as OCE01 section 4 has it: radiation gains are made with it and sound travels in it.
 inline constexpr double kAirDensityKgM3 = 1.21;
@@ -74,6 +74,7 @@ struct Proof {
   std::vector<std::int64_t> cluster_first;  // groups of degenerate modes, to the tolerance: their shapes are one subspace, in which the
   std::vector<std::int64_t> cluster_count;  // basis is canonical; first mode and how many
   std::string method;                       // in words
+  double complete_below_hz = 0.0;           // every mode of the mesh from the first cut to here is in the bank; 0: up to its last one
 };
 
 /// What the modes do to that which fixes the body. S supports: patches of fixed nodes that belong together.
@@ -87,6 +88,32 @@ struct Supports {
   std::vector<double> energy;       // (m, S) share of the mode's strain energy within one thickness of the patch
 
   std::size_t count() const { return area_m2.size(); }
+};
+
+/// Why a frequency was corrected for the error of the mesh, or why not. The numbers are those of the file.
+enum class Correction : std::uint8_t {
+  kOneMesh = 0,    // corrected by the estimate of one mesh
+  kTwoMeshes = 1,  // corrected; two meshes agree on it
+  kRough = 2,      // corrected, but the estimate is a large share of the frequency or comes from singular edges: a wide bar
+  kStiff = 3,      // not: the elements are much too stiff for this mode
+  kLumped = 4,     // not: T10 with a lumped mass
+  kDisputed = 5,   // not: two meshes contradict each other
+};
+inline constexpr int kCorrectionCount = 6;
+/// Whether the frequency is another than the mesh's.
+constexpr bool is_corrected(Correction correction) { return correction <= Correction::kRough; }
+/// In a word or two: "one mesh", "two meshes", "rough", "too stiff", "lumped T10", "disputed".
+const char* describe(Correction correction);
+
+/// What the modes of the body are believed to be, after the error of the mesh was estimated and taken off. One entry a mode, in the order
+/// of the mesh's frequencies; corrected ones change places.
+struct Corrected {
+  std::vector<double> freq_hz;         // (m) undamped; the mesh's own where it was not corrected
+  std::vector<double> decay_per_s;     // (m) by the damping law at this frequency
+  std::vector<double> error_cents;     // (m) the k-th lowest freq_hz is so near to the k-th of the body, an estimate; infinite: unknown
+  std::vector<Correction> correction;  // (m)
+
+  bool is_empty() const { return freq_hz.empty(); }
 };
 
 /// Sizes of the solve behind the bank.
@@ -113,7 +140,8 @@ struct Bank {
   // Error bars [cent]: the true frequency is within the modes of the mesh by the first (a bound) and of the body by the second (an
   // estimate). Both are one-sided widths: f 2^(+-error / 1200).
   std::vector<double> algebraic_error_cents;       // (m), or empty: unknown
-  std::vector<double> discretisation_error_cents;  // (m), or empty: unknown
+  std::vector<double> discretisation_error_cents;  // (m), or empty: unknown; infinite: of this mode unknown
+  Corrected corrected;                             // or empty: unknown; since 1.4
 
   RigidBody rigid;
   Supports supports;  // of a body with fixed nodes, since 1.3
@@ -123,7 +151,8 @@ struct Bank {
   std::optional<Proof> proof;  // banks of version 1.0 have none
   Counts counts;
   std::array<double, 2> band_hz{20.0, 20000.0};
-  bool complete = true;    // every mode of the band is here (false only when max_modes or calc_reduced cut the list)
+  bool complete = true;    // every mode of the band is here (false only when max_modes or calc_reduced cut the list, which keep those of
+                           // the lowest corrected frequencies)
   std::string element;     // "T4" or "T10"
   std::string mass;        // "consistent" or "lumped"
   std::string provenance;  // JSON text: resolved job, versions, ranks, seconds and peak memory per phase

@@ -85,7 +85,8 @@ Check check_completeness(const Bank& bank, const Proof& proof) {
     const std::int64_t wanted = proof.below[i + 1] - proof.below[i];
     const std::int64_t held = count_modes_below(bank, proof.cut_hz[i + 1]) - count_modes_below(bank, proof.cut_hz[i]);
     // max_modes and calc_reduced keep the lowest ones: only where the list ends may there be more than the bank holds.
-    const bool is_cut_here = !bank.complete && count_modes_below(bank, proof.cut_hz[i + 1]) == modes;
+    const bool is_cut_here = !bank.complete && (proof.complete_below_hz > 0.0 ? proof.cut_hz[i + 1] > proof.complete_below_hz
+                                                                              : count_modes_below(bank, proof.cut_hz[i + 1]) == modes);
     if (held == wanted || (is_cut_here && held < wanted)) continue;
     faults.add("{} modes lie between {:.6g} and {:.6g} Hz by the counts, and the bank holds {}", wanted, proof.cut_hz[i],
                proof.cut_hz[i + 1], held);
@@ -95,6 +96,8 @@ Check check_completeness(const Bank& bank, const Proof& proof) {
     faults.add("{} modes were found, {} are here, and the counts give {} - {} = {}", proof.found, modes, proof.below.back(),
                proof.below.front(), counted);
   }
+  if (bank.complete ? proof.complete_below_hz != 0.0 : !(proof.complete_below_hz >= 0.0))
+    faults.add("complete_below_hz is {:.6g}, of a bank that is {}", proof.complete_below_hz, bank.complete ? "complete" : "cut");
   return {"complete",
           bank.complete ? fmt::format("{} - {} = {} modes, all of them found; every interval between cuts agrees", proof.below.back(),
                                       proof.below.front(), counted)
@@ -212,7 +215,9 @@ Check check_error_bars(const Bank& bank) {
     }
     std::vector<double> sorted = *cents;
     std::sort(sorted.begin(), sorted.end(), [](double a, double b) { return a < b || (std::isnan(b) && !std::isnan(a)); });
-    figure += fmt::format("{} at most {:.2g} cent, median {:.2g}", name, sorted.back(), sorted[sorted.size() / 2]);
+    figure += std::isfinite(sorted.back())
+                  ? fmt::format("{} at most {:.2g} cent, median {:.2g}", name, sorted.back(), sorted[sorted.size() / 2])
+                  : fmt::format("{} not known of all modes", name);
   }
   return {"error bars", figure, faults.take()};
 }
@@ -250,11 +255,14 @@ std::string describe_completeness(const Bank& bank) {
 
 std::string describe_accuracy(const Bank& bank) {
   const auto describe_largest = [](const std::vector<double>& cents, const char* known, const char* kind, const char* unknown) {
-    return cents.empty() ? std::string(unknown)
-                         : fmt::format("{} {:.2g} cent ({})", known, *std::max_element(cents.begin(), cents.end()), kind);
+    return cents.empty() || std::isinf(*std::max_element(cents.begin(), cents.end()))
+               ? std::string(unknown)
+               : fmt::format("{} {:.2g} cent ({})", known, *std::max_element(cents.begin(), cents.end()), kind);
   };
+  const bool is_corrected = !bank.corrected.is_empty();
   return describe_largest(bank.algebraic_error_cents, "frequencies are those of the mesh to", "a bound", "no bounds against the mesh") +
-         describe_largest(bank.discretisation_error_cents, " and those of the body to about", "an estimate",
+         describe_largest(is_corrected ? bank.corrected.error_cents : bank.discretisation_error_cents,
+                          is_corrected ? ", corrected ones those of the body to about" : " and those of the body to about", "an estimate",
                           ", no estimates against the body");
 }
 

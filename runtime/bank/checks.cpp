@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -16,6 +17,7 @@
 #include "runtime/bank/bank.hpp"
 #include "runtime/bank/edges.hpp"
 #include "runtime/bank/faults.hpp"
+#include "runtime/bank/radiation_gain.hpp"
 #include "runtime/bank/surface.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/material/solids.hpp"
@@ -58,6 +60,12 @@ Check check_arrays(const Bank& bank) {
   for (const auto& [name, cents] : {std::pair("algebraic_error_cents", &bank.algebraic_error_cents),
                                     std::pair("discretisation_error_cents", &bank.discretisation_error_cents)}) {
     if (!cents->empty()) expect(name, cents->size(), modes);
+  }
+  if (const Corrected& corrected = bank.corrected; !corrected.is_empty()) {
+    expect("corrected_frequency_hz", corrected.freq_hz.size(), modes);
+    expect("corrected_decay", corrected.decay_per_s.size(), modes);
+    expect("corrected_error_cents", corrected.error_cents.size(), modes);
+    expect("correction", corrected.correction.size(), modes);
   }
   expect("shape", bank.shape.size(), vertices * modes * 3);
   const Supports& supports = bank.supports;
@@ -102,7 +110,8 @@ Check check_numbers(const Bank& bank) {
   look("alpha2_per_s", &material.alpha2_per_s, 1);
   const auto look_all = [&](const char* name, const std::vector<double>& values) { look(name, values.data(), values.size()); };
   look_all("algebraic_error_cents", bank.algebraic_error_cents);
-  look_all("discretisation_error_cents", bank.discretisation_error_cents);
+  look_all("corrected_frequency_hz", bank.corrected.freq_hz);
+  look_all("corrected_decay", bank.corrected.decay_per_s);
   look_all("damping/coefficient", bank.damping.coefficient);
   look_all("damping/power", bank.damping.power);
   look_all("damping/freq_hz", bank.damping.freq_hz);
@@ -117,6 +126,7 @@ Check check_numbers(const Bank& bank) {
   if (bank.proof) {
     look_all("proof/cut_hz", bank.proof->cut_hz);
     look_all("proof/margin", bank.proof->margin);
+    look("proof/complete_below_hz", &bank.proof->complete_below_hz, 1);
     look("proof/orthonormality", &bank.proof->orthonormality, 1);
     look("proof/backward_error", &bank.proof->backward_error, 1);
   }
@@ -188,6 +198,41 @@ Check check_decay(const Bank& bank) {
           faults.take()};
 }
 
+constexpr double kMaxCorrection = 64.0;  // of a frequency, to either side
+
+/// The corrected frequencies, their decays and what is said of them.
+Check check_corrected(const Bank& bank) {
+  Faults faults;
+  const Corrected& corrected = bank.corrected;
+  if (corrected.is_empty()) return {"corrected", "no corrected frequencies", {}};
+  const bool has_law = bank.damping.law != "mixed" && check_decay(bank).faults.empty();
+  std::array<std::size_t, kCorrectionCount> counts{};
+  for (std::size_t i = 0; i < bank.mode_count(); ++i) {
+    const double hz = corrected.freq_hz[i], mesh_hz = bank.freq_hz(i), d = corrected.decay_per_s[i], cents = corrected.error_cents[i];
+    if (!(hz > mesh_hz / kMaxCorrection && hz < mesh_hz * kMaxCorrection))
+      faults.add("corrected_frequency_hz[{}] is {:.6g}, and the mesh's is {:.6g}: too far apart", i, hz, mesh_hz);
+    if (!(d >= 0.0 && d <= kMaxDecayPerS)) faults.add("corrected_decay[{}] is {:.6g} 1/s, which is none", i, d);
+    if (!(cents >= 0.0)) faults.add("corrected_error_cents[{}] is {:.6g}, negative", i, cents);
+    const auto correction = static_cast<std::size_t>(corrected.correction[i]);
+    if (correction >= counts.size()) {
+      faults.add("correction[{}] is {}, and none above {} is known", i, correction, counts.size() - 1);
+      continue;
+    }
+    ++counts[correction];
+    if (!is_corrected(corrected.correction[i]) && !(std::abs(hz - mesh_hz) <= kLawTolerance * mesh_hz))
+      faults.add("corrected_frequency_hz[{}] is {:.9g}, and its reason (\"{}\") leaves it at the mesh's {:.9g}", i, hz,
+                 describe(corrected.correction[i]), mesh_hz);
+    const double omega = 2.0 * std::numbers::pi * hz;
+    const double law = has_law ? calc_decay(bank.damping, bank.material, omega * omega) : d;
+    if (!(std::abs(d - law) <= kLawTolerance * law))
+      faults.add("corrected_decay[{}] is {:.9g} 1/s, and the damping law gives {:.9g}", i, d, law);
+  }
+  std::string figure;
+  for (std::size_t c = 0; c < counts.size(); ++c)
+    if (counts[c] > 0) figure += fmt::format("{}{} {}", figure.empty() ? "" : ", ", counts[c], describe(static_cast<Correction>(c)));
+  return {"corrected", figure.empty() ? "no modes" : figure, faults.take()};
+}
+
 Check check_residuals(const Bank& bank) {
   Faults faults;
   std::size_t worst = 0;
@@ -218,13 +263,11 @@ double calc_area(const Bank& bank) {
 Check check_gains(const Bank& bank) {
   Faults faults;
   double largest = 0.0;
-  const double area = calc_area(bank), radius = std::sqrt(area / (4.0 * std::numbers::pi));
+  const double area = calc_area(bank);
   for (std::size_t i = 0; i < bank.mode_count(); ++i) {
     if (!(bank.radiation_gain[i] >= 0.0)) faults.add("radiation_gain[{}] is {:.6g}, negative", i, bank.radiation_gain[i]);
     // A pulsating sphere of the surface's area (docs/equations.md), all of it at the largest motion that the mode has anywhere.
-    const double omega = 2.0 * std::numbers::pi * bank.freq_hz(i), ka = omega / kSoundSpeedMs * radius;
-    const double max =
-        kAirDensityKgM3 * omega / (4.0 * std::numbers::pi * std::hypot(1.0, ka)) * area * calc_max_motion(bank, i, kMaxSteps);
+    const double max = calc_radiation_gain(2.0 * std::numbers::pi * bank.freq_hz(i), area * calc_max_motion(bank, i, kMaxSteps), area);
     if (max >= 0.0 && bank.radiation_gain[i] > kGainSlack * max)  // a negative scale is reported elsewhere
       faults.add("radiation_gain[{}] is {:.3g}, and a surface of this size and motion has {:.3g} at most", i, bank.radiation_gain[i], max);
     largest = std::max(largest, bank.radiation_gain[i]);
@@ -446,8 +489,8 @@ Check check_solve(const Bank& bank) {
 std::vector<Check> calc_checks(const Bank& bank) {
   std::vector<Check> checks{check_arrays(bank)};
   if (!checks[0].faults.empty()) return checks;
-  for (const auto check : {check_numbers, check_eigenvalues, check_band, check_decay, check_residuals, check_gains, check_shapes,
-                           check_surface, check_rigid_body, check_supports, check_material, check_solve}) {
+  for (const auto check : {check_numbers, check_eigenvalues, check_band, check_decay, check_corrected, check_residuals, check_gains,
+                           check_shapes, check_surface, check_rigid_body, check_supports, check_material, check_solve}) {
     checks.push_back(check(bank));
   }
   checks.push_back(check_error_bars(bank));

@@ -12,7 +12,7 @@
 #include <iterator>
 #include <numbers>
 
-#include "runtime/bank/surface.hpp"
+#include "runtime/bank/radiation_gain.hpp"
 
 namespace carillon::bank {
 namespace {
@@ -73,22 +73,6 @@ void check(const Bank& bank, const Edits& edits) {
   }
 }
 
-/// Radius of the sphere of the same outer area, as the radiation gains take it.
-double calc_radius_m(const Bank& bank) {
-  double twice = 0.0;
-  for (const Triangle& triangle : find_outer_triangles(bank.vertices_m, bank.triangles)) {
-    const Vec3 normal = calc_normal(bank.vertices_m, triangle);
-    twice += std::hypot(normal[0], normal[1], normal[2]);
-  }
-  return std::sqrt(0.5 * twice / (4.0 * std::numbers::pi));
-}
-
-/// What the gain has of the frequency: omega / sqrt(1 + (k a)^2).
-double calc_frequency_factor(double omega_rad_s, double radius_m) {
-  const double ka = omega_rad_s / kSoundSpeedMs * radius_m;
-  return omega_rad_s / std::sqrt(1.0 + ka * ka);
-}
-
 std::string format_list(const char* name, const std::vector<double>& values) {
   std::string text;
   for (const double value : values) fmt::format_to(std::back_inserter(text), "{}{}", text.empty() ? "" : ", ", value);
@@ -109,7 +93,7 @@ Bank calc_edited(const Bank& bank, const Edits& edits) {
   const double eigenvalue_scale = k / (s * g * g);
   const double shape_scale = 1.0 / std::sqrt(s * g * g * g);
   const double freq_scale = std::sqrt(eigenvalue_scale);
-  const double radius = calc_radius_m(bank);
+  const double area = calc_outer_area_m2(bank);
   Bank edited = bank;
   edited.material.young_modulus_pa *= k;
   edited.material.density_kg_m3 *= s;
@@ -128,9 +112,13 @@ Bank calc_edited(const Bank& bank, const Edits& edits) {
     if (!(edited.decay_per_s[m] >= 0.0) || !std::isfinite(edited.decay_per_s[m]))
       throw InputError(fmt::format("the damping makes mode {} ({:.5g} Hz) decay by {:.3g} 1/s, which is no decay; check its numbers", m + 1,
                                    edited.freq_hz(m), edited.decay_per_s[m]));
+    if (Corrected& corrected = edited.corrected; !corrected.is_empty()) {
+      const double omega = 2.0 * std::numbers::pi * (corrected.freq_hz[m] *= freq_scale);
+      corrected.decay_per_s[m] = calc_decay(edited.damping, edited.material, omega * omega);
+    }
     edited.shape_scale[m] *= shape_scale;
-    edited.radiation_gain[m] *= shape_scale * g * g * calc_frequency_factor(std::sqrt(edited.eigenvalue_rad2_s2[m]), radius * g) /
-                                calc_frequency_factor(std::sqrt(bank.eigenvalue_rad2_s2[m]), radius);
+    edited.radiation_gain[m] *= calc_radiation_gain(std::sqrt(edited.eigenvalue_rad2_s2[m]), shape_scale * g * g, area * g * g) /
+                                calc_radiation_gain(std::sqrt(bank.eigenvalue_rad2_s2[m]), 1.0, area);
   }
   for (Vec3& vertex : edited.vertices_m) {
     for (double& x : vertex) x *= g;
@@ -150,6 +138,7 @@ Bank calc_edited(const Bank& bank, const Edits& edits) {
   for (double& freq : edited.band_hz) freq *= freq_scale;
   if (edited.proof) {
     for (double& cut : edited.proof->cut_hz) cut *= freq_scale;
+    edited.proof->complete_below_hz *= freq_scale;
   }
   edited.provenance = fmt::format(R"({{"edits": {{"density_scale": {}, "stiffness_scale": {}, "size_scale": {})", s, k, g);
   if (edits.alphas) edited.provenance += fmt::format(R"(, "alpha1_s": {}, "alpha2_per_s": {})", (*edits.alphas)[0], (*edits.alphas)[1]);

@@ -26,6 +26,17 @@ void add_later_fields(const Bank& bank, const FileForm& form, std::vector<Field>
   };
   add_errors("modes/algebraic_error_cents", "bound: the exact mode of the mesh is no further", bank.algebraic_error_cents);
   add_errors("modes/discretisation_error_cents", "estimate: the mode of the body is no further", bank.discretisation_error_cents);
+  if (const Corrected& corrected = bank.corrected; !corrected.is_empty()) {
+    fields.insert(fields.end(), {{"modes/corrected_frequency_hz", "<f8", find_shape(corrected.freq_hz), "Hz",
+                                  "undamped, with the estimated error of the mesh taken off", corrected.freq_hz.data()},
+                                 {"modes/corrected_decay", "<f8", find_shape(corrected.decay_per_s), "1/s",
+                                  "by the damping law at the corrected frequency", corrected.decay_per_s.data()},
+                                 {"modes/corrected_error_cents", "<f8", find_shape(corrected.error_cents), "cent",
+                                  "estimate: the k-th mode of the body is no further from the k-th lowest corrected frequency",
+                                  corrected.error_cents.data()},
+                                 {"modes/correction", "|u1", find_shape(corrected.correction), "1",
+                                  "why it was corrected or not: docs/bank-format.md", corrected.correction.data()}});
+  }
   if (!form.damping_law.empty()) {
     const Damping& damping = bank.damping;
     fields.push_back({"damping/law", text_type(form.damping_law), {}, "1", "how the decays came about", form.damping_law.data()});
@@ -75,6 +86,13 @@ void add_later_fields(const Bank& bank, const FileForm& form, std::vector<Field>
         proof.cluster_first.data()},
        {"proof/cluster_count", "<i8", find_shape(proof.cluster_count), "1", "modes of the group", proof.cluster_count.data()},
        {"proof/method", text_type(form.proof_method), {}, "1", "how it was counted", form.proof_method.data()}});
+  if (form.has_complete_below)
+    fields.push_back({"proof/complete_below_hz",
+                      "<f8",
+                      {},
+                      "Hz",
+                      "every mode of the mesh from the first cut to here is in the bank",
+                      &proof.complete_below_hz});
 }
 
 }  // namespace
@@ -125,7 +143,9 @@ std::vector<Field> list_fields(const Bank& bank, const FileForm& form) {
   return fields;
 }
 
-int find_version_minor(const Bank& bank) { return bank.supports.count() > 0 ? 3 : bank.shape_bytes == 1 ? 2 : 1; }
+int find_version_minor(const Bank& bank) {
+  return !bank.corrected.is_empty() ? 4 : bank.supports.count() > 0 ? 3 : bank.shape_bytes == 1 ? 2 : 1;
+}
 
 std::uint64_t find_item_bytes(const std::string& dtype) {
   if (dtype == "<f8" || dtype == "<i8") return 8;

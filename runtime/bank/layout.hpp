@@ -28,10 +28,11 @@ struct FileForm {
   std::string element;
   std::string mass;
   std::string provenance;
-  std::string damping_law;   // since 1.1
-  std::string regions;       // since 1.1, perhaps absent
-  std::string proof_method;  // since 1.1, absent without a proof
-  std::string supports;      // since 1.3, absent where nothing is fixed
+  std::string damping_law;          // since 1.1
+  std::string regions;              // since 1.1, perhaps absent
+  std::string proof_method;         // since 1.1, absent without a proof
+  std::string supports;             // since 1.3, absent where nothing is fixed
+  bool has_complete_below = false;  // since 1.4: Proof::complete_below_hz is there
 };
 
 /// The arrays of `bank` and `form` in the order of docs/bank-format.md; those that are not there (no proof, no error bars, a file of

@@ -17,12 +17,14 @@
 
 #include "runtime/bank/bank.hpp"
 #include "runtime/bank/edits.hpp"
+#include "runtime/bank/of_material.hpp"
 #include "runtime/bank/reduce.hpp"
 #include "runtime/bank/report.hpp"
 #include "runtime/bank/write.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/base/standard_output.hpp"
 #include "runtime/material/solids.hpp"
+#include "runtime/material/table.hpp"
 #include "runtime/version/version.hpp"
 
 namespace {
@@ -50,6 +52,7 @@ void check(const std::string& file) {
 /// What `carillon-bank edit` does to a bank.
 struct Wishes {
   bank::Edits edits;
+  std::string material;
   std::vector<double> alphas;
   std::optional<double> tan_phi;
   std::vector<std::string> loss, caughey;  // "HZ:FACTOR", "POWER:COEFFICIENT"
@@ -58,6 +61,8 @@ struct Wishes {
 };
 
 void add_options(CLI::App& editing, Wishes& wishes) {
+  editing.add_option("--material", wishes.material,
+                     "Of another material, by its name (carillon materials): its density, stiffness and damping; Poisson's ratio stays");
   editing.add_option("--density", wishes.edits.density_scale, "Times this much")->capture_default_str();
   editing.add_option("--stiffness", wishes.edits.stiffness_scale, "Times this much; Poisson's ratio stays")->capture_default_str();
   editing.add_option("--size", wishes.edits.size_scale, "All lengths times this much")->capture_default_str();
@@ -146,6 +151,27 @@ void check_bank_name(const std::filesystem::path& out) {
 
 constexpr double kMaxAudibleHz = 20000.0;
 
+/// --material, with another damping where one is given too.
+void take_material(const bank::Bank& bank, Wishes& wishes) {
+  constexpr double kAudibleCents = 5.0;
+  if (wishes.edits.density_scale != 1.0 || wishes.edits.stiffness_scale != 1.0)
+    throw InputError("--material has a density and a stiffness of its own; leave --density and --stiffness out");
+  const material::Material& material = material::MaterialTable::get().require("--material", wishes.material).material;
+  const bank::Edits own = bank::make_edits(bank, material);
+  wishes.edits.density_scale = own.density_scale;
+  wishes.edits.stiffness_scale = own.stiffness_scale;
+  if (!wishes.edits.alphas && !wishes.edits.damping) {
+    wishes.edits.alphas = own.alphas;
+    wishes.edits.damping = own.damping;
+  }
+  if (const double cents = bank::calc_poisson_cents(bank, material); cents > kAudibleCents)
+    fmt::print(
+        stderr,
+        "carillon-bank: note: Poisson's ratio stays {:g}, and {} has {:g}: modes of torsion are off by {:.0f} cents, others by less; a "
+        "job with \"material\": \"{}\" has them right\n",
+        bank.material.poisson_ratio, material.name, material.poisson_ratio, cents, material.name);
+}
+
 void edit(const std::string& file, const std::string& out, Wishes& wishes) {
   const bool is_piped = base::is_standard_output(out);
   if (is_piped)
@@ -154,10 +180,11 @@ void edit(const std::string& file, const std::string& out, Wishes& wishes) {
     check_bank_name(out);
   read_damping(wishes);
   wishes.reduction.keep = wishes.keep == "lowest" ? bank::Keep::kLowest : bank::Keep::kLoudest;
-  const bank::Edits& e = wishes.edits;
   const bool is_reduced = wishes.reduction.modes || wishes.reduction.shape_bits < bank::kMaxShapeBits;
-  const bool is_edited = e.density_scale != 1.0 || e.stiffness_scale != 1.0 || e.size_scale != 1.0 || e.alphas || e.damping;
   bank::Bank bank = bank::read_bank(file);
+  if (!wishes.material.empty()) take_material(bank, wishes);
+  const bank::Edits& e = wishes.edits;
+  const bool is_edited = e.density_scale != 1.0 || e.stiffness_scale != 1.0 || e.size_scale != 1.0 || e.alphas || e.damping;
   const double old_end_hz = bank.band_hz[1];
   if (is_edited || !is_reduced) bank = bank::calc_edited(bank, e);  // first: what is heard most may change
   if (const auto question = material::ask_about_solid(bank.material.young_modulus_pa, bank.material.density_kg_m3))

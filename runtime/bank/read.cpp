@@ -129,6 +129,12 @@ void allocate_later(const Seal& seal, const std::string& name, Loaded& loaded, c
                               std::pair("modes/discretisation_error_cents", &bank.discretisation_error_cents)}) {
     if (seal.extents.contains(field)) make_list(field, "<f8", *cents);
   }
+  if (seal.extents.contains("modes/corrected_frequency_hz")) {
+    make_list("modes/corrected_frequency_hz", "<f8", bank.corrected.freq_hz);
+    make_list("modes/corrected_decay", "<f8", bank.corrected.decay_per_s);
+    make_list("modes/corrected_error_cents", "<f8", bank.corrected.error_cents);
+    make_list("modes/correction", "|u1", bank.corrected.correction);
+  }
   if (has_group(seal, "damping")) {
     make_text("damping/law", loaded.form.damping_law);
     make_list("damping/coefficient", "<f8", bank.damping.coefficient);
@@ -161,6 +167,7 @@ void allocate_later(const Seal& seal, const std::string& name, Loaded& loaded, c
   make_list("proof/cluster_first", "<i8", proof.cluster_first);
   make_list("proof/cluster_count", "<i8", proof.cluster_count);
   make_text("proof/method", loaded.form.proof_method);
+  loaded.form.has_complete_below = seal.extents.contains("proof/complete_below_hz");
 }
 
 /// Gives the arrays the sizes that the seal states. The seal bounds their sum by the length of the file.

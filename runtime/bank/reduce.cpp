@@ -11,9 +11,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <numeric>
 
+#include "runtime/bank/select.hpp"
 #include "runtime/bank/surface.hpp"
+#include "runtime/base/sort_order.hpp"
 
 namespace carillon::bank {
 namespace {
@@ -43,60 +44,16 @@ std::vector<double> calc_mean_squares(const Bank& bank) {
   return sums;
 }
 
-/// Numbers of the modes that stay, ascending.
-std::vector<std::size_t> find_kept(const Bank& bank, const Reduction& reduction) {
-  std::vector<std::size_t> kept(bank.mode_count());
-  std::iota(kept.begin(), kept.end(), std::size_t{0});
-  if (!reduction.modes || *reduction.modes >= kept.size()) return kept;
-  if (reduction.keep == Keep::kLoudest) {
-    const std::vector<double> audibility = calc_audibility(bank);
-    std::stable_sort(kept.begin(), kept.end(), [&](std::size_t a, std::size_t b) { return audibility[a] > audibility[b]; });
-  }
-  kept.resize(*reduction.modes);
+/// Leaves the bank its `count` most audible modes, ascending.
+void keep_loudest(Bank& bank, std::size_t count) {
+  std::vector<double> silence = calc_audibility(bank);
+  for (double& audibility : silence) audibility = -audibility;
+  std::vector<std::size_t> kept = base::find_sort_order(silence);
+  kept.resize(count);
   std::sort(kept.begin(), kept.end());
-  return kept;
-}
-
-void keep_values(std::vector<double>& values, const std::vector<std::size_t>& kept) {
-  if (values.empty()) return;                                                 // error bars that are unknown
-  for (std::size_t i = 0; i < kept.size(); ++i) values[i] = values[kept[i]];  // kept[i] >= i
-  values.resize(kept.size());
-}
-
-void keep_modes(Bank& bank, const std::vector<std::size_t>& kept) {
-  const std::size_t before = bank.mode_count();
-  for (std::size_t v = 0; v < bank.vertex_count(); ++v) {
-    for (std::size_t i = 0; i < kept.size(); ++i)
-      std::copy_n(&bank.shape[(v * before + kept[i]) * 3], 3, &bank.shape[(v * kept.size() + i) * 3]);
-  }
-  bank.shape.resize(bank.vertex_count() * kept.size() * 3);
-  for (auto* values : {&bank.eigenvalue_rad2_s2, &bank.decay_per_s, &bank.residual, &bank.radiation_gain, &bank.shape_scale,
-                       &bank.algebraic_error_cents, &bank.discretisation_error_cents}) {
-    keep_values(*values, kept);
-  }
-  Supports& supports = bank.supports;
-  const std::size_t rows = supports.count();
-  for (std::size_t i = 0; i < kept.size(); ++i) {
-    std::copy_n(supports.reaction.begin() + static_cast<std::ptrdiff_t>(kept[i] * rows * 6), rows * 6,
-                supports.reaction.begin() + static_cast<std::ptrdiff_t>(i * rows * 6));
-    std::copy_n(supports.energy.begin() + static_cast<std::ptrdiff_t>(kept[i] * rows), rows,
-                supports.energy.begin() + static_cast<std::ptrdiff_t>(i * rows));
-  }
-  supports.reaction.resize(kept.size() * rows * 6);
-  supports.energy.resize(kept.size() * rows);
+  select_modes(bank, kept);
   bank.complete = false;
-}
-
-/// The counts stay true; groups of degenerate modes end where the list ends.
-void cut_groups(Proof& proof, std::int64_t modes) {
-  std::size_t groups = 0;
-  for (; groups < proof.cluster_first.size(); ++groups) {
-    std::int64_t& count = proof.cluster_count[groups];
-    count = std::min(count, modes - proof.cluster_first[groups]);
-    if (count < 2) break;
-  }
-  proof.cluster_first.resize(groups);
-  proof.cluster_count.resize(groups);
+  bank.proof.reset();
 }
 
 void round_shapes(Bank& bank, int bits) {
@@ -143,17 +100,10 @@ Bank calc_reduced(const Bank& bank, const Reduction& reduction) {
     throw InputError(fmt::format("shapes of {} bits; give {} to {}", reduction.shape_bits, kMinShapeBits, kMaxShapeBits));
   }
   Bank reduced = bank;
-  const std::vector<std::size_t> kept = find_kept(bank, reduction);
-  if (kept.size() < bank.mode_count()) {
-    keep_modes(reduced, kept);
-    if (reduction.keep == Keep::kLoudest) {
-      reduced.proof.reset();
-    } else if (reduced.proof) {
-      cut_groups(*reduced.proof, static_cast<std::int64_t>(kept.size()));
-    }
-  }
+  if (const std::size_t count = reduction.modes.value_or(bank.mode_count()); count < bank.mode_count())
+    reduction.keep == Keep::kLoudest ? keep_loudest(reduced, count) : keep_lowest(reduced, count);
   if (reduction.shape_bits < kMaxShapeBits) round_shapes(reduced, reduction.shape_bits);
-  reduced.provenance = fmt::format(R"({{"reduced": {{"modes": {}, "of_modes": {}, "keep": "{}", "shape_bits": {}}})", kept.size(),
+  reduced.provenance = fmt::format(R"({{"reduced": {{"modes": {}, "of_modes": {}, "keep": "{}", "shape_bits": {}}})", reduced.mode_count(),
                                    bank.mode_count(), reduction.keep == Keep::kLoudest ? "loudest" : "lowest", reduction.shape_bits);
   reduced.provenance += bank.provenance.empty() ? "}" : fmt::format(R"(, "of": {}}})", bank.provenance);
   return reduced;

@@ -20,7 +20,8 @@ double calc_a_weight(double freq_hz) noexcept;
 /// along the normal, averaged over all places of the surface. By the bank's own gains. The bank is sane.
 std::vector<double> calc_audibility(const Bank& bank);
 
-/// Modes that a reduced bank keeps: the most audible ones by calc_audibility(), or the lowest ones as `max_modes` of a job does.
+/// Modes that a reduced bank keeps: the most audible ones by calc_audibility(), or those of the lowest corrected frequencies, as
+/// `max_modes` of a job does.
 enum class Keep : std::uint8_t { kLoudest, kLowest };
 
 inline constexpr int kMinShapeBits = 2, kMaxShapeBits = 16;

@@ -8,6 +8,7 @@
 #include <optional>
 #include <sstream>
 
+#include "runtime/bank/select.hpp"
 #include "runtime/base/printable.hpp"
 
 namespace carillon::bank {
@@ -48,7 +49,7 @@ std::string format_scalar(const std::string& key, const Json::Value& value) {
   if (value.isString()) return base::printable(value.asString());
   std::string text = value.toStyledString();
   text.erase(std::remove(text.begin(), text.end(), '\n'), text.end());
-  return text.size() > 100 ? text.substr(0, 97) + "..." : text;
+  return text.size() > 100 ? fmt::format("{}...", std::string_view(text).substr(0, 97)) : text;
 }
 
 bool is_nested(const Json::Value& value) { return value.isObject() || value.isArray(); }
@@ -84,23 +85,28 @@ void append_tree(const Json::Value& tree, std::size_t depth, std::string& text) 
 
 /// "0.012", or "-" where the bank does not say.
 std::string format_cents(const std::vector<double>& cents, std::size_t mode) {
-  return mode < cents.size() ? fmt::format("{:.2g}", cents[mode]) : "-";
+  return mode < cents.size() && std::isfinite(cents[mode]) ? fmt::format("{:.2g}", cents[mode]) : "-";
 }
 
 std::string format_modes(const Bank& bank, std::size_t limit) {
-  std::string text = fmt::format("\n{:>5} {:>11} {:>9} {:>9} {:>11} {:>9} {:>10} {:>8} {:>9} {:>13}\n", "mode", "freq [Hz]", "+-mesh",
-                                 "+-body", "decay [1/s]", "T60 [s]", "d/omega", "regime", "residual", "gain");
+  const bool is_corrected = !bank.corrected.is_empty();
+  std::string text =
+      fmt::format("\n{:>5} {:>11} {:>9} {:>9} {:>11} {:>8} {:>10} {:>11} {:>9} {:>10} {:>8} {:>9} {:>13}\n", "mode", "mesh [Hz]", "+-mesh",
+                  "+-body", "freq [Hz]", "+-body", "correction", "decay [1/s]", "T60 [s]", "d/omega", "regime", "residual", "gain");
   const std::size_t shown = std::min(limit, bank.mode_count());
   for (std::size_t i = 0; i < shown; ++i) {
     const double omega = std::sqrt(bank.eigenvalue_rad2_s2[i]), decay = bank.decay_per_s[i];
-    text += fmt::format("{:>5} {:>11.2f} {:>9} {:>9} {:>11.4g} {:>9.3g} {:>10.3g} {:>8} {:>9.1e} {:>13.4g}\n", i + 1, bank.freq_hz(i),
-                        format_cents(bank.algebraic_error_cents, i), format_cents(bank.discretisation_error_cents, i), decay,
-                        calc_t60_s(decay), decay / omega, find_regime(decay, omega), bank.residual[i], bank.radiation_gain[i]);
+    text += fmt::format("{:>5} {:>11.2f} {:>9} {:>9} {:>11} {:>8} {:>10} {:>11.4g} {:>9.3g} {:>10.3g} {:>8} {:>9.1e} {:>13.4g}\n", i + 1,
+                        bank.freq_hz(i), format_cents(bank.algebraic_error_cents, i), format_cents(bank.discretisation_error_cents, i),
+                        is_corrected ? fmt::format("{:.2f}", bank.corrected.freq_hz[i]) : "-", format_cents(bank.corrected.error_cents, i),
+                        is_corrected ? describe(bank.corrected.correction[i]) : "-", decay, calc_t60_s(decay), decay / omega,
+                        find_regime(decay, omega), bank.residual[i], bank.radiation_gain[i]);
   }
   if (shown < bank.mode_count())
     text += fmt::format("  ... {} more; --modes {} shows them all\n", bank.mode_count() - shown, bank.mode_count());
   text +=
-      "+-mesh: cents to the exact mode of the mesh, a bound; +-body: cents to the mode of the body, an estimate\n"
+      "mesh: the frequency of the mesh; +-mesh: cents to its exact mode, a bound; +-body: cents to the mode of the body, an estimate\n"
+      "freq: the same with the estimated error of the mesh taken off, which is what is played; sorted again where modes change places\n"
       "gain: Pa at 1 m for unit modal velocity (q' = 1 m kg^1/2 / s); frequencies are undamped\n";
   return text;
 }
@@ -140,9 +146,17 @@ Json::Value make_mode(const Bank& bank, std::size_t i) {
   mode["damping_ratio"] = decay / omega;
   mode["regime"] = find_regime(decay, omega);
   mode["residual"] = bank.residual[i];
-  const auto get_cents = [&](const std::vector<double>& cents) { return i < cents.size() ? Json::Value(cents[i]) : Json::Value(); };
+  const auto get_cents = [&](const std::vector<double>& cents) {
+    return i < cents.size() && std::isfinite(cents[i]) ? Json::Value(cents[i]) : Json::Value();
+  };
   mode["algebraic_error_cents"] = get_cents(bank.algebraic_error_cents);
   mode["discretisation_error_cents"] = get_cents(bank.discretisation_error_cents);
+  if (const Corrected& corrected = bank.corrected; !corrected.is_empty()) {
+    mode["corrected_frequency_hz"] = corrected.freq_hz[i];
+    mode["corrected_decay_per_s"] = corrected.decay_per_s[i];
+    mode["corrected_error_cents"] = get_cents(corrected.error_cents);
+    mode["correction"] = describe(corrected.correction[i]);
+  }
   mode["radiation_gain"] = bank.radiation_gain[i];
   mode["shape_scale"] = bank.shape_scale[i];
   return mode;
@@ -257,6 +271,9 @@ std::string format_info_json(const Bank& bank, const std::filesystem::path& file
     material["regions"] = regions ? *regions : Json::Value(bank.regions);
   root["proof"] = bank.proof ? make_proof(*bank.proof) : Json::Value();
   root["frequencies_hz"] = Json::Value(Json::arrayValue);
+  root["corrected_frequencies_hz"] = Json::Value(Json::arrayValue);
+  for (const std::size_t mode : sort_modes(bank))
+    if (!bank.corrected.is_empty()) root["corrected_frequencies_hz"].append(bank.corrected.freq_hz[mode]);
   root["modes"] = Json::Value(Json::arrayValue);
   for (std::size_t i = 0; i < bank.mode_count(); ++i) {
     root["frequencies_hz"].append(bank.freq_hz(i));

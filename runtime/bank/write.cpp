@@ -59,6 +59,7 @@ void use_bytes(const Bank& bank, Use&& use) {
   form.regions = bank.regions;
   if (bank.supports.count() > 0) form.supports = pad_text(bank.supports.text);
   if (bank.proof) form.proof_method = pad_text(bank.proof->method);
+  form.has_complete_below = bank.proof && bank.proof->complete_below_hz > 0.0;
   if (bank.shape_bytes == 1) form.narrow_shape.assign(bank.shape.begin(), bank.shape.end());  // within -127 and 127: find_faults()
 
   const Hdf5Image image = make_hdf5_image(bank, list_fields(bank, form));

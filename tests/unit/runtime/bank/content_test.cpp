@@ -110,6 +110,13 @@ TEST(Faults, ABankWithoutProofOrCutByMaxModesHasNone) {
   EXPECT_FALSE(find_faults(bank).empty());
 }
 
+TEST(Faults, CorrectedFrequenciesAndBarsThatAreUnknownAreNone) {
+  Bank bank = example::make_corrected_bank(3, 9);
+  EXPECT_EQ(find_faults(bank), std::vector<std::string>{});
+  bank.discretisation_error_cents[1] = bank.corrected.error_cents[1] = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(find_faults(bank), std::vector<std::string>{});
+}
+
 TEST(Faults, AHollowBodyWithItsInnerSkinHasNone) {
   Bank bank = example::make_bank(2, 3);
   const std::vector<Vec3> outer = bank.vertices_m;
@@ -399,6 +406,57 @@ const Spoiled kSpoiled[] = {
     {"no_component", [](Bank& b) { b.counts.components = 0; }, "0 connected components"},
     {"seven_rigid_modes", [](Bank& b) { b.counts.rigid_modes = 7; }, "7 rigid modes"},
 };
+
+void add_corrected(Bank& b) { b.corrected = example::make_corrected_bank(3, 6).corrected; }
+
+const Spoiled kSpoiledCorrections[] = {
+    {"fewer_corrected",
+     [](Bank& b) {
+       add_corrected(b);
+       b.corrected.freq_hz.pop_back();
+     },
+     "corrected_frequency_hz holds 5 values"},
+    {"no_corrected_frequency",
+     [](Bank& b) {
+       add_corrected(b);
+       b.corrected.freq_hz[2] = std::numeric_limits<double>::quiet_NaN();
+     },
+     "corrected_frequency_hz[2] is nan"},
+    {"far_corrected",
+     [](Bank& b) {
+       add_corrected(b);
+       b.corrected.freq_hz[2] *= 1e-3;
+     },
+     "too far apart"},
+    {"corrected_decay_of_another_law",
+     [](Bank& b) {
+       add_corrected(b);
+       b.corrected.decay_per_s[1] *= 1.01;
+     },
+     "corrected_decay[1]"},
+    {"negative_corrected_bar",
+     [](Bank& b) {
+       add_corrected(b);
+       b.corrected.error_cents[1] = -1.0;
+     },
+     "corrected_error_cents[1] is -1"},
+    {"unknown_correction",
+     [](Bank& b) {
+       add_corrected(b);
+       b.corrected.correction[0] = static_cast<Correction>(77);
+     },
+     "correction[0] is 77"},
+    {"kept_but_changed",
+     [](Bank& b) {
+       add_corrected(b);
+       b.corrected.correction[0] = Correction::kDisputed;
+     },
+     "leaves it at the mesh's"},
+    {"complete_only_in_part", [](Bank& b) { b.proof->complete_below_hz = 3000.0; }, "complete_below_hz is 3000"},
+};
+
+INSTANTIATE_TEST_SUITE_P(Corrected, BankFaults, testing::ValuesIn(kSpoiledCorrections),
+                         [](const auto& info) { return std::string(info.param.name); });
 
 INSTANTIATE_TEST_SUITE_P(, BankFaults, testing::ValuesIn(kSpoiled), [](const auto& info) { return std::string(info.param.name); });
 

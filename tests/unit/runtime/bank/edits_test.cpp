@@ -4,7 +4,10 @@
 
 #include <cmath>
 #include <limits>
+#include <numbers>
 
+#include "runtime/bank/of_material.hpp"
+#include "runtime/material/table.hpp"
 #include "tests/unit/runtime/bank/example_bank.hpp"
 
 namespace carillon::bank {
@@ -120,6 +123,25 @@ TEST(Edits, WhatMeansNothingIsRefused) {
   Bank several = bank;
   several.damping.law = "mixed";
   EXPECT_THROW(calc_edited(several, {}), InputError);
+}
+
+TEST(Edits, AnotherMaterialHasItsSpeedOfSoundAndItsLoss) {
+  const Bank bank = example::make_bank(3, 12);
+  const material::MaterialTable& table = material::MaterialTable::get();
+  const material::Material& glass = table.find("glass")->material;
+  const Bank of_glass = calc_edited(bank, make_edits(bank, glass));
+  EXPECT_EQ(find_faults(of_glass), std::vector<std::string>{});
+  const double faster =
+      std::sqrt(glass.young_modulus_pa / bank.material.young_modulus_pa / (glass.density_kg_m3 / bank.material.density_kg_m3));
+  for (std::size_t m = 0; m < bank.mode_count(); ++m) {
+    EXPECT_NEAR(of_glass.freq_hz(m) / bank.freq_hz(m), faster, 1e-12);
+    EXPECT_NEAR(of_glass.decay_per_s[m] / (std::numbers::pi * of_glass.freq_hz(m) * 1e-3), 1.0, 1e-12);
+  }
+  EXPECT_NEAR(of_glass.rigid.mass_kg / bank.rigid.mass_kg, 2500 / bank.material.density_kg_m3, 1e-12);
+  EXPECT_NEAR(of_glass.material.young_modulus_pa / 72e9, 1.0, 1e-12);
+  const double poisson = bank.material.poisson_ratio;
+  EXPECT_NEAR(calc_poisson_cents(bank, glass), std::abs(1200 * std::log2(std::sqrt((1 + 0.22) / (1 + poisson)))), 1e-9);
+  EXPECT_THROW(make_edits(bank, table.find("oak")->material), InputError);
 }
 
 }  // namespace

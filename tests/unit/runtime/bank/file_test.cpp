@@ -163,6 +163,8 @@ TEST_F(BankFile, EveryReleasedVersionIsStillRead) {
                calc_reduced(example::make_bank(1, 2), {.shape_bits = 8}));
   // make_example_bank version_1_3.hdf 1 2 supports
   expect_equal(read_bank(CARILLON_SOURCE_DIR "/tests/unit/runtime/bank/pinned/version_1_3.hdf"), example::make_supported_bank(1, 2));
+  // make_example_bank version_1_4.hdf 1 6 corrected
+  expect_equal(read_bank(CARILLON_SOURCE_DIR "/tests/unit/runtime/bank/pinned/version_1_4.hdf"), example::make_corrected_bank(1, 6));
 }
 
 TEST_F(BankFile, SupportsComeBackAndRaiseTheVersionOnlyWhereThereAreSome) {

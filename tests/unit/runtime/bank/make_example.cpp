@@ -1,20 +1,25 @@
-// make_example_bank OUT [squares a side] [modes] [supports]: writes the example bank, for the scripts among the tests.
+// make_example_bank OUT [squares a side] [modes] [supports|corrected]: writes the example bank, for the scripts among the tests.
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <string>
 
 #include "tests/unit/runtime/bank/example_bank.hpp"
 
 int main(int argc, char** argv) try {
   if (argc < 2) {
-    std::fputs("usage: make_example_bank OUT [squares a side] [modes] [supports]\n", stderr);
+    std::fputs("usage: make_example_bank OUT [squares a side] [modes] [supports|corrected]\n", stderr);
     return 1;
   }
   const int n = argc > 2 ? std::atoi(argv[2]) : 2;
   const int modes = argc > 3 ? std::atoi(argv[3]) : 5;
   namespace example = carillon::bank::example;
   const auto count = static_cast<std::size_t>(modes);
-  carillon::bank::write_bank(argc > 4 ? example::make_supported_bank(n, count) : example::make_bank(n, count), argv[1]);
+  const std::string kind = argc > 4 ? argv[4] : "";
+  carillon::bank::write_bank(kind == "supports"    ? example::make_supported_bank(n, count)
+                             : kind == "corrected" ? example::make_corrected_bank(n, count)
+                                                   : example::make_bank(n, count),
+                             argv[1]);
   return 0;
 } catch (const std::exception& error) {
   std::fprintf(stderr, "%s\n", error.what());

@@ -1,0 +1,81 @@
+#include "runtime/bank/select.hpp"
+
+#include <algorithm>
+
+#include "runtime/base/sort_order.hpp"
+
+namespace carillon::bank {
+namespace {
+
+/// values: (modes, width), or empty.
+template <typename T>
+void select_values(std::vector<T>& values, const std::vector<std::size_t>& chosen, std::size_t width = 1) {
+  if (values.empty()) return;
+  std::vector<T> selected;
+  selected.reserve(chosen.size() * width);
+  for (const std::size_t mode : chosen) {
+    const auto first = values.begin() + static_cast<std::ptrdiff_t>(mode * width);
+    selected.insert(selected.end(), first, first + static_cast<std::ptrdiff_t>(width));
+  }
+  values = std::move(selected);
+}
+
+/// Groups of degenerate modes with the numbers that their modes have now; groups of one are none. kept: ascending.
+void renumber_groups(Proof& proof, const std::vector<std::size_t>& kept) {
+  std::size_t groups = 0;
+  for (std::size_t g = 0; g < proof.cluster_first.size(); ++g) {
+    const auto place = [&](std::int64_t mode) {
+      return std::lower_bound(kept.begin(), kept.end(), static_cast<std::size_t>(mode)) - kept.begin();
+    };
+    const std::int64_t first = place(proof.cluster_first[g]), end = place(proof.cluster_first[g] + proof.cluster_count[g]);
+    if (end - first < 2) continue;
+    proof.cluster_first[groups] = first;
+    proof.cluster_count[groups++] = end - first;
+  }
+  proof.cluster_first.resize(groups);
+  proof.cluster_count.resize(groups);
+}
+
+}  // namespace
+
+std::vector<std::size_t> sort_modes(const Bank& bank) {
+  return base::find_sort_order(bank.corrected.is_empty() ? bank.eigenvalue_rad2_s2 : bank.corrected.freq_hz);
+}
+
+void select_modes(Bank& bank, const std::vector<std::size_t>& chosen) {
+  const std::size_t before = bank.mode_count();
+  std::vector<std::int16_t> row(chosen.size() * 3);
+  for (std::size_t v = 0; v < bank.vertex_count(); ++v) {  // rows do not become longer, so that they may move down in place
+    for (std::size_t i = 0; i < chosen.size(); ++i) std::copy_n(&bank.shape[(v * before + chosen[i]) * 3], 3, &row[3 * i]);
+    std::copy(row.begin(), row.end(), bank.shape.begin() + static_cast<std::ptrdiff_t>(v * row.size()));
+  }
+  bank.shape.resize(bank.vertex_count() * row.size());
+  for (auto* values : {&bank.decay_per_s, &bank.residual, &bank.radiation_gain, &bank.shape_scale, &bank.algebraic_error_cents,
+                       &bank.discretisation_error_cents, &bank.corrected.freq_hz, &bank.corrected.decay_per_s, &bank.corrected.error_cents,
+                       &bank.eigenvalue_rad2_s2}) {
+    select_values(*values, chosen);
+  }
+  select_values(bank.corrected.correction, chosen);
+  select_values(bank.supports.reaction, chosen, 6 * bank.supports.count());
+  select_values(bank.supports.energy, chosen, bank.supports.count());
+}
+
+void keep_lowest(Bank& bank, std::size_t count) {
+  if (count >= bank.mode_count()) return;
+  std::vector<std::size_t> kept = sort_modes(bank);
+  const std::size_t first_gone = *std::min_element(kept.begin() + static_cast<std::ptrdiff_t>(count), kept.end());
+  const double complete_below_hz = bank.freq_hz(first_gone);
+  const bool is_head = first_gone == count;  // the lowest of the mesh, too
+  kept.resize(count);
+  std::sort(kept.begin(), kept.end());
+  select_modes(bank, kept);
+  bank.complete = false;
+  if (!bank.proof) return;
+  renumber_groups(*bank.proof, kept);
+  if (double& below_hz = bank.proof->complete_below_hz; below_hz > 0.0)
+    below_hz = std::min(below_hz, complete_below_hz);
+  else if (!is_head)
+    below_hz = complete_below_hz;
+}
+
+}  // namespace carillon::bank

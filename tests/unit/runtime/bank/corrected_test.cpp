@@ -1,0 +1,148 @@
+// What becomes of a bank when its corrected frequencies are played, and which modes are the lowest.
+#include "runtime/bank/corrected.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+#include <string>
+
+#include "runtime/bank/edits.hpp"
+#include "runtime/bank/reduce.hpp"
+#include "runtime/bank/select.hpp"
+#include "tests/unit/runtime/bank/example_bank.hpp"
+
+namespace carillon::bank {
+namespace {
+
+constexpr std::size_t kModes = 9;
+
+/// What the gain of a pulsating sphere of the example's area has of the frequency (Pierce 1981, section 4.1), but for a constant.
+double calc_sphere(double freq_hz) {
+  const auto [a, b, c] = example::kSidesM;
+  const double radius = std::sqrt((a * b + b * c + c * a) / (2 * std::numbers::pi));
+  return freq_hz / std::hypot(1.0, 2 * std::numbers::pi * freq_hz / 343.0 * radius);
+}
+
+TEST(Corrected, AreReadAsTheyWereWrittenAndRaiseTheVersion) {
+  const std::filesystem::path file = testing::TempDir() + "corrected.hdf";
+  const Bank bank = example::make_corrected_bank(2, kModes);
+  write_bank(bank, file);
+  const Bank read = read_bank(file);
+  EXPECT_EQ(read_version(file), (std::array<int, 2>{1, 4}));
+  EXPECT_EQ(read.corrected.freq_hz, bank.corrected.freq_hz);
+  EXPECT_EQ(read.corrected.decay_per_s, bank.corrected.decay_per_s);
+  EXPECT_EQ(read.corrected.error_cents, bank.corrected.error_cents);
+  EXPECT_EQ(read.corrected.correction, bank.corrected.correction);
+}
+
+TEST(Corrected, AreInAscendingOrderAndEveryModeKeepsWhatIsItsOwn) {
+  const Bank bank = example::make_corrected_bank(2, kModes), played = calc_corrected(bank);
+  EXPECT_EQ(find_faults(played), std::vector<std::string>{});
+  ASSERT_EQ(played.mode_count(), kModes);
+  bool has_moved = false;
+  for (std::size_t m = 0; m < kModes; ++m) {
+    const auto of = static_cast<std::size_t>(
+        std::min_element(bank.corrected.freq_hz.begin(), bank.corrected.freq_hz.end(),
+                         [&](double a, double b) { return std::abs(a - played.freq_hz(m)) < std::abs(b - played.freq_hz(m)); }) -
+        bank.corrected.freq_hz.begin());
+    has_moved = has_moved || of != m;
+    EXPECT_NEAR(played.freq_hz(m) / bank.corrected.freq_hz[of], 1.0, 1e-14);
+    EXPECT_EQ(played.decay_per_s[m], bank.corrected.decay_per_s[of]);
+    EXPECT_NEAR(played.radiation_gain[m] / bank.radiation_gain[of], calc_sphere(played.freq_hz(m)) / calc_sphere(bank.freq_hz(of)), 1e-12);
+    EXPECT_EQ(played.discretisation_error_cents[m], bank.corrected.error_cents[of]);
+    for (const std::size_t vertex : {0U, 7U, 25U}) EXPECT_EQ(played.shape_at(vertex, m), bank.shape_at(vertex, of));
+  }
+  EXPECT_TRUE(has_moved) << "the example has modes that change places";
+  EXPECT_FALSE(played.proof.has_value()) << "it is about the mesh";
+}
+
+TEST(Corrected, KeepWhatEveryModeGivesItsSupportsPerAcceleration) {
+  Bank bank = example::make_corrected_bank(2, kModes);
+  bank.supports = example::make_supported_bank(2, kModes).supports;
+  const Bank played = calc_corrected(bank);
+  EXPECT_EQ(find_faults(played), std::vector<std::string>{});
+  const std::vector<std::size_t> of = sort_modes(bank);
+  for (std::size_t m = 0; m < kModes; ++m) {
+    for (std::size_t i = 0; i < 12; ++i) {
+      const double before = bank.supports.reaction[of[m] * 12 + i] / bank.eigenvalue_rad2_s2[of[m]];
+      EXPECT_NEAR(played.supports.reaction[m * 12 + i] / played.eigenvalue_rad2_s2[m] / before, 1.0, 1e-12);
+    }
+    for (std::size_t i = 0; i < 2; ++i) EXPECT_EQ(played.supports.energy[2 * m + i], bank.supports.energy[2 * of[m] + i]);
+  }
+}
+
+TEST(Corrected, LeaveABankAloneThatHasNone) {
+  const Bank bank = example::make_bank(2, 5), played = calc_corrected(bank);
+  EXPECT_EQ(played.eigenvalue_rad2_s2, bank.eigenvalue_rad2_s2);
+  EXPECT_EQ(played.decay_per_s, bank.decay_per_s);
+  EXPECT_TRUE(played.proof.has_value());
+  const Bank mesh = choose_frequencies(example::make_corrected_bank(2, 5), Frequencies::kMesh);
+  EXPECT_EQ(mesh.eigenvalue_rad2_s2, example::make_corrected_bank(2, 5).eigenvalue_rad2_s2);
+}
+
+TEST(Corrected, DecideWhichModesAreTheLowestAndTheProofSaysHowFarItReaches) {
+  const Bank bank = example::make_corrected_bank(2, kModes);
+  for (std::size_t count = 1; count < kModes; ++count) {
+    Bank kept = bank;
+    keep_lowest(kept, count);
+    EXPECT_EQ(find_faults(kept), std::vector<std::string>{}) << count;
+    ASSERT_EQ(kept.mode_count(), count);
+    std::vector<double> all = bank.corrected.freq_hz, here = kept.corrected.freq_hz;
+    std::sort(all.begin(), all.end());
+    std::sort(here.begin(), here.end());
+    EXPECT_TRUE(std::equal(here.begin(), here.end(), all.begin())) << count;
+    // Every mode of the mesh below the bound is here, and the next one is not.
+    const double bound = kept.proof->complete_below_hz;
+    const auto count_below = [&](const Bank& of) {
+      return std::count_if(of.eigenvalue_rad2_s2.begin(), of.eigenvalue_rad2_s2.end(),
+                           [&](double lambda) { return lambda < std::pow(2 * 3.14159265358979323846 * bound, 2) * (1 - 1e-12); });
+    };
+    if (bound > 0.0) {
+      EXPECT_EQ(count_below(kept), count_below(bank)) << count;
+    }
+    const std::filesystem::path file = testing::TempDir() + "lowest.hdf";
+    write_bank(kept, file);
+    EXPECT_EQ(read_bank(file).proof->complete_below_hz, bound);
+  }
+}
+
+TEST(Corrected, ABankThatIsCutTwiceIsTheOneThatIsCutOnce) {
+  const Bank bank = example::make_corrected_bank(2, kModes);
+  for (std::size_t first = 2; first < kModes; ++first) {
+    for (std::size_t second = 1; second < first; ++second) {
+      Bank twice = bank, once = bank;
+      keep_lowest(twice, first);
+      keep_lowest(twice, second);
+      keep_lowest(once, second);
+      EXPECT_EQ(find_faults(twice), std::vector<std::string>{}) << first << ", then " << second;
+      EXPECT_EQ(twice.eigenvalue_rad2_s2, once.eigenvalue_rad2_s2) << first << ", then " << second;
+      EXPECT_TRUE(once.proof->complete_below_hz == 0.0 || twice.proof->complete_below_hz <= once.proof->complete_below_hz)
+          << first << ", then " << second;
+    }
+  }
+}
+
+TEST(Corrected, AModeThatIsMissingBelowTheBoundIsAFault) {
+  Bank kept = example::make_corrected_bank(2, kModes);
+  keep_lowest(kept, 5);
+  ASSERT_GT(kept.proof->complete_below_hz, 0.0);
+  kept.proof->complete_below_hz = kept.band_hz[1];
+  const auto faults = find_faults(kept);
+  ASSERT_FALSE(faults.empty());
+  EXPECT_NE(faults[0].find("by the counts, and the bank holds"), std::string::npos) << faults[0];
+}
+
+TEST(Corrected, FollowEditsAsTheMeshsDo) {
+  const Bank bank = example::make_corrected_bank(2, kModes);
+  Edits edits;
+  edits.stiffness_scale = 4.0;
+  const Bank edited = calc_edited(bank, edits);
+  EXPECT_EQ(find_faults(edited), std::vector<std::string>{});
+  for (std::size_t m = 0; m < kModes; ++m) EXPECT_NEAR(edited.corrected.freq_hz[m] / bank.corrected.freq_hz[m], 2.0, 1e-12);
+}
+
+}  // namespace
+}  // namespace carillon::bank
