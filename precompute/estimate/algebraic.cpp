@@ -32,7 +32,7 @@ MassBounds find_bounds(const Matrix10& mass) {
 
 MassBounds find_element_bounds(const std::array<Vec3, 10>& x) {
   fem::ElementMatrices element;
-  job::Material unit;
+  material::Material unit;
   unit.young_modulus_pa = unit.density_kg_m3 = 1.0;
   if (!fem::calc_element(x, unit, job::Mass::consistent, element)) return {0.0, std::numeric_limits<double>::infinity()};
   return find_bounds(Eigen::Map<const Matrix10>(element.mass.data()));

@@ -71,9 +71,9 @@ void load_displacement(const partition::LocalMesh& local, const std::vector<std:
   }
 }
 
-/// The sums of one block of modes over this rank's elements: error, energy, lumping, change, magnitude, and the last two again for the
-/// surface that the body may have as well.
-constexpr int kSums = 7;
+/// The sums of one block of modes over this rank's elements: error, energy, lumping, change, magnitude, the last two again for the surface
+/// that the body may have as well, and the error of singular elements.
+constexpr int kSums = 8;
 using Sums = std::array<DoubleLanes, kSums>;
 
 Sums calc_block(const Kernels& kernels, Recovery& recovery, Room& room, job::Mass mass_kind, const DoubleLanes& lambda) {
@@ -99,7 +99,7 @@ Sums calc_block(const Kernels& kernels, Recovery& recovery, Room& room, job::Mas
     kernels.find_middles(recovery.middles, elements.materials, room.patches.data(), room.values.data());
     values = room.values.data();
   }
-  kernels.add_energies(elements, recovery.value_of.data(), values, displacement, room.strains.data(), sums[0], sums[1]);
+  kernels.add_energies(elements, recovery.value_of.data(), values, displacement, room.strains.data(), sums[0], sums[7], sums[1]);
   kernels.add_shifts(recovery.shifts, values, displacement, lambda, sums[3], sums[4]);
   kernels.add_tractions(recovery.tractions, values, sums[0]);
   kernels.add_shifts(recovery.doubts, values, displacement, lambda, sums[5], sums[6]);
@@ -167,6 +167,18 @@ bool is_curved(const comm::Communicator& comm, const partition::LocalMesh& local
 
 }  // namespace
 
+Solid make_isotropic(double young_modulus_pa, double poisson_ratio, double density_kg_m3) {
+  const double lambda = young_modulus_pa * poisson_ratio / ((1 + poisson_ratio) * (1 - 2 * poisson_ratio));
+  const double mu = young_modulus_pa / (2 * (1 + poisson_ratio));
+  Solid solid;
+  solid.density_kg_m3 = density_kg_m3;
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) solid.elasticity_pa[6 * r + c] = lambda + (r == c ? 2 * mu : 0.0);
+    solid.elasticity_pa[7 * (3 + r)] = mu;
+  }
+  return solid;
+}
+
 ErrorBars calc_error_bars(const comm::Communicator& comm, const partition::LocalMesh& local, Mat stiffness, Mat mass,
                           std::span<const Solid> solids, std::span<const std::int32_t> material_of_tet, job::Mass mass_kind,
                           const Solution& solution) {
@@ -176,24 +188,35 @@ ErrorBars calc_error_bars(const comm::Communicator& comm, const partition::Local
   bars.algebraic_cents = calc_algebraic_cents(comm, stiffness, mass, find_mass_bounds(comm, local, mass_kind), solution);
   Recovery recovery = make_recovery(comm, local, solids, material_of_tet, mass_kind);
   const std::vector<double> sums = calc_sums(comm, local, recovery, mass_kind, solution);
-  bars.kind = local.order == 1 ? Kind::kT4 : is_curved(comm, local) ? Kind::kT10Curved : Kind::kT10;
-  std::vector<double> cents, cents_above;
+  Level& level = bars.level;
+  level.kind = local.order == 1 ? Kind::kT4 : is_curved(comm, local) ? Kind::kT10Curved : Kind::kT10;
+  level.is_lumped = mass_kind == job::Mass::lumped;
+  level.lambda.assign(solution.lambda.begin(), solution.lambda.end());
+  level.one_layer = recovery.one_layer;
+  level.unlisted = {solution.high_hz, solution.low_hz, solution.below};
+  OwnIntervals own;
   for (std::size_t m = 0; m < solution.lambda.size(); ++m) {
     const double* sum = &sums[m * kSums];
-    ErrorBars::Parts parts;
+    ErrorParts parts;
     parts.interpolation = sum[0];
+    parts.singular = sum[7];
     parts.energy = sum[1];
     parts.lumping = sum[2];
     parts.geometry = sum[3];
     parts.geometry_noise = sum[4];
     parts.doubt = sum[5];
     parts.doubt_noise = sum[6];
-    bars.parts.push_back(parts);
-    cents.push_back(predict_cents(parts, bars.kind));
+    level.parts.push_back(parts);
+    const double cents = calc_cents(parts, level.kind);
     parts.interpolation = 0.0;  // elements that cannot follow a mode are too stiff: the truth lies below
-    cents_above.push_back(predict_cents(parts, bars.kind));
+    own.stated.push_back(0.0);
+    own.low.push_back(-cents);
+    own.high.push_back(cents);
+    own.above.push_back(calc_cents(parts, level.kind));
   }
-  bars.discretisation_cents = widen_for_order(solution.lambda, {cents, cents_above}, {solution.high_hz, solution.low_hz, solution.below});
+  bars.discretisation_cents = widen_for_order(solution.lambda, own, level.unlisted);
+  bars.corrected = calc_corrections(level);
+  if (is_too_short(level)) bars.discretisation_cents = bars.corrected.cents;
   return bars;
 }
 

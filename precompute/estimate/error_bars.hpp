@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "partition/distributed_mesh.hpp"
+#include "precompute/estimate/correct.hpp"
 #include "precompute/job/job_spec.hpp"
 
 namespace carillon::estimate {
@@ -31,13 +32,6 @@ struct Solution {
   std::int64_t below = 0;            // elastic modes below low_hz, counted
 };
 
-/// The kinds of mesh whose errors fall at different rates.
-enum class Kind {
-  kT4,         // interpolation h^2, lumping h^2, geometry h^2
-  kT10,        // straight sides: interpolation h^4, lumping h^2, geometry h^2
-  kT10Curved,  // mid nodes on the surface: interpolation h^4, lumping h^2, geometry h^4
-};
-
 /// Error bars, one entry a mode, the same on every rank. A bar b says that the true frequency of the k-th mode lies between
 /// f_k 2^(-b/1200) and f_k 2^(b/1200).
 struct ErrorBars {
@@ -46,21 +40,13 @@ struct ErrorBars {
   std::vector<double> algebraic_cents;
   /// Between the frequency of K phi = lambda M phi and that of the elastic body: an estimate, safety factor included; holds for the k-th of
   /// the sorted frequencies, whatever modes change places, those that are not in the list among them. k counts the elastic modes below the
-  /// band too.
+  /// band too. Infinite where is_too_short().
   std::vector<double> discretisation_cents;
 
-  /// The parts of the estimate as shares of lambda, without safety factors: for predict_cents() and for people.
-  struct Parts {
-    double interpolation = 0.0;   // energy of the stress that the elements cannot follow, lambda_h - lambda > 0
-    double energy = 0.0;          // of the whole mode as the estimate sums it: 1 (0.99 for curved T10)
-    double lumping = 0.0;         // of a lumped mass: lambda (consistent) - lambda (lumped)
-    double geometry = 0.0;        // lambda (smooth surface) - lambda (surface of the mesh), signed
-    double geometry_noise = 0.0;  // how uncertain `geometry` is, >= 0
-    double doubt = 0.0;           // lambda (the other surface that the body may have, TetMesh::doubt_m) - lambda; no mesh makes it smaller
-    double doubt_noise = 0.0;
-  };
-  std::vector<Parts> parts;
-  Kind kind = Kind::kT4;  // of the mesh the parts come from
+  Level level;  // what they were made from: for predictions and for people
+
+  /// The same for corrected frequencies.
+  Corrections corrected;
 };
 
 /// Calculates the error bars of all modes from K, M and the modes, in one pass over the elements.
@@ -73,10 +59,5 @@ ErrorBars calc_error_bars(const comm::Communicator& comm, const partition::Local
 
 /// The elasticity of an isotropic solid.
 Solid make_isotropic(double young_modulus_pa, double poisson_ratio, double density_kg_m3);
-
-/// Predicts the discretisation bar [cents] of a mode on a mesh whose edges are `edge_ratio` times as long as those the parts come from,
-/// with the rates of `kind` (smooth modes; a fixed face with its singular rim converges slower, which the safety factor covers for ratios
-/// down to about 1/4). Pure.
-double predict_cents(const ErrorBars::Parts& parts, Kind kind, double edge_ratio = 1.0);
 
 }  // namespace carillon::estimate

@@ -148,9 +148,9 @@ void add_strains(const Elements& elements, bool lumped, const void* displacement
 }
 
 void add_energies_t4(const Elements& elements, const std::int32_t* value_of, const Strain* values, const void* displacement, const Strain*,
-                     DoubleLanes& error, DoubleLanes& energy) {
+                     DoubleLanes& error, DoubleLanes& singular, DoubleLanes& energy) {
   for (std::size_t begin = 0; begin < elements.count; begin += kChunk) {
-    Lanes errors = {}, energies = {};
+    Lanes errors = {}, singulars = {}, energies = {};
     for (std::size_t e = begin; e < std::min(elements.count, begin + kChunk); ++e) {
       Lanes d[3][3], q[6];
       load_differences<4>(elements, static_cast<const FloatLanes*>(displacement), e, d);
@@ -167,18 +167,21 @@ void add_energies_t4(const Elements& elements, const std::int32_t* value_of, con
         squares += sum * sum;
         own += q[r] * q[r];
       }
-      errors += squares * (elements.volume[e] / 20);
+      squares *= elements.volume[e] / 20;
+      errors += squares;
+      singulars += squares * elements.singular[e];
       energies += own * elements.volume[e];
     }
     flush(errors, error);
+    flush(singulars, singular);
     flush(energies, energy);
   }
 }
 
 void add_energies_t10(const Elements& elements, const std::int32_t* value_of, const Strain* values, const void*, const Strain* strains,
-                      DoubleLanes& error, DoubleLanes& energy) {
+                      DoubleLanes& error, DoubleLanes& singular, DoubleLanes& energy) {
   for (std::size_t begin = 0; begin < elements.count; begin += kChunk) {
-    Lanes errors = {}, energies = {};
+    Lanes errors = {}, singulars = {}, energies = {};
     for (std::size_t e = begin; e < std::min(elements.count, begin + kChunk); ++e) {
       const Strain* q = strains + 4 * e;
       const std::int32_t* value = value_of + 10 * e;
@@ -194,10 +197,13 @@ void add_energies_t10(const Elements& elements, const std::int32_t* value_of, co
         for (int m = 0; m < 6; ++m) d[4 + m] = values[value[4 + m]][r] - (corner[mesh::kEdges[m][0]] + corner[mesh::kEdges[m][1]]) * 0.5F;
         squares += integrate_square(d);
       }
-      errors += squares * elements.volume[e];
+      squares *= elements.volume[e];
+      errors += squares;
+      singulars += squares * elements.singular[e];
       energies += own * (elements.volume[e] / 4);
     }
     flush(errors, error);
+    flush(singulars, singular);
     flush(energies, energy);
   }
 }

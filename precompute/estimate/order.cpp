@@ -1,4 +1,4 @@
-// Method:     the k-th lowest of numbers that lie in intervals around their centres lies between the k-th lowest of all lower and of all
+// Method:     the k-th lowest of numbers that lie in intervals lies between the k-th lowest of all lower and of all
 //             upper ends. Modes that are not in the list take part: one above it, computed at F or higher, is really at F 2^(-b/1200) or
 //             higher, b being the bar of a mode there; one below it, at F or lower, really at F 2^(b/1200) or lower.
 // Source:     -
@@ -10,6 +10,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+
+#include "runtime/base/sort_order.hpp"
 
 namespace carillon::estimate {
 namespace {
@@ -38,28 +40,32 @@ double predict(std::span<const double> at, std::span<const double> cents, double
 
 }  // namespace
 
-std::vector<double> widen_for_order(std::span<const double> lambda, const OwnBars& own, const Unlisted& unlisted) {
+std::vector<double> widen_for_order(std::span<const double> lambda, const OwnIntervals& own, const Unlisted& unlisted) {
   const std::size_t count = lambda.size();
   const auto place = [&](double l) { return 600 * std::log2(l / lambda[0]); };
   const auto place_hz = [&](double hz) { return place(4 * std::numbers::pi * std::numbers::pi * hz * hz); };
-  std::vector<double> at(count), low(count), high(count), result(count);
+  std::vector<double> at(count), stated(count), low(count), high(count), reach(count), result(count);
   for (std::size_t m = 0; m < count; ++m) {
     at[m] = place(lambda[m]);
-    low[m] = at[m] - own.cents[m];
-    high[m] = at[m] + own.cents[m];
+    stated[m] = at[m] + own.stated[m];
+    low[m] = at[m] + own.low[m];
+    high[m] = at[m] + own.high[m];
+    reach[m] = std::max(-own.low[m], 0.0);
   }
+  const std::vector<std::size_t> order = base::find_sort_order(stated);
   std::sort(low.begin(), low.end());
   std::sort(high.begin(), high.end());
   const double top = unlisted.high_hz > 0 ? std::max(at[count - 1], place_hz(unlisted.high_hz)) : at[count - 1];
-  const double min = top - predict(at, own.cents, top);  // of all above
-  double max = at[0] - 1e9;                              // of all below
+  const double min = top - predict(at, reach, top);  // of all above
+  double max = at[0] - 1e9;                          // of all below
   if (unlisted.below > 0 && unlisted.low_hz > 0) {
     const double bottom = std::min(at[0], place_hz(unlisted.low_hz));
     const auto octave = std::upper_bound(at.begin(), at.end(), bottom + kOctave) - at.begin();
     const auto last = std::max(octave, static_cast<std::ptrdiff_t>((count + 3) / 4));
-    max = bottom + *std::max_element(own.cents_above.begin(), own.cents_above.begin() + last);
+    max = bottom + *std::max_element(own.above.begin(), own.above.begin() + last);
   }
-  for (std::size_t m = 0; m < count; ++m) result[m] = std::max(at[m] - std::min(low[m], min), std::max(high[m], max) - at[m]);
+  for (std::size_t k = 0; k < count; ++k)
+    result[order[k]] = std::max(stated[order[k]] - std::min(low[k], min), std::max(high[k], max) - stated[order[k]]);
   return result;
 }
 

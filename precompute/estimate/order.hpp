@@ -7,10 +7,12 @@
 
 namespace carillon::estimate {
 
-/// What a mode by itself can be wrong by, cents.
-struct OwnBars {
-  std::span<const double> cents;        // (m) to either side
-  std::span<const double> cents_above;  // (m) by which the truth can lie above: what a lumped mass and a surface cut short leave open
+/// What is stated of each mode by itself, and where its true frequency can be; cents above its frequency on the mesh.
+struct OwnIntervals {
+  std::vector<double> stated;  // (m) 0: the mesh's frequency; otherwise the correction
+  std::vector<double> low;     // (m) lower end of the interval, <= stated
+  std::vector<double> high;    // (m) upper end, >= stated
+  std::vector<double> above;   // (m) upper end for a mode that is not corrected: what a lumped mass and a surface cut short leave open
 };
 
 /// The modes of the mesh that are not in the list.
@@ -20,7 +22,8 @@ struct Unlisted {
   std::int64_t below = 0;  // how many, rigid ones left out
 };
 
-/// The bars [cents] of the k-th lowest, k counting what is unlisted below too. lambda: (m) ascending, m > 0. Pure.
-std::vector<double> widen_for_order(std::span<const double> lambda, const OwnBars& own, const Unlisted& unlisted);
+/// The bars [cents] of the stated frequencies: the k-th lowest of them is within its bar of the k-th true one, k counting what is unlisted
+/// below too. lambda: (m) of the mesh, ascending, m > 0. Returns (m), in the order of lambda. Pure.
+std::vector<double> widen_for_order(std::span<const double> lambda, const OwnIntervals& own, const Unlisted& unlisted);
 
 }  // namespace carillon::estimate

@@ -4,26 +4,27 @@
 #include <algorithm>
 #include <cmath>
 
-#include "precompute/estimate/error_bars.hpp"
+#include "precompute/estimate/parts.hpp"
 
 namespace carillon::estimate {
 
-Solid make_isotropic(double young_modulus_pa, double poisson_ratio, double density_kg_m3) {
-  const double lambda = young_modulus_pa * poisson_ratio / ((1 + poisson_ratio) * (1 - 2 * poisson_ratio));
-  const double mu = young_modulus_pa / (2 * (1 + poisson_ratio));
-  Solid solid;
-  solid.density_kg_m3 = density_kg_m3;
-  for (int r = 0; r < 3; ++r) {
-    for (int c = 0; c < 3; ++c) solid.elasticity_pa[6 * r + c] = lambda + (r == c ? 2 * mu : 0.0);
-    solid.elasticity_pa[7 * (3 + r)] = mu;
-  }
-  return solid;
+double find_order(Kind kind) { return kind == Kind::kT4 ? 2.0 : 4.0; }
+
+ErrorParts predict_parts(const ErrorParts& parts, Kind kind, double order, double edge_ratio) {
+  const double second = edge_ratio * edge_ratio, interpolation = std::pow(edge_ratio, order);
+  const double geometry = kind == Kind::kT10Curved ? second * second : second;
+  ErrorParts then = parts;
+  then.interpolation *= interpolation;
+  then.singular *= interpolation;
+  then.lumping *= second;
+  then.geometry *= geometry;
+  then.geometry_noise *= geometry;
+  return then;
 }
 
-double predict_cents(const ErrorBars::Parts& parts, Kind kind, double edge_ratio) {
+double calc_cents(const ErrorParts& parts, Kind kind) {
   constexpr double kMaxOfEnergy = 0.99, kGeometry = 1.5, kNoise = 0.15, kT10 = 3.5, kT10Lumped = 4.5;
-  const double second = edge_ratio * edge_ratio, fourth = second * second;
-  const double interpolation = parts.interpolation * (kind == Kind::kT4 ? second : fourth), lumping = std::abs(parts.lumping) * second;
+  const double interpolation = parts.interpolation, lumping = std::abs(parts.lumping);
   // A share of the computed lambda as a share of the true one, which is smaller, times a safety factor.
   const auto enlarge = [&](double factor, double share) {
     const double s = std::clamp(share, 0.0, kMaxOfEnergy);
@@ -35,8 +36,7 @@ double predict_cents(const ErrorBars::Parts& parts, Kind kind, double edge_ratio
     mesh = enlarge(2.0, std::abs(interpolation - lumping)) + 0.4 * std::min(interpolation, lumping);
   else if (lumping > 0.0)  // how far up, and how far down
     mesh = std::max(enlarge(kT10Lumped, interpolation) - lumping, 1.75 * lumping - 0.65 * interpolation);
-  const double geometry =
-      (kGeometry * std::abs(parts.geometry) + kNoise * parts.geometry_noise) * (kind == Kind::kT10Curved ? fourth : second);
+  const double geometry = kGeometry * std::abs(parts.geometry) + kNoise * parts.geometry_noise;
   const double doubt = kGeometry * std::abs(parts.doubt) + kNoise * parts.doubt_noise;
   return 600.0 * std::log2(1.0 + mesh + geometry + doubt);
 }

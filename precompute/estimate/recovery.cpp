@@ -110,7 +110,7 @@ std::array<float, 36> calc_root(const Solid& solid) {
 float find_dilatation(const Solid& solid) {
   const double mean = fem::calc_mean_dilatation_modulus_pa(solid.elasticity_pa);
   if (mean == 0.0) return 1.0F;
-  const double full = (fem::kMaxDisplacementLambda + 2.0 / 3) * job::calc_mean_shear_pa(solid.elasticity_pa);
+  const double full = (fem::kMaxDisplacementLambda + 2.0 / 3) * material::calc_mean_shear_pa(solid.elasticity_pa);
   return static_cast<float>(std::sqrt(full / (full + mean)));
 }
 
@@ -200,7 +200,7 @@ std::vector<std::int32_t> find_places(const partition::LocalMesh& local, const s
 }
 
 void fill_elements(const partition::LocalMesh& local, std::span<const Solid> solids, std::span<const std::int32_t> material_of_tet,
-                   Recovery& recovery) {
+                   const std::vector<char>& singular, Recovery& recovery) {
   Elements& elements = recovery.elements;
   const int n = elements.nodes, s = elements.samples;
   elements.node.resize(elements.count * n);
@@ -212,6 +212,7 @@ void fill_elements(const partition::LocalMesh& local, std::span<const Solid> sol
   elements.material.resize(elements.count, 0);
   elements.gradient.resize(elements.count * s * (n - 1) * 3);
   elements.volume.resize(elements.count);
+  elements.singular.resize(elements.count);
   elements.patch.resize(elements.count * 4);
   recovery.value_of.resize(elements.count * n);
   std::vector<Vec3> x(n);
@@ -229,6 +230,7 @@ void fill_elements(const partition::LocalMesh& local, std::span<const Solid> sol
     if (!(volume > 0))
       throw InputError(fmt::format("element {} of the mesh has no volume; remesh there", local.tet_in_mesh[recovery.order[e]] + 1));
     elements.volume[e] = static_cast<float>(volume);
+    elements.singular[e] = std::any_of(tet, tet + 4, [&](std::int32_t node) { return singular[node] != 0; }) ? 1.0F : 0.0F;
     for (int v = 0; v < 4; ++v) elements.patch[4 * e + v] = recovery.vertex_place[tet[v]] * elements.materials + elements.material[e];
     for (int i = 0; i < n; ++i) {
       elements.node[e * n + i] = recovery.place[tet[i]];
@@ -270,6 +272,24 @@ void find_middles(const partition::LocalMesh& local, const Patches& patches, Rec
       recovery.middles.push_back(middle);
       done[node] = 1;
     }
+}
+
+/// How many elements are flat and have all corners on the surface.
+double count_one_layer(const partition::LocalMesh& local, const std::vector<char>& is_outer) {
+  constexpr double kFlat = 4.0;  // longest edge over least height: 1.2 of a regular tetrahedron, 2.5 in a lattice of cubes
+  double count = 0.0;
+  for (std::size_t at = 0; at < local.tets.size(); at += static_cast<std::size_t>(local.nodes_per_tet())) {
+    const std::int32_t* tet = &local.tets[at];
+    if (!std::all_of(tet, tet + 4, [&](std::int32_t node) { return is_outer[node] != 0; })) continue;
+    std::array<Vec3, 4> x;
+    for (int i = 0; i < 4; ++i) x[i] = local.nodes_m[tet[i]];
+    double longest = 0.0, widest = 0.0;
+    for (const auto& [a, b] : mesh::kEdges) longest = std::max(longest, norm(x[b] - x[a]));
+    for (const auto& [a, b, c] : mesh::kFaces) widest = std::max(widest, norm(cross(x[b] - x[a], x[c] - x[a])));
+    const double six_volumes = std::abs(dot(x[1] - x[0], cross(x[2] - x[0], x[3] - x[0])));
+    if (longest * widest > kFlat * six_volumes) count += 1.0;
+  }
+  return count;
 }
 
 /// Both faces of an edge in one entry, in the order of the elements.
@@ -381,15 +401,18 @@ Recovery make_recovery(const comm::Communicator& comm, const partition::LocalMes
   elements.terms = local.order == 1 ? 1 : 10;
   elements.materials = static_cast<int>(solids.size());
   elements.count = static_cast<std::size_t>(local.tet_count());
-  std::array<double, 2> size{0.0, static_cast<double>(elements.count)};  // volume, elements
+  const Surface surface = find_surface(comm, local);
+  std::array<double, 3> size{0.0, static_cast<double>(elements.count), 0.0};  // volume, elements, those of a thin wall of one layer
   comm.agree([&] {
     recovery.vertex_node.resize(static_cast<std::size_t>(*std::max_element(vertex_place.begin(), vertex_place.end()) + 1));
     for (std::size_t n = 0; n < place.size(); ++n)
       if (vertex_place[n] >= 0) recovery.vertex_node[vertex_place[n]] = place[n];
-    fill_elements(local, solids, material_of_tet, recovery);
+    fill_elements(local, solids, material_of_tet, surface.is_singular, recovery);
     for (const float volume : elements.volume) size[0] += volume;
+    size[2] = count_one_layer(local, surface.is_outer);
   });
   comm.sum(size);
+  recovery.one_layer = size[2] / size[1];
 
   std::unique_ptr<Patches> patches;
   comm.agree([&] {
@@ -398,7 +421,6 @@ Recovery make_recovery(const comm::Communicator& comm, const partition::LocalMes
     for_each_sample(local, recovery, *patches, [&](std::size_t, int, int, std::size_t patch, const auto& p) { patches->add(patch, p); });
   });
   patches->sum(recovery.vertices, elements.materials);
-  const Surface surface = find_surface(comm, local);
   const std::vector<SurfaceEdge> doubtful = find_doubtful_edges(comm, local);
   comm.agree([&] {
     patches->invert();

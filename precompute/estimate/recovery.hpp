@@ -24,6 +24,7 @@ struct Recovery {
   std::vector<Shift> shifts, doubts;       // to the smooth surface; to the surface that the body may have as well
   std::vector<Traction> tractions;         // T10 with a consistent mass only
   comm::HaloExchange nodes, vertices;      // of values at places; at places among the vertices
+  double one_layer = 0.0;                  // Level::one_layer
 };
 
 /// Collective. Throws InputError naming an element without volume and a material that is not positive definite, on all ranks alike.

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <numeric>
 #include <unordered_map>
 
@@ -21,6 +22,7 @@ namespace carillon::estimate {
 namespace {
 
 constexpr double kSmoothCosine = 0.642787609686539;  // 50 degrees
+constexpr double kInwardSine = 0.766044443118978;    // of 50 degrees
 constexpr double kParabola = 0.37;                   // measured on a sphere 0.36, on a cylinder 0.13
 
 Vec3 normalise(const Vec3& a) {
@@ -172,12 +174,83 @@ std::vector<Vec3> find_normals(const comm::Communicator& comm, const partition::
       [](const comm::ByRank<Corner>& met) { return smooth_normals(met.items); });
 }
 
+/// Bits of nodes.
+constexpr char kOuter = 1, kSingular = 2;
+
+/// What Surface says of the nodes, as bits. Collective.
+std::vector<char> find_marks(const comm::Communicator& comm, const partition::LocalMesh& local, const std::vector<Face>& faces) {
+  struct Side {
+    std::array<std::int32_t, 2> key;  // node numbers in the whole mesh, ascending
+    Vec3 normal, across;              // unit: of the face; from the middle of the edge to the corner opposite
+    char is_fixed;
+  };
+  std::vector<std::array<std::int32_t, 2>> ends;  // local nodes of the sides
+  const auto sides = comm.agree([&] {
+    std::vector<Side> list;
+    for (const Face& face : faces) {
+      const auto& loop = mesh::kFaces[face.face];
+      std::array<std::int32_t, 3> nodes;
+      for (int i = 0; i < 3; ++i) nodes[i] = get_node(local, face.tet, loop[i]);
+      const std::array<Vec3, 3> x{local.nodes_m[nodes[0]], local.nodes_m[nodes[1]], local.nodes_m[nodes[2]]};
+      const Vec3 normal = normalise(cross(x[1] - x[0], x[2] - x[0]));
+      const bool is_fixed = local.row[nodes[0]] < 0 && local.row[nodes[1]] < 0 && local.row[nodes[2]] < 0;
+      for (int i = 0; i < 3; ++i) {
+        const int j = (i + 1) % 3, k = (i + 2) % 3;
+        const auto [low, high] = std::minmax(local.node_in_mesh[nodes[i]], local.node_in_mesh[nodes[j]]);
+        list.push_back({{low, high}, normal, normalise(x[k] - 0.5 * (x[i] + x[j])), static_cast<char>(is_fixed)});
+        ends.push_back({nodes[i], nodes[j]});
+      }
+    }
+    return list;
+  });
+  const auto is_singular = comm::query_owners<char>(
+      comm, sides, [&](const Side& side) { return side.key[0] % comm.size(); },
+      [](const comm::ByRank<Side>& met) {
+        std::map<std::array<std::int32_t, 2>, std::vector<std::size_t>> at;
+        for (std::size_t i = 0; i < met.items.size(); ++i) at[met.items[i].key].push_back(i);
+        std::vector<char> answers(met.items.size(), 0);
+        for (const auto& [key, all] : at)
+          for (const std::size_t i : all)
+            for (const std::size_t j : all) {
+              const Side &a = met.items[i], &b = met.items[j];
+              if (i != j && (a.is_fixed != b.is_fixed || dot(a.normal, b.across) > kInwardSine)) answers[i] = answers[j] = 1;
+            }
+        return answers;
+      });
+  // Ranks that have an element at such a node but no face must know, too.
+  struct Mark {
+    std::int32_t node;
+    char bits;
+  };
+  const auto marks = comm.agree([&] {
+    std::vector<Mark> list(local.nodes_m.size());
+    for (std::size_t n = 0; n < list.size(); ++n) list[n] = {local.node_in_mesh[n], 0};
+    for (std::size_t s = 0; s < ends.size(); ++s)
+      for (const std::int32_t node : ends[s])
+        list[static_cast<std::size_t>(node)].bits |= is_singular[s] != 0 ? kOuter | kSingular : kOuter;
+    return list;
+  });
+  return comm::query_owners<char>(
+      comm, marks, [&](const Mark& mark) { return mark.node % comm.size(); },
+      [](const comm::ByRank<Mark>& met) {
+        std::unordered_map<std::int32_t, char> all;
+        for (const Mark& mark : met.items) all[mark.node] |= mark.bits;
+        std::vector<char> answers;
+        for (const Mark& mark : met.items) answers.push_back(all[mark.node]);
+        return answers;
+      });
+}
+
 }  // namespace
 
 Surface find_surface(const comm::Communicator& comm, const partition::LocalMesh& local) {
   const std::vector<Face> faces = find_faces(comm, local);
   const std::vector<Vec3> normals = find_normals(comm, local, faces);
   Surface surface;
+  for (const char bits : find_marks(comm, local, faces)) {
+    surface.is_singular.push_back((bits & kSingular) != 0);
+    surface.is_outer.push_back((bits & kOuter) != 0);
+  }
   for (std::size_t f = 0; f < faces.size(); ++f) {
     const auto& loop = mesh::kFaces[faces[f].face];
     std::array<std::int32_t, 3> nodes;

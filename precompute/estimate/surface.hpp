@@ -31,14 +31,18 @@ struct FreeFace {
 struct Surface {
   std::vector<SurfaceEdge> edges;
   std::vector<FreeFace> free_faces;
+  /// (nodes) 1 where stresses have no limit, so that errors fall slowly: the vertices of edges at which the surface turns inwards by more
+  /// than 50 degrees, and of those that part a fixed face from a free one. Whichever rank has the faces.
+  std::vector<char> is_singular;
+  std::vector<char> is_outer;  // (nodes) 1 at corners of faces of the surface, whichever rank has them
 };
 
 /// The surface faces of this rank's elements. Faces that meet at less than 50 degrees belong to one smooth surface; at sharper edges each
 /// side is smooth by itself. Collective.
 Surface find_surface(const comm::Communicator& comm, const partition::LocalMesh& local);
 
-/// The same edges with the way to the surface that the body may have as well (TetMesh::doubt_m), in `gap_m`; those without doubt are left
-/// out. Collective.
+/// The edges of the surface with the way to the surface that the body may have as well (TetMesh::doubt_m), in `gap_m`; those without doubt
+/// are left out. Collective.
 std::vector<SurfaceEdge> find_doubtful_edges(const comm::Communicator& comm, const partition::LocalMesh& local);
 
 }  // namespace carillon::estimate

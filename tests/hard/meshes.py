@@ -5,13 +5,15 @@ refusal.
 usage: meshes.py CASE
 The truth is elastic.py (an assembly of its own, LAPACK and ARPACK) on the same mesh or on the sound one, or theory where it is named.
 """
+import json
+import pathlib
 import sys
 
 import numpy as np
 
 import elastic
 from figure import hold, hold_refusal
-from programs import STEEL, calc_distance, refuse, solve
+from programs import STEEL, Folder, calc_distance, refuse, solve
 from solids import (
     Solid,
     burst,
@@ -26,6 +28,9 @@ from solids import (
     of_order,
     to_quadratic,
 )
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "bench/mesher"))
+import surfaces  # noqa: E402
 
 C = elastic.isotropic(STEEL["young_modulus_pa"], STEEL["poisson_ratio"])
 BAR = [0.1, 0.02, 0.01]
@@ -299,6 +304,70 @@ def far_from_origin():
     hold_refusal(
         "far_from_origin", solve(make_box([8, 2, 1], BAR, (1e10, 0, 0)), "T4").text, ["warning", "from the origin", "rounded"], "1e10 m"
     )
+
+
+def mesh_surface(folder, points, triangles, *options):
+    """The mesher's report of a surface; the mesh is mesh.msh in the folder."""
+    surfaces.write_obj(folder.path / "body.obj", points, triangles)
+    outcome = folder.run(1, "carillon-mesh", "body.obj", "-o", "mesh.msh", "--json", "report.json", "-q", *options)
+    assert outcome.code == 0, outcome.text
+    return json.loads((folder.path / "report.json").read_text()), outcome.text
+
+
+def make_ball(radius, times):
+    """An octahedron's faces divided, the points on the sphere."""
+    points = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], float)
+    triangles = np.array([[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]])
+    for _ in range(times):
+        points, triangles = surfaces.divide(points, triangles)
+        points /= np.linalg.norm(points, axis=1)[:, None]
+    return radius * points, triangles
+
+
+def noisy_scan():
+    # A steel ball, R = 50 mm, ten modes.
+    ball = make_ball(0.05, 5)
+    truth = None
+    for roughness, bound in ((0.0, 0), (0.2, 0.005), (0.35, 0.01)):
+        scan = surfaces.roughen(*ball, roughness, holes=30 if roughness else 0)
+        with Folder() as folder:
+            report, text = mesh_surface(folder, *scan, "--nodes", 9000, "--order", 2)
+            outcome = folder.solve(None, "T10", band_hz=(20, 60000), max_modes=10)
+            assert outcome.code == 0, outcome.text
+        if truth is None:
+            truth = outcome.freq_hz
+            continue
+        tag = f"noise of {roughness} edges"
+        hold("noisy_scan", calc_distance(outcome.freq_hz, truth), bound, f"{tag}, against the surface without")
+        hold("noisy_scan", 9 - report["min_dihedral_deg"], 0, f"{tag}, degrees that the worst angle lacks of 9")
+        hold_refusal("noisy_scan", text, ["scan", "smoothed", "--facets"], tag)
+
+
+def narrow_rims():
+    points, triangles = surfaces.make_pot()
+    for nodes in (8000, 15000):
+        with Folder() as folder:
+            report, _ = mesh_surface(folder, points, triangles, "--nodes", nodes, "--facets")
+        volume = np.einsum("ij,ij->i", points[triangles[:, 0]], np.cross(points[triangles[:, 1]], points[triangles[:, 2]])).sum() / 6
+        hold("narrow_rims", abs(report["nodes"] / nodes - 1), 0.1, f"{nodes} nodes, how far off the count")
+        hold("narrow_rims", abs(report["volume_m3"] / volume - 1), 0.015, f"{nodes} nodes, volume")
+
+
+def thin_tip():
+    # A cone of 20 degrees whose tip is a ball of 0.5 mm; elements of 4 mm.
+    half = np.radians(10)
+    tip = [[0.0005 * np.cos(a), 0.15 + 0.0005 * np.sin(a)] for a in np.linspace(half, np.pi / 2, 6)]
+    foot = tip[0][0] + (tip[0][1]) * np.tan(half)
+    points, triangles = surfaces.make_lathe([[0, 0], [foot, 0], *tip[:-1], [0, tip[-1][1]]], 48)
+    height = points[:, 1].max()
+    for words in ([], ["--method", "stuffing"]):
+        with Folder() as folder:
+            report, text = mesh_surface(folder, points, triangles, "--nodes", 3000, *words)
+        lost = 1 - (report["box_high_m"][1] - report["box_low_m"][1]) / height
+        if words:
+            hold_refusal("thin_tip", text, ["three cells", "error bars"], "stuffing")
+        else:
+            hold("thin_tip", lost, 0.01, "part of the height that the default mesh lacks")
 
 
 if __name__ == "__main__":

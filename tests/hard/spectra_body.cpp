@@ -63,7 +63,7 @@ double find_largest_angle(const Answer& alone, const Answer& together, std::size
 
 }  // namespace
 
-job::Material make_solid(double young_modulus_pa, double poisson_ratio, double density_kg_m3) {
+material::Material make_solid(double young_modulus_pa, double poisson_ratio, double density_kg_m3) {
   return {.young_modulus_pa = young_modulus_pa, .poisson_ratio = poisson_ratio, .density_kg_m3 = density_kg_m3};
 }
 
@@ -99,7 +99,7 @@ Answer solve(MPI_Comm comm, const Body& body, const eigen::Options& options) {
 
 estimate::ErrorBars calc_bars(MPI_Comm comm, const Body& body, const Answer& answer, const eigen::Options& options) {
   std::vector<estimate::Solid> solids;
-  for (const job::Material& material : body.materials) solids.push_back({material.calc_elasticity_pa(), material.density_kg_m3});
+  for (const material::Material& material : body.materials) solids.push_back({material.calc_elasticity_pa(), material.density_kg_m3});
   const std::vector<std::int32_t> of_tet = body.materials.size() > 1 ? answer.pieces.local.region : std::vector<std::int32_t>{};
   const bool is_cut = answer.modes.band_count > static_cast<std::int64_t>(answer.freq_hz.size());
   return estimate::calc_error_bars(

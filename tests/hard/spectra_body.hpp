@@ -16,11 +16,11 @@ namespace carillon::hard {
 
 struct Body {
   mesh::TetMesh mesh;
-  std::vector<job::Material> materials;  // by region of the mesh
+  std::vector<material::Material> materials;  // by region of the mesh
 };
 
 /// A material without damping.
-job::Material make_solid(double young_modulus_pa, double poisson_ratio, double density_kg_m3);
+material::Material make_solid(double young_modulus_pa, double poisson_ratio, double density_kg_m3);
 
 /// Both in one mesh, without contact: the materials of `b` follow those of `a`.
 Body join(const Body& a, const Body& b);

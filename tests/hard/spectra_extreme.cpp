@@ -20,7 +20,7 @@ namespace {
 
 constexpr double kRho = 7850, kNu = 0.3, kE = 200e9;
 
-Body make_brick(int order, const job::Material& material = make_solid(kE, kNu, kRho), Vec3 origin = {}) {
+Body make_brick(int order, const material::Material& material = make_solid(kE, kNu, kRho), Vec3 origin = {}) {
   const std::array<int, 3> cells = order == 1 ? std::array{4, 5, 6} : std::array{2, 2, 3};
   const mesh::TetMesh box = shapes::make_box({0.05, 0.065, 0.085}, cells, order);
   return {move_nodes(box, [&](const Vec3& x) { return Vec3{x[0] + origin[0], x[1] + origin[1], x[2] + origin[2]}; }), {material}};

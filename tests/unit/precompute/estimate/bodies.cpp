@@ -8,6 +8,7 @@
 #include <fstream>
 #include <map>
 #include <numbers>
+#include <numeric>
 #include <random>
 #include <sstream>
 #include <stdexcept>
@@ -17,6 +18,7 @@
 #include "precompute/fem/assemble.hpp"
 #include "precompute/mesh/check.hpp"
 #include "precompute/shapes/shapes.hpp"
+#include "runtime/base/sort_order.hpp"
 
 namespace carillon::tests {
 namespace {
@@ -173,56 +175,79 @@ std::string describe(MeshKind kind) {
   return "";
 }
 
+std::string describe(Role role) { return role == Role::training ? "training" : role == Role::test ? "test" : "unseen"; }
+
 const std::vector<Body>& get_bodies() {
   // Spruce along x; 2, 3 are the radial and the tangential directions.
-  static const job::Material spruce{.density_kg_m3 = 400,
-                                    .orthotropic = job::Orthotropic{.young_modulus_pa = {10.8e9, 0.84e9, 0.46e9},
-                                                                    .shear_modulus_pa = {0.69e9, 0.032e9, 0.66e9},
-                                                                    .poisson_ratio = {0.372, 0.435, 0.467}}};
+  static const material::Material spruce{.density_kg_m3 = 400,
+                                         .orthotropic = material::Orthotropic{.young_modulus_pa = {10.8e9, 0.84e9, 0.46e9},
+                                                                              .shear_modulus_pa = {0.69e9, 0.032e9, 0.66e9},
+                                                                              .poisson_ratio = {0.372, 0.435, 0.467}}};
+  static const material::Material maple{
+      .density_kg_m3 = 590,
+      .orthotropic = material::Orthotropic{
+          .young_modulus_pa = {12.6e9, 1.7e9, 0.8e9}, .shear_modulus_pa = {1.6e9, 0.4e9, 1.4e9}, .poisson_ratio = {0.35, 0.5, 0.38}}};
+  static const material::Material rosewood{
+      .density_kg_m3 = 870,
+      .orthotropic = material::Orthotropic{
+          .young_modulus_pa = {18e9, 2.2e9, 1.2e9}, .shear_modulus_pa = {1.8e9, 0.5e9, 1.5e9}, .poisson_ratio = {0.36, 0.55, 0.4}}};
   const auto solid = [](double young_modulus_pa, double poisson_ratio, double density_kg_m3) {
-    return std::vector<job::Material>{
+    return std::vector<material::Material>{
         {.young_modulus_pa = young_modulus_pa, .poisson_ratio = poisson_ratio, .density_kg_m3 = density_kg_m3}};
   };
   const auto pair = [&](double nu_steel, double nu_aluminium) {
-    return std::vector<job::Material>{solid(200e9, nu_steel, 7850)[0], solid(70e9, nu_aluminium, 2700)[0]};
+    return std::vector<material::Material>{solid(200e9, nu_steel, 7850)[0], solid(70e9, nu_aluminium, 2700)[0]};
   };
   // A fineness is cells along the shortest edge of a box (negative: not shaken), ten times the cells across a strip and its
   // layers, rings of a cylinder, or the nodes of a shape.
   static const std::vector<Body> bodies{
-      {"cube", solid(200e9, 0.3, 7850), false, true, {3, 6, 10}},
-      {"bar", solid(70e9, 0.33, 2700), false, true, {-1, 2, 4}},
-      {"plate", solid(200e9, 0.3, 7850), false, true, {-1, 2, 3}},
-      {"cantilever", solid(70e9, 0.33, 2700), false, true, {-1, 2, 4}, false, true},
-      {"ball", solid(200e9, 0.3, 7850), true, true, {300, 1200, 6000}},
-      {"thin-shell", solid(200e9, 0.3, 7850), true, true, {800, 3000, 9000}},
-      {"ring", solid(100e9, 0.34, 8500), true, true, {300, 1200, 6000}},
-      {"cube-nu045", solid(200e9, 0.45, 7850), false, false, {3, 6}},
-      {"box", solid(200e9, 0.3, 7850), false, false, {-3, 5, 8}},
-      {"slab", solid(200e9, 0.3, 7850), false, false, {-1, 2, 3}},
-      {"prism", solid(200e9, 0.3, 7850), false, false, {2, 5}},
-      {"ruler", solid(200e9, 0.3, 7850), false, false, {-1, -2}},
-      {"thick-shell", solid(200e9, 0.3, 8000), true, false, {600, 2500, 8000}},
-      {"pipe", solid(200e9, 0.3, 8000), true, false, {500, 2500, 8000}},
-      {"cylinder-2", solid(200e9, 0.3, 7850), true, false, {2, 4, 7}},
-      {"cylinder-10", solid(200e9, 0.3, 7850), true, false, {2, 4}},
-      {"disc", solid(200e9, 0.3, 7850), true, false, {3, 5, 8}},
-      {"slender-bar", solid(200e9, 0.3, 7850), false, false, {1000, 5000}},
-      {"chime", solid(68.3518e9, 0.329801, 2700), true, false, {1000, 5000}},
-      {"spruce-bar", {spruce}, false, false, {1, 2, 3}},
-      {"spruce-block", {spruce}, false, false, {3, 6}},
-      {"rod-two", pair(0, 0), false, false, {1, 2, 4}},
-      {"bar-two", pair(0.3, 0.33), false, false, {1, 2, 4}},
-      {"rubber-ball", solid(10e6, 0.4999, 1100), true, false, {300, 1200}, true},
-      {"strip-thin", solid(200e9, 0.3, 7850), false, false, {41, 62, 63}},
-      {"strip-thick", solid(200e9, 0.3, 7850), false, false, {41, 62, 63}},
-      {"strip-nu0", solid(200e9, 0, 7850), false, false, {41, 62, 63}},
-      {"strip-nu045", solid(200e9, 0.45, 7850), false, false, {41, 62, 63}},
-      {"strip-spruce", {spruce}, false, false, {41, 62, 63}},
-      {"strip-fixed", solid(200e9, 0.3, 7850), false, false, {41, 62, 63}, false, true},
-      {"plate-thin", solid(200e9, 0.3, 7850), false, false, {61, 122, 123}},
-      {"shell-3", solid(200e9, 0.3, 7850), true, false, {300, 1200, 4000}},
-      {"shell-5", solid(200e9, 0.3, 7850), true, false, {300, 1200, 4000}},
-      {"shell-7", solid(200e9, 0.3, 7850), true, false, {400, 1600, 4000}},
+      {"cube", solid(200e9, 0.3, 7850), false, Role::training, {3, 6, 10}},
+      {"bar", solid(70e9, 0.33, 2700), false, Role::training, {-1, 2, 4}},
+      {"plate", solid(200e9, 0.3, 7850), false, Role::training, {-1, 2, 3}},
+      {"cantilever", solid(70e9, 0.33, 2700), false, Role::training, {-1, 2, 4}, false, true},
+      {"ball", solid(200e9, 0.3, 7850), true, Role::training, {300, 1200, 6000}},
+      {"thin-shell", solid(200e9, 0.3, 7850), true, Role::training, {800, 3000, 9000}},
+      {"ring", solid(100e9, 0.34, 8500), true, Role::training, {300, 1200, 6000}},
+      {"cube-nu045", solid(200e9, 0.45, 7850), false, Role::test, {3, 6}},
+      {"box", solid(200e9, 0.3, 7850), false, Role::test, {-3, 5, 8}},
+      {"slab", solid(200e9, 0.3, 7850), false, Role::test, {-1, 2, 3}},
+      {"prism", solid(200e9, 0.3, 7850), false, Role::test, {2, 5}},
+      {"ruler", solid(200e9, 0.3, 7850), false, Role::test, {-1, -2}},
+      {"thick-shell", solid(200e9, 0.3, 8000), true, Role::test, {600, 2500, 8000}},
+      {"pipe", solid(200e9, 0.3, 8000), true, Role::test, {500, 2500, 8000}},
+      {"cylinder-2", solid(200e9, 0.3, 7850), true, Role::test, {2, 4, 7}},
+      {"cylinder-10", solid(200e9, 0.3, 7850), true, Role::test, {2, 4}},
+      {"disc", solid(200e9, 0.3, 7850), true, Role::test, {3, 5, 8}},
+      {"slender-bar", solid(200e9, 0.3, 7850), false, Role::test, {1000, 5000}},
+      {"chime", solid(68.3518e9, 0.329801, 2700), true, Role::test, {1000, 5000}},
+      {"spruce-bar", {spruce}, false, Role::test, {1, 2, 3}},
+      {"spruce-block", {spruce}, false, Role::test, {3, 6}},
+      {"rod-two", pair(0, 0), false, Role::test, {1, 2, 4}},
+      {"bar-two", pair(0.3, 0.33), false, Role::test, {1, 2, 4}},
+      {"rubber-ball", solid(10e6, 0.4999, 1100), true, Role::test, {300, 1200}, true},
+      {"strip-thin", solid(200e9, 0.3, 7850), false, Role::test, {41, 62, 63}},
+      {"strip-thick", solid(200e9, 0.3, 7850), false, Role::test, {41, 62, 63}},
+      {"strip-nu0", solid(200e9, 0, 7850), false, Role::test, {41, 62, 63}},
+      {"strip-nu045", solid(200e9, 0.45, 7850), false, Role::test, {41, 62, 63}},
+      {"strip-spruce", {spruce}, false, Role::test, {41, 62, 63}},
+      {"strip-fixed", solid(200e9, 0.3, 7850), false, Role::test, {41, 62, 63}, false, true},
+      {"plate-thin", solid(200e9, 0.3, 7850), false, Role::test, {61, 122, 123}},
+      {"shell-3", solid(200e9, 0.3, 7850), true, Role::test, {300, 1200, 4000}},
+      {"shell-5", solid(200e9, 0.3, 7850), true, Role::test, {300, 1200, 4000}},
+      {"shell-7", solid(200e9, 0.3, 7850), true, Role::test, {400, 1600, 4000}},
+      {"slat", solid(210e9, 0.25, 7800), false, Role::unseen, {-1, 2, 3}},
+      {"tile", solid(65e9, 0.22, 2500), false, Role::unseen, {-1, 2, 3}},
+      {"brick", solid(370e9, 0.18, 3900), false, Role::unseen, {3, 5, 8}},
+      {"stick", solid(3.2e9, 0.38, 1180), false, Role::unseen, {-1, 2, 4}},
+      {"maple-plate", {maple}, false, Role::unseen, {-1, 2}},
+      {"rosewood-bar", {rosewood}, false, Role::unseen, {-1, 2, 3}},
+      {"shelf", solid(200e9, 0.29, 7800), false, Role::unseen, {-1, 2}, false, true},
+      {"post", solid(70e9, 0.33, 2700), false, Role::unseen, {2, 3, 5}, false, true},
+      {"reed", solid(105e9, 0.35, 8500), false, Role::unseen, {41, 62}},
+      {"coaster", solid(64e9, 0.2, 2230), false, Role::unseen, {-1, 2, 3}},
+      {"shell-85", solid(70e9, 0.2, 2500), true, Role::unseen, {600, 2400, 6000}},
+      {"shell-95", solid(200e9, 0.28, 7850), true, Role::unseen, {1200, 4000, 9000}},
+      {"shell-20", solid(16e9, 0.44, 11000), true, Role::unseen, {400, 1600, 4000}},
   };
   return bodies;
 }
@@ -248,6 +273,15 @@ TetMesh make_mesh(const Body& body, int fineness, MeshKind kind, std::vector<std
       {"ruler", {{0.3, 0.025, 0.001}, {80 * n, 6 * n, n}}},
       {"plate", {{0.2, 0.2, 0.005}, {16 * n, 16 * n, n}}},
       {"spruce-bar", {{0.3, 0.04, 0.015}, {16 * n, 3 * n, n}}},
+      {"slat", {{0.25, 0.03, 0.004}, {25 * n, 4 * n, n}}},
+      {"tile", {{0.15, 0.1, 0.006}, {15 * n, 10 * n, n}}},
+      {"brick", {{0.08, 0.05, 0.03}, {8 * n / 3, 5 * n / 3, n}}},
+      {"stick", {{0.2, 0.012, 0.012}, {16 * n, n, n}}},
+      {"maple-plate", {{0.2, 0.12, 0.004}, {20 * n, 12 * n, n}}},
+      {"rosewood-bar", {{0.2, 0.04, 0.015}, {14 * n, 3 * n, n}}},
+      {"shelf", {{0.12, 0.08, 0.003}, {18 * n, 12 * n, n}}},
+      {"post", {{0.1, 0.02, 0.015}, {6 * n, 4 * n / 3, n}}},
+      {"coaster", {{0.06, 0.06, 0.008}, {8 * n, 8 * n, n}}},
       {"spruce-block", {{0.05, 0.065, 0.085}, {n, static_cast<int>(1.3 * n), static_cast<int>(1.7 * n)}}},
       {"rod-two", {{0.3, 0.03, 0.02}, {14 * n, 2 * n, n}}},
       {"bar-two", {{0.3, 0.03, 0.02}, {14 * n, 2 * n, n}}}};
@@ -259,7 +293,7 @@ TetMesh make_mesh(const Body& body, int fineness, MeshKind kind, std::vector<std
   const std::map<std::string, std::pair<Vec3, int>> strips{
       {"strip-thin", {{0.3, 0.03, 0.001}, 10}},  {"strip-thick", {{0.3, 0.03, 0.003}, 10}}, {"strip-nu0", {{0.2, 0.025, 0.002}, 8}},
       {"strip-nu045", {{0.1, 0.01, 0.001}, 10}}, {"strip-spruce", {{0.3, 0.04, 0.003}, 8}}, {"strip-fixed", {{0.2, 0.02, 0.001}, 10}},
-      {"plate-thin", {{0.1, 0.09, 0.002}, 1}}};
+      {"reed", {{0.18, 0.025, 0.0012}, 7}},      {"plate-thin", {{0.1, 0.09, 0.002}, 1}}};
   if (const auto found = strips.find(body.name); found != strips.end()) {
     const int across = n / 10, layers = n % 10;
     TetMesh mesh = finish(make_lattice(found->second.first, {found->second.second * across, across, layers}, layers > 1, false), kind);
@@ -269,6 +303,9 @@ TetMesh make_mesh(const Body& body, int fineness, MeshKind kind, std::vector<std
   for (const int tenths : {3, 5, 7})
     if (body.name == "shell-" + std::to_string(tenths))
       return make_shape_mesh("sphere", {{"radius", 0.1}, {"wall", 0.1 - 0.01 * tenths}}, n, kind);
+  if (body.name == "shell-20") return make_shape_mesh("sphere", {{"radius", 0.02}, {"wall", 0.016}}, n, kind);
+  if (body.name == "shell-85") return make_shape_mesh("sphere", {{"radius", 0.1}, {"wall", 0.015}}, n, kind);
+  if (body.name == "shell-95") return make_shape_mesh("sphere", {{"radius", 0.04}, {"wall", 0.002}}, n, kind);
   if (body.name == "slender-bar") return make_shape_mesh("bar", {{"length", 0.3}, {"width", 0.02}, {"thickness", 0.01}}, n, kind);
   if (body.name == "ball" || body.name == "rubber-ball") return make_shape_mesh("sphere", {{"radius", 0.05}}, n, kind);
   if (body.name == "thick-shell") return make_shape_mesh("sphere", {{"radius", 6.0}, {"wall", 4.2}}, n, kind);
@@ -285,6 +322,36 @@ TetMesh make_mesh(const Body& body, int fineness, MeshKind kind, std::vector<std
 
 double Outcome::error_cents(std::size_t m) const { return 1200 * std::log2(freq_hz[m] / true_hz[m]); }
 
+double Outcome::corrected_error_cents(std::size_t m) const {
+  return 600 * std::log2(bars.corrected.lambda[by_correction[m]]) - 1200 * std::log2(2 * std::numbers::pi * true_hz[m]);
+}
+
+double Outcome::corrected_bar_cents(std::size_t m) const {
+  return bars.algebraic_cents[by_correction[m]] + bars.corrected.cents[by_correction[m]];
+}
+
+namespace {
+
+double find_median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
+  return values[values.size() / 2];
+}
+
+}  // namespace
+
+double Outcome::median_error_cents() const {
+  std::vector<double> errors;
+  for (std::size_t m = 0; m < true_hz.size(); ++m) errors.push_back(std::abs(error_cents(m)));
+  return find_median(std::move(errors));
+}
+
+double Outcome::median_corrected_error_cents() const {
+  std::vector<double> errors;
+  for (std::size_t m = 0; m < true_hz.size(); ++m) errors.push_back(std::abs(corrected_error_cents(m)));
+  return find_median(std::move(errors));
+}
+
 double Outcome::coverage() const {
   int good = 0;
   for (std::size_t m = 0; m < true_hz.size(); ++m) good += contains(m) ? 1 : 0;
@@ -295,12 +362,10 @@ double Outcome::median_width() const {
   std::vector<double> widths;
   for (std::size_t m = 0; m < true_hz.size(); ++m)
     if (std::abs(error_cents(m)) > 3 * truth_cents[m]) widths.push_back(bar_cents(m) / std::abs(error_cents(m)));
-  if (widths.empty()) return 1.0;
-  std::nth_element(widths.begin(), widths.begin() + static_cast<std::ptrdiff_t>(widths.size() / 2), widths.end());
-  return widths[widths.size() / 2];
+  return widths.empty() ? 1.0 : find_median(std::move(widths));
 }
 
-Outcome solve(MPI_Comm comm, const TetMesh& mesh, const std::vector<std::int32_t>& fixed, std::span<const job::Material> materials,
+Outcome solve(MPI_Comm comm, const TetMesh& mesh, const std::vector<std::int32_t>& fixed, std::span<const material::Material> materials,
               bool lumped, double low_hz, double high_hz, int max_modes, double tolerance) {
   const job::Mass mass = lumped ? job::Mass::lumped : job::Mass::consistent;
   const partition::DistributedMesh pieces = partition::distribute(comm, mesh, fixed);
@@ -308,7 +373,7 @@ Outcome solve(MPI_Comm comm, const TetMesh& mesh, const std::vector<std::int32_t
   solid.list.assign(materials.begin(), materials.end());
   if (materials.size() > 1) solid.of_tet = pieces.local.region;
   std::vector<estimate::Solid> solids;
-  for (const job::Material& material : materials) solids.push_back({material.calc_elasticity_pa(), material.density_kg_m3});
+  for (const material::Material& material : materials) solids.push_back({material.calc_elasticity_pa(), material.density_kg_m3});
   const fem::System system = fem::assemble(comm, pieces.local, solid, mass);
   eigen::NodeLayout layout;
   layout.nodes_m.assign(pieces.local.nodes_m.begin(), pieces.local.nodes_m.begin() + pieces.local.free_nodes);
@@ -332,6 +397,7 @@ Outcome solve(MPI_Comm comm, const TetMesh& mesh, const std::vector<std::int32_t
                                            {modes.lambda, modes.residual, modes.shapes, low_hz, cut ? outcome.freq_hz.back() : high_hz,
                                             modes.count_below_low - modes.rigid_count - modes.mechanism_count});
   outcome.estimate_cpu_s = find_cpu_s() - begin;
+  outcome.by_correction = base::find_sort_order(outcome.bars.corrected.lambda);
   return outcome;
 }
 
@@ -339,8 +405,9 @@ Outcome solve(MPI_Comm comm, const Body& body, const TetMesh& given, MeshKind ki
   const std::vector<Truth> truth = read_truth(body.name);
   const TetMesh mesh = finish(given, kind);
   Outcome outcome = solve(comm, mesh, find_fixed(body, mesh), body.materials, kind == MeshKind::T4Lumped || kind == MeshKind::T10Lumped,
-                          0.2 * truth.front().freq_hz, 30 * truth.back().freq_hz, static_cast<int>(truth.size()), tolerance);
-  for (std::size_t m = 0; m < outcome.freq_hz.size(); ++m) {
+                          0.2 * truth.front().freq_hz, 30 * truth.back().freq_hz,
+                          static_cast<int>(estimate::find_computed_count(truth.size())), tolerance);
+  for (std::size_t m = 0; m < std::min(truth.size(), outcome.freq_hz.size()); ++m) {
     outcome.true_hz.push_back(truth[m].freq_hz);
     outcome.truth_cents.push_back(1200 * std::log2(1 + truth[m].uncertainty));
   }

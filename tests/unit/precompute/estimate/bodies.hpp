@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "precompute/estimate/error_bars.hpp"
-#include "precompute/job/material.hpp"
 #include "precompute/mesh/tet_mesh.hpp"
+#include "runtime/material/material.hpp"
 
 namespace carillon::tests {
 
@@ -26,14 +26,22 @@ std::vector<Truth> read_truth(const std::string& body);
 enum class MeshKind { T4, T4Lumped, T10, T10Curved, T10Lumped };
 std::string describe(MeshKind kind);
 
+/// What a body was used for when the formulas of the estimate were chosen.
+enum class Role {
+  training,  // the safety factors were chosen on it
+  test,      // in view then
+  unseen     // came when all formulas were fixed
+};
+std::string describe(Role role);
+
 struct Body {
   std::string name;
-  std::vector<job::Material> materials;  // by region of the mesh
-  bool round = false;                    // has curved faces
-  bool training = false;                 // the safety factors were chosen on it
-  std::vector<int> fineness;             // meshes from coarse to fine, in numbers that make_mesh knows
-  bool locks = false;                    // T4 are not for it
-  bool fixed = false;                    // at its face of lowest x
+  std::vector<material::Material> materials;  // by region of the mesh
+  bool round = false;                         // has curved faces
+  Role role = Role::test;
+  std::vector<int> fineness;  // meshes from coarse to fine, in numbers that make_mesh knows
+  bool locks = false;         // T4 are not for it
+  bool fixed = false;         // at its face of lowest x
 };
 
 const std::vector<Body>& get_bodies();
@@ -44,12 +52,21 @@ mesh::TetMesh make_mesh(const Body& body, int fineness, MeshKind kind, std::vect
 
 /// Computed modes against the truth.
 struct Outcome {
-  std::vector<double> freq_hz, true_hz, truth_cents;  // truth_cents: the uncertainty of the truth
+  std::vector<double> freq_hz;               // (m) of the mesh, all that were computed
+  std::vector<std::size_t> by_correction;    // (m) modes by ascending corrected frequency
+  std::vector<double> true_hz, truth_cents;  // those known; truth_cents: the uncertainty of the truth
   estimate::ErrorBars bars;
   std::int64_t unknowns = 0;
   double solve_cpu_s = 0.0, estimate_cpu_s = 0.0;  // of this rank
 
   double error_cents(std::size_t m) const;
+  /// Of the m-th lowest corrected frequency.
+  double corrected_error_cents(std::size_t m) const;
+  double corrected_bar_cents(std::size_t m) const;
+  bool corrected_contains(std::size_t m) const { return std::abs(corrected_error_cents(m)) <= corrected_bar_cents(m) + truth_cents[m]; }
+  /// Median of the errors of all modes with a truth: of the mesh's, of the corrected frequencies.
+  double median_error_cents() const;
+  double median_corrected_error_cents() const;
   double bar_cents(std::size_t m) const { return bars.algebraic_cents[m] + bars.discretisation_cents[m]; }
   bool contains(std::size_t m) const { return std::abs(error_cents(m)) <= bar_cents(m) + truth_cents[m]; }
   /// Parts of all modes whose bar contains the truth.
@@ -65,8 +82,9 @@ Outcome solve(MPI_Comm comm, const Body& body, int fineness, MeshKind kind, doub
 Outcome solve(MPI_Comm comm, const Body& body, const mesh::TetMesh& mesh, MeshKind kind, double tolerance = 1e-8);
 
 /// The same for any mesh, without truth, up to `high_hz`. Collective.
-Outcome solve(MPI_Comm comm, const mesh::TetMesh& mesh, const std::vector<std::int32_t>& fixed, std::span<const job::Material> materials,
-              bool lumped, double low_hz, double high_hz, int max_modes, double tolerance = 1e-8);
+Outcome solve(MPI_Comm comm, const mesh::TetMesh& mesh, const std::vector<std::int32_t>& fixed,
+              std::span<const material::Material> materials, bool lumped, double low_hz, double high_hz, int max_modes,
+              double tolerance = 1e-8);
 
 /// One body of the list on one mesh.
 struct Case {

@@ -51,7 +51,7 @@ TEST(Order, holds_at_the_upper_end_of_a_band) {
   // the error: of the lowest mode, a twist, 30.2 cents are true, 30.7 estimated and 107 the bar; of the first ten all are right to 7 %.
   EXPECT_NEAR(outcome.error_cents(0), 30.2, 0.3);
   for (std::size_t m = 0; m < 10; ++m) {
-    const double estimated_cents = 600 * std::log2(1 + outcome.bars.parts[m].interpolation);
+    const double estimated_cents = 600 * std::log2(1 + outcome.bars.level.parts[m].interpolation);
     EXPECT_NEAR(estimated_cents / outcome.error_cents(m), 1, 0.07) << m;
   }
 }
@@ -86,20 +86,23 @@ TEST(Order, of_modes_made_up_holds_for_any_part_of_the_list) {
     for (const Mode& mode : modes) truth.push_back(mode.truth);
     std::sort(truth.begin(), truth.end());
     const std::size_t first = random() % (modes.size() / 3), count = 20 + random() % (modes.size() / 3);
-    std::vector<double> lambda, bar, above, low, high;
+    std::vector<double> lambda, low, high;
+    estimate::OwnIntervals own;
     for (std::size_t m = first; m < first + count; ++m) {
       lambda.push_back(to_lambda(100 * std::exp2(modes[m].computed / 1200)));
-      bar.push_back(modes[m].bar);
-      above.push_back(modes[m].above);
-      low.push_back(modes[m].computed - bar.back());
-      high.push_back(modes[m].computed + bar.back());
+      own.stated.push_back(0.0);
+      own.low.push_back(-modes[m].bar);
+      own.high.push_back(modes[m].bar);
+      own.above.push_back(modes[m].above);
+      low.push_back(modes[m].computed - modes[m].bar);
+      high.push_back(modes[m].computed + modes[m].bar);
     }
     std::sort(low.begin(), low.end());
     std::sort(high.begin(), high.end());
     const estimate::Unlisted unlisted{.high_hz = 100 * std::exp2((modes[first + count].computed - 1e-9) / 1200),
                                       .low_hz = first > 0 ? 100 * std::exp2((modes[first - 1].computed + 1e-9) / 1200) : 20,
                                       .below = static_cast<std::int64_t>(first)};
-    const std::vector<double> wide = estimate::widen_for_order(lambda, {bar, above}, unlisted);
+    const std::vector<double> wide = estimate::widen_for_order(lambda, own, unlisted);
     for (std::size_t k = 0; k < count; ++k) {
       const Mode& mode = modes[first + k];
       EXPECT_LE(std::abs(truth[first + k] - mode.computed), wide[k]) << round << ": " << k << " of " << count;
@@ -112,13 +115,10 @@ TEST(Order, of_modes_made_up_holds_for_any_part_of_the_list) {
 }
 
 TEST(Order, leaves_alone_what_nothing_unlisted_can_reach) {
-  std::vector<double> lambda, bar, above;
-  for (int m = 0; m < 40; ++m) {
-    lambda.push_back(to_lambda(1000 * std::exp2(m / 12.0)));
-    bar.push_back(30);
-    above.push_back(0);
-  }
-  for (const double cents : estimate::widen_for_order(lambda, {bar, above}, {.high_hz = 20e3, .low_hz = 990, .below = 3}))
+  std::vector<double> lambda;
+  for (int m = 0; m < 40; ++m) lambda.push_back(to_lambda(1000 * std::exp2(m / 12.0)));
+  const estimate::OwnIntervals own{std::vector(40, 0.0), std::vector(40, -30.0), std::vector(40, 30.0), std::vector(40, 0.0)};
+  for (const double cents : estimate::widen_for_order(lambda, own, {.high_hz = 20e3, .low_hz = 990, .below = 3}))
     EXPECT_NEAR(cents, 30, 1e-9);
 }
 

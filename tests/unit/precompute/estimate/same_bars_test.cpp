@@ -16,9 +16,14 @@ TEST_P(SameBars, on_one_rank_and_on_all) {
   ASSERT_EQ(one.freq_hz.size(), all.freq_hz.size());
   for (std::size_t m = 0; m < one.freq_hz.size(); ++m) {
     EXPECT_NEAR(all.bars.discretisation_cents[m] / one.bars.discretisation_cents[m], 1, 1e-3) << m;
-    EXPECT_NEAR(all.bars.parts[m].interpolation / one.bars.parts[m].interpolation, 1, 1e-3) << m;
-    EXPECT_NEAR(all.bars.parts[m].lumping, one.bars.parts[m].lumping, 1e-6) << m;
-    EXPECT_NEAR(all.bars.parts[m].geometry, one.bars.parts[m].geometry, 1e-4 * one.bars.parts[m].geometry_noise + 1e-12) << m;
+    EXPECT_NEAR(all.bars.level.parts[m].interpolation / one.bars.level.parts[m].interpolation, 1, 1e-3) << m;
+    EXPECT_NEAR(all.bars.level.parts[m].singular, one.bars.level.parts[m].singular, 1e-3 * one.bars.level.parts[m].interpolation) << m;
+    EXPECT_NEAR(all.bars.corrected.lambda[m] / one.bars.corrected.lambda[m], 1, 1e-6) << m;
+    EXPECT_NEAR(all.bars.corrected.cents[m] / one.bars.corrected.cents[m], 1, 1e-3) << m;
+    EXPECT_EQ(all.bars.corrected.correction[m], one.bars.corrected.correction[m]) << m;
+    EXPECT_NEAR(all.bars.level.parts[m].lumping, one.bars.level.parts[m].lumping, 1e-6) << m;
+    EXPECT_NEAR(all.bars.level.parts[m].geometry, one.bars.level.parts[m].geometry, 1e-4 * one.bars.level.parts[m].geometry_noise + 1e-12)
+        << m;
   }
 }
 

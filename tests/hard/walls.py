@@ -1,0 +1,169 @@
+#!/usr/bin/env python3
+"""Hard walls: sheets and thin bodies that are extruded (carillon-mesh --wall). Every case ends with the right body and frequencies within a
+bound, or in a refusal that names the place.
+
+usage: walls.py CASE
+The truth is a closed form, Ritz, or the same body as a solid in elements of the volume mesher, where it is named.
+"""
+import json
+import math
+import sys
+
+import numpy as np
+
+from figure import hold, hold_refusal
+from programs import STEEL, Folder, calc_distance
+
+
+def make_grid(place, nu, nv, skip=lambda i, j: False):
+    """place(u, v) over nu x nv quads in two triangles each: points and triangles."""
+    points = [place(i / nu, j / nv) for j in range(nv + 1) for i in range(nu + 1)]
+    faces = []
+    for j in range(nv):
+        for i in range(nu):
+            if not skip(i, j):
+                a = j * (nu + 1) + i
+                faces += [(a, a + 1, a + nu + 2), (a, a + nu + 2, a + nu + 1)]
+    return points, faces
+
+
+def join(*parts):
+    points, faces = [], []
+    for p, f in parts:
+        faces += [tuple(i + len(points) for i in t) for t in f]
+        points += p
+    return points, faces
+
+
+def make_plate(side):
+    return make_grid(lambda u, v: (side * u, side * v, 0), 3, 3)
+
+
+def make_fold(angle_deg, wide=0.04, long=0.08):
+    half = math.radians(angle_deg) / 2
+    return make_grid(lambda u, v: (abs(2 * v - 1) * wide * math.cos(half), (2 * v - 1) * wide * math.sin(half), long * u), 4, 8)
+
+
+def make_bracket(angle_deg, wall, wide=0.04, long=0.08):
+    """The solid between both sides of the wall on make_fold(): a prism over six corners."""
+    half = math.radians(angle_deg) / 2
+    along, across = np.array([math.cos(half), math.sin(half)]), np.array([-math.sin(half), math.cos(half)])
+    tip, end = wall / 2 / math.sin(half), wide * along
+    corners = [(-tip, 0), *(end + sign * wall / 2 * across for sign in (1, -1)), (tip, 0)]
+    corners += [(x, -y) for x, y in (corners[2], corners[1])]
+    points = [(x, y, z) for z in (0, long) for x, y in corners]
+    caps = [(0, 1, 2), (0, 2, 3), (0, 3, 4), (0, 4, 5)]
+    faces = caps + [tuple(6 + i for i in t[::-1]) for t in caps]
+    for i in range(6):
+        j = (i + 1) % 6
+        faces += [(j, i, 6 + i), (j, 6 + i, 6 + j)]
+    return points, faces
+
+
+def write(folder, name, surface):
+    points, faces = surface
+    lines = [f"v {x:.12g} {y:.12g} {z:.12g}" for x, y, z in points] + [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces]
+    (folder.path / name).write_text("\n".join(lines) + "\n")
+
+
+def mesh(folder, surface, *words):
+    write(folder, "sheet.obj", surface)
+    return folder.run(1, "carillon-mesh", "sheet.obj", "-o", "mesh.msh", "--json", "report.json", *words)
+
+
+def solve(surface, *words, **keys):
+    """Frequencies of the body that carillon-mesh makes, and its report."""
+    with Folder() as folder:
+        made = mesh(folder, surface, *words)
+        assert made.code == 0, made.text
+        outcome = folder.solve(None, "T10", **keys)
+        assert outcome.code == 0, outcome.text[-1500:]
+        report = json.loads((folder.path / "report.json").read_text())
+        report["bars"] = outcome.bank["modes/discretisation_error_cents"]
+        return outcome.freq_hz, report
+
+
+def refuse(case, surface, words, *options):
+    with Folder() as folder:
+        made = mesh(folder, surface, *options)
+        assert made.code == 2 and folder.list() == ["sheet.obj"], f"exit code {made.code}: {made.text}"
+        hold_refusal(case, made.text, ["sheet.obj", *words], " ".join(map(str, options)))
+
+
+def sheet():
+    # Free steel plate 200 x 200 x 5 mm: 404.797, 594.1203, 735.4314 Hz (Legendre-Ritz in three dimensions, 8e-6).
+    for side in ("middle", "outside", "inside"):
+        freq_hz, report = solve(make_plate(0.2), "--wall", 0.005, "--side", side, "--edge", 0.01, band_hz=(20, 1000))
+        hold("sheet", calc_distance(freq_hz[:3], [404.797, 594.1203, 735.4314]), 2e-3, f"plate, the surface is the {side}, against Ritz")
+        hold("sheet", abs(report["volume_m3"] / 2e-4 - 1), 1e-12, f"its volume, the surface is the {side}")
+    # Rayleigh's motions without extension of a free tube; its own error is of the order of the wall over the radius.
+    radius, wall, long = 0.03, 0.0005, 0.1
+    turn = 2 * math.pi
+    tube = make_grid(lambda u, v: (radius * math.cos(turn * u), radius * math.sin(turn * u), long * v), 32, 4)
+    freq_hz, report = solve(tube, "--wall", wall, band_hz=(20, 2000))
+    speed = STEEL["young_modulus_pa"] / (12 * (1 - STEEL["poisson_ratio"] ** 2) * STEEL["density_kg_m3"])
+    theory = [math.sqrt(speed * n**2 * (n**2 - 1) ** 2 / (n**2 + 1)) * wall / radius**2 / turn for n in (2, 3)]
+    hold("sheet", abs(freq_hz[0] / theory[0] - 1), 1.5e-2, "tube from 32 facets, two waves around, against Rayleigh")
+    hold("sheet", abs(freq_hz[1] / freq_hz[0] - 1), 1e-3, "the pair's distance")
+    hold("sheet", abs(report["volume_m3"] / (turn * radius * wall * long) - 1), 5e-4, "the tube's volume")
+
+
+def wall_0_1_mm():
+    # Kirchhoff, nu 0.3: lambda^2 = 13.46819, 19.59614, 24.27020, 34.80089 twice.
+    side, wall = 0.1, 1e-4
+    stiffness = STEEL["young_modulus_pa"] * wall**2 / (12 * 0.91 * STEEL["density_kg_m3"])
+    theory = np.array([13.46819, 19.59614, 24.27020, 34.80089, 34.80089]) / (2 * np.pi * side**2) * stiffness**0.5
+    freq_hz, report = solve(make_plate(side), "--wall", wall, "--nodes", 60000, band_hz=(5, 130))
+    hold("wall_0_1_mm", calc_distance(freq_hz[:5], theory), 2e-2, f"edges of {report['edge_per_wall']:.0f} walls, against theory")
+    hold("wall_0_1_mm", report["straightened_tets"], 0, "elements made straight-sided")
+
+
+def folds():
+    wall = 0.003
+    for angle in (175, 90, 60, 40):
+        freq_hz, report = solve(make_fold(angle), "--wall", wall, "--edge", 0.003, band_hz=(20, 60000), max_modes=8)
+        hold("folds", abs(report["volume_m3"] / (2 * 0.04 * 0.08 * wall) - 1), 1e-9, f"{angle} degrees, volume")
+        solid, _ = solve(
+            make_bracket(angle, wall), "--method", "delaunay", "--order", 2, "--edge", 0.0018, band_hz=(20, 60000), max_modes=8
+        )
+        # A sharp inner corner is singular: the sharper, the slower the error falls. The bars have to contain it.
+        parts = np.abs(1200 * np.log2(freq_hz / solid)) / report["bars"]
+        hold("folds", parts.max(), 1, f"{angle} degrees, distance from the solid over the error bar")
+        if angle >= 90:
+            hold("folds", calc_distance(freq_hz, solid), 1.5e-2, f"{angle} degrees, against the solid in elements of the volume mesher")
+    refuse("folds", make_fold(5), ["cannot be mitred at (", "folded there to 5 degrees", "29 are the least"], "--wall", wall)
+
+
+def walls_that_touch():
+    turn = 4 * math.pi
+    spiral = make_grid(
+        lambda u, v: ((0.02 + 0.003 * u) * math.cos(turn * u), (0.02 + 0.003 * u) * math.sin(turn * u), 0.04 * v), 96, 6
+    )  # 1.5 mm between its turns
+    refuse("walls_that_touch", spiral, ["runs into itself at (", "closer there than the wall is thick"], "--wall", 0.002)
+    with Folder() as folder:
+        made = mesh(folder, spiral, "--wall", 0.001)
+        hold("walls_that_touch", made.code, 0, "exit code with a wall that leaves a gap")
+    blade = make_grid(lambda u, v: (0.1 * u, 0.047, 0.1 * v - 0.05), 3, 3)
+    refuse("walls_that_touch", join(make_plate(0.1), blade), ["runs into itself at ("], "--wall", 0.002)
+
+
+def walls_that_branch():
+    plate = make_grid(lambda u, v: (0.1 * u, 0.1 * v, 0), 4, 4)
+    post = make_grid(lambda u, v: (0.1 * u, 0.05, 0.05 * v), 4, 2)
+    refuse("walls_that_branch", join(plate, post), ["T-junction", "0.05, 0)", "modeller"], "--wall", 0.002)
+
+
+def holes_at_a_rim():
+    radius, long, wall, turn = 0.03, 0.1, 0.002, 2 * math.pi
+    tube = make_grid(
+        lambda u, v: (radius * math.cos(turn * u), radius * math.sin(turn * u), long * v), 48, 24, lambda i, j: j in (1, 2) and i % 8 < 2
+    )  # six holes of 8 mm, 4 mm from the rim
+    freq_hz, report = solve(tube, "--wall", wall, "--edge", 0.005, band_hz=(20, 8000), max_modes=4)
+    area = turn * radius * long - 6 * (turn * radius / 24) * (long / 12)
+    hold("holes_at_a_rim", abs(report["volume_m3"] / (area * wall) - 1), 2e-3, "volume")
+    fine, _ = solve(tube, "--wall", wall, "--edge", 0.0025, band_hz=(20, 8000), max_modes=4)
+    hold("holes_at_a_rim", calc_distance(freq_hz, fine), 1e-2, "against edges half as long")
+
+
+if __name__ == "__main__":
+    globals()[sys.argv[1]]()
