@@ -4,77 +4,31 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <new>
+#include <array>
 #include <numeric>
 
 #include "precompute/comm/messages.hpp"
 #include "runtime/base/failure.hpp"
+#include "runtime/base/result.hpp"
 
 namespace carillon::comm {
 namespace {
 
-enum ErrorKind : int { kNone, kInput, kSolve, kSystem, kMemory, kDiskFull };
-
-/// An error on its way between ranks.
-struct Failure {
-  int kind = kNone;
-  std::string text = {};
-  std::size_t place = 0;    // length of the place that the text begins with (PlacedError)
-  double need_bytes = 0.0;  // MemoryError
-};
-
-[[noreturn]] void throw_kind(const Failure& failure) {
-  switch (failure.kind) {
-    case kInput:
-      if (failure.place > 0) throw PlacedError(failure.text.substr(0, failure.place), failure.text.substr(failure.place + 2));
-      throw InputError(failure.text);
-    case kSolve:
-      throw SolveError(failure.text);
-    case kMemory:
-      throw MemoryError(failure.text, failure.need_bytes);
-    case kDiskFull:
-      throw DiskFullError(failure.text);
-    default:
-      throw SystemError(failure.text);
-  }
-}
-
-Failure describe(const std::exception_ptr& error) {
-  if (!error) return {};
-  try {
-    std::rethrow_exception(error);
-  } catch (const PlacedError& e) {
-    return {kInput, e.what(), e.get_place().size()};
-  } catch (const InputError& e) {
-    return {kInput, e.what()};
-  } catch (const SolveError& e) {
-    return {kSolve, e.what()};
-  } catch (const MemoryError& e) {
-    return {kMemory, e.what(), 0, e.get_need_bytes()};
-  } catch (const DiskFullError& e) {
-    return {kDiskFull, e.what()};
-  } catch (const std::bad_alloc&) {
-    return {kMemory, "Out of memory. Take a coarser mesh, a narrower band, or more ranks on more machines."};
-  } catch (const std::exception& e) {
-    return {kSystem, e.what()};
-  } catch (...) {
-    return {kSystem, "An unknown exception was thrown."};
-  }
-}
-
 /// Throws the error of the lowest failing rank on every rank.
-void agree_on(const Communicator& comm, Failure failure) {
-  const int first = comm.min(std::int32_t{failure.kind == kNone ? comm.size() : comm.rank()});
+void agree_on(const Communicator& comm, base::Result failure) {
+  const int first = comm.min(std::int32_t{failure.kind == base::ResultKind::done ? comm.size() : comm.rank()});
   if (first == comm.size()) return;
-  std::array<double, 4> header{static_cast<double>(failure.kind), static_cast<double>(failure.text.size()),
-                               static_cast<double>(failure.place), failure.need_bytes};
-  MPI_Bcast(header.data(), 4, MPI_DOUBLE, first, comm);
-  failure.kind = static_cast<int>(header[0]);
-  failure.text.resize(static_cast<std::size_t>(header[1]));
-  failure.place = static_cast<std::size_t>(header[2]);
+  std::array<double, 5> header{static_cast<double>(failure.kind), static_cast<double>(failure.message.size()),
+                               static_cast<double>(failure.place.size()), failure.need_bytes, static_cast<double>(failure.possible_nodes)};
+  MPI_Bcast(header.data(), static_cast<int>(header.size()), MPI_DOUBLE, first, comm);
+  failure.kind = static_cast<base::ResultKind>(header[0]);
+  failure.message.resize(static_cast<std::size_t>(header[1]));
+  failure.place.resize(static_cast<std::size_t>(header[2]));
   failure.need_bytes = header[3];
-  MPI_Bcast(failure.text.data(), static_cast<int>(failure.text.size()), MPI_CHAR, first, comm);
-  throw_kind(failure);
+  failure.possible_nodes = static_cast<std::int64_t>(header[4]);
+  for (std::string* text : {&failure.message, &failure.place})
+    MPI_Bcast(text->data(), static_cast<int>(text->size()), MPI_CHAR, first, comm);
+  base::throw_error(failure);
 }
 
 }  // namespace
@@ -86,9 +40,15 @@ Communicator::Communicator(MPI_Comm comm) : comm_(comm) {
 
 bool Communicator::all(bool ok) const { return min(std::int32_t{ok}) == 1; }
 
-void Communicator::agree(const std::string& error_text) const { agree_on(*this, {error_text.empty() ? kNone : kInput, error_text}); }
+void Communicator::agree(const std::string& error_text) const {
+  agree_on(*this, {error_text.empty() ? base::ResultKind::done : base::ResultKind::bad_input, error_text});
+}
 
-void Communicator::agree(std::exception_ptr error) const { agree_on(*this, describe(error)); }
+void Communicator::agree(std::exception_ptr error) const {
+  agree_on(*this, error
+                      ? base::describe_error(error, "Out of memory. Take a coarser mesh, a narrower band, or more ranks on more machines.")
+                      : base::Result{});
+}
 
 void Communicator::reduce(void* values, std::size_t count, MPI_Datatype type, MPI_Op operation) const {
   MPI_Allreduce(MPI_IN_PLACE, values, static_cast<int>(count), type, operation, comm_);

@@ -25,8 +25,8 @@ struct Speeds {
   double bending = 0;  // sqrt(E / (rho (1 - nu^2)))
 };
 
-Speeds calc_speeds(const job::Material& material) {
-  const job::Elasticity c = material.calc_elasticity_pa();
+Speeds calc_speeds(const material::Material& material) {
+  const material::Elasticity c = material.calc_elasticity_pa();
   const double normal = c[0] + c[7] + c[14];
   const double coupled = c[1] + c[2] + c[8];
   const double bulk = (normal + 2 * coupled) / 9;
@@ -54,7 +54,7 @@ double count_in_wall(const Speeds& c, double volume, double area, double f) {
 
 }  // namespace
 
-ModeEstimate estimate_modes(const std::vector<job::Material>& materials, const std::vector<double>& volume_m3, double area_m2,
+ModeEstimate estimate_modes(const std::vector<material::Material>& materials, const std::vector<double>& volume_m3, double area_m2,
                             double low_hz, double high_hz) {
   ModeEstimate estimate;
   const double all = std::accumulate(volume_m3.begin(), volume_m3.end(), 0.0);

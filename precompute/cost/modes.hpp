@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "precompute/job/material.hpp"
+#include "runtime/material/material.hpp"
 
 namespace carillon::cost {
 
@@ -16,7 +16,7 @@ struct ModeEstimate {
 };
 
 /// Modes below high_hz less those below low_hz. materials and volume_m3: what the body is made of; area_m2: of its whole surface.
-ModeEstimate estimate_modes(const std::vector<job::Material>& materials, const std::vector<double>& volume_m3, double area_m2,
+ModeEstimate estimate_modes(const std::vector<material::Material>& materials, const std::vector<double>& volume_m3, double area_m2,
                             double low_hz, double high_hz);
 
 }  // namespace carillon::cost

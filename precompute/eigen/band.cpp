@@ -17,6 +17,7 @@ using petsc::check;
 constexpr double kDenseRounding = 1e4;       // Of epsilon times the largest ratio of the diagonals: far above what LAPACK leaves of it.
 constexpr double kMechanismTolerance = 1e2;  // Of the same: eigenvalues below are zero as far as a count by inertia can resolve.
 constexpr double kMechanismRatio = 1e-4;     // Of the band's lower end: no mechanism is faster.
+constexpr double kLowEnd = 1e-4;             // Of the upper end, in lambda: a lower end below need not be counted.
 
 // Collective.
 double find_fastest(const Operators& operators) {
@@ -24,6 +25,15 @@ double find_fastest(const Operators& operators) {
   for (std::size_t i = 0; i < operators.stiffness_diagonal.size(); ++i)
     fastest = std::max(fastest, operators.stiffness_diagonal[i] / operators.mass_diagonal[i]);
   return operators.comm.max(fastest);
+}
+
+// Whether the lower end may be left to the shift inside the band. So far below the upper end few bodies have a mode, and a guess of some
+// modes too many costs next to nothing. A part of the band alone (max_modes) would be cut by the guess, CHOLMOD counts nothing at its
+// shift, and where rounding is near the end may have to move.
+bool can_assume_low_end(const BandProblem& body) {
+  const Options& options = body.options;
+  return !options.max_modes && options.factorisation != Factorisation::kCholmod && body.asked.low <= kLowEnd * body.asked.high &&
+         body.asked.low > kDenseRounding * body.rounding();
 }
 
 // What follows copies K and M.
@@ -62,15 +72,30 @@ std::string explain_rounding(const BandProblem& body, const BandLimits& limits) 
       body.to_hz(body.rounding()), body.to_hz(kSafe * body.rounding()));
 }
 
-BandCounts count_band(const BandProblem& body, const std::function<Inertia(double, double, ShiftRule)>& count_below,
-                      const std::function<void(double)>& forget) {
+BandCounts count_band(const BandProblem& body, const BandCounter& counter) {
   BandCounts counts;
+  const Inertia above = count_below_high(counter.count_below, body.asked.high);
   counts.limits = body.asked;
-  counts.band = count_between(count_below, body.asked.low, body.asked.high);
-  const Slice& band = counts.band;
+  counts.band = {find_count_below_low(body.asked.low), body.rigid_count(), above.lambda, above.below};
+  if (can_assume_low_end(body) && counts.band.count() > 0) {
+    counts.is_low_assumed = true;
+    counts.band_count = counts.band.count();
+    counts.count_below_low = counts.band.below_low;
+  } else {
+    count_low_end(body, counter, counts);
+  }
+  return counts;
+}
+
+void count_low_end(const BandProblem& body, const BandCounter& counter, BandCounts& counts) {
+  const Inertia below = count_below_low(counter.count_below, body.asked.low);
+  Slice& band = counts.band;
+  band.low = below.lambda;
+  band.below_low = below.below;
+  counts.is_low_assumed = false;
   counts.band_count = band.count();
   counts.count_below_low = band.below_low;
-  counts.limits.low = std::max(counts.limits.low, band.low);
+  counts.limits.low = std::max(body.asked.low, band.low);
   if (band.below_low < body.rigid_count() || band.count() < 0) {
     throw SolveError(
         fmt::format("The inertia counts {} eigenvalues below {:.6g} Hz and {} below {:.6g} Hz, with {} rigid modes: K or M is not "
@@ -80,12 +105,11 @@ BandCounts count_band(const BandProblem& body, const std::function<Inertia(doubl
   if (band.below_low > body.rigid_count()) {
     constexpr double kReach = 1e-6;
     const double limit = kMechanismRatio * counts.limits.low;
-    const Inertia zeros = count_below(std::min(limit, kMechanismTolerance * body.rounding()), kReach, ShiftRule::kMayMoveUp);
+    const Inertia zeros = counter.count_below(std::min(limit, kMechanismTolerance * body.rounding()), kReach, ShiftRule::kMayMoveUp);
     // Where rounding hides what is so slow, slow modes would be taken for mechanisms.
     if (zeros.lambda <= limit * (1 + kReach)) counts.mechanism_count = std::max<std::int64_t>(0, zeros.below - body.rigid_count());
-    if (zeros.lambda != band.low) forget(zeros.lambda);
+    if (zeros.lambda != band.low) counter.forget(zeros.lambda);
   }
-  return counts;
 }
 
 }  // namespace carillon::eigen

@@ -66,12 +66,21 @@ struct BandCounts {
   std::int64_t band_count = 0;       // modes in the band,
   std::int64_t count_below_low = 0;  // and below it
   std::int64_t mechanism_count = 0;  // see Modes
+  bool is_low_assumed = false;       // nothing was counted at the lower end: only the rigid modes are taken to lie below it,
+  bool is_low_derived = false;       // which the count at a shift inside has proven
 };
 
-/// By the inertia of K - lambda M at both ends, and once more near zero where something other than the rigid modes is below the band.
-/// count_below: of InertiaCounter, or of a record of it; forget: drops a count. Collective. Throws SolveError where the counts contradict
-/// each other.
-BandCounts count_band(const BandProblem& body, const std::function<Inertia(double, double, ShiftRule)>& count_below,
-                      const std::function<void(double)>& forget);
+/// Where counts come from: an InertiaCounter, or a record of it.
+struct BandCounter {
+  std::function<Inertia(double lambda, double reach, ShiftRule rule)> count_below;
+  std::function<void(double lambda)> forget;  // drops a count
+};
+
+/// By the inertia of K - lambda M at both ends, and once more near zero where something other than the rigid modes is below the band. A
+/// lower end that is low enough is not counted: as a rule only rigid modes are below it, and the count at a shift inside the band shows it
+/// when all modes up to the shift are found. Collective. Throws SolveError where the counts contradict each other.
+BandCounts count_band(const BandProblem& body, const BandCounter& counter);
+/// Counts at the lower end what count_band() has assumed of it. Collective; throws as it does.
+void count_low_end(const BandProblem& body, const BandCounter& counter, BandCounts& counts);
 
 }  // namespace carillon::eigen

@@ -100,7 +100,8 @@ void BlockLanczos::plan_check(const RitzSelection& selection) {
   }
   last_converged_ = selection.converged;
   last_size_ = basis_.size();
-  next_check_ = basis_.size() + std::max(2 * basis_.block(), static_cast<int>(ahead));
+  const int least = wanted - converged <= basis_.block() ? basis_.block() : 2 * basis_.block();
+  next_check_ = basis_.size() + std::max(least, static_cast<int>(ahead));
 }
 
 void BlockLanczos::restart(RitzPairs& pairs, const RitzSelection& selection) {

@@ -18,6 +18,7 @@
 #include "precompute/petsc/diagonal.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/base/error.hpp"
+#include "runtime/base/sort_order.hpp"
 
 namespace carillon::eigen {
 namespace {
@@ -30,7 +31,7 @@ using la::LocalColumns;
 using la::NodeMatrix;
 using Row = NodeMatrix::Row;
 constexpr int kStrip = NodeMatrix::kStrip;
-constexpr int kWide = 4 * kStrip;  // Columns at a time in a Gram matrix: wide enough for BLAS to run at full speed.
+constexpr int kWide = 2 * kStrip;  // Columns at a time in a Gram matrix: what block_kernels.hpp takes without packing the others.
 constexpr double kNear = 1e-4;     // Relative to lambda: nearer ones serve to measure a residual.
 
 // The upper triangle of Phi^T M Phi, summed over the ranks; calc_mass_product(first, m_phi) writes M times as many columns from `first` on.
@@ -169,9 +170,7 @@ ModeErrors normalise_and_measure(const Operators& operators, std::vector<double>
 
 void sort_modes(std::vector<double>& lambda, Mat shapes, ModeErrors& errors) {
   if (std::is_sorted(lambda.begin(), lambda.end())) return;
-  std::vector<std::size_t> order(lambda.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return lambda[a] < lambda[b]; });
+  const std::vector<std::size_t> order = base::find_sort_order(lambda);
   for (std::vector<double>* values : {&lambda, &errors.residual, &errors.floor}) {
     const std::vector<double> old = *values;
     for (std::size_t j = 0; j < order.size(); ++j) (*values)[j] = old[order[j]];

@@ -11,12 +11,12 @@
 #include <numeric>
 
 #include "runtime/base/error.hpp"
+#include "runtime/base/sort_order.hpp"
 
 namespace carillon::eigen {
 namespace {
 
-constexpr double kSeparated = 1e-6;   // Modes farther apart than this, relative to lambda, are not degenerate.
-constexpr double kSafeMargin = 1e-7;  // Counts nearer to a mode (relative to lambda) are taken again, farther from it.
+constexpr double kSeparated = 1e-6;  // Modes farther apart than this, relative to lambda, are not degenerate.
 
 }  // namespace
 
@@ -88,9 +88,7 @@ void verify(const std::vector<Inertia>& counts, const std::vector<double>& lambd
 WantedModes select_wanted(const std::vector<double>& lambda, const BandLimits& limits, std::optional<std::int64_t> max_modes) {
   WantedModes wanted;
   std::vector<std::size_t>& order = wanted.order;
-  order.resize(lambda.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return lambda[a] < lambda[b]; });
+  order = base::find_sort_order(lambda);
   std::erase_if(order, [&](std::size_t i) { return limits.is_below(lambda[i]) || limits.is_above(lambda[i]); });
   wanted.within = static_cast<std::int64_t>(order.size());
   // Of degenerate modes all are kept until their basis is made: part of a cluster would depend on how it was found.

@@ -12,6 +12,8 @@
 
 namespace carillon::eigen {
 
+inline constexpr double kSafeMargin = 1e-7;  // Counts nearer to a mode (relative to lambda) are taken again, farther from it.
+
 std::vector<Inertia> sort_counts(std::vector<Inertia> counts);
 
 /// Modes with low <= lambda < high; lambda in any order.

@@ -62,6 +62,11 @@ Inertia Search::count_below(double lambda, double reach, ShiftRule rule) {
   return count;
 }
 
+BandCounter Search::get_band_counter() {
+  return {[this](double lambda, double reach, ShiftRule rule) { return count_below(lambda, reach, rule); },
+          [this](double lambda) { forget(lambda); }};
+}
+
 Slice Search::cut_to_wanted(const Slice& band) {
   if (!body_.options.max_modes) return band;
   return cut_to_lowest(band, *body_.options.max_modes, [this](double lambda) { return count_below(lambda).below; });
@@ -116,14 +121,33 @@ double Search::run_round(const Slice& slice, ShiftedFactor* cholmod, double sigm
   return statistics.solved_to;
 }
 
+// After the first run, whose slice begins at the lower end of the band. As many modes found up to the shift as were counted there, but for
+// the rigid ones, leave none for what is below the band; else that is counted.
+void Search::settle_low_end(Slice& slice, const Inertia& shift) {
+  const std::int64_t found = count_found(found_.lambda, slice.low * (1 - kEdge), shift.lambda);
+  if (shift.below - found == slice.below_low && find_margin(found_.lambda, shift.lambda) >= kSafeMargin) {
+    counter_.restore({slice.low, slice.below_low});
+    counts_->is_low_assumed = false;
+    counts_->is_low_derived = true;
+    return;
+  }
+  count_low_end(body_, get_band_counter(), *counts_);
+  slice.low = counts_->band.low;
+  slice.below_low = counts_->band.below_low;
+}
+
 // Runs with the factor at sigma until the slice holds what it was counted to hold, or runs find nothing new.
-void Search::run_rounds(const Slice& slice, ShiftedFactor* cholmod, double sigma, int first) {
+void Search::run_rounds(Slice slice, ShiftedFactor* cholmod, double sigma, int first) {
   int idle = 0;
+  const auto find_shift = [&] {
+    return *std::find_if(counts().begin(), counts().end(), [&](const Inertia& c) { return c.lambda == sigma; });
+  };
   for (int round = first; round < kMaxRounds && idle < kMaxIdleRounds; ++round) {
     const std::int64_t missing = slice.count() - count_found(found_.lambda, slice.low * (1 - kEdge), slice.high * (1 + kEdge));
     if (missing <= 0) break;
     const std::int64_t before = count();
     run_round(slice, cholmod, sigma, {missing, true}, round);
+    if (counts_->is_low_assumed) settle_low_end(slice, find_shift());
     idle = count() > before ? 0 : idle + 1;
   }
 }
@@ -153,7 +177,9 @@ void Search::find_missing(const Slice& slice, double sigma) {
   run_rounds(slice, cholmod.get(), sigma, 0);
 }
 
-void Search::run(const Slice& wanted) {
+void Search::run(BandCounts& counts) {
+  counts_ = &counts;
+  Slice wanted = cut_to_wanted(counts.band);
   searched_to_ = wanted.high;
   check_memory(body_.comm, calc_search_bytes(body_.rows, wanted.count(), body_.rigid_count()), body_.options.memory_limit_bytes,
                fmt::format("The search for {} modes", wanted.count()));
@@ -171,6 +197,11 @@ void Search::run(const Slice& wanted) {
     counted.high = part.sigma;
     counted.below_high = part.below_sigma;
     const double solved_to = run_round(part.slice, nullptr, part.sigma, {part.slice.count(), false}, 0);
+    if (counts.is_low_assumed) {
+      settle_low_end(counted, {part.sigma, part.below_sigma});
+      wanted.low = counted.low;
+      wanted.below_low = counted.below_low;
+    }
     if (count_found(found_.lambda, counted.low, counted.high) >= counted.count()) {
       sweep.advance(solved_to, wanted.below_low + count_found(found_.lambda, wanted.low * (1 - kEdge), solved_to));
     } else {

@@ -35,10 +35,12 @@ class Search {
   void forget(double lambda) { counter_.forget(lambda); }
   InertiaCounter& counter() { return counter_; }
 
-  /// The part of the band that holds the modes wanted.
-  Slice cut_to_wanted(const Slice& band);
-  /// Goes through `wanted` slice by slice. Copies of repeated eigenvalues that stay hidden are left to complete().
-  void run(const Slice& wanted);
+  /// Both of this search.
+  BandCounter get_band_counter();
+
+  /// Goes through the part of the band that holds the modes wanted, slice by slice. Copies of repeated eigenvalues that stay hidden are
+  /// left to complete(). Where the lower end was assumed it is proven by the first shift, or else counted, and `counts` changes with it.
+  void run(BandCounts& counts);
   /// Until every count agrees with the modes found: counts on a mode are taken again elsewhere, gaps between two counts are searched once
   /// more. Counts of the ends move to the band where a mode lies between, and `counts` with them. Throws SolveError where a gap stays.
   void complete(BandCounts& counts);
@@ -54,7 +56,9 @@ class Search {
   };
   double run_round(const Slice& slice, ShiftedFactor* cholmod, double sigma, Missing missing, int round);
   KrylovRequest make_request(const Slice& slice, double sigma, Missing missing, int round) const;
-  void run_rounds(const Slice& slice, ShiftedFactor* cholmod, double sigma, int first);
+  Slice cut_to_wanted(const Slice& band);
+  void run_rounds(Slice slice, ShiftedFactor* cholmod, double sigma, int first);
+  void settle_low_end(Slice& slice, const Inertia& shift);
   void find_missing(const Slice& slice, double sigma);
   std::unique_ptr<ShiftedFactor> factorise_with_cholmod(double sigma);
   void move_doubtful_counts(const BandLimits& limits);
@@ -71,7 +75,8 @@ class Search {
   FoundModes found_;
   SearchCheckpoint checkpoint_;
   InertiaCounter counter_;
-  double searched_to_ = 0;  // the end of the last slice
+  double searched_to_ = 0;        // the end of the last slice
+  BandCounts* counts_ = nullptr;  // of run() and complete()
 };
 
 }  // namespace carillon::eigen

@@ -32,11 +32,9 @@ BandEnds find_ends(const Options& options) {
   return {calc_lambda(options.low_hz > 0 ? options.low_hz : kZeroFraction * options.high_hz), calc_lambda(options.high_hz)};
 }
 
-Slice count_between(const TakeCount& take, double low, double high) {
-  const Inertia above = take(high * (1 + kEdgeNudge), kEdgeNudge, ShiftRule::kExact);
-  const Inertia below = take(low * (1 - 2 * kEdgeNudge), kEdgeNudge, ShiftRule::kMayMoveUp);
-  return {below.lambda, below.below, above.lambda, above.below};
-}
+Inertia count_below_low(const TakeCount& take, double low) { return take(find_count_below_low(low), kEdgeNudge, ShiftRule::kMayMoveUp); }
+
+Inertia count_below_high(const TakeCount& take, double high) { return take(high * (1 + kEdgeNudge), kEdgeNudge, ShiftRule::kExact); }
 
 std::int64_t calc_copies_bytes(const Problem& problem) {
   double entries = 0;
@@ -100,10 +98,12 @@ SolveEstimate estimate_solve(const Problem& problem, const Options& options, con
   estimate.factor_kept_bytes = 8 * estimate.entries;
   if (!may_count(estimate)) return estimate;
   const double start = base::get_process_cpu_s();
-  const Slice band = count_between([&](double lambda, double reach, ShiftRule rule) { return counter.count_below(lambda, reach, rule); },
-                                   scaling.to_scaled(ends.low), scaling.to_scaled(ends.high));
+  const auto take = [&](double lambda, double reach, ShiftRule rule) { return counter.count_below(lambda, reach, rule); };
+  const Inertia above = count_below_high(take, scaling.to_scaled(ends.high));
+  const Inertia below = count_below_low(take, scaling.to_scaled(ends.low));
   estimate.factor_seconds = (base::get_process_cpu_s() - start) / static_cast<double>(std::max<std::int64_t>(statistics.factorisations, 1));
-  estimate.modes = std::min(band.count(), options.max_modes.value_or(band.count()));
+  const std::int64_t modes = above.below - below.below;
+  estimate.modes = std::min(modes, options.max_modes.value_or(modes));
   return estimate;
 }
 

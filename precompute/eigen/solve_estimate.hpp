@@ -31,9 +31,12 @@ BandEnds find_ends(const Options& options);
 /// InertiaCounter::count_below, or who asks it.
 using TakeCount = std::function<Inertia(double lambda, double reach, ShiftRule rule)>;
 
-/// Counts the eigenvalues below both ends (scaled), a little outside; below the lower one where rounding allows. Two factorisations, seldom
-/// more. Collective.
-Slice count_between(const TakeCount& take, double low, double high);
+/// Counts the eigenvalues below an end of the band (scaled), a little outside it; below the lower one where rounding allows. A
+/// factorisation each, seldom more. Collective.
+Inertia count_below_low(const TakeCount& take, double low);
+Inertia count_below_high(const TakeCount& take, double high);
+/// Where the first of them is taken.
+inline double find_count_below_low(double low) { return low * (1 - 2 * kEdgeNudge); }
 
 /// Of this rank [byte]. K and M by nodes, at their worst moment while their arrays grow, and the rigid modes.
 std::int64_t calc_copies_bytes(const Problem& problem);

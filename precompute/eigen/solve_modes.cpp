@@ -97,7 +97,8 @@ std::vector<double> solve_dense_band(const BandProblem& body, const BandLimits& 
 }
 
 // The counts that the modes found have met.
-void describe_proof(const BandProblem& body, const Search& search, const std::vector<double>& lambda, Modes& modes) {
+void describe_proof(const BandProblem& body, const Search& search, const BandCounts& band, const std::vector<double>& lambda,
+                    Modes& modes) {
   Proof& proof = modes.proof;
   std::vector<Inertia> counts = sort_counts(search.counts());
   // Where the shift had to go up for rounding, and nothing but the rigid modes lies below it, nothing else lies below the band either.
@@ -106,7 +107,8 @@ void describe_proof(const BandProblem& body, const Search& search, const std::ve
   for (const Inertia& count : counts) proof.counts.push_back({body.to_hz(count.lambda), count.below, find_margin(lambda, count.lambda)});
   proof.found = count_found(lambda, counts.front().lambda, counts.back().lambda);
   proof.factor_backward_error = search.get_worst_backward_error();
-  proof.method = fmt::format("signs of the pivots of K - lambda M = L D L^T ({})", modes.factor.solver);
+  proof.method = fmt::format("signs of the pivots of K - lambda M = L D L^T ({}){}", modes.factor.solver,
+                             band.is_low_derived ? "; below the band lies what the first shift counts less the modes found up to it" : "");
 }
 
 // Whether so many of the lowest modes are wanted that LAPACK finds them sooner.
@@ -150,25 +152,25 @@ void Solve::solve_sparse_band() {
   report_(Phase::kAnalyse, 0);
   Search& search = search_.emplace(body_, report_, modes_.factor, modes_.seconds);
   report_(Phase::kCount, 0);
-  BandCounts counts = count_band(
-      body_, [&](double lambda, double reach, ShiftRule rule) { return search.count_below(lambda, reach, rule); },
-      [&](double lambda) { search.forget(lambda); });
+  BandCounts counts = count_band(body_, search.get_band_counter());
   limits = counts.limits;
   modes_.mechanism_count = counts.mechanism_count;
   report_.band_count = modes_.band_count = counts.band_count;
   modes_.count_below_low = counts.count_below_low;
-  if (counts.band_count == 0) return describe_proof(body_, search, {}, modes_);
+  if (counts.band_count == 0) return describe_proof(body_, search, counts, {}, modes_);
   if (is_mostly_wanted(body_, counts)) {
     search_.reset();
     others_ = solve_dense_band(body_, limits, report_, modes_);
     return;
   }
-  search.run(search.cut_to_wanted(counts.band));
+  search.run(counts);
   search.complete(counts);
+  limits = counts.limits;
+  modes_.mechanism_count = counts.mechanism_count;
   modes_.band_count = counts.band_count;
   modes_.count_below_low = counts.count_below_low;
   FoundModes& found = search.found();
-  describe_proof(body_, search, found.lambda, modes_);
+  describe_proof(body_, search, counts, found.lambda, modes_);
   WantedModes wanted = take_wanted(body_, limits, found.lambda, modes_);
   modes_.shapes = found.take(wanted.order);
   others_ = std::move(wanted.others);

@@ -122,7 +122,9 @@ struct Cluster {
 
 /// Why no mode of the band is missing: between any two neighbouring counts as many modes were found as the counts differ by.
 struct Proof {
-  std::vector<Count> counts;                      // ascending in frequency: both ends of the band, every cut and every shift
+  /// Ascending in frequency: both ends of the band, every cut and every shift. The lower end may follow from the first shift (`method` says
+  /// so).
+  std::vector<Count> counts;
   std::vector<std::int64_t> rigid_per_component;  // (components) rigid modes of each, in the count below the band
   std::int64_t found = 0;            // modes found; fewer than lie between the first count and the last only if max_modes cut the search
   std::string method;                // how the counts were taken, in words

@@ -66,7 +66,7 @@ System assemble(const comm::Communicator& comm, const LocalMesh& local, const Ma
   LocalRows rows = make_rows(comm, local, mass == job::Mass::lumped);
   comm.agree([&] {
     std::vector<Solid> solids;
-    for (const job::Material& material : materials.list) solids.emplace_back(material, form == Form::displacement);
+    for (const material::Material& material : materials.list) solids.emplace_back(material, form == Form::displacement);
     ElementMatrices element;
     std::array<Vec3, kMaxNodes> x;
     for (const std::int32_t e : order_by_row(local)) {

@@ -339,7 +339,7 @@ bool calc_curved_t10(std::span<const Vec3> x, const Solid& solid, double& mass_k
 
 }  // namespace
 
-double calc_mean_dilatation_modulus_pa(const job::Elasticity& c) {
+double calc_mean_dilatation_modulus_pa(const material::Elasticity& c) {
   // C s = 1 for the normal strains s under a unit pressure, by elimination; C is positive definite.
   std::array<std::array<double, 7>, 6> row{};
   for (int i = 0; i < 6; ++i) {
@@ -355,10 +355,10 @@ double calc_mean_dilatation_modulus_pa(const job::Elasticity& c) {
   double dilatation = 0.0;
   for (int i = 0; i < 3; ++i) dilatation += row[i][6] / row[i][i];
   const double bulk = 1 / dilatation;
-  return std::max(bulk - (kMaxDisplacementLambda + 2.0 / 3) * job::calc_mean_shear_pa(c), 0.0);
+  return std::max(bulk - (kMaxDisplacementLambda + 2.0 / 3) * material::calc_mean_shear_pa(c), 0.0);
 }
 
-Solid::Solid(const job::Material& material, bool full)
+Solid::Solid(const material::Material& material, bool full)
     : isotropic(!material.orthotropic), lame_mu_pa(material.lame_mu_pa()), density_kg_m3(material.density_kg_m3) {
   if (isotropic) {
     mean_dilatation_modulus_pa = full ? 0.0 : std::max(material.lame_lambda_pa() - kMaxDisplacementLambda * lame_mu_pa, 0.0);
@@ -366,7 +366,7 @@ Solid::Solid(const job::Material& material, bool full)
     return;
   }
   constexpr int kVoigt[3][3] = {{0, 5, 4}, {5, 1, 3}, {4, 3, 2}};
-  const job::Elasticity c = material.calc_elasticity_pa();
+  const material::Elasticity c = material.calc_elasticity_pa();
   mean_dilatation_modulus_pa = full ? 0.0 : calc_mean_dilatation_modulus_pa(c);
   for (int r = 0; r < 3; ++r)
     for (int s = 0; s < 3; ++s)

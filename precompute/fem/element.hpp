@@ -32,12 +32,12 @@ inline constexpr double kMaxDisplacementLambda = 10.0;
 /// The modulus that resists the mean of the dilatation alone in a T10 [Pa]: the part of the bulk modulus (Reuss' average) above
 /// (kMaxDisplacementLambda + 2/3) times the shear modulus (Voigt's average), for an isotropic solid lambda - kMaxDisplacementLambda mu; 0
 /// if there is none. C less this part of every normal pair is still positive definite.
-double calc_mean_dilatation_modulus_pa(const job::Elasticity& elasticity_pa);
+double calc_mean_dilatation_modulus_pa(const material::Elasticity& elasticity_pa);
 
 /// A material as the elements use it, made once for many elements.
 struct Solid {
   /// full: no mean dilatation; all of lambda resists all of the dilatation, near incompressibility too.
-  Solid(const job::Material& material, bool full = false);  // NOLINT(google-explicit-constructor): a material is a solid
+  Solid(const material::Material& material, bool full = false);  // NOLINT(google-explicit-constructor): a material is a solid
 
   bool isotropic = true;
   double displacement_lambda_pa = 0.0;      // of isotropic solids: resists all of the dilatation in a T10;

@@ -65,11 +65,27 @@ std::vector<double> normalise(const std::vector<std::vector<double>>& by_materia
 
 }  // namespace
 
+std::vector<double> calc_decay_per_s(const Materials& materials, const EnergyShares& shares, std::span<const double> lambda) {
+  std::vector<double> decay_per_s;
+  const std::size_t count = materials.list.size();
+  for (std::size_t j = 0; j < lambda.size(); ++j) {
+    if (count == 1) {
+      decay_per_s.push_back(materials.list[0].calc_decay_per_s(lambda[j]));
+      continue;
+    }
+    double c = 0.0;
+    for (std::size_t r = 0; r < count; ++r)
+      c += materials.list[r].calc_damping_per_s(lambda[j], shares.elastic[j * count + r], shares.kinetic[j * count + r]);
+    decay_per_s.push_back(c / 2);
+  }
+  return decay_per_s;
+}
+
 Decay calc_decay(const comm::Communicator& comm, const partition::LocalMesh& local, const Materials& materials, job::Mass mass,
                  std::span<const double> lambda, Mat shapes) {
   Decay decay;
   if (materials.list.size() == 1 || lambda.empty()) {
-    for (const double value : lambda) decay.decay_per_s.push_back(materials.list[0].calc_decay_per_s(value));
+    decay.decay_per_s = calc_decay_per_s(materials, decay.shares, lambda);
     return decay;
   }
   const auto modes = static_cast<std::int64_t>(lambda.size());
@@ -82,12 +98,7 @@ Decay calc_decay(const comm::Communicator& comm, const partition::LocalMesh& loc
     kinetic.push_back(calc_forms(comm, system.mass, shapes, modes));
   }
   decay.shares = {count, normalise(elastic, modes), normalise(kinetic, modes)};
-  for (std::int64_t j = 0; j < modes; ++j) {
-    double c = 0.0;
-    for (std::int32_t r = 0; r < count; ++r)
-      c += materials.list[r].calc_damping_per_s(lambda[j], decay.shares.elastic[j * count + r], decay.shares.kinetic[j * count + r]);
-    decay.decay_per_s.push_back(c / 2);
-  }
+  decay.decay_per_s = calc_decay_per_s(materials, decay.shares, lambda);
   return decay;
 }
 

@@ -23,8 +23,11 @@ struct Decay {
   EnergyShares shares;              // empty when there is one material: then no energy was integrated
 };
 
+/// The decay rates [1/s] at these eigenvalues, which may be others than those of the shapes behind `shares`: (modes). Pure.
+std::vector<double> calc_decay_per_s(const Materials& materials, const EnergyShares& shares, std::span<const double> lambda);
+
 /// Calculates the decay rate of every mode, d = c / 2. One material: c(lambda) of its law. Several: the sum over the materials of what each
-/// law draws from its share of the mode's elastic and kinetic energy (job::Material::calc_damping_per_s), which is the diagonal of the
+/// law draws from its share of the mode's elastic and kinetic energy (material::Material::calc_damping_per_s), which is the diagonal of the
 /// modal damping matrix; docs/equations.md, damping. `lambda` (modes) [rad^2/s^2]; `shapes` (3n, modes) dense, rows as those of the system
 /// of `local`, null when there are no modes. Collective. Throws on every rank what assemble() throws.
 Decay calc_decay(const comm::Communicator& comm, const partition::LocalMesh& local, const Materials& materials, job::Mass mass,

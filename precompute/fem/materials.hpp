@@ -14,11 +14,11 @@ namespace carillon::fem {
 /// The materials of a body; a single one for all of it converts to this.
 struct Materials {
   Materials() = default;
-  Materials(job::Material material) : list{std::move(material)} {}  // NOLINT(google-explicit-constructor)
+  Materials(material::Material material) : list{std::move(material)} {}  // NOLINT(google-explicit-constructor)
 
-  std::vector<job::Material> list;   // the same on every rank
-  std::vector<std::string> region;   // of each in `list`: as the job names it, "" for the rest of the mesh; empty when there is one
-  std::vector<std::int32_t> of_tet;  // (this rank's tetrahedra) place in `list`; empty: all 0
+  std::vector<material::Material> list;  // the same on every rank
+  std::vector<std::string> region;       // of each in `list`: as the job names it, "" for the rest of the mesh; empty when there is one
+  std::vector<std::int32_t> of_tet;      // (this rank's tetrahedra) place in `list`; empty: all 0
 
   std::int32_t find(std::int32_t tet) const { return of_tet.empty() ? 0 : of_tet[tet]; }
 };

@@ -15,7 +15,7 @@
 
 #include "precompute/comm/exchange.hpp"
 #include "precompute/fem/element.hpp"
-#include "precompute/mesh/faces.hpp"
+#include "precompute/mesh/parts.hpp"
 #include "precompute/petsc/handle.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/base/vector.hpp"

@@ -1,7 +1,7 @@
 // Method: rank 0 sends each rank its rows on the surface and hands out the outer triangles; what a triangle needs of another
 //   rank's rows is fetched once per block of modes. A block is read from the columns once: its largest components give the steps (maximum
 //   over the ranks), its flow through the triangles the gains (sum over the ranks). Rank 0 then takes the steps, one rank after the other.
-// Source: none needed; the flow is that of radiation.cpp. Deviations: none.
+// Source: none needed; the flow is that of runtime/bank/radiation_gain.hpp. Deviations: none.
 #include "precompute/io/surface_modes.hpp"
 
 #include <fmt/core.h>
@@ -96,8 +96,8 @@ void SurfaceWork::deal(const Surface& surface) {
   const auto list_panels = [&] {
     std::vector<Panel> panels;
     if (!comm_.is_root()) return panels;
-    for (const Triangle& triangle : find_outer_triangles(surface.vertices_m, surface.triangles)) {
-      Panel panel{{}, calc_normal(surface.vertices_m, triangle)};
+    for (const Triangle& triangle : bank::find_outer_triangles(surface.vertices_m, surface.triangles)) {
+      Panel panel{{}, bank::calc_normal(surface.vertices_m, triangle)};
       area_m2_ += std::hypot(panel.normal[0], panel.normal[1], panel.normal[2]) / 2;
       for (int i = 0; i < 3; ++i) panel.row[i] = surface.row[triangle[i]];
       if (std::any_of(panel.row.begin(), panel.row.end(), [](std::int32_t row) { return row >= 0; })) panels.push_back(panel);
@@ -230,7 +230,7 @@ SurfaceModes SurfaceWork::calc(std::span<const double> omega_rad_s) {
   }
   comm_.sum(flow_);
   SurfaceModes modes;
-  for (std::size_t k = 0; k < modes_; ++k) modes.radiation_gain.push_back(calc_radiation_gain(omega_rad_s[k], flow_[k], area_m2_));
+  for (std::size_t k = 0; k < modes_; ++k) modes.radiation_gain.push_back(bank::calc_radiation_gain(omega_rad_s[k], flow_[k], area_m2_));
   modes.shape_scale = scale_;
   values_ = {};
   modes.shape = collect();

@@ -8,9 +8,12 @@
 #include <vector>
 
 #include "precompute/comm/communicator.hpp"
-#include "precompute/io/radiation.hpp"
+#include "runtime/bank/radiation_gain.hpp"
+#include "runtime/bank/surface.hpp"
 
 namespace carillon::io {
+
+using bank::Triangle;
 
 /// The surface of the body, known to rank 0.
 struct Surface {

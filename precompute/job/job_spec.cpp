@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "precompute/job/read_body.hpp"
-#include "precompute/job/read_material.hpp"
+#include "runtime/material/read_material.hpp"
 
 namespace carillon::job {
 namespace {
@@ -86,7 +86,9 @@ std::vector<Fixed> read_all_fixed(base::Object& job) {
 }
 
 void read_materials(base::Object& job, JobSpec& spec) {
-  const auto read = [&](base::Object object) { return read_material(std::move(object), spec.band_hz, spec.warnings); };
+  const auto read = [&](base::Object& parent, const std::string& key) {
+    return material::read_material(parent, key, spec.band_hz, spec.warnings);
+  };
   if (auto materials = job.object_if("materials")) {
     if (materials->keys().empty() || materials->keys().size() > kMaxRegions)
       job.fail("materials",
@@ -95,11 +97,11 @@ void read_materials(base::Object& job, JobSpec& spec) {
                            kMaxRegions));
     for (const std::string& region : materials->keys()) {
       if (region.empty()) materials->fail("", "a region's name is empty; give its tag or its name");
-      spec.materials[region] = read(materials->object(region));
+      spec.materials[region] = read(*materials, region);
     }
   }
   spec.has_material = spec.materials.empty() || job.has("material");
-  spec.material = spec.has_material ? read(job.object("material")) : spec.materials.begin()->second;
+  spec.material = spec.has_material ? read(job, "material") : spec.materials.begin()->second;
 }
 
 void read_solver(base::Object& job, JobSpec& spec) {

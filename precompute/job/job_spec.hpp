@@ -8,11 +8,13 @@
 #include <string>
 #include <vector>
 
-#include "precompute/job/material.hpp"
 #include "runtime/base/document.hpp"
+#include "runtime/material/material.hpp"
 #include "runtime/material/supports.hpp"
 
 namespace carillon::job {
+
+using material::Material;
 
 enum class Element { T4, T10 };
 enum class Mass { consistent, lumped };
@@ -30,18 +32,19 @@ struct Fixed {
   material::Fixing fixing = {};                                    // what is behind these nodes; a scene may choose another
 };
 
-/// A body that the program meshes itself, in place of a mesh file: a parametric shape or a closed surface, as carillon-mesh takes them.
+/// A body that the program meshes itself, in place of a mesh file: a parametric shape or a surface, as carillon-mesh takes them.
 struct Body {
   std::string shape = {};                         // of carillon-mesh --shape; empty: a surface
   std::map<std::string, double> dimensions = {};  // of the shape, by carillon-mesh's names ("outer-radius"): metres, angles in degrees
   std::filesystem::path surface = {};             // absolute; empty: a shape
-  std::optional<double> wall_m = {};              // surface: hollow, without it solid
-  std::optional<double> height_m = {};            // surface: scaled to this extent along `up`
-  std::optional<double> scale = {};               // surface: metres per unit of the file
-  std::optional<double> close_holes = {};         // surface: holes up to this part of the body's diagonal are closed
-  char up = 'y';                                  // surface: 'x', 'y' or 'z'
-  std::string method = "auto";                    // surface: "auto", "delaunay" or "stuffing"
-  std::optional<long long> nodes = {};            // of the mesh, mid-side nodes among them; at most one of nodes and edge_m
+  std::optional<double> wall_m = {};              // surface: thickness of an open one, or of the shell in a closed one, without it solid
+  std::string side = {};                   // surface with a wall: "middle", "outside" or "inside" of it; empty: carillon-mesh's default
+  std::optional<double> height_m = {};     // surface: scaled to this extent along `up`
+  std::optional<double> scale = {};        // surface: metres per unit of the file
+  std::optional<double> close_holes = {};  // surface: holes up to this part of the body's diagonal are closed
+  char up = 'y';                           // surface: 'x', 'y' or 'z'
+  std::string method = "auto";             // surface: "auto", "delaunay", "stuffing" or "extrude"
+  std::optional<long long> nodes = {};     // of the mesh, mid-side nodes among them; at most one of nodes and edge_m
   std::optional<double> edge_m = {};
   std::string place = {};  // "file:line" of the job, for messages
 };

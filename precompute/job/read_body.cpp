@@ -48,6 +48,10 @@ void read_shape(base::Object& body, Body& result) {
 void read_surface(base::Object& body, Body& result) {
   result.surface = body.path("surface");
   result.wall_m = read_length_if(body, "wall_m");
+  if (body.has("side")) {
+    result.side = body.choice("side", {"middle", "outside", "inside"});
+    if (!result.wall_m) body.fail("side", "it says where a wall lies; give its thickness with \"wall_m\"");
+  }
   result.height_m = read_length_if(body, "height_m");
   result.scale = body.number_if("scale", base::kPositive);
   result.close_holes = body.number_if("close_holes");
@@ -55,7 +59,7 @@ void read_surface(base::Object& body, Body& result) {
     body.fail("close_holes", fmt::format("is a part of the body's diagonal, from 0 to 1, and this is {:g}", *result.close_holes));
   if (result.height_m && result.scale) body.fail("scale", "\"height_m\" gives the size already; give one of them");
   result.up = body.choice_or("up", {"x", "y", "z"}, "y")[0];
-  result.method = body.choice_or("method", {"auto", "delaunay", "stuffing"}, "auto");
+  result.method = body.choice_or("method", {"auto", "delaunay", "stuffing", "extrude"}, "auto");
 }
 
 }  // namespace

@@ -9,6 +9,8 @@
 namespace carillon::job {
 namespace {
 
+using material::CaugheyTerm, material::DampingLaw, material::LossRow, material::Orthotropic;
+
 namespace fs = std::filesystem;
 
 Json::Value to_json(const std::array<double, 3>& v) {
@@ -77,6 +79,7 @@ Json::Value write_body(const Body& body, const fs::path& base) {
   } else {
     root["surface"] = relative_to(body.surface, base);
     if (body.wall_m) root["wall_m"] = *body.wall_m;
+    if (!body.side.empty()) root["side"] = body.side;
     if (body.height_m) root["height_m"] = *body.height_m;
     if (body.scale) root["scale"] = *body.scale;
     if (body.close_holes) root["close_holes"] = *body.close_holes;

@@ -22,11 +22,12 @@ namespace carillon::la {
 namespace {
 
 constexpr std::ptrdiff_t kRowsTransposed = 4096;  // of a panel for A^T B: 16 columns of B are half a megabyte
-constexpr std::ptrdiff_t kStripTransposed = 256;  // of a strip of it
+constexpr std::ptrdiff_t kStripTransposed = 128;  // of a strip of it
 constexpr std::ptrdiff_t kRowsProduct = 2048;     // of a panel for B - A S, which is written too
 constexpr std::ptrdiff_t kStripProduct = 128;     // of a strip of it
 constexpr std::ptrdiff_t kRowsCombined = 256;     // of a panel for A S
-constexpr int kTile = 4;                          // columns of the narrow block in registers
+constexpr int kNarrow = 32;                       // columns of the narrow block at most: dgemm is as fast for wider ones
+constexpr int kTile = 4;                          // of them in registers
 constexpr int kWide = 6;                          // columns of the wide block with them
 
 int round_up(int n, int to) { return (n + to - 1) / to * to; }
@@ -38,17 +39,57 @@ bool has_avx512() { return base::has_instructions(base::Instructions::kAvx512); 
 
 // Loops over what shall stay in registers are unrolled, all of them: one that is not sends the others' values through memory.
 
-// What a tile prefetches while it works: the same rows of some columns of the wide block, one strip ahead.
+// What a tile prefetches while it works: some columns of the wide block, one strip ahead to the first-level cache and a few strips ahead to
+// the second. The first alone has too few open requests to keep the memory busy.
 struct Prefetch {
-  const double* first = nullptr;
+  const double* near = nullptr;
+  const double* far = nullptr;
   int columns = 0;
 };
 
-// The share of tile `j` of `tiles` in prefetching the next strip of columns [i, i + wide).
-Prefetch find_prefetch(const Columns& a, int i, int wide, std::ptrdiff_t row, int j, int tiles) {
-  const int from = j * wide / tiles;
-  return {a.column(i + from) + row, (j + 1) * wide / tiles - from};
-}
+/// The strips of a panel in the order of their use: down some columns, then down the next ones. Where a tile stands costs no division.
+class Strips {
+ public:
+  /// first, rows: of the panel; strip: rows of a strip; tiles: that work on each.
+  Strips(const Columns& a, std::ptrdiff_t first, std::ptrdiff_t rows, std::ptrdiff_t strip, int tiles)
+      : a_(a), first_(first), rows_(rows), strip_(strip), height_((rows + strip - 1) / strip * strip), tiles_(tiles) {}
+
+  /// Columns [i, i + wide) come next.
+  void begin_columns(int i, int wide) {
+    column_ = i;
+    for (int j = 0; j <= tiles_; ++j) share_[j] = j * wide / tiles_;
+  }
+  /// Row r of the panel comes next.
+  void begin_strip(std::ptrdiff_t r) {
+    constexpr int kFar = 3;
+    near_ = find(r + strip_);
+    far_ = find(r + kFar * strip_);
+  }
+  /// The share of tile j.
+  Prefetch find_prefetch(int j) const {
+    const std::ptrdiff_t offset = share_[j] * a_.stride;
+    return {near_ + offset, far_ + offset, share_[j + 1] - share_[j]};
+  }
+
+ private:
+  const double* find(std::ptrdiff_t r) const {
+    int i = column_;
+    for (; r >= height_; r -= height_) i += kWide;
+    if (i < a_.count) return a_.column(i) + first_ + r;
+    return a_.column(0) + std::min(first_ + rows_ + r, a_.rows - 1);  // of the next panel
+  }
+
+  const Columns& a_;
+  std::ptrdiff_t first_;
+  std::ptrdiff_t rows_;
+  std::ptrdiff_t strip_;
+  std::ptrdiff_t height_;
+  int tiles_;
+  int column_ = 0;
+  int share_[kNarrow / kTile + 1] = {};
+  const double* near_ = nullptr;
+  const double* far_ = nullptr;
+};
 
 // sum (kCount x 4 vectors of lanes) += a^T b over `rows`, any number; b is packed: aligned, zero beyond the rows.
 template <int kCount>
@@ -64,7 +105,10 @@ CARILLON_AVX512 void add_transposed_tile(const double* a, std::ptrdiff_t lda, co
     const __mmask8 mask = r + 8 <= rows ? 0xff : static_cast<__mmask8>((1 << (rows - r)) - 1);
     const __m512d b0 = _mm512_load_pd(b + r), b1 = _mm512_load_pd(b + ldb + r);
     const __m512d b2 = _mm512_load_pd(b + 2 * ldb + r), b3 = _mm512_load_pd(b + 3 * ldb + r);
-    for (int i = 0; i < next.columns; ++i) _mm_prefetch(reinterpret_cast<const char*>(next.first + i * lda + r), _MM_HINT_T0);
+    for (int i = 0; i < next.columns; ++i) {
+      _mm_prefetch(reinterpret_cast<const char*>(next.near + i * lda + r), _MM_HINT_T0);
+      _mm_prefetch(reinterpret_cast<const char*>(next.far + i * lda + r), _MM_HINT_T1);
+    }
 #pragma GCC unroll 6
     for (int i = 0; i < kCount; ++i) {
       const __m512d x = _mm512_maskz_loadu_pd(mask, a + i * lda + r);
@@ -95,7 +139,10 @@ CARILLON_AVX512 void subtract_tile(const double* a, std::ptrdiff_t lda, const do
     const __mmask8 mask = r + 8 <= rows ? 0xff : static_cast<__mmask8>((1 << (rows - r)) - 1);
     __m512d b0 = _mm512_load_pd(b + r), b1 = _mm512_load_pd(b + ldb + r);
     __m512d b2 = _mm512_load_pd(b + 2 * ldb + r), b3 = _mm512_load_pd(b + 3 * ldb + r);
-    for (int i = 0; i < next.columns; ++i) _mm_prefetch(reinterpret_cast<const char*>(next.first + i * lda + r), _MM_HINT_T0);
+    for (int i = 0; i < next.columns; ++i) {
+      _mm_prefetch(reinterpret_cast<const char*>(next.near + i * lda + r), _MM_HINT_T0);
+      _mm_prefetch(reinterpret_cast<const char*>(next.far + i * lda + r), _MM_HINT_T1);
+    }
 #pragma GCC unroll 6
     for (int i = 0; i < kCount; ++i) {
       const __m512d x = _mm512_maskz_loadu_pd(mask, a + i * lda + r);
@@ -109,6 +156,14 @@ CARILLON_AVX512 void subtract_tile(const double* a, std::ptrdiff_t lda, const do
     _mm512_store_pd(b + 2 * ldb + r, b2);
     _mm512_store_pd(b + 3 * ldb + r, b3);
   }
+}
+
+// Of one sum, in a fixed order.
+CARILLON_AVX512 double add_lanes(const double* lane) {
+  const __m256d half = _mm256_add_pd(_mm256_load_pd(lane), _mm256_load_pd(lane + 4));
+  const __m128d quarter = _mm_add_pd(_mm_unpacklo_pd(_mm256_castpd256_pd128(half), _mm256_extractf128_pd(half, 1)),
+                                     _mm_unpackhi_pd(_mm256_castpd256_pd128(half), _mm256_extractf128_pd(half, 1)));
+  return _mm_cvtsd_f64(_mm_add_sd(quarter, _mm_unpackhi_pd(quarter, quarter)));
 }
 
 using TransposedTile = void (*)(const double*, std::ptrdiff_t, const double*, std::ptrdiff_t, std::ptrdiff_t, double*, Prefetch);
@@ -153,7 +208,7 @@ class PackedPanel {
   double* values_ = nullptr;
 };
 
-void multiply_transposed_avx512(const Columns& a, const Columns& b, double* small, int small_stride) {
+CARILLON_AVX512 void multiply_transposed_avx512(const Columns& a, const Columns& b, double* small, int small_stride) {
   constexpr int kLanes = 8 * kWide * kTile;  // of one tile's sums
   const int tiles = round_up(b.count, kTile) / kTile;
   for (int j = 0; j < b.count; ++j) std::fill_n(small + static_cast<std::ptrdiff_t>(j) * small_stride, a.count, 0.0);
@@ -161,22 +216,24 @@ void multiply_transposed_avx512(const Columns& a, const Columns& b, double* smal
   PackedPanel sums(kLanes, tiles);
   for (std::ptrdiff_t first = 0; first < a.rows; first += kRowsTransposed) {
     const std::ptrdiff_t rows = std::min(kRowsTransposed, a.rows - first);
+    Strips strips(a, first, rows, kStripTransposed, tiles);
     panel.load(b, first, rows);
     for (int i = 0; i < a.count; i += kWide) {
       const int wide = std::min(kWide, a.count - i);
+      strips.begin_columns(i, wide);
       std::fill_n(sums.get(), static_cast<std::ptrdiff_t>(tiles) * kLanes, 0.0);
       for (std::ptrdiff_t r = 0; r < rows; r += kStripTransposed) {
         const std::ptrdiff_t strip = std::min(kStripTransposed, rows - r);
+        strips.begin_strip(r);
         for (int j = 0; j < tiles; ++j) {
           kTransposedTile[wide](a.column(i) + first + r, a.stride, panel.get() + j * kTile * panel.stride() + r, panel.stride(), strip,
-                                sums.get() + j * kLanes, find_prefetch(a, i, wide, first + r + kStripTransposed, j, tiles));
+                                sums.get() + j * kLanes, strips.find_prefetch(j));
         }
       }
       for (int j = 0; j < b.count; ++j) {
         for (int k = 0; k < wide; ++k) {
           const double* lane = sums.get() + (j / kTile) * kLanes + 8 * (k * kTile + j % kTile);
-          small[static_cast<std::ptrdiff_t>(j) * small_stride + i + k] +=
-              ((lane[0] + lane[4]) + (lane[1] + lane[5])) + ((lane[2] + lane[6]) + (lane[3] + lane[7]));
+          small[static_cast<std::ptrdiff_t>(j) * small_stride + i + k] += add_lanes(lane);
         }
       }
     }
@@ -192,15 +249,17 @@ void subtract_product_avx512(const Columns& a, const double* small, int small_st
   PackedPanel panel(kRowsProduct, b.count);
   for (std::ptrdiff_t first = 0; first < a.rows; first += kRowsProduct) {
     const std::ptrdiff_t rows = std::min(kRowsProduct, a.rows - first);
+    Strips strips(a, first, rows, kStripProduct, tiles);
     panel.load(b, first, rows);
     for (int i = 0; i < a.count; i += kWide) {
       const int wide = std::min(kWide, a.count - i);
+      strips.begin_columns(i, wide);
       for (std::ptrdiff_t r = 0; r < rows; r += kStripProduct) {
         const std::ptrdiff_t strip = std::min(kStripProduct, rows - r);
+        strips.begin_strip(r);
         for (int j = 0; j < tiles; ++j) {
           kSubtractTile[wide](a.column(i) + first + r, a.stride, coefficients.data() + static_cast<std::ptrdiff_t>(j * kTile) * a.count + i,
-                              a.count, panel.get() + j * kTile * panel.stride() + r, panel.stride(), strip,
-                              find_prefetch(a, i, wide, first + r + kStripProduct, j, tiles));
+                              a.count, panel.get() + j * kTile * panel.stride() + r, panel.stride(), strip, strips.find_prefetch(j));
         }
       }
     }
@@ -274,14 +333,19 @@ void subtract_product_avx512(const Columns&, const double*, int, const Columns&)
 void combine_columns_avx512(const Columns&, const double*, int) {}
 #endif
 
-constexpr int kNarrow = 32;  // dgemm is as fast for wider blocks.
-
 }  // namespace
 
 void multiply_transposed(const Columns& a, const Columns& b, double* small, int small_stride) {
   if (a.count == 0 || b.count == 0) return;
   petsc::add_flops(2.0 * static_cast<double>(a.rows) * a.count * b.count);
   if (b.count <= kNarrow && has_avx512()) return multiply_transposed_avx512(a, b, small, small_stride);
+  if (a.count <= kNarrow && has_avx512()) {  // The transpose of the other way round.
+    Matrix turned(b.count, a.count);
+    multiply_transposed_avx512(b, a, turned.data(), b.count);
+    for (int j = 0; j < b.count; ++j)
+      for (int i = 0; i < a.count; ++i) small[static_cast<std::ptrdiff_t>(j) * small_stride + i] = turned(j, i);
+    return;
+  }
   gemm(Transpose::kYes, a.count, b.count, a.rows, 1.0, a.values, a.stride, b.values, b.stride, 0.0, small, small_stride);
 }
 

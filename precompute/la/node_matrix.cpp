@@ -33,8 +33,15 @@ constexpr std::size_t kNodes = 32;  // whose products are put back at a time, wh
 typedef double Vector __attribute__((vector_size(64), may_alias));
 constexpr int kVectors = kStrip / 8;
 
-// One row of nodes: y (3 x 16) = rest (3 x 3) times its own x (3 x 16) + sum of blocks (3 x 3) times differences from it. All loops over
-// the sums are unrolled: GCC 12 sends them through memory otherwise.
+constexpr int kAhead = 4;  // blocks, whose rows of x are prefetched: they lie anywhere
+
+[[gnu::always_inline]] inline void prefetch_rows(const Row* rows) {
+#pragma GCC unroll 6
+  for (int line = 0; line < 3 * kVectors; ++line) __builtin_prefetch(reinterpret_cast<const Vector*>(rows) + line);
+}
+
+// One row of nodes: y (3 x 16) = rest (3 x 3) times its own x (3 x 16) + sum of blocks (3 x 3) times differences from it. kAhead places
+// stand behind the last neighbour. All loops over the sums are unrolled: GCC 12 sends them through memory otherwise.
 CARILLON_CLONES void multiply_blocks(const std::int64_t* start, const std::int32_t* neighbour, const double* values, const double* rest,
                                      std::size_t nodes, const Row* own_rows, const Row* x, Row* y) {
   auto* out = reinterpret_cast<Vector*>(y);
@@ -52,6 +59,7 @@ CARILLON_CLONES void multiply_blocks(const std::int64_t* start, const std::int32
     for (std::int64_t k = start[node]; k < start[node + 1]; ++k) {
       const double* a = values + 9 * k;
       const auto* from = reinterpret_cast<const Vector*>(x + 3 * static_cast<std::ptrdiff_t>(neighbour[k]));
+      prefetch_rows(x + 3 * static_cast<std::ptrdiff_t>(neighbour[k + kAhead]));
 #pragma GCC unroll 3
       for (int d = 0; d < 3; ++d)
 #pragma GCC unroll 2
@@ -76,6 +84,7 @@ CARILLON_CLONES void multiply_scalars(const std::int64_t* start, const std::int3
     for (int v = 0; v < kAll; ++v) sum[v] = Vector{};
     for (std::int64_t k = start[node]; k < start[node + 1]; ++k) {
       const auto* from = reinterpret_cast<const Vector*>(x + 3 * static_cast<std::ptrdiff_t>(neighbour[k]));
+      prefetch_rows(x + 3 * static_cast<std::ptrdiff_t>(neighbour[k + kAhead]));
 #pragma GCC unroll 6
       for (int v = 0; v < kAll; ++v) sum[v] += values[k] * from[v];
     }
@@ -150,6 +159,10 @@ void NodeMatrix::read(Mat matrix, double factor) {
   std::vector<PetscInt> global;
   start_.push_back(0);
   std::vector<Block> blocks;
+  MatInfo info;
+  check(MatGetInfo(matrix, MAT_LOCAL, &info));
+  values_.reserve(static_cast<std::size_t>(info.nz_used));
+  global.reserve(static_cast<std::size_t>(info.nz_used) / 9);
   for (PetscInt row = first; row < last; row += 3) {
     read_node_row(matrix, factor, row, blocks);
     for (const auto& [node, block] : blocks) {
@@ -196,6 +209,7 @@ void NodeMatrix::read(Mat matrix, double factor) {
       neighbour_.push_back(static_cast<std::int32_t>(nodes_) + static_cast<std::int32_t>(at));
     }
   }
+  neighbour_.resize(neighbour_.size() + kAhead, 0);  // see multiply_blocks
   plan_exchange(matrix, ghosts);
 }
 
@@ -235,7 +249,8 @@ void NodeMatrix::plan_exchange(Mat matrix, const std::vector<PetscInt>& ghosts) 
 
 void NodeMatrix::pack(const Columns& x, int first, std::vector<Row>& packed) const {
   // What is packed is multiplied once.
-  if (kind_ != Kind::kDiagonal) petsc::add_flops((kind_ == Kind::kScalars ? 6.0 : 18.0) * kStrip * static_cast<double>(neighbour_.size()));
+  if (kind_ != Kind::kDiagonal)
+    petsc::add_flops((kind_ == Kind::kScalars ? 6.0 : 18.0) * kStrip * static_cast<double>(neighbour_.size() - kAhead));
   packed.resize(3 * (nodes_ + ghosts_));
   to_rows(x.part(first, std::min(kStrip, x.count - first)), packed.data());
   if (exchange_.get() == nullptr) return;

@@ -59,6 +59,8 @@ struct Kernels {
   void (*trmm)(const double* tiles, int n, int vectors, const double* in, double* out);
   /// out (n rows) += T^T in. next: as above.
   void (*add_trmm_transposed)(const double* tiles, int n, int vectors, double* in, double* out, const double* next);
+  /// out (n rows) = D^-1 in; diagonal and off: of BlockPivots, from the first row on.
+  void (*multiply_by_d_inverse)(const double* diagonal, const double* off, int n, int vectors, const double* in, double* out);
   /// Factorises a symmetric block, both triangles given, columns kMaxBlock apart, by rook pivoting; overwrites it and puts L^-1 in tiles
   /// (count_triangle). False if a pivot vanishes exactly or is not finite.
   bool (*factorise_block)(double* block, int n, BlockPivots& pivots, double* tiles);
@@ -74,6 +76,8 @@ struct Kernels {
   /// target[c][run.to + i] += source[c][run.from + i] for every run and three columns; in column c rows before the c-th of the first run
   /// are left out.
   void (*extend_add)(const double* const* source, const Run* runs, int count, double* const* target);
+  /// to (m rows of n numbers, to_stride apart) = the transpose of from (n rows of m numbers, from_stride apart). They do not overlap.
+  void (*transpose)(const double* from, long from_stride, int n, int m, double* to, long to_stride);
   const char* name;
 };
 

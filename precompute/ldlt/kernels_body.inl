@@ -15,12 +15,12 @@ namespace {
 
 typedef double Vector __attribute__((vector_size(64)));
 
-/// Numbers of L to call ahead of their use, from memory to the second-level cache and then to the first: the order of use inside a tile is
+/// Numbers of L to prefetch, from memory to the second-level cache and then to the first: the order of use inside a tile is
 /// not what the processor predicts.
-constexpr int kFar = 512;
+constexpr int kFar = 1024;
 constexpr int kNear = 256;
 constexpr int kLine = 8;
-inline void call(const double* far, const double* near) {
+inline void prefetch(const double* far, const double* near) {
   __builtin_prefetch(far, 0, 2);
   __builtin_prefetch(near);
 }
@@ -72,7 +72,7 @@ inline void multiply_rows(const double* tile, int n, const Vector* in, const Til
 #pragma GCC unroll 2
     for (int v = 0; v < kUsed; ++v) row[v] = in[k * kStride + first + v];
     const double* a = tile + k * kHeight + kBegin;
-    for (int i = 0; i < kCount; i += kLine) call(a + kFar + i, a + kNear + i);
+    for (int i = 0; i < kCount; i += kLine) prefetch(a + kFar + i, a + kNear + i);
 #pragma GCC unroll 12
     for (int i = 0; i < kCount; ++i)
 #pragma GCC unroll 2
@@ -132,8 +132,10 @@ inline void multiply_columns(const double* tile, const Reading& reading, const T
   for (int k = 0; k < kCount; ++k)
 #pragma GCC unroll 2
     for (int v = 0; v < kUsed; ++v) sum[k][v] = out[k * kStride + first + v];
+#pragma GCC unroll 12
   for (int i = 0; i < kHeight; ++i) {
-    for (int line = i * kCount / kLine; line < (i + 1) * kCount / kLine; ++line) call(far + kLine * line, near + kLine * line);
+#pragma GCC unroll 2
+    for (int line = i * kCount / kLine; line < (i + 1) * kCount / kLine; ++line) prefetch(far + kLine * line, near + kLine * line);
     Vector row[kUsed];
 #pragma GCC unroll 2
     for (int v = 0; v < kUsed; ++v) row[v] = in.at(i, first + v);
@@ -201,6 +203,24 @@ void trmm(const double* tiles, int n, int vectors, const double* in, double* out
 }
 void add_trmm_transposed(const double* tiles, int n, int vectors, double* in, double* out, const double* next) {
   vectors == 1 ? add_trmm_transposed<1>(tiles, n, in, out, next) : add_trmm_transposed<2>(tiles, n, in, out, next);
+}
+
+template <int kStride>
+void multiply_by_d_inverse(const double* diagonal, const double* off, int n, const double* in_rows, double* out_rows) {
+  const auto* in = reinterpret_cast<const Vector*>(in_rows);
+  auto* out = reinterpret_cast<Vector*>(out_rows);
+  for (int k = 0; k < n; ++k, in += kStride, out += kStride)
+#pragma GCC unroll 2
+    for (int v = 0; v < kStride; ++v) {
+      Vector row = diagonal[k] * in[v];
+      if (off[k] != 0) row += off[k] * in[kStride + v];
+      if (k > 0 && off[k - 1] != 0) row += off[k - 1] * in[v - kStride];
+      out[v] = row;
+    }
+}
+
+void multiply_by_d_inverse(const double* diagonal, const double* off, int n, int vectors, const double* in, double* out) {
+  vectors == 1 ? multiply_by_d_inverse<1>(diagonal, off, n, in, out) : multiply_by_d_inverse<2>(diagonal, off, n, in, out);
 }
 
 inline double magnitude(double x) { return __builtin_fabs(x); }
@@ -553,10 +573,31 @@ void extend_add(const double* const* source, const Run* runs, int count, double*
     for (int c = 0; c < 3; ++c) add_run(source[c] + runs[k].from, target[c] + runs[k].to, runs[k].length);
 }
 
+/// Four rows of four numbers.
+inline void transpose_square(const double* from, long from_stride, double* to, long to_stride) {
+  const Quad a = load(from), b = load(from + from_stride), c = load(from + 2 * from_stride), d = load(from + 3 * from_stride);
+  const Quad ab_even = __builtin_shufflevector(a, b, 0, 4, 2, 6), ab_odd = __builtin_shufflevector(a, b, 1, 5, 3, 7);
+  const Quad cd_even = __builtin_shufflevector(c, d, 0, 4, 2, 6), cd_odd = __builtin_shufflevector(c, d, 1, 5, 3, 7);
+  store(to, __builtin_shufflevector(ab_even, cd_even, 0, 1, 4, 5));
+  store(to + to_stride, __builtin_shufflevector(ab_odd, cd_odd, 0, 1, 4, 5));
+  store(to + 2 * to_stride, __builtin_shufflevector(ab_even, cd_even, 2, 3, 6, 7));
+  store(to + 3 * to_stride, __builtin_shufflevector(ab_odd, cd_odd, 2, 3, 6, 7));
+}
+
+void transpose(const double* from, long from_stride, int n, int m, double* to, long to_stride) {
+  const int whole_n = n / 4 * 4;
+  const int whole_m = m / 4 * 4;
+  for (int j = 0; j < whole_m; j += 4)
+    for (int i = 0; i < whole_n; i += 4) transpose_square(from + i * from_stride + j, from_stride, to + j * to_stride + i, to_stride);
+  for (int j = 0; j < m; ++j)
+    for (int i = j < whole_m ? whole_n : 0; i < n; ++i) to[j * to_stride + i] = from[i * from_stride + j];
+}
+
 }  // namespace
 
 extern const Kernels kTable;
-const Kernels kTable{subtract_product, subtract_transposed, trmm, add_trmm_transposed, factorise_block, trsm, scale_by_d_inverse, update,
-                     extend_add,       CARILLON_ISA_NAME};
+const Kernels kTable{
+    subtract_product, subtract_transposed, trmm,      add_trmm_transposed, multiply_by_d_inverse, factorise_block, trsm, scale_by_d_inverse,
+    update,           extend_add,          transpose, CARILLON_ISA_NAME};
 
 }  // namespace carillon::ldlt::CARILLON_ISA

@@ -39,32 +39,24 @@ class Solver {
       std::memset(
           find_row(block, plan_.subdomain_nodes), 0,
           sizeof(double) * 3 * static_cast<std::size_t>(plan_.local_nodes - plan_.subdomain_nodes) * static_cast<std::size_t>(block.width));
-      for (std::ptrdiff_t v = 0; v < plan_.own_nodes; ++v) {
-        double* row = find_own(block, v);
-        call_rows(block, v, true);
-        const double* from = b + block.first_column * stride + 3 * v;
-        for (int d = 0; d < 3; ++d, row += block.width, ++from) {
-          for (int c = 0; c < block.columns; ++c) row[c] = from[c * stride];
-          for (int c = block.columns; c < block.width; ++c) row[c] = 0;
-        }
-      }
+      load_own(block, b + block.first_column * stride, stride);
     }
   }
 
   /// By strips of nodes that stay in the first-level cache. Columns are written in whole runs: one number of each at a time would wait for
   /// memory at every line.
   void store(double* x, std::ptrdiff_t stride) const {
-    constexpr std::ptrdiff_t kStrip = 64;
+    alignas(64) double rows[3 * kStrip][16];
     alignas(64) double strip[16][3 * kStrip];
     for (const Block& block : blocks_)
       for (std::ptrdiff_t first = 0; first < plan_.own_nodes; first += kStrip) {
         const std::ptrdiff_t nodes = std::min<std::ptrdiff_t>(kStrip, plan_.own_nodes - first);
+        prefetch_columns<true>(block, x + block.first_column * stride, stride, first + kStrip);
         for (std::ptrdiff_t v = 0; v < nodes; ++v) {
-          const double* row = find_own(block, first + v);
-          call_rows(block, first + v, false);
-          for (std::ptrdiff_t d = 0; d < 3; ++d, row += block.width)
-            for (int c = 0; c < block.columns; ++c) strip[c][3 * v + d] = row[c];
+          prefetch_rows(block, first + v, false);
+          copy_node(find_own(block, first + v), block.width, rows[0] + 3 * v * block.width);
         }
+        kernels_.transpose(rows[0], block.width, static_cast<int>(3 * nodes), block.columns, strip[0], 3 * kStrip);
         for (int c = 0; c < block.columns; ++c)
           std::memcpy(x + (block.first_column + c) * stride + 3 * first, strip[c], sizeof(double) * 3 * static_cast<std::size_t>(nodes));
       }
@@ -99,14 +91,42 @@ class Solver {
   }
 
  private:
+  static constexpr std::ptrdiff_t kStrip = 32;  // nodes whose rows of 16 and columns are in the first-level cache together
+
+  /// The rows of the own nodes; columns that are not in use become zero.
+  void load_own(const Block& block, const double* b, std::ptrdiff_t stride) const {
+    alignas(64) double rows[3 * kStrip][16];
+    alignas(64) double strip[16][3 * kStrip];
+    std::memset(strip, 0, sizeof(strip));
+    for (std::ptrdiff_t first = 0; first < plan_.own_nodes; first += kStrip) {
+      const std::ptrdiff_t nodes = std::min<std::ptrdiff_t>(kStrip, plan_.own_nodes - first);
+      prefetch_columns(block, b, stride, first + kStrip);
+      for (int c = 0; c < block.columns; ++c)
+        std::memcpy(strip[c], b + c * stride + 3 * first, sizeof(double) * 3 * static_cast<std::size_t>(nodes));
+      kernels_.transpose(strip[0], 3 * kStrip, block.width, static_cast<int>(3 * nodes), rows[0], block.width);
+      for (std::ptrdiff_t v = 0; v < nodes; ++v) {
+        prefetch_rows(block, first + v, true);
+        copy_node(rows[0] + 3 * v * block.width, block.width, find_own(block, first + v));
+      }
+    }
+  }
+
   static double* find_row(const Block& block, std::int32_t node) {
     return block.rows + 3 * static_cast<std::ptrdiff_t>(node) * block.width;
   }
 
   double* find_own(const Block& block, std::ptrdiff_t v) const { return find_row(block, plan_.node_of_own[static_cast<std::size_t>(v)]); }
 
-  /// Calls the rows of a later own node from memory: they lie anywhere.
-  void call_rows(const Block& block, std::ptrdiff_t v, bool is_written) const {
+  /// Prefetches the strip that begins at an own node: runs as short as it has in a column are over before the processor sees them.
+  template <bool kIsWritten = false>
+  void prefetch_columns(const Block& block, const double* columns, std::ptrdiff_t stride, std::ptrdiff_t first) const {
+    const std::ptrdiff_t count = 3 * std::min<std::ptrdiff_t>(kStrip, plan_.own_nodes - first);
+    for (int c = 0; c < block.columns; ++c)
+      for (std::ptrdiff_t i = 0; i < count; i += 8) __builtin_prefetch(columns + c * stride + 3 * first + i, kIsWritten ? 1 : 0);
+  }
+
+  /// Prefetches the rows of a later own node: they lie anywhere.
+  void prefetch_rows(const Block& block, std::ptrdiff_t v, bool is_written) const {
     constexpr std::ptrdiff_t kAhead = 12;
     const double* rows = find_own(block, std::min<std::ptrdiff_t>(v + kAhead, plan_.own_nodes - 1));
     for (int i = 0; i < 3 * block.width; i += 8) is_written ? __builtin_prefetch(rows + i, 1) : __builtin_prefetch(rows + i);
@@ -121,6 +141,13 @@ class Solver {
       std::memcpy(to, from, 16 * sizeof(double));
     else
       std::memcpy(to, from, 8 * sizeof(double));
+  }
+
+  static void copy_node(const double* from, int width, double* to) {
+    if (width == 16)
+      std::memcpy(to, from, 3 * 16 * sizeof(double));
+    else
+      std::memcpy(to, from, 3 * 8 * sizeof(double));
   }
 
   /// nodes_: the nodes of a front.
@@ -163,11 +190,13 @@ class Solver {
       const int n = end - begin;
       const int m = 3 * front.size() - end;
       const std::uint8_t* order = find_order(front, begin);
+      const auto first_row = static_cast<std::size_t>(3 * front.first + begin);
       tiles -= count_triangle(n) + static_cast<std::ptrdiff_t>(n) * m;
       const double* next = tiles - find_below(s, p);
       for (const Block& block : blocks_) {
         double* own = find_row(block, front.first) + begin * block.width;
-        divide_by_pivots(3 * static_cast<std::size_t>(front.first) + static_cast<std::size_t>(begin), n, block.width, own, pivots);
+        kernels_.multiply_by_d_inverse(numbers_.d_diagonal.data() + first_row, numbers_.d_off.data() + first_row, n, block.width / 8, own,
+                                       pivots);
         kernels_.subtract_transposed(tiles + count_triangle(n), m, n, block.width / 8, nodes_.data() + end / 3, block.rows, pivots, tiles);
         std::memset(solution, 0, sizeof(double) * static_cast<std::size_t>(n * block.width));
         kernels_.add_trmm_transposed(tiles, n, block.width / 8, pivots, solution,
@@ -184,24 +213,6 @@ class Solver {
     if (p == 0) p = count_panels(front.width);
     const int end = 3 * find_panel_start(front.width, p);
     return static_cast<std::ptrdiff_t>(end - 3 * find_panel_start(front.width, p - 1)) * (3 * front.size() - end);
-  }
-
-  /// to <- D^-1 from, n rows of kWidth.
-  template <int kWidth>
-  void divide_by_pivots(std::size_t first_row, int n, const double* from, double* to) const {
-    const double* diagonal = numbers_.d_diagonal.data() + first_row;
-    const double* off = numbers_.d_off.data() + first_row;
-    for (int k = 0; k < n; ++k, from += kWidth, to += kWidth) {
-      for (int c = 0; c < kWidth; ++c) to[c] = diagonal[k] * from[c];
-      if (off[k] != 0)
-        for (int c = 0; c < kWidth; ++c) to[c] += off[k] * from[kWidth + c];
-      if (k > 0 && off[k - 1] != 0)
-        for (int c = 0; c < kWidth; ++c) to[c] += off[k - 1] * from[c - kWidth];
-    }
-  }
-
-  void divide_by_pivots(std::size_t first_row, int n, int width, const double* from, double* to) const {
-    width == 16 ? divide_by_pivots<16>(first_row, n, from, to) : divide_by_pivots<8>(first_row, n, from, to);
   }
 
   void send(int rank, int tag, const Ints& nodes) {

@@ -12,6 +12,7 @@
 
 #include "precompute/comm/exchange.hpp"
 #include "precompute/mesh/faces.hpp"
+#include "precompute/mesh/parts.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::parallel_mesh {

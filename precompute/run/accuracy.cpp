@@ -1,8 +1,8 @@
 // Method:     A coarse solve gives every mode's error bar in parts whose rates of convergence are known. They say how much finer the mesh
 //             must be; its cost follows from the last trial's by the cost model, or by the exponent between two trials. What is predicted
-//             is then solved and its own error bars decide; where they fall short the rate that was measured between two trials slows a
-//             known one that is faster.
-// Source:     estimate::predict_cents (docs/error-bars.md); precompute/cost.
+//             is then solved, its corrected frequencies are compared with those of the coarser mesh, and their error bars decide; where
+//             they fall short the rate that was measured between two trials takes the place of the known one.
+// Source:     precompute/estimate/correct.hpp (docs/error-bars.md); precompute/cost.
 // Deviations: none.
 #include "precompute/run/accuracy.hpp"
 
@@ -31,7 +31,7 @@ namespace {
 constexpr std::size_t kMaxTrials = 7;
 constexpr std::int64_t kCoarseShapeNodes = 1500, kCoarseSurfaceNodes = 6000;
 constexpr double kGoal = 0.85;        // of what was asked: aimed at, so that the next trial is the last
-constexpr double kFinestStep = 0.25;  // the rates hold for edges so much shorter, see predict_cents()
+constexpr double kFinestStep = 0.25;  // the rates hold for edges so much shorter, see predict_parts()
 constexpr double kMinStep = 0.9;      // at most this: a trial with nearly the same edges gives no new information
 constexpr double kLinearFrom = 20e3;  // nodes with T10 above which T4 is tried, too
 constexpr int kMaxCounts = 4;         // asked of the mesher for one trial
@@ -58,47 +58,15 @@ double calc_mean_edge(const comm::Communicator& comm, const partition::LocalMesh
 }
 
 /// The largest part of a bar that no mesh makes smaller: the facets of the surface leave it open what the body is.
-double calc_doubt(const estimate::ErrorBars& bars) {
+double calc_doubt(const estimate::Level& level) {
   double worst = 0.0;
-  for (const estimate::ErrorBars::Parts& parts : bars.parts) {
-    estimate::ErrorBars::Parts doubt;
+  for (const estimate::ErrorParts& parts : level.parts) {
+    estimate::ErrorParts doubt;
     doubt.doubt = parts.doubt;
     doubt.doubt_noise = parts.doubt_noise;
-    worst = std::max(worst, estimate::predict_cents(doubt, bars.kind));
+    worst = std::max(worst, estimate::calc_cents(doubt, level.kind));
   }
   return worst;
-}
-
-/// The largest predicted bar on a mesh with edges `ratio` times as long. A refined mesh file keeps its facets.
-double predict_worst(const estimate::ErrorBars& bars, bool keeps_geometry, double ratio) {
-  double worst = 0.0, widest = 0.0, own = 0.0, own_then = 0.0;
-  for (std::size_t k = 0; k < bars.parts.size(); ++k) {
-    estimate::ErrorBars::Parts parts = bars.parts[k];
-    if (keeps_geometry) {
-      const double rate = std::pow(ratio, bars.kind == estimate::Kind::kT10Curved ? 4 : 2);
-      parts.geometry /= rate;
-      parts.geometry_noise /= rate;
-    }
-    // What the bar holds beyond its parts (modes that change places) shrinks with them.
-    const double now = estimate::predict_cents(bars.parts[k], bars.kind), then = estimate::predict_cents(parts, bars.kind, ratio);
-    worst = std::max(worst, std::clamp(bars.discretisation_cents[k] / std::max(now, 1e-300), 1.0, 10.0) * then);
-    widest = std::max(widest, bars.discretisation_cents[k]);
-    own = std::max(own, now);
-    own_then = std::max(own_then, then);
-  }
-  // The bars of the last modes follow from the widest, not from their own parts.
-  return own > 0.0 ? std::max(worst, widest / own * own_then) : worst;
-}
-
-/// The longest edges, as a part of those now, that are predicted to meet the goal; `least` if none above it does.
-double find_ratio(const estimate::ErrorBars& bars, double goal_cents, double min) {
-  if (predict_worst(bars, false, min) > goal_cents) return min;
-  double low = min, high = 1.0;
-  for (int i = 0; i < 40; ++i) {
-    const double middle = std::sqrt(low * high);
-    (predict_worst(bars, false, middle) <= goal_cents ? low : high) = middle;
-  }
-  return low;
 }
 
 class Search {
@@ -112,6 +80,7 @@ class Search {
  private:
   void attempt(const Setting& setting);
   Trial judge(const Setting& setting, std::size_t first_phase);
+  void judge_bars(Trial& trial) const;
   Decision decide();
   Decision decide_on_body();
   Decision decide_on_file();
@@ -119,6 +88,11 @@ class Search {
   const Trial* find_before(const Trial& trial) const;
   double measure_exponent(double Trial::*quantity, double fallback, double min, double max) const;
   double find_dimension() const;
+  double predict_worst(bool keeps_geometry, double ratio) const;
+  double find_ratio(double goal_cents, double min) const;
+  std::vector<std::size_t> find_listed(const estimate::Corrections& corrections) const;
+  double find_worst(const estimate::Corrections& corrections) const;
+  void compare_levels();
   Forecast forecast(const Setting& setting, double ratio) const;
   Forecast forecast_next() const;
   std::string describe_surface(double cents) const;
@@ -130,6 +104,7 @@ class Search {
   double asked_;
   double tolerance_;
   bool is_refinable_ = false;       // the mesh file can be refined: rank 0 reads it
+  double order_ = 4.0;              // by which power of the edges the errors of the last trial fall
   std::optional<Trial> quadratic_;  // while the linear trial is looked at: what ten nodes are predicted to need
   Forecast quadratic_forecast_;
   AccuracyReport report_;
@@ -141,6 +116,47 @@ const Trial* Search::find_before(const Trial& trial) const {
   for (auto before = report_.trials.rbegin(); before != report_.trials.rend(); ++before)
     if (before->setting.element == trial.setting.element && before->nodes < trial.nodes) return &*before;
   return nullptr;
+}
+
+/// The modes that the bank will have.
+std::vector<std::size_t> Search::find_listed(const estimate::Corrections& corrections) const {
+  return estimate::find_lowest(corrections, static_cast<std::size_t>(run_.job.max_modes.value_or(std::numeric_limits<int>::max())));
+}
+
+/// The widest bar of them.
+double Search::find_worst(const estimate::Corrections& corrections) const {
+  double worst = 0.0;
+  for (const std::size_t m : find_listed(corrections)) worst = std::max(worst, corrections.cents[m]);
+  return worst;
+}
+
+/// The largest bar that is predicted on a mesh with edges `ratio` times as long, which is compared with this one. A refined mesh file keeps
+/// its facets.
+double Search::predict_worst(bool keeps_geometry, double ratio) const {
+  const estimate::Level& level = current_.solved.errors.bars.level;
+  if (level.parts.empty()) return 0.0;
+  return find_worst(estimate::calc_corrections(estimate::predict_level(level, order_, keeps_geometry, ratio), &level));
+}
+
+/// The longest edges, as a part of those now, that are predicted to meet the goal; `min` if none above it does.
+double Search::find_ratio(double goal_cents, double min) const {
+  if (predict_worst(false, min) > goal_cents) return min;
+  double low = min, high = 1.0;
+  for (int i = 0; i < 20; ++i) {
+    const double middle = std::sqrt(low * high);
+    (predict_worst(false, middle) <= goal_cents ? low : high) = middle;
+  }
+  return low;
+}
+
+/// The last trial against the one before it: which corrections both agree on, and how fast the errors fall.
+void Search::compare_levels() {
+  estimate::ErrorBars& bars = current_.solved.errors.bars;
+  const Trial& last = report_.trials.back();
+  const Trial* before = find_before(last);
+  const estimate::Level* coarser = before == nullptr || before->modes == 0 ? nullptr : &before->level;
+  order_ = estimate::find_order(bars.level, coarser, before == nullptr ? 1.0 : before->edge_m / last.edge_m);
+  if (coarser != nullptr && !bars.level.parts.empty()) bars.corrected = estimate::calc_corrections(bars.level, coarser);
 }
 
 double Search::measure_exponent(double Trial::*quantity, double fallback, double min, double max) const {
@@ -166,8 +182,7 @@ Forecast Search::forecast(const Setting& setting, double ratio) const {
   next.setting = setting;
   const double growth = std::pow(ratio, -find_dimension());
   next.nodes = static_cast<double>(last.nodes) * growth;
-  next.worst_cents =
-      predict_worst(current_.solved.errors.bars, setting.refinements > last.setting.refinements, ratio) + last.algebraic_cents;
+  next.worst_cents = predict_worst(setting.refinements > last.setting.refinements, ratio) + last.algebraic_cents;
   const cost::ProblemSize finer = cost::refine(last.size, growth);
   const double slower = cost::predict_seconds(finer).sum() / cost::predict_seconds(last.size).sum();
   const double predicted = growth == 1.0 ? 1.0 : std::log(slower) / std::log(growth);
@@ -229,11 +244,10 @@ std::string Search::describe_surface(double cents) const {
 /// Rank 0 decides on a body that is meshed here.
 Decision Search::decide_on_body() {
   const Trial& last = report_.trials.back();
-  const estimate::ErrorBars& bars = current_.solved.errors.bars;
   if (last.modes == 0) return {0, make_setting(last.setting.element, 0.5)};
   if (last.setting.element == job::Element::T4 && quadratic_) {
     // Ten nodes were tried first; the cheaper of the two forecasts is used.
-    const double ratio = find_ratio(bars, kGoal * asked_, kFinestStep / 4);
+    const double ratio = find_ratio(kGoal * asked_, kFinestStep / 4);
     const Forecast linear = forecast(make_setting(job::Element::T4, ratio), ratio);
     const bool is_linear_cheaper = linear.worst_cents <= asked_ && linear.cpu_seconds < quadratic_forecast_.cpu_seconds;
     run_.log.print(fmt::format("T4 needs about {:.0f} nodes, T10 {:.0f}: {} is cheaper", linear.nodes, quadratic_forecast_.nodes,
@@ -241,16 +255,7 @@ Decision Search::decide_on_body() {
     quadratic_.reset();
     return {0, is_linear_cheaper ? linear.setting : quadratic_forecast_.setting};
   }
-  double ratio = find_ratio(bars, kGoal * asked_, kFinestStep);
-  constexpr double kMinRateStep = 4.0 / 3;  // of edges: less says nothing of a rate
-  if (const Trial* before = find_before(last);
-      before != nullptr && before->modes > 0 && before->worst_cents > last.worst_cents && before->edge_m > kMinRateStep * last.edge_m) {
-    // A rate measured on coarse meshes is slower than what follows: half way between it and the known one.
-    const double order = std::log(before->worst_cents / last.worst_cents) / std::log(before->edge_m / last.edge_m);
-    const double measured = std::pow(kGoal * asked_ / last.worst_cents, 1.0 / std::clamp(order, 0.5, 6.0));
-    if (measured < ratio) ratio = std::sqrt(measured * ratio);
-  }
-  ratio = std::clamp(ratio, kFinestStep, kMinStep);
+  const double ratio = std::min(find_ratio(kGoal * asked_, kFinestStep), kMinStep);
   const Forecast next = forecast(make_setting(last.setting.element, ratio), ratio);
   if (report_.trials.size() == 1 && next.nodes > kLinearFrom) {
     quadratic_ = last;
@@ -272,10 +277,9 @@ Decision Search::decide_on_file() {
     return {0, setting};
   }
   if (!is_refinable_) give_up("this mesh file is read by all ranks in parts and is not refined; make a finer one");
-  const estimate::ErrorBars& bars = current_.solved.errors.bars;
   int more = 1;
-  while (more < kMaxRefinements && predict_worst(bars, true, std::pow(0.5, more)) > asked_) ++more;
-  const double facets = predict_worst(bars, true, 1e-3);
+  while (more < kMaxRefinements && predict_worst(true, std::pow(0.5, more)) > asked_) ++more;
+  const double facets = predict_worst(true, 1e-3);
   if (last.modes > 0 && facets > asked_) give_up(describe_surface(facets));
   setting.refinements += more;
   if (setting.refinements > kMaxRefinements)
@@ -289,7 +293,7 @@ Decision Search::decide() {
   if (last.modes > 0 && last.worst_cents <= asked_) return {1, last.setting};
   if (const Trial* before = find_before(last); last.modes == 0 && before != nullptr && before->modes == 0)
     return {1, last.setting};  // twice none: there is none
-  if (const double doubt = calc_doubt(current_.solved.errors.bars); doubt > asked_)
+  if (const double doubt = calc_doubt(current_.solved.errors.bars.level); doubt > asked_)
     give_up(fmt::format(
         "{:.3g} cents of it cannot be reduced by any mesh: the facets of the surface are so coarse that they may be planes or samples of "
         "a smooth surface; give a surface in finer facets, or, if the facets are the body, mesh it with carillon-mesh --facets "
@@ -328,17 +332,23 @@ Trial Search::judge(const Setting& setting, std::size_t first_phase) {
   trial.size.factor_flops = solved.modes.factor.flops;
   trial.size.factor_entries = solved.modes.factor.entries;
   trial.size.modes = static_cast<std::int64_t>(trial.modes);
-  for (std::size_t k = 0; k < trial.modes; ++k) {
-    const double cents = solved.errors.bars.algebraic_cents[k] + solved.errors.bars.discretisation_cents[k];
-    trial.algebraic_cents = std::max(trial.algebraic_cents, solved.errors.bars.algebraic_cents[k]);
-    if (cents <= trial.worst_cents) continue;
-    trial.worst_cents = cents;
-    trial.worst_hz = std::sqrt(solved.modes.lambda[k]) / (2 * std::numbers::pi);
-  }
   const auto& phases = run_.log.get_phases();
   for (std::size_t i = first_phase; i < phases.size(); ++i) trial.cpu_seconds += phases[i].cpu_seconds;
   trial.peak_bytes = phases.back().peak_sum_bytes;
+  trial.level = solved.errors.bars.level;
   return trial;
+}
+
+/// The widest bar of the last trial, and where.
+void Search::judge_bars(Trial& trial) const {
+  const estimate::ErrorBars& bars = current_.solved.errors.bars;
+  for (const std::size_t k : find_listed(bars.corrected)) {
+    const double cents = bars.algebraic_cents[k] + bars.corrected.cents[k];
+    trial.algebraic_cents = std::max(trial.algebraic_cents, bars.algebraic_cents[k]);
+    if (cents <= trial.worst_cents) continue;
+    trial.worst_cents = cents;
+    trial.worst_hz = std::sqrt(bars.corrected.lambda[k]) / (2 * std::numbers::pi);
+  }
 }
 
 void Search::attempt(const Setting& setting) {
@@ -347,8 +357,10 @@ void Search::attempt(const Setting& setting) {
   current_.setting = setting;
   current_.body = make_trial_body(run_, current_.setting);
   current_.solved = solve_body(run_, current_.setting, current_.body);
-  const Trial trial = judge(current_.setting, first_phase);
-  report_.trials.push_back(trial);
+  report_.trials.push_back(judge(current_.setting, first_phase));
+  compare_levels();
+  Trial& trial = report_.trials.back();
+  judge_bars(trial);
   run_.log.print(trial.modes == 0 ? std::string("no mode in the band")
                                   : fmt::format("error bars up to {:.3g} cents (at {:.1f} Hz); {:g} are asked", trial.worst_cents,
                                                 trial.worst_hz, asked_));
@@ -358,8 +370,7 @@ Forecast Search::forecast_next() const {
   const Trial& last = report_.trials.back();
   constexpr double kHalf = 0.5;  // of the edges, where the error bars do not say how much finer
   if (run_.job.body) {
-    const double ratio =
-        last.modes == 0 ? kHalf : std::min(find_ratio(current_.solved.errors.bars, 0.5 * last.worst_cents, kFinestStep), kMinStep);
+    const double ratio = last.modes == 0 ? kHalf : std::min(find_ratio(0.5 * last.worst_cents, kFinestStep), kMinStep);
     return forecast(make_setting(last.setting.element, ratio), ratio);
   }
   Setting setting = last.setting;
@@ -447,17 +458,14 @@ void check_count(const Run& run, const Setting& setting) {
 Body make_trial_body(Run& run, Setting& setting, Patience* patience) {
   const bool is_body = run.job.body.has_value();
   for (int count = 1;; ++count) {
-    Patience endless;
-    Patience& left = patience != nullptr ? *patience : endless;
-    left.possible_nodes = 0;
     const auto start = std::chrono::steady_clock::now();
     try {
-      return make_body(run, setting, is_body ? &left : nullptr);
-    } catch (const InputError&) {
+      return make_body(run, setting, is_body ? patience : nullptr);
+    } catch (const CountRefusal& refusal) {
+      const std::int64_t nodes = refusal.get_possible_nodes();
+      if (nodes == setting.nodes || count == kMaxCounts) throw;
       const std::chrono::duration<double> gone = std::chrono::steady_clock::now() - start;
-      left.seconds = std::max(left.seconds - gone.count(), 0.0);
-      const std::int64_t nodes = run.comm.broadcast(left.possible_nodes);
-      if (nodes == 0 || nodes == setting.nodes || count == kMaxCounts) throw;
+      if (patience != nullptr) patience->seconds = std::max(patience->seconds - gone.count(), 0.0);
       run.log.print(fmt::format("{} nodes cannot be met on this body; {} are tried", setting.nodes.value_or(0), nodes));
       setting.nodes = nodes;
       if (patience == nullptr) check_count(run, setting);

@@ -24,6 +24,7 @@ struct Trial {
   double algebraic_cents = 0.0;  // largest of that part
   double cpu_seconds = 0.0;      // all ranks
   std::int64_t peak_bytes = 0;   // all ranks, the process so far
+  estimate::Level level;         // its modes and what the estimate says of them
 };
 
 /// The next stricter setting and its predicted cost.

@@ -4,46 +4,24 @@
 #include <json/json.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
+#include <numbers>
 #include <utility>
 
 #include "precompute/run/describe_run.hpp"
 #include "precompute/run/modes.hpp"
+#include "runtime/bank/of_material.hpp"
+#include "runtime/bank/select.hpp"
 #include "runtime/base/json.hpp"
 
 namespace carillon::run {
 namespace {
 
 bank::Damping make_damping(const fem::Materials& materials) {
+  if (materials.list.size() == 1) return bank::make_damping(materials.list[0]);
   bank::Damping damping;
-  if (materials.list.size() > 1) {
-    damping.law = "mixed";
-    return damping;
-  }
-  const job::Material& material = materials.list[0];
-  switch (material.law) {
-    case job::DampingLaw::rayleigh:
-      damping.law = "rayleigh";
-      break;
-    case job::DampingLaw::internal_friction:
-      damping.law = "internal_friction";
-      damping.coefficient = {material.tan_phi};
-      break;
-    case job::DampingLaw::caughey:
-      damping.law = "caughey";
-      for (const job::CaugheyTerm& term : material.caughey) {
-        damping.coefficient.push_back(term.coefficient);
-        damping.power.push_back(term.power);
-      }
-      break;
-    case job::DampingLaw::loss_table:
-      damping.law = "loss_table";
-      for (const job::LossRow& row : material.loss_table) {
-        damping.freq_hz.push_back(row.freq_hz);
-        damping.loss_factor.push_back(row.loss_factor);
-      }
-      break;
-  }
+  damping.law = "mixed";
   return damping;
 }
 
@@ -53,12 +31,12 @@ bank::Material make_material(const SolvedBody& solved) {
   bank::Material material;
   if (list.size() == 1) {
     material = {list[0].young_modulus_pa, list[0].poisson_ratio, list[0].density_kg_m3, 0.0, 0.0};
-    if (list[0].law == job::DampingLaw::rayleigh) {
+    if (list[0].law == material::DampingLaw::rayleigh) {
       material.alpha1_s = list[0].alpha1_s;
       material.alpha2_per_s = list[0].alpha2_per_s;
     }
   } else {
-    const job::Equivalent equivalent = job::calc_equivalent(list, solved.properties.volume_m3);
+    const material::Equivalent equivalent = material::calc_equivalent(list, solved.properties.volume_m3);
     material = {equivalent.young_modulus_pa, equivalent.poisson_ratio, equivalent.density_kg_m3, 0.0, 0.0};
   }
   return material;
@@ -90,6 +68,18 @@ bank::Supports make_supports(const job::JobSpec& job, const fem::Supports& found
   supports.reaction = found.reaction;
   supports.energy = found.energy;
   return supports;
+}
+
+bank::Corrected make_corrected(const SolvedBody& solved) {
+  const estimate::Corrections& found = solved.errors.bars.corrected;
+  bank::Corrected corrected;
+  for (std::size_t m = 0; m < found.lambda.size(); ++m) {
+    corrected.freq_hz.push_back(std::sqrt(found.lambda[m]) / (2 * std::numbers::pi));
+    corrected.error_cents.push_back(found.cents[m] + solved.errors.bars.algebraic_cents[m]);
+  }
+  corrected.correction = found.correction;
+  corrected.decay_per_s = fem::calc_decay_per_s(solved.properties.materials, solved.errors.shares, found.lambda);
+  return corrected;
 }
 
 bank::Proof make_proof(const eigen::Modes& modes) {
@@ -127,6 +117,7 @@ bank::Bank make_bank(const job::JobSpec& job, const Setting& setting, Body& body
   bank.shape = std::move(surface_modes.shape);
   bank.algebraic_error_cents = solved.errors.bars.algebraic_cents;
   bank.discretisation_error_cents = solved.errors.bars.discretisation_cents;
+  bank.corrected = make_corrected(solved);
   bank.rigid = {solved.properties.rigid.mass_kg, solved.properties.rigid.centre_m, solved.properties.rigid.inertia_kg_m2,
                 solved.properties.rigid.volume_m3};
   bank.material = make_material(solved);
@@ -139,6 +130,7 @@ bank::Bank make_bank(const job::JobSpec& job, const Setting& setting, Body& body
   bank.complete = modes.band_count == static_cast<std::int64_t>(modes.lambda.size());
   bank.element = job::to_text(setting.element);
   bank.mass = job::to_text(job.mass);
+  if (job.max_modes) bank::keep_lowest(bank, static_cast<std::size_t>(*job.max_modes));
   return bank;
 }
 

@@ -10,6 +10,7 @@
 
 #include "partition/distribute.hpp"
 #include "precompute/cost/calibration.hpp"
+#include "precompute/estimate/correct.hpp"
 #include "precompute/mesh/read.hpp"
 #include "precompute/parallel_mesh/read_parallel.hpp"
 #include "precompute/petsc/session.hpp"
@@ -182,6 +183,11 @@ std::string describe_scale_key(const job::JobSpec& job) {
   return fmt::format("\"scale\" inside \"body\", metres per unit of the surface, is {:g}: {:g} for that", scale, 0.001 * scale);
 }
 
+std::optional<std::int64_t> find_computed_count(const job::JobSpec& job) {
+  if (!job.max_modes) return std::nullopt;
+  return static_cast<std::int64_t>(estimate::find_computed_count(static_cast<std::size_t>(*job.max_modes)));
+}
+
 cost::ProblemSize estimate_size(const job::JobSpec& job, const Setting& setting) {
   const bool is_quadratic = setting.element == job::Element::T10;
   cost::ProblemSize size;
@@ -193,14 +199,14 @@ cost::ProblemSize estimate_size(const job::JobSpec& job, const Setting& setting)
     const auto bytes = static_cast<std::int64_t>(std::filesystem::file_size(job.mesh, error));
     size = cost::estimate_file_size(error ? 0 : bytes, is_quadratic, setting.refinements);
   }
-  size.modes = job.max_modes;
+  size.modes = find_computed_count(job);
   return size;
 }
 
 cost::ProblemSize find_problem_size(const Run& run, const Setting& setting, const Body& body) {
   cost::ProblemSize size;
   size.is_quadratic = setting.element == job::Element::T10;
-  size.modes = run.job.max_modes;
+  size.modes = find_computed_count(run.job);
   size.nodes = body.pieces.nodes;
   size.tets = body.pieces.tets;
   size.unknowns = 3 * body.pieces.free_nodes;

@@ -32,6 +32,9 @@ struct Body {
 /// The key of the job that says in which unit its mesh is, and how, for messages about its size.
 std::string describe_scale_key(const job::JobSpec& job);
 
+/// How many modes are computed for the job: more than `max_modes`, so that the lowest corrected ones are sure; none: all of the band.
+std::optional<std::int64_t> find_computed_count(const job::JobSpec& job);
+
 /// Size of the problem before the mesh is read or made: by the job and the size of the mesh file. Rank 0.
 cost::ProblemSize estimate_size(const job::JobSpec& job, const Setting& setting);
 /// The same of a body that was made. Rank 0.

@@ -131,25 +131,25 @@ Json::Value describe_effort(const petsc::WorkTable& table) {
   return phases;
 }
 
-Json::Value describe_damping(const job::Material& material) {
+Json::Value describe_damping(const material::Material& material) {
   Json::Value damping;
   switch (material.law) {
-    case job::DampingLaw::rayleigh:
+    case material::DampingLaw::rayleigh:
       damping["rayleigh"]["alpha1_s"] = material.alpha1_s;
       damping["rayleigh"]["alpha2_per_s"] = material.alpha2_per_s;
       break;
-    case job::DampingLaw::internal_friction:
+    case material::DampingLaw::internal_friction:
       damping["internal_friction"]["tan_phi"] = material.tan_phi;
       break;
-    case job::DampingLaw::caughey:
-      for (const job::CaugheyTerm& term : material.caughey) {
+    case material::DampingLaw::caughey:
+      for (const material::CaugheyTerm& term : material.caughey) {
         Json::Value& entry = damping["caughey"].append(Json::Value());
         entry["power"] = term.power;
         entry["coefficient"] = term.coefficient;
       }
       break;
-    case job::DampingLaw::loss_table:
-      for (const job::LossRow& row : material.loss_table) {
+    case material::DampingLaw::loss_table:
+      for (const material::LossRow& row : material.loss_table) {
         Json::Value& entry = damping["loss_table"].append(Json::Value());
         entry["freq_hz"] = row.freq_hz;
         entry["loss_factor"] = row.loss_factor;
@@ -166,7 +166,7 @@ Json::Value describe_warnings(const Run& run) { return make_list(run.log.get_war
 Json::Value describe_materials(const fem::Materials& materials, const std::vector<double>& volume_m3) {
   Json::Value list(Json::arrayValue);
   for (std::size_t i = 0; i < materials.list.size(); ++i) {
-    const job::Material& material = materials.list[i];
+    const material::Material& material = materials.list[i];
     Json::Value& entry = list.append(Json::Value());
     entry["region"] = i < materials.region.size() ? materials.region[i] : "";
     if (!material.name.empty()) entry["name"] = material.name;
@@ -175,7 +175,7 @@ Json::Value describe_materials(const fem::Materials& materials, const std::vecto
     entry["young_modulus_pa"] = material.young_modulus_pa;
     entry["poisson_ratio"] = material.poisson_ratio;
     if (material.orthotropic) {
-      const job::Orthotropic& own = *material.orthotropic;
+      const material::Orthotropic& own = *material.orthotropic;
       Json::Value& orthotropic = entry["orthotropic"];
       orthotropic["young_modulus_pa"] = make_list(own.young_modulus_pa);
       orthotropic["shear_modulus_pa"] = make_list(own.shear_modulus_pa);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "precompute/fem/energy.hpp"
 #include "precompute/run/modes.hpp"
@@ -13,7 +14,7 @@ namespace {
 estimate::ErrorBars calc_bars(Run& run, const Body& body, const AssembledSystem& system, const eigen::Modes& modes) {
   const fem::Materials& materials = system.properties.materials;
   std::vector<estimate::Solid> solids;
-  for (const job::Material& material : materials.list) solids.push_back({material.calc_elasticity_pa(), material.density_kg_m3});
+  for (const material::Material& material : materials.list) solids.push_back({material.calc_elasticity_pa(), material.density_kg_m3});
   const bool is_cut = modes.band_count > static_cast<std::int64_t>(modes.lambda.size());
   const double last_hz = modes.lambda.empty() ? 0.0 : std::sqrt(modes.lambda.back()) / (2 * std::numbers::pi);
   estimate::Solution solution{modes.lambda, modes.residual, modes.shapes, find_low_hz(run.job, modes),
@@ -30,7 +31,9 @@ ModeProperties calc_errors(Run& run, const Body& body, const AssembledSystem& sy
   const partition::LocalMesh& mesh = body.pieces.local;
   const fem::Materials& materials = system.properties.materials;
   ModeProperties errors;
-  errors.decay_per_s = fem::calc_decay(run.comm, mesh, materials, run.job.mass, modes.lambda, modes.shapes).decay_per_s;
+  fem::Decay decay = fem::calc_decay(run.comm, mesh, materials, run.job.mass, modes.lambda, modes.shapes);
+  errors.decay_per_s = std::move(decay.decay_per_s);
+  errors.shares = std::move(decay.shares);
   errors.supports = fem::calc_supports(run.comm, mesh, materials, run.job.mass, modes.lambda, modes.shapes);
   errors.bars = name_errors(body.source, run, [&] { return calc_bars(run, body, system, modes); });
   run.log.end();

@@ -5,6 +5,7 @@
 
 #include "precompute/eigen/solve_modes.hpp"
 #include "precompute/estimate/error_bars.hpp"
+#include "precompute/fem/energy.hpp"
 #include "precompute/fem/supports.hpp"
 #include "precompute/run/body.hpp"
 #include "precompute/run/run.hpp"
@@ -14,6 +15,7 @@ namespace carillon::run {
 
 struct ModeProperties {
   std::vector<double> decay_per_s;  // (m)
+  fem::EnergyShares shares;         // of the materials; empty when there is one
   fem::Supports supports;           // energy and reactions at the fixed nodes
   estimate::ErrorBars bars;
 };

@@ -53,7 +53,7 @@ base::Finished run_mesher(const std::vector<std::string>& words, Cleanup& cleanu
 std::string format_length(double metres) { return fmt::format("{:.17g}", metres); }
 
 // What carillon-mesh --estimate prints, each on a line of its own, before an object.
-constexpr std::string_view kRoughWord = "rough {", kEstimateWord = "estimate {", kInsteadWord = "instead {";
+constexpr std::string_view kRoughWord = "rough {", kEstimateWord = "estimate {";
 
 bool has_line(const std::string& errors, std::string_view word) {
   return errors.starts_with(word) || errors.find("\n" + std::string(word)) != std::string::npos;
@@ -85,19 +85,6 @@ std::optional<BodyEstimate> take_estimate(std::string& errors, std::string_view 
   return estimate;
 }
 
-[[noreturn]] void throw_failure(base::ResultKind kind, const std::string& message) {
-  switch (kind) {
-    case base::ResultKind::bad_input:
-      throw InputError(message);
-    case base::ResultKind::memory:
-      throw MemoryError(message);
-    case base::ResultKind::disk_full:
-      throw DiskFullError(message);
-    default:
-      throw SystemError(message);
-  }
-}
-
 mesh::TetMesh mesh_surface(const job::Body& body, int order, const Fineness& fineness, Patience* patience) {
   std::string folder = (fs::temp_directory_path() / "carillon-mesh-XXXXXX").string();
   if (::mkdtemp(folder.data()) == nullptr)
@@ -111,6 +98,7 @@ mesh::TetMesh mesh_surface(const job::Body& body, int order, const Fineness& fin
     words.push_back(value);
   };
   if (body.wall_m) add("--wall", format_length(*body.wall_m));
+  if (!body.side.empty()) add("--side", body.side);
   if (body.height_m) add("--height", format_length(*body.height_m));
   if (body.scale) add("--scale", format_length(*body.scale));
   if (body.close_holes) add("--close-holes", format_length(*body.close_holes));
@@ -136,8 +124,6 @@ mesh::TetMesh mesh_surface(const job::Body& body, int order, const Fineness& fin
   ::unlink(result_file.c_str());
   if (patience != nullptr) {
     const std::optional<BodyEstimate> rough = take_estimate(ended.errors, kRoughWord), good = take_estimate(ended.errors, kEstimateWord);
-    if (std::optional<base::Document> instead = take_object(ended.errors, kInsteadWord))
-      patience->possible_nodes = instead->root().integer("nodes", 1, kMaxCount);
     if (ended.was_stopped) {
       if (!good && !rough)
         throw InputError(fmt::format(
@@ -150,15 +136,14 @@ mesh::TetMesh mesh_surface(const job::Body& body, int order, const Fineness& fin
   }
   if (ended.exit_code == 0) return mesh::read_mesh(file);
   const std::string failed = fmt::format("{}: the body cannot be meshed", body.place);
-  const bool has_reason = result && !result->message.empty();
-  if (ended.signal == 0)
-    throw_failure(result                          ? result->kind
-                  : ended.exit_code == kExitInput ? base::ResultKind::bad_input
-                                                  : base::ResultKind::system,
-                  fmt::format("{}: {}", failed,
-                              has_reason             ? result->message
-                              : ended.errors.empty() ? "carillon-mesh gave no reason"
-                                                     : ended.errors));
+  if (ended.signal == 0) {
+    base::Result reason =
+        result.value_or(base::Result{.kind = ended.exit_code == kExitInput ? base::ResultKind::bad_input : base::ResultKind::system});
+    if (reason.message.empty()) reason.message = ended.errors.empty() ? "carillon-mesh gave no reason" : ended.errors;
+    reason.message = fmt::format("{}: {}", failed, reason.message);
+    reason.place.clear();  // the job's is in front
+    base::throw_error(reason);
+  }
   const int signal = ended.signal;
   // It says itself where it broke down, if it still can; a signal that it sends itself comes from the surface, one from outside does not.
   const bool is_own =

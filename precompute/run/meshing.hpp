@@ -30,7 +30,6 @@ struct BodyEstimate {
 struct Patience {
   double seconds = std::numeric_limits<double>::infinity();  // of the clock
   std::optional<BodyEstimate> estimate{};                    // set when they were too few: there is no mesh then
-  std::int64_t possible_nodes = 0;  // set when the count asked for cannot be met: one that can, about. InputError was thrown then
 };
 
 /// Meshes the body with tetrahedra of four (order 1) or ten nodes (order 2), the mid-side ones on the true surface. A surface is meshed by

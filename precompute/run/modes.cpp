@@ -111,7 +111,7 @@ eigen::Options make_options(const Run& run, const Setting& setting) {
   eigen::Options options;
   options.low_hz = run.job.band_hz[0];
   options.high_hz = run.job.band_hz[1];
-  if (run.job.max_modes) options.max_modes = *run.job.max_modes;
+  options.max_modes = find_computed_count(run.job);
   options.tolerance = setting.tolerance;
   options.factorisation = to_eigen(run.job.factorisation);
   options.method = to_eigen(run.job.method);

@@ -78,10 +78,13 @@ constexpr double kAudibleCents = 50.0;
 /// What to say of error bars against the body that are wide, with the correction; empty when they are not. `is_asked`: the job has
 /// accuracy_cents, and got what it asked for.
 std::string describe_wide_bars(const bank::Bank& bank, const Setting& setting, bool is_asked) {
-  const std::vector<double>& cents = bank.discretisation_error_cents;
+  const std::vector<double>& cents = bank.corrected.error_cents;
   if (cents.empty() || is_asked) return {};
   const auto worst = std::max_element(cents.begin(), cents.end());
   if (!(*worst > kAudibleCents)) return {};
+  if (std::isinf(*worst))
+    return "frequencies have no error bars: of so few modes of T4 with a lumped mass a whole kind may be missing; a consistent mass, "
+           "\"element\": \"T10\", or a wider band brings them";
   const auto wide = std::count_if(cents.begin(), cents.end(), [](double c) { return c > kAudibleCents; });
   return fmt::format(
       "frequencies can be wrong by {:.0f} cents (estimate, mode {}; {} of {} modes by more than {:g}): {}a finer mesh, or "
@@ -92,7 +95,10 @@ std::string describe_wide_bars(const bank::Bank& bank, const Setting& setting, b
 
 std::string describe_result(const bank::Bank& bank) {
   std::string text = fmt::format("{}\n{}", bank::describe_completeness(bank), bank::describe_accuracy(bank));
-  if (bank.mode_count() > 0) text += fmt::format("\n{:.2f} Hz to {:.2f} Hz", bank.freq_hz(0), bank.freq_hz(bank.mode_count() - 1));
+  if (bank.mode_count() > 0) {
+    const auto [low, high] = std::minmax_element(bank.corrected.freq_hz.begin(), bank.corrected.freq_hz.end());
+    text += fmt::format("\n{:.2f} Hz to {:.2f} Hz", *low, *high);
+  }
   return text;
 }
 

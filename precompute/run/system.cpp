@@ -19,18 +19,18 @@ void check_method(const Run& run, std::int64_t unknowns) {
 }
 
 /// Elements that cannot bend without straining in the one way that the solid hardly allows are too stiff; docs/elements.md.
-void warn_of_locking(Run& run, const job::Material& material, bool is_linear) {
+void warn_of_locking(Run& run, const material::Material& material, bool is_linear) {
   constexpr double kStiff = 50;
   if (is_linear && material.poisson_ratio > 0.4)
     run.log.warn(
         fmt::format("T4 locks at a Poisson's ratio of {:g}: its frequencies will be several per cent sharp; use \"element\": \"T10\"",
                     material.poisson_ratio));
   if (!material.orthotropic) return;
-  job::Elasticity c = material.calc_elasticity_pa();
+  material::Elasticity c = material.calc_elasticity_pa();
   const double mean = fem::calc_mean_dilatation_modulus_pa(c);
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) c[6 * i + j] -= mean;
-  const auto stiffness = job::calc_eigenvalues(c);
+  const auto stiffness = material::calc_eigenvalues(c);
   if (stiffness[5] > kStiff * stiffness[4])
     run.log.warn(
         fmt::format("{}: the solid is {:.0f} times as stiff in one strain as in any other: coarse meshes lock and are some per cent sharp; "
@@ -52,7 +52,7 @@ AssembledSystem assemble_system(Run& run, const Setting& setting, const Body& bo
   properties.volume_m3 = fem::calc_volumes(run.comm, mesh, properties.materials);
   properties.rigid = fem::calc_rigid_body(run.comm, mesh, properties.materials);
   const bool is_linear = setting.element == job::Element::T4;
-  for (const job::Material& material : properties.materials.list) warn_of_locking(run, material, is_linear);
+  for (const material::Material& material : properties.materials.list) warn_of_locking(run, material, is_linear);
   run.log.end();
   return system;
 }

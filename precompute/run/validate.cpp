@@ -87,6 +87,10 @@ class Validation {
   std::int64_t get_max_modes() const {
     return solve_estimate_.modes.value_or(has_volume() ? std::llround(std::ceil(estimate_.high)) : *size_.modes);
   }
+  /// Of so many that are computed, those that the bank will hold.
+  std::int64_t get_listed(std::int64_t modes) const {
+    return run_.job.max_modes ? std::min<std::int64_t>(modes, *run_.job.max_modes) : modes;
+  }
 
   Run run_;
   Heartbeat heartbeat_;
@@ -324,15 +328,15 @@ void Validation::predict_modes() {
   estimate_ = cost::estimate_modes(properties_.materials.list, properties_.volume_m3,
                                    body_.estimate ? body_.estimate->area_m2 : calc_area(body_.surface.vertices_m, body_.surface.triangles),
                                    run_.job.band_hz[0], run_.job.band_hz[1]);
-  if (run_.job.max_modes) {
-    const auto max_modes = static_cast<double>(*run_.job.max_modes);
-    for (double* count : {&estimate_.count, &estimate_.low, &estimate_.high}) *count = std::min(*count, max_modes);
+  if (const std::optional<std::int64_t> computed = find_computed_count(run_.job)) {
+    const auto most = static_cast<double>(*computed);
+    for (double* count : {&estimate_.count, &estimate_.low, &estimate_.high}) *count = std::min(*count, most);
   }
   size_.is_thin = estimate_.slenderness > cost::kVerySlender;
   size_.modes = solve_estimate_.modes.value_or(std::llround(estimate_.count));
   if (solve_estimate_.modes) return;
-  notes_.push_back(fmt::format("the modes are estimated from volume and surface (Weyl's law), between {:.0f} and {:.0f}{}", estimate_.low,
-                               estimate_.high,
+  notes_.push_back(fmt::format("the modes are estimated from volume and surface (Weyl's law), between {} and {}{}",
+                               get_listed(std::llround(estimate_.low)), get_listed(std::llround(estimate_.high)),
                                estimate_.is_thin ? ": its walls are thinner than half a shear wave, where that is rough" : ""));
 }
 
@@ -374,11 +378,11 @@ Json::Value Validation::describe() const {
   mesh["mean_ratio_min"] = body_.check.mean_ratio_min;
   root["unknowns"] = Json::Int64(size_.unknowns);
   Json::Value& modes = root["modes"];
-  modes["count"] = Json::Int64(*size_.modes);
+  modes["count"] = Json::Int64(get_listed(*size_.modes));
   modes["how"] = solve_estimate_.modes ? "counted" : has_volume() ? "estimated" : "unknown";
-  modes["estimate"] = Json::Int64(std::llround(estimate_.count));
-  modes["low"] = Json::Int64(solve_estimate_.modes ? *size_.modes : std::llround(std::floor(estimate_.low)));
-  modes["high"] = Json::Int64(get_max_modes());
+  modes["estimate"] = Json::Int64(get_listed(std::llround(estimate_.count)));
+  modes["low"] = Json::Int64(get_listed(solve_estimate_.modes ? *size_.modes : std::llround(std::floor(estimate_.low))));
+  modes["high"] = Json::Int64(get_listed(get_max_modes()));
   root["factor"]["entries"] = Json::Int64(solve_estimate_.entries);
   root["factor"]["flops"] = solve_estimate_.flops;
   root["factor"]["how"] = is_analysed_ ? "analysed" : "guessed";
@@ -397,10 +401,14 @@ Json::Value Validation::describe() const {
 std::string Validation::describe_for_people() const {
   std::string text = fmt::format("{}: well\n{}{} nodes, {} tetrahedra, {} unknowns\n", run_.job.file.string(),
                                  body_.estimate ? "about " : "", size_.nodes, size_.tets, size_.unknowns);
+  const std::int64_t listed = get_listed(*size_.modes);
   text += solve_estimate_.modes
-              ? fmt::format("{} modes in {:g} .. {:g} Hz, counted by inertia\n", *size_.modes, run_.job.band_hz[0], run_.job.band_hz[1])
-              : fmt::format("{} {} modes in {:g} .. {:g} Hz\n", has_volume() ? "about" : "as for", *size_.modes, run_.job.band_hz[0],
+              ? fmt::format("{} modes in {:g} .. {:g} Hz, counted by inertia\n", listed, run_.job.band_hz[0], run_.job.band_hz[1])
+              : fmt::format("{} {} modes in {:g} .. {:g} Hz\n", has_volume() ? "about" : "as for", listed, run_.job.band_hz[0],
                             run_.job.band_hz[1]);
+  if (listed < *size_.modes)
+    text += fmt::format("{} modes are computed, so that the lowest {} are sure in the order of their corrected frequencies\n", *size_.modes,
+                        listed);
   for (std::size_t i = 0; i < kRanks.size(); ++i)
     text += fmt::format("{} rank{}: at most {:.2f} GB, about {:.1f} s\n", kRanks[i], kRanks[i] == 1 ? "" : "s",
                         1e-9 * static_cast<double>(bytes_[i]), wall_s_[i]);
