@@ -18,6 +18,7 @@
 
 #include "runtime/abi/carillon.h"
 #include "runtime/bank/bank.hpp"
+#include "runtime/bank/corrected.hpp"
 #include "runtime/bank/edits.hpp"
 #include "runtime/bank/nearest.hpp"
 #include "runtime/base/chance.hpp"
@@ -251,6 +252,12 @@ carillon_status push(carillon_synth* synth, const events::Event& event) noexcept
   return synth->synthesiser.push(event) ? CARILLON_OK : CARILLON_FULL;
 }
 
+bank::Frequencies to_frequencies(int32_t frequencies) {
+  if (frequencies != CARILLON_FREQUENCIES_CORRECTED && frequencies != CARILLON_FREQUENCIES_MESH)
+    throw InputError("frequencies " + std::to_string(frequencies) + " is no carillon_frequencies");
+  return frequencies == CARILLON_FREQUENCIES_MESH ? bank::Frequencies::kMesh : bank::Frequencies::kCorrected;
+}
+
 }  // namespace
 
 extern "C" {
@@ -258,15 +265,28 @@ extern "C" {
 uint32_t carillon_abi_version(void) { return CARILLON_ABI_VERSION; }
 
 carillon_status carillon_bank_open(const char* file, carillon_bank** bank, char* message, size_t message_size) {
-  if (bank != nullptr) *bank = nullptr;
-  if (file == nullptr || bank == nullptr) return refuse("carillon_bank_open: file and bank must not be NULL", message, message_size);
-  return run(message, message_size, [&] { *bank = new carillon_bank(bank::read_bank(file)); });
+  return carillon_bank_open_as(file, CARILLON_FREQUENCIES_CORRECTED, bank, message, message_size);
 }
 
 carillon_status carillon_bank_parse(const void* bytes, size_t size, carillon_bank** bank, char* message, size_t message_size) {
+  return carillon_bank_parse_as(bytes, size, CARILLON_FREQUENCIES_CORRECTED, bank, message, message_size);
+}
+
+carillon_status carillon_bank_open_as(const char* file, int32_t frequencies, carillon_bank** bank, char* message, size_t message_size) {
+  if (bank != nullptr) *bank = nullptr;
+  if (file == nullptr || bank == nullptr) return refuse("carillon_bank_open: file and bank must not be NULL", message, message_size);
+  return run(message, message_size,
+             [&] { *bank = new carillon_bank(bank::choose_frequencies(bank::read_bank(file), to_frequencies(frequencies))); });
+}
+
+carillon_status carillon_bank_parse_as(const void* bytes, size_t size, int32_t frequencies, carillon_bank** bank, char* message,
+                                       size_t message_size) {
   if (bank != nullptr) *bank = nullptr;
   if (bytes == nullptr || bank == nullptr) return refuse("carillon_bank_parse: bytes and bank must not be NULL", message, message_size);
-  return run(message, message_size, [&] { *bank = new carillon_bank(bank::parse_bank({static_cast<const std::byte*>(bytes), size})); });
+  return run(message, message_size, [&] {
+    *bank = new carillon_bank(
+        bank::choose_frequencies(bank::parse_bank({static_cast<const std::byte*>(bytes), size}), to_frequencies(frequencies)));
+  });
 }
 
 void carillon_bank_close(carillon_bank* bank) { delete bank; }

@@ -26,7 +26,7 @@ extern "C" {
 
 /* Grows with every function and field that is added. The number in the name of libcarillon.so.2 is another one, which changes only when
  * programs would have to be compiled again. */
-#define CARILLON_ABI_VERSION 5
+#define CARILLON_ABI_VERSION 6
 
 /* That of the library. */
 CARILLON_API uint32_t carillon_abi_version(void);
@@ -48,10 +48,20 @@ typedef struct carillon_synth carillon_synth;
 
 /* ---- Banks: what carillon-precompute writes. [any], not on an audio thread. */
 
-/* Reads a bank. Files are untrusted: a damaged one gives CARILLON_BAD_INPUT. */
+typedef enum carillon_frequencies {
+  CARILLON_FREQUENCIES_CORRECTED = 0, /* the mesh's with its estimated error taken off; as they are where the bank has no others */
+  CARILLON_FREQUENCIES_MESH = 1       /* those of the mesh that was solved */
+} carillon_frequencies;
+
+/* Reads a bank, with its corrected frequencies. Files are untrusted: a damaged one gives CARILLON_BAD_INPUT. */
 CARILLON_API carillon_status carillon_bank_open(const char* file, carillon_bank** bank, char* message, size_t message_size);
 /* The same from memory, which is not needed afterwards. */
 CARILLON_API carillon_status carillon_bank_parse(const void* bytes, size_t size, carillon_bank** bank, char* message, size_t message_size);
+/* Both with the frequencies that are asked for: a carillon_frequencies. Modes are in their ascending order. */
+CARILLON_API carillon_status carillon_bank_open_as(const char* file, int32_t frequencies, carillon_bank** bank, char* message,
+                                                   size_t message_size);
+CARILLON_API carillon_status carillon_bank_parse_as(const void* bytes, size_t size, int32_t frequencies, carillon_bank** bank,
+                                                    char* message, size_t message_size);
 /* NULL is allowed. Models that were made of the bank stay. */
 CARILLON_API void carillon_bank_close(carillon_bank* bank);
 CARILLON_API int32_t carillon_bank_mode_count(const carillon_bank* bank);

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "runtime/bank/corrected.hpp"
+
 namespace carillon::host {
 namespace {
 
@@ -32,7 +34,7 @@ Banks read_banks(Scene& scene) {
       const std::string place = body.support_place.empty() ? scene.file.string() : body.support_place;
       try {
         slot = std::make_unique<ReadBank>();
-        if (!files.contains(body.bank)) files[body.bank] = bank::read_bank(body.bank);
+        if (!files.contains(body.bank)) files[body.bank] = bank::choose_frequencies(bank::read_bank(body.bank), scene.frequencies);
         slot->bank = is_last ? std::move(files[body.bank]) : files[body.bank];
         mount(scene, body, slot->bank);
         radiation::Radiation radiation = radiation::calc_radiation(slot->bank, scene.radiation);

@@ -14,8 +14,10 @@
 #include <utility>
 
 #include "runtime/base/vector.hpp"
+#include "runtime/material/mallets.hpp"
 #include "runtime/material/solids.hpp"
 #include "runtime/material/supports.hpp"
+#include "runtime/material/table.hpp"
 
 namespace carillon::host {
 namespace {
@@ -203,8 +205,28 @@ SceneBody parse_body(base::Object& object, const effect_selection::EffectOverrid
   return body;
 }
 
+/// A required number from `low` to `high`.
+double read_amount(base::Object& object, std::string_view key, double low, double high) {
+  const double value = object.number(key);
+  if (!(value >= low && value <= high))
+    object.fail(key, fmt::format("{} is out of range; give a number from {:g} to {:g}", value, low, high));
+  return value;
+}
+
+/// The material that "material" names; its own constants may follow.
+template <class Solid>
+const material::Material* take_material(base::Object& object, Solid& solid) {
+  if (!object.has("material")) return nullptr;
+  const material::Material& material =
+      material::MaterialTable::get().require(object.find_place("material"), object.string("material")).material;
+  solid.young_modulus_pa = material.young_modulus_pa;
+  solid.poisson_ratio = material.poisson_ratio;
+  return &material;
+}
+
 contact::GroundSpec parse_ground(base::Object& object, std::vector<std::string>& warnings) {
   contact::GroundSpec ground;
+  if (const material::Material* material = take_material(object, ground)) ground.density_kg_m3 = material->density_kg_m3;
   ground.height_m = read_within(object, "height_m", ground.height_m, -kFarthestM, kFarthestM);
   ground.young_modulus_pa = object.number_or("young_modulus_pa", ground.young_modulus_pa, base::kPositive);
   ground.density_kg_m3 = read_within(object, "density_kg_m3", ground.density_kg_m3, 1.0, 3e4);
@@ -327,37 +349,60 @@ contact::CordSpec parse_cord(base::Object& object, const Names& names) {
   return cord;
 }
 
-Mallet parse_mallet(base::Object& object, std::vector<std::string>& warnings) {
-  Mallet mallet;
-  const auto read_positive = [&](base::Object& from, std::string_view key, double low, double high) {
-    const double value = from.number(key);
-    if (!(value >= low && value <= high))
-      from.fail(key, fmt::format("{} is out of range; give a number from {:g} to {:g}", value, low, high));
-    return value;
-  };
-  mallet.mass_kg = read_positive(object, "mass_kg", 1e-6, 1e3);
-  mallet.speed_m_s = read_positive(object, "speed_m_s", 1e-6, kMaxSpeedMs);
+Mallet make_mallet(const material::NamedMallet& named) {
+  Mallet mallet{.mass_kg = named.mass_kg, .speed_m_s = material::kMalletSpeedMs, .restitution = named.restitution};
+  if (named.material.empty()) {
+    mallet.felt = Felt{named.stiffness_n_m_p, named.exponent};
+  } else {
+    const material::Material& head = material::MaterialTable::get().require(named.name, named.material).material;
+    mallet.radius_m = named.radius_m;
+    mallet.young_modulus_pa = head.young_modulus_pa;
+    mallet.poisson_ratio = head.poisson_ratio;
+  }
+  return mallet;
+}
+
+/// The mallet that the text of `key` names.
+Mallet read_named_mallet(base::Object& object, std::string_view key) {
+  return make_mallet(material::require_mallet(object.find_place(key), object.string(key)));
+}
+
+/// The head of one that is given by numbers: a felt, or a sphere of a solid.
+void read_head(base::Object& object, Mallet& mallet) {
   if (auto felt = object.object_if("felt")) {
-    for (const char* key : {"radius_m", "young_modulus_pa", "poisson_ratio"}) {
+    for (const char* key : {"radius_m", "material", "young_modulus_pa", "poisson_ratio"}) {
       if (object.has(key)) object.fail(key, "is of a hard head, and there is a \"felt\"; keep one of them");
     }
-    mallet.felt = Felt{.stiffness_n_m_p = read_positive(*felt, "stiffness_n_m_p", 1e-3, 1e30)};
+    mallet.felt = Felt{.stiffness_n_m_p = read_amount(*felt, "stiffness_n_m_p", 1e-3, 1e30)};
     mallet.felt->exponent = read_within(*felt, "exponent", mallet.felt->exponent, 1.0, 6.0);
     mallet.restitution = kFeltRestitution;
     felt->finish();
-  } else {
-    if (!object.has("young_modulus_pa"))
-      object.fail("young_modulus_pa", "is missing; say how hard the head is: \"young_modulus_pa\" and \"radius_m\", or \"felt\"");
-    mallet.young_modulus_pa = read_positive(object, "young_modulus_pa", kSoftestGroundPa, kStiffestGroundPa);
-    mallet.radius_m = read_positive(object, "radius_m", 1e-4, 10.0);
-    mallet.poisson_ratio = object.number_or("poisson_ratio", mallet.poisson_ratio, {-1.0, 0.5});
-    const double sphere_kg_m3 = mallet.mass_kg / (4.0 / 3.0 * std::numbers::pi * std::pow(mallet.radius_m, 3));
-    if (sphere_kg_m3 > kDensestKgM3) {
-      warnings.push_back(
-          fmt::format("{}: a sphere of {:g} m that weighs {:g} kg would be denser than osmium; \"radius_m\" is that of the "
-                      "head where it touches, in metres",
-                      object.find_place("radius_m"), mallet.radius_m, mallet.mass_kg));
-    }
+    return;
+  }
+  mallet.felt.reset();
+  if (take_material(object, mallet) == nullptr && !object.has("young_modulus_pa"))
+    object.fail("young_modulus_pa",
+                "is missing; say how hard the head is: \"material\" or \"young_modulus_pa\", and \"radius_m\", or \"felt\"");
+  if (object.has("young_modulus_pa"))
+    mallet.young_modulus_pa = read_amount(object, "young_modulus_pa", kSoftestGroundPa, kStiffestGroundPa);
+  mallet.radius_m = read_amount(object, "radius_m", 1e-4, 10.0);
+  mallet.poisson_ratio = object.number_or("poisson_ratio", mallet.poisson_ratio, {-1.0, 0.5});
+}
+
+Mallet parse_mallet(base::Object& object, std::vector<std::string>& warnings) {
+  Mallet mallet;
+  const bool is_derived = object.has("from");
+  if (is_derived) mallet = read_named_mallet(object, "from");
+  if (!is_derived || object.has("mass_kg")) mallet.mass_kg = read_amount(object, "mass_kg", 1e-6, 1e3);
+  if (!is_derived || object.has("speed_m_s")) mallet.speed_m_s = read_amount(object, "speed_m_s", 1e-6, kMaxSpeedMs);
+  const bool has_head = object.has("felt") || object.has("material") || object.has("young_modulus_pa") || object.has("radius_m");
+  if (!is_derived || has_head) read_head(object, mallet);
+  const double sphere_kg_m3 = mallet.felt ? 0.0 : mallet.mass_kg / (4.0 / 3.0 * std::numbers::pi * std::pow(mallet.radius_m, 3));
+  if (sphere_kg_m3 > kDensestKgM3) {
+    warnings.push_back(
+        fmt::format("{}: a sphere of {:g} m that weighs {:g} kg would be denser than osmium; \"radius_m\" is that of the "
+                    "head where it touches, in metres",
+                    object.find_place("radius_m"), mallet.radius_m, mallet.mass_kg));
   }
   mallet.restitution = read_within(object, "restitution", mallet.restitution, 0.0, 1.0);
   mallet.friction = read_within(object, "friction", mallet.friction, 0.0, 10.0);
@@ -391,11 +436,16 @@ SceneStrike parse_strike(base::Object& object, Scene& scene, const Names& names)
   } else {
     strike.triangle = static_cast<std::int32_t>(object.integer("triangle", 0, std::numeric_limits<std::int32_t>::max()));
   }
-  if (auto mallet = object.object_if("mallet")) {
+  if (object.has("mallet")) {
     for (const char* key : {"impulse_n_s", "duration_s"}) {
       if (object.has(key)) object.fail(key, "follows from the \"mallet\"; keep one of them");
     }
-    strike.mallet = parse_mallet(*mallet, scene.warnings);
+    if (object.has_string("mallet")) {
+      strike.mallet = read_named_mallet(object, "mallet");
+    } else {
+      base::Object mallet = object.object("mallet");
+      strike.mallet = parse_mallet(mallet, scene.warnings);
+    }
   } else {
     if (!object.has("impulse_n_s")) object.numbers<3>("impulse_n_s");  // its message
     strike.impulse_n_s = read_vector(object, "impulse_n_s", {}, kMaxImpulseNs);
@@ -525,7 +575,7 @@ Scene parse_scene(const base::Document& document) {
   std::vector<base::Object> bodies = root.objects("bodies");
   if (bodies.empty()) {
     for (const char* later :
-         {"joints", "cords", "strikes", "listener", "microphones", "effects", "variation", "radiation", "output", "quality"})
+         {"joints", "cords", "strikes", "listener", "microphones", "effects", "variation", "radiation", "frequencies", "output", "quality"})
       root.has(later);
     root.finish();  // a mistyped key is the likeliest reason
     root.fail("bodies", "is missing or empty; list at least one body with a \"name\" and a \"bank\"");
@@ -557,6 +607,7 @@ Scene parse_scene(const base::Document& document) {
       scene.microphones_m.push_back(read_place(root, "microphones", row));
     }
   }
+  scene.frequencies = static_cast<bank::Frequencies>(read_name(root, "frequencies", kFrequenciesNames, "corrected"));
   scene.radiation = static_cast<radiation::GainKind>(read_name(root, "radiation", kGainKindNames, "sphere"));
   if (auto output = root.object_if("output")) scene.output = parse_output(*output);
   if (auto quality = root.object_if("quality")) scene.quality = parse_quality(*quality);

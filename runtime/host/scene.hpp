@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "runtime/bank/corrected.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/vector.hpp"
 #include "runtime/contact/world.hpp"
@@ -27,6 +28,9 @@ inline const std::vector<std::string> kSampleFormatNames{"pcm16", "pcm24", "pcm3
 
 /// The names of the key "radiation", in the order of radiation::GainKind.
 inline const std::vector<std::string> kGainKindNames{"osg02", "sphere"};
+
+/// The names of the key "frequencies", in the order of bank::Frequencies.
+inline const std::vector<std::string> kFrequenciesNames{"corrected", "mesh"};
 
 /// The names of the key "kind" of a joint, in the order of joints::Kind.
 inline const std::vector<std::string> kJointNames{"weld", "hinge", "slider", "universal", "ball"};
@@ -127,8 +131,9 @@ struct Scene {
   SceneListener listener;
   std::vector<Vec3> microphones_m;  // places in the world, a channel each, instead of the listener's ears
   radiation::GainKind radiation = radiation::GainKind::kSphere;
-  effect_selection::EffectOverrides overrides;  // the key "effects"
-  synth::EffectSet effects = kDefaultEffects;   // of all bodies where they are not planned
+  bank::Frequencies frequencies = bank::Frequencies::kCorrected;  // of the banks, that are played
+  effect_selection::EffectOverrides overrides;                    // the key "effects"
+  synth::EffectSet effects = kDefaultEffects;                     // of all bodies where they are not planned
   Output output;
   Quality quality;
   std::vector<std::string> warnings;  // of numbers that may be meant, a line each

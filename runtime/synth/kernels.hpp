@@ -10,9 +10,11 @@
 namespace carillon::synth {
 
 inline constexpr int kGroup = 16;       // modes that are stored and culled together
-inline constexpr int kSubBlock = 32;    // samples of one table: the grid on which anything may change
+inline constexpr int kSubBlock = 32;    // samples: the grid on which anything may change
 inline constexpr int kBlock = 128;      // samples between two steps of the double-precision state
 inline constexpr int kSubBlocks = 4;    // in a block
+inline constexpr int kColumn = 16;      // samples of one table
+inline constexpr int kColumns = 8;      // in a block
 inline constexpr int kTerms = 10;       // Chebyshev terms of a strike: -169 dB at the Nyquist frequency
 inline constexpr int kStrikeRows = 9;   // three corners times three directions
 inline constexpr int kMaxContacts = 8;  // that drive a body at once
@@ -20,16 +22,16 @@ inline constexpr int kMaxContacts = 8;  // that drive a body at once
 /// Instruction sets, least first. kBest stands for the last one that the processor has.
 enum class Isa : std::uint8_t { kPlain, kSse2, kAvx2, kAvx512, kBest };
 
-/// The sound of each mode over a sub-block: sample k is re wave[m][0][k] + im wave[m][1][k] when the sub-block begins in the state re + i
-/// im.
+/// The sound of each mode over a column: sample k of mode m is re wave[m / 2][0][k][m % 2] + im wave[m / 2][1][k][m % 2] when the column
+/// begins in the state re + i im.
 struct alignas(64) SoundTable {
-  float wave[kGroup][2][kSubBlock];
+  float wave[kGroup / 2][2][kColumn][2];
 };
 
 /// How each mode turns while nothing drives it.
 struct alignas(64) RotationTable {
-  double block_re[kGroup], block_im[kGroup];                                           // over kBlock samples
-  float sub_blocks_re[kSubBlocks - 1][kGroup], sub_blocks_im[kSubBlocks - 1][kGroup];  // over 1, 2 and 3 sub-blocks
+  double block_re[kGroup], block_im[kGroup];           // over kBlock samples
+  float columns_re[3][kGroup], columns_im[3][kGroup];  // over 1, 2 and 4 columns
 };
 
 /// How each mode answers a strike.
@@ -46,9 +48,9 @@ struct alignas(64) ModeState {
   double re[kGroup], im[kGroup];
 };
 
-/// The state of each mode at the start of each sub-block of this block.
-struct alignas(64) SubBlockStates {
-  float re[kSubBlocks][kGroup], im[kSubBlocks][kGroup];
+/// The state of each mode at the start of each column of this block.
+struct alignas(64) ColumnStates {
+  float re[kColumns][kGroup], im[kColumns][kGroup];
 };
 
 /// A pulse within one sub-block.
@@ -94,21 +96,21 @@ struct Reading {
 struct Kernels {
   Isa isa;
   /// Fills the starts of a block, and turns the state to the start of the next.
-  void (*advance)(const RotationTable* turn, ModeState* state, SubBlockStates* starts, int groups) noexcept;
+  void (*advance)(const RotationTable* turn, ModeState* state, ColumnStates* starts, int groups) noexcept;
   /// Adds the sound of `sub_blocks` (1 to kSubBlocks) sub-blocks from `first` on to out, sub-blocks x kSubBlock samples. How a block is cut
   /// into calls does not change a bit.
-  void (*emit)(const SoundTable* sound, const SubBlockStates* starts, int groups, int first, int sub_blocks, float* out) noexcept;
+  void (*emit)(const SoundTable* sound, const ColumnStates* starts, int groups, int first, int sub_blocks, float* out) noexcept;
   /// advance, and emit of the whole block, to the same bits; the starts are kept nowhere.
   void (*ring)(const SoundTable* sound, const RotationTable* turn, ModeState* state, int groups, float* out) noexcept;
   /// Adds what a pulse makes in one sub-block to out, kSubBlock samples, and what it leaves to the starts and the state after it.
   void (*strike)(const StrikeTable* strike, const RotationTable* turn, const PulseBlock& touch, int sub_block, ModeState* state,
-                 SubBlockStates* starts, int groups, float* out) noexcept;
+                 ColumnStates* starts, int groups, float* out) noexcept;
   /// Adds what a drive makes in one sub-block to out, kSubBlock samples, and what it leaves to the starts and the state after it. When it
   /// damps, that is all the sound of the sub-block (no emit), and every mode's amplitude is multiplied by a factor of at most 1 at each
   /// sample: 1 - e, where e = p / (1 + p), p = x + x^2 / 2 + x^3 / 6, which is 1 - exp(-x) to x^4 / 24, for x the sum over the contacts of
   /// their dampings, kept below the mode's angle; e is linear between both ends.
   void (*drive)(const StrikeTable* strike, const RotationTable* turn, const ContactBlock& drive, int sub_block, ModeState* state,
-                SubBlockStates* starts, int groups, float* out) noexcept;
+                ColumnStates* starts, int groups, float* out) noexcept;
   /// A sub-block of what an ear hears through taps that stay: kTaps + kSubBlock - 1 samples to kSubBlock.
   void (*convolve)(const float* taps, const float* samples, float* out) noexcept;
   /// And through taps that move.

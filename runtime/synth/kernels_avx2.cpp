@@ -13,6 +13,9 @@ struct F {
   __m256 v;
   static F load(const float* at) { return {_mm256_loadu_ps(at)}; }
   static F all(float x) { return {_mm256_set1_ps(x)}; }
+  static F pair(const float* at) {  // two numbers, again and again
+    return {_mm256_castsi256_ps(_mm256_broadcastq_epi64(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(at))))};
+  }
   static F zero() { return {_mm256_setzero_ps()}; }
   static F convert(const std::int16_t* at) {
     return {_mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(at))))};
@@ -48,7 +51,8 @@ struct D {
 inline D more(D c, D a, D b) { return {_mm256_fmadd_pd(a.lo, b.lo, c.lo), _mm256_fmadd_pd(a.hi, b.hi, c.hi)}; }    // c + a b
 inline D less(D c, D a, D b) { return {_mm256_fnmadd_pd(a.lo, b.lo, c.lo), _mm256_fnmadd_pd(a.hi, b.hi, c.hi)}; }  // c - a b
 
-constexpr int kVectors = 2, kColumns = 2, kAhead = 0;
+using P = F;
+constexpr int kVectors = 4, kHeldColumns = 3;
 #include "runtime/synth/kernels_body.inl"
 #include "runtime/synth/kernels_receiver.inl"
 

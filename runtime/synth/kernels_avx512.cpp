@@ -13,6 +13,9 @@ struct F {
   __m512 v;
   static F load(const float* at) { return {_mm512_loadu_ps(at)}; }
   static F all(float x) { return {_mm512_set1_ps(x)}; }
+  static F pair(const float* at) {  // two numbers, again and again
+    return {_mm512_castsi512_ps(_mm512_broadcastq_epi64(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(at))))};
+  }
   static F zero() { return {_mm512_setzero_ps()}; }
   static F convert(const std::int16_t* at) {
     return {_mm512_cvtepi32_ps(_mm512_cvtepi16_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(at))))};
@@ -49,7 +52,8 @@ struct D {
 inline D more(D c, D a, D b) { return {_mm512_fmadd_pd(a.lo, b.lo, c.lo), _mm512_fmadd_pd(a.hi, b.hi, c.hi)}; }    // c + a b
 inline D less(D c, D a, D b) { return {_mm512_fnmadd_pd(a.lo, b.lo, c.lo), _mm512_fnmadd_pd(a.hi, b.hi, c.hi)}; }  // c - a b
 
-constexpr int kVectors = 2, kColumns = 4, kAhead = 512;
+using P = F;
+constexpr int kVectors = 2, kHeldColumns = 8;
 #include "runtime/synth/kernels_body.inl"
 #include "runtime/synth/kernels_receiver.inl"
 

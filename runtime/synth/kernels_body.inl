@@ -1,16 +1,18 @@
-// Method:     emit is a small matrix product: a mode's sound over a sub-block is its table (32 x 2, single precision) times its state at
-//             the start of the sub-block (2 x 1), so 1 to 4 starts are columns that share the table. Two sets of sums, of even and odd
-//             modes, hide the latency of the FMA. advance restarts the columns every block from a state in double precision. strike is the
-//             exact answer of a mode at rest to the pulse, sample by sample, with modes in the lanes; the answer's end is added to what
-//             rings. drive does the same with forces that are linear between samples; when it damps, it steps what rings through the
-//             sub-block too, for its sound only: the state in double precision is multiplied by the product of the factors.
+// Method:     emit is a small matrix product: a mode's sound over 16 samples is its table (16 x 2, single precision) times its state at
+//             their start (2 x 1), so the eight starts of a block are columns that share the table. Modes go in pairs: a vector of the
+//             table holds the samples of two modes in turn, and one load of 64 bits, repeated, is the states of both; their sums are
+//             added at the end. advance restarts the columns every block from a state in double precision; three turns, over 1, 2 and
+//             4 columns, make all eight. strike is the exact answer of a mode at rest to the pulse, sample by sample, with modes in the
+//             lanes; the answer's end is added to what rings. drive does the same with forces that are linear between samples; when it
+//             damps, it steps what rings through the sub-block too, for its sound only: the state in double precision is multiplied by
+//             the product of the factors.
 // Source:     docs/decisions/resonator-kernel.md.
 // Deviations: none.
 //
-// Included by kernels_*.cpp, which give the types F (lanes of float), D (as many lanes of double) and kVectors, kColumns: how many vectors
-// of samples and how many starts emit holds in registers at once. Everything is in an unnamed namespace and nothing of std is used, so that
-// no function compiled for one processor can be linked in place of another's.
-// The pragmas make g++ 12 keep arrays of sums in registers.
+// Included by kernels_*.cpp, which give the types F (lanes of float), D (as many lanes of double), P (lanes of float in pairs) and
+// kVectors, kHeldColumns: how many vectors of samples of how many columns emit holds in registers at once. Everything is in an unnamed
+// namespace and nothing of std is used, so that no function compiled for one processor can be linked in place of another's. The pragmas
+// make g++ 12 keep arrays of sums in registers.
 
 template <int kNumber>
 struct Count {
@@ -29,119 +31,218 @@ inline Number add_lanes(Number* lane) noexcept {
   }
 }
 
-constexpr int kTile = 8;  // groups whose tables stay in the first cache while other columns pass over them
+constexpr int kEach = kSubBlock / kColumn;  // columns of a sub-block
+constexpr int kTile = 8;         // groups that are summed by themselves; their tables stay in the first cache while columns pass over them
+constexpr int kStatesAhead = 8;  // groups whose states are called for early: those of many voices come from the third cache
 
+/// Sums over modes, of even and odd modes apart.
+struct alignas(64) Sums {
+  float of[kColumns][kColumn][2];
+};
+
+/// The sums of kHeld columns in registers, kVectors vectors of samples of each.
 template <int kHeld>
-inline void emit_columns(const SoundTable* sound, const SubBlockStates* starts, int groups, int sub_block, int sample,
-                         float* out) noexcept {
-  F sum[2][kHeld][kVectors];
+struct Held {
+  P sum[kHeld][kVectors];
+
+  [[gnu::always_inline]] void clear() noexcept {
 #pragma GCC unroll 8
-  for (int q = 0; q < kHeld; ++q) {
+    for (int q = 0; q < kHeld; ++q) {
 #pragma GCC unroll 8
-    for (int v = 0; v < kVectors; ++v) sum[0][q][v] = sum[1][q][v] = F::zero();
+      for (int v = 0; v < kVectors; ++v) sum[q][v] = P::zero();
+    }
   }
-  for (int g = 0; g < groups; ++g) {
-    const float* table = sound[g].wave[0][0] + sample;
-    const float* re = starts[g].re[sub_block];
-    const float* im = starts[g].im[sub_block];
-    for (int lane = 0; lane < kGroup; lane += 2) {
-#pragma GCC unroll 2
-      for (int odd = 0; odd < 2; ++odd) {
-        F a[kVectors], b[kVectors];
+  /// Puts the sums of the first tile there, and adds those of others.
+  [[gnu::always_inline]] void put(float* sums, bool is_first) const noexcept {
 #pragma GCC unroll 8
-        for (int v = 0; v < kVectors; ++v) {
-          a[v] = F::load(table + v * F::kWidth);
-          b[v] = F::load(table + kSubBlock + v * F::kWidth);
-        }
-        if constexpr (kAhead > 0) {
-#pragma GCC unroll 4
-          for (int line = 0; line < 4; ++line) __builtin_prefetch(table + kAhead + line * 16);
-        }
-        table += 2 * kSubBlock;
+    for (int q = 0; q < kHeld; ++q) {
 #pragma GCC unroll 8
-        for (int q = 0; q < kHeld; ++q) {
-          const F x = F::all(re[q * kGroup + lane + odd]);
-#pragma GCC unroll 8
-          for (int v = 0; v < kVectors; ++v) sum[odd][q][v] = fma(a[v], x, sum[odd][q][v]);
-        }
-#pragma GCC unroll 8
-        for (int q = 0; q < kHeld; ++q) {
-          const F x = F::all(im[q * kGroup + lane + odd]);
-#pragma GCC unroll 8
-          for (int v = 0; v < kVectors; ++v) sum[odd][q][v] = fma(b[v], x, sum[odd][q][v]);
-        }
+      for (int v = 0; v < kVectors; ++v) {
+        float* at = sums + q * 2 * kColumn + v * P::kWidth;
+        (is_first ? sum[q][v] : P::load(at) + sum[q][v]).store(at);
       }
     }
   }
+  /// Adds what one part of the states of two modes sounds.
+  [[gnu::always_inline]] void add_part(const float* table, const float* states) noexcept {
+    // The fewer of the two, vectors of the table and columns, stay in registers.
+    if constexpr (kHeld > kVectors) {
+      P a[kVectors];
 #pragma GCC unroll 8
-  for (int q = 0; q < kHeld; ++q) {
+      for (int v = 0; v < kVectors; ++v) a[v] = P::load(table + v * P::kWidth);
 #pragma GCC unroll 8
-    for (int v = 0; v < kVectors; ++v) {
-      float* at = out + q * kSubBlock + v * F::kWidth;
-      (F::load(at) + (sum[0][q][v] + sum[1][q][v])).store(at);
+      for (int q = 0; q < kHeld; ++q) {
+        const P x = P::pair(states + q * kGroup);
+#pragma GCC unroll 8
+        for (int v = 0; v < kVectors; ++v) sum[q][v] = fma(a[v], x, sum[q][v]);
+      }
+    } else {
+      P x[kHeld];
+#pragma GCC unroll 8
+      for (int q = 0; q < kHeld; ++q) x[q] = P::pair(states + q * kGroup);
+#pragma GCC unroll 8
+      for (int v = 0; v < kVectors; ++v) {
+        const P a = P::load(table + v * P::kWidth);
+#pragma GCC unroll 8
+        for (int q = 0; q < kHeld; ++q) sum[q][v] = fma(a, x[q], sum[q][v]);
+      }
     }
   }
+  /// Adds a group, from a column and a sample of the column on.
+  [[gnu::always_inline]] void add(const SoundTable& sound, const ColumnStates& starts, int column, int sample) noexcept {
+#pragma GCC unroll 2
+    for (int m = 0; m < kGroup; m += 2) {
+      add_part(sound.wave[m / 2][0][sample], starts.re[column] + m);
+      add_part(sound.wave[m / 2][1][sample], starts.im[column] + m);
+    }
+  }
+};
+
+/// Adds kHeld columns of a tile, from `column` and from `sample` of them on.
+template <int kHeld>
+inline void add_columns(const SoundTable* sound, const ColumnStates* starts, int groups, int column, int sample, bool is_first,
+                        float* sums) noexcept {
+  Held<kHeld> held;
+  held.clear();
+  for (int g = 0; g < groups; ++g) held.add(sound[g], starts[g], column, sample);
+  held.put(sums, is_first);
 }
 
-inline void emit_tile(const SoundTable* sound, const SubBlockStates* starts, int groups, int first, int sub_blocks, float* out) noexcept {
-  for (int k = 0; k < kSubBlock; k += kVectors * F::kWidth) {
+/// Adds `columns` columns of a tile, from `first` on.
+inline void add_tile(const SoundTable* sound, const ColumnStates* starts, int groups, int first, int columns, bool is_first,
+                     Sums& sums) noexcept {
+  for (int k = 0; k < kColumn; k += kVectors * P::kWidth / 2) {
     int q = 0;
-    const auto columns = [&](auto held) {
-      for (; sub_blocks - q >= held.count; q += held.count) {
-        emit_columns<held.count>(sound, starts, groups, first + q, k, out + q * kSubBlock + k);
+    const auto add = [&](auto held) {
+      // Two pairs rather than three and one.
+      for (; columns - q >= held.count && (held.count != 3 || columns - q != 4); q += held.count) {
+        add_columns<held.count>(sound, starts, groups, first + q, k, is_first, sums.of[q][k]);
       }
     };
-    columns(Count<kColumns>{});
-    if constexpr (kColumns > 2) columns(Count<2>{});
-    if constexpr (kColumns > 1) columns(Count<1>{});
+    add(Count<kHeldColumns>{});
+    if constexpr (kHeldColumns > 4) add(Count<4>{});
+    if constexpr (kHeldColumns > 2) add(Count<2>{});
   }
 }
 
-inline void advance_group(const RotationTable& turn, ModeState& state, SubBlockStates& starts) noexcept {
+/// The sums of even and odd modes together, added to the samples.
+inline void add_sums(const Sums& sums, int columns, float* out) noexcept {
+  const float* sum = sums.of[0][0];
+  for (int n = 0; n < columns * kColumn; ++n) out[n] += sum[2 * n] + sum[2 * n + 1];
+}
+
+/// The states of the modes in the lanes from `lane` on after 0 to kColumns - 1 columns, left to themselves.
+struct Turned {
+  F re[kColumns], im[kColumns];
+  Turned(const RotationTable& turn, int lane, F x, F y) noexcept {
+    re[0] = x;
+    im[0] = y;
+#pragma GCC unroll 3
+    for (int i = 0; i < 3; ++i) {
+      const F c = F::load(turn.columns_re[i] + lane), s = F::load(turn.columns_im[i] + lane);
+      const int known = 1 << i;
+#pragma GCC unroll 4
+      for (int q = 0; q < known; ++q) {
+        re[known + q] = less(re[q] * c, im[q], s);
+        im[known + q] = fma(re[q], s, im[q] * c);
+      }
+    }
+  }
+};
+
+inline void advance_group(const RotationTable& turn, ModeState& state, ColumnStates& starts) noexcept {
 #pragma GCC unroll 2
   for (int m = 0; m < kGroup; m += F::kWidth) {
     const D re = D::load(state.re + m), im = D::load(state.im + m);
     const D turn_re = D::load(turn.block_re + m), turn_im = D::load(turn.block_im + m);
     less(re * turn_re, im, turn_im).store(state.re + m);
     more(re * turn_im, im, turn_re).store(state.im + m);
-    const F x = re.narrow(), y = im.narrow();
-    x.store(starts.re[0] + m);
-    y.store(starts.im[0] + m);
-#pragma GCC unroll 4
-    for (int q = 1; q < kSubBlocks; ++q) {
-      const F c = F::load(turn.sub_blocks_re[q - 1] + m), s = F::load(turn.sub_blocks_im[q - 1] + m);
-      less(x * c, y, s).store(starts.re[q] + m);
-      fma(x, s, y * c).store(starts.im[q] + m);
+    const Turned turned(turn, m, re.narrow(), im.narrow());
+#pragma GCC unroll 8
+    for (int q = 0; q < kColumns; ++q) {
+      turned.re[q].store(starts.re[q] + m);
+      turned.im[q].store(starts.im[q] + m);
     }
   }
 }
 
-void advance(const RotationTable* turn, ModeState* state, SubBlockStates* starts, int groups) noexcept {
-  for (int g = 0; g < groups; ++g) advance_group(turn[g], state[g], starts[g]);
-}
-
-void emit(const SoundTable* sound, const SubBlockStates* starts, int groups, int first, int sub_blocks, float* out) noexcept {
-  for (int g = 0; g < groups; g += kTile) emit_tile(sound + g, starts + g, groups - g < kTile ? groups - g : kTile, first, sub_blocks, out);
-}
-
-void ring(const SoundTable* sound, const RotationTable* turn, ModeState* state, int groups, float* out) noexcept {
-  SubBlockStates starts[kTile];
-  for (int g = 0; g < groups; g += kTile) {
-    const int count = groups - g < kTile ? groups - g : kTile;
-    advance(turn + g, state + g, starts, count);
-    emit_tile(sound + g, starts, count, 0, kSubBlocks, out);
+/// Has a state come to the first cache.
+inline void call_for(const ModeState& state) noexcept {
+#pragma GCC unroll 4
+  for (int m = 0; m < kGroup; m += 8) {
+    __builtin_prefetch(state.re + m, 1);
+    __builtin_prefetch(state.im + m, 1);
   }
 }
 
+void advance(const RotationTable* turn, ModeState* state, ColumnStates* starts, int groups) noexcept {
+  for (int g = 0; g < groups; ++g) {
+    if (g + kStatesAhead < groups) call_for(state[g + kStatesAhead]);
+    advance_group(turn[g], state[g], starts[g]);
+  }
+}
+
+void emit(const SoundTable* sound, const ColumnStates* starts, int groups, int first, int sub_blocks, float* out) noexcept {
+  if (groups == 0) return;
+  Sums sums;
+  for (int g = 0; g < groups; g += kTile)
+    add_tile(sound + g, starts + g, groups - g < kTile ? groups - g : kTile, first * kEach, sub_blocks * kEach, g == 0, sums);
+  add_sums(sums, sub_blocks * kEach, out);
+}
+
+void ring(const SoundTable* sound, const RotationTable* turn, ModeState* state, int groups, float* out) noexcept {
+  if (groups == 0) return;
+  for (int g = 0; g < groups && g < kStatesAhead; ++g) call_for(state[g]);
+  Sums sums;
+  if constexpr (kHeldColumns == kColumns && kVectors * P::kWidth == 2 * kColumn) {
+    // All sums are in registers: the next group is advanced while one sounds.
+    ColumnStates starts[2];
+    advance_group(turn[0], state[0], starts[0]);
+    Held<kColumns> held;
+    for (int tile = 0; tile < groups; tile += kTile) {
+      held.clear();
+      for (int g = tile; g < groups && g < tile + kTile; ++g) {
+        if (g + kStatesAhead < groups) call_for(state[g + kStatesAhead]);
+        if (g + 1 < groups) advance_group(turn[g + 1], state[g + 1], starts[(g + 1) % 2]);
+        held.add(sound[g], starts[g % 2], 0, 0);
+      }
+      held.put(sums.of[0][0], tile == 0);
+    }
+  } else {
+    ColumnStates starts[kTile];
+    for (int tile = 0; tile < groups; tile += kTile) {
+      const int count = groups - tile < kTile ? groups - tile : kTile;
+      for (int g = 0; g < count; ++g) {
+        if (tile + g + kStatesAhead < groups) call_for(state[tile + g + kStatesAhead]);
+        advance_group(turn[tile + g], state[tile + g], starts[g]);
+      }
+      add_tile(sound + tile, starts, count, 0, kColumns, tile == 0, sums);
+    }
+  }
+  add_sums(sums, kColumns, out);
+}
+
+/// Adds what an answer is at the start of the next sub-block to the starts from there on, and to the state after the block.
+inline void add_later(const RotationTable& turn, int lane, F x, F y, int sub_block, ModeState& ringing, ColumnStates& start) noexcept {
+  const Turned later(turn, lane, x, y);
+  const int first = (sub_block + 1) * kEach;
+  for (int q = first; q < kColumns; ++q) {
+    (F::load(start.re[q] + lane) + later.re[q - first]).store(start.re[q] + lane);
+    (F::load(start.im[q] + lane) + later.im[q - first]).store(start.im[q] + lane);
+  }
+  (D::load(ringing.re + lane) + D::widen(later.re[kColumns - first])).store(ringing.re + lane);
+  (D::load(ringing.im + lane) + D::widen(later.im[kColumns - first])).store(ringing.im + lane);
+}
+
 void strike(const StrikeTable* strike, const RotationTable* turn, const PulseBlock& touch, int sub_block, ModeState* state,
-            SubBlockStates* starts, int groups, float* out) noexcept {
+            ColumnStates* starts, int groups, float* out) noexcept {
   alignas(64) float sum[kSubBlock * F::kWidth] = {};
   for (int m = 0; m < groups * kGroup; m += F::kWidth) {
     const int lane = m % kGroup;
     const StrikeTable& table = strike[m / kGroup];
     const RotationTable& later = turn[m / kGroup];
     ModeState& ringing = state[m / kGroup];
-    SubBlockStates& start = starts[m / kGroup];
+    ColumnStates& start = starts[m / kGroup];
     F amplitude = F::zero();
     for (int i = 0; i < kStrikeRows; ++i) amplitude = fma(F::all(touch.weight[i]), F::convert(touch.row[i] + m), amplitude);
     amplitude = amplitude * F::load(table.scale + lane);
@@ -177,21 +278,7 @@ void strike(const StrikeTable* strike, const RotationTable* turn, const PulseBlo
     }
     // At the start of the next sub-block, and from there on.
     const F re = less(x * turn_re, y, turn_im), im = fma(x, turn_im, y * turn_re);
-    for (int q = sub_block + 1; q <= kSubBlocks; ++q) {
-      F later_re = re, later_im = im;
-      if (const int ahead = q - sub_block - 1; ahead > 0) {
-        const F c = F::load(later.sub_blocks_re[ahead - 1] + lane), s = F::load(later.sub_blocks_im[ahead - 1] + lane);
-        later_re = less(re * c, im, s);
-        later_im = fma(re, s, im * c);
-      }
-      if (q < kSubBlocks) {
-        (F::load(start.re[q] + lane) + later_re).store(start.re[q] + lane);
-        (F::load(start.im[q] + lane) + later_im).store(start.im[q] + lane);
-      } else {
-        (D::load(ringing.re + lane) + D::widen(later_re)).store(ringing.re + lane);
-        (D::load(ringing.im + lane) + D::widen(later_im)).store(ringing.im + lane);
-      }
-    }
+    add_later(later, lane, re, im, sub_block, ringing, start);
   }
   for (int n = 0; n < kSubBlock; ++n) out[n] += add_lanes<F::kWidth>(sum + n * F::kWidth);
 }
@@ -214,14 +301,14 @@ inline F calc_damping(const ContactBlock& drive, int end, int mode, F scale, F a
 
 template <bool kForces, bool kDamps>
 inline void drive_modes(const StrikeTable* strike, const RotationTable* turn, const ContactBlock& drive, int sub_block, ModeState* state,
-                        SubBlockStates* starts, int groups, float* out) noexcept {
+                        ColumnStates* starts, int groups, float* out) noexcept {
   alignas(64) float sum[kSubBlock * F::kWidth] = {};
   for (int m = 0; m < groups * kGroup; m += F::kWidth) {
     const int lane = m % kGroup;
     const StrikeTable& table = strike[m / kGroup];
     const RotationTable& later = turn[m / kGroup];
     ModeState& ringing = state[m / kGroup];
-    SubBlockStates& start = starts[m / kGroup];
+    ColumnStates& start = starts[m / kGroup];
     const F scale = F::load(table.scale + lane);
     const F turn_re = F::load(table.turn_re + lane), turn_im = F::load(table.turn_im + lane);
     const F out_re = F::load(table.out_re + lane), out_im = F::load(table.out_im + lane);
@@ -254,8 +341,8 @@ inline void drive_modes(const StrikeTable* strike, const RotationTable* turn, co
       const F angle = F::load(table.angle + lane);
       damping = calc_damping(drive, 0, m, scale, angle);
       last_damping = calc_damping(drive, 1, m, scale, angle);
-      ring_re = F::load(start.re[sub_block] + lane);
-      ring_im = F::load(start.im[sub_block] + lane);
+      ring_re = F::load(start.re[sub_block * kEach] + lane);
+      ring_im = F::load(start.im[sub_block * kEach] + lane);
       fma(out_re, ring_re, fma(out_im, ring_im, F::load(sum))).store(sum);
     }
     F x = F::zero(), y = F::zero();  // what the force makes
@@ -284,37 +371,22 @@ inline void drive_modes(const StrikeTable* strike, const RotationTable* turn, co
         fma(out_re, x + ring_re, fma(out_im, y + ring_im, F::load(at))).store(at);
       }
     }
-    for (int q = sub_block + 1; q <= kSubBlocks; ++q) {
-      F later_re = x, later_im = y;
-      if (const int ahead = q - sub_block - 1; ahead > 0) {
-        const F c = F::load(later.sub_blocks_re[ahead - 1] + lane), s = F::load(later.sub_blocks_im[ahead - 1] + lane);
-        later_re = less(x * c, y, s);
-        later_im = fma(x, s, y * c);
+    if constexpr (kDamps) {
+      const F keep = kept.narrow();
+      for (int q = (sub_block + 1) * kEach; q < kColumns; ++q) {
+        (F::load(start.re[q] + lane) * keep).store(start.re[q] + lane);
+        (F::load(start.im[q] + lane) * keep).store(start.im[q] + lane);
       }
-      if (q < kSubBlocks) {
-        F re = F::load(start.re[q] + lane), im = F::load(start.im[q] + lane);
-        if constexpr (kDamps) {
-          re = re * kept.narrow();
-          im = im * kept.narrow();
-        }
-        (re + later_re).store(start.re[q] + lane);
-        (im + later_im).store(start.im[q] + lane);
-      } else {
-        D re = D::load(ringing.re + lane), im = D::load(ringing.im + lane);
-        if constexpr (kDamps) {
-          re = re * kept;
-          im = im * kept;
-        }
-        (re + D::widen(later_re)).store(ringing.re + lane);
-        (im + D::widen(later_im)).store(ringing.im + lane);
-      }
+      (D::load(ringing.re + lane) * kept).store(ringing.re + lane);
+      (D::load(ringing.im + lane) * kept).store(ringing.im + lane);
     }
+    if constexpr (kForces) add_later(later, lane, x, y, sub_block, ringing, start);
   }
   for (int n = 0; n < kSubBlock; ++n) out[n] += add_lanes<F::kWidth>(sum + n * F::kWidth);
 }
 
 void drive(const StrikeTable* strike, const RotationTable* turn, const ContactBlock& what, int sub_block, ModeState* state,
-           SubBlockStates* starts, int groups, float* out) noexcept {
+           ColumnStates* starts, int groups, float* out) noexcept {
   if (what.forces && what.damps)
     drive_modes<true, true>(strike, turn, what, sub_block, state, starts, groups, out);
   else if (what.forces)

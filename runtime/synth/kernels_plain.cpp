@@ -37,7 +37,19 @@ struct D {
 inline D more(D c, D a, D b) { return {c.v + a.v * b.v}; }  // c + a b
 inline D less(D c, D a, D b) { return {c.v - a.v * b.v}; }  // c - a b
 
-constexpr int kVectors = 8, kColumns = 1, kAhead = 0;
+/// Two numbers.
+struct P {
+  static constexpr int kWidth = 2;
+  float v[2];
+  static P load(const float* at) { return {{at[0], at[1]}}; }
+  static P zero() { return {{0.0F, 0.0F}}; }
+  static P pair(const float* at) { return load(at); }
+  void store(float* at) const { at[0] = v[0], at[1] = v[1]; }
+};
+inline P operator+(P a, P b) { return {{a.v[0] + b.v[0], a.v[1] + b.v[1]}}; }
+inline P fma(P a, P b, P c) { return {{a.v[0] * b.v[0] + c.v[0], a.v[1] * b.v[1] + c.v[1]}}; }
+
+constexpr int kVectors = 8, kHeldColumns = 1;
 #include "runtime/synth/kernels_body.inl"
 #include "runtime/synth/kernels_receiver.inl"
 

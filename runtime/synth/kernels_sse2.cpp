@@ -13,6 +13,10 @@ struct F {
   __m128 v;
   static F load(const float* at) { return {_mm_loadu_ps(at)}; }
   static F all(float x) { return {_mm_set1_ps(x)}; }
+  static F pair(const float* at) {  // two numbers, again and again
+    const __m128 x = _mm_castsi128_ps(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(at)));
+    return {_mm_movelh_ps(x, x)};
+  }
   static F zero() { return {_mm_setzero_ps()}; }
   static F convert(const std::int16_t* at) {
     const __m128i x = _mm_loadl_epi64(reinterpret_cast<const __m128i*>(at));
@@ -48,7 +52,8 @@ struct D {
 inline D more(D c, D a, D b) { return {_mm_add_pd(c.lo, _mm_mul_pd(a.lo, b.lo)), _mm_add_pd(c.hi, _mm_mul_pd(a.hi, b.hi))}; }  // c + a b
 inline D less(D c, D a, D b) { return {_mm_sub_pd(c.lo, _mm_mul_pd(a.lo, b.lo)), _mm_sub_pd(c.hi, _mm_mul_pd(a.hi, b.hi))}; }  // c - a b
 
-constexpr int kVectors = 4, kColumns = 1, kAhead = 0;
+using P = F;
+constexpr int kVectors = 8, kHeldColumns = 1;
 #include "runtime/synth/kernels_body.inl"
 #include "runtime/synth/kernels_receiver.inl"
 

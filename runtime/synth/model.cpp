@@ -115,10 +115,10 @@ void Model::add_ringing_mode(const Mode& mode) {
   const double omega_d = std::sqrt((omega - d) * (omega + d));
   const auto answer = [&](double samples) { return std::exp(-d * samples * h) * std::polar(1.0, omega_d * samples * h); };
   const std::complex<double> out(mode.gain, mode.gain * d / omega_d);
-  for (int k = 0; k < kSubBlock; ++k) {
+  for (int k = 0; k < kColumn; ++k) {
     const std::complex<double> wave = out * answer(k);
-    sound_.back().wave[lane][0][k] = static_cast<float>(wave.real());
-    sound_.back().wave[lane][1][k] = static_cast<float>(-wave.imag());
+    sound_.back().wave[lane / 2][0][k][lane % 2] = static_cast<float>(wave.real());
+    sound_.back().wave[lane / 2][1][k][lane % 2] = static_cast<float>(-wave.imag());
   }
   RotationTable& turn = turn_.back();
   // The angle of a block is repeated for as long as the mode sounds: half a unit of a double in it is heard after hours.
@@ -127,9 +127,9 @@ void Model::add_ringing_mode(const Mode& mode) {
   const Exact angle = std::sqrt((exact_omega - exact_d) * (exact_omega + exact_d)) * period, size = std::exp(-exact_d * period);
   turn.block_re[lane] = static_cast<double>(size * std::cos(angle));
   turn.block_im[lane] = static_cast<double>(size * std::sin(angle));
-  for (int q = 1; q < kSubBlocks; ++q) {
-    turn.sub_blocks_re[q - 1][lane] = static_cast<float>(answer(q * kSubBlock).real());
-    turn.sub_blocks_im[q - 1][lane] = static_cast<float>(answer(q * kSubBlock).imag());
+  for (int i = 0; i < 3; ++i) {
+    turn.columns_re[i][lane] = static_cast<float>(answer(kColumn << i).real());
+    turn.columns_im[i][lane] = static_cast<float>(answer(kColumn << i).imag());
   }
   StrikeTable& strike = strike_.back();
   strike.turn_re[lane] = static_cast<float>(answer(1.0).real());

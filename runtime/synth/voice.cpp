@@ -152,7 +152,7 @@ void Voice::add_acting(std::int64_t sample, int sub_block, const ContactBlock* d
 
 /// Makes as many groups live as the limit allows; the starts of those that were not are out of date.
 void Voice::wake(int groups) noexcept {
-  for (const int last = std::min(groups, limit_); live_ < last; ++live_) starts_[static_cast<std::size_t>(live_)] = SubBlockStates{};
+  for (const int last = std::min(groups, limit_); live_ < last; ++live_) starts_[static_cast<std::size_t>(live_)] = ColumnStates{};
 }
 
 /// Up to which group a strike can be heard above the floor.
@@ -224,11 +224,10 @@ void Voice::cull() noexcept {
   const double share = silence_pa_ / static_cast<double>(groups_ + 1);
   for (; live_ > 0; --live_) {
     ModeState& state = state_[static_cast<std::size_t>(live_ - 1)];
-    const StrikeTable& table = model_->strike_[static_cast<std::size_t>(live_ - 1)];
+    const auto& weight = model_->weight_[static_cast<std::size_t>(live_ - 1)];
     double bound = 0.0;
     for (int lane = 0; lane < kGroup; ++lane) {
-      const double weight = std::hypot(table.out_re[lane], table.out_im[lane]);
-      bound += weight * std::sqrt(state.re[lane] * state.re[lane] + state.im[lane] * state.im[lane]);
+      bound += static_cast<double>(weight[lane]) * std::sqrt(state.re[lane] * state.re[lane] + state.im[lane] * state.im[lane]);
     }
     if (bound >= share) break;
     state = ModeState{};
@@ -293,7 +292,7 @@ void Voice::reset() noexcept {
 
 std::size_t Voice::calc_bytes() const {
   return sizeof(Voice) + strikes_.calc_bytes() + damped_.calc_bytes() + state_.capacity() * sizeof(ModeState) +
-         starts_.capacity() * sizeof(SubBlockStates) + bounds_.capacity() * sizeof(float) + radiation_.capacity() * sizeof(Radiation);
+         starts_.capacity() * sizeof(ColumnStates) + bounds_.capacity() * sizeof(float) + radiation_.capacity() * sizeof(Radiation);
 }
 
 VoiceCounters Voice::get_counters() const noexcept {

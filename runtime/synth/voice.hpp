@@ -178,9 +178,9 @@ class Voice {
   VoiceCounters counters_;  // without those of strikes_
   StrikeQueue strikes_;
   DampedModes damped_;
-  std::vector<ModeState> state_;        // zero beyond live_
-  std::vector<SubBlockStates> starts_;  // out of date beyond live_, and once a whole block was rendered
-  std::vector<float> bounds_;           // of measure()
+  std::vector<ModeState> state_;      // zero beyond live_
+  std::vector<ColumnStates> starts_;  // out of date beyond live_, and once a whole block was rendered
+  std::vector<float> bounds_;         // of measure()
   PulseBlock touch_;
   alignas(64) std::array<float, kBlock> block_{}, fade_{};
 };
