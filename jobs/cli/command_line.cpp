@@ -4,6 +4,7 @@
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <charconv>
 #include <memory>
 #include <string>
@@ -12,6 +13,7 @@
 #include <vector>
 
 #include "jobs/cli/commands.hpp"
+#include "precompute/job/read_body.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/version/version.hpp"
@@ -165,6 +167,54 @@ void add_gc(CLI::App& app, Shared& shared, Run& run) {
   set_work(*command, shared, run, options, run_gc);
 }
 
+/// The dimensions of all shapes, once each, by carillon-mesh's names.
+std::vector<std::string> list_dimensions() {
+  std::vector<std::string> names;
+  for (const job::ShapeKeys& shape : job::get_shape_keys())
+    for (const std::string& name : shape.dimensions)
+      if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+  return names;
+}
+
+void add_hear(CLI::App& app, Shared& shared, Run& run) {
+  auto options = std::make_shared<HearOptions>();
+  hear::Order& hear = options->hear;
+  CLI::App* command = app.add_subcommand(
+      "hear",
+      "From an object to its sound: meshes it, finds its modes, strikes it in a few places, and writes a WAV, a spectrogram and a report. "
+      "What\nyou do not say (size, solid or wall, material) is assumed, and it says so.");
+  command->add_option("OBJECT", hear.object, "A surface (OBJ, STL, PLY, OFF, glTF, GLB) or a mesh (.msh, .vtu)");
+  command->add_option("--shape", hear.shape, "A parametric body in place of a file, with its dimensions: carillon-mesh --help has them");
+  command->add_option("-o,--output", hear.out, "The folder for all files (default: NAME-sound)");
+  command->add_option("--material", hear.materials, "By name (carillon materials); several with commas, each a sound of its own")
+      ->delimiter(',');
+  command
+      ->add_option("--height", hear.heights_m,
+                   "Makes the object so high, in metres (y is up; of a shape: its dimension); several with commas")
+      ->delimiter(',');
+  command->add_option("--scale", hear.scale, "Metres per unit of the file");
+  command->add_option("--mallet", hear.mallet, "steel, hard-wood, plastic, rubber, hard-felt, soft-felt or yarn")->capture_default_str();
+  command->add_option("--accuracy", hear.accuracy_cents, "Refines until every mode is so near, in cents; without it a preview");
+  command->add_flag("-q,--quiet", hear.is_quiet, "No progress");
+  for (const std::string& name : list_dimensions()) {
+    if (name == "height") continue;
+    command->add_option_function<double>(
+        "--" + name, [options, name](double value) { options->hear.dimensions[name] = value; },
+        name == "wall" ? "Thickness of a shell, in metres; of a surface, or a dimension of a shape" : "A dimension of shapes");
+  }
+  set_work(*command, shared, run, options, run_hear);
+}
+
+void add_materials(CLI::App& app, Shared& shared, Run& run) {
+  auto options = std::make_shared<MaterialsOptions>();
+  CLI::App* command = app.add_subcommand(
+      "materials",
+      "Lists the materials that \"material\" in a job or a scene may name, those of your own file first: $CARILLON_MATERIALS, else\n"
+      "~/.config/carillon/materials.json. With names: all constants and their sources.");
+  command->add_option("NAME", options->names, "These only, in full");
+  set_work(*command, shared, run, options, run_materials);
+}
+
 void add_verify(CLI::App& app, Shared& shared, Run& run) {
   auto options = std::make_shared<VerifyOptions>();
   CLI::App* command = app.add_subcommand(
@@ -268,7 +318,7 @@ Run parse_command_line(int argc, char** argv, Shared& shared) {
   app.add_flag("--json", shared.json, "One JSON document (of commands that keep running: one object a line)");
   app.set_version_flag("--version", version::describe("carillon"));
   for (const auto add : {add_submit, add_status, add_log, add_cancel, add_retry, add_explain, add_run, add_get, add_gc, add_verify,
-                         add_validate, add_study, add_report})
+                         add_validate, add_study, add_report, add_hear, add_materials})
     add(app, shared, run);
   add_attempt(app, run);
   check_command(app, argc, argv);

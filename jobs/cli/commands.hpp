@@ -9,6 +9,7 @@
 #include "jobs/attempt/attempt.hpp"
 #include "jobs/cli/options.hpp"
 #include "jobs/cli/shared.hpp"
+#include "jobs/hear/hear.hpp"
 #include "jobs/queue/run.hpp"
 
 namespace carillon::cli {
@@ -102,6 +103,18 @@ struct ReportOptions {
   bool no_pictures = false;
 };
 int run_report(Shared& shared, const ReportOptions& options);
+
+/// carillon hear: an object, and how it sounds.
+struct HearOptions {
+  hear::Order hear;
+};
+int run_hear(Shared& shared, const HearOptions& options);
+
+/// carillon materials: the materials that can be named.
+struct MaterialsOptions {
+  std::vector<std::string> names;  // empty: all, a line each
+};
+int run_materials(Shared& shared, const MaterialsOptions& options);
 
 /// carillon attempt: one attempt at one job. It needs neither registry nor profile.
 struct AttemptOptions {

@@ -23,10 +23,13 @@ Html make_tiles(const Subject& subject) {
   const bank::Bank& bank = subject.bank;
   Html out = make_tile("Modes", html("{}", format_count(static_cast<std::int64_t>(bank.mode_count()))),
                        fmt::format("{} to {} Hz", format_plain(bank.band_hz[0]), format_plain(bank.band_hz[1])));
-  const std::vector<double>& bars = bank.discretisation_error_cents;
+  const bool is_corrected = !bank.corrected.is_empty();
+  const std::vector<double>& bars = is_corrected ? bank.corrected.error_cents : bank.discretisation_error_cents;
   const auto worst = std::max_element(bars.begin(), bars.end());
   out += make_tile("Error bar", worst == bars.end() ? html("-") : html("{}", format_cents(*worst)),
-                   worst == bars.end() ? "not known" : "body, worst mode");
+                   worst == bars.end() ? "not known"
+                   : is_corrected      ? "body, worst mode, corrected"
+                                       : "body, worst mode");
   const auto residual = std::max_element(bank.residual.begin(), bank.residual.end());
   out += make_tile("Residual", residual == bank.residual.end() ? html("-") : html("{:.1e}", *residual), "worst mode");
   const auto seconds = find_run_seconds(subject);
@@ -42,14 +45,18 @@ Html make_tiles(const Subject& subject) {
 
 /// How wrong the frequencies can be, the worst of all modes, without a full stop.
 std::string describe_bars(const bank::Bank& bank) {
-  const auto find_worst = [](const std::vector<double>& bars) { return format_cents(*std::max_element(bars.begin(), bars.end())); };
+  const auto find_worst = [](const std::vector<double>& bars) { return *std::max_element(bars.begin(), bars.end()); };
   if (bank.mode_count() == 0) return "There are no frequencies that could be wrong";
-  std::string text = bank.algebraic_error_cents.empty()
-                         ? "There are no bounds against the mesh"
-                         : fmt::format("Frequencies are those of the mesh to {} (a bound)", find_worst(bank.algebraic_error_cents));
-  return text + (bank.discretisation_error_cents.empty()
-                     ? ", and no estimates against the body"
-                     : fmt::format(", and those of the body to about {} (an estimate)", find_worst(bank.discretisation_error_cents)));
+  std::string text = bank.algebraic_error_cents.empty() ? "There are no bounds against the mesh"
+                                                        : fmt::format("Frequencies are those of the mesh to {} (a bound)",
+                                                                      format_cents(find_worst(bank.algebraic_error_cents)));
+  const bool is_corrected = !bank.corrected.is_empty();
+  const std::vector<double>& bars = is_corrected ? bank.corrected.error_cents : bank.discretisation_error_cents;
+  if (bars.empty()) return text + ", and no estimates against the body";
+  if (const double worst = find_worst(bars); std::isfinite(worst))
+    return text +
+           fmt::format(", and {}those of the body to about {} (an estimate)", is_corrected ? "corrected ones " : "", format_cents(worst));
+  return text + ", and not all of them have an estimate against the body";
 }
 
 Html make_warnings(const Subject& subject) {

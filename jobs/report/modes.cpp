@@ -27,7 +27,7 @@ double calc_cents(const bank::Bank& bank, std::size_t mode) {
 std::string format_small(double value) { return fmt::format("{:.1e}", value); }
 
 Html make_cents(const std::vector<double>& cents, std::size_t mode) {
-  return mode < cents.size() ? html("{:.2g}", cents[mode]) : html("-");
+  return mode < cents.size() && std::isfinite(cents[mode]) ? html("{:.2g}", cents[mode]) : html("-");
 }
 
 std::string name_mode(const bank::Bank& bank, std::size_t mode) {
@@ -72,25 +72,32 @@ Series make_series(const bank::Bank& bank, const char* name, int colour, const s
 
 Html make_mode_table(const bank::Bank& bank) {
   Table table({{"mode", true},
-               {"frequency [Hz]", true},
+               {"frequency of the mesh [Hz]", true},
                {"\u00b1 mesh [cent]", true},
                {"\u00b1 body [cent]", true},
+               {"corrected [Hz]", true},
+               {"\u00b1 body [cent]", true},
+               {"correction"},
                {"decay [1/s]", true},
                {"T60 [s]", true},
                {"residual", true},
                {"gain", true}});
   const std::size_t shown = std::min(kMaxRows, bank.mode_count());
+  const bool is_corrected = !bank.corrected.is_empty();
   for (std::size_t i = 0; i < shown; ++i) {
     table.add({html("{}", i + 1), html("{:.2f}", bank.freq_hz(i)), make_cents(bank.algebraic_error_cents, i),
-               make_cents(bank.discretisation_error_cents, i), html("{:.4g}", bank.decay_per_s[i]), html("{:.3g}", calc_t60_s(bank, i)),
-               html("{:.1e}", bank.residual[i]), html("{:.4g}", bank.radiation_gain[i])});
+               make_cents(bank.discretisation_error_cents, i), is_corrected ? html("{:.2f}", bank.corrected.freq_hz[i]) : html("-"),
+               make_cents(bank.corrected.error_cents, i), html("{}", is_corrected ? bank::describe(bank.corrected.correction[i]) : "-"),
+               html("{:.4g}", bank.decay_per_s[i]), html("{:.3g}", calc_t60_s(bank, i)), html("{:.1e}", bank.residual[i]),
+               html("{:.4g}", bank.radiation_gain[i])});
   }
   Html out = table.finish();
   if (shown < bank.mode_count())
     out += html("<p class=\"remark\">The first {} of {} modes; carillon-bank info --json has them all.</p>\n", shown, bank.mode_count());
   return html(
       "<details><summary>All modes in numbers</summary>\n{}<p class=\"remark\">Frequencies are undamped. \u00b1 mesh: to the exact mode of "
-      "the mesh, a bound; \u00b1 body: to the mode of the body, an estimate; gain: Pa at 1 m for unit modal velocity.</p>\n</details>\n",
+      "the mesh, a bound; \u00b1 body: to the mode of the body, an estimate; corrected: with the estimated error of the mesh taken off, "
+      "which is played; gain: Pa at 1 m for unit modal velocity.</p>\n</details>\n",
       out);
 }
 
@@ -103,7 +110,12 @@ Html find_largest(const std::vector<double>& values, const bank::Bank& bank, std
 /// Both error bars over the frequency; bounds that are negligible against the estimates only in words.
 Html draw_errors(const bank::Bank& bank) {
   constexpr double kNothing = 1e-3;
-  const auto find_worst = [](const std::vector<double>& bars) { return bars.empty() ? 0.0 : *std::max_element(bars.begin(), bars.end()); };
+  const auto find_worst = [](const std::vector<double>& bars) {
+    double worst = 0.0;
+    for (const double cents : bars)
+      if (std::isfinite(cents)) worst = std::max(worst, cents);
+    return worst;
+  };
   const double body = find_worst(bank.discretisation_error_cents), mesh = find_worst(bank.algebraic_error_cents);
   Scatter chart{.title = "Error bars by frequency",
                 .x = make_frequency_axis(),
@@ -111,6 +123,8 @@ Html draw_errors(const bank::Bank& bank) {
                 .series = {},
                 .lines = {}};
   if (body > 0.0) chart.series.push_back(make_series(bank, "body (estimate)", 0, bank.discretisation_error_cents, format_cents));
+  if (find_worst(bank.corrected.error_cents) > 0.0)
+    chart.series.push_back(make_series(bank, "body, corrected", 2, bank.corrected.error_cents, format_cents));
   if (mesh > kNothing * body) chart.series.push_back(make_series(bank, "mesh (bound)", 1, bank.algebraic_error_cents, format_cents));
   Html out = draw_scatter(chart);
   if (body > 0.0 && mesh > 0.0 && mesh <= kNothing * body)
@@ -190,6 +204,8 @@ Html make_error_section(const Subject& subject) {
   Facts facts;
   if (const Html worst = find_largest(bank.discretisation_error_cents, bank, format_cents); !worst.empty())
     facts.add("body, largest", worst, "how far the mode of the body may be: an estimate");
+  if (const Html worst = find_largest(bank.corrected.error_cents, bank, format_cents); !worst.empty())
+    facts.add("corrected, largest", worst, "how far it may be from the corrected frequency: an estimate");
   if (const Html worst = find_largest(bank.algebraic_error_cents, bank, format_cents); !worst.empty())
     facts.add("mesh, largest", worst, "how far the exact mode of this mesh may be: a bound");
   if (const auto asked = find_amount(subject.record.job, "accuracy_cents")) facts.add("asked for", html("{} cent", format_plain(*asked)));

@@ -38,6 +38,7 @@ std::string format_seconds(double seconds) {
 std::string format_hz(double freq_hz) { return fmt::format("{:.2f} Hz", freq_hz); }
 
 std::string format_cents(double cents) {
+  if (!std::isfinite(cents)) return "unknown";  // a list too short for a bar
   return std::abs(cents) >= 9.95 && std::abs(cents) < 1e7 ? fmt::format("{:.0f} cent", cents) : fmt::format("{:.2g} cent", cents);
 }
 

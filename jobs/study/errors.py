@@ -7,11 +7,11 @@ class InputError(Exception):
 
 
 class RunError(Exception):
-    """A run that failed, with its exit code."""
+    """A run that failed, with its exit code. possible_nodes: of a mesh, a count of nodes that can be met, where another was asked for."""
 
-    def __init__(self, code, text):
+    def __init__(self, code, text, possible_nodes=None):
         super().__init__(text)
-        self.code = code
+        self.code, self.possible_nodes = code, possible_nodes
 
 
 def printable(text):

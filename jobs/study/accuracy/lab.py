@@ -47,6 +47,8 @@ class Solve:
     algebraic_cents: list
     discretisation_cents: list
     residual: list
+    corrected_hz: list  # in the order of freq_hz: not ascending where modes change places
+    corrected_cents: list
     nodes: int
     unknowns: int
     elements: int
@@ -159,13 +161,17 @@ class Lab:
                     change(part)
                     kept = {"nodes": base.nodes, "elements": base.elements, "cpu_s": base.cpu_s}
                 else:
-                    cost = self.call([program, *words, "--quiet", "--json", part.with_suffix(".json"), "-o", part], "carillon-mesh")
+                    files = ["--json", part.with_suffix(".json"), "--result", part.with_suffix(".result"), "-o", part]
+                    cost = self.call([program, *words, "--quiet", *files], "carillon-mesh")
                     made = json.loads(part.with_suffix(".json").read_text())
                     kept = {"nodes": made["nodes"], "elements": made["tets"], "cpu_s": cost.cpu_s}
                 os.replace(part, mesh)
+            except RunError as error:
+                result = read_kept(part.with_suffix(".result")) or {}
+                raise RunError(error.code, str(error), result.get("possible_nodes")) from None
             finally:
-                part.unlink(missing_ok=True)
-                part.with_suffix(".json").unlink(missing_ok=True)
+                for path in (part, part.with_suffix(".json"), part.with_suffix(".result")):
+                    path.unlink(missing_ok=True)
             write_whole(note, json.dumps({"words": words, "change": name} | kept, indent=1) + "\n")
         return Mesh(mesh, kept["nodes"], kept["elements"], kept["cpu_s"])
 
@@ -252,7 +258,14 @@ class Lab:
             raise RunError(4, f"{bank}: {child.stderr.strip()}")
         content = json.loads(child.stdout)
         record = json.loads(pathlib.Path(f"{bank}.resolved.json").read_text())["run"]
-        columns = ("frequency_hz", "algebraic_error_cents", "discretisation_error_cents", "residual")
+        columns = (
+            "frequency_hz",
+            "algebraic_error_cents",
+            "discretisation_error_cents",
+            "residual",
+            "corrected_frequency_hz",
+            "corrected_error_cents",
+        )
         return {
             "modes": [[mode[column] for column in columns] for mode in content["modes"]],
             "record": record,
@@ -262,8 +275,8 @@ class Lab:
 
     def make_solve(self, kept, key, repeats):
         if kept.get("error"):
-            return Solve([], [], [], [], [], [], 0, 0, 0, self.runs / key / "bank.hdf", {}, kept["error"])
-        columns = list(map(list, zip(*kept["modes"]))) or [[], [], [], []]
+            return Solve([], [], [], [], [], [], [], [], 0, 0, 0, self.runs / key / "bank.hdf", {}, kept["error"])
+        columns = list(map(list, zip(*kept["modes"]))) or [[], [], [], [], [], []]
         return Solve(
             kept["cpu_s"][:repeats],
             kept["wall_s"][:repeats],

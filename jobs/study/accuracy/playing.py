@@ -10,6 +10,7 @@ NAME, TITLE = "playing", "Playing: what each knob of the runtime costs and buys"
 PROGRAMS = banks.PROGRAMS
 EFFECTS = ("modal", "hertz_pulse", "roughness", "rolling", "contact_damping", "acceleration_noise", "air_delay", "doppler", "two_ears")
 INSTRUCTIONS = ("plain", "sse2", "avx2", "avx512")
+SOUND_SPEED = 343.0  # m/s
 # The strictest thresholds of effect selection that a scene may set, and the most accurate: the reference of what selection leaves out.
 STRICTEST = {"planner_db": -150, "quiet_db": 250, "silence_pa": 1e-15, "lead_s": 0.2}
 SOFT_DB = 40.0  # a blow that is just heard in a living room
@@ -233,12 +234,29 @@ def measure_fall(lab, scene, steps=(2.5e-4, 1e-4)):
 # --- the kernel against the closed form
 
 
+def calc_sphere_gain(freq_hz, corners):
+    """What the gain of a pulsating sphere of the surface's area has of the frequency, but for a constant (Pierce 1981, section 4.1)."""
+    area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
+    return freq_hz / np.hypot(1, 2 * np.pi * freq_hz / SOUND_SPEED * np.sqrt(area / (4 * np.pi)))
+
+
 def calc_closed_form(bank, strikes, rate_hz, samples):
     """Pressure at 1 m of ideal blows in double precision, without the runtime's tables: sum g (phi . J) e^(-d t) (cos w_d t - d / w_d sin
     w_d t)."""
-    names = ("mesh/triangles", "modes/eigenvalue", "modes/decay", "modes/radiation_gain", "modes/shape_scale", "modes/shape")
+    names = (
+        "mesh/vertices",
+        "mesh/triangles",
+        "modes/frequency_hz",
+        "modes/corrected_frequency_hz",
+        "modes/corrected_decay",
+        "modes/radiation_gain",
+        "modes/shape_scale",
+        "modes/shape",
+    )
     arrays = sounds.read_arrays(bank, set(names))
-    triangles, eigenvalue, decay, gain, scale, shape = (arrays[name] for name in names)
+    vertices, triangles, mesh_hz, freq_hz, decay, gain, scale, shape = (arrays[name] for name in names)
+    eigenvalue = (2 * np.pi * freq_hz) ** 2
+    gain = gain * calc_sphere_gain(freq_hz, vertices[triangles]) / calc_sphere_gain(mesh_hz, vertices[triangles])
     heard = (np.sqrt(eigenvalue) < np.pi * rate_hz) & (decay < 0.9 * np.sqrt(eigenvalue))
     pressure = np.zeros(samples)
     for strike in strikes:

@@ -1,0 +1,89 @@
+// carillon hear: an object, and how it sounds.
+#include "jobs/hear/hear.hpp"
+
+#include <fmt/core.h>
+
+#include <cmath>
+
+#include "jobs/cli/commands.hpp"
+
+namespace carillon::cli {
+namespace {
+
+Json::Value describe(const hear::Sound& sound) {
+  Json::Value entry;
+  entry["name"] = to_json(sound.name);
+  entry["material"] = to_json(sound.material);
+  entry["height_m"] = sound.height_m > 0.0 ? Json::Value(sound.height_m) : Json::Value();
+  for (const auto& [key, file] :
+       {std::pair{"bank", &sound.bank}, {"scene", &sound.scene}, {"wav", &sound.wav}, {"spectrogram", &sound.spectrogram}})
+    entry[key] = to_json(file->string());
+  entry["is_scaled"] = sound.is_edited;
+  entry["mode_count"] = Json::UInt64(sound.mode_count);
+  entry["worst_cents"] = std::isfinite(sound.worst_cents) ? Json::Value(sound.worst_cents) : Json::Value();
+  entry["modes"] = Json::arrayValue;
+  for (const hear::HeardMode& mode : sound.modes) {
+    Json::Value& one = entry["modes"].append(Json::objectValue);
+    one["freq_hz"] = mode.freq_hz;
+    one["t60_s"] = std::isfinite(mode.t60_s) ? Json::Value(mode.t60_s) : Json::Value();
+    one["error_cents"] = std::isfinite(mode.error_cents) ? Json::Value(mode.error_cents) : Json::Value();
+    one["level_dba"] = std::isfinite(mode.level_dba) ? Json::Value(mode.level_dba) : Json::Value();
+  }
+  return entry;
+}
+
+void print(const hear::Sound& sound) {
+  fmt::print("\n{}: {} modes, {}{}\n", show(sound.name), sound.mode_count,
+             std::isfinite(sound.worst_cents)
+                 ? fmt::format("frequencies to about {:.2g} cents (an estimate; the worst mode)", sound.worst_cents)
+                 : std::string("without error bars"),
+             sound.is_edited ? "; scaled from another solve" : "");
+  fmt::print("{:>5} {:>10} {:>8} {:>9} {:>9}\n", "mode", "Hz", "+-cents", "T60 [s]", "dB(A)");
+  for (std::size_t m = 0; m < sound.modes.size(); ++m) {
+    const hear::HeardMode& mode = sound.modes[m];
+    fmt::print("{:>5} {:>10.1f} {:>8} {:>9.3g} {:>9}\n", m + 1, mode.freq_hz,
+               std::isfinite(mode.error_cents) ? fmt::format("{:.2g}", mode.error_cents) : "-", mode.t60_s,
+               std::isfinite(mode.level_dba) ? fmt::format("{:.0f}", mode.level_dba) : "-");
+  }
+  fmt::print("sound        {}\nspectrogram  {}\n", show(sound.wav.string(), 1000), show(sound.spectrogram.string(), 1000));
+}
+
+}  // namespace
+
+int run_hear(Shared& shared, const HearOptions& options) {
+  hear::Order wanted = options.hear;
+  wanted.is_quiet = wanted.is_quiet || shared.json;
+  if (wanted.shape.empty()) {
+    if (const auto wall = wanted.dimensions.find("wall"); wall != wanted.dimensions.end()) {
+      wanted.wall_m = wall->second;
+      wanted.dimensions.erase(wall);
+    }
+    if (!wanted.dimensions.empty())
+      throw InputError(fmt::format("--{} is a dimension of a shape; leave it out, or give --shape", wanted.dimensions.begin()->first));
+  } else if (wanted.heights_m.size() == 1) {
+    wanted.dimensions["height"] = wanted.heights_m[0];
+    wanted.heights_m.clear();
+  }
+  const hear::Heard heard = hear::hear(wanted);
+  if (shared.json) {
+    Json::Value root;
+    root["folder"] = to_json(heard.folder.string());
+    root["page"] = to_json(heard.page.string());
+    root["assumed"] = to_json(heard.assumed);
+    for (const double x : heard.extent_m) root["extent_m"].append(x);
+    root["sounds"] = Json::arrayValue;
+    for (const hear::Sound& sound : heard.sounds) root["sounds"].append(describe(sound));
+    root["seconds"] = heard.seconds;
+    print_json(root);
+    return 0;
+  }
+  for (const std::string& line : heard.assumed) fmt::print("assumed      {}\n", show(line, 1000));
+  fmt::print("body         {:.3g} x {:.3g} x {:.3g} m\n", heard.extent_m[0], heard.extent_m[1], heard.extent_m[2]);
+  for (const hear::Sound& sound : heard.sounds) print(sound);
+  fmt::print("\nreport       {}\n{:.1f} s{}\n", show(heard.page.string(), 1000), heard.seconds,
+             wanted.accuracy_cents ? "" : "; a preview: --accuracy 10 refines it to 10 cents");
+  if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
+  return 0;
+}
+
+}  // namespace carillon::cli

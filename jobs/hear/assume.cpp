@@ -1,0 +1,104 @@
+#include "jobs/hear/assume.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+
+namespace carillon::hear {
+namespace {
+
+// Objects that people strike: from a ring to a table.
+constexpr double kSmallestM = 0.005, kLargestM = 3.0;
+constexpr double kLeastM = 0.001, kMostM = 100.0;  // whatever was asked for
+constexpr double kThinnestWall = 1.0 / 5000;       // of the body's largest extent
+constexpr double kNormalisedM = 0.15;              // what a model without a unit is made
+
+struct Unit {
+  const char* name;
+  double metres;
+  double max;  // of the largest extent in it: what is larger was likely given in the next unit
+};
+constexpr Unit kUnits[] = {{"metres", 1.0, kLargestM}, {"centimetres", 0.01, 30.0}, {"millimetres", 0.001, 1000.0 * kLargestM}};
+
+std::string format_extent(const std::array<double, 3>& extent, double scale) {
+  return fmt::format("{:.3g} x {:.3g} x {:.3g} m", extent[0] * scale, extent[1] * scale, extent[2] * scale);
+}
+
+/// From -1 to 1, or from 0 to 1: what programs make that scale to a unit of their own.
+bool is_normalised(double largest) { return std::abs(largest - 1.0) < 1e-3 || std::abs(largest - 2.0) < 1e-3; }
+
+bool is_gltf(const std::filesystem::path& file) {
+  std::string ending = file.extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return std::tolower(c); });
+  return ending == ".glb" || ending == ".gltf";
+}
+
+double guess_scale(const Order& options, const SurfaceFacts& look, std::vector<std::string>& assumed) {
+  const double largest = *std::max_element(look.extent.begin(), look.extent.end());
+  const std::string file = options.object.filename().string();
+  if (is_gltf(options.object)) {  // in metres by its specification
+    if (largest < kSmallestM || largest > kLargestM)
+      throw InputError(
+          fmt::format("{}: it is {:.4g} m across, since glTF is in metres, which is the size of nothing one strikes; give its --height in "
+                      "metres, or --scale",
+                      options.object.string(), largest));
+    assumed.push_back(fmt::format("size: {}, since glTF is in metres; --height says otherwise", format_extent(look.extent, 1.0)));
+    return 1.0;
+  }
+  if (is_normalised(largest)) {
+    const double scale = kNormalisedM / largest;
+    assumed.push_back(
+        fmt::format("size: {} is {:g} units across, which is no unit of length: it is made {:g} m ({}); --height or --scale says otherwise",
+                    file, largest, kNormalisedM, format_extent(look.extent, scale)));
+    return scale;
+  }
+  for (const Unit& unit : kUnits) {
+    if (largest > unit.max || largest * unit.metres < kSmallestM) continue;
+    assumed.push_back(fmt::format(
+        "size: {}, since {} is {:.4g} units across, which are taken for {}; --scale ({}) or --height says otherwise",
+        format_extent(look.extent, unit.metres), file, largest, unit.name, unit.metres == 1.0 ? "0.001 for millimetres" : "1 for metres"));
+    return unit.metres;
+  }
+  throw InputError(
+      fmt::format("{}: it is {:.4g} units across, which is the size of nothing one strikes in metres, centimetres or millimetres; give its "
+                  "--height in metres, or --scale, metres per unit",
+                  options.object.string(), largest));
+}
+
+}  // namespace
+
+double find_scale(const Order& options, const SurfaceFacts& look, double height_m, std::vector<std::string>& assumed) {
+  const double largest = *std::max_element(look.extent.begin(), look.extent.end());
+  if (!(largest > 0.0)) throw InputError(fmt::format("{}: all its points are one; check the file", options.object.string()));
+  if (height_m > 0.0 && !(look.extent[1] > 0.0))
+    throw InputError(fmt::format("{}: it is flat across y, along which --height is measured; give --scale", options.object.string()));
+  const double scale = height_m > 0.0 ? height_m / look.extent[1] : options.scale ? *options.scale : guess_scale(options, look, assumed);
+  if (!(scale * largest >= kLeastM && scale * largest <= kMostM))
+    throw InputError(fmt::format("{}: it would be {:.3g} m across; bodies of {:g} to {:g} m are heard, check {}", options.object.string(),
+                                 scale * largest, kLeastM, kMostM, height_m > 0.0 ? "--height (metres)" : "--scale (metres per unit)"));
+  return scale;
+}
+
+void check_wall(const Order& options, const SurfaceFacts& look, double scale) {
+  const double smallest = scale * *std::min_element(look.extent.begin(), look.extent.end());
+  if (!options.wall_m) {
+    if (look.openings > 0)
+      throw InputError(
+          fmt::format("{}: it is an open surface ({} border{}), which has no thickness; say how thick it is, in metres: --wall 0.002",
+                      options.object.string(), look.openings, look.openings == 1 ? "" : "s"));
+    return;
+  }
+  if (*options.wall_m < kThinnestWall * scale * *std::max_element(look.extent.begin(), look.extent.end()))
+    throw InputError(fmt::format("{}: a wall of {:g} m is thinner than a {:.0f}th of the body; --wall is in metres",
+                                 options.object.string(), *options.wall_m, 1.0 / kThinnestWall));
+  if (look.openings == 0 && 2.0 * *options.wall_m >= smallest)
+    throw InputError(
+        fmt::format("{}: a wall of {:g} m is thicker than half the body, which is {:.3g} m across where it is thinnest; give a thinner one "
+                    "(metres), or "
+                    "leave --wall out for a solid body",
+                    options.object.string(), *options.wall_m, smallest));
+}
+
+}  // namespace carillon::hear

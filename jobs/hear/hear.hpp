@@ -1,0 +1,63 @@
+// From an object to its sound in one call: mesh, modes, a scene of a few strikes, WAV, spectrogram, and a table of the first modes.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "runtime/base/error.hpp"
+
+namespace carillon::hear {
+
+struct Order {
+  std::filesystem::path object;              // a surface (OBJ, STL, PLY, OFF, glTF) or a mesh (.msh, .vtu, .mesh); empty: a shape
+  std::string shape;                         // of carillon-mesh --shape
+  std::map<std::string, double> dimensions;  // of the shape, by its names ("outer-radius")
+  std::optional<double> wall_m;              // a shell of this thickness
+  std::optional<double> scale;               // metres per unit of the file
+  std::vector<double> heights_m;             // the object is made so high (up: y); several: one after the other
+  std::vector<std::string> materials;        // names; empty: kDefaultMaterial
+  std::string mallet = "hard-wood";
+  std::optional<double> accuracy_cents;  // none: a preview
+  std::filesystem::path out;             // folder; empty: NAME-sound here
+  bool is_quiet = false;                 // no progress on standard error
+};
+
+inline constexpr const char* kDefaultMaterial = "steel";
+
+/// One mode as it is heard at the first strike.
+struct HeardMode {
+  double freq_hz = 0.0, t60_s = 0.0;
+  double error_cents = 0.0;  // infinite: unknown
+  double level_dba = 0.0;    // of its beginning, below that of the loudest
+};
+
+/// What came of one material and height.
+struct Sound {
+  std::string name;  // "cup-steel-0.1m"
+  std::string material;
+  double height_m = 0.0;  // 0: as the file has it
+  std::filesystem::path bank, scene, wav, spectrogram;
+  std::vector<HeardMode> modes;  // the first ones
+  std::size_t mode_count = 0;
+  double worst_cents = 0.0;  // the widest error bar
+  bool is_edited = false;    // of another solve, by scaling
+};
+
+struct Heard {
+  std::filesystem::path folder, page;  // page: report.html of the first sound
+  std::vector<std::string> assumed;    // what was not said and is taken, a sentence each
+  std::array<double, 3> extent_m{};    // of the first sound's body
+  std::vector<Sound> sounds;
+  double seconds = 0.0;  // by the clock
+};
+
+/// Meshes, solves, plays. Files go to options.out, each whole or not at all. Throws InputError (a sentence with the remedy), SolveError,
+/// SystemError; what the programs that it starts refuse is thrown with their message.
+Heard hear(const Order& options);
+
+}  // namespace carillon::hear

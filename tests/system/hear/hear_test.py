@@ -1,0 +1,257 @@
+#!/usr/bin/python3
+"""carillon hear from outside: a ball against Lamb's theory, sounds against the modes that they are made of, sweeps against fresh solves and
+scaling laws, and the mistakes of a newcomer.
+
+Finds the programs in $CARILLON_BIN_DIR.
+"""
+import json
+import math
+import os
+import pathlib
+import struct
+import subprocess
+import tempfile
+import unittest
+import wave
+
+import numpy
+
+BIN = pathlib.Path(os.environ["CARILLON_BIN_DIR"])
+
+
+def make_ball(radius, levels):
+    """OFF: an octahedron divided `levels` times, its points on the sphere."""
+    points = [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)]
+    faces = [(0, 2, 4), (2, 1, 4), (1, 3, 4), (3, 0, 4), (2, 0, 5), (1, 2, 5), (3, 1, 5), (0, 3, 5)]
+    for _ in range(levels):
+        middles, finer = {}, []
+
+        def middle(a, b):
+            key = min(a, b), max(a, b)
+            if key not in middles:
+                p = [(x + y) / 2 for x, y in zip(points[a], points[b])]
+                points.append(tuple(x / math.dist(p, (0, 0, 0)) for x in p))
+                middles[key] = len(points) - 1
+            return middles[key]
+
+        for a, b, c in faces:
+            ab, bc, ca = middle(a, b), middle(b, c), middle(c, a)
+            finer += [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+        faces = finer
+    lines = [f"OFF\n{len(points)} {len(faces)} 0"]
+    lines += [" ".join(f"{radius * x:.9g}" for x in p) for p in points] + ["3 %d %d %d" % f for f in faces]
+    return "\n".join(lines) + "\n"
+
+
+def make_cup(scale=1.0, sides=32, rows=8):
+    """OBJ: a cylinder with a bottom and no lid, 80 mm high."""
+    lines, at = [], lambda i, j: 1 + j * sides + i % sides
+    for j in range(rows + 1):
+        for i in range(sides):
+            turn = 2 * math.pi * i / sides
+            lines.append(f"v {scale * 0.035 * math.cos(turn)} {scale * 0.08 * j / rows} {scale * 0.035 * math.sin(turn)}")
+    lines.append("v 0 0 0")
+    for j in range(rows):
+        for i in range(sides):
+            lines += [f"f {at(i, j)} {at(i + 1, j + 1)} {at(i + 1, j)}", f"f {at(i, j)} {at(i, j + 1)} {at(i + 1, j + 1)}"]
+    lines += [f"f {len(lines[: sides * (rows + 1)]) + 1} {at(i, 0)} {at(i + 1, 0)}" for i in range(sides)]
+    return "\n".join(lines) + "\n"
+
+
+def make_glb(off):
+    """A GLB file of the triangles of an OFF text."""
+    words = off.split()
+    points, faces = int(words[1]), int(words[2])
+    numbers = words[4 : 4 + 3 * points]
+    corners = words[4 + 3 * points :]
+    binary = struct.pack(f"<{3 * points}f", *map(float, numbers))
+    binary += b"".join(struct.pack("<3I", *map(int, corners[4 * f + 1 : 4 * f + 4])) for f in range(faces))
+    content = {
+        "asset": {"version": "2.0"},
+        "buffers": [{"byteLength": len(binary)}],
+        "bufferViews": [{"buffer": 0, "byteLength": 12 * points}, {"buffer": 0, "byteOffset": 12 * points, "byteLength": 12 * faces}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": points, "type": "VEC3"},
+            {"bufferView": 1, "componentType": 5125, "count": 3 * faces, "type": "SCALAR"},
+        ],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "nodes": [{"mesh": 0}],
+        "scenes": [{"nodes": [0]}],
+    }
+    text = json.dumps(content).encode()
+    text += b" " * (-len(text) % 4)
+    header = struct.pack("<III", 2, 28 + len(text) + len(binary), len(text))
+    return b"glTF" + header + b"JSON" + text + struct.pack("<I", len(binary)) + b"BIN\0" + binary
+
+
+def read_wave(path):
+    """(rate, samples of both ears in the middle) of a WAV of 24 bits."""
+    with wave.open(str(path)) as file:
+        rate, channels, raw = file.getframerate(), file.getnchannels(), file.readframes(file.getnframes())
+        assert file.getsampwidth() == 3
+    bytes_ = numpy.frombuffer(raw, "u1").reshape(-1, 3).astype(numpy.int32)
+    values = bytes_[:, 0] | bytes_[:, 1] << 8 | bytes_[:, 2] << 16
+    return rate, (values - ((values & 0x800000) << 1)).reshape(-1, channels) / 2.0**23
+
+
+class Hear(unittest.TestCase):
+    def setUp(self):
+        self.scratch = tempfile.TemporaryDirectory(prefix="carillon-hear-")
+        self.folder = pathlib.Path(self.scratch.name)
+        self.addCleanup(self.scratch.cleanup)
+
+    def call(self, *words, code=0):
+        run = subprocess.run(
+            [str(BIN / "carillon"), *map(str, words)],
+            cwd=self.folder,
+            capture_output=True,
+            text=True,
+            stdin=subprocess.DEVNULL,
+            timeout=200,
+            env=os.environ | {"HOME": str(self.folder)},
+        )
+        self.assertEqual(run.returncode, code, f"{words}: {run.stdout}{run.stderr}")
+        return run.stdout if code == 0 else run.stderr
+
+    def hear(self, *words):
+        return json.loads(self.call("--json", "hear", *words))
+
+    def refuse(self, *words, contains=()):
+        before = sorted(self.folder.rglob("*.wav"))
+        said = self.call("hear", "-q", *words, code=2).strip()
+        self.assertEqual(len(said.splitlines()), 1, said)
+        for word in contains:
+            self.assertIn(word, said)
+        self.assertEqual(sorted(self.folder.rglob("*.wav")), before)
+
+    def test_a_ball_in_millimetres_sounds_as_lamb_says(self):
+        (self.folder / "ball.off").write_text(make_ball(200, 4))
+        heard = self.hear("ball.off", "--material", "steel")
+        self.assertIn("millimetres", " ".join(heard["assumed"]))
+        self.assertTrue(all(abs(x - 0.4) < 4e-3 for x in heard["extent_m"]), heard["extent_m"])
+        sound = heard["sounds"][0]
+        # The lowest torsional modes, twice five: tan eta = eta (12 - eta^2) / (12 - 5 eta^2), eta = omega R / c_t = 2.50113.
+        speed = math.sqrt(200e9 / (2 * 1.29) / 7850)
+        expected = 2.50113 * speed / (2 * math.pi * 0.2)
+        for mode in sound["modes"][:5]:
+            cents = abs(1200 * math.log2(mode["freq_hz"] / expected))
+            self.assertLess(cents, 5)
+            self.assertLess(cents, mode["error_cents"])
+            self.assertAlmostEqual(mode["t60_s"] * mode["freq_hz"] * 2e-4 * math.pi / math.log(1000), 1, delta=1e-3)
+        rate, samples = read_wave(sound["wav"])
+        self.assertEqual((rate, samples.shape[1]), (48000, 2))
+        self.assertTrue(0.5 < numpy.abs(samples).max() < 1 and numpy.all(numpy.isfinite(samples)))
+        # What is heard are the modes: the strongest line is one of the table.
+        spectrum = numpy.abs(numpy.fft.rfft(samples[: 2 * rate, 0] * numpy.hanning(2 * rate)))
+        strongest = numpy.argmax(spectrum) / 2
+        self.assertLess(min(abs(strongest - mode["freq_hz"]) for mode in sound["modes"]), 2)
+        self.assertTrue(pathlib.Path(sound["spectrogram"]).read_bytes().startswith(b"\x89PNG"))
+        self.assertIn("<h1>ball</h1>", pathlib.Path(heard["page"]).read_text())
+        scene = json.loads(pathlib.Path(sound["scene"]).read_text())
+        self.assertEqual(len(scene["strikes"]), 4)
+        self.assertLess(heard["seconds"], 60)
+
+    def test_a_glb_is_in_metres_and_sounds_as_the_same_off(self):
+        off = make_ball(0.25, 3)
+        (self.folder / "ball.off").write_text(off)
+        (self.folder / "game.glb").write_bytes(make_glb(off))
+        game, plain = self.hear("game.glb", "--material", "glass"), self.hear("ball.off", "--material", "glass")
+        self.assertIn("glTF is in metres", " ".join(game["assumed"]))
+        for one, other in zip(game["sounds"][0]["modes"], plain["sounds"][0]["modes"]):
+            self.assertLess(abs(1200 * math.log2(one["freq_hz"] / other["freq_hz"])), 1)
+        whole = (self.folder / "game.glb").read_bytes()
+        (self.folder / "cut.glb").write_bytes(whole[: len(whole) // 2])
+        self.refuse("cut.glb", contains=("cut.glb", "cut off"))
+        (self.folder / "bent.glb").write_bytes(whole.replace(b'[{"mesh": 0}]', b'[{"skin": 0}]'))
+        self.refuse("bent.glb", contains=("bent.glb", "bones"))
+
+    def test_one_solve_serves_all_that_scales(self):
+        (self.folder / "ball.off").write_text(make_ball(1, 3))
+        heard = self.hear("ball.off", "--material", "brass,titanium,glass", "--height", "0.4,0.8")
+        sounds = {sound["name"]: sound for sound in heard["sounds"]}
+        self.assertEqual(list(sounds), [f"ball-{name}-{height}m" for name in ("brass", "titanium", "glass") for height in ("0.4", "0.8")])
+        # brass and titanium have one Poisson's ratio, glass another.
+        self.assertEqual(sum(not sound["is_scaled"] for sound in heard["sounds"]), 2)
+        first = lambda name: sounds[name]["modes"][0]["freq_hz"]
+        self.assertAlmostEqual(first("ball-brass-0.4m") / first("ball-brass-0.8m"), 2, delta=1e-6)
+        speed = lambda young, density: math.sqrt(young / density)
+        self.assertAlmostEqual(first("ball-titanium-0.4m") / first("ball-brass-0.4m"), speed(110e9, 4500) / speed(100e9, 8500), delta=1e-6)
+        ball = lambda young, poisson, density: 2.50113 * speed(young / (2 + 2 * poisson), density) / (2 * math.pi * 0.2)
+        for name, constants in (("brass", (100e9, 0.34, 8500)), ("glass", (72e9, 0.22, 2500))):
+            self.assertLess(abs(1200 * math.log2(first(f"ball-{name}-0.4m") / ball(*constants))), 8)
+        for sound in heard["sounds"]:
+            self.assertTrue(pathlib.Path(sound["wav"]).stat().st_size > 40000, sound["wav"])
+
+    def test_an_open_cup_needs_a_wall_and_has_a_sound_then(self):
+        (self.folder / "cup.obj").write_text(make_cup())
+        self.refuse("cup.obj", contains=("cup.obj", "open surface (1 border)", "--wall"))
+        heard = self.hear("cup.obj", "--wall", "0.003", "--material", "porcelain", "--mallet", "soft-felt", "-o", "tea")
+        self.assertEqual(heard["sounds"][0]["name"], "cup-porcelain")
+        self.assertGreater(heard["sounds"][0]["mode_count"], 3)
+        self.assertEqual(pathlib.Path(heard["folder"]), self.folder.resolve() / "tea")
+        hard = self.hear("cup.obj", "--wall", "0.003", "--material", "porcelain", "--mallet", "steel", "-o", "hard")
+        brightness = []
+        for one in (heard, hard):
+            rate, samples = read_wave(one["sounds"][0]["wav"])
+            spectrum = numpy.abs(numpy.fft.rfft(samples[: rate // 2, 0])) ** 2
+            brightness.append(numpy.sum(spectrum * numpy.fft.rfftfreq(rate // 2, 1 / rate)) / numpy.sum(spectrum))
+        self.assertGreater(brightness[1], 1.2 * brightness[0], "steel is brighter than felt")
+
+    def test_shapes_wood_and_accuracy(self):
+        heard = self.hear("--shape", "bar", "--length", 0.3, "--width", 0.03, "--thickness", 0.012, "--material", "oak", "--accuracy", 10)
+        sound = heard["sounds"][0]
+        self.assertLessEqual(sound["worst_cents"], 10)
+        # Bending of a slender beam along the grain, E 13.5 GPa; shear of wood takes some of it.
+        beam = 4.73004**2 / (2 * math.pi * 0.3**2) * math.sqrt(13.5e9 * 0.012**2 / 12 / 760)
+        self.assertTrue(0.85 * beam < sound["modes"][0]["freq_hz"] < beam, (sound["modes"][0], beam))
+
+    def test_it_says_what_it_takes_for_granted(self):
+        (self.folder / "ball.off").write_text(make_ball(0.3, 3))
+        said = self.call("hear", "-q", "ball.off")
+        for words in ("taken for metres", "material: steel, since none is given", "body: solid", "a preview", "T60 [s]", "ball-steel.wav"):
+            self.assertIn(words, said)
+        (self.folder / "unit.off").write_text(make_ball(1, 3))
+        self.assertIn("no unit of length", self.call("hear", "-q", "unit.off"))
+
+    def test_mistakes_end_in_a_sentence_with_the_remedy(self):
+        (self.folder / "ball.off").write_text(make_ball(50, 2))
+        (self.folder / "far.off").write_text(make_ball(5e6, 2))
+        (self.folder / "tiny.off").write_text(make_ball(0.001, 3))
+        self.refuse("none.obj", contains=("none.obj", "no such file"))
+        self.refuse(contains=("give an object",))
+        self.refuse("ball.off", "--material", "steele", contains=("--material", 'did you mean "steel"?'))
+        self.refuse("ball.off", "--mallet", "hammer", contains=("--mallet", "soft-felt"))
+        self.refuse("ball.off", "--wall", "0.05", contains=("thicker than half the body", "0.1 m"))
+        self.refuse("ball.off", "--wall", "-1", contains=("--wall",))
+        self.refuse("ball.off", "--wall", "1e-7", contains=("thinner than a 5000th", "metres"))
+        self.refuse("ball.off", "--height", "0", contains=("--height",))
+        self.refuse("ball.off", "--height", "1e9", contains=("1e+09 m across", "--height"))
+        self.refuse("ball.off", "--scale", "1e-9", contains=("--scale",))
+        self.refuse("ball.off", "--height", "0.1", "--scale", "0.001", contains=("exclude each other",))
+        self.refuse("ball.off", "--length", "1", contains=("--length", "--shape"))
+        self.refuse("ball.off", "--material", "steel,steel", contains=("asked for twice",))
+        self.refuse("far.off", contains=("far.off", "--height"))
+        self.refuse("tiny.off", "--scale", "1", "--material", "alumina", contains=("no mode from 20 to 20000 Hz", "larger"))
+        self.refuse("--shape", "bar", "--scale", "1", contains=("--scale",))
+        self.refuse("--shape", "barr", contains=("barr",))
+        (self.folder / "text.obj").write_text("hello\n")
+        self.refuse("text.obj", contains=("text.obj",))
+
+    def test_materials_are_listed_and_a_file_of_your_own_adds_to_them(self):
+        listed = json.loads(self.call("--json", "materials"))["materials"]
+        self.assertGreaterEqual(len(listed), 30)
+        for entry in listed:
+            self.assertTrue(entry["loss_source"] and entry["elasticity_source"], entry)
+        self.assertIn("along the grain", self.call("materials", "oak"))
+        self.assertIn("did you mean", self.call("materials", "ook", code=2))
+        own = self.folder / ".config/carillon/materials.json"
+        own.parent.mkdir(parents=True)
+        own.write_text('{"materials": [{"name": "my bronze", "from": "bronze", "density_kg_m3": 8700}]}')
+        listed = json.loads(self.call("--json", "materials", "my-bronze"))["materials"]
+        self.assertEqual((listed[0]["density_kg_m3"], listed[0]["place"]), (8700, f"{own}:1"))
+        own.write_text('{"materials": [{"name": "my bronze", "from": "bronse"}]}')
+        self.assertIn(f"{own}:1", self.call("materials", code=2))
+
+
+if __name__ == "__main__":
+    unittest.main()
