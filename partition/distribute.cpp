@@ -12,7 +12,7 @@
 
 #include "partition/partition.hpp"
 #include "precompute/comm/exchange.hpp"
-#include "precompute/mesh/faces.hpp"
+#include "precompute/mesh/parts.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::partition {

@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "precompute/comm/exchange.hpp"
-#include "precompute/mesh/faces.hpp"
+#include "precompute/mesh/parts.hpp"
 
 namespace carillon::partition {
 namespace {

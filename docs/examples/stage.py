@@ -75,8 +75,8 @@ class Stage:
         ).stdout
         bank = json.loads(text)
         print(
-            f"  {name}: {bank['element']}, {bank['counts']['nodes']} nodes, {bank['mode_count']} modes, {bank['frequencies_hz'][0]:.2f} Hz"
-            f" and up, {seconds:.1f} s"
+            f"  {name}: {bank['element']}, {bank['counts']['nodes']} nodes, {bank['mode_count']} modes,"
+            f" {bank['corrected_frequencies_hz'][0]:.2f} Hz and up, {seconds:.1f} s"
         )
         return bank
 

@@ -90,6 +90,7 @@ LAW = {
         ["fmt"],
     ),
     "jobs/report": (["runtime/base", "runtime/bank"], ["fmt", "json"]),
+    "jobs/hear": (["runtime/base", "runtime/bank", "runtime/material", "precompute/job", "jobs/report"], ["fmt"]),
     "jobs/slurm": (
         ["runtime/base", "precompute/cost", "jobs/process", "jobs/outcome", "jobs/store", "jobs/registry", "jobs/attempt", "jobs/queue"],
         ["fmt"],
@@ -97,8 +98,11 @@ LAW = {
     "jobs/cli": (
         [
             "runtime/base",
+            "runtime/bank",
+            "runtime/material",
             "runtime/version",
             "precompute/job",
+            "jobs/hear",
             "jobs/process",
             "jobs/store",
             "jobs/registry",
@@ -110,7 +114,7 @@ LAW = {
         ["fmt", "cli", "json"],
     ),
     "precompute/job": (["runtime/base", "runtime/material"], ["fmt", "json"]),
-    "precompute/cost": (["precompute/job"], []),
+    "precompute/cost": (["runtime/material", "precompute/job"], []),
     "precompute/mesh": (["runtime/base"], ["fmt", "xml", "zlib"]),
     "precompute/shapes": (["runtime/base", "precompute/mesh"], ["fmt"]),
     "precompute/mesher": (["runtime/base", "runtime/version", "precompute/mesh", "precompute/shapes"], ["fmt", "cli", "eigen", "cgal"]),
@@ -123,7 +127,16 @@ LAW = {
         ["fmt", "mpi", "petsc"],
     ),
     "precompute/estimate": (
-        ["runtime/base", "precompute/job", "partition", "precompute/mesh", "precompute/comm", "precompute/petsc", "precompute/fem"],
+        [
+            "runtime/base",
+            "runtime/bank",
+            "precompute/job",
+            "partition",
+            "precompute/mesh",
+            "precompute/comm",
+            "precompute/petsc",
+            "precompute/fem",
+        ],
         ["fmt", "mpi", "petsc", "eigen"],
     ),
     "precompute/vtkhdf": (["runtime/base"], ["fmt", "hdf5"]),

@@ -33,7 +33,7 @@ ALLOWED = {
     ("Body", "job", "run"): JOB,
     ("Body", "job", "shapes"): JOB,
     ("Factorisation", "eigen", "job"): JOB,
-    ("Material", "job", "bank"): JOB,
+    ("Material", "bank", "material"): BANK,
     ("Method", "eigen", "job"): JOB,
     ("Counts", "eigen", "bank"): BANK,
     ("Counts", "shapes", "bank"): BANK,

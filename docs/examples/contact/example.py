@@ -59,7 +59,7 @@ def play(stage):
 
     decays = {}
     struck_hz = [
-        tile["frequencies_hz"][i] for i in (0, 2)
+        tile["corrected_frequencies_hz"][i] for i in (0, 2)
     ]  # the second one's still lines go through the corners: it is not struck there, nor touched
     scene = tools.read_json(stage.folder / "lie.json")
     for name, effects in (("touched", scene["effects"]), ("free", ["modal", "hertz_pulse"])):

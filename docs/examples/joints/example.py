@@ -40,7 +40,7 @@ def play_chime(stage):
     for name in TUBES:
         times, places, hits = read_path(stage, "chime", name)
         blows, far = count_blows(hits), 1e3 * numpy.linalg.norm(places - places[0], axis=1).max()
-        hz = banks[name]["frequencies_hz"][0]
+        hz = banks[name]["corrected_frequencies_hz"][0]
         rows.append((name, blows, f"{hz:.1f}", f"{far:.1f}"))
         stage.expect(f"the clapper strikes the {name} tube 1 to 60 times ({blows})", 1 <= blows <= 60)
         stage.expect(f"the {name} tube swings, and its cords keep it ({far:.1f} mm)", 0.1 < far < 100)
@@ -80,7 +80,7 @@ def play_bell(stage):
     stage.expect(f"the pendulum strikes the bell 2 to 60 times ({count_blows(hits)})", 2 <= count_blows(hits) <= 60)
     swing = read_path(stage, "bell", "bell")[1]
     stage.expect("the bell's pole stays on its hinge", (abs(numpy.linalg.norm(swing - [0, 0, 0.08], axis=1) - 0.08) < 1e-5).all())
-    hear(stage, "the bell", samples, rate, bank["frequencies_hz"][0], 0.3)
+    hear(stage, "the bell", samples, rate, bank["corrected_frequencies_hz"][0], 0.3)
     return report
 
 
@@ -98,7 +98,7 @@ def play_bar(stage):
     stage.expect(f"they hold it where they are taut ({1e6 * abs(caught[:, 2]).max():.1f} um off)", abs(caught[:, 2]).max() < 2e-5)
     print(f"  the mallet strikes at {first:.4f} s, {count_blows(hits)} blows")
     stage.expect(f"the mallet strikes the bar 1 to 60 times ({count_blows(hits)})", 1 <= count_blows(hits) <= 60)
-    hear(stage, "the bar", samples[int(first * rate) :], rate, bank["frequencies_hz"][0], 0.3)
+    hear(stage, "the bar", samples[int(first * rate) :], rate, bank["corrected_frequencies_hz"][0], 0.3)
     return report
 
 

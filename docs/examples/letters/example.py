@@ -37,6 +37,7 @@ def make_scene(word, duration_s):
         x += (width + 1.5) * SQUARE_M
     return {
         "radiation": "osg02",
+        "frequencies": "mesh",
         "duration_s": duration_s,
         "ground": {"height_m": -0.06},
         "bodies": bodies,
@@ -57,6 +58,7 @@ def play(stage):
     struck = {
         "radiation": "osg02",
         "duration_s": 0.6 * len(base) + 0.1,
+        "frequencies": "mesh",  # as the paper plays its letters: coarse, and as sharp as their meshes make them
         "listener": {"position_m": [0, -1.2, 0]},
         "bodies": [{"name": letter, "bank": f"{letter}.hdf", "fixed": True} for letter in base],
         "strikes": [

@@ -98,6 +98,7 @@ def play(stage):
             # Radiation as OSG02 has it: the ball's lowest mode is torsion, and really makes no sound.
             scene = {
                 "radiation": "osg02",
+                "frequencies": "mesh",  # the formula is about those
                 "duration_s": 1.0,
                 "bodies": [{"name": body, "bank": f"{body}-{name}.hdf", "fixed": True}],
                 "strikes": [{"time_s": 0.05, "body": body, "point_m": [size * x for x in point], "impulse_n_s": [-0.05, 0.02, -0.05]}],

@@ -15,6 +15,7 @@
 #include <exception>
 #include <iterator>
 #include <memory>
+#include <numbers>
 #include <set>
 #include <stdexcept>
 #include <string>
@@ -36,11 +37,16 @@ bool wants(const std::set<std::string>& chosen, const std::string& name) { retur
 
 void write_modes(std::FILE* file, const Body& body, int fineness, MeshKind kind, const Outcome& outcome) {
   for (std::size_t m = 0; m < outcome.true_hz.size(); ++m) {
-    const auto& parts = outcome.bars.parts[m];
-    fmt::print(file, "{},{},{},{},{},{},{:.9g},{:.9g},{:.3g},{:.3g},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g}\n", body.name,
-               body.training ? "training" : "test", describe(kind), fineness, outcome.unknowns, m, outcome.freq_hz[m], outcome.true_hz[m],
+    const estimate::ErrorParts& parts = outcome.bars.level.parts[m];
+    const std::size_t c = outcome.by_correction[m];
+    fmt::print(file,
+               "{},{},{},{},{},{},{:.9g},{:.9g},{:.3g},{:.3g},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},{},{:.9g},{:.4g},{:."
+               "4g},{}\n",
+               body.name, describe(body.role), describe(kind), fineness, outcome.unknowns, m, outcome.freq_hz[m], outcome.true_hz[m],
                outcome.truth_cents[m], outcome.bars.algebraic_cents[m], outcome.bars.discretisation_cents[m], outcome.error_cents(m),
-               parts.interpolation, parts.energy, parts.lumping, parts.geometry, parts.geometry_noise);
+               parts.interpolation, parts.energy, parts.lumping, parts.geometry, parts.geometry_noise, parts.singular, c,
+               std::sqrt(outcome.bars.corrected.lambda[c]) / (2 * std::numbers::pi), outcome.corrected_bar_cents(m),
+               outcome.corrected_error_cents(m), static_cast<int>(outcome.bars.corrected.correction[c]));
   }
   std::fflush(file);
 }
@@ -64,7 +70,7 @@ Outcome solve_file(const std::string& file, int count) {
   mesh::TetMesh mesh = mesh::read_mesh(file);
   mesh::check_mesh(mesh, file);
   const double lambda = 3.99e9, mu = 2.05e9;
-  const job::Material ceramic{
+  const material::Material ceramic{
       .young_modulus_pa = mu * (3 * lambda + 2 * mu) / (lambda + mu), .poisson_ratio = lambda / (2 * (lambda + mu)), .density_kg_m3 = 2700};
   return solve(PETSC_COMM_WORLD, mesh, {}, std::span(&ceramic, 1), false, 20, 20e3, count);
 }
@@ -72,15 +78,15 @@ Outcome solve_file(const std::string& file, int count) {
 void compare_meshes(const std::string& finest, const std::vector<std::string>& coarser, int count, int rank, std::FILE* modes) {
   const Outcome truth = solve_file(finest, count);
   if (rank == 0) print_head();
-  if (rank == 0) print_row(finest, "finest", truth.bars.kind == estimate::Kind::kT4 ? "T4" : "T10 curved", truth);
+  if (rank == 0) print_row(finest, "finest", truth.bars.level.kind == estimate::Kind::kT4 ? "T4" : "T10 curved", truth);
   for (const std::string& file : coarser) {
     Outcome outcome = solve_file(file, count);
     const std::size_t both = std::min(truth.freq_hz.size(), outcome.freq_hz.size());
     outcome.true_hz.assign(truth.freq_hz.begin(), truth.freq_hz.begin() + static_cast<std::ptrdiff_t>(both));
     for (std::size_t m = 0; m < both; ++m) outcome.truth_cents.push_back(truth.bar_cents(m) / 2);
-    const MeshKind kind = outcome.bars.kind == estimate::Kind::kT4    ? MeshKind::T4
-                          : outcome.bars.kind == estimate::Kind::kT10 ? MeshKind::T10
-                                                                      : MeshKind::T10Curved;
+    const MeshKind kind = outcome.bars.level.kind == estimate::Kind::kT4    ? MeshKind::T4
+                          : outcome.bars.level.kind == estimate::Kind::kT10 ? MeshKind::T10
+                                                                            : MeshKind::T10Curved;
     if (rank == 0) print_row(file, "test", describe(kind), outcome);
     if (modes != nullptr)
       write_modes(modes, {.name = "bunny", .materials = {}, .fineness = {}}, static_cast<int>(outcome.unknowns), kind, outcome);
@@ -136,7 +142,8 @@ int run(const Choice& choice, int rank) {
     if (!modes) throw std::runtime_error(choice.modes + " cannot be written");
     fmt::print(modes.get(),
                "body,set,element,fineness,unknowns,mode,freq_hz,true_hz,truth_cents,algebraic_cents,discretisation_cents,error_cents,"
-               "interpolation,energy,lumping,geometry,geometry_magnitude\n");
+               "interpolation,energy,lumping,geometry,geometry_magnitude,singular,corrected_mode,corrected_hz,corrected_bar_cents,"
+               "corrected_error_cents,trust\n");
   });
   if (!choice.coarser.empty() && choice.finest.empty()) {
     if (choice.bodies.size() != 1 || choice.elements.size() != 1)
@@ -149,7 +156,7 @@ int run(const Choice& choice, int rank) {
       const mesh::TetMesh mesh = mesh::read_mesh(file);
       const Outcome outcome = solve(PETSC_COMM_WORLD, body, mesh, kind);
       if (modes) write_modes(modes.get(), body, static_cast<int>(outcome.unknowns), kind, outcome);
-      if (rank == 0) print_row(body.name + ", " + file, body.training ? "training" : "test", describe(kind), outcome);
+      if (rank == 0) print_row(body.name + ", " + file, describe(body.role), describe(kind), outcome);
     }
     return 0;
   }
@@ -174,7 +181,7 @@ int run(const Choice& choice, int rank) {
         if (body.name == "prism" && kind == MeshKind::T10Lumped && f == 0) min = 22.0 / 24;
         if (body.name == "plate-thin" && kind == MeshKind::T4Lumped) min = 10.0 / 16;
         failures += outcome.coverage() < min ? 1 : 0;
-        print_row(body.name, body.training ? "training" : "test", describe(kind), outcome);
+        print_row(body.name, describe(body.role), describe(kind), outcome);
       }
     }
   }

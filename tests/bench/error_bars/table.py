@@ -48,6 +48,30 @@ def print_table(groups):
     )
 
 
+def print_corrected(groups):
+    """Corrected frequencies against those of the mesh, by element and by what a body was used for."""
+    print("\n| element | bodies | meshes | modes | median error, corrected over mesh | bars, corrected over mesh | within their bars |")
+    print("|---|---|--:|--:|---|--:|--:|")
+    for element in COLOURS:
+        for kinds, name in (({"training", "test"}, "in view"), ({"unseen"}, "unseen")):
+            own = {key: rows for key, rows in groups.items() if key[2] == element and key[1] in kinds}
+            if not own:
+                continue
+            ratios, bars, modes, held = collections.defaultdict(list), [], 0, 0
+            for (body, *_), rows in own.items():
+                errors = [abs(float(row["corrected_error_cents"])) for row in rows]
+                wide = [float(row["corrected_bar_cents"]) for row in rows]
+                ratios[body].append(statistics.median(errors) / statistics.median(map(error, rows)))
+                bars.append(statistics.median(wide) / statistics.median(map(bar, rows)))
+                modes += len(rows)
+                held += sum(e <= b + float(row["truth_cents"]) for e, b, row in zip(errors, wide, rows))
+            by_body = [statistics.median(values) for values in ratios.values()]
+            print(
+                f"| {element} | {name}, {len(by_body)} | {len(own)} | {modes} | {statistics.median(by_body):.2f} ({min(by_body):.2f} to"
+                f" {max(by_body):.2f}) | {statistics.median(bars):.2f} | {100 * held / modes:.2f} % |"
+            )
+
+
 def draw(groups, file):
     low, high, size, left = -2, 4, 620, 60
     scale = size / (high - low)
@@ -99,5 +123,6 @@ if __name__ == "__main__":
         sys.exit(__doc__)
     found = read(sys.argv[1])
     print_table(found)
+    print_corrected(found)
     if len(sys.argv) > 2:
         draw(found, sys.argv[2])

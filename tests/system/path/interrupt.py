@@ -33,11 +33,18 @@ def find_mentions(folder):
     return found
 
 
-def interrupt(folder, job, ranks, phase, delay_s, number, at_rank):
+def interrupt(folder, temporary, job, ranks, phase, delay_s, number, at_rank):
     before = sorted(path.relative_to(folder) for path in folder.rglob("*"))
-    temporary = {path for path in pathlib.Path(tempfile.gettempdir()).glob("carillon-mesh-*")}
     command = ["mpirun", "-np", str(ranks), "--oversubscribe", "--bind-to", "none", str(bin_dir / "carillon-precompute"), job]
-    run = subprocess.Popen(command, cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    run = subprocess.Popen(
+        command,
+        cwd=folder,
+        env=os.environ | {"TMPDIR": str(temporary)},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
     lines = []
     for line in run.stdout:
         lines.append(line)
@@ -64,7 +71,7 @@ def interrupt(folder, job, ranks, phase, delay_s, number, at_rank):
     assert not any(map(is_running, processes)), f"{name}: ranks keep running"
     after = sorted(path.relative_to(folder) for path in folder.rglob("*"))
     assert after == before, f"{name}: files before {before}, after {after}"
-    left = {path for path in pathlib.Path(tempfile.gettempdir()).glob("carillon-mesh-*")} - temporary
+    left = list(temporary.glob("carillon-mesh-*"))
     assert not left, f"{name}: {left} stays"
     for _ in range(50):  # nor does a program that a rank started
         if not (others := find_mentions(folder)):
@@ -75,8 +82,9 @@ def interrupt(folder, job, ranks, phase, delay_s, number, at_rank):
     print(f"{name}: ended after {took_s:.1f} s with code {run.returncode}")
 
 
-with tempfile.TemporaryDirectory(prefix="carillon-interrupt-") as scratch:
-    folder = pathlib.Path(scratch)
+# Temporary files go to a folder of this test: other tests mesh at the same time.
+with tempfile.TemporaryDirectory(prefix="carillon-interrupt-") as scratch, tempfile.TemporaryDirectory() as own:
+    folder, temporary = pathlib.Path(scratch), pathlib.Path(own)
     subprocess.run(
         [
             bin_dir / "carillon-mesh",
@@ -99,7 +107,7 @@ with tempfile.TemporaryDirectory(prefix="carillon-interrupt-") as scratch:
         ("modes", 0.3, signal.SIGINT, 0),
         ("partition", 0.0, signal.SIGTERM, 1),
     ):
-        interrupt(folder, "bar.json", 2, phase, delay_s, number, at_rank)
+        interrupt(folder, temporary, "bar.json", 2, phase, delay_s, number, at_rank)
     assert (folder / "bar.hdf").read_text() == "an older bank"
     # While another program meshes: it ends too, and its folder goes.
     rings = 40
@@ -129,5 +137,5 @@ with tempfile.TemporaryDirectory(prefix="carillon-interrupt-") as scratch:
         + "".join("3 %d %d %d\n" % f for f in faces)
     )
     (folder / "ball.json").write_text(json.dumps({"body": {"surface": "ball.off", "nodes": 200000}, "bank": "ball.hdf", "material": STEEL}))
-    interrupt(folder, "ball.json", 2, "read", 0.5, signal.SIGTERM, 0)
-    interrupt(folder, "ball.json", 1, "read", 0.5, signal.SIGTERM, None)
+    interrupt(folder, temporary, "ball.json", 2, "read", 0.5, signal.SIGTERM, 0)
+    interrupt(folder, temporary, "ball.json", 1, "read", 0.5, signal.SIGTERM, None)

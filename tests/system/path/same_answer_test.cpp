@@ -96,7 +96,11 @@ TEST(MaxModes, gives_the_lowest_of_the_band_and_says_that_there_are_more) {
   const bank::Bank three = folder.solve();
   EXPECT_FALSE(three.complete);
   ASSERT_EQ(three.mode_count(), 3u);
-  for (std::size_t m = 0; m < 3; ++m) EXPECT_NEAR(three.freq_hz(m) / all.freq_hz(m), 1, 1e-8);
+  // Those of the lowest corrected frequencies; on this mesh bending is too high, so that the lowest of the mesh are others.
+  std::vector<double> wanted = all.corrected.freq_hz, found = three.corrected.freq_hz;
+  std::sort(wanted.begin(), wanted.end());
+  std::sort(found.begin(), found.end());
+  for (std::size_t m = 0; m < 3; ++m) EXPECT_NEAR(found[m] / wanted[m], 1, 1e-8);
 }
 
 TEST(HeldNodes, by_name_and_by_box_give_the_same_modes) {

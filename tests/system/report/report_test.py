@@ -189,26 +189,30 @@ class Reports(unittest.TestCase):
         self.assertFalse((self.root / "report/report-modes.png").exists())
 
     def test_modes_are_those_of_the_bank(self):
-        rows = self.page.rows("modes", 8)[1:]
+        rows = self.page.rows("modes", 11)[1:]
         with h5py.File(self.bank) as bank:
             freq, decay = bank["modes/frequency_hz"][:], bank["modes/decay"][:]
-            columns = [
-                numpy.arange(1, len(freq) + 1),
-                freq,
-                bank["modes/algebraic_error_cents"][:],
-                bank["modes/discretisation_error_cents"][:],
-                decay,
-                math.log(1000) / decay,
-                bank["modes/residual"][:],
-                bank["modes/radiation_gain"][:],
-            ]
+            columns = {
+                0: numpy.arange(1, len(freq) + 1),
+                1: freq,
+                2: bank["modes/algebraic_error_cents"][:],
+                3: bank["modes/discretisation_error_cents"][:],
+                4: bank["modes/corrected_frequency_hz"][:],
+                5: bank["modes/corrected_error_cents"][:],
+                7: decay,
+                8: math.log(1000) / decay,
+                9: bank["modes/residual"][:],
+                10: bank["modes/radiation_gain"][:],
+            }
+            names = numpy.array(["one mesh", "two meshes", "rough", "too stiff", "lumped T10", "disputed"])[bank["modes/correction"][:]]
         self.assertGreater(len(freq), 10)
         self.assertEqual(len(rows), len(freq))
-        for column, digits in zip(range(8), [9, 6, 2, 2, 4, 3, 2, 4]):
+        self.assertEqual([row[6] for row in rows], list(names))
+        for column, digits in zip(columns, [9, 6, 2, 2, 6, 2, 4, 3, 2, 4]):
             shown = numpy.array([float(row[column]) for row in rows])
             # Rounded to so many digits, and frequencies to a hundredth of a hertz.
             self.assertTrue(
-                numpy.all(abs(shown - columns[column]) <= 0.51 * 10.0 ** (1 - digits) * abs(columns[column]) + 0.006 * (column == 1)),
+                numpy.all(abs(shown - columns[column]) <= 0.51 * 10.0 ** (1 - digits) * abs(columns[column]) + 0.006 * (column in (1, 4))),
                 column,
             )
 
@@ -454,7 +458,7 @@ class Reports(unittest.TestCase):
         self.assert_whole(page)
         (dots,) = [a["d"] for tag, a, _ in page.charts["modes"] if tag == "path" and a.get("class", "").startswith("dots")]
         self.assertEqual(dots.count("h0"), 2500)
-        self.assertEqual(len(page.rows("modes", 8)), 1001)
+        self.assertEqual(len(page.rows("modes", 11)), 1001)
         self.assertIn("The first 1000 of 2500 modes", page.text["modes"])
 
     def test_modes_that_ring_for_ever_are_drawn_by_their_number(self):
@@ -465,7 +469,7 @@ class Reports(unittest.TestCase):
         y = numpy.array([float(a["cy"]) for tag, a, _ in page.charts["modes"] if tag == "circle"])
         steps = numpy.diff(y)
         self.assertTrue(len(y) > 10 and max(steps) < 0 and max(abs(steps - steps.mean())) < 0.11, steps)
-        self.assertEqual({row[5] for row in page.rows("modes", 8)[1:]}, {"inf"})
+        self.assertEqual({row[8] for row in page.rows("modes", 11)[1:]}, {"inf"})
 
     def test_a_bank_without_modes_has_a_report(self):
         bank = self.root / "mute.hdf"
@@ -569,7 +573,7 @@ class Reports(unittest.TestCase):
         # The name that the user knows, not that of the snapshot; and all of the record.
         self.assertEqual(page.title, "chime.msh")
         self.assertEqual([name for name, is_missing in page.missing.items() if is_missing], ["pictures"])
-        self.assertEqual(len(page.rows("modes", 8)), 4)
+        self.assertEqual(len(page.rows("modes", 11)), 4)
         carillon("report", job, "-o", self.root / "made", "--no-pictures")
         self.assertEqual((self.root / "made/report.html").read_bytes(), page.source)
         # Who asks for it first has it drawn, next to the bank and for all who ask later. The records there stay what was published.

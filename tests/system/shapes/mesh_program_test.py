@@ -74,7 +74,7 @@ with tempfile.TemporaryDirectory() as name:
         (["--shape", "bar", "--order", "3", "-o", "out.msh"], ["--order", "3"]),
         (["--shape", "bar", "-o", "out.vtu"], ["out.vtu", ".msh"]),
         (["--shape", "bar", "-o", "out.msh", "--json", "./out.msh"], ["--json", "overwrite the mesh"]),
-        (["--shape", "bar"], ["--output is required"]),
+        (["--shape", "bar"], ["-o is missing"]),
         (["-o", "out.msh"], ["SURFACE", "--shape"]),
         (["a.obj", "--shape", "bar", "-o", "out.msh"], ["both", "a.obj", "one of them"]),
         (["a.obj", "--length", "1", "-o", "out.msh"], ["--length is a dimension of a --shape"]),

@@ -125,7 +125,7 @@ class Study(unittest.TestCase):
             if job["element"] != "T10" or record["nodes"] < 1000:
                 continue
             truth = truths["ring" if job["material"]["density_kg_m3"] == 8500 else "cube"]
-            frequency, algebraic, body, _ = record["modes"][0]
+            frequency, algebraic, body, *_ = record["modes"][0]
             self.assertLess(abs(cents.to_cents(frequency, truth.freq_hz[0])), algebraic + body)
             looked += 1
         self.assertGreaterEqual(looked, 3)
@@ -171,6 +171,26 @@ class Study(unittest.TestCase):
         third = subprocess.run(update, capture_output=True, text=True)
         self.assertEqual((third.returncode, len(third.stderr.splitlines())), (2, 1), third.stderr)
         self.assertEqual(page.read_text(), "no place\n")
+
+    def test_corrected_frequencies_and_thin_walls_against_a_plate_that_is_known(self):
+        result = call(self.folder, "--quick", "--on", "plate", "--only", "corrected", "walls", "-o", "walls")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        read = lambda name: list(csv.DictReader((self.folder / "walls" / name).open()))
+        for row in read("corrected-ratios.csv"):
+            self.assertLess(float(row["ratio_of_medians"]), 0.75, row)
+            self.assertLess(float(row["bars"]), 1, row)
+            self.assertEqual(row["held"], row["modes"], row)
+        rows = read("walls-plate.csv")
+        self.assertEqual({row["way"] for row in rows}, {"thin wall", "volume", "regular mesh"})
+        for row in rows:
+            self.assertEqual(row["held"], row["modes"], row)
+            self.assertLess(float(row["corrected_worst"]), float(row["worst"]), row)
+        coarse, fine = [row for row in rows if row["way"] == "thin wall"]
+        self.assertLess(float(fine["worst"]), float(coarse["worst"]))
+        self.assertLess(float(fine["mesh_cpu_s"]), float(fine["cpu_s"]))
+        text = (self.folder / "walls" / "report.md").read_text()
+        self.assertIn("**Thin walls**", text)
+        self.assertIn("`accuracy_cents`", text)
 
     def test_bad_input_is_one_clear_error_and_starts_nothing(self):
         (self.folder / "file").write_text("")

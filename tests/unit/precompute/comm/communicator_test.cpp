@@ -72,6 +72,13 @@ TEST(Agree, keeps_the_kind_of_the_error) {
     EXPECT_STREQ(error.what(), "job.json:3: bad key");
     EXPECT_EQ(error.get_place(), "job.json:3");
   }
+  try {
+    world().agree(fail(CountRefusal("too few nodes", 7000)));
+    ADD_FAILURE() << "nothing was thrown";
+  } catch (const CountRefusal& error) {
+    EXPECT_STREQ(error.what(), "too few nodes");
+    EXPECT_EQ(error.get_possible_nodes(), 7000);
+  }
   EXPECT_THAT(catch_message<SystemError>([&] { world().agree(fail(std::bad_alloc())); }), HasSubstr("Out of memory"));
   EXPECT_NO_THROW(world().agree([] {}));
 }

@@ -133,7 +133,7 @@ TEST(Speed, is_measured_within_its_limits) {
 // Bending, torsion and stretching of a slender bar have closed forms: with its section small against the waves, the law for solids
 // undercounts, and the bounds must still contain the true count.
 TEST(Weyl, bounds_hold_the_modes_of_a_slender_bar) {
-  job::Material steel;
+  material::Material steel;
   steel.density_kg_m3 = 7850;
   steel.young_modulus_pa = 2e11;
   steel.poisson_ratio = 0.3;

@@ -19,7 +19,7 @@ extern "C" void dsygv_(const int* type, const char* job, const char* half, const
 namespace carillon::eigen {
 namespace {
 
-const job::Material kSteel{.young_modulus_pa = 200e9, .poisson_ratio = 0.3, .density_kg_m3 = 7850, .alpha1_s = 0, .alpha2_per_s = 0};
+const material::Material kSteel{.young_modulus_pa = 200e9, .poisson_ratio = 0.3, .density_kg_m3 = 7850, .alpha1_s = 0, .alpha2_per_s = 0};
 
 std::vector<double> to_dense(Mat matrix, int n) {
   std::vector<double> dense(static_cast<std::size_t>(n) * n, 0.0);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 #include <vector>
 
 #include "precompute/eigen/solve_modes.hpp"
@@ -44,6 +45,57 @@ TEST(Proof, counts_what_dense_lapack_counts) {
   EXPECT_TRUE(proof.clusters.empty());
   EXPECT_LT(proof.factor_backward_error, 1e-10);
   EXPECT_NE(proof.method.find("L D L^T"), std::string::npos) << proof.method;
+}
+
+// Below a low end of the band nothing is counted: the shift inside shows that the rigid modes alone are there.
+TEST(Proof, leaves_a_low_end_to_the_shift_inside) {
+  const Network block = make_block(4, 5, 9);
+  const std::vector<double> all = test::calc_all_eigenvalues(block);
+  const test::System system = test::make_system(block);
+  Options options;
+  options.high_hz = to_hz(0.5 * (all[80] + all[81]));
+  options.low_hz = 0.009 * options.high_hz;
+  const Modes low = solve_modes(system.problem, options);
+  EXPECT_EQ(low.factor.factorisations, 2);
+  EXPECT_NE(low.proof.method.find("first shift"), std::string::npos) << low.proof.method;
+  options.low_hz = 0.011 * options.high_hz;
+  const Modes high = solve_modes(system.problem, options);
+  EXPECT_EQ(high.factor.factorisations, 3);
+  EXPECT_EQ(high.proof.method.find("first shift"), std::string::npos) << high.proof.method;
+  for (const Modes* modes : {&low, &high}) {
+    expect_eigenvalues(*modes, {all.begin() + 6, all.begin() + 81});
+    ASSERT_EQ(modes->proof.counts.size(), 3u);
+    EXPECT_EQ(modes->proof.counts[0].below, 6);
+    EXPECT_EQ(modes->proof.counts[2].below, 81);
+    EXPECT_EQ(modes->count_below_low, 6);
+  }
+}
+
+// Two blocks on threads: six modes below the band that are not rigid. What was assumed of the lower end is wrong, and it is counted.
+TEST(Proof, counts_a_low_end_with_modes_below_it) {
+  constexpr double kThread = 1e-6;  // [N/m], of 1 inside the blocks
+  Network two = test::join(make_block(4, 4, 9), make_block(3, 4, 8, {12, 0.5, 0.7}));
+  const int first = 4 * 4 * 9;
+  std::fill(two.component.begin(), two.component.end(), 0);
+  for (int k = 0; k < 24; ++k) two.springs.push_back({(37 * k) % first, first + (29 * k) % (3 * 4 * 8), kThread});
+  const std::vector<double> all = test::calc_all_eigenvalues(two);
+  const test::System system = test::make_system(two);
+  Options options;
+  options.high_hz = to_hz(0.5 * (all[90] + all[91]));
+  options.low_hz = 0.009 * options.high_hz;
+  ASSERT_LT(to_hz(all[11]), 0.5 * options.low_hz);
+  ASSERT_GT(to_hz(all[12]), options.low_hz);
+  ASSERT_GT(all[6], 1e-12) << "not rigid";
+  for (const std::optional<std::int64_t> most : {std::optional<std::int64_t>{}, std::optional<std::int64_t>{30}}) {
+    options.max_modes = most;
+    const Modes modes = solve_modes(system.problem, options);
+    expect_eigenvalues(modes, {all.begin() + 12, all.begin() + (most ? 12 + *most : 91)});
+    EXPECT_EQ(modes.rigid_count, 6);
+    EXPECT_EQ(modes.count_below_low, 12);
+    EXPECT_EQ(modes.proof.counts.front().below, 12);
+    EXPECT_LE(modes.proof.counts.front().freq_hz, options.low_hz);
+    EXPECT_EQ(modes.proof.method.find("first shift"), std::string::npos) << modes.proof.method;
+  }
 }
 
 TEST(Proof, counts_a_small_body_by_its_whole_spectrum) {

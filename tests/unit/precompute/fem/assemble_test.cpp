@@ -22,7 +22,7 @@ using tests::get_rank;
 using tests::get_ranks;
 
 const MPI_Comm kWorld = MPI_COMM_WORLD;
-const job::Material kSteel{.young_modulus_pa = 200e9, .poisson_ratio = 0.3, .density_kg_m3 = 7850, .alpha1_s = 0, .alpha2_per_s = 0};
+const material::Material kSteel{.young_modulus_pa = 200e9, .poisson_ratio = 0.3, .density_kg_m3 = 7850, .alpha1_s = 0, .alpha2_per_s = 0};
 constexpr std::array<double, 3> kSize{0.3, 0.2, 0.1};
 
 mesh::TetMesh on_rank_0(const mesh::TetMesh& whole) { return get_rank() == 0 ? whole : mesh::TetMesh{}; }

@@ -19,7 +19,7 @@
 namespace carillon::fem {
 namespace {
 
-std::vector<double> calc_omega(const mesh::TetMesh& mesh, const job::Material& material, Form form, double low_hz, double high_hz) {
+std::vector<double> calc_omega(const mesh::TetMesh& mesh, const material::Material& material, Form form, double low_hz, double high_hz) {
   partition::DistributedMesh pieces = partition::distribute(PETSC_COMM_WORLD, mesh, {});
   const System system = assemble(PETSC_COMM_WORLD, pieces.local, material, job::Mass::consistent, form);
   eigen::NodeLayout layout;
@@ -50,7 +50,7 @@ double study_ball(const char* element, double nu, int order, Form form, bool str
   std::vector<double> error, elements;
   for (const double edge : {0.8, 0.45, 0.21}) {
     const auto mesh = make("sphere", {{"radius", 1.0}}, order, edge, straight);
-    job::Material material;
+    material::Material material;
     material.young_modulus_pa = 2 * (1 + nu);
     material.poisson_ratio = nu;
     material.density_kg_m3 = 1;
@@ -84,11 +84,11 @@ TEST(Convergence, of_the_ball) {
 }
 
 /// An orthotropic solid that is incompressible but for `play` of its Poisson's ratios: every row of its compliance adds up to `play` / E.
-job::Material make_orthotropic_rubber(double play) {
+material::Material make_orthotropic_rubber(double play) {
   constexpr double e1 = 3.0, e2 = 2.0, e3 = 1.5;
-  job::Material material;
+  material::Material material;
   material.density_kg_m3 = 1;
-  material.orthotropic = job::Orthotropic{};
+  material.orthotropic = material::Orthotropic{};
   material.orthotropic->young_modulus_pa = {e1, e2, e3};
   material.orthotropic->shear_modulus_pa = {0.9, 0.5, 0.7};
   material.orthotropic->poisson_ratio = {(1 - play) * (1 + e1 / e2 - e1 / e3) / 2, (1 - play) * (1 + e2 / e3 - e2 / e1) / 2,
@@ -125,7 +125,7 @@ TEST(Convergence, of_an_orthotropic_ball_that_is_nearly_incompressible) {
 
 TEST(Convergence, of_the_chime) {
   // D3 of OSG02 Table 2: 0.505 m, outer radius 12.5 mm, wall 1 mm, aluminium of Table 1; exact in 3-D (Fourier-Ritz): 587.88302 Hz.
-  job::Material aluminium;
+  material::Material aluminium;
   aluminium.young_modulus_pa = 68351788079.47;
   aluminium.poisson_ratio = 0.32980132450331;
   aluminium.density_kg_m3 = 2700;

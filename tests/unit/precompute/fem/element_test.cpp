@@ -17,7 +17,8 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-const job::Material kMaterial{.young_modulus_pa = 70e9, .poisson_ratio = 0.33, .density_kg_m3 = 2700, .alpha1_s = 0, .alpha2_per_s = 0};
+const material::Material kMaterial{
+    .young_modulus_pa = 70e9, .poisson_ratio = 0.33, .density_kg_m3 = 2700, .alpha1_s = 0, .alpha2_per_s = 0};
 
 const std::vector<Vec3> kTet{{0.1, -0.2, 0.05}, {1.3, 0.1, 0.2}, {0.2, 0.9, -0.1}, {0.3, 0.2, 1.1}};
 

@@ -11,7 +11,7 @@ namespace carillon::fem {
 namespace {
 
 int count_refused(const mesh::TetMesh& mesh) {
-  const job::Material material{.young_modulus_pa = 1e9, .poisson_ratio = 0.3, .density_kg_m3 = 1000, .alpha1_s = 0, .alpha2_per_s = 0};
+  const material::Material material{.young_modulus_pa = 1e9, .poisson_ratio = 0.3, .density_kg_m3 = 1000, .alpha1_s = 0, .alpha2_per_s = 0};
   ElementMatrices element;
   int refused = 0;
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e) {

@@ -184,7 +184,7 @@ TEST(DecayOfOneMaterial, is_its_law_and_of_two_alike_halves_the_same) {
 const std::string kSpruce = R"({"orthotropic": {"young_modulus_pa": [11e9, 0.9e9, 0.5e9], "shear_modulus_pa": [0.7e9, 0.04e9, 0.6e9],
                                 "poisson_ratio": [0.37, 0.43, 0.47]AXES}, "density_kg_m3": 400, "damping": {"rayleigh": {}}})";
 
-job::Material make_spruce(const std::string& axes) {
+material::Material make_spruce(const std::string& axes) {
   std::string text = kSpruce;
   text.replace(text.find("AXES"), 4, axes);
   return parse("\"material\": " + text).material;
@@ -259,8 +259,8 @@ TEST_P(IsotropicConstants, given_as_orthotropic_ones_make_the_same_stiffness) {
       R"({{"orthotropic": {{"young_modulus_pa": [{0}, {0}, {0}], "shear_modulus_pa": [{1:.17g}, {1:.17g}, {1:.17g}], "poisson_ratio": [{2}, {2}, {2}],
            "axes": [[1, 2, 2], [2, 1, -2]]}}, "density_kg_m3": 1, "damping": {{"rayleigh": {{}}}}}})",
       e, g, nu);
-  const job::Material as_orthotropic = parse("\"material\": " + text).material;
-  job::Material as_isotropic;
+  const material::Material as_orthotropic = parse("\"material\": " + text).material;
+  material::Material as_isotropic;
   as_isotropic.young_modulus_pa = e;
   as_isotropic.poisson_ratio = nu;
   as_isotropic.density_kg_m3 = 1;
@@ -288,8 +288,8 @@ TEST(OrthotropicRubber, keeps_the_energy_of_every_uniform_strain) {
   const std::string rubber =
       R"("material": {"orthotropic": {"young_modulus_pa": [3e6, 2e6, 1.5e6], "shear_modulus_pa": [0.9e6, 0.5e6, 0.7e6],
     "poisson_ratio": [0.24995, 0.83316, 0.74985]}, "density_kg_m3": 1100, "damping": {"rayleigh": {}}})";
-  const job::Material material = parse(rubber).material;
-  const job::Elasticity c = material.calc_elasticity_pa();
+  const material::Material material = parse(rubber).material;
+  const material::Elasticity c = material.calc_elasticity_pa();
   EXPECT_GT(Solid(material).mean_dilatation_modulus_pa, 0.9 * c[1]);
   const std::array<double, 6> strain{0.3, -0.2, 0.15, 0.1, -0.25, 0.2};  // Voigt
   const auto field = [&](const Vec3& x) {

@@ -16,7 +16,8 @@ namespace carillon::fem {
 namespace {
 
 constexpr std::array<double, 3> kSize{0.3, 0.2, 0.1};
-const job::Material kAluminium{.young_modulus_pa = 70e9, .poisson_ratio = 0.33, .density_kg_m3 = 2700, .alpha1_s = 0, .alpha2_per_s = 0};
+const material::Material kAluminium{
+    .young_modulus_pa = 70e9, .poisson_ratio = 0.33, .density_kg_m3 = 2700, .alpha1_s = 0, .alpha2_per_s = 0};
 
 std::vector<double> calc_frequencies(std::array<int, 3> cells, int order, job::Mass mass) {
   const partition::DistributedMesh pieces = partition::distribute(PETSC_COMM_WORLD, tests::make_box(cells, kSize, order), {});

@@ -20,7 +20,7 @@ using tests::kT2;
 
 /// The first ten elastic modes: five times T2, five times S2.
 std::vector<double> calc_modes(const mesh::TetMesh& mesh, double nu, Form form) {
-  job::Material material;
+  material::Material material;
   material.young_modulus_pa = 2 * (1 + nu);
   material.poisson_ratio = nu;
   material.density_kg_m3 = 1;

@@ -18,7 +18,7 @@ namespace {
 using tests::get_rank;
 
 const MPI_Comm kWorld = MPI_COMM_WORLD;
-const job::Material kSteel{.young_modulus_pa = 200e9, .poisson_ratio = 0.3, .density_kg_m3 = 7850, .alpha1_s = 0, .alpha2_per_s = 0};
+const material::Material kSteel{.young_modulus_pa = 200e9, .poisson_ratio = 0.3, .density_kg_m3 = 7850, .alpha1_s = 0, .alpha2_per_s = 0};
 constexpr std::array<double, 3> kSize{0.3, 0.04, 0.02};
 constexpr std::array<int, 3> kCells{15, 4, 2};
 

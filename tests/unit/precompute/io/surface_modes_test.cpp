@@ -164,13 +164,13 @@ TEST(RadiationGain, ignores_the_wall_of_a_closed_cavity) {
   const std::vector<double> omega{1000.0};
   const double both = calc_gain(hollow, omega, sample(hollow, {radial}))[0], alone = calc_gain(outer, omega, sample(outer, {radial}))[0];
   EXPECT_NEAR(both / alone, 1, 1e-13);
-  EXPECT_EQ(find_outer_triangles(hollow.vertices_m, hollow.triangles), outer.triangles);
+  EXPECT_EQ(bank::find_outer_triangles(hollow.vertices_m, hollow.triangles), outer.triangles);
 }
 
 TEST(RadiationGain, counts_two_separate_bodies_wherever_they_are) {
   Shell two = make_sphere(0.1, 2, {5, 0, 0});
   append(two, make_sphere(0.1, 2, {-5, 3, 1}));
-  EXPECT_EQ(find_outer_triangles(two.vertices_m, two.triangles).size(), two.triangles.size());
+  EXPECT_EQ(bank::find_outer_triangles(two.vertices_m, two.triangles).size(), two.triangles.size());
 }
 
 /// Twenty modes (more than are worked on at a time), of very different sizes; mode 7 is at rest.

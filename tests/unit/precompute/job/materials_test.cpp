@@ -11,6 +11,7 @@
 namespace {
 
 using carillon::InputError;
+using carillon::material::calc_eigenvalues, carillon::material::calc_mean_shear_pa;
 using carillon::tests::BadJob;
 using namespace carillon::job;
 

@@ -23,6 +23,11 @@ TEST(BlockKernels, agree_with_plain_loops_at_odd_sizes) {
         const Columns narrow_block{b.data(), rows, stride, narrow};
         std::vector<double> gram(static_cast<std::size_t>(wide * narrow));
         multiply_transposed(wide_block, narrow_block, gram.data(), wide);
+        std::vector<double> turned(gram.size());
+        multiply_transposed(narrow_block, wide_block, turned.data(), narrow);
+        for (int j = 0; j < narrow; ++j)
+          for (int i = 0; i < wide; ++i)
+            EXPECT_NEAR(turned[static_cast<std::size_t>(i * narrow + j)], gram[static_cast<std::size_t>(j * wide + i)], 1e-10);
         const std::vector<double> old = b;
         subtract_product(wide_block, gram.data(), wide, narrow_block);
         for (int j = 0; j < narrow; ++j) {

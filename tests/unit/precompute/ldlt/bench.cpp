@@ -103,7 +103,7 @@ void run(const std::string& file, bool with_mumps, int rank) {
     if (rank == 0) body = mesh::read_mesh(file);
   });
   const partition::DistributedMesh pieces = partition::distribute(PETSC_COMM_WORLD, body, {});
-  job::Material ceramic;
+  material::Material ceramic;
   ceramic.young_modulus_pa = 5.4543e9;
   ceramic.poisson_ratio = 0.3303;
   ceramic.density_kg_m3 = 2700;

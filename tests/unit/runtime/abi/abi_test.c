@@ -57,6 +57,39 @@ static void check_banks(const char* name, carillon_bank** bank) {
   free(bytes);
 }
 
+/* A bank with corrected frequencies: they are the default, and each way to read it gives either. */
+static void check_frequencies(const char* name) {
+  size_t size;
+  void* bytes = read_file(name, &size);
+  carillon_bank *plain = NULL, *opened = NULL, *parsed = NULL;
+  int32_t way, mode, differ = 0;
+  CHECK(carillon_bank_open(name, &plain, message, sizeof message) == CARILLON_OK);
+  for (way = CARILLON_FREQUENCIES_CORRECTED; way <= CARILLON_FREQUENCIES_MESH; ++way) {
+    CHECK(carillon_bank_open_as(name, way, &opened, message, sizeof message) == CARILLON_OK && message[0] == '\0');
+    CHECK(carillon_bank_parse_as(bytes, size, way, &parsed, NULL, 0) == CARILLON_OK);
+    CHECK(carillon_bank_mode_count(opened) == carillon_bank_mode_count(plain) && carillon_bank_mode_count(plain) > 0);
+    for (mode = 0; mode < carillon_bank_mode_count(plain); ++mode) {
+      const double hz = carillon_bank_frequency_hz(opened, mode);
+      CHECK(hz == carillon_bank_frequency_hz(parsed, mode));
+      CHECK(mode == 0 || hz >= carillon_bank_frequency_hz(opened, mode - 1));
+      CHECK(way == CARILLON_FREQUENCIES_MESH || hz == carillon_bank_frequency_hz(plain, mode));
+      differ += hz != carillon_bank_frequency_hz(plain, mode);
+    }
+    carillon_bank_close(opened);
+    carillon_bank_close(parsed);
+  }
+  CHECK(differ > 0);
+  for (way = -1; way <= 2; way += 3) {
+    CHECK(carillon_bank_open_as(name, way, &opened, message, sizeof message) == CARILLON_BAD_INPUT && opened == NULL);
+    CHECK(strstr(message, "carillon_frequencies") != NULL);
+    CHECK(carillon_bank_parse_as(bytes, size, way, &parsed, message, sizeof message) == CARILLON_BAD_INPUT && parsed == NULL);
+  }
+  CHECK(carillon_bank_open_as(NULL, 0, &opened, message, sizeof message) == CARILLON_BAD_ARGUMENT && opened == NULL);
+  CHECK(carillon_bank_parse_as(bytes, size, 0, NULL, message, sizeof message) == CARILLON_BAD_ARGUMENT);
+  carillon_bank_close(plain);
+  free(bytes);
+}
+
 /* The nearest point of a triangle by brute force, and the barycentric coordinates as carillon_impulse has them. */
 static void check_nearest(const carillon_bank* bank) {
   const int32_t vertices = carillon_bank_vertex_count(bank), triangles = carillon_bank_triangle_count(bank);
@@ -580,9 +613,10 @@ static void check_synth(const carillon_model* model) {
 int main(int argc, char** argv) {
   carillon_bank* bank = NULL;
   carillon_model* model = NULL;
-  if (argc != 2) return 2;
+  if (argc != 3) return 2;
   CHECK(carillon_abi_version() == CARILLON_ABI_VERSION);
   check_banks(argv[1], &bank);
+  check_frequencies(argv[2]);
   check_nearest(bank);
   check_variation(bank);
   check_models(bank, &model);

@@ -30,7 +30,7 @@ Result describe(const Error& error) {
 
 TEST_F(ResultFile, is_read_back_as_it_was_written) {
   for (int kind = 0; kind <= static_cast<int>(ResultKind::checkpointed); ++kind) {
-    const Result wanted{static_cast<ResultKind>(kind), "it \"needs\"\n more", "a.json:3", 12.5e9, kind % 2 == 1};
+    const Result wanted{static_cast<ResultKind>(kind), "it \"needs\"\n more", "a.json:3", 12.5e9, kind % 2 == 1, 7000};
     ASSERT_TRUE(base::write_result(file_, wanted));
     const auto found = base::read_result(file_);
     ASSERT_TRUE(found);
@@ -39,6 +39,7 @@ TEST_F(ResultFile, is_read_back_as_it_was_written) {
     EXPECT_EQ(found->place, wanted.place);
     EXPECT_EQ(found->need_bytes, wanted.need_bytes);
     EXPECT_EQ(found->is_resumable, wanted.is_resumable);
+    EXPECT_EQ(found->possible_nodes, wanted.possible_nodes);
   }
 }
 
@@ -70,6 +71,27 @@ TEST(ResultKind, follows_from_the_exception) {
   EXPECT_EQ(memory.need_bytes, 3e9);
   EXPECT_EQ(describe(std::bad_alloc()).message, "no memory");
   EXPECT_EQ(describe(std::logic_error("odd")).kind, ResultKind::system);
+}
+
+TEST(DescribeError, and_throw_error_are_inverse) {
+  const auto fail = [](const auto& error) { return std::make_exception_ptr(error); };
+  for (const std::exception_ptr& error :
+       {fail(carillon::PlacedError("job.json:3", "bad key")), fail(carillon::CountRefusal("too few nodes", 7000)),
+        fail(carillon::InputError("no")), fail(carillon::SolveError("not found")), fail(carillon::MemoryError("too much", 3e9)),
+        fail(carillon::DiskFullError("full")), fail(carillon::SystemError("odd"))}) {
+    const Result before = base::describe_error(error, "");
+    Result after;
+    try {
+      base::throw_error(before);
+    } catch (...) {
+      after = base::describe_error(std::current_exception(), "");
+    }
+    EXPECT_EQ(after.kind, before.kind);
+    EXPECT_EQ(after.message, before.message);
+    EXPECT_EQ(after.place, before.place);
+    EXPECT_EQ(after.need_bytes, before.need_bytes);
+    EXPECT_EQ(after.possible_nodes, before.possible_nodes);
+  }
 }
 
 TEST(ResultKind, has_the_exit_code_of_its_error) {

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <fstream>
+#include <numbers>
 #include <sstream>
 #include <string>
 
@@ -79,6 +80,31 @@ TEST(Scene, MalletsAreRead) {
 const std::string kTwo = R"("bodies": [{"name": "a", "bank": "a.h5"}, {"name": "b", "bank": "b.h5"}])";
 std::string with_joint(const std::string& keys) { return "{\"duration_s\": 1, " + kTwo + ",\n\"joints\": [{" + keys + "}]}"; }
 std::string with_cord(const std::string& keys) { return "{\"duration_s\": 1, " + kTwo + ",\n\"cords\": [{" + keys + "}]}"; }
+
+TEST(Scene, MalletsAndMaterialsHaveNames) {
+  const Scene scene = parse(R"({"duration_s": 2, "ground": {"material": "oak", "friction": 0.3}, "bodies": [{"name": "a", "bank": "a.h5"}],
+  "strikes": [
+    {"time_s": 0.5, "body": "a", "triangle": 7, "mallet": "steel"},
+    {"time_s": 0.6, "body": "a", "triangle": 7, "mallet": {"from": "soft-felt", "speed_m_s": 3}},
+    {"time_s": 0.7, "body": "a", "triangle": 7, "mallet": {"mass_kg": 0.02, "speed_m_s": 2, "radius_m": 0.01, "material": "nylon"}},
+    {"time_s": 0.8, "body": "a", "triangle": 7, "mallet": {"from": "steel", "felt": {"stiffness_n_m_p": 1e8}}}]})");
+  EXPECT_EQ(scene.ground->density_kg_m3, 760);
+  EXPECT_EQ(scene.ground->friction, 0.3);
+  EXPECT_GT(scene.ground->young_modulus_pa, 1e9);
+  EXPECT_LT(scene.ground->young_modulus_pa, 13.5e9) << "wood is softer across its grain";
+  const auto mallet = [&](std::size_t i) { return *scene.strikes[i].mallet; };
+  EXPECT_EQ(mallet(0).young_modulus_pa, 200e9);
+  EXPECT_EQ(mallet(0).speed_m_s, 1.0);
+  // A ball of steel of its radius weighs what it says.
+  EXPECT_NEAR(mallet(0).mass_kg / (7850 * 4.0 / 3.0 * std::numbers::pi * std::pow(mallet(0).radius_m, 3)), 1.0, 0.01);
+  EXPECT_EQ(mallet(1).speed_m_s, 3.0);
+  EXPECT_EQ(mallet(1).mass_kg, 0.02);
+  ASSERT_TRUE(mallet(1).felt.has_value());
+  EXPECT_EQ(mallet(2).young_modulus_pa, 2.7e9);
+  EXPECT_EQ(mallet(2).poisson_ratio, 0.39);
+  EXPECT_EQ(mallet(3).felt->stiffness_n_m_p, 1e8);
+  EXPECT_EQ(mallet(3).mass_kg, 0.033);
+}
 
 TEST(Scene, JointsAndCordsAreRead) {
   const Scene scene = parse("{\"duration_s\": 2, " + kTwo + R"(, "joints": [
@@ -407,6 +433,12 @@ INSTANTIATE_TEST_SUITE_P(
         BadScene{"mallet_of_no_hardness",
                  with_strike(kMalletPlace + R"("mallet": {"mass_kg": 1, "speed_m_s": 1})"),
                  {"young_modulus_pa", "felt"}},
+        BadScene{"mallet_of_no_name", with_strike(kMalletPlace + R"("mallet": "hammer")"), {"\"hammer\" is no known mallet", "soft-felt"}},
+        BadScene{"mallet_from_nothing", with_strike(kMalletPlace + R"("mallet": {"from": "hammer"})"), {"no known mallet"}},
+        BadScene{"mallet_of_no_material",
+                 with_strike(kMalletPlace + R"("mallet": {"mass_kg": 1, "speed_m_s": 1, "radius_m": 0.01, "material": "glas"})"),
+                 {"did you mean \"glass\""}},
+        BadScene{"ground_of_no_material", with_root("\"ground\": {\"material\": \"concreet\"}"), {"did you mean \"concrete\""}},
         BadScene{"mallet_without_radius",
                  with_strike(kMalletPlace + R"("mallet": {"mass_kg": 1, "speed_m_s": 1, "young_modulus_pa": 3e9})"),
                  {"radius_m", "missing"}},

@@ -30,7 +30,7 @@ struct Invented {
   std::vector<RotationTable> turn;
   std::vector<StrikeTable> strike;
   std::vector<ModeState> state;
-  std::vector<SubBlockStates> starts;
+  std::vector<ColumnStates> starts;
   std::vector<std::int16_t> rows;
   PulseBlock touch{};
   int groups, modes;
@@ -48,11 +48,11 @@ struct Invented {
     for (int m = 0; m < modes; ++m) {
       const std::size_t g = static_cast<std::size_t>(m / kGroup);
       const int l = m % kGroup;
-      for (auto& part : sound[g].wave[l]) {
-        for (float& x : part) x = number(random);
+      for (auto& part : sound[g].wave[l / 2]) {
+        for (auto& sample : part) sample[l % 2] = number(random);
       }
       turn[g].block_re[l] = number(random), turn[g].block_im[l] = number(random);
-      for (int q = 0; q < kSubBlocks - 1; ++q) turn[g].sub_blocks_re[q][l] = number(random), turn[g].sub_blocks_im[q][l] = number(random);
+      for (int i = 0; i < 3; ++i) turn[g].columns_re[i][l] = 0.7F * number(random), turn[g].columns_im[i][l] = 0.7F * number(random);
       const float angle = number(random);
       strike[g].turn_re[l] = std::cos(angle), strike[g].turn_im[l] = std::sin(angle);
       strike[g].out_re[l] = number(random), strike[g].out_im[l] = number(random);
@@ -70,15 +70,20 @@ struct Invented {
   std::size_t row(int r) const { return static_cast<std::size_t>(r * groups * kGroup); }
 };
 
-/// The state of a mode at the start of a sub-block; after the last one, at the start of the next block.
-Complex get_start(const Invented& of, std::size_t g, int l, int sub_block) {
-  if (sub_block == kSubBlocks) return {of.state[g].re[l], of.state[g].im[l]};
-  return {of.starts[g].re[sub_block][l], of.starts[g].im[sub_block][l]};
+constexpr int kEach = kSubBlock / kColumn;  // columns of a sub-block
+
+/// The state of a mode at the start of a column; after the last one, at the start of the next block.
+Complex get_start(const Invented& of, std::size_t g, int l, int column) {
+  if (column == kColumns) return {of.state[g].re[l], of.state[g].im[l]};
+  return {of.starts[g].re[column][l], of.starts[g].im[column][l]};
 }
 
-/// A state `sub_blocks` later, left to itself.
-Complex turn_on(const Invented& of, std::size_t g, int l, const Complex& x, int sub_blocks) {
-  return sub_blocks == 0 ? x : x * Complex(of.turn[g].sub_blocks_re[sub_blocks - 1][l], of.turn[g].sub_blocks_im[sub_blocks - 1][l]);
+/// A state `columns` later, left to itself: the turns of its binary digits.
+Complex turn_on(const Invented& of, std::size_t g, int l, Complex x, int columns) {
+  for (int i = 0; i < 3; ++i) {
+    if ((columns >> i) % 2 != 0) x *= Complex(of.turn[g].columns_re[i][l], of.turn[g].columns_im[i][l]);
+  }
+  return x;
 }
 
 const std::array<int, 12> kCounts{0, 1, 2, 3, 4, 7, 8, 15, 16, 17, 33, 160};
@@ -103,8 +108,8 @@ TEST(Kernels, AdvanceTurnsTheStateAndFillsTheStarts) {
         const Complex turned = z * Complex(before.turn[g].block_re[l], before.turn[g].block_im[l]);
         ASSERT_NEAR(now.state[g].re[l], turned.real(), 1e-15) << get_name(isa) << ", " << count << " modes";
         ASSERT_NEAR(now.state[g].im[l], turned.imag(), 1e-15);
-        for (int q = 0; q < kSubBlocks; ++q) {
-          const Complex start = q == 0 ? z : z * Complex(before.turn[g].sub_blocks_re[q - 1][l], before.turn[g].sub_blocks_im[q - 1][l]);
+        for (int q = 0; q < kColumns; ++q) {
+          const Complex start = turn_on(before, g, l, z, q);
           ASSERT_NEAR(now.starts[g].re[q][l], start.real(), 3e-7);
           ASSERT_NEAR(now.starts[g].im[q][l], start.imag(), 3e-7);
         }
@@ -126,9 +131,9 @@ TEST(Kernels, EmitSumsTheSoundOfAllModes) {
             double expected = 0.5, size = 1.0;
             for (int m = 0; m < count && n < sub_blocks * kSubBlock; ++m) {
               const std::size_t g = static_cast<std::size_t>(m / kGroup);
-              const int l = m % kGroup, q = first + n / kSubBlock;
-              const double a = static_cast<double>(invented.starts[g].re[q][l]) * invented.sound[g].wave[l][0][n % kSubBlock];
-              const double b = static_cast<double>(invented.starts[g].im[q][l]) * invented.sound[g].wave[l][1][n % kSubBlock];
+              const int l = m % kGroup, q = first * kEach + n / kColumn, k = n % kColumn;
+              const double a = static_cast<double>(invented.starts[g].re[q][l]) * invented.sound[g].wave[l / 2][0][k][l % 2];
+              const double b = static_cast<double>(invented.starts[g].im[q][l]) * invented.sound[g].wave[l / 2][1][k][l % 2];
               expected += a + b;
               size += std::abs(a) + std::abs(b);
             }
@@ -194,12 +199,12 @@ TEST(Kernels, AStrikeAddsItsAnswerAndLeavesItToTheRestOfThePeriod) {
             size += std::abs(x);
           }
           x *= turn;
-          for (int q = sub_block + 1; q <= kSubBlocks; ++q) {
+          for (int q = (sub_block + 1) * kEach; q <= kColumns; ++q) {
             const Complex added = get_start(now, g, l, q) - get_start(before, g, l, q);
-            ASSERT_LT(std::abs(added - turn_on(before, g, l, x, q - sub_block - 1)), 2e-5 * (1.0 + std::abs(x)))
+            ASSERT_LT(std::abs(added - turn_on(before, g, l, x, q - (sub_block + 1) * kEach)), 2e-5 * (1.0 + std::abs(x)))
                 << get_name(isa) << ", " << count << " modes, sub_block " << sub_block;
           }
-          for (int q = 0; q <= sub_block; ++q) ASSERT_EQ(now.starts[g].re[q][l], before.starts[g].re[q][l]);
+          for (int q = 0; q < (sub_block + 1) * kEach; ++q) ASSERT_EQ(now.starts[g].re[q][l], before.starts[g].re[q][l]);
         }
         for (std::size_t n = 0; n < expected.size(); ++n) ASSERT_NEAR(out[n], expected[n], 2e-6 * size) << get_name(isa) << ", " << count;
       }
@@ -268,7 +273,7 @@ TEST(Kernels, ADriveAddsItsForcesAndTakesItsShareOfWhatRings) {
               first += static_cast<double>(drive.ramp[0][j]) * Complex(table.force_re[j][l], table.force_im[j][l]);
               second += static_cast<double>(drive.ramp[1][j]) * Complex(table.force_re[j][l], table.force_im[j][l]);
             }
-            Complex ringing = damps ? get_start(before, g, l, sub_block) : 0.0, made = 0.0;
+            Complex ringing = damps ? get_start(before, g, l, sub_block * kEach) : 0.0, made = 0.0;
             double kept = 1.0;
             for (int n = 0; n <= kSubBlock; ++n) {
               if (n > 0) {
@@ -282,15 +287,15 @@ TEST(Kernels, ADriveAddsItsForcesAndTakesItsShareOfWhatRings) {
                 expected[n] += static_cast<double>(table.out_re[l]) * z.real() + static_cast<double>(table.out_im[l]) * z.imag();
               size += std::abs(z);
             }
-            for (int q = sub_block + 1; q <= kSubBlocks; ++q) {
-              const Complex expected_start = kept * get_start(before, g, l, q) + turn_on(before, g, l, made, q - sub_block - 1);
-              ASSERT_LT(std::abs(get_start(now, g, l, q) - expected_start), (forces           ? 2e-5
-                                                                             : q < kSubBlocks ? 3e-7
-                                                                                              : 1e-6) *
+            for (int q = (sub_block + 1) * kEach; q <= kColumns; ++q) {
+              const Complex expected_start = kept * get_start(before, g, l, q) + turn_on(before, g, l, made, q - (sub_block + 1) * kEach);
+              ASSERT_LT(std::abs(get_start(now, g, l, q) - expected_start), (forces         ? 2e-5
+                                                                             : q < kColumns ? 3e-7
+                                                                                            : 1e-6) *
                                                                                 (1.0 + std::abs(made)))
                   << get_name(isa) << ", " << count << " modes" << forces << damps;
             }
-            for (int q = 0; q <= sub_block; ++q) ASSERT_EQ(now.starts[g].re[q][l], before.starts[g].re[q][l]);
+            for (int q = 0; q < (sub_block + 1) * kEach; ++q) ASSERT_EQ(now.starts[g].re[q][l], before.starts[g].re[q][l]);
           }
           for (std::size_t n = 0; n < expected.size(); ++n) ASSERT_NEAR(out[n], expected[n], 2e-6 * size) << get_name(isa) << ", " << count;
         }

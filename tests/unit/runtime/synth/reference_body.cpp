@@ -14,6 +14,7 @@
 #include <numeric>
 
 #include "runtime/base/error.hpp"
+#include "runtime/base/sort_order.hpp"
 #include "runtime/synth/oscillator.hpp"
 
 namespace carillon::testing {
@@ -57,10 +58,8 @@ ReferenceBody::ReferenceBody(const bank::Bank& bank, double sample_rate_hz, Refe
     : bank_(&bank), rate_hz_(sample_rate_hz), silence_pa_(options.silence_pa) {
   if (!(sample_rate_hz > 0.0) || !std::isfinite(sample_rate_hz)) throw InputError("the sample rate must be a positive number of Hz");
   check_bank(bank);
-  std::vector<std::size_t> order(bank.mode_count());
-  std::iota(order.begin(), order.end(), std::size_t{0});
   // Slow modes first: tiles of modes that decay alike fall asleep together.
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return bank.decay_per_s[a] < bank.decay_per_s[b]; });
+  const std::vector<std::size_t> order = base::find_sort_order(bank.decay_per_s);
   const double nyquist_rad_s = std::numbers::pi * sample_rate_hz;
   for (const std::size_t mode : order) {
     const double omega = std::sqrt(bank.eigenvalue_rad2_s2[mode]);

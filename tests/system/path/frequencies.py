@@ -1,0 +1,101 @@
+#!/usr/bin/python3
+"""Corrected frequencies from the job to the sound: a scene plays them, or the mesh's, as it asks; a list that is too short for error bars
+says so in the log, in the bank and in its report, and nowhere as a number.
+
+usage: frequencies.py BIN_DIR
+"""
+import json
+import math
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import wave
+
+import h5py
+import numpy
+
+BIN = pathlib.Path(sys.argv[1]).resolve()
+STEEL = {"young_modulus_pa": 2e11, "poisson_ratio": 0.3, "density_kg_m3": 7850, "damping": {"rayleigh": {"alpha2_per_s": 2}}}
+BAR = {"shape": "bar", "length_m": 0.3, "width_m": 0.03, "thickness_m": 0.012, "nodes": 700}
+
+
+def run(folder, code, program, *words):
+    done = subprocess.run([str(BIN / program), *words], cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=200)
+    assert done.returncode == code, f"{program} {words}: exit code {done.returncode}\n{done.stdout}{done.stderr}"
+    return done.stdout + done.stderr
+
+
+def solve(folder, name, **more):
+    job = {"body": BAR, "material": STEEL, "bank": f"{name}.hdf", "element": "T4"} | more
+    (folder / f"{name}.json").write_text(json.dumps(job))
+    said = run(folder, 0, "carillon-precompute", f"{name}.json")
+    with h5py.File(folder / f"{name}.hdf") as bank:
+        return said, {key: values[()] for key, values in bank["modes"].items() if "frequency" in key or "error" in key}
+
+
+def measure(folder, name, freq_hz):
+    """How strong each frequency is in the WAV, by a Hann window over its last second."""
+    with wave.open(str(folder / f"{name}.wav")) as file:
+        rate, channels = file.getframerate(), file.getnchannels()
+        sound = numpy.frombuffer(file.readframes(file.getnframes()), "<i2").reshape(-1, channels).sum(axis=1)[-rate:]
+    time = numpy.arange(rate) / rate
+    return [abs(numpy.sum(sound * numpy.hanning(rate) * numpy.exp(-2j * math.pi * f * time))) for f in freq_hz]
+
+
+def check_sound(folder):
+    _, modes = solve(folder, "bar", band_hz=[20, 1000])  # one mode: no other one is where it is not
+    mesh, corrected = modes["frequency_hz"][0], modes["corrected_frequency_hz"][0]
+    assert mesh - corrected > 10, f"{mesh} and {corrected} Hz cannot be separated here"
+    scene = {
+        "duration_s": 1.5,
+        "sample_rate_hz": 48000,
+        "bodies": [{"name": "bar", "bank": "bar.hdf", "fixed": True}],
+        "strikes": [{"time_s": 0.1, "body": "bar", "point_m": [0.15, 0, 0.006], "impulse_n_s": [0, 0, -0.01], "duration_s": 0.0005}],
+        "listener": {"position_m": [0, 1, 1], "look_at_m": [0, 0, 0]},
+        "output": {"format": "pcm16"},
+    }
+    for name, more in ("unsaid", {}), ("corrected", {"frequencies": "corrected"}), ("mesh", {"frequencies": "mesh"}):
+        (folder / f"{name}.json").write_text(json.dumps(scene | more))
+        run(folder, 0, "carillon-render", f"{name}.json", "-o", f"{name}.wav")
+        of_mesh, of_corrected = measure(folder, name, (mesh, corrected))
+        played, other = (of_mesh, of_corrected) if name == "mesh" else (of_corrected, of_mesh)
+        assert played > 100 * other > 0, f"{name}: {of_mesh:.3g} at {mesh:.2f} Hz, {of_corrected:.3g} at {corrected:.2f} Hz"
+    assert (folder / "unsaid.wav").read_bytes() == (folder / "corrected.wav").read_bytes()
+    (folder / "wrong.json").write_text(json.dumps(scene | {"frequencies": "true"}))
+    said = run(folder, 2, "carillon-render", "wrong.json", "-o", "wrong.wav")
+    assert "wrong.json" in said and '"frequencies"' in said and '"corrected", "mesh"' in said, said
+    assert not (folder / "wrong.wav").exists()
+    print(f"sound: {mesh:.2f} Hz of the mesh, {corrected:.2f} Hz corrected")
+
+
+def check_short_list(folder):
+    _, modes = solve(folder, "long", mass="lumped", band_hz=[20, 9000])
+    mesh = modes["frequency_hz"]
+    assert len(mesh) > 4 and numpy.all(numpy.isfinite(modes["corrected_error_cents"]))
+    for count in 1, 3:
+        name = f"short-{count}"
+        said, modes = solve(folder, name, mass="lumped", band_hz=[20, (mesh[count - 1] + mesh[count]) / 2])
+        assert "frequencies have no error bars" in said, said
+        assert len(modes["frequency_hz"]) == count
+        assert numpy.all(numpy.isposinf(modes["corrected_error_cents"])), modes
+        assert numpy.all(numpy.isposinf(modes["discretisation_error_cents"])), modes
+        run(folder, 0, "carillon-bank", "check", f"{name}.hdf")
+        said = run(folder, 0, "carillon-bank", "info", f"{name}.hdf")
+        assert "inf" not in said.replace("info", ""), said
+        said = json.loads(run(folder, 0, "carillon-bank", "info", f"{name}.hdf", "--json"))
+        assert "Infinity" not in json.dumps(said)
+        run(folder, 0, "carillon", "report", f"{name}.hdf", "-o", f"{name}-report", "--no-pictures")
+        page = (folder / f"{name}-report" / "report.html").read_text()
+        assert "unknown" in page and "not known of all modes" in page
+        assert not re.search(r"\binf\b", page), page[page.index("inf") - 200 :][:400]
+    # The lowest modes of a longer list are not so: they are computed with more, and cut.
+    _, modes = solve(folder, "cut", mass="lumped", band_hz=[20, 9000], max_modes=2)
+    assert len(modes["frequency_hz"]) == 2 and numpy.all(numpy.isfinite(modes["corrected_error_cents"])), modes
+    print(f"short lists: {len(mesh)} modes have bars, 3 and 1 have none, 2 of more have some")
+
+
+with tempfile.TemporaryDirectory(prefix="carillon-frequencies-") as scratch:
+    check_sound(pathlib.Path(scratch))
+    check_short_list(pathlib.Path(scratch))

@@ -1,0 +1,153 @@
+// Materials by name: the table of the repository is one of solids with sources, and a file of the user's own stands in front of it.
+#include "runtime/material/table.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <set>
+#include <string>
+
+#include "runtime/material/read_material.hpp"
+#include "runtime/material/solids.hpp"
+
+namespace carillon::material {
+namespace {
+
+constexpr std::array<double, 2> kBandHz{20.0, 20000.0};
+
+Material read(const std::string& text) {
+  base::Document document = base::parse_document("{\"material\": " + text + "}", "/job.json");
+  base::Object root = document.root();
+  std::vector<std::string> warnings;
+  return read_material(root, "material", kBandHz, warnings);
+}
+
+std::string find_error(const std::string& text) {
+  try {
+    read(text);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(MaterialTable, has_solids_of_every_kind_with_sources) {
+  std::set<std::string> names, groups;
+  for (const Row& row : MaterialTable::get().rows()) {
+    SCOPED_TRACE(row.material.name);
+    EXPECT_TRUE(names.insert(row.material.name).second);
+    for (const std::string& other : row.also) EXPECT_TRUE(names.insert(other).second) << other;
+    groups.insert(row.group);
+    EXPECT_GT(row.elasticity_source.size(), 10);
+    EXPECT_GT(row.loss_source.size(), 10);
+    const bool is_panel = row.group == "wood" && (row.material.name == "plywood" || row.material.name == "chipboard" ||
+                                                  row.material.name == "mdf" || row.material.name == "cork");
+    EXPECT_EQ(row.material.orthotropic.has_value(), (row.group == "wood" && !is_panel) || row.material.name == "bone");
+    // Its fastest waves: no solid has faster ones than diamond, and soft rubber has about 70 m/s.
+    const Elasticity c = row.material.calc_elasticity_pa();
+    const double fast = std::sqrt(calc_eigenvalues(c)[5] / row.material.density_kg_m3);
+    EXPECT_GT(fast, 60);
+    EXPECT_LT(fast, 20000);
+    EXPECT_FALSE(ask_about_solid(row.material.young_modulus_pa, row.material.density_kg_m3).has_value());
+    // Steel rings for seconds at 1 kHz, rubber for hundredths.
+    const double omega = 2 * std::numbers::pi * 1000;
+    const double loss = 2 * row.material.calc_decay_per_s(omega * omega) / omega;
+    EXPECT_GE(loss, 1e-6);
+    EXPECT_LE(loss, 0.2);
+  }
+  EXPECT_GE(MaterialTable::get().rows().size(), 30);
+  EXPECT_EQ(groups, (std::set<std::string>{"metal", "glass", "ceramic", "stone", "wood", "plastic", "nature"}));
+}
+
+TEST(MaterialTable, knows_what_everybody_knows) {
+  // Speed of sound in a rod [m/s], of tables of physics.
+  for (const auto& [name, speed] : {std::pair{"steel", 5050}, {"aluminium", 5090}, {"glass", 5370}, {"lead", 1190}, {"copper", 3740}}) {
+    const Material& m = MaterialTable::get().find(name)->material;
+    EXPECT_NEAR(std::sqrt(m.young_modulus_pa / m.density_kg_m3) / speed, 1, 0.02) << name;
+  }
+  const Material& oak = MaterialTable::get().find("oak")->material;
+  ASSERT_TRUE(oak.orthotropic);
+  EXPECT_NEAR(oak.orthotropic->young_modulus_pa[0], 13.5e9, 0.1e9);
+  EXPECT_GT(oak.orthotropic->young_modulus_pa[1], oak.orthotropic->young_modulus_pa[2]) << "radial and tangential";
+}
+
+TEST(MaterialTable, finds_names_however_they_are_written) {
+  for (const char* name : {"stainless steel", "Stainless-Steel", "STAINLESS_STEEL", "stainlesssteel"})
+    EXPECT_EQ(read('"' + std::string(name) + '"').name, "stainless steel");
+  EXPECT_EQ(read("\"PMMA\"").name, "acrylic");
+  EXPECT_THAT(find_error("\"aluminim\""),
+              testing::AllOf(testing::HasSubstr("/job.json:1"), testing::HasSubstr("did you mean \"aluminium\"?"),
+                             testing::HasSubstr("carillon materials")));
+  EXPECT_THAT(find_error("\" - \""), testing::HasSubstr("no known material"));
+}
+
+TEST(MaterialTable, gives_materials_that_a_job_may_change_in_part) {
+  const Material steel = read("\"steel\""), damped = read(R"({"from": "steel", "damping": {"rayleigh": {"alpha2_per_s": 3}}})");
+  EXPECT_EQ(damped.young_modulus_pa, steel.young_modulus_pa);
+  EXPECT_EQ(damped.law, DampingLaw::rayleigh);
+  EXPECT_EQ(damped.alpha2_per_s, 3);
+  const Material light =
+      read(R"({"from": "steel", "name": "foam", "density_kg_m3": 4000, "young_modulus_pa": 5e10, "poisson_ratio": 0.1})");
+  EXPECT_EQ(light.density_kg_m3, 4000);
+  EXPECT_EQ(light.poisson_ratio, 0.1);
+  EXPECT_EQ(light.tan_phi, steel.tan_phi);
+  EXPECT_EQ(light.name, "foam");
+  const Material upright = read(R"({"from": "spruce", "axes": [[0, 0, 2], [1, 0, 0]]})"), flat = read("\"spruce\"");
+  EXPECT_EQ(upright.orthotropic->axes[0], (std::array<double, 3>{0, 0, 1}));
+  EXPECT_EQ(upright.orthotropic->young_modulus_pa, flat.orthotropic->young_modulus_pa);
+  EXPECT_NE(upright.calc_elasticity_pa(), flat.calc_elasticity_pa());
+  const Material plain = read(R"({"from": "spruce", "young_modulus_pa": 1e10, "poisson_ratio": 0.3})");
+  EXPECT_FALSE(plain.orthotropic);
+}
+
+TEST(MaterialTable, refuses_what_makes_no_sense) {
+  EXPECT_THAT(find_error(R"({"from": "steel", "axes": [[0, 0, 1], [1, 0, 0]]})"), testing::HasSubstr("same in all directions"));
+  EXPECT_THAT(find_error(R"({"from": "stel"})"), testing::HasSubstr("did you mean \"steel\"?"));
+  EXPECT_THAT(find_error(R"({"from": "steel", "young_modulus_pa": 1e10})"), testing::HasSubstr("poisson_ratio"));
+  EXPECT_THAT(find_error(R"({"young_modulus_pa": 1e10, "poisson_ratio": 0.3, "density_kg_m3": 1000})"),
+              testing::HasSubstr("\"damping\" is missing"));
+  EXPECT_THAT(find_error(R"({"from": "steel", "densty_kg_m3": 4000})"), testing::HasSubstr("density_kg_m3"));
+}
+
+MaterialTable read_own(const std::string& text) {
+  return MaterialTable::read(base::parse_document(text, "/own.json"), &MaterialTable::get());
+}
+
+TEST(MaterialTable, is_extended_by_a_file_that_comes_first) {
+  const MaterialTable table = read_own(R"({"materials": [
+    {"name": "my bronze", "from": "bronze", "damping": {"internal_friction": {"tan_phi": 1e-4}}},
+    {"name": "steel", "also": ["stahl"], "young_modulus_pa": 2.1e11, "poisson_ratio": 0.3, "density_kg_m3": 7800,
+     "damping": {"loss_table": [[100, 1e-4], [1000, 2e-4]]}, "loss_source": "own measurement"}]})");
+  EXPECT_EQ(table.rows().size(), MaterialTable::get().rows().size() + 2);
+  EXPECT_EQ(table.find("my-bronze")->material.tan_phi, 1e-4);
+  EXPECT_EQ(table.find("my-bronze")->material.density_kg_m3, 8800);
+  EXPECT_EQ(table.find("my-bronze")->place, "/own.json:2");
+  EXPECT_EQ(table.find("steel")->material.density_kg_m3, 7800);
+  EXPECT_EQ(table.find("Stahl"), table.find("steel"));
+  EXPECT_EQ(table.find("brass")->place, "");
+}
+
+TEST(MaterialTable, names_the_line_of_what_is_wrong_in_such_a_file) {
+  for (const auto& [text, words] : {
+           std::pair{R"({"materials": [{"name": "a", "from": "b"}]})", "no known material"},
+           {R"({"materials": [{"from": "steel"}]})", "name"},
+           {R"({"materials": [{"name": " -", "from": "steel"}]})", "needs a name"},
+           {R"({"materials": [{"name": "x", "from": "steel"}, {"name": "X", "from": "steel"}]})", "there already"},
+           {R"({"materials": [{"name": "x", "from": "steel", "colour": 3}]})", "colour"},
+           {R"({"material": []})", "materials"},
+           {R"({"materials": [{"name": "x", "also": [{}], "from": "steel"}]})", "as texts"},
+       }) {
+    try {
+      read_own(text);
+      ADD_FAILURE() << text;
+    } catch (const InputError& error) {
+      EXPECT_THAT(error.what(), testing::StartsWith("/own.json:")) << text;
+      EXPECT_THAT(error.what(), testing::HasSubstr(words)) << text;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace carillon::material
