@@ -18,6 +18,7 @@
 #include "precompute/run/enter_folder.hpp"
 #include "precompute/run/estimate.hpp"
 #include "precompute/run/interrupt.hpp"
+#include "precompute/run/known_body.hpp"
 #include "precompute/run/run_job.hpp"
 #include "precompute/run/run_log.hpp"
 #include "precompute/run/validate.hpp"
@@ -107,6 +108,10 @@ struct CommandLine {
     app.add_option("--count", options.count_s, "with --validate: most seconds for the count of the modes [what --patience leaves]")
         ->check(CLI::Range(0.0, 1e6))
         ->needs(validate);
+    app.add_option("--at", options.at_m, "print the modes of a string, beam, membrane, plate or table at a point, and write no bank")
+        ->delimiter(',')
+        ->type_name("X,Y,Z")
+        ->excludes(validate);
     app.add_flag("--json", options.json, "with --validate: print one JSON object")->needs(validate);
     app.add_flag("--profile", options.profile, "count messages and the time inside MPI too, and write them to the record of the run");
     app.add_option("--estimate", estimate,
@@ -138,11 +143,16 @@ bool is_first_of_all() {
 /// Does what was asked for.
 base::Result carry_out(const petsc::Session& session, const CommandLine& words) {
   const bool speaks = session.rank() == 0;
-  print_start(session, words.options.quiet || words.options.validate);
+  print_start(session, words.options.quiet || words.options.validate || words.options.at_m);
   petsc::reserve_blas_memory(PETSC_COMM_WORLD);
   if (words.options.validate) {
     const std::string text = run::validate_job(PETSC_COMM_WORLD, words.job, words.options);
     if (speaks) fmt::print("{}\n", words.options.json ? text : base::printable_lines(text));
+    return {};
+  }
+  if (words.options.at_m) {
+    const std::string table = run::list_modes_at(PETSC_COMM_WORLD, words.job, words.options);
+    if (speaks) fmt::print("{}", table);
     return {};
   }
   const run::RunSummary summary = run::run_job(PETSC_COMM_WORLD, words.job, words.options);

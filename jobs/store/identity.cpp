@@ -80,11 +80,17 @@ Json::Value parse_object(const std::string& text) {
   return {};
 }
 
+/// Where a job names its input.
+Json::Value& get_input_key(Json::Value& root, InputKind kind) {
+  if (kind == InputKind::surface) return root["body"]["surface"];
+  return kind == InputKind::table ? root["body"]["modes_csv"] : root["mesh"];
+}
+
 /// As JSON, not as a job: the words of the schema at that time are those of the request.
 Origin compare_origin(Json::Value root, const Request& request) {
   if (!root.isObject()) return Origin::unknown;
   try {
-    const Json::Value& named = request.input_kind == InputKind::surface ? root["body"]["surface"] : root["mesh"];
+    const Json::Value& named = get_input_key(root, request.input_kind);
     const std::string input = named.isString() ? fs::path(named.asString()).stem().string() : "";
     for (const char* key : {"run", "bank"}) root.removeMember(key);
     if (make_canonical(root) != request.job) return Origin::another_job;
@@ -128,8 +134,6 @@ std::string find_user() {
   ::getpwuid_r(::geteuid(), &entry, buffer.data(), buffer.size(), &found);
   return found != nullptr ? to_text(found->pw_name) : fmt::format("{}", ::geteuid());
 }
-
-const fs::path& get_input(const job::JobSpec& job) { return job.body ? job.body->surface : job.mesh; }
 
 /// Copies a file to `target` while it is hashed.
 Id copy_hashed(const fs::path& file, std::string_view what, const fs::path& target) {
@@ -188,7 +192,7 @@ bool ensure_input(const Store& store, const job::JobSpec& job, const Request& re
   if (request.input_kind == InputKind::shape) return false;
   const auto [entry, is_new] = known.try_emplace(request.input_sha256 + "." + request.input_format, false);
   if (is_new && find_input_fault(store, request)) {
-    take_snapshot(store, get_input(job), request);
+    take_snapshot(store, job::get_input(job), request);
     entry->second = true;
   }
   return entry->second;
@@ -209,7 +213,7 @@ void fill_work(const Store& store, const job::JobSpec& job, const Request& reque
   const fs::path work = store.work_folder(id);
   if (request.input_kind != InputKind::shape) {
     const fs::path input = store.input_file(require_id(request.input_sha256, "the request"), request.input_format);
-    (job.body ? inner.body->surface : inner.mesh) = input;
+    job::set_input(inner, input);
   }
   inner.bank = work / kBankFile;
   write_unsynced(folder / kJobFile, job::resolved_json(inner, work, ""));
@@ -223,7 +227,7 @@ job::JobSpec make_job(const Store& store, const Request& request, const Id& id) 
   const fs::path work = store.work_folder(id);
   if (request.input_kind != InputKind::shape) {
     const fs::path input = store.input_file(require_id(request.input_sha256, "the request"), request.input_format);
-    (request.input_kind == InputKind::surface ? root["body"]["surface"] : root["mesh"]) = input.string();
+    get_input_key(root, request.input_kind) = input.string();
   }
   root["bank"] = (work / kBankFile).string();
   Json::StreamWriterBuilder writer;
@@ -272,9 +276,9 @@ Request RequestMaker::make(const job::JobSpec& job) {
   request.resources = job.resources;
   request.user = find_user();
   request.submitted_unix_s = std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-  const fs::path& input = get_input(job);
+  const fs::path& input = job::get_input(job);
   const std::string ending = lower_ending(input);
-  request.input_kind = input.empty() ? InputKind::shape : job.body ? InputKind::surface : InputKind::mesh;
+  request.input_kind = input.empty() ? InputKind::shape : job.analytic ? InputKind::table : job.body ? InputKind::surface : InputKind::mesh;
   if (!input.empty()) request.input_file = to_text(input);
   if (request.input_kind == InputKind::mesh && (ending == "node" || ending == "ele")) {
     const auto pair = find_tetgen_pair(input);
@@ -283,7 +287,7 @@ Request RequestMaker::make(const job::JobSpec& job) {
     request.input_sha256 = hash_pair(node, find_input(pair[1], "mesh").sha256).text();
   } else if (!input.empty()) {
     const Known& known = find_input(input, to_text(request.input_kind));
-    request.input_format = job.body ? ending : find_mesh_format(known.head, ending);
+    request.input_format = request.input_kind != InputKind::mesh ? ending : find_mesh_format(known.head, ending);
     request.input_sha256 = known.sha256.text();
   }
   request.job_file = to_text(fs::absolute(job.file).lexically_normal());

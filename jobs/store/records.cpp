@@ -35,8 +35,8 @@ constexpr std::array<Word<JobState>, 6> kStates{{{JobState::queued, "queued"},
                                                  {JobState::failed, "failed"},
                                                  {JobState::cancelled, "cancelled"}}};
 constexpr std::array<Word<JobEngine>, 2> kEngines{{{JobEngine::local, "local"}, {JobEngine::slurm, "slurm"}}};
-constexpr std::array<Word<InputKind>, 3> kInputKinds{
-    {{InputKind::mesh, "mesh"}, {InputKind::surface, "surface"}, {InputKind::shape, "shape"}}};
+constexpr std::array<Word<InputKind>, 4> kInputKinds{
+    {{InputKind::mesh, "mesh"}, {InputKind::surface, "surface"}, {InputKind::shape, "shape"}, {InputKind::table, "table"}}};
 
 template <class Words>
 auto find_word(const Words& words, std::string_view word) {
@@ -62,7 +62,7 @@ Request read_request_root(base::Object root, const std::string& where) {
   Request request;
   request.id = require_id(root.string("id"), where).text();
   request.job = root.string("job");
-  request.input_kind = *find_word(kInputKinds, root.choice("input_kind", {"mesh", "surface", "shape"}));
+  request.input_kind = *find_word(kInputKinds, root.choice("input_kind", {"mesh", "surface", "shape", "table"}));
   request.input_format = read_empty_or(root, "input_format");
   request.input_sha256 = read_empty_or(root, "input_sha256");
   if (request.input_kind != InputKind::shape) require_id(request.input_sha256, where);

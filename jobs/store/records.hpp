@@ -20,7 +20,7 @@ enum class JobState { queued, running, waiting, done, failed, cancelled };
 /// Where a job runs: the queue of this machine, or Slurm.
 enum class JobEngine { local, slurm };
 /// What a job is made of, in addition to its description.
-enum class InputKind { mesh, surface, shape };
+enum class InputKind { mesh, surface, shape, table };
 /// The words of these in files and on the command line.
 std::string to_text(JobState state);
 std::string to_text(JobEngine engine);

@@ -86,8 +86,9 @@ std::vector<Fixed> read_all_fixed(base::Object& job) {
 }
 
 void read_materials(base::Object& job, JobSpec& spec) {
+  const std::string fallback = spec.analytic ? get_default_material(*spec.analytic) : "";
   const auto read = [&](base::Object& parent, const std::string& key) {
-    return material::read_material(parent, key, spec.band_hz, spec.warnings);
+    return material::read_material(parent, key, spec.band_hz, spec.warnings, fallback);
   };
   if (auto materials = job.object_if("materials")) {
     if (materials->keys().empty() || materials->keys().size() > kMaxRegions)
@@ -129,13 +130,23 @@ void read_geometry(base::Object& job, JobSpec& spec) {
     if (job.has("mesh")) job.fail("body", "\"mesh\" names the body already; give one of \"mesh\" (a file) and \"body\"");
     if (job.has("mesh_scale"))
       job.fail("mesh_scale", "is for a \"mesh\" file; a surface has \"scale\" inside \"body\", and shapes are in metres");
-    spec.body = read_body(job.object("body"));
+    base::Object body = job.object("body");
+    if (is_analytic(body))
+      spec.analytic = read_analytic(body);
+    else
+      spec.body = read_body(body);
   } else {
     spec.mesh = job.path("mesh");
     spec.mesh_scale = job.number_or("mesh_scale", spec.mesh_scale, base::kPositive);
     if (spec.mesh_scale < kMinScale || spec.mesh_scale > kMaxScale)
       job.fail("mesh_scale", fmt::format("metres per unit of the mesh file, from {:g} to {:g} (0.001 for millimetres), and is {:g}",
                                          kMinScale, kMaxScale, spec.mesh_scale));
+  }
+  if (spec.analytic) {
+    for (const char* key : {"accuracy_cents", "element", "mass", "solver", "fixed", "materials"})
+      if (job.has(key))
+        job.fail(key, fmt::format("is for bodies of elements, and the modes of a \"{}\" are known; remove it", get_key(*spec.analytic)));
+    return;
   }
   if (!spec.accuracy_cents) return;
   if (job.has("element")) job.fail("element", "\"accuracy_cents\" chooses the element; give one of the two");
@@ -153,10 +164,12 @@ bool is_same_file(const fs::path& a, const fs::path& b) {
 
 void check_outputs(base::Object& job, const JobSpec& spec) {
   if (spec.bank.empty()) return;
-  const fs::path input = !spec.body ? spec.mesh : spec.body->surface;
+  const fs::path& input = get_input(spec);
   const fs::path resolved = find_resolved_path(spec.bank);
   if (!input.empty() && (is_same_file(spec.bank, input) || is_same_file(resolved, input))) {
-    job.fail("bank", fmt::format("the bank or its record would overwrite the {}; choose another file", spec.body ? "surface" : "mesh"));
+    job.fail("bank", fmt::format("the bank or its record would overwrite the {}; choose another file", spec.analytic ? "table"
+                                                                                                       : spec.body   ? "surface"
+                                                                                                                     : "mesh"));
   }
   if (is_same_file(spec.bank, spec.file)) job.fail("bank", "the bank would overwrite this job file; choose another file");
 }
@@ -190,6 +203,21 @@ JobSpec read_root(base::Object job, const fs::path& file, BankKey bank) {
 }
 
 }  // namespace
+
+namespace {
+
+template <class Job>
+auto& find_input(Job& job) {
+  if (job.body) return job.body->surface;
+  auto* measured = job.analytic ? std::get_if<MeasuredBody>(&job.analytic->kind) : nullptr;
+  return measured != nullptr ? measured->csv : job.mesh;
+}
+
+}  // namespace
+
+const fs::path& get_input(const JobSpec& job) { return find_input(job); }
+
+void set_input(JobSpec& job, const fs::path& file) { find_input(job) = file; }
 
 fs::path find_resolved_path(const fs::path& bank) { return fs::path(bank) += ".resolved.json"; }
 

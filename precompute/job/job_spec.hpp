@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "precompute/job/analytic_body.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/material/material.hpp"
 #include "runtime/material/supports.hpp"
@@ -61,6 +62,7 @@ struct JobSpec {
   std::filesystem::path mesh;                 // absolute; empty when the job names a body
   double mesh_scale = 1.0;                    // metres per unit of the mesh file
   std::optional<Body> body;                   // in place of mesh
+  std::optional<AnalyticBody> analytic;       // in place of both: its modes are known, and nothing is meshed
   std::filesystem::path bank;                 // absolute; empty: none given
   Material material;                          // of the whole body, or of the regions that `materials` does not name
   bool has_material = true;                   // false: `materials` has to name every region, and `material` is the first of them
@@ -85,6 +87,12 @@ enum class BankKey { required, optional };
 JobSpec read_job(const std::filesystem::path& file, BankKey bank = BankKey::required);
 /// The same from text; `file` names it in messages and anchors relative paths, `first_line` is the number of its first line there.
 JobSpec parse_job(std::string_view text, const std::filesystem::path& file, BankKey bank = BankKey::required, int first_line = 1);
+
+/// The file of the mesh, the surface or the table that the job is about; empty: a shape or a formula.
+const std::filesystem::path& get_input(const JobSpec& job);
+
+/// Puts another file in its place, where there is one.
+void set_input(JobSpec& job, const std::filesystem::path& file);
 
 /// Where the resolved job goes: next to the bank, "<bank>.resolved.json".
 std::filesystem::path find_resolved_path(const std::filesystem::path& bank);

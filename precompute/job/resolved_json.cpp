@@ -115,23 +115,9 @@ Json::Value write_fixed(const std::vector<Fixed>& list) {
   return root.size() == 1 ? root[0] : root;
 }
 
-}  // namespace
-
-std::string resolved_json(const JobSpec& job, const fs::path& folder, const std::string& run_json) {
-  const fs::path base = fs::absolute(folder).lexically_normal();
-  Json::Value root;
-  if (job.body)
-    root["body"] = write_body(*job.body, base);
-  else
-    root["mesh"] = relative_to(job.mesh, base);
-  if (job.mesh_scale != 1.0) root["mesh_scale"] = job.mesh_scale;
-  if (!job.bank.empty()) root["bank"] = relative_to(job.bank, base);
-  if (job.has_material) root["material"] = write_material(job.material);
-  for (const auto& [region, material] : job.materials) root["materials"][region] = write_material(material);
+/// How the modes of a body of elements are found.
+void write_solve(const JobSpec& job, Json::Value& root) {
   root["mass"] = to_text(job.mass);
-  root["band_hz"].append(job.band_hz[0]);
-  root["band_hz"].append(job.band_hz[1]);
-  if (job.max_modes) root["max_modes"] = *job.max_modes;
   if (!job.fixed.empty()) root["fixed"] = write_fixed(job.fixed);
   if (job.accuracy_cents) {
     root["accuracy_cents"] = *job.accuracy_cents;
@@ -141,6 +127,27 @@ std::string resolved_json(const JobSpec& job, const fs::path& folder, const std:
   }
   root["solver"]["method"] = to_text(job.method);
   root["solver"]["factorisation"] = to_text(job.factorisation);
+}
+
+}  // namespace
+
+std::string resolved_json(const JobSpec& job, const fs::path& folder, const std::string& run_json) {
+  const fs::path base = fs::absolute(folder).lexically_normal();
+  Json::Value root;
+  if (job.analytic)
+    add_members(write_analytic(*job.analytic, base), root["body"]);
+  else if (job.body)
+    root["body"] = write_body(*job.body, base);
+  else
+    root["mesh"] = relative_to(job.mesh, base);
+  if (job.mesh_scale != 1.0) root["mesh_scale"] = job.mesh_scale;
+  if (!job.bank.empty()) root["bank"] = relative_to(job.bank, base);
+  if (job.has_material) root["material"] = write_material(job.material);
+  for (const auto& [region, material] : job.materials) root["materials"][region] = write_material(material);
+  root["band_hz"].append(job.band_hz[0]);
+  root["band_hz"].append(job.band_hz[1]);
+  if (job.max_modes) root["max_modes"] = *job.max_modes;
+  if (!job.analytic) write_solve(job, root);
   if (!run_json.empty()) {
     std::istringstream stream(run_json);
     Json::CharReaderBuilder reader;

@@ -194,7 +194,7 @@ std::string write_json(const Json::Value& value) {
   return Json::writeString(writer, value);
 }
 
-Json::Value describe_run(const Run& run, const Setting& setting, const Body& body, const SolvedBody& solved, const Measured& measured) {
+Json::Value describe_program(const Run& run) {
   Json::Value root;
   root["program"] = "carillon-precompute";
   root["git"] = git_id();
@@ -209,6 +209,11 @@ Json::Value describe_run(const Run& run, const Setting& setting, const Body& bod
     entry["peak_bytes_largest_rank"] = Json::Int64(phase.peak_bytes);
     entry["peak_bytes_all_ranks"] = Json::Int64(phase.peak_sum_bytes);
   }
+  return root;
+}
+
+Json::Value describe_run(const Run& run, const Setting& setting, const Body& body, const SolvedBody& solved, const Measured& measured) {
+  Json::Value root = describe_program(run);
   root["phase_seconds"] = describe_phases(run, solved.modes);
   root["work"] = describe_work(measured.work);
   root["effort"] = describe_effort(measured.work);

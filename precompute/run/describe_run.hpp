@@ -13,6 +13,9 @@ namespace carillon::run {
 /// What goes under "run" in the resolved job and in the provenance of the bank. Rank 0 only.
 Json::Value describe_run(const Run& run, const Setting& setting, const Body& body, const SolvedBody& solved, const Measured& measured);
 
+/// Its part about the program alone: name, version, ranks, phases.
+Json::Value describe_program(const Run& run);
+
 /// Materials by region: what they are, how they damp, and their volume.
 Json::Value describe_materials(const fem::Materials& materials, const std::vector<double>& volume_m3);
 

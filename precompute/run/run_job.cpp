@@ -21,6 +21,7 @@
 #include "precompute/run/body.hpp"
 #include "precompute/run/describe_run.hpp"
 #include "precompute/run/interrupt.hpp"
+#include "precompute/run/known_body.hpp"
 #include "precompute/run/open_job.hpp"
 #include "precompute/run/run.hpp"
 #include "precompute/run/solve_body.hpp"
@@ -36,7 +37,7 @@ void open_progress(Run& run) {
   comm::Communicator(run.comm).agree([&] {
     const fs::path& file = run.options.progress;
     if (!run.comm.is_root() || file.empty()) return;
-    for (const fs::path& other : {run.job.file, run.job.mesh, run.job.bank, job::find_resolved_path(run.job.bank)}) {
+    for (const fs::path& other : {run.job.file, job::get_input(run.job), run.job.bank, job::find_resolved_path(run.job.bank)}) {
       std::error_code error;  // One of them that does not exist is none of the others.
       if (!other.empty() && (file == other || fs::equivalent(file, other, error)))
         throw InputError(
@@ -139,7 +140,7 @@ void check_checkpoint(const Run& run) {
   const fs::path& file = run.options.checkpoint;
   base::check_writable(file, "checkpoint");
   std::vector<fs::path> others{run.job.file, run.job.bank, job::find_resolved_path(run.job.bank), run.options.progress};
-  others.push_back(run.job.body ? run.job.body->surface : run.job.mesh);
+  others.push_back(job::get_input(run.job));
   for (const fs::path& other : others) {
     std::error_code ignored;
     if (other.empty()) continue;
@@ -172,6 +173,11 @@ RunSummary carry_out(Run& run, const fs::path& job_file) {
   open_job(run, job_file);
   io::check_matrices(run.comm, run.options.matrices);
   open_progress(run);
+  if (run.job.analytic) {
+    RunSummary summary = write_known_body(run);
+    if (run.progress) run.progress->finish();
+    return summary;
+  }
   open_checkpoint(run);
   AccurateBody found = run.job.accuracy_cents ? solve_to_accuracy(run) : solve_once(run);
   check_options_used(run.comm);

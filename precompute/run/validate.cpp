@@ -25,6 +25,7 @@
 #include "precompute/run/accuracy.hpp"
 #include "precompute/run/describe_run.hpp"
 #include "precompute/run/heartbeat.hpp"
+#include "precompute/run/known_body.hpp"
 #include "precompute/run/modes.hpp"
 #include "precompute/run/open_job.hpp"
 #include "precompute/run/system.hpp"
@@ -424,6 +425,9 @@ std::string Validation::describe_for_people() const {
 std::string validate_job(const comm::Communicator& comm, const std::filesystem::path& job_file, const RunOptions& options) {
   RunOptions silent = options;
   silent.quiet = true;
+  Run known(comm, silent);
+  open_job(known, job_file, job::BankKey::optional);
+  if (known.job.analytic) return validate_known_body(known);
   Validation validation(comm, silent, !options.quiet);
   validation.run(job_file);
   return options.json ? write_json(validation.describe()) : validation.describe_for_people();

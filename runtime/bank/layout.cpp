@@ -135,7 +135,7 @@ std::vector<Field> list_fields(const Bank& bank, const FileForm& form) {
       {"solve/rigid_modes", "<i8", {}, "1", "rigid modes that were deflated", &counts.rigid_modes},
       {"solve/band_hz", "<f8", {2}, "Hz", "modes were looked for from here to there", bank.band_hz.data()},
       {"solve/complete", "|u1", {}, "1", "1 when every mode of the band is here", &form.complete},
-      {"solve/element", text_type(form.element), {}, "1", "T4 or T10", form.element.data()},
+      {"solve/element", text_type(form.element), {}, "1", "T4, T10, or analytic", form.element.data()},
       {"solve/mass", text_type(form.mass), {}, "1", "consistent or lumped", form.mass.data()},
       {"provenance", text_type(form.provenance), {}, "1", "JSON text", form.provenance.data()},
   };

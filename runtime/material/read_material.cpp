@@ -314,8 +314,8 @@ bool has_elasticity(base::Object& material) {
 }
 
 /// The material that this one stands on.
-Material read_from(base::Object& material, const MaterialTable* table) {
-  const std::string name = material.string("from");
+Material read_from(base::Object& material, const MaterialTable* table, const std::string& fallback) {
+  const std::string name = material.string_or("from", fallback);
   if (table == nullptr) material.fail("from", "a material of this table cannot stand on another; give its constants");
   Material result = table->require(material.find_place("from"), name).material;
   result.place = material.find_place("");
@@ -324,11 +324,14 @@ Material read_from(base::Object& material, const MaterialTable* table) {
 
 }  // namespace
 
-Material read_material(base::Object material, const std::array<double, 2>& band_hz, std::vector<std::string>& warnings,
-                       const MaterialTable* table) {
+namespace {
+
+/// fallback: what "from" is where the object gives neither that nor constants of its own; empty: nothing.
+Material read_one(base::Object material, const std::array<double, 2>& band_hz, std::vector<std::string>& warnings,
+                  const MaterialTable* table, const std::string& fallback) {
   Material result;
-  const bool is_derived = material.has("from");
-  if (is_derived) result = read_from(material, table);
+  const bool is_derived = material.has("from") || (!fallback.empty() && !has_elasticity(material) && !material.has("density_kg_m3"));
+  if (is_derived) result = read_from(material, table, fallback);
   result.place = material.find_place("");
   const bool has_stiffness = !is_derived || has_elasticity(material), has_density = !is_derived || material.has("density_kg_m3");
   if (has_stiffness) {
@@ -354,10 +357,19 @@ Material read_material(base::Object material, const std::array<double, 2>& band_
   return result;
 }
 
+}  // namespace
+
+Material read_material(base::Object material, const std::array<double, 2>& band_hz, std::vector<std::string>& warnings,
+                       const MaterialTable* table) {
+  return read_one(std::move(material), band_hz, warnings, table, "");
+}
+
 Material read_material(base::Object& parent, std::string_view key, const std::array<double, 2>& band_hz,
-                       std::vector<std::string>& warnings) {
-  if (!parent.has_string(key)) return read_material(parent.object(key), band_hz, warnings, &MaterialTable::get());
-  Material result = MaterialTable::get().require(parent.find_place(key), parent.string(key)).material;
+                       std::vector<std::string>& warnings, const std::string& fallback) {
+  const bool is_missing = !parent.has(key) && !fallback.empty();
+  if (!is_missing && !parent.has_string(key)) return read_one(parent.object(key), band_hz, warnings, &MaterialTable::get(), fallback);
+  const std::string name = is_missing ? fallback : parent.string(key);
+  Material result = MaterialTable::get().require(parent.find_place(key), name).material;
   result.place = parent.find_place(key);
   return result;
 }

@@ -147,6 +147,10 @@ LAW = {
         ["runtime/base", "precompute/cost", "precompute/comm", "precompute/petsc", "precompute/la", "precompute/ldlt"],
         ["fmt", "mpi", "petsc", "mumps", "eigen"],
     ),
+    "precompute/analytic": (
+        ["runtime/base", "runtime/bank", "runtime/material", "precompute/job", "precompute/petsc", "precompute/la"],
+        ["fmt", "petsc", "eigen"],
+    ),
     "precompute/io": (
         [
             "runtime/base",
@@ -178,6 +182,7 @@ LAW = {
             "precompute/parallel_mesh",
             "precompute/estimate",
             "precompute/eigen",
+            "precompute/analytic",
             "precompute/cost",
             "precompute/io",
         ],

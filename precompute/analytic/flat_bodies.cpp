@@ -1,0 +1,263 @@
+#include "precompute/analytic/flat_bodies.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace carillon::analytic {
+namespace {
+
+using std::numbers::pi;
+
+double square(double x) { return x * x; }
+
+/// Intervals along the longest side for so many half-waves along it: a multiple of ten.
+int choose_flat_grid(double half_waves) {
+  const int wanted = 10 * static_cast<int>(std::ceil(0.4 * half_waves));
+  return std::clamp(wanted, 40, kMaxDefaultGrid);
+}
+
+void warn_if_thick(double thickness_m, double rate, double high_hz, std::vector<std::string>& warnings) {
+  constexpr double kWaves = 10.0;  // thicknesses in a wavelength below which Kirchhoff's theory is more than about 3 per cent sharp
+  const double hz = 2.0 * pi * std::sqrt(rate) / square(kWaves * thickness_m);
+  if (hz < high_hz)
+    warnings.push_back(
+        fmt::format("above {:.0f} Hz a wavelength is less than ten thicknesses, and Kirchhoff's theory is several per cent "
+                    "sharp; elements (\"shape\": \"plate\") have shear and rotary inertia",
+                    hz));
+}
+
+void sort_modes(std::vector<Mode>& modes) {
+  std::stable_sort(modes.begin(), modes.end(), [](const Mode& a, const Mode& b) { return a.lambda_rad2_s2 < b.lambda_rad2_s2; });
+}
+
+/// Z_(m+1)/Z_m and the like come from these; the standard library's are exact to about 1e-13 here.
+double calc_j(int m, double x) { return std::cyl_bessel_j(m, x); }
+double calc_i(int m, double x) { return std::cyl_bessel_i(m, x); }
+
+constexpr double kMaxRoot = 600.0;  // I_m of more overflows
+
+}  // namespace
+
+std::array<double, 2> find_sheet(const job::MembraneBody& body, const material::Material& material) {
+  const double density = material.density_kg_m3;
+  const double per_area = body.density_kg_m2 ? *body.density_kg_m2 : *body.thickness_m * density;
+  return {per_area, body.thickness_m ? *body.thickness_m : per_area / density};
+}
+
+double calc_plate_rate(const material::Material& material, double thickness_m) {
+  return material.young_modulus_pa * square(thickness_m) / (12.0 * (1.0 - square(material.poisson_ratio)) * material.density_kg_m3);
+}
+
+void FlatBody::calc_shapes(const Vec3& point_m, std::span<const Mode> modes, std::span<Vec3> phi) const {
+  std::vector<double> w(modes.size());
+  calc_deflections({point_m[0], point_m[1]}, modes, w);
+  for (std::size_t m = 0; m < modes.size(); ++m) phi[m] = {0.0, 0.0, w[m]};
+}
+
+void FlatBody::set_rigid(double density_kg_m2) {
+  const Net net = make_net(kMaxDefaultGrid);
+  const double area = calc_slab_rigid(net, thickness_m_, 1.0).volume_m3 / thickness_m_;
+  rigid = calc_slab_rigid(net, thickness_m_, density_kg_m2 * area);
+}
+
+SineRectangle::SineRectangle(const job::MembraneBody& body, const material::Material& material)
+    : length_m_(body.length_m), width_m_(body.width_m), is_plate_(false) {
+  std::tie(density_kg_m2_, thickness_m_) = std::tuple_cat(find_sheet(body, material));
+  const double lowest = square(1.0 / length_m_) + square(1.0 / width_m_);
+  rate_ = body.tension_n_m ? *body.tension_n_m / density_kg_m2_ : square(2.0 * *body.lowest_hz) / lowest;
+  theory = "rectangular membrane, fixed along its rim";
+  method = "closed form: all numbers of half-waves along both sides up to the end of the band";
+  set_rigid(density_kg_m2_);
+}
+
+SineRectangle::SineRectangle(const job::PlateBody& body, const material::Material& material)
+    : length_m_(body.length_m), width_m_(body.width_m), density_kg_m2_(material.density_kg_m3 * body.thickness_m), is_plate_(true) {
+  thickness_m_ = body.thickness_m;
+  rate_ = calc_plate_rate(material, thickness_m_);
+  theory = "rectangular plate (Kirchhoff), hinged on all sides";
+  method = "closed form: all numbers of half-waves along both sides up to the end of the band";
+  set_rigid(density_kg_m2_);
+}
+
+ModeList SineRectangle::list_modes(double high_hz, std::int64_t) {
+  ModeList list{{}, high_hz};
+  const double high = square(2.0 * pi * high_hz);
+  const auto calc_lambda = [&](int m, int n) {
+    const double k2 = square(pi) * (square(m / length_m_) + square(n / width_m_));
+    return is_plate_ ? rate_ * k2 * k2 : rate_ * k2;
+  };
+  for (int m = 1; calc_lambda(m, 1) <= high; ++m)
+    for (int n = 1; calc_lambda(m, n) <= high; ++n)
+      list.modes.push_back({calc_lambda(m, n), 0.0, {m, n, 0, 0}, fmt::format("({}, {})", m, n)});
+  sort_modes(list.modes);
+  if (is_plate_) warn_if_thick(thickness_m_, rate_, high_hz, warnings);
+  return list;
+}
+
+void SineRectangle::calc_deflections(const Point2& point_m, std::span<const Mode> modes, std::span<double> w) const {
+  std::array<int, 2> largest{0, 0};
+  for (const Mode& mode : modes)
+    for (int side = 0; side < 2; ++side) largest[side] = std::max(largest[side], mode.index[side]);
+  std::array<std::vector<double>, 2> sines;
+  for (int side = 0; side < 2; ++side) {
+    const double part = std::clamp(point_m[side] / (side == 0 ? length_m_ : width_m_), 0.0, 1.0);
+    for (int k = 0; k <= largest[side]; ++k) sines[side].push_back(part == 1.0 ? 0.0 : std::sin(k * pi * part));
+  }
+  const double scale = 2.0 / std::sqrt(density_kg_m2_ * length_m_ * width_m_);
+  for (std::size_t i = 0; i < modes.size(); ++i) w[i] = scale * sines[0][modes[i].index[0]] * sines[1][modes[i].index[1]];
+}
+
+Net SineRectangle::make_net(int grid) const {
+  const double longest = std::max(length_m_, width_m_);
+  const auto cut = [&](double side) { return std::max(2, static_cast<int>(std::lround(grid * side / longest))); };
+  return make_rectangle_net(length_m_, width_m_, cut(length_m_), cut(width_m_));
+}
+
+int SineRectangle::choose_grid(std::span<const Mode> modes) const {
+  const double longest = std::max(length_m_, width_m_);
+  double half_waves = 1.0;
+  for (const Mode& mode : modes)
+    half_waves = std::max({half_waves, mode.index[0] * longest / length_m_, mode.index[1] * longest / width_m_});
+  return choose_flat_grid(half_waves);
+}
+
+Circle::Circle(const job::MembraneBody& body, const material::Material& material) : radius_m_(body.radius_m), is_plate_(false) {
+  std::tie(density_kg_m2_, thickness_m_) = std::tuple_cat(find_sheet(body, material));
+  constexpr double kFirstZero = 2.404825557695773;  // of J_0
+  rate_ = body.tension_n_m ? *body.tension_n_m / density_kg_m2_ : square(2.0 * pi * radius_m_ * *body.lowest_hz / kFirstZero);
+  theory = "circular membrane, fixed along its rim";
+  method = "closed form: all zeros of the Bessel functions up to the end of the band";
+  set_rigid(density_kg_m2_);
+}
+
+Circle::Circle(const job::PlateBody& body, const material::Material& material)
+    : radius_m_(body.radius_m),
+      density_kg_m2_(material.density_kg_m3 * body.thickness_m),
+      poisson_ratio_(material.poisson_ratio),
+      is_plate_(true),
+      edge_(body.edges[0]) {
+  thickness_m_ = body.thickness_m;
+  rate_ = calc_plate_rate(material, thickness_m_);
+  theory = fmt::format("circular plate (Kirchhoff), {} along its rim", to_text(edge_));
+  method = "closed form: all roots of the determinant of J_m and I_m up to the end of the band, each m scanned";
+  rigid_modes = edge_ == job::Edge::free ? 6 : edge_ == job::Edge::sliding ? 1 : 0;
+  set_rigid(density_kg_m2_);
+}
+
+/// The rim's two conditions on J_m(k r) and I_m(k r) / I_m(k R), in r / R: {J of the first, I of the first, J of the second, I of the
+/// second}. With Z for either: slope k Z'; moment -+ k^2 Z - (1 - nu) (k Z' - m^2 Z); shear -+ k^3 Z' - (1 - nu) m^2 (k Z' - Z).
+std::array<double, 4> Circle::calc_conditions(int m, double k) const {
+  const double j = calc_j(m, k), j_next = calc_j(m + 1, k);
+  const double i_ratio = calc_i(m + 1, k) / calc_i(m, k);
+  const double m2 = square(m), soft = 1.0 - poisson_ratio_;
+  const std::array<double, 2> z{j, 1.0}, slope{m * j - k * j_next, m + k * i_ratio}, sign{-1.0, 1.0};
+  std::array<double, 2> moment, shear;
+  for (int f = 0; f < 2; ++f) {
+    moment[f] = sign[f] * k * k * z[f] - soft * (slope[f] - m2 * z[f]);
+    shear[f] = sign[f] * k * k * slope[f] - soft * m2 * (slope[f] - z[f]);
+  }
+  const auto& first = edge_ == job::Edge::free ? moment : edge_ == job::Edge::sliding ? slope : z;
+  const auto& second = edge_ == job::Edge::clamped ? slope : edge_ == job::Edge::hinged ? moment : shear;
+  return {first[0], first[1], second[0], second[1]};
+}
+
+double Circle::calc_determinant(int m, double root) const {
+  if (!is_plate_) return calc_j(m, root);
+  const std::array<double, 4> c = calc_conditions(m, root);
+  return c[0] * c[3] - c[1] * c[2];
+}
+
+Circle::Radial Circle::make_radial(int m, double k) const {
+  Radial radial{m, k, 1.0, 0.0};
+  const double j = calc_j(m, k), j_next = calc_j(m + 1, k), angular = m == 0 ? 2.0 * pi : pi;
+  double square_mean = 0.5 * square(j_next);  // integral of r w^2 over 0 <= r <= 1
+  if (is_plate_) {
+    const std::array<double, 4> c = calc_conditions(m, k);
+    // The larger entry of the second function says best how much of it there is.
+    const bool is_first = std::abs(c[1]) > std::abs(c[3]) * 1e-3 && edge_ != job::Edge::sliding;
+    radial.modified = is_first ? -c[0] / c[1] : -c[2] / c[3];
+    const double i_ratio = calc_i(m + 1, k) / calc_i(m, k), m2 = square(m / k);
+    const double j_slope = m / k * j - j_next, i_slope = m / k + i_ratio;
+    square_mean = 0.5 * (square(j_slope) + (1.0 - m2) * square(j)) + square(radial.modified) * 0.5 * ((1.0 + m2) - square(i_slope)) +
+                  radial.modified * (j * i_ratio + j_next) / k;
+  }
+  const double scale = 1.0 / std::sqrt(density_kg_m2_ * square(radius_m_) * angular * square_mean);
+  radial.bessel = scale;
+  radial.modified *= scale;
+  return radial;
+}
+
+ModeList Circle::list_modes(double high_hz, std::int64_t) {
+  ModeList list{{}, high_hz};
+  radials_.clear();
+  const double omega = 2.0 * pi * high_hz;
+  const double max_root = (is_plate_ ? std::sqrt(omega / std::sqrt(rate_)) : omega / std::sqrt(rate_)) * radius_m_;
+  if (max_root > kMaxRoot)
+    throw InputError(fmt::format("the circle has about {:.0f} half-waves across at {:g} Hz, more than {:.0f}; lower the end of \"band_hz\"",
+                                 max_root / pi * 2.0, high_hz, kMaxRoot / pi * 2.0));
+  // The first root of each m lies above 0.7 m, and roots of one m are further apart than 2.
+  constexpr double kStep = 0.25, kFirst = 0.7;
+  for (int m = 0; kFirst * m <= max_root; ++m) {
+    double low = std::max(0.5, kFirst * m), value = calc_determinant(m, low);
+    for (int s = 1; low < max_root;) {
+      const double high = std::min(low + kStep, max_root), next = calc_determinant(m, high);
+      if ((value > 0.0) != (next > 0.0)) {
+        double a = low, b = high;
+        while (true) {
+          const double middle = 0.5 * (a + b);
+          if (middle <= a || middle >= b) break;
+          ((calc_determinant(m, middle) > 0.0) == (value > 0.0) ? a : b) = middle;
+        }
+        const double root = 0.5 * (a + b), k = root / radius_m_;
+        for (int part = 0; part < (m == 0 ? 1 : 2); ++part)
+          list.modes.push_back({is_plate_ ? rate_ * square(k * k) : rate_ * k * k,
+                                0.0,
+                                {m, s, part, static_cast<int>(radials_.size())},
+                                fmt::format("({}, {}){}", m, s,
+                                            m == 0      ? ""
+                                            : part == 0 ? " cos"
+                                                        : " sin")});
+        radials_.push_back(make_radial(m, root));
+        ++s;
+      }
+      low = high;
+      value = next;
+    }
+  }
+  sort_modes(list.modes);
+  cached_radius_ = -1.0;
+  if (is_plate_) warn_if_thick(thickness_m_, rate_, high_hz, warnings);
+  return list;
+}
+
+void Circle::calc_deflections(const Point2& point_m, std::span<const Mode> modes, std::span<double> w) const {
+  const double r = std::min(std::hypot(point_m[0], point_m[1]) / radius_m_, 1.0), angle = std::atan2(point_m[1], point_m[0]);
+  if (std::abs(r - cached_radius_) > 1e-12) {
+    cached_.assign(radials_.size(), std::nan(""));
+    cached_radius_ = r;
+  }
+  for (std::size_t i = 0; i < modes.size(); ++i) {
+    const auto place = static_cast<std::size_t>(modes[i].index[3]);
+    if (std::isnan(cached_[place])) {
+      const Radial& radial = radials_[place];
+      cached_[place] = radial.bessel * calc_j(radial.m, radial.root * r);
+      if (radial.modified != 0.0) cached_[place] += radial.modified * calc_i(radial.m, radial.root * r) / calc_i(radial.m, radial.root);
+      if (!is_plate_ && r == 1.0) cached_[place] = 0.0;
+    }
+    const double turned = modes[i].index[0] * angle;
+    w[i] = cached_[place] * (modes[i].index[2] == 0 ? std::cos(turned) : std::sin(turned));
+  }
+}
+
+Net Circle::make_net(int grid) const { return make_disc_net(radius_m_, std::max(1, grid / 2)); }
+
+int Circle::choose_grid(std::span<const Mode> modes) const {
+  double root = 1.0;
+  for (const Mode& mode : modes) root = std::max(root, radials_[static_cast<std::size_t>(mode.index[3])].root);
+  return choose_flat_grid(2.0 * root / pi);
+}
+
+}  // namespace carillon::analytic

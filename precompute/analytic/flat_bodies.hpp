@@ -1,0 +1,120 @@
+// Membranes and plates on rectangles and circles.
+#pragma once
+
+#include <functional>
+
+#include "precompute/analytic/known_body.hpp"
+#include "precompute/analytic/slabs.hpp"
+#include "precompute/la/lapack.hpp"
+
+namespace carillon::analytic {
+
+/// What all flat bodies share: they move along z, and their surface is a slab.
+class FlatBody : public KnownBody {
+ public:
+  /// grid intervals along the longest side.
+  Surface make_surface(int grid) const override { return make_slab(make_net(grid), thickness_m_); }
+  void calc_shapes(const Vec3& point_m, std::span<const Mode> modes, std::span<Vec3> phi) const override;
+
+ protected:
+  virtual Net make_net(int grid) const = 0;
+  /// w of each mode [kg^-1/2], (modes).
+  virtual void calc_deflections(const Point2& point_m, std::span<const Mode> modes, std::span<double> w) const = 0;
+  /// Mass and inertia of a body of this mass per area.
+  void set_rigid(double density_kg_m2);
+
+  double thickness_m_ = 0.0;
+};
+
+/// A rectangle whose modes are products of sines: f = c / 2 sqrt((m / a)^2 + (n / b)^2) of a membrane, pi / 2 sqrt(D / (rho h)) ((m / a)^2
+/// + (n / b)^2) of a plate hinged on all sides; phi = 2 / sqrt(sigma a b) sin sin (Rayleigh, The Theory of Sound, sections 194 to 200 and
+/// 225). Mode::index: m, n.
+class SineRectangle : public FlatBody {
+ public:
+  SineRectangle(const job::MembraneBody& body, const material::Material& material);
+  SineRectangle(const job::PlateBody& body, const material::Material& material);
+  ModeList list_modes(double high_hz, std::int64_t max_modes) override;
+  int choose_grid(std::span<const Mode> modes) const override;
+
+ private:
+  Net make_net(int grid) const override;
+  void calc_deflections(const Point2& point_m, std::span<const Mode> modes, std::span<double> w) const override;
+
+  double length_m_, width_m_, density_kg_m2_;
+  bool is_plate_;
+  double rate_;  // membrane: c^2 [m^2/s^2]; plate: D / (rho h) [m^4/s^2]
+};
+
+/// Radial functions of a circle: J_m, and for a plate I_m, which meet the rim's conditions. Mode::index: m, s, 0 for cos and 1 for sin, and
+/// the place in radials_.
+class Circle : public FlatBody {
+ public:
+  /// f = j_ms / (2 pi R) c, phi = J_m(j r / R) cos or sin / (|J_(m+1)(j)| sqrt(sigma pi R^2 (m ? 1/2 : 1))) (Rayleigh, section 204).
+  Circle(const job::MembraneBody& body, const material::Material& material);
+  /// w = J_m(k r) + C I_m(k r) (Leissa 1969, Vibration of Plates, chapter 2).
+  Circle(const job::PlateBody& body, const material::Material& material);
+  ModeList list_modes(double high_hz, std::int64_t max_modes) override;
+  int choose_grid(std::span<const Mode> modes) const override;
+
+ private:
+  struct Radial {
+    int m = 0;
+    double root = 0.0;
+    double bessel = 0.0, modified = 0.0;  // factors of J_m(root r / R) and I_m(root r / R) / I_m(root)
+  };
+  Net make_net(int grid) const override;
+  void calc_deflections(const Point2& point_m, std::span<const Mode> modes, std::span<double> w) const override;
+  std::array<double, 4> calc_conditions(int m, double root) const;
+  double calc_determinant(int m, double root) const;
+  Radial make_radial(int m, double root) const;
+
+  double radius_m_, density_kg_m2_, poisson_ratio_ = 0.0;
+  bool is_plate_;
+  job::Edge edge_ = job::Edge::clamped;
+  double rate_;  // as SineRectangle
+  std::vector<Radial> radials_;
+  mutable double cached_radius_ = -1.0;  // points come ring by ring
+  mutable std::vector<double> cached_;
+};
+
+/// A rectangular plate with any edges: Ritz's method on products of polynomials that meet the conditions on deflection and slope
+/// (Bhat 1985; here Legendre polynomials, turned into the modes of a beam in each direction). Mode::index: place in shapes_.
+class RitzPlate : public FlatBody {
+ public:
+  RitzPlate(const job::PlateBody& body, const material::Material& material);
+  ModeList list_modes(double high_hz, std::int64_t max_modes) override;
+  int choose_grid(std::span<const Mode> modes) const override;
+
+ private:
+  /// Functions of one direction and parity: coefficients of Legendre polynomials, and their integrals.
+  struct Line {
+    la::Matrix functions;             // (polynomials, k)
+    la::Matrix slopes, bends, mixed;  // integrals of f' f', f'' f'', f f''
+  };
+  struct Shape {
+    int x_line = 0, y_line = 0;
+    la::Matrix coefficients;  // (k of x, k of y)
+  };
+  struct Solved {
+    std::vector<double> lambda;
+    std::vector<Shape> shapes;
+  };
+  std::vector<Line> make_lines(int polynomials, job::Edge first, job::Edge last) const;
+  Solved solve(int x_polynomials, int y_polynomials, double high_lambda);
+  Net make_net(int grid) const override;
+  void calc_deflections(const Point2& point_m, std::span<const Mode> modes, std::span<double> w) const override;
+
+  job::PlateBody body_;
+  double density_kg_m2_, poisson_ratio_, rate_;
+  int x_polynomials_ = 0, y_polynomials_ = 0;
+  std::vector<Line> x_lines_, y_lines_;
+  std::vector<Shape> shapes_;
+};
+
+/// Mass per area and thickness of a membrane, of which the job gives one or both.
+std::array<double, 2> find_sheet(const job::MembraneBody& body, const material::Material& material);
+
+/// Flexural rigidity D = E h^3 / (12 (1 - nu^2)) over the mass per area [m^4/s^2].
+double calc_plate_rate(const material::Material& material, double thickness_m);
+
+}  // namespace carillon::analytic

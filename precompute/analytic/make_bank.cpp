@@ -1,0 +1,205 @@
+#include "precompute/analytic/make_bank.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "precompute/analytic/known_body.hpp"
+#include "precompute/analytic/measured.hpp"
+#include "runtime/bank/of_material.hpp"
+#include "runtime/bank/radiation_gain.hpp"
+#include "runtime/bank/select.hpp"
+#include "runtime/base/error.hpp"
+
+namespace carillon::analytic {
+namespace {
+
+using std::numbers::pi;
+
+constexpr double kEdge = 1e-9;        // of a frequency: rounding at the ends of the band
+constexpr double kDegenerate = 1e-9;  // relative distance of equal eigenvalues
+constexpr double kMaxNumbers = 6e8;   // components of shapes that a bank may have
+
+double to_hz(double lambda) { return std::sqrt(lambda) / (2.0 * pi); }
+
+/// The modes of the band, and the counts that show that none is missing.
+struct Band {
+  std::vector<Mode> modes;
+  bank::Proof proof;
+  std::array<double, 2> band_hz{};
+  bool is_complete = true;
+};
+
+/// Half-way between two modes, or at the end of the band where none is near.
+double choose_cut(double end_hz, double below_hz, double above_hz) {
+  const bool is_clear = below_hz < end_hz * (1.0 - kEdge) && above_hz > end_hz * (1.0 + kEdge);
+  return is_clear ? end_hz : 0.5 * (below_hz + above_hz);
+}
+
+Band find_band(KnownBody& body, const job::JobSpec& job) {
+  const auto max_modes = job.max_modes ? static_cast<std::int64_t>(*job.max_modes) : std::numeric_limits<std::int64_t>::max() / 4;
+  // Somewhat further than the band, to see where the next mode is.
+  const double beyond = 1.0 + 1e-6;
+  ModeList list = body.list_modes(job.band_hz[1] * beyond, max_modes);
+  Band band;
+  band.band_hz = {job.band_hz[0], std::min(job.band_hz[1], list.complete_below_hz / beyond)};
+  const auto is_in = [&](double hz) { return hz >= band.band_hz[0] * (1.0 - kEdge) && hz <= band.band_hz[1] * (1.0 + kEdge); };
+  double before_hz = 0.0, first_hz = 0.0, last_hz = 0.0, next_hz = list.complete_below_hz;
+  std::int64_t below = body.rigid_modes;
+  for (Mode& mode : list.modes) {
+    const double hz = to_hz(mode.lambda_rad2_s2);
+    if (hz > band.band_hz[1] * (1.0 + kEdge)) {
+      next_hz = std::min(next_hz, hz);
+      break;
+    }
+    if (is_in(hz)) {
+      if (band.modes.empty()) first_hz = hz;
+      last_hz = hz;
+      band.modes.push_back(std::move(mode));
+    } else {
+      before_hz = hz;
+      ++below;
+    }
+  }
+  if (band.modes.empty()) first_hz = last_hz = 0.5 * (band.band_hz[0] + band.band_hz[1]);
+  const double low_hz = choose_cut(band.band_hz[0], before_hz, first_hz), high_hz = choose_cut(band.band_hz[1], last_hz, next_hz);
+  bank::Proof& proof = band.proof;
+  proof.cut_hz = {std::min(low_hz, band.band_hz[0]), std::max(high_hz, band.band_hz[1])};
+  proof.found = static_cast<std::int64_t>(band.modes.size());
+  proof.below = {below, below + proof.found};
+  const auto calc_margin = [](double cut_hz, double a_hz, double b_hz) {
+    const auto apart = [&](double hz) { return std::abs(hz * hz / (cut_hz * cut_hz) - 1.0); };
+    return std::min({apart(a_hz), apart(b_hz), 1.0}) * (1.0 - 1e-9);
+  };
+  proof.margin = {calc_margin(proof.cut_hz[0], before_hz, first_hz), calc_margin(proof.cut_hz[1], last_hz, next_hz)};
+  proof.rigid_per_component = {body.rigid_modes};
+  proof.method = body.method;
+  if (band.modes.size() > static_cast<std::size_t>(max_modes)) {
+    band.modes.resize(static_cast<std::size_t>(max_modes));
+    band.is_complete = false;
+  }
+  for (std::size_t m = 0; m < band.modes.size();) {
+    std::size_t end = m + 1;
+    while (end < band.modes.size() &&
+           band.modes[end].lambda_rad2_s2 - band.modes[m].lambda_rad2_s2 <= kDegenerate * band.modes[m].lambda_rad2_s2)
+      ++end;
+    if (end - m > 1) {
+      proof.cluster_first.push_back(static_cast<std::int64_t>(m));
+      proof.cluster_count.push_back(static_cast<std::int64_t>(end - m));
+    }
+    m = end;
+  }
+  return band;
+}
+
+/// The material's law; of a table of measured decays the loss factors that give them.
+void set_damping(bank::Bank& bank, const KnownBody& body, const job::JobSpec& job, const std::vector<Mode>& modes) {
+  const auto* measured = dynamic_cast<const MeasuredObject*>(&body);
+  if (measured == nullptr) {
+    bank.damping = bank::make_damping(job.material);
+    if (job.material.law == material::DampingLaw::rayleigh) {
+      bank.material.alpha1_s = job.material.alpha1_s;
+      bank.material.alpha2_per_s = job.material.alpha2_per_s;
+    }
+    for (const double lambda : bank.eigenvalue_rad2_s2) bank.decay_per_s.push_back(bank::calc_decay(bank.damping, bank.material, lambda));
+    return;
+  }
+  const ModesTable& table = measured->get_table();
+  bool has_twins = false;
+  for (std::size_t m = 0; m < modes.size(); ++m) {
+    const auto row = static_cast<std::size_t>(modes[m].index[0]);
+    const double hz = to_hz(bank.eigenvalue_rad2_s2[m]);
+    bank.decay_per_s.push_back(table.decay_per_s[row]);
+    if (!bank.damping.freq_hz.empty() && hz <= bank.damping.freq_hz.back()) {
+      has_twins |= table.decay_per_s[row] != bank.decay_per_s[m - 1];
+      continue;
+    }
+    bank.damping.freq_hz.push_back(hz);
+    bank.damping.loss_factor.push_back(table.decay_per_s[row] / (pi * hz));
+  }
+  bank.damping.law = "loss_table";
+  if (has_twins || modes.empty()) {  // two decays at one frequency are no law
+    bank.damping = {};
+    bank.damping.law = "mixed";
+  }
+}
+
+/// The bank's own gain: the air that the outer surface moves, triangle by triangle without sign.
+void set_gains(bank::Bank& bank, std::span<const double> shapes) {
+  const std::size_t modes = bank.mode_count();
+  std::vector<double> flow(modes, 0.0);
+  double twice_area = 0.0;
+  for (const bank::Triangle& t : bank::find_outer_triangles(bank.vertices_m, bank.triangles)) {
+    const Vec3 normal = bank::calc_normal(bank.vertices_m, t);
+    twice_area += std::hypot(normal[0], normal[1], normal[2]);
+    const double* rows[3];
+    for (int k = 0; k < 3; ++k) rows[k] = &shapes[static_cast<std::size_t>(t[k]) * modes * 3];
+    for (std::size_t m = 0; m < modes; ++m) {
+      double through = 0.0;
+      for (std::size_t c = 0; c < 3; ++c) through += normal[c] * (rows[0][3 * m + c] + rows[1][3 * m + c] + rows[2][3 * m + c]);
+      flow[m] += std::abs(through) / 6.0;
+    }
+  }
+  for (std::size_t m = 0; m < modes; ++m)
+    bank.radiation_gain.push_back(bank::calc_radiation_gain(std::sqrt(bank.eigenvalue_rad2_s2[m]), flow[m], 0.5 * twice_area));
+}
+
+}  // namespace
+
+Made make_bank(const job::JobSpec& job) {
+  const std::unique_ptr<KnownBody> body = make_known_body(*job.analytic, job.material);
+  Band band = find_band(*body, job);
+  const std::size_t count = band.modes.size();
+  Made made{{}, body->theory, body->method, {}, body->warnings};
+  bank::Bank& bank = made.bank;
+  Surface surface = body->make_surface(job.analytic->grid.value_or(body->choose_grid(band.modes)));
+  if (static_cast<double>(surface.vertices_m.size()) * static_cast<double>(count) * 3.0 > kMaxNumbers)
+    throw InputError(
+        fmt::format("{}: {} modes at {} points make a bank of {:.1f} GB; lower the end of \"band_hz\", give \"max_modes\", or a "
+                    "smaller \"grid\"",
+                    job.analytic->place, count, surface.vertices_m.size(),
+                    6e-9 * static_cast<double>(surface.vertices_m.size()) * static_cast<double>(count)));
+  bank.vertices_m = std::move(surface.vertices_m);
+  bank.triangles = std::move(surface.triangles);
+  std::vector<double> shapes(bank.vertices_m.size() * count * 3);
+  std::vector<Vec3> row(count);
+  for (std::size_t v = 0; v < bank.vertices_m.size(); ++v) {
+    body->calc_shapes(bank.vertices_m[v], band.modes, row);
+    for (std::size_t m = 0; m < count; ++m) std::copy(row[m].begin(), row[m].end(), &shapes[(v * count + m) * 3]);
+  }
+  for (const Mode& mode : band.modes) {
+    bank.eigenvalue_rad2_s2.push_back(mode.lambda_rad2_s2);
+    bank.discretisation_error_cents.push_back(mode.error_cents);
+    made.names.push_back(mode.name);
+  }
+  bank.residual.assign(count, 0.0);
+  bank.algebraic_error_cents.assign(count, 0.0);
+  bank.rigid = body->rigid;
+  bank.material = {job.material.young_modulus_pa, job.material.poisson_ratio, body->rigid.mass_kg / body->rigid.volume_m3, 0.0, 0.0};
+  set_damping(bank, *body, job, band.modes);
+  set_gains(bank, shapes);
+  bank::quantise_shapes(bank, shapes);
+  bank.proof = std::move(band.proof);
+  bank.counts = {static_cast<std::int64_t>(bank.vertices_m.size()), 1, 1, body->rigid_modes};
+  bank.band_hz = band.band_hz;
+  bank.complete = band.is_complete;
+  bank.element = "analytic";
+  bank.mass = "consistent";
+  made.method = body->method;
+  return made;
+}
+
+std::vector<ModeAtPoint> calc_modes_at(const job::JobSpec& job, const Vec3& point_m) {
+  const std::unique_ptr<KnownBody> body = make_known_body(*job.analytic, job.material);
+  const Band band = find_band(*body, job);
+  std::vector<Vec3> phi(band.modes.size());
+  body->calc_shapes(point_m, band.modes, phi);
+  std::vector<ModeAtPoint> found;
+  for (std::size_t m = 0; m < phi.size(); ++m) found.push_back({to_hz(band.modes[m].lambda_rad2_s2), phi[m], band.modes[m].name});
+  return found;
+}
+
+}  // namespace carillon::analytic

@@ -1,0 +1,157 @@
+#include "precompute/analytic/particular_solutions.hpp"
+
+#include <Eigen/QR>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "precompute/analytic/triangulate.hpp"
+#include "precompute/la/lapack.hpp"
+
+namespace carillon::analytic {
+namespace {
+
+using std::numbers::pi;
+
+constexpr int kRimPoints = 90;  // on each side, Gauss's
+constexpr int kInsidePoints = 90;
+constexpr double kRegular = 1e-12;  // of pi / angle from a whole number
+constexpr double kLimit = 1e-10;    // sine of the least angle that counts as zero
+constexpr double kMaxWaves = 40.0;  // wave number times reach beyond which the rim's points are too few
+
+/// J at the orders first, first + 1, ..., (count), by Miller's downward recurrence, matched to the library's value at the larger of the two
+/// lowest.
+std::vector<double> calc_bessel(double first, int count, double x) {
+  std::vector<double> values(static_cast<std::size_t>(count), 0.0);
+  if (x <= 0.0) return values;
+  const int start = std::max(count, static_cast<int>(x)) + 40;
+  double next = 0.0, now = 1e-200, zero = 0.0, one = 0.0;
+  for (int k = start; k >= 0; --k) {
+    if (k < count) values[static_cast<std::size_t>(k)] = now;
+    if (k == 1) one = now;
+    if (k == 0) zero = now;
+    const double before = 2.0 * (first + k) / x * now - next;
+    next = now;
+    now = before;
+    if (std::abs(now) > 1e150) {
+      now *= 1e-250;
+      next *= 1e-250;
+      zero *= 1e-250;
+      one *= 1e-250;
+      for (double& value : values) value *= 1e-250;
+    }
+  }
+  const double j0 = std::cyl_bessel_j(first, x), j1 = std::cyl_bessel_j(first + 1.0, x);
+  const double scale = std::abs(j0) > std::abs(j1) ? j0 / zero : j1 / one;
+  for (double& value : values) value *= scale;
+  return values;
+}
+
+bool is_regular(double angle) {
+  const double n = pi / angle;
+  return std::abs(n - std::round(n)) < kRegular * n && std::round(n) >= 1.0;
+}
+
+}  // namespace
+
+std::optional<ParticularSolutions> ParticularSolutions::make(const std::vector<Point2>& p) {
+  const std::vector<double> angles = calc_angles(p);
+  std::size_t corner = static_cast<std::size_t>(std::max_element(angles.begin(), angles.end()) - angles.begin());
+  std::size_t singular = 0;
+  for (std::size_t i = 0; i < p.size(); ++i)
+    if (!is_regular(angles[i])) corner = i, ++singular;
+  if (singular > 1 || (singular == 0 && angles[corner] > pi * (1.0 - 1e-9))) return std::nullopt;
+  ParticularSolutions solutions;
+  solutions.alpha_ = pi / angles[corner];
+  const Point2 centre = p[corner], after = p[(corner + 1) % p.size()];
+  const double turn = std::atan2(after[1] - centre[1], after[0] - centre[0]);
+  solutions.reach_ = 0.0;
+  const auto to_polar = [&](const Point2& x) -> Point2 {
+    double angle = std::atan2(x[1] - centre[1], x[0] - centre[0]) - turn;
+    if (angle < -1e-9) angle += 2.0 * pi;
+    const double radius = std::hypot(x[0] - centre[0], x[1] - centre[1]);
+    solutions.reach_ = std::max(solutions.reach_, radius);
+    return {radius, angle};
+  };
+  for (std::size_t side = 1; side + 1 < p.size(); ++side) {
+    const Point2 &a = p[(corner + side) % p.size()], &b = p[(corner + side + 1) % p.size()];
+    for (int i = 0; i < kRimPoints; ++i) {
+      const double part = 0.5 * (1.0 - std::cos(pi * (i + 0.5) / kRimPoints));
+      solutions.rim_.push_back(to_polar({a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1])}));
+    }
+  }
+  // Points inside need no order: corners of a net serve, thinned out.
+  double longest = 0.0;
+  for (const Point2& x : p) longest = std::max(longest, std::hypot(x[0] - centre[0], x[1] - centre[1]));
+  const Net net = triangulate(p, 0.08 * longest);
+  const std::size_t step = std::max<std::size_t>(1, net.triangles.size() / (kInsidePoints * (p.size() - 2) / 2));
+  for (std::size_t t = 0; t < net.triangles.size(); t += step) {
+    const bank::Triangle& v = net.triangles[t];
+    Point2 middle{};
+    for (int c = 0; c < 2; ++c) middle[c] = (net.points_m[v[0]][c] * 0.37 + net.points_m[v[1]][c] * 0.34 + net.points_m[v[2]][c] * 0.29);
+    solutions.inside_.push_back(to_polar(middle));
+  }
+  return solutions;
+}
+
+double ParticularSolutions::calc_sine(double kappa, int rank) const {
+  const double k = std::sqrt(kappa);
+  // Orders up to somewhat beyond k reach, from where on J falls faster than any power.
+  const int count = static_cast<int>(std::ceil((k * reach_ + 8.0 * std::cbrt(k * reach_) + 26.0) / alpha_));
+  const auto rows = static_cast<Eigen::Index>(rim_.size() + inside_.size());
+  la::Matrix a(rows, count);
+  // Orders k alpha with one fractional part follow each other by steps of one where alpha is a fraction p / q: chains of q.
+  int q = 1;
+  while (q < 64 && std::abs(q * alpha_ - std::round(q * alpha_)) > 1e-12 * q) ++q;
+  const bool has_chains = q < 64;
+  const int rise = static_cast<int>(std::lround(q * alpha_));
+  for (Eigen::Index row = 0; row < rows; ++row) {
+    const bool is_rim = static_cast<std::size_t>(row) < rim_.size();
+    const auto& [radius, angle] = is_rim ? rim_[static_cast<std::size_t>(row)] : inside_[static_cast<std::size_t>(row) - rim_.size()];
+    const double x = k * radius;
+    for (int chain = 1; chain <= (has_chains ? std::min(q, count) : count); ++chain) {
+      const double order = chain * alpha_, first = order - std::floor(order + 1e-9);
+      const int skip = static_cast<int>(std::floor(order + 1e-9)), members = has_chains ? (count - chain) / q + 1 : 1;
+      const std::vector<double> values = calc_bessel(std::max(first, 0.0), skip + (members - 1) * rise + 2, x);
+      for (int i = 0; i < members; ++i) {
+        const int n = chain + i * q;
+        a(row, n - 1) = values[static_cast<std::size_t>(skip + i * rise)] * std::sin(n * alpha_ * angle);
+      }
+    }
+  }
+  for (int c = 0; c < count; ++c) {
+    const double norm = a.col(c).norm();
+    if (norm > 0.0) a.col(c) /= norm;
+  }
+  const Eigen::HouseholderQR<la::Matrix> qr(a);
+  const la::Matrix basis = qr.householderQ() * la::Matrix::Identity(rows, count);
+  // Singular values of the rim's part are sines of the angles; the small ones come from it with all their digits.
+  const la::Vector sines = Eigen::BDCSVD<la::Matrix>(basis.topRows(static_cast<Eigen::Index>(rim_.size()))).singularValues();
+  return sines(std::max<Eigen::Index>(sines.size() - rank, 0));
+}
+
+std::optional<ParticularSolutions::Refined> ParticularSolutions::refine(double kappa, double error, int multiplicity) const {
+  if (std::sqrt(kappa) * reach_ > kMaxWaves) return std::nullopt;
+  // The sine falls to zero like a V: where the lines from both sides meet is the next estimate, and its error is of second order.
+  double centre = kappa, width = std::max(error, 1e-9) * kappa;
+  Refined refined{kappa, error, 1.0};
+  for (int round = 0; round < 8; ++round) {
+    const double low = centre - width, high = centre + width;
+    const double at_low = calc_sine(low, multiplicity), at_high = calc_sine(high, multiplicity);
+    const double meet = (low * at_high + high * at_low) / (at_low + at_high), there = calc_sine(meet, multiplicity);
+    if (!(there < 0.9 * std::min(at_low, at_high))) {
+      if (round == 0) return std::nullopt;  // no V here
+      break;
+    }
+    const double slope = (at_low + at_high) / (high - low);
+    refined = {meet, 0.0, there};
+    refined.error = std::max(there / slope / meet, 2e-15);
+    if (there / slope < 4e-15 * meet || width < 1e-13 * meet) break;
+    centre = meet;
+    width = std::max(4.0 * there / slope, 2e-14 * meet);
+  }
+  return refined.sine < kLimit ? std::optional(refined) : std::nullopt;
+}
+
+}  // namespace carillon::analytic

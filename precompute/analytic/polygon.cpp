@@ -1,0 +1,203 @@
+#include "precompute/analytic/polygon.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "precompute/analytic/particular_solutions.hpp"
+#include "precompute/analytic/triangulate.hpp"
+#include "runtime/base/error.hpp"
+
+namespace carillon::analytic {
+namespace {
+
+using std::numbers::pi;
+
+constexpr double kEdgePerRadian = 2.0;  // longest edge times wave number
+constexpr int kLayers = 12;             // about a singular corner
+constexpr double kRatio = 0.2;          // of their sizes
+constexpr double kMaxUnknowns = 1.5e6;
+constexpr double kSlow = 4.0;         // at a singular corner the last order gained as little as a fifth of the error
+constexpr double kMinError = 1e-12;   // relative, of the eigensolver
+constexpr double kDegenerate = 1e-7;  // relative distance of eigenvalues that may be one
+constexpr int kMaxRefined = 400;      // modes
+
+double square(double x) { return x * x; }
+
+bool is_singular(double angle) {
+  const double n = pi / angle;
+  return std::abs(n - std::round(n)) > 1e-9 * n || n < 0.75;
+}
+
+}  // namespace
+
+Polygon::Polygon(const job::MembraneBody& body, const material::Material& material) : corners_m_(body.corners_m), side_m_(body.side_m) {
+  const auto [per_area, thickness] = find_sheet(body, material);
+  density_kg_m2_ = per_area;
+  thickness_m_ = thickness;
+  tension_n_m_ = body.tension_n_m;
+  lowest_hz_ = body.lowest_hz;
+  if (side_m_ > 0.0) {
+    const double s = side_m_;
+    corners_m_ = {{0, 0}, {2 * s, 0}, {2 * s, s}, {s, s}, {s, 2 * s}, {0, 2 * s}};
+  }
+  Point2 low = corners_m_[0], high = low;
+  for (std::size_t i = 0; i < corners_m_.size(); ++i) {
+    const Point2 &a = corners_m_[i], &b = corners_m_[(i + 1) % corners_m_.size()];
+    area_m2_ += 0.5 * (a[0] * b[1] - a[1] * b[0]);
+    rim_m_ += std::hypot(b[0] - a[0], b[1] - a[1]);
+    for (int c = 0; c < 2; ++c) low[c] = std::min(low[c], a[c]), high[c] = std::max(high[c], a[c]);
+  }
+  longest_m_ = std::max(high[0] - low[0], high[1] - low[1]);
+  theory = fmt::format("{} membrane, fixed along its rim", side_m_ > 0.0 ? "L-shaped" : "polygonal");
+  set_rigid(density_kg_m2_);
+}
+
+Polygon::Solved Polygon::solve(double max_kappa) {
+  const double k = std::sqrt(max_kappa), edge = std::min(kEdgePerRadian / k, 0.34 * longest_m_);
+  if (area_m2_ / square(edge) * 60.0 > kMaxUnknowns)
+    throw InputError(
+        fmt::format("the membrane has about {:.0f} modes in its band, which takes more elements than this is made for; lower "
+                    "the end of \"band_hz\", or give \"max_modes\"",
+                    area_m2_ * max_kappa / (4.0 * pi)));
+  const std::vector<double> angles = calc_angles(corners_m_);
+  elements_ = triangulate(corners_m_, edge);
+  // A triangle with two singular corners cannot be graded to both: finer ones keep them apart.
+  const auto corners = static_cast<std::int32_t>(corners_m_.size());
+  const auto count_singular = [&](const bank::Triangle& t) {
+    return std::count_if(t.begin(), t.end(),
+                         [&](std::int32_t v) { return v < corners && is_singular(angles[static_cast<std::size_t>(v)]); });
+  };
+  double finer = edge;
+  for (int round = 0; round < 6 && std::any_of(elements_.triangles.begin(), elements_.triangles.end(),
+                                               [&](const auto& t) { return count_singular(t) > 1; });
+       ++round)
+    elements_ = triangulate(corners_m_, finer *= 0.5);
+  for (std::int32_t c = 0; c < corners; ++c)
+    if (is_singular(angles[static_cast<std::size_t>(c)])) grade(elements_, c, kLayers, kRatio);
+  const TriangleModes coarse = solve_triangles(elements_, TriangleBasis(basis_.order() - 1), 1.02 * max_kappa);
+  modes_ = solve_triangles(elements_, basis_, max_kappa);
+  Solved solved{modes_.kappa, {}};
+  for (std::size_t m = 0; m < modes_.kappa.size(); ++m)
+    solved.error.push_back(m < coarse.kappa.size() ? std::max(kSlow * std::abs(coarse.kappa[m] / modes_.kappa[m] - 1.0), kMinError) : 1.0);
+  refine(solved);
+  return solved;
+}
+
+/// Eigenvalues, not shapes: those are exact to the bank's steps already.
+void Polygon::refine(Solved& solved) {
+  refined_ = 0;
+  const std::optional<ParticularSolutions> solutions = ParticularSolutions::make(corners_m_);
+  if (!solutions) return;
+  const std::size_t count = std::min<std::size_t>(solved.kappa.size(), kMaxRefined);
+  for (std::size_t m = 0; m < count;) {
+    std::size_t end = m + 1;
+    while (end < solved.kappa.size() &&
+           solved.kappa[end] - solved.kappa[end - 1] <= (kDegenerate + 2.0 * solved.error[end]) * solved.kappa[end])
+      ++end;
+    const double middle = 0.5 * (solved.kappa[m] + solved.kappa[end - 1]);
+    double error = 0.5 * (solved.kappa[end - 1] - solved.kappa[m]) / middle;
+    for (std::size_t i = m; i < end; ++i) error = std::max(error, solved.error[i]);
+    // All of a group that are equal vanish together; a group that is not is left as it is.
+    const auto found = solutions->refine(middle, error, static_cast<int>(end - m));
+    if (found && std::abs(found->kappa / middle - 1.0) <= 2.0 * error)
+      for (std::size_t i = m; i < end; ++i, ++refined_) {
+        solved.kappa[i] = found->kappa;
+        solved.error[i] = found->error;
+      }
+    m = end;
+  }
+}
+
+ModeList Polygon::list_modes(double high_hz, std::int64_t max_modes) {
+  if (lowest_hz_) {
+    // kappa_1 of the disc of this area is the least that any membrane has (Faber, Krahn); four times that of a narrow one is enough.
+    double kappa = 1.5 * square(2.404825557695773) * pi / area_m2_;
+    Solved lowest = solve(kappa);
+    while (lowest.kappa.empty()) lowest = solve(kappa *= 2.0);
+    rate_ = square(2.0 * pi * *lowest_hz_) / lowest.kappa[0];
+  } else {
+    rate_ = *tension_n_m_ / density_kg_m2_;
+  }
+  const double asked = square(2.0 * pi * high_hz) / rate_;
+  const double k =
+      (rim_m_ + std::sqrt(square(rim_m_) + 16.0 * pi * (1.05 * static_cast<double>(max_modes) + 5.0) * area_m2_)) / (2.0 * area_m2_);
+  const double kappa = std::min(asked, square(k));
+  ModeList list{{}, kappa < asked ? std::sqrt(kappa * rate_) / (2.0 * pi) : high_hz};
+  const Solved solved = solve(kappa);
+  for (std::size_t m = 0; m < solved.kappa.size(); ++m)
+    list.modes.push_back(
+        {rate_ * solved.kappa[m], 600.0 * std::log2(1.0 + solved.error[m]), {static_cast<int>(m), 0, 0, 0}, fmt::format("{}", m + 1)});
+  std::stable_sort(list.modes.begin(), list.modes.end(), [](const Mode& a, const Mode& b) { return a.lambda_rad2_s2 < b.lambda_rad2_s2; });
+  method = fmt::format("triangles of order {}, {} of them, all eigenvalues counted by inertia{}", basis_.order(),
+                       elements_.triangles.size(), refined_ > 0 ? fmt::format("; {} refined by particular solutions", refined_) : "");
+  return list;
+}
+
+/// The element that a point lies in, or is nearest to.
+std::size_t Polygon::find_element(const Point2& x, double& r, double& s) const {
+  std::size_t best = 0;
+  double outside = 1e300;
+  const std::size_t count = elements_.triangles.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t t = (last_element_ + i) % count;
+    const bank::Triangle& v = elements_.triangles[t];
+    const Point2 &a = elements_.points_m[v[0]], &b = elements_.points_m[v[1]], &c = elements_.points_m[v[2]];
+    const double bx = b[0] - a[0], by = b[1] - a[1], cx = c[0] - a[0], cy = c[1] - a[1], twice = bx * cy - by * cx;
+    const double one = ((x[0] - a[0]) * cy - (x[1] - a[1]) * cx) / twice, other = (bx * (x[1] - a[1]) - by * (x[0] - a[0])) / twice;
+    const double off = std::max({-one, -other, one + other - 1.0, 0.0}) * std::sqrt(twice);
+    if (off >= outside) continue;
+    outside = off;
+    best = t;
+    r = one;
+    s = other;
+    if (off <= 0.0) break;
+  }
+  return last_element_ = best;
+}
+
+void Polygon::calc_deflections(const Point2& point_m, std::span<const Mode> modes, std::span<double> w) const {
+  double r = 0.0, s = 0.0;
+  const std::size_t t = find_element(point_m, r, s);
+  r = std::clamp(r, 0.0, 1.0);
+  s = std::clamp(s, 0.0, 1.0 - r);
+  const la::Vector values = basis_.calc(r, s) / std::sqrt(density_kg_m2_);
+  for (std::size_t i = 0; i < modes.size(); ++i) {
+    double sum = 0.0;
+    for (int n = 0; n < basis_.size(); ++n)
+      sum += values(n) * modes_.shapes(modes_.elements[t][static_cast<std::size_t>(n)], modes[i].index[0]);
+    w[i] = sum;
+  }
+}
+
+Net Polygon::make_net(int grid) const {
+  if (side_m_ <= 0.0) return triangulate(corners_m_, 1.5 * longest_m_ / grid);
+  // Three squares of a regular net.
+  const int half = std::max(1, grid / 2);
+  const Net whole = make_rectangle_net(2.0 * side_m_, 2.0 * side_m_, 2 * half, 2 * half);
+  Net net;
+  std::vector<std::int32_t> number(whole.points_m.size(), -1);
+  for (std::size_t t = 0; t < whole.triangles.size(); ++t) {
+    const int cell = static_cast<int>(t / 2), column = cell % (2 * half), row = cell / (2 * half);
+    if (column >= half && row >= half) continue;
+    bank::Triangle triangle = whole.triangles[t];
+    for (std::int32_t& v : triangle) {
+      if (number[v] < 0) {
+        number[v] = static_cast<std::int32_t>(net.points_m.size());
+        net.points_m.push_back(whole.points_m[v]);
+      }
+      v = number[v];
+    }
+    net.triangles.push_back(triangle);
+  }
+  return net;
+}
+
+int Polygon::choose_grid(std::span<const Mode> modes) const {
+  const double k = std::sqrt(modes.empty() ? 0.0 : modes.back().lambda_rad2_s2 / rate_);
+  return std::clamp(10 * static_cast<int>(std::ceil(0.4 * k * longest_m_ / pi)), 40, kMaxDefaultGrid);
+}
+
+}  // namespace carillon::analytic

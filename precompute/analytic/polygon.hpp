@@ -1,0 +1,41 @@
+// A membrane on any polygon.
+#pragma once
+
+#include "precompute/analytic/flat_bodies.hpp"
+#include "precompute/analytic/triangle_modes.hpp"
+
+namespace carillon::analytic {
+
+/// Finite elements of order five, graded towards corners that are no whole part of a half turn; error bars from those of order four.
+/// Where only one corner is such, as of an L, eigenvalues are refined by particular solutions. Mode::index: place in modes_.
+class Polygon : public FlatBody {
+ public:
+  Polygon(const job::MembraneBody& body, const material::Material& material);
+  ModeList list_modes(double high_hz, std::int64_t max_modes) override;
+  int choose_grid(std::span<const Mode> modes) const override;
+
+  /// Eigenvalues of -Laplace up to max_kappa [1/m^2], and their relative errors (estimates).
+  struct Solved {
+    std::vector<double> kappa, error;
+  };
+  Solved solve(double max_kappa);
+
+ private:
+  Net make_net(int grid) const override;
+  void calc_deflections(const Point2& point_m, std::span<const Mode> modes, std::span<double> w) const override;
+  std::size_t find_element(const Point2& point_m, double& r, double& s) const;
+  void refine(Solved& solved);
+
+  std::vector<Point2> corners_m_;
+  double side_m_ = 0.0;  // of an L
+  double area_m2_ = 0.0, rim_m_ = 0.0, longest_m_ = 0.0;
+  std::optional<double> tension_n_m_, lowest_hz_;
+  double density_kg_m2_ = 0.0, rate_ = 0.0;
+  int refined_ = 0;
+  TriangleBasis basis_{5};
+  Net elements_;
+  TriangleModes modes_;
+  mutable std::size_t last_element_ = 0;
+};
+
+}  // namespace carillon::analytic

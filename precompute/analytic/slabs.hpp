@@ -1,0 +1,33 @@
+// Surfaces of thin flat bodies and of straight ones.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "precompute/analytic/known_body.hpp"
+
+namespace carillon::analytic {
+
+using Point2 = std::array<double, 2>;
+
+/// Triangles in the plane, counter-clockwise.
+struct Net {
+  std::vector<Point2> points_m;
+  std::vector<bank::Triangle> triangles;
+};
+
+/// A rectangle from the origin, cut into columns by rows and each cell in two.
+Net make_rectangle_net(double length_m, double width_m, int columns, int rows);
+/// A disc about the origin: ring k of `rings` has 6 k points.
+Net make_disc_net(double radius_m, int rings);
+
+/// Both sides of a net at z = +-thickness / 2, and the rim between them.
+Surface make_slab(const Net& net, double thickness_m);
+
+/// A straight body along x from the origin: `section` is a convex polygon in (y, z), counter-clockwise seen from +x.
+Surface make_prism(double length_m, const std::vector<Point2>& section, int intervals);
+
+/// Of a slab of uniform density: mass, centre, inertia. Area, first and second moments are those of the net's triangles.
+bank::RigidBody calc_slab_rigid(const Net& net, double thickness_m, double mass_kg);
+
+}  // namespace carillon::analytic

@@ -1,0 +1,42 @@
+// Eigenvalues of -Laplace on a net of triangles, zero along its rim, by finite elements of high order.
+#pragma once
+
+#include <vector>
+
+#include "precompute/analytic/slabs.hpp"
+#include "precompute/la/lapack.hpp"
+
+namespace carillon::analytic {
+
+/// Lagrange's functions of one order on the unit triangle, at equispaced points.
+class TriangleBasis {
+ public:
+  explicit TriangleBasis(int order);
+  int size() const { return static_cast<int>(points_.size()); }
+  int order() const { return order_; }
+  const std::vector<Point2>& points() const { return points_; }
+  /// Values at (r, s), r, s >= 0, r + s <= 1.
+  la::Vector calc(double r, double s) const;
+  /// Integrals over the unit triangle, (size, size): products of values; of derivatives (r r), (r s) and (s s).
+  la::Matrix mass, stiffness_rr, stiffness_rs, stiffness_ss;
+
+ private:
+  la::Vector calc_monomials(double r, double s, int derivative) const;
+  int order_;
+  std::vector<Point2> points_;
+  la::Matrix inverse_;  // of Vandermonde's matrix in orthogonal polynomials
+};
+
+/// Modes with unit integral of the square.
+struct TriangleModes {
+  std::vector<double> kappa;                        // (m) [1/m^2], ascending
+  la::Matrix shapes;                                // (nodes, m)
+  std::vector<std::vector<std::int32_t>> elements;  // (triangles)(basis size): nodes, in the order of the basis
+  std::vector<double> residuals;                    // (m) relative
+};
+
+/// All eigenvalues up to `max_kappa`, each counted by the inertia of factorisations (SLEPc's spectrum slicing over MUMPS). Not collective.
+/// Throws SolveError.
+TriangleModes solve_triangles(const Net& net, const TriangleBasis& basis, double max_kappa);
+
+}  // namespace carillon::analytic
