@@ -46,19 +46,20 @@ class Solver {
   /// By strips of nodes that stay in the first-level cache. Columns are written in whole runs: one number of each at a time would wait for
   /// memory at every line.
   void store(double* x, std::ptrdiff_t stride) const {
-    alignas(64) double rows[3 * kStrip][16];
-    alignas(64) double strip[16][3 * kStrip];
+    alignas(64) double rows[kColumn * kWidth];
+    alignas(64) double strip[kWidth * kColumn];
     for (const Block& block : blocks_)
       for (std::ptrdiff_t first = 0; first < plan_.own_nodes; first += kStrip) {
         const std::ptrdiff_t nodes = std::min<std::ptrdiff_t>(kStrip, plan_.own_nodes - first);
         prefetch_columns<true>(block, x + block.first_column * stride, stride, first + kStrip);
         for (std::ptrdiff_t v = 0; v < nodes; ++v) {
           prefetch_rows(block, first + v, false);
-          copy_node(find_own(block, first + v), block.width, rows[0] + 3 * v * block.width);
+          copy_node(find_own(block, first + v), block.width, rows + 3 * v * block.width);
         }
-        kernels_.transpose(rows[0], block.width, static_cast<int>(3 * nodes), block.columns, strip[0], 3 * kStrip);
+        kernels_.transpose(rows, block.width, static_cast<int>(3 * nodes), block.columns, strip, kColumn);
         for (int c = 0; c < block.columns; ++c)
-          std::memcpy(x + (block.first_column + c) * stride + 3 * first, strip[c], sizeof(double) * 3 * static_cast<std::size_t>(nodes));
+          std::memcpy(x + (block.first_column + c) * stride + 3 * first, strip + c * kColumn,
+                      sizeof(double) * 3 * static_cast<std::size_t>(nodes));
       }
   }
 
@@ -92,21 +93,22 @@ class Solver {
 
  private:
   static constexpr std::ptrdiff_t kStrip = 32;  // nodes whose rows of 16 and columns are in the first-level cache together
+  static constexpr std::ptrdiff_t kColumn = 3 * kStrip, kWidth = 16;  // numbers of a strip in a column; columns of a block at most
 
   /// The rows of the own nodes; columns that are not in use become zero.
   void load_own(const Block& block, const double* b, std::ptrdiff_t stride) const {
-    alignas(64) double rows[3 * kStrip][16];
-    alignas(64) double strip[16][3 * kStrip];
+    alignas(64) double rows[kColumn * kWidth];
+    alignas(64) double strip[kWidth * kColumn];
     std::memset(strip, 0, sizeof(strip));
     for (std::ptrdiff_t first = 0; first < plan_.own_nodes; first += kStrip) {
       const std::ptrdiff_t nodes = std::min<std::ptrdiff_t>(kStrip, plan_.own_nodes - first);
       prefetch_columns(block, b, stride, first + kStrip);
       for (int c = 0; c < block.columns; ++c)
-        std::memcpy(strip[c], b + c * stride + 3 * first, sizeof(double) * 3 * static_cast<std::size_t>(nodes));
-      kernels_.transpose(strip[0], 3 * kStrip, block.width, static_cast<int>(3 * nodes), rows[0], block.width);
+        std::memcpy(strip + c * kColumn, b + c * stride + 3 * first, sizeof(double) * 3 * static_cast<std::size_t>(nodes));
+      kernels_.transpose(strip, kColumn, block.width, static_cast<int>(3 * nodes), rows, block.width);
       for (std::ptrdiff_t v = 0; v < nodes; ++v) {
         prefetch_rows(block, first + v, true);
-        copy_node(rows[0] + 3 * v * block.width, block.width, find_own(block, first + v));
+        copy_node(rows + 3 * v * block.width, block.width, find_own(block, first + v));
       }
     }
   }
