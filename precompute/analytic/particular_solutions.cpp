@@ -14,8 +14,8 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr int kRimPoints = 90;  // on each side, Gauss's
-constexpr int kInsidePoints = 90;
+constexpr int kRimPoints = 60;  // on each side, Gauss's
+constexpr int kInsidePoints = 60;
 constexpr double kRegular = 1e-12;  // of pi / angle from a whole number
 constexpr double kLimit = 1e-10;    // sine of the least angle that counts as zero
 constexpr double kMaxWaves = 40.0;  // wave number times reach beyond which the rim's points are too few

@@ -15,8 +15,8 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr double kEdgePerRadian = 2.0;  // longest edge times wave number
-constexpr int kLayers = 12;             // about a singular corner
+constexpr double kEdgePerRadian = 6.0;  // longest edge times wave number
+constexpr int kLayers = 8;              // about a singular corner
 constexpr double kRatio = 0.2;          // of their sizes
 constexpr double kMaxUnknowns = 1.5e6;
 constexpr double kSlow = 4.0;         // at a singular corner the last order gained as little as a fifth of the error
@@ -57,7 +57,7 @@ Polygon::Polygon(const job::MembraneBody& body, const material::Material& materi
 
 Polygon::Solved Polygon::solve(double max_kappa) {
   const double k = std::sqrt(max_kappa), edge = std::min(kEdgePerRadian / k, 0.34 * longest_m_);
-  if (area_m2_ / square(edge) * 60.0 > kMaxUnknowns)
+  if (area_m2_ / square(edge) * 160.0 > kMaxUnknowns)
     throw InputError(
         fmt::format("the membrane has about {:.0f} modes in its band, which takes more elements than this is made for; lower "
                     "the end of \"band_hz\", or give \"max_modes\"",

@@ -6,7 +6,7 @@
 
 namespace carillon::analytic {
 
-/// Finite elements of order five, graded towards corners that are no whole part of a half turn; error bars from those of order four.
+/// Finite elements of order eight, graded towards corners that are no whole part of a half turn; error bars from those of order seven.
 /// Where only one corner is such, as of an L, eigenvalues are refined by particular solutions. Mode::index: place in modes_.
 class Polygon : public FlatBody {
  public:
@@ -32,7 +32,7 @@ class Polygon : public FlatBody {
   std::optional<double> tension_n_m_, lowest_hz_;
   double density_kg_m2_ = 0.0, rate_ = 0.0;
   int refined_ = 0;
-  TriangleBasis basis_{5};
+  TriangleBasis basis_{8};
   Net elements_;
   TriangleModes modes_;
   mutable std::size_t last_element_ = 0;

@@ -1,17 +1,15 @@
 #include "precompute/analytic/triangle_modes.hpp"
 
-#include <fmt/core.h>
-#include <slepceps.h>
-
 #include <Eigen/LU>
 #include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <set>
+#include <numbers>
 #include <utility>
 
 #include "precompute/analytic/polynomials.hpp"
+#include "precompute/eigen/solve_modes.hpp"
 #include "precompute/petsc/handle.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/base/error.hpp"
@@ -22,7 +20,7 @@ namespace {
 using petsc::check;
 using Sparse = Eigen::SparseMatrix<double, Eigen::RowMajor, PetscInt>;
 
-constexpr double kTolerance = 1e-12;
+constexpr double kTolerance = 1e-10;  // of residuals; eigenvalues are good to its square
 
 /// Where the nodes of each element are, and which nodes the rim fixes.
 struct Numbering {
@@ -78,14 +76,32 @@ petsc::MatHandle wrap(Sparse& matrix) {
   return handle;
 }
 
-void use_mumps(EPS eps) {
-  KSP ksp = nullptr;
-  PC pc = nullptr;
-  check(EPSKrylovSchurGetKSP(eps, &ksp));
-  check(KSPSetType(ksp, KSPPREONLY));
-  check(KSPGetPC(ksp, &pc));
-  check(PCSetType(pc, PCCHOLESKY));
-  check(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
+/// Unknowns in the order in which the elements, along a curve through their middles, meet them first: three that follow each other are
+/// near each other, as those of one node of a solid are, for which the solver is made. -1: fixed.
+std::vector<PetscInt> number_unknowns(const Net& net, const Numbering& numbering, PetscInt& count) {
+  Point2 low{1e300, 1e300}, high{-1e300, -1e300};
+  for (const Point2& point : net.points_m)
+    for (std::size_t c = 0; c < 2; ++c) low[c] = std::min(low[c], point[c]), high[c] = std::max(high[c], point[c]);
+  const double side = std::max(high[0] - low[0], high[1] - low[1]);
+  std::vector<std::pair<std::uint64_t, std::size_t>> order;
+  for (std::size_t t = 0; t < net.triangles.size(); ++t) {
+    std::array<std::uint64_t, 2> cell{};
+    for (std::size_t c = 0; c < 2; ++c) {
+      double middle = 0.0;
+      for (const std::int32_t v : net.triangles[t]) middle += net.points_m[v][c] / 3.0;
+      cell[c] = static_cast<std::uint64_t>((middle - low[c]) / side * 0x7fffffff);
+    }
+    std::uint64_t key = 0;
+    for (int bit = 30; bit >= 0; --bit) key = key << 2 | (cell[0] >> bit & 1) << 1 | (cell[1] >> bit & 1);
+    order.emplace_back(key, t);
+  }
+  std::sort(order.begin(), order.end());
+  std::vector<PetscInt> unknown(numbering.is_fixed.size(), -1);
+  count = 0;
+  for (const auto& [key, t] : order)
+    for (const std::int32_t n : numbering.elements[t])
+      if (!numbering.is_fixed[n] && unknown[n] < 0) unknown[n] = count++;
+  return unknown;
 }
 
 }  // namespace
@@ -126,10 +142,9 @@ la::Vector TriangleBasis::calc(double r, double s) const { return inverse_.trans
 
 TriangleModes solve_triangles(const Net& net, const TriangleBasis& basis, double max_kappa) {
   Numbering numbering = number_nodes(net, basis);
-  std::vector<PetscInt> unknown(numbering.is_fixed.size(), -1);
-  PetscInt unknowns = 0;
-  for (std::size_t n = 0; n < unknown.size(); ++n)
-    if (!numbering.is_fixed[n]) unknown[n] = unknowns++;
+  PetscInt used = 0;
+  const std::vector<PetscInt> unknown = number_unknowns(net, numbering, used);
+  const PetscInt unknowns = (used + 2) / 3 * 3;
   std::vector<Eigen::Triplet<double, PetscInt>> stiff, heavy;
   for (std::size_t t = 0; t < net.triangles.size(); ++t) {
     const bank::Triangle& v = net.triangles[t];
@@ -146,44 +161,46 @@ TriangleModes solve_triangles(const Net& net, const TriangleBasis& basis, double
         heavy.emplace_back(row, column, twice * basis.mass(i, j));
       }
   }
+  // What fills up the last three is far above the band.
+  for (PetscInt n = used; n < unknowns; ++n) {
+    stiff.emplace_back(n, n, 1.0);
+    heavy.emplace_back(n, n, 1e-6 / max_kappa);
+  }
   Sparse stiffness(unknowns, unknowns), mass(unknowns, unknowns);
   stiffness.setFromTriplets(stiff.begin(), stiff.end());
   mass.setFromTriplets(heavy.begin(), heavy.end());
   stiff = {};
   heavy = {};
   const petsc::MatHandle k = wrap(stiffness), m = wrap(mass);
-  petsc::EpsHandle eps;
-  check(EPSCreate(PETSC_COMM_SELF, eps.out()));
-  check(EPSSetOperators(eps, k, m));
-  check(EPSSetProblemType(eps, EPS_GHEP));
-  check(EPSSetType(eps, EPSKRYLOVSCHUR));
-  check(EPSSetWhichEigenpairs(eps, EPS_ALL));
-  check(EPSSetInterval(eps, 0.0, max_kappa));
-  check(EPSSetTolerances(eps, kTolerance, PETSC_DEFAULT));
-  ST st = nullptr;
-  check(EPSGetST(eps, &st));
-  check(STSetType(st, STSINVERT));
-  use_mumps(eps);
-  check(EPSSolve(eps));
-  PetscInt count = 0;
-  check(EPSGetConverged(eps, &count));
+  eigen::NodeLayout layout;
+  layout.nodes_m.resize(static_cast<std::size_t>(unknowns) / 3);
+  layout.component.assign(layout.nodes_m.size(), 0);
+  for (std::size_t t = 0; t < net.triangles.size(); ++t)
+    for (const std::int32_t n : numbering.elements[t])
+      if (unknown[n] >= 0) {
+        const Point2& at = net.points_m[net.triangles[t][0]];
+        layout.nodes_m[static_cast<std::size_t>(unknown[n]) / 3] = {at[0], at[1], 0.0};
+      }
+  layout.fixed.resize(1);  // three points that are no line: no rigid modes
+  for (const std::int32_t v : net.triangles[0]) layout.fixed[0].push_back({net.points_m[v][0], net.points_m[v][1], 0.0});
+  eigen::Options options;
+  options.low_hz = 0.0;
+  options.high_hz = std::sqrt(max_kappa) / (2.0 * std::numbers::pi);
+  options.tolerance = kTolerance;
+  const eigen::Modes solved = eigen::solve_modes({k, m, std::move(layout)}, options);
   TriangleModes modes;
   modes.elements = std::move(numbering.elements);
+  modes.kappa = solved.lambda;
+  modes.residuals = solved.residual;
+  const auto count = static_cast<Eigen::Index>(solved.lambda.size());
   modes.shapes = la::Matrix::Zero(static_cast<Eigen::Index>(unknown.size()), count);
-  la::Vector x(unknowns);
-  petsc::VecHandle vector;
-  check(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, unknowns, x.data(), vector.out()));
-  for (PetscInt i = 0; i < count; ++i) {
-    PetscScalar kappa = 0.0;
-    check(EPSGetEigenpair(eps, i, &kappa, nullptr, vector, nullptr));
-    const la::Vector mx = mass * x, kx = stiffness * x;
-    modes.kappa.push_back(kappa);
-    modes.residuals.push_back((kx - kappa * mx).norm() / (kappa * mx.norm()));
-    const double scale = 1.0 / std::sqrt(x.dot(mx));
+  if (count == 0) return modes;
+  const PetscScalar* values = nullptr;
+  check(MatDenseGetArrayRead(solved.shapes, &values));
+  for (Eigen::Index i = 0; i < count; ++i)
     for (std::size_t n = 0; n < unknown.size(); ++n)
-      if (unknown[n] >= 0) modes.shapes(static_cast<Eigen::Index>(n), i) = scale * x(unknown[n]);
-  }
-  if (!std::is_sorted(modes.kappa.begin(), modes.kappa.end())) throw SolveError("internal: eigenvalues of the membrane are not sorted");
+      if (unknown[n] >= 0) modes.shapes(static_cast<Eigen::Index>(n), i) = values[i * unknowns + unknown[n]];
+  check(MatDenseRestoreArrayRead(solved.shapes, &values));
   return modes;
 }
 

@@ -35,8 +35,8 @@ struct TriangleModes {
   std::vector<double> residuals;                    // (m) relative
 };
 
-/// All eigenvalues up to `max_kappa`, each counted by the inertia of factorisations (SLEPc's spectrum slicing over MUMPS). Not collective.
-/// Throws SolveError.
+/// All eigenvalues up to `max_kappa`, by the solver of solids (eigen::solve_modes), which counts them by inertia. Not collective. Throws as
+/// that does.
 TriangleModes solve_triangles(const Net& net, const TriangleBasis& basis, double max_kappa);
 
 }  // namespace carillon::analytic

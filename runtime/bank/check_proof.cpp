@@ -248,8 +248,8 @@ std::string describe_completeness(const Bank& bank) {
                                    : fmt::format("the lowest {} of {} modes in {:g} .. {:g} Hz", modes, counted, low, high);
   std::int64_t rigid = 0;
   for (const std::int64_t count : proof.rigid_per_component) rigid += count;
-  text += fmt::format(": {} below {:.6g} Hz and {} below {:.6g} Hz by inertia, {} rigid", proof.below.front(), proof.cut_hz.front(),
-                      proof.below.back(), proof.cut_hz.back(), rigid);
+  text += fmt::format(": {} below {:.6g} Hz and {} below {:.6g} Hz {}, {} rigid", proof.below.front(), proof.cut_hz.front(),
+                      proof.below.back(), proof.cut_hz.back(), bank.element == "analytic" ? "by enumeration" : "by inertia", rigid);
   return text;
 }
 
@@ -259,6 +259,9 @@ std::string describe_accuracy(const Bank& bank) {
                ? std::string(unknown)
                : fmt::format("{} {:.2g} cent ({})", known, *std::max_element(cents.begin(), cents.end()), kind);
   };
+  if (bank.element == "analytic")
+    return describe_largest(bank.discretisation_error_cents, "frequencies are those of the theory to", "an estimate",
+                            "no estimates against the theory");
   const bool is_corrected = !bank.corrected.is_empty();
   return describe_largest(bank.algebraic_error_cents, "frequencies are those of the mesh to", "a bound", "no bounds against the mesh") +
          describe_largest(is_corrected ? bank.corrected.error_cents : bank.discretisation_error_cents,

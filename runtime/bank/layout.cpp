@@ -144,7 +144,7 @@ std::vector<Field> list_fields(const Bank& bank, const FileForm& form) {
 }
 
 int find_version_minor(const Bank& bank) {
-  return !bank.corrected.is_empty() ? 4 : bank.supports.count() > 0 ? 3 : bank.shape_bytes == 1 ? 2 : 1;
+  return !bank.corrected.is_empty() || bank.element == "analytic" ? 4 : bank.supports.count() > 0 ? 3 : bank.shape_bytes == 1 ? 2 : 1;
 }
 
 std::uint64_t find_item_bytes(const std::string& dtype) {

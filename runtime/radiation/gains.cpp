@@ -15,6 +15,7 @@
 #include <complex>
 #include <cstddef>
 #include <numbers>
+#include <utility>
 
 #include "runtime/bank/air.hpp"
 #include "runtime/bank/surface.hpp"
@@ -210,17 +211,26 @@ void check_sizes(const bank::Bank& bank) {
   if (!inside) throw InputError("the arrays of the bank disagree: shapes, gains and triangles do not belong together");
 }
 
+/// What makes q of q': a mode of unit velocity swings with amplitude 1 / omega.
+std::vector<double> calc_gains_of_coordinates(const bank::Bank& bank) {
+  std::vector<double> gains;
+  for (const double lambda : bank.eigenvalue_rad2_s2) gains.push_back(1.0 / std::sqrt(lambda));
+  return gains;
+}
+
 }  // namespace
 
 std::vector<double> calc_gains(const bank::Bank& bank, GainKind kind) {
   check_sizes(bank);
+  if (kind == GainKind::kVddp96) return calc_gains_of_coordinates(bank);
   return kind == GainKind::kOsg02 ? bank.radiation_gain : calc_gains_of_skin(bank, make_skin(bank));
 }
 
 Radiation calc_radiation(const bank::Bank& bank, GainKind kind) {
   check_sizes(bank);
   const Skin skin = make_skin(bank);
-  return {kind == GainKind::kOsg02 ? bank.radiation_gain : calc_gains_of_skin(bank, skin), calc_sphere_radius_of_skin(skin)};
+  std::vector<double> gains = kind == GainKind::kSphere ? calc_gains_of_skin(bank, skin) : calc_gains(bank, kind);
+  return {std::move(gains), calc_sphere_radius_of_skin(skin)};
 }
 
 Limited limit_gains(std::span<double> gains, std::span<const double> decay_per_s) {

@@ -11,7 +11,8 @@ namespace carillon::radiation {
 
 enum class GainKind {
   kOsg02,  // the bank's own: one pulsating sphere, no cancellation (O'Brien, Shen, Gatchalian 2002)
-  kSphere  // spherical multipoles about the body's centre, with cancellation
+  kSphere,  // spherical multipoles about the body's centre, with cancellation
+  kVddp96   // no air at all: every mode as loud as its coordinate q, 1 Pa for 1 m kg^1/2 (van den Doel, Pai 1996, a_n = Psi_n / omega_n)
 };
 
 /// Multipoles that are resolved; what moves in finer patterns radiates as one of order kMaxLobes + 1.

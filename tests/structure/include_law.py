@@ -148,7 +148,7 @@ LAW = {
         ["fmt", "mpi", "petsc", "mumps", "eigen"],
     ),
     "precompute/analytic": (
-        ["runtime/base", "runtime/bank", "runtime/material", "precompute/job", "precompute/petsc", "precompute/la"],
+        ["runtime/base", "runtime/bank", "runtime/material", "precompute/job", "precompute/petsc", "precompute/la", "precompute/eigen"],
         ["fmt", "petsc", "eigen"],
     ),
     "precompute/io": (
