@@ -14,13 +14,14 @@
 #include <limits>
 
 #include "jobs/hear/assume.hpp"
-#include "jobs/hear/programs.hpp"
 #include "jobs/hear/strikes.hpp"
+#include "jobs/process/programs.hpp"
 #include "jobs/report/report.hpp"
 #include "precompute/job/read_body.hpp"
 #include "runtime/bank/bank.hpp"
 #include "runtime/bank/corrected.hpp"
 #include "runtime/bank/of_material.hpp"
+#include "runtime/bank/strikes.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/failure.hpp"
 #include "runtime/base/file.hpp"
@@ -70,7 +71,7 @@ class Listening {
   Heard run() {
     check_options();
     make_folder();
-    Programs programs(heard_.folder, order_.is_quiet);
+    process::Programs programs(heard_.folder, order_.is_quiet);
     programs_ = &programs;
     look();
     const std::vector<Wish> wishes = list_wishes();
@@ -275,7 +276,7 @@ class Listening {
       throw InputError(fmt::format(
           "{}: it has no mode from {:g} to {:g} Hz: it is too small, or too stiff, to be heard; make it larger (--height, --scale)",
           sound.name, kBandHz[0], kBandHz[1]));
-    const std::vector<std::size_t> strikes = find_strikes(bank, kStrikes);
+    const std::vector<std::size_t> strikes = bank::find_strikes(bank, kStrikes);
     sound.mode_count = bank.mode_count();
     sound.modes = list_modes(bank, strikes.front(), kListed);
     for (const double cents : bank.discretisation_error_cents) sound.worst_cents = std::max(sound.worst_cents, cents);
@@ -307,14 +308,14 @@ class Listening {
       scene.member("strikes").add(strike);
     }
     listener.set("position_m", base::Json::array(Vec3{middle[0], middle[1] - std::clamp(2.0 * size, 1.0, 500.0), middle[2]}));
-    listener.set("facts_at_m", base::Json::array(middle));
+    listener.set("look_at_m", base::Json::array(middle));
     scene.set("listener", listener);
     return scene;
   }
 
   const Order& order_;
   Clock::time_point start_;
-  const Programs* programs_ = nullptr;
+  const process::Programs* programs_ = nullptr;
   std::string stem_;
   SurfaceFacts facts_;
   std::vector<std::string> materials_;

@@ -29,6 +29,7 @@ LIBRARIES = {
     "zlib": ["zlib.h"],
     "simbody": ["SimTKsimbody.h"],
     "sqlite": ["sqlite3.h"],
+    "httplib": ["httplib.h"],
 }
 # folder: (folders of ours that it may include, libraries that it may include). std and POSIX are free everywhere.
 LAW = {
@@ -90,7 +91,14 @@ LAW = {
         ["fmt"],
     ),
     "jobs/report": (["runtime/base", "runtime/bank"], ["fmt", "json"]),
-    "jobs/hear": (["runtime/base", "runtime/bank", "runtime/material", "precompute/job", "jobs/report"], ["fmt"]),
+    "jobs/explore": (
+        ["runtime/base", "runtime/bank", "runtime/material", "runtime/version", "jobs/process"],
+        ["fmt", "json", "httplib"],
+    ),
+    "jobs/hear": (
+        ["runtime/base", "runtime/bank", "runtime/material", "precompute/job", "jobs/explore", "jobs/process", "jobs/report"],
+        ["fmt"],
+    ),
     "jobs/slurm": (
         ["runtime/base", "precompute/cost", "jobs/process", "jobs/outcome", "jobs/store", "jobs/registry", "jobs/attempt", "jobs/queue"],
         ["fmt"],
@@ -102,6 +110,7 @@ LAW = {
             "runtime/material",
             "runtime/version",
             "precompute/job",
+            "jobs/explore",
             "jobs/hear",
             "jobs/process",
             "jobs/store",
