@@ -23,22 +23,38 @@ constexpr std::uintmax_t kSmallBytes = 4'000'000;  // as it is
 constexpr std::size_t kModes = 200;
 constexpr int kShapeBits = 8;
 
-/// The material of the job behind the bank where it has a name, else the one of the table whose stiffness and density are nearest.
-void find_material(const bank::Bank& bank, BankFacts& facts) {
+const material::Row* find_nearest(const material::MaterialTable& table, const bank::Material& material) {
+  const material::Row* nearest = nullptr;
+  double least = std::numeric_limits<double>::infinity();
+  for (const material::Row& row : table.rows()) {
+    const double off = std::abs(std::log(row.material.young_modulus_pa / material.young_modulus_pa)) +
+                       2.0 * std::abs(std::log(row.material.density_kg_m3 / material.density_kg_m3));
+    if (off < least) least = off, nearest = &row;
+  }
+  return nearest;
+}
+
+/// What the body looks to be of: the material of the job behind the bank where it has a name; a material or a group that the name of the
+/// file has in it ("shelf_wood"); else the row of the table whose stiffness and density are nearest.
+void find_material(const bank::Bank& bank, const fs::path& file, BankFacts& facts) {
   const material::MaterialTable& table = material::MaterialTable::get();
-  const material::Row* row = nullptr;
   const Json::Value job = parse_json(bank.provenance);
-  const Json::Value& given = job.isObject() && job["job"].isObject() ? job["job"]["material"] : job["material"];
+  const Json::Value& given = job.isObject() ? job["material"] : Json::Value::nullSingleton();
+  const material::Row* row = nullptr;
   if (given.isString()) row = table.find(given.asString());
   if (given.isObject() && given["name"].isString()) row = table.find(given["name"].asString());
-  if (row == nullptr) {
-    double nearest = std::numeric_limits<double>::infinity();
-    for (const material::Row& one : table.rows()) {
-      const double off = std::abs(std::log(one.material.young_modulus_pa / bank.material.young_modulus_pa)) +
-                         2.0 * std::abs(std::log(one.material.density_kg_m3 / bank.material.density_kg_m3));
-      if (off < nearest) nearest = off, row = &one;
+  std::string word;
+  for (const char c : file.stem().string() + " ") {
+    if (std::isalpha(static_cast<unsigned char>(c)) != 0) {
+      word += c;
+      continue;
     }
+    if (row == nullptr && !word.empty()) row = table.find(word);
+    for (const material::Row& one : table.rows())
+      if (row == nullptr && one.group == word) facts.group = word;
+    word.clear();
   }
+  if (row == nullptr && facts.group.empty()) row = find_nearest(table, bank.material);
   if (row == nullptr) return;
   facts.material = row->material.name;
   facts.group = row->group;
@@ -71,7 +87,7 @@ const BankFacts& Banks::add(const fs::path& file) {
   const bank::Bank bank = bank::read_bank(file);
   if (bank.mode_count() == 0) throw InputError(fmt::format("{}: the bank has no modes; nothing of it can be heard", file.string()));
   BankFacts facts;
-  find_material(bank, facts);
+  find_material(bank, file, facts);
   find_place(bank, facts);
   facts.packed.full_bytes = fs::file_size(file);
   std::set<std::string> taken;

@@ -17,10 +17,10 @@ namespace carillon::explore {
 
 struct BankFacts {
   PackedBank packed;
-  Vec3 low_m{}, high_m{};         // of the surface, in the frame of the mesh
-  std::string material, group;    // the name of the table that it has or is nearest to, and its group
-  Vec3 loudest_m{};               // the vertex where a blow is heard most
-  std::array<int, 2> loudest{};   // the same place: a triangle, and which of its corners
+  Vec3 low_m{}, high_m{};        // of the surface, in the frame of the mesh
+  std::string material, group;   // the name of the table that it has or is nearest to, and its group
+  Vec3 loudest_m{};              // the vertex where a blow is heard most
+  std::array<int, 2> loudest{};  // the same place: a triangle, and which of its corners
 };
 
 /// Puts banks into a folder, each once. Large ones keep the modes that are heard and coarser shapes.

@@ -25,7 +25,8 @@ namespace fs = std::filesystem;
 
 constexpr int kVersion = 1;  // of explore.json
 constexpr std::uint64_t kMaxSceneBytes = 16 << 20;
-constexpr const char *kAboutFile = "explore.json", *kSceneFile = "scene.json", *kContactsFile = "contacts.jsonl", *kBankFolder = "banks";
+constexpr const char *kAboutFile = "explore.json", *kSceneFile = "scene.json", *kContactsFile = "contacts.jsonl",
+                     *kPackedContactsFile = "contacts.jsonl.gz", *kBankFolder = "banks";
 constexpr double kProbeGain = 0.35;  // of the gain that brings the probe's blows to full scale: hands strike harder at times
 
 bool is_bank(const fs::path& file) {
@@ -40,12 +41,20 @@ bool is_bank(const fs::path& file) {
 /// The folder of an order, with what stands there now judged.
 fs::path find_place(const Order& order) {
   fs::path folder = order.folder;
-  if (folder.empty()) folder = order.subjects.front().stem().string() + "-explore";
+  if (folder.empty()) folder = make_name(fs::absolute(order.subjects.front()).stem().string()) + "-explore";
   folder = fs::absolute(folder).lexically_normal();
   if (folder.filename().empty()) folder = folder.parent_path();
   std::error_code error;
   if (!fs::exists(folder, error) || is_explorer(folder) || (fs::is_directory(folder, error) && fs::is_empty(folder, error))) return folder;
   throw InputError(fmt::format("{}: something else is there; give another folder with -o", folder.string()));
+}
+
+/// The name of what is shown: of a file "scene.json" the folder says more.
+std::string find_title(const Order& order) {
+  if (!order.title.empty()) return order.title;
+  const fs::path first = fs::absolute(order.subjects.front());
+  if (order.subjects.size() > 1) return fmt::format("{} and {} more", first.stem().string(), order.subjects.size() - 1);
+  return first.filename() == "scene.json" ? first.parent_path().filename().string() : first.stem().string();
 }
 
 class Work {
@@ -78,8 +87,7 @@ class Work {
     const auto is_all = [&](auto&& test) { return std::all_of(order_.subjects.begin(), order_.subjects.end(), test); };
     std::error_code error;
     for (const fs::path& subject : order_.subjects)
-      if (!fs::is_regular_file(subject, error))
-        throw InputError(fmt::format("{}: no such file; give banks or a scene", subject.string()));
+      if (!fs::is_regular_file(subject, error)) throw InputError(fmt::format("{}: no such file; give banks or a scene", subject.string()));
     if (is_all(is_bank) || order_.subjects.size() > 1) {
       for (const fs::path& subject : order_.subjects) add_bank(subject);
       scene_ = make_row(files_, facts_, order_.up);
@@ -104,7 +112,10 @@ class Work {
     for (const Json::Value& warning : report_["warnings"]) done_.warnings.push_back(warning.asString());
     done_.has_recording = report_["peak_pa"].isNumeric() && report_["peak_pa"].asDouble() > 0.0;
     std::error_code error;
-    if (!done_.has_recording) fs::remove(path(kContactsFile), error);
+    if (done_.has_recording)
+      compress_file(path(kContactsFile));
+    else
+      fs::remove(path(kContactsFile), error);
   }
 
   /// The report of carillon-render on a scene file.
@@ -134,9 +145,9 @@ class Work {
     Json::Value about(Json::objectValue);
     about["carillon_explore"] = kVersion;
     about["made_by"] = version::describe("carillon");
-    about["title"] = order_.title.empty() ? order_.subjects.front().stem().string() : order_.title;
+    about["title"] = find_title(order_);
     about["scene"] = kSceneFile;
-    about["contacts"] = done_.has_recording ? Json::Value(kContactsFile) : Json::Value();
+    about["contacts"] = done_.has_recording ? Json::Value(kPackedContactsFile) : Json::Value();
     about["duration_s"] = done_.duration_s;
     about["gain_per_pa"] = gain;
     for (Json::ArrayIndex i = 0; i < scene_["bodies"].size(); ++i) {
@@ -165,8 +176,8 @@ class Work {
   Banks banks_;
   process::Programs programs_;
   Json::Value scene_, report_;
-  std::vector<fs::path> files_;            // per body: its bank
-  std::vector<const BankFacts*> facts_;    // per body
+  std::vector<fs::path> files_;          // per body: its bank
+  std::vector<const BankFacts*> facts_;  // per body
   Explored done_;
 };
 

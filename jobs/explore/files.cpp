@@ -1,6 +1,7 @@
 #include "jobs/explore/files.hpp"
 
 #include <fmt/core.h>
+#include <zlib.h>
 
 #include <cctype>
 #include <cerrno>
@@ -8,6 +9,8 @@
 #include <cstring>
 #include <memory>
 #include <system_error>
+
+#include "runtime/base/file.hpp"
 
 namespace carillon::explore {
 namespace {
@@ -58,6 +61,25 @@ void put_folder(const fs::path& from, const fs::path& to) {
   fs::create_directories(to, error);
   if (!error) fs::copy(from, to, fs::copy_options::recursive, error);
   if (error) refuse(to, error);
+}
+
+void compress_file(const fs::path& file) {
+  const fs::path target = file.string() + ".gz";
+  const gzFile out = ::gzopen(target.c_str(), "wb6");
+  if (out == nullptr) refuse(target, std::error_code(errno, std::generic_category()));
+  bool is_whole = true;
+  try {
+    base::read_pieces(file, "contacts file", 1 << 20, [&](std::string_view piece) {
+      is_whole = is_whole && ::gzwrite(out, piece.data(), static_cast<unsigned>(piece.size())) == static_cast<int>(piece.size());
+    });
+  } catch (...) {
+    ::gzclose(out);
+    throw;
+  }
+  is_whole = ::gzclose(out) == Z_OK && is_whole;
+  if (!is_whole) refuse(target, std::make_error_code(std::errc::no_space_on_device));
+  std::error_code error;
+  fs::remove(file, error);
 }
 
 std::uintmax_t calc_bytes(const fs::path& folder) {

@@ -22,6 +22,8 @@ std::string to_text(const Json::Value& value);
 /// Throw SystemError when the disk refuses.
 void put_file(const std::filesystem::path& from, const std::filesystem::path& to);
 void put_folder(const std::filesystem::path& from, const std::filesystem::path& to);
+/// `file` becomes `file`.gz.
+void compress_file(const std::filesystem::path& file);
 std::uintmax_t calc_bytes(const std::filesystem::path& folder);
 
 /// A folder that appears whole or not at all: it is filled under another name beside its place, and renamed by commit().

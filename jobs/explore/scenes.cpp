@@ -10,10 +10,10 @@
 namespace carillon::explore {
 namespace {
 
-constexpr double kGap = 0.25;       // between neighbours, in the mean of their widths
-constexpr double kView = 1.6;       // distance of the listener, in the length of the row's diagonal
-constexpr double kNearestM = 0.3;   // that the listener comes
-constexpr double kStrikeS = 0.15;   // between two blows of the probe
+constexpr double kGap = 0.25;      // between neighbours, in the mean of their widths
+constexpr double kView = 1.6;      // distance of the listener, in the length of the row's diagonal
+constexpr double kNearestM = 0.3;  // that the listener comes
+constexpr double kStrikeS = 0.15;  // between two blows of the probe
 constexpr const char* kMallet = "hard-wood";
 
 Json::Value to_json(const Vec3& v) {

@@ -43,10 +43,12 @@ int serve(const std::filesystem::path& folder, int port, const std::function<voi
   const BlockedSignals signals;
   httplib::Server server;
   server.set_default_headers({{"Cache-Control", "no-cache"}, {"X-Content-Type-Options", "nosniff"}});
+  // Of types that it knows as text the library makes brotli of the highest level, which takes seconds for a contacts file and brings
+  // nothing here: none of the large files has such a type.
   for (const auto& [ending, type] : {std::pair{"html", "text/html; charset=utf-8"},
-                                     {"js", "text/javascript; charset=utf-8"},
+                                     {"js", "application/javascript; charset=utf-8"},
                                      {"css", "text/css; charset=utf-8"},
-                                     {"json", "application/json"},
+                                     {"json", "application/json; charset=utf-8"},
                                      {"jsonl", "application/x-ndjson"},
                                      {"wasm", "application/wasm"},
                                      {"hdf", "application/octet-stream"}})

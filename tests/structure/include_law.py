@@ -93,7 +93,7 @@ LAW = {
     "jobs/report": (["runtime/base", "runtime/bank"], ["fmt", "json"]),
     "jobs/explore": (
         ["runtime/base", "runtime/bank", "runtime/material", "runtime/version", "jobs/process"],
-        ["fmt", "json", "httplib"],
+        ["fmt", "json", "zlib", "httplib"],
     ),
     "jobs/hear": (
         ["runtime/base", "runtime/bank", "runtime/material", "precompute/job", "jobs/explore", "jobs/process", "jobs/report"],

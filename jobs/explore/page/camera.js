@@ -1,9 +1,11 @@
 // A camera that turns about a point, z up: drag, pinch, wheel and keys. It keeps turning a little when it is let go.
 import * as THREE from './three/three.module.min.js';
-import { add, cross, fromAxes, norm, normalise, scale, subtract } from './geometry.js';
+import { add, cross, dot, fromAxes, norm, normalise, scale, subtract } from './geometry.js';
 
 const kNearlyUp = 1.5; // rad
 const kGlideS = 0.12;
+const kNarrowestDeg = 16, kWidestDeg = 50; // angles of view, upright
+const kFilled = 0.88; // of the free part of the picture
 
 export class OrbitCamera {
   constructor() {
@@ -15,7 +17,7 @@ export class OrbitCamera {
     this.elevation = 0.3;
     this.size = 1;
     this.glide = { azimuth: 0, elevation: 0, zoom: 0 };
-    this.aside = 0; // share of the width that the panel covers
+    this.covered = { right: 0, below: 0 }; // shares of the picture on which controls lie
   }
 
   /** From a listener to what it looks at. size: of all that there is. */
@@ -82,12 +84,34 @@ export class OrbitCamera {
     return { position_m: this.position_m, rotation: fromAxes(right, cross([0, 0, 1], right), [0, 0, 1]) };
   }
 
+  /** covered: {right, below}, shares of the picture on which controls lie; what is looked at stands in the middle of the rest. */
   resize(width, height, covered) {
-    this.aside = covered;
+    this.covered = covered;
     this.camera.aspect = width / height;
-    // What is looked at stands in the middle of what the panel leaves free.
-    if (covered > 0) this.camera.setViewOffset(width, height, (covered * width) / 2, 0, width, height);
+    if (covered.right > 0 || covered.below > 0)
+      this.camera.setViewOffset(width, height, (covered.right * width) / 2, (covered.below * height) / 2, width, height);
     else this.camera.clearViewOffset();
+    this.apply();
+  }
+
+  /** Opens the angle until all points are seen, and goes further away where that is not enough. */
+  fit(points) {
+    const { right, forward, up } = this.findAxes(), eye = this.position_m;
+    const [wide, high] = [this.camera.aspect * (1 - this.covered.right), 1 - this.covered.below].map((free) => free * kFilled);
+    const calcReach = (from) => {
+      let reach = 0;
+      for (const point of points) {
+        const way = subtract(point, from), ahead = Math.max(1e-6, dot(way, forward));
+        reach = Math.max(reach, Math.abs(dot(way, right)) / ahead / wide, Math.abs(dot(way, up)) / ahead / high);
+      }
+      return reach;
+    };
+    const widest = Math.tan((kWidestDeg * Math.PI) / 360);
+    let back = 0;
+    while (calcReach(subtract(eye, scale(back, forward))) > widest && back < 100 * this.size) back += 0.05 * this.size;
+    this.distance += back;
+    const reach = calcReach(subtract(eye, scale(back, forward)));
+    this.camera.fov = Math.max(kNarrowestDeg, (360 / Math.PI) * Math.atan(Math.min(reach, widest)));
     this.apply();
   }
 

@@ -48,6 +48,7 @@ export class Hands {
   // ---- pointers
 
   press(event) {
+    document.documentElement.classList.remove('by-keys');
     this.view.canvas.focus({ preventScroll: true });
     this.view.orbit.stop();
     this.view.canvas.setPointerCapture(event.pointerId);
@@ -197,6 +198,7 @@ export class Hands {
 
   key(event) {
     const arrows = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+    document.documentElement.classList.add('by-keys');
     if (event.ctrlKey || event.metaKey || event.altKey) {
       if (event.key === 'Home') this.view.dispatchEvent(new Event('first'));
       return;

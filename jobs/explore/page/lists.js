@@ -27,6 +27,11 @@ export function makeList(element, { focused = () => {}, chosen = () => {}, left 
   });
   element.addEventListener('focus', () => mark(Math.max(0, current), true));
   element.addEventListener('blur', () => left());
+  const clear = () => {
+    items[current]?.setAttribute('aria-selected', 'false');
+    element.removeAttribute('aria-activedescendant');
+    current = -1;
+  };
   return {
     fill(entries) {
       current = -1;
@@ -48,7 +53,7 @@ export function makeList(element, { focused = () => {}, chosen = () => {}, left 
       element.replaceChildren(...items);
       element.removeAttribute('aria-activedescendant');
     },
-    mark: (index) => mark(index, false),
+    mark: (index) => (index < 0 ? clear() : mark(index, false)),
     item: (index) => items[index],
     get current() {
       return current;

@@ -1,5 +1,4 @@
 // The page of a folder made by carillon explore: reads what it shows, opens the sound engine, and lets one play.
-import { CarillonAudio } from './audio/carillon-audio.js';
 import { View } from './view.js';
 import { ShownBody, makeLook } from './body.js';
 import { Player } from './player.js';
@@ -45,7 +44,16 @@ async function fetchBytes(name, progressed = () => {}) {
   parts.reduce((at, part) => (bytes.set(part, at), at + part.length), 0);
   return bytes.buffer;
 }
-const fetchText = async (name) => new TextDecoder().decode(await fetchBytes(name));
+/** Of a file that may be compressed, and that the server may have unpacked on the way. */
+async function fetchText(name) {
+  const bytes = await fetchBytes(name), [first, second] = new Uint8Array(bytes, 0, Math.min(2, bytes.byteLength));
+  if (first !== 0x1f || second !== 0x8b) return new TextDecoder().decode(bytes);
+  try {
+    return await new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream('gzip'))).text();
+  } catch {
+    throw new Error(`${name} is damaged; make the folder again with carillon explore`);
+  }
+}
 async function fetchJson(name) {
   const text = await fetchText(name);
   try {
@@ -64,6 +72,15 @@ async function readFolder() {
   if (!Array.isArray(scene.bodies) || scene.bodies.length !== about.bodies?.length)
     throw new Error(`${about.scene} and explore.json disagree; make the folder again with carillon explore`);
   return { about, scene };
+}
+
+/** The sound engine that the folder has. */
+async function loadEngine() {
+  try {
+    return (await import('./audio/carillon-audio.js')).CarillonAudio;
+  } catch (error) {
+    throw new Error(`the sound engine, audio/carillon-audio.js, cannot be loaded (${error.message}); make the folder again with carillon explore`);
+  }
 }
 
 /** The two ears of a scene, in the frame of the listener. */
@@ -96,12 +113,13 @@ async function addBodies({ about, scene }, audio, view, player) {
   }
 }
 
-/** The view from the scene's listener, a little further away where it is too near to see everything. */
+/** The view from where the scene's listener is, wide enough to see everything, further away only where that is not enough. */
 function placeView(scene, view) {
   const { listener = {} } = scene, position = listener.position_m ?? listener.path?.[0].slice(1) ?? [0, -1.5, 0.5];
   const away = norm(subtract(view.middle, position)), facing = listener.facing;
   const target = listener.look_at_m ?? (facing ? position.map((x, c) => x + (away * facing[c]) / norm(facing)) : view.middle);
   view.orbit.place(position, target, view.size);
+  view.orbit.fit(view.listCorners());
 }
 
 async function begin() {
@@ -111,6 +129,7 @@ async function begin() {
   document.title = find('title').textContent = about.title;
   const context = new AudioContext({ latencyHint: 'interactive', sampleRate: scene.sample_rate_hz ?? 48000 });
   const ground = scene.ground ? { roughness_m: scene.ground.roughness_m, friction: scene.ground.friction } : undefined;
+  const CarillonAudio = await loadEngine();
   const audio = await CarillonAudio.open({
     context, connect: false, microphones_m: findEars(scene), gain_per_pa: about.gain_per_pa, max_bodies: Math.max(1, scene.bodies.length), ground,
   });

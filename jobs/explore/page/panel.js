@@ -9,6 +9,8 @@ const find = (id) => document.getElementById(id);
 const kEditS = 0.06; // between two edits while a slider moves
 const kPlanS = 0.5;
 
+/** Two significant digits, without an exponent. */
+const short = (value) => Number(value.toPrecision(2)).toString();
 const times = (value) => (value === 1 ? 'as it is' : `× ${value < 1 ? value.toFixed(2) : value.toFixed(value < 10 ? 2 : 0)}`);
 
 export class Panel {
@@ -42,6 +44,7 @@ export class Panel {
       if (!place) return;
       const index = this.view.bodies.indexOf(place.body);
       if (index !== this.current) this.select(index, false, false);
+      this.places.mark(this.body.places.findIndex(({ triangle, barycentric }) => triangle === place.triangle && barycentric === place.barycentric));
       void this.showLevels();
     });
     this.view.addEventListener('first', () => this.goTo(0));
@@ -87,8 +90,8 @@ export class Panel {
       this.say(`mallet: ${names[index]}`);
     }, start);
     this.view.addEventListener('mallet', ({ detail: index }) => this.mallets.choose(index));
-    makeSlider(find('speed'), (x) => 10 ** x, (v) => `${v.toPrecision(2)} m/s`, (v) => (this.player.speed_m_s = v));
-    makeSlider(find('force'), (x) => 10 ** x, (v) => `${v.toPrecision(2)} N`, (v) => (this.player.force_n = v));
+    makeSlider(find('speed'), (x) => 10 ** x, (v) => `${short(v)} m/s`, (v) => (this.player.speed_m_s = v));
+    makeSlider(find('force'), (x) => 10 ** x, (v) => `${short(v)} N`, (v) => (this.player.force_n = v));
     const gestures = ['strike', 'scrape', 'press'];
     makeChoice(find('gesture'), ['Strike', 'Scrape', 'Press'], (index) => (this.hands.gesture = gestures[index]));
     this.player.addEventListener('done', ({ detail }) => this.showDone(detail));
@@ -107,13 +110,13 @@ export class Panel {
     find('hint').classList.add('gone');
     let text;
     if (done.kind === 'strike') {
-      const parts = [`${done.mallet.replace('-', ' ')} at ${done.speed_m_s.toPrecision(2)} m/s`];
-      if (done.contact_s > 0) parts.push(`${(1000 * done.contact_s).toPrecision(2)} ms of contact`);
-      if (done.peak_n > 0) parts.push(`${done.peak_n.toPrecision(2)} N at most`);
+      const parts = [`${done.mallet.replace('-', ' ')} at ${short(done.speed_m_s)} m/s`];
+      if (done.contact_s > 0) parts.push(`${short(1000 * done.contact_s)} ms of contact`);
+      if (done.peak_n > 0) parts.push(`${short(done.peak_n)} N at most`);
       text = parts.join(', ');
       this.say(`struck ${done.name}: ${text}`);
     } else {
-      text = `${done.kind === 'scrape' ? 'scraped' : 'pressed'} with ${done.force_n.toPrecision(2)} N for ${done.seconds.toFixed(1)} s`;
+      text = `${done.kind === 'scrape' ? 'scraped' : 'pressed'} with ${short(done.force_n)} N for ${done.seconds.toFixed(1)} s`;
       this.say(`${done.name}: ${text}`);
     }
     find('last').textContent = text;

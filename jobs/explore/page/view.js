@@ -15,14 +15,21 @@ function makeSurroundings(renderer) {
     box.position.set(...at);
     room.add(box);
   };
-  const walls = new THREE.Mesh(new THREE.BoxGeometry(20, 20, 20), new THREE.MeshBasicMaterial({ color: 0x20262e, side: THREE.BackSide }));
-  room.add(walls);
-  add(0xfff3e0, 9, [7, 7, 0.2], [-3, -3, 9.5]);
-  add(0xdfeaff, 5, [0.2, 7, 5], [-9.6, 1, 3]);
-  add(0xffe2bd, 4, [0.2, 5, 6], [9.6, -4, 2]);
-  add(0xbfd4ff, 2.5, [9, 0.2, 2], [0, 9.6, 4]);
-  add(0x0b0d10, 1, [20, 20, 0.2], [0, 0, -9.8]);
-  const maker = new THREE.PMREMGenerator(renderer), texture = maker.fromScene(room, 0.03).texture;
+  const shell = new THREE.SphereGeometry(14, 32, 24), colors = [], low = new THREE.Color(0x262a30), high = new THREE.Color(0x59616c);
+  const { position } = shell.attributes;
+  for (let i = 0; i < position.count; ++i) {
+    const color = low.clone().lerp(high, Math.max(0, Math.min(1, 0.5 + position.getZ(i) / 16)));
+    colors.push(color.r, color.g, color.b);
+  }
+  shell.setAttribute('color', new THREE.Float32BufferAttribute(colors, 3));
+  room.add(new THREE.Mesh(shell, new THREE.MeshBasicMaterial({ vertexColors: true, side: THREE.BackSide })));
+  add(0xfff1dc, 8, [7, 6, 0.2], [-3, -3, 9.5]); // above
+  add(0xfff4e6, 3.2, [5, 0.2, 3.2], [-6.5, -9, 2.5]); // before, to the left
+  add(0xcfe0ff, 4.5, [0.2, 7, 5], [-9.6, 2, 3]); // left
+  add(0xffdfb8, 4, [0.2, 5, 6], [9.6, -3, 2]); // right
+  add(0xbfd4ff, 2.5, [10, 0.2, 2.5], [0, 9.6, 4]); // behind
+  add(0xfff4e6, 0.9, [9, 7, 0.2], [2, -7, -7]); // what a floor throws back
+  const maker = new THREE.PMREMGenerator(renderer), texture = maker.fromScene(room, 0.035).texture;
   maker.dispose();
   return texture;
 }
@@ -39,7 +46,7 @@ function makeFloor(size, at, middle) {
   paper.fillRect(0, 0, 256, 256);
   const floor = new THREE.Group(), plane = new THREE.PlaneGeometry(6 * size, 6 * size);
   const shine = new THREE.Mesh(plane, new THREE.MeshBasicMaterial({ map: new THREE.CanvasTexture(canvas), transparent: true, depthWrite: false }));
-  const shade = new THREE.Mesh(plane, new THREE.ShadowMaterial({ opacity: 0.5, depthWrite: false }));
+  const shade = new THREE.Mesh(plane, new THREE.ShadowMaterial({ opacity: 0.42, depthWrite: false }));
   shade.receiveShadow = true;
   shade.position.z = 1e-4 * size;
   floor.add(shine, shade);
@@ -55,14 +62,15 @@ export class View extends EventTarget {
     this.renderer.toneMapping = THREE.ACESFilmicToneMapping;
     this.renderer.toneMappingExposure = 1.05;
     this.renderer.shadowMap.enabled = true;
-    this.renderer.shadowMap.type = THREE.PCFSoftShadowMap;
+    this.renderer.shadowMap.type = THREE.VSMShadowMap;
     this.scene = new THREE.Scene();
     this.scene.environment = makeSurroundings(this.renderer);
     this.key = new THREE.DirectionalLight(0xfff1de, 1.9);
     this.key.castShadow = true;
     this.key.shadow.mapSize.set(1024, 1024);
-    this.key.shadow.radius = 5;
-    this.key.shadow.normalBias = 0.01;
+    this.key.shadow.radius = 7;
+    this.key.shadow.blurSamples = 16;
+    this.key.shadow.bias = -1e-3;
     const rim = new THREE.DirectionalLight(0x9ec9ff, 0.7);
     rim.position.set(2, 3, 1.5);
     this.scene.add(this.key, this.key.target, rim);
@@ -98,14 +106,16 @@ export class View extends EventTarget {
     this.draw();
   }
 
+  /** Of the boxes of all bodies, in the world. */
+  listCorners() {
+    const ends = (body, k) => [0, 1, 2].map((c) => (k & (1 << c) ? body.box.high[c] : body.box.low[c]));
+    return this.bodies.flatMap((body) => [0, 1, 2, 3, 4, 5, 6, 7].map((k) => body.toWorld(ends(body, k))));
+  }
+
   /** Once all bodies are there: light and floor to their size. ground_m: its height, or null for none. */
   settle(ground_m) {
     const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
-    for (const body of this.bodies)
-      for (let k = 0; k < 8; ++k) {
-        const at = body.toWorld([0, 1, 2].map((c) => (k & (1 << c) ? body.box.high[c] : body.box.low[c])));
-        at.forEach((x, c) => ([low[c], high[c]] = [Math.min(low[c], x), Math.max(high[c], x)]));
-      }
+    for (const at of this.listCorners()) at.forEach((x, c) => ([low[c], high[c]] = [Math.min(low[c], x), Math.max(high[c], x)]));
     this.middle = scale(0.5, add(low, high));
     this.size = norm(subtract(high, low));
     const floor = ground_m ?? low[2];
@@ -116,7 +126,6 @@ export class View extends EventTarget {
     this.key.target.position.set(...this.middle);
     Object.assign(camera, { left: -reach, right: reach, top: reach, bottom: -reach, near: 0.2 * this.size, far: 5 * this.size });
     camera.updateProjectionMatrix();
-    this.key.shadow.normalBias = 4e-3 * this.size;
     this.draw();
   }
 
@@ -124,7 +133,8 @@ export class View extends EventTarget {
     const { clientWidth: width, clientHeight: height } = this.canvas;
     if (width === 0 || height === 0) return;
     const panel = document.getElementById('panel').getBoundingClientRect();
-    const covered = panel.height > 0.8 * height ? panel.width / width : 0;
+    const isBeside = panel.height > 0.8 * height, chart = document.getElementById('spectrum').getBoundingClientRect();
+    const covered = { right: isBeside ? panel.width / width : 0, below: Math.max(0, height - chart.top) / height };
     this.renderer.setPixelRatio(Math.min(2, devicePixelRatio) * this.pixels);
     this.renderer.setSize(width, height, false);
     this.orbit.resize(width, height, covered);
