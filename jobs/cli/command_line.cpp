@@ -221,9 +221,7 @@ void add_explore(CLI::App& app, Shared& shared, Run& run) {
       ->option_text("AXIS");
   command->add_flag("--whole", explore.keeps_banks, "Banks as they are, however large; else those above 4 MB are made smaller");
   CLI::Option* serves = command->add_flag("--serve", options->is_serving, "Serve it on this machine, until Ctrl-C");
-  command->add_option("--port", options->port, "With --serve: the port (default: a free one)")
-      ->check(CLI::Range(1, 65535))
-      ->needs(serves);
+  command->add_option("--port", options->port, "With --serve: the port (default: a free one)")->check(CLI::Range(1, 65535))->needs(serves);
   set_work(*command, shared, run, options, run_explore);
 }
 
@@ -276,8 +274,9 @@ void add_report(CLI::App& app, Shared& shared, Run& run) {
                                          "a job that is done, or of any bank.\nExit code 1: not there yet.");
   command->add_option("JOB|BANK", options->word, "Job file (what it holds now), an id or its beginning, or, with -o, the file of a bank")
       ->required();
-  command->add_option("-o,--output", options->folder, "Write report.html and its pictures into this folder");
+  command->add_option("-o,--output", options->folder, "Write report.html, its pictures and the page to play it into this folder");
   command->add_flag("--no-pictures", options->no_pictures, "Draw no pictures of the first modes");
+  command->add_flag("--no-page", options->no_page, "With -o: leave out the page on which the body is struck (carillon explore)");
   set_work(*command, shared, run, options, run_report);
 }
 

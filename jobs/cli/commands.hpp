@@ -101,7 +101,7 @@ int run_study(Shared& shared, const StudyOptions& options);
 struct ReportOptions {
   std::string word;
   std::filesystem::path folder;  // empty: the report of the store
-  bool no_pictures = false;
+  bool no_pictures = false, no_page = false;
 };
 int run_report(Shared& shared, const ReportOptions& options);
 

@@ -49,6 +49,11 @@ fs::path find_place(const Order& order) {
   throw InputError(fmt::format("{}: something else is there; give another folder with -o", folder.string()));
 }
 
+fs::path find_page() { return base::find_data_folder("explore", "install Carillon with its page, or build it where npm is installed"); }
+fs::path find_engine() {
+  return base::find_data_folder("web", "install Carillon with its page, or build it where emscripten is installed");
+}
+
 /// The name of what is shown: of a file "scene.json" the folder says more.
 std::string find_title(const Order& order) {
   if (!order.title.empty()) return order.title;
@@ -61,8 +66,8 @@ class Work {
  public:
   explicit Work(const Order& order)
       : order_(order),
-        page_(base::find_data_folder("explore", "install Carillon with its page, or build it where npm is installed")),
-        engine_(base::find_data_folder("web", "install Carillon with its page, or build it where emscripten is installed")),
+        page_(find_page()),
+        engine_(find_engine()),
         place_(find_place(order)),
         folder_(place_),
         banks_(folder_.path() / kBankFolder, order.keeps_banks),
@@ -186,6 +191,16 @@ class Work {
 Explored explore(const Order& order) {
   if (order.subjects.empty()) throw InputError("say what to explore: banks, or a scene");
   return Work(order).run();
+}
+
+bool is_installed() {
+  try {
+    (void)find_page();
+    (void)find_engine();
+  } catch (const SystemError&) {
+    return false;
+  }
+  return true;
 }
 
 bool is_explorer(const fs::path& folder) {

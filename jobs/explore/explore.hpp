@@ -13,11 +13,11 @@ namespace carillon::explore {
 enum class Up { kZ, kY };
 
 struct Order {
-  std::vector<std::filesystem::path> subjects;  // banks, side by side; or one scene
-  std::filesystem::path folder;                 // made, or made again; empty: NAME-explore here
-  std::string title = {};                       // of the page; empty: the name of the subject
-  Up up = Up::kZ;                               // axis of the meshes of banks that points up
-  bool keeps_banks = false;                     // banks as they are, however large
+  std::vector<std::filesystem::path> subjects = {};  // banks, side by side; or one scene
+  std::filesystem::path folder;                      // made, or made again; empty: NAME-explore here
+  std::string title = {};                            // of the page; empty: the name of the subject
+  Up up = Up::kZ;                                    // axis of the meshes of banks that points up
+  bool keeps_banks = false;                          // banks as they are, however large
 };
 
 /// A bank as the folder has it.
@@ -40,6 +40,9 @@ struct Explored {
 /// carillon-render makes. It appears whole or not at all, in place of an earlier one of this program. Throws InputError for subjects that
 /// cannot be played and for a folder that holds something else, SystemError when page or engine are not installed or the disk refuses.
 Explored explore(const Order& order);
+
+/// Whether page and sound engine are installed beside this program; without, other commands leave the page out.
+bool is_installed();
 
 /// Whether explore() made this folder.
 bool is_explorer(const std::filesystem::path& folder);

@@ -13,6 +13,7 @@
 #include <cmath>
 #include <limits>
 
+#include "jobs/explore/explore.hpp"
 #include "jobs/hear/assume.hpp"
 #include "jobs/hear/strikes.hpp"
 #include "jobs/process/programs.hpp"
@@ -39,6 +40,7 @@ using Clock = std::chrono::steady_clock;
 constexpr std::int64_t kSolidNodes = 16000, kWallNodes = 15000, kShapeNodes = 6000;  // of a preview
 constexpr std::int64_t kMaxPreviewNodes = 80000;
 constexpr int kPreviewModes = 200, kMaxModes = 600;
+constexpr const char* kExplorer = "explore";  // folder of the page
 constexpr std::size_t kStrikes = 4, kListed = 12;
 constexpr double kSameCents = 5.0;  // an edit that leaves Poisson's ratio may be so far off
 constexpr std::array<double, 2> kBandHz{20.0, 20000.0};
@@ -79,7 +81,9 @@ class Listening {
     std::sort(heard_.sounds.begin(), heard_.sounds.end(), [&](const Sound& a, const Sound& b) { return place_[a.name] < place_[b.name]; });
     heard_.page = heard_.folder / report::kPageFile;
     const fs::path& bank = heard_.sounds.front().bank;
-    report::write_report(bank, bank.string() + ".resolved.json", heard_.folder, {.title = stem_, .drawn_modes = 0});
+    make_explorer();
+    const std::string beside = heard_.explorer.empty() ? "" : kExplorer;
+    report::write_report(bank, bank.string() + ".resolved.json", heard_.folder, {.title = stem_, .drawn_modes = 0, .explorer = beside});
     heard_.seconds = calc_seconds();
     return std::move(heard_);
   }
@@ -93,6 +97,16 @@ class Listening {
   }
   /// Since the beginning.
   double calc_seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
+
+  /// The page on which all that was asked for stands side by side.
+  void make_explorer() {
+    if (!explore::is_installed()) return;
+    explore::Order order{.folder = heard_.folder / kExplorer, .title = stem_};
+    for (const Sound& sound : heard_.sounds) order.subjects.push_back(sound.bank);
+    if (!is_shape() && !is_mesh()) order.up = explore::Up::kY;
+    say("making the page");
+    heard_.explorer = explore::explore(order).folder;
+  }
 
   void check_options() {
     if (is_shape() == !order_.object.empty()) throw InputError("give an object: a file, or --shape with its dimensions");

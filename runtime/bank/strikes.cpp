@@ -1,4 +1,5 @@
-// Method:     A blow J along the normal n at a vertex makes mode m sound with g_m |phi_m . n| J at 1 m; by the ear's weight of its frequency
+// Method:     A blow J along the normal n at a vertex makes mode m sound with g_m |phi_m . n| J at 1 m; by the ear's weight of its
+// frequency
 //             (A-weighting) that is its level. Vertices are ranked by the sum of the squares.
 // Source:     docs/equations.md, E5 and E7.
 // Deviations: none.
