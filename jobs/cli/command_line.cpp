@@ -205,6 +205,26 @@ void add_hear(CLI::App& app, Shared& shared, Run& run) {
   set_work(*command, shared, run, options, run_hear);
 }
 
+void add_explore(CLI::App& app, Shared& shared, Run& run) {
+  auto options = std::make_shared<ExploreOptions>();
+  explore::Order& explore = options->explore;
+  CLI::App* command = app.add_subcommand(
+      "explore",
+      "Makes a page of bodies that one strikes, scrapes and hears: a folder that any web server can serve. Of a scene, what happens in it "
+      "is\nsimulated and played too. A folder that was made before is served as it is.");
+  command->add_option("BANK|SCENE|FOLDER", explore.subjects, "Banks, side by side; or one scene file (JSON); or a folder made before")
+      ->required();
+  command->add_option("-o,--output", explore.folder, "The folder (default: NAME-explore)");
+  command->add_option("--title", explore.title, "Of the page (default: the name of the bank or scene)");
+  command->add_option("--up", explore.up, "Axis of the meshes of banks that points up: y or z (default)")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, explore::Up>{{"y", explore::Up::kY}, {"z", explore::Up::kZ}}))
+      ->option_text("AXIS");
+  command->add_flag("--whole", explore.keeps_banks, "Banks as they are, however large; else those above 4 MB are made smaller");
+  CLI::Option* serves = command->add_flag("--serve", options->is_serving, "Serve it on this machine, until Ctrl-C");
+  command->add_option("--port", options->port, "With --serve: the port (default: a free one)")->check(CLI::Range(1, 65535))->needs(serves);
+  set_work(*command, shared, run, options, run_explore);
+}
+
 void add_materials(CLI::App& app, Shared& shared, Run& run) {
   auto options = std::make_shared<MaterialsOptions>();
   CLI::App* command = app.add_subcommand(
@@ -254,8 +274,9 @@ void add_report(CLI::App& app, Shared& shared, Run& run) {
                                          "a job that is done, or of any bank.\nExit code 1: not there yet.");
   command->add_option("JOB|BANK", options->word, "Job file (what it holds now), an id or its beginning, or, with -o, the file of a bank")
       ->required();
-  command->add_option("-o,--output", options->folder, "Write report.html and its pictures into this folder");
+  command->add_option("-o,--output", options->folder, "Write report.html, its pictures and the page to play it into this folder");
   command->add_flag("--no-pictures", options->no_pictures, "Draw no pictures of the first modes");
+  command->add_flag("--no-page", options->no_page, "With -o: leave out the page on which the body is struck (carillon explore)");
   set_work(*command, shared, run, options, run_report);
 }
 
@@ -318,7 +339,7 @@ Run parse_command_line(int argc, char** argv, Shared& shared) {
   app.add_flag("--json", shared.json, "One JSON document (of commands that keep running: one object a line)");
   app.set_version_flag("--version", version::describe("carillon"));
   for (const auto add : {add_submit, add_status, add_log, add_cancel, add_retry, add_explain, add_run, add_get, add_gc, add_verify,
-                         add_validate, add_study, add_report, add_hear, add_materials})
+                         add_validate, add_study, add_report, add_hear, add_explore, add_materials})
     add(app, shared, run);
   add_attempt(app, run);
   check_command(app, argc, argv);

@@ -9,6 +9,7 @@
 #include "jobs/attempt/attempt.hpp"
 #include "jobs/cli/options.hpp"
 #include "jobs/cli/shared.hpp"
+#include "jobs/explore/explore.hpp"
 #include "jobs/hear/hear.hpp"
 #include "jobs/queue/run.hpp"
 
@@ -100,7 +101,7 @@ int run_study(Shared& shared, const StudyOptions& options);
 struct ReportOptions {
   std::string word;
   std::filesystem::path folder;  // empty: the report of the store
-  bool no_pictures = false;
+  bool no_pictures = false, no_page = false;
 };
 int run_report(Shared& shared, const ReportOptions& options);
 
@@ -109,6 +110,14 @@ struct HearOptions {
   hear::Order hear;
 };
 int run_hear(Shared& shared, const HearOptions& options);
+
+/// carillon explore: a page on which bodies are struck.
+struct ExploreOptions {
+  explore::Order explore;
+  bool is_serving = false;
+  int port = 0;
+};
+int run_explore(Shared& shared, const ExploreOptions& options);
 
 /// carillon materials: the materials that can be named.
 struct MaterialsOptions {

@@ -69,6 +69,7 @@ int run_hear(Shared& shared, const HearOptions& options) {
     Json::Value root;
     root["folder"] = to_json(heard.folder.string());
     root["page"] = to_json(heard.page.string());
+    root["explorer"] = heard.explorer.empty() ? Json::Value() : to_json(heard.explorer.string());
     root["assumed"] = to_json(heard.assumed);
     for (const double x : heard.extent_m) root["extent_m"].append(x);
     root["sounds"] = Json::arrayValue;
@@ -80,8 +81,12 @@ int run_hear(Shared& shared, const HearOptions& options) {
   for (const std::string& line : heard.assumed) fmt::print("assumed      {}\n", show(line, 1000));
   fmt::print("body         {:.3g} x {:.3g} x {:.3g} m\n", heard.extent_m[0], heard.extent_m[1], heard.extent_m[2]);
   for (const hear::Sound& sound : heard.sounds) print(sound);
-  fmt::print("\nreport       {}\n{:.1f} s{}\n", show(heard.page.string(), 1000), heard.seconds,
-             wanted.accuracy_cents ? "" : "; a preview: --accuracy 10 refines it to 10 cents");
+  fmt::print("\nreport       {}\n", show(heard.page.string(), 1000));
+  if (heard.explorer.empty())
+    fmt::print("to play it   the page is not installed here\n");
+  else
+    fmt::print("to play it   carillon explore {} --serve\n", show(heard.explorer.string(), 1000));
+  fmt::print("{:.1f} s{}\n", heard.seconds, wanted.accuracy_cents ? "" : "; a preview: --accuracy 10 refines it to 10 cents");
   if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
   return 0;
 }

@@ -14,11 +14,24 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr const char* kExplorer = "explore";  // folder of the page beside the report
+
+/// The page beside a report; empty for a bank that cannot be played, of which the report says why.
+std::string make_explorer(const fs::path& bank, const fs::path& folder, const std::string& title) {
+  try {
+    (void)explore::explore({.subjects = {bank}, .folder = folder / kExplorer, .title = title});
+    return kExplorer;
+  } catch (const InputError&) {
+    return "";
+  }
+}
+
 /// Into options.folder.
 fs::path write(const ReportOptions& options, const fs::path& bank, const fs::path& resolved_job, const std::string& title) {
   report::Options wanted;
   wanted.title = title;
   if (options.no_pictures) wanted.drawn_modes = 0;
+  if (!options.no_page && explore::is_installed()) wanted.explorer = make_explorer(bank, options.folder, title);
   report::write_report(bank, resolved_job, options.folder, wanted);
   return options.folder / report::kPageFile;
 }

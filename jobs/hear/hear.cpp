@@ -13,14 +13,16 @@
 #include <cmath>
 #include <limits>
 
+#include "jobs/explore/explore.hpp"
 #include "jobs/hear/assume.hpp"
-#include "jobs/hear/programs.hpp"
 #include "jobs/hear/strikes.hpp"
+#include "jobs/process/programs.hpp"
 #include "jobs/report/report.hpp"
 #include "precompute/job/read_body.hpp"
 #include "runtime/bank/bank.hpp"
 #include "runtime/bank/corrected.hpp"
 #include "runtime/bank/of_material.hpp"
+#include "runtime/bank/strikes.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/failure.hpp"
 #include "runtime/base/file.hpp"
@@ -38,6 +40,7 @@ using Clock = std::chrono::steady_clock;
 constexpr std::int64_t kSolidNodes = 16000, kWallNodes = 15000, kShapeNodes = 6000;  // of a preview
 constexpr std::int64_t kMaxPreviewNodes = 80000;
 constexpr int kPreviewModes = 200, kMaxModes = 600;
+constexpr const char* kExplorer = "explore";  // folder of the page
 constexpr std::size_t kStrikes = 4, kListed = 12;
 constexpr double kSameCents = 5.0;  // an edit that leaves Poisson's ratio may be so far off
 constexpr std::array<double, 2> kBandHz{20.0, 20000.0};
@@ -70,7 +73,7 @@ class Listening {
   Heard run() {
     check_options();
     make_folder();
-    Programs programs(heard_.folder, order_.is_quiet);
+    process::Programs programs(heard_.folder, order_.is_quiet);
     programs_ = &programs;
     look();
     const std::vector<Wish> wishes = list_wishes();
@@ -78,7 +81,9 @@ class Listening {
     std::sort(heard_.sounds.begin(), heard_.sounds.end(), [&](const Sound& a, const Sound& b) { return place_[a.name] < place_[b.name]; });
     heard_.page = heard_.folder / report::kPageFile;
     const fs::path& bank = heard_.sounds.front().bank;
-    report::write_report(bank, bank.string() + ".resolved.json", heard_.folder, {.title = stem_, .drawn_modes = 0});
+    make_explorer();
+    const std::string beside = heard_.explorer.empty() ? "" : kExplorer;
+    report::write_report(bank, bank.string() + ".resolved.json", heard_.folder, {.title = stem_, .drawn_modes = 0, .explorer = beside});
     heard_.seconds = calc_seconds();
     return std::move(heard_);
   }
@@ -92,6 +97,16 @@ class Listening {
   }
   /// Since the beginning.
   double calc_seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
+
+  /// The page on which all that was asked for stands side by side.
+  void make_explorer() {
+    if (!explore::is_installed()) return;
+    explore::Order order{.folder = heard_.folder / kExplorer, .title = stem_};
+    for (const Sound& sound : heard_.sounds) order.subjects.push_back(sound.bank);
+    if (!is_shape() && !is_mesh()) order.up = explore::Up::kY;
+    say("making the page");
+    heard_.explorer = explore::explore(order).folder;
+  }
 
   void check_options() {
     if (is_shape() == !order_.object.empty()) throw InputError("give an object: a file, or --shape with its dimensions");
@@ -275,7 +290,7 @@ class Listening {
       throw InputError(fmt::format(
           "{}: it has no mode from {:g} to {:g} Hz: it is too small, or too stiff, to be heard; make it larger (--height, --scale)",
           sound.name, kBandHz[0], kBandHz[1]));
-    const std::vector<std::size_t> strikes = find_strikes(bank, kStrikes);
+    const std::vector<std::size_t> strikes = bank::find_strikes(bank, kStrikes);
     sound.mode_count = bank.mode_count();
     sound.modes = list_modes(bank, strikes.front(), kListed);
     for (const double cents : bank.discretisation_error_cents) sound.worst_cents = std::max(sound.worst_cents, cents);
@@ -307,14 +322,14 @@ class Listening {
       scene.member("strikes").add(strike);
     }
     listener.set("position_m", base::Json::array(Vec3{middle[0], middle[1] - std::clamp(2.0 * size, 1.0, 500.0), middle[2]}));
-    listener.set("facts_at_m", base::Json::array(middle));
+    listener.set("look_at_m", base::Json::array(middle));
     scene.set("listener", listener);
     return scene;
   }
 
   const Order& order_;
   Clock::time_point start_;
-  const Programs* programs_ = nullptr;
+  const process::Programs* programs_ = nullptr;
   std::string stem_;
   SurfaceFacts facts_;
   std::vector<std::string> materials_;

@@ -50,6 +50,7 @@ struct Sound {
 
 struct Heard {
   std::filesystem::path folder, page;  // page: report.html of the first sound
+  std::filesystem::path explorer;      // folder of the page on which all sounds are struck; empty: it is not installed
   std::vector<std::string> assumed;    // what was not said and is taken, a sentence each
   std::array<double, 3> extent_m{};    // of the first sound's body
   std::vector<Sound> sounds;

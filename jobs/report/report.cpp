@@ -59,17 +59,31 @@ Html make_picture_section(const Subject& subject, const fs::path& folder, const 
       html("<p><img src=\"{}\" alt=\"The first {} modes as deformed bodies, coloured by displacement\"></p>\n", kPictureFile, modes));
 }
 
+/// The body, to be played; where the page of `carillon explore` is not beside the report, how to get one.
+Html make_play_section(const Subject& subject, const Options& options) {
+  constexpr const char* kHeading = "Play it";
+  if (options.explorer.empty())
+    return leave_out("play", kHeading,
+                     fmt::format("carillon explore {} --serve opens a page to strike the body on.", subject.file.string()));
+  return make_section("play", kHeading,
+                      html("<p><iframe src=\"{0}/index.html\" title=\"The body, to be struck and heard\" allow=\"autoplay\"></iframe></p>\n"
+                           "<p>It plays where a web server has the folder: <code>carillon explore {0} --serve</code> opens it alone. "
+                           "<a href=\"{0}/index.html\">The whole window</a></p>\n",
+                           options.explorer));
+}
+
 Html make_page(const Subject& subject, const Html& pictures, const std::string& title) {
   Html out = html(
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
       "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src &#39;none&#39;; style-src &#39;unsafe-inline&#39;; img-src * "
-      "file:\">\n"
+      "file:; frame-src &#39;self&#39; file:\">\n"
       "<meta name=\"generator\" content=\"carillon\">\n<title>{}</title>\n<style>{}</style>\n</head>\n<body>\n<main>\n",
       title, get_style());
   out += make_head(subject, title);
   out += html(
-      "<nav><a href=\"#pictures\">Pictures</a><a href=\"#modes\">Modes</a><a href=\"#proof\">Proof</a><a href=\"#errors\">Error bars</a>"
+      "<nav><a href=\"#pictures\">Pictures</a><a href=\"#play\">Play</a><a href=\"#modes\">Modes</a><a href=\"#proof\">Proof</a><a "
+      "href=\"#errors\">Error bars</a>"
       "<a href=\"#residuals\">Residuals</a><a href=\"#mesh\">Mesh</a><a href=\"#time\">Time</a><a href=\"#memory\">Memory</a>"
       "<a href=\"#work\">Work</a><a href=\"#size\">Size</a><a href=\"#checks\">Checks</a><a href=\"#job\">Job</a></nav>\n");
   out += pictures;
@@ -90,7 +104,8 @@ void write_report(const fs::path& bank, const fs::path& resolved_job, const fs::
   if (error || !fs::is_directory(folder))
     throw SystemError(fmt::format("{}: this folder for the report cannot be made: {}; choose another place", folder.string(),
                                   error ? error.message() : "something else has that name"));
-  const Html pictures = make_picture_section(subject, folder, options);
+  Html pictures = make_picture_section(subject, folder, options);
+  pictures += make_play_section(subject, options);
   const std::string title = options.title.empty() ? find_title(subject) : options.title;
   base::write_file(folder / kPageFile, make_page(subject, pictures, title).text());
 }

@@ -14,6 +14,7 @@ h2 { font-size: 19px; margin: 0 0 10px }
 h3 { font-size: 15px; margin: 20px 0 6px }
 p { margin: 8px 0; overflow-wrap: anywhere }
 a { color: var(--c0) }
+iframe { width: 100%; height: 620px; border: 0; border-radius: 8px; background: #12161c }
 .remark, .missing { color: var(--soft); font-size: 13px }
 section.missing { padding: 14px 28px }
 section.missing h2 { font-size: 16px; margin: 0; color: var(--soft) }

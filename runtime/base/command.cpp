@@ -37,6 +37,7 @@ constexpr double kAskS = 0.1;           // between two questions to may_stop
 constexpr double kLateS = 1.0;          // for what a late program has printed
 constexpr double kKillPatienceS = 5.0;  // for a program that was killed
 constexpr const char* kHelperFolder = "libexec/carillon";
+constexpr const char* kDataFolder = "share/carillon";
 constexpr const char* kOomScore = "500";  // of 1,000
 
 struct Pipe {
@@ -250,6 +251,13 @@ fs::path find_helper(const std::string& name) {
   std::error_code error;
   if (!fs::is_regular_file(file, error)) throw SystemError(fmt::format("{} is missing; install Carillon again", file.string()));
   return file;
+}
+
+fs::path find_data_folder(const std::string& name, std::string_view remedy) {
+  fs::path folder = find_prefix(find_self()) / kDataFolder / name;
+  std::error_code error;
+  if (!fs::is_directory(folder, error)) throw SystemError(fmt::format("{} is missing; {}", folder.string(), remedy));
+  return folder;
 }
 
 fs::path require_program(const std::string& name) {

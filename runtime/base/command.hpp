@@ -24,6 +24,9 @@ std::optional<std::filesystem::path> find_program(const std::string& name);
 /// A program or library that only the programs of this installation use: PREFIX/libexec/carillon/NAME, for programs in PREFIX/bin and
 /// PREFIX/libexec/carillon. Throws SystemError where there is none.
 std::filesystem::path find_helper(const std::string& name);
+/// A folder of files that the programs of this installation read: PREFIX/share/carillon/NAME, likewise. Throws SystemError where there is
+/// none; `remedy` says in the message what makes it.
+std::filesystem::path find_data_folder(const std::string& name, std::string_view remedy);
 /// The same as find_program(). Throws SystemError where there is none.
 std::filesystem::path require_program(const std::string& name);
 /// Is it a file that may be run?

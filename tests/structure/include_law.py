@@ -30,6 +30,7 @@ LIBRARIES = {
     "zlib": ["zlib.h"],
     "simbody": ["SimTKsimbody.h"],
     "sqlite": ["sqlite3.h"],
+    "httplib": ["httplib.h"],
 }
 # folder: (folders of ours that it may include, libraries that it may include). std and POSIX are free everywhere.
 LAW = {
@@ -91,7 +92,14 @@ LAW = {
         ["fmt"],
     ),
     "jobs/report": (["runtime/base", "runtime/bank"], ["fmt", "json"]),
-    "jobs/hear": (["runtime/base", "runtime/bank", "runtime/material", "precompute/job", "jobs/report"], ["fmt"]),
+    "jobs/explore": (
+        ["runtime/base", "runtime/bank", "runtime/material", "runtime/version", "jobs/process"],
+        ["fmt", "json", "zlib", "httplib"],
+    ),
+    "jobs/hear": (
+        ["runtime/base", "runtime/bank", "runtime/material", "precompute/job", "jobs/explore", "jobs/process", "jobs/report"],
+        ["fmt"],
+    ),
     "jobs/slurm": (
         ["runtime/base", "precompute/cost", "jobs/process", "jobs/outcome", "jobs/store", "jobs/registry", "jobs/attempt", "jobs/queue"],
         ["fmt"],
@@ -103,6 +111,7 @@ LAW = {
             "runtime/material",
             "runtime/version",
             "precompute/job",
+            "jobs/explore",
             "jobs/hear",
             "jobs/process",
             "jobs/store",

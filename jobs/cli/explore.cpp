@@ -1,0 +1,87 @@
+// carillon explore: a page on which bodies are struck.
+#include "jobs/explore/explore.hpp"
+
+#include <fmt/core.h>
+
+#include <cstdio>
+#include <string>
+
+#include "jobs/cli/commands.hpp"
+#include "jobs/explore/serve.hpp"
+
+namespace carillon::cli {
+namespace {
+
+void flush() {
+  if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
+}
+
+void print(const explore::Explored& made) {
+  for (const std::string& warning : made.warnings) fmt::print(stderr, "carillon: warning: {}\n", show_message(warning));
+  for (const explore::PackedBank& bank : made.banks)
+    if (!bank.change.empty())
+      fmt::print("{}: {} of {}: {}; --whole keeps all\n", show(bank.name), format_bytes(static_cast<double>(bank.bytes)),
+                 format_bytes(static_cast<double>(bank.full_bytes)), bank.change);
+  if (made.has_recording) fmt::print("recording    {:g} s\n", made.duration_s);
+  fmt::print("page         {}\nsize         {}\n", show((made.folder / "index.html").string(), 1000),
+             format_bytes(static_cast<double>(made.bytes)));
+}
+
+Json::Value describe(const explore::Explored& made) {
+  Json::Value root;
+  root["folder"] = to_json(made.folder.string());
+  root["page"] = to_json((made.folder / "index.html").string());
+  root["bytes"] = Json::UInt64(made.bytes);
+  root["recording_s"] = made.has_recording ? Json::Value(made.duration_s) : Json::Value();
+  root["warnings"] = to_json(made.warnings);
+  root["banks"] = Json::arrayValue;
+  for (const explore::PackedBank& bank : made.banks) {
+    Json::Value& one = root["banks"].append(Json::objectValue);
+    one["file"] = to_json(bank.name);
+    one["bytes"] = Json::UInt64(bank.bytes);
+    one["full_bytes"] = Json::UInt64(bank.full_bytes);
+    one["change"] = bank.change.empty() ? Json::Value() : to_json(bank.change);
+  }
+  return root;
+}
+
+}  // namespace
+
+int run_explore(Shared& shared, const ExploreOptions& options) {
+  explore::Order order = options.explore;
+  std::error_code error;
+  const bool is_made = order.subjects.size() == 1 && std::filesystem::is_directory(order.subjects[0], error);
+  Json::Value root;
+  if (is_made) {
+    order.folder = order.subjects[0];
+    if (!options.is_serving || !explore::is_explorer(order.folder))
+      throw InputError(fmt::format("{}: {}", order.folder.string(),
+                                   options.is_serving ? "this folder was not made by carillon explore; give banks or a scene"
+                                                      : "a folder is only served: --serve; give banks or a scene to make one"));
+    root["folder"] = to_json(order.folder.string());
+  } else {
+    const explore::Explored made = explore::explore(order);
+    order.folder = made.folder;
+    root = describe(made);
+    if (!shared.json) print(made);
+  }
+  if (!options.is_serving) {
+    if (shared.json)
+      print_json(root);
+    else
+      fmt::print("to open it   carillon explore {} --serve, or put the folder on any web server\n", show(order.folder.string(), 1000));
+    flush();
+    return 0;
+  }
+  (void)explore::serve(order.folder, options.port, [&](const std::string& address) {
+    root["address"] = address;
+    if (shared.json)
+      print_json(root);
+    else
+      fmt::print("open         {}   (Ctrl-C ends it)\n", address);
+    flush();
+  });
+  return 0;
+}
+
+}  // namespace carillon::cli

@@ -1,0 +1,118 @@
+#include "jobs/explore/banks.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "jobs/explore/files.hpp"
+#include "runtime/bank/bank.hpp"
+#include "runtime/bank/reduce.hpp"
+#include "runtime/bank/strikes.hpp"
+#include "runtime/material/table.hpp"
+
+namespace carillon::explore {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::uintmax_t kSmallBytes = 4'000'000;  // as it is
+constexpr std::size_t kModes = 200;
+constexpr int kShapeBits = 8;
+
+const material::Row* find_nearest(const material::MaterialTable& table, const bank::Material& material) {
+  const material::Row* nearest = nullptr;
+  double least = std::numeric_limits<double>::infinity();
+  for (const material::Row& row : table.rows()) {
+    const double off = std::abs(std::log(row.material.young_modulus_pa / material.young_modulus_pa)) +
+                       2.0 * std::abs(std::log(row.material.density_kg_m3 / material.density_kg_m3));
+    if (off < least) least = off, nearest = &row;
+  }
+  return nearest;
+}
+
+/// What the body looks to be of: the material of the job behind the bank where it has a name; a material or a group that the name of the
+/// file has in it ("shelf_wood"); else the row of the table whose stiffness and density are nearest.
+void find_material(const bank::Bank& bank, const fs::path& file, BankFacts& facts) {
+  const material::MaterialTable& table = material::MaterialTable::get();
+  const Json::Value job = parse_json(bank.provenance);
+  const Json::Value& given = job.isObject() ? job["material"] : Json::Value::nullSingleton();
+  const material::Row* row = nullptr;
+  if (given.isString()) row = table.find(given.asString());
+  if (given.isObject() && given["name"].isString()) row = table.find(given["name"].asString());
+  std::string word;
+  for (const char c : file.stem().string() + " ") {
+    if (std::isalpha(static_cast<unsigned char>(c)) != 0) {
+      word += c;
+      continue;
+    }
+    if (row == nullptr && !word.empty()) row = table.find(word);
+    for (const material::Row& one : table.rows())
+      if (row == nullptr && one.group == word) facts.group = word;
+    word.clear();
+  }
+  if (row == nullptr && facts.group.empty()) row = find_nearest(table, bank.material);
+  if (row == nullptr) return;
+  facts.material = row->material.name;
+  facts.group = row->group;
+}
+
+void find_place(const bank::Bank& bank, BankFacts& facts) {
+  facts.low_m = facts.high_m = bank.vertices_m.front();
+  for (const Vec3& x : bank.vertices_m)
+    for (std::size_t c = 0; c < 3; ++c) facts.low_m[c] = std::min(facts.low_m[c], x[c]), facts.high_m[c] = std::max(facts.high_m[c], x[c]);
+  const std::size_t vertex = bank::find_strikes(bank, 1).front();
+  facts.loudest_m = bank.vertices_m[vertex];
+  for (std::size_t t = 0; t < bank.triangles.size(); ++t)
+    for (int corner = 0; corner < 3; ++corner)
+      if (static_cast<std::size_t>(bank.triangles[t][corner]) == vertex) {
+        facts.loudest = {static_cast<int>(t), corner};
+        return;
+      }
+}
+
+std::string describe(std::size_t before, std::size_t after, int bits) {
+  return after < before ? fmt::format("the {} most audible of {} modes, shapes of {} bits", after, before, bits)
+                        : fmt::format("shapes of {} bits", bits);
+}
+
+}  // namespace
+
+const BankFacts& Banks::add(const fs::path& file) {
+  const fs::path whole = fs::weakly_canonical(file);
+  if (const auto found = facts_.find(whole); found != facts_.end()) return found->second;
+  const bank::Bank bank = bank::read_bank(file);
+  if (bank.mode_count() == 0) throw InputError(fmt::format("{}: the bank has no modes; nothing of it can be heard", file.string()));
+  BankFacts facts;
+  find_material(bank, file, facts);
+  find_place(bank, facts);
+  facts.packed.full_bytes = fs::file_size(file);
+  std::set<std::string> taken;
+  for (const BankFacts* other : order_) taken.insert(other->packed.name);
+  const std::string stem = make_name(file.stem().string());
+  facts.packed.name = stem + ".hdf";
+  for (int k = 2; taken.contains(facts.packed.name); ++k) facts.packed.name = fmt::format("{}-{}.hdf", stem, k);
+  const fs::path target = folder_ / facts.packed.name;
+  if (keeps_all_ || facts.packed.full_bytes <= kSmallBytes) {
+    put_file(file, target);
+  } else {
+    const bank::Bank reduced = bank::calc_reduced(bank, {.modes = kModes, .shape_bits = kShapeBits});
+    bank::write_bank(reduced, target);
+    facts.packed.change = describe(bank.mode_count(), reduced.mode_count(), kShapeBits);
+  }
+  facts.packed.bytes = fs::file_size(target);
+  const BankFacts& kept = facts_.emplace(whole, std::move(facts)).first->second;
+  order_.push_back(&kept);
+  return kept;
+}
+
+std::vector<PackedBank> Banks::list() const {
+  std::vector<PackedBank> packed;
+  for (const BankFacts* facts : order_) packed.push_back(facts->packed);
+  return packed;
+}
+
+}  // namespace carillon::explore

@@ -1,0 +1,211 @@
+// Method:     what is asked for becomes a scene; carillon-render checks it, simulates it and records its contacts; the folder gets scene,
+//             contacts, banks, page and sound engine. explore.json says what belongs to what. A scene that is silent by itself is tried
+//             with a blow on each body, to know how loud to play.
+// Source:     the Sonic Explorer of van den Doel and Pai 1996.
+// Deviations: theirs synthesised on the machine of the listener, in a program of its own; this one is a page.
+#include "jobs/explore/explore.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+
+#include "jobs/explore/banks.hpp"
+#include "jobs/explore/files.hpp"
+#include "jobs/explore/scenes.hpp"
+#include "jobs/process/programs.hpp"
+#include "runtime/base/command.hpp"
+#include "runtime/base/file.hpp"
+#include "runtime/version/version.hpp"
+
+namespace carillon::explore {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kVersion = 1;  // of explore.json
+constexpr std::uint64_t kMaxSceneBytes = 16 << 20;
+constexpr const char *kAboutFile = "explore.json", *kSceneFile = "scene.json", *kContactsFile = "contacts.jsonl",
+                     *kPackedContactsFile = "contacts.jsonl.gz", *kBankFolder = "banks";
+constexpr double kProbeGain = 0.35;  // of the gain that brings the probe's blows to full scale: hands strike harder at times
+
+bool is_bank(const fs::path& file) {
+  std::array<char, 13> begin{};
+  std::FILE* in = std::fopen(file.c_str(), "rb");
+  if (in == nullptr) return false;
+  const std::size_t read = std::fread(begin.data(), 1, begin.size(), in);
+  std::fclose(in);
+  return std::string_view(begin.data(), read) == "CARILLON BANK";
+}
+
+/// The folder of an order, with what stands there now judged.
+fs::path find_place(const Order& order) {
+  fs::path folder = order.folder;
+  if (folder.empty()) folder = make_name(fs::absolute(order.subjects.front()).stem().string()) + "-explore";
+  folder = fs::absolute(folder).lexically_normal();
+  if (folder.filename().empty()) folder = folder.parent_path();
+  std::error_code error;
+  if (!fs::exists(folder, error) || is_explorer(folder) || (fs::is_directory(folder, error) && fs::is_empty(folder, error))) return folder;
+  throw InputError(fmt::format("{}: something else is there; give another folder with -o", folder.string()));
+}
+
+fs::path find_page() { return base::find_data_folder("explore", "install Carillon with its page, or build it where npm is installed"); }
+fs::path find_engine() {
+  return base::find_data_folder("web", "install Carillon with its page, or build it where emscripten is installed");
+}
+
+/// The name of what is shown: of a file "scene.json" the folder says more.
+std::string find_title(const Order& order) {
+  if (!order.title.empty()) return order.title;
+  const fs::path first = fs::absolute(order.subjects.front());
+  if (order.subjects.size() > 1) return fmt::format("{} and {} more", first.stem().string(), order.subjects.size() - 1);
+  return first.filename() == "scene.json" ? first.parent_path().filename().string() : first.stem().string();
+}
+
+class Work {
+ public:
+  explicit Work(const Order& order)
+      : order_(order),
+        page_(find_page()),
+        engine_(find_engine()),
+        place_(find_place(order)),
+        folder_(place_),
+        banks_(folder_.path() / kBankFolder, order.keeps_banks),
+        programs_(folder_.path(), true) {}
+
+  Explored run() {
+    fs::create_directory(folder_.path() / kBankFolder);
+    read_subject();
+    const double gain = find_gain();
+    write(gain);
+    done_.folder = place_;
+    done_.banks = banks_.list();
+    done_.bytes = calc_bytes(folder_.path());
+    folder_.commit();
+    return std::move(done_);
+  }
+
+ private:
+  fs::path path(const char* name) const { return folder_.path() / name; }
+
+  void read_subject() {
+    const auto is_all = [&](auto&& test) { return std::all_of(order_.subjects.begin(), order_.subjects.end(), test); };
+    std::error_code error;
+    for (const fs::path& subject : order_.subjects)
+      if (!fs::is_regular_file(subject, error)) throw InputError(fmt::format("{}: no such file; give banks or a scene", subject.string()));
+    if (is_all(is_bank) || order_.subjects.size() > 1) {
+      for (const fs::path& subject : order_.subjects) add_bank(subject);
+      scene_ = make_row(files_, facts_, order_.up);
+      return;
+    }
+    const fs::path& file = order_.subjects.front();
+    record(file);
+    scene_ = parse_json(base::read_file(file, "scene", kMaxSceneBytes));
+    for (Json::Value& body : scene_["bodies"]) add_bank(fs::absolute(file).parent_path() / body["bank"].asString());
+  }
+
+  void add_bank(const fs::path& file) {
+    const BankFacts& facts = banks_.add(file);
+    files_.push_back(fs::absolute(file));
+    facts_.push_back(&facts);
+  }
+
+  /// Simulates a scene file, which is checked by that, and keeps what happened.
+  void record(const fs::path& scene) {
+    report_ = render(scene, {"--record", path(kContactsFile).string()});
+    done_.duration_s = report_["duration_s"].asDouble();
+    for (const Json::Value& warning : report_["warnings"]) done_.warnings.push_back(warning.asString());
+    done_.has_recording = report_["peak_pa"].isNumeric() && report_["peak_pa"].asDouble() > 0.0;
+    std::error_code error;
+    if (done_.has_recording)
+      compress_file(path(kContactsFile));
+    else
+      fs::remove(path(kContactsFile), error);
+  }
+
+  /// The report of carillon-render on a scene file.
+  Json::Value render(const fs::path& scene, std::vector<std::string> words) {
+    const fs::path sound = path(".sound.wav"), report = path(".report.json");
+    words.insert(words.begin(), {fs::absolute(scene).string(), "-q", "-o", sound.string(), "--report", report.string()});
+    (void)programs_.run("carillon-render", words, false);
+    Json::Value root = parse_json(base::read_file(report, "report of carillon-render", kMaxSceneBytes));
+    std::error_code error;
+    fs::remove(sound, error);
+    fs::remove(report, error);
+    return root;
+  }
+
+  /// Full scale per pascal.
+  double find_gain() {
+    if (done_.has_recording) return report_["gain_per_pa"].asDouble();
+    const fs::path probe = path(".probe.json");
+    base::write_file(probe, to_text(make_probe(scene_, files_, facts_)));
+    report_ = render(probe, {});
+    std::error_code error;
+    fs::remove(probe, error);
+    return kProbeGain * report_["gain_per_pa"].asDouble();
+  }
+
+  void write(double gain) {
+    Json::Value about(Json::objectValue);
+    about["carillon_explore"] = kVersion;
+    about["made_by"] = version::describe("carillon");
+    about["title"] = find_title(order_);
+    about["scene"] = kSceneFile;
+    about["contacts"] = done_.has_recording ? Json::Value(kPackedContactsFile) : Json::Value();
+    about["duration_s"] = done_.duration_s;
+    about["gain_per_pa"] = gain;
+    for (Json::ArrayIndex i = 0; i < scene_["bodies"].size(); ++i) {
+      const BankFacts& facts = *facts_[i];
+      scene_["bodies"][i]["bank"] = fmt::format("{}/{}", kBankFolder, facts.packed.name);
+      Json::Value body(Json::objectValue);
+      body["bank_bytes"] = Json::UInt64(facts.packed.bytes);
+      body["full_bytes"] = Json::UInt64(facts.packed.full_bytes);
+      body["change"] = facts.packed.change.empty() ? Json::Value() : Json::Value(facts.packed.change);
+      body["material"] = facts.material;
+      body["group"] = facts.group;
+      body["loudest"]["triangle"] = facts.loudest[0];
+      body["loudest"]["corner"] = facts.loudest[1];
+      if (done_.has_recording) body["effects"] = report_["per_body"][i]["effects"];
+      about["bodies"].append(body);
+    }
+    base::write_file(path(kSceneFile), to_text(scene_));
+    base::write_file(path(kAboutFile), to_text(about));
+    put_folder(page_, folder_.path());
+    put_folder(engine_, folder_.path() / "audio");
+  }
+
+  const Order& order_;
+  fs::path page_, engine_, place_;
+  WholeFolder folder_;
+  Banks banks_;
+  process::Programs programs_;
+  Json::Value scene_, report_;
+  std::vector<fs::path> files_;          // per body: its bank
+  std::vector<const BankFacts*> facts_;  // per body
+  Explored done_;
+};
+
+}  // namespace
+
+Explored explore(const Order& order) {
+  if (order.subjects.empty()) throw InputError("say what to explore: banks, or a scene");
+  return Work(order).run();
+}
+
+bool is_installed() {
+  try {
+    (void)find_page();
+    (void)find_engine();
+  } catch (const SystemError&) {
+    return false;
+  }
+  return true;
+}
+
+bool is_explorer(const fs::path& folder) {
+  std::error_code error;
+  return fs::is_regular_file(folder / kAboutFile, error) && fs::is_regular_file(folder / "index.html", error);
+}
+
+}  // namespace carillon::explore

@@ -1,0 +1,304 @@
+// The controls at the side: what is struck and how, what the body is made of, its modes, what is computed, how loud.
+import { makeChoice, makeList, makeSlider } from './lists.js';
+import { findNamedPlaces } from './geometry.js';
+import { makeLook } from './body.js';
+import { formatHz, formatSeconds } from './spectrum.js';
+import { makeWav, Recorder } from './recorder.js';
+
+const find = (id) => document.getElementById(id);
+const kEditS = 0.06; // between two edits while a slider moves
+const kPlanS = 0.5;
+
+/** Two significant digits, without an exponent. */
+const short = (value) => Number(value.toPrecision(2)).toString();
+const times = (value) => (value === 1 ? 'as it is' : `× ${value < 1 ? value.toFixed(2) : value.toFixed(value < 10 ? 2 : 0)}`);
+
+export class Panel {
+  constructor(page) {
+    Object.assign(this, page); // about, player, view, hands, spectrum
+    this.current = 0;
+    this.makeBodies();
+    this.makeStrike();
+    this.makeEdit();
+    this.makeModes();
+    this.makeSound();
+    find('title').textContent = document.title = this.about.title;
+    find('about').textContent = `${this.about.made_by}. Sound and contacts are computed here, by the program that made this folder.`;
+    this.select(0, true);
+  }
+
+  get body() {
+    return this.player.bodies[this.current];
+  }
+  say(text) {
+    find('status').textContent = text;
+  }
+
+  // ---- bodies
+
+  makeBodies() {
+    this.bodies = makeList(find('bodies'), { focused: (index) => this.select(index), chosen: () => this.hands.place && this.hands.strike(this.hands.place) });
+    this.bodies.fill(this.player.bodies.map(({ name }) => ({ text: name })));
+    find('bodies-part').hidden = this.player.bodies.length < 2;
+    this.view.addEventListener('place', ({ detail: place }) => {
+      if (!place) return;
+      const index = this.view.bodies.indexOf(place.body);
+      if (index !== this.current) this.select(index, false, false);
+      this.places.mark(this.body.places.findIndex(({ triangle, barycentric }) => triangle === place.triangle && barycentric === place.barycentric));
+      void this.showLevels();
+    });
+    this.view.addEventListener('first', () => this.goTo(0));
+    this.view.addEventListener('edge', () => this.say('the edge of the body as it is seen'));
+  }
+
+  /** moves: the place that is struck goes to this body. */
+  select(index, isQuiet = false, moves = true) {
+    this.leaveMode();
+    this.current = index;
+    this.bodies.mark(index);
+    const { body } = this;
+    body.places ??= findNamedPlaces(body.surface, body.shown.rotation, body.about.loudest);
+    this.places.fill(body.places.map(({ name }) => ({ text: name })));
+    if (moves) this.goTo(0, isQuiet);
+    for (const [name, slider] of Object.entries(this.sliders)) slider.reset(body.edit[name]);
+    find('material').value = body.edit.material;
+    this.player.bodies.forEach((other, i) => other.sound.watch(i === index));
+    this.showModes();
+    this.showFacts();
+    find('view').setAttribute('aria-label', `${body.name}, ${body.sound.modes.length} modes`);
+  }
+
+  showFacts() {
+    const { bank, about } = this.body, size = (100 * this.body.shown.box.size * this.body.shown.size).toPrecision(3);
+    const parts = [`${bank.mode_count} modes`, `${size} cm across`];
+    if (about.change) parts.push(about.change);
+    find('facts').textContent = parts.join(' · ');
+  }
+
+  // ---- strikes
+
+  makeStrike() {
+    this.places = makeList(find('places'), {
+      focused: (index) => this.goTo(index),
+      chosen: () => this.hands.strike(this.hands.place),
+    });
+    const names = this.player.audio.mallets.map(({ name }) => name);
+    const start = Math.max(0, names.indexOf(this.player.mallet));
+    this.player.mallet = names[start];
+    this.mallets = makeChoice(find('mallets'), names.map((name) => name.replace('-', ' ')), (index) => {
+      this.player.mallet = names[index];
+      this.say(`mallet: ${names[index]}`);
+    }, start);
+    this.view.addEventListener('mallet', ({ detail: index }) => this.mallets.choose(index));
+    makeSlider(find('speed'), (x) => 10 ** x, (v) => `${short(v)} m/s`, (v) => (this.player.speed_m_s = v));
+    makeSlider(find('force'), (x) => 10 ** x, (v) => `${short(v)} N`, (v) => (this.player.force_n = v));
+    const gestures = ['strike', 'scrape', 'press'];
+    makeChoice(find('gesture'), ['Strike', 'Scrape', 'Press'], (index) => (this.hands.gesture = gestures[index]));
+    this.player.addEventListener('done', ({ detail }) => this.showDone(detail));
+  }
+
+  goTo(index, isQuiet = false) {
+    const { body } = this, place = body.places[index];
+    if (!place) return;
+    this.places.mark(index);
+    const normal = body.shown.findWorldNormal(place.triangle);
+    this.hands.select({ body: body.shown, triangle: place.triangle, barycentric: place.barycentric, normal, point: body.shown.findWorldPoint(place) });
+    if (!isQuiet) this.say(`${body.name}, ${place.name}`);
+  }
+
+  showDone(done) {
+    find('hint').classList.add('gone');
+    let text;
+    if (done.kind === 'strike') {
+      const parts = [`${done.mallet.replace('-', ' ')} at ${short(done.speed_m_s)} m/s`];
+      if (done.contact_s > 0) parts.push(`${short(1000 * done.contact_s)} ms of contact`);
+      if (done.peak_n > 0) parts.push(`${short(done.peak_n)} N at most`);
+      text = parts.join(', ');
+      this.say(`struck ${done.name}: ${text}`);
+    } else {
+      text = `${done.kind === 'scrape' ? 'scraped' : 'pressed'} with ${short(done.force_n)} N for ${done.seconds.toFixed(1)} s`;
+      this.say(`${done.name}: ${text}`);
+    }
+    find('last').textContent = text;
+    this.askPlan();
+  }
+
+  // ---- the body
+
+  makeEdit() {
+    const select = find('material'), option = (value, text) => Object.assign(document.createElement('option'), { value, textContent: text });
+    select.append(option('', 'as it is'));
+    const groups = new Map();
+    for (const { name, group = '' } of this.player.audio.materials) {
+      if (!groups.has(group)) groups.set(group, Object.assign(document.createElement('optgroup'), { label: group || 'materials' }));
+      groups.get(group).append(option(name, name));
+    }
+    select.append(...groups.values());
+    for (const body of this.player.bodies) body.edit = { material: '', size: 0, damping: 0, stiffness: 0, density: 0 };
+    const double = (x) => 2 ** x, changed = (name) => () => {
+      this.body.edit[name] = Number(find(name).value);
+      this.edit();
+    };
+    this.sliders = {};
+    for (const name of ['size', 'damping', 'stiffness', 'density']) this.sliders[name] = makeSlider(find(name), double, times, changed(name));
+    select.addEventListener('change', () => {
+      this.body.edit.material = select.value;
+      this.edit();
+    });
+    find('reset').addEventListener('click', () => {
+      this.body.edit = { material: '', size: 0, damping: 0, stiffness: 0, density: 0 };
+      for (const slider of Object.values(this.sliders)) slider.reset();
+      select.value = '';
+      this.edit();
+    });
+  }
+
+  /** Sends what the sliders say, not more often than kEditS; the last word wins. */
+  edit() {
+    const body = this.body, { material, size, damping, stiffness, density } = body.edit;
+    body.shown.setSize(2 ** size);
+    const row = this.player.audio.materials.find(({ name }) => name === material);
+    body.shown.setLook(row ? makeLook(row.name, row.group) : body.look);
+    this.view.draw();
+    clearTimeout(this.editing);
+    this.editing = setTimeout(async () => {
+      const wish = { size_scale: 2 ** size, damping_scale: 2 ** damping, stiffness_scale: 2 ** stiffness, density_scale: 2 ** density };
+      if (material) wish.material = material;
+      try {
+        await body.sound.edit(wish);
+        find('edited').textContent = '';
+      } catch (error) {
+        find('edited').textContent = error.message;
+        this.say(error.message);
+      }
+      if (body === this.body) {
+        this.showModes();
+        this.showFacts();
+      }
+    }, 1000 * kEditS);
+  }
+
+  // ---- modes
+
+  makeModes() {
+    const element = find('modes');
+    this.modes = makeList(element, {
+      focused: (index) => this.enterMode(index),
+      chosen: (index) => this.enterMode(index),
+      left: () => this.leaveMode(),
+    });
+    element.addEventListener('pointerover', (event) => {
+      const item = event.target.closest('li');
+      if (item) this.enterMode([...element.children].indexOf(item));
+    });
+    element.addEventListener('pointerleave', () => this.leaveMode());
+    this.spectrum.addEventListener('mode', ({ detail: mode }) => (mode === null ? this.leaveMode() : this.enterMode(mode)));
+  }
+
+  showModes() {
+    const { modes } = this.body.sound;
+    this.modes.fill(modes.map(({ freq_hz, t60_s, error_cents }, i) => {
+      const cents = Number.isFinite(error_cents) ? error_cents.toPrecision(2) : '–';
+      return {
+        cells: [freq_hz.toFixed(1), formatSeconds(t60_s), cents],
+        label: `mode ${i + 1}: ${formatHz(freq_hz)}, T60 ${formatSeconds(t60_s)}, error bar ${cents} cents`,
+      };
+    }));
+    this.spectrum.setModes(modes);
+    void this.showLevels();
+  }
+
+  async showLevels() {
+    const { place } = this.hands, { sound } = this.body;
+    if (!place || !sound.levels || place.body !== this.body.shown || this.isLevelling) return;
+    this.isLevelling = true;
+    const levels = await sound.levels(place.triangle, place.barycentric);
+    this.isLevelling = false;
+    const loudest = Math.max(...levels);
+    this.spectrum.setLevels(Array.from(levels, (level) => 20 * Math.log10(Math.max(1e-6, level / loudest))));
+  }
+
+  async enterMode(mode) {
+    if (mode === this.mode) return;
+    this.modes.item(this.mode)?.classList.remove('shown');
+    this.mode = mode;
+    this.modes.item(mode)?.classList.add('shown');
+    this.spectrum.show(mode);
+    const { body, current } = this;
+    this.player.solo(current, mode);
+    const shape = await body.bank.shape(mode);
+    if (this.mode !== mode || this.body !== body) return;
+    body.shown.bendIn(shape);
+    this.view.draw();
+  }
+  leaveMode() {
+    if (this.mode === undefined) return;
+    this.modes.item(this.mode)?.classList.remove('shown');
+    this.mode = undefined;
+    this.spectrum.show(null);
+    this.player.solo(this.current, null);
+    this.body.shown.bendIn(null);
+    this.view.draw();
+  }
+
+  // ---- sound
+
+  makeSound() {
+    makeSlider(find('volume'), (x) => x, (v) => `${v > 0 ? '+' : ''}${v.toFixed(0)} dB`, (v) => this.player.setVolume(v));
+    const button = find('record');
+    button.addEventListener('click', async () => {
+      const isOn = button.getAttribute('aria-pressed') === 'true';
+      button.setAttribute('aria-pressed', String(!isOn));
+      button.textContent = isOn ? 'Record' : 'Stop';
+      if (!isOn) {
+        await this.player.wake();
+        this.recorder ??= await Recorder.open(this.player.audio.context, this.player.audio.node);
+        this.recorder.start();
+        find('recorded').textContent = 'recording';
+        return;
+      }
+      const taken = await this.recorder.stop();
+      const link = Object.assign(document.createElement('a'), { href: URL.createObjectURL(makeWav(taken)), download: 'explorer.wav', textContent: 'explorer.wav' });
+      find('recorded').replaceChildren(link, ` ${(taken.samples.length / 2 / taken.rate_hz).toFixed(1)} s`);
+      this.say('the recording is ready');
+    });
+    this.askPlan();
+  }
+
+  /** The plan of the selector, not more often than kPlanS. */
+  askPlan() {
+    if (this.planning) return;
+    this.planning = setTimeout(async () => {
+      this.planning = undefined;
+      this.showPlan(await this.player.audio.plan());
+    }, 1000 * kPlanS);
+  }
+  showPlan(plan) {
+    const effects = plan?.bodies?.[this.current]?.effects ?? {};
+    find('plan').replaceChildren(...Object.entries(effects).flatMap(([name, { on, why }]) => {
+      const term = Object.assign(document.createElement('dt'), { textContent: name.replaceAll('_', ' '), className: on ? 'on' : '' });
+      term.append(Object.assign(document.createElement('span'), { className: 'for-ears', textContent: on ? ': on' : ': off' }));
+      return [term, Object.assign(document.createElement('dd'), { textContent: why })];
+    }));
+  }
+
+  /** At each report of the sound engine. */
+  hear({ peak_pa, bodies, load, counters }) {
+    const peak = peak_pa * this.player.gain_per_pa * 10 ** (this.player.volume_db / 20);
+    find('level').style.transform = `scaleX(${Math.max(0, Math.min(1, 1 + Math.log10(Math.max(1e-4, peak)) / 3)).toFixed(3)})`;
+    const heard = bodies?.find(({ amplitudes }) => amplitudes);
+    if (heard) this.showRinging(heard.amplitudes);
+    this.spectrum.draw();
+    this.load = load;
+    this.counters = counters;
+  }
+  /** Of amplitudes [m kg^1/2], as velocities, so that high modes count. */
+  showRinging(amplitudes) {
+    const { modes } = this.body.sound, speeds = Array.from(amplitudes, (a, i) => a * (modes[i]?.freq_hz ?? 0) * (modes[i]?.gain ?? 1));
+    this.loudest = Math.max(0.97 * (this.loudest ?? 0), ...speeds, 1e-30);
+    this.spectrum.setRinging(speeds.map((speed) => Math.max(0, 1 + Math.log10(Math.max(1e-9, speed / this.loudest)) / 3)));
+  }
+  showEars(distance_m) {
+    find('ears').textContent = `${distance_m.toFixed(2)} m away, ${(1000 * distance_m / 343).toFixed(1)} ms`;
+  }
+}
