@@ -307,7 +307,7 @@ class Listening {
       scene.member("strikes").add(strike);
     }
     listener.set("position_m", base::Json::array(Vec3{middle[0], middle[1] - std::clamp(2.0 * size, 1.0, 500.0), middle[2]}));
-    listener.set("facts_at_m", base::Json::array(middle));
+    listener.set("look_at_m", base::Json::array(middle));
     scene.set("listener", listener);
     return scene;
   }
