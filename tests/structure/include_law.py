@@ -33,6 +33,7 @@ LIBRARIES = {
 # folder: (folders of ours that it may include, libraries that it may include). std and POSIX are free everywhere.
 LAW = {
     "runtime/base": ([], ["json", "fmt", "openssl"]),
+    "runtime/gltf": (["runtime/base"], ["fmt"]),
     "runtime/material": (["runtime/base"], ["fmt"]),
     "runtime/version": ([], ["fmt"]),
     "runtime/bank": (["runtime/base", "runtime/material", "runtime/version"], ["json", "fmt", "hdf5", "cli"]),
@@ -117,7 +118,7 @@ LAW = {
     "precompute/cost": (["runtime/material", "precompute/job"], []),
     "precompute/mesh": (["runtime/base"], ["fmt", "xml", "zlib"]),
     "precompute/shapes": (["runtime/base", "precompute/mesh"], ["fmt"]),
-    "precompute/mesher": (["runtime/base", "runtime/version", "precompute/mesh", "precompute/shapes"], ["fmt", "cli", "eigen", "cgal"]),
+    "precompute/mesher": (["runtime/base", "runtime/gltf", "runtime/version", "precompute/mesh", "precompute/shapes"], ["fmt", "cli", "eigen", "cgal"]),
     "precompute/comm": (["runtime/base"], ["fmt", "mpi"]),
     "precompute/launch": (["runtime/base"], ["fmt"]),
     "precompute/mpi_profile": (["runtime/base", "precompute/petsc"], ["mpi"]),
