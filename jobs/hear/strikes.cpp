@@ -1,91 +1,25 @@
-// Method:     A blow J along the normal n at a vertex makes mode m sound with g_m |phi_m . n| J at 1 m; by the ear's weight of its
-// frequency
-//             (A-weighting) that is its level. Vertices are ranked by the sum of the squares.
-// Source:     docs/equations.md, E5 and E7.
-// Deviations: none.
 #include "jobs/hear/strikes.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "runtime/bank/reduce.hpp"
-#include "runtime/base/vector.hpp"
+#include "runtime/bank/blows.hpp"
 
 namespace carillon::hear {
-namespace {
-
-constexpr double kHeard = 0.1;  // of the loudest vertex's power: struck where less is made, it would seem broken
-constexpr double kLoudest = 0.1;
-
-std::vector<Vec3> find_normals(const bank::Bank& bank) {
-  std::vector<Vec3> normals(bank.vertex_count(), Vec3{});
-  for (const auto& t : bank.triangles) {
-    const Vec3 &a = bank.vertices_m[static_cast<std::size_t>(t[0])], &b = bank.vertices_m[static_cast<std::size_t>(t[1])],
-               &c = bank.vertices_m[static_cast<std::size_t>(t[2])];
-    const Vec3 normal = cross(b - a, c - a);
-    for (const std::int32_t v : t) normals[static_cast<std::size_t>(v)] = normals[static_cast<std::size_t>(v)] + normal;
-  }
-  for (Vec3& n : normals)
-    if (norm(n) > 0.0) n = (1.0 / norm(n)) * n;
-  return normals;
-}
-
-/// A-weighted amplitude of each mode after a unit blow at a vertex.
-std::vector<double> calc_amplitudes(const bank::Bank& bank, std::size_t vertex, const Vec3& normal) {
-  std::vector<double> amplitudes(bank.mode_count());
-  for (std::size_t m = 0; m < bank.mode_count(); ++m)
-    amplitudes[m] = bank::calc_a_weight(bank.freq_hz(m)) * bank.radiation_gain[m] * std::abs(dot(bank.shape_at(vertex, m), normal));
-  return amplitudes;
-}
-
-double calc_t60_s(const bank::Bank& bank, std::size_t mode) { return std::log(1000.0) / bank.decay_per_s[mode]; }
-
-}  // namespace
-
-std::vector<std::size_t> find_strikes(const bank::Bank& bank, std::size_t count) {
-  const std::vector<Vec3> normals = find_normals(bank);
-  std::vector<double> power(bank.vertex_count(), 0.0);
-  for (std::size_t v = 0; v < power.size(); ++v)
-    for (const double a : calc_amplitudes(bank, v, normals[v])) power[v] += a * a;
-  std::vector<std::size_t> chosen;
-  if (power.empty()) return chosen;
-  chosen.push_back(static_cast<std::size_t>(std::max_element(power.begin(), power.end()) - power.begin()));
-  std::vector<double> distance(power.size(), std::numeric_limits<double>::infinity());
-  while (chosen.size() < count) {
-    std::size_t next = 0;
-    double farthest = 0.0;
-    for (std::size_t v = 0; v < power.size(); ++v) {
-      distance[v] = std::min(distance[v], norm(bank.vertices_m[v] - bank.vertices_m[chosen.back()]));
-      if (power[v] > kHeard * power[chosen[0]] && distance[v] > farthest) farthest = distance[v], next = v;
-    }
-    if (!(farthest > 0.0)) break;
-    chosen.push_back(next);
-  }
-  return chosen;
-}
 
 std::vector<HeardMode> list_modes(const bank::Bank& bank, std::size_t vertex, std::size_t count) {
-  const std::vector<double> amplitudes = calc_amplitudes(bank, vertex, find_normals(bank)[vertex]);
+  const std::vector<double> amplitudes = bank::calc_blow_amplitudes(bank, vertex, bank::calc_vertex_normals(bank)[vertex]);
   const double loudest = amplitudes.empty() ? 0.0 : *std::max_element(amplitudes.begin(), amplitudes.end());
   std::vector<HeardMode> modes;
   for (std::size_t m = 0; m < std::min(count, bank.mode_count()); ++m) {
-    HeardMode mode{.freq_hz = bank.freq_hz(m), .t60_s = calc_t60_s(bank, m)};
+    HeardMode mode{.freq_hz = bank.freq_hz(m), .t60_s = std::log(1000.0) / bank.decay_per_s[m]};
     mode.error_cents =
         m < bank.discretisation_error_cents.size() ? bank.discretisation_error_cents[m] : std::numeric_limits<double>::infinity();
     mode.level_dba = amplitudes[m] > 0.0 ? 20.0 * std::log10(amplitudes[m] / loudest) : -std::numeric_limits<double>::infinity();
     modes.push_back(mode);
   }
   return modes;
-}
-
-double calc_ring_s(const bank::Bank& bank, std::size_t vertex) {
-  const std::vector<double> amplitudes = calc_amplitudes(bank, vertex, find_normals(bank)[vertex]);
-  const double loudest = amplitudes.empty() ? 0.0 : *std::max_element(amplitudes.begin(), amplitudes.end());
-  double longest = 0.0;
-  for (std::size_t m = 0; m < amplitudes.size(); ++m)
-    if (amplitudes[m] > kLoudest * loudest) longest = std::max(longest, calc_t60_s(bank, m));
-  return longest;
 }
 
 }  // namespace carillon::hear

@@ -12,31 +12,15 @@
 #include "precompute/mesher/surface_text.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/gltf/file.hpp"
+#include "runtime/gltf/nodes.hpp"
 
 namespace carillon::mesher {
 namespace {
 
 constexpr int kMaxDepth = 200;
 
-using Matrix = std::array<double, 16>;  // column by column
-constexpr Matrix kIdentity{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
-
-Matrix multiply(const Matrix& a, const Matrix& b) {
-  Matrix c{};
-  for (int j = 0; j < 4; ++j)
-    for (int i = 0; i < 4; ++i)
-      for (int k = 0; k < 4; ++k) c[4 * j + i] += a[4 * k + i] * b[4 * j + k];
-  return c;
-}
-
-Vec3 move(const Matrix& m, const Vec3& p) {
-  Vec3 q{m[12], m[13], m[14]};
-  for (int i = 0; i < 3; ++i)
-    for (int k = 0; k < 3; ++k) q[i] += m[4 * k + i] * p[k];
-  return q;
-}
-
-double calc_determinant(const Matrix& m) { return dot(Vec3{m[0], m[1], m[2]}, cross(Vec3{m[4], m[5], m[6]}, Vec3{m[8], m[9], m[10]})); }
+using gltf::kIdentity;
+using gltf::Matrix;
 
 class Gltf {
  public:
@@ -76,39 +60,13 @@ class Gltf {
     return list;
   }
 
-  static Matrix read_transform(base::Object& node) {
-    if (node.has("matrix")) return node.numbers<16>("matrix");
-    const auto t = node.numbers_or<3>("translation", {0, 0, 0}), s = node.numbers_or<3>("scale", {1, 1, 1});
-    auto q = node.numbers_or<4>("rotation", {0, 0, 0, 1});
-    const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-    if (!(length > 0)) node.fail("rotation", "is no rotation; it has to be a unit quaternion");
-    for (double& x : q) x /= length;
-    const auto [x, y, z, w] = q;
-    return {s[0] * (1 - 2 * (y * y + z * z)),
-            s[0] * 2 * (x * y + z * w),
-            s[0] * 2 * (x * z - y * w),
-            0,
-            s[1] * 2 * (x * y - z * w),
-            s[1] * (1 - 2 * (x * x + z * z)),
-            s[1] * 2 * (y * z + x * w),
-            0,
-            s[2] * 2 * (x * z + y * w),
-            s[2] * 2 * (y * z - x * w),
-            s[2] * (1 - 2 * (x * x + y * y)),
-            0,
-            t[0],
-            t[1],
-            t[2],
-            1};
-  }
-
   void add_node(std::size_t n, const Matrix& parent, int depth) {
     base::Object& node = nodes_[n];
     if (is_used_[n]) node.fail("", fmt::format("node {} hangs in two places, or inside itself; export it again", n));
     if (depth > kMaxDepth) node.fail("", fmt::format("nodes lie {} deep in each other; join them in a modeller", kMaxDepth));
     is_used_[n] = true;
     if (node.has("skin")) node.fail("skin", "its mesh is bent by bones (a skin), and a body keeps its shape; apply the pose in a modeller");
-    const Matrix own = multiply(parent, read_transform(node));
+    const Matrix own = gltf::multiply(parent, gltf::read_transform(node));
     if (const auto mesh = node.integer_if("mesh", 0, static_cast<long long>(meshes_.size()) - 1))
       add_mesh(static_cast<std::size_t>(*mesh), own);
     for (const std::size_t child : list_nodes(node, "children")) add_node(child, own, depth + 1);
@@ -126,7 +84,7 @@ class Gltf {
       const auto first = static_cast<std::int64_t>(soup_.points.size());
       if (points.count() > static_cast<std::size_t>(3 * kMaxTriangles - first)) refuse_size();
       for (std::size_t i = 0; i < points.count(); ++i) {
-        const Vec3 p = move(matrix, {points.get(i, 0), points.get(i, 1), points.get(i, 2)});
+        const Vec3 p = gltf::move(matrix, {points.get(i, 0), points.get(i, 1), points.get(i, 2)});
         for (const double x : p)
           if (!(std::abs(x) < kLargestCoordinate)) primitive.fail("", fmt::format("point {} of mesh {} lies nowhere: {}", i, m, x));
         soup_.points.push_back(p);
@@ -135,7 +93,7 @@ class Gltf {
                     mode == kStrip ? 1
                     : mode == kFan ? 2
                                    : 0,
-                    calc_determinant(matrix) < 0);
+                    gltf::calc_determinant(matrix) < 0);
     }
   }
 

@@ -206,6 +206,9 @@ bool Object::has(std::string_view key) {
 
 bool Object::has_string(std::string_view key) { return has(key) && json(value_)[std::string(key)].isString(); }
 bool Object::has_number(std::string_view key) { return has(key) && json(value_)[std::string(key)].isNumeric(); }
+bool Object::is_empty_list(std::string_view key) {
+  return has(key) && json(value_)[std::string(key)].isArray() && json(value_)[std::string(key)].empty();
+}
 bool Object::has_object(std::string_view key) { return has(key) && json(value_)[std::string(key)].isObject(); }
 
 namespace {
@@ -405,6 +408,30 @@ std::filesystem::path Object::path(std::string_view key) {
 }
 
 void Object::ignore(std::string_view key) { has(key); }
+
+Object::Excerpt Object::make_excerpt(const std::vector<std::string>& keys) {
+  const Json::Value& object = json(value_);
+  std::vector<std::string> found;
+  for (const std::string& key : keys)
+    if (has(key)) found.push_back(key);
+  std::sort(found.begin(), found.end(),
+            [&](const auto& a, const auto& b) { return object[a].getOffsetStart() < object[b].getOffsetStart(); });
+  Excerpt excerpt{.text = "{", .first_line = found.empty() ? 1 : data_->line_at(find_key_offset(*data_, object[found[0]], found[0]))};
+  int line = excerpt.first_line;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const Json::Value& value = object[found[i]];
+    if (i > 0) excerpt.text += ", ";
+    for (; line < data_->line_at(find_key_offset(*data_, value, found[i])); ++line) excerpt.text += '\n';
+    excerpt.text += fmt::format("\"{}\": ", found[i]);
+    for (; line < data_->line_at(value.getOffsetStart()); ++line) excerpt.text += '\n';
+    const std::string own = data_->text.substr(static_cast<std::size_t>(value.getOffsetStart()),
+                                               static_cast<std::size_t>(value.getOffsetLimit() - value.getOffsetStart()));
+    line += static_cast<int>(std::count(own.begin(), own.end(), '\n'));
+    excerpt.text += own;
+  }
+  excerpt.text += "}\n";
+  return excerpt;
+}
 
 std::vector<std::string> Object::keys() const {
   const Json::Value& object = json(value_);

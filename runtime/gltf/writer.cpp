@@ -42,10 +42,10 @@ Writer::Writer(const std::string& generator) : json_(base::Json::object()), view
 }
 
 template <class T>
-int Writer::add_view(std::span<const T> values, std::size_t alignment, int target) {
+int Writer::add_view(std::span<const T> values, std::size_t alignment, int target, std::size_t later_bytes) {
   pad(buffer_, alignment, '\0');
   base::Json view = base::Json::object();
-  view.set("buffer", 0).set("byteOffset", buffer_.size()).set("byteLength", values.size_bytes());
+  view.set("buffer", 0).set("byteOffset", buffer_.size()).set("byteLength", values.size_bytes() + later_bytes);
   if (target != 0) view.set("target", target);
   views_.add(view);
   buffer_.append(reinterpret_cast<const char*>(values.data()), values.size_bytes());
@@ -93,8 +93,15 @@ int Writer::add_scalars(std::span<const float> values) {
   return add_accessor(add_view(values, sizeof(float), 0), static_cast<int>(Component::kFloat), "SCALAR", values.size());
 }
 
-int Writer::add_rows(std::span<const float> rows) {
-  return add_accessor(add_view(rows, sizeof(float), 0), static_cast<int>(Component::kFloat), "VEC3", rows.size() / 3);
+int Writer::add_rows(std::size_t blocks, std::size_t rows, const std::function<void(std::size_t, std::span<float>)>& fill) {
+  const int view = add_view(std::span<const float>(), sizeof(float), 0, 3 * sizeof(float) * blocks * rows);
+  buffer_.reserve(buffer_.size() + 3 * sizeof(float) * blocks * rows);
+  std::vector<float> numbers(3 * rows);
+  for (std::size_t block = 0; block < blocks; ++block) {
+    fill(block, numbers);
+    buffer_.append(reinterpret_cast<const char*>(numbers.data()), sizeof(float) * numbers.size());
+  }
+  return add_accessor(view, static_cast<int>(Component::kFloat), "VEC3", blocks * rows);
 }
 
 int Writer::add_bytes(std::span<const std::byte> bytes) { return add_view(bytes, sizeof(double), 0); }

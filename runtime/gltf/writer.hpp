@@ -29,9 +29,10 @@ class Writer {
   int add_vertices(std::span<const float> rows, bool has_bounds);
   /// Corners of triangles, below `vertices`: 16 bits each where that many fit, else 32.
   int add_indices(std::span<const std::int32_t> corners, std::size_t vertices);
-  /// Numbers, or rows of three, that no mesh has.
+  /// Numbers that no mesh has.
   int add_scalars(std::span<const float> values);
-  int add_rows(std::span<const float> rows);
+  /// Rows of three, block after block of so many: fill(block, numbers) writes all numbers of one.
+  int add_rows(std::size_t blocks, std::size_t rows, const std::function<void(std::size_t block, std::span<float> numbers)>& fill);
   /// Bytes as they are, at a multiple of 8; gives the view's number.
   int add_bytes(std::span<const std::byte> bytes);
 
@@ -43,7 +44,7 @@ class Writer {
 
  private:
   template <class T>
-  int add_view(std::span<const T> values, std::size_t alignment, int target);
+  int add_view(std::span<const T> values, std::size_t alignment, int target, std::size_t later_bytes = 0);
   int add_accessor(int view, int component, const char* type, std::size_t count);
 
   base::Json json_, views_, accessors_;

@@ -1,4 +1,4 @@
-#include "jobs/hear/programs.hpp"
+#include "jobs/process/programs.hpp"
 
 #include <fmt/core.h>
 #include <unistd.h>
@@ -9,7 +9,7 @@
 #include "runtime/base/error.hpp"
 #include "runtime/base/result.hpp"
 
-namespace carillon::hear {
+namespace carillon::process {
 namespace {
 
 /// The last line of what a program said of itself, without its name: "carillon-mesh: cup.obj: ..." or "carillon-precompute: error: ...".
@@ -54,4 +54,4 @@ std::string Programs::run(const std::string& program, std::vector<std::string> w
   base::throw_error(result);
 }
 
-}  // namespace carillon::hear
+}  // namespace carillon::process

@@ -1,11 +1,11 @@
-// The programs that make a sound, started one after the other.
+// The programs of this installation, started one after the other.
 #pragma once
 
 #include <filesystem>
 #include <string>
 #include <vector>
 
-namespace carillon::hear {
+namespace carillon::process {
 
 /// Runs programs in one folder; what one of them refuses is thrown with its own words.
 class Programs {
@@ -22,4 +22,4 @@ class Programs {
   bool is_quiet_;
 };
 
-}  // namespace carillon::hear
+}  // namespace carillon::process

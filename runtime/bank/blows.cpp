@@ -1,0 +1,73 @@
+// Method:     A blow J along the normal n at a vertex makes mode m sound with g_m |phi_m . n| J at 1 m; by the ear's weight of its
+//             frequency (A-weighting) that is its level. Vertices are ranked by the sum of the squares.
+// Source:     docs/equations.md, E5 and E7.
+// Deviations: none.
+#include "runtime/bank/blows.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "runtime/bank/reduce.hpp"
+#include "runtime/base/vector.hpp"
+
+namespace carillon::bank {
+namespace {
+
+constexpr double kHeard = 0.1;  // of the loudest vertex's power: struck where less is made, it would seem broken
+constexpr double kLoudest = 0.1;
+
+}  // namespace
+
+std::vector<Vec3> calc_vertex_normals(const Bank& bank) {
+  std::vector<Vec3> normals(bank.vertex_count(), Vec3{});
+  for (const auto& t : bank.triangles) {
+    const Vec3 &a = bank.vertices_m[static_cast<std::size_t>(t[0])], &b = bank.vertices_m[static_cast<std::size_t>(t[1])],
+               &c = bank.vertices_m[static_cast<std::size_t>(t[2])];
+    const Vec3 normal = cross(b - a, c - a);
+    for (const std::int32_t v : t) normals[static_cast<std::size_t>(v)] = normals[static_cast<std::size_t>(v)] + normal;
+  }
+  for (Vec3& n : normals)
+    if (norm(n) > 0.0) n = (1.0 / norm(n)) * n;
+  return normals;
+}
+
+std::vector<double> calc_blow_amplitudes(const Bank& bank, std::size_t vertex, const Vec3& direction) {
+  std::vector<double> amplitudes(bank.mode_count());
+  for (std::size_t m = 0; m < bank.mode_count(); ++m)
+    amplitudes[m] = calc_a_weight(bank.freq_hz(m)) * bank.radiation_gain[m] * std::abs(dot(bank.shape_at(vertex, m), direction));
+  return amplitudes;
+}
+
+std::vector<std::size_t> find_strikes(const Bank& bank, std::size_t count) {
+  const std::vector<Vec3> normals = calc_vertex_normals(bank);
+  std::vector<double> power(bank.vertex_count(), 0.0);
+  for (std::size_t v = 0; v < power.size(); ++v)
+    for (const double a : calc_blow_amplitudes(bank, v, normals[v])) power[v] += a * a;
+  std::vector<std::size_t> chosen;
+  if (power.empty()) return chosen;
+  chosen.push_back(static_cast<std::size_t>(std::max_element(power.begin(), power.end()) - power.begin()));
+  std::vector<double> distance(power.size(), std::numeric_limits<double>::infinity());
+  while (chosen.size() < count) {
+    std::size_t next = 0;
+    double farthest = 0.0;
+    for (std::size_t v = 0; v < power.size(); ++v) {
+      distance[v] = std::min(distance[v], norm(bank.vertices_m[v] - bank.vertices_m[chosen.back()]));
+      if (power[v] > kHeard * power[chosen[0]] && distance[v] > farthest) farthest = distance[v], next = v;
+    }
+    if (!(farthest > 0.0)) break;
+    chosen.push_back(next);
+  }
+  return chosen;
+}
+
+double calc_ring_s(const Bank& bank, std::size_t vertex) {
+  const std::vector<double> amplitudes = calc_blow_amplitudes(bank, vertex, calc_vertex_normals(bank)[vertex]);
+  const double loudest = amplitudes.empty() ? 0.0 : *std::max_element(amplitudes.begin(), amplitudes.end());
+  double longest = 0.0;
+  for (std::size_t m = 0; m < amplitudes.size(); ++m)
+    if (amplitudes[m] > kLoudest * loudest) longest = std::max(longest, std::log(1000.0) / bank.decay_per_s[m]);
+  return longest;
+}
+
+}  // namespace carillon::bank
