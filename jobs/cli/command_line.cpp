@@ -225,6 +225,22 @@ void add_explore(CLI::App& app, Shared& shared, Run& run) {
   set_work(*command, shared, run, options, run_explore);
 }
 
+void add_bank_for(CLI::App& app, Shared& shared, Run& run) {
+  auto options = std::make_shared<BankForOptions>();
+  CLI::App* command = app.add_subcommand(
+      "bank-for",
+      "Prints the path of the bank of a body, which is computed if it is not there: a job without \"bank\", as the bodies of a scene are.\n"
+      "A body that says neither \"nodes\" nor \"accuracy_cents\" is a preview. Banks are kept in $XDG_CACHE_HOME/carillon, else "
+      "~/.cache/carillon,\nwhich may be removed at any time.");
+  command->add_option("JOB", options->word, "Job file; - is standard input")->required();
+  command->add_option("--cache", options->cache, "Keep banks in this folder");
+  command->add_option("--name", options->name, "The file that standard input comes from: messages name it, and paths start at its folder");
+  command->add_option("--first-line", options->first_line, "The line on which it begins there")->check(CLI::PositiveNumber);
+  command->add_option("--result", options->result, "Write how it ended to this file, a JSON object, in place of a message");
+  command->add_flag("-q,--quiet", options->is_quiet, "No progress");
+  set_work(*command, shared, run, options, run_bank_for);
+}
+
 void add_materials(CLI::App& app, Shared& shared, Run& run) {
   auto options = std::make_shared<MaterialsOptions>();
   CLI::App* command = app.add_subcommand(
@@ -339,7 +355,7 @@ Run parse_command_line(int argc, char** argv, Shared& shared) {
   app.add_flag("--json", shared.json, "One JSON document (of commands that keep running: one object a line)");
   app.set_version_flag("--version", version::describe("carillon"));
   for (const auto add : {add_submit, add_status, add_log, add_cancel, add_retry, add_explain, add_run, add_get, add_gc, add_verify,
-                         add_validate, add_study, add_report, add_hear, add_explore, add_materials})
+                         add_validate, add_study, add_report, add_hear, add_explore, add_materials, add_bank_for})
     add(app, shared, run);
   add_attempt(app, run);
   check_command(app, argc, argv);

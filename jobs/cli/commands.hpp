@@ -119,6 +119,17 @@ struct ExploreOptions {
 };
 int run_explore(Shared& shared, const ExploreOptions& options);
 
+/// carillon bank-for: the bank of a body, made if it is missing.
+struct BankForOptions {
+  std::string word;            // job file, or "-"
+  std::filesystem::path name;  // of what comes on standard input, for messages and relative paths
+  int first_line = 1;
+  std::filesystem::path cache;   // empty: the default one
+  std::filesystem::path result;  // where it says how it ended, in place of a message; empty: nowhere
+  bool is_quiet = false;
+};
+int run_bank_for(Shared& shared, const BankForOptions& options);
+
 /// carillon materials: the materials that can be named.
 struct MaterialsOptions {
   std::vector<std::string> names;  // empty: all, a line each

@@ -11,7 +11,7 @@
 #include "jobs/explore/files.hpp"
 #include "runtime/bank/bank.hpp"
 #include "runtime/bank/reduce.hpp"
-#include "runtime/bank/strikes.hpp"
+#include "runtime/bank/blows.hpp"
 #include "runtime/material/table.hpp"
 
 namespace carillon::explore {

@@ -18,11 +18,12 @@
 #include "jobs/hear/strikes.hpp"
 #include "jobs/process/programs.hpp"
 #include "jobs/report/report.hpp"
+#include "precompute/job/preview.hpp"
 #include "precompute/job/read_body.hpp"
 #include "runtime/bank/bank.hpp"
+#include "runtime/bank/blows.hpp"
 #include "runtime/bank/corrected.hpp"
 #include "runtime/bank/of_material.hpp"
-#include "runtime/bank/strikes.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/failure.hpp"
 #include "runtime/base/file.hpp"
@@ -37,9 +38,7 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-constexpr std::int64_t kSolidNodes = 16000, kWallNodes = 15000, kShapeNodes = 6000;  // of a preview
-constexpr std::int64_t kMaxPreviewNodes = 80000;
-constexpr int kPreviewModes = 200, kMaxModes = 600;
+constexpr int kMaxModes = 600;                // of what is not a preview
 constexpr const char* kExplorer = "explore";  // folder of the page
 constexpr std::size_t kStrikes = 4, kListed = 12;
 constexpr double kSameCents = 5.0;  // an edit that leaves Poisson's ratio may be so far off
@@ -217,7 +216,7 @@ class Listening {
     else
       job.set("mesh", make_mesh(wish).filename().string());
     job.set("material", wish.material->name).set("bank", sound.bank.filename().string());
-    job.set("band_hz", base::Json::array(kBandHz)).set("max_modes", order_.accuracy_cents ? kMaxModes : kPreviewModes);
+    job.set("band_hz", base::Json::array(kBandHz)).set("max_modes", order_.accuracy_cents ? kMaxModes : job::kPreviewModes);
     const fs::path file = heard_.folder / (wish.name + ".json");
     base::write_file(file, job.text());
     say(fmt::format("{}: finding the modes", wish.name));
@@ -255,31 +254,22 @@ class Listening {
     const fs::path file =
         heard_.folder / fmt::format("{}{}.msh", stem_, order_.heights_m.size() > 1 ? fmt::format("-{:g}m", wish.height_m) : "");
     std::vector<std::string> words;
-    std::int64_t nodes = kShapeNodes;
+    std::int64_t nodes = job::kPreviewShapeNodes;
     if (is_shape()) {
       words = {"--shape", order_.shape};
       for (const auto& [name, value] : order_.dimensions) words.insert(words.end(), {"--" + name, fmt::format("{:.17g}", value)});
     } else {
       words = {fs::absolute(order_.object).string(), "--scale", fmt::format("{:.17g}", find_scale_of(wish))};
       if (order_.wall_m) words.insert(words.end(), {"--wall", fmt::format("{:.17g}", *order_.wall_m)});
-      nodes = order_.wall_m || facts_.thickness > 0.0 ? kWallNodes : kSolidNodes;
+      nodes = order_.wall_m || facts_.thickness > 0.0 ? job::kPreviewWallNodes : job::kPreviewSolidNodes;
     }
     words.insert(words.end(), {"--order", "2", "-q", "-o", file.string()});
     say(fmt::format("meshing {}", stem_));
-    for (bool is_second = false;; is_second = true) {
+    (void)job::run_at_possible_count(nodes, "--accuracy CENTS takes what it needs", [&](std::int64_t count) {
       std::vector<std::string> all = words;
-      all.insert(all.end(), {"--nodes", std::to_string(nodes)});
-      try {
-        (void)programs_->run("carillon-mesh", all, true);
-        break;
-      } catch (const CountRefusal& error) {
-        if (is_second) throw;
-        if (error.get_possible_nodes() > kMaxPreviewNodes)
-          throw InputError(
-              fmt::format("{} (a preview has {} nodes at most; --accuracy CENTS takes what it needs)", error.what(), kMaxPreviewNodes));
-        nodes = error.get_possible_nodes();
-      }
-    }
+      all.insert(all.end(), {"--nodes", std::to_string(count)});
+      (void)programs_->run("carillon-mesh", all, true);
+    });
     meshes_[wish.height_m] = file;
     return file;
   }
@@ -310,7 +300,7 @@ class Listening {
 
   base::Json make_scene(const Sound& sound, const bank::Bank& bank, const std::vector<std::size_t>& strikes, const Vec3& middle,
                         double size) const {
-    const double ring = calc_ring_s(bank, strikes.front()), gap = std::clamp(ring, 0.5, 1.5), begin = 0.05;
+    const double ring = bank::calc_ring_s(bank, strikes.front()), gap = std::clamp(ring, 0.5, 1.5), begin = 0.05;
     base::Json scene = base::Json::object(), body = base::Json::object(), listener = base::Json::object();
     scene.set("duration_s", begin + gap * static_cast<double>(strikes.size() - 1) + std::clamp(ring, 0.5, 4.0));
     body.set("name", stem_).set("bank", sound.bank.filename().string()).set("fixed", true);

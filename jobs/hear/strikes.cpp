@@ -4,38 +4,22 @@
 #include <cmath>
 #include <limits>
 
-#include "runtime/bank/strikes.hpp"
+#include "runtime/bank/blows.hpp"
 
 namespace carillon::hear {
-namespace {
-
-constexpr double kLoudest = 0.1;
-
-double calc_t60_s(const bank::Bank& bank, std::size_t mode) { return std::log(1000.0) / bank.decay_per_s[mode]; }
-
-}  // namespace
 
 std::vector<HeardMode> list_modes(const bank::Bank& bank, std::size_t vertex, std::size_t count) {
-  const std::vector<double> amplitudes = bank::calc_blow_levels(bank, vertex);
+  const std::vector<double> amplitudes = bank::calc_blow_amplitudes(bank, vertex, bank::calc_vertex_normals(bank)[vertex]);
   const double loudest = amplitudes.empty() ? 0.0 : *std::max_element(amplitudes.begin(), amplitudes.end());
   std::vector<HeardMode> modes;
   for (std::size_t m = 0; m < std::min(count, bank.mode_count()); ++m) {
-    HeardMode mode{.freq_hz = bank.freq_hz(m), .t60_s = calc_t60_s(bank, m)};
+    HeardMode mode{.freq_hz = bank.freq_hz(m), .t60_s = std::log(1000.0) / bank.decay_per_s[m]};
     mode.error_cents =
         m < bank.discretisation_error_cents.size() ? bank.discretisation_error_cents[m] : std::numeric_limits<double>::infinity();
     mode.level_dba = amplitudes[m] > 0.0 ? 20.0 * std::log10(amplitudes[m] / loudest) : -std::numeric_limits<double>::infinity();
     modes.push_back(mode);
   }
   return modes;
-}
-
-double calc_ring_s(const bank::Bank& bank, std::size_t vertex) {
-  const std::vector<double> amplitudes = bank::calc_blow_levels(bank, vertex);
-  const double loudest = amplitudes.empty() ? 0.0 : *std::max_element(amplitudes.begin(), amplitudes.end());
-  double longest = 0.0;
-  for (std::size_t m = 0; m < amplitudes.size(); ++m)
-    if (amplitudes[m] > kLoudest * loudest) longest = std::max(longest, calc_t60_s(bank, m));
-  return longest;
 }
 
 }  // namespace carillon::hear

@@ -12,7 +12,4 @@ namespace carillon::hear {
 /// The first `count` modes as a blow at a vertex makes them.
 std::vector<HeardMode> list_modes(const bank::Bank& bank, std::size_t vertex, std::size_t count);
 
-/// The time after which nearly all of what a blow makes is over: T60 of its loudest modes [s].
-double calc_ring_s(const bank::Bank& bank, std::size_t vertex);
-
 }  // namespace carillon::hear

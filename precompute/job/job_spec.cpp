@@ -126,7 +126,11 @@ void read_resources(base::Object& job, JobSpec& spec) {
 }
 
 void read_geometry(base::Object& job, JobSpec& spec) {
-  if (job.has("body")) {
+  if (job.has("shape")) {
+    for (const char* key : {"body", "mesh", "mesh_scale"})
+      if (job.has(key)) job.fail(key, "\"shape\" is the body already; give one of them");
+    spec.body = read_short_shape(job.object("shape"));
+  } else if (job.has("body")) {
     if (job.has("mesh")) job.fail("body", "\"mesh\" names the body already; give one of \"mesh\" (a file) and \"body\"");
     if (job.has("mesh_scale"))
       job.fail("mesh_scale", "is for a \"mesh\" file; a surface has \"scale\" inside \"body\", and shapes are in metres");
@@ -151,7 +155,7 @@ void read_geometry(base::Object& job, JobSpec& spec) {
   if (!spec.accuracy_cents) return;
   if (job.has("element")) job.fail("element", "\"accuracy_cents\" chooses the element; give one of the two");
   if (spec.body && (spec.body->nodes || spec.body->edge_m)) {
-    base::Object body = job.object("body");
+    base::Object body = job.has("shape") ? job.object("shape").object(spec.body->shape) : job.object("body");
     body.fail(spec.body->nodes ? "nodes" : "edge_m", "\"accuracy_cents\" chooses the mesh; give one of the two");
   }
 }

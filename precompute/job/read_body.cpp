@@ -1,6 +1,7 @@
 #include "precompute/job/read_body.hpp"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <limits>
@@ -24,10 +25,13 @@ std::optional<double> read_length_if(base::Object& body, const std::string& key)
   return body.has(key) ? std::optional(read_length(body, key)) : std::nullopt;
 }
 
-void read_shape(base::Object& body, Body& result) {
+std::vector<std::string> list_shapes() {
   std::vector<std::string> names;
   for (const ShapeKeys& keys : get_shape_keys()) names.emplace_back(keys.shape);
-  result.shape = body.choice("shape", names);
+  return names;
+}
+
+void read_dimensions(base::Object& body, Body& result) {
   for (const ShapeKeys& keys : get_shape_keys()) {
     if (keys.shape != result.shape) continue;
     for (const std::string& dimension : keys.dimensions) {
@@ -43,6 +47,16 @@ void read_shape(base::Object& body, Body& result) {
       result.dimensions[dimension] = angle;
     }
   }
+}
+
+/// How fine the mesh is.
+void read_fineness(base::Object& body, Body& result) {
+  result.nodes = body.integer_if("nodes", 4, std::numeric_limits<long long>::max());
+  if (result.nodes.value_or(0) > kMaxNodes)
+    body.fail("nodes", fmt::format("the mesher makes at most {} nodes, and this asks for {}; larger bodies come as a \"mesh\" file",
+                                   kMaxNodes, *result.nodes));
+  result.edge_m = read_length_if(body, "edge_m");
+  if (result.nodes && result.edge_m) body.fail("edge_m", "\"nodes\" says how fine the mesh is already; give one of them");
 }
 
 void read_surface(base::Object& body, Body& result) {
@@ -91,16 +105,32 @@ Body read_body(base::Object body) {
   if (body.has("shape") == body.has("surface"))
     body.fail(body.has("shape") ? "surface" : "",
               "a body is a \"shape\" (bar, tube, plate ... with its dimensions) or a \"surface\" (a file); give one of the two");
-  if (body.has("shape"))
-    read_shape(body, result);
-  else
+  if (body.has("shape")) {
+    result.shape = body.choice("shape", list_shapes());
+    read_dimensions(body, result);
+  } else {
     read_surface(body, result);
-  result.nodes = body.integer_if("nodes", 4, std::numeric_limits<long long>::max());
-  if (result.nodes.value_or(0) > kMaxNodes)
-    body.fail("nodes", fmt::format("the mesher makes at most {} nodes, and this asks for {}; larger bodies come as a \"mesh\" file",
-                                   kMaxNodes, *result.nodes));
-  result.edge_m = read_length_if(body, "edge_m");
-  if (result.nodes && result.edge_m) body.fail("edge_m", "\"nodes\" says how fine the mesh is already; give one of them");
+  }
+  read_fineness(body, result);
+  body.finish();
+  return result;
+}
+
+Body read_short_shape(base::Object shape) {
+  const std::vector<std::string> keys = shape.keys(), names = list_shapes();
+  if (keys.size() != 1)
+    shape.fail("", fmt::format("names one shape with its dimensions: {{\"bowl\": {{...}}}}, and this names {}", keys.size()));
+  if (std::find(names.begin(), names.end(), keys[0]) == names.end()) {
+    const std::string near = base::find_nearest(keys[0], names);
+    shape.fail(keys[0], fmt::format("is no shape{}; there are {}", near.empty() ? "" : fmt::format(", did you mean \"{}\"?", near),
+                                    fmt::join(names, ", ")));
+  }
+  Body result;
+  base::Object body = shape.object(keys[0]);
+  result.place = body.find_place("");
+  result.shape = keys[0];
+  read_dimensions(body, result);
+  read_fineness(body, result);
   body.finish();
   return result;
 }

@@ -17,5 +17,7 @@ std::string find_dimension_key(const std::string& dimension);
 
 /// Reads and validates a body. Throws InputError.
 Body read_body(base::Object body);
+/// The same of the short form of a shape: {"bowl": {"outer_radius_m": 0.06, "wall_m": 0.004}}.
+Body read_short_shape(base::Object shape);
 
 }  // namespace carillon::job

@@ -19,6 +19,9 @@ std::vector<std::uint64_t> find_shape(const Vector& values) {
   return {values.size()};
 }
 
+/// A text of the file has at least one byte.
+std::string pad_text(const std::string& text) { return text.empty() ? std::string(1, '\0') : text; }
+
 /// What came with version 1.1.
 void add_later_fields(const Bank& bank, const FileForm& form, std::vector<Field>& fields) {
   const auto add_errors = [&](const char* name, const char* meaning, const std::vector<double>& cents) {
@@ -141,6 +144,22 @@ std::vector<Field> list_fields(const Bank& bank, const FileForm& form) {
   };
   add_later_fields(bank, form, fields);
   return fields;
+}
+
+FileForm make_file_form(const Bank& bank) {
+  FileForm form;
+  for (std::size_t i = 0; i < bank.mode_count(); ++i) form.freq_hz.push_back(bank.freq_hz(i));
+  form.complete = bank.complete ? 1 : 0;
+  form.element = pad_text(bank.element);
+  form.mass = pad_text(bank.mass);
+  form.provenance = pad_text(bank.provenance);
+  form.damping_law = pad_text(bank.damping.law);
+  form.regions = bank.regions;
+  if (bank.supports.count() > 0) form.supports = pad_text(bank.supports.text);
+  if (bank.proof) form.proof_method = pad_text(bank.proof->method);
+  form.has_complete_below = bank.proof && bank.proof->complete_below_hz > 0.0;
+  if (bank.shape_bytes == 1) form.narrow_shape.assign(bank.shape.begin(), bank.shape.end());  // within -127 and 127: find_faults()
+  return form;
 }
 
 int find_version_minor(const Bank& bank) {

@@ -1,7 +1,9 @@
-// Where everything lies in a bank file, as one table that the writer and the reader share. Internal to carillon::bank.
+// The arrays of a bank, as one table that the writer and the reader of bank files share, and containers of other formats.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -39,6 +41,19 @@ struct FileForm {
 /// version 1.0) are left out. The sizes are those of the members at the time of the call, and `data` points into them (`bank` and `form`
 /// must outlive the table).
 std::vector<Field> list_fields(const Bank& bank, const FileForm& form);
+
+/// What the file of `bank` holds in addition to it.
+FileForm make_file_form(const Bank& bank);
+
+/// An array whose bytes another container holds; `field.data` is not looked at.
+struct FieldBytes {
+  Field field;
+  std::span<const std::byte> bytes;
+};
+
+/// The bank that arrays make: what parse_bank() gives for a file that holds them and no others. Types, extents and bytes are untrusted.
+/// Throws InputError as parse_bank() does; `name` stands for the file.
+Bank assemble_bank(const std::vector<FieldBytes>& arrays, const std::string& name);
 
 /// The oldest minor version that can say what is in the bank: it is the file's, so that older readers read all that they can.
 int find_version_minor(const Bank& bank);

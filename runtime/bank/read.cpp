@@ -13,6 +13,7 @@
 #include <cmath>
 #include <cstring>
 #include <functional>
+#include <map>
 #include <numbers>
 
 #include "runtime/bank/bank.hpp"
@@ -320,6 +321,44 @@ Bank parse_bank(std::span<const std::byte> bytes, const std::string& name) {
   const Seal seal = parse_seal({reinterpret_cast<const char*>(head.data()), head.size()}, bytes.size(), name);
   const auto copy = [&](std::uint64_t offset, std::span<std::byte> to) { std::memcpy(to.data(), bytes.data() + offset, to.size()); };
   Bank bank = finish(load(seal, name, copy), name);
+  require_sane(bank, name);
+  return bank;
+}
+
+Bank assemble_bank(const std::vector<FieldBytes>& arrays, const std::string& name) {
+  Seal seal;
+  std::map<std::string, std::span<const std::byte>> found;
+  for (const auto& [field, bytes] : arrays) seal.length += bytes.size();
+  for (const auto& [field, bytes] : arrays) {
+    const Extent extent{.dtype = field.dtype, .shape = field.shape, .bytes = bytes.size()};
+    std::uint64_t size = find_item_bytes(field.dtype);
+    bool is_whole = size > 0;
+    for (const std::uint64_t n : field.shape) {
+      is_whole = is_whole && n <= seal.length && (n == 0 || size <= seal.length / n);  // as in a seal: nothing is larger than all of it
+      size = is_whole ? size * n : 0;
+    }
+    if (!is_whole || size != bytes.size())
+      throw InputError(fmt::format("{}: {} is said to be {}, and has {} bytes; write it again", name, field.name,
+                                   describe(field.dtype, field.shape), bytes.size()));
+    if (!found.emplace(field.name, bytes).second) throw InputError(fmt::format("{}: {} is there twice; write it again", name, field.name));
+    seal.extents.emplace(field.name, extent);
+  }
+  Loaded loaded;
+  allocate(seal, name, loaded);
+  for (const Field& wanted : list_fields(loaded.bank, loaded.form)) {
+    const Extent& extent = get_extent(seal, wanted.name, name);
+    check_extent(wanted, extent, name);
+    const std::byte* from = found.at(wanted.name).data();
+    if (extent.bytes == 0) continue;
+    if (wanted.name == "modes/shape" && loaded.bank.shape_bytes == 2) {
+      loaded.bank.shape.resize(extent.bytes / sizeof(std::int16_t));
+      std::memcpy(loaded.bank.shape.data(), from, extent.bytes);
+    } else {
+      // As in load(): what the table points to is ours to fill.
+      std::memcpy(const_cast<void*>(wanted.data), from, extent.bytes);
+    }
+  }
+  Bank bank = finish(std::move(loaded), name);
   require_sane(bank, name);
   return bank;
 }

@@ -35,9 +35,6 @@ fs::path resolve_target(const fs::path& file) {
   return target;
 }
 
-/// A text of the file has at least one byte.
-std::string pad_text(const std::string& text) { return text.empty() ? std::string(1, '\0') : text; }
-
 /// Throws InputError for a bank that is not sane; `name` stands for it in the message.
 void check_faults(const Bank& bank, const std::string& name) {
   const auto faults = find_faults(bank);
@@ -49,19 +46,7 @@ void check_faults(const Bank& bank, const std::string& name) {
 /// Makes the sealed bytes of a bank without faults and hands them on.
 template <typename Use>
 void use_bytes(const Bank& bank, Use&& use) {
-  FileForm form;
-  for (std::size_t i = 0; i < bank.mode_count(); ++i) form.freq_hz.push_back(bank.freq_hz(i));
-  form.complete = bank.complete ? 1 : 0;
-  form.element = pad_text(bank.element);
-  form.mass = pad_text(bank.mass);
-  form.provenance = pad_text(bank.provenance);
-  form.damping_law = pad_text(bank.damping.law);
-  form.regions = bank.regions;
-  if (bank.supports.count() > 0) form.supports = pad_text(bank.supports.text);
-  if (bank.proof) form.proof_method = pad_text(bank.proof->method);
-  form.has_complete_below = bank.proof && bank.proof->complete_below_hz > 0.0;
-  if (bank.shape_bytes == 1) form.narrow_shape.assign(bank.shape.begin(), bank.shape.end());  // within -127 and 127: find_faults()
-
+  const FileForm form = make_file_form(bank);
   const Hdf5Image image = make_hdf5_image(bank, list_fields(bank, form));
   const std::span<std::byte> bytes = image.bytes;
   const std::string text = format_seal_text(bytes.size(), find_version_minor(bank), image.extents);

@@ -29,6 +29,7 @@ struct Value {
   std::optional<std::int64_t> integer{};  // of a number, if it is whole and fits
   double number = 0.0;
   std::ptrdiff_t offset = 0;  // a place on its first line
+  std::ptrdiff_t end = 0;     // behind its last byte
   std::string text{};
   std::vector<Value> items{};           // of a list
   std::vector<Member> members{};        // of an object, in the order of the text
@@ -41,7 +42,7 @@ struct Value {
 
 struct Member {
   std::string key;
-  std::ptrdiff_t offset = 0;  // of the key
+  std::ptrdiff_t offset = 0;  // behind the key
   Value value{};
 };
 
@@ -121,7 +122,8 @@ class Builder {
   bool Double(double x) {
     constexpr double kBeyond = 9223372036854775808.0;  // 2^63
     const bool is_whole = x == std::floor(x) && x >= -kBeyond && x < kBeyond;
-    return add({.kind = Value::Kind::kNumber, .integer = is_whole ? std::optional(static_cast<std::int64_t>(x)) : std::nullopt, .number = x});
+    return add(
+        {.kind = Value::Kind::kNumber, .integer = is_whole ? std::optional(static_cast<std::int64_t>(x)) : std::nullopt, .number = x});
   }
   bool RawNumber(const char*, rapidjson::SizeType, bool) { return false; }
   bool String(const char* text, rapidjson::SizeType size, bool) {
@@ -152,11 +154,9 @@ class Builder {
  private:
   /// Somewhere from the beginning of what was read last to the byte behind it: that a token lies on one line is what counts.
   std::ptrdiff_t get_offset() const { return static_cast<std::ptrdiff_t>(stream_->Tell()); }
-  bool add_integer(std::int64_t x) {
-    return add({.kind = Value::Kind::kNumber, .integer = x, .number = static_cast<double>(x)});
-  }
+  bool add_integer(std::int64_t x) { return add({.kind = Value::Kind::kNumber, .integer = x, .number = static_cast<double>(x)}); }
   bool add(Value value) {
-    value.offset = get_offset();
+    value.offset = value.end = get_offset();
     Value& into = *open_.back();
     Value* place = &into;  // the root
     if (is_root_there_) place = into.is(Value::Kind::kList) ? &into.items.emplace_back() : &into.members.back().value;
@@ -168,6 +168,7 @@ class Builder {
     return true;
   }
   bool close() {
+    open_.back()->end = get_offset();
     if (open_.size() > 1) open_.pop_back();
     return true;
   }
@@ -184,7 +185,8 @@ class Builder {
   std::string reason = rapidjson::GetParseError_En(result.Code());
   if (reason.ends_with('.')) reason.pop_back();
   if (!reason.empty()) reason[0] = static_cast<char>(std::tolower(static_cast<unsigned char>(reason[0])));
-  data.fail(static_cast<std::ptrdiff_t>(at), fmt::format("this is not JSON (column {}): {}; correct the text there", at - line_begin + 1, reason));
+  data.fail(static_cast<std::ptrdiff_t>(at),
+            fmt::format("this is not JSON (column {}): {}; correct the text there", at - line_begin + 1, reason));
 }
 
 /// What is wrong with a word that begins like a number, as part of a sentence; nullptr when it is one by the grammar of JSON.
@@ -281,8 +283,7 @@ Document parse_document(std::string_view text, const std::filesystem::path& file
   rapidjson::StringStream stream(data->text.c_str());
   Builder builder(*data, stream, data->root);
   rapidjson::Reader reader;
-  const rapidjson::ParseResult result =
-      reader.Parse<rapidjson::kParseFullPrecisionFlag | rapidjson::kParseCommentsFlag>(stream, builder);
+  const rapidjson::ParseResult result = reader.Parse<rapidjson::kParseFullPrecisionFlag | rapidjson::kParseCommentsFlag>(stream, builder);
   if (result.IsError()) fail_syntax(*data, result);
   if (!data->root.is(Value::Kind::kObject))
     throw InputError(
@@ -301,6 +302,9 @@ bool Object::has(std::string_view key) {
 bool Object::has_string(std::string_view key) { return has(key) && json(value_).find(key)->value.is(Value::Kind::kText); }
 bool Object::has_number(std::string_view key) { return has(key) && json(value_).find(key)->value.is(Value::Kind::kNumber); }
 bool Object::has_object(std::string_view key) { return has(key) && json(value_).find(key)->value.is(Value::Kind::kObject); }
+bool Object::is_empty_list(std::string_view key) {
+  return has(key) && json(value_).find(key)->value.is(Value::Kind::kList) && json(value_).find(key)->value.items.empty();
+}
 
 namespace {
 
@@ -415,7 +419,8 @@ bool Object::boolean_or(std::string_view key, bool fallback) {
 
 void Object::copy_numbers(std::string_view key, double* values, std::size_t count) {
   const Value& list = json(require_value(key));
-  if (!list.is(Value::Kind::kList) || list.items.size() != count) fail(key, fmt::format("must be a list of {} numbers, and is {}", count, kind_of(list)));
+  if (!list.is(Value::Kind::kList) || list.items.size() != count)
+    fail(key, fmt::format("must be a list of {} numbers, and is {}", count, kind_of(list)));
   for (std::size_t i = 0; i < count; ++i) values[i] = to_number(*this, list.items[i], key, {});
 }
 
@@ -497,6 +502,47 @@ std::filesystem::path Object::path(std::string_view key) {
 }
 
 void Object::ignore(std::string_view key) { has(key); }
+
+namespace {
+
+/// The first byte from `at` on that is neither white space nor part of a comment; the text was parsed before.
+std::size_t skip_space(std::string_view text, std::size_t at) {
+  while (at < text.size()) {
+    if (std::string_view(" \t\r\n").find(text[at]) != std::string_view::npos)
+      ++at;
+    else if (text.substr(at, 2) == "//")
+      at = std::min(text.find('\n', at), text.size());
+    else if (text.substr(at, 2) == "/*")
+      at = std::min(text.find("*/", at + 2), text.size() - 2) + 2;
+    else
+      break;
+  }
+  return at;
+}
+
+}  // namespace
+
+Object::Excerpt Object::make_excerpt(const std::vector<std::string>& keys) {
+  std::vector<const Member*> found;
+  for (const std::string& key : keys)
+    if (has(key)) found.push_back(json(value_).find(key));
+  std::sort(found.begin(), found.end(), [](const Member* a, const Member* b) { return a->offset < b->offset; });
+  Excerpt excerpt{.text = "{", .first_line = found.empty() ? 1 : data_->line_at(found[0]->offset)};
+  int line = excerpt.first_line;
+  for (const Member* member : found) {
+    if (member != found[0]) excerpt.text += ", ";
+    for (; line < data_->line_at(member->offset); ++line) excerpt.text += '\n';
+    excerpt.text += fmt::format("\"{}\": ", member->key);
+    const std::size_t colon = skip_space(data_->text, static_cast<std::size_t>(member->offset));
+    const std::size_t begin = skip_space(data_->text, colon + 1);
+    for (; line < data_->line_at(static_cast<std::ptrdiff_t>(begin)); ++line) excerpt.text += '\n';
+    const std::string own = data_->text.substr(begin, static_cast<std::size_t>(member->value.end) - begin);
+    line += static_cast<int>(std::count(own.begin(), own.end(), '\n'));
+    excerpt.text += own;
+  }
+  excerpt.text += "}\n";
+  return excerpt;
+}
 
 std::vector<std::string> Object::keys() const {
   std::vector<std::string> names;

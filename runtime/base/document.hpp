@@ -44,6 +44,8 @@ class Object {
   bool has_number(std::string_view key);
   /// True when `key` is there and holds an object in braces.
   bool has_object(std::string_view key);
+  /// True when `key` is there and holds a list of nothing.
+  bool is_empty_list(std::string_view key);
 
   std::string string(std::string_view key);
   std::string string_or(std::string_view key, std::string_view fallback);
@@ -87,6 +89,14 @@ class Object {
 
   /// Marks `key` as known and skips whatever it holds (recorded facts that are not input).
   void ignore(std::string_view key);
+
+  /// A document of those of the keys that are here, as they stand in the file, for another program to read: parse_document() of it with
+  /// the same file and `first_line` has every value at its line.
+  struct Excerpt {
+    std::string text;
+    int first_line = 1;
+  };
+  Excerpt make_excerpt(const std::vector<std::string>& keys);
 
   /// The keys of this object in the order of the file.
   std::vector<std::string> keys() const;

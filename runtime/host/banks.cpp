@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "runtime/bank/corrected.hpp"
+#include "runtime/host/missing_banks.hpp"
 
 namespace carillon::host {
 namespace {
@@ -21,7 +22,8 @@ void mount(Scene& scene, SceneBody& body, bank::Bank& bank) {
 
 }  // namespace
 
-Banks read_banks(Scene& scene) {
+Banks read_banks(Scene& scene, bool is_quiet) {
+  find_missing_banks(scene, is_quiet);
   Banks banks;
   std::map<std::filesystem::path, int> left;  // bodies that still need the bank as it is in the file
   for (const SceneBody& body : scene.bodies) ++left[body.bank];

@@ -23,6 +23,7 @@ using Banks = std::map<std::pair<std::filesystem::path, std::string>, std::uniqu
 /// Reads every bank once for every way in which its bodies are mounted, puts in what the supports take, and gives it the gains that the
 /// scene asks for; those of `"sphere"` are limited to what damping takes. The scene's bodies point into the result, and know its radius and
 /// in words how they are mounted; warnings about supports join the scene's. Throws InputError, which names scene and body.
-Banks read_banks(Scene& scene);
+/// Banks that are missing are found or computed first (find_missing_banks()).
+Banks read_banks(Scene& scene, bool is_quiet = false);
 
 }  // namespace carillon::host

@@ -131,7 +131,8 @@ void check_outputs(const ProgramOptions& options, const Scene& scene) {
   if (options.record) outputs.emplace_back(*options.record, "contacts file");
   std::vector<std::pair<fs::path, std::string>> taken{{scene.file, "scene"}};
   if (options.contacts) taken.emplace_back(*options.contacts, "contacts file to play");
-  for (const SceneBody& body : scene.bodies) taken.emplace_back(body.bank, fmt::format("bank of \"{}\"", body.name));
+  for (const SceneBody& body : scene.bodies)
+    if (!body.bank.empty()) taken.emplace_back(body.bank, fmt::format("bank of \"{}\"", body.name));
   for (const auto& [file, what] : outputs) {
     for (const auto& [other, name] : taken) {
       if (is_same_file(file, other)) {
@@ -250,7 +251,7 @@ class Run {
     if (is_standard_output(options.wav)) base::check_standard_output("sound");
     check_outputs(options, scene_);
     if (!options.plan) check_room(scene_, options.wav);
-    banks_ = read_banks(scene_);
+    banks_ = read_banks(scene_, options.quiet);
     for (const SceneBody& body : scene_.bodies) body_banks_.push_back(body.spec.bank);
     figures_.bodies = scene_.bodies.size();
   }

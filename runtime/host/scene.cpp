@@ -171,6 +171,22 @@ support::MountingRequest read_support(base::Object& body) {
   return overrides;
 }
 
+/// The bank of a body, or what a job says of one, which the solver's side reads.
+void read_bank_or_job(base::Object& object, SceneBody& body) {
+  static const std::vector<std::string> kBodies{"shape", "body", "mesh"};
+  static const std::vector<std::string> kKeys{"shape",     "body",    "mesh",           "mesh_scale", "material",
+                                              "materials", "element", "accuracy_cents", "band_hz",    "max_modes"};
+  const bool is_described = std::any_of(kBodies.begin(), kBodies.end(), [&](const std::string& key) { return object.has(key); });
+  if (!is_described || object.has("bank")) {
+    for (const std::string& key : kKeys)
+      if (object.has("bank") && object.has(key))
+        object.fail(key, "describes the body to be computed, and \"bank\" names it computed; keep one of them");
+    body.bank = object.path("bank");
+    return;
+  }
+  body.job = object.make_excerpt(kKeys);
+}
+
 SceneBody parse_body(base::Object& object, const effect_selection::EffectOverrides& overrides, double variation) {
   SceneBody body;
   body.name = object.string("name");
@@ -179,7 +195,8 @@ SceneBody parse_body(base::Object& object, const effect_selection::EffectOverrid
     object.fail("name",
                 fmt::format("is no name: at most {} bytes, and none of them a line feed or another control character", kLongestName));
   }
-  body.bank = object.path("bank");
+  body.place = object.find_place("");
+  read_bank_or_job(object, body);
   body.variation = read_within(object, "variation", variation, 0.0, 1.0);
   contact::BodySpec& spec = body.spec;
   spec.name = body.name;
@@ -349,6 +366,8 @@ contact::CordSpec parse_cord(base::Object& object, const Names& names) {
   return cord;
 }
 
+}  // namespace
+
 Mallet make_mallet(const material::NamedMallet& named) {
   Mallet mallet{.mass_kg = named.mass_kg, .speed_m_s = material::kMalletSpeedMs, .restitution = named.restitution};
   if (named.material.empty()) {
@@ -361,6 +380,8 @@ Mallet make_mallet(const material::NamedMallet& named) {
   }
   return mallet;
 }
+
+namespace {
 
 /// The mallet that the text of `key` names.
 Mallet read_named_mallet(base::Object& object, std::string_view key) {

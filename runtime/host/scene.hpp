@@ -14,6 +14,7 @@
 #include "runtime/base/vector.hpp"
 #include "runtime/contact/world.hpp"
 #include "runtime/effect_selection/effect_selector.hpp"
+#include "runtime/material/mallets.hpp"
 #include "runtime/radiation/gains.hpp"
 #include "runtime/support/losses.hpp"
 #include "runtime/synth/effects.hpp"
@@ -49,7 +50,9 @@ struct Mounting {
 
 struct SceneBody {
   std::string name;
-  std::filesystem::path bank;                   // absolute
+  std::string place;                            // "file:line", for messages
+  std::filesystem::path bank;                   // absolute; empty: `job` describes the body
+  base::Object::Excerpt job{};                  // keys of a job, for `carillon bank-for`
   contact::BodySpec spec;                       // spec.bank is filled when the banks are read
   effect_selection::EffectOverrides overrides;  // its own key "effects", or the scene's
   support::MountingRequest support{};           // its keys "on", "joint", "loss", "supports" and "held"
@@ -75,6 +78,9 @@ struct Mallet {
   double friction = 0.0;            // between head and body
   std::optional<Vec3> direction{};  // of its way, unit, in the frame of the body's mesh; nothing: straight into the surface
 };
+
+/// The head that a name stands for.
+Mallet make_mallet(const material::NamedMallet& named);
 
 /// A blow that the scene gives without physics. Point and impulse are in the frame of the body's mesh.
 struct SceneStrike {
@@ -142,7 +148,8 @@ struct Scene {
 /// Reads a scene file. Throws as parse_scene does, and for a file that cannot be read.
 Scene read_scene(const std::filesystem::path& file);
 
-/// Reads a scene. Banks are only named, not opened. Throws InputError "file:line: ..." for anything that is not a scene.
+/// Reads a scene. Banks are only named, not opened, and what describes a body in place of a bank is not looked at. Throws InputError
+/// "file:line: ..." for anything that is not a scene.
 Scene parse_scene(const base::Document& document);
 
 /// Channels of the sound: microphones, or two ears.

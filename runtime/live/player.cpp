@@ -235,7 +235,7 @@ void print_statistics(const DeviceStatistics& card, const synth::SynthesiserCoun
 
 void play(const PlayerOptions& options) {
   host::Scene scene = host::read_scene(options.scene);
-  const host::Banks banks = host::read_banks(scene);
+  const host::Banks banks = host::read_banks(scene, options.quiet);
   std::vector<const bank::Bank*> body_banks;
   for (const host::SceneBody& body : scene.bodies) body_banks.push_back(body.spec.bank);
   warn(scene.warnings);

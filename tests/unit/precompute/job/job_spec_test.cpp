@@ -7,6 +7,8 @@
 #include <fstream>
 #include <string>
 
+#include "precompute/job/preview.hpp"
+#include "runtime/base/failure.hpp"
 #include "tests/support/folder.hpp"
 #include "tests/unit/precompute/job/bad_job.hpp"
 
@@ -47,6 +49,43 @@ TEST(JobSpec, a_bank_may_be_left_out_only_where_a_store_keeps_it) {
   EXPECT_TRUE(parse_job(text, "/jobs/job.json", BankKey::optional).bank.empty());
   EXPECT_EQ(resolved_json(parse_job(text, "/jobs/job.json", BankKey::optional), "/jobs", "").find("bank"), std::string::npos);
   EXPECT_THROW(parse_job(text, "/jobs/job.json"), InputError);
+}
+
+TEST(JobSpec, a_shape_may_stand_in_short_form) {
+  const auto read = [](const std::string& body) {
+    return parse_job("{" + body + ", \"material\": \"glass\"}", "/jobs/job.json", BankKey::optional);
+  };
+  const JobSpec shortly = read(R"("shape": {"bowl": {"outer_radius_m": 0.06, "wall_m": 0.004, "nodes": 900}})");
+  const JobSpec longly = read(R"("body": {"shape": "bowl", "outer_radius_m": 0.06, "wall_m": 0.004, "nodes": 900})");
+  EXPECT_EQ(resolved_json(shortly, "/jobs", ""), resolved_json(longly, "/jobs", ""));
+  for (const char* bad : {R"("shape": {})", R"("shape": {"bowl": {}, "bar": {}})", R"("shape": {"bol": {}})", R"("shape": "bowl")",
+                          R"("shape": {"bowl": {}}, "mesh": "m.msh")", R"("shape": {"bowl": {"length_m": 1}})",
+                          R"("shape": {"bowl": {"nodes": 900}}, "accuracy_cents": 5)"})
+    EXPECT_THROW(read(bad), InputError) << bad;
+}
+
+TEST(JobSpec, what_says_neither_nodes_nor_accuracy_becomes_a_preview) {
+  const auto make = [](const std::string& body) {
+    JobSpec job = parse_job("{" + body + ", \"material\": \"glass\"}", "/jobs/job.json", BankKey::optional);
+    const bool is_preview = make_preview(job);
+    return std::pair(is_preview, job);
+  };
+  EXPECT_EQ(make(R"("shape": {"bowl": {"outer_radius_m": 0.06}})").second.body->nodes, kPreviewShapeNodes);
+  EXPECT_EQ(make(R"("body": {"surface": "cup.obj"})").second.body->nodes, kPreviewSolidNodes);
+  EXPECT_EQ(make(R"("body": {"surface": "cup.obj", "wall_m": 0.002}, "max_modes": 7)").second.max_modes, 7);
+  EXPECT_EQ(make(R"("shape": {"bowl": {"outer_radius_m": 0.06}})").second.max_modes, kPreviewModes);
+  for (const char* other : {R"("shape": {"bowl": {"nodes": 900}})", R"("shape": {"bowl": {}}, "accuracy_cents": 5)", R"("mesh": "m.msh")",
+                            R"("body": {"membrane": {"shape": "circle", "radius_m": 0.2, "lowest_hz": 200, "density_kg_m2": 0.3}})"})
+    EXPECT_FALSE(make(other).first) << other;
+  std::vector<std::int64_t> asked;
+  const auto refuse = [&](std::int64_t nodes) {
+    asked.push_back(nodes);
+    if (nodes < 7000) throw carillon::CountRefusal("too few", 7000);
+  };
+  EXPECT_EQ(run_at_possible_count(6000, "ask for more", refuse), 7000);
+  EXPECT_EQ(asked, (std::vector<std::int64_t>{6000, 7000}));
+  EXPECT_THROW(run_at_possible_count(6000, "ask for more", [](std::int64_t) { throw carillon::CountRefusal("too few", 90000); }),
+               InputError);
 }
 
 TEST(JobSpec, lame_constants_become_the_table_s_engineering_constants) {

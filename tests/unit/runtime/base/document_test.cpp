@@ -148,6 +148,25 @@ TEST(Document, finding_the_lines_of_all_values_reads_the_text_once) {
   EXPECT_LE(document.count_scanned_bytes(), text.size());
 }
 
+TEST(Document, an_excerpt_has_its_values_at_their_lines_of_the_file) {
+  auto whole = parse(
+      "{\n\"name\": \"a\", // the body\n\"material\":\n  \"glass\", \"fixed\": true,\n\"shape\": {\"bowl\": {\n\"wall_m\": "
+      "1e-3}},\n\"end\": [1, \"}\"]}");
+  const base::Object::Excerpt excerpt = whole.make_excerpt({"shape", "end", "material", "none"});
+  EXPECT_EQ(excerpt.first_line, 3);
+  auto part = base::parse_document(excerpt.text, "some/dir/file.json", excerpt.first_line).root();
+  EXPECT_EQ(part.keys(), (std::vector<std::string>{"material", "shape", "end"}));
+  EXPECT_EQ(part.string("material"), "glass");
+  EXPECT_EQ(part.object("shape").object("bowl").number("wall_m"), 1e-3);
+  for (const char* key : {"material", "shape", "end"}) EXPECT_EQ(part.find_place(key), whole.find_place(key)) << key;
+  auto bowl = part.object("shape").object("bowl");
+  EXPECT_NE(message_of([&] { bowl.finish(); }).find("file.json:6:"), std::string::npos);
+  whole.string("name");
+  whole.boolean_or("fixed", false);
+  whole.finish();  // what is in the excerpt was asked for
+  EXPECT_EQ(parse("{}").make_excerpt({"a"}).text, "{}\n");
+}
+
 TEST(Document, deep_nesting_is_refused_before_it_can_exhaust_the_stack) {
   const auto message = message_of([] { parse("{\"a\": " + std::string(1000000, '[')); });
   EXPECT_NE(message.find("brackets"), std::string::npos);

@@ -40,6 +40,19 @@ TEST(Scene, AWholeSceneIsRead) {
   EXPECT_FALSE(scene.output.gain_per_pa.has_value());
 }
 
+TEST(Scene, BodiesMayBeDescribedInPlaceOfABank) {
+  const Scene scene = parse(
+      "{\"duration_s\": 1, \"bodies\": [\n{\"name\": \"a\", \"shape\": {\"bowl\": {\"any\": 1}},\n\"material\": \"glass\", \"fixed\": "
+      "true},\n{\"name\": \"b\", \"bank\": \"b.h5\"}]}");
+  EXPECT_TRUE(scene.bodies[0].bank.empty());
+  EXPECT_EQ(scene.bodies[0].job.first_line, 2);
+  EXPECT_EQ(scene.bodies[0].job.text, "{\"shape\": {\"bowl\": {\"any\": 1}}, \n\"material\": \"glass\"}\n");
+  EXPECT_EQ(scene.bodies[0].place, "/somewhere/scene.json:2");
+  EXPECT_TRUE(scene.bodies[1].job.text.empty());
+  EXPECT_THROW(parse(R"({"duration_s": 1, "bodies": [{"name": "a", "bank": "a.h5", "shape": {"bowl": {}}}]})"), InputError);
+  EXPECT_THROW(parse(R"({"duration_s": 1, "bodies": [{"name": "a", "material": "glass"}]})"), InputError);
+}
+
 TEST(Scene, StrikesAreRead) {
   const Scene scene = parse("{\"duration_s\": 2, " + kBody + R"(, "strikes": [
     {"time_s": 0.5, "body": "a", "point_m": [0.1, 0, 0], "impulse_n_s": [0, 0, -0.01], "duration_s": 1e-3},

@@ -1,9 +1,8 @@
 // Method:     A blow J along the normal n at a vertex makes mode m sound with g_m |phi_m . n| J at 1 m; by the ear's weight of its
-// frequency
-//             (A-weighting) that is its level. Vertices are ranked by the sum of the squares.
+//             frequency (A-weighting) that is its level. Vertices are ranked by the sum of the squares.
 // Source:     docs/equations.md, E5 and E7.
 // Deviations: none.
-#include "runtime/bank/strikes.hpp"
+#include "runtime/bank/blows.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -16,8 +15,11 @@ namespace carillon::bank {
 namespace {
 
 constexpr double kHeard = 0.1;  // of the loudest vertex's power: struck where less is made, it would seem broken
+constexpr double kLoudest = 0.1;
 
-std::vector<Vec3> find_normals(const Bank& bank) {
+}  // namespace
+
+std::vector<Vec3> calc_vertex_normals(const Bank& bank) {
   std::vector<Vec3> normals(bank.vertex_count(), Vec3{});
   for (const auto& t : bank.triangles) {
     const Vec3 &a = bank.vertices_m[static_cast<std::size_t>(t[0])], &b = bank.vertices_m[static_cast<std::size_t>(t[1])],
@@ -30,28 +32,18 @@ std::vector<Vec3> find_normals(const Bank& bank) {
   return normals;
 }
 
-/// Of each mode, by what a unit blow makes of a unit of its shape along the normal.
-std::vector<double> calc_weights(const Bank& bank) {
-  std::vector<double> weights(bank.mode_count());
-  for (std::size_t m = 0; m < weights.size(); ++m)
-    weights[m] = calc_a_weight(bank.freq_hz(m)) * bank.radiation_gain[m] * bank.shape_scale[m];
-  return weights;
+std::vector<double> calc_blow_amplitudes(const Bank& bank, std::size_t vertex, const Vec3& direction) {
+  std::vector<double> amplitudes(bank.mode_count());
+  for (std::size_t m = 0; m < bank.mode_count(); ++m)
+    amplitudes[m] = calc_a_weight(bank.freq_hz(m)) * bank.radiation_gain[m] * std::abs(dot(bank.shape_at(vertex, m), direction));
+  return amplitudes;
 }
-
-/// The amplitude of a mode after a unit blow along the normal at a vertex.
-double calc_level(const Bank& bank, const std::vector<double>& weights, std::size_t vertex, const Vec3& normal, std::size_t mode) {
-  const std::int16_t* shape = &bank.shape[(vertex * bank.mode_count() + mode) * 3];
-  return weights[mode] * std::abs(shape[0] * normal[0] + shape[1] * normal[1] + shape[2] * normal[2]);
-}
-
-}  // namespace
 
 std::vector<std::size_t> find_strikes(const Bank& bank, std::size_t count) {
-  const std::vector<Vec3> normals = find_normals(bank);
-  const std::vector<double> weights = calc_weights(bank);
+  const std::vector<Vec3> normals = calc_vertex_normals(bank);
   std::vector<double> power(bank.vertex_count(), 0.0);
   for (std::size_t v = 0; v < power.size(); ++v)
-    for (std::size_t m = 0; m < weights.size(); ++m) power[v] += std::pow(calc_level(bank, weights, v, normals[v], m), 2);
+    for (const double a : calc_blow_amplitudes(bank, v, normals[v])) power[v] += a * a;
   std::vector<std::size_t> chosen;
   if (power.empty()) return chosen;
   chosen.push_back(static_cast<std::size_t>(std::max_element(power.begin(), power.end()) - power.begin()));
@@ -69,12 +61,13 @@ std::vector<std::size_t> find_strikes(const Bank& bank, std::size_t count) {
   return chosen;
 }
 
-std::vector<double> calc_blow_levels(const Bank& bank, std::size_t vertex) {
-  const Vec3 normal = find_normals(bank)[vertex];
-  const std::vector<double> weights = calc_weights(bank);
-  std::vector<double> levels(bank.mode_count());
-  for (std::size_t m = 0; m < levels.size(); ++m) levels[m] = calc_level(bank, weights, vertex, normal, m);
-  return levels;
+double calc_ring_s(const Bank& bank, std::size_t vertex) {
+  const std::vector<double> amplitudes = calc_blow_amplitudes(bank, vertex, calc_vertex_normals(bank)[vertex]);
+  const double loudest = amplitudes.empty() ? 0.0 : *std::max_element(amplitudes.begin(), amplitudes.end());
+  double longest = 0.0;
+  for (std::size_t m = 0; m < amplitudes.size(); ++m)
+    if (amplitudes[m] > kLoudest * loudest) longest = std::max(longest, std::log(1000.0) / bank.decay_per_s[m]);
+  return longest;
 }
 
 }  // namespace carillon::bank

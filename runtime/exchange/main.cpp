@@ -1,4 +1,5 @@
-// carillon-bank: what is in a bank; is it whole and sane; another density, stiffness, size or damping; fewer modes, coarser shapes.
+// carillon-bank: what is in a bank; is it whole and sane; another density, stiffness, size or damping; fewer modes, coarser shapes; other
+// formats.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -23,6 +24,7 @@
 #include "runtime/bank/write.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/base/standard_output.hpp"
+#include "runtime/exchange/commands.hpp"
 #include "runtime/material/solids.hpp"
 #include "runtime/material/table.hpp"
 #include "runtime/version/version.hpp"
@@ -172,6 +174,32 @@ void take_material(const bank::Bank& bank, Wishes& wishes) {
         bank.material.poisson_ratio, material.name, material.poisson_ratio, cents, material.name);
 }
 
+void add_export(CLI::App& app, exchange::ExportWishes& wishes) {
+  app.add_option("BANK", wishes.bank, "The bank file")->required();
+  app.add_option("-o,--output", wishes.out, "The file to write, .glb or .dsp; - is standard output")->required();
+  app.add_option("--format", wishes.format, "glb or faust, where the name of the file does not say")
+      ->check(CLI::IsMember({"glb", "faust"}));
+  app.add_option("--modes", wishes.modes, "The most audible so many; without it all (glb), or 100 (faust)")->check(CLI::PositiveNumber);
+  app.add_option("--points", wishes.points, "Where the body is struck (faust): X,Y,Z in metres, as many as there are; or how many (4)")
+      ->option_text("X,Y,Z ...");
+  app.add_option("--radiation", wishes.radiation, "How loud modes are (faust), as a scene's \"radiation\"")
+      ->check(CLI::IsMember({"sphere", "osg02", "vddp96"}))
+      ->capture_default_str();
+  app.add_option("--name", wishes.name, "Of the body in the file; without it that of the bank's file");
+  app.add_option_function<std::string>(
+         "--up", [&wishes](const std::string& axis) { wishes.is_z_up = axis == "z"; },
+         "The axis of the body that points up in the other program (glb), y or z; without it y")
+      ->check(CLI::IsMember({"y", "z"}));
+}
+
+void add_import(CLI::App& app, exchange::ImportWishes& wishes) {
+  app.add_option("GLB", wishes.glb, "The GLB file")->required();
+  app.add_option("-o,--output", wishes.out, "The bank to write; - is standard output")->required();
+  app.add_option("--model", wishes.model, "Which modal model of the file, from 0");
+  app.add_option("--material", wishes.material, "Of a model that names none, by its name (carillon materials)");
+  app.add_flag("--plain", wishes.is_plain, "Take what the extension itself says, without what carillon-bank export has added");
+}
+
 void edit(const std::string& file, const std::string& out, Wishes& wishes) {
   const bool is_piped = base::is_standard_output(out);
   if (is_piped)
@@ -227,6 +255,14 @@ int run(int argc, char** argv) {
   editing->add_option("BANK", file, "The bank file")->required();
   editing->add_option("OUT", edited, "The new bank file; - is standard output")->required();
   add_options(*editing, wishes);
+  exchange::ExportWishes exported;
+  CLI::App* exporting = app.add_subcommand(
+      "export", "The body for other programs: GLB (mesh and modes, KHR_audio_rigid_bodies) or Faust (the loudest modes at a few points)");
+  add_export(*exporting, exported);
+  exchange::ImportWishes imported;
+  CLI::App* importing =
+      app.add_subcommand("import", "The bank of a GLB file with KHR_audio_rigid_bodies; of one that export wrote, the same bank");
+  add_import(*importing, imported);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -236,6 +272,11 @@ int run(int argc, char** argv) {
     check(file);
   } else if (*editing) {
     edit(file, edited, wishes);
+  } else if (*exporting) {
+    exchange::run_export(exported);
+  } else if (*importing) {
+    if (!base::is_standard_output(imported.out)) check_bank_name(imported.out);
+    exchange::run_import(imported);
   } else {
     const bank::Bank bank = bank::read_bank(file);
     fmt::print("{}", json ? bank::format_info_json(bank, file) : base::printable_lines(bank::format_info(bank, file, modes, all)));

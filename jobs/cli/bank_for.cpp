@@ -1,0 +1,56 @@
+// carillon bank-for: the bank of a body, made if it is missing. carillon-render and carillon-live start it for bodies without a bank.
+#include <fmt/core.h>
+
+#include <iostream>
+#include <iterator>
+
+#include "jobs/cache/cache.hpp"
+#include "jobs/cli/commands.hpp"
+#include "precompute/job/job_spec.hpp"
+#include "runtime/base/result.hpp"
+
+namespace carillon::cli {
+namespace {
+
+job::JobSpec read(const BankForOptions& options) {
+  if (options.word != "-") return job::read_job(options.word, job::BankKey::optional);
+  const std::string text(std::istreambuf_iterator<char>(std::cin), {});
+  return job::parse_job(text, std::filesystem::absolute(options.name.empty() ? "standard input" : options.name), job::BankKey::optional,
+                        options.first_line);
+}
+
+int make(const Shared& shared, const BankForOptions& options) {
+  const std::filesystem::path cache = options.cache.empty() ? cache::find_default_cache() : options.cache;
+  const cache::Made made = cache::find_or_make(read(options), read_solver_version(), cache, options.is_quiet || shared.json);
+  for (const std::string& warning : made.warnings) fmt::print(stderr, "carillon: warning: {}\n", show_message(warning));
+  if (shared.json) {
+    Json::Value root;
+    root["bank"] = to_json(made.bank.string());
+    root["is_new"] = made.is_new;
+    root["warnings"] = to_json(made.warnings);
+    print_json(root);
+  } else {
+    fmt::print("{}\n", made.bank.string());
+  }
+  if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
+  return 0;
+}
+
+}  // namespace
+
+int run_bank_for(Shared& shared, const BankForOptions& options) {
+  if (options.result.empty()) return make(shared, options);
+  // The program that asked says what is wrong, once.
+  base::Result result;
+  int code = 0;
+  try {
+    code = make(shared, options);
+  } catch (...) {
+    result = base::describe_error(std::current_exception(), "out of memory; close other programs");
+    code = base::get_exit_code(result.kind);
+  }
+  base::write_result(options.result, result);
+  return code;
+}
+
+}  // namespace carillon::cli

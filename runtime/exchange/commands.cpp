@@ -1,0 +1,144 @@
+#include "runtime/exchange/commands.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+
+#include "runtime/bank/bank.hpp"
+#include "runtime/bank/reduce.hpp"
+#include "runtime/bank/write.hpp"
+#include "runtime/base/error.hpp"
+#include "runtime/base/file.hpp"
+#include "runtime/base/printable.hpp"
+#include "runtime/base/standard_output.hpp"
+#include "runtime/exchange/faust.hpp"
+#include "runtime/exchange/glb.hpp"
+#include "runtime/material/table.hpp"
+
+namespace carillon::exchange {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::uint64_t kMaxGlbBytes = 1ULL << 32;
+
+std::string lower_ending(const fs::path& file) {
+  std::string ending = file.extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return std::tolower(c); });
+  return ending;
+}
+
+std::string find_format(const ExportWishes& wishes) {
+  if (!wishes.format.empty()) return wishes.format;
+  const std::string ending = lower_ending(wishes.out);
+  if (ending == ".glb") return "glb";
+  if (ending == ".dsp") return "faust";
+  throw InputError(fmt::format("{}: a GLB file ends in .glb, a Faust program in .dsp; name it so, or give --format", wishes.out.string()));
+}
+
+/// "0.01,0,0.05"
+Vec3 read_point(const std::string& word) {
+  Vec3 point{};
+  const char* at = word.data();
+  const char* const end = at + word.size();
+  for (std::size_t c = 0; c < 3; ++c) {
+    const auto read = std::from_chars(at, end, point[c]);
+    const bool is_last = c == 2;
+    if (read.ec != std::errc() || !std::isfinite(point[c]) || (is_last ? read.ptr != end : read.ptr == end || *read.ptr != ','))
+      throw InputError(fmt::format("--points {}: give X,Y,Z in metres, or how many points are wanted", word));
+    at = read.ptr + 1;
+  }
+  return point;
+}
+
+void read_points(const std::vector<std::string>& words, FaustOptions& options) {
+  std::size_t count = 0;
+  if (words.size() == 1) {
+    const auto read = std::from_chars(words[0].data(), words[0].data() + words[0].size(), count);
+    if (read.ec == std::errc() && read.ptr == words[0].data() + words[0].size()) {
+      if (count < 1 || count > kMaxFaustPoints) throw InputError(fmt::format("--points {}: give 1 to {}", words[0], kMaxFaustPoints));
+      options.point_count = count;
+      return;
+    }
+  }
+  for (const std::string& word : words) options.points_m.push_back(read_point(word));
+}
+
+/// A file that appears whole, or standard output; and where words about it go.
+template <class Fill>
+void write_output(const fs::path& out, const char* what, const Fill& fill) {
+  if (base::is_standard_output(out)) {
+    base::check_standard_output(what);
+    fill([](std::string_view bytes) { base::write_standard_output(bytes); });
+    return;
+  }
+  base::check_writable(out, what);
+  base::WholeFile file(out);
+  fill([&](std::string_view bytes) { file.append(bytes); });
+  file.commit();
+}
+
+void check_other(const fs::path& in, const fs::path& out) {
+  std::error_code error;
+  if (fs::equivalent(in, out, error))
+    throw InputError(fmt::format("{}: this would overwrite what is read; name another file", out.string()));
+}
+
+}  // namespace
+
+void run_export(const ExportWishes& wishes) {
+  const std::string format = find_format(wishes);
+  check_other(wishes.bank, wishes.out);
+  std::FILE* const notes = base::is_standard_output(wishes.out) ? stderr : stdout;
+  const std::string name = wishes.name.empty() ? wishes.bank.stem().string() : wishes.name;
+  bank::Bank bank = bank::read_bank(wishes.bank);
+  if (format == "glb") {
+    for (const auto& [is_given, option] : {std::pair(!wishes.points.empty(), "--points"), {wishes.radiation != "sphere", "--radiation"}})
+      if (is_given) throw InputError(fmt::format("{} is for Faust; a GLB file has the whole surface and no gains", option));
+    const std::size_t modes = bank.mode_count();
+    if (wishes.modes) bank = bank::calc_reduced(bank, {.modes = wishes.modes});
+    std::uint64_t bytes = 0;
+    write_output(wishes.out, "GLB file", [&](const auto& sink) {
+      write_glb(bank, {.name = name, .is_z_up = wishes.is_z_up}, [&](std::string_view piece) {
+        bytes += piece.size();
+        sink(piece);
+      });
+    });
+    fmt::print(notes, "glb       {} of {} modes at {} points, {:.3g} MB\n", bank.mode_count(), modes, bank.vertex_count(),
+               1e-6 * static_cast<double>(bytes));
+    return;
+  }
+  if (wishes.is_z_up) throw InputError("--up is for GLB; a Faust program has no directions");
+  FaustOptions options{.name = name};
+  if (wishes.modes) options.modes = *wishes.modes;
+  read_points(wishes.points, options);
+  options.radiation = wishes.radiation == "osg02"    ? radiation::GainKind::kOsg02
+                      : wishes.radiation == "vddp96" ? radiation::GainKind::kVddp96
+                                                     : radiation::GainKind::kSphere;
+  const FaustProgram program = make_faust(bank, options);
+  write_output(wishes.out, "Faust program", [&](const auto& sink) { sink(program.text); });
+  fmt::print(notes, "faust     {} of {} modes{}\n", program.modes, bank.mode_count(),
+             std::isfinite(program.left_out_db) ? fmt::format("; what is left out is {:.1f} dB(A) below all", -program.left_out_db) : "");
+  for (std::size_t p = 0; p < program.points_m.size(); ++p)
+    fmt::print(notes, "point {:<4}{:.5g}, {:.5g}, {:.5g} m\n", p, program.points_m[p][0], program.points_m[p][1], program.points_m[p][2]);
+}
+
+void run_import(const ImportWishes& wishes) {
+  check_other(wishes.glb, wishes.out);
+  GlbReading reading{.model = wishes.model, .ignores_extras = wishes.is_plain};
+  if (!wishes.material.empty()) reading.material = &material::MaterialTable::get().require("--material", wishes.material).material;
+  const std::string bytes = base::read_file(wishes.glb, "GLB file", kMaxGlbBytes);
+  const bank::Bank bank = parse_glb(bytes, wishes.glb.string(), reading);
+  if (base::is_standard_output(wishes.out)) {
+    base::check_standard_output("bank");
+    base::write_standard_output(bank::make_bank_bytes(bank));
+  } else {
+    bank::write_bank(bank, wishes.out);
+    fmt::print("bank      {} modes, {} vertices: {}\n", bank.mode_count(), bank.vertex_count(), base::printable(wishes.out.string()));
+  }
+}
+
+}  // namespace carillon::exchange

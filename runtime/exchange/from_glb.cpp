@@ -1,0 +1,457 @@
+// Method:     Of a file with our extras: the arrays there, triangles and shapes from the extension, put together as those of a bank file
+//             are (bank::assemble_bank). What both places say has to agree. Of another program's: lambda = (2 pi f)^2 + d^2, shapes
+//             rounded to 16 bits; mass properties by the divergence theorem where the model has none.
+// Source:     KHR_audio_rigid_bodies, draft of 2026 (K. Hiner); integrals over a polyhedron: Tonon 2004.
+// Deviations: a scale of the node is taken in as it is at the beginning; its rotation and translation place the body and are no part of it.
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numbers>
+#include <numeric>
+#include <vector>
+
+#include "runtime/bank/layout.hpp"
+#include "runtime/bank/radiation_gain.hpp"
+#include "runtime/bank/surface.hpp"
+#include "runtime/base/error.hpp"
+#include "runtime/base/json.hpp"
+#include "runtime/base/sort_order.hpp"
+#include "runtime/base/vector.hpp"
+#include "runtime/exchange/damped.hpp"
+#include "runtime/exchange/glb.hpp"
+#include "runtime/gltf/file.hpp"
+#include "runtime/gltf/nodes.hpp"
+
+namespace carillon::exchange {
+namespace {
+
+using gltf::Component;
+
+constexpr std::size_t kMaxFields = 1000, kMaxListed = 10'000'000, kMaxNodes = 10'000'000;
+constexpr double kSameFreq = 1e-6;   // as far as float and a sum of squares may put a frequency off
+constexpr double kSameStep = 0.02;   // of a step of a shape, for a number that is whole but for its float
+constexpr double kSameLaw = 1e-5;    // of a decay in floats and its law
+constexpr double kSameScale = 1e-4;  // along the three axes of a node
+constexpr const char* kChanged = "was changed since carillon-bank wrote it; --plain takes what the extension itself says";
+
+/// The model, as the extension has it.
+struct Model {
+  std::vector<double> freq_hz, decay_per_s;            // (M)
+  std::vector<Vec3> positions;                         // (P)
+  std::vector<std::array<std::int32_t, 3>> triangles;  // (T)
+  gltf::Numbers shapes;                                // (M, P) rows of three
+};
+
+class Reader {
+ public:
+  Reader(std::string_view bytes, const std::string& name, const GlbReading& reading)
+      : file_(gltf::parse_glb(bytes, name)), reading_(&reading), root_(file_.root()) {}
+
+  bank::Bank read() {
+    base::Object extension = find_extension();
+    base::Object model = choose_model(extension);
+    read_model(model);
+    std::optional<base::Object> extras = model.object_if("extras");
+    std::optional<base::Object> own = extras && !reading_->ignores_extras ? extras->object_if("carillon") : std::nullopt;
+    return own ? assemble(*own) : make(extension, model);
+  }
+
+ private:
+  base::Object find_extension() {
+    std::optional<base::Object> extensions = root_.object_if("extensions");
+    if (!extensions || !extensions->has(kExtension))
+      throw InputError(fmt::format("{}: it has no {}, and so no modes; carillon hear solves its surface", file_.name(), kExtension));
+    return extensions->object(kExtension);
+  }
+
+  base::Object choose_model(base::Object& extension) {
+    std::vector<base::Object> models = extension.objects("modalModels");
+    if (models.empty()) extension.fail("modalModels", "there is no modal model in this file; export it with one");
+    if (!reading_->model && models.size() > 1)
+      extension.fail("modalModels", fmt::format("there are {} models; say which with --model, from 0", models.size()));
+    number_ = reading_->model.value_or(0);
+    if (number_ >= models.size())
+      extension.fail("modalModels", fmt::format("there is no model {}; there are {}, numbered from 0", number_, models.size()));
+    return models[number_];
+  }
+
+  std::vector<double> read_scalars(base::Object& model, const char* key) {
+    const gltf::Numbers numbers = file_.read(model, key, "SCALAR", {Component::kFloat});
+    std::vector<double> values(numbers.count());
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      values[i] = numbers.get(i, 0);
+      if (!(std::isfinite(values[i]) && values[i] >= 0.0)) model.fail(key, fmt::format("number {} is {}, which is none", i, values[i]));
+    }
+    return values;
+  }
+
+  std::vector<Vec3> read_rows(base::Object& owner, const char* key, double scale = 1.0) {
+    const gltf::Numbers numbers = file_.read(owner, key, "VEC3", {Component::kFloat});
+    std::vector<Vec3> rows(numbers.count());
+    for (std::size_t i = 0; i < rows.size(); ++i)
+      for (std::size_t c = 0; c < 3; ++c) {
+        rows[i][c] = scale * numbers.get(i, c);
+        if (!std::isfinite(rows[i][c])) owner.fail(key, fmt::format("row {} lies nowhere: {}", i, rows[i][c]));
+      }
+    return rows;
+  }
+
+  void read_model(base::Object& model) {
+    model_.freq_hz = read_scalars(model, "frequencies");
+    model_.decay_per_s = read_scalars(model, "decayRates");
+    const std::size_t modes = model_.freq_hz.size();
+    if (model_.decay_per_s.size() != modes)
+      model.fail("decayRates", fmt::format("has {} numbers, and there are {} frequencies", model_.decay_per_s.size(), modes));
+    for (std::size_t m = 0; m < modes; ++m)
+      if (!(model_.freq_hz[m] > 0.0)) model.fail("frequencies", fmt::format("number {} is 0, which no mode has", m));
+    model_.positions = read_rows(model, "positions");
+    const std::size_t points = model_.positions.size();
+    model_.shapes = file_.read(model, "shapes", "VEC3", {Component::kFloat});
+    if (model_.shapes.count() / points != modes || model_.shapes.count() % points != 0)
+      model.fail("shapes",
+                 fmt::format("has {} rows, and {} modes at {} points have {}", model_.shapes.count(), modes, points, modes * points));
+    if (!model.has("indices"))
+      model.fail("", "the model has no \"indices\": its points are no surface, which a bank needs; export it with them");
+    const gltf::Numbers corners = file_.read(model, "indices", "SCALAR", gltf::kIndexTypes);
+    if (corners.count() % 3 != 0) model.fail("indices", fmt::format("{} corners make no triangles", corners.count()));
+    model_.triangles.resize(corners.count() / 3);
+    for (std::size_t i = 0; i < corners.count(); ++i) {
+      const double v = corners.get(i, 0);
+      if (!(v < static_cast<double>(points))) model.fail("indices", fmt::format("index {} is {}, and there are {} points", i, v, points));
+      model_.triangles[i / 3][i % 3] = static_cast<std::int32_t>(v);
+    }
+  }
+
+  // ---- a bank that was written here ----
+
+  /// The modes of the bank that the rows of some shapes are.
+  std::vector<std::size_t> read_modes(base::Object& object, std::size_t count, std::size_t modes) {
+    std::vector<std::size_t> list;
+    for (const double number : object.number_list("modes", kMaxListed)) {
+      if (!(number >= 0.0 && number < static_cast<double>(modes) && number == std::floor(number)))
+        object.fail("modes", fmt::format("{:g} is no mode; there are {}", number, modes));
+      list.push_back(static_cast<std::size_t>(number));
+    }
+    if (list.size() != count) object.fail("modes", fmt::format("lists {} modes, and there are shapes of {}", list.size(), count));
+    return list;
+  }
+
+  static double get_double(const bank::FieldBytes& field, std::size_t i) {
+    double value = 0.0;
+    std::memcpy(&value, field.bytes.data() + i * sizeof value, sizeof value);
+    return value;
+  }
+
+  /// The field of that name with so many numbers of 8 bytes.
+  const bank::FieldBytes& find_field(const char* name, std::size_t count) const {
+    const auto found = fields_.find(name);
+    if (found == fields_.end() || found->second.bytes.size() != count * sizeof(double) || found->second.field.dtype != "<f8")
+      throw InputError(fmt::format("{}: its extras have no \"{}\" of {} numbers: it {}", file_.name(), name, count, kChanged));
+    return found->second;
+  }
+
+  void read_fields(base::Object& own) {
+    for (base::Object& entry : own.objects("fields")) {
+      if (fields_.size() > kMaxFields) own.fail("fields", "there are more than any bank has");
+      bank::FieldBytes array;
+      array.field.name = entry.string("name");
+      array.field.dtype = entry.string("type");
+      // An empty list is a single number; Object::number_list() takes none.
+      for (const std::int64_t extent : read_extents(entry)) array.field.shape.push_back(static_cast<std::uint64_t>(extent));
+      if (entry.has("view")) {
+        const std::string_view view = file_.read_view(entry, "view");
+        array.bytes = std::as_bytes(std::span(view.data(), view.size()));
+      }
+      const std::string name = array.field.name;
+      if (!fields_.emplace(name, array).second) entry.fail("name", fmt::format("\"{}\" is there twice: the file {}", name, kChanged));
+    }
+  }
+
+  static std::vector<std::int64_t> read_extents(base::Object& entry) {
+    std::vector<std::int64_t> extents;
+    if (entry.is_empty_list("shape")) return extents;
+    for (const double n : entry.number_list("shape", 4)) {
+      if (!(n >= 0.0 && n <= 9e15 && n == std::floor(n))) entry.fail("shape", fmt::format("{:g} is no number of rows", n));
+      extents.push_back(static_cast<std::int64_t>(n));
+    }
+    return extents;
+  }
+
+  /// Steps of the shapes of some modes into (V, m, 3).
+  void read_steps(base::Object& owner, const gltf::Numbers& shapes, const std::vector<std::size_t>& modes, std::size_t mode_count,
+                  std::vector<std::int16_t>& steps, std::vector<bool>& is_known) {
+    const std::size_t points = model_.positions.size();
+    const bank::FieldBytes& scales = find_field("modes/shape_scale", mode_count);
+    for (std::size_t k = 0; k < modes.size(); ++k) {
+      const std::size_t m = modes[k];
+      if (is_known[m]) owner.fail("modes", fmt::format("mode {} is there twice: the file {}", m, kChanged));
+      is_known[m] = true;
+      const double scale = get_double(scales, m);
+      for (std::size_t v = 0; v < points; ++v)
+        for (std::size_t c = 0; c < 3; ++c) {
+          const double exact = scale > 0.0 ? shapes.get(k * points + v, c) / scale : shapes.get(k * points + v, c),
+                       step = std::round(exact);
+          if (!(std::abs(exact - step) <= kSameStep && std::abs(step) <= 32767.0))
+            owner.fail("shapes", fmt::format("mode {} at point {} is no whole number of its steps: the file {}", k, v, kChanged));
+          steps[(v * mode_count + m) * 3 + c] = static_cast<std::int16_t>(step);
+        }
+    }
+  }
+
+  void compare_vertices(const bank::FieldBytes& vertices) {
+    for (std::size_t v = 0; v < model_.positions.size(); ++v)
+      for (std::size_t c = 0; c < 3; ++c)
+        if (static_cast<double>(static_cast<float>(get_double(vertices, 3 * v + c))) != model_.positions[v][c])
+          throw InputError(fmt::format("{}: point {} is not where its extras have it: the file {}", file_.name(), v, kChanged));
+  }
+
+  /// Frequencies and decays of the extension are those of the bank that comes of the extras.
+  void compare_modes(const bank::Bank& bank, const std::vector<std::size_t>& modes) {
+    for (std::size_t k = 0; k < modes.size(); ++k) {
+      const bool is_corrected = !bank.corrected.is_empty();
+      const double omega =
+          is_corrected ? 2.0 * std::numbers::pi * bank.corrected.freq_hz[modes[k]] : std::sqrt(bank.eigenvalue_rad2_s2[modes[k]]);
+      const double decay = is_corrected ? bank.corrected.decay_per_s[modes[k]] : bank.decay_per_s[modes[k]];
+      const double hz = calc_damped_hz(omega, decay);
+      if (!(std::abs(model_.freq_hz[k] - hz) <= kSameFreq * hz && std::abs(model_.decay_per_s[k] - decay) <= kSameFreq * decay))
+        throw InputError(fmt::format("{}: mode {} has {:.7g} Hz, and its extras say {:.7g} Hz: the file {}", file_.name(), k,
+                                     model_.freq_hz[k], hz, kChanged));
+    }
+  }
+
+  bank::Bank assemble(base::Object& own) {
+    read_fields(own);
+    const auto eigenvalues = fields_.find("modes/eigenvalue"), shape = fields_.find("modes/shape");
+    if (eigenvalues == fields_.end() || shape == fields_.end() || shape->second.field.shape.size() != 3)
+      own.fail("fields", fmt::format("there are no eigenvalues or shapes among them: the file {}", kChanged));
+    const std::size_t mode_count = eigenvalues->second.bytes.size() / sizeof(double), points = model_.positions.size();
+    compare_vertices(find_field("mesh/vertices", 3 * points));
+    std::optional<base::Object> still = own.object_if("still");
+    gltf::Numbers still_shapes;
+    if (still) still_shapes = file_.read(*still, "shapes", "VEC3", {Component::kFloat});
+    const std::size_t still_count = still_shapes.count() / points;
+    if (still_shapes.count() % points != 0 || model_.freq_hz.size() + still_count != mode_count)
+      own.fail("modes", fmt::format("there are shapes of {} modes, and {} modes: the file {}", model_.freq_hz.size() + still_count,
+                                    mode_count, kChanged));
+    std::vector<std::int16_t> steps(3 * mode_count * points);
+    std::vector<bool> is_known(mode_count, false);
+    const std::vector<std::size_t> swinging = read_modes(own, model_.freq_hz.size(), mode_count);
+    read_steps(own, model_.shapes, swinging, mode_count, steps, is_known);
+    if (still) read_steps(*still, still_shapes, read_modes(*still, still_count, mode_count), mode_count, steps, is_known);
+
+    std::vector<std::int8_t> narrow;
+    if (shape->second.field.dtype == "|i1") {
+      narrow.assign(steps.begin(), steps.end());
+      shape->second.bytes = std::as_bytes(std::span(narrow));
+    } else {
+      shape->second.bytes = std::as_bytes(std::span(steps));
+    }
+    std::vector<bank::FieldBytes> arrays;
+    for (const auto& [name, array] : fields_) arrays.push_back(array);
+    bank::FieldBytes triangles;
+    triangles.field = {"mesh/triangles", "<i4", {model_.triangles.size(), 3}, "", "", nullptr};
+    triangles.bytes = std::as_bytes(std::span(model_.triangles));
+    arrays.push_back(triangles);
+    bank::Bank bank = bank::assemble_bank(arrays, file_.name());
+    compare_modes(bank, swinging);
+    return bank;
+  }
+
+  // ---- a model of another program ----
+
+  /// By how much the first node that has the model enlarges it; 1 where none has.
+  double find_scale() {
+    std::vector<base::Object> nodes = root_.objects("nodes");
+    std::vector<std::size_t> parent(nodes.size(), nodes.size());
+    std::optional<std::size_t> found;
+    for (std::size_t n = 0; n < nodes.size(); ++n) {
+      if (nodes[n].has("children"))
+        for (const double child : nodes[n].number_list("children", kMaxNodes))
+          if (child >= 0.0 && child < static_cast<double>(nodes.size())) parent[static_cast<std::size_t>(child)] = n;
+      std::optional<base::Object> extensions = nodes[n].object_if("extensions");
+      std::optional<base::Object> own = extensions ? extensions->object_if(kExtension) : std::nullopt;
+      if (found || !own) continue;
+      if (own->integer_if("modalModel", 0, std::numeric_limits<std::int32_t>::max()) == static_cast<long long>(number_)) found = n;
+    }
+    gltf::Matrix matrix = gltf::kIdentity;
+    std::size_t steps = 0;
+    for (std::size_t n = found.value_or(nodes.size()); n < nodes.size(); n = parent[n]) {
+      if (++steps > nodes.size()) nodes[n].fail("", fmt::format("node {} hangs inside itself; export it again", n));
+      matrix = gltf::multiply(gltf::read_transform(nodes[n]), matrix);
+    }
+    const std::array<double, 3> along{norm(Vec3{matrix[0], matrix[1], matrix[2]}), norm(Vec3{matrix[4], matrix[5], matrix[6]}),
+                                      norm(Vec3{matrix[8], matrix[9], matrix[10]})};
+    const auto [low, high] = std::minmax_element(along.begin(), along.end());
+    if (!(*low > 0.0 && *high - *low <= kSameScale * *high))
+      nodes[*found].fail("", "its node is not scaled by the same along all axes, and no modes are known of such a body; apply the scale");
+    return *high;
+  }
+
+  struct Solid {
+    double volume_m3 = 0.0;
+    Vec3 centre_m{};
+    std::array<double, 9> inertia_m5{};  // of unit density, about the centre
+  };
+
+  /// Of the volume that a closed surface encloses.
+  static Solid calc_solid(const bank::Bank& bank) {
+    Solid solid;
+    Eigen::Matrix3d second = Eigen::Matrix3d::Zero();  // integral of x x^T
+    Eigen::Vector3d first = Eigen::Vector3d::Zero();
+    for (const auto& triangle : bank.triangles) {
+      Eigen::Matrix3d p;
+      for (int c = 0; c < 3; ++c)
+        p.col(c) = Eigen::Map<const Eigen::Vector3d>(bank.vertices_m[static_cast<std::size_t>(triangle[c])].data());
+      const double part = p.determinant() / 6.0;  // of the tetrahedron with the origin
+      const Eigen::Vector3d sum = p.rowwise().sum();
+      solid.volume_m3 += part;
+      first += part / 4.0 * sum;
+      second += part / 20.0 * (sum * sum.transpose() + p * p.transpose());
+    }
+    const Eigen::Vector3d centre = first / solid.volume_m3;
+    const Eigen::Matrix3d about = second - solid.volume_m3 * centre * centre.transpose();
+    const Eigen::Matrix3d inertia = about.trace() * Eigen::Matrix3d::Identity() - about;
+    for (std::size_t c = 0; c < 3; ++c) solid.centre_m[c] = centre[static_cast<int>(c)];
+    for (std::size_t i = 0; i < 9; ++i) solid.inertia_m5[i] = inertia(static_cast<int>(i / 3), static_cast<int>(i % 3));
+    return solid;
+  }
+
+  bank::Material read_material(base::Object& extension, base::Object& model) {
+    bank::Material material;
+    if (reading_->material != nullptr) {
+      material.young_modulus_pa = reading_->material->young_modulus_pa;
+      material.poisson_ratio = reading_->material->poisson_ratio;
+      material.density_kg_m3 = reading_->material->density_kg_m3;
+      return material;
+    }
+    std::vector<base::Object> materials = extension.objects("acousticMaterials");
+    const auto number = model.integer_if("material", 0, static_cast<long long>(materials.size()) - 1);
+    if (!number) model.fail("material", "the model names no material, whose stiffness contacts need; say what it is with --material NAME");
+    base::Object& own = materials[static_cast<std::size_t>(*number)];
+    for (const char* key : {"density", "youngsModulus", "poissonRatio"})
+      if (!own.has(key)) own.fail(key, fmt::format("the material of the model has no \"{}\"; say what it is with --material NAME", key));
+    material.density_kg_m3 = own.number("density", base::kPositive);
+    material.young_modulus_pa = own.number("youngsModulus", base::kPositive);
+    material.poisson_ratio = own.number("poissonRatio", {-1.0, 0.5});
+    material.alpha2_per_s = own.number_or("alpha", 0.0);
+    material.alpha1_s = own.number_or("beta", 0.0);
+    return material;
+  }
+
+  /// The mass properties of the model, or of its surface filled with the material.
+  void read_mass(base::Object& model, double scale, bank::Bank& bank) {
+    const Solid solid = calc_solid(bank);
+    if (!(solid.volume_m3 > 0.0))
+      model.fail("indices", "its triangles enclose no volume, or face inward; a bank is of a closed surface that faces outward");
+    bank.rigid.volume_m3 = solid.volume_m3;
+    bank.rigid.mass_kg = bank.material.density_kg_m3 * solid.volume_m3;
+    bank.rigid.centre_m = solid.centre_m;
+    std::optional<base::Object> own = model.object_if("massProperties");
+    std::optional<std::array<double, 3>> diagonal;
+    if (own) {
+      bank.rigid.mass_kg = own->number("mass", base::kPositive);
+      for (std::size_t c = 0; c < 3; ++c) bank.rigid.centre_m[c] = scale * own->numbers_or<3>("centerOfMass", {0, 0, 0})[c];
+      if (own->has("inertiaDiagonal")) diagonal = own->numbers<3>("inertiaDiagonal");
+    }
+    if (diagonal && (*diagonal)[0] > 0.0 && (*diagonal)[1] > 0.0 && (*diagonal)[2] > 0.0) {
+      const auto q = own->numbers_or<4>("inertiaOrientation", {0, 0, 0, 1});
+      const Eigen::Matrix3d axes = Eigen::Quaterniond(q[3], q[0], q[1], q[2]).normalized().toRotationMatrix();
+      const Eigen::Matrix3d inertia =
+          axes * Eigen::Vector3d((*diagonal)[0], (*diagonal)[1], (*diagonal)[2]).asDiagonal() * axes.transpose();
+      for (std::size_t i = 0; i < 9; ++i) bank.rigid.inertia_kg_m2[i] = inertia(static_cast<int>(i / 3), static_cast<int>(i % 3));
+    } else {
+      for (std::size_t i = 0; i < 9; ++i) bank.rigid.inertia_kg_m2[i] = bank.rigid.mass_kg / solid.volume_m3 * solid.inertia_m5[i];
+    }
+    bank.material.density_kg_m3 = bank.rigid.mass_kg / solid.volume_m3;
+  }
+
+  /// Rayleigh's law where the decays follow it, else decays as they are.
+  static void settle_damping(bank::Bank& bank) {
+    bank.damping.law = "mixed";
+    const double a1 = bank.material.alpha1_s, a2 = bank.material.alpha2_per_s;
+    std::vector<double> law;
+    for (std::size_t m = 0; m < bank.mode_count(); ++m) law.push_back(0.5 * (a1 * bank.eigenvalue_rad2_s2[m] + a2));
+    for (std::size_t m = 0; m < bank.mode_count(); ++m)
+      if (!(std::abs(bank.decay_per_s[m] - law[m]) <= kSameLaw * law[m])) {
+        bank.material.alpha1_s = bank.material.alpha2_per_s = 0.0;
+        return;
+      }
+    bank.damping.law = "rayleigh";
+    bank.decay_per_s = law;
+  }
+
+  /// As docs/equations.md (E5) has them for every bank.
+  static void find_gains(bank::Bank& bank) {
+    std::vector<double> flow(bank.mode_count(), 0.0);
+    double area_m2 = 0.0;
+    for (const bank::Triangle& triangle : bank::find_outer_triangles(bank.vertices_m, bank.triangles)) {
+      const Vec3 normal = bank::calc_normal(bank.vertices_m, triangle);
+      area_m2 += 0.5 * norm(normal);
+      for (std::size_t m = 0; m < bank.mode_count(); ++m) {
+        Vec3 sum{};
+        for (const std::int32_t v : triangle) sum = sum + bank.shape_at(static_cast<std::size_t>(v), m);
+        flow[m] += std::abs(dot(sum, normal)) / 6.0;
+      }
+    }
+    for (std::size_t m = 0; m < bank.mode_count(); ++m)
+      bank.radiation_gain.push_back(bank::calc_radiation_gain(std::sqrt(bank.eigenvalue_rad2_s2[m]), flow[m], area_m2));
+  }
+
+  bank::Bank make(base::Object& extension, base::Object& model) {
+    const std::size_t modes = model_.freq_hz.size(), points = model_.positions.size();
+    const double scale = find_scale();
+    bank::Bank bank;
+    for (const Vec3& p : model_.positions) bank.vertices_m.push_back(scale * p);
+    bank.triangles = model_.triangles;
+    std::vector<double> lambda(modes);
+    for (std::size_t m = 0; m < modes; ++m)
+      lambda[m] = std::pow(2.0 * std::numbers::pi * model_.freq_hz[m], 2) + model_.decay_per_s[m] * model_.decay_per_s[m];
+    const std::vector<std::size_t> order = base::find_sort_order(lambda);
+    std::vector<double> shapes(3 * modes * points);
+    for (std::size_t m = 0; m < modes; ++m) {
+      bank.eigenvalue_rad2_s2.push_back(lambda[order[m]]);
+      bank.decay_per_s.push_back(model_.decay_per_s[order[m]]);
+      for (std::size_t v = 0; v < points; ++v)
+        for (std::size_t c = 0; c < 3; ++c) {
+          const double phi = model_.shapes.get(order[m] * points + v, c);
+          if (!std::isfinite(phi)) model.fail("shapes", fmt::format("mode {} moves point {} by {}", order[m], v, phi));
+          shapes[(v * modes + m) * 3 + c] = phi;
+        }
+    }
+    bank.residual.assign(modes, 0.0);
+    bank::quantise_shapes(bank, shapes);
+    bank.material = read_material(extension, model);
+    read_mass(model, scale, bank);
+    settle_damping(bank);
+    find_gains(bank);
+    bank.counts = {.nodes = static_cast<std::int64_t>(points), .tets = 1, .components = 1, .rigid_modes = 6};
+    bank.band_hz = {std::min(20.0, 0.99 * bank.freq_hz(0)), std::max(20000.0, 1.01 * bank.freq_hz(modes - 1))};
+    bank.complete = false;
+    bank.element = "analytic";
+    bank.mass = "consistent";
+    bank.provenance = base::Json::object().set("imported", kExtension).set("file", file_.name()).line();
+    if (const std::vector<std::string> faults = bank::find_faults(bank); !faults.empty())
+      throw InputError(fmt::format("{}: no bank comes of its model: {}; correct it in the program that made it", file_.name(), faults[0]));
+    return bank;
+  }
+
+  gltf::File file_;
+  const GlbReading* reading_;
+  base::Object root_;
+  std::size_t number_ = 0;  // of the model
+  Model model_;
+  std::map<std::string, bank::FieldBytes> fields_;
+};
+
+}  // namespace
+
+bank::Bank parse_glb(std::string_view bytes, const std::string& name, const GlbReading& reading) {
+  return Reader(bytes, name, reading).read();
+}
+
+}  // namespace carillon::exchange

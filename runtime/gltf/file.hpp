@@ -1,0 +1,115 @@
+// A glTF 2 file being read: its JSON, its buffers, and the numbers of its accessors. What a file says is checked against the bytes that are
+// there before any of them is read; what is in the JSON beyond accessors is the reader's own.
+//
+//   gltf::File file = gltf::parse_glb(bytes, "body.glb");
+//   base::Object attributes = ...;                                   // of file.root()
+//   const gltf::Numbers points = file.read(attributes, "POSITION", "VEC3", gltf::kVertexTypes);
+//
+// All errors are InputError that begins with the name of the file. One thread.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <initializer_list>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "runtime/base/document.hpp"
+
+namespace carillon::gltf {
+
+/// Types of the numbers in an accessor, by their numbers in the file.
+enum class Component : std::uint16_t {
+  kByte = 5120,
+  kUnsignedByte = 5121,
+  kShort = 5122,
+  kUnsignedShort = 5123,
+  kUnsignedInt = 5125,
+  kFloat = 5126
+};
+inline constexpr std::initializer_list<Component> kIndexTypes{Component::kUnsignedByte, Component::kUnsignedShort, Component::kUnsignedInt};
+inline constexpr std::initializer_list<Component> kVertexTypes{Component::kByte,          Component::kUnsignedByte, Component::kShort,
+                                                               Component::kUnsignedShort, Component::kUnsignedInt,  Component::kFloat};
+
+/// The numbers of an accessor where they lie: `count` entries of one (SCALAR), three (VEC3) ... numbers. They end with the file.
+class Numbers {
+ public:
+  std::size_t count() const { return count_; }
+  /// Number `c` of entry `i`, which is there; normalised ones are within -1 and 1.
+  double get(std::size_t i, std::size_t c) const {
+    const char* at = bytes_.data() + i * stride_;
+    switch (component_) {
+      case Component::kByte:
+        return scale(read<std::int8_t>(at, c), 127);
+      case Component::kUnsignedByte:
+        return scale(read<std::uint8_t>(at, c), 255);
+      case Component::kShort:
+        return scale(read<std::int16_t>(at, c), 32767);
+      case Component::kUnsignedShort:
+        return scale(read<std::uint16_t>(at, c), 65535);
+      case Component::kUnsignedInt:
+        return read<std::uint32_t>(at, c);
+      default:
+        return static_cast<double>(read<float>(at, c));
+    }
+  }
+
+ private:
+  friend class File;
+  template <class T>
+  static T read(const char* at, std::size_t c) {
+    T value{};
+    std::memcpy(&value, at + c * sizeof(T), sizeof(T));
+    return value;
+  }
+  double scale(double value, double largest) const {
+    const double share = value / largest;
+    return is_normalised_ ? (share < -1.0 ? -1.0 : share) : value;
+  }
+
+  std::string_view bytes_;
+  std::size_t count_ = 0, stride_ = 0;
+  Component component_ = Component::kFloat;
+  bool is_normalised_ = false;
+};
+
+/// Every index of a buffer, a view or an accessor that it gives out has been found inside what holds it.
+class File {
+ public:
+  base::Object root() const { return root_; }
+  const std::string& name() const { return name_; }
+
+  /// The accessor whose number `key` of `owner` holds: of that type and one of these components. Throws InputError for one that is not
+  /// there, is sparse, or has more numbers than its bytes hold.
+  Numbers read(base::Object& owner, const char* key, const char* type, std::initializer_list<Component> components);
+  /// The bytes of the view whose number `key` of `owner` holds.
+  std::string_view read_view(base::Object& owner, const char* key);
+
+ private:
+  friend File parse_glb(std::string_view bytes, const std::string& name);
+  friend File parse_text(std::string_view text, const std::string& name);
+  File(std::string_view json, std::optional<std::string_view> binary, const std::string& name);
+  void check();
+  void open_buffers(std::optional<std::string_view> binary);
+  std::string read_uri(base::Object& buffer) const;
+  std::string_view find_view(std::size_t number, base::Object& view);
+
+  std::string name_;
+  base::Document document_;
+  base::Object root_;
+  std::vector<base::Object> views_, accessors_;
+  std::vector<std::string_view> buffers_;
+  std::vector<std::unique_ptr<std::string>> owned_;
+};
+
+/// A GLB file, whose bytes outlive the result; `name` is that of the file, next to which others may lie that it names.
+/// Throws InputError for what is none, for glTF 1, for compressed meshes, and for buffers whose bytes are not there.
+File parse_glb(std::string_view bytes, const std::string& name);
+/// The same of a .gltf file.
+File parse_text(std::string_view text, const std::string& name);
+
+}  // namespace carillon::gltf

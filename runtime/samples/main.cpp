@@ -1,0 +1,107 @@
+// carillon-samples: strikes of a body as samples for any sampler.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <exception>
+#include <string>
+#include <vector>
+
+#include "runtime/base/error.hpp"
+#include "runtime/base/printable.hpp"
+#include "runtime/samples/samples.hpp"
+#include "runtime/version/version.hpp"
+
+namespace {
+
+using namespace carillon;
+
+int fail(int code, const char* message) {
+  std::fflush(stdout);
+  fmt::print(stderr, "carillon-samples: {}\n", base::printable(message));
+  return code;
+}
+
+void run(samples::SampleOptions& options, bool is_quiet) {
+  int next = 10;
+  if (!is_quiet)
+    options.progress = [&next](double share) {
+      if (100.0 * share + 1e-9 < next) return;
+      fmt::print(stderr, "samples: {} %\n", next);
+      next += 10;
+    };
+  const samples::SampleSet set = samples::make_samples(options);
+  if (is_quiet) return;
+  fmt::print("samples     {}, {:.3g} MB\n", set.samples, 1e-6 * set.bytes);
+  fmt::print("full scale  {:.4g} Pa at 1 m, at velocity 127\n", set.full_scale_pa);
+  if (options.layers > 1)
+    fmt::print("layers      {}; a mode changes by up to {:.1f} dB from one to the next, beyond its velocity\n", options.layers,
+               set.layer_step_db);
+  for (const auto& file : set.instruments) fmt::print("instrument  {}\n", base::printable(file.string()));
+}
+
+/// The numbers of --at, three a point.
+void take_points(const std::vector<double>& numbers, samples::SampleOptions& options) {
+  if (numbers.size() % 3 != 0) throw InputError(fmt::format("--at has {} numbers; give three for each point, in metres", numbers.size()));
+  for (std::size_t i = 0; i < numbers.size(); i += 3) options.points_m.push_back({numbers[i], numbers[i + 1], numbers[i + 2]});
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  samples::SampleOptions options;
+  bool is_quiet = false;
+  std::string keys = samples::kKeysNames[0], format = "pcm24";
+  std::vector<double> at;
+  CLI::App app("Strikes a body and writes the sounds as samples: WAV files and an SFZ instrument, which any sampler plays.",
+               "carillon-samples");
+  app.failure_message(
+      [](const CLI::App* asked, const CLI::Error& error) { return base::printable_lines(CLI::FailureMessage::simple(asked, error)); });
+  app.set_version_flag("--version", version::describe("carillon-samples"));
+  app.add_option("BANK", options.bank, "The bank file")->required();
+  app.add_option("-o,--output", options.folder, "The folder for the instrument and its samples")->required();
+  app.add_option("--name", options.name, "Of the instrument; without it that of the bank's file");
+  CLI::Option* places = app.add_option("--places", options.places, "Strike it in so many places, far from each other")
+                            ->check(CLI::Range(1, 64))
+                            ->capture_default_str();
+  app.add_option("--at", at, "Strike it at these points: X Y Z in metres, three numbers each")->excludes(places)->option_text("X Y Z ...");
+  app.add_option("--layers", options.layers, "Layers of velocity")->check(CLI::Range(1, 16))->capture_default_str();
+  app.add_option("--mallets", options.mallets,
+                 "By name, with commas between them: steel, hard-wood, plastic, rubber, hard-felt, soft-felt, yarn")
+      ->delimiter(',')
+      ->capture_default_str();
+  app.add_option("--round-robin", options.round_robin, "Strikes around each place that take turns")
+      ->check(CLI::Range(1, 16))
+      ->capture_default_str();
+  app.add_option("--speed", options.speed_m_s, "Of the mallet at velocity 127, in m/s")->capture_default_str();
+  app.add_option("--keys", keys, "What a key is: \"places\", each at its own pitch, or \"pitches\", one body over the keyboard")
+      ->check(CLI::IsMember(samples::kKeysNames))
+      ->capture_default_str();
+  app.add_option("--first-key", options.first_key, "The first key of places, 0 to 127; 60 is middle C")->capture_default_str();
+  app.add_option("--rate", options.rate_hz, "Sample rate")->check(CLI::Range(8000, 192000))->capture_default_str();
+  app.add_option("--format", format, "pcm16, pcm24, pcm32 or float")->check(CLI::IsMember(host::kSampleFormatNames))->capture_default_str();
+  app.add_option("--seconds", options.max_seconds, "Length of a sample at most; it ends at 80 dB below its peak")->capture_default_str();
+  app.add_flag("-q,--quiet", is_quiet, "Print nothing but errors");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : kExitInput;
+  }
+  const auto find = [](const std::vector<std::string>& names, const std::string& name) {
+    return std::find(names.begin(), names.end(), name) - names.begin();
+  };
+  options.keys = static_cast<samples::Keys>(find(samples::kKeysNames, keys));
+  options.format = static_cast<host::SampleFormat>(find(host::kSampleFormatNames, format));
+  try {
+    take_points(at, options);
+    run(options, is_quiet);
+  } catch (const InputError& error) {
+    return fail(kExitInput, error.what());
+  } catch (const SolveError& error) {
+    return fail(kExitSolve, error.what());
+  } catch (const std::exception& error) {
+    return fail(kExitSystem, error.what());
+  }
+  return 0;
+}

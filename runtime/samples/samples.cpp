@@ -1,0 +1,343 @@
+// Method:     each sample is a scene of one blow (runtime/host), heard at 1 m without delay. A layer is struck at the speed of its middle
+//             velocity, v = v127 (velocity / 127)^2, since samplers play a velocity at (velocity / 127)^2 of full scale (SFZ's
+//             amp_veltrack): what is written is the sound over that factor, times one gain for all. Within a layer the level is then that
+//             of the blow as far as the blow is linear; brightness changes from layer to layer.
+// Source:     SFZ 1 (Cakewalk 2004); docs/equations.md E5a.
+// Deviations: the body does not move: no click of its acceleration. A blow is along the normal.
+#include "runtime/samples/samples.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <numbers>
+#include <variant>
+
+#include "runtime/bank/blows.hpp"
+#include "runtime/bank/nearest.hpp"
+#include "runtime/bank/reduce.hpp"
+#include "runtime/base/error.hpp"
+#include "runtime/base/file.hpp"
+#include "runtime/base/vector.hpp"
+#include "runtime/host/banks.hpp"
+#include "runtime/host/events.hpp"
+#include "runtime/host/render.hpp"
+#include "runtime/host/sound_file.hpp"
+#include "runtime/host/sound_store.hpp"
+#include "runtime/host/strikes.hpp"
+#include "runtime/material/mallets.hpp"
+
+namespace carillon::samples {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kVelocities = 127, kKeyCount = 128;
+constexpr std::size_t kMaxPlaces = 64, kMaxMallets = 16;
+constexpr int kMaxLayers = 16, kMaxRoundRobin = 16;
+constexpr double kPeakDbfs = -1.0;
+constexpr double kSilence = 1e-4;  // of the peak, where a sample ends
+constexpr double kShortestS = 0.05;
+constexpr double kAround = 0.05;   // of the body's extent: how far from a place its other strikes are
+constexpr double kHeardDb = 30.0;  // below the loudest mode
+
+/// A layer of velocities, and the one that is struck.
+struct Layer {
+  int low = 1, high = kVelocities, middle = 64;
+  double share() const { return std::pow(static_cast<double>(middle) / kVelocities, 2); }  // of full scale, by which a sampler plays it
+};
+
+std::vector<Layer> divide_velocities(int layers) {
+  std::vector<Layer> list;
+  for (int i = 0; i < layers; ++i) {
+    Layer layer{.low = 1 + i * kVelocities / layers, .high = (i + 1) * kVelocities / layers};
+    layer.middle = (layer.low + layer.high + 1) / 2;
+    list.push_back(layer);
+  }
+  return list;
+}
+
+/// One strike and its sound.
+struct Sample {
+  std::size_t mallet = 0, place = 0;
+  int layer = 0, turn = 0;
+  std::string file;           // relative to the folder
+  std::vector<float> frames;  // [Pa]
+  double peak_pa = 0.0;
+};
+
+class Maker {
+ public:
+  explicit Maker(const SampleOptions& options) : options_(&options) {
+    check();
+    name_ = options.name.empty() ? options.bank.stem().string() : options.name;
+    layers_ = divide_velocities(options.layers);
+    open();
+    choose_places();
+  }
+
+  SampleSet run() {
+    SampleSet set;
+    std::error_code error;
+    fs::create_directories(options_->folder / "samples", error);
+    if (error)
+      throw SystemError(
+          fmt::format("{}: the folder cannot be made: {}; give another one with -o", options_->folder.string(), error.message()));
+    strike_all(set);
+    const double gain = write_waves(set);
+    set.full_scale_pa = 1.0 / gain;
+    write_instruments(set);
+    return set;
+  }
+
+ private:
+  void check() const {
+    const auto require = [](bool is_so, const std::string& message) {
+      if (!is_so) throw InputError(message);
+    };
+    const SampleOptions& o = *options_;
+    require(o.layers >= 1 && o.layers <= kMaxLayers, fmt::format("{} velocity layers; give 1 to {}", o.layers, kMaxLayers));
+    require(o.round_robin >= 1 && o.round_robin <= kMaxRoundRobin,
+            fmt::format("{} strikes in turn; give 1 to {}", o.round_robin, kMaxRoundRobin));
+    require(!o.mallets.empty() && o.mallets.size() <= kMaxMallets, fmt::format("{} mallets; give 1 to {}", o.mallets.size(), kMaxMallets));
+    require(o.speed_m_s > 0.0 && o.speed_m_s <= 100.0, fmt::format("a mallet of {:g} m/s; give a speed up to 100 m/s", o.speed_m_s));
+    require(o.max_seconds >= kShortestS && o.max_seconds <= 600.0,
+            fmt::format("samples of {:g} s; give {:g} to 600", o.max_seconds, kShortestS));
+    require(o.first_key >= 0 && o.first_key < kKeyCount, fmt::format("key {}; keys are 0 to {}", o.first_key, kKeyCount - 1));
+    for (const std::string& name : o.mallets) (void)material::require_mallet("--mallets", name);
+  }
+
+  void open() {
+    scene_.file = options_->bank;
+    scene_.sample_rate_hz = options_->rate_hz;
+    scene_.gravity_m_s2 = {};
+    host::SceneBody body;
+    body.name = name_;
+    body.place = options_->bank.string();
+    body.bank = fs::absolute(options_->bank);
+    body.spec.name = name_;
+    body.spec.fixed = true;
+    scene_.bodies.push_back(body);
+    scene_.overrides.automatic = false;
+    scene_.overrides.on = {synth::Effect::kModal};
+    scene_.effects = scene_.overrides.on;
+    banks_ = host::read_banks(scene_);
+    bank_ = scene_.bodies[0].spec.bank;
+    if (bank_->mode_count() == 0 || bank_->triangles.empty())
+      throw InputError(fmt::format("{}: the bank has no modes, and so no sound", options_->bank.string()));
+    scene_.microphones_m = {bank_->rigid.centre_m + Vec3{1.0, 0.0, 0.0}};
+    low_ = high_ = bank_->vertices_m.front();
+    for (const Vec3& x : bank_->vertices_m)
+      for (std::size_t c = 0; c < 3; ++c) low_[c] = std::min(low_[c], x[c]), high_[c] = std::max(high_[c], x[c]);
+  }
+
+  void choose_places() {
+    points_ = options_->points_m;
+    if (points_.empty())
+      for (const std::size_t v : bank::find_strikes(*bank_, options_->places)) points_.push_back(bank_->vertices_m[v]);
+    if (points_.empty() || points_.size() > kMaxPlaces)
+      throw InputError(fmt::format("{} places; give 1 to {}", points_.size(), kMaxPlaces));
+    const std::size_t keys = points_.size() * options_->mallets.size();
+    if (options_->keys == Keys::kPlaces && options_->first_key + keys > kKeyCount)
+      throw InputError(fmt::format("{} places times {} mallets do not fit the keys from {} to {}; give fewer, or a lower --first-key",
+                                   points_.size(), options_->mallets.size(), options_->first_key, kKeyCount - 1));
+  }
+
+  /// The place itself, or the surface next to it.
+  Vec3 find_point(std::size_t place, int turn) const {
+    if (turn == 0) return points_[place];
+    const bank::NearestPlace at = bank::find_nearest(*bank_, points_[place]);
+    const auto& corners = bank_->triangles[static_cast<std::size_t>(at.triangle)];
+    const auto get = [&](std::size_t c) { return bank_->vertices_m[static_cast<std::size_t>(corners[c])]; };
+    const Vec3 normal = cross(get(1) - get(0), get(2) - get(0));
+    if (!(norm(normal) > 0.0)) return points_[place];
+    const Vec3 u = find_across(normalise(normal)), v = cross(normalise(normal), u);
+    const double angle = 2.0 * std::numbers::pi * turn / std::max(1, options_->round_robin - 1), far = kAround * norm(high_ - low_);
+    return bank::find_nearest(*bank_, at.point_m + far * std::cos(angle) * u + far * std::sin(angle) * v).point_m;
+  }
+
+  host::SceneStrike make_strike(std::size_t mallet, const Vec3& point_m, const Layer& layer) const {
+    host::SceneStrike strike;
+    strike.place = options_->bank.string();
+    strike.time_s = 0.0;
+    strike.point_m = point_m;
+    strike.mallet = host::make_mallet(material::require_mallet("--mallets", options_->mallets[mallet]));
+    strike.mallet->speed_m_s = options_->speed_m_s * layer.share();
+    return strike;
+  }
+
+  /// What a blow leaves in each mode, (m) [dB(A) re 1 Pa at 1 m], over what the sampler makes of its velocity.
+  std::vector<double> calc_levels(const std::vector<events::Event>& events, const Layer& layer) const {
+    std::vector<double> levels(bank_->mode_count());
+    for (std::size_t m = 0; m < levels.size(); ++m) {
+      const double omega = std::sqrt(bank_->eigenvalue_rad2_s2[m]);
+      std::complex<double> sum = 0.0;
+      for (const events::Event& event : events) {
+        const auto* force = std::get_if<events::Force>(&event);
+        if (force == nullptr) continue;
+        const std::vector<double>& shapes = find_shapes(*force);
+        for (int k = 0; k < force->count; ++k) {
+          const std::array<float, 3>& j = force->impulse_n_s[static_cast<std::size_t>(k)];
+          const double amplitude = shapes[3 * m] * j[0] + shapes[3 * m + 1] * j[1] + shapes[3 * m + 2] * j[2];
+          sum += amplitude * std::polar(1.0, -omega * (force->time_s + (k + 0.5) * force->step_s));
+        }
+      }
+      const double heard = bank::calc_a_weight(bank_->freq_hz(m)) * bank_->radiation_gain[m] * std::abs(sum) / layer.share();
+      levels[m] = 20.0 * std::log10(std::max(heard, 1e-30));
+    }
+    return levels;
+  }
+
+  const std::vector<double>& find_shapes(const events::Force& force) const {
+    if (shapes_triangle_ != force.triangle || shapes_at_ != force.barycentric) {
+      shapes_triangle_ = force.triangle;
+      shapes_at_ = force.barycentric;
+      shapes_ = bank::calc_shapes(*bank_, force.triangle, force.barycentric);
+    }
+    return shapes_;
+  }
+
+  void compare(const std::vector<double>& softer, const std::vector<double>& harder, SampleSet& set) const {
+    const double loudest = std::max(*std::max_element(softer.begin(), softer.end()), *std::max_element(harder.begin(), harder.end()));
+    for (std::size_t m = 0; m < softer.size(); ++m)
+      if (std::max(softer[m], harder[m]) > loudest - kHeardDb)
+        set.layer_step_db = std::max(set.layer_step_db, std::abs(harder[m] - softer[m]));
+  }
+
+  void strike_all(SampleSet& set) {
+    const double all = static_cast<double>(options_->mallets.size() * points_.size()) * options_->layers * options_->round_robin;
+    for (std::size_t mallet = 0; mallet < options_->mallets.size(); ++mallet)
+      for (std::size_t place = 0; place < points_.size(); ++place)
+        for (int turn = 0; turn < options_->round_robin; ++turn) {
+          const Vec3 point_m = find_point(place, turn);
+          std::vector<double> before;
+          for (int layer = 0; layer < options_->layers; ++layer) {
+            const Layer& own = layers_[static_cast<std::size_t>(layer)];
+            scene_.strikes = {make_strike(mallet, point_m, own)};
+            const host::Strikes strikes = host::make_strikes(scene_, {bank_});
+            const std::vector<double> levels = calc_levels(strikes.events, own);
+            if (!before.empty()) compare(before, levels, set);
+            before = levels;
+            samples_.push_back(
+                render(strikes.events, {.mallet = mallet, .place = place, .layer = layer, .turn = turn, .file = {}, .frames = {}}));
+            if (options_->progress) options_->progress(static_cast<double>(samples_.size()) / all);
+          }
+        }
+    set.samples = samples_.size();
+  }
+
+  Sample render(const std::vector<events::Event>& events, Sample sample) {
+    scene_.duration_s = options_->max_seconds;
+    host::SoundStore store(options_->rate_hz, 1);
+    host::calc_sound(scene_, {bank_}, host::make_events(events), {.rate_hz = options_->rate_hz, .fades_end = true}, store);
+    sample.frames.resize(store.get_frames());
+    store.read(0, sample.frames);
+    for (const float p : sample.frames) sample.peak_pa = std::max(sample.peak_pa, static_cast<double>(std::abs(p)));
+    std::size_t end = sample.frames.size();
+    while (end > 0 && std::abs(static_cast<double>(sample.frames[end - 1])) <= kSilence * sample.peak_pa) --end;
+    sample.frames.resize(std::min(sample.frames.size(), std::max(end, static_cast<std::size_t>(kShortestS * options_->rate_hz))));
+    sample.file = fmt::format("samples/{}-{}-{}-v{}{}.wav", name_, options_->mallets[sample.mallet], sample.place + 1,
+                              layers_[static_cast<std::size_t>(sample.layer)].middle,
+                              options_->round_robin > 1 ? fmt::format("-r{}", sample.turn + 1) : "");
+    return sample;
+  }
+
+  /// Full scale per pascal, of what velocity 127 plays.
+  double write_waves(SampleSet& set) const {
+    double loudest = 0.0;
+    const auto share = [&](const Sample& sample) { return layers_[static_cast<std::size_t>(sample.layer)].share(); };
+    for (const Sample& sample : samples_) loudest = std::max(loudest, sample.peak_pa / share(sample));
+    if (!(loudest > 0.0)) throw InputError(fmt::format("{}: no strike makes it sound; strike it elsewhere", options_->bank.string()));
+    const double gain = std::pow(10.0, kPeakDbfs / 20.0) / loudest;
+    for (const Sample& sample : samples_) {
+      host::SoundStore store(options_->rate_hz, 1);
+      store.append(sample.frames);
+      base::WholeFile file(options_->folder / sample.file);
+      host::write_wav(store, gain / share(sample), options_->format, [&](std::string_view bytes) { file.append(bytes); });
+      file.commit();
+      set.bytes += static_cast<double>(host::calc_wav_bytes(1, options_->format, sample.frames.size()));
+    }
+    return gain;
+  }
+
+  std::string write_region(const Sample& sample) const {
+    const Layer& layer = layers_[static_cast<std::size_t>(sample.layer)];
+    const bool is_pitched = options_->keys == Keys::kPitches;
+    const auto places = static_cast<int>(points_.size());
+    std::string text = fmt::format("<region> sample={} lovel={} hivel={}", sample.file, layer.low, layer.high);
+    const int length = options_->round_robin * (is_pitched ? places : 1);
+    const int position = sample.turn * (is_pitched ? places : 1) + (is_pitched ? static_cast<int>(sample.place) : 0) + 1;
+    if (length > 1) text += fmt::format(" seq_length={} seq_position={}", length, position);
+    return text + "\n";
+  }
+
+  /// The key and the cents of the mode that is heard most at the first place.
+  std::pair<int, double> find_pitch() const {
+    const bank::NearestPlace at = bank::find_nearest(*bank_, points_[0]);
+    const auto vertex = static_cast<std::size_t>(bank_->triangles[static_cast<std::size_t>(at.triangle)][0]);
+    const std::vector<double> levels = bank::calc_blow_amplitudes(*bank_, vertex, bank::calc_vertex_normals(*bank_)[vertex]);
+    const auto loudest = static_cast<std::size_t>(std::max_element(levels.begin(), levels.end()) - levels.begin());
+    const double key = 69.0 + 12.0 * std::log2(bank_->freq_hz(loudest) / 440.0);
+    const int nearest = std::clamp(static_cast<int>(std::lround(key)), 0, kKeyCount - 1);
+    return {nearest, 100.0 * (key - nearest)};
+  }
+
+  std::string write_head(double full_scale_pa) const {
+    return fmt::format(
+        "// {}: strikes of a body. Full scale at velocity 127 is {:.4g} Pa at 1 m; below, the level goes with the square of the velocity.\n"
+        "<global>\nloop_mode=one_shot\namp_veltrack=100\nampeg_release=0.05\n",
+        name_, full_scale_pa);
+  }
+
+  void write_instruments(SampleSet& set) const {
+    const auto write = [&](const std::string& name, const std::string& text) {
+      set.instruments.push_back(options_->folder / (name + ".sfz"));
+      base::write_file(set.instruments.back(), text);
+    };
+    if (options_->keys == Keys::kPitches) {
+      const auto [key, cents] = find_pitch();
+      for (std::size_t mallet = 0; mallet < options_->mallets.size(); ++mallet) {
+        std::string text = write_head(set.full_scale_pa);
+        text +=
+            fmt::format("<group> lokey=0 hikey={} pitch_keycenter={} tune={}\n", kKeyCount - 1, key, -static_cast<int>(std::lround(cents)));
+        for (const Sample& sample : samples_)
+          if (sample.mallet == mallet) text += write_region(sample);
+        write(options_->mallets.size() == 1 ? name_ : fmt::format("{}-{}", name_, options_->mallets[mallet]), text);
+      }
+      return;
+    }
+    std::string text = write_head(set.full_scale_pa);
+    const Sample* before = nullptr;
+    for (const Sample& sample : samples_) {
+      if (before == nullptr || before->mallet != sample.mallet || before->place != sample.place) {
+        const std::size_t key = static_cast<std::size_t>(options_->first_key) + sample.mallet * points_.size() + sample.place;
+        const Vec3& x = points_[sample.place];
+        text += fmt::format("// {}, at {:.4g}, {:.4g}, {:.4g} m\n<group> lokey={} hikey={} pitch_keycenter={} pitch_keytrack=0\n",
+                            options_->mallets[sample.mallet], x[0], x[1], x[2], key, key, key);
+      }
+      before = &sample;
+      text += write_region(sample);
+    }
+    write(name_, text);
+  }
+
+  const SampleOptions* options_;
+  std::string name_;
+  std::vector<Layer> layers_;
+  host::Scene scene_;
+  host::Banks banks_;
+  const bank::Bank* bank_ = nullptr;
+  Vec3 low_{}, high_{};
+  std::vector<Vec3> points_;
+  std::vector<Sample> samples_;
+  mutable std::int32_t shapes_triangle_ = -1;
+  mutable Vec3 shapes_at_{};
+  mutable std::vector<double> shapes_;
+};
+
+}  // namespace
+
+SampleSet make_samples(const SampleOptions& options) { return Maker(options).run(); }
+
+}  // namespace carillon::samples

@@ -1,0 +1,187 @@
+// A bank goes through GLB and is the same, to the bit; what other programs write becomes a bank that sounds alike; what is damaged or
+// changed ends in one error.
+#include "runtime/exchange/glb.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <numbers>
+#include <string>
+
+#include "runtime/bank/bank.hpp"
+#include "runtime/bank/reduce.hpp"
+#include "runtime/bank/write.hpp"
+#include "runtime/base/error.hpp"
+#include "runtime/material/table.hpp"
+#include "tests/unit/runtime/bank/example_bank.hpp"
+#include "tests/unit/runtime/synth/cube_bank.hpp"
+
+namespace carillon::exchange {
+namespace {
+
+std::string to_glb(const bank::Bank& bank, const GlbOptions& options = {}) {
+  std::string bytes;
+  write_glb(bank, options, [&](std::string_view piece) { bytes += piece; });
+  return bytes;
+}
+
+std::string find_error(const std::string& bytes, const GlbReading& reading = {}) {
+  try {
+    (void)parse_glb(bytes, "body.glb", reading);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+/// The JSON chunk with another text in place of one that is there, lengths put right.
+std::string replace_json(const std::string& glb, const std::string& from, const std::string& to) {
+  std::uint32_t length = 0;
+  std::memcpy(&length, glb.data() + 12, 4);
+  std::string json = glb.substr(20, length);
+  const std::size_t at = json.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  json.replace(at, from.size(), to);
+  while (json.size() % 4 != 0) json += ' ';
+  const auto put = [](std::string& bytes, std::size_t place, std::size_t value) {
+    const auto narrow = static_cast<std::uint32_t>(value);
+    std::memcpy(bytes.data() + place, &narrow, 4);
+  };
+  std::string changed = glb.substr(0, 20) + json + glb.substr(20 + length);
+  put(changed, 8, changed.size());
+  put(changed, 12, json.size());
+  return changed;
+}
+
+/// Two modes that swing and one that does not, as its damping is over critical.
+bank::Bank make_damped() {
+  bank::Bank bank = testing::make_cube_bank({{100.0, 900.0, 0.02, {0.4, 0.7, 1.1}, 0.07},
+                                             {820.0, 12.0, 0.3, {0.4, -0.7, 1.1}, 0.07},
+                                             {1730.0, 40.0, 0.3, {1.0, 0.1, 0.2}, 0.05}});
+  bank.damping.law = "mixed";
+  bank.material.alpha2_per_s = 0.0;
+  return bank;
+}
+
+TEST(Glb, of_every_released_bank_is_the_same_bank) {
+  int count = 0;
+  for (const auto& entry :
+       std::filesystem::directory_iterator(std::filesystem::path(CARILLON_SOURCE_DIR) / "tests/unit/runtime/bank/pinned")) {
+    const bank::Bank bank = bank::read_bank(entry.path());
+    EXPECT_EQ(bank::make_bank_bytes(parse_glb(to_glb(bank), "body.glb")), bank::make_bank_bytes(bank)) << entry.path();
+    ++count;
+  }
+  EXPECT_GE(count, 5);
+}
+
+TEST(Glb, keeps_modes_that_do_not_swing_narrow_shapes_and_single_modes) {
+  const bank::Bank damped = make_damped();
+  EXPECT_EQ(bank::make_bank_bytes(parse_glb(to_glb(damped), "body.glb")), bank::make_bank_bytes(damped));
+  EXPECT_EQ(parse_glb(to_glb(damped), "body.glb", {.model = {}, .ignores_extras = true, .material = nullptr}).mode_count(), 2);
+  const bank::Bank narrow = bank::calc_reduced(damped, {.shape_bits = 8});
+  ASSERT_EQ(narrow.shape_bytes, 1);
+  EXPECT_EQ(bank::make_bank_bytes(parse_glb(to_glb(narrow), "body.glb")), bank::make_bank_bytes(narrow));
+  const bank::Bank one = bank::calc_reduced(damped, {.modes = 1});
+  EXPECT_EQ(bank::make_bank_bytes(parse_glb(to_glb(one), "body.glb")), bank::make_bank_bytes(one));
+  EXPECT_THROW(to_glb(testing::make_cube_bank({})), InputError);
+  bank::Bank still = testing::make_cube_bank({{100.0, 900.0, 0.02}});
+  EXPECT_THROW(to_glb(still), InputError);
+}
+
+TEST(Glb, of_more_vertices_than_16_bits_hold_is_the_same_bank) {
+  bank::Bank bank = bank::example::make_bank(105, 2);
+  ASSERT_GT(bank.vertex_count(), 65535);
+  const std::string bytes = to_glb(bank);
+  EXPECT_EQ(bank::make_bank_bytes(parse_glb(bytes, "body.glb")), bank::make_bank_bytes(bank));
+  EXPECT_LT(bytes.size(), bank.vertex_count() * (2 * 12 + 24 + 2 * 12) + bank.triangles.size() * 12 + 100000);
+}
+
+TEST(Glb, taken_plainly_is_the_body_to_what_floats_hold) {
+  const bank::Bank bank = make_damped();
+  const bank::Bank plain = parse_glb(to_glb(bank), "body.glb", {.model = {}, .ignores_extras = true, .material = nullptr});
+  ASSERT_EQ(plain.mode_count(), 2);
+  for (std::size_t m = 0; m < 2; ++m) {
+    EXPECT_NEAR(plain.freq_hz(m) / bank.freq_hz(m + 1), 1.0, 1e-7);
+    EXPECT_NEAR(plain.decay_per_s[m] / bank.decay_per_s[m + 1], 1.0, 1e-7);
+    for (std::size_t v = 0; v < bank.vertex_count(); ++v)
+      for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(plain.shape_at(v, m)[c], bank.shape_at(v, m + 1)[c], 1.01 * bank.shape_scale[m + 1]);
+  }
+  EXPECT_NEAR(plain.rigid.mass_kg, bank.rigid.mass_kg, 1e-9);
+  for (std::size_t i = 0; i < 9; ++i) EXPECT_NEAR(plain.rigid.inertia_kg_m2[i], bank.rigid.inertia_kg_m2[i], 1e-9);
+  EXPECT_EQ(plain.damping.law, "mixed");
+}
+
+TEST(Glb, of_another_program_may_scale_its_node_and_leave_the_mass_out) {
+  const bank::Bank bank = testing::make_cube_bank({{820.0, 12.0, 0.3, {0.4, -0.7, 1.1}, 0.07}});
+  std::string bytes = replace_json(to_glb(bank), R"("massProperties")", R"("ignored")");
+  bytes = replace_json(bytes, R"("nodes": [{"name": "body", )", R"("nodes": [{"children": [1], "scale": [2, 2, 2]}, {"name": "body", )");
+  const GlbReading plain{.model = {}, .ignores_extras = true, .material = nullptr};
+  const bank::Bank scaled = parse_glb(bytes, "body.glb", plain);
+  EXPECT_NEAR(scaled.vertices_m[7][0], 0.1, 1e-7);  // a cube of 0.2 m: 8 litres of 1000 kg/m^3, m a^2 / 6
+  EXPECT_NEAR(scaled.rigid.mass_kg, 8.0, 1e-5);
+  EXPECT_NEAR(scaled.rigid.volume_m3, 8e-3, 1e-8);
+  EXPECT_NEAR(scaled.rigid.inertia_kg_m2[0], 8.0 * 0.04 / 6.0, 1e-6);
+  EXPECT_NEAR(scaled.rigid.inertia_kg_m2[1], 0.0, 1e-8);
+  EXPECT_EQ(scaled.damping.law, "rayleigh");
+  EXPECT_NEAR(scaled.freq_hz(0), 820.0, 1e-3);
+  EXPECT_THAT(find_error(replace_json(bytes, "[2, 2, 2]", "[2, 2, 3]"), plain),
+              ::testing::HasSubstr("not scaled by the same along all axes"));
+  EXPECT_THAT(find_error(replace_json(bytes, R"("scale": [2, 2, 2])", R"("scale": [0, 0, 0])"), plain), ::testing::StartsWith("body.glb"));
+}
+
+TEST(Glb, without_a_material_takes_the_one_that_is_named) {
+  const std::string bytes = replace_json(to_glb(make_damped()), R"(, "material": 0)", "");
+  GlbReading plain{.model = {}, .ignores_extras = true, .material = nullptr};
+  EXPECT_THAT(find_error(bytes, plain), ::testing::HasSubstr("--material NAME"));
+  plain.material = &material::MaterialTable::get().require("", "steel").material;
+  EXPECT_EQ(parse_glb(bytes, "body.glb", plain).material.young_modulus_pa, plain.material->young_modulus_pa);
+}
+
+TEST(Glb, that_is_none_damaged_or_changed_ends_in_a_sentence) {
+  const std::string whole = to_glb(make_damped());
+  const auto change = [&](const std::string& from, const std::string& to) { return find_error(replace_json(whole, from, to)); };
+  for (const auto& [said, words] : {
+           std::pair{find_error("hello"), "does not begin with"},
+           {find_error(whole + "x"), "cut off, or something was added"},
+           {change(R"("KHR_audio_rigid_bodies": {"acoustic)", R"("KHR_audio": {"acoustic)"), "has no KHR_audio_rigid_bodies"},
+           {change(R"("modalModels": [)", R"("others": [)"), "no modal model"},
+           {change(R"("decayRates": 4)", R"("decayRates": 900)"), "decayRates"},
+           {change(R"("decayRates": 4)", R"("decayRates": 0)"), "has to be SCALAR"},
+           {change(R"("indices": 2, "material")", R"("material")"), "no \"indices\""},
+           {change(R"("modes": [)", R"("modes": [7, )"), "7 is no mode"},
+           {change(R"("name": "modes/decay")", R"("name": "modes/decays")"), "modes/decay is missing"},
+           {change(R"("name": "modes/shape_scale", "type": "<f8")", R"("name": "modes/shape_scale", "type": "<i8")"), "shape_scale"},
+           {change(R"("name": "rigid/mass_kg", "type": "<f8", "shape": [])", R"("name": "rigid/mass_kg", "type": "<f8", "shape": [2])"),
+            "has 8 bytes"},
+           {change(R"("name": "rigid/mass_kg", "type": "<f8", "shape": [])",
+                   R"("name": "rigid/mass_kg", "type": "<f8", "shape": [0, 9e15])"),
+            "rigid/mass_kg"},
+           {find_error(whole, {.model = 3, .ignores_extras = false, .material = nullptr}), "no model 3"},
+       })
+    EXPECT_THAT(said, ::testing::AllOf(::testing::StartsWith("body.glb"), ::testing::HasSubstr(words)));
+}
+
+TEST(Glb, cut_or_changed_at_any_byte_ends_in_the_bank_or_an_error) {
+  const bank::Bank bank = testing::make_cube_bank({{820.0, 12.0, 0.3, {0.4, -0.7, 1.1}, 0.07}});
+  const std::string whole = to_glb(bank);
+  for (std::size_t n = 0; n < whole.size(); n += n < 64 ? 1 : 7) EXPECT_NE(find_error(whole.substr(0, n)), "") << n;
+  for (std::size_t n = 0; n < whole.size(); ++n) {
+    std::string changed = whole;
+    changed[n] = static_cast<char>(changed[n] ^ (n % 3 == 0 ? '\x01' : n % 3 == 1 ? '\x20' : '\x80'));
+    find_error(changed);
+  }
+}
+
+TEST(Glb, as_the_corpus_of_the_fuzz_target_is_read) {
+  const std::filesystem::path file = std::filesystem::path(CARILLON_SOURCE_DIR) / "tests/unit/runtime/exchange/corpus/cube.glb";
+  std::ifstream stream(file, std::ios::binary);
+  const std::string bytes(std::istreambuf_iterator<char>(stream), {});
+  EXPECT_EQ(parse_glb(bytes, "cube.glb").mode_count(), 3);
+}
+
+}  // namespace
+}  // namespace carillon::exchange
