@@ -19,7 +19,7 @@ namespace carillon::eigen {
 namespace {
 
 constexpr int kPurifiedAgainst = 32;        // Converged pairs that the others are cleared of at the end.
-constexpr int kColumnsCleared = 128;        // Columns that are cleared of locked modes at a time.
+constexpr int kColumnsCleared = 128;        // Locked modes that the others are cleared of at a time.
 constexpr double kLockedRemainder = 1e-12;  // Less of a locked mode may stay in the others.
 constexpr double kOrthonormal = 1e-6;       // An orthonormal block that was saved is no farther from being one.
 
@@ -171,27 +171,29 @@ void BlockLanczos::clear_nearest(const RitzPairs& pairs, const RitzSelection& se
   }
 }
 
-// What remained of locked modes.
+// What remained of locked modes. M times them is made behind w, where the columns are free now.
 void BlockLanczos::clear_locked(int count) {
   const std::vector<double>& remaining = orthogonaliser_.get_remaining();
   const auto is_left = [](double x) { return x > kLockedRemainder; };
   const auto first = std::find_if(remaining.begin(), remaining.end(), is_left);
   const auto last = std::find_if(remaining.rbegin(), std::make_reverse_iterator(first), is_left).base();
   const LockedRange range{static_cast<int>(first - remaining.begin()), static_cast<int>(last - first)};
-  if (range.count == 0) return;
   const int block = basis_.block();
-  const int wide = std::min(basis_.room() - count, kColumnsCleared);  // of the columns behind w, which are free now
-  const int step = std::max(wide, block);
-  for (int at = 0; at < count; at += step) {
-    const Columns some = basis_.columns(at, std::min(step, count - at));
-    const Columns images = wide < block ? inner_.z().part(0, some.count) : basis_.columns(count + block, some.count);
-    for (int from = 0; from < some.count; from += block) {
-      const int width = std::min(block, some.count - from);
-      copy(some.part(from, width), inner_.w());
-      inner_.multiply();
-      if (wide >= block) copy(inner_.z().part(0, width), images.part(from, width));
+  const int wide = std::min(basis_.room() - count, kColumnsCleared);
+  const Columns found = basis_.columns(0, count);
+  for (const Columns& part : locked_.find_parts(range)) {
+    const int step = std::max(wide, block);
+    for (int at = 0; at < part.count; at += step) {
+      const Columns some = part.part(at, std::min(step, part.count - at));
+      const Columns images = wide < block ? inner_.z().part(0, some.count) : basis_.columns(count + block, some.count);
+      for (int from = 0; from < some.count; from += block) {
+        const int width = std::min(block, some.count - from);
+        copy(some.part(from, width), inner_.w());
+        inner_.multiply();
+        if (wide >= block) copy(inner_.z().part(0, width), images.part(from, width));
+      }
+      la::subtract_product(some, inner_.calc_products(images, found).data(), some.count, found);
     }
-    (void)locked_.project_out(inner_.comm(), range, some, images);
   }
 }
 

@@ -4,6 +4,7 @@
 #include <petscmat.h>
 
 #include <array>
+#include <span>
 
 #include "precompute/comm/communicator.hpp"
 #include "precompute/la/block_kernels.hpp"
@@ -17,8 +18,9 @@ using la::Columns;
 /// placed elsewhere.
 class InnerProduct {
  public:
-  /// mass: M (n, n) with `rows` rows on this rank; null: the identity. Collective.
-  InnerProduct(const comm::Communicator& comm, Mat mass, PetscInt rows, PetscInt n, int width);
+  /// mass: M (n, n) with `rows` rows on this rank; null: the identity. diagonal: (rows) where M has nothing else, and must outlive it; null
+  /// where it has. Collective.
+  InnerProduct(const comm::Communicator& comm, Mat mass, PetscInt rows, PetscInt n, int width, const double* diagonal = nullptr);
   ~InnerProduct();
   InnerProduct(const InnerProduct&) = delete;
   InnerProduct& operator=(const InnerProduct&) = delete;
@@ -36,14 +38,20 @@ class InnerProduct {
 
   /// A^T B of all ranks, (a.count, b.count). Collective.
   la::Matrix calc_products(const Columns& a, const Columns& b) const { return la::multiply_transposed(comm_, a, b); }
-  /// The same; `sums` of all ranks go in the same message. Collective.
-  la::Matrix calc_products(const Columns& a, const Columns& b, std::array<double, 2>& sums) const;
+
+  /// The first `count` columns of W: W <- W - A S; returns C^T M W of all ranks, set by set of C below each other. W may be one of them.
+  /// `sums` of all ranks go in the same message. Collective.
+  la::Matrix subtract_and_calc_products(const la::Product& product, int s_stride, std::span<const Columns> c, int count,
+                                        std::array<double, 2>& sums);
+  /// W <- (W - the sum of the products) T, Z = M W; T: (count, count), null: the identity. Collective.
+  void subtract_and_combine(std::span<const la::Product> products, int s_stride, const double* t, int count);
 
  private:
   comm::Communicator comm_;
   int width_;
   petsc::MatHandle mass_, w_mat_, z_mat_;
   Columns w_, z_;
+  const double* diagonal_;
   bool is_placed_ = false;
 };
 

@@ -411,6 +411,7 @@ KrylovStatistics run_krylov(const KrylovRequest& request, FoundModes& found) {
   check(EPSSetFromOptions(eps));
   if (family == Family::block) {
     check(set_locked(eps, &locked));
+    check(set_mass_diagonal(eps, request.mass_blocks->get_diagonal()));
     check(set_checkpoint(eps, request.checkpoint));
     set_starting_block(eps, request);
   } else if (family == Family::krylov || family == Family::davidson) {

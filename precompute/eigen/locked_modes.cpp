@@ -16,6 +16,12 @@ void LockedModes::for_parts(LockedRange range, const Visit& visit) const {
   }
 }
 
+std::vector<Columns> LockedModes::find_parts(LockedRange range) const {
+  std::vector<Columns> parts;
+  for_parts(range, [&](const Columns& part, int) { parts.push_back(part); });
+  return parts;
+}
+
 la::Matrix LockedModes::multiply_transposed(const comm::Communicator& comm, LockedRange range, const Columns& b) const {
   la::Matrix products = la::Matrix::Zero(range.count, b.count);
   for_parts(range, [&](const Columns& part, int at) { la::multiply_transposed(part, b, products.data() + at, range.count); });

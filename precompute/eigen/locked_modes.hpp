@@ -25,6 +25,8 @@ struct LockedModes {
 
   int count() const { return static_cast<int>(lambda.size()); }
   LockedRange all() const { return {0, count()}; }
+  /// Those columns, in as many parts as they are in.
+  std::vector<Columns> find_parts(LockedRange range) const;
   /// L^T B of all ranks for a range of columns of L, (range.count, b.count). Collective.
   la::Matrix multiply_transposed(const comm::Communicator& comm, LockedRange range, const Columns& b) const;
   /// B <- B - L S for that range, S: (range.count, b.count). Local.

@@ -19,7 +19,9 @@ namespace {
 
 constexpr double kWellConditioned = 1e-2;  // Smallest pivot of the scaled Gram matrix that needs no second Cholesky QR,
 constexpr double kDependent = 1e-11;       // and smallest that Cholesky QR is trusted with.
-constexpr double kReproject = 1e-2;        // A projection that takes more of a column's square is done once more.
+constexpr double kReproject = 1e-2;        // A projection that takes more of a column's square is done once more,
+constexpr int kPasses = 3;                 // so often at most.
+constexpr double kNegligible = 1e-9;       // Where one takes less, the semi-orthogonality of the basis does not show in what is left.
 
 // One rank decides for all.
 template <std::size_t count>
@@ -40,6 +42,22 @@ bool scale_to_unit_diagonal(la::Matrix& gram, la::Vector& scale) {
   return true;
 }
 
+// R and its inverse by the Gram matrix of a block that has yet to lose c along an almost orthonormal set; empty where that is not enough:
+// where c is not small, or the block so badly conditioned that it would take another step.
+void calc_triangle(const la::Matrix& c, la::Matrix gram, la::Matrix& r, la::Matrix& inverse) {
+  r.resize(0, 0);
+  const la::Vector square = gram.diagonal();
+  if (!(c.colwise().squaredNorm().transpose().array() < kNegligible * square.array()).all()) return;
+  gram -= c.transpose() * c;
+  la::Vector scale;
+  if (!scale_to_unit_diagonal(gram, scale) || la::factorise_cholesky(gram) != 0) return;
+  if (!(gram.diagonal().array().square() > kWellConditioned).all()) return;
+  inverse = gram.triangularView<Eigen::Upper>();
+  inverse = inverse * scale.asDiagonal();
+  const la::Matrix triangle = inverse;
+  if (la::invert_upper(inverse) == 0) r = triangle;
+}
+
 }  // namespace
 
 Orthogonaliser::Orthogonaliser(InnerProduct& inner, LanczosBasis& basis, const LockedModes& locked, std::vector<double> theta, PetscInt n,
@@ -52,15 +70,15 @@ void Orthogonaliser::reset() {
 }
 
 int Orthogonaliser::start() {
-  project(nullptr);
-  return static_cast<int>(orthonormalise().rows());
+  const la::Matrix r = project(nullptr);
+  return static_cast<int>((r.size() > 0 ? r : orthonormalise()).rows());
 }
 
 void Orthogonaliser::step() {
   la::Matrix alpha;
-  project(&alpha);
+  la::Matrix r = project(&alpha);
   basis_.set_diagonal(alpha);
-  la::Matrix r = orthonormalise();
+  if (r.size() == 0) r = orthonormalise();
   if (r.rows() == basis_.width() && !confirm(r)) r = reproject(r);
   estimate_.advance(here(), r, is_skipped_);
   deflation_.advance(here(), r, projected_);
@@ -71,15 +89,13 @@ void Orthogonaliser::step() {
   basis_.set_coupling(std::move(r));
 }
 
-// w -= V_{j-1} R_{j-1}^T + V_j alpha; Z still is M V_j. Returns alpha.
-la::Matrix Orthogonaliser::subtract_recurrence(const Columns& next) {
+// The coefficients of V_{j-1} and V_j in A^-1 M V_j: R_{j-1}^T and alpha, (size - previous, width).
+la::Matrix Orthogonaliser::calc_recurrence(const la::Matrix& alpha) const {
   const int width = basis_.width(), previous = basis_.previous(), coupled = basis_.size() - previous;
-  const la::Matrix alpha = inner_.calc_products(inner_.z().part(0, width), next);
   la::Matrix local(coupled, width);
   local.topRows(coupled - width) = basis_.t().block(previous, basis_.size() - width, coupled - width, width);
   local.bottomRows(width) = alpha;
-  la::subtract_product(basis_.columns(previous, coupled), local.data(), coupled, next);
-  return alpha;
+  return local;
 }
 
 // What is projected out in this step.
@@ -92,53 +108,73 @@ void Orthogonaliser::decide(const la::Matrix& alpha) {
   projected_ = {decision[1], decision[2]};
 }
 
-la::Matrix Orthogonaliser::calc_products_and_vote(const Columns& against, const Columns& next_mass) {
-  if (checkpoint_ == nullptr) return inner_.calc_products(against, next_mass);
-  const CheckpointRequest own = checkpoint_->ask();
+la::Matrix Orthogonaliser::subtract_and_vote(const la::Product& product, int s_stride, std::span<const Columns> against, int count) {
+  CheckpointRequest own;
+  if (checkpoint_ != nullptr) own = checkpoint_->ask();
   std::array<double, 2> votes{own.stop ? 1.0 : 0.0, own.save ? 1.0 : 0.0};
-  la::Matrix products = inner_.calc_products(against, next_mass, votes);
+  la::Matrix products = inner_.subtract_and_calc_products(product, s_stride, against, count, votes);
   request_.stop = request_.stop || votes[0] > 0;
   request_.save = request_.save || votes[1] > 0;
   return products;
 }
 
-// w -= (everything so far) (everything so far)^T M w, after the recurrence has taken the bulk away; where little is predicted to be left,
-// only the blocks that the recurrence couples to. alpha: (width, width) the diagonal block; null for the first block.
-void Orthogonaliser::project(la::Matrix* alpha) {
+// Where little is predicted to be left along the basis, only the blocks that the recurrence couples to.
+std::vector<Columns> Orthogonaliser::find_projected_out() const {
+  std::vector<Columns> sets;
+  if (is_skipped_) {
+    sets = {basis_.columns(basis_.previous(), basis_.size() - basis_.previous()), basis_.fixed()};
+  } else {
+    sets = {basis_.fixed_and_basis()};
+  }
+  for (const Columns& part : locked_.find_parts(projected_)) sets.push_back(part);
+  return sets;
+}
+
+// w -= V_{j-1} R_{j-1}^T + V_j alpha, Z still being M V_j, and then w -= (everything so far) (everything so far)^T M w.
+// alpha: (width, width) the diagonal block; null for the first block. The last pass makes w M-orthonormal as well where the Gram matrix
+// that came with its products allows, by (w - V c)^T M (w - V c) = w^T M w - c^T c. Returns R then, and an empty matrix otherwise.
+la::Matrix Orthogonaliser::project(la::Matrix* alpha) {
   const bool is_first = alpha == nullptr;
   const Columns next = inner_.w().part(0, count());
-  const Columns next_mass = inner_.z().part(0, next.count);
+  la::Matrix local;  // what the recurrence takes away
+  la::Product recurrence{basis_.columns(0, 0), nullptr};
   is_skipped_ = false;
   projected_ = deflation_.all();
   if (!is_first) {
-    *alpha = subtract_recurrence(next);
+    *alpha = inner_.calc_products(inner_.z().part(0, basis_.width()), next);
+    local = calc_recurrence(*alpha);
+    recurrence = {basis_.columns(basis_.previous(), static_cast<int>(local.rows())), local.data()};
     decide(*alpha);
   }
-  const int width = basis_.width(), fixed = basis_.fixed().count;
-  const Columns against = is_skipped_ ? basis_.columns(basis_.previous(), basis_.size() - basis_.previous()) : basis_.fixed_and_basis();
-  const int stride = against.count + next.count;  // w follows them in memory, and its squares come with the products
-  for (int pass = 0; pass < 3; ++pass) {
-    inner_.multiply();
-    const la::Matrix c = calc_products_and_vote(against.part(0, stride), next_mass);
-    const la::Matrix parts = locked_.project_out(inner_.comm(), projected_, next, next_mass);
+  const std::vector<Columns> against = find_projected_out();
+  std::vector<Columns> sets = against;
+  sets.push_back(next);
+  const int width = basis_.width(), fixed = is_skipped_ ? 0 : basis_.fixed().count, basis = against.front().count;
+  for (int pass = 0;; ++pass) {
+    const la::Matrix c = subtract_and_vote(recurrence, static_cast<int>(local.rows()), sets, next.count);
+    const auto stride = static_cast<int>(c.rows()), all = stride - next.count;
+    const la::Matrix parts = c.middleRows(all - projected_.count, projected_.count);
+    recurrence.a.count = 0;
+    if (!is_first) (*alpha) += c.middleRows(basis - width, width);
     if (pass == 0 && !is_first) deflation_.update_noise(projected_, parts);
-    if (is_skipped_ && fixed > 0) la::subtract_product(basis_.fixed(), inner_.calc_products(basis_.fixed(), next_mass).data(), fixed, next);
-    la::subtract_product(against, c.data(), stride, next);
     if (pass == 0 && !is_first && !is_skipped_) estimate_.update_noise(here(), c.data() + fixed, stride);
-    double taken = 0;  // largest part of a column that this pass took away; its rounding is what it leaves behind
-    double largest = 0;
-    for (int j = 0; j < next.count; ++j) {
-      const double* column = c.col(j).data();
-      if (!is_first) {
-        for (int i = 0; i < width; ++i) (*alpha)(i, j) += column[against.count - width + i];
-      }
-      const double part = std::inner_product(column, column + against.count, column, 0.0);
-      taken = std::max(taken, part / column[against.count + j]);
-      largest = std::max(largest, part);
-    }
-    if (!is_skipped_) estimate_.record_projection(std::sqrt(largest));
+    const la::Vector along_basis = c.topRows(basis).colwise().squaredNorm();
+    // The largest part of a column's square that this pass takes away: its rounding is what it leaves behind.
+    const double taken = (along_basis.array() / c.bottomRows(next.count).diagonal().array()).maxCoeff();
+    if (!is_skipped_) estimate_.record_projection(std::sqrt(along_basis.maxCoeff()));
     estimate_.record_deflation(deflation_.calc_returned(projected_, parts));
-    if (taken < kReproject) break;
+    const bool is_last = !(taken >= kReproject) || pass + 1 == kPasses;
+    la::Matrix r, inverse;
+    if (is_last) calc_triangle(c.topRows(all), c.bottomRows(next.count), r, inverse);
+    if (basis_.size() + next.count > free_dimension()) r.resize(0, 0);
+    std::vector<la::Product> products;
+    const double* coefficients = c.data();
+    for (const Columns& set : against) {
+      products.push_back({set, coefficients});
+      coefficients += set.count;
+    }
+    inner_.subtract_and_combine(products, stride, r.size() > 0 ? inverse.data() : nullptr, next.count);
+    if (is_last) return r;
   }
 }
 

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
+#include <vector>
 
 #include "precompute/eigen/inner_product.hpp"
 #include "precompute/eigen/lanczos_basis.hpp"
@@ -42,10 +44,11 @@ class Orthogonaliser {
   LanczosStep here() const { return {basis_.t(), basis_.size(), basis_.width(), basis_.previous()}; }
   int count() const { return basis_.size() == 0 ? basis_.block() : basis_.width(); }  // columns of the next block at most
   PetscInt free_dimension() const { return n_ - basis_.fixed().count - locked_.count(); }
-  la::Matrix subtract_recurrence(const Columns& next);
+  la::Matrix calc_recurrence(const la::Matrix& alpha) const;
   void decide(const la::Matrix& alpha);
-  void project(la::Matrix* alpha);
-  la::Matrix calc_products_and_vote(const Columns& against, const Columns& next_mass);
+  la::Matrix project(la::Matrix* alpha);
+  la::Matrix subtract_and_vote(const la::Product& product, int s_stride, std::span<const Columns> against, int count);
+  std::vector<Columns> find_projected_out() const;
   bool confirm(const la::Matrix& r) const;
   la::Matrix reproject(const la::Matrix& before);
   la::Matrix orthonormalise();

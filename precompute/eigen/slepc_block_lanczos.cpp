@@ -23,6 +23,7 @@ struct Settings {
   PetscInt block = PETSC_DEFAULT;
   PetscBool is_count_known = PETSC_TRUE;
   const LockedModes* locked = nullptr;
+  const double* mass_diagonal = nullptr;
   LanczosCheckpoint* checkpoint = nullptr;
 };
 
@@ -104,7 +105,7 @@ void run(EPS eps) {
 
   const ShiftInvert inverse(eps->st);
   const OpenBasis open(eps, static_cast<int>(fixed) + room + block);
-  InnerProduct inner(comm, mass, eps->nloc, eps->n, block);
+  InnerProduct inner(comm, mass, eps->nloc, eps->n, block, settings.mass_diagonal);
   check(MatGetOwnershipRange(inner.w_mat(), &first_row, nullptr));
   LanczosBasis basis(open.memory, static_cast<int>(fixed), room, block);
   BlockLanczos lanczos({inverse, inner, basis, locked, eps->n, first_row}, make_goal(eps), static_cast<int>(eps->max_it),
@@ -235,6 +236,13 @@ PetscErrorCode set_locked(EPS eps, const LockedModes* locked) {
   PetscBool is_ours = PETSC_FALSE;
   PetscCall(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(eps), kBlockLanczosType, &is_ours));
   if (is_ours == PETSC_TRUE) get_settings(eps).locked = locked;
+  return 0;
+}
+
+PetscErrorCode set_mass_diagonal(EPS eps, const double* diagonal) {
+  PetscBool is_ours = PETSC_FALSE;
+  PetscCall(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(eps), kBlockLanczosType, &is_ours));
+  if (is_ours == PETSC_TRUE) get_settings(eps).mass_diagonal = diagonal;
   return 0;
 }
 

@@ -32,6 +32,10 @@ PetscErrorCode set_count_known(EPS eps, PetscBool known);
 /// (orthogonality.hpp). Must outlive the solve; null: none. Logically collective.
 PetscErrorCode set_locked(EPS eps, const LockedModes* locked);
 
+/// The own rows' diagonal of a mass matrix that has nothing else, on every rank or on none: its products are made while others are. Must
+/// outlive the solve; null: not known. Logically collective.
+PetscErrorCode set_mass_diagonal(EPS eps, const double* diagonal);
+
 /// Null: none. Must outlive the solve. Logically collective.
 PetscErrorCode set_checkpoint(EPS eps, LanczosCheckpoint* checkpoint);
 

@@ -25,6 +25,7 @@ constexpr std::ptrdiff_t kRowsTransposed = 4096;  // of a panel for A^T B: 16 co
 constexpr std::ptrdiff_t kStripTransposed = 128;  // of a strip of it
 constexpr std::ptrdiff_t kRowsProduct = 2048;     // of a panel for B - A S, which is written too
 constexpr std::ptrdiff_t kStripProduct = 128;     // of a strip of it
+constexpr std::ptrdiff_t kRowsFused = 2048;       // of a panel that more than one product uses
 constexpr std::ptrdiff_t kRowsCombined = 256;     // of a panel for A S
 constexpr int kNarrow = 32;                       // columns of the narrow block at most: dgemm is as fast for wider ones
 constexpr int kTile = 4;                          // of them in registers
@@ -197,6 +198,14 @@ class PackedPanel {
       std::fill(to + rows, to + rounded, 0.0);
     }
   }
+  /// Row i times d[i].
+  void scale(const double* d, std::ptrdiff_t rows, int columns) {
+    for (int j = 0; j < columns; ++j) {
+      double* column = values_ + j * stride_;
+      for (std::ptrdiff_t i = 0; i < rows; ++i) column[i] *= d[i];
+    }
+  }
+  void clear() { std::fill(space_.begin(), space_.end(), 0.0); }
   void store(const Columns& to, std::ptrdiff_t first, std::ptrdiff_t rows) const {
     for (int j = 0; j < to.count; ++j)
       std::memcpy(to.column(j) + first, values_ + j * stride_, static_cast<std::size_t>(rows) * sizeof(double));
@@ -208,62 +217,142 @@ class PackedPanel {
   double* values_ = nullptr;
 };
 
-CARILLON_AVX512 void multiply_transposed_avx512(const Columns& a, const Columns& b, double* small, int small_stride) {
-  constexpr int kLanes = 8 * kWide * kTile;  // of one tile's sums
-  const int tiles = round_up(b.count, kTile) / kTile;
-  for (int j = 0; j < b.count; ++j) std::fill_n(small + static_cast<std::ptrdiff_t>(j) * small_stride, a.count, 0.0);
-  PackedPanel panel(kRowsTransposed, b.count);
-  PackedPanel sums(kLanes, tiles);
-  for (std::ptrdiff_t first = 0; first < a.rows; first += kRowsTransposed) {
-    const std::ptrdiff_t rows = std::min(kRowsTransposed, a.rows - first);
-    Strips strips(a, first, rows, kStripTransposed, tiles);
-    panel.load(b, first, rows);
+/// Adds A^T P to small, P: rows [first, first + rows) of a narrow block, packed.
+class TransposedProducts {
+ public:
+  explicit TransposedProducts(int narrow) : narrow_(narrow), tiles_(round_up(narrow, kTile) / kTile), sums_(kLanes, tiles_) {}
+
+  CARILLON_AVX512 void add(const Columns& a, std::ptrdiff_t first, std::ptrdiff_t rows, PackedPanel& panel, double* small,
+                           int small_stride) {
+    Strips strips(a, first, rows, kStripTransposed, tiles_);
     for (int i = 0; i < a.count; i += kWide) {
       const int wide = std::min(kWide, a.count - i);
       strips.begin_columns(i, wide);
-      std::fill_n(sums.get(), static_cast<std::ptrdiff_t>(tiles) * kLanes, 0.0);
+      std::fill_n(sums_.get(), static_cast<std::ptrdiff_t>(tiles_) * kLanes, 0.0);
       for (std::ptrdiff_t r = 0; r < rows; r += kStripTransposed) {
         const std::ptrdiff_t strip = std::min(kStripTransposed, rows - r);
         strips.begin_strip(r);
-        for (int j = 0; j < tiles; ++j) {
+        for (int j = 0; j < tiles_; ++j) {
           kTransposedTile[wide](a.column(i) + first + r, a.stride, panel.get() + j * kTile * panel.stride() + r, panel.stride(), strip,
-                                sums.get() + j * kLanes, strips.find_prefetch(j));
+                                sums_.get() + j * kLanes, strips.find_prefetch(j));
         }
       }
-      for (int j = 0; j < b.count; ++j) {
+      for (int j = 0; j < narrow_; ++j) {
         for (int k = 0; k < wide; ++k) {
-          const double* lane = sums.get() + (j / kTile) * kLanes + 8 * (k * kTile + j % kTile);
+          const double* lane = sums_.get() + (j / kTile) * kLanes + 8 * (k * kTile + j % kTile);
           small[static_cast<std::ptrdiff_t>(j) * small_stride + i + k] += add_lanes(lane);
         }
       }
     }
   }
+
+ private:
+  static constexpr int kLanes = 8 * kWide * kTile;  // of one tile's sums
+  int narrow_;
+  int tiles_;
+  PackedPanel sums_;
+};
+
+/// S of a product, with zero columns up to a whole number of tiles.
+class PackedCoefficients {
+ public:
+  PackedCoefficients(const double* s, int s_stride, int rows, int columns)
+      : rows_(rows), values_(static_cast<std::size_t>(rows) * static_cast<std::size_t>(round_up(columns, kTile)), 0.0) {
+    for (int j = 0; j < columns; ++j)
+      std::copy_n(s + static_cast<std::ptrdiff_t>(j) * s_stride, rows, values_.data() + static_cast<std::ptrdiff_t>(j) * rows);
+  }
+  int rows() const { return rows_; }
+  const double* column(int j) const { return values_.data() + static_cast<std::ptrdiff_t>(j) * rows_; }
+
+ private:
+  int rows_;
+  std::vector<double> values_;
+};
+
+// P -= A S, P: rows [first, first + rows) of a block of `narrow` columns, packed.
+void subtract_from_panel(const Columns& a, const PackedCoefficients& s, std::ptrdiff_t first, std::ptrdiff_t rows, int narrow,
+                         PackedPanel& panel) {
+  const int tiles = round_up(narrow, kTile) / kTile;
+  Strips strips(a, first, rows, kStripProduct, tiles);
+  for (int i = 0; i < a.count; i += kWide) {
+    const int wide = std::min(kWide, a.count - i);
+    strips.begin_columns(i, wide);
+    for (std::ptrdiff_t r = 0; r < rows; r += kStripProduct) {
+      const std::ptrdiff_t strip = std::min(kStripProduct, rows - r);
+      strips.begin_strip(r);
+      for (int j = 0; j < tiles; ++j) {
+        kSubtractTile[wide](a.column(i) + first + r, a.stride, s.column(j * kTile) + i, s.rows(),
+                            panel.get() + j * kTile * panel.stride() + r, panel.stride(), strip, strips.find_prefetch(j));
+      }
+    }
+  }
+}
+
+void multiply_transposed_avx512(const Columns& a, const Columns& b, double* small, int small_stride) {
+  for (int j = 0; j < b.count; ++j) std::fill_n(small + static_cast<std::ptrdiff_t>(j) * small_stride, a.count, 0.0);
+  PackedPanel panel(kRowsTransposed, b.count);
+  TransposedProducts products(b.count);
+  for (std::ptrdiff_t first = 0; first < a.rows; first += kRowsTransposed) {
+    const std::ptrdiff_t rows = std::min(kRowsTransposed, a.rows - first);
+    panel.load(b, first, rows);
+    products.add(a, first, rows, panel, small, small_stride);
+  }
 }
 
 void subtract_product_avx512(const Columns& a, const double* small, int small_stride, const Columns& b) {
-  const int tiles = round_up(b.count, kTile) / kTile;
-  std::vector<double> coefficients(static_cast<std::size_t>(a.count) * static_cast<std::size_t>(tiles * kTile), 0.0);
-  for (int j = 0; j < b.count; ++j)
-    std::copy_n(small + static_cast<std::ptrdiff_t>(j) * small_stride, a.count,
-                coefficients.data() + static_cast<std::ptrdiff_t>(j) * a.count);
+  const PackedCoefficients s(small, small_stride, a.count, b.count);
   PackedPanel panel(kRowsProduct, b.count);
   for (std::ptrdiff_t first = 0; first < a.rows; first += kRowsProduct) {
     const std::ptrdiff_t rows = std::min(kRowsProduct, a.rows - first);
-    Strips strips(a, first, rows, kStripProduct, tiles);
     panel.load(b, first, rows);
-    for (int i = 0; i < a.count; i += kWide) {
-      const int wide = std::min(kWide, a.count - i);
-      strips.begin_columns(i, wide);
-      for (std::ptrdiff_t r = 0; r < rows; r += kStripProduct) {
-        const std::ptrdiff_t strip = std::min(kStripProduct, rows - r);
-        strips.begin_strip(r);
-        for (int j = 0; j < tiles; ++j) {
-          kSubtractTile[wide](a.column(i) + first + r, a.stride, coefficients.data() + static_cast<std::ptrdiff_t>(j * kTile) * a.count + i,
-                              a.count, panel.get() + j * kTile * panel.stride() + r, panel.stride(), strip, strips.find_prefetch(j));
-        }
-      }
-    }
+    subtract_from_panel(a, s, first, rows, b.count, panel);
     panel.store(b, first, rows);
+  }
+}
+
+void subtract_and_multiply_transposed_avx512(const Product& product, int s_stride, const double* d, const Columns& b,
+                                             std::span<const Columns> c, double* small, int small_stride) {
+  const PackedCoefficients s(product.s, s_stride, product.a.count, b.count);
+  PackedPanel panel(kRowsFused, b.count);
+  TransposedProducts products(b.count);
+  for (std::ptrdiff_t first = 0; first < b.rows; first += kRowsFused) {
+    const std::ptrdiff_t rows = std::min(kRowsFused, b.rows - first);
+    panel.load(b, first, rows);
+    if (product.a.count > 0) {
+      subtract_from_panel(product.a, s, first, rows, b.count, panel);
+      panel.store(b, first, rows);
+    }
+    panel.scale(d + first, rows, b.count);
+    double* at = small;
+    for (const Columns& set : c) {
+      products.add(set, first, rows, panel, at, small_stride);
+      at += set.count;
+    }
+  }
+}
+
+void subtract_and_combine_avx512(std::span<const Product> products, int s_stride, const double* t, const double* d, const Columns& b,
+                                 const Columns& z) {
+  std::vector<PackedCoefficients> s;
+  for (const Product& product : products) s.emplace_back(product.s, s_stride, product.a.count, b.count);
+  std::vector<double> negative(static_cast<std::size_t>(b.count) * static_cast<std::size_t>(b.count), 0.0);  // -T
+  for (std::size_t i = 0; t != nullptr && i < negative.size(); ++i) negative[i] = -t[i];
+  const PackedCoefficients combination(negative.data(), b.count, b.count, b.count);
+  PackedPanel panel(kRowsFused, b.count);
+  PackedPanel combined(kRowsFused, b.count);
+  const Columns loaded{panel.get(), kRowsFused, panel.stride(), b.count};
+  for (std::ptrdiff_t first = 0; first < b.rows; first += kRowsFused) {
+    const std::ptrdiff_t rows = std::min(kRowsFused, b.rows - first);
+    panel.load(b, first, rows);
+    for (std::size_t k = 0; k < products.size(); ++k) subtract_from_panel(products[k].a, s[k], first, rows, b.count, panel);
+    if (t != nullptr) {
+      combined.clear();
+      subtract_from_panel(loaded, combination, 0, rows, b.count, combined);
+    }
+    PackedPanel& result = t != nullptr ? combined : panel;
+    result.store(b, first, rows);
+    result.scale(d + first, rows, b.count);
+    result.store(z, first, rows);
   }
 }
 
@@ -330,8 +419,26 @@ void combine_columns_avx512(const Columns& a, const double* small, int kept) {
 bool has_avx512() { return false; }
 void multiply_transposed_avx512(const Columns&, const Columns&, double*, int) {}
 void subtract_product_avx512(const Columns&, const double*, int, const Columns&) {}
+void subtract_and_multiply_transposed_avx512(const Product&, int, const double*, const Columns&, std::span<const Columns>, double*, int) {}
+void subtract_and_combine_avx512(std::span<const Product>, int, const double*, const double*, const Columns&, const Columns&) {}
 void combine_columns_avx512(const Columns&, const double*, int) {}
 #endif
+
+// The rows [first, first + rows) of some columns.
+Columns take_rows(const Columns& from, std::ptrdiff_t first, std::ptrdiff_t rows) {
+  return {from.values + first, rows, from.stride, from.count};
+}
+
+void subtract_by_blas(const Columns& a, const double* s, int s_stride, const Columns& b) {
+  gemm(Transpose::kNo, b.rows, b.count, a.count, -1.0, a.values, a.stride, s, s_stride, 1.0, b.values, b.stride);
+}
+
+// Z = D B
+void scale_rows(const double* d, const Columns& b, const Columns& z) {
+  for (int j = 0; j < b.count; ++j) {
+    for (std::ptrdiff_t i = 0; i < b.rows; ++i) z.column(j)[i] = d[i] * b.column(j)[i];
+  }
+}
 
 }  // namespace
 
@@ -360,7 +467,52 @@ void subtract_product(const Columns& a, const double* small, int small_stride, c
   if (a.count == 0 || b.count == 0) return;
   petsc::add_flops(2.0 * static_cast<double>(a.rows) * a.count * b.count);
   if (b.count <= kNarrow && has_avx512()) return subtract_product_avx512(a, small, small_stride, b);
-  gemm(Transpose::kNo, a.rows, b.count, a.count, -1.0, a.values, a.stride, small, small_stride, 1.0, b.values, b.stride);
+  subtract_by_blas(a, small, small_stride, b);
+}
+
+void subtract_and_multiply_transposed(const Product& product, int s_stride, const double* d, const Columns& b, std::span<const Columns> c,
+                                      double* small, int small_stride) {
+  int all = product.a.count;
+  for (const Columns& set : c) all += set.count;
+  petsc::add_flops(2.0 * static_cast<double>(b.rows) * all * b.count);
+  for (int j = 0; j < b.count; ++j) std::fill_n(small + static_cast<std::ptrdiff_t>(j) * small_stride, all - product.a.count, 0.0);
+  if (b.count <= kNarrow && has_avx512()) return subtract_and_multiply_transposed_avx512(product, s_stride, d, b, c, small, small_stride);
+  std::vector<double> space(static_cast<std::size_t>(kRowsFused) * static_cast<std::size_t>(b.count));
+  for (std::ptrdiff_t first = 0; first < b.rows; first += kRowsFused) {
+    const std::ptrdiff_t rows = std::min(kRowsFused, b.rows - first);
+    const Columns panel = take_rows(b, first, rows);
+    const Columns scaled{space.data(), rows, kRowsFused, b.count};
+    if (product.a.count > 0) subtract_by_blas(take_rows(product.a, first, rows), product.s, s_stride, panel);
+    scale_rows(d + first, panel, scaled);
+    double* at = small;
+    for (const Columns& set : c) {
+      if (set.count > 0)
+        gemm(Transpose::kYes, set.count, b.count, rows, 1.0, set.values + first, set.stride, scaled.values, kRowsFused, 1.0, at,
+             small_stride);
+      at += set.count;
+    }
+  }
+}
+
+void subtract_and_combine(std::span<const Product> products, int s_stride, const double* t, const double* d, const Columns& b,
+                          const Columns& z) {
+  int all = t != nullptr ? b.count : 0;
+  for (const Product& product : products) all += product.a.count;
+  petsc::add_flops(2.0 * static_cast<double>(b.rows) * all * b.count);
+  if (b.count <= kNarrow && has_avx512()) return subtract_and_combine_avx512(products, s_stride, t, d, b, z);
+  for (std::ptrdiff_t first = 0; first < b.rows; first += kRowsFused) {
+    const std::ptrdiff_t rows = std::min(kRowsFused, b.rows - first);
+    const Columns panel = take_rows(b, first, rows);
+    const Columns image = take_rows(z, first, rows);
+    for (const Product& product : products) {
+      if (product.a.count > 0) subtract_by_blas(take_rows(product.a, first, rows), product.s, s_stride, panel);
+    }
+    if (t != nullptr) {
+      gemm(Transpose::kNo, rows, b.count, b.count, 1.0, panel.values, panel.stride, t, b.count, 0.0, image.values, image.stride);
+      for (int j = 0; j < b.count; ++j) std::copy_n(image.column(j), rows, panel.column(j));
+    }
+    scale_rows(d + first, panel, image);
+  }
 }
 
 void combine_columns(const Columns& a, const double* small, int kept) {

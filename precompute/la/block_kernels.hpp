@@ -4,6 +4,7 @@
 #include <mpi.h>
 
 #include <cstddef>
+#include <span>
 
 #include "precompute/comm/communicator.hpp"
 #include "precompute/la/lapack.hpp"
@@ -30,6 +31,22 @@ Matrix multiply_transposed(const comm::Communicator& comm, const Columns& a, con
 
 /// B <- B - A S, S: (a.count, b.count) column-major with stride `small_stride`. Not collective.
 void subtract_product(const Columns& a, const double* small, int small_stride, const Columns& b);
+
+/// A S, S: (a.count, any) column-major with a stride that the call gives.
+struct Product {
+  Columns a;
+  const double* s = nullptr;
+};
+
+/// B <- B - A S, then small = C^T D B for all columns of C, set by set below each other, (all, b.count) column-major with stride
+/// `small_stride`; D: diagonal, (b.rows). B may be one of C. Every number is read from memory once: B changes a panel of rows at a time,
+/// which is multiplied while it is in the cache. Not collective.
+void subtract_and_multiply_transposed(const Product& product, int s_stride, const double* d, const Columns& b, std::span<const Columns> c,
+                                      double* small, int small_stride);
+
+/// B <- (B - sum of the products) T, then Z = D B, in one pass like that. T: (b.count, b.count), null: the identity. Not collective.
+void subtract_and_combine(std::span<const Product> products, int s_stride, const double* t, const double* d, const Columns& b,
+                          const Columns& z);
 
 /// The first `kept` columns of A <- A S, S: (a.count, kept) column-major with stride a.count. Not collective.
 void combine_columns(const Columns& a, const double* small, int kept);

@@ -40,6 +40,8 @@ class NodeMatrix {
   static void unpack(const Row* rows, std::size_t begin, std::size_t nodes, const Columns& y);
 
   bool is_diagonal() const { return kind_ == Kind::kDiagonal; }
+  /// (rows) the diagonal where that is all there is, null otherwise.
+  const double* get_diagonal() const { return is_diagonal() ? diagonal_.data() : nullptr; }
 
  private:
   enum class Kind { kDiagonal, kScalars, kBlocks };

@@ -172,13 +172,48 @@ TEST(InnerProduct, multiplies_by_the_mass_wherever_its_block_is) {
       EXPECT_LT(find_largest(rig.gather_columns(inner.z()) - z), 1e-14);
       const Matrix products = v.transpose() * z;
       EXPECT_LT(find_largest(inner.calc_products(rig.view(), inner.z()) - products), 1e-13);
-      std::array<double, 2> sums{1, 0.5};
-      EXPECT_LT(find_largest(inner.calc_products(rig.view(), inner.z(), sums) - products), 1e-13);
-      int ranks = 1;
-      MPI_Comm_size(world(), &ranks);
-      EXPECT_EQ(sums[0], ranks);
-      EXPECT_EQ(sums[1], 0.5 * ranks);
     }
+  }
+}
+
+// With a mass matrix of any kind, and with a diagonal one, against Eigen's products.
+TEST(InnerProduct, subtracts_multiplies_and_combines_in_one_pass) {
+  Rig rig(2 * Rig::kBlock);
+  const auto n = static_cast<PetscInt>(rig.k.rows());
+  for (const bool is_diagonal : {false, true}) {
+    rig.fill_at_random(rig.view());
+    petsc::MatHandle mass;
+    check(MatDuplicate(rig.system.mass, MAT_COPY_VALUES, mass.out()));
+    std::vector<double> diagonal(static_cast<std::size_t>(rig.rows));
+    Matrix m = rig.m;
+    if (is_diagonal) {
+      m = Matrix(rig.m.diagonal().asDiagonal());
+      for (PetscInt i = 0; i < rig.rows; ++i) diagonal[static_cast<std::size_t>(i)] = m(rig.first + i, rig.first + i);
+    }
+    InnerProduct inner(world(), mass, rig.rows, n, Rig::kBlock, is_diagonal ? diagonal.data() : nullptr);
+    inner.place(rig.view().part(Rig::kBlock, Rig::kBlock));
+    const Columns a = rig.view().part(0, Rig::kBlock);
+    const Matrix v = rig.gather_columns(a), old = rig.gather_columns(inner.w());
+    Matrix s(Rig::kBlock + 1, Rig::kBlock), t(Rig::kBlock, Rig::kBlock);
+    for (Eigen::Index i = 0; i < s.size(); ++i) s.data()[i] = std::sin(1.1 * static_cast<double>(i));
+    for (Eigen::Index i = 0; i < t.size(); ++i) t.data()[i] = std::cos(0.7 * static_cast<double>(i));
+    std::array<double, 2> sums{1, 0.5};
+    const std::vector<Columns> sets{rig.view().part(0, 2 * Rig::kBlock), a.part(1, 2)};
+    const Matrix products = inner.subtract_and_calc_products({a, s.data()}, Rig::kBlock + 1, sets, Rig::kBlock, sums);
+    const Matrix w = old - v * s.topRows(Rig::kBlock);
+    EXPECT_LT(find_largest(rig.gather_columns(inner.w()) - w), 1e-13);
+    Matrix expected(2 * Rig::kBlock + 2, Rig::kBlock);
+    expected << v.transpose() * m * w, w.transpose() * m * w, v.middleCols(1, 2).transpose() * m * w;
+    EXPECT_LT(find_largest(products - expected), 1e-12);
+    int ranks = 1;
+    MPI_Comm_size(world(), &ranks);
+    EXPECT_EQ(sums[0], ranks);
+    EXPECT_EQ(sums[1], 0.5 * ranks);
+    const std::vector<la::Product> subtracted{{a, s.data()}};
+    inner.subtract_and_combine(subtracted, Rig::kBlock + 1, t.data(), Rig::kBlock);
+    const Matrix combined = (w - v * s.topRows(Rig::kBlock)) * t;
+    EXPECT_LT(find_largest(rig.gather_columns(inner.w()) - combined), 1e-12);
+    EXPECT_LT(find_largest(rig.gather_columns(inner.z()) - m * combined), 1e-12);
   }
 }
 

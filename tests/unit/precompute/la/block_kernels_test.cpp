@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -52,6 +53,52 @@ TEST(BlockKernels, agree_with_plain_loops_at_odd_sizes) {
               sum += before[static_cast<std::size_t>(i * stride + r)] * gram[static_cast<std::size_t>(j * wide + i)];
             ASSERT_NEAR(a[static_cast<std::size_t>(j * stride + r)], sum, 1e-8);
           }
+        }
+      }
+    }
+  }
+}
+
+/// (rows, columns), numbers that nothing else has, and the columns of it.
+struct Block {
+  Block(int rows, int columns, double seed) : values(rows + 3, columns), rows_(rows) {
+    for (Eigen::Index i = 0; i < values.size(); ++i) values.data()[i] = std::sin(seed * static_cast<double>(i + 1));
+  }
+  Columns view() { return {values.data(), rows_, values.rows(), static_cast<int>(values.cols())}; }
+  Eigen::MatrixXd rows() const { return values.topRows(rows_); }
+
+  Eigen::MatrixXd values;
+  int rows_;
+};
+
+// Products of several passes in one, against Eigen's.
+TEST(BlockKernels, agree_in_one_pass_with_the_products_one_after_the_other) {
+  for (const int rows : {0, 1, 25, 2047, 2053, 4100}) {
+    for (const int wide : {0, 1, 6, 13}) {
+      for (const int narrow : {1, 3, 16, 33}) {
+        Block a(rows, wide, 1.7), b(rows, narrow, 0.9), c(rows, 5, 0.3), z(rows, narrow, 0.7);
+        const Eigen::MatrixXd s = 0.1 * Block(wide, narrow, 1.3).values, d = Block(rows, 1, 2.1).rows();
+        const auto stride = static_cast<int>(s.rows());
+        const Eigen::MatrixXd expected = b.rows() - a.rows() * s.topRows(wide);
+        std::vector<Columns> sets{c.view(), a.view(), b.view()};
+        const int all = 5 + wide + narrow;
+        Eigen::MatrixXd products = Eigen::MatrixXd::Constant(all, narrow, 7.0);
+        subtract_and_multiply_transposed({a.view(), s.data()}, stride, d.data(), b.view(), sets, products.data(), all);
+        EXPECT_LT((b.rows() - expected).norm(), 1e-12 * (1 + expected.norm()));
+        Eigen::MatrixXd together(rows, all);
+        together << c.rows(), a.rows(), expected;
+        const Eigen::MatrixXd by_eigen = together.transpose() * d.asDiagonal() * expected;
+        EXPECT_LT((products - by_eigen).norm(), 1e-12 * (1 + by_eigen.norm())) << rows << " " << wide << " " << narrow;
+
+        const Eigen::MatrixXd t = Block(narrow, narrow, 0.4).rows();
+        for (const bool is_combined : {false, true}) {
+          const Eigen::MatrixXd left = b.rows() - a.rows() * s.topRows(wide) - c.rows() * products.topRows(5);
+          const Eigen::MatrixXd result = is_combined ? Eigen::MatrixXd(left * t) : left;
+          const Eigen::MatrixXd coefficients = (Eigen::MatrixXd(5 + wide, narrow) << products.topRows(5), s.topRows(wide)).finished();
+          const std::vector<Product> subtracted{{c.view(), coefficients.data()}, {a.view(), coefficients.data() + 5}};
+          subtract_and_combine(subtracted, 5 + wide, is_combined ? t.data() : nullptr, d.data(), b.view(), z.view());
+          EXPECT_LT((b.rows() - result).norm(), 1e-12 * (1 + result.norm()));
+          EXPECT_LT((z.rows() - d.asDiagonal() * result).norm(), 1e-12 * (1 + result.norm()));
         }
       }
     }
