@@ -7,8 +7,10 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <charconv>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -24,7 +26,9 @@ static_assert(std::endian::native == std::endian::little, "glTF is little-endian
 
 constexpr long long kHuge = 1LL << 40;
 constexpr int kMaxDepth = 200;
-constexpr std::uint64_t kMaxBufferBytes = 4ULL << 30;
+constexpr std::uint64_t kMaxBufferBytes = 4ULL << 30;                      // of all buffers
+constexpr std::size_t kMaxTextBytes = 256U << 20, kMaxValues = 3'000'000;  // of the JSON: what it takes in memory is in proportion
+constexpr const char* kDraco = "KHR_draco_mesh_compression";
 constexpr std::uint32_t kJsonChunk = 0x4E4F534A, kBinaryChunk = 0x004E4942;
 
 using Matrix = std::array<double, 16>;  // column by column
@@ -77,6 +81,34 @@ std::optional<std::string> decode_base64(std::string_view text) {
   return bytes;
 }
 
+/// A URI without its escapes (RFC 3986, 2.1); nothing where one is none.
+std::optional<std::string> decode_percent(std::string_view uri) {
+  std::string text;
+  for (std::size_t i = 0; i < uri.size(); ++i) {
+    if (uri[i] != '%') {
+      text += uri[i];
+      continue;
+    }
+    unsigned value = 0;
+    const char* const begin = uri.data() + i + 1;
+    if (uri.size() - i < 3 || std::from_chars(begin, begin + 2, value, 16).ptr != begin + 2 || value == 0) return std::nullopt;
+    text += static_cast<char>(value);
+    i += 2;
+  }
+  return text;
+}
+
+/// Throws InputError for a text that would take too much memory.
+void check_text(std::string_view json, const std::string& name) {
+  if (json.size() > kMaxTextBytes)
+    throw InputError(fmt::format("{}: its JSON has {} MiB, and {} are the most; export it as a .glb file, whose buffers are binary", name,
+                                 json.size() >> 20, kMaxTextBytes >> 20));
+  const auto values = std::count_if(json.begin(), json.end(), [](char c) { return c == ',' || c == '{' || c == '['; });
+  if (static_cast<std::size_t>(values) > kMaxValues)
+    throw InputError(
+        fmt::format("{}: its JSON has more than {} values; export the object alone, without the rest of its scene", name, kMaxValues));
+}
+
 /// The numbers of an accessor where they lie.
 struct Numbers {
   std::string_view bytes;
@@ -115,7 +147,7 @@ struct Numbers {
 class Gltf {
  public:
   Gltf(std::string_view json, std::optional<std::string_view> binary, const std::string& name)
-      : name_(name), document_(base::parse_document(json, name)), root_(document_.root()), binary_(binary) {
+      : name_(name), document_(parse(json, name)), root_(document_.root()), binary_(binary) {
     views_ = root_.objects("bufferViews");
     accessors_ = root_.objects("accessors");
     meshes_ = root_.objects("meshes");
@@ -130,8 +162,7 @@ class Gltf {
     if (scenes.empty()) {
       for (std::size_t m = 0; m < meshes_.size(); ++m) add_mesh(m, kIdentity);
     } else {
-      const auto last = static_cast<long long>(scenes.size()) - 1;
-      base::Object& scene = scenes[static_cast<std::size_t>(root_.integer_if("scene", 0, last).value_or(0))];
+      base::Object& scene = scenes[find_index(root_, "scene", scenes.size(), "scene").value_or(0)];
       for (const std::size_t node : list_nodes(scene, "nodes")) add_node(node, kIdentity, 0);
     }
     if (soup_.counts.empty())
@@ -141,20 +172,46 @@ class Gltf {
   }
 
  private:
+  static base::Document parse(std::string_view json, const std::string& name) {
+    check_text(json, name);
+    return base::parse_document(json, name);
+  }
+
   /// What this file is, and what it needs to be read.
   void check() {
     base::Object asset = root_.object("asset");
     if (!asset.string("version").starts_with("2")) asset.fail("version", "only glTF 2 is read; convert it first");
     for (const base::Entry& entry : root_.entries("extensionsRequired", 1000)) {
-      if (entry.text == "KHR_draco_mesh_compression" || entry.text == "EXT_meshopt_compression" || entry.text == "KHR_meshopt_compression")
+      if (entry.text == kDraco || entry.text == "EXT_meshopt_compression" || entry.text == "KHR_meshopt_compression")
         root_.fail("extensionsRequired", fmt::format("its meshes are compressed ({}); export it without compression", entry.text));
     }
     if (!root_.objects("animations").empty())
       root_.fail("animations", "it is animated, and a body keeps its shape; export it still, without animations");
   }
 
+  /// The number of one of `size` things. `what`: one of them.
+  static std::optional<std::size_t> find_index(base::Object& object, const char* key, std::size_t size, const char* what) {
+    const std::optional<long long> index =
+        object.integer_if(key, std::numeric_limits<long long>::min(), std::numeric_limits<long long>::max());
+    if (index && (*index < 0 || static_cast<unsigned long long>(*index) >= size))
+      object.fail(key, fmt::format("is {}, and no {} has this number (there are {}); export it again", *index, what, size));
+    return index ? std::optional(static_cast<std::size_t>(*index)) : std::nullopt;
+  }
+  static std::size_t require_index(base::Object& object, const char* key, std::size_t size, const char* what) {
+    const std::optional<std::size_t> index = find_index(object, key, size, what);
+    if (!index) object.fail("", fmt::format("\"{}\" is missing here, the number of a {}; export it again", key, what));
+    return *index;
+  }
+
   void open_buffers() {
     std::vector<base::Object> buffers = root_.objects("buffers");
+    std::uint64_t total = 0;
+    for (base::Object& buffer : buffers) {
+      total += static_cast<std::uint64_t>(buffer.integer("byteLength", 1, kHuge));
+      if (total > kMaxBufferBytes)
+        buffer.fail("byteLength",
+                    fmt::format("all buffers up to here have more than {} GiB; export the object alone", kMaxBufferBytes >> 30));
+    }
     for (std::size_t b = 0; b < buffers.size(); ++b) {
       base::Object& buffer = buffers[b];
       const auto length = static_cast<std::size_t>(buffer.integer("byteLength", 1, kHuge));
@@ -181,8 +238,10 @@ class Gltf {
       if (!bytes) buffer.fail("uri", "its data are not base64; export it again");
       return *bytes;
     }
-    const std::filesystem::path file = uri;
-    if (file.is_absolute() || uri.find("..") != std::string::npos || uri.find("://") != std::string::npos)
+    const std::optional<std::string> decoded = decode_percent(uri);
+    const std::filesystem::path file = decoded.value_or("");
+    if (!decoded || decoded->empty() || file.is_absolute() || decoded->find("..") != std::string::npos ||
+        decoded->find("://") != std::string::npos)
       buffer.fail("uri", "is no file next to this one; put it there, or export one .glb file");
     return base::read_file(std::filesystem::path(name_).parent_path() / file, "buffer of a glTF file", kMaxBufferBytes);
   }
@@ -232,8 +291,9 @@ class Gltf {
     is_used_[n] = true;
     if (node.has("skin")) node.fail("skin", "its mesh is bent by bones (a skin), and a body keeps its shape; apply the pose in a modeller");
     const Matrix own = multiply(parent, read_transform(node));
-    if (const auto mesh = node.integer_if("mesh", 0, static_cast<long long>(meshes_.size()) - 1))
-      add_mesh(static_cast<std::size_t>(*mesh), own);
+    if (std::optional<base::Object> extensions = node.object_if("extensions"); extensions && extensions->has("EXT_mesh_gpu_instancing"))
+      node.fail("extensions", "its mesh is drawn in many places (EXT_mesh_gpu_instancing); make copies of it in a modeller");
+    if (const auto mesh = find_index(node, "mesh", meshes_.size(), "mesh")) add_mesh(*mesh, own);
     for (const std::size_t child : list_nodes(node, "children")) add_node(child, own, depth + 1);
   }
 
@@ -243,6 +303,8 @@ class Gltf {
       const long long mode = primitive.integer_if("mode", 0, 6).value_or(kTriangles);
       if (mode < kTriangles) continue;  // points and lines
       if (primitive.has("targets")) primitive.fail("targets", "it has morph targets, and a body keeps its shape; apply one in a modeller");
+      if (std::optional<base::Object> extensions = primitive.object_if("extensions"); extensions && extensions->has(kDraco))
+        primitive.fail("extensions", fmt::format("its meshes are compressed ({}); export it without compression", kDraco));
       base::Object attributes = primitive.object("attributes");
       if (!attributes.has("POSITION")) continue;
       const Numbers points = read_accessor(attributes, "POSITION", "VEC3");
@@ -269,6 +331,8 @@ class Gltf {
     std::optional<Numbers> indices;
     if (primitive.has("indices")) indices = read_accessor(primitive, "indices", "SCALAR");
     const std::size_t corners = indices ? indices->count : points;
+    if (kind == 0 && corners % 3 != 0)
+      primitive.fail("", fmt::format("mesh {} has {} corners, which are no whole number of triangles; export it again", m, corners));
     if (corners / (kind == 0 ? 3 : 1) + soup_.counts.size() > static_cast<std::size_t>(kMaxTriangles)) refuse_size();
     const auto get = [&](std::size_t i) {
       const auto index = static_cast<std::size_t>(indices ? indices->get(i, 0) : static_cast<double>(i));
@@ -287,8 +351,8 @@ class Gltf {
   }
 
   Numbers read_accessor(base::Object& owner, const char* key, const char* type) {
-    const long long a = owner.integer(key, 0, static_cast<long long>(accessors_.size()) - 1);
-    base::Object& accessor = accessors_[static_cast<std::size_t>(a)];
+    const std::size_t a = require_index(owner, key, accessors_.size(), "accessor");
+    base::Object& accessor = accessors_[a];
     if (accessor.has("sparse")) accessor.fail("sparse", "sparse accessors are not read; export it again without them");
     if (accessor.string("type") != type) accessor.fail("type", fmt::format("accessor {} is used as {} and has to be {}", a, key, type));
     Numbers numbers;
@@ -301,11 +365,11 @@ class Gltf {
       accessor.fail("componentType", fmt::format("{} is no type of {}", numbers.component, is_index ? "an index" : "a position"));
     numbers.count = static_cast<std::size_t>(accessor.integer("count", 1, kHuge));
     const std::size_t size = component * (is_index ? 1 : 3);
-    if (!accessor.has("bufferView")) accessor.fail("", fmt::format("accessor {} has no \"bufferView\", and so no numbers", a));
-    const long long v = accessor.integer("bufferView", 0, static_cast<long long>(views_.size()) - 1);
-    base::Object& view = views_[static_cast<std::size_t>(v)];
-    const std::string_view buffer =
-        buffers_.at(static_cast<std::size_t>(view.integer("buffer", 0, static_cast<long long>(buffers_.size()) - 1)));
+    if (!accessor.has("bufferView"))
+      accessor.fail("", fmt::format("accessor {} has no \"bufferView\", and so no numbers; export it again", a));
+    const std::size_t v = require_index(accessor, "bufferView", views_.size(), "bufferView");
+    base::Object& view = views_[v];
+    const std::string_view buffer = buffers_[require_index(view, "buffer", buffers_.size(), "buffer")];
     const auto view_at = static_cast<std::size_t>(view.integer_if("byteOffset", 0, kHuge).value_or(0));
     const auto view_size = static_cast<std::size_t>(view.integer("byteLength", 1, kHuge));
     if (view_at > buffer.size() || view_size > buffer.size() - view_at)
