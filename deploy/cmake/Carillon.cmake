@@ -179,12 +179,16 @@ function(carillon_script_test name)
     ENVIRONMENT "${CARILLON_MPI_ENVIRONMENT};CARILLON_BIN_DIR=${CMAKE_BINARY_DIR}/bin;CARILLON_SOURCE_DIR=${PROJECT_SOURCE_DIR}")
 endfunction()
 
-# carillon_fuzz(NAME SOURCES ... LINK libs... CORPUS dir): a libFuzzer target (clang only, CARILLON_FUZZ=ON) and a short CTest run of it.
+# carillon_fuzz(NAME SOURCES ... LINK libs... CORPUS dir [DICTIONARY file]): a libFuzzer target (clang only, CARILLON_FUZZ=ON) and a short CTest
+# run of it. A dictionary has the words of a format.
 function(carillon_fuzz name)
   if(NOT CARILLON_FUZZ)
     return()
   endif()
-  cmake_parse_arguments(arg "" "CORPUS" "SOURCES;LINK" ${ARGN})
+  cmake_parse_arguments(arg "" "CORPUS;DICTIONARY" "SOURCES;LINK" ${ARGN})
+  if(arg_DICTIONARY)
+    set(dictionary -dict=${arg_DICTIONARY})
+  endif()
   add_executable(fuzz_${name} ${arg_SOURCES})
   target_include_directories(fuzz_${name} PRIVATE ${PROJECT_SOURCE_DIR})
   target_compile_options(fuzz_${name} PRIVATE -fsanitize=fuzzer)
@@ -197,6 +201,6 @@ function(carillon_fuzz name)
   # New inputs go to a folder of the build; the kept corpus is only read.
   file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/fuzz/${name})
   add_test(NAME fuzz.${name} COMMAND fuzz_${name} -max_total_time=15 -rss_limit_mb=3000 -timeout=20 -print_final_stats=1
-    -artifact_prefix=${CMAKE_BINARY_DIR}/fuzz/${name}- ${CMAKE_BINARY_DIR}/fuzz/${name} ${arg_CORPUS})
+    ${dictionary} -artifact_prefix=${CMAKE_BINARY_DIR}/fuzz/${name}- ${CMAKE_BINARY_DIR}/fuzz/${name} ${arg_CORPUS})
   set_tests_properties(fuzz.${name} PROPERTIES LABELS fuzz TIMEOUT 120)
 endfunction()

@@ -130,7 +130,7 @@ class Maker {
     std::vector<std::string> words{file.string()};
     if (is_preview_) words.emplace_back("-q");
     try {
-      (void)process::Programs(folder, is_quiet_).run("carillon-precompute", words, true, !is_preview_);
+      (void)process::Programs(is_quiet_).run("carillon-precompute", words, true, !is_preview_);
     } catch (const CountRefusal&) {
       throw;
     } catch (const InputError& error) {

@@ -20,6 +20,8 @@ Json::Value describe(const hear::Sound& sound) {
     entry[key] = to_json(file->string());
   entry["is_scaled"] = sound.is_edited;
   entry["mode_count"] = Json::UInt64(sound.mode_count);
+  entry["highest_hz"] = sound.highest_hz;
+  entry["is_complete"] = sound.is_complete;
   entry["worst_cents"] = std::isfinite(sound.worst_cents) ? Json::Value(sound.worst_cents) : Json::Value();
   entry["modes"] = Json::arrayValue;
   for (const hear::HeardMode& mode : sound.modes) {
@@ -33,17 +35,20 @@ Json::Value describe(const hear::Sound& sound) {
 }
 
 void print(const hear::Sound& sound) {
-  fmt::print("\n{}: {} modes, {}{}\n", show(sound.name), sound.mode_count,
-             std::isfinite(sound.worst_cents)
-                 ? fmt::format("frequencies to about {:.2g} cents (an estimate; the worst mode)", sound.worst_cents)
-                 : std::string("without error bars"),
-             sound.is_edited ? "; scaled from another solve" : "");
+  std::string text = fmt::format("{}: {} modes", show(sound.name), sound.mode_count);
+  if (!sound.is_complete) text += fmt::format(" up to {:.0f} Hz, and more above", sound.highest_hz);
+  text += std::isfinite(sound.worst_cents)
+              ? fmt::format(", frequencies to about {} cents (an estimate; the worst mode)", hear::format_cents(sound.worst_cents))
+              : std::string(", without error bars");
+  if (sound.is_edited) text += "; scaled from another solve";
+  if (sound.poisson_cents > 0.0) text += fmt::format(", {} cents of it for Poisson's ratio", hear::format_cents(sound.poisson_cents));
+  fmt::print("\n{}\n", text);
   fmt::print("{:>5} {:>10} {:>8} {:>9} {:>9}\n", "mode", "Hz", "+-cents", "T60 [s]", "dB(A)");
   for (std::size_t m = 0; m < sound.modes.size(); ++m) {
     const hear::HeardMode& mode = sound.modes[m];
     fmt::print("{:>5} {:>10.1f} {:>8} {:>9.3g} {:>9}\n", m + 1, mode.freq_hz,
-               std::isfinite(mode.error_cents) ? fmt::format("{:.2g}", mode.error_cents) : "-", mode.t60_s,
-               std::isfinite(mode.level_dba) ? fmt::format("{:.0f}", mode.level_dba) : "-");
+               std::isfinite(mode.error_cents) ? hear::format_cents(mode.error_cents) : "-", mode.t60_s,
+               mode.level_dba > -99.5 ? fmt::format("{:.0f}", mode.level_dba) : "<-99");
   }
   fmt::print("sound        {}\nspectrogram  {}\n", show(sound.wav.string(), 1000), show(sound.spectrogram.string(), 1000));
 }

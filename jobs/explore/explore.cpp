@@ -71,7 +71,7 @@ class Work {
         place_(find_place(order)),
         folder_(place_),
         banks_(folder_.path() / kBankFolder, order.keeps_banks),
-        programs_(folder_.path(), true) {}
+        programs_(true) {}
 
   Explored run() {
     fs::create_directory(folder_.path() / kBankFolder);

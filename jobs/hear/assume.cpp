@@ -12,7 +12,9 @@ namespace {
 // Objects that people strike: from a ring to a table.
 constexpr double kSmallestM = 0.005, kLargestM = 3.0;
 constexpr double kLeastM = 0.001, kMostM = 100.0;  // whatever was asked for
+constexpr double kHugeM = 10.0;                    // asked for, and not likely meant
 constexpr double kThinnestWall = 1.0 / 5000;       // of the body's largest extent
+constexpr double kNoWallM = 0.3;                   // and above: millimetres, if anything
 constexpr double kNormalisedM = 0.15;              // what a model without a unit is made
 
 struct Unit {
@@ -38,13 +40,15 @@ bool is_gltf(const std::filesystem::path& file) {
 double guess_scale(const Order& options, const SurfaceFacts& look, std::vector<std::string>& assumed) {
   const double largest = *std::max_element(look.extent.begin(), look.extent.end());
   const std::string file = options.object.filename().string();
-  if (is_gltf(options.object)) {  // in metres by its specification
+  if (look.is_mesh || is_gltf(options.object)) {  // glTF is in metres by its specification
+    const char* const what = look.is_mesh ? "meshes are" : "glTF is";
+    const char* const remedy =
+        look.is_mesh ? "--scale, metres per unit of the file (0.001 for millimetres)" : "its --height in metres, or --scale";
     if (largest < kSmallestM || largest > kLargestM)
-      throw InputError(
-          fmt::format("{}: it is {:.4g} m across, since glTF is in metres, which is the size of nothing one strikes; give its --height in "
-                      "metres, or --scale",
-                      options.object.string(), largest));
-    assumed.push_back(fmt::format("size: {}, since glTF is in metres; --height says otherwise", format_extent(look.extent, 1.0)));
+      throw InputError(fmt::format("{}: it is {:.4g} m across, since {} in metres, which is the size of nothing one strikes; give {}",
+                                   options.object.string(), largest, what, remedy));
+    assumed.push_back(fmt::format("size: {}, since {} in metres; {} says otherwise", format_extent(look.extent, 1.0), what,
+                                  look.is_mesh ? "--scale (0.001 for millimetres)" : "--height"));
     return 1.0;
   }
   if (is_normalised(largest)) {
@@ -78,27 +82,37 @@ double find_scale(const Order& options, const SurfaceFacts& look, double height_
   if (!(scale * largest >= kLeastM && scale * largest <= kMostM))
     throw InputError(fmt::format("{}: it would be {:.3g} m across; bodies of {:g} to {:g} m are heard, check {}", options.object.string(),
                                  scale * largest, kLeastM, kMostM, height_m > 0.0 ? "--height (metres)" : "--scale (metres per unit)"));
+  if (scale * largest > kHugeM)
+    assumed.push_back(fmt::format("size: {}, as {} says, which is more than one strikes: is it in metres?",
+                                  format_extent(look.extent, scale), height_m > 0.0 ? "--height" : "--scale"));
   return scale;
 }
 
 void check_wall(const Order& options, const SurfaceFacts& look, double scale) {
-  const double smallest = scale * *std::min_element(look.extent.begin(), look.extent.end());
+  const std::string file = options.object.string();
   if (!options.wall_m) {
     if (look.openings > 0)
       throw InputError(
-          fmt::format("{}: it is an open surface ({} border{}), which has no thickness; say how thick it is, in metres: --wall 0.002",
-                      options.object.string(), look.openings, look.openings == 1 ? "" : "s"));
+          fmt::format("{}: it is an open surface ({} border{}), which has no thickness; say how thick it is, in metres: --wall 0.002", file,
+                      look.openings, look.openings == 1 ? "" : "s"));
     return;
   }
-  if (*options.wall_m < kThinnestWall * scale * *std::max_element(look.extent.begin(), look.extent.end()))
-    throw InputError(fmt::format("{}: a wall of {:g} m is thinner than a {:.0f}th of the body; --wall is in metres",
-                                 options.object.string(), *options.wall_m, 1.0 / kThinnestWall));
-  if (look.openings == 0 && 2.0 * *options.wall_m >= smallest)
+  const double wall_m = *options.wall_m;
+  const auto [smallest, largest] = std::minmax_element(look.extent.begin(), look.extent.end());
+  if (wall_m < kThinnestWall * scale * *largest)
     throw InputError(
-        fmt::format("{}: a wall of {:g} m is thicker than half the body, which is {:.3g} m across where it is thinnest; give a thinner one "
-                    "(metres), or "
-                    "leave --wall out for a solid body",
-                    options.object.string(), *options.wall_m, smallest));
+        fmt::format("{}: a wall of {:g} m is thinner than a {:.0f}th of the body; --wall is in metres", file, wall_m, 1.0 / kThinnestWall));
+  // Of a closed surface the wall is inside; a sheet whose wall is as thick as half of it is long is none.
+  const bool is_sheet = look.openings > 0;
+  const double space_m = scale * (is_sheet ? *largest : *smallest);
+  if (2.0 * wall_m < space_m) return;
+  const double millimetres_m = 1e-3 * wall_m;
+  const bool is_in_millimetres = wall_m >= kNoWallM && 2.0 * millimetres_m < space_m && millimetres_m >= kThinnestWall * scale * *largest;
+  throw InputError(fmt::format("{}: a wall of {:g} m is thicker than half the body, which is {:.3g} m across{}; {}", file, wall_m, space_m,
+                               is_sheet ? "" : " where it is thinnest",
+                               is_in_millimetres ? fmt::format("--wall is in metres: {:g} mm are --wall {:g}", wall_m, millimetres_m)
+                               : is_sheet        ? std::string("give a thinner one (metres)")
+                                                 : std::string("give a thinner one (metres), or leave --wall out for a solid body")));
 }
 
 }  // namespace carillon::hear

@@ -1,4 +1,4 @@
-// What an object is taken for that comes without size, material and wall.
+// What an object is taken for that comes without size and wall.
 #pragma once
 
 #include <array>
@@ -9,8 +9,9 @@
 
 namespace carillon::hear {
 
-/// What `carillon-mesh --look` says of a surface.
+/// What `carillon-mesh --look` says of a surface or a mesh.
 struct SurfaceFacts {
+  bool is_mesh = false;  // of tetrahedra: extent is all that is known
   long long triangles = 0, parts = 0, openings = 0;
   std::array<double, 3> extent{};  // in the file's units
   double thickness = 0.0;          // of a surface that is both sides of a wall, in the file's units

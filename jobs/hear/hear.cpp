@@ -4,14 +4,19 @@
 // Deviations: none.
 #include "jobs/hear/hear.hpp"
 
+#include <fcntl.h>
 #include <fmt/core.h>
+#include <sys/file.h>
 
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cerrno>
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <string_view>
+#include <utility>
 
 #include "jobs/explore/explore.hpp"
 #include "jobs/hear/assume.hpp"
@@ -24,10 +29,12 @@
 #include "runtime/bank/blows.hpp"
 #include "runtime/bank/corrected.hpp"
 #include "runtime/bank/of_material.hpp"
+#include "runtime/base/descriptor.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/failure.hpp"
 #include "runtime/base/file.hpp"
 #include "runtime/base/json.hpp"
+#include "runtime/base/printable.hpp"
 #include "runtime/base/vector.hpp"
 #include "runtime/material/mallets.hpp"
 #include "runtime/material/table.hpp"
@@ -41,21 +48,83 @@ using Clock = std::chrono::steady_clock;
 constexpr int kMaxModes = 600;                // of what is not a preview
 constexpr const char* kExplorer = "explore";  // folder of the page
 constexpr std::size_t kStrikes = 4, kListed = 12;
-constexpr double kSameCents = 5.0;  // an edit that leaves Poisson's ratio may be so far off
+constexpr double kSameCents = 5.0;                       // an edit that leaves Poisson's ratio may be so far off
+constexpr double kMinCents = 0.001, kMaxCents = 1200.0;  // of a job's accuracy_cents
 constexpr std::array<double, 2> kBandHz{20.0, 20000.0};
 
-/// Letters, digits and what else is harmless in the name of a file.
+/// What is harmless in the name of a file: letters and digits of any script, points and underscores.
 std::string clean(const std::string& name) {
+  const bool is_text = base::printable(name) == name;  // bytes that are no UTF-8 would be no JSON
   std::string text;
-  for (const char c : name) text += std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '.' || c == '_' ? c : '-';
+  for (const char c : name) {
+    const auto byte = static_cast<unsigned char>(c);
+    text += std::isalnum(byte) != 0 || c == '.' || c == '_' || (byte >= 0x80 && is_text) ? c : '-';
+  }
   return text.empty() || text[0] == '.' ? "object" + text : text;
 }
 
-bool is_mesh_file(const fs::path& file) {
+std::string find_ending(const fs::path& file) {
   std::string ending = file.extension().string();
   std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return std::tolower(c); });
-  return ending == ".msh" || ending == ".vtu" || ending == ".vtk" || ending == ".mesh" || ending == ".node" || ending == ".vtkhdf";
+  return ending;
 }
+
+bool is_mesh_file(const fs::path& file) {
+  constexpr std::array<std::string_view, 7> kEndings{".msh", ".vtu", ".vtk", ".mesh", ".node", ".ele", ".vtkhdf"};
+  return std::find(kEndings.begin(), kEndings.end(), find_ending(file)) != kEndings.end();
+}
+
+bool is_surface_file(const fs::path& file) {
+  constexpr std::array<std::string_view, 6> kEndings{".obj", ".stl", ".ply", ".off", ".gltf", ".glb"};
+  return std::find(kEndings.begin(), kEndings.end(), find_ending(file)) != kEndings.end();
+}
+
+/// Throws InputError where the object is no file of one, and says what else it is.
+void check_object(const fs::path& object) {
+  constexpr const char* kTakes = "a surface (.obj, .stl, .ply, .off, .gltf, .glb) or a mesh (.msh, .vtu, .mesh)";
+  const std::string name = object.string(), ending = find_ending(object);
+  std::error_code error;
+  if (!fs::exists(object, error)) throw InputError(fmt::format("{}: no such file; give {}", name, kTakes));
+  if (fs::is_directory(object, error)) throw InputError(fmt::format("{}: a folder; give the file of {} in it", name, kTakes));
+  if (is_surface_file(object) || is_mesh_file(object)) return;
+  if (ending == ".json" || ending == ".jsonl")
+    throw InputError(
+        fmt::format("{}: no object, by its name, but a scene (carillon-render {} -o sound.wav plays one) or a job "
+                    "(carillon-precompute {} solves one); give {}",
+                    name, name, name, kTakes));
+  if (ending == ".hdf" || ending == ".h5" || ending == ".hdf5" || ending == ".bank")
+    throw InputError(fmt::format("{}: a bank, by its name, which has its modes already; name it in a scene for carillon-render, or give {}",
+                                 name, kTakes));
+  throw InputError(fmt::format("{}: no file of an object, by its name; give {}, and convert other kinds first", name, kTakes));
+}
+
+/// A folder that one run at a time writes to. One that was made here and is still empty goes with it.
+class OutFolder {
+ public:
+  /// Throws InputError or SystemError where it cannot be made, or another run writes to it.
+  explicit OutFolder(fs::path folder) : folder_(std::move(folder)) {
+    std::error_code error;
+    is_new_ = fs::create_directories(folder_, error);
+    if (error)
+      throw SystemError(fmt::format("{}: the folder cannot be made: {}; give another one with -o", folder_.string(), error.message()));
+    base::check_writable(folder_ / "report.html", "sound");
+    lock_ = base::Descriptor(::open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+    if (lock_.get() >= 0 && ::flock(lock_.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+      throw InputError(
+          fmt::format("{}: another `carillon hear` writes to this folder; wait for it, or give another one with -o", folder_.string()));
+  }
+  ~OutFolder() {
+    std::error_code error;
+    if (is_new_ && fs::is_empty(folder_, error)) fs::remove(folder_, error);
+  }
+  OutFolder(const OutFolder&) = delete;
+  OutFolder& operator=(const OutFolder&) = delete;
+
+ private:
+  fs::path folder_;
+  bool is_new_ = false;
+  base::Descriptor lock_;
+};
 
 /// One material and height, and where it stands among the others.
 struct Wish {
@@ -67,22 +136,18 @@ struct Wish {
 
 class Listening {
  public:
-  explicit Listening(const Order& order) : order_(order), start_(Clock::now()) {}
+  explicit Listening(const Order& order) : order_(order), start_(Clock::now()), programs_(order.is_quiet) {}
 
   Heard run() {
     check_options();
-    make_folder();
-    process::Programs programs(heard_.folder, order_.is_quiet);
-    programs_ = &programs;
     look();
     const std::vector<Wish> wishes = list_wishes();
+    if (!is_shape()) (void)find_scale_of(wishes.front());
+    const OutFolder folder(heard_.folder);
     for (const Wish& wish : wishes) listen(wish);
+    if (order_.accuracy_cents) refine(wishes);
     std::sort(heard_.sounds.begin(), heard_.sounds.end(), [&](const Sound& a, const Sound& b) { return place_[a.name] < place_[b.name]; });
-    heard_.page = heard_.folder / report::kPageFile;
-    const fs::path& bank = heard_.sounds.front().bank;
-    make_explorer();
-    const std::string beside = heard_.explorer.empty() ? "" : kExplorer;
-    report::write_report(bank, bank.string() + ".resolved.json", heard_.folder, {.title = stem_, .drawn_modes = 0, .explorer = beside});
+    write_page();
     heard_.seconds = calc_seconds();
     return std::move(heard_);
   }
@@ -109,9 +174,7 @@ class Listening {
 
   void check_options() {
     if (is_shape() == !order_.object.empty()) throw InputError("give an object: a file, or --shape with its dimensions");
-    std::error_code error;
-    if (!is_shape() && !fs::exists(order_.object, error))
-      throw InputError(fmt::format("{}: no such file; give a surface (OBJ, STL, PLY, OFF, glTF, GLB) or a mesh", order_.object.string()));
+    if (!is_shape()) check_object(order_.object);
     if (!order_.heights_m.empty() && (is_shape() || is_mesh()))
       throw InputError(fmt::format("--height is for surfaces; {}",
                                    is_shape() ? "a shape has its dimensions" : "a mesh has its size, which --scale changes"));
@@ -122,23 +185,18 @@ class Listening {
     for (const double height : order_.heights_m)
       if (!(height > 0.0) || !std::isfinite(height)) throw InputError("--height is in metres, above 0");
     if (order_.scale && !(*order_.scale > 0.0)) throw InputError("--scale is metres per unit of the file, above 0");
-    if (order_.accuracy_cents && !(*order_.accuracy_cents > 0.0)) throw InputError("--accuracy is in cents, above 0");
+    if (order_.accuracy_cents && !(*order_.accuracy_cents >= kMinCents && *order_.accuracy_cents <= kMaxCents))
+      throw InputError(fmt::format("--accuracy is in cents, from {:g} to {:g}", kMinCents, kMaxCents));
+    if (order_.accuracy_cents && is_mesh())
+      throw InputError("--accuracy meshes the object again, finer: give its surface, or a finer mesh without --accuracy");
     for (const std::string& name : order_.materials) (void)material::MaterialTable::get().require("--material", name);
     (void)material::require_mallet("--mallet", order_.mallet);
   }
 
-  void make_folder() {
-    stem_ = clean(is_shape() ? order_.shape : order_.object.stem().string());
-    heard_.folder = fs::absolute(order_.out.empty() ? fs::path(stem_ + "-sound") : order_.out);
-    std::error_code error;
-    fs::create_directories(heard_.folder, error);
-    if (error)
-      throw SystemError(
-          fmt::format("{}: the folder cannot be made: {}; give another one with -o", heard_.folder.string(), error.message()));
-  }
-
   /// What the file holds, and what is taken for granted.
   void look() {
+    stem_ = clean(is_shape() ? order_.shape : order_.object.stem().string());
+    heard_.folder = fs::absolute(order_.out.empty() ? fs::path(stem_ + "-sound") : order_.out);
     if (order_.materials.empty()) {
       materials_ = {kDefaultMaterial};
       heard_.assumed.push_back(
@@ -146,15 +204,17 @@ class Listening {
     } else {
       materials_ = order_.materials;
     }
-    if (is_shape() || is_mesh()) return;
+    if (is_shape()) return;
     say("looking at " + order_.object.filename().string());
-    const std::string text = programs_->run("carillon-mesh", {fs::absolute(order_.object).string(), "--look"}, true);
+    facts_.is_mesh = is_mesh();
+    const std::string text = programs_.run("carillon-mesh", {fs::absolute(order_.object).string(), "--look"}, true);
     const base::Document document = base::parse_document(text, "carillon-mesh --look");
     base::Object root = document.root();
+    facts_.extent = root.numbers<3>("extent");
+    if (is_mesh()) return;
     facts_.triangles = root.integer("triangles", 0, std::numeric_limits<long long>::max());
     facts_.parts = root.integer("parts", 0, std::numeric_limits<long long>::max());
     facts_.openings = root.integer("openings", 0, std::numeric_limits<long long>::max());
-    facts_.extent = root.numbers<3>("extent");
     facts_.thickness = root.has_number("thickness") ? root.number("thickness") : 0.0;
     if (!order_.wall_m && facts_.openings == 0)
       heard_.assumed.push_back(facts_.thickness > 0.0 ? std::string("body: a closed wall with two sides, as the file has it")
@@ -187,21 +247,57 @@ class Listening {
     sound.is_edited = edit(wish, sound);
     if (!sound.is_edited) solve(wish, sound);
     play(sound);
-    heard_.sounds.push_back(sound);
+    const auto earlier = std::find_if(heard_.sounds.begin(), heard_.sounds.end(), [&](const Sound& s) { return s.name == sound.name; });
+    if (earlier == heard_.sounds.end())
+      heard_.sounds.push_back(std::move(sound));
+    else
+      *earlier = std::move(sound);
+  }
+
+  /// The sounds again, of meshes that are fine enough. What was heard before stays where that fails.
+  void refine(const std::vector<Wish>& wishes) {
+    double worst_cents = 0.0;
+    for (const Sound& sound : heard_.sounds) worst_cents = std::max(worst_cents, sound.worst_cents);
+    const std::string preview = fmt::format("the preview, to about {} cents, is in {}", format_cents(worst_cents), heard_.folder.string());
+    if (worst_cents <= *order_.accuracy_cents) return;
+    say(preview);
+    solved_.clear();
+    is_refining_ = true;
+    try {
+      for (const Wish& wish : wishes) listen(wish);
+    } catch (const SolveError& error) {
+      throw SolveError(fmt::format("{} Or give a larger --accuracy; {}", error.what(), preview));
+    } catch (...) {
+      if (process::SignalWatch::get_signal() != 0) throw;
+      rethrow_after(preview + ", and refining it failed: ");
+    }
+  }
+
+  /// What shows the sounds.
+  void write_page() {
+    heard_.page = heard_.folder / report::kPageFile;
+    const fs::path& bank = heard_.sounds.front().bank;
+    make_explorer();
+    const std::string beside = heard_.explorer.empty() ? "" : kExplorer;
+    report::write_report(bank, bank.string() + ".resolved.json", heard_.folder, {.title = stem_, .drawn_modes = 0, .explorer = beside});
   }
 
   /// The bank of a body that was solved, scaled; false where none is like it.
-  bool edit(const Wish& wish, const Sound& sound) {
-    if (wish.material->orthotropic) return false;
+  bool edit(const Wish& wish, Sound& sound) {
     for (const auto& [solved, bank_file] : solved_) {
-      const bool is_scaled = solved.height_m != wish.height_m;
-      if (solved.material->orthotropic || (is_scaled && order_.wall_m)) continue;  // the wall stays as thick
-      const bank::Bank bank = bank::read_bank(bank_file);
-      if (bank::calc_poisson_cents(bank, *wish.material) > kSameCents) continue;
-      say(fmt::format("{}: scaled from {}", wish.name, solved.name));
-      std::vector<std::string> words{"edit", bank_file.string(), sound.bank.string(), "--material", wish.material->name};
+      const bool is_scaled = solved.height_m != wish.height_m, is_same = solved.material == wish.material;
+      if (is_scaled && order_.wall_m) continue;  // the wall stays as thick
+      std::vector<std::string> words{"edit", bank_file.string(), sound.bank.string()};
+      if (!is_same) {
+        if (wish.material->orthotropic || solved.material->orthotropic) continue;
+        const double cents = bank::calc_poisson_cents(bank::read_bank(bank_file), *wish.material);
+        if (cents > kSameCents) continue;
+        sound.poisson_cents = cents;
+        words.insert(words.end(), {"--material", wish.material->name});
+      }
       if (is_scaled) words.insert(words.end(), {"--size", fmt::format("{:.17g}", wish.height_m / solved.height_m)});
-      (void)programs_->run("carillon-bank", words, false);
+      say(fmt::format("{}: scaled from {}", wish.name, solved.name));
+      (void)programs_.run("carillon-bank", words, false);
       return true;
     }
     return false;
@@ -209,20 +305,20 @@ class Listening {
 
   void solve(const Wish& wish, const Sound& sound) {
     base::Json job = base::Json::object();
-    if (order_.accuracy_cents)
+    if (is_refining_)
       job.set("body", make_body(wish)).set("accuracy_cents", *order_.accuracy_cents);
     else if (is_mesh())
       job.set("mesh", fs::absolute(order_.object).string()).set("mesh_scale", order_.scale.value_or(1.0));
     else
       job.set("mesh", make_mesh(wish).filename().string());
     job.set("material", wish.material->name).set("bank", sound.bank.filename().string());
-    job.set("band_hz", base::Json::array(kBandHz)).set("max_modes", order_.accuracy_cents ? kMaxModes : job::kPreviewModes);
+    job.set("band_hz", base::Json::array(kBandHz)).set("max_modes", is_refining_ ? kMaxModes : job::kPreviewModes);
     const fs::path file = heard_.folder / (wish.name + ".json");
     base::write_file(file, job.text());
-    say(fmt::format("{}: finding the modes", wish.name));
+    say(fmt::format("{}: {}finding the modes", wish.name, is_refining_ ? "meshing finer and " : ""));
     std::vector<std::string> words{file.string()};
-    if (!order_.accuracy_cents) words.emplace_back("-q");
-    (void)programs_->run("carillon-precompute", words, true, order_.accuracy_cents.has_value());
+    if (!is_refining_) words.emplace_back("-q");
+    (void)programs_.run("carillon-precompute", words, true, is_refining_);
     solved_.emplace_back(wish, sound.bank);
   }
 
@@ -237,7 +333,6 @@ class Listening {
 
   base::Json make_body(const Wish& wish) {
     base::Json body = base::Json::object();
-    if (is_mesh()) throw InputError("--accuracy meshes the object again, finer: give its surface, or a finer mesh without --accuracy");
     if (is_shape()) {
       body.set("shape", order_.shape);
       for (const auto& [name, value] : order_.dimensions) body.set(job::find_dimension_key(name), value);
@@ -265,10 +360,10 @@ class Listening {
     }
     words.insert(words.end(), {"--order", "2", "-q", "-o", file.string()});
     say(fmt::format("meshing {}", stem_));
-    (void)job::run_at_possible_count(nodes, "--accuracy CENTS takes what it needs", [&](std::int64_t count) {
+    (void)job::run_at_possible_count(nodes, "mesh it by `carillon-mesh` and give the mesh, or make it thicker", [&](std::int64_t count) {
       std::vector<std::string> all = words;
       all.insert(all.end(), {"--nodes", std::to_string(count)});
-      (void)programs_->run("carillon-mesh", all, true);
+      (void)programs_.run("carillon-mesh", all, true);
     });
     meshes_[wish.height_m] = file;
     return file;
@@ -277,13 +372,19 @@ class Listening {
   void play(Sound& sound) {
     const bank::Bank bank = bank::choose_frequencies(bank::read_bank(sound.bank), bank::Frequencies::kCorrected);
     if (bank.mode_count() == 0 || bank.freq_hz(0) > kBandHz[1])
-      throw InputError(fmt::format(
-          "{}: it has no mode from {:g} to {:g} Hz: it is too small, or too stiff, to be heard; make it larger (--height, --scale)",
-          sound.name, kBandHz[0], kBandHz[1]));
+      throw InputError(
+          fmt::format("{}: it has no mode from {:g} to {:g} Hz: it is too small, or too stiff, to be heard; make it larger ({})",
+                      sound.name, kBandHz[0], kBandHz[1],
+                      is_shape()  ? "its dimensions"
+                      : is_mesh() ? "--scale"
+                                  : "--height, --scale"));
     const std::vector<std::size_t> strikes = bank::find_strikes(bank, kStrikes);
     sound.mode_count = bank.mode_count();
+    sound.highest_hz = bank.freq_hz(bank.mode_count() - 1);
+    sound.is_complete = bank.complete;
     sound.modes = list_modes(bank, strikes.front(), kListed);
-    for (const double cents : bank.discretisation_error_cents) sound.worst_cents = std::max(sound.worst_cents, cents);
+    for (HeardMode& mode : sound.modes) mode.error_cents += sound.poisson_cents;
+    for (const double cents : bank.discretisation_error_cents) sound.worst_cents = std::max(sound.worst_cents, cents + sound.poisson_cents);
     Vec3 low = bank.vertices_m.front(), high = low;
     for (const Vec3& x : bank.vertices_m)
       for (int c = 0; c < 3; ++c) low[c] = std::min(low[c], x[c]), high[c] = std::max(high[c], x[c]);
@@ -294,8 +395,8 @@ class Listening {
     sound.spectrogram = heard_.folder / (sound.name + ".png");
     base::write_file(sound.scene, make_scene(sound, bank, strikes, middle, norm(extent)).text());
     say(fmt::format("{}: playing {} strikes", sound.name, strikes.size()));
-    (void)programs_->run("carillon-render",
-                         {sound.scene.string(), "-q", "-o", sound.wav.string(), "--spectrogram", sound.spectrogram.string()}, false);
+    (void)programs_.run("carillon-render",
+                        {sound.scene.string(), "-q", "-o", sound.wav.string(), "--spectrogram", sound.spectrogram.string()}, false);
   }
 
   base::Json make_scene(const Sound& sound, const bank::Bank& bank, const std::vector<std::size_t>& strikes, const Vec3& middle,
@@ -319,7 +420,8 @@ class Listening {
 
   const Order& order_;
   Clock::time_point start_;
-  const process::Programs* programs_ = nullptr;
+  const process::SignalWatch watch_;
+  const process::Programs programs_;
   std::string stem_;
   SurfaceFacts facts_;
   std::vector<std::string> materials_;
@@ -327,10 +429,13 @@ class Listening {
   std::vector<std::pair<Wish, fs::path>> solved_;  // with their banks
   std::map<std::string, std::size_t> place_;       // in which sounds were asked for
   bool is_size_said_ = false;
+  bool is_refining_ = false;  // after the preview
   Heard heard_;
 };
 
 }  // namespace
+
+std::string format_cents(double cents) { return cents < 10.0 ? fmt::format("{:.2g}", cents) : fmt::format("{:.0f}", cents); }
 
 Heard hear(const Order& order) { return Listening(order).run(); }
 

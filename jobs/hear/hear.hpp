@@ -22,7 +22,7 @@ struct Order {
   std::vector<double> heights_m;             // the object is made so high (up: y); several: one after the other
   std::vector<std::string> materials;        // names; empty: kDefaultMaterial
   std::string mallet = "hard-wood";
-  std::optional<double> accuracy_cents;  // none: a preview
+  std::optional<double> accuracy_cents;  // refines the preview until every mode is so near; none: the preview is all
   std::filesystem::path out;             // folder; empty: NAME-sound here
   bool is_quiet = false;                 // no progress on standard error
 };
@@ -44,8 +44,11 @@ struct Sound {
   std::filesystem::path bank, scene, wav, spectrogram;
   std::vector<HeardMode> modes;  // the first ones
   std::size_t mode_count = 0;
-  double worst_cents = 0.0;  // the widest error bar
-  bool is_edited = false;    // of another solve, by scaling
+  double highest_hz = 0.0;     // of its modes
+  bool is_complete = true;     // every mode from 20 to 20000 Hz is there; false: only the lowest ones
+  double worst_cents = 0.0;    // the widest error bar
+  bool is_edited = false;      // of another solve, by scaling
+  double poisson_cents = 0.0;  // by which that may be off, since Poisson's ratio stayed; in the error bars
 };
 
 struct Heard {
@@ -57,8 +60,12 @@ struct Heard {
   double seconds = 0.0;  // by the clock
 };
 
-/// Meshes, solves, plays. Files go to options.out, each whole or not at all. Throws InputError (a sentence with the remedy), SolveError,
-/// SystemError; what the programs that it starts refuse is thrown with their message.
+/// An error bar as people read it: two digits, and whole cents from 10 on.
+std::string format_cents(double cents);
+
+/// Meshes, solves, plays: first a preview, then, where an accuracy is asked for, again on finer meshes. Files go to options.out, each whole
+/// or not at all, and no other call writes there meanwhile. Throws InputError (a sentence with the remedy), SolveError, SystemError; what
+/// the programs that it starts refuse is thrown with their message. SIGINT, SIGTERM and SIGHUP end them, and then this process.
 Heard hear(const Order& options);
 
 }  // namespace carillon::hear

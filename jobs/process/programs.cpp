@@ -1,8 +1,14 @@
 #include "jobs/process/programs.hpp"
 
 #include <fmt/core.h>
+#include <signal.h>
+#include <stdlib.h>
 #include <unistd.h>
 
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <cstring>
 #include <optional>
 
 #include "runtime/base/command.hpp"
@@ -12,11 +18,16 @@
 namespace carillon::process {
 namespace {
 
-/// The last line of what a program said of itself, without its name: "carillon-mesh: cup.obj: ..." or "carillon-precompute: error: ...".
+/// The last line of what a program said of itself, without its name: "carillon-mesh: cup.obj: ..." or "carillon-precompute: error: ...";
+/// of one that said nothing of the kind, the last line.
 std::string find_message(const std::string& errors, const std::string& program) {
   const std::string mark = program + ": ";
   const std::size_t at = errors.rfind(mark);
-  if (at == std::string::npos) return "";
+  if (at == std::string::npos) {
+    const std::size_t end = errors.find_last_not_of(" \n-") + 1;
+    const std::string text = errors.substr(0, end);
+    return text.empty() ? "" : program + " ended: " + text.substr(text.rfind('\n') + 1);
+  }
   std::string message = errors.substr(at + mark.size());
   message = message.substr(0, message.find('\n'));
   return message.starts_with("error: ") ? message.substr(7) : message;
@@ -29,10 +40,46 @@ base::ResultKind find_kind(int exit_code) {
   return base::ResultKind::system;
 }
 
+volatile std::sig_atomic_t noted_signal = 0;
+constexpr std::array kSignals{SIGINT, SIGTERM, SIGHUP};
+std::array<struct sigaction, kSignals.size()> earlier_actions;
+
 }  // namespace
 
+SignalWatch::SignalWatch() {
+  noted_signal = 0;
+  for (std::size_t k = 0; k < kSignals.size(); ++k) {
+    ::sigaction(kSignals[k], nullptr, &earlier_actions[k]);
+    if (earlier_actions[k].sa_handler == SIG_IGN) continue;  // nohup
+    struct sigaction action {};
+    action.sa_handler = [](int signal) { noted_signal = signal; };
+    ::sigaction(kSignals[k], &action, nullptr);
+  }
+}
+
+SignalWatch::~SignalWatch() {
+  for (std::size_t k = 0; k < kSignals.size(); ++k) ::sigaction(kSignals[k], &earlier_actions[k], nullptr);
+  if (noted_signal != 0) ::raise(noted_signal);
+}
+
+int SignalWatch::get_signal() { return noted_signal; }
+
+Programs::Programs(bool is_quiet) : is_quiet_(is_quiet) {
+  std::error_code error;
+  std::string name = (std::filesystem::temp_directory_path(error) / "carillon-XXXXXX").string();
+  if (error || ::mkdtemp(name.data()) == nullptr)
+    throw SystemError(fmt::format("{}: no temporary folder can be made: {}; make room there, or name another by TMPDIR", name,
+                                  error ? error.message() : std::strerror(errno)));
+  folder_ = name;
+}
+
+Programs::~Programs() {
+  std::error_code error;
+  std::filesystem::remove_all(folder_, error);
+}
+
 std::string Programs::run(const std::string& program, std::vector<std::string> words, bool has_result, bool shows) const {
-  const std::filesystem::path result_file = folder_ / ".result.json";
+  const std::filesystem::path result_file = folder_ / "result.json";
   std::error_code error;
   std::filesystem::remove(result_file, error);
   base::Command command;
@@ -42,10 +89,10 @@ std::string Programs::run(const std::string& program, std::vector<std::string> w
   command.folder = folder_;
   command.output = shows && !is_quiet_ ? STDERR_FILENO : base::kCapture;
   command.errors = base::kCapture;
-  const base::Finished finished = base::run(command);
-  const std::optional<base::Result> said = has_result ? base::read_result(result_file) : std::nullopt;
-  std::filesystem::remove(result_file, error);
+  const base::Finished finished = base::run(command, {.may_stop = [](const base::Finished&) { return SignalWatch::get_signal() != 0; }});
+  if (SignalWatch::get_signal() != 0) throw SystemError(fmt::format("ended by signal {}", SignalWatch::get_signal()));
   if (finished.exit_code == 0) return finished.output;
+  const std::optional<base::Result> said = has_result ? base::read_result(result_file) : std::nullopt;
   base::Result result = said.value_or(base::Result{.kind = find_kind(finished.exit_code)});
   if (result.message.empty()) result.message = find_message(finished.errors, program);
   if (result.message.empty())

@@ -7,14 +7,30 @@
 
 namespace carillon::process {
 
-/// Runs programs in one folder; what one of them refuses is thrown with its own words.
+/// While it lives, the signals that ask a program to end (SIGINT, SIGTERM, SIGHUP) are noted. When it goes, a signal that came does what it
+/// does by default: this process ends by it. One at a time.
+class SignalWatch {
+ public:
+  SignalWatch();
+  ~SignalWatch();
+  SignalWatch(const SignalWatch&) = delete;
+  SignalWatch& operator=(const SignalWatch&) = delete;
+
+  /// 0: none came.
+  static int get_signal();
+};
+
+/// Runs programs in a temporary folder of its own, which goes with it; what one of them refuses is thrown with its own words.
 class Programs {
  public:
-  /// folder: where they work, and where files of results go. is_quiet: their progress is not shown.
-  Programs(std::filesystem::path folder, bool is_quiet) : folder_(std::move(folder)), is_quiet_(is_quiet) {}
+  /// is_quiet: their progress is not shown. Throws SystemError where no folder can be made.
+  explicit Programs(bool is_quiet);
+  ~Programs();
+  Programs(const Programs&) = delete;
+  Programs& operator=(const Programs&) = delete;
 
-  /// The standard output of a program of this installation. `has_result`: it takes --result. `shows`: its progress goes to standard error.
-  /// Throws InputError, SolveError, SystemError.
+  /// The standard output of a program of this installation. Files among the words are absolute. `has_result`: it takes --result. `shows`:
+  /// its progress goes to standard error. It is killed once SignalWatch has a signal. Throws InputError, SolveError, SystemError.
   std::string run(const std::string& program, std::vector<std::string> words, bool has_result, bool shows = false) const;
 
  private:

@@ -3,21 +3,26 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <filesystem>
 #include <map>
 #include <optional>
 #include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "precompute/mesh/check.hpp"
 #include "precompute/mesh/curved.hpp"
+#include "precompute/mesh/read.hpp"
 #include "precompute/mesh/write.hpp"
 #include "precompute/mesher/surface.hpp"
+#include "precompute/mesher/triangle_surface.hpp"
 #include "precompute/shapes/shapes.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/file.hpp"
@@ -340,9 +345,23 @@ void make_mesh(const Order& order) {
   throw InputError(message);
 }
 
+bool is_mesh_name(const std::filesystem::path& file) {
+  constexpr std::array<std::string_view, 5> kEndings{".msh", ".vtu", ".mesh", ".node", ".ele"};
+  const std::string ending = file.extension().string();
+  return std::find(kEndings.begin(), kEndings.end(), ending) != kEndings.end();
+}
+
 /// --look
 void print_look(const Order& order) {
-  if (order.surface.empty()) throw InputError("--look is for surfaces; give a SURFACE file");
+  if (order.surface.empty()) throw InputError("--look is for surfaces and meshes; give a file");
+  if (is_mesh_name(order.surface)) {
+    const mesh::TetMesh mesh = mesh::read_mesh(order.surface);
+    base::Json root = base::Json::object();
+    root.set("mesh", order.surface).set("nodes", mesh.nodes_m.size()).set("tets", mesh.tet_count());
+    root.set("extent", base::Json::array(mesher::calc_box(mesh.nodes_m).extent()));
+    fmt::print("{}\n", root.line());
+    return;
+  }
   const mesher::SurfaceLook look = mesher::look_at_surface(order.surface);
   base::Json root = base::Json::object();
   root.set("surface", order.surface).set("triangles", look.triangles).set("parts", look.parts).set("openings", look.openings);
@@ -360,8 +379,8 @@ void make(int argc, char** argv, Order& order) {
   app.add_option("-o,--output", order.out, "The mesh to write, Gmsh 4.1 (.msh); - is standard output");
   app.add_flag(
       "--look", order.look,
-      "Surface: meshes nothing and prints what the file holds, as JSON: triangles, extents in its own units, openings, parts, and the "
-      "thickness of a surface that is both sides of a wall");
+      "Meshes nothing and prints what the file of a surface or a mesh holds, as JSON: triangles, extents in its own units, openings, "
+      "parts, and the thickness of a surface that is both sides of a wall; of a mesh nodes, tetrahedra and extents");
   app.add_option("--scale", order.scale, "Surface: metres per unit of the file");
   app.add_option("--up", order.up, "Surface: the axis along which --height is measured [y]")->check(CLI::IsMember({"x", "y", "z"}));
   app.add_option("--method", order.method,

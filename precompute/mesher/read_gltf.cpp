@@ -37,8 +37,7 @@ class Gltf {
     if (scenes.empty()) {
       for (std::size_t m = 0; m < meshes_.size(); ++m) add_mesh(m, kIdentity);
     } else {
-      const auto last = static_cast<long long>(scenes.size()) - 1;
-      base::Object& scene = scenes[static_cast<std::size_t>(root_.integer_if("scene", 0, last).value_or(0))];
+      base::Object& scene = scenes[gltf::find_index(root_, "scene", scenes.size(), "scene").value_or(0)];
       for (const std::size_t node : list_nodes(scene, "nodes")) add_node(node, kIdentity, 0);
     }
     if (soup_.counts.empty())
@@ -67,8 +66,9 @@ class Gltf {
     is_used_[n] = true;
     if (node.has("skin")) node.fail("skin", "its mesh is bent by bones (a skin), and a body keeps its shape; apply the pose in a modeller");
     const Matrix own = gltf::multiply(parent, gltf::read_transform(node));
-    if (const auto mesh = node.integer_if("mesh", 0, static_cast<long long>(meshes_.size()) - 1))
-      add_mesh(static_cast<std::size_t>(*mesh), own);
+    if (std::optional<base::Object> extensions = node.object_if("extensions"); extensions && extensions->has("EXT_mesh_gpu_instancing"))
+      node.fail("extensions", "its mesh is drawn in many places (EXT_mesh_gpu_instancing); make copies of it in a modeller");
+    if (const auto mesh = gltf::find_index(node, "mesh", meshes_.size(), "mesh")) add_mesh(*mesh, own);
     for (const std::size_t child : list_nodes(node, "children")) add_node(child, own, depth + 1);
   }
 
@@ -78,6 +78,8 @@ class Gltf {
       const long long mode = primitive.integer_if("mode", 0, 6).value_or(kTriangles);
       if (mode < kTriangles) continue;  // points and lines
       if (primitive.has("targets")) primitive.fail("targets", "it has morph targets, and a body keeps its shape; apply one in a modeller");
+      if (std::optional<base::Object> extensions = primitive.object_if("extensions"); extensions && extensions->has(gltf::kDraco))
+        primitive.fail("extensions", fmt::format("its meshes are compressed ({}); export it without compression", gltf::kDraco));
       base::Object attributes = primitive.object("attributes");
       if (!attributes.has("POSITION")) continue;
       const gltf::Numbers points = file_.read(attributes, "POSITION", "VEC3", gltf::kVertexTypes);
@@ -104,6 +106,8 @@ class Gltf {
     std::optional<gltf::Numbers> indices;
     if (primitive.has("indices")) indices = file_.read(primitive, "indices", "SCALAR", gltf::kIndexTypes);
     const std::size_t corners = indices ? indices->count() : points;
+    if (kind == 0 && corners % 3 != 0)
+      primitive.fail("", fmt::format("mesh {} has {} corners, which are no whole number of triangles; export it again", m, corners));
     if (corners / (kind == 0 ? 3 : 1) + soup_.counts.size() > static_cast<std::size_t>(kMaxTriangles)) refuse_size();
     const auto get = [&](std::size_t i) {
       const auto index = static_cast<std::size_t>(indices ? indices->get(i, 0) : static_cast<double>(i));

@@ -15,8 +15,8 @@
 namespace carillon::mesher {
 namespace {
 
-/// No surface that could be meshed here is larger; what is, is no surface.
-constexpr std::uint64_t kMaxBytes = 16ULL << 30;
+/// No surface that could be meshed here is larger: kMaxTriangles as text with normals, colours and textures.
+constexpr std::uint64_t kMaxBytes = 4ULL << 30;
 
 /// "obj", "stl", "ply", "off", "gltf" or "glb".
 std::string find_format(const std::filesystem::path& path) {
@@ -115,7 +115,7 @@ TriangleSurface read_surface(const std::filesystem::path& path) {
   if (!std::filesystem::is_regular_file(path, error))
     throw InputError(fmt::format("{}: this is a folder or a device, not a file; give the file of a surface", name));
   const std::string bytes = base::read_file(path, "surface", kMaxBytes);
-  if (bytes.empty()) throw InputError(fmt::format("{}: the file is empty", name));
+  if (bytes.empty()) throw InputError(fmt::format("{}: the file is empty; export it again", name));
   return parse_surface(bytes, name, format);
 }
 

@@ -8,9 +8,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <iterator>
 #include <numbers>
+#include <string_view>
+#include <system_error>
 
 #include "runtime/bank/radiation_gain.hpp"
 
@@ -65,12 +69,29 @@ void check(const Bank& bank, const Edits& edits) {
     if (edits.alphas) throw InputError("a body has one damping law; give alphas or another law, not both");
     check_law(*edits.damping);
   }
-  if (!bank.regions.empty() || bank.damping.law == "mixed") {
+  const bool is_of_size = edits.density_scale == 1.0 && edits.stiffness_scale == 1.0 && !edits.alphas && !edits.damping;
+  if (bank.damping.law == "mixed" || (!bank.regions.empty() && !is_of_size)) {
     throw InputError(
-        "the bank is of a body of several materials, which one density, stiffness, size or damping does not describe; change the materials "
-        "of "
-        "its job and compute the bank again");
+        "the bank is of a body of several materials, or of one that is not the same in all directions, which one density, stiffness or "
+        "damping does not describe; change the materials of its job and compute the bank again");
   }
+}
+
+/// Bank::regions with the volumes of a body that is as many times larger.
+std::string scale_volumes(const std::string& regions, double scale) {
+  constexpr std::string_view kKey = "\"volume_m3\":";
+  std::string scaled;
+  std::size_t done = 0;
+  for (std::size_t at = regions.find(kKey); at != std::string::npos; at = regions.find(kKey, done)) {
+    at = std::min(regions.find_first_not_of(' ', at + kKey.size()), regions.size());
+    scaled.append(regions, done, at - done);
+    double volume_m3 = 0.0;
+    const char* const end = regions.data() + regions.size();
+    const auto [rest, error] = std::from_chars(regions.data() + at, end, volume_m3);
+    if (error == std::errc() && std::isfinite(volume_m3 * scale)) scaled += fmt::format("{}", volume_m3 * scale);
+    done = error == std::errc() && std::isfinite(volume_m3 * scale) ? static_cast<std::size_t>(rest - regions.data()) : at;
+  }
+  return scaled.append(regions, done);
 }
 
 std::string format_list(const char* name, const std::vector<double>& values) {
@@ -131,6 +152,7 @@ Bank calc_edited(const Bank& bank, const Edits& edits) {
     for (double& x : centre) x *= g;
   for (double& area : edited.supports.area_m2) area *= g * g;
   for (double& thickness : edited.supports.thickness_m) thickness *= g;
+  edited.regions = scale_volumes(bank.regions, g * g * g);
   edited.rigid.mass_kg *= s * g * g * g;
   edited.rigid.volume_m3 *= g * g * g;
   for (double& x : edited.rigid.centre_m) x *= g;

@@ -1,5 +1,5 @@
-// Method:     jsoncpp reads the JSON. Numbers of a file that point at something are compared with what is there before they are used.
-// Source:     glTF 2.0 specification, Khronos 2021 (ISO/IEC 12113:2022): chapters 3.6 (buffers, views, accessors) and 4 (GLB).
+// Method:     base::Document reads the JSON. Numbers of a file that point at something are compared with what is there before they are
+// used. Source:     glTF 2.0 specification, Khronos 2021 (ISO/IEC 12113:2022): chapters 3.6 (buffers, views, accessors) and 4 (GLB).
 // Deviations: sparse accessors and compressed buffers are refused.
 #include "runtime/gltf/file.hpp"
 
@@ -7,7 +7,9 @@
 
 #include <algorithm>
 #include <bit>
+#include <charconv>
 #include <filesystem>
+#include <limits>
 
 #include "runtime/base/error.hpp"
 #include "runtime/base/file.hpp"
@@ -19,7 +21,8 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "glTF is little-endian and is read as it is.");
 
 constexpr long long kHuge = 1LL << 40;
-constexpr std::uint64_t kMaxBufferBytes = 4ULL << 30;
+constexpr std::uint64_t kMaxBufferBytes = 4ULL << 30;                      // of all buffers
+constexpr std::size_t kMaxTextBytes = 256U << 20, kMaxValues = 3'000'000;  // of the JSON: what it takes in memory is in proportion
 
 std::uint32_t read_u32(std::string_view bytes, std::size_t at) {
   std::uint32_t value = 0;
@@ -51,6 +54,42 @@ std::optional<std::string> decode_base64(std::string_view text) {
   return bytes;
 }
 
+/// A URI without its escapes (RFC 3986, 2.1); nothing where one is none.
+std::optional<std::string> decode_percent(std::string_view uri) {
+  std::string text;
+  for (std::size_t i = 0; i < uri.size(); ++i) {
+    if (uri[i] != '%') {
+      text += uri[i];
+      continue;
+    }
+    unsigned value = 0;
+    const char* const begin = uri.data() + i + 1;
+    if (uri.size() - i < 3 || std::from_chars(begin, begin + 2, value, 16).ptr != begin + 2 || value == 0) return std::nullopt;
+    text += static_cast<char>(value);
+    i += 2;
+  }
+  return text;
+}
+
+/// Throws InputError for a text that would take too much memory.
+base::Document parse_json(std::string_view json, const std::string& name) {
+  if (json.size() > kMaxTextBytes)
+    throw InputError(fmt::format("{}: its JSON has {} MiB, and {} are the most; export it as a .glb file, whose buffers are binary", name,
+                                 json.size() >> 20, kMaxTextBytes >> 20));
+  const auto values = std::count_if(json.begin(), json.end(), [](char c) { return c == ',' || c == '{' || c == '['; });
+  if (static_cast<std::size_t>(values) > kMaxValues)
+    throw InputError(
+        fmt::format("{}: its JSON has more than {} values; export the object alone, without the rest of its scene", name, kMaxValues));
+  return base::parse_document(json, name);
+}
+
+/// As find_index(), of a number that has to be there.
+std::size_t require_index(base::Object& object, const char* key, std::size_t size, const char* what) {
+  const std::optional<std::size_t> index = find_index(object, key, size, what);
+  if (!index) object.fail("", fmt::format("\"{}\" is missing here, the number of a {}; export it again", key, what));
+  return *index;
+}
+
 std::size_t find_component_bytes(long long component) {
   constexpr std::size_t kSizes[] = {1, 1, 2, 2, 0, 4, 4};
   return kSizes[component - 5120];
@@ -58,8 +97,16 @@ std::size_t find_component_bytes(long long component) {
 
 }  // namespace
 
+std::optional<std::size_t> find_index(base::Object& object, const char* key, std::size_t size, const char* what) {
+  const std::optional<long long> index =
+      object.integer_if(key, std::numeric_limits<long long>::min(), std::numeric_limits<long long>::max());
+  if (index && (*index < 0 || static_cast<unsigned long long>(*index) >= size))
+    object.fail(key, fmt::format("is {}, and no {} has this number (there are {}); export it again", *index, what, size));
+  return index ? std::optional(static_cast<std::size_t>(*index)) : std::nullopt;
+}
+
 File::File(std::string_view json, std::optional<std::string_view> binary, const std::string& name)
-    : name_(name), document_(base::parse_document(json, name)), root_(document_.root()) {
+    : name_(name), document_(parse_json(json, name)), root_(document_.root()) {
   check();
   views_ = root_.objects("bufferViews");
   accessors_ = root_.objects("accessors");
@@ -70,13 +117,20 @@ void File::check() {
   base::Object asset = root_.object("asset");
   if (!asset.string("version").starts_with("2")) asset.fail("version", "only glTF 2 is read; convert it first");
   for (const base::Entry& entry : root_.entries("extensionsRequired", 1000)) {
-    if (entry.text == "KHR_draco_mesh_compression" || entry.text == "EXT_meshopt_compression" || entry.text == "KHR_meshopt_compression")
+    if (entry.text == kDraco || entry.text == "EXT_meshopt_compression" || entry.text == "KHR_meshopt_compression")
       root_.fail("extensionsRequired", fmt::format("its meshes are compressed ({}); export it without compression", entry.text));
   }
 }
 
 void File::open_buffers(std::optional<std::string_view> binary) {
   std::vector<base::Object> buffers = root_.objects("buffers");
+  std::uint64_t total = 0;
+  for (base::Object& buffer : buffers) {
+    total += static_cast<std::uint64_t>(buffer.integer("byteLength", 1, kHuge));
+    if (total > kMaxBufferBytes)
+      buffer.fail("byteLength",
+                  fmt::format("all buffers up to here have more than {} GiB; export the object alone", kMaxBufferBytes >> 30));
+  }
   for (std::size_t b = 0; b < buffers.size(); ++b) {
     base::Object& buffer = buffers[b];
     const auto length = static_cast<std::size_t>(buffer.integer("byteLength", 1, kHuge));
@@ -103,15 +157,16 @@ std::string File::read_uri(base::Object& buffer) const {
     if (!bytes) buffer.fail("uri", "its data are not base64; export it again");
     return *bytes;
   }
-  const std::filesystem::path file = uri;
-  if (file.is_absolute() || uri.find("..") != std::string::npos || uri.find("://") != std::string::npos)
+  const std::optional<std::string> decoded = decode_percent(uri);
+  const std::filesystem::path file = decoded.value_or("");
+  if (!decoded || decoded->empty() || file.is_absolute() || decoded->find("..") != std::string::npos ||
+      decoded->find("://") != std::string::npos)
     buffer.fail("uri", "is no file next to this one; put it there, or export one .glb file");
   return base::read_file(std::filesystem::path(name_).parent_path() / file, "buffer of a glTF file", kMaxBufferBytes);
 }
 
 std::string_view File::find_view(std::size_t number, base::Object& view) {
-  const std::string_view buffer =
-      buffers_.at(static_cast<std::size_t>(view.integer("buffer", 0, static_cast<long long>(buffers_.size()) - 1)));
+  const std::string_view buffer = buffers_[require_index(view, "buffer", buffers_.size(), "buffer")];
   const auto at = static_cast<std::size_t>(view.integer_if("byteOffset", 0, kHuge).value_or(0));
   const auto size = static_cast<std::size_t>(view.integer("byteLength", 1, kHuge));
   if (at > buffer.size() || size > buffer.size() - at)
@@ -120,13 +175,13 @@ std::string_view File::find_view(std::size_t number, base::Object& view) {
 }
 
 std::string_view File::read_view(base::Object& owner, const char* key) {
-  const auto number = static_cast<std::size_t>(owner.integer(key, 0, static_cast<long long>(views_.size()) - 1));
+  const std::size_t number = require_index(owner, key, views_.size(), "bufferView");
   return find_view(number, views_[number]);
 }
 
 Numbers File::read(base::Object& owner, const char* key, const char* type, std::initializer_list<Component> components) {
-  const long long a = owner.integer(key, 0, static_cast<long long>(accessors_.size()) - 1);
-  base::Object& accessor = accessors_[static_cast<std::size_t>(a)];
+  const std::size_t a = require_index(owner, key, accessors_.size(), "accessor");
+  base::Object& accessor = accessors_[a];
   if (accessor.has("sparse")) accessor.fail("sparse", "sparse accessors are not read; export it again without them");
   if (accessor.string("type") != type) accessor.fail("type", fmt::format("accessor {} is used as {} and has to be {}", a, key, type));
   Numbers numbers;
@@ -138,8 +193,9 @@ Numbers File::read(base::Object& owner, const char* key, const char* type, std::
   numbers.is_normalised_ = accessor.boolean_or("normalized", false);
   numbers.count_ = static_cast<std::size_t>(accessor.integer("count", 1, kHuge));
   const std::size_t size = find_component_bytes(component) * (std::string_view(type) == "SCALAR" ? 1 : 3);
-  if (!accessor.has("bufferView")) accessor.fail("", fmt::format("accessor {} has no \"bufferView\", and so no numbers", a));
-  const auto v = static_cast<std::size_t>(accessor.integer("bufferView", 0, static_cast<long long>(views_.size()) - 1));
+  if (!accessor.has("bufferView"))
+    accessor.fail("", fmt::format("accessor {} has no \"bufferView\", and so no numbers; export it again", a));
+  const std::size_t v = require_index(accessor, "bufferView", views_.size(), "bufferView");
   base::Object& view = views_[v];
   const std::string_view bytes = find_view(v, view);
   numbers.stride_ = static_cast<std::size_t>(view.integer_if("byteStride", 4, 252).value_or(static_cast<long long>(size)));

@@ -79,6 +79,13 @@ std::string find_error(const std::string& bytes, const std::string& format = "gl
   return "";
 }
 
+/// Nodes of which each is the child of the one before; the last has the mesh.
+std::string make_chain(int count) {
+  std::string nodes = "[";
+  for (int n = 1; n < count; ++n) nodes += "{\"children\": [" + std::to_string(n) + "]}, ";
+  return nodes + "{\"mesh\": 0}]";
+}
+
 TEST(Gltf, is_the_body_of_its_points_and_indices) {
   const Polygons ball = make_sphere(0.5, 3);
   const TriangleSurface read_back = read(make_model(ball)), plain = to_triangles(ball);
@@ -157,6 +164,12 @@ TEST(Gltf, reads_text_with_its_buffer_inside_or_next_to_it) {
   EXPECT_NEAR(calc_volume(parse_surface(text, "b.gltf", "gltf")), 1, 1e-6);
   write_text("part.bin", model.binary);
   EXPECT_NEAR(calc_volume(read_surface(write_text("b.gltf", model.json(R"(, "uri": "part.bin")")))), 1, 1e-6);
+  write_text("my part \xC3\xA4.bin", model.binary);  // URIs have escapes, and many programs write none
+  EXPECT_NEAR(calc_volume(read_surface(write_text("b.gltf", model.json(R"(, "uri": "my%20part%20%C3%a4.bin")")))), 1, 1e-6);
+  EXPECT_NEAR(calc_volume(read_surface(write_text("b.gltf", model.json(", \"uri\": \"my part \xC3\xA4.bin\"")))), 1, 1e-6);
+  for (const char* uri : {"%2e%2e/part.bin", "%2Fetc/passwd", "part%.bin", "part%0.bin", "part%zz.bin", "part.bin%00"})
+    EXPECT_THAT(find_error(model.json(", \"uri\": \"" + std::string(uri) + "\""), "gltf"), ::testing::HasSubstr("no file next to this one"))
+        << uri;
   EXPECT_THAT(find_error(model.json(R"(, "uri": "/etc/passwd")"), "gltf"), ::testing::HasSubstr("no file next to this one"));
   EXPECT_THAT(find_error(model.json(R"(, "uri": "../part.bin")"), "gltf"), ::testing::HasSubstr("no file next to this one"));
   EXPECT_THAT(find_error(model.json(R"(, "uri": "data:text/plain,hello")"), "gltf"), ::testing::HasSubstr("not base64"));
@@ -184,7 +197,20 @@ TEST(Gltf, refuses_what_bends_moves_or_is_compressed_in_a_sentence) {
            {with("", R"(, "targets": [{"POSITION": 0}])", ""), "morph targets"},
            {with("", "", R"(, "extensionsRequired": ["KHR_draco_mesh_compression"])"), "without compression"},
            {with(R"([{"mesh": 0, "children": [0]}])", "", ""), "inside itself"},
-           {with(R"([{"mesh": 1}])", "", ""), "mesh"},
+           {with(R"([{"mesh": 1}])", "", ""), "is 1, and no mesh has this number (there are 1)"},
+           {with(R"([{"mesh": -1}])", "", ""), "is -1, and no mesh has this number"},
+           {with(R"([{"mesh": 0, "extensions": {"EXT_mesh_gpu_instancing": {}}}])", "", ""), "in many places"},
+           {with("", R"(, "extensions": {"KHR_draco_mesh_compression": {"bufferView": 0}})", ""), "without compression"},
+           {with(R"([{"children": [1]}, {"children": [0], "mesh": 0}])", "", ""), "inside itself"},
+           {with(make_chain(300), "", ""), "200 deep"},
+           {replace(R"("count": 36)", R"("count": 35)"), "35 corners, which are no whole number of triangles"},
+           {replace(R"("byteLength": 96)", R"("byteLength": 96, "byteStride": 0)"), "byteStride"},
+           {replace(R"("byteLength": 96)", R"("byteLength": 96, "byteStride": 8)"), "a stride of 8 for 12 bytes"},
+           {replace(R"("byteLength": 96)", R"("byteLength": 9223372036854775807)"), "byteLength"},
+           {replace(R"({"bufferView": 0, )", R"({"bufferView": 0, "byteOffset": 9223372036854775807, )"), "byteOffset"},
+           {replace(R"("buffer": 0, "byteLength": 96)", R"("buffer": 3, "byteLength": 96)"), "no buffer has this number"},
+           {replace(R"("POSITION": 0)", R"("POSITION": 70)"), "no accessor has this number"},
+           {replace(R"("scene": 0)", R"("scene": 4)"), "no scene has this number"},
            {with(R"([{"mesh": 0, "children": [7]}])", "", ""), "7 is no node"},
            {with(R"([{"mesh": 0, "rotation": [0, 0, 0, 0]}])", "", ""), "no rotation"},
            {with(R"([{"mesh": 0, "scale": [1e300, 1, 1]}])", "", ""), "lies nowhere"},
@@ -217,6 +243,17 @@ TEST(Gltf, of_ten_million_triangles_is_refused_before_it_takes_memory) {
   many.indices = 30'000'000;
   many.binary.append(2 * many.indices, '\0');
   EXPECT_THAT(find_error(to_glb(many.json(), many.binary)), ::testing::HasSubstr("more than 5,000,000 triangles; reduce it"));
+}
+
+TEST(Gltf, of_very_many_values_or_buffers_is_refused_before_it_takes_memory) {
+  Model box = make_model(make_box(1, 1, 1));
+  box.nodes = R"([{"mesh": 0})";
+  for (int n = 0; n < 3'000'000; ++n) box.nodes += ",{}";
+  box.nodes += "]";
+  EXPECT_THAT(find_error(to_glb(box.json(), box.binary)), ::testing::HasSubstr("more than 3000000 values; export the object alone"));
+  const std::string buffer = R"({"byteLength": 3000000000, "uri": "none.bin"})";
+  EXPECT_THAT(find_error(R"({"asset": {"version": "2.0"}, "buffers": [)" + buffer + ", " + buffer + "]}", "gltf"),
+              ::testing::AllOf(::testing::HasSubstr("buffers[1].byteLength"), ::testing::HasSubstr("more than 4 GiB")));
 }
 
 TEST(Gltf, cut_or_changed_at_any_byte_ends_in_a_surface_or_an_error) {

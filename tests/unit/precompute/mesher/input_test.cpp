@@ -304,7 +304,7 @@ TEST(input, what_cannot_be_meshed_is_refused_with_the_reason) {
   const auto plain = surface([](auto&) {});
   const Case cases[] = {
       {"b.step", box, plain, "not from '.step'"},
-      {"empty.off", "", plain, "the file is empty"},
+      {"empty.off", "", plain, "the file is empty; export it again"},
       {"text.obj", "no surface here\n", plain, "no triangles in it"},
       {"points.off", "OFF\n1 0 0\n0 0 0\n", plain, "no triangles in it"},
       {"huge.off", "OFF\n900000000000 12 0\n0 0 0\n", plain, "the header promises 900000000000 vertices"},

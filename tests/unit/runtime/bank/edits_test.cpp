@@ -123,6 +123,19 @@ TEST(Edits, WhatMeansNothingIsRefused) {
   Bank several = bank;
   several.damping.law = "mixed";
   EXPECT_THROW(calc_edited(several, {}), InputError);
+  EXPECT_THROW(calc_edited(several, {.size_scale = 2.0}), InputError);
+}
+
+TEST(Edits, WoodTakesAnotherSizeAndNothingElse) {
+  Bank wood = example::make_bank(2, 5);
+  wood.regions = R"([{"region":"","volume_m3":0.25,"orthotropic":{"poisson_ratio":[0.3,0.4,0.4]}}, {"volume_m3": 1e-3}, {"volume_m3":)";
+  const Bank larger = calc_edited(wood, {.size_scale = 2.0});
+  for (std::size_t m = 0; m < wood.mode_count(); ++m) EXPECT_NEAR(larger.freq_hz(m) / wood.freq_hz(m), 0.5, 1e-12);
+  EXPECT_EQ(larger.regions,
+            R"([{"region":"","volume_m3":2,"orthotropic":{"poisson_ratio":[0.3,0.4,0.4]}}, {"volume_m3": 0.008}, {"volume_m3":)");
+  EXPECT_THROW(calc_edited(wood, {.density_scale = 2.0}), InputError);
+  EXPECT_THROW(calc_edited(wood, {.stiffness_scale = 2.0}), InputError);
+  EXPECT_THROW(calc_edited(wood, {.alphas = {{0.0, 1.0}}}), InputError);
 }
 
 TEST(Edits, AnotherMaterialHasItsSpeedOfSoundAndItsLoss) {
