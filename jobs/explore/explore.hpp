@@ -41,7 +41,7 @@ struct Explored {
 /// cannot be played and for a folder that holds something else, SystemError when page or engine are not installed or the disk refuses.
 Explored explore(const Order& order);
 
-/// Whether page and sound engine are installed beside this program; without, other commands leave the page out.
+/// Whether page and sound engine are installed with this program; without, other commands leave the page out.
 bool is_installed();
 
 /// Whether explore() made this folder.

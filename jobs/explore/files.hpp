@@ -26,7 +26,7 @@ void put_folder(const std::filesystem::path& from, const std::filesystem::path& 
 void compress_file(const std::filesystem::path& file);
 std::uintmax_t calc_bytes(const std::filesystem::path& folder);
 
-/// A folder that appears whole or not at all: it is filled under another name beside its place, and renamed by commit().
+/// A folder that appears whole or not at all: it is filled under another name next to its place, and renamed by commit().
 class WholeFolder {
  public:
   /// Throws SystemError where none can be made.

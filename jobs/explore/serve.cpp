@@ -42,6 +42,10 @@ class BlockedSignals {
 int serve(const std::filesystem::path& folder, int port, const std::function<void(const std::string& address)>& on_ready) {
   const BlockedSignals signals;
   httplib::Server server;
+  server.set_socket_options([](socket_t socket) {  // not the library's SO_REUSEPORT, by which two servers would share a port
+    const int yes = 1;
+    ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof(yes));
+  });
   server.set_default_headers({{"Cache-Control", "no-cache"}, {"X-Content-Type-Options", "nosniff"}});
   // Of types that it knows as text the library makes brotli of the highest level, which takes seconds for a contacts file and brings
   // nothing here: none of the large files has such a type.
@@ -66,6 +70,7 @@ int serve(const std::filesystem::path& folder, int port, const std::function<voi
     response.status = 421;  // misdirected request
     return httplib::Server::HandlerResponse::Handled;
   });
+  server.set_write_timeout(600);     // a browser that builds its picture may read nothing for long [s]
   server.set_keep_alive_timeout(1);  // what an idle browser may delay the end by [s]
   int signal = 0;
   std::atomic<bool> has_ended = false;

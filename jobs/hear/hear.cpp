@@ -278,8 +278,8 @@ class Listening {
     heard_.page = heard_.folder / report::kPageFile;
     const fs::path& bank = heard_.sounds.front().bank;
     make_explorer();
-    const std::string beside = heard_.explorer.empty() ? "" : kExplorer;
-    report::write_report(bank, bank.string() + ".resolved.json", heard_.folder, {.title = stem_, .drawn_modes = 0, .explorer = beside});
+    const std::string explorer = heard_.explorer.empty() ? "" : kExplorer;
+    report::write_report(bank, bank.string() + ".resolved.json", heard_.folder, {.title = stem_, .drawn_modes = 0, .explorer = explorer});
   }
 
   /// The bank of a body that was solved, scaled; false where none is like it.

@@ -59,7 +59,7 @@ Html make_picture_section(const Subject& subject, const fs::path& folder, const 
       html("<p><img src=\"{}\" alt=\"The first {} modes as deformed bodies, coloured by displacement\"></p>\n", kPictureFile, modes));
 }
 
-/// The body, to be played; where the page of `carillon explore` is not beside the report, how to get one.
+/// The body, to be played; where the page of `carillon explore` is not next to the report, how to get one.
 Html make_play_section(const Subject& subject, const Options& options) {
   constexpr const char* kHeading = "Play it";
   if (options.explorer.empty())

@@ -16,7 +16,7 @@ struct Options {
   int drawn_modes = 6;                      // pictures of so many first modes, at most 12; 0: none
   std::string undrawn_reason = {};          // why there are none, for the page; empty: not drawn yet
   std::filesystem::path draw_program = {};  // empty: carillon-draw next to this program, else in PATH
-  std::string explorer = {};                // folder of `carillon explore` beside the page, where there is one: the page shows it
+  std::string explorer = {};                // folder of `carillon explore` next to the page, where there is one: the page shows it
   double draw_limit_s = 120.0;              // it is ended when it takes longer, and the report goes without pictures
 };
 

@@ -36,8 +36,8 @@ varying float vBend;
 
 export class ShownBody {
   /** surface: {vertices_m, triangles}, frame of the mesh. position_m of its origin, rotation, in the world. */
-  constructor({ name, surface, position_m, rotation, centre_m, look }) {
-    Object.assign(this, { name, surface, centre_m });
+  constructor({ name, surface, position_m, rotation, centre_m, look, fixed }) {
+    Object.assign(this, { name, surface, centre_m, fixed });
     this.box = findBox(surface);
     this.corners = makeCorners(surface);
     const geometry = new THREE.BufferGeometry();

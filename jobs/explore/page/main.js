@@ -22,7 +22,7 @@ function refuse(error) {
   document.documentElement.dataset.state = 'failed';
 }
 
-/** The bytes of a file beside the page; progressed(bytes). */
+/** The bytes of a file next to the page; progressed(bytes). */
 async function fetchBytes(name, progressed = () => {}) {
   let response;
   try {
@@ -102,7 +102,9 @@ async function addBodies({ about, scene }, audio, view, player) {
     const bank = banks.get(said.bank), surface = { vertices_m: bank.vertices_m, triangles: bank.triangles };
     const position_m = said.position_m ?? [0, 0, 0], rotation = said.quaternion ?? fromDegrees(said.rotation_deg ?? [0, 0, 0]);
     const look = makeLook(about.bodies[i].material, about.bodies[i].group);
-    const shown = new ShownBody({ name: said.name, surface, position_m, rotation, centre_m: bank.centre_m, look });
+    const shown = new ShownBody({
+      name: said.name, surface, position_m, rotation, centre_m: bank.centre_m, look, fixed: said.fixed ?? false,
+    });
     const sound = await audio.addBody({
       bank, name: said.name, position_m, rotation, fixed: said.fixed ?? false, effects: said.effects ?? scene.effects ?? 'auto',
       roughness_m: said.roughness_m, friction: said.friction, radiation: scene.radiation, frequencies: scene.frequencies,

@@ -1,4 +1,4 @@
-// What is played: bodies in the sound engine, hands on them, and what was done, for the panel and for whoever asks from outside.
+// What is played: bodies in the sound engine, hands on them, and what was done, for the panel and for scripts.
 import { findNormal, findPoint, rotateBack, scale } from './geometry.js';
 
 const kKneeShare = 0.85; // full scale up to which the output is as it is; louder is bent, not cut

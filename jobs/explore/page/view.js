@@ -1,6 +1,7 @@
 // The picture: bodies on a dark stage, the place that is struck, and what a place of the picture shows. It draws when something changes.
 import * as THREE from './three/three.module.min.js';
 import { castRay, rotate, rotateBack, scale, add, norm, normalise, subtract, cross } from './geometry.js';
+import { makeStand } from './stand.js';
 import { OrbitCamera } from './camera.js';
 
 const kSlowFrameMs = 45; // slower: fewer pixels while something moves
@@ -121,6 +122,10 @@ export class View extends EventTarget {
     const floor = ground_m ?? low[2];
     this.scene.add((this.floor = makeFloor(Math.max(this.size, 2 * (this.middle[2] - floor)), floor - 1e-3 * this.size, this.middle)));
     this.floor.visible = ground_m !== null || high[2] - low[2] < 4 * Math.max(high[0] - low[0], high[1] - low[1]);
+    for (const body of this.bodies) {
+      const stand = body.fixed ? makeStand(body, floor) : null;
+      if (stand) this.scene.add(stand);
+    }
     const reach = 0.75 * this.size, { camera } = this.key.shadow;
     this.key.position.set(...add(this.middle, scale(2.2 * this.size, normalise([-0.55, -0.6, 1.1]))));
     this.key.target.position.set(...this.middle);
