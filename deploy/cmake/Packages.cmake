@@ -18,7 +18,7 @@ set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_NAME carillon-runtime)
-set(CPACK_COMPONENT_RUNTIME_DESCRIPTION "Sound of solid objects from mode banks: carillon-render, carillon-live, carillon-bank, libcarillon")
+set(CPACK_COMPONENT_RUNTIME_DESCRIPTION "Sound of solid objects from mode banks: carillon-render, carillon-live, carillon-bank, carillon-samples, libcarillon")
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_DEPENDS fonts-dejavu-core)
 
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME carillon-runtime-dev)

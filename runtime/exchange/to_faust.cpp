@@ -27,6 +27,7 @@ namespace carillon::exchange {
 namespace {
 
 constexpr double kCritical = 5e-7;    // of omega: nearer to critical damping
+constexpr std::size_t kGroup = 32;    // modes that are added up first: Faust takes a sum of many apart again for each term
 constexpr double kUsualNs = 0.01;     // of a blow of the instrument
 constexpr double kUsualScale = 0.25;  // of full scale, that such a blow makes at most
 
@@ -185,9 +186,16 @@ FaustProgram make_faust(const bank::Bank& given, const FaustOptions& options) {
   }
   text += fmt::format("\n// The gain of the point that is struck.\npoint = int(nentry(\"[1] point\", 0, 0, {}, 1));\nat(point{}) = {};\n",
                       places.size() - 1, arguments, sum);
-  text += "\n// Of each mode: Hz (undamped), decay [1/s], pressure at 1 m for a blow of 1 N s at each point [Pa].\nbody(point) = _ <:\n";
-  for (std::size_t k = 0; k < kept.size(); ++k) text += write_mode(bank, kept[k], places) + (k + 1 < kept.size() ? ",\n" : "\n");
-  text += "  :> _;\n";
+  text += "\n// Of each mode: Hz (undamped), decay [1/s], pressure at 1 m for a blow of 1 N s at each point [Pa].\n";
+  std::string groups;
+  for (std::size_t first = 0; first < kept.size(); first += kGroup) {
+    const std::size_t last = std::min(first + kGroup, kept.size());
+    text += fmt::format("group{}(point) = _ <:\n", first / kGroup);
+    for (std::size_t k = first; k < last; ++k) text += write_mode(bank, kept[k], places) + (k + 1 < last ? ",\n" : "\n");
+    text += "  :> _;\n";
+    groups += fmt::format("{}group{}(point)", first == 0 ? "" : ", ", first / kGroup);
+  }
+  text += fmt::format("body(point) = _ <: {} :> _;\n", groups);
   const double usual = loudest > 0.0 ? kUsualScale / (loudest * kUsualNs) : 1.0;
   std::string instrument = kInstrument;
   for (const auto& [word, value] : {std::pair("USUAL_GAIN", usual), {"GREATEST_GAIN", 100.0 * usual}, {"SMALL_GAIN", 0.001 * usual}})

@@ -46,7 +46,7 @@ def faust_damped(folder):
     with h5py.File(bank) as file:
         assert (2 * np.pi * file["modes/frequency_hz"][:] < file["modes/decay"][:]).sum() > 0
     hold("faust_damped", compare(folder, bank, 100, (0.31, 0.17, 0.0015), 44100), 1e-5)
-    assert "creep(" in (folder / "body.dsp").read_text().split("body(point)")[1]
+    assert "creep(" in (folder / "body.dsp").read_text().split("group0(point)")[1]
 
 
 def faust_nyquist(folder):
@@ -69,7 +69,7 @@ def faust_one_mode(folder):
     t = np.arange(48000) / 48000
     v = np.sqrt((2 * np.pi * hz) ** 2 - d**2)
     exact = gain * np.exp(-d * t) * (np.cos(v * t) - d / v * np.sin(v * t))
-    for precision, bound in (("-double", 1e-9), ("-single", 1e-3)):
+    for precision, bound in (("-double", 1e-9), ("-single", 5e-3)):
         compile_dsp(folder, "body.dsp", precision)
         hold("faust_one_mode", abs(play(folder, 48000, len(t), 1.0) - exact).max() / abs(gain), bound, precision[1:])
 
@@ -114,11 +114,11 @@ def glb_damaged(folder):
 
     bad = 0
     for i in range(40):
-        code, is_told = read(whole[: i * len(whole) // 40])
-        bad += not is_told
+        code, is_said = read(whole[: i * len(whole) // 40])
+        bad += not is_said
     for at in range(0, len(whole), max(1, len(whole) // 60)):
-        code, is_told = read(whole[:at] + bytes([whole[at] ^ 0x41]) + whole[at + 1 :])
-        bad += not (is_told or code == 0)
+        code, is_said = read(whole[:at] + bytes([whole[at] ^ 0x41]) + whole[at + 1 :])
+        bad += not (is_said or code == 0)
     hold("glb_damaged", bad, 0)
     hold_refusal(
         "glb_damaged",

@@ -138,7 +138,10 @@ LAW = {
     "precompute/cost": (["runtime/material", "precompute/job"], []),
     "precompute/mesh": (["runtime/base"], ["fmt", "xml", "zlib"]),
     "precompute/shapes": (["runtime/base", "precompute/mesh"], ["fmt"]),
-    "precompute/mesher": (["runtime/base", "runtime/gltf", "runtime/version", "precompute/mesh", "precompute/shapes"], ["fmt", "cli", "eigen", "cgal"]),
+    "precompute/mesher": (
+        ["runtime/base", "runtime/gltf", "runtime/version", "precompute/mesh", "precompute/shapes"],
+        ["fmt", "cli", "eigen", "cgal"],
+    ),
     "precompute/comm": (["runtime/base"], ["fmt", "mpi"]),
     "precompute/launch": (["runtime/base"], ["fmt"]),
     "precompute/mpi_profile": (["runtime/base", "precompute/petsc"], ["mpi"]),

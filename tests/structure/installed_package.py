@@ -13,7 +13,14 @@ import sys
 
 # Of each package: what it contains, and whom it may and may not need.
 RUNTIME = {
-    "files": ["bin/carillon-render", "bin/carillon-live", "bin/carillon-bank", "lib/libcarillon.so.2", "lib/carillon/carillon-joints.so"],
+    "files": [
+        "bin/carillon-render",
+        "bin/carillon-live",
+        "bin/carillon-bank",
+        "bin/carillon-samples",
+        "lib/libcarillon.so.2",
+        "lib/carillon/carillon-joints.so",
+    ],
     "needs": "libhdf5-",
     "free_of": "mpi|petsc|slepc|metis|mumps|libcgal|libgmp",
 }
@@ -115,7 +122,7 @@ def main():
         run("dpkg-deb", "-x", file, root)
     usr = root / "usr"
     check_symbols(usr / "lib/libcarillon.so")
-    for name in ("carillon-render", "carillon-bank", "carillon", "carillon-precompute", "carillon-mesh"):
+    for name in ("carillon-render", "carillon-bank", "carillon-samples", "carillon", "carillon-precompute", "carillon-mesh"):
         if (build / "bin" / name).exists():
             assert read(usr / "bin" / name, "--version") == read(build / "bin" / name, "--version"), name
 

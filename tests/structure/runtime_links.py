@@ -22,7 +22,7 @@ def list_libraries(file):
 
 
 bad = []
-for name in ("carillon-bank", "carillon-render", "carillon-live"):
+for name in ("carillon-bank", "carillon-render", "carillon-live", "carillon-samples"):
     program = pathlib.Path(sys.argv[1]) / name
     loaded = list_libraries(program)
     found = {library for library in loaded if FORBIDDEN.search(library)}

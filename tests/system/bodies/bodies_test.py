@@ -156,12 +156,12 @@ class BodiesTest(unittest.TestCase):
 
     def test_bank_for_is_a_command_of_its_own(self):
         (self.folder / "body.json").write_text(json.dumps(BOX))
-        told = json.loads(self.run_program(BIN / "carillon", "--json", "bank-for", "body.json").stdout)
-        self.assertTrue(told["is_new"])
+        answer = json.loads(self.run_program(BIN / "carillon", "--json", "bank-for", "body.json").stdout)
+        self.assertTrue(answer["is_new"])
         again = self.run_program(BIN / "carillon", "bank-for", "body.json")
-        self.assertEqual((again.stdout, again.stderr), (told["bank"] + "\n", ""))
-        self.run_program(BIN / "carillon-bank", "check", told["bank"])
-        # The cache is a store: gc finds nothing that it needs, and removes it when told to.
+        self.assertEqual((again.stdout, again.stderr), (answer["bank"] + "\n", ""))
+        self.run_program(BIN / "carillon-bank", "check", answer["bank"])
+        # The cache is a store: gc finds nothing that it needs, and removes it when asked to.
         self.run_program(BIN / "carillon", "--store", self.folder / "cache" / "carillon", "gc", "--delete")
 
 

@@ -19,6 +19,7 @@ blocks = re.findall(r"^```(\w+)(?: +(\S+))?\n(.*?)^```$", page.read_text(), re.M
 environment = {**os.environ, "PATH": f"{bin_dir}:/usr/bin:/bin:{os.environ['PATH']}"}
 ran = 0
 with tempfile.TemporaryDirectory(prefix="carillon-docs-") as folder:
+    environment["XDG_CACHE_HOME"] = f"{folder}/.cache"
     for kind, name, text in blocks:
         if kind in ("json", "python") and name:
             target = pathlib.Path(folder) / name

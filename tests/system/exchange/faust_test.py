@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""carillon-bank export to Faust, from outside: the program is compiled by Faust and a C++ compiler, runs, and sounds as carillon-render does
-and as the closed form of damped oscillators.
+"""carillon-bank export to Faust, from outside: the program is compiled by Faust and a C++ compiler, runs, and sounds as carillon-render
+does. Its hard cases are tests/hard/formats.py.
 
 Finds the programs in $CARILLON_BIN_DIR.
 """
@@ -73,7 +73,7 @@ int main(int, char** argv) {
 
 
 def compile_dsp(folder, dsp, precision="-double", entry="struck", level="-O1"):
-    run("faust", "-lang", "cpp", precision, "-cn", "body", "-pn", entry, dsp, "-o", "body.cpp", cwd=folder)
+    run("faust", "-t", "0", "-lang", "cpp", precision, "-cn", "body", "-pn", entry, dsp, "-o", "body.cpp", cwd=folder)
     (folder / "main.cpp").write_text(MAIN)
     run("g++", level, "-w", "main.cpp", "-o", "play", cwd=folder)
 

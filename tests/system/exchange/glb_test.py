@@ -90,10 +90,10 @@ class GlbTest(unittest.TestCase):
         self.assertTrue(numpy.allclose([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], [0, 1, 0]))
 
     def test_assimp_reads_the_same_mesh(self):
-        told = run("assimp", "info", "bowl.glb", cwd=self.folder).stdout
+        answer = run("assimp", "info", "bowl.glb", cwd=self.folder).stdout
         numbers = {
             line.split(":")[0].strip(): line.split(":")[1].split()[0]
-            for line in told.splitlines()
+            for line in answer.splitlines()
             if ":" in line and line.split(":")[1].split()
         }
         self.assertEqual(int(numbers["Faces"]), len(self.triangles))

@@ -38,7 +38,7 @@ std::string find_error(const std::string& bytes, const GlbReading& reading = {})
   return "";
 }
 
-/// The JSON chunk with another text in place of one that is there, lengths put right.
+/// The JSON chunk with another text in place of one that is there, lengths corrected.
 std::string replace_json(const std::string& glb, const std::string& from, const std::string& to) {
   std::uint32_t length = 0;
   std::memcpy(&length, glb.data() + 12, 4);
@@ -177,10 +177,10 @@ TEST(Glb, cut_or_changed_at_any_byte_ends_in_the_bank_or_an_error) {
 }
 
 TEST(Glb, as_the_corpus_of_the_fuzz_target_is_read) {
-  const std::filesystem::path file = std::filesystem::path(CARILLON_SOURCE_DIR) / "tests/unit/runtime/exchange/corpus/cube.glb";
+  const std::filesystem::path file = std::filesystem::path(CARILLON_SOURCE_DIR) / "tests/unit/runtime/exchange/corpus/box.glb";
   std::ifstream stream(file, std::ios::binary);
   const std::string bytes(std::istreambuf_iterator<char>(stream), {});
-  EXPECT_EQ(parse_glb(bytes, "cube.glb").mode_count(), 3);
+  EXPECT_EQ(parse_glb(bytes, "box.glb").mode_count(), 6);
 }
 
 }  // namespace
