@@ -14,9 +14,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kExplorer = "explore";  // folder of the page beside the report
+constexpr const char* kExplorer = "explore";  // folder of the page next to the report
 
-/// The page beside a report; empty for a bank that cannot be played, of which the report says why.
+/// The page next to a report; empty for a bank that cannot be played, of which the report says why.
 std::string make_explorer(const fs::path& bank, const fs::path& folder, const std::string& title) {
   try {
     (void)explore::explore({.subjects = {bank}, .folder = folder / kExplorer, .title = title});

@@ -91,6 +91,8 @@ std::uintmax_t calc_bytes(const fs::path& folder) {
 
 WholeFolder::WholeFolder(fs::path place) : place_(std::move(place)) {
   std::error_code error;
+  for (fs::path above = place_.parent_path(); !above.empty() && !fs::exists(above, error); above = above.parent_path())
+    made_.push_back(above);
   fs::create_directories(place_.parent_path(), error);
   std::string path = (place_.parent_path() / ("." + place_.filename().string() + ".XXXXXX")).string();
   if (error || ::mkdtemp(path.data()) == nullptr) refuse(place_, error ? error : std::error_code(errno, std::generic_category()));
@@ -100,7 +102,9 @@ WholeFolder::WholeFolder(fs::path place) : place_(std::move(place)) {
 
 WholeFolder::~WholeFolder() {
   std::error_code error;
-  if (!path_.empty()) fs::remove_all(path_, error);
+  if (path_.empty()) return;
+  fs::remove_all(path_, error);
+  for (const fs::path& above : made_) fs::remove(above, error);  // only those that are empty
 }
 
 void WholeFolder::commit() {

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "runtime/base/error.hpp"
 
@@ -41,6 +42,7 @@ class WholeFolder {
 
  private:
   std::filesystem::path place_, path_;
+  std::vector<std::filesystem::path> made_;  // folders above it that were not there, innermost first: they go with it
 };
 
 }  // namespace carillon::explore

@@ -60,11 +60,9 @@ Html make_picture_section(const Subject& subject, const fs::path& folder, const 
 }
 
 /// The body, to be played; where the page of `carillon explore` is not next to the report, how to get one.
-Html make_play_section(const Subject& subject, const Options& options) {
+Html make_play_section(const Options& options) {
   constexpr const char* kHeading = "Play it";
-  if (options.explorer.empty())
-    return leave_out("play", kHeading,
-                     fmt::format("carillon explore {} --serve opens a page to strike the body on.", subject.file.string()));
+  if (options.explorer.empty()) return leave_out("play", kHeading, "carillon explore BANK --serve opens a page to strike the body on.");
   return make_section("play", kHeading,
                       html("<p><iframe src=\"{0}/index.html\" title=\"The body, to be struck and heard\" allow=\"autoplay\"></iframe></p>\n"
                            "<p>It plays where a web server has the folder: <code>carillon explore {0} --serve</code> opens it alone. "
@@ -105,7 +103,7 @@ void write_report(const fs::path& bank, const fs::path& resolved_job, const fs::
     throw SystemError(fmt::format("{}: this folder for the report cannot be made: {}; choose another place", folder.string(),
                                   error ? error.message() : "something else has that name"));
   Html pictures = make_picture_section(subject, folder, options);
-  pictures += make_play_section(subject, options);
+  pictures += make_play_section(options);
   const std::string title = options.title.empty() ? find_title(subject) : options.title;
   base::write_file(folder / kPageFile, make_page(subject, pictures, title).text());
 }

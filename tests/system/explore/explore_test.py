@@ -207,6 +207,7 @@ class Explore(unittest.TestCase):
         self.refuse("text.json", contains=("text.json:1",))
         self.refuse("other.json", contains=("none.hdf",))
         self.refuse("cut.hdf", contains=("cut.hdf",))
+        self.refuse("cut.hdf", "-o", "deep/down/page", contains=("cut.hdf",))
         self.refuse("changed.hdf", contains=("changed.hdf",))
         self.refuse("future.hdf", contains=("future.hdf", "9."))
         self.refuse("brass.hdf", "scene.json", contains=("scene.json",))

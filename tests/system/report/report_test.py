@@ -21,7 +21,22 @@ import numpy
 
 BIN = pathlib.Path(os.environ["CARILLON_BIN_DIR"])
 SOURCE = pathlib.Path(os.environ["CARILLON_SOURCE_DIR"])
-SECTIONS = ["pictures", "modes", "proof", "errors", "residuals", "mesh", "time", "memory", "work", "size", "checks", "job", "program"]
+SECTIONS = [
+    "pictures",
+    "play",
+    "modes",
+    "proof",
+    "errors",
+    "residuals",
+    "mesh",
+    "time",
+    "memory",
+    "work",
+    "size",
+    "checks",
+    "job",
+    "program",
+]
 VOID = {"meta", "img", "br", "path", "rect", "circle"}
 NOTHING = "/nowhere/carillon-draw"
 
@@ -183,7 +198,7 @@ class Reports(unittest.TestCase):
 
     def test_every_section_is_there(self):
         self.assert_whole(self.page)
-        self.assertEqual([name for name, is_missing in self.page.missing.items() if is_missing], ["pictures"])
+        self.assertEqual([name for name, is_missing in self.page.missing.items() if is_missing], ["pictures", "play"])
         self.assertEqual(self.page.title, "chime.msh")
         self.assertIn("carillon-draw is not installed here", self.page.text["pictures"])
         self.assertFalse((self.root / "report/report-modes.png").exists())
@@ -396,7 +411,7 @@ class Reports(unittest.TestCase):
                 del record["run"][key]
             page = self.report(f"without-{section}", record)
             self.assert_whole(page)
-            self.assertEqual({name for name, is_missing in page.missing.items() if is_missing}, {"pictures", section})
+            self.assertEqual({name for name, is_missing in page.missing.items() if is_missing}, {"pictures", "play", section})
             self.assertIn("of an older version, or damaged", page.text[section])
 
     def test_damaged_records_are_left_out_and_nothing_breaks(self):
@@ -572,9 +587,9 @@ class Reports(unittest.TestCase):
         self.assert_whole(page)
         # The name that the user knows, not that of the snapshot; and all of the record.
         self.assertEqual(page.title, "chime.msh")
-        self.assertEqual([name for name, is_missing in page.missing.items() if is_missing], ["pictures"])
+        self.assertEqual([name for name, is_missing in page.missing.items() if is_missing], ["pictures", "play"])
         self.assertEqual(len(page.rows("modes", 11)), 4)
-        carillon("report", job, "-o", self.root / "made", "--no-pictures")
+        carillon("report", job, "-o", self.root / "made", "--no-pictures", "--no-page")
         self.assertEqual((self.root / "made/report.html").read_bytes(), page.source)
         # Who asks for it first has it drawn, next to the bank and for all who ask later. The records there stay what was published.
         picture = bank.parent / "report-modes.png"
@@ -592,6 +607,10 @@ class Reports(unittest.TestCase):
         said = carillon("report", self.bank, "-o", self.root / "of file", "--no-pictures")
         self.assertEqual(said.strip(), str(self.root / "of file/report.html"))
         self.assertFalse(Page(said.strip()).missing["time"])
+        # With the page to play it, where the page is installed.
+        has_page = all((BIN.parent / "share/carillon" / part).is_dir() for part in ("explore", "web"))
+        self.assertEqual(Page(said.strip()).missing["play"], not has_page)
+        self.assertEqual((self.root / "of file/explore/index.html").exists(), has_page)
         self.assertIn("-o", carillon("report", self.bank, code=2))
         self.assertIn("not a Carillon bank", carillon("report", self.root / "chime.msh", "-o", self.root / "none", code=2))
         self.assertFalse((self.root / "none").exists())
