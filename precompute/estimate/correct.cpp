@@ -3,9 +3,10 @@
 //   the smooth surface. T4 recover less, the more the coarser: two polynomials in I and the share L that a lumped mass takes, of first
 //   order 1 - I + L but for the constant of I, fitted to the bodies of docs/error-bars.md. Modes that are one eigenvalue to rounding have
 //   shapes that are any basis of a space: they get the mean of their parts, which does not depend on the basis. Bars: half of the mesh's
-//   bar around the corrected value. Where the estimate is a large share of lambda the mesh's interval itself is kept, which lies below the
-//   mesh's frequency but for what lumping and geometry leave open. Two meshes agree where |lambda' - lambda'_coarser| is less than half of
-//   what their corrections differ by.
+//   bar around the corrected value, 0.4 of it for T4. Where the estimate is a large share of lambda the mesh's interval itself is kept,
+//   which lies below the mesh's frequency but for what lumping and geometry leave open (of T4 what of it is within 0.45 of the bar). Two
+//   meshes agree where |lambda' - lambda'_coarser| is less than half of what their corrections differ by. What no recovery sees in curved
+//   elements that are wide against their wall: parts.hpp, calc_excess().
 // Source: Naga, Zhang and Zhou 2006, SIAM J. Sci. Comput. 28, 1289 (eigenvalues less the energy of the recovered error); Zienkiewicz and
 //   Zhu 1992.
 // Deviations: strains are recovered (error_bars.cpp), not displacements; the rational form instead of the difference keeps lambda > 0.
@@ -24,18 +25,19 @@ using bank::Correction;
 
 // Shares of lambda. Above the first the estimate is a tendency, above the second it says next to nothing.
 constexpr double kRoughT4 = 0.5, kStiffT4 = 1.0, kRoughT10 = 0.3, kStiffT10 = 0.6;
-constexpr double kSingularShare = 0.25;  // of the estimate's energy
-constexpr double kHalf = 0.5, kQuarter = 0.25, kThird = 1.0 / 3;
-constexpr double kSameEigenvalue = 1e-6;  // of lambda
+constexpr double kRoughWidthT4 = 0.45, kRoughWidthLumped = 0.5;                  // of the mesh's bar
+constexpr double kSingularShare = 0.25;                                          // of the estimate's energy
+constexpr double kHalf = 0.5, kHalfT4 = 0.4, kQuarter = 0.25, kThird = 1.0 / 3;  // of the mesh's bar
+constexpr double kSameEigenvalue = 1e-6;                                         // of lambda
 
 double to_cents(double share) { return 600 * std::log2(share); }
 
 Correction find_correction(const ErrorParts& parts, Kind kind, bool is_lumped) {
   if (is_lumped && kind != Kind::kT4) return Correction::kLumped;
   const bool is_t4 = kind == Kind::kT4;
-  if (parts.interpolation > (is_t4 ? kStiffT4 : kStiffT10)) return Correction::kStiff;
-  if (parts.interpolation > (is_t4 ? kRoughT4 : kRoughT10) || parts.singular > kSingularShare * parts.interpolation)
-    return Correction::kRough;
+  const double excess = calc_excess(parts, kind);
+  if (excess > (is_t4 ? kStiffT4 : kStiffT10)) return Correction::kStiff;
+  if (excess > (is_t4 ? kRoughT4 : kRoughT10) || parts.singular > kSingularShare * parts.interpolation) return Correction::kRough;
   return Correction::kOneMesh;
 }
 
@@ -44,8 +46,8 @@ std::vector<ErrorParts> share_parts(const Level& level) {
   std::vector<ErrorParts> shared = level.parts;
   for (std::size_t first = 0, end = 0; first < shared.size(); first = end) {
     for (end = first + 1; end < shared.size() && level.lambda[end] <= level.lambda[end - 1] * (1 + kSameEigenvalue);) ++end;
-    for (double ErrorParts::*part : {&ErrorParts::interpolation, &ErrorParts::singular, &ErrorParts::lumping, &ErrorParts::geometry,
-                                     &ErrorParts::geometry_noise, &ErrorParts::doubt, &ErrorParts::doubt_noise}) {
+    for (double ErrorParts::*part : {&ErrorParts::interpolation, &ErrorParts::singular, &ErrorParts::bent, &ErrorParts::lumping,
+                                     &ErrorParts::geometry, &ErrorParts::geometry_noise, &ErrorParts::doubt, &ErrorParts::doubt_noise}) {
       double sum = 0.0;
       for (std::size_t m = first; m < end; ++m) sum += level.parts[m].*part;
       for (std::size_t m = first; m < end; ++m) shared[m].*part = sum / static_cast<double>(end - first);
@@ -66,18 +68,22 @@ OwnIntervals find_intervals(const Level& level, const std::vector<ErrorParts>& p
   OwnIntervals own;
   for (std::size_t m = 0; m < parts.size(); ++m) {
     ErrorParts one_sided = parts[m];
-    one_sided.interpolation = one_sided.singular = 0.0;
+    one_sided.interpolation = one_sided.singular = one_sided.bent = 0.0;
     const double all = calc_cents(parts[m], level.kind), above = calc_cents(one_sided, level.kind);
     const double stated = to_cents(corrections.lambda[m] / level.lambda[m]);
     double low = -std::max(all, least_cents[m]), high = -low;
     if (corrections.correction[m] == Correction::kRough) {
-      high = std::max(above, stated);
-      low = std::min(-all, stated);
+      const double part = level.is_lumped ? kRoughWidthLumped : kRoughWidthT4;
+      const double width = level.kind == Kind::kT4 ? std::max(part * all, above) : HUGE_VAL;
+      high = std::min(std::max(above, stated), stated + width);
+      low = std::max(std::min(-all, stated), stated - width);
     } else if (bank::is_corrected(corrections.correction[m])) {
       ErrorParts mesh = parts[m];
       mesh.doubt = mesh.doubt_noise = 0.0;
       const double reducible = calc_cents(mesh, level.kind);
-      const double factor = corrections.correction[m] == Correction::kOneMesh ? kHalf : level.kind == Kind::kT10Curved ? kThird : kQuarter;
+      const double alone = level.kind == Kind::kT4 && !level.is_lumped ? kHalfT4 : kHalf,
+                   both = level.kind == Kind::kT10Curved ? kThird : kQuarter;
+      const double factor = corrections.correction[m] == Correction::kOneMesh ? alone : both;
       const double width = factor * reducible + (all - reducible);  // a doubt of the surface is not made smaller
       low = stated - width;
       high = stated + width;
@@ -93,7 +99,7 @@ OwnIntervals find_intervals(const Level& level, const std::vector<ErrorParts>& p
 }  // namespace
 
 double calc_share_left(const ErrorParts& parts, Kind kind, bool is_lumped) {
-  const double i = parts.interpolation, l = parts.lumping;
+  const double i = calc_excess(parts, kind), l = parts.lumping;
   double left = 1.0;
   if (kind != Kind::kT4)
     left = 1 / (1 + i);

@@ -35,8 +35,8 @@ struct Corrections {
   std::vector<double> lambda;  // (m) [rad^2/s^2] what is believed: corrected, or the mesh's
   std::vector<double> cents;   // (m) bar: the k-th lowest of `lambda` is so near to the k-th true one, k as in ErrorBars; infinite where
                                // is_too_short()
-  // (m) half the mesh's bar by one mesh, a quarter (a third of curved elements) by two, the mesh's own interval where it is rough, the
-  // mesh's bar where it is not corrected, and as far as two meshes are apart where they dispute
+  // (m) half the mesh's bar (T4: 0.4 of it) by one mesh, a quarter (a third of curved elements) by two, the mesh's own interval where it is
+  // rough, the mesh's bar where it is not corrected, and as far as two meshes are apart where they dispute
   std::vector<bank::Correction> correction;
 };
 

@@ -72,8 +72,8 @@ void load_displacement(const partition::LocalMesh& local, const std::vector<std:
 }
 
 /// The sums of one block of modes over this rank's elements: error, energy, lumping, change, magnitude, the last two again for the surface
-/// that the body may have as well, and the error of singular elements.
-constexpr int kSums = 8;
+/// that the body may have as well, the error of singular elements, and that of bent ones.
+constexpr int kSums = 9;
 using Sums = std::array<DoubleLanes, kSums>;
 
 Sums calc_block(const Kernels& kernels, Recovery& recovery, Room& room, job::Mass mass_kind, const DoubleLanes& lambda) {
@@ -99,7 +99,7 @@ Sums calc_block(const Kernels& kernels, Recovery& recovery, Room& room, job::Mas
     kernels.find_middles(recovery.middles, elements.materials, room.patches.data(), room.values.data());
     values = room.values.data();
   }
-  kernels.add_energies(elements, recovery.value_of.data(), values, displacement, room.strains.data(), sums[0], sums[7], sums[1]);
+  kernels.add_energies(elements, recovery.value_of.data(), values, displacement, room.strains.data(), sums[0], sums[7], sums[8], sums[1]);
   kernels.add_shifts(recovery.shifts, values, displacement, lambda, sums[3], sums[4]);
   kernels.add_tractions(recovery.tractions, values, sums[0]);
   kernels.add_shifts(recovery.doubts, values, displacement, lambda, sums[5], sums[6]);
@@ -200,6 +200,7 @@ ErrorBars calc_error_bars(const comm::Communicator& comm, const partition::Local
     ErrorParts parts;
     parts.interpolation = sum[0];
     parts.singular = sum[7];
+    parts.bent = sum[8];
     parts.energy = sum[1];
     parts.lumping = sum[2];
     parts.geometry = sum[3];
@@ -208,7 +209,7 @@ ErrorBars calc_error_bars(const comm::Communicator& comm, const partition::Local
     parts.doubt_noise = sum[6];
     level.parts.push_back(parts);
     const double cents = calc_cents(parts, level.kind);
-    parts.interpolation = 0.0;  // elements that cannot follow a mode are too stiff: the truth lies below
+    parts.interpolation = parts.bent = 0.0;  // elements that cannot follow a mode are too stiff: the truth lies below
     own.stated.push_back(0.0);
     own.low.push_back(-cents);
     own.high.push_back(cents);

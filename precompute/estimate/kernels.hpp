@@ -41,6 +41,7 @@ struct Elements {
   std::vector<float> weight;                // (e, 4, s, t) what a sample adds to the terms of the patches
   std::vector<float> volume;                // (e) [m^3]
   std::vector<float> singular;              // (e) 1: touches an edge where stresses have no limit (Surface::is_singular), 0: does not
+  std::vector<float> bent;                  // (e) how far it bends with the surface (Surface::bend), squared
   std::vector<std::array<float, 36>> root;  // (materials) U with U^T U = C, row-major, upper triangular
   std::vector<float> dilatation;  // (materials) what counts of a T10's dilatation beyond its mean; 1, less when nearly incompressible
   std::vector<float> density;     // (materials) [kg/m^3]
@@ -76,10 +77,10 @@ struct Kernels {
                       DoubleLanes& difference);
   /// Recovered strains at mid-side nodes from patches with ten terms. values: (nodes * materials).
   void (*find_middles)(const std::vector<Middle>& middles, int materials, const Strain* patches, Strain* values);
-  /// Adds per element the energies of recovered minus computed strain, of all elements and of the singular ones, and that of the computed
-  /// strain. T4 compute their strains again: that costs less than to read what add_strains would have to write.
+  /// Adds per element the energies of recovered minus computed strain, of all elements, of the singular ones and times `bent`, and that of
+  /// the computed strain. T4 compute their strains again: that costs less than to read what add_strains would have to write.
   void (*add_energies)(const Elements& elements, const std::int32_t* value_of, const Strain* values, const void* displacement,
-                       const Strain* strains, DoubleLanes& error, DoubleLanes& singular, DoubleLanes& energy);
+                       const Strain* strains, DoubleLanes& error, DoubleLanes& singular, DoubleLanes& bent, DoubleLanes& energy);
   /// Adds gap times (2 W - lambda rho |u|^2), and the sum of its magnitudes.
   void (*add_shifts)(const std::vector<Shift>& shifts, const Strain* values, const void* displacement, const DoubleLanes& lambda,
                      DoubleLanes& change, DoubleLanes& magnitude);

@@ -148,9 +148,9 @@ void add_strains(const Elements& elements, bool lumped, const void* displacement
 }
 
 void add_energies_t4(const Elements& elements, const std::int32_t* value_of, const Strain* values, const void* displacement, const Strain*,
-                     DoubleLanes& error, DoubleLanes& singular, DoubleLanes& energy) {
+                     DoubleLanes& error, DoubleLanes& singular, DoubleLanes& bent, DoubleLanes& energy) {
   for (std::size_t begin = 0; begin < elements.count; begin += kChunk) {
-    Lanes errors = {}, singulars = {}, energies = {};
+    Lanes errors = {}, singulars = {}, bents = {}, energies = {};
     for (std::size_t e = begin; e < std::min(elements.count, begin + kChunk); ++e) {
       Lanes d[3][3], q[6];
       load_differences<4>(elements, static_cast<const FloatLanes*>(displacement), e, d);
@@ -170,18 +170,20 @@ void add_energies_t4(const Elements& elements, const std::int32_t* value_of, con
       squares *= elements.volume[e] / 20;
       errors += squares;
       singulars += squares * elements.singular[e];
+      bents += squares * elements.bent[e];
       energies += own * elements.volume[e];
     }
     flush(errors, error);
     flush(singulars, singular);
+    flush(bents, bent);
     flush(energies, energy);
   }
 }
 
 void add_energies_t10(const Elements& elements, const std::int32_t* value_of, const Strain* values, const void*, const Strain* strains,
-                      DoubleLanes& error, DoubleLanes& singular, DoubleLanes& energy) {
+                      DoubleLanes& error, DoubleLanes& singular, DoubleLanes& bent, DoubleLanes& energy) {
   for (std::size_t begin = 0; begin < elements.count; begin += kChunk) {
-    Lanes errors = {}, singulars = {}, energies = {};
+    Lanes errors = {}, singulars = {}, bents = {}, energies = {};
     for (std::size_t e = begin; e < std::min(elements.count, begin + kChunk); ++e) {
       const Strain* q = strains + 4 * e;
       const std::int32_t* value = value_of + 10 * e;
@@ -200,10 +202,12 @@ void add_energies_t10(const Elements& elements, const std::int32_t* value_of, co
       squares *= elements.volume[e];
       errors += squares;
       singulars += squares * elements.singular[e];
+      bents += squares * elements.bent[e];
       energies += own * (elements.volume[e] / 4);
     }
     flush(errors, error);
     flush(singulars, singular);
+    flush(bents, bent);
     flush(energies, energy);
   }
 }

@@ -16,6 +16,7 @@ enum class Kind : std::uint8_t {
 struct ErrorParts {
   double interpolation = 0.0;   // energy of the stress that the elements cannot follow, lambda_h - lambda > 0
   double singular = 0.0;        // of it, what elements at inward edges and at rims of fixed faces have
+  double bent = 0.0;            // of it, times the square of how far elements bend with the surface against their height (Surface::bend)
   double energy = 0.0;          // of the whole mode as the estimate sums it: 1 (0.99 for curved T10)
   double lumping = 0.0;         // of a lumped mass: lambda (consistent) - lambda (lumped)
   double geometry = 0.0;        // lambda (smooth surface) - lambda (surface of the mesh), signed
@@ -30,6 +31,9 @@ double find_order(Kind kind);
 /// Predicts the parts on a mesh whose edges are `edge_ratio` times as long. order: of interpolation, find_order() or what was measured.
 /// Smooth modes; a fixed face with its singular rim converges slower, which the safety factor covers for ratios down to about 1/4. Pure.
 ErrorParts predict_parts(const ErrorParts& parts, Kind kind, double order, double edge_ratio);
+
+/// The part of lambda that the elements take too much: of T10 with what no recovery sees where they bend far with a thin wall. Pure.
+double calc_excess(const ErrorParts& parts, Kind kind);
 
 /// How far [cents] the true frequency can be from the mesh's, to either side, safety factors included. Pure.
 double calc_cents(const ErrorParts& parts, Kind kind);

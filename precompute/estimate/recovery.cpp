@@ -200,7 +200,7 @@ std::vector<std::int32_t> find_places(const partition::LocalMesh& local, const s
 }
 
 void fill_elements(const partition::LocalMesh& local, std::span<const Solid> solids, std::span<const std::int32_t> material_of_tet,
-                   const std::vector<char>& singular, Recovery& recovery) {
+                   const Surface& surface, Recovery& recovery) {
   Elements& elements = recovery.elements;
   const int n = elements.nodes, s = elements.samples;
   elements.node.resize(elements.count * n);
@@ -213,6 +213,7 @@ void fill_elements(const partition::LocalMesh& local, std::span<const Solid> sol
   elements.gradient.resize(elements.count * s * (n - 1) * 3);
   elements.volume.resize(elements.count);
   elements.singular.resize(elements.count);
+  elements.bent.resize(elements.count);
   elements.patch.resize(elements.count * 4);
   recovery.value_of.resize(elements.count * n);
   std::vector<Vec3> x(n);
@@ -230,7 +231,9 @@ void fill_elements(const partition::LocalMesh& local, std::span<const Solid> sol
     if (!(volume > 0))
       throw InputError(fmt::format("element {} of the mesh has no volume; remesh there", local.tet_in_mesh[recovery.order[e]] + 1));
     elements.volume[e] = static_cast<float>(volume);
-    elements.singular[e] = std::any_of(tet, tet + 4, [&](std::int32_t node) { return singular[node] != 0; }) ? 1.0F : 0.0F;
+    elements.singular[e] = std::any_of(tet, tet + 4, [&](std::int32_t node) { return surface.is_singular[node] != 0; }) ? 1.0F : 0.0F;
+    const float bend = std::accumulate(tet, tet + 4, 0.0F, [&](float sum, std::int32_t node) { return sum + surface.bend[node] / 4; });
+    elements.bent[e] = bend * bend;
     for (int v = 0; v < 4; ++v) elements.patch[4 * e + v] = recovery.vertex_place[tet[v]] * elements.materials + elements.material[e];
     for (int i = 0; i < n; ++i) {
       elements.node[e * n + i] = recovery.place[tet[i]];
@@ -407,7 +410,7 @@ Recovery make_recovery(const comm::Communicator& comm, const partition::LocalMes
     recovery.vertex_node.resize(static_cast<std::size_t>(*std::max_element(vertex_place.begin(), vertex_place.end()) + 1));
     for (std::size_t n = 0; n < place.size(); ++n)
       if (vertex_place[n] >= 0) recovery.vertex_node[vertex_place[n]] = place[n];
-    fill_elements(local, solids, material_of_tet, surface.is_singular, recovery);
+    fill_elements(local, solids, material_of_tet, surface, recovery);
     for (const float volume : elements.volume) size[0] += volume;
     size[2] = count_one_layer(local, surface.is_outer);
   });

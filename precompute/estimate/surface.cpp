@@ -174,11 +174,22 @@ std::vector<Vec3> find_normals(const comm::Communicator& comm, const partition::
       [](const comm::ByRank<Corner>& met) { return smooth_normals(met.items); });
 }
 
-/// Bits of nodes.
-constexpr char kOuter = 1, kSingular = 2;
+/// What Surface says of a node.
+struct Mark {
+  std::int32_t node = 0;  // in the whole mesh
+  float bend = 0.0F;
+  char is_outer = 0, is_singular = 0;
 
-/// What Surface says of the nodes, as bits. Collective.
-std::vector<char> find_marks(const comm::Communicator& comm, const partition::LocalMesh& local, const std::vector<Face>& faces) {
+  void join(const Mark& other) {
+    bend = std::max(bend, other.bend);
+    is_outer |= other.is_outer;
+    is_singular |= other.is_singular;
+  }
+};
+
+/// The marks of the nodes, bend: (faces) that of each face. Collective.
+std::vector<Mark> find_marks(const comm::Communicator& comm, const partition::LocalMesh& local, const std::vector<Face>& faces,
+                             const std::vector<float>& bend) {
   struct Side {
     std::array<std::int32_t, 2> key;  // node numbers in the whole mesh, ascending
     Vec3 normal, across;              // unit: of the face; from the middle of the edge to the corner opposite
@@ -218,24 +229,19 @@ std::vector<char> find_marks(const comm::Communicator& comm, const partition::Lo
         return answers;
       });
   // Ranks that have an element at such a node but no face must know, too.
-  struct Mark {
-    std::int32_t node;
-    char bits;
-  };
   const auto marks = comm.agree([&] {
     std::vector<Mark> list(local.nodes_m.size());
-    for (std::size_t n = 0; n < list.size(); ++n) list[n] = {local.node_in_mesh[n], 0};
-    for (std::size_t s = 0; s < ends.size(); ++s)
-      for (const std::int32_t node : ends[s])
-        list[static_cast<std::size_t>(node)].bits |= is_singular[s] != 0 ? kOuter | kSingular : kOuter;
+    for (std::size_t n = 0; n < list.size(); ++n) list[n].node = local.node_in_mesh[n];
+    for (std::size_t s = 0; s < ends.size(); ++s)  // three of each face
+      for (const std::int32_t node : ends[s]) list[static_cast<std::size_t>(node)].join({0, bend[s / 3], 1, is_singular[s]});
     return list;
   });
-  return comm::query_owners<char>(
+  return comm::query_owners<Mark>(
       comm, marks, [&](const Mark& mark) { return mark.node % comm.size(); },
       [](const comm::ByRank<Mark>& met) {
-        std::unordered_map<std::int32_t, char> all;
-        for (const Mark& mark : met.items) all[mark.node] |= mark.bits;
-        std::vector<char> answers;
+        std::unordered_map<std::int32_t, Mark> all;
+        for (const Mark& mark : met.items) all[mark.node].join(mark);
+        std::vector<Mark> answers;
         for (const Mark& mark : met.items) answers.push_back(all[mark.node]);
         return answers;
       });
@@ -247,10 +253,7 @@ Surface find_surface(const comm::Communicator& comm, const partition::LocalMesh&
   const std::vector<Face> faces = find_faces(comm, local);
   const std::vector<Vec3> normals = find_normals(comm, local, faces);
   Surface surface;
-  for (const char bits : find_marks(comm, local, faces)) {
-    surface.is_singular.push_back((bits & kSingular) != 0);
-    surface.is_outer.push_back((bits & kOuter) != 0);
-  }
+  std::vector<float> bend(faces.size(), 0.0F);
   for (std::size_t f = 0; f < faces.size(); ++f) {
     const auto& loop = mesh::kFaces[faces[f].face];
     std::array<std::int32_t, 3> nodes;
@@ -268,6 +271,7 @@ Surface find_surface(const comm::Communicator& comm, const partition::LocalMesh&
       const Vec3 along = xb - xa, mean = normalise({na[0] + nb[0], na[1] + nb[1], na[2] + nb[2]});
       free.normal[i] = mean;
       double gap = dot(nb - na, along) / 8;
+      if (free.height_m > 0) bend[f] = std::max(bend[f], static_cast<float>(std::abs(gap) / free.height_m));
       if (local.order == 2) {
         const double across = dot(na, mean);  // the same for nb
         if (across > 0.5) gap = (gap + gap / across) / 2 + kParabola * (gap / across - gap);
@@ -279,6 +283,11 @@ Surface find_surface(const comm::Communicator& comm, const partition::LocalMesh&
         surface.edges.push_back({faces[f].tet, static_cast<std::int8_t>(edge), is_fixed, gap, third});
     }
     if (!is_fixed) surface.free_faces.push_back(free);
+  }
+  for (const Mark& mark : find_marks(comm, local, faces, bend)) {
+    surface.is_singular.push_back(mark.is_singular);
+    surface.is_outer.push_back(mark.is_outer);
+    surface.bend.push_back(mark.bend);
   }
   return surface;
 }

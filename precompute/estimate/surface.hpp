@@ -35,6 +35,9 @@ struct Surface {
   /// than 50 degrees, and of those that part a fixed face from a free one. Whichever rank has the faces.
   std::vector<char> is_singular;
   std::vector<char> is_outer;  // (nodes) 1 at corners of faces of the surface, whichever rank has them
+  /// (nodes) by how much of the height of the elements the smooth surface rises above the chords of its edges, the most there; 0 inside
+  /// and where it is flat. Whichever rank has the faces.
+  std::vector<float> bend;
 };
 
 /// The surface faces of this rank's elements. Faces that meet at less than 50 degrees belong to one smooth surface; at sharper edges each

@@ -23,7 +23,7 @@ namespace carillon::mesher {
 namespace {
 
 constexpr double kMaxMitre = 4;         // of the thickness: folds of 29 degrees between the sides
-constexpr double kMinShrink = 0.1;      // of a triangle's area, from one side of the wall to the other
+constexpr double kMinShrink = 0.05;     // of a triangle's area, from one side of the wall to the other
 constexpr double kSameNormal = 0.9998;  // cosine of 1.1 degrees
 constexpr int kSmoothings = 30;
 

@@ -395,17 +395,23 @@ std::optional<Sheet> find_sheet(const TriangleSurface& surface, const SurfaceOpt
       report.flipped_triangles = static_cast<std::int64_t>(sheet.surface.triangles.size()) - report.flipped_triangles;
     }
   }
-  const auto describe_edge = [&](const Edge& e, std::size_t faces) {
+  const auto describe_place = [&](const Edge& e) {
     const Vec3 p = 0.5 * (sheet.surface.points[static_cast<std::size_t>(e[0])] + sheet.surface.points[static_cast<std::size_t>(e[1])]);
-    return fmt::format("{} of its triangles meet in one edge at ({:.4g}, {:.4g}, {:.4g}) in the file's units", faces, p[0], p[1], p[2]);
+    return fmt::format("at ({:.4g}, {:.4g}, {:.4g}) in the file's units", p[0], p[1], p[2]);
   };
-  std::optional<Edge> first;
+  std::optional<Edge> branch, turn;  // the first of each
+  std::size_t branches = 0;
   for (const auto& [edge, faces] : find_edge_faces(sheet.surface.triangles)) {
-    if (faces.size() <= 2) continue;
-    if (first && *first < edge) continue;
-    first = edge;
-    sheet.fault = describe_edge(edge, faces.size());
+    if (faces.size() > 2 && (!branch || edge < *branch)) branch = edge, branches = faces.size();
+    // After all patches were oriented: the last edge of a way around along which the sides change.
+    if (faces.size() == 2 && (faces[0] > 0) == (faces[1] > 0) && (!turn || edge < *turn)) turn = edge;
   }
+  if (branch)
+    sheet.fault = fmt::format("cannot branch: {} of its triangles meet in one edge {} (a T-junction)", branches, describe_place(*branch));
+  else if (turn)
+    sheet.fault =
+        fmt::format("has no two sides, for the surface has only one, as a Moebius strip has: its triangles cannot be turned alike {}",
+                    describe_place(*turn));
   std::int32_t parts = 0;
   find_patches(find_edge_faces(sheet.surface.triangles), sheet.surface.triangles.size(), true, parts);
   report.components = parts;

@@ -30,6 +30,7 @@ constexpr double kMaxTilt = 0.35;     // of the normal at a border, radians
 constexpr double kSpeck = 0.02;       // of the wanted length's square: twice the area of a triangle that has no normal of its own
 constexpr double kMinSine = 0.3, kMinRingPart = 0.15, kMaxRingPart = 0.75;  // of edges at rings
 constexpr double kFlatFold = 0.98, kPerMitre = 1.3;                         // a fold that takes nothing; edges over what its mitre takes
+constexpr double kRoom = 0.13, kRoomShape = 0.1;                            // of a triangle between the mitres of folds, see make_room()
 constexpr double kMinHeight = 0.02;                                         // of a triangle's longest edge: flatter ones have no normal
 
 Vec3 calc_unit(const Vec3& a) {
@@ -92,37 +93,113 @@ class Remesher {
       along[b].push_back(a);
     }
     struct Leaving {
-      Vec3 way{}, across{};  // unit: along the edge, and at right angles to the nearest of the folds here
-      double sine = 1, length = 0;
+      Vec3 across{};  // unit: at right angles to one of the folds here
+      double sine = 1, distance = 0;
     };
-    const auto find_leaving = [&](std::int32_t a, std::int32_t b) {
-      Leaving out;
-      out.length = norm(x_[b] - x_[a]);
-      out.way = out.across = calc_unit(x_[b] - x_[a]);
+    // Of the edge from a to b: each fold at a that it leaves by less than a right angle, and how far its ring is.
+    const auto list_leaving = [&](std::int32_t a, std::int32_t b) {
+      const Vec3 way = calc_unit(x_[b] - x_[a]);
+      std::vector<Leaving> leaving;
       for (const std::int32_t c : along[a]) {
         const Vec3 side = calc_unit(x_[c] - x_[a]);
-        const double cosine = dot(side, out.way), sine = std::sqrt(std::max(1 - cosine * cosine, 0.0));
-        if (cosine <= 0 || sine >= out.sine) continue;
-        out.sine = sine;
-        out.across = calc_unit(out.way - cosine * side);
+        const double cosine = dot(side, way);
+        const Vec3 across = calc_unit(way - cosine * side);
+        if (cosine > 0)
+          leaving.push_back({across, std::max(std::sqrt(std::max(1 - cosine * cosine, 0.0)), kMinSine), distance_m(a, across)});
       }
-      out.sine = std::max(out.sine, kMinSine);
-      return out;
+      if (leaving.empty()) leaving.push_back({way, 1, distance_m(a, way)});
+      return leaving;
     };
     // What lies between fold and ring is moved out to the ring.
     for (int round = 0; round < 2; ++round)
-      for (const auto& [a, b] : cut) {
-        const Leaving leaving = find_leaving(a, b);
-        const double gap = distance_m(a, leaving.way, leaving.sine) - leaving.length * leaving.sine;
-        if (!(gap > 0)) continue;
-        const Vec3 p = places_.on_surface(x_[b] + gap * leaving.across);
-        if (keeps_sides(b, -1, p)) x_[b] = p;
-      }
+      for (const auto& [a, b] : cut)
+        for (const Leaving& leaving : list_leaving(a, b)) {
+          const double gap = leaving.distance - norm(x_[b] - x_[a]) * leaving.sine;
+          if (!(gap > 0)) continue;
+          const Vec3 p = places_.on_surface(x_[b] + gap * leaving.across);
+          if (keeps_sides(b, -1, p)) x_[b] = p;
+        }
     for (const auto& [a, b] : cut) {
-      const Leaving leaving = find_leaving(a, b);
-      const double part = distance_m(a, leaving.way, leaving.sine) / (leaving.length * leaving.sine);
+      double part = 0;
+      for (const Leaving& leaving : list_leaving(a, b)) part = std::max(part, leaving.distance / (norm(x_[b] - x_[a]) * leaving.sine));
       if (part < kMinRingPart || part > kMaxRingPart) continue;
-      split(a, b, places_.on_surface(x_[a] + (part * leaving.length) * leaving.way));
+      split(a, b, places_.on_surface(x_[a] + part * (x_[b] - x_[a])));
+    }
+    return get();
+  }
+
+  Skin make_room(const std::vector<Vec3>& ways, const std::array<double, 2>& levels_m) {
+    constexpr int kRounds = 12;
+    // How much smaller one copy of a triangle is than the other, negative where it is folded over, and no better than its shape.
+    const auto rate = [&](const Triangle& t, std::int32_t v, const Vec3& p) {
+      std::array<Vec3, 3> x;
+      for (int c = 0; c < 3; ++c) x[c] = t[c] == v ? p : x_[t[c]];
+      const Vec3 normal = calc_unit(cross(x[1] - x[0], x[2] - x[0]));
+      double longest = 0, least = HUGE_VAL, most = 0;
+      for (int c = 0; c < 3; ++c) longest = std::max(longest, norm(x[(c + 1) % 3] - x[c]));
+      for (const double level : levels_m) {
+        const auto at = [&](int c) { return x[c] + level * ways[static_cast<std::size_t>(t[c])]; };
+        const double area = dot(cross(at(1) - at(0), at(2) - at(0)), normal);
+        least = std::min(least, area);
+        most = std::max(most, std::abs(area));
+      }
+      return most > 0 ? least / std::max(most, kRoomShape * longest * longest) : 0.0;
+    };
+    const auto rate_star = [&](std::int32_t v, const Vec3& p) {
+      double least = HUGE_VAL;
+      for (const std::int32_t f : star_[v]) least = std::min(least, rate(t_[f], v, p));
+      return least;
+    };
+    // In turn: narrow triangles take the other diagonal, then their points move to where the narrowest around them is widest.
+    for (int round = 0; round < kRounds; ++round) {
+      for (const auto& [a, b] : list_edges()) {
+        std::array<std::int32_t, 2> faces{};
+        if (features_.contains(make_edge(a, b)) || find_faces(a, b, faces) != 2) continue;
+        const std::int32_t c = find_third(faces[0], a, b), d = find_third(faces[1], a, b);
+        if (kind_[c] != 0 && kind_[d] != 0) continue;  // no edge from fold to fold
+        const double before = std::min(rate(t_[faces[0]], -1, {}), rate(t_[faces[1]], -1, {}));
+        if (before > kRoom || !flip(a, b, faces)) continue;
+        if (std::min(rate(t_[faces[0]], -1, {}), rate(t_[faces[1]], -1, {})) > before) continue;
+        std::array<std::int32_t, 2> back{};
+        if (find_faces(c, d, back) == 2) flip(c, d, back);
+      }
+      bool again = false;
+      for (std::int32_t v = 0; v < static_cast<std::int32_t>(x_.size()); ++v) {
+        if (star_[v].empty() || kind_[v] == 2) continue;
+        double best = rate_star(v, x_[v]);
+        if (best > kRoom) continue;
+        double reach = HUGE_VAL;
+        Vec3 normal{};
+        std::vector<Vec3> ends;  // along the fold
+        for (const std::int32_t f : star_[v]) {
+          normal = normal + calc_area(t_[f]);
+          for (const std::int32_t w : t_[f]) {
+            if (w == v) continue;
+            reach = std::min(reach, norm(x_[w] - x_[v]));
+            if (features_.contains(make_edge(v, w))) ends.push_back(x_[w]);
+          }
+        }
+        std::vector<Vec3> ways_to;  // unit
+        if (kind_[v] == 1) {
+          for (const Vec3& end : ends) ways_to.push_back(calc_unit(end - x_[v]));
+        } else {
+          normal = calc_unit(normal);
+          const Vec3 along = calc_unit(cross(normal, std::abs(normal[0]) < 0.7 ? Vec3{1, 0, 0} : Vec3{0, 1, 0}));
+          const Vec3 across = cross(normal, along);
+          for (int n = 0; n < 12; ++n)
+            ways_to.push_back(std::cos(n * std::numbers::pi / 6) * along + std::sin(n * std::numbers::pi / 6) * across);
+        }
+        Vec3 found = x_[v];
+        for (const double part : {0.9, 0.5, 0.25, 0.1, 0.03})
+          for (const Vec3& way : ways_to) {
+            const Vec3 p = place(x_[v] + (part * reach) * way, kind_[v] == 1);
+            const double now = rate_star(v, p);
+            if (now > best + 1e-3 && keeps_sides(v, -1, p)) best = now, found = p;
+          }
+        again = again || norm(found - x_[v]) > 0;
+        x_[v] = found;
+      }
+      if (!again) break;
     }
     return get();
   }
@@ -675,6 +752,10 @@ Skin remesh(const Skin& skin, const SkinSizes& sizes, const SkinPlaces& places) 
 
 Skin add_rings(const Skin& skin, const SkinPlaces& places, const RingDistance& distance_m) {
   return Remesher(skin, {1, 1, 1}, places).add_rings(distance_m);
+}
+
+Skin make_room(const Skin& skin, const SkinPlaces& places, const std::vector<Vec3>& ways, const std::array<double, 2>& levels_m) {
+  return Remesher(skin, {0, 0, 0}, places).make_room(ways, levels_m);
 }
 
 }  // namespace carillon::mesher

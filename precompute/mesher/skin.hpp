@@ -40,9 +40,13 @@ std::vector<std::array<Vec3, 3>> find_skin_normals(const Skin& skin);
 Skin remesh(const Skin& skin, const SkinSizes& sizes, const SkinPlaces& places);
 
 /// Where edges leave a fold or border, a ring of narrow triangles follows it: each is cut at the distance from the fold that `distance_m`
-/// says for its point on it, its unit vector, and the sine of its angle with the fold. Where that is 0, or nearly the whole edge, it stays.
-using RingDistance = std::function<double(std::int32_t point, const Vec3& way, double sine)>;
+/// says for its point on it and the unit vector across the fold. Where that is 0, or nearly the whole edge, it stays.
+using RingDistance = std::function<double(std::int32_t point, const Vec3& across)>;
 Skin add_rings(const Skin& skin, const SkinPlaces& places, const RingDistance& distance_m);
+
+/// Moves points and turns edges where a copy of a triangle, whose points lie `levels_m` along their `ways`, is folded over or much smaller
+/// than the other: in corners, where the mitres of several folds meet. Points on folds stay on them.
+Skin make_room(const Skin& skin, const SkinPlaces& places, const std::vector<Vec3>& ways, const std::array<double, 2>& levels_m);
 
 /// The edges of one triangle.
 std::vector<Edge> find_border(const TriangleSurface& surface);

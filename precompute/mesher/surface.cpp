@@ -544,7 +544,7 @@ mesh::TetMesh make_sheet(Sheet sheet, const SurfaceOptions& options, SurfaceRepo
     throw InputError(fmt::format("{}: it is an open sheet, and its wall {}; change that in a modeller, or give a thinner wall",
                                  options.surface.string(), fault));
   };
-  if (!sheet.fault.empty()) refuse("cannot branch: " + sheet.fault + " (a T-junction)");
+  if (!sheet.fault.empty()) refuse(sheet.fault);
   if (options.method == Method::kDelaunay || options.method == Method::kStuffing)
     throw InputError(fmt::format("{}: it is an open sheet, whose wall only the method extrude makes", options.surface.string()));
   Body body;

@@ -300,7 +300,7 @@ class ThinMesher {
     Attempt attempt;
     run_("remeshing the skin", [&] { attempt = meet_count(); });
     Extruded extruded;
-    run_("extruding", [&] { extruded = extrude_skin(attempt.skin); });
+    run_("extruding", [&] { extruded = extrude_or_retry(attempt); });
     run_("comparing with the body", [&] { compare(attempt.skin, extruded); });
     fill_report(attempt, extruded);
     return std::move(extruded.mesh);
@@ -323,20 +323,20 @@ class ThinMesher {
     const std::vector<Vec3> low = low_source_ ? find_low(plain, ways) : std::vector<Vec3>{};
     std::vector<char> on_border(points, 0);
     for (const auto& [a, b] : find_border(plain.surface)) on_border[a] = on_border[b] = 1;
-    attempt.skin = add_rings(plain, places_, [&](std::int32_t v, const Vec3& way, double sine) {
+    attempt.skin = add_rings(plain, places_, [&](std::int32_t v, const Vec3& across) {
       const Vec3& out = ways[static_cast<std::size_t>(v)];
       double distance = on_border[v] != 0 ? kRimRing * wall : 0;
       if (norm(out) > kRingFrom) {
         // The mitre takes so much of the ring's side at the wall's inner corner.
         const auto point = static_cast<std::size_t>(v);
-        const double shift = (low_source_ ? dot(low[point] - plain.surface.points[point], way)
-                                          : std::max(levels_[0] * dot(out, way), levels_[1] * dot(out, way))) /
-                             sine;
+        const double shift = low_source_ ? dot(low[point] - plain.surface.points[point], across)
+                                         : std::max(levels_[0] * dot(out, across), levels_[1] * dot(out, across));
         distance = std::max(shift, 0.0) + calc_margin(edge_m);
       }
       return distance;
     });
     attempt.rings = static_cast<std::int64_t>(attempt.skin.surface.points.size() - points);
+    if (!low_source_ && !attempt.skin.folds.empty()) attempt.skin = make_room(attempt.skin, places_, find_ways_out(attempt.skin), levels_);
     attempt.nodes = count_mesh_nodes(attempt.skin.surface, order_, layers_);
     return attempt;
   }
@@ -368,6 +368,24 @@ class ThinMesher {
                                      options_.surface.string(), *options_.nodes, nearest),
                          std::llround(nearest));
     return best;
+  }
+
+  /// Where the mitres of folds meet it depends on the triangles there whether the wall folds over: other edges are tried.
+  Extruded extrude_or_retry(Attempt& attempt) {
+    constexpr std::array<double, 6> kFactors{1.06, 0.94, 1.12, 0.88, 1.2, 0.8};
+    const bool has_folds = !attempt.skin.folds.empty();
+    const double edge = edge_;
+    for (std::size_t n = 0;; ++n) {
+      try {
+        return extrude_skin(attempt.skin);
+      } catch (const WallError&) {
+        if (!has_folds || n == kFactors.size()) throw;
+      }
+      edge_ = edge * kFactors[n];
+      Attempt other = make_skin(edge_, kPerRadius);
+      const double off = options_.nodes ? static_cast<double>(other.nodes) / static_cast<double>(*options_.nodes) - 1 : 0;
+      if (std::abs(off) <= kCountTolerance) attempt = std::move(other);
+    }
   }
 
   Extruded extrude_skin(const Skin& skin) {

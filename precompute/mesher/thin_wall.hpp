@@ -14,7 +14,7 @@ namespace carillon::mesher {
 struct Sheet {
   TriangleSurface surface;
   std::int64_t holes = 0;
-  std::string fault = {};  // why it is no sheet either: more than two triangles at an edge; the end of a sentence
+  std::string fault = {};  // why it takes no wall: more than two triangles at an edge, or one side only; the end of a sentence
   SurfaceReport report = {};
 };
 

@@ -108,6 +108,76 @@ def sheet():
     hold("sheet", abs(report["volume_m3"] / (turn * radius * wall * long) - 1), 5e-4, "the tube's volume")
 
 
+def make_tub(long, wide, high):
+    """A box without a lid, two triangles a side."""
+    points = [(x, y, z) for z in (0, high) for x, y in ((0, 0), (long, 0), (long, wide), (0, wide))]
+    faces = [(0, 2, 1), (0, 3, 2)]
+    for i in range(4):
+        j = (i + 1) % 4
+        faces += [(i, j, 4 + j), (i, 4 + j, 4 + i)]
+    return points, faces
+
+
+def make_tub_skins(long, wide, high, wall):
+    """Both sides of the wall inside make_tub(), and the rim between them: closed."""
+    outer, faces = make_tub(long, wide, high)
+    inner = [(min(max(x, wall), long - wall), min(max(y, wall), wide - wall), z if z > 0 else wall) for x, y, z in outer]
+    points, faces = outer + inner, faces + [tuple(8 + i for i in t[::-1]) for t in faces]
+    for i in range(4):
+        j = (i + 1) % 4
+        faces += [(4 + i, 4 + j, 12 + j), (4 + i, 12 + j, 12 + i)]
+    return points, faces
+
+
+def corners():
+    # Three mitres meet in a corner; with a rim folded outwards they go to both sides.
+    size, wall = (0.06, 0.05, 0.03), 0.002
+    tub = make_tub(*size)
+    for side, edges in (("outside", size), ("inside", [size[0] + 2 * wall, size[1] + 2 * wall, size[2] + wall])):
+        hollow = (edges[0] - 2 * wall) * (edges[1] - 2 * wall) * (edges[2] - wall)
+        volume = edges[0] * edges[1] * edges[2] - hollow
+        freq_hz, report = solve(tub, "--wall", wall, "--side", side, "--edge", 0.003, band_hz=(20, 40000), max_modes=6)
+        # The wall ends at the rim at right angles, so that one inside the surface is as high as it.
+        rim = wall * (2 * (edges[0] + edges[1]) - 4 * wall) * (size[2] + (wall if side == "inside" else 0) - edges[2])
+        hold("corners", abs(report["volume_m3"] / (volume + rim) - 1), 1e-9, f"box without a lid, volume, the surface is the {side}")
+        if side == "outside":
+            solid, _ = solve(
+                make_tub_skins(*size, wall), "--method", "delaunay", "--order", 2, "--edge", 0.002, band_hz=(20, 40000), max_modes=6
+            )
+            parts = np.abs(1200 * np.log2(freq_hz / solid)) / report["bars"]
+            hold("corners", parts.max(), 1, "distance from the solid over the error bar")
+            hold("corners", calc_distance(freq_hz, solid), 2e-2, "against the solid in elements of the volume mesher")
+    points, faces = tub
+    rim = 0.01
+    points = points + [(x + (rim if x > 0 else -rim), y + (rim if y > 0 else -rim), size[2]) for x, y, z in points[4:]]
+    for i in range(4):
+        j = (i + 1) % 4
+        faces = faces + [(4 + i, 4 + j, 8 + j), (4 + i, 8 + j, 8 + i)]
+    area = size[0] * size[1] + 2 * (size[0] + size[1]) * size[2] + (size[0] + 2 * rim) * (size[1] + 2 * rim) - size[0] * size[1]
+    for thickness in (0.0015, 0.003):
+        with Folder() as folder:
+            made = mesh(folder, (points, faces), "--wall", thickness, "--side", "middle")
+            assert made.code == 0, made.text
+            report = json.loads((folder.path / "report.json").read_text())
+            hold("corners", abs(report["volume_m3"] / (area * thickness) - 1), 1e-9, f"tray with a rim, {thickness * 1000:g} mm, volume")
+            hold("corners", report["straightened_tets"], 0, f"tray with a rim, {thickness * 1000:g} mm, folded elements")
+
+
+def one_sided():
+    turn, n, across, points, faces = 2 * math.pi, 60, 4, [], []
+    for i in range(n):
+        a = turn * i / n
+        for j in range(across + 1):
+            w = 0.01 * (2 * j / across - 1)
+            far = 0.05 + w * math.cos(a / 2)
+            points.append((far * math.cos(a), far * math.sin(a), w * math.sin(a / 2)))
+    at = lambda i, j: i * (across + 1) + j if i < n else across - j
+    for i in range(n):
+        for j in range(across):
+            faces += [(at(i, j), at(i + 1, j), at(i + 1, j + 1)), (at(i, j), at(i + 1, j + 1), at(i, j + 1))]
+    refuse("one_sided", (points, faces), ["has only one", "Moebius", "at (", "modeller"], "--wall", 0.002)
+
+
 def wall_0_1_mm():
     # Kirchhoff, nu 0.3: lambda^2 = 13.46819, 19.59614, 24.27020, 34.80089 twice.
     side, wall = 0.1, 1e-4

@@ -39,14 +39,15 @@ void write_modes(std::FILE* file, const Body& body, int fineness, MeshKind kind,
   for (std::size_t m = 0; m < outcome.true_hz.size(); ++m) {
     const estimate::ErrorParts& parts = outcome.bars.level.parts[m];
     const std::size_t c = outcome.by_correction[m];
-    fmt::print(file,
-               "{},{},{},{},{},{},{:.9g},{:.9g},{:.3g},{:.3g},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},{},{:.9g},{:.4g},{:."
-               "4g},{}\n",
-               body.name, describe(body.role), describe(kind), fineness, outcome.unknowns, m, outcome.freq_hz[m], outcome.true_hz[m],
-               outcome.truth_cents[m], outcome.bars.algebraic_cents[m], outcome.bars.discretisation_cents[m], outcome.error_cents(m),
-               parts.interpolation, parts.energy, parts.lumping, parts.geometry, parts.geometry_noise, parts.singular, c,
-               std::sqrt(outcome.bars.corrected.lambda[c]) / (2 * std::numbers::pi), outcome.corrected_bar_cents(m),
-               outcome.corrected_error_cents(m), static_cast<int>(outcome.bars.corrected.correction[c]));
+    fmt::print(
+        file,
+        "{},{},{},{},{},{},{:.9g},{:.9g},{:.3g},{:.3g},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},{},{:.9g},{:.4g}"
+        ",{:.4g},{}\n",
+        body.name, describe(body.role), describe(kind), fineness, outcome.unknowns, m, outcome.freq_hz[m], outcome.true_hz[m],
+        outcome.truth_cents[m], outcome.bars.algebraic_cents[m], outcome.bars.discretisation_cents[m], outcome.error_cents(m),
+        parts.interpolation, parts.energy, parts.lumping, parts.geometry, parts.geometry_noise, parts.singular, parts.bent, c,
+        std::sqrt(outcome.bars.corrected.lambda[c]) / (2 * std::numbers::pi), outcome.corrected_bar_cents(m),
+        outcome.corrected_error_cents(m), static_cast<int>(outcome.bars.corrected.correction[c]));
   }
   std::fflush(file);
 }
@@ -142,7 +143,7 @@ int run(const Choice& choice, int rank) {
     if (!modes) throw std::runtime_error(choice.modes + " cannot be written");
     fmt::print(modes.get(),
                "body,set,element,fineness,unknowns,mode,freq_hz,true_hz,truth_cents,algebraic_cents,discretisation_cents,error_cents,"
-               "interpolation,energy,lumping,geometry,geometry_magnitude,singular,corrected_mode,corrected_hz,corrected_bar_cents,"
+               "interpolation,energy,lumping,geometry,geometry_magnitude,singular,bent,corrected_mode,corrected_hz,corrected_bar_cents,"
                "corrected_error_cents,trust\n");
   });
   if (!choice.coarser.empty() && choice.finest.empty()) {

@@ -142,6 +142,16 @@ TetMesh make_shape_mesh(const std::string& shape, const std::map<std::string, do
       kind);
 }
 
+/// A tube along x, its outer radius widened from 0.02 to 0.05 m.
+TetMesh make_cone(int nodes, MeshKind kind) {
+  TetMesh mesh = make_shape_mesh("tube", {{"length", 0.06}, {"outer-radius", 0.035}, {"wall", 0.003}}, nodes, kind);
+  for (Vec3& x : mesh.nodes_m) {
+    const double radius = std::hypot(x[1], x[2]), scale = (radius + 0.5 * x[0]) / radius;
+    x = {x[0], scale * x[1], scale * x[2]};
+  }
+  return mesh;
+}
+
 }  // namespace
 
 std::vector<Truth> read_truth(const std::string& body) {
@@ -191,6 +201,10 @@ const std::vector<Body>& get_bodies() {
       .density_kg_m3 = 870,
       .orthotropic = material::Orthotropic{
           .young_modulus_pa = {18e9, 2.2e9, 1.2e9}, .shear_modulus_pa = {1.8e9, 0.5e9, 1.5e9}, .poisson_ratio = {0.36, 0.55, 0.4}}};
+  static const material::Material cedar{
+      .density_kg_m3 = 350,
+      .orthotropic = material::Orthotropic{
+          .young_modulus_pa = {8e9, 0.62e9, 0.4e9}, .shear_modulus_pa = {0.6e9, 0.05e9, 0.55e9}, .poisson_ratio = {0.38, 0.45, 0.45}}};
   const auto solid = [](double young_modulus_pa, double poisson_ratio, double density_kg_m3) {
     return std::vector<material::Material>{
         {.young_modulus_pa = young_modulus_pa, .poisson_ratio = poisson_ratio, .density_kg_m3 = density_kg_m3}};
@@ -245,9 +259,15 @@ const std::vector<Body>& get_bodies() {
       {"post", solid(70e9, 0.33, 2700), false, Role::unseen, {2, 3, 5}, false, true},
       {"reed", solid(105e9, 0.35, 8500), false, Role::unseen, {41, 62}},
       {"coaster", solid(64e9, 0.2, 2230), false, Role::unseen, {-1, 2, 3}},
-      {"shell-85", solid(70e9, 0.2, 2500), true, Role::unseen, {600, 2400, 6000}},
-      {"shell-95", solid(200e9, 0.28, 7850), true, Role::unseen, {1200, 4000, 9000}},
-      {"shell-20", solid(16e9, 0.44, 11000), true, Role::unseen, {400, 1600, 4000}},
+      {"shell-85", solid(70e9, 0.2, 2500), true, Role::test, {600, 2400, 6000}},
+      {"shell-95", solid(200e9, 0.28, 7850), true, Role::test, {1200, 4000, 9000}},
+      {"shell-20", solid(16e9, 0.44, 11000), true, Role::test, {400, 1600, 4000}},
+      {"collar", solid(110e9, 0.35, 8900), true, Role::unseen, {600, 2400}},
+      {"washer", solid(200e9, 0.29, 7850), true, Role::unseen, {800, 2500}},
+      {"cone", solid(70e9, 0.33, 2700), true, Role::unseen, {800, 2500}},
+      {"shell-60", solid(3e9, 0.4, 1200), true, Role::unseen, {500, 2000}},
+      {"shell-92", solid(70e9, 0.22, 2500), true, Role::unseen, {1000, 3500}},
+      {"board", {cedar}, false, Role::unseen, {-1, 2}},
   };
   return bodies;
 }
@@ -281,6 +301,7 @@ TetMesh make_mesh(const Body& body, int fineness, MeshKind kind, std::vector<std
       {"rosewood-bar", {{0.2, 0.04, 0.015}, {14 * n, 3 * n, n}}},
       {"shelf", {{0.12, 0.08, 0.003}, {18 * n, 12 * n, n}}},
       {"post", {{0.1, 0.02, 0.015}, {6 * n, 4 * n / 3, n}}},
+      {"board", {{0.25, 0.18, 0.0035}, {20 * n, 14 * n, n}}},
       {"coaster", {{0.06, 0.06, 0.008}, {8 * n, 8 * n, n}}},
       {"spruce-block", {{0.05, 0.065, 0.085}, {n, static_cast<int>(1.3 * n), static_cast<int>(1.7 * n)}}},
       {"rod-two", {{0.3, 0.03, 0.02}, {14 * n, 2 * n, n}}},
@@ -306,6 +327,11 @@ TetMesh make_mesh(const Body& body, int fineness, MeshKind kind, std::vector<std
   if (body.name == "shell-20") return make_shape_mesh("sphere", {{"radius", 0.02}, {"wall", 0.016}}, n, kind);
   if (body.name == "shell-85") return make_shape_mesh("sphere", {{"radius", 0.1}, {"wall", 0.015}}, n, kind);
   if (body.name == "shell-95") return make_shape_mesh("sphere", {{"radius", 0.04}, {"wall", 0.002}}, n, kind);
+  if (body.name == "shell-60") return make_shape_mesh("sphere", {{"radius", 0.05}, {"wall", 0.02}}, n, kind);
+  if (body.name == "shell-92") return make_shape_mesh("sphere", {{"radius", 0.06}, {"wall", 0.0048}}, n, kind);
+  if (body.name == "collar") return make_shape_mesh("tube", {{"length", 0.04}, {"outer-radius", 0.03}, {"wall", 0.0025}}, n, kind);
+  if (body.name == "washer") return make_shape_mesh("tube", {{"length", 0.004}, {"outer-radius", 0.06}, {"wall", 0.045}}, n, kind);
+  if (body.name == "cone") return make_cone(n, kind);
   if (body.name == "slender-bar") return make_shape_mesh("bar", {{"length", 0.3}, {"width", 0.02}, {"thickness", 0.01}}, n, kind);
   if (body.name == "ball" || body.name == "rubber-ball") return make_shape_mesh("sphere", {{"radius", 0.05}}, n, kind);
   if (body.name == "thick-shell") return make_shape_mesh("sphere", {{"radius", 6.0}, {"wall", 4.2}}, n, kind);

@@ -41,6 +41,7 @@ Work make_work(int nodes) {
   for (std::size_t i = 0; i < e.count; ++i) {
     e.volume.push_back(1.0F + value(random) / 8);
     e.singular.push_back(i % 3 == 0 ? 1.0F : 0.0F);
+    e.bent.push_back(i % 4 == 0 ? 0.5F : 0.0F);
     for (int k = 0; k < nodes; ++k) {
       e.node.push_back(node(random));
       work.value_of.push_back(node(random));
@@ -77,19 +78,20 @@ TEST_P(Loops, give_the_same_with_every_instruction_set) {
   const void* displacement = GetParam() == 4 ? static_cast<const void*>(work.displacement.data()) : work.displacement2.data();
   DoubleLanes lambda;
   for (int l = 0; l < kLanes; ++l) lambda.lane[l] = 0.1 * (l + 1);
-  std::array<DoubleLanes, 7> first{};
+  std::array<DoubleLanes, 8> first{};
   const std::vector<const Kernels*> tables = list_kernels(GetParam());
   for (const Kernels* kernels : tables) {
     std::vector<Strain> patches(40 * work.elements.terms, Strain{}), strains(work.elements.count * work.elements.samples);
-    std::array<DoubleLanes, 7> sums{};
+    std::array<DoubleLanes, 8> sums{};
     kernels->add_strains(work.elements, true, displacement, strains.data(), patches.data(), sums[2]);
     std::vector<Strain> values(patches.begin(), patches.begin() + 40);
     if (GetParam() == 10) kernels->find_middles(work.middles, 1, patches.data(), values.data());
-    kernels->add_energies(work.elements, work.value_of.data(), values.data(), displacement, strains.data(), sums[0], sums[6], sums[1]);
+    kernels->add_energies(work.elements, work.value_of.data(), values.data(), displacement, strains.data(), sums[0], sums[6], sums[7],
+                          sums[1]);
     kernels->add_shifts(work.shifts, patches.data(), displacement, lambda, sums[3], sums[4]);
     kernels->add_tractions(work.tractions, patches.data(), sums[5]);
     if (kernels == tables.front()) first = sums;
-    for (int s = 0; s < 7; ++s)
+    for (int s = 0; s < 8; ++s)
       for (int l = 0; l < kLanes; ++l) {
         EXPECT_NEAR(sums[s].lane[l], first[s].lane[l], 1e-5 * first[s == 3 ? 4 : s].lane[l]) << kernels->name << " " << s;
         EXPECT_GT(first[s == 3 ? 4 : s].lane[l], 0) << s;
@@ -123,6 +125,7 @@ TEST(Energies, of_T10_are_the_exact_integrals_of_the_squared_field) {
   elements.count = 1;
   elements.volume = {2.5F};
   elements.singular = {1.0F};
+  elements.bent = {2.0F};
   const std::vector<std::int32_t> value_of{0, 1, 2, 3, 4, 5, 6, 7, 8, 9};
   std::vector<Strain> values(10, Strain{}), strains(4, Strain{});
   std::mt19937 random(3);
@@ -145,11 +148,12 @@ TEST(Energies, of_T10_are_the_exact_integrals_of_the_squared_field) {
       }
     }
   for (const Kernels* kernels : list_kernels(10)) {
-    DoubleLanes error{}, singular{}, energy{};
-    kernels->add_energies(elements, value_of.data(), values.data(), nullptr, strains.data(), error, singular, energy);
+    DoubleLanes error{}, singular{}, bent{}, energy{};
+    kernels->add_energies(elements, value_of.data(), values.data(), nullptr, strains.data(), error, singular, bent, energy);
     for (int l = 0; l < kLanes; ++l) {
       EXPECT_NEAR(error.lane[l] / (2.5 * calc_mean_square(field[l])), 1, 1e-5) << kernels->name << " " << l;
       EXPECT_EQ(singular.lane[l], error.lane[l]);
+      EXPECT_EQ(bent.lane[l], 2 * error.lane[l]);
       EXPECT_EQ(energy.lane[l], 0);
     }
   }
