@@ -29,6 +29,7 @@ LIBRARIES = {
     "zlib": ["zlib.h"],
     "simbody": ["SimTKsimbody.h"],
     "sqlite": ["sqlite3.h"],
+    "pybind11": ["pybind11/"],
 }
 # folder: (folders of ours that it may include, libraries that it may include). std and POSIX are free everywhere.
 LAW = {
@@ -78,6 +79,21 @@ LAW = {
             "runtime/host",
         ],
         ["fmt", "cli", "portaudio"],
+    ),
+    "runtime/python": (
+        [
+            "runtime/base",
+            "runtime/material",
+            "runtime/version",
+            "runtime/bank",
+            "runtime/support",
+            "runtime/events",
+            "runtime/radiation",
+            "runtime/synth",
+            "runtime/effect_selection",
+            "runtime/host",
+        ],
+        ["fmt", "pybind11"],
     ),
     "partition": (["runtime/base", "precompute/mesh", "precompute/comm"], ["fmt", "mpi", "metis", "eigen"]),
     "jobs/process": (["runtime/base"], ["fmt"]),
