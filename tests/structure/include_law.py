@@ -31,6 +31,7 @@ LIBRARIES = {
     "simbody": ["SimTKsimbody.h"],
     "sqlite": ["sqlite3.h"],
     "httplib": ["httplib.h"],
+    "pybind11": ["pybind11/"],
 }
 # folder: (folders of ours that it may include, libraries that it may include). std and POSIX are free everywhere.
 LAW = {
@@ -85,6 +86,21 @@ LAW = {
             "runtime/host",
         ],
         ["fmt", "cli", "portaudio"],
+    ),
+    "runtime/python": (
+        [
+            "runtime/base",
+            "runtime/material",
+            "runtime/version",
+            "runtime/bank",
+            "runtime/support",
+            "runtime/events",
+            "runtime/radiation",
+            "runtime/synth",
+            "runtime/effect_selection",
+            "runtime/host",
+        ],
+        ["fmt", "pybind11"],
     ),
     "runtime/samples": (
         ["runtime/base", "runtime/material", "runtime/version", "runtime/bank", "runtime/events", "runtime/host"],

@@ -1,0 +1,111 @@
+"""Types of the compiled part. Units are SI and stand in the names; (m), (V, 3) ... are shapes of arrays."""
+import os
+from typing import Any, Dict, Iterable, List, Optional, Sequence, Tuple, Union
+
+import numpy
+import numpy.typing
+
+File = Union[str, os.PathLike]
+Vector = Sequence[float]
+Doubles = numpy.typing.NDArray[numpy.float64]
+Floats = numpy.typing.NDArray[numpy.float32]
+
+__version__: str
+
+class InputError(ValueError): ...
+class SolveError(RuntimeError): ...
+class SystemError(OSError): ...
+
+class Bank:
+    """The modes of a body: m modes, V vertices and T triangles of its surface."""
+
+    def __init__(self, file: File, frequencies: str = "corrected") -> None: ...
+    @staticmethod
+    def parse(data: bytes, frequencies: str = "corrected") -> Bank: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def vertices_m(self) -> Doubles: ...  # (V, 3)
+    @property
+    def triangles(self) -> numpy.typing.NDArray[numpy.int32]: ...  # (T, 3)
+    @property
+    def frequency_hz(self) -> Doubles: ...  # (m)
+    @property
+    def decay_per_s(self) -> Doubles: ...  # (m)
+    @property
+    def t60_s(self) -> Doubles: ...  # (m)
+    @property
+    def radiation_gain(self) -> Doubles: ...  # (m), Pa at 1 m for unit modal velocity
+    @property
+    def residual(self) -> Doubles: ...  # (m)
+    @property
+    def error_cents(self) -> Doubles: ...  # (m)
+    @property
+    def algebraic_error_cents(self) -> Doubles: ...  # (m)
+    @property
+    def shape_steps(self) -> numpy.typing.NDArray[numpy.int16]: ...  # (V, m, 3)
+    @property
+    def shape_scale(self) -> Doubles: ...  # (m), kg^-1/2
+    def shapes(self, modes: Union[None, int, slice, Iterable[int]] = None) -> Doubles: ...  # (V, 3) or (V, k, 3), kg^-1/2
+    def nearest(self, point_m: Vector) -> Tuple[int, Doubles, Doubles, float]: ...
+    def edited(self, *, material: Optional[str] = None, density: float = 1.0, stiffness: float = 1.0, size: float = 1.0) -> Bank: ...
+    def write(self, file: File) -> None: ...
+    @property
+    def material(self) -> Dict[str, Any]: ...
+    @property
+    def provenance(self) -> Dict[str, Any]: ...
+    @property
+    def supports(self) -> Dict[str, Any]: ...
+    @property
+    def mass_kg(self) -> float: ...
+    @property
+    def volume_m3(self) -> float: ...
+    @property
+    def centre_m(self) -> Doubles: ...  # (3)
+    @property
+    def inertia_kg_m2(self) -> Doubles: ...  # (3, 3)
+    @property
+    def band_hz(self) -> Tuple[float, float]: ...
+    @property
+    def complete(self) -> bool: ...
+    @property
+    def element(self) -> str: ...
+    def __len__(self) -> int: ...
+
+class Synthesiser:
+    """Bodies that ring when they are struck, heard by microphones."""
+
+    def __init__(
+        self, rate_hz: float = 48000.0, microphones_m: Sequence[Vector] = ..., listener_m: Vector = ..., max_bodies: int = 64
+    ) -> None: ...
+    def add_body(
+        self, bank: Bank, position_m: Vector = ..., rotation: Vector = ..., radiation: str = "sphere", effects: Optional[List[str]] = None
+    ) -> int: ...
+    def swap_bank(self, body: int, bank: Bank, radiation: str = "sphere") -> None: ...
+    def remove_body(self, body: int) -> None: ...
+    def strike(
+        self,
+        body: int,
+        impulse_n_s: Vector,
+        *,
+        point_m: Optional[Vector] = None,
+        triangle: Optional[int] = None,
+        duration_s: float = 1e-3,
+        time_s: Optional[float] = None,
+    ) -> None: ...
+    def move(
+        self, body: int, position_m: Vector, velocity_m_s: Vector = ..., rotation: Vector = ..., time_s: Optional[float] = None
+    ) -> None: ...
+    def process(self, frames: int) -> Floats: ...  # (frames, channels), Pa
+    @property
+    def rate_hz(self) -> float: ...
+    @property
+    def channels(self) -> int: ...
+    @property
+    def time_s(self) -> float: ...
+    @property
+    def counters(self) -> Dict[str, int]: ...
+
+def materials() -> Dict[str, Dict[str, Any]]: ...
+def render(file: File, text: str = "", rate_hz: Optional[int] = None) -> Tuple[Floats, int]: ...
+def find_bank(file: File, text: str = "") -> Optional[os.PathLike]: ...

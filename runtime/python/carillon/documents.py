@@ -1,0 +1,25 @@
+"""Documents of Python as the JSON that the programs read."""
+import json
+import os
+
+import numpy
+
+from ._carillon import InputError
+
+
+def write_json(document: dict, what: str) -> str:
+    """A document as text, a line for each value, so that messages name a line. numpy's numbers and arrays are numbers and lists."""
+
+    def to_plain(value):
+        if isinstance(value, (numpy.ndarray, numpy.generic)):
+            return value.tolist()
+        if isinstance(value, os.PathLike):
+            return os.fspath(value)
+        raise InputError(f"{what}: {type(value).__name__} is nothing that JSON has; give numbers, texts, lists and dicts")
+
+    try:
+        return json.dumps(document, indent=1, allow_nan=False, default=to_plain)
+    except InputError:
+        raise
+    except ValueError as error:
+        raise InputError(f"{what}: {error}; give finite numbers") from None

@@ -1,0 +1,115 @@
+"""Jobs, solved by carillon-precompute, which runs as a process of its own (MPI and PETSc are never loaded here)."""
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import tempfile
+import typing
+import warnings
+
+from ._carillon import Bank, InputError, SolveError, SystemError, find_bank
+from .documents import write_json
+
+PATIENCE_S = 5.0  # for a solver that is asked to end
+SOLVER = "carillon-precompute"
+
+
+def find_program(name: str) -> str:
+    """A program of this installation, else along PATH. Raises SystemError."""
+    prefixes = list(pathlib.Path(__file__).resolve().parents)[:-1]  # without the root: /bin is of the system
+    own = next((prefix / "bin" / name for prefix in prefixes if (prefix / "bin" / name).is_file()), None)
+    found = str(own) if own else shutil.which(name)
+    if found is None:
+        raise SystemError(f"{name} is not installed here (package carillon-precompute), or not along PATH")
+    return found
+
+
+def make_command(ranks: int) -> typing.List[str]:
+    """The words that start the solver on so many ranks."""
+    if ranks == 1:
+        return [find_program(SOLVER)]
+    return ["mpirun", "-np", str(ranks), "--bind-to", "none", "--oversubscribe", find_program(SOLVER)]
+
+
+def make_environment() -> typing.Dict[str, str]:
+    """One thread a rank."""
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "HWLOC_COMPONENTS": "-gl"}
+    if os.geteuid() == 0:
+        environment.update(OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1")
+    return environment
+
+
+def run(command: typing.List[str]) -> typing.Tuple[int, str]:
+    """Exit code and what it prints on standard error. Whatever interrupts this (Ctrl-C) ends it, too."""
+    if shutil.which(command[0]) is None:
+        raise SystemError(f"{command[0]} is not along PATH; install it (package openmpi-bin)")
+    with subprocess.Popen(
+        command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=make_environment()
+    ) as solver:
+        try:
+            _, said = solver.communicate()
+        except BaseException:
+            solver.terminate()
+            try:
+                solver.wait(PATIENCE_S)
+            except subprocess.TimeoutExpired:
+                solver.kill()
+            raise
+    return solver.returncode, said.decode(errors="backslashreplace")
+
+
+def raise_error(result: dict, code: int, said: str) -> typing.NoReturn:
+    """The exception that the result file of a program describes (docs/howto/when-jobs-die.md)."""
+    kinds = {"bad-input": InputError, "no-solution": SolveError}
+    lines = [line for line in said.splitlines() if line.strip(" -")]
+    message = result.get("message") or (lines[-1] if lines else f"{SOLVER} ended with exit code {code} and said nothing")
+    raise kinds.get(result.get("kind"), SystemError)(message)
+
+
+def solve(job: typing.Union[dict, str, os.PathLike], *, ranks: int = 1, bank: typing.Union[None, str, os.PathLike] = None) -> Bank:
+    """Solves a job and returns its bank.
+
+    job: the file of a job, or the job itself as a dict (docs/howto/make-a-bank.md), whose relative paths start here.
+    ranks: processes that solve together (MPI).
+    bank: the file to write; without it the job's own "bank", and where the job has none the bank is only in memory.
+    What the solver warns of is a warning here. Raises InputError, SolveError or SystemError with the solver's message. Other threads run
+    meanwhile; Ctrl-C ends the solver.
+    """
+    if isinstance(ranks, bool) or not isinstance(ranks, int) or ranks < 1:
+        raise InputError(f"ranks: {ranks!r}; give a whole number, 1 or more")
+    with tempfile.TemporaryDirectory(prefix="carillon-solve-") as name:
+        folder = pathlib.Path(name)
+        if isinstance(job, dict):
+            here, text, file = os.path.join(os.getcwd(), "job"), write_json(anchor(job), "job"), folder / "job"
+            file.write_text(text, encoding="utf-8", errors="surrogateescape")
+        else:
+            here, text, file = os.fspath(job), "", pathlib.Path(job)
+        kept = os.path.abspath(bank) if bank is not None else find_bank(here, text)
+        written, result = kept or str(folder / "bank.hdf"), folder / "result"
+        code, said = run(make_command(ranks) + [str(file), "-q", "--bank", written, "--result", str(result)])
+        said = said.replace(str(file), here) if text else said
+        if code != 0:
+            read = json.loads(result.read_text(errors="backslashreplace")) if result.is_file() else {}
+            if text and "message" in read:
+                read["message"] = read["message"].replace(str(file), here)
+            raise_error(read, code, said)
+        for line in said.splitlines():
+            if line.startswith(f"{SOLVER}: warning: "):
+                warnings.warn(line.partition(" warning: ")[2], stacklevel=2)
+        return Bank(written) if kept else Bank.parse(pathlib.Path(written).read_bytes())
+
+
+def anchor(job: dict) -> dict:
+    """The job with its files as absolute paths: it is solved from another folder."""
+
+    def absolute(value: dict, *keys: str) -> dict:
+        return {
+            **value,
+            **{key: os.path.abspath(value[key]) for key in keys if isinstance(value.get(key), (str, os.PathLike)) and value[key]},
+        }
+
+    job = absolute(job, "mesh", "bank")
+    if isinstance(job.get("body"), dict):
+        job["body"] = absolute(job["body"], "surface", "modes_csv")
+    return job
