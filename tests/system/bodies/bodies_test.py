@@ -141,7 +141,8 @@ class BodiesTest(unittest.TestCase):
         done = self.run_program(alone / "carillon-render", scene, "-o", "out.wav", code=2, PATH="/usr/bin:/bin")
         self.assertRegex(
             done.stderr,
-            r'^carillon-render: \S*scene\.json:4: body "body0" has no "bank", and the program that computes one, carillon, is not installed',
+            r'^carillon-render: \S*scene\.json:4: body "body0" has no "bank", and the program that computes one, carillon, is not'
+            " installed",
         )
         self.assertEqual(done.stderr.count("\n"), 1)
 

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""carillon-samples, from outside: the SFZ file by a parser of its own, the samples against scenes of the same blows, and the whole played by
-a sampler: Polyphone reads the SFZ, FluidSynth plays what it made of it.
+"""carillon-samples, from outside: the SFZ file by a parser of its own, the samples against scenes of the same blows, and the whole played
+by a sampler: Polyphone reads the SFZ, FluidSynth plays what it made of it.
 
 Finds the programs in $CARILLON_BIN_DIR.
 """
