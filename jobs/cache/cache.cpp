@@ -65,7 +65,7 @@ class Maker {
   }
 
   Made run() {
-    store::Request request = requests_.make(job_);
+    store::Request request = make_request();
     const store::Id asked = store::require_id(request.id, "the job");
     if (is_preview_) request = recall_count(asked, request);
     Made made{.bank = find(store::require_id(request.id, "the job")), .warnings = job_.warnings};
@@ -98,6 +98,14 @@ class Maker {
     return cache_.has_bank(id) ? cache_.bank_folder(id) / store::kBankFile : fs::path();
   }
 
+  store::Request make_request() {
+    try {
+      return requests_.make(job_);
+    } catch (const InputError& error) {  // a file that cannot be read
+      throw InputError(fmt::format("{}: {}", find_place(job_), error.what()));
+    }
+  }
+
   store::Request recall_count(const store::Id& asked, const store::Request& request) {
     std::error_code error;
     const fs::path file = cache_.root() / kCountFolder / asked.text();
@@ -105,7 +113,7 @@ class Maker {
     const long long nodes = std::atoll(base::read_file(file, "count of nodes", kMaxCountBytes).c_str());
     if (nodes < 4 || nodes > job::kMaxPreviewNodes) return request;
     job_.body->nodes = nodes;
-    return requests_.make(job_);
+    return make_request();
   }
 
   void remember_count(const store::Id& asked, std::int64_t nodes) const {
@@ -119,7 +127,7 @@ class Maker {
   }
 
   fs::path solve() {
-    const store::Request request = requests_.make(job_);
+    const store::Request request = make_request();
     const store::Id id = store::require_id(request.id, "the job");
     const auto start = std::chrono::steady_clock::now();
     say(fmt::format("computing the modes of {}, once", describe(job_)));

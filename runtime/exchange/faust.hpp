@@ -14,7 +14,7 @@ inline constexpr std::size_t kMaxFaustPoints = 64, kDefaultFaustPoints = 4;
 
 struct FaustOptions {
   std::string name = "body";
-  std::size_t modes = 100;     // the loudest so many of blows at the points; all where there are fewer
+  std::size_t modes = 100;       // the loudest so many of blows at the points; all where there are fewer
   std::vector<Vec3> points_m{};  // of the frame of the mesh; the nearest places of the surface are struck. Empty: bank::find_strikes()
   std::size_t point_count = kDefaultFaustPoints;  // of those
   radiation::GainKind radiation = radiation::GainKind::kSphere;

@@ -120,7 +120,7 @@ class Maker {
     body.spec.fixed = true;
     scene_.bodies.push_back(body);
     scene_.overrides.automatic = false;
-    scene_.overrides.on = {synth::Effect::kModal};
+    scene_.overrides.on = {synth::Effect::kModal, synth::Effect::kHertzPulse};
     scene_.effects = scene_.overrides.on;
     banks_ = host::read_banks(scene_);
     bank_ = scene_.bodies[0].spec.bank;

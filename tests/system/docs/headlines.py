@@ -16,6 +16,7 @@ GROUPS = {
     "materials": "extreme materials",
     "spectra": "dense, clustered and wide spectra",
     "time": "long times, contacts, joints, sound",
+    "formats": "formats of other programs",
     "cross": "answers of other solvers and engines",
 }
 

@@ -157,8 +157,8 @@ class GlbTest(unittest.TestCase):
 
     def test_fewer_modes_make_a_smaller_file(self):
         out = run(BIN / "carillon-bank", "export", self.bank, "-o", "few.glb", "--modes", "10", cwd=self.folder).stdout
-        self.assertIn("10 of 60 modes", out)
-        self.assertLess((self.folder / "few.glb").stat().st_size, (self.folder / "bowl.glb").stat().st_size / 3)
+        self.assertIn(f"10 of {len(self.freq_hz)} modes", out)
+        self.assertLess((self.folder / "few.glb").stat().st_size, (self.folder / "bowl.glb").stat().st_size / 2)
 
     def test_mistakes_end_in_a_sentence(self):
         for words, said in (
