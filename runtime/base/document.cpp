@@ -1,25 +1,63 @@
-// Method: jsoncpp parses and keeps the byte offset of every value; lines are counted from those offsets. Each Object remembers the keys
-// that it was asked for, so the set of known keys is the set that the reading code really uses and cannot drift from it.
+// Method: RapidJSON reads the text event by event; every value and every key is kept with the offset of its place, from which lines are
+// counted. Each Object remembers the keys that it was asked for, so the set of known keys is the set that the reading code really uses and
+// cannot drift from it.
 #include "runtime/base/document.hpp"
 
 #include <fmt/core.h>
-#include <json/json.h>
+#include <rapidjson/error/en.h>
+#include <rapidjson/reader.h>
 
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <cstdio>
+#include <limits>
+#include <numeric>
 
 #include "runtime/base/failure.hpp"
 #include "runtime/base/file.hpp"
 
 namespace carillon::base {
+namespace {
+
+struct Member;
+
+/// A value of JSON and where it stands in the text.
+struct Value {
+  enum class Kind : std::uint8_t { kNull, kBoolean, kNumber, kText, kList, kObject };
+  Kind kind = Kind::kNull;
+  bool is_true = false;
+  std::optional<std::int64_t> integer{};  // of a number, if it is whole and fits
+  double number = 0.0;
+  std::ptrdiff_t offset = 0;  // a place on its first line
+  std::string text{};
+  std::vector<Value> items{};           // of a list
+  std::vector<Member> members{};        // of an object, in the order of the text
+  std::vector<std::uint32_t> by_key{};  // their numbers, in the order of the keys
+
+  bool is(Kind other) const { return kind == other; }
+  /// nullptr when there is none.
+  const Member* find(std::string_view key) const;
+};
+
+struct Member {
+  std::string key;
+  std::ptrdiff_t offset = 0;  // of the key
+  Value value{};
+};
+
+const Member* Value::find(std::string_view key) const {
+  const auto at = std::lower_bound(by_key.begin(), by_key.end(), key,
+                                   [this](std::uint32_t i, std::string_view wanted) { return members[i].key < wanted; });
+  return at != by_key.end() && members[*at].key == key ? &members[*at] : nullptr;
+}
+
+}  // namespace
 
 struct DocumentData {
   std::filesystem::path file;
   int first_line = 1;
   std::string text;
-  Json::Value root;
+  Value root;
   mutable std::vector<std::size_t> line_ends;  // made when the first line is asked for, then searched
   mutable std::size_t scanned_bytes = 0;       // of `text`, in search of line ends
 
@@ -41,23 +79,24 @@ namespace {
 constexpr std::uint64_t kMaxBytes = 16u << 20;
 constexpr int kMaxDepth = 100;
 
-const Json::Value& json(const void* value) { return *static_cast<const Json::Value*>(value); }
+const Value& json(const void* value) { return *static_cast<const Value*>(value); }
 
-std::string kind_of(const Json::Value& value) {
-  switch (value.type()) {
-    case Json::nullValue:
+std::string kind_of(const Value& value) {
+  switch (value.kind) {
+    case Value::Kind::kNull:
       return "null";
-    case Json::booleanValue:
-      return value.asBool() ? "true" : "false";
-    case Json::stringValue:
-      return fmt::format("the text \"{}\"", value.asString().substr(0, 60));
-    case Json::arrayValue:
-      return fmt::format("a list of {}", value.size());
-    case Json::objectValue:
+    case Value::Kind::kBoolean:
+      return value.is_true ? "true" : "false";
+    case Value::Kind::kText:
+      return fmt::format("the text \"{}\"", value.text.substr(0, 60));
+    case Value::Kind::kList:
+      return fmt::format("a list of {}", value.items.size());
+    case Value::Kind::kObject:
       return "an object";
-    default:
-      return fmt::format("the number {}", value.asString());
+    case Value::Kind::kNumber:
+      break;
   }
+  return value.integer ? fmt::format("the number {}", *value.integer) : fmt::format("the number {}", value.number);
 }
 
 std::string join(const std::vector<std::string>& words) {
@@ -66,24 +105,86 @@ std::string join(const std::vector<std::string>& words) {
   return text;
 }
 
-/// jsoncpp keeps no offset for a key: it is the last place before the value where the quoted key stands.
-std::ptrdiff_t find_key_offset(const DocumentData& data, const Json::Value& value, std::string_view key) {
-  const auto at = data.text.rfind(fmt::format("\"{}\"", key), static_cast<std::size_t>(value.getOffsetStart()));
-  return at == std::string::npos ? value.getOffsetStart() : static_cast<std::ptrdiff_t>(at);
-}
+/// Makes Values of the events of a rapidjson::Reader.
+class Builder {
+ public:
+  Builder(const DocumentData& data, const rapidjson::StringStream& stream, Value& root) : data_(&data), stream_(&stream), open_{&root} {}
 
-/// Turns jsoncpp's report ("* Line 3, Column 5\n  Missing ',' ...") into "file:3: ...".
-[[noreturn]] void fail_syntax(const DocumentData& data, const std::string& report) {
-  int line = 1;
-  int column = 1;
-  std::string reason = report;
-  if (std::sscanf(report.c_str(), "* Line %d, Column %d", &line, &column) == 2) {
-    const auto start = std::min(report.find('\n'), report.size());
-    reason = report.substr(start, report.find('\n', start + 1) - start);
+  bool Null() { return add({}); }
+  bool Bool(bool is_true) { return add({.kind = Value::Kind::kBoolean, .is_true = is_true}); }
+  bool Int(int x) { return add_integer(x); }
+  bool Uint(unsigned x) { return add_integer(x); }
+  bool Int64(std::int64_t x) { return add_integer(x); }
+  bool Uint64(std::uint64_t x) {
+    return x <= std::numeric_limits<std::int64_t>::max() ? add_integer(static_cast<std::int64_t>(x)) : Double(static_cast<double>(x));
   }
-  reason.erase(0, reason.find_first_not_of(" \n"));
-  throw PlacedError(fmt::format("{}:{}", data.file.string(), line - 1 + data.first_line),
-                    fmt::format("this is not JSON (column {}): {}; correct the text there", column, reason.substr(0, 200)));
+  bool Double(double x) {
+    constexpr double kBeyond = 9223372036854775808.0;  // 2^63
+    const bool is_whole = x == std::floor(x) && x >= -kBeyond && x < kBeyond;
+    return add({.kind = Value::Kind::kNumber, .integer = is_whole ? std::optional(static_cast<std::int64_t>(x)) : std::nullopt, .number = x});
+  }
+  bool RawNumber(const char*, rapidjson::SizeType, bool) { return false; }
+  bool String(const char* text, rapidjson::SizeType size, bool) {
+    return add({.kind = Value::Kind::kText, .text = std::string(text, size)});
+  }
+  bool Key(const char* text, rapidjson::SizeType size, bool) {
+    open_.back()->members.push_back({.key = std::string(text, size), .offset = get_offset()});
+    return true;
+  }
+  bool StartObject() { return add({.kind = Value::Kind::kObject}); }
+  bool StartArray() { return add({.kind = Value::Kind::kList}); }
+  bool EndArray(rapidjson::SizeType) { return close(); }
+  bool EndObject(rapidjson::SizeType) {
+    Value& object = *open_.back();
+    object.by_key.resize(object.members.size());
+    std::iota(object.by_key.begin(), object.by_key.end(), 0U);
+    std::stable_sort(object.by_key.begin(), object.by_key.end(),
+                     [&](std::uint32_t a, std::uint32_t b) { return object.members[a].key < object.members[b].key; });
+    const auto twice = std::adjacent_find(object.by_key.begin(), object.by_key.end(),
+                                          [&](std::uint32_t a, std::uint32_t b) { return object.members[a].key == object.members[b].key; });
+    if (twice != object.by_key.end()) {
+      const Member& second = object.members[*(twice + 1)];
+      data_->fail(second.offset, fmt::format("the key \"{}\" is there twice; leave one of them", second.key.substr(0, 80)));
+    }
+    return close();
+  }
+
+ private:
+  /// Somewhere from the beginning of what was read last to the byte behind it: that a token lies on one line is what counts.
+  std::ptrdiff_t get_offset() const { return static_cast<std::ptrdiff_t>(stream_->Tell()); }
+  bool add_integer(std::int64_t x) {
+    return add({.kind = Value::Kind::kNumber, .integer = x, .number = static_cast<double>(x)});
+  }
+  bool add(Value value) {
+    value.offset = get_offset();
+    Value& into = *open_.back();
+    Value* place = &into;  // the root
+    if (is_root_there_) place = into.is(Value::Kind::kList) ? &into.items.emplace_back() : &into.members.back().value;
+    *place = std::move(value);
+    if (place->is(Value::Kind::kList) || place->is(Value::Kind::kObject)) {
+      if (is_root_there_) open_.push_back(place);
+    }
+    is_root_there_ = true;
+    return true;
+  }
+  bool close() {
+    if (open_.size() > 1) open_.pop_back();
+    return true;
+  }
+
+  const DocumentData* data_;
+  const rapidjson::StringStream* stream_;
+  std::vector<Value*> open_;  // containers, the root first; only the last one grows, so that they stay where they are
+  bool is_root_there_ = false;
+};
+
+[[noreturn]] void fail_syntax(const DocumentData& data, const rapidjson::ParseResult& result) {
+  const std::size_t at = std::min(result.Offset(), data.text.size());
+  const std::size_t line_begin = at == 0 ? 0 : data.text.rfind('\n', at - 1) + 1;
+  std::string reason = rapidjson::GetParseError_En(result.Code());
+  if (reason.ends_with('.')) reason.pop_back();
+  if (!reason.empty()) reason[0] = static_cast<char>(std::tolower(static_cast<unsigned char>(reason[0])));
+  data.fail(static_cast<std::ptrdiff_t>(at), fmt::format("this is not JSON (column {}): {}; correct the text there", at - line_begin + 1, reason));
 }
 
 /// What is wrong with a word that begins like a number, as part of a sentence; nullptr when it is one by the grammar of JSON.
@@ -117,8 +218,8 @@ const char* find_number_fault(std::string_view word) {
   return word.empty() ? nullptr : "there is something behind the number; separate values by commas, and give units no letters";
 }
 
-/// What jsoncpp is too lenient with: the depth of brackets outside strings and comments, so that the parser's recursion is bounded before
-/// it starts, and the form of numbers.
+/// What comes before the parser: the depth of brackets outside strings and comments, so that the parser's recursion is bounded before it
+/// starts, and the form of numbers, with a better word than it has.
 void check_text(const DocumentData& data) {
   constexpr std::string_view kWord = "0123456789+-._abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ";
   const std::string_view text = data.text;
@@ -177,20 +278,13 @@ Document parse_document(std::string_view text, const std::filesystem::path& file
                       "there is a zero byte, which no text has; check that this is the right file");
   }
   check_text(*data);
-  Json::CharReaderBuilder builder;
-  Json::CharReaderBuilder::strictMode(&builder.settings_);
-  builder["allowComments"] = true;
-  builder["collectComments"] = false;
-  builder["rejectDupKeys"] = true;
-  builder["stackLimit"] = kMaxDepth + 2;
-  const std::unique_ptr<Json::CharReader> reader(builder.newCharReader());
-  std::string report;
-  try {
-    if (!reader->parse(data->text.data(), data->text.data() + data->text.size(), &data->root, &report)) fail_syntax(*data, report);
-  } catch (const Json::Exception& error) {
-    throw PlacedError(fmt::format("{}:{}", file.string(), first_line), fmt::format("this is not JSON: {}; correct the text", error.what()));
-  }
-  if (!data->root.isObject())
+  rapidjson::StringStream stream(data->text.c_str());
+  Builder builder(*data, stream, data->root);
+  rapidjson::Reader reader;
+  const rapidjson::ParseResult result =
+      reader.Parse<rapidjson::kParseFullPrecisionFlag | rapidjson::kParseCommentsFlag>(stream, builder);
+  if (result.IsError()) fail_syntax(*data, result);
+  if (!data->root.is(Value::Kind::kObject))
     throw InputError(
         fmt::format("{}:{}: the file must hold one JSON object in braces, and holds {}", file.string(), first_line, kind_of(data->root)));
   return Document(std::move(data));
@@ -201,12 +295,12 @@ Object::Object(std::shared_ptr<DocumentData> data, const void* value, std::strin
 
 bool Object::has(std::string_view key) {
   if (std::find(asked_->begin(), asked_->end(), key) == asked_->end()) asked_->emplace_back(key);
-  return json(value_).isMember(std::string(key));
+  return json(value_).find(key) != nullptr;
 }
 
-bool Object::has_string(std::string_view key) { return has(key) && json(value_)[std::string(key)].isString(); }
-bool Object::has_number(std::string_view key) { return has(key) && json(value_)[std::string(key)].isNumeric(); }
-bool Object::has_object(std::string_view key) { return has(key) && json(value_)[std::string(key)].isObject(); }
+bool Object::has_string(std::string_view key) { return has(key) && json(value_).find(key)->value.is(Value::Kind::kText); }
+bool Object::has_number(std::string_view key) { return has(key) && json(value_).find(key)->value.is(Value::Kind::kNumber); }
+bool Object::has_object(std::string_view key) { return has(key) && json(value_).find(key)->value.is(Value::Kind::kObject); }
 
 namespace {
 
@@ -218,11 +312,9 @@ std::string full_name(const std::string& name, std::string_view key) {
 }  // namespace
 
 void Object::fail(std::string_view key, const std::string& message) const {
-  const Json::Value& object = json(value_);
-  if (!key.empty() && object.isMember(std::string(key))) {
-    data_->fail(find_key_offset(*data_, object[std::string(key)], key), fmt::format("\"{}\": {}", full_name(name_, key), message));
-  }
-  data_->fail(object.getOffsetStart(), key.empty() ? message : fmt::format("\"{}\": {}", full_name(name_, key), message));
+  const Member* member = key.empty() ? nullptr : json(value_).find(key);
+  if (member != nullptr) data_->fail(member->offset, fmt::format("\"{}\": {}", full_name(name_, key), message));
+  data_->fail(json(value_).offset, key.empty() ? message : fmt::format("\"{}\": {}", full_name(name_, key), message));
 }
 
 namespace {
@@ -253,9 +345,9 @@ std::string find_misspelt(std::string_view wanted, const std::vector<std::string
   return "";
 }
 
-double to_number(const Object& object, const Json::Value& value, std::string_view key, Range range) {
-  if (!value.isNumeric()) object.fail(key, fmt::format("must be a number, and is {}", kind_of(value)));
-  const double number = value.asDouble();
+double to_number(const Object& object, const Value& value, std::string_view key, Range range) {
+  if (!value.is(Value::Kind::kNumber)) object.fail(key, fmt::format("must be a number, and is {}", kind_of(value)));
+  const double number = value.number;
   if (!std::isfinite(number)) object.fail(key, "must be a finite number");
   if (!(number > range.low && number < range.high)) {
     if (range.low == 0.0 && std::isinf(range.high)) object.fail(key, fmt::format("must be greater than 0, and is {}", number));
@@ -272,15 +364,15 @@ const void* Object::require_value(std::string_view key) {
     fail(near, near.empty() ? fmt::format("\"{}\" is missing here; add it", key)
                             : fmt::format("unknown key; \"{}\" is required here: did you mean \"{}\"?", key, key));
   }
-  return &json(value_)[std::string(key)];
+  return &json(value_).find(key)->value;
 }
 
 std::string Object::string(std::string_view key) {
-  const Json::Value& value = json(require_value(key));
-  if (!value.isString()) fail(key, fmt::format("must be a text in quotes, and is {}", kind_of(value)));
-  if (value.asString().empty()) fail(key, "must not be empty");
-  if (value.asString().find('\0') != std::string::npos) fail(key, "must not hold a zero byte");
-  return value.asString();
+  const Value& value = json(require_value(key));
+  if (!value.is(Value::Kind::kText)) fail(key, fmt::format("must be a text in quotes, and is {}", kind_of(value)));
+  if (value.text.empty()) fail(key, "must not be empty");
+  if (value.text.find('\0') != std::string::npos) fail(key, "must not hold a zero byte");
+  return value.text;
 }
 
 std::string Object::string_or(std::string_view key, std::string_view fallback) { return has(key) ? string(key) : std::string(fallback); }
@@ -303,9 +395,9 @@ std::optional<double> Object::number_if(std::string_view key, Range range) {
 }
 
 long long Object::integer(std::string_view key, long long low, long long high) {
-  const Json::Value& value = json(require_value(key));
-  if (!value.isInt64()) fail(key, fmt::format("must be a whole number, and is {}", kind_of(value)));
-  const long long number = value.asInt64();
+  const Value& value = json(require_value(key));
+  if (!value.integer) fail(key, fmt::format("must be a whole number, and is {}", kind_of(value)));
+  const long long number = *value.integer;
   if (number < low || number > high) fail(key, fmt::format("must be from {} to {}, and is {}", low, high, number));
   return number;
 }
@@ -316,72 +408,71 @@ std::optional<long long> Object::integer_if(std::string_view key, long long low,
 
 bool Object::boolean_or(std::string_view key, bool fallback) {
   if (!has(key)) return fallback;
-  const Json::Value& value = json(value_)[std::string(key)];
-  if (!value.isBool()) fail(key, fmt::format("must be true or false, and is {}", kind_of(value)));
-  return value.asBool();
+  const Value& value = json(value_).find(key)->value;
+  if (!value.is(Value::Kind::kBoolean)) fail(key, fmt::format("must be true or false, and is {}", kind_of(value)));
+  return value.is_true;
 }
 
 void Object::copy_numbers(std::string_view key, double* values, std::size_t count) {
-  const Json::Value& list = json(require_value(key));
-  if (!list.isArray() || list.size() != count) fail(key, fmt::format("must be a list of {} numbers, and is {}", count, kind_of(list)));
-  for (std::size_t i = 0; i < count; ++i) values[i] = to_number(*this, list[static_cast<Json::ArrayIndex>(i)], key, {});
+  const Value& list = json(require_value(key));
+  if (!list.is(Value::Kind::kList) || list.items.size() != count) fail(key, fmt::format("must be a list of {} numbers, and is {}", count, kind_of(list)));
+  for (std::size_t i = 0; i < count; ++i) values[i] = to_number(*this, list.items[i], key, {});
 }
 
 std::vector<double> Object::number_list(std::string_view key, std::size_t max) {
-  const Json::Value& list = json(require_value(key));
-  if (!list.isArray() || list.empty() || list.size() > max)
+  const Value& list = json(require_value(key));
+  if (!list.is(Value::Kind::kList) || list.items.empty() || list.items.size() > max)
     fail(key, fmt::format("must be a list of 1 to {} numbers, and is {}", max, kind_of(list)));
-  std::vector<double> values(list.size());
+  std::vector<double> values(list.items.size());
   copy_numbers(key, values.data(), values.size());
   return values;
 }
 
 std::vector<std::vector<double>> Object::number_rows(std::string_view key, std::size_t columns, std::size_t max) {
-  const Json::Value& list = json(require_value(key));
-  if (!list.isArray() || list.empty() || list.size() > max)
+  const Value& list = json(require_value(key));
+  if (!list.is(Value::Kind::kList) || list.items.empty() || list.items.size() > max)
     fail(key, fmt::format("must be a list of 1 to {} lists of {} numbers, and is {}", max, columns, kind_of(list)));
   std::vector<std::vector<double>> rows;
-  for (Json::ArrayIndex i = 0; i < list.size(); ++i) {
-    if (!list[i].isArray() || list[i].size() != columns)
-      fail(key, fmt::format("entry {} must be a list of {} numbers, and is {}", i, columns, kind_of(list[i])));
+  for (std::size_t i = 0; i < list.items.size(); ++i) {
+    const Value& entry = list.items[i];
+    if (!entry.is(Value::Kind::kList) || entry.items.size() != columns)
+      fail(key, fmt::format("entry {} must be a list of {} numbers, and is {}", i, columns, kind_of(entry)));
     std::vector<double>& row = rows.emplace_back();
-    for (const Json::Value& value : list[i]) row.push_back(to_number(*this, value, key, {}));
+    for (const Value& value : entry.items) row.push_back(to_number(*this, value, key, {}));
   }
   return rows;
 }
 
 std::vector<Entry> Object::entries(std::string_view key, std::size_t max) {
   if (!has(key)) return {};
-  const Json::Value& value = json(value_)[std::string(key)];
+  const Value& value = json(value_).find(key)->value;
   std::vector<Entry> list;
-  const auto add = [&](const Json::Value& entry, const std::string& name) {
-    const std::string place = fmt::format("{}:{}", data_->file.string(), data_->line_at(entry.getOffsetStart()));
-    if (entry.isString() && !entry.asString().empty() && entry.asString().find('\0') == std::string::npos)
-      list.push_back({entry.asString(), {}, place});
-    else if (entry.isObject())
+  const auto add = [&](const Value& entry, const std::string& name) {
+    const std::string place = fmt::format("{}:{}", data_->file.string(), data_->line_at(entry.offset));
+    if (entry.is(Value::Kind::kText) && !entry.text.empty() && entry.text.find('\0') == std::string::npos)
+      list.push_back({entry.text, {}, place});
+    else if (entry.is(Value::Kind::kObject))
       list.push_back({"", Object(data_, &entry, name), place});
     else
       fail(key, fmt::format("must be a text or an object, or a list of them, and holds {}", kind_of(entry)));
   };
-  if (!value.isArray()) {
+  if (!value.is(Value::Kind::kList)) {
     add(value, full_name(name_, key));
     return list;
   }
-  if (value.size() > max) fail(key, fmt::format("must have at most {} entries, and has {}", max, value.size()));
-  for (Json::ArrayIndex i = 0; i < value.size(); ++i) add(value[i], fmt::format("{}[{}]", full_name(name_, key), i));
+  if (value.items.size() > max) fail(key, fmt::format("must have at most {} entries, and has {}", max, value.items.size()));
+  for (std::size_t i = 0; i < value.items.size(); ++i) add(value.items[i], fmt::format("{}[{}]", full_name(name_, key), i));
   return list;
 }
 
 std::string Object::find_place(std::string_view key) const {
-  const Json::Value& object = json(value_);
-  const auto offset =
-      !key.empty() && object.isMember(std::string(key)) ? find_key_offset(*data_, object[std::string(key)], key) : object.getOffsetStart();
-  return fmt::format("{}:{}", data_->file.string(), data_->line_at(offset));
+  const Member* member = key.empty() ? nullptr : json(value_).find(key);
+  return fmt::format("{}:{}", data_->file.string(), data_->line_at(member != nullptr ? member->offset : json(value_).offset));
 }
 
 Object Object::object(std::string_view key) {
-  const Json::Value& value = json(require_value(key));
-  if (!value.isObject()) fail(key, fmt::format("must be an object in braces, and is {}", kind_of(value)));
+  const Value& value = json(require_value(key));
+  if (!value.is(Value::Kind::kObject)) fail(key, fmt::format("must be an object in braces, and is {}", kind_of(value)));
   return Object(data_, &value, full_name(name_, key));
 }
 
@@ -390,11 +481,12 @@ std::optional<Object> Object::object_if(std::string_view key) { return has(key) 
 std::vector<Object> Object::objects(std::string_view key) {
   std::vector<Object> list;
   if (!has(key)) return list;
-  const Json::Value& value = json(value_)[std::string(key)];
-  if (!value.isArray()) fail(key, fmt::format("must be a list in square brackets, and is {}", kind_of(value)));
-  for (Json::ArrayIndex i = 0; i < value.size(); ++i) {
-    if (!value[i].isObject()) fail(key, fmt::format("entry {} must be an object in braces, and is {}", i, kind_of(value[i])));
-    list.emplace_back(data_, &value[i], fmt::format("{}[{}]", full_name(name_, key), i));
+  const Value& value = json(value_).find(key)->value;
+  if (!value.is(Value::Kind::kList)) fail(key, fmt::format("must be a list in square brackets, and is {}", kind_of(value)));
+  for (std::size_t i = 0; i < value.items.size(); ++i) {
+    const Value& entry = value.items[i];
+    if (!entry.is(Value::Kind::kObject)) fail(key, fmt::format("entry {} must be an object in braces, and is {}", i, kind_of(entry)));
+    list.emplace_back(data_, &entry, fmt::format("{}[{}]", full_name(name_, key), i));
   }
   return list;
 }
@@ -407,10 +499,8 @@ std::filesystem::path Object::path(std::string_view key) {
 void Object::ignore(std::string_view key) { has(key); }
 
 std::vector<std::string> Object::keys() const {
-  const Json::Value& object = json(value_);
-  std::vector<std::string> names = object.getMemberNames();
-  std::sort(names.begin(), names.end(),
-            [&](const auto& a, const auto& b) { return object[a].getOffsetStart() < object[b].getOffsetStart(); });
+  std::vector<std::string> names;
+  for (const Member& member : json(value_).members) names.push_back(member.key);
   return names;
 }
 
@@ -418,7 +508,7 @@ void Object::finish() {
   // A key that is not there yet is likelier meant than one that is: alpha2_s next to alpha1_s is alpha2_per_s.
   std::vector<std::string> open;
   for (const std::string& key : *asked_)
-    if (!json(value_).isMember(key)) open.push_back(key);
+    if (json(value_).find(key) == nullptr) open.push_back(key);
   for (const std::string& key : keys()) {
     if (std::find(asked_->begin(), asked_->end(), key) != asked_->end()) continue;
     std::string near = find_nearest(key, open);

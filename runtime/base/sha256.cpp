@@ -1,10 +1,24 @@
 #include "runtime/base/sha256.hpp"
 
-#include <openssl/evp.h>
-
 #include "runtime/base/error.hpp"
 
+#if defined(__EMSCRIPTEN__)
+#include "runtime/base/sha256_plain.hpp"
+#else
+#include <openssl/evp.h>
+#endif
+
 namespace carillon::base {
+
+#if defined(__EMSCRIPTEN__)
+
+Sha256::Sha256() : context_(new PlainSha256) {}
+Sha256::~Sha256() { delete static_cast<PlainSha256*>(context_); }
+void Sha256::add(std::span<const std::byte> bytes) { static_cast<PlainSha256*>(context_)->add(bytes); }
+Sha256::Hash Sha256::finish() { return static_cast<PlainSha256*>(context_)->finish(); }
+
+#else
+
 namespace {
 
 EVP_MD_CTX* get(void* context) { return static_cast<EVP_MD_CTX*>(context); }
@@ -23,13 +37,15 @@ void Sha256::add(std::span<const std::byte> bytes) {
   if (EVP_DigestUpdate(get(context_), bytes.data(), bytes.size()) != 1) throw SystemError("SHA-256 failed");
 }
 
-void Sha256::add(std::string_view bytes) { add(std::as_bytes(std::span(bytes))); }
-
 Sha256::Hash Sha256::finish() {
   Hash hash{};
   if (EVP_DigestFinal_ex(get(context_), hash.data(), nullptr) != 1) throw SystemError("SHA-256 failed");
   return hash;
 }
+
+#endif
+
+void Sha256::add(std::string_view bytes) { add(std::as_bytes(std::span(bytes))); }
 
 Sha256::Hash calc_sha256(std::string_view bytes) {
   Sha256 sha;

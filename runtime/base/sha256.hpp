@@ -1,4 +1,4 @@
-// SHA-256 (FIPS 180-4), by OpenSSL.
+// SHA-256 (FIPS 180-4), by OpenSSL; in WebAssembly by sha256_plain.hpp.
 #pragma once
 
 #include <array>

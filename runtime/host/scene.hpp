@@ -103,7 +103,7 @@ struct Output {
 };
 
 /// The names of quality.instructions, in the order of synth::Isa.
-inline const std::vector<std::string> kInstructionNames{"plain", "sse2", "avx2", "avx512", "best"};
+inline const std::vector<std::string> kInstructionNames{"plain", "simd128", "sse2", "avx2", "avx512", "best"};
 
 /// What accuracy is bought with; the initialisers are the defaults that docs/accuracy.md chose.
 struct Quality {

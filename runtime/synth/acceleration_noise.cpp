@@ -21,13 +21,6 @@ namespace {
 constexpr int kMaxSubsteps = 256;     // a sphere below 0.03 mm at 48 kHz counts as one of that size
 constexpr double kSilencePa = 1e-10;  // as for modes
 
-Vec3 turn(const events::Quaternion& rotation, const Vec3& x) noexcept {
-  const auto [w, a, b, c] = rotation;
-  // x + 2 w (v cross x) + 2 v cross (v cross x), v = (a, b, c).
-  const Vec3 t{2.0 * (b * x[2] - c * x[1]), 2.0 * (c * x[0] - a * x[2]), 2.0 * (a * x[1] - b * x[0])};
-  return {x[0] + w * t[0] + b * t[2] - c * t[1], x[1] + w * t[1] + c * t[0] - a * t[2], x[2] + w * t[2] + a * t[1] - b * t[0]};
-}
-
 }  // namespace
 
 AccelerationNoise::AccelerationNoise(double radius_m, double mass_kg, double sample_rate_hz, int max_strikes, int max_forces)

@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstring>
 
 #include "runtime/synth/kernels.hpp"
 
@@ -27,12 +28,23 @@ constexpr double kReleaseBelow = 0.9;  // of the room
 constexpr float kRelease = 0.7F;
 constexpr float kInaudible = 1e-12F;  // Pa
 
+std::int32_t to_bits(float x) noexcept {  // std::bit_cast, which the library of the WebAssembly build lacks
+  std::int32_t bits;
+  std::memcpy(&bits, &x, sizeof bits);
+  return bits;
+}
+float from_bits(std::int32_t bits) noexcept {
+  float x;
+  std::memcpy(&x, &bits, sizeof x);
+  return x;
+}
+
 }  // namespace
 
 /// Exponent and first bits of the fraction: monotone, as the pressure is not negative.
 int Budget::find_bin(float pressure_pa) noexcept {
   constexpr int kShift = 23 - std::bit_width(static_cast<unsigned>(kStepsPerOctave - 1));
-  return std::clamp(std::bit_cast<std::int32_t>(pressure_pa) >> kShift, 0, kBins - 1);
+  return std::clamp(to_bits(pressure_pa) >> kShift, 0, kBins - 1);
 }
 
 bool Budget::begin(double allowed, double spent, std::int64_t live_groups, int awake_bodies) noexcept {
@@ -71,7 +83,7 @@ void Budget::decide() noexcept {
     last_room_ -= count_[static_cast<std::size_t>(last_bin_)];
   constexpr int kShift = 23 - std::bit_width(static_cast<unsigned>(kStepsPerOctave - 1));
   // Where only first groups ring there is nothing to choose among, and no reason to let strikes wake more.
-  threshold_pa_ = std::max(kRelease * threshold_pa_, std::bit_cast<float>(last_bin_ << kShift));
+  threshold_pa_ = std::max(kRelease * threshold_pa_, from_bits(last_bin_ << kShift));
 }
 
 int Budget::find_limit(std::span<const float> bounds_pa) noexcept {

@@ -226,7 +226,7 @@ std::int32_t ContactForces::take_free(Slot& slot) noexcept {
 }
 
 bool ContactForces::take(const events::LastingContact& contact, const ContactSurface& other) noexcept {
-  if (events::find_fault(events::Event(contact)) != nullptr || static_cast<std::size_t>(contact.triangle) >= model_->triangles_.size() ||
+  if (events::find_fault(events::Event(contact)) != nullptr || static_cast<std::size_t>(contact.triangle) >= model_->surface_->triangles.size() ||
       find_fault(other) != nullptr) {
     ++counters_.refused;
     return false;
@@ -279,7 +279,7 @@ void ContactForces::find_modulus(Slot& slot) const noexcept {
 }
 
 void ContactForces::find_rows(Node& node) const noexcept {
-  const auto& triangle = model_->triangles_[static_cast<std::size_t>(node.values.triangle)];
+  const auto& triangle = model_->surface_->triangles[static_cast<std::size_t>(node.values.triangle)];
   for (std::size_t i = 0; i < kStrikeRows; ++i) node.row[i] = model_->get_row(triangle[i / 3], static_cast<int>(i % 3));
 }
 
@@ -291,7 +291,7 @@ void ContactForces::take_over(ContactForces& other) noexcept {
   reached_ = other.reached_;
   looked_ = other.looked_;
   counters_ = other.counters_;
-  const auto fits = [this](const Record& record) { return static_cast<std::size_t>(record.triangle) < model_->triangles_.size(); };
+  const auto fits = [this](const Record& record) { return static_cast<std::size_t>(record.triangle) < model_->surface_->triangles.size(); };
   for (Slot& slot : slots_) {
     if (!slot.used) continue;
     bool all = fits(slot.from) && (!slot.has_to || fits(slot.to)) && fits(slot.node.values);

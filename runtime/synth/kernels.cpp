@@ -1,6 +1,7 @@
 // Method:     every source file kernels_*.cpp brings one table of functions.
 // Source:     none.
-// Deviations: processors other than x86-64 take the plain kernels.
+// Deviations: processors other than x86-64 take the plain kernels. WebAssembly has no question for what a processor has: there are two
+//             builds, of which this file and the kernels are compiled with and without its SIMD.
 #include "runtime/synth/kernels.hpp"
 
 #include "runtime/base/instructions.hpp"
@@ -12,6 +13,8 @@ Isa find_best_isa() noexcept {
   if (base::has_instructions(base::Instructions::kAvx512)) return Isa::kAvx512;
   if (base::has_instructions(base::Instructions::kAvx2)) return Isa::kAvx2;
   return Isa::kSse2;
+#elif defined(__wasm_simd128__)
+  return Isa::kSimd128;
 #else
   return Isa::kPlain;
 #endif
@@ -30,6 +33,8 @@ const Kernels& get_kernels(Isa isa) noexcept {
     default:
       return kPlainKernels;
   }
+#elif defined(__wasm_simd128__)
+  return isa == Isa::kPlain ? kPlainKernels : kSimd128Kernels;
 #else
   static_cast<void>(isa);
   return kPlainKernels;
@@ -40,6 +45,8 @@ const char* get_name(Isa isa) noexcept {
   switch (isa) {
     case Isa::kPlain:
       return "plain";
+    case Isa::kSimd128:
+      return "simd128";
     case Isa::kSse2:
       return "sse2";
     case Isa::kAvx2:

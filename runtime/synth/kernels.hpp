@@ -19,8 +19,8 @@ inline constexpr int kTerms = 10;       // Chebyshev terms of a strike: -169 dB 
 inline constexpr int kStrikeRows = 9;   // three corners times three directions
 inline constexpr int kMaxContacts = 8;  // that drive a body at once
 
-/// Instruction sets, least first. kBest stands for the last one that the processor has.
-enum class Isa : std::uint8_t { kPlain, kSse2, kAvx2, kAvx512, kBest };
+/// Instruction sets, least first. kBest stands for the last one that the processor has. kSimd128 is WebAssembly's.
+enum class Isa : std::uint8_t { kPlain, kSimd128, kSse2, kAvx2, kAvx512, kBest };
 
 /// The sound of each mode over a column: sample k of mode m is re wave[m / 2][0][k][m % 2] + im wave[m / 2][1][k][m % 2] when the column
 /// begins in the state re + i im.
@@ -121,13 +121,15 @@ struct Kernels {
 Isa find_best_isa() noexcept;
 /// Kernels of one instruction set; of the best one below it when the processor does not have it. Any thread.
 const Kernels& get_kernels(Isa isa) noexcept;
-/// "plain", "sse2", "avx2", "avx512".
+/// "plain", "simd128", "sse2", "avx2", "avx512".
 const char* get_name(Isa isa) noexcept;
 
 // One a source file; call get_kernels().
 extern const Kernels kPlainKernels;
 #if defined(__x86_64__)
 extern const Kernels kSse2Kernels, kAvx2Kernels, kAvx512Kernels;
+#elif defined(__wasm_simd128__)
+extern const Kernels kSimd128Kernels;
 #endif
 
 }  // namespace carillon::synth

@@ -9,8 +9,12 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <cstring>
 #include <limits>
 #include <numbers>
+#include <type_traits>
+#include <unordered_map>
+#include <utility>
 
 #include "runtime/bank/large.hpp"
 #include "runtime/base/error.hpp"
@@ -85,6 +89,15 @@ std::shared_ptr<const Model> Model::make(const bank::Bank& bank, const ModelOpti
   }
   std::stable_sort(ringing.begin(), ringing.end(),
                    [](const Sorted& a, const Sorted& b) { return a.heard_s != b.heard_s ? a.heard_s > b.heard_s : a.level > b.level; });
+  if (options.like != nullptr) {  // what that model has not comes last
+    std::unordered_map<int, int> place;
+    for (int m = 0; m < options.like->get_ringing_mode_count(); ++m) place.emplace(options.like->get_bank_mode(m), m);
+    const auto find_place = [&](const Sorted& sorted) {
+      const auto found = place.find(sorted.mode.bank_mode);
+      return found != place.end() ? found->second : std::numeric_limits<int>::max();
+    };
+    std::stable_sort(ringing.begin(), ringing.end(), [&](const Sorted& a, const Sorted& b) { return find_place(a) < find_place(b); });
+  }
   const auto model = std::make_shared<Model>(Model());
   model->rate_hz_ = options.rate_hz;
   model->mass_kg_ = bank.rigid.mass_kg;
@@ -92,10 +105,14 @@ std::shared_ptr<const Model> Model::make(const bank::Bank& bank, const ModelOpti
                                                           : std::cbrt(std::max(0.0, bank.rigid.volume_m3) * 3.0 / (4.0 * std::numbers::pi));
   const bank::Material& material = bank.material;
   model->plane_strain_modulus_pa_ = material.young_modulus_pa / (1.0 - material.poisson_ratio * material.poisson_ratio);
-  model->triangles_ = bank.triangles;
   for (const Sorted& sorted : ringing) model->add_ringing_mode(sorted.mode);
   model->add_damped_modes(damped);
-  model->copy_shapes(bank);
+  if (options.like != nullptr && model->has_modes_of(*options.like) &&
+      options.like->surface_->shape.size() == bank.vertex_count() * 3 * options.like->surface_->columns &&
+      options.like->surface_->triangles == bank.triangles)
+    model->surface_ = options.like->surface_;
+  else
+    model->copy_shapes(bank);
   model->find_bounds();
   return model;
 }
@@ -194,29 +211,39 @@ void Model::add_damped_modes(const std::vector<Mode>& modes) {
   }
 }
 
+/// Whether the modes are the same, in the same order.
+bool Model::has_modes_of(const Model& other) const {
+  return ringing_ == other.ringing_ && std::equal(modes_.begin(), modes_.end(), other.modes_.begin(), other.modes_.end(),
+                                                  [](const Mode& a, const Mode& b) { return a.bank_mode == b.bank_mode; });
+}
+
 void Model::copy_shapes(const bank::Bank& bank) {
-  columns_ = sound_.size() * kGroup + damped_.size();
-  bank::reserve_large(shape_, bank.vertex_count() * 3 * columns_);
-  std::vector<std::int16_t> row(3 * columns_, 0);  // of a vertex; lanes without a mode stay 0
+  const auto surface = std::make_shared<ModelSurface>();
+  surface_ = surface;
+  surface->triangles = bank.triangles;
+  const std::size_t columns = surface->columns = sound_.size() * kGroup + damped_.size();
+  bank::reserve_large(surface->shape, bank.vertex_count() * 3 * columns);
+  std::vector<std::int16_t> row(3 * columns, 0);  // of a vertex; lanes without a mode stay 0
   std::vector<std::uint32_t> first, column;        // of each mode: its place in a vertex's row of the bank, and here
   for (std::size_t i = 0; i < modes_.size(); ++i) {
     first.push_back(3 * static_cast<std::uint32_t>(modes_[i].bank_mode));
     column.push_back(static_cast<std::uint32_t>(
         i < static_cast<std::size_t>(ringing_) ? i : sound_.size() * kGroup + i - static_cast<std::size_t>(ringing_)));
   }
-  largest_.assign(sound_.size() * kGroup, 0.0F);
+  std::vector<float>& largest = surface->largest;
+  largest.assign(sound_.size() * kGroup, 0.0F);
   for (std::size_t vertex = 0; vertex < bank.vertex_count(); ++vertex) {
     const std::int16_t* from = &bank.shape[vertex * bank.mode_count() * 3];
-    std::int16_t *x = row.data(), *y = x + columns_, *z = y + columns_;
+    std::int16_t *x = row.data(), *y = x + columns, *z = y + columns;
     for (std::size_t i = 0; i < modes_.size(); ++i) {
       x[column[i]] = from[first[i]];
       y[column[i]] = from[first[i] + 1];
       z[column[i]] = from[first[i] + 2];
     }
-    shape_.insert(shape_.end(), row.begin(), row.end());
-    for (std::size_t c = 0; c < largest_.size(); ++c) {
+    surface->shape.insert(surface->shape.end(), row.begin(), row.end());
+    for (std::size_t c = 0; c < largest.size(); ++c) {
       const auto fx = static_cast<float>(x[c]), fy = static_cast<float>(y[c]), fz = static_cast<float>(z[c]);
-      largest_[c] = std::max(largest_[c], fx * fx + fy * fy + fz * fz);
+      largest[c] = std::max(largest[c], fx * fx + fy * fy + fz * fz);
     }
   }
 }
@@ -226,7 +253,7 @@ void Model::find_bounds() {
   reach_.resize(sound_.size());
   float largest = 0.0F;
   for (std::size_t g = sound_.size(); g-- > 0;) {
-    const float* size = &largest_[g * kGroup];
+    const float* size = &surface_->largest[g * kGroup];
     float reach = 0.0F;
     for (std::size_t lane = 0; lane < kGroup; ++lane) {
       weight_[g][lane] = std::hypot(strike_[g].out_re[lane], strike_[g].out_im[lane]);
@@ -235,17 +262,141 @@ void Model::find_bounds() {
     largest = std::max(largest, reach);
     reach_[g] = largest;
   }
-  largest_ = {};
+}
+
+std::shared_ptr<const Model> Model::make_solo(const Model& of, int bank_mode) {
+  const auto model = std::make_shared<Model>(Model(of));
+  // What decides which modes are heard, weight_ and reach_, stays: those that are muted live as long as they would.
+  for (int m = 0; m < of.get_mode_count(); ++m) {
+    if (of.get_bank_mode(m) == bank_mode) continue;
+    if (m >= of.ringing_) {
+      model->damped_[static_cast<std::size_t>(m - of.ringing_)].gain = 0.0;
+      continue;
+    }
+    const auto group = static_cast<std::size_t>(m / kGroup);
+    const int lane = m % kGroup;
+    for (int part = 0; part < 2; ++part)
+      for (int k = 0; k < kColumn; ++k) model->sound_[group].wave[lane / 2][part][k][lane % 2] = 0.0F;
+    model->strike_[group].out_re[lane] = model->strike_[group].out_im[lane] = 0.0F;
+  }
+  return model;
+}
+
+namespace {
+
+/// Numbers and arrays one after the other, each array with its length before it.
+class TableWriter {
+ public:
+  template <class Value>
+  void put(const Value& value) {
+    static_assert(std::is_trivially_copyable_v<Value>);
+    const auto* at = reinterpret_cast<const std::byte*>(&value);
+    bytes.insert(bytes.end(), at, at + sizeof(Value));
+  }
+  template <class Value>
+  void put(const std::vector<Value>& values) {
+    static_assert(std::is_trivially_copyable_v<Value>);
+    put(static_cast<std::uint64_t>(values.size()));
+    const auto* at = reinterpret_cast<const std::byte*>(values.data());
+    bytes.insert(bytes.end(), at, at + values.size() * sizeof(Value));
+  }
+  std::vector<std::byte> bytes;
+};
+
+class TableReader {
+ public:
+  explicit TableReader(std::span<const std::byte> bytes) : left_(bytes) {}
+  template <class Value>
+  void take(Value& value) {
+    std::memcpy(&value, take_bytes(sizeof(Value)), sizeof(Value));
+  }
+  template <class Value>
+  void take(std::vector<Value>& values) {
+    std::uint64_t count = 0;
+    take(count);
+    if (count > left_.size() / sizeof(Value)) refuse();
+    values.resize(static_cast<std::size_t>(count));
+    const std::byte* from = take_bytes(values.size() * sizeof(Value));
+    if (!values.empty()) std::memcpy(values.data(), from, values.size() * sizeof(Value));
+  }
+  bool is_at_end() const { return left_.empty(); }
+  [[noreturn]] static void refuse() { throw InputError("these bytes are no model of this build"); }
+
+ private:
+  const std::byte* take_bytes(std::size_t count) {
+    if (count > left_.size()) refuse();
+    const std::byte* at = left_.data();
+    left_ = left_.subspan(count);
+    return at;
+  }
+  std::span<const std::byte> left_;
+};
+
+// Of a build: another one that lays its tables out in another way has other sizes, or another number here.
+constexpr std::uint64_t kTablesMark = 0x63617272'00000001 + (sizeof(SoundTable) << 8) + (sizeof(StrikeTable) << 16);
+
+}  // namespace
+
+std::vector<std::byte> Model::write_tables() const {
+  TableWriter writer;
+  writer.put(kTablesMark);
+  writer.put(rate_hz_);
+  writer.put(mass_kg_);
+  writer.put(sphere_radius_m_);
+  writer.put(plane_strain_modulus_pa_);
+  writer.put(static_cast<std::int64_t>(ringing_));
+  writer.put(modes_);
+  writer.put(sound_);
+  writer.put(turn_);
+  writer.put(strike_);
+  writer.put(weight_);
+  writer.put(reach_);
+  writer.put(damped_);
+  return std::move(writer.bytes);
+}
+
+std::shared_ptr<const Model> Model::read_tables(std::span<const std::byte> bytes, std::shared_ptr<const ModelSurface> surface) {
+  TableReader reader(bytes);
+  std::uint64_t mark = 0;
+  reader.take(mark);
+  if (mark != kTablesMark || surface == nullptr) TableReader::refuse();
+  const auto model = std::make_shared<Model>(Model());
+  std::int64_t ringing = 0;
+  reader.take(model->rate_hz_);
+  reader.take(model->mass_kg_);
+  reader.take(model->sphere_radius_m_);
+  reader.take(model->plane_strain_modulus_pa_);
+  reader.take(ringing);
+  reader.take(model->modes_);
+  reader.take(model->sound_);
+  reader.take(model->turn_);
+  reader.take(model->strike_);
+  reader.take(model->weight_);
+  reader.take(model->reach_);
+  reader.take(model->damped_);
+  const std::size_t groups = model->sound_.size();
+  const bool agrees = ringing >= 0 && static_cast<std::size_t>(ringing) <= groups * kGroup && (groups == 0 || ringing > 0) &&
+                      model->modes_.size() == static_cast<std::size_t>(ringing) + model->damped_.size() && model->turn_.size() == groups &&
+                      model->strike_.size() == groups && model->weight_.size() == groups && model->reach_.size() == groups &&
+                      reader.is_at_end() && surface->columns == groups * kGroup + model->damped_.size();
+  if (!agrees) TableReader::refuse();
+  const std::size_t vertices = surface->columns > 0 ? surface->shape.size() / (3 * surface->columns) : 0;
+  for (const auto& triangle : surface->triangles)
+    for (const std::int32_t vertex : triangle)
+      if (vertex < 0 || (surface->columns > 0 && static_cast<std::size_t>(vertex) >= vertices)) TableReader::refuse();
+  model->ringing_ = static_cast<int>(ringing);
+  model->surface_ = std::move(surface);
+  return model;
 }
 
 double Model::calc_projection(int mode, std::int32_t triangle, const Vec3& barycentric, const Vec3& direction) const {
-  if (triangle < 0 || static_cast<std::size_t>(triangle) >= triangles_.size()) throw InputError("the bank has no such triangle");
+  if (!has_triangle(triangle)) throw InputError("the bank has no such triangle");
   const int column = mode < ringing_ ? mode : static_cast<int>(sound_.size()) * kGroup + mode - ringing_;
   double sum = 0.0;
   for (std::size_t corner = 0; corner < 3; ++corner) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       sum += barycentric[corner] * direction[axis] *
-             get_row(triangles_[static_cast<std::size_t>(triangle)][corner], static_cast<int>(axis))[column];
+             get_row(surface_->triangles[static_cast<std::size_t>(triangle)][corner], static_cast<int>(axis))[column];
     }
   }
   return sum * modes_[static_cast<std::size_t>(mode)].scale;
@@ -253,8 +404,9 @@ double Model::calc_projection(int mode, std::int32_t triangle, const Vec3& baryc
 
 std::size_t Model::calc_bytes() const {
   return sound_.size() * (sizeof(SoundTable) + sizeof(RotationTable) + sizeof(StrikeTable) + sizeof(weight_[0]) + sizeof(reach_[0])) +
-         damped_.size() * sizeof(DampedMode) + modes_.size() * sizeof(Mode) + triangles_.size() * sizeof(triangles_[0]) +
-         shape_.size() * sizeof(shape_[0]);
+         damped_.size() * sizeof(DampedMode) + modes_.size() * sizeof(Mode) +
+         surface_->triangles.size() * sizeof(surface_->triangles[0]) + surface_->shape.size() * sizeof(surface_->shape[0]) +
+         surface_->largest.size() * sizeof(surface_->largest[0]);
 }
 
 }  // namespace carillon::synth

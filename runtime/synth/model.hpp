@@ -17,12 +17,23 @@
 
 namespace carillon::synth {
 
+/// The surface of a body as strikes need it: which vertices a triangle has, and how the modes move there. Models of one body may share it.
+struct ModelSurface {
+  std::vector<std::array<std::int32_t, 3>> triangles;
+  std::size_t columns = 0;          // of a row of shapes: groups x kGroup ringing modes, then the damped ones
+  std::vector<std::int16_t> shape;  // (V, 3, columns), in steps of each mode's scale
+  std::vector<float> largest;       // (groups x kGroup) largest squared motion of each ringing mode, in steps
+};
+
 struct ModelOptions {
   double rate_hz = 48000.0;
   std::span<const double> gains{};      // (m) Pa at 1 m for unit modal velocity; empty: those of the bank
   double reference_impulse_n_s = 1e-3;  // the strike by which audibility is judged
   double silence_pa = 1e-10;            // -106 dB re 20 uPa: what is not heard
   double sphere_radius_m = 0.0;         // radiation::calc_sphere_radius_m(); 0: of the solid's own volume, without its cavities
+  /// A model of the same body, before its bank was edited: where both have the same modes, they stand in its order and share its surface,
+  /// which is most of the memory. Which modes are dropped first is then the order of that model.
+  const class Model* like = nullptr;
 };
 
 /// Immutable; any number of voices on any threads may share one.
@@ -32,6 +43,10 @@ class Model {
   /// Throws InputError when arrays of the bank or the gains disagree in length, when a triangle names a vertex that does not exist, or when
   /// rate, impulse or silence are not positive numbers. Not for an audio thread.
   static std::shared_ptr<const Model> make(const bank::Bank& bank, const ModelOptions& options = {});
+
+  /// The same body of which one mode alone is heard: all others swing, die away and take their places as they do in `of`, but sound
+  /// nothing. `bank_mode` that the model has not: silence. Shares the surface. Not for an audio thread.
+  static std::shared_ptr<const Model> make_solo(const Model& of, int bank_mode);
 
   /// Modes below the Nyquist frequency: first the under-damped ones by audibility (the time until the last is silent after the reference
   /// strike, longest first), then those near and above critical damping. 0 <= mode < get_mode_count() below.
@@ -67,10 +82,21 @@ class Model {
   const std::vector<DampedMode>& get_damped_modes() const { return damped_; }
   /// Where the shape of one of them stands in a row of find_rows().
   std::size_t get_damped_column(std::size_t mode) const { return sound_.size() * kGroup + mode; }
-  bool has_triangle(std::int32_t triangle) const { return triangle >= 0 && static_cast<std::size_t>(triangle) < triangles_.size(); }
+  bool has_triangle(std::int32_t triangle) const {
+    return triangle >= 0 && static_cast<std::size_t>(triangle) < surface_->triangles.size();
+  }
+  const std::shared_ptr<const ModelSurface>& get_surface() const { return surface_; }
+
+  /// All but the surface as bytes, for another program of the same build: a WebAssembly module makes models in one memory and plays them
+  /// in another. No file format.
+  std::vector<std::byte> write_tables() const;
+  /// The model of these bytes and its surface. Throws InputError for bytes that are no model's of this build, or do not fit the surface.
+  /// Takes no longer than copying the bytes does.
+  static std::shared_ptr<const Model> read_tables(std::span<const std::byte> bytes, std::shared_ptr<const ModelSurface> surface);
+
   /// The shapes of all modes at the corners of a triangle along x, y and z: kStrikeRows rows, three for each corner.
   void find_rows(std::int32_t triangle, const std::int16_t** row) const {
-    const auto& corners = triangles_[static_cast<std::size_t>(triangle)];
+    const auto& corners = surface_->triangles[static_cast<std::size_t>(triangle)];
     for (int corner = 0; corner < 3; ++corner) {
       for (int axis = 0; axis < 3; ++axis) row[corner * 3 + axis] = get_row(corners[static_cast<std::size_t>(corner)], axis);
     }
@@ -86,10 +112,11 @@ class Model {
   };
   void add_ringing_mode(const Mode& mode);
   void add_damped_modes(const std::vector<Mode>& modes);
+  bool has_modes_of(const Model& other) const;
   void copy_shapes(const bank::Bank& bank);
   void find_bounds();
   const std::int16_t* get_row(std::int32_t vertex, int axis) const {
-    return shape_.data() + (static_cast<std::size_t>(vertex) * 3 + static_cast<std::size_t>(axis)) * columns_;
+    return surface_->shape.data() + (static_cast<std::size_t>(vertex) * 3 + static_cast<std::size_t>(axis)) * surface_->columns;
   }
 
   double rate_hz_ = 0.0;
@@ -101,12 +128,9 @@ class Model {
   std::vector<RotationTable> turn_;
   std::vector<StrikeTable> strike_;
   std::vector<std::array<float, kGroup>> weight_;  // bound on the pressure of a mode is weight times the size of its state
-  std::vector<float> largest_;                     // while it is made: largest squared motion of each mode, in integer steps
   std::vector<float> reach_;                       // Pa at 1 m per N s: what a strike can make of a group, or of a later one
   std::vector<DampedMode> damped_;                 // ascending in substeps; those that follow come first
-  std::vector<std::array<std::int32_t, 3>> triangles_;
-  std::size_t columns_ = 0;          // groups x kGroup, then the damped modes
-  std::vector<std::int16_t> shape_;  // (V, 3, columns_)
+  std::shared_ptr<const ModelSurface> surface_;
 };
 
 }  // namespace carillon::synth

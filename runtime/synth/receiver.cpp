@@ -25,6 +25,16 @@ constexpr double kFarthest = 1e12;   // samples; keeps what follows within integ
 constexpr double kKaiserBeta = 9.0;  // stop band -90 dB
 using Taps = std::array<float, kTaps>;
 
+/// Its power series (Abramowitz and Stegun 9.6.12), for 0 <= x <= kKaiserBeta: std::cyl_bessel_i is not in every C++ library.
+double calc_bessel_i0(double x) {
+  double term = 1.0, sum = 1.0;
+  for (int k = 1; term > 1e-17 * sum; ++k) {
+    term *= 0.25 * x * x / (static_cast<double>(k) * k);
+    sum += term;
+  }
+  return sum;
+}
+
 std::vector<Taps> make_sinc_table() {
   std::vector<Taps> table(kPhases + 1);
   const double half = kTaps / 2;
@@ -36,7 +46,7 @@ std::vector<Taps> make_sinc_table() {
       const double x = tap - half + 1.0 - static_cast<double>(phase) / kPhases;
       const double sinc = x == 0.0 ? 1.0 : std::sin(std::numbers::pi * x) / (std::numbers::pi * x);
       const double w = std::max(0.0, 1.0 - (x / half) * (x / half));
-      taps[tap] = sinc * std::cyl_bessel_i(0.0, kKaiserBeta * std::sqrt(w));
+      taps[tap] = sinc * calc_bessel_i0(kKaiserBeta * std::sqrt(w));
       total += taps[tap];
     }
     for (int tap = 0; tap < kTaps; ++tap) table[phase][tap] = static_cast<float>(taps[tap] / total);

@@ -26,14 +26,6 @@ constexpr EffectSet kOfContacts = kContactEffects.common(kCompiledEffects);
 /// Whether lasting contacts do anything: they act on modes.
 constexpr bool needs_contacts(EffectSet effects) { return has(effects, Effect::kModal) && effects.has_any(kOfContacts); }
 
-/// The middle of the microphones, where those are who hear a body without two ears.
-Vec3 calc_middle(const std::vector<Vec3>& places) {
-  Vec3 middle{};
-  for (const Vec3& place : places)
-    for (std::size_t k = 0; k < 3; ++k) middle[k] += place[k] / static_cast<double>(places.size());
-  return middle;
-}
-
 /// The first of a set, or another where it is empty.
 constexpr Effect find_first(EffectSet effects, Effect otherwise) { return effects.is_empty() ? otherwise : *effects.begin(); }
 
@@ -55,6 +47,11 @@ std::unique_ptr<Propagation> make_propagation(EffectSet effects, const BodyFrame
     propagation->ears.emplace_back(calc_middle(frame.microphones_m), frame.rate_hz, effects);
   }
   return propagation;
+}
+
+/// Of a propagation's ear, which stands for all microphones where the body is heard without two ears.
+const Trajectory& find_ear_track(const Propagation& propagation, const ListenerTracks& listener, std::size_t ear) noexcept {
+  return has(propagation.effects, Effect::kTwoEars) ? listener.get_track(ear) : listener.get_middle_track();
 }
 
 }  // namespace
@@ -131,7 +128,7 @@ std::unique_ptr<BodyChange> SoundingBody::make_change(EffectSet from, EffectSet 
   return change;
 }
 
-void SoundingBody::apply(BodyChange& change, const Trajectory& listener, std::int64_t sample) noexcept {
+void SoundingBody::apply(BodyChange& change, const ListenerTracks& listener, std::int64_t sample) noexcept {
   if (is_asleep()) wake(sample);
   rendered_ = sample;
   change_ = &change;
@@ -164,7 +161,8 @@ void SoundingBody::apply(BodyChange& change, const Trajectory& listener, std::in
   if (next_propagation_->monopole) next_propagation_->monopole->push_silence(sample);
   for (const auto& delay_line : next_propagation_->dipole)
     if (delay_line) delay_line->push_silence(sample);
-  for (Receiver& ear : next_propagation_->ears) ear.begin(next_propagation_->source, listener, sample);
+  for (std::size_t m = 0; m < next_propagation_->ears.size(); ++m)
+    next_propagation_->ears[m].begin(next_propagation_->source, find_ear_track(*next_propagation_, listener, m), sample);
 }
 
 /// Contacts begin, change what they do, or fall.
@@ -184,19 +182,22 @@ void SoundingBody::put_contacts(BodyChange& change) noexcept {
 }
 
 /// Whether the receivers of a new propagation find in its delay lines all that the old one could have given them.
-bool SoundingBody::is_filled(const Propagation& propagation, const Trajectory& listener, std::int64_t sample) const noexcept {
+bool SoundingBody::is_filled(const Propagation& propagation, const ListenerTracks& listener, std::int64_t sample) const noexcept {
   if (!propagation_ || propagation_->is_silent()) return true;
   const std::int64_t filled = sample - propagation.first;
   const DelayLine& delay_line = propagation.monopole ? *propagation.monopole : *propagation.dipole[0];
   double longest_s = 0.0;
   if (has(propagation.effects, Effect::kAirDelay)) {
-    for (const Receiver& ear : propagation.ears) longest_s = std::max(longest_s, ear.calc_delay_s(propagation.source, listener, sample));
+    for (std::size_t m = 0; m < propagation.ears.size(); ++m) {
+      const Trajectory& track = find_ear_track(propagation, listener, m);
+      longest_s = std::max(longest_s, propagation.ears[m].calc_delay_s(propagation.source, track, sample));
+    }
   }
   const double needed = longest_s * frame_.rate_hz + Receiver::kLatency + kTaps + kBlock;
   return static_cast<double>(filled) >= needed || filled >= delay_line.get_size();
 }
 
-BodyChange* SoundingBody::finish_change(const Trajectory& listener, std::int64_t sample) noexcept {
+BodyChange* SoundingBody::finish_change(const ListenerTracks& listener, std::int64_t sample) noexcept {
   if (change_ == nullptr) return nullptr;
   const bool sounds = has(effects_, Effect::kModal) || has(effects_, Effect::kAccelerationNoise);
   if (contacts_ && !needs_contacts(effects_) && !contacts_->is_idle()) return nullptr;  // they fall first
@@ -218,11 +219,12 @@ BodyChange* SoundingBody::finish_change(const Trajectory& listener, std::int64_t
   return std::exchange(change_, nullptr);
 }
 
-float SoundingBody::calc_nearness(const Trajectory& listener, std::int64_t sample) const noexcept {
+float SoundingBody::calc_nearness(const ListenerTracks& listener, std::int64_t sample) const noexcept {
   const double time_s = static_cast<double>(sample) / frame_.rate_hz;
-  const Vec3 here = track_.find(time_s).position_m, there = listener.find(time_s).position_m;
+  const Vec3 here = track_.find(time_s).position_m;
   double nearest = std::numeric_limits<double>::infinity();  // squared
-  for (const Vec3& place : frame_.microphones_m) {
+  for (std::size_t m = 0; m < frame_.microphones_m.size(); ++m) {
+    const Vec3 there = listener.get_track(m).find(time_s).position_m, place = frame_.microphones_m[m];
     double square = 0.0;
     for (std::size_t k = 0; k < 3; ++k) square += (there[k] + place[k] - here[k]) * (there[k] + place[k] - here[k]);
     nearest = std::min(nearest, square);
@@ -400,19 +402,20 @@ void SoundingBody::make_sound(std::size_t count, BodyScratch& scratch, TickFunct
 }
 
 /// `fade`: 0 none, 1 in, -1 out.
-void SoundingBody::hear(Propagation& propagation, std::int64_t sample, std::size_t count, const Trajectory& listener, int fade,
+void SoundingBody::hear(Propagation& propagation, std::int64_t sample, std::size_t count, const ListenerTracks& listener, int fade,
                         BodyScratch& scratch, Mix& mix, TickFunction ticks) noexcept {
   if (propagation.is_silent()) return;
   std::uint64_t started = ticks != nullptr ? ticks() : 0;
   const bool apart = has(propagation.effects, Effect::kTwoEars);
   const std::span<double> heard = std::span(scratch.heard).first(count);
   for (std::size_t m = 0; m < propagation.ears.size(); ++m) {
+    const Trajectory& track = find_ear_track(propagation, listener, m);
     int moved = 0;
     if (apart && fade == 0) {
-      moved = propagation.ears[m].process(propagation.source, listener, sample, std::span(mix[m]).first(count));
+      moved = propagation.ears[m].process(propagation.source, track, sample, std::span(mix[m]).first(count));
     } else {
       std::fill(heard.begin(), heard.end(), 0.0);
-      moved = propagation.ears[m].process(propagation.source, listener, sample, heard);
+      moved = propagation.ears[m].process(propagation.source, track, sample, heard);
       const auto begin = static_cast<int>(sample % kBlock);
       for (std::size_t n = 0; n < count && fade != 0; ++n) {
         const double u = (begin + static_cast<int>(n)) / static_cast<double>(kBlock), in = u * u * (3.0 - 2.0 * u);
@@ -432,7 +435,7 @@ void SoundingBody::hear(Propagation& propagation, std::int64_t sample, std::size
   }
 }
 
-void SoundingBody::render(std::int64_t sample, std::size_t count, const Trajectory& listener, BodyScratch& scratch, Mix& mix,
+void SoundingBody::render(std::int64_t sample, std::size_t count, const ListenerTracks& listener, BodyScratch& scratch, Mix& mix,
                           TickFunction ticks) noexcept {
   wake(sample);
   make_sound(count, scratch, ticks);

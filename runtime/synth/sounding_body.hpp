@@ -14,6 +14,7 @@
 #include "runtime/synth/delay_line.hpp"
 #include "runtime/synth/effects.hpp"
 #include "runtime/synth/kernels.hpp"
+#include "runtime/synth/listener.hpp"
 #include "runtime/synth/model.hpp"
 #include "runtime/synth/receiver.hpp"
 #include "runtime/synth/trajectory.hpp"
@@ -109,9 +110,9 @@ class SoundingBody {
   /// All that follows: [audio-thread], no heap, no lock, no throw.
 
   /// The change begins with this sample, the first of a block; it is over when finish_change() says so.
-  void apply(BodyChange& change, const Trajectory& listener, std::int64_t sample) noexcept;
+  void apply(BodyChange& change, const ListenerTracks& listener, std::int64_t sample) noexcept;
   /// At the first sample of a block: the change that is over now, with the modules that are not needed any more; or nullptr.
-  BodyChange* finish_change(const Trajectory& listener, std::int64_t sample) noexcept;
+  BodyChange* finish_change(const ListenerTracks& listener, std::int64_t sample) noexcept;
 
   /// `sample`: the first that is not rendered. False when no effect could take it.
   bool take(const events::Impulse& impulse, std::int64_t sample) noexcept;
@@ -121,7 +122,7 @@ class SoundingBody {
   bool take(const events::BodyMotion& motion) noexcept;
 
   /// Adds to `mix` what is heard of it in samples `sample` to `sample + count`, all of one block.
-  void render(std::int64_t sample, std::size_t count, const Trajectory& listener, BodyScratch& scratch, Mix& mix,
+  void render(std::int64_t sample, std::size_t count, const ListenerTracks& listener, BodyScratch& scratch, Mix& mix,
               TickFunction ticks) noexcept;
 
   /// Nothing sounds, nothing is under way, nothing is to come: until the next event render() would add nothing.
@@ -132,8 +133,9 @@ class SoundingBody {
   const BodyWork& get_work() const { return work_; }
   /// Its modes; nullptr without.
   Voice* get_voice() noexcept { return voice_.get(); }
+  const Voice* get_voice() const noexcept { return voice_.get(); }
   /// How many pascals 1 Pa at 1 m is at the nearest microphone, at a sample.
-  float calc_nearness(const Trajectory& listener, std::int64_t sample) const noexcept;
+  float calc_nearness(const ListenerTracks& listener, std::int64_t sample) const noexcept;
 
  private:
   template <class Strike>
@@ -143,9 +145,9 @@ class SoundingBody {
   Effect make_modal_sound(std::span<float> mono) noexcept;
   void make_acceleration_noise(const std::array<std::span<float>, 3>& dipole) noexcept;
   void make_sound(std::size_t count, BodyScratch& scratch, TickFunction ticks) noexcept;
-  void hear(Propagation& propagation, std::int64_t sample, std::size_t count, const Trajectory& listener, int fade, BodyScratch& scratch,
+  void hear(Propagation& propagation, std::int64_t sample, std::size_t count, const ListenerTracks& listener, int fade, BodyScratch& scratch,
             Mix& mix, TickFunction ticks) noexcept;
-  bool is_filled(const Propagation& propagation, const Trajectory& listener, std::int64_t sample) const noexcept;
+  bool is_filled(const Propagation& propagation, const ListenerTracks& listener, std::int64_t sample) const noexcept;
 
   std::shared_ptr<const Model> model_;  // the main thread's
   BodyFrame frame_;

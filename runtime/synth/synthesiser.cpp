@@ -73,7 +73,7 @@ class Synthesiser::Pipe {
 Synthesiser::Synthesiser(SynthesiserOptions options)
     : options_(check(std::move(options))),
       ring_(static_cast<std::size_t>(options_.ring_events)),
-      listener_(static_cast<std::size_t>(options_.max_waypoints)),
+      listener_(static_cast<std::size_t>(options_.max_waypoints), options_.microphones_m, options_.listener_m),
       allowed_(options_.budget) {
   const auto bodies = static_cast<std::size_t>(options_.max_bodies);
   // A number comes, changes and goes in at most three commands, and two come back.
@@ -84,7 +84,6 @@ Synthesiser::Synthesiser(SynthesiserOptions options)
   playing_.resize(bodies);
   awake_.resize((bodies + 63) / 64);
   mix_.resize(options_.microphones_m.size());
-  listener_.push({.position_m = options_.listener_m});
 }
 
 Synthesiser::~Synthesiser() = default;
@@ -329,7 +328,7 @@ void Synthesiser::take(const events::BodyMotion& motion) noexcept {
 }
 
 void Synthesiser::take(const events::Listener& listener) noexcept {
-  if (!listener_.push({listener.time_s, listener.position_m, listener.velocity_m_s})) ++work_.refused;
+  if (!listener_.push(listener)) ++work_.refused;
 }
 
 void Synthesiser::take_events() noexcept {
@@ -497,6 +496,14 @@ EffectCounters Synthesiser::get_effect_counters(int body) const noexcept {
 double Synthesiser::get_peak_pa(int body) const noexcept {
   if (body < 0 || body >= options_.max_bodies) return 0.0;
   return static_cast<double>(published_bodies_[static_cast<std::size_t>(body)].peak_pa.load(std::memory_order_relaxed));
+}
+
+bool Synthesiser::measure_amplitudes(int body, std::span<float> by_bank_mode) const noexcept {
+  std::fill(by_bank_mode.begin(), by_bank_mode.end(), 0.0F);
+  if (body < 0 || body >= options_.max_bodies || playing_[static_cast<std::size_t>(body)] == nullptr) return false;
+  const Voice* voice = playing_[static_cast<std::size_t>(body)]->get_voice();
+  if (voice != nullptr) voice->measure_amplitudes(by_bank_mode);
+  return true;
 }
 
 double Synthesiser::get_energy_rise(int body) const noexcept {

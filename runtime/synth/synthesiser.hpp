@@ -24,6 +24,7 @@
 #include "runtime/events/ring.hpp"
 #include "runtime/synth/budget.hpp"
 #include "runtime/synth/effects.hpp"
+#include "runtime/synth/listener.hpp"
 #include "runtime/synth/model.hpp"
 #include "runtime/synth/receiver.hpp"
 #include "runtime/synth/sounding_body.hpp"
@@ -32,7 +33,8 @@ namespace carillon::synth {
 
 struct SynthesiserOptions {
   double rate_hz = 48000.0;
-  /// From the listener, in the axes of the world: by default two ears 20 cm apart (OCE01).
+  /// From the listener, in the axes of the world as long as it is not turned (events::Listener::rotation); by default two ears 20 cm apart
+  /// (OCE01).
   std::vector<Vec3> microphones_m{{-0.1, 0.0, 0.0}, {0.1, 0.0, 0.0}};
   Vec3 listener_m{};
   int max_bodies = 64;
@@ -165,6 +167,9 @@ class Synthesiser {
   EffectCounters get_effect_counters(int body) const noexcept;
   /// The loudest that its modes have been so far [Pa at 1 m]. [any-thread]
   double get_peak_pa(int body) const noexcept;
+  /// How far each mode of a body swings at this moment: the amplitude of its coordinate q [m kg^1/2], by number in the bank. Modes that do
+  /// not ring, and those that the model has not, are 0. False for a number that is no body's. [audio-thread], between calls of process().
+  bool measure_amplitudes(int body, std::span<float> by_bank_mode) const noexcept;
   /// Of a body that audits_energy: the largest share by which the energy of its modes rose over a block in which nothing acted on it.
   /// [any-thread]
   double get_energy_rise(int body) const noexcept;
@@ -232,7 +237,7 @@ class Synthesiser {
   std::unique_ptr<Published[]> published_bodies_;
   std::vector<SoundingBody*> playing_;  // by number; the audio thread's
   std::vector<std::uint64_t> awake_;    // bit i % 64 of word i / 64: body i has something to do
-  Trajectory listener_;
+  ListenerTracks listener_;
   Mix mix_;
   BodyScratch scratch_;
   double marked_s_ = 0.0;  // of the last TimeWatermark: nothing earlier will come

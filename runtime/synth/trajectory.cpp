@@ -109,6 +109,13 @@ events::Quaternion Attitude::find(double time_s) const noexcept {
   return here;
 }
 
+Vec3 turn(const events::Quaternion& rotation, const Vec3& x) noexcept {
+  const auto [w, a, b, c] = rotation;
+  // x + 2 w (v cross x) + 2 v cross (v cross x), v = (a, b, c).
+  const Vec3 t{2.0 * (b * x[2] - c * x[1]), 2.0 * (c * x[0] - a * x[2]), 2.0 * (a * x[1] - b * x[0])};
+  return {x[0] + w * t[0] + b * t[2] - c * t[1], x[1] + w * t[1] + c * t[0] - a * t[2], x[2] + w * t[2] + a * t[1] - b * t[0]};
+}
+
 Trajectory make_trajectory(std::span<const PathPoint> places) {
   std::vector<Waypoint> waypoints;
   for (const PathPoint& place : places) {

@@ -78,6 +78,9 @@ class Attitude {
   std::size_t first_ = 0, count_ = 0;
 };
 
+/// A vector of something that is turned, in the axes of the world. [any-thread]
+Vec3 turn(const events::Quaternion& rotation, const Vec3& x) noexcept;
+
 /// A track through places whose velocities are not known: each takes its own from its neighbours.
 struct PathPoint {
   double time_s = 0.0;

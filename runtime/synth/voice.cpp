@@ -314,6 +314,22 @@ double Voice::calc_ringing_energy_j(int m) const noexcept {
   return 0.5 * (v * v + mode.lambda * q * q);
 }
 
+void Voice::measure_amplitudes(std::span<float> by_bank_mode) const noexcept {
+  const int ringing = std::min(live_ * kGroup, model_->ringing_);
+  const auto put = [&](int m, double amplitude) {
+    const auto at = static_cast<std::size_t>(model_->get_bank_mode(m));
+    if (at < by_bank_mode.size()) by_bank_mode[at] = static_cast<float>(amplitude);
+  };
+  for (int m = 0; m < ringing; ++m) {
+    const auto& mode = model_->modes_[static_cast<std::size_t>(m)];
+    const ModeState& state = state_[static_cast<std::size_t>(m / kGroup)];
+    const double omega = std::sqrt(mode.lambda);
+    put(m, std::hypot(state.re[m % kGroup], state.im[m % kGroup]) / std::sqrt((omega - mode.decay) * (omega + mode.decay)));
+  }
+  if (!damped_.is_live()) return;
+  for (int m = model_->ringing_; m < model_->get_mode_count(); ++m) put(m, std::abs(get_mode_state(m).q));
+}
+
 double Voice::calc_energy_j() const noexcept {
   double energy = 0.0;
   for (int m = 0; m < std::min(live_ * kGroup, model_->ringing_); ++m) energy += calc_ringing_energy_j(m);

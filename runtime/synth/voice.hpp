@@ -125,6 +125,8 @@ class Voice {
   /// Memory that this voice has taken, without that of the model.
   std::size_t calc_bytes() const;
   VoiceCounters get_counters() const noexcept;
+  /// Fills in the amplitude of q [m kg^1/2] of each mode that rings, by number in the bank, where there is room for it. [audio-thread]
+  void measure_amplitudes(std::span<float> by_bank_mode) const noexcept;
   /// Sum over the sounded modes of (q'^2 + lambda q^2) / 2 [J] at the horizon, which must be a multiple of kBlock.
   double calc_energy_j() const noexcept;
 

@@ -11,6 +11,7 @@ import sys
 # Third-party headers, by prefix of the include path, and the name the table below uses for them.
 LIBRARIES = {
     "json": ["json/"],
+    "rapidjson": ["rapidjson/"],
     "fmt": ["fmt/"],
     "cli": ["CLI/"],
     "hdf5": ["hdf5", "H5"],
@@ -33,7 +34,7 @@ LIBRARIES = {
 }
 # folder: (folders of ours that it may include, libraries that it may include). std and POSIX are free everywhere.
 LAW = {
-    "runtime/base": ([], ["json", "fmt", "openssl"]),
+    "runtime/base": ([], ["rapidjson", "fmt", "openssl"]),
     "runtime/material": (["runtime/base"], ["fmt"]),
     "runtime/version": ([], ["fmt"]),
     "runtime/bank": (["runtime/base", "runtime/material", "runtime/version"], ["json", "fmt", "hdf5", "cli"]),

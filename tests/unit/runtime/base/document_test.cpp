@@ -95,7 +95,7 @@ TEST_P(BadDocument, is_refused_in_words) {
 INSTANTIATE_TEST_SUITE_P(Table, BadDocument,
                          testing::Values(BadText{"empty", "", "not JSON"}, BadText{"array", "[1]", "JSON"},
                                          BadText{"comma", "{\"a\": 1,\n \"b\" 2}", "file.json:2"},
-                                         BadText{"twice", "{\"a\": 1, \"a\": 2}", "Duplicate"}, BadText{"tail", "{\"a\": 1} x", "Extra"},
+                                         BadText{"twice", "{\"a\": 1, \"a\": 2}", "there twice"}, BadText{"tail", "{\"a\": 1} x", "not JSON"},
                                          BadText{"text", "{\"a\": \"1\"}", "must be a number, and is the text \"1\""},
                                          BadText{"negative", "{\"a\": -1}", "must be greater than 0, and is -1"},
                                          BadText{"missing", "{}", "\"a\" is missing here"}, BadText{"huge", "{\"a\": 1e999}", "file.json"},

@@ -3,7 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <span>
 #include <string>
+
+#include "runtime/base/sha256_plain.hpp"
 
 namespace carillon::base {
 namespace {
@@ -22,6 +26,22 @@ TEST(Sha256, knows_no_pieces) {
   for (std::size_t at = 0, size = 1; at < text.size(); at += size, size = size * 3 % 1009 + 1)
     sha.add(std::string_view(text).substr(at, size));
   EXPECT_EQ(sha.finish(), calc_sha256(text));
+}
+
+// Against OpenSSL: every length around the ends of blocks, and in pieces of every length.
+TEST(PlainSha256, is_that_of_openssl) {
+  std::string text(1000, ' ');
+  for (std::size_t i = 0; i < text.size(); ++i) text[i] = static_cast<char>(i * 89 + i / 7);
+  for (std::size_t size = 0; size <= text.size(); size += size < 300 ? 1 : 37) {
+    const auto bytes = std::as_bytes(std::span(text)).first(size);
+    PlainSha256 whole;
+    whole.add(bytes);
+    ASSERT_EQ(whole.finish(), calc_sha256(std::string_view(text).substr(0, size))) << size;
+    PlainSha256 pieces;
+    for (std::size_t at = 0, piece = 1; at < size; at += piece, piece = piece % 130 + 1)
+      pieces.add(bytes.subspan(at, std::min(piece, size - at)));
+    ASSERT_EQ(pieces.finish(), calc_sha256(std::string_view(text).substr(0, size))) << size;
+  }
 }
 
 }  // namespace
