@@ -121,7 +121,8 @@ class Builder {
   bool Double(double x) {
     constexpr double kBeyond = 9223372036854775808.0;  // 2^63
     const bool is_whole = x == std::floor(x) && x >= -kBeyond && x < kBeyond;
-    return add({.kind = Value::Kind::kNumber, .integer = is_whole ? std::optional(static_cast<std::int64_t>(x)) : std::nullopt, .number = x});
+    return add(
+        {.kind = Value::Kind::kNumber, .integer = is_whole ? std::optional(static_cast<std::int64_t>(x)) : std::nullopt, .number = x});
   }
   bool RawNumber(const char*, rapidjson::SizeType, bool) { return false; }
   bool String(const char* text, rapidjson::SizeType size, bool) {
@@ -152,9 +153,7 @@ class Builder {
  private:
   /// Somewhere from the beginning of what was read last to the byte behind it: that a token lies on one line is what counts.
   std::ptrdiff_t get_offset() const { return static_cast<std::ptrdiff_t>(stream_->Tell()); }
-  bool add_integer(std::int64_t x) {
-    return add({.kind = Value::Kind::kNumber, .integer = x, .number = static_cast<double>(x)});
-  }
+  bool add_integer(std::int64_t x) { return add({.kind = Value::Kind::kNumber, .integer = x, .number = static_cast<double>(x)}); }
   bool add(Value value) {
     value.offset = get_offset();
     Value& into = *open_.back();
@@ -184,7 +183,8 @@ class Builder {
   std::string reason = rapidjson::GetParseError_En(result.Code());
   if (reason.ends_with('.')) reason.pop_back();
   if (!reason.empty()) reason[0] = static_cast<char>(std::tolower(static_cast<unsigned char>(reason[0])));
-  data.fail(static_cast<std::ptrdiff_t>(at), fmt::format("this is not JSON (column {}): {}; correct the text there", at - line_begin + 1, reason));
+  data.fail(static_cast<std::ptrdiff_t>(at),
+            fmt::format("this is not JSON (column {}): {}; correct the text there", at - line_begin + 1, reason));
 }
 
 /// What is wrong with a word that begins like a number, as part of a sentence; nullptr when it is one by the grammar of JSON.
@@ -281,8 +281,7 @@ Document parse_document(std::string_view text, const std::filesystem::path& file
   rapidjson::StringStream stream(data->text.c_str());
   Builder builder(*data, stream, data->root);
   rapidjson::Reader reader;
-  const rapidjson::ParseResult result =
-      reader.Parse<rapidjson::kParseFullPrecisionFlag | rapidjson::kParseCommentsFlag>(stream, builder);
+  const rapidjson::ParseResult result = reader.Parse<rapidjson::kParseFullPrecisionFlag | rapidjson::kParseCommentsFlag>(stream, builder);
   if (result.IsError()) fail_syntax(*data, result);
   if (!data->root.is(Value::Kind::kObject))
     throw InputError(
@@ -415,7 +414,8 @@ bool Object::boolean_or(std::string_view key, bool fallback) {
 
 void Object::copy_numbers(std::string_view key, double* values, std::size_t count) {
   const Value& list = json(require_value(key));
-  if (!list.is(Value::Kind::kList) || list.items.size() != count) fail(key, fmt::format("must be a list of {} numbers, and is {}", count, kind_of(list)));
+  if (!list.is(Value::Kind::kList) || list.items.size() != count)
+    fail(key, fmt::format("must be a list of {} numbers, and is {}", count, kind_of(list)));
   for (std::size_t i = 0; i < count; ++i) values[i] = to_number(*this, list.items[i], key, {});
 }
 

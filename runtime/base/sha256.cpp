@@ -45,7 +45,7 @@ Sha256::Hash Sha256::finish() {
 
 #endif
 
-void Sha256::add(std::string_view bytes) { add(std::as_bytes(std::span(bytes))); }
+void Sha256::add(std::string_view bytes) { add(std::as_bytes(std::span(bytes.data(), bytes.size()))); }
 
 Sha256::Hash calc_sha256(std::string_view bytes) {
   Sha256 sha;

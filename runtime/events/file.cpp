@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstdlib>
 #include <iterator>
 #include <limits>
 #include <optional>
@@ -52,8 +53,12 @@ std::string format_numbers(const std::array<double, n>& x) {
 /// The shortest text of a number in single precision that is read back to the same by way of a double; nearly always that of its own.
 std::string format_number(float x) {
   std::string text = fmt::format("{}", x);
+#if defined(__EMSCRIPTEN__)  // its library reads no floating-point numbers by from_chars, and has one locale
+  const double read = std::strtod(text.c_str(), nullptr);
+#else
   double read = 0.0;
   std::from_chars(text.data(), text.data() + text.size(), read);
+#endif
   if (static_cast<float>(read) != x) return format_number(static_cast<double>(x));
   if (text.find_first_of(".e") == std::string::npos) text += ".0";
   return text;
@@ -266,6 +271,30 @@ std::optional<long long> parse_header(base::Object line, std::vector<RecordedBod
 }
 
 }  // namespace
+
+SurfaceMark mark_surface(std::span<const Vec3> vertices_m, std::span<const std::array<std::int32_t, 3>> triangles) {
+  Vec3 low = vertices_m.front(), high = low, sum{};
+  for (const Vec3& vertex : vertices_m) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      low[k] = std::min(low[k], vertex[k]);
+      high[k] = std::max(high[k], vertex[k]);
+    }
+  }
+  double weights = 0.0;
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    const auto weight = static_cast<double>(t + 1);
+    weights += weight;
+    for (const std::int32_t corner : triangles[t]) {
+      for (std::size_t k = 0; k < 3; ++k) sum[k] += weight / 3.0 * vertices_m[static_cast<std::size_t>(corner)][k];
+    }
+  }
+  SurfaceMark mark;
+  for (std::size_t k = 0; k < 3; ++k) {
+    mark.size_m[k] = high[k] - low[k];
+    mark.order_m[k] = sum[k] / weights;
+  }
+  return mark;
+}
 
 bool is_same_surface(const SurfaceMark& a, const SurfaceMark& b) {
   constexpr double kSlack = 1e-6;  // of the size: the same surface with other rounding

@@ -1,10 +1,12 @@
 // Contacts files: the events of a scene, to be played without physics. Reference: docs/howto/contacts-file.md.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -19,6 +21,9 @@ struct SurfaceMark {
   Vec3 size_m{};
   Vec3 order_m{};
 };
+
+/// Of at least one vertex [m] and triangle, whose corners are there.
+SurfaceMark mark_surface(std::span<const Vec3> vertices_m, std::span<const std::array<std::int32_t, 3>> triangles);
 
 /// Whether two marks are of one surface, to 1e-6 of its size.
 bool is_same_surface(const SurfaceMark& a, const SurfaceMark& b);

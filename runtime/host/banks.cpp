@@ -37,11 +37,9 @@ Banks read_banks(Scene& scene) {
         if (!files.contains(body.bank)) files[body.bank] = bank::choose_frequencies(bank::read_bank(body.bank), scene.frequencies);
         slot->bank = is_last ? std::move(files[body.bank]) : files[body.bank];
         mount(scene, body, slot->bank);
-        radiation::Radiation radiation = radiation::calc_radiation(slot->bank, scene.radiation);
-        slot->bank.radiation_gain = std::move(radiation.gains);
-        slot->sphere_radius_m = radiation.sphere_radius_m;
-        if (scene.radiation == radiation::GainKind::kSphere)
-          slot->limited = radiation::limit_gains(slot->bank.radiation_gain, slot->bank.decay_per_s);
+        const radiation::PutGains put = radiation::put_gains(slot->bank, scene.radiation);
+        slot->sphere_radius_m = put.sphere_radius_m;
+        slot->limited = put.limited;
       } catch (const InputError& error) {
         throw InputError(fmt::format("{}: the bank of body \"{}\": {}", place, body.name, error.what()));
       }

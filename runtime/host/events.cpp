@@ -8,45 +8,11 @@
 
 #include "runtime/contact/world.hpp"
 #include "runtime/host/pose.hpp"
+#include "runtime/host/recorded_bodies.hpp"
 #include "runtime/host/strikes.hpp"
 
 namespace carillon::host {
 namespace {
-
-events::SurfaceMark mark_surface(const bank::Bank& bank) {
-  Vec3 low = bank.vertices_m.front(), high = low, sum{};
-  for (const Vec3& vertex : bank.vertices_m) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      low[k] = std::min(low[k], vertex[k]);
-      high[k] = std::max(high[k], vertex[k]);
-    }
-  }
-  double weights = 0.0;
-  for (std::size_t t = 0; t < bank.triangles.size(); ++t) {
-    const auto weight = static_cast<double>(t + 1);
-    weights += weight;
-    for (const std::int32_t corner : bank.triangles[t]) {
-      for (std::size_t k = 0; k < 3; ++k) sum[k] += weight / 3.0 * bank.vertices_m[static_cast<std::size_t>(corner)][k];
-    }
-  }
-  events::SurfaceMark mark;
-  for (std::size_t k = 0; k < 3; ++k) {
-    mark.size_m[k] = high[k] - low[k];
-    mark.order_m[k] = sum[k] / weights;
-  }
-  return mark;
-}
-
-std::vector<events::RecordedBody> list_bodies(const Scene& scene) {
-  std::vector<events::RecordedBody> bodies;
-  for (const SceneBody& body : scene.bodies) {
-    const bank::Bank& bank = *body.spec.bank;
-    bodies.push_back({body.name, static_cast<std::int64_t>(bank.triangles.size()), mark_surface(bank)});
-  }
-  return bodies;
-}
-
-std::string format_size(const Vec3& size_m) { return fmt::format("{:.4g} x {:.4g} x {:.4g} m", size_m[0], size_m[1], size_m[2]); }
 
 /// Where no body can move there is no physics: every body stays where the scene puts it.
 std::vector<events::Event> make_still(const Scene& scene) {
@@ -116,43 +82,6 @@ void run_physics(const Scene& scene, bool has_contacts, bool audits, const std::
   }
   happened.steps = world.get_statistics().steps;
   happened.energy = world.get_statistics().energy;
-}
-
-/// Throws InputError unless the file's bodies are the scene's.
-void check_bodies(const std::filesystem::path& file, const std::vector<events::RecordedBody>& theirs,
-                  const std::vector<events::RecordedBody>& ours, std::vector<std::string>& warnings) {
-  if (theirs.size() != ours.size()) {
-    throw InputError(fmt::format("{}: is of {} bodies, and the scene has {}; play it with the scene that it was made for", file.string(),
-                                 theirs.size(), ours.size()));
-  }
-  for (std::size_t i = 0; i < ours.size(); ++i) {
-    if (theirs[i].name != ours[i].name) {
-      throw InputError(fmt::format("{}: body {} is \"{}\", and \"{}\" in the scene; play it with the scene that it was made for",
-                                   file.string(), i, theirs[i].name, ours[i].name));
-    }
-    if (theirs[i].triangles != ours[i].triangles) {
-      throw InputError(
-          fmt::format("{}: was made for a bank of \"{}\" with {} triangles, and the scene's has {}; use banks of the same mesh",
-                      file.string(), ours[i].name, theirs[i].triangles, ours[i].triangles));
-    }
-    if (theirs[i].surface && !events::is_same_surface(*theirs[i].surface, *ours[i].surface)) {
-      const std::string were = format_size(theirs[i].surface->size_m), are = format_size(ours[i].surface->size_m);
-      throw InputError(were == are
-                           ? fmt::format("{}: was made for another surface of \"{}\", of the same size and number of triangles; use "
-                                         "a bank of the same mesh",
-                                         file.string(), ours[i].name)
-                           : fmt::format("{}: was made for a body \"{}\" of {}, and the scene's bank measures {}; use a bank of the "
-                                         "same mesh and size, or record the contacts again",
-                                         file.string(), ours[i].name, were, are));
-    }
-  }
-  const auto is_unmarked = [](const events::RecordedBody& body) { return !body.surface; };
-  if (std::any_of(theirs.begin(), theirs.end(), is_unmarked)) {
-    warnings.push_back(fmt::format(
-        "{}: does not say how large its bodies are (\"size_m\", \"order_m\"); that they have as many triangles as the scene's is all "
-        "that was compared",
-        file.string()));
-  }
 }
 
 }  // namespace

@@ -251,4 +251,12 @@ double calc_sphere_radius_m(const bank::Bank& bank) {
   return calc_sphere_radius_of_skin(make_skin(bank));
 }
 
+PutGains put_gains(bank::Bank& bank, GainKind kind) {
+  Radiation radiation = calc_radiation(bank, kind);
+  bank.radiation_gain = std::move(radiation.gains);
+  PutGains put{.sphere_radius_m = radiation.sphere_radius_m};
+  if (kind == GainKind::kSphere) put.limited = limit_gains(bank.radiation_gain, bank.decay_per_s);
+  return put;
+}
+
 }  // namespace carillon::radiation

@@ -42,6 +42,15 @@ struct Limited {
 /// keeps its gain: it rings for ever, as it was asked to. Throws InputError where the sizes differ.
 Limited limit_gains(std::span<double> gains, std::span<const double> decay_per_s);
 
+/// What put_gains() has found and done.
+struct PutGains {
+  double sphere_radius_m = 0.0;
+  Limited limited{};
+};
+/// Puts the gains of a kind into a bank that has the decays with which it is played; those of kSphere are limited by them. Throws InputError
+/// as calc_gains() does.
+PutGains put_gains(bank::Bank& bank, GainKind kind);
+
 /// Radius [m] of the sphere that has the volume inside the outer surface, cavities and all. InputError as above.
 double calc_sphere_radius_m(const bank::Bank& bank);
 

@@ -34,14 +34,14 @@ struct D {
   static D load(const double* at) { return {wasm_v128_load(at), wasm_v128_load(at + 2)}; }
   static D all(double x) { return {wasm_f64x2_splat(x), wasm_f64x2_splat(x)}; }
   static D zero() { return {wasm_f64x2_const(0.0, 0.0), wasm_f64x2_const(0.0, 0.0)}; }
-  static D widen(F x) { return {wasm_f64x2_promote_low_f32x4(x.v), wasm_f64x2_promote_low_f32x4(wasm_i32x4_shuffle(x.v, x.v, 2, 3, 2, 3))}; }
+  static D widen(F x) {
+    return {wasm_f64x2_promote_low_f32x4(x.v), wasm_f64x2_promote_low_f32x4(wasm_i32x4_shuffle(x.v, x.v, 2, 3, 2, 3))};
+  }
   void store(double* at) const {
     wasm_v128_store(at, lo);
     wasm_v128_store(at + 2, hi);
   }
-  F narrow() const {
-    return {wasm_i32x4_shuffle(wasm_f32x4_demote_f64x2_zero(lo), wasm_f32x4_demote_f64x2_zero(hi), 0, 1, 4, 5)};
-  }
+  F narrow() const { return {wasm_i32x4_shuffle(wasm_f32x4_demote_f64x2_zero(lo), wasm_f32x4_demote_f64x2_zero(hi), 0, 1, 4, 5)}; }
   friend D operator+(D a, D b) { return {wasm_f64x2_add(a.lo, b.lo), wasm_f64x2_add(a.hi, b.hi)}; }
   friend D operator*(D a, D b) { return {wasm_f64x2_mul(a.lo, b.lo), wasm_f64x2_mul(a.hi, b.hi)}; }
 };

@@ -224,7 +224,7 @@ void Model::copy_shapes(const bank::Bank& bank) {
   const std::size_t columns = surface->columns = sound_.size() * kGroup + damped_.size();
   bank::reserve_large(surface->shape, bank.vertex_count() * 3 * columns);
   std::vector<std::int16_t> row(3 * columns, 0);  // of a vertex; lanes without a mode stay 0
-  std::vector<std::uint32_t> first, column;        // of each mode: its place in a vertex's row of the bank, and here
+  std::vector<std::uint32_t> first, column;       // of each mode: its place in a vertex's row of the bank, and here
   for (std::size_t i = 0; i < modes_.size(); ++i) {
     first.push_back(3 * static_cast<std::uint32_t>(modes_[i].bank_mode));
     column.push_back(static_cast<std::uint32_t>(
@@ -404,9 +404,8 @@ double Model::calc_projection(int mode, std::int32_t triangle, const Vec3& baryc
 
 std::size_t Model::calc_bytes() const {
   return sound_.size() * (sizeof(SoundTable) + sizeof(RotationTable) + sizeof(StrikeTable) + sizeof(weight_[0]) + sizeof(reach_[0])) +
-         damped_.size() * sizeof(DampedMode) + modes_.size() * sizeof(Mode) +
-         surface_->triangles.size() * sizeof(surface_->triangles[0]) + surface_->shape.size() * sizeof(surface_->shape[0]) +
-         surface_->largest.size() * sizeof(surface_->largest[0]);
+         damped_.size() * sizeof(DampedMode) + modes_.size() * sizeof(Mode) + surface_->triangles.size() * sizeof(surface_->triangles[0]) +
+         surface_->shape.size() * sizeof(surface_->shape[0]) + surface_->largest.size() * sizeof(surface_->largest[0]);
 }
 
 }  // namespace carillon::synth

@@ -145,8 +145,8 @@ class SoundingBody {
   Effect make_modal_sound(std::span<float> mono) noexcept;
   void make_acceleration_noise(const std::array<std::span<float>, 3>& dipole) noexcept;
   void make_sound(std::size_t count, BodyScratch& scratch, TickFunction ticks) noexcept;
-  void hear(Propagation& propagation, std::int64_t sample, std::size_t count, const ListenerTracks& listener, int fade, BodyScratch& scratch,
-            Mix& mix, TickFunction ticks) noexcept;
+  void hear(Propagation& propagation, std::int64_t sample, std::size_t count, const ListenerTracks& listener, int fade,
+            BodyScratch& scratch, Mix& mix, TickFunction ticks) noexcept;
   bool is_filled(const Propagation& propagation, const ListenerTracks& listener, std::int64_t sample) const noexcept;
 
   std::shared_ptr<const Model> model_;  // the main thread's
