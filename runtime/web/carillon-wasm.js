@@ -43,7 +43,7 @@ export class Wasm {
     this.exports._initialize();
   }
 
-  /** There are no files, no environment and no arguments; there is a clock. */
+  /** There are no files, no environment and no arguments; there is a clock, and a root. */
   makeImport(from, name) {
     if (name === 'emscripten_notify_memory_growth') return () => {};
     if (name === 'proc_exit')
@@ -58,6 +58,12 @@ export class Wasm {
         return 0;
       };
     if (name === 'environ_get') return () => 0;
+    if (name === '__syscall_getcwd')
+      return (address, size) => {
+        if (size < 2) return -kNotThere;
+        new Uint8Array(this.exports.memory.buffer).set([0x2f, 0], address >>> 0); // "/": paths of scenes become whole by it
+        return 2;
+      };
     if (name === 'clock_time_get')
       return (...args) => {
         new DataView(this.exports.memory.buffer).setBigUint64(args[args.length - 1], BigInt(Date.now()) * 1000000n, true);
