@@ -11,6 +11,7 @@ const kPlanS = 0.5;
 
 /** Two significant digits, without an exponent. */
 const short = (value) => Number(value.toPrecision(2)).toString();
+const describeCents = (cents) => (!Number.isFinite(cents) ? '–' : cents < 0.1 ? '< 0.1' : short(cents));
 const times = (value) => (value === 1 ? 'as it is' : `× ${value < 1 ? value.toFixed(2) : value.toFixed(value < 10 ? 2 : 0)}`);
 
 export class Panel {
@@ -198,7 +199,7 @@ export class Panel {
   showModes() {
     const { modes } = this.body.sound;
     this.modes.fill(modes.map(({ freq_hz, t60_s, error_cents }, i) => {
-      const cents = Number.isFinite(error_cents) ? error_cents.toPrecision(2) : '–';
+      const cents = describeCents(error_cents);
       return {
         cells: [freq_hz.toFixed(1), formatSeconds(t60_s), cents],
         label: `mode ${i + 1}: ${formatHz(freq_hz)}, T60 ${formatSeconds(t60_s)}, error bar ${cents} cents`,

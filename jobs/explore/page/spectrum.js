@@ -62,7 +62,15 @@ export class Spectrum extends EventTarget {
     this.draw();
   }
 
+  /** In the next frame. */
   draw() {
+    this.waiting ??= requestAnimationFrame(() => {
+      this.waiting = undefined;
+      this.paint();
+    });
+  }
+
+  paint() {
     const { canvas, meter } = this, ratio = Math.min(2, devicePixelRatio), width = canvas.clientWidth, height = canvas.clientHeight;
     if (width === 0) return;
     if (canvas.width !== Math.round(width * ratio)) canvas.width = Math.round(width * ratio);

@@ -8,8 +8,18 @@ const kSlowFrameMs = 45; // slower: fewer pixels while something moves
 const kLeastPixels = 0.5;
 const kRippleS = 0.55;
 
+/** Whether pictures are computed by the processor, which then has little left for the sound. */
+function isSoftware() {
+  const context = document.createElement('canvas').getContext('webgl2');
+  if (!context) throw new Error('this browser draws no WebGL 2; allow it, or use another browser');
+  const facts = context.getExtension('WEBGL_debug_renderer_info');
+  const name = context.getParameter(facts ? facts.UNMASKED_RENDERER_WEBGL : context.RENDERER);
+  context.getExtension('WEBGL_lose_context')?.loseContext();
+  return /swiftshader|llvmpipe|software/i.test(name);
+}
+
 /** Soft boxes around the stage, which metal and glazes mirror. */
-function makeSurroundings(renderer) {
+function makeSurroundings(renderer, size) {
   const room = new THREE.Scene();
   const add = (color, strength, size, at) => {
     const box = new THREE.Mesh(new THREE.BoxGeometry(...size), new THREE.MeshBasicMaterial({ color: new THREE.Color(color).multiplyScalar(strength) }));
@@ -30,7 +40,7 @@ function makeSurroundings(renderer) {
   add(0xffdfb8, 4, [0.2, 5, 6], [9.6, -3, 2]); // right
   add(0xbfd4ff, 2.5, [10, 0.2, 2.5], [0, 9.6, 4]); // behind
   add(0xfff4e6, 0.9, [9, 7, 0.2], [2, -7, -7]); // what a floor throws back
-  const maker = new THREE.PMREMGenerator(renderer), texture = maker.fromScene(room, 0.035).texture;
+  const maker = new THREE.PMREMGenerator(renderer), texture = maker.fromScene(room, 0.035, 0.1, 100, { size }).texture;
   maker.dispose();
   return texture;
 }
@@ -59,16 +69,18 @@ export class View extends EventTarget {
   constructor(canvas) {
     super();
     this.canvas = canvas;
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true });
+    this.isPlain = isSoftware();
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !this.isPlain, alpha: true });
     this.renderer.toneMapping = THREE.ACESFilmicToneMapping;
     this.renderer.toneMappingExposure = 1.05;
     this.renderer.shadowMap.enabled = true;
-    this.renderer.shadowMap.type = THREE.VSMShadowMap;
+    this.renderer.shadowMap.type = this.isPlain ? THREE.PCFShadowMap : THREE.VSMShadowMap;
+    this.renderer.shadowMap.autoUpdate = false;
     this.scene = new THREE.Scene();
-    this.scene.environment = makeSurroundings(this.renderer);
+    this.scene.environment = makeSurroundings(this.renderer, this.isPlain ? 64 : 256);
     this.key = new THREE.DirectionalLight(0xfff1de, 1.9);
     this.key.castShadow = true;
-    this.key.shadow.mapSize.set(1024, 1024);
+    this.key.shadow.mapSize.setScalar(this.isPlain ? 512 : 1024);
     this.key.shadow.radius = 7;
     this.key.shadow.blurSamples = 16;
     this.key.shadow.bias = -1e-3;
@@ -104,7 +116,6 @@ export class View extends EventTarget {
   addBody(body) {
     this.bodies.push(body);
     this.scene.add(body.mesh);
-    this.draw();
   }
 
   /** Of the boxes of all bodies, in the world. */
@@ -131,6 +142,7 @@ export class View extends EventTarget {
     this.key.target.position.set(...this.middle);
     Object.assign(camera, { left: -reach, right: reach, top: reach, bottom: -reach, near: 0.2 * this.size, far: 5 * this.size });
     camera.updateProjectionMatrix();
+    this.isReady = true;
     this.draw();
   }
 
@@ -143,12 +155,12 @@ export class View extends EventTarget {
     this.renderer.setPixelRatio(Math.min(2, devicePixelRatio) * this.pixels);
     this.renderer.setSize(width, height, false);
     this.orbit.resize(width, height, covered);
-    this.paint(performance.now());
+    if (this.isReady) this.paint();
   }
 
   /** In the next frame. */
   draw() {
-    if (this.isWaiting) return;
+    if (this.isWaiting || !this.isReady) return;
     this.isWaiting = true;
     requestAnimationFrame((now) => this.frame(now));
   }
@@ -169,7 +181,7 @@ export class View extends EventTarget {
       if (mover(now / 1000)) moves = true;
       else this.movers.delete(mover);
     }
-    this.paint(now);
+    this.paint();
     this.govern(performance.now() - began, moves);
     if (moves) this.draw();
     else this.lastFrame = undefined;
@@ -177,6 +189,9 @@ export class View extends EventTarget {
 
   paint() {
     if (this.cursorPlace) this.placeMark(this.cursor, this.cursorPlace, 0.011);
+    const pose = this.bodies.map(({ mesh, uniforms }) => `${mesh.matrix.elements} ${uniforms.uBend.value}`).join();
+    this.renderer.shadowMap.needsUpdate = pose !== this.shadowPose; // shadows of what has moved
+    this.shadowPose = pose;
     this.renderer.render(this.scene, this.orbit.camera);
   }
 

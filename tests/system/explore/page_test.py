@@ -1,0 +1,292 @@
+#!/usr/bin/python3
+"""The page of carillon explore in headless Chromium: clicks, keys, sliders, and the sound that comes of them, held against carillon-render.
+
+Finds the programs in $CARILLON_BIN_DIR.
+"""
+import base64
+import gzip
+import json
+import math
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+import h5py
+import numpy
+
+sys.path.insert(0, str(pathlib.Path(__file__).parents[1] / "web"))
+from browser import Browser, serve  # noqa: E402
+
+BIN = pathlib.Path(os.environ["CARILLON_BIN_DIR"])
+GRAPHICS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", "--window-size=900,640"]
+EFFECTS = ["modal", "hertz_pulse", "air_delay", "doppler", "two_ears"]
+LIMIT_DB = -60.0
+JOB = {
+    "body": {"beam": {"length_m": 0.3, "width_m": 0.05, "thickness_m": 0.008, "theory": "timoshenko"}},
+    "material": "brass",
+    "band_hz": [20, 8000],
+    "max_modes": 30,
+    "bank": "bar.hdf",
+}
+BODY = {"name": "bar", "bank": "bar.hdf", "position_m": [-0.15, 0, 0.2], "rotation_deg": [35, 10, 0]}
+ROOM = {
+    "duration_s": 1,
+    "effects": EFFECTS,
+    "bodies": [{**BODY, "fixed": True}],
+    "listener": {"position_m": [0, -0.8, 0.5], "look_at_m": [0, 0, 0.2]},
+}
+FALL = {"duration_s": 0.8, "ground": {}, "bodies": [BODY]}
+KEYS = {"ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40, "Home": 36}
+
+
+def run(*words, cwd):
+    done = subprocess.run([str(word) for word in words], cwd=cwd, capture_output=True, text=True)
+    assert done.returncode == 0, (words, done.stdout, done.stderr)
+    return done.stdout
+
+
+def read_float_wav(file):
+    data, at = pathlib.Path(file).read_bytes(), 12
+    while data[at : at + 4] != b"data":
+        at += 8 + int.from_bytes(data[at + 4 : at + 8], "little")
+    return numpy.frombuffer(data[at + 8 : at + 8 + int.from_bytes(data[at + 4 : at + 8], "little")], "<f4").reshape(-1, 2).astype(float)
+
+
+class PageTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.scratch = tempfile.TemporaryDirectory(prefix="carillon-page-")
+        cls.root = pathlib.Path(cls.scratch.name)
+        (cls.root / "bar.json").write_text(json.dumps(JOB))
+        run(BIN / "carillon-precompute", "bar.json", "-q", cwd=cls.root)
+        for name, scene in (("room", ROOM), ("fall", FALL)):
+            (cls.root / f"{name}.json").write_text(json.dumps(scene))
+            run(BIN / "carillon", "explore", f"{name}.json", "-o", name, cwd=cls.root)
+        cls.server = serve(cls.root)
+        cls.browser = Browser(GRAPHICS)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.browser.close()
+        cls.server.__exit__()
+        cls.scratch.cleanup()
+
+    def open(self, folder, state="ready"):
+        page = self.browser.open(f"{self.server.url}{folder}/index.html")
+        self.addCleanup(page.close)
+        got = page.wait_for("document.documentElement.dataset.state", timeout_s=100)
+        self.assertEqual(got, state, page.evaluate("document.getElementById('card-text').textContent"))
+        return page
+
+    def count_modes(self):
+        with h5py.File(self.root / "bar.hdf") as bank:
+            return len(bank["modes/eigenvalue"])
+
+    def press(self, page, key, **more):
+        page.press(key, key_code=KEYS.get(key, 0), **more)
+
+    def wait_for_log(self, page, count):
+        page.wait_for(f"carillon.player.log.length >= {count}", timeout_s=60)
+        return page.evaluate("carillon.player.log")
+
+    def test_a_click_sounds_as_carillon_render_has_it(self):
+        page = self.open("room")
+        self.assertEqual(page.evaluate("document.title"), "room")
+        spot = page.evaluate("carillon.view.project(carillon.panel.body.shown.findWorldPoint(carillon.panel.body.places[1]))")
+        x, y = round(spot["x"]) - 12, round(spot["y"]) + 5
+        page.evaluate("carillon.Recorder.open(carillon.audio.context, carillon.audio.node).then(r => { window.taken = r; r.start(); })")
+        page.mouse("mouseMoved", x, y)
+        time.sleep(1.5)  # the ears have come to the camera, and the pointer is at rest
+        page.mouse("mousePressed", x, y, "left", clickCount=1, buttons=1)
+        page.mouse("mouseReleased", x, y, "left", clickCount=1)
+        blow = self.wait_for_log(page, 1)[0]
+        self.assertEqual((blow["kind"], blow["mallet"], blow["speed_m_s"]), ("strike", "hard-wood", 1))
+
+        # The place is on the surface, and where the pixel is, by a pinhole camera of our own.
+        with h5py.File(self.root / "bar.hdf") as bank:
+            corners = bank["mesh/vertices"][:][bank["mesh/triangles"][:][blow["triangle"]]]
+        numpy.testing.assert_allclose(numpy.array(blow["barycentric"]) @ corners, blow["point_m"], atol=1e-6)
+        a, b = numpy.radians(BODY["rotation_deg"][0]), numpy.radians(BODY["rotation_deg"][1])
+        turn = numpy.array([[math.cos(b), 0, math.sin(b)], [0, 1, 0], [-math.sin(b), 0, math.cos(b)]]) @ numpy.array(
+            [[1, 0, 0], [0, math.cos(a), -math.sin(a)], [0, math.sin(a), math.cos(a)]]
+        )
+        world = turn @ blow["point_m"] + BODY["position_m"]
+        view = page.evaluate(
+            "(({orbit, canvas}) => ({eye: orbit.position_m, target: orbit.target, fov: orbit.camera.fov, covered: orbit.covered,"
+            " size: [canvas.clientWidth, canvas.clientHeight]}))(carillon.view)"
+        )
+        eye, (width, height) = numpy.array(view["eye"]), view["size"]
+        forward = numpy.array(view["target"]) - eye
+        forward /= numpy.linalg.norm(forward)
+        right = numpy.cross(forward, [0, 0, 1])
+        right /= numpy.linalg.norm(right)
+        way, focal = world - eye, height / 2 / math.tan(math.radians(view["fov"] / 2))
+        ahead = way @ forward
+        seen_x = width / 2 * (1 - view["covered"]["right"]) + focal * (way @ right) / ahead
+        seen_y = height / 2 * (1 - view["covered"]["below"]) - focal * (way @ numpy.cross(right, forward)) / ahead
+        self.assertLess(math.hypot(seen_x - x, seen_y - y), 0.5)
+
+        # The sound, against the same blow by carillon-render, shifted by whole frames.
+        time.sleep(1.5)
+        taken = page.evaluate(
+            "window.taken.stop().then(({samples, rate_hz}) => { const bytes = new Uint8Array(samples.buffer); let text = '';"
+            " for (let i = 0; i < bytes.length; i += 8192) text += String.fromCharCode(...bytes.subarray(i, i + 8192));"
+            " return {rate_hz, gain: carillon.player.gain_per_pa, text: btoa(text)}; })"
+        )
+        heard = numpy.frombuffer(base64.b64decode(taken["text"]), "<f4").reshape(-1, 2).astype(float)
+        begin = 384 * 128 / 48000
+        strike = {
+            "time_s": begin,
+            "body": "bar",
+            "point_m": blow["point_m"],
+            "mallet": {"from": blow["mallet"], "speed_m_s": blow["speed_m_s"]},
+        }
+        scene = json.loads((self.root / "room/scene.json").read_text())
+        level = forward * [1, 1, 0] / numpy.linalg.norm(forward * [1, 1, 0])
+        scene |= {"duration_s": begin + 1, "strikes": [strike], "sample_rate_hz": round(taken["rate_hz"])}
+        scene |= {
+            "listener": {"position_m": list(eye), "facing": list(level)},
+            "output": {"gain": 0.01, "format": "float", "fade_end": False},
+        }
+        (self.root / "room/struck.json").write_text(json.dumps(scene))
+        run(BIN / "carillon-render", "struck.json", "-q", "-o", "struck.wav", cwd=self.root / "room")
+        expected = read_float_wav(self.root / "room/struck.wav")[round(begin * 48000) - 64 :] * taken["gain"] / 0.01
+        size = 1 << (len(heard) + len(expected)).bit_length()
+        match = numpy.fft.irfft(numpy.fft.rfft(heard[:, 0], size) * numpy.conj(numpy.fft.rfft(expected[:, 0], size)))
+        lag = int(numpy.argmax(match[: len(heard) - len(expected)]))
+        difference = heard[lag : lag + len(expected)] - expected
+        db = 10 * math.log10((difference**2).mean() / (expected**2).mean())
+        print(f"a click against carillon-render: {db:.1f} dB, limit {LIMIT_DB:g} dB")
+        self.assertLess(db, LIMIT_DB)
+        counters = page.evaluate("carillon.audio.counters()")
+        self.assertEqual([counters[name] for name in ("refused", "faults", "resets", "zeroed")], [0, 0, 0, 0])
+        self.assertEqual(page.find_strangers(self.server.url), [])
+        self.assertEqual(page.errors, [])
+
+    def test_keys_and_screen_readers(self):
+        page = self.open("room")
+        # What a screen reader has: the roles and names of the tree.
+        nodes = page.call("Accessibility.getFullAXTree")["nodes"]
+        tree = {(node["role"]["value"], node.get("name", {}).get("value", "")) for node in nodes if not node.get("ignored")}
+        for wanted in (
+            ("application", f"bar, {self.count_modes()} modes"),
+            ("listbox", "Places to strike; Enter strikes"),
+            ("option", "top"),
+            ("option", "where it is loudest"),
+            ("radiogroup", "Mallet"),
+            ("radio", "soft felt"),
+            ("listbox", "Modes"),
+            ("slider", "Size"),
+            ("combobox", "Material"),
+            ("button", "Record"),
+        ):
+            self.assertTrue(wanted in tree, wanted)
+        self.assertTrue(any(role == "status" for role, _ in tree))
+        described = next(node for node in nodes if node["role"]["value"] == "application")
+        self.assertIn("Enter or Space strikes", described["description"]["value"])
+        # Arrows move the place, Enter strikes there, and it is announced.
+        page.evaluate("document.getElementById('view').focus()")
+        before = page.evaluate("carillon.view.project(carillon.hands.place.point)")
+        for _ in range(2):
+            self.press(page, "ArrowLeft")
+        after = page.evaluate("carillon.view.project(carillon.hands.place.point)")
+        self.assertLess(after["x"], before["x"] - 3)
+        self.assertLess(abs(after["y"] - before["y"]), 12)
+        self.press(page, "Enter")
+        self.wait_for_log(page, 1)
+        self.assertIn("struck bar: hard wood at 1 m/s", page.evaluate("document.getElementById('status').textContent"))
+        page.press("6")
+        page.press(" ")
+        self.assertEqual(self.wait_for_log(page, 2)[1]["mallet"], "soft-felt")
+        # The list of places strikes, too.
+        page.evaluate("document.getElementById('places').focus()")
+        self.press(page, "ArrowDown")
+        self.press(page, "Enter")
+        blow = self.wait_for_log(page, 3)[2]
+        self.assertEqual(blow["triangle"], page.evaluate("carillon.panel.body.places[1].triangle"))
+        # A mode of the list moves the body and sounds alone; leaving it ends that.
+        page.evaluate("document.getElementById('modes').focus()")
+        page.wait_for("carillon.panel.body.shown.isBent")
+        self.press(page, "ArrowDown")
+        page.wait_for("carillon.panel.mode === 1")
+        page.evaluate("document.getElementById('modes').blur()")
+        page.wait_for("!carillon.panel.body.shown.isBent")
+
+    def test_drags_scrape_holds_press_and_sliders_edit(self):
+        page = self.open("room")
+        spot = page.evaluate("carillon.view.project(carillon.panel.body.shown.findWorldPoint(carillon.panel.body.places[1]))")
+        page.mouse("mouseMoved", spot["x"], spot["y"])
+        page.mouse("mousePressed", spot["x"], spot["y"], "left", clickCount=1, buttons=1)
+        for step in range(12):
+            page.mouse("mouseMoved", spot["x"] - 3 * step, spot["y"], "left", buttons=1)
+            time.sleep(0.02)
+        page.mouse("mouseReleased", spot["x"] - 33, spot["y"], "left", clickCount=1)
+        kinds = [entry["kind"] for entry in self.wait_for_log(page, 2)]
+        self.assertEqual(sorted(kinds), ["scrape", "strike"])
+        scrape = next(entry for entry in page.evaluate("carillon.player.log") if entry["kind"] == "scrape")
+        self.assertGreater(scrape["fastest_m_s"], 0.005)
+        page.mouse("mouseMoved", spot["x"], spot["y"])
+        page.mouse("mousePressed", spot["x"], spot["y"], "left", clickCount=1, buttons=1)
+        page.wait_for("[...carillon.hands.pointers.values()].some(({touch}) => touch)")
+        page.mouse("mouseReleased", spot["x"], spot["y"], "left", clickCount=1)
+        page.wait_for("carillon.player.log.some(({kind}) => kind === 'press')")
+        # Twice the size: half the frequencies. Four times the density: half again. No solve.
+        first = page.evaluate("carillon.panel.body.sound.modes.map(({freq_hz}) => freq_hz)")
+        set_slider = "(() => { const it = document.getElementById('%s'); it.value = %g; it.dispatchEvent(new Event('input')); })()"
+        page.evaluate(set_slider % ("size", 1))
+        page.wait_for(f"Math.abs(carillon.panel.body.sound.modes[0].freq_hz / {first[0]} - 0.5) < 1e-6")
+        page.evaluate(set_slider % ("density", 2))
+        page.wait_for(f"Math.abs(carillon.panel.body.sound.modes[0].freq_hz / {first[0]} - 0.25) < 1e-6")
+        numpy.testing.assert_allclose(
+            page.evaluate("carillon.panel.body.sound.modes.map(({freq_hz}) => freq_hz)"), numpy.array(first) / 4, rtol=1e-6
+        )
+        page.evaluate("document.getElementById('reset').click()")
+        page.wait_for(f"Math.abs(carillon.panel.body.sound.modes[0].freq_hz / {first[0]} - 1) < 1e-9")
+        # Why each effect is on or off is shown.
+        page.wait_for("document.querySelectorAll('#plan dt').length === 9")
+        self.assertIn("modal", page.evaluate("document.querySelector('#plan dt.on').textContent"))
+        self.assertEqual(page.errors, [])
+
+    def test_a_recording_plays_with_its_motion(self):
+        page = self.open("fall")
+        lines = gzip.decompress((self.root / "fall/contacts.jsonl.gz").read_bytes()).decode().splitlines()
+        motions = [event["motion"] for event in map(json.loads, lines[1:]) if "motion" in event]
+        at = motions[len(motions) // 2]
+        page.evaluate(f"carillon.transport.show({at['time_s']})")
+        got = page.evaluate("(({shown, bank}) => shown.toWorld(bank.centre_m))(carillon.player.bodies[0])")
+        numpy.testing.assert_allclose(got, at["position_m"], atol=2e-4)
+        page.evaluate(
+            "window.peak = 0; carillon.audio.addEventListener('state', ({detail}) => (window.peak = Math.max(window.peak, detail.peak_pa)))"
+        )
+        page.evaluate("document.getElementById('play').click()")
+        page.wait_for("carillon.transport.isPlaying && carillon.transport.recording.time_s > 0.2", timeout_s=60)
+        # The picture is at the time that is heard, to the time of a slow frame.
+        off = page.evaluate("Math.abs(carillon.transport.recording.time_s - Number(document.getElementById('position').value))")
+        self.assertLess(off, 0.5)
+        page.wait_for("!carillon.transport.isPlaying", timeout_s=60)
+        self.assertGreater(page.evaluate("window.peak"), 0)
+        self.assertEqual(page.errors, [])
+
+    def test_a_bank_that_cannot_be_read_is_one_clear_error(self):
+        whole = (self.root / "room/banks/bar.hdf").read_bytes()
+        for name, bytes_, words in (
+            ("future", whole.replace(b"CARILLON BANK 1.", b"CARILLON BANK 9.", 1), ("bar.hdf", "9.")),
+            ("damaged", whole[:9000] + bytes([whole[9000] ^ 1]) + whole[9001:], ("bar.hdf",)),
+        ):
+            shutil.copytree(self.root / "room", self.root / name)
+            (self.root / name / "banks/bar.hdf").write_bytes(bytes_)
+            page = self.open(name, state="failed")
+            said = page.evaluate("document.getElementById('card-text').textContent")
+            for word in words:
+                self.assertIn(word, said)
+            self.assertEqual(len(said.splitlines()), 1)
+            self.assertEqual(page.evaluate("document.getElementById('card-title').textContent"), "This cannot be played")
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
