@@ -35,9 +35,7 @@ void run(samples::SampleOptions& options, bool is_quiet) {
   if (is_quiet) return;
   fmt::print("samples     {}, {:.3g} MB\n", set.samples, 1e-6 * set.bytes);
   fmt::print("full scale  {:.4g} Pa at 1 m, at velocity 127\n", set.full_scale_pa);
-  if (options.layers > 1)
-    fmt::print("layers      {}; a mode changes by up to {:.1f} dB from one to the next, beyond its velocity\n", options.layers,
-               set.layer_step_db);
+  fmt::print("layers      {}; a velocity is {:.1f} dB(A) from its own blow, in the mean\n", options.layers, set.error_db);
   for (const auto& file : set.instruments) fmt::print("instrument  {}\n", base::printable(file.string()));
 }
 

@@ -39,13 +39,16 @@ constexpr int kMaxLayers = 16, kMaxRoundRobin = 16;
 constexpr double kPeakDbfs = -1.0;
 constexpr double kSilence = 1e-4;  // of the peak, where a sample ends
 constexpr double kShortestS = 0.05;
-constexpr double kAround = 0.05;   // of the body's extent: how far from a place its other strikes are
-constexpr double kHeardDb = 30.0;  // below the loudest mode
+constexpr double kAround = 0.05;  // of the body's extent: how far from a place its other strikes are
+constexpr int kVelocityStep = 3;  // of those at which layers are compared with the blow itself: no divisor of usual layers
+
+/// Of full scale, at which a sampler plays a velocity.
+double calc_share(int velocity) { return std::pow(static_cast<double>(velocity) / kVelocities, 2); }
 
 /// A layer of velocities, and the one that is struck.
 struct Layer {
   int low = 1, high = kVelocities, middle = 64;
-  double share() const { return std::pow(static_cast<double>(middle) / kVelocities, 2); }  // of full scale, by which a sampler plays it
+  double share() const { return calc_share(middle); }
 };
 
 std::vector<Layer> divide_velocities(int layers) {
@@ -157,20 +160,20 @@ class Maker {
     return bank::find_nearest(*bank_, at.point_m + far * std::cos(angle) * u + far * std::sin(angle) * v).point_m;
   }
 
-  host::SceneStrike make_strike(std::size_t mallet, const Vec3& point_m, const Layer& layer) const {
+  host::SceneStrike make_strike(std::size_t mallet, const Vec3& point_m, int velocity) const {
     host::SceneStrike strike;
     strike.place = options_->bank.string();
     strike.time_s = 0.0;
     strike.point_m = point_m;
     strike.mallet = host::make_mallet(material::require_mallet("--mallets", options_->mallets[mallet]));
-    strike.mallet->speed_m_s = options_->speed_m_s * layer.share();
+    strike.mallet->speed_m_s = options_->speed_m_s * calc_share(velocity);
     return strike;
   }
 
-  /// What a blow leaves in each mode, (m) [dB(A) re 1 Pa at 1 m], over what the sampler makes of its velocity.
-  std::vector<double> calc_levels(const std::vector<events::Event>& events, const Layer& layer) const {
-    std::vector<double> levels(bank_->mode_count());
-    for (std::size_t m = 0; m < levels.size(); ++m) {
+  /// What a blow leaves in each mode, A-weighted (m) [Pa at 1 m], over what the sampler makes of its velocity.
+  std::vector<double> calc_amplitudes(const std::vector<events::Event>& events, int velocity) const {
+    std::vector<double> amplitudes(bank_->mode_count());
+    for (std::size_t m = 0; m < amplitudes.size(); ++m) {
       const double omega = std::sqrt(bank_->eigenvalue_rad2_s2[m]);
       std::complex<double> sum = 0.0;
       for (const events::Event& event : events) {
@@ -183,10 +186,9 @@ class Maker {
           sum += amplitude * std::polar(1.0, -omega * (force->time_s + (k + 0.5) * force->step_s));
         }
       }
-      const double heard = bank::calc_a_weight(bank_->freq_hz(m)) * bank_->radiation_gain[m] * std::abs(sum) / layer.share();
-      levels[m] = 20.0 * std::log10(std::max(heard, 1e-30));
+      amplitudes[m] = bank::calc_a_weight(bank_->freq_hz(m)) * bank_->radiation_gain[m] * std::abs(sum) / calc_share(velocity);
     }
-    return levels;
+    return amplitudes;
   }
 
   const std::vector<double>& find_shapes(const events::Force& force) const {
@@ -198,11 +200,28 @@ class Maker {
     return shapes_;
   }
 
-  void compare(const std::vector<double>& softer, const std::vector<double>& harder, SampleSet& set) const {
-    const double loudest = std::max(*std::max_element(softer.begin(), softer.end()), *std::max_element(harder.begin(), harder.end()));
-    for (std::size_t m = 0; m < softer.size(); ++m)
-      if (std::max(softer[m], harder[m]) > loudest - kHeardDb)
-        set.layer_step_db = std::max(set.layer_step_db, std::abs(harder[m] - softer[m]));
+  /// Adds up how far the sample of its layer is from the blow of each velocity, in this place.
+  void compare(std::size_t mallet, const Vec3& point_m) {
+    std::vector<std::vector<double>> of_layer;
+    for (const Layer& layer : layers_) of_layer.push_back(calc_amplitudes(make_blow(mallet, point_m, layer.middle), layer.middle));
+    for (int velocity = kVelocityStep; velocity < kVelocities; velocity += kVelocityStep) {
+      const std::vector<double> exact = calc_amplitudes(make_blow(mallet, point_m, velocity), velocity);
+      const auto layer = std::find_if(layers_.begin(), layers_.end(), [&](const Layer& l) { return velocity <= l.high; });
+      const std::vector<double>& played = of_layer[static_cast<std::size_t>(layer - layers_.begin())];
+      double difference = 0.0, whole = 0.0;
+      for (std::size_t m = 0; m < exact.size(); ++m) {
+        difference += (played[m] - exact[m]) * (played[m] - exact[m]);
+        whole += exact[m] * exact[m];
+      }
+      if (!(whole > 0.0)) continue;
+      error_sum_ += difference / whole;
+      ++error_count_;
+    }
+  }
+
+  std::vector<events::Event> make_blow(std::size_t mallet, const Vec3& point_m, int velocity) {
+    scene_.strikes = {make_strike(mallet, point_m, velocity)};
+    return host::make_strikes(scene_, {bank_}).events;
   }
 
   void strike_all(SampleSet& set) {
@@ -211,20 +230,15 @@ class Maker {
       for (std::size_t place = 0; place < points_.size(); ++place)
         for (int turn = 0; turn < options_->round_robin; ++turn) {
           const Vec3 point_m = find_point(place, turn);
-          std::vector<double> before;
+          if (turn == 0) compare(mallet, point_m);
           for (int layer = 0; layer < options_->layers; ++layer) {
-            const Layer& own = layers_[static_cast<std::size_t>(layer)];
-            scene_.strikes = {make_strike(mallet, point_m, own)};
-            const host::Strikes strikes = host::make_strikes(scene_, {bank_});
-            const std::vector<double> levels = calc_levels(strikes.events, own);
-            if (!before.empty()) compare(before, levels, set);
-            before = levels;
-            samples_.push_back(
-                render(strikes.events, {.mallet = mallet, .place = place, .layer = layer, .turn = turn, .file = {}, .frames = {}}));
+            const std::vector<events::Event> blow = make_blow(mallet, point_m, layers_[static_cast<std::size_t>(layer)].middle);
+            samples_.push_back(render(blow, {.mallet = mallet, .place = place, .layer = layer, .turn = turn, .file = {}, .frames = {}}));
             if (options_->progress) options_->progress(static_cast<double>(samples_.size()) / all);
           }
         }
     set.samples = samples_.size();
+    set.error_db = error_count_ > 0 ? 10.0 * std::log10(std::max(error_sum_ / error_count_, 1e-30)) : 0.0;
   }
 
   Sample render(const std::vector<events::Event>& events, Sample sample) {
@@ -331,6 +345,8 @@ class Maker {
   Vec3 low_{}, high_{};
   std::vector<Vec3> points_;
   std::vector<Sample> samples_;
+  double error_sum_ = 0.0;
+  int error_count_ = 0;
   mutable std::int32_t shapes_triangle_ = -1;
   mutable Vec3 shapes_at_{};
   mutable std::vector<double> shapes_;

@@ -38,8 +38,8 @@ struct SampleSet {
   std::size_t samples = 0;
   double bytes = 0.0;          // of the WAV files
   double full_scale_pa = 0.0;  // pressure at 1 m at full scale and velocity 127
-  double layer_step_db = 0.0;  // by how much a mode differs between neighbouring layers, beyond what velocity makes of both; the most of
-                               // all modes within 30 dB(A) of the loudest. 0 with one layer
+  double error_db = 0.0;       // mean over velocities: modes as played by their layer against those of the blow, A-weighted energy of the
+                               // difference over that of the blow; what more layers make smaller
 };
 
 /// Strikes the body, fixed, with each mallet in each place at each speed, and writes the samples (1 m from its centre, mono) and the
