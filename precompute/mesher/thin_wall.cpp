@@ -336,7 +336,6 @@ class ThinMesher {
       return distance;
     });
     attempt.rings = static_cast<std::int64_t>(attempt.skin.surface.points.size() - points);
-    if (!low_source_ && !attempt.skin.folds.empty()) attempt.skin = make_room(attempt.skin, places_, find_ways_out(attempt.skin), levels_);
     attempt.nodes = count_mesh_nodes(attempt.skin.surface, order_, layers_);
     return attempt;
   }
@@ -370,21 +369,24 @@ class ThinMesher {
     return best;
   }
 
-  /// Where the mitres of folds meet it depends on the triangles there whether the wall folds over: other edges are tried.
+  /// Where the mitres of folds meet in corners, triangles need room for both sides of the wall; whether they find it depends on the edges.
   Extruded extrude_or_retry(Attempt& attempt) {
-    constexpr std::array<double, 6> kFactors{1.06, 0.94, 1.12, 0.88, 1.2, 0.8};
-    const bool has_folds = !attempt.skin.folds.empty();
+    constexpr std::array<double, 7> kFactors{1, 1.06, 0.94, 1.12, 0.88, 1.2, 0.8};
+    const bool may_retry = !low_source_ && !attempt.skin.folds.empty();
     const double edge = edge_;
     for (std::size_t n = 0;; ++n) {
       try {
         return extrude_skin(attempt.skin);
       } catch (const WallError&) {
-        if (!has_folds || n == kFactors.size()) throw;
+        if (!may_retry || n == kFactors.size()) throw;
       }
-      edge_ = edge * kFactors[n];
-      Attempt other = make_skin(edge_, kPerRadius);
-      const double off = options_.nodes ? static_cast<double>(other.nodes) / static_cast<double>(*options_.nodes) - 1 : 0;
-      if (std::abs(off) <= kCountTolerance) attempt = std::move(other);
+      if (n > 0) {
+        edge_ = edge * kFactors[n];
+        Attempt other = make_skin(edge_, kPerRadius);
+        const double off = options_.nodes ? static_cast<double>(other.nodes) / static_cast<double>(*options_.nodes) - 1 : 0;
+        if (std::abs(off) <= kCountTolerance) attempt = std::move(other);
+      }
+      attempt.skin = make_room(attempt.skin, places_, find_ways_out(attempt.skin), levels_);
     }
   }
 
