@@ -409,6 +409,7 @@ std::string Workshop::make_plan(std::string_view scene, std::span<const int> bod
   }
   host::Events happened(base::Spool({}, "events", kMostEvents));
   std::vector<bool> struck(bodies.size(), false);
+  bool is_touched = false;  // by a hand, though nothing of the scene may move
   read_words(words, [&](const events::Event& event, Timing) {
     happened.append(event);
     const auto note = [&](std::int32_t body) {
@@ -416,8 +417,10 @@ std::string Workshop::make_plan(std::string_view scene, std::span<const int> bod
     };
     if (const auto* impulse = std::get_if<events::Impulse>(&event)) note(impulse->body);
     if (const auto* force = std::get_if<events::Force>(&event)) note(force->body);
+    is_touched = is_touched || std::holds_alternative<events::LastingContact>(event);
   });
   effect_selection::SceneFacts facts = make_scene_facts(described);
+  facts.moves = facts.moves || is_touched;
   for (std::size_t i = 0; i < bodies.size(); ++i) facts.bodies[i].struck = facts.bodies[i].struck || struck[i];
   const host::Plan plan = host::make_plan(std::move(facts), happened, {});
   std::vector<synth::EffectSet> now(bodies.size());

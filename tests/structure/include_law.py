@@ -81,6 +81,20 @@ LAW = {
         ],
         ["fmt", "cli", "portaudio"],
     ),
+    "runtime/web": (
+        [
+            "runtime/base",
+            "runtime/material",
+            "runtime/bank",
+            "runtime/support",
+            "runtime/events",
+            "runtime/radiation",
+            "runtime/synth",
+            "runtime/effect_selection",
+            "runtime/host",
+        ],
+        ["fmt"],
+    ),
     "partition": (["runtime/base", "precompute/mesh", "precompute/comm"], ["fmt", "mpi", "metis", "eigen"]),
     "jobs/process": (["runtime/base"], ["fmt"]),
     "jobs/outcome": (["runtime/base", "jobs/process"], ["fmt"]),
@@ -211,7 +225,7 @@ INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 # The C library and POSIX: free everywhere. A header of C++ itself has neither a folder nor an ending.
 SYSTEM = re.compile(
     r"^(sys/[a-z]+|unistd|fcntl|dirent|dlfcn|signal|pthread|poll|termios|errno|limits|"
-    r"stddef|stdint|stdlib|stdio|string|math|time|sched|spawn|immintrin|xmmintrin|pwd|malloc)\.h$"
+    r"stddef|stdint|stdlib|stdio|string|math|time|sched|spawn|immintrin|xmmintrin|wasm_simd128|pwd|malloc)\.h$"
 )
 
 

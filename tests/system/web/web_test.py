@@ -203,9 +203,7 @@ def test_scenes():
         (bench.folder / "wrong.jsonl").write_text(wrong)
         refused = bench.render_page(
             {"seconds": 0.1},
-            act.replace("contacts.jsonl", "wrong.jsonl").replace("recording = await", "recording = await")
-            if False
-            else """
+            """
                 const bank = await load('a.hdf'), bodies = [await audio.addBody({bank, name: 'a'}), await audio.addBody({bank, name: 'b'})];
                 return await audio.addRecording(await (await fetch('wrong.jsonl')).text(), bodies, 'wrong.jsonl').catch((e) => e.message);
             """,
@@ -224,7 +222,7 @@ def test_edits():
             "another damping": (["--tan-phi", 0.004], "{loss: 0.002, damping_scale: 2}"),
         }
         for name, (given, edits) in made.items():
-            run(BIN / "carillon-bank", "edit", bench.folder / "a.hdf", "-o", bench.folder / "b.hdf", *given)
+            run(BIN / "carillon-bank", "edit", bench.folder / "a.hdf", bench.folder / "b.hdf", *given)
             scene = make_scene(bodies=[{**BODY, "bank": "b.hdf"}])
             bench.compare(name, scene, options, LOAD + f"await body.edit({edits});" + STRIKE_AT % 0.1)
             # While it plays: the last of three wishes is heard.
@@ -238,7 +236,7 @@ def test_edits():
                 begin, end = int(0.24 * 48000), int(0.3 * 48000)
                 assert steps[begin:end].max() < 1.5 * steps[int(0.15 * 48000) : begin].max(), "a click"
 
-        run(BIN / "carillon-bank", "edit", bench.folder / "a.hdf", "-o", bench.folder / "one.hdf", "--modes", 1, "--keep", "lowest")
+        run(BIN / "carillon-bank", "edit", bench.folder / "a.hdf", bench.folder / "one.hdf", "--modes", 1, "--keep", "lowest")
         scene = make_scene(bodies=[{**BODY, "bank": "one.hdf"}])
         bench.compare("one mode alone", scene, options, LOAD + "body.solo(0);" + STRIKE_AT % 0.1)
         # All the others go on: once the solo is over they are heard as if it had not been.
@@ -327,14 +325,15 @@ def test_hard():
         # Sizes from a hundredth to a hundredfold, rates from 8 to 192 kHz.
         for size in (0.01, 0.1, 10, 100):
             given = ["--size", size]
-            run(BIN / "carillon-bank", "edit", bench.folder / "a.hdf", "-o", bench.folder / "b.hdf", *given)
+            run(BIN / "carillon-bank", "edit", bench.folder / "a.hdf", bench.folder / "b.hdf", *given)
             far = {**LISTENER, "position_m": [0.0, -50.0, 0.5]}
+            sized = LOAD.replace("fixed: true,", f"fixed: true, edits: {{size_scale: {size}}},")
             scene = make_scene(bodies=[{**BODY, "bank": "b.hdf"}], listener=far, duration_s=0.5)
             if np.mean(bench.render_file(scene) ** 2) == 0.0:
-                got = bench.render_page({"seconds": 0.5, "listener": far}, LOAD + f"await body.edit({{size_scale: {size}}});" + STRIKE_AT % 0.1)
+                got = bench.render_page({"seconds": 0.5, "listener": far}, sized + STRIKE_AT % 0.1)
                 assert not got["sound"].any() and got["errors"] == [], size  # all its modes are above what can be heard
                 continue
-            bench.compare(f"{size} times as large", scene, {"listener": far}, LOAD + f"await body.edit({{size_scale: {size}}});" + STRIKE_AT % 0.1)
+            bench.compare(f"{size} times as large", scene, {"listener": far}, sized + STRIKE_AT % 0.1)
         for rate_hz in (8000, 192000):
             bench.compare(f"{rate_hz} Hz", make_scene(0.5, sample_rate_hz=rate_hz), {**options, "rate_hz": rate_hz}, LOAD + STRIKE_AT % 0.1)
 
@@ -381,7 +380,8 @@ def test_live():
         page.wait_for(f"audio.counters().then((c) => c.quanta > {at['quanta']} + 50)")
         after = page.evaluate("audio.counters()")
         assert after["strikes"] == before["strikes"] + 2 or after["strikes"] >= 2, (before, after)
-        assert after["gaps"] == 0 and after["faults"] == 0 and after["resets"] == 0, after
+        # A browser may leave the quantum out in which it falls asleep.
+        assert after["gaps"] - at["gaps"] <= 1 and after["late"] == after["faults"] == after["resets"] == 0, (at, after)
 
         # A trap ends the sound, says so once, and leaves the page alive.
         page.evaluate("audio.engine.ask({type: 'fail'}).catch(() => 0)")
@@ -435,26 +435,26 @@ def test_minute(seconds=60):
         time.sleep(1.0)
         before, cpu_before, wall_before = page.evaluate("audio.counters()"), read_audio_cpu_s(bench.browser), time.monotonic()
         played = page.evaluate("audio.context.currentTime")
-        page.evaluate("window.underruns_ = audio.context.playbackStats?.underrunEvents ?? -1")
+        underruns = page.evaluate("audio.context.playbackStats?.underrunEvents ?? 0")
         time.sleep(seconds)
         after, cpu_s, wall_s = page.evaluate("audio.counters()"), read_audio_cpu_s(bench.browser) - cpu_before, time.monotonic() - wall_before
         played_s = page.evaluate("audio.context.currentTime") - played
-        stats = page.evaluate("({events: audio.context.playbackStats?.underrunEvents ?? -1, s: audio.context.playbackStats?.underrunDuration ?? -1})")
+        underruns = page.evaluate("audio.context.playbackStats?.underrunEvents ?? 0") - underruns
         page.evaluate("clearInterval(striking)")
         errors = page.evaluate("audio.seen.errors")
         modes = (after["mode_samples"] - before["mode_samples"]) / (played_s * page.evaluate("audio.context.sampleRate"))
         busy = os.getloadavg()[0] / os.cpu_count()
         over = after["over_budget"] - before["over_budget"]
         print(f"{played_s:.1f} s of sound in {wall_s:.1f} s: {modes:.0f} modes at work, {after['strikes'] - before['strikes']} strikes,")
-        print(f"audio thread {100 * cpu_s / played_s:.1f} % of a core, {over} quanta over budget, underruns {stats}, load {busy:.1f} a core")
-        assert errors == [] and after["gaps"] == 0 and after["resets"] == 0 and after["zeroed"] == 0 and after["faded"] == 0, (errors, after)
+        print(f"audio thread {100 * cpu_s / played_s:.1f} % of a core, {over} quanta over budget, {underruns} underruns of the browser, load {busy:.1f} a core")
+        assert errors == [] and after["gaps"] == before["gaps"] and after["resets"] == 0 and after["zeroed"] == 0 and after["faded"] == 0, (errors, after)
         assert after["refused"] == 0 and after["overflows"] == 0, after
         assert after["strikes"] - before["strikes"] > 190 * played_s, after
         assert played_s > 0.98 * seconds, played_s
         # What the thread itself took must leave room; whether it got the core in time is the machine's affair, and only asked of an idle one.
         assert 0.0 < cpu_s < 0.5 * played_s, (cpu_s, played_s)
         if busy < 0.7:
-            assert over <= 2, over
+            assert over <= 2 and underruns == 0, (over, underruns)
 
 
 if __name__ == "__main__":
