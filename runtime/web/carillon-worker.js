@@ -1,7 +1,7 @@
 // The workshop: banks, models, blows of mallets, plans and recorded scenes, away from the page's thread and the audio thread.
 import { Refusal, Wasm } from './carillon-wasm.js';
 
-const kPiece = 1 << 18; // bytes of a surface at once: some tens of microseconds of the audio thread
+const kPiece = 12 << 14; // bytes of a surface at once, whole triangles: some tens of microseconds of the audio thread
 const kRows = 1 << 15; // words of a recording at once, about
 const kLogged = 1 << 20; // words of what has happened, for the plan
 

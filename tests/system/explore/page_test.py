@@ -272,6 +272,15 @@ class PageTest(unittest.TestCase):
         self.assertGreater(page.evaluate("window.peak"), 0)
         self.assertEqual(page.errors, [])
 
+    def test_a_surface_of_many_pieces_arrives_whole(self):
+        run(BIN / "make_example_bank", "large.hdf", "62", "4", cwd=self.root)  # 46,128 triangles: more than one piece for the audio thread
+        run(BIN / "carillon", "explore", "large.hdf", "-o", "large", "--whole", cwd=self.root)
+        page = self.open("large")
+        self.assertEqual(page.evaluate("carillon.panel.body.surface.triangles.length"), 3 * 46128)
+        page.evaluate("carillon.hands.strike(carillon.hands.place)")
+        page.wait_for("carillon.panel.counters?.strikes >= 1")
+        self.assertEqual(page.errors, [])
+
     def test_a_bank_that_cannot_be_read_is_one_clear_error(self):
         whole = (self.root / "room/banks/bar.hdf").read_bytes()
         for name, bytes_, words in (
