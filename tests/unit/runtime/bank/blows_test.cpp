@@ -1,4 +1,4 @@
-#include "runtime/bank/strikes.hpp"
+#include "runtime/bank/blows.hpp"
 
 #include <gtest/gtest.h>
 
@@ -49,7 +49,7 @@ TEST(Strikes, OthersAreFarAndHeardToo) {
 TEST(Strikes, LevelsAreGainTimesMotionAlongTheNormal) {
   const Bank bank = example::make_bank(4, 6);
   const std::size_t vertex = list_upper(bank)[4];
-  const std::vector<double> levels = calc_blow_levels(bank, vertex);
+  const std::vector<double> levels = calc_blow_amplitudes(bank, vertex, calc_vertex_normals(bank)[vertex]);
   ASSERT_EQ(levels.size(), 6u);
   for (std::size_t m = 0; m < 6; ++m) {
     // IEC 61672-1, E.4.2, written out.
