@@ -263,37 +263,9 @@ class Hear(unittest.TestCase):
             [BIN / "carillon-mesh", "--shape", "sphere", "--radius", "100", "--nodes", "500", "-o", "b.msh", "-q"], cwd=self.folder
         )
         self.refuse("b.msh", contains=("b.msh", "200 m across", "--scale", "0.001 for millimetres"))
-        heard = self.hear("b.msh", "--scale", "0.001", "--material", "steel")
+        heard = self.hear("b.msh", "--scale", "0.001", "--material", "cork")
         self.assertTrue(all(abs(x - 0.2) < 0.02 for x in heard["extent_m"]), heard["extent_m"])
         self.refuse("b.msh", "--accuracy", "10", contains=("--accuracy", "its surface"))
-
-    def test_names_may_have_any_letters_and_blanks(self):
-        (self.folder / "ein ö bäll.off").write_text(make_ball(0.3, 3))
-        heard = self.hear("ein ö bäll.off", "--material", "steel", "-o", "wo hin ß")
-        self.assertEqual(heard["sounds"][0]["name"], "ein-ö-bäll-steel")
-        self.assertTrue((self.folder / "wo hin ß/ein-ö-bäll-steel.wav").exists())
-
-    def test_what_is_scaled_is_what_a_solve_of_its_own_gives(self):
-        """Another size of wood, and another material with nearly the same Poisson's ratio: the bars of one hold the other."""
-        own = self.folder / ".config/carillon/materials.json"
-        own.parent.mkdir(parents=True)
-        own.write_text("""{"materials": [{"name": "other steel", "from": "steel", "young_modulus_pa": 2e11, "poisson_ratio": 0.295}]}""")
-        (self.folder / "ball.off").write_text(make_ball(1, 3))
-        worst = 0.0
-        for materials, heights, name, height, first in (
-            ("oak", "0.1,0.2", "oak", "0.1", "ball-oak-0.2m"),
-            ("steel,other steel", "0.4", "other steel", "0.4", "ball-steel"),
-        ):
-            swept = self.hear("ball.off", "--material", materials, "--height", heights, "-o", "swept")["sounds"]
-            self.assertEqual([sound["name"] for sound in swept if not sound["is_scaled"]], [first])
-            scaled = next(sound for sound in swept if sound["is_scaled"])
-            one = self.hear("ball.off", "--material", name, "--height", height, "-o", "one")["sounds"][0]
-            self.assertFalse(one["is_scaled"])
-            for mine, its in zip(scaled["modes"], one["modes"]):
-                cents = 1200 * abs(math.log2(mine["freq_hz"] / its["freq_hz"]))
-                self.assertLess(cents, mine["error_cents"])
-                worst = max(worst, cents)
-        self.assertGreater(worst, 0.5, "Poisson's ratio made no difference: this test proves nothing")
 
     def test_one_run_writes_to_a_folder(self):
         words = [BIN / "carillon", "hear", "-q", "--shape", "bowl", "--material", "glass", "-o", "out"]
