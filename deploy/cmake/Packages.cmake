@@ -1,5 +1,5 @@
 # Debian packages of what has been built: cpack --config build/release/CPackConfig.cmake -G DEB. docs/howto/packages.md
-# One install component is one package: runtime, dev (what other projects build against) and precompute.
+# One install component is one package: runtime, dev (what other projects build against), python and precompute.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME carillon)
 set(CPACK_PACKAGE_VENDOR "The Carillon maintainers")
@@ -31,6 +31,17 @@ set(CPACK_COMPONENT_PRECOMPUTE_DESCRIPTION "Vibration modes of solid objects: ca
 set(CPACK_DEBIAN_PRECOMPUTE_PACKAGE_DEPENDS
   "carillon-runtime (= ${PROJECT_VERSION}), openmpi-bin, libopenblas0-serial, python3, python3-numpy, python3-h5py")
 set(CPACK_DEBIAN_PRECOMPUTE_PACKAGE_RECOMMENDS python3-vtk9)
+
+if(TARGET carillon_python)
+  list(APPEND CPACK_COMPONENTS_ALL python)
+  math(EXPR next_minor "${Python3_VERSION_MINOR} + 1")
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-carillon)
+  set(CPACK_COMPONENT_PYTHON_DESCRIPTION "Python module: mode banks as numpy arrays, jobs solved, scenes rendered, bodies struck by hand")
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS
+    "carillon-runtime (= ${PROJECT_VERSION}), python3 (>= 3.${Python3_VERSION_MINOR}), python3 (<< 3.${next_minor}), python3-numpy")
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS "carillon-precompute, python3-matplotlib")
+endif()
 
 foreach(component ${CPACK_COMPONENTS_ALL})
   string(TOUPPER ${component} upper)

@@ -9,8 +9,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
+#include <cstdlib>
 #include <iterator>
 #include <numbers>
 #include <string_view>
@@ -85,11 +85,11 @@ std::string scale_volumes(const std::string& regions, double scale) {
   for (std::size_t at = regions.find(kKey); at != std::string::npos; at = regions.find(kKey, done)) {
     at = std::min(regions.find_first_not_of(' ', at + kKey.size()), regions.size());
     scaled.append(regions, done, at - done);
-    double volume_m3 = 0.0;
-    const char* const end = regions.data() + regions.size();
-    const auto [rest, error] = std::from_chars(regions.data() + at, end, volume_m3);
-    if (error == std::errc() && std::isfinite(volume_m3 * scale)) scaled += fmt::format("{}", volume_m3 * scale);
-    done = error == std::errc() && std::isfinite(volume_m3 * scale) ? static_cast<std::size_t>(rest - regions.data()) : at;
+    char* rest = nullptr;
+    const double volume_m3 = scale * std::strtod(regions.c_str() + at, &rest);
+    const bool is_number = rest != regions.c_str() + at && std::isfinite(volume_m3);
+    if (is_number) scaled += fmt::format("{}", volume_m3);
+    done = is_number ? static_cast<std::size_t>(rest - regions.c_str()) : at;
   }
   return scaled.append(regions, done);
 }

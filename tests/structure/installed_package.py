@@ -34,7 +34,12 @@ PRECOMPUTE = {
     "needs": "libpetsc-real",
     "free_of": "nothing",
 }
-PACKAGES = {"carillon-runtime": RUNTIME, "carillon-runtime-dev": DEV, "carillon-precompute": PRECOMPUTE}
+PYTHON = {
+    "files": ["lib/python3/dist-packages/carillon/__init__.py", "lib/python3/dist-packages/carillon/_carillon.pyi"],
+    "needs": "python3-numpy",
+    "free_of": "mpi|petsc|slepc|metis|mumps|libcgal|libgmp",
+}
+PACKAGES = {"python3-carillon": PYTHON, "carillon-runtime": RUNTIME, "carillon-runtime-dev": DEV, "carillon-precompute": PRECOMPUTE}
 
 source, build, work = (pathlib.Path(word).resolve() for word in sys.argv[1:4])
 quiet = {"stdout": subprocess.DEVNULL}
@@ -52,7 +57,11 @@ def make_packages():
     """{name of a package: its file}; one package a component of the build."""
     run("cpack", "--config", build / "CPackConfig.cmake", "-G", "DEB", "-B", work / "packages", cwd=work, **quiet)
     files = {read("dpkg-deb", "-f", file, "Package").strip(): file for file in (work / "packages").glob("*.deb")}
-    wanted = set(PACKAGES) if (build / "bin/carillon-precompute").exists() else {"carillon-runtime", "carillon-runtime-dev"}
+    wanted = set(PACKAGES)
+    if not (build / "bin/carillon-precompute").exists():
+        wanted.discard("carillon-precompute")
+    if not (build / "python").exists():
+        wanted.discard("python3-carillon")
     assert set(files) == wanted, files
     return files
 
@@ -79,6 +88,15 @@ def check_symbols(library):
     symbols = re.findall(r" T (\w+)$", read("nm", "-D", "--defined-only", library), re.M)
     wrong = [name for name in symbols if not name.startswith("carillon_")]
     assert not wrong and "carillon_process" in symbols, f"{library}: visible in addition to the interface, or missing from it: {wrong[:5]}"
+
+
+def check_module(folder, bank):
+    """The Python module reads a bank, by Debian's Python, from where it was unpacked."""
+    if not folder.exists():
+        return
+    script = f"import carillon; print(len(carillon.Bank({str(bank)!r})), carillon.__file__)"
+    words = read("/usr/bin/python3", "-c", script, env={**os.environ, "PYTHONPATH": str(folder)}, cwd=work).split()
+    assert int(words[0]) > 0 and words[1].startswith(str(folder)), words
 
 
 def build_by_cmake(example, usr):
@@ -137,6 +155,7 @@ def main():
     edited = play(edits, r"peak (\S+) Pa, (\S+) Pa after the edit; (\d+) -> (\d+) Hz(?:; 0 underruns)?\n", bank)
     assert len({groups[2:] for groups in edited}) == 1, "they do not edit the same bank"
     play([by_cmake / "click_c", by_pkg_config / "click_c"], r"triangle \d+ of \d+, peak \S+ Pa at the left ear\n", bank)
+    check_module(usr / "lib/python3/dist-packages", bank)
     bad = subprocess.run([by_cmake / "strike_c", __file__], capture_output=True, text=True)
     assert bad.returncode == 1 and "installed_package.py" in bad.stderr, f"no clear error for a file that is no bank: {bad.stderr}"
 

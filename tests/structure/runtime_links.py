@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The runtime's programs load no MPI, PETSc, SLEPc, METIS, MUMPS, parallel HDF5 or GPL mesher.   usage: runtime_links.py BIN_DIR
+"""The runtime's programs and its Python module load no MPI, PETSc, SLEPc, METIS, MUMPS, parallel HDF5 or GPL mesher.   usage: runtime_links.py BIN_DIR
 
 GMP stands for CGAL here. Debian's serial HDF5 loads it as well, for its downloads (curl, GnuTLS); from there it is excused.
 """
@@ -22,8 +22,10 @@ def list_libraries(file):
 
 
 bad = []
-for name in ("carillon-bank", "carillon-render", "carillon-live", "carillon-samples"):
-    program = pathlib.Path(sys.argv[1]) / name
+folder = pathlib.Path(sys.argv[1])
+module = folder.parent.glob("python/carillon/_carillon*.so")  # the Python module, where it is built
+for name in ("carillon-bank", "carillon-render", "carillon-live", "carillon-samples", *module):
+    program = folder / name
     loaded = list_libraries(program)
     found = {library for library in loaded if FORBIDDEN.search(library)}
     for library, path in loaded.items():

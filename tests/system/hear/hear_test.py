@@ -8,9 +8,11 @@ import json
 import math
 import os
 import pathlib
+import signal
 import struct
 import subprocess
 import tempfile
+import time
 import unittest
 import wave
 
@@ -116,9 +118,9 @@ class Hear(unittest.TestCase):
     def hear(self, *words):
         return json.loads(self.call("--json", "hear", *words))
 
-    def refuse(self, *words, contains=()):
+    def refuse(self, *words, contains=(), code=2):
         before = sorted(self.folder.rglob("*.wav"))
-        said = self.call("hear", "-q", *words, code=2).strip()
+        said = self.call("hear", "-q", *words, code=code).strip()
         self.assertEqual(len(said.splitlines()), 1, said)
         for word in contains:
             self.assertIn(word, said)
@@ -218,10 +220,25 @@ class Hear(unittest.TestCase):
         (self.folder / "far.off").write_text(make_ball(5e6, 2))
         (self.folder / "tiny.off").write_text(make_ball(0.001, 3))
         self.refuse("none.obj", contains=("none.obj", "no such file"))
+        (self.folder / "empty.glb").write_bytes(b"")
+        self.refuse("empty.glb", contains=("empty.glb", "the file is empty", "export it again"))
+        self.refuse(".", contains=(".: a folder",))
+        for name, words in (
+            ("s.json", "a scene (carillon-render"),
+            ("b.hdf", "a bank, by its name"),
+            ("c.3ds", "convert other kinds first"),
+        ):
+            (self.folder / name).write_text("{}")
+            self.refuse(name, contains=(name, words, ".obj, .stl"))
         self.refuse(contains=("give an object",))
         self.refuse("ball.off", "--material", "steele", contains=("--material", 'did you mean "steel"?'))
         self.refuse("ball.off", "--mallet", "hammer", contains=("--mallet", "soft-felt"))
         self.refuse("ball.off", "--wall", "0.05", contains=("thicker than half the body", "0.1 m"))
+        self.refuse("ball.off", "--wall", "3", contains=("thicker than half the body", "3 mm are --wall 0.003"))
+        (self.folder / "cup.obj").write_text(make_cup())
+        self.refuse("cup.obj", "--wall", "0.2", contains=("thicker than half the body", "thinner one (metres)"))
+        self.refuse("ball.off", "--accuracy", "1e-5", contains=("--accuracy", "0.001 to 1200"))
+        self.refuse("ball.off", "-o", "/proc/none", contains=("/proc/none",), code=4)
         self.refuse("ball.off", "--wall", "-1", contains=("--wall",))
         self.refuse("ball.off", "--wall", "1e-7", contains=("thinner than a 5000th", "metres"))
         self.refuse("ball.off", "--height", "0", contains=("--height",))
@@ -236,6 +253,45 @@ class Hear(unittest.TestCase):
         self.refuse("--shape", "barr", contains=("barr",))
         (self.folder / "text.obj").write_text("hello\n")
         self.refuse("text.obj", contains=("text.obj",))
+        # A run that was refused before it had anything to write has left no folder.
+        self.assertFalse(
+            [f for f in self.folder.iterdir() if f.name in ("empty-sound", "ball-sound", "far-sound", "text-sound", "cup-sound")]
+        )
+
+    def test_a_mesh_in_millimetres_is_asked_about(self):
+        subprocess.run(
+            [BIN / "carillon-mesh", "--shape", "sphere", "--radius", "100", "--nodes", "500", "-o", "b.msh", "-q"], cwd=self.folder
+        )
+        self.refuse("b.msh", contains=("b.msh", "200 m across", "--scale", "0.001 for millimetres"))
+        heard = self.hear("b.msh", "--scale", "0.001", "--material", "cork")
+        self.assertTrue(all(abs(x - 0.2) < 0.02 for x in heard["extent_m"]), heard["extent_m"])
+        self.refuse("b.msh", "--accuracy", "10", contains=("--accuracy", "its surface"))
+
+    def test_one_run_writes_to_a_folder(self):
+        words = [BIN / "carillon", "hear", "-q", "--shape", "bowl", "--material", "glass", "-o", "out"]
+        with subprocess.Popen(words, cwd=self.folder, env=os.environ | {"HOME": str(self.folder)}) as first:
+            while not (self.folder / "out").exists():
+                time.sleep(0.005)
+            self.refuse("--shape", "bowl", "--material", "oak", "-o", "out", contains=("out", "another `carillon hear`"))
+            self.assertEqual(first.wait(200), 0)
+        self.assertTrue((self.folder / "out/bowl-glass.wav").exists())
+
+    def test_an_interrupt_leaves_whole_files_and_nothing_else(self):
+        (self.folder / "ball.off").write_text(make_ball(0.3, 4))
+        temporary = self.folder / "tmp"
+        temporary.mkdir()
+        words = [BIN / "carillon", "hear", "ball.off", "--material", "oak"]
+        environment = os.environ | {"HOME": str(self.folder), "TMPDIR": str(temporary)}
+        with subprocess.Popen(words, cwd=self.folder, env=environment, stderr=subprocess.PIPE, text=True) as run:
+            for line in run.stderr:
+                if "finding the modes" in line:
+                    break
+            run.send_signal(signal.SIGINT)
+            run.stderr.read()
+            self.assertEqual(run.wait(30), -signal.SIGINT)
+        self.assertEqual(sorted(f.name for f in (self.folder / "ball-sound").iterdir()), ["ball-oak.json", "ball.msh"])
+        self.assertFalse([f for f in temporary.iterdir() if f.name.startswith("carillon-hear-")])
+        subprocess.run([BIN / "carillon-mesh", "ball-sound/ball.msh", "--look"], cwd=self.folder, check=True, stdout=subprocess.DEVNULL)
 
     def test_materials_are_listed_and_a_file_of_your_own_adds_to_them(self):
         listed = json.loads(self.call("--json", "materials"))["materials"]

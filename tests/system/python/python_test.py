@@ -250,7 +250,7 @@ class Jobs(Case):
 class Sounds(Case):
     def make_scene(self):
         bank = carillon.Bank(self.bank_file)
-        low, high = bank.vertices_m.min(axis=0), bank.vertices_m.max(axis=0)
+        low = bank.vertices_m.min(axis=0)
         return {
             "duration_s": 1.0,
             "ground": {"height_m": 0.0},
