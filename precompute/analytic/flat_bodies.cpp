@@ -51,6 +51,10 @@ double calc_plate_rate(const material::Material& material, double thickness_m) {
   return material.young_modulus_pa * square(thickness_m) / (12.0 * (1.0 - square(material.poisson_ratio)) * material.density_kg_m3);
 }
 
+double find_wave_number(double area_m2, double rim_m, double modes) {
+  return (rim_m + std::sqrt(square(rim_m) + 16.0 * pi * modes * area_m2)) / (2.0 * area_m2);
+}
+
 void FlatBody::calc_shapes(const Vec3& point_m, std::span<const Mode> modes, std::span<Vec3> phi) const {
   std::vector<double> w(modes.size());
   calc_deflections({point_m[0], point_m[1]}, modes, w);
@@ -85,6 +89,8 @@ SineRectangle::SineRectangle(const job::PlateBody& body, const material::Materia
 ModeList SineRectangle::list_modes(double high_hz, std::int64_t) {
   ModeList list{{}, high_hz};
   const double high = square(2.0 * pi * high_hz);
+  const double k2_high = is_plate_ ? std::sqrt(high / rate_) : high / rate_;
+  check_mode_count(std::max(0.25 / pi * length_m_ * width_m_ * k2_high, std::sqrt(k2_high) * std::max(length_m_, width_m_) / pi), high_hz);
   const auto calc_lambda = [&](int m, int n) {
     const double k2 = square(pi) * (square(m / length_m_) + square(n / width_m_));
     return is_plate_ ? rate_ * k2 * k2 : rate_ * k2;

@@ -1,5 +1,7 @@
 #include "precompute/analytic/known_body.hpp"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 
 #include "precompute/analytic/flat_bodies.hpp"
@@ -38,9 +40,15 @@ std::unique_ptr<KnownBody> make(const job::MeasuredBody& body, const material::M
 
 std::unique_ptr<KnownBody> make_known_body(const job::AnalyticBody& body, const material::Material& material) {
   if (material.orthotropic && body.kind.index() != 4)
-    throw InputError(body.place + ": the formulas are for materials that are the same in all directions, and \"" + material.name +
+    throw InputError("the formulas are for materials that are the same in all directions, and \"" + material.name +
                      "\" is not; take another, or elements (\"shape\")");
   return std::visit([&](const auto& kind) { return make(kind, material); }, body.kind);
+}
+
+void check_mode_count(double count, double high_hz) {
+  if (!(count <= kMaxListed))
+    throw InputError(fmt::format("there are about {:.2g} modes up to {:g} Hz, more than {:g}; lower the end of \"band_hz\"", count, high_hz,
+                                 kMaxListed));
 }
 
 }  // namespace carillon::analytic

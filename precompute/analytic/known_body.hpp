@@ -40,7 +40,8 @@ class KnownBody {
  public:
   virtual ~KnownBody() = default;
 
-  /// All modes below `high_hz`; of more than `max_modes` at least the lowest so many. Throws SolveError, InputError.
+  /// All modes below `high_hz`; of more than `max_modes` at least the lowest so many. Throws SolveError, InputError (without the place of
+  /// the job).
   virtual ModeList list_modes(double high_hz, std::int64_t max_modes) = 0;
   /// phi [kg^-1/2] of each mode at a point of the body, (modes). Points outside count as the nearest one of the rim.
   virtual void calc_shapes(const Vec3& point_m, std::span<const Mode> modes, std::span<Vec3> phi) const = 0;
@@ -59,7 +60,13 @@ class KnownBody {
 
 inline constexpr int kMaxDefaultGrid = 80;  // of flat bodies: a multiple of ten, so that tenths of a side are vertices
 
-/// The body of a job. Throws InputError that names the job's line.
+/// More are more than a body with such modes is for: a formula may give any number.
+inline constexpr double kMaxListed = 100000;
+
+/// Before modes are listed: throws InputError when there are about so many up to high_hz, and that is too many.
+void check_mode_count(double count, double high_hz);
+
+/// The body of a job. Throws InputError without the job's place.
 std::unique_ptr<KnownBody> make_known_body(const job::AnalyticBody& body, const material::Material& material);
 
 }  // namespace carillon::analytic

@@ -64,6 +64,7 @@ String::String(const job::StringBody& body, const material::Material& material) 
 ModeList String::list_modes(double high_hz, std::int64_t) {
   ModeList list{{}, high_hz};
   const double first_hz = std::sqrt(tension_n_ / mass_kg_m_) / (2.0 * length_m_);
+  check_mode_count(2.0 * high_hz / first_hz, high_hz);
   for (int n = 1;; ++n) {
     const double hz = n * first_hz * std::sqrt(1.0 + stiffness_ * n * n);
     if (hz > high_hz) return list;
@@ -143,6 +144,7 @@ ModeList Beam::list_modes(double high_hz, std::int64_t) {
 void Beam::add_bending(Motion motion, double second_moment_m4, double high_hz, std::vector<Mode>& modes) {
   const double length = body_.length_m, rate = std::sqrt(young_pa_ * second_moment_m4 / (density_kg_m3_ * area_m2_)) / square(length);
   const double max_beta = std::sqrt(2.0 * pi * high_hz / rate);
+  check_mode_count(max_beta / pi, high_hz);
   const std::vector<double> roots = find_beam_roots(body_.ends, max_beta);
   const double depth = std::sqrt(12.0 * second_moment_m4 / area_m2_);
   const char axis = motion == kBendingY ? 'y' : 'z';
@@ -221,6 +223,7 @@ void Beam::add_timoshenko(Motion motion, double second_moment_m4, double high_hz
 
 void Beam::add_waves(Motion motion, double speed_m_s, double high_hz, std::vector<Mode>& modes) {
   const double shift = is_fixed(0) != is_fixed(1) ? 0.5 : 0.0;
+  check_mode_count(2.0 * body_.length_m * high_hz / speed_m_s, high_hz);
   for (int n = 1;; ++n) {
     const double wave = (n - shift) * pi, hz = wave * speed_m_s / (2.0 * pi * body_.length_m);
     if (hz > high_hz) return;

@@ -19,16 +19,18 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr double kEdge = 1e-9;        // of a frequency: rounding at the ends of the band
-constexpr double kDegenerate = 1e-9;  // relative distance of equal eigenvalues
-constexpr double kMaxNumbers = 6e8;   // components of shapes that a bank may have
+constexpr double kEdge = 1e-9;          // of a frequency: rounding at the ends of the band
+constexpr double kDegenerate = 1e-9;    // relative distance of equal eigenvalues
+constexpr double kBeyond = 1.0 + 1e-6;  // further than the band
+constexpr std::int64_t kNoLimit = std::numeric_limits<std::int64_t>::max() / 4;
+constexpr double kMaxNumbers = 6e8;  // components of shapes that a bank may have
 
 double to_hz(double lambda) { return std::sqrt(lambda) / (2.0 * pi); }
 
 /// The modes of the band, and the counts that show that none is missing.
 struct Band {
   std::vector<Mode> modes;
-  bank::Proof proof;
+  std::optional<bank::Proof> proof;  // none of a table: what was not measured is not known
   std::array<double, 2> band_hz{};
   bool is_complete = true;
 };
@@ -39,13 +41,24 @@ double choose_cut(double end_hz, double below_hz, double above_hz) {
   return is_clear ? end_hz : 0.5 * (below_hz + above_hz);
 }
 
+/// The modes up to the end of the band, somewhat further to see where the next one is, or as far as the lowest max_modes of the band take.
+ModeList list_band(KnownBody& body, const job::JobSpec& job, std::int64_t max_modes) {
+  const double high_hz = job.band_hz[1] * kBeyond;
+  for (std::int64_t wanted = max_modes;; wanted *= 2) {
+    body.warnings.clear();
+    ModeList list = body.list_modes(high_hz, wanted);
+    const auto in_band = std::count_if(list.modes.begin(), list.modes.end(),
+                                       [&](const Mode& mode) { return to_hz(mode.lambda_rad2_s2) >= job.band_hz[0] * (1.0 - kEdge); });
+    if (list.complete_below_hz >= high_hz || in_band > max_modes) return list;
+  }
+}
+
+/// One mode more than max_modes is known wherever there is one.
 Band find_band(KnownBody& body, const job::JobSpec& job) {
-  const auto max_modes = job.max_modes ? static_cast<std::int64_t>(*job.max_modes) : std::numeric_limits<std::int64_t>::max() / 4;
-  // Somewhat further than the band, to see where the next mode is.
-  const double beyond = 1.0 + 1e-6;
-  ModeList list = body.list_modes(job.band_hz[1] * beyond, max_modes);
+  const auto max_modes = job.max_modes ? static_cast<std::int64_t>(*job.max_modes) : kNoLimit;
+  ModeList list = list_band(body, job, max_modes);
   Band band;
-  band.band_hz = {job.band_hz[0], std::min(job.band_hz[1], list.complete_below_hz / beyond)};
+  band.band_hz = {job.band_hz[0], std::min(job.band_hz[1], list.complete_below_hz / kBeyond)};
   const auto is_in = [&](double hz) { return hz >= band.band_hz[0] * (1.0 - kEdge) && hz <= band.band_hz[1] * (1.0 + kEdge); };
   double before_hz = 0.0, first_hz = 0.0, last_hz = 0.0, next_hz = list.complete_below_hz;
   std::int64_t below = body.rigid_modes;
@@ -66,7 +79,7 @@ Band find_band(KnownBody& body, const job::JobSpec& job) {
   }
   if (band.modes.empty()) first_hz = last_hz = 0.5 * (band.band_hz[0] + band.band_hz[1]);
   const double low_hz = choose_cut(band.band_hz[0], before_hz, first_hz), high_hz = choose_cut(band.band_hz[1], last_hz, next_hz);
-  bank::Proof& proof = band.proof;
+  bank::Proof proof;
   proof.cut_hz = {std::min(low_hz, band.band_hz[0]), std::max(high_hz, band.band_hz[1])};
   proof.found = static_cast<std::int64_t>(band.modes.size());
   proof.below = {below, below + proof.found};
@@ -92,6 +105,7 @@ Band find_band(KnownBody& body, const job::JobSpec& job) {
     }
     m = end;
   }
+  if (!std::holds_alternative<job::MeasuredBody>(job.analytic->kind)) band.proof = std::move(proof);
   return band;
 }
 
@@ -147,11 +161,27 @@ void set_gains(bank::Bank& bank, std::span<const double> shapes) {
     bank.radiation_gain.push_back(bank::calc_radiation_gain(std::sqrt(bank.eigenvalue_rad2_s2[m]), flow[m], 0.5 * twice_area));
 }
 
+struct Found {
+  std::unique_ptr<KnownBody> body;
+  Band band;
+};
+
+/// Throws InputError of what is wrong with the body, after the place of the body in the job.
+Found find(const job::JobSpec& job) {
+  try {
+    Found found{make_known_body(*job.analytic, job.material), {}};
+    found.band = find_band(*found.body, job);
+    return found;
+  } catch (const InputError& error) {
+    if (std::holds_alternative<job::MeasuredBody>(job.analytic->kind)) throw;  // has the place in the table
+    throw InputError(fmt::format("{}: {}", job.analytic->place, error.what()));
+  }
+}
+
 }  // namespace
 
 Made make_bank(const job::JobSpec& job) {
-  const std::unique_ptr<KnownBody> body = make_known_body(*job.analytic, job.material);
-  Band band = find_band(*body, job);
+  auto [body, band] = find(job);
   const std::size_t count = band.modes.size();
   Made made{{}, body->theory, body->method, {}, body->warnings};
   bank::Bank& bank = made.bank;
@@ -193,8 +223,7 @@ Made make_bank(const job::JobSpec& job) {
 }
 
 std::vector<ModeAtPoint> calc_modes_at(const job::JobSpec& job, const Vec3& point_m) {
-  const std::unique_ptr<KnownBody> body = make_known_body(*job.analytic, job.material);
-  const Band band = find_band(*body, job);
+  const auto [body, band] = find(job);
   std::vector<Vec3> phi(band.modes.size());
   body->calc_shapes(point_m, band.modes, phi);
   std::vector<ModeAtPoint> found;

@@ -19,7 +19,7 @@ namespace carillon::analytic {
 namespace {
 
 constexpr std::uint64_t kMaxBytes = 64 << 20;
-constexpr std::size_t kMaxModes = 40000, kMaxPoints = 10000;
+constexpr std::size_t kMaxRows = 40000, kMaxPoints = 10000;
 constexpr double kT60 = 6.907755278982137;  // ln 1000: decay times T60
 constexpr double kMaxGain = 1e9;
 
@@ -151,7 +151,7 @@ ModesTable read_modes_table(const std::filesystem::path& file) {
       if (std::abs(row.gains.back()) > kMaxGain)
         throw InputError(fmt::format("{}: a gain is {:g} kg^-1/2, more than any body has", place, row.gains.back()));
     }
-    if (rows.size() == kMaxModes) throw InputError(fmt::format("{}: more than {} modes", place, kMaxModes));
+    if (rows.size() == kMaxRows) throw InputError(fmt::format("{}: more than {} modes", place, kMaxRows));
     rows.push_back(std::move(row));
   }
   if (!columns || rows.empty())

@@ -15,14 +15,11 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr double kEdgePerRadian = 6.0;  // longest edge times wave number
-constexpr int kLayers = 8;              // about a singular corner
-constexpr double kRatio = 0.2;          // of their sizes
-constexpr double kMaxUnknowns = 1.5e6;
+constexpr double kMaxWanted = 20000;  // modes: hours
 constexpr double kSlow = 4.0;         // at a singular corner the last order gained as little as a fifth of the error
 constexpr double kMinError = 1e-12;   // relative, of the eigensolver
 constexpr double kDegenerate = 1e-7;  // relative distance of eigenvalues that may be one
-constexpr int kMaxRefined = 400;      // modes
+constexpr int kMaxRefined = 200;      // modes: what follows costs more than the elements do
 
 double square(double x) { return x * x; }
 
@@ -31,9 +28,18 @@ bool is_singular(double angle) {
   return std::abs(n - std::round(n)) > 1e-9 * n || n < 0.75;
 }
 
+/// Rings of elements after which a corner leaves less than corner_error in an eigenvalue: what r^alpha has of it in an element of size h is
+/// about c^2 (k h)^(2 alpha) / p^(4 alpha) (Babuska and Suri 1987), c the distance of alpha from the next regular exponent.
+int count_rings(double angle, double k_h, const PolygonSetting& setting) {
+  const double alpha = pi / angle, distance = alpha - std::max(1.0, std::round(alpha));
+  const double left = square(distance) * std::pow(k_h / square(setting.order), 2.0 * alpha);
+  return std::max(0, static_cast<int>(std::ceil(std::log(setting.corner_error / left) / (2.0 * alpha * std::log(setting.ratio)))));
+}
+
 }  // namespace
 
-Polygon::Polygon(const job::MembraneBody& body, const material::Material& material) : corners_m_(body.corners_m), side_m_(body.side_m) {
+Polygon::Polygon(const job::MembraneBody& body, const material::Material& material, const PolygonSetting& setting)
+    : corners_m_(body.corners_m), side_m_(body.side_m), setting_(setting), basis_(setting.order) {
   const auto [per_area, thickness] = find_sheet(body, material);
   density_kg_m2_ = per_area;
   thickness_m_ = thickness;
@@ -55,28 +61,42 @@ Polygon::Polygon(const job::MembraneBody& body, const material::Material& materi
   set_rigid(density_kg_m2_);
 }
 
-Polygon::Solved Polygon::solve(double max_kappa) {
-  const double k = std::sqrt(max_kappa), edge = std::min(kEdgePerRadian / k, 0.34 * longest_m_);
-  if (area_m2_ / square(edge) * 160.0 > kMaxUnknowns)
-    throw InputError(
-        fmt::format("the membrane has about {:.0f} modes in its band, which takes more elements than this is made for; lower "
-                    "the end of \"band_hz\", or give \"max_modes\"",
-                    area_m2_ * max_kappa / (4.0 * pi)));
+Net Polygon::make_elements(double k, double edge_m) const {
   const std::vector<double> angles = calc_angles(corners_m_);
-  elements_ = triangulate(corners_m_, edge);
-  // A triangle with two singular corners cannot be graded to both: finer ones keep them apart.
-  const auto corners = static_cast<std::int32_t>(corners_m_.size());
-  const auto count_singular = [&](const bank::Triangle& t) {
-    return std::count_if(t.begin(), t.end(),
-                         [&](std::int32_t v) { return v < corners && is_singular(angles[static_cast<std::size_t>(v)]); });
-  };
-  double finer = edge;
-  for (int round = 0; round < 6 && std::any_of(elements_.triangles.begin(), elements_.triangles.end(),
-                                               [&](const auto& t) { return count_singular(t) > 1; });
-       ++round)
-    elements_ = triangulate(corners_m_, finer *= 0.5);
-  for (std::int32_t c = 0; c < corners; ++c)
-    if (is_singular(angles[static_cast<std::size_t>(c)])) grade(elements_, c, kLayers, kRatio);
+  std::vector<bool> singular;
+  for (std::size_t c = 0; c < angles.size(); ++c) {
+    // Elements are no longer than the sides that meet at a corner. A corner that costs nothing at that size, as those of a polygon that is
+    // almost round, is no singular one.
+    const Point2 &before = corners_m_[(c + angles.size() - 1) % angles.size()], &at = corners_m_[c],
+                 &after = corners_m_[(c + 1) % angles.size()];
+    const double side =
+        std::min({edge_m, std::hypot(before[0] - at[0], before[1] - at[1]), std::hypot(after[0] - at[0], after[1] - at[1])});
+    singular.push_back(is_singular(angles[c]) && count_rings(angles[c], k * side, setting_) > 0);
+  }
+  Net net = triangulate(corners_m_, edge_m, singular);  // a triangle with two singular corners could not be graded to both
+  std::vector<double> longest(corners_m_.size(), 0.0);
+  for (const bank::Triangle& t : net.triangles)
+    for (int c = 0; c < 3; ++c) {
+      const auto corner = static_cast<std::size_t>(t[c]);
+      if (corner >= corners_m_.size()) continue;
+      for (int other = 0; other < 3; ++other) {
+        const Point2 &a = net.points_m[corner], &b = net.points_m[t[other]];
+        longest[corner] = std::max(longest[corner], std::hypot(b[0] - a[0], b[1] - a[1]));
+      }
+    }
+  for (std::size_t c = 0; c < corners_m_.size(); ++c)
+    if (singular[c]) grade(net, static_cast<std::int32_t>(c), count_rings(angles[c], k * longest[c], setting_), setting_.ratio);
+  return net;
+}
+
+Polygon::Solved Polygon::solve(double max_kappa) {
+  const double k = std::sqrt(max_kappa), edge = std::min(setting_.edge_radians / k, 0.34 * longest_m_);
+  if (const double wanted = area_m2_ * max_kappa / (4.0 * pi); wanted > kMaxWanted)
+    throw InputError(
+        fmt::format("the membrane has about {:.2g} modes up to the end of its band, more than finite elements are used for here "
+                    "({}); lower the end of \"band_hz\", or give \"max_modes\"",
+                    wanted, kMaxWanted));
+  elements_ = make_elements(k, edge);
   const TriangleModes coarse = solve_triangles(elements_, TriangleBasis(basis_.order() - 1), 1.02 * max_kappa);
   modes_ = solve_triangles(elements_, basis_, max_kappa);
   Solved solved{modes_.kappa, {}};
@@ -89,6 +109,7 @@ Polygon::Solved Polygon::solve(double max_kappa) {
 /// Eigenvalues, not shapes: those are exact to the bank's steps already.
 void Polygon::refine(Solved& solved) {
   refined_ = 0;
+  if (!setting_.uses_particular_solutions) return;
   const std::optional<ParticularSolutions> solutions = ParticularSolutions::make(corners_m_);
   if (!solutions) return;
   const std::size_t count = std::min<std::size_t>(solved.kappa.size(), kMaxRefined);
@@ -122,8 +143,7 @@ ModeList Polygon::list_modes(double high_hz, std::int64_t max_modes) {
     rate_ = *tension_n_m_ / density_kg_m2_;
   }
   const double asked = square(2.0 * pi * high_hz) / rate_;
-  const double k =
-      (rim_m_ + std::sqrt(square(rim_m_) + 16.0 * pi * (1.05 * static_cast<double>(max_modes) + 5.0) * area_m2_)) / (2.0 * area_m2_);
+  const double k = find_wave_number(area_m2_, rim_m_, 1.05 * static_cast<double>(max_modes) + 5.0);
   const double kappa = std::min(asked, square(k));
   ModeList list{{}, kappa < asked ? std::sqrt(kappa * rate_) / (2.0 * pi) : high_hz};
   const Solved solved = solve(kappa);

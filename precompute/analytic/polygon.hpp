@@ -6,11 +6,20 @@
 
 namespace carillon::analytic {
 
-/// Finite elements of order eight, graded towards corners that are no whole part of a half turn; error bars from those of order seven.
+/// How fine the elements of a polygon are. The defaults are those of tests/bench/analytic.
+struct PolygonSetting {
+  int order = 8;
+  double edge_radians = 6.0;   // longest edge times the largest wave number
+  double corner_error = 1e-8;  // relative, that a singular corner may leave in an eigenvalue: its rings of elements follow
+  double ratio = 0.2;          // of the sizes of two rings
+  bool uses_particular_solutions = true;
+};
+
+/// Finite elements of high order, graded towards corners that are no whole part of a half turn; error bars from those of one order less.
 /// Where only one corner is such, as of an L, eigenvalues are refined by particular solutions. Mode::index: place in modes_.
 class Polygon : public FlatBody {
  public:
-  Polygon(const job::MembraneBody& body, const material::Material& material);
+  Polygon(const job::MembraneBody& body, const material::Material& material, const PolygonSetting& setting = {});
   ModeList list_modes(double high_hz, std::int64_t max_modes) override;
   int choose_grid(std::span<const Mode> modes) const override;
 
@@ -21,6 +30,7 @@ class Polygon : public FlatBody {
   Solved solve(double max_kappa);
 
  private:
+  Net make_elements(double k, double edge_m) const;
   Net make_net(int grid) const override;
   void calc_deflections(const Point2& point_m, std::span<const Mode> modes, std::span<double> w) const override;
   std::size_t find_element(const Point2& point_m, double& r, double& s) const;
@@ -32,7 +42,8 @@ class Polygon : public FlatBody {
   std::optional<double> tension_n_m_, lowest_hz_;
   double density_kg_m2_ = 0.0, rate_ = 0.0;
   int refined_ = 0;
-  TriangleBasis basis_{8};
+  PolygonSetting setting_;
+  TriangleBasis basis_;
   Net elements_;
   TriangleModes modes_;
   mutable std::size_t last_element_ = 0;

@@ -44,6 +44,30 @@ GaussRule make_gauss_rule(int n) {
   return rule;
 }
 
+std::vector<double> make_lobatto_points(int n) {
+  if (n == 0) return {0.5};
+  std::vector<double> points{0.0};
+  for (int i = 1; i < n; ++i) {
+    double t = -std::cos(std::numbers::pi * i / n);
+    for (int step = 0; step < 100; ++step) {
+      double now = 1.0, before = 0.0;
+      for (int k = 1; k <= n; ++k) {
+        const double next = ((2 * k - 1) * t * now - (k - 1) * before) / k;
+        before = now;
+        now = next;
+      }
+      // Newton's method on P_n', whose derivative follows from Legendre's equation.
+      const double slope = n * (before - t * now) / (1.0 - t * t), bend = (2.0 * t * slope - n * (n + 1) * now) / (1.0 - t * t);
+      const double change = slope / bend;
+      t -= change;
+      if (std::abs(change) < 1e-16) break;
+    }
+    points.push_back(0.5 * (1.0 + t));
+  }
+  points.push_back(1.0);
+  return points;
+}
+
 la::Matrix calc_products(int n, int a, int b) {
   const GaussRule rule = make_gauss_rule(n + 1);
   la::Matrix left(n, rule.x.size()), right(n, rule.x.size());

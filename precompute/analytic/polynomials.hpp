@@ -18,6 +18,9 @@ struct GaussRule {
 };
 GaussRule make_gauss_rule(int n);
 
+/// The n + 1 points of Gauss and Lobatto on [0, 1], ascending: the ends, and where the derivative of P_n vanishes; of n = 0 the middle.
+std::vector<double> make_lobatto_points(int n);
+
 /// Integrals over [0, 1] of products of derivatives, (n, n): entry (i, j) of P_i^(a) P_j^(b).
 la::Matrix calc_products(int n, int a, int b);
 

@@ -24,13 +24,6 @@ EndConditions get_conditions(Edge edge) {
   return {edge == Edge::hinged || edge == Edge::clamped, edge == Edge::clamped || edge == Edge::sliding};
 }
 
-/// Half-waves along a side at which so many modes lie below, of a plate or membrane of this area and rim (Weyl's law with its second term,
-/// the larger for clamped edges).
-double find_wave_number(double area_m2, double rim_m, double modes) {
-  // N = A k^2 / 4 pi - rim k / 4 pi.
-  return (rim_m + std::sqrt(square(rim_m) + 16.0 * pi * modes * area_m2)) / (2.0 * area_m2);
-}
-
 }  // namespace
 
 RitzPlate::RitzPlate(const job::PlateBody& body, const material::Material& material)
@@ -39,7 +32,6 @@ RitzPlate::RitzPlate(const job::PlateBody& body, const material::Material& mater
   rate_ = calc_plate_rate(material, thickness_m_);
   theory = fmt::format("rectangular plate (Kirchhoff), edges {}, {}, {}, {}", to_text(body.edges[0]), to_text(body.edges[1]),
                        to_text(body.edges[2]), to_text(body.edges[3]));
-  method = "Ritz's method on products of Legendre polynomials; all eigenvalues of the dense problem up to the end of the band";
   set_rigid(density_kg_m2_);
 }
 
@@ -145,7 +137,8 @@ ModeList RitzPlate::list_modes(double high_hz, std::int64_t max_modes) {
   }
   const bool is_free = std::all_of(body_.edges.begin(), body_.edges.end(), [](Edge edge) { return edge == Edge::free; });
   rigid_modes = is_free ? 6 : mechanisms;
-  if (list.modes.size() > static_cast<std::size_t>(max_modes)) method += fmt::format(" ({:.0f} Hz, for max_modes)", list.complete_below_hz);
+  method = fmt::format("Ritz's method on products of Legendre polynomials; all eigenvalues of the dense problem up to {:.6g} Hz",
+                       list.complete_below_hz);
   return list;
 }
 

@@ -37,10 +37,7 @@ Numbering number_nodes(const Net& net, const TriangleBasis& basis) {
   std::map<std::pair<std::int32_t, std::int32_t>, int> uses;
   for (const bank::Triangle& t : net.triangles) {
     std::vector<std::int32_t> nodes;
-    // Point (i, j) of the lattice: barycentric (p - i - j, i, j) / p.
-    for (const Point2& point : basis.points()) {
-      const int i = static_cast<int>(std::lround(point[0] * p)), j = static_cast<int>(std::lround(point[1] * p)), h = p - i - j;
-      const std::array<int, 3> weights{h, i, j};
+    for (const std::array<int, 3>& weights : basis.places()) {
       const auto zeros = std::count(weights.begin(), weights.end(), 0);
       if (zeros == 2) {
         nodes.push_back(
@@ -104,41 +101,78 @@ std::vector<PetscInt> number_unknowns(const Net& net, const Numbering& numbering
   return unknown;
 }
 
+/// A point of the triangle as the mean of those that its place has on the three sides, each weighted by how near that side is.
+Point2 place_point(const std::array<int, 3>& place, const std::vector<std::vector<double>>& lobatto) {
+  const int order = place[0] + place[1] + place[2];
+  std::array<double, 3> sum{};
+  double total = 0.0;
+  for (int side = 0; side < 3; ++side) {
+    const int a = (side + 1) % 3, b = (side + 2) % 3, n = place[a] + place[b];
+    const double weight = lobatto[order][n];
+    sum[a] += weight * lobatto[n][place[a]];
+    sum[b] += weight * lobatto[n][place[b]];
+    total += weight;
+  }
+  return {sum[1] / total, sum[2] / total};
+}
+
 }  // namespace
 
 TriangleBasis::TriangleBasis(int order) : order_(order) {
+  std::vector<std::vector<double>> lobatto;  // of each order up to this one
+  for (int n = 0; n <= order; ++n) lobatto.push_back(make_lobatto_points(n));
   for (int j = 0; j <= order; ++j)
-    for (int i = 0; i + j <= order; ++i) points_.push_back({static_cast<double>(i) / order, static_cast<double>(j) / order});
+    for (int i = 0; i + j <= order; ++i) {
+      places_.push_back({order - i - j, i, j});
+      points_.push_back(place_point(places_.back(), lobatto));
+    }
   la::Matrix values(size(), size());
-  for (int q = 0; q < size(); ++q) values.row(q) = calc_monomials(points_[q][0], points_[q][1], 0).transpose();
+  for (int q = 0; q < size(); ++q) values.row(q) = calc_polynomials(points_[q][0], points_[q][1]).col(0).transpose();
   inverse_ = values.inverse();
+  mass = inverse_.transpose() * inverse_;
   // The square (x, y) -> (r, s) = (x (1 - y), y) makes Gauss's rule one of the triangle.
   const GaussRule rule = make_gauss_rule(order + 1);
-  mass = stiffness_rr = stiffness_rs = stiffness_ss = la::Matrix::Zero(size(), size());
+  la::Matrix rr = la::Matrix::Zero(size(), size()), rs = rr, ss = rr;
   for (std::size_t a = 0; a < rule.x.size(); ++a)
     for (std::size_t b = 0; b < rule.x.size(); ++b) {
       const double s = rule.x[b], r = rule.x[a] * (1.0 - s), weight = rule.weight[a] * rule.weight[b] * (1.0 - s);
-      const la::Vector v = inverse_.transpose() * calc_monomials(r, s, 0), dr = inverse_.transpose() * calc_monomials(r, s, 1),
-                       ds = inverse_.transpose() * calc_monomials(r, s, 2);
-      mass += weight * v * v.transpose();
-      stiffness_rr += weight * dr * dr.transpose();
-      stiffness_rs += weight * dr * ds.transpose();
-      stiffness_ss += weight * ds * ds.transpose();
+      const auto p = calc_polynomials(r, s);
+      rr += weight * p.col(1) * p.col(1).transpose();
+      rs += weight * p.col(1) * p.col(2).transpose();
+      ss += weight * p.col(2) * p.col(2).transpose();
     }
+  stiffness_rr = inverse_.transpose() * rr * inverse_;
+  stiffness_rs = inverse_.transpose() * rs * inverse_;
+  stiffness_ss = inverse_.transpose() * ss * inverse_;
 }
 
-/// Products of Legendre polynomials of r and of s, or their derivative by r (1) or s (2).
-la::Vector TriangleBasis::calc_monomials(double r, double s, int derivative) const {
-  const la::Vector along_r = calc_legendre(order_ + 1, r, derivative == 1 ? 1 : 0),
-                   along_s = calc_legendre(order_ + 1, s, derivative == 2 ? 1 : 0);
-  la::Vector values(size());
+/// sqrt(2 (2 i + 1) (i + j + 1)) t^i P_i(x / t) P_j^(2 i + 1, 0)(2 s - 1), t = 1 - s, x = 2 r - t; both factors by their recurrences.
+Eigen::Matrix<double, Eigen::Dynamic, 3> TriangleBasis::calc_polynomials(double r, double s) const {
+  using Row = Eigen::RowVector3d;  // value, by r, by s
+  const auto times = [](const Row& a, const Row& b) { return Row(a[0] * b[0], a[0] * b[1] + a[1] * b[0], a[0] * b[2] + a[2] * b[0]); };
+  const Row t(1.0 - s, 0.0, -1.0), x(2.0 * r - t[0], 2.0, 1.0), z(2.0 * s - 1.0, 0.0, 2.0), one(1.0, 0.0, 0.0);
+  std::vector<Row> legendre{one, x};
+  for (int i = 1; i < order_; ++i)
+    legendre.push_back(((2 * i + 1) * times(x, legendre[i]) - i * times(times(t, t), legendre[i - 1])) / (i + 1));
+  Eigen::Matrix<double, Eigen::Dynamic, 3> values(size(), 3);
   int q = 0;
   for (int j = 0; j <= order_; ++j)
-    for (int i = 0; i + j <= order_; ++i) values(q++) = along_r(i) * along_s(j);
+    for (int i = 0; i + j <= order_; ++i) {
+      const double a = 2 * i + 1;
+      Row before = one, now = j == 0 ? one : Row(0.5 * ((a + 2.0) * z + a * one));
+      for (int n = 2; n <= j; ++n) {  // Jacobi's polynomials with beta = 0 (Abramowitz and Stegun 1964, 22.7.1)
+        const double c = 2.0 * n + a;
+        const Row next = ((c - 1.0) * (c * (c - 2.0) * times(z, now) + a * a * now) - 2.0 * (n + a - 1.0) * (n - 1.0) * c * before) /
+                         (2.0 * n * (n + a) * (c - 2.0));
+        before = now;
+        now = next;
+      }
+      values.row(q++) = std::sqrt(2.0 * a * (i + j + 1)) * times(legendre[i], now);
+    }
   return values;
 }
 
-la::Vector TriangleBasis::calc(double r, double s) const { return inverse_.transpose() * calc_monomials(r, s, 0); }
+la::Vector TriangleBasis::calc(double r, double s) const { return inverse_.transpose() * calc_polynomials(r, s).col(0); }
 
 TriangleModes solve_triangles(const Net& net, const TriangleBasis& basis, double max_kappa) {
   Numbering numbering = number_nodes(net, basis);

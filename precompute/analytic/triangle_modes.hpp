@@ -8,23 +8,28 @@
 
 namespace carillon::analytic {
 
-/// Lagrange's functions of one order on the unit triangle, at equispaced points.
+/// Lagrange's functions of one order on the unit triangle, at points that on each side are those of Gauss and Lobatto (Isaac 2020,
+/// Recursive, parameter-free, explicitly defined interpolation nodes for simplices): at equispaced ones order eight would lose five digits.
 class TriangleBasis {
  public:
   explicit TriangleBasis(int order);
   int size() const { return static_cast<int>(points_.size()); }
   int order() const { return order_; }
   const std::vector<Point2>& points() const { return points_; }
+  /// Of each point the place in the lattice of barycentric numbers that add up to the order.
+  const std::vector<std::array<int, 3>>& places() const { return places_; }
   /// Values at (r, s), r, s >= 0, r + s <= 1.
   la::Vector calc(double r, double s) const;
   /// Integrals over the unit triangle, (size, size): products of values; of derivatives (r r), (r s) and (s s).
   la::Matrix mass, stiffness_rr, stiffness_rs, stiffness_ss;
 
  private:
-  la::Vector calc_monomials(double r, double s, int derivative) const;
+  /// Orthonormal polynomials of Dubiner (1991) and their derivatives, columns: value, by r, by s.
+  Eigen::Matrix<double, Eigen::Dynamic, 3> calc_polynomials(double r, double s) const;
   int order_;
   std::vector<Point2> points_;
-  la::Matrix inverse_;  // of Vandermonde's matrix in orthogonal polynomials
+  std::vector<std::array<int, 3>> places_;
+  la::Matrix inverse_;  // of Vandermonde's matrix in orthonormal polynomials
 };
 
 /// Modes with unit integral of the square.

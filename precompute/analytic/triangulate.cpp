@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <tuple>
 #include <utility>
 
 #include "runtime/base/error.hpp"
@@ -38,15 +39,23 @@ std::vector<Triangle> cut_ears(const std::vector<Point2>& p) {
     const double longest = std::max({calc_length(p[a], p[b]), calc_length(p[b], p[c]), calc_length(p[c], p[a])});
     return static_cast<double>(area) / (longest * longest);
   };
+  std::vector<double> quality;  // of the ear at each place of the ring, as it was judged last
+  const auto judge_all = [&] {
+    quality.clear();
+    for (std::size_t i = 0; i < ring.size(); ++i) quality.push_back(judge(i));
+    return std::max_element(quality.begin(), quality.end());
+  };
+  judge_all();
   while (ring.size() > 3) {
-    std::size_t best = 0;
-    double quality = -1.0;
-    for (std::size_t i = 0; i < ring.size(); ++i)
-      if (const double now = judge(i); now > quality) quality = now, best = i;
-    if (quality < 0.0) throw InputError("the polygon is too thin somewhere to be cut into triangles; move its corners apart");
+    auto best = std::max_element(quality.begin(), quality.end());
+    if (*best < 0.0) best = judge_all();  // corners that were in the way may have gone
+    if (*best < 0.0) throw InputError("the polygon is too thin somewhere to be cut into triangles; move its corners apart");
+    const auto at = static_cast<std::size_t>(best - quality.begin());
     const std::size_t n = ring.size();
-    triangles.push_back({ring[(best + n - 1) % n], ring[best], ring[(best + 1) % n]});
-    ring.erase(ring.begin() + static_cast<std::ptrdiff_t>(best));
+    triangles.push_back({ring[(at + n - 1) % n], ring[at], ring[(at + 1) % n]});
+    ring.erase(ring.begin() + static_cast<std::ptrdiff_t>(at));
+    quality.erase(best);
+    for (const std::size_t next : {(at + n - 2) % (n - 1), at % (n - 1)}) quality[next] = judge(next);
   }
   triangles.push_back({ring[0], ring[1], ring[2]});
   return triangles;
@@ -65,8 +74,10 @@ double calc_angle(const Point2& tip, const Point2& a, const Point2& b) {
   return std::atan2(std::abs(static_cast<double>(cross(tip, a, b))), dot);
 }
 
-/// Lawson's flips: an inner edge whose opposite angles add up to more than a half turn gives way to the other diagonal.
-void flip_edges(Net& net) {
+/// Lawson's flips: an inner edge whose opposite angles add up to more than a half turn gives way to the other diagonal, unless that joins
+/// two points that are to be apart.
+void flip_edges(Net& net, const std::vector<bool>& apart) {
+  const auto is_marked = [&](std::int32_t v) { return static_cast<std::size_t>(v) < apart.size() && apart[static_cast<std::size_t>(v)]; };
   constexpr double kSlack = 1e-9;
   std::map<Edge, std::size_t> edges = list_edges(net.triangles);
   std::vector<Edge> work;
@@ -86,6 +97,7 @@ void flip_edges(Net& net) {
     const std::int32_t c = third(s, {a, b}), d = third(t, {a, b});
     const auto& p = net.points_m;
     if (calc_angle(p[c], p[a], p[b]) + calc_angle(p[d], p[a], p[b]) <= std::numbers::pi + kSlack) continue;
+    if (is_marked(c) && is_marked(d)) continue;
     if (!(cross(p[d], p[b], p[c]) > 0) || !(cross(p[c], p[a], p[d]) > 0)) continue;
     edges.erase(left);
     edges.erase(right);
@@ -97,8 +109,9 @@ void flip_edges(Net& net) {
   }
 }
 
-/// Halves the longest edge of a triangle, and before that those of neighbours that are longer, until none is too long.
-void halve_edges(Net& net, double max_edge_m) {
+/// Halves the longest edge of a triangle, and before that those of neighbours that are longer, until none is too long and no triangle has
+/// two of the points that are to be apart.
+void halve_edges(Net& net, double max_edge_m, const std::vector<bool>& apart) {
   std::map<Edge, std::size_t> edges = list_edges(net.triangles);
   const auto longest = [&](std::size_t t) {
     const Triangle& v = net.triangles[t];
@@ -109,6 +122,9 @@ void halve_edges(Net& net, double max_edge_m) {
       if (const double now = calc_length(net.points_m[a], net.points_m[b]); now > length) length = now, best = k;
     }
     return std::pair(best, length);
+  };
+  const auto is_apart = [&](const Triangle& t) {
+    return std::count_if(t.begin(), t.end(), [&](std::int32_t v) { return static_cast<std::size_t>(v) < apart.size() && apart[v]; }) < 2;
   };
   const auto split = [&](std::size_t t, const Edge& e, std::int32_t middle) {
     const Triangle v = net.triangles[t];
@@ -124,22 +140,22 @@ void halve_edges(Net& net, double max_edge_m) {
   std::vector<std::size_t> work;
   for (std::size_t t = net.triangles.size(); t-- > 0;) work.push_back(t);
   while (!work.empty()) {
-    const std::size_t t = work.back();
-    const auto [k, length] = longest(t);
-    if (length <= max_edge_m) {
+    if (const std::size_t t = work.back(); longest(t).second <= max_edge_m && is_apart(net.triangles[t])) {
       work.pop_back();
       continue;
     }
     if (net.triangles.size() > kMaxTriangles)
       throw InputError("the polygon takes too many triangles; lower the end of \"band_hz\", or give \"max_modes\"");
-    const Edge e{net.triangles[t][k], net.triangles[t][(k + 1) % 3]};
-    const auto neighbour = edges.find({e.second, e.first});
-    if (neighbour != edges.end()) {
-      const std::size_t n = neighbour->second;
-      if (longest(n).second > length * (1.0 + 1e-12)) {
-        work.push_back(n);  // its own longest edge first
-        continue;
-      }
+    // Rivara's path: from neighbour to neighbour across longest edges that are longer still, to an edge that is the longest on both sides.
+    std::size_t t = work.back();
+    auto [k, length] = longest(t);
+    Edge e{net.triangles[t][k], net.triangles[t][(k + 1) % 3]};
+    auto neighbour = edges.find({e.second, e.first});
+    while (neighbour != edges.end() && longest(neighbour->second).second > length * (1.0 + 1e-12)) {
+      t = neighbour->second;
+      std::tie(k, length) = longest(t);
+      e = {net.triangles[t][k], net.triangles[t][(k + 1) % 3]};
+      neighbour = edges.find({e.second, e.first});
     }
     const auto middle = static_cast<std::int32_t>(net.points_m.size());
     const Point2 &a = net.points_m[e.first], &b = net.points_m[e.second];
@@ -165,11 +181,11 @@ std::vector<double> calc_angles(const std::vector<Point2>& p) {
   return angles;
 }
 
-Net triangulate(const std::vector<Point2>& corners_m, double max_edge_m) {
+Net triangulate(const std::vector<Point2>& corners_m, double max_edge_m, const std::vector<bool>& apart) {
   Net net{corners_m, cut_ears(corners_m)};
-  flip_edges(net);
-  halve_edges(net, max_edge_m);
-  flip_edges(net);
+  flip_edges(net, {});
+  halve_edges(net, max_edge_m, apart);
+  flip_edges(net, apart);
   return net;
 }
 

@@ -12,7 +12,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kMinLength = 1e-6, kMaxLength = 1e4;  // [m]
-constexpr int kMinGrid = 2, kMaxGrid = 2000;
+constexpr int kMinGrid = 2, kMaxGrid = 1000;
 constexpr std::size_t kMaxCorners = 1000;
 constexpr std::array<const char*, 5> kKeys{"string", "beam", "membrane", "plate", "modes_csv"};
 constexpr std::array<const char*, 4> kEdgeNames{"free", "hinged", "clamped", "sliding"};

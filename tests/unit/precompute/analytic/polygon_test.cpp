@@ -69,13 +69,23 @@ TEST(Triangulate, fills_any_polygon) {
     }
 }
 
+TEST(Triangulate, keeps_corners_apart) {
+  for (const int n : {8, 40, 200}) {
+    std::vector<Point2> round;
+    for (int i = 0; i < n; ++i) round.push_back({std::cos(2 * pi * i / n), std::sin(2 * pi * i / n)});
+    const Net net = triangulate(round, 0.4, std::vector<bool>(round.size(), true));
+    expect_net(net, calc_area(round));
+    for (const bank::Triangle& t : net.triangles) EXPECT_LT(std::count_if(t.begin(), t.end(), [&](std::int32_t v) { return v < n; }), 2);
+  }
+}
+
 TEST(Angles, are_those_inside) {
   const std::vector<double> angles = calc_angles(kL);
   for (std::size_t i = 0; i < angles.size(); ++i) EXPECT_NEAR(angles[i], i == 3 ? 1.5 * pi : 0.5 * pi, 1e-15);
 }
 
 TEST(TriangleBasis, is_one_at_its_points_and_sums_to_one) {
-  for (const int order : {1, 2, 4, 5, 6}) {
+  for (const int order : {1, 2, 5, 8, 10}) {
     const TriangleBasis basis(order);
     ASSERT_EQ(basis.size(), (order + 1) * (order + 2) / 2);
     for (int i = 0; i < basis.size(); ++i) {
@@ -83,7 +93,7 @@ TEST(TriangleBasis, is_one_at_its_points_and_sums_to_one) {
       for (int j = 0; j < basis.size(); ++j) EXPECT_NEAR(values(j), i == j ? 1.0 : 0.0, 1e-12);
     }
     EXPECT_NEAR(basis.calc(0.21, 0.33).sum(), 1.0, 1e-12);
-    EXPECT_NEAR(basis.mass.sum(), 0.5, 1e-13);
+    EXPECT_NEAR(basis.mass.sum(), 0.5, 1e-12);
     EXPECT_NEAR(basis.stiffness_rr.sum(), 0.0, 1e-10);
   }
 }
@@ -93,7 +103,7 @@ TEST(TriangleModes, of_a_square_are_those_of_the_closed_form) {
   for (int m = 1; m < 9; ++m)
     for (int n = 1; n < 9; ++n) wanted.push_back(pi * pi * (m * m + n * n));
   std::sort(wanted.begin(), wanted.end());
-  const TriangleModes modes = solve_triangles(triangulate(kSquare, 0.12), TriangleBasis(5), 500.0);
+  const TriangleModes modes = solve_triangles(triangulate(kSquare, 0.18), TriangleBasis(8), 500.0);
   ASSERT_EQ(modes.kappa.size(), static_cast<std::size_t>(std::count_if(wanted.begin(), wanted.end(), [](double k) { return k < 500.0; })));
   for (std::size_t m = 0; m < modes.kappa.size(); ++m) {
     EXPECT_NEAR(modes.kappa[m] / wanted[m], 1.0, 1e-9);
@@ -148,17 +158,24 @@ TEST(PolygonMembrane, that_is_a_rectangle_is_the_rectangle) {
   std::vector<Vec3> a(one.modes.size()), b(a.size());
   polygon->calc_shapes({0.11, 0.07, 0}, one.modes, a);
   rectangle->calc_shapes({0.11, 0.07, 0}, other.modes, b);
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    EXPECT_NEAR(one.modes[i].lambda_rad2_s2 / other.modes[i].lambda_rad2_s2, 1.0, 1e-12);
-    EXPECT_NEAR(std::abs(a[i][2]), std::abs(b[i][2]), 1e-4) << i;
+  for (std::size_t i = 0; i < a.size();) {
+    std::size_t end = i;  // of the modes of one frequency, whose basis is free: (3, 4) and (4, 3) and the like of a rectangle 4 : 3
+    double found = 0.0, wanted = 0.0;
+    for (; end < a.size() && other.modes[end].lambda_rad2_s2 < (1.0 + 1e-9) * other.modes[i].lambda_rad2_s2; ++end) {
+      EXPECT_NEAR(one.modes[end].lambda_rad2_s2 / other.modes[end].lambda_rad2_s2, 1.0, 1e-12);
+      found += a[end][2] * a[end][2];
+      wanted += b[end][2] * b[end][2];
+    }
+    EXPECT_NEAR(std::sqrt(found), std::sqrt(wanted), 1e-4) << i;
+    i = end;
   }
 }
 
 TEST(PolygonMembrane, error_bars_cover_what_singular_corners_cost) {
-  // Two re-entrant corners: no particular solutions. Truth: the same with a band four times as wide, whose elements are a quarter as large.
+  // Two re-entrant corners: no particular solutions. Truth: the same with a band three times as wide, whose elements are a third as large.
   auto body = make(parse(
       R"({"membrane": {"shape": "polygon", "corners_m": [[0,0],[3,0],[3,1],[2,1],[2,2],[1,2],[1,1],[0,1]], "tension_n_m": 1, "density_kg_m2": 1}})"));
-  const ModeList coarse = body->list_modes(0.9, kAll), fine = body->list_modes(3.6, kAll);
+  const ModeList coarse = body->list_modes(0.9, kAll), fine = body->list_modes(2.7, kAll);
   ASSERT_GT(coarse.modes.size(), 5u);
   for (std::size_t i = 0; i < coarse.modes.size(); ++i) {
     const double cents = 1200 * std::abs(std::log2(to_hz(coarse.modes[i]) / to_hz(fine.modes[i])));
