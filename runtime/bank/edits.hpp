@@ -19,10 +19,10 @@ struct Edits {
 
 /// The bank of the edited body: what a solve of it gives, on the same mesh. Modes, decays, shapes, surface, rigid-body data, material,
 /// band, proof and radiation gains all follow, and the provenance says what was done to what. Decays follow the damping law with its
-/// numbers as they are, at the new frequencies. `radiation_gain` is OSG02's, as in every bank. A body that is not the same in all directions
-/// (wood) takes another size alone. Throws InputError when a scale is not within 1e-6 to 1e6, when an alpha is negative or not finite, when
-/// a damping law is not one of those, has numbers out of range or makes a mode swell, and for what means nothing to a body of several
-/// materials or directions. Not for an audio thread.
+/// numbers as they are, at the new frequencies. `radiation_gain` is OSG02's, as in every bank. A body that is not the same in all
+/// directions (wood) takes another size alone. Throws InputError when a scale is not within 1e-6 to 1e6, when an alpha is negative or not
+/// finite, when a damping law is not one of those, has numbers out of range or makes a mode swell, and for what means nothing to a body of
+/// several materials or directions. Not for an audio thread.
 Bank calc_edited(const Bank& bank, const Edits& edits);
 
 }  // namespace carillon::bank
