@@ -207,7 +207,7 @@ void add_hear(CLI::App& app, Shared& shared, Run& run) {
 
 void add_explore(CLI::App& app, Shared& shared, Run& run) {
   auto options = std::make_shared<ExploreOptions>();
-  explore::Order& explore = options->explore;
+  explore::PageOrder& explore = options->explore;
   CLI::App* command = app.add_subcommand(
       "explore",
       "Makes a page of bodies that one strikes, scrapes and hears: a folder that any web server can serve. Of a scene, what happens in it "

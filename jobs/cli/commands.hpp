@@ -113,7 +113,7 @@ int run_hear(Shared& shared, const HearOptions& options);
 
 /// carillon explore: a page on which bodies are struck.
 struct ExploreOptions {
-  explore::Order explore;
+  explore::PageOrder explore;
   bool is_serving = false;
   int port = 0;
 };

@@ -48,7 +48,7 @@ Json::Value describe(const explore::Explored& made) {
 }  // namespace
 
 int run_explore(Shared& shared, const ExploreOptions& options) {
-  explore::Order order = options.explore;
+  explore::PageOrder order = options.explore;
   std::error_code error;
   const bool is_made = order.subjects.size() == 1 && std::filesystem::is_directory(order.subjects[0], error);
   Json::Value root;

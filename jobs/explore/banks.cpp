@@ -10,8 +10,8 @@
 
 #include "jobs/explore/files.hpp"
 #include "runtime/bank/bank.hpp"
-#include "runtime/bank/reduce.hpp"
 #include "runtime/bank/blows.hpp"
+#include "runtime/bank/reduce.hpp"
 #include "runtime/material/table.hpp"
 
 namespace carillon::explore {

@@ -39,7 +39,7 @@ bool is_bank(const fs::path& file) {
 }
 
 /// The folder of an order, with what stands there now judged.
-fs::path find_place(const Order& order) {
+fs::path find_place(const PageOrder& order) {
   fs::path folder = order.folder;
   if (folder.empty()) folder = make_name(fs::absolute(order.subjects.front()).stem().string()) + "-explore";
   folder = fs::absolute(folder).lexically_normal();
@@ -55,7 +55,7 @@ fs::path find_engine() {
 }
 
 /// The name of what is shown: of a file "scene.json" the folder says more.
-std::string find_title(const Order& order) {
+std::string find_title(const PageOrder& order) {
   if (!order.title.empty()) return order.title;
   const fs::path first = fs::absolute(order.subjects.front());
   if (order.subjects.size() > 1) return fmt::format("{} and {} more", first.stem().string(), order.subjects.size() - 1);
@@ -64,7 +64,7 @@ std::string find_title(const Order& order) {
 
 class Work {
  public:
-  explicit Work(const Order& order)
+  explicit Work(const PageOrder& order)
       : order_(order),
         page_(find_page()),
         engine_(find_engine()),
@@ -175,7 +175,7 @@ class Work {
     put_folder(engine_, folder_.path() / "audio");
   }
 
-  const Order& order_;
+  const PageOrder& order_;
   fs::path page_, engine_, place_;
   WholeFolder folder_;
   Banks banks_;
@@ -188,7 +188,7 @@ class Work {
 
 }  // namespace
 
-Explored explore(const Order& order) {
+Explored explore(const PageOrder& order) {
   if (order.subjects.empty()) throw InputError("say what to explore: banks, or a scene");
   return Work(order).run();
 }

@@ -12,7 +12,7 @@ namespace carillon::explore {
 
 enum class Up { kZ, kY };
 
-struct Order {
+struct PageOrder {
   std::vector<std::filesystem::path> subjects = {};  // banks, side by side; or one scene
   std::filesystem::path folder;                      // made, or made again; empty: NAME-explore here
   std::string title = {};                            // of the page; empty: the name of the subject
@@ -39,7 +39,7 @@ struct Explored {
 /// Makes the folder: page, sound engine, banks, scene and, where something happens in the scene, the contacts of its simulation, which
 /// carillon-render makes. It appears whole or not at all, in place of an earlier one of this program. Throws InputError for subjects that
 /// cannot be played and for a folder that holds something else, SystemError when page or engine are not installed or the disk refuses.
-Explored explore(const Order& order);
+Explored explore(const PageOrder& order);
 
 /// Whether page and sound engine are installed with this program; without, other commands leave the page out.
 bool is_installed();

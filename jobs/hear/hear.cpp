@@ -165,7 +165,7 @@ class Listening {
   /// The page on which all that was asked for stands side by side.
   void make_explorer() {
     if (!explore::is_installed()) return;
-    explore::Order order{.folder = heard_.folder / kExplorer, .title = stem_};
+    explore::PageOrder order{.folder = heard_.folder / kExplorer, .title = stem_};
     for (const Sound& sound : heard_.sounds) order.subjects.push_back(sound.bank);
     if (!is_shape() && !is_mesh()) order.up = explore::Up::kY;
     say("making the page");

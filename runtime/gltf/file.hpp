@@ -24,8 +24,8 @@ namespace carillon::gltf {
 
 inline constexpr const char* kDraco = "KHR_draco_mesh_compression";
 
-/// The number of one of `size` things that `key` of `object` holds, if it is there. `what`: one of them. Throws InputError for a number that
-/// none has.
+/// The number of one of `size` things that `key` of `object` holds, if it is there. `what`: one of them. Throws InputError for a number
+/// that none has.
 std::optional<std::size_t> find_index(base::Object& object, const char* key, std::size_t size, const char* what);
 
 /// Types of the numbers in an accessor, by their numbers in the file.

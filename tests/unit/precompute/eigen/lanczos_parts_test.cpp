@@ -348,7 +348,7 @@ TEST(Orthogonaliser, replaces_dependent_columns_of_the_starting_block) {
 }
 
 // Hard cases of the Gram matrix that comes with the products: nearly dependent columns, where it is not enough; and locked modes that make
-// up nearly all of a column, where w^T M w - c^T c would be cancellation. Bound: orthonormal to 1e-12 all the same.
+// up nearly all of a column, where w^T M w - c^T c would be cancellation. Bound: still orthonormal to 1e-12.
 TEST(Orthogonaliser, keeps_nearly_dependent_and_nearly_locked_columns_orthonormal) {
   for (const double rest : {1e-1, 1e-3, 1e-6, 1e-9}) {
     Rig rig(20);

@@ -1,4 +1,4 @@
-// glTF and GLB, for changes that go on: the input is the JSON up to the first NUL and then the binary chunk, put into a container of the
+// glTF and GLB, for changes that last: the input is the JSON up to the first NUL and then the binary chunk, put into a container of the
 // right lengths, which a change of any byte would make wrong. fuzz_surface has the container itself.
 #include <algorithm>
 #include <cstddef>
