@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
-"""The runtime's programs and its Python module load no MPI, PETSc, SLEPc, METIS, MUMPS, parallel HDF5 or GPL mesher.   usage: runtime_links.py BIN_DIR
+"""The runtime's programs and its Python module load no MPI, PETSc, SLEPc, METIS, MUMPS, parallel HDF5 or GPL mesher.
+
+usage: runtime_links.py BIN_DIR
 
 GMP stands for CGAL here. Debian's serial HDF5 loads it as well, for its downloads (curl, GnuTLS); from there it is excused.
 """

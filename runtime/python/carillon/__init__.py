@@ -4,8 +4,8 @@
     bank = carillon.solve({"body": {"shape": "bar", "length_m": 0.3, "width_m": 0.03, "thickness_m": 0.012}, "material": "steel"})
     print(bank.frequency_hz[:5], bank.t60_s[:5])
 
-Units are SI and stand in the names. Errors are InputError (a ValueError), SolveError (a RuntimeError) and SystemError (an OSError), with the
-message that the programs print. docs/howto/python.md
+Units are SI and stand in the names. Errors are InputError (a ValueError), SolveError (a RuntimeError) and SystemError (an OSError), with
+the message that the programs print. docs/howto/python.md
 """
 import os as _os
 import typing as _typing
