@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "jobs/cli/commands.hpp"
 #include "runtime/material/table.hpp"
@@ -29,6 +30,11 @@ Json::Value describe(const material::Row& row) {
   entry["poisson_ratio"] = m.poisson_ratio;
   entry["density_kg_m3"] = m.density_kg_m3;
   entry["is_orthotropic"] = m.orthotropic.has_value();
+  if (m.orthotropic) {
+    const auto& [e, g, nu, axes] = *m.orthotropic;
+    for (const auto& [key, values] : {std::pair{"young_modulus_pa", &e}, {"shear_modulus_pa", &g}, {"poisson_ratio", &nu}})
+      for (const double value : *values) entry["orthotropic"][key].append(value);
+  }
   entry["loss_factor_at_1_khz"] = calc_loss_factor(m);
   entry["damping"] = to_json(m.describe_damping());
   entry["elasticity_source"] = to_json(row.elasticity_source);

@@ -299,6 +299,8 @@ class Hear(unittest.TestCase):
         for entry in listed:
             self.assertTrue(entry["loss_source"] and entry["elasticity_source"], entry)
         self.assertIn("along the grain", self.call("materials", "oak"))
+        oak = json.loads(self.call("--json", "materials", "oak"))["materials"][0]
+        self.assertEqual([len(oak["orthotropic"][key]) for key in ("young_modulus_pa", "shear_modulus_pa", "poisson_ratio")], [3, 3, 3])
         self.assertIn("did you mean", self.call("materials", "ook", code=2))
         own = self.folder / ".config/carillon/materials.json"
         own.parent.mkdir(parents=True)

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <set>
@@ -59,6 +60,64 @@ TEST(MaterialTable, has_solids_of_every_kind_with_sources) {
   }
   EXPECT_GE(MaterialTable::get().rows().size(), 30);
   EXPECT_EQ(groups, (std::set<std::string>{"metal", "glass", "ceramic", "stone", "wood", "plastic", "nature"}));
+}
+
+TEST(MaterialTable, lies_within_the_charts_of_each_group) {
+  // Ashby, Materials Selection in Mechanical Design, 4th ed., 2011, chapter 4: modulus, density and loss coefficient of the families, and
+  // Poisson's ratio, each as [least, greatest]. A wrong power of ten or exchanged columns fall outside.
+  struct Chart {
+    const char* group;
+    double young_gpa[2], density[2], poisson[2], loss[2];
+  };
+  for (const Chart& chart : {Chart{"metal", {14, 420}, {1700, 19400}, {0.24, 0.45}, {5e-5, 3e-2}},
+                             {"glass", {50, 80}, {2100, 3200}, {0.15, 0.25}, {1e-6, 3e-3}},
+                             {"ceramic", {10, 420}, {1700, 4100}, {0.15, 0.28}, {1e-5, 2e-2}},
+                             {"stone", {3, 100}, {1100, 3000}, {0.1, 0.3}, {1e-3, 3e-2}},
+                             {"wood", {0.015, 10}, {100, 850}, {0.0, 0.4}, {5e-3, 0.2}},
+                             {"plastic", {1e-3, 150}, {850, 2300}, {0.29, 0.49999}, {1e-3, 0.3}},
+                             {"nature", {5, 25}, {900, 2100}, {0.25, 0.45}, {1e-3, 5e-2}}}) {
+    for (const Row& row : MaterialTable::get().rows()) {
+      if (row.group != chart.group) continue;
+      SCOPED_TRACE(row.material.name);
+      const auto expect_within = [](double x, const double(&range)[2]) {
+        EXPECT_GE(x, range[0]);
+        EXPECT_LE(x, range[1]);
+      };
+      const double omega = 2 * std::numbers::pi * 1000;
+      expect_within(1e-9 * row.material.young_modulus_pa, chart.young_gpa);
+      expect_within(row.material.density_kg_m3, chart.density);
+      expect_within(row.material.poisson_ratio, chart.poisson);
+      expect_within(2 * row.material.calc_decay_per_s(omega * omega) / omega, chart.loss);
+    }
+  }
+}
+
+TEST(MaterialTable, has_woods_that_are_stiffest_along_the_grain_and_could_exist) {
+  int woods = 0;
+  for (const Row& row : MaterialTable::get().rows()) {
+    if (!row.material.orthotropic) continue;
+    SCOPED_TRACE(row.material.name);
+    const auto& [e, g, nu, axes] = *row.material.orthotropic;
+    // Compliance [1/E1, -nu12/E1, -nu13/E1; ...]: positive leading minors, by Sylvester's criterion.
+    const double s11 = 1 / e[0], s22 = 1 / e[1], s33 = 1 / e[2], s12 = -nu[0] / e[0], s23 = -nu[1] / e[1], s13 = -nu[2] / e[0];
+    EXPECT_GT(s11 * s22 - s12 * s12, 0);
+    EXPECT_GT(s11 * (s22 * s33 - s23 * s23) - s12 * (s12 * s33 - s23 * s13) + s13 * (s12 * s23 - s22 * s13), 0);
+    for (const double shear : g) EXPECT_GT(shear, 0);
+    EXPECT_GT(calc_definiteness(row.material.calc_elasticity_pa()), 1e-4);
+    if (row.group != "wood") continue;
+    ++woods;
+    // Wood Handbook, table 5-1: tangential 0.015 to 0.09 of along, radial 0.04 to 0.2, rolling shear 0.003 to 0.03.
+    EXPECT_GT(e[1], e[2]);
+    EXPECT_GE(e[2] / e[0], 0.014);
+    EXPECT_LE(e[2] / e[0], 0.09);
+    EXPECT_GE(e[1] / e[0], 0.04);
+    EXPECT_LE(e[1] / e[0], 0.2);
+    EXPECT_LE(g[1] / e[0], 0.031);
+    EXPECT_EQ(*std::min_element(g.begin(), g.end()), g[1]);
+    // Speed of sound along the grain of all woods: 3,500 to 6,000 m/s (Cremer; Wegst 2006).
+    EXPECT_NEAR(std::sqrt(e[0] / row.material.density_kg_m3), 4700, 700);
+  }
+  EXPECT_GE(woods, 8);
 }
 
 TEST(MaterialTable, knows_what_everybody_knows) {
