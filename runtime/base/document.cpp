@@ -153,7 +153,7 @@ class Builder {
 
  private:
   /// Somewhere from the beginning of what was read last to the byte behind it: that a token lies on one line is what counts.
-  std::ptrdiff_t get_offset() const { return static_cast<std::ptrdiff_t>(stream_->Tell()); }
+  std::ptrdiff_t get_offset() const { return stream_->src_ - stream_->head_; }
   bool add_integer(std::int64_t x) { return add({.kind = Value::Kind::kNumber, .integer = x, .number = static_cast<double>(x)}); }
   bool add(Value value) {
     value.offset = value.end = get_offset();

@@ -226,8 +226,8 @@ std::int32_t ContactForces::take_free(Slot& slot) noexcept {
 }
 
 bool ContactForces::take(const events::LastingContact& contact, const ContactSurface& other) noexcept {
-  if (events::find_fault(events::Event(contact)) != nullptr || static_cast<std::size_t>(contact.triangle) >= model_->surface_->triangles.size() ||
-      find_fault(other) != nullptr) {
+  if (events::find_fault(events::Event(contact)) != nullptr ||
+      static_cast<std::size_t>(contact.triangle) >= model_->surface_->triangles.size() || find_fault(other) != nullptr) {
     ++counters_.refused;
     return false;
   }

@@ -8,7 +8,8 @@
 namespace carillon::synth {
 
 /// While one of these lives, results that would be denormal are zero (FTZ) and denormal operands count as zero (DAZ): on many processors
-/// they cost a hundred cycles each. The caller's setting comes back afterwards. Does nothing on processors other than x86-64.
+/// they cost a hundred cycles each. The caller's setting comes back afterwards. Does nothing on processors other than x86-64, and in
+/// WebAssembly, which has no such setting: there Voice clears small states itself.
 class FpGuard {
  public:
 #if defined(__x86_64__)

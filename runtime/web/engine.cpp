@@ -1,4 +1,4 @@
-// Method:     a synth::Synthesiser, with what hands need on top. Somebody who is moved by hand (the camera, a body) gets waypoints a little
+// Method:     a synth::Synthesiser, with what hands need on top. What is moved by hand (the listener, a body) gets waypoints a little
 //             ahead of the sound, so that the way to the next one is known when the sound comes to the last; after a rest the place of the
 //             rest is a waypoint first. Recorded scenes are host::EventSchedulers, pushed kPushedS before they are due. One mark a block
 //             says that nothing earlier follows.
@@ -23,7 +23,7 @@ constexpr double kPushedS = 0.1;     // by which events of recordings are pushed
 constexpr double kMarginS = 0.01;    // by which waypoints and records of contacts are pushed earlier than strikes
 constexpr double kSoonS = 0.03;      // how far ahead of the sound the waypoints of hands lie: two pictures of a screen
 constexpr double kStepS = 0.002;     // between two waypoints at least
-constexpr double kFastestMs = 60.0;  // that hands move somebody; further ahead than kFarAheadS they may be faster
+constexpr double kFastestMs = 60.0;  // that hands move anything; further ahead than kFarAheadS they may be faster
 constexpr double kFarAheadS = 0.5;
 constexpr double kStillS = 0.06;                          // a hand that was not heard of for so long does not move
 constexpr std::size_t kMostBytes = std::size_t{3} << 30;  // of a surface
@@ -132,7 +132,7 @@ bool Engine::push_event(const events::Event& event) {
   return false;
 }
 
-/// A waypoint of somebody moved by hand, kSoonS ahead.
+/// A waypoint of what is moved by hand, kSoonS ahead.
 template <class Waypoint>
 bool Engine::move_soon(Way& way, Waypoint waypoint) {
   const double now_s = synthesiser_.get_horizon_s();
@@ -199,7 +199,7 @@ bool Engine::touch_soon(const events::LastingContact& contact) {
   return true;
 }
 
-/// A contact of which nothing is heard falls; that of a hand that rests goes on, without slip once it has been silent for a while.
+/// A contact of which nothing is heard falls; that of a hand that rests continues, without slip once it has been silent for a while.
 void Engine::hold_contacts() {
   const double now_s = synthesiser_.get_horizon_s();
   for (auto& [key, contact] : hand_contacts_) {

@@ -57,7 +57,7 @@ class Engine {
 
   /// Throws InputError as the synthesiser does.
   int add_body(int model, const synth::BodySettings& settings);
-  /// The body goes on with another model.
+  /// The body continues with another model.
   void swap_model(int body, int model);
   /// One mode of a body alone, by its number in the bank; -1: all.
   void set_solo(int body, int bank_mode);
@@ -73,7 +73,7 @@ class Engine {
   /// InputError for bodies that are not there.
   void begin_playback(int playback, const PlaybackRequest& request);
   void add_to_playback(int playback, std::span<const double> words);
-  /// What rings goes on; contacts end. Nothing happens for a number that is not there.
+  /// What rings continues; contacts end. Nothing happens for a number that is not there.
   void end_playback(int playback);
 
   /// The next frames, any number.
@@ -93,7 +93,7 @@ class Engine {
     int solo = -1;
     synth::EffectSet effects;
   };
-  /// The last waypoint of somebody moved by hand.
+  /// The last waypoint of a body or listener that is moved by hand.
   struct Way {
     double time_s = -1e300;
     Vec3 position_m{};

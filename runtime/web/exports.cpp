@@ -1,5 +1,5 @@
 // What JavaScript calls: numbers in, numbers out; texts and arrays at addresses of the module's memory.
-// Method:     one Engine and one Workshop a module, as it is told. What throws gives -1, and its sentence is the text.
+// Method:     one Engine or one Workshop a module. What throws gives -1, and its sentence is the text.
 // Source:     none.
 // Deviations: none.
 #include <algorithm>

@@ -128,7 +128,7 @@ class Browser:
         self._pages[session] = page
         for domain in ("Page", "Runtime", "Network", "Log"):
             page.call(f"{domain}.enable")
-        # Workers and worklets of the page tell of their requests, too.
+        # Requests of workers and worklets are reported, too.
         page.call("Target.setAutoAttach", {"autoAttach": True, "waitForDebuggerOnStart": False, "flatten": True})
         page.go(url, wait)
         return page
@@ -210,7 +210,9 @@ class Page:
         answer = self.call("Runtime.evaluate", params, timeout_s)
         if "exceptionDetails" in answer:
             details = answer["exceptionDetails"]
-            raise BrowserError(details.get("exception", {}).get("description") or details.get("exception", {}).get("value") or details["text"])
+            raise BrowserError(
+                details.get("exception", {}).get("description") or details.get("exception", {}).get("value") or details["text"]
+            )
         return answer["result"].get("value")
 
     def wait_for(self, script, timeout_s=30, every_s=0.05):

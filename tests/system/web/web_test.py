@@ -16,7 +16,7 @@ import time
 
 import numpy as np
 
-from browser import Browser, BrowserError, serve
+from browser import Browser, serve
 
 BIN = pathlib.Path(os.environ["CARILLON_BIN_DIR"])
 WEB = BIN.parent / "share" / "carillon" / "web"
@@ -46,7 +46,7 @@ def read_wav(file):
 
 
 class Bench:
-    """A folder with banks, served beside the engine, and a page that has loaded it."""
+    """A folder with banks, served with the engine, and a page that has loaded it."""
 
     def __init__(self, flags=()):
         self.flags = flags
@@ -185,7 +185,9 @@ def test_scenes():
             const began_s = await recording.start({at_s: 0});
             const plan = await recording.plan();
             return {duration_s: recording.duration_s, began_s, pose: recording.pose(0, 0.5), plan};
-        """.replace("EFFECTS", json.dumps(EFFECTS + CONTACTS))
+        """.replace(
+            "EFFECTS", json.dumps(EFFECTS + CONTACTS)
+        )
         file_options = ("--contacts", contacts)
         got = bench.compare("a recorded scene", scene, {"listener": LISTENER}, act, file_options=file_options)
         extra = got["extra"]
@@ -217,7 +219,10 @@ def test_edits():
         bench.make_bank("a.hdf")
         options = {"listener": LISTENER}
         made = {
-            "heavier, stiffer, larger": (["--density", 1.4, "--stiffness", 0.7, "--size", 1.3], "{density_scale: 1.4, stiffness_scale: 0.7, size_scale: 1.3}"),
+            "heavier, stiffer, larger": (
+                ["--density", 1.4, "--stiffness", 0.7, "--size", 1.3],
+                "{density_scale: 1.4, stiffness_scale: 0.7, size_scale: 1.3}",
+            ),
             "of glass": (["--material", "glass"], "{material: 'glass'}"),
             "another damping": (["--tan-phi", 0.004], "{loss: 0.002, damping_scale: 2}"),
         }
@@ -226,12 +231,17 @@ def test_edits():
             scene = make_scene(bodies=[{**BODY, "bank": "b.hdf"}])
             bench.compare(name, scene, options, LOAD + f"await body.edit({edits});" + STRIKE_AT % 0.1)
             # While it plays: the last of three wishes is heard.
-            live = LOAD + f"at(0.25, async () => {{ body.edit({{size_scale: 3}}); body.edit({{size_scale: 0.5}}); await body.edit({edits}); {STRIKE_AT % 0.4} }});"
+            live = (
+                LOAD
+                + f"at(0.25, async () => {{ body.edit({{size_scale: 3}}); body.edit({{size_scale: 0.5}}); await body.edit({edits}); {STRIKE_AT % 0.4} }});"
+            )
             late = {**scene, "strikes": [{"time_s": 0.4, "body": "a", **STRIKE}]}
             bench.compare(f"{name}, live", late, options, live)
             if name == "of glass":
-                # A body that rings goes on without a click: no step of the sound is larger than those of its own strike.
-                ringing = bench.render_page({"seconds": 0.6, **options}, LOAD + STRIKE_AT % 0.1 + f"at(0.25, () => body.edit({edits}));")["sound"]
+                # A body that rings continues without a click: no step of the sound is larger than those of its own strike.
+                ringing = bench.render_page({"seconds": 0.6, **options}, LOAD + STRIKE_AT % 0.1 + f"at(0.25, () => body.edit({edits}));")[
+                    "sound"
+                ]
                 steps = np.abs(np.diff(ringing, axis=0)).max(1)
                 begin, end = int(0.24 * 48000), int(0.3 * 48000)
                 assert steps[begin:end].max() < 1.5 * steps[int(0.15 * 48000) : begin].max(), "a click"
@@ -239,8 +249,10 @@ def test_edits():
         run(BIN / "carillon-bank", "edit", bench.folder / "a.hdf", bench.folder / "one.hdf", "--modes", 1, "--keep", "lowest")
         scene = make_scene(bodies=[{**BODY, "bank": "one.hdf"}])
         bench.compare("one mode alone", scene, options, LOAD + "body.solo(0);" + STRIKE_AT % 0.1)
-        # All the others go on: once the solo is over they are heard as if it had not been.
-        back = bench.render_page({"seconds": 1.0, **options}, LOAD + STRIKE_AT % 0.1 + "body.solo(0); at(0.3, () => body.solo(null));")["sound"]
+        # All the others continue: once the solo is over they are heard as if it had not been.
+        back = bench.render_page({"seconds": 1.0, **options}, LOAD + STRIKE_AT % 0.1 + "body.solo(0); at(0.3, () => body.solo(null));")[
+            "sound"
+        ]
         whole = bench.render_file(make_scene())
         check("after one mode alone", back[int(0.32 * 48000) :], whole[int(0.32 * 48000) :])
 
@@ -259,11 +271,11 @@ def test_edits():
 
 
 def test_banks():
-    """Bad banks give one sentence each, and the engine goes on."""
+    """Bad banks give one sentence each, and the engine continues."""
     with Bench() as bench:
         bench.make_bank("a.hdf", 2, 8)
         whole = (bench.folder / "a.hdf").read_bytes()
-        told = bench.page.evaluate(
+        answer = bench.page.evaluate(
             """(async () => {
           const audio = await CarillonAudio.open({context: new OfflineAudioContext(2, 4800, 48000)});
           const whole = new Uint8Array(await (await fetch('a.hdf')).arrayBuffer()), said = [];
@@ -284,17 +296,17 @@ def test_banks():
         })()""",
             timeout_s=110,
         )
-        good = [text for text in told["said"] if not text]
-        assert good == [], f"{len(good)} of {len(told['said'])} damaged banks were taken"
-        for text in told["said"]:
+        good = [text for text in answer["said"] if not text]
+        assert good == [], f"{len(good)} of {len(answer['said'])} damaged banks were taken"
+        for text in answer["said"]:
             assert text.startswith("cup.hdf") and "failed" not in text and "\n" not in text and len(text) < 400, text
-        assert "9.9" in told["said"][-2], (told["said"][-2], told["header"])
-        assert told["modes"] == 8 and len(told["said"]) > 300, told["modes"]
-        print(f"{len(told['said'])} damaged banks of {len(whole)} bytes, a sentence each; the last: {told['said'][-1]}")
+        assert "9.9" in answer["said"][-2], (answer["said"][-2], answer["header"])
+        assert answer["modes"] == 8 and len(answer["said"]) > 300, answer["modes"]
+        print(f"{len(answer['said'])} damaged banks of {len(whole)} bytes, a sentence each; the last: {answer['said'][-1]}")
 
 
 def test_hard():
-    """What nobody should do."""
+    """Input out of range, storms of strikes, extreme sizes and rates."""
     with Bench() as bench:
         bench.make_bank("a.hdf", 3, 30)
         options = {"listener": LISTENER}
@@ -347,26 +359,30 @@ def test_live():
     with Bench() as bench:
         bench.make_bank("a.hdf", 3, 30)
         page = bench.page
-        page.evaluate("""(async () => {
+        page.evaluate(
+            """(async () => {
           const audio = window.audio = await live();
           const bank = await audio.addBank(await (await fetch('a.hdf')).arrayBuffer(), 'a.hdf');
           window.body = await audio.addBody({bank, name: 'a', fixed: true});
           body.watch(true);
           audio.addEventListener('state', ({detail}) => (window.state = detail));
-        })()""")
+        })()"""
+        )
         before = page.evaluate("body.strike({triangle: 3, impulse_n_s: [0, 0, 0.1], duration_s: 1e-3}), audio.counters()")
         amplitudes = page.wait_for("window.state?.bodies[0] && state.peak_pa > 0 && Array.from(state.bodies[0].amplitudes)")
         assert len(amplitudes) == 30 and max(amplitudes) > 0.0, amplitudes
 
         # A scrape sounds as long as the hand moves, and ends with it.
-        page.evaluate("""(async () => {
+        page.evaluate(
+            """(async () => {
           const touch = body.touch({triangle: 3, normal: [0, 0, 1], force_n: 5, slip_m_s: [0.3, 0, 0], mallet: 'steel'});
           for (let k = 0; k < 30; ++k) {
             touch.move({slip_m_s: [0.3, 0.01 * k, 0]});
             await new Promise((resolve) => setTimeout(resolve, 16));
           }
           touch.end();
-        })()""")
+        })()"""
+        )
         plan = page.evaluate("audio.plan()")
         effects = plan["bodies"][0]["effects"]
         assert effects["modal"]["on"] and effects["roughness"]["on"], effects
@@ -437,7 +453,11 @@ def test_minute(seconds=60):
         played = page.evaluate("audio.context.currentTime")
         underruns = page.evaluate("audio.context.playbackStats?.underrunEvents ?? 0")
         time.sleep(seconds)
-        after, cpu_s, wall_s = page.evaluate("audio.counters()"), read_audio_cpu_s(bench.browser) - cpu_before, time.monotonic() - wall_before
+        after, cpu_s, wall_s = (
+            page.evaluate("audio.counters()"),
+            read_audio_cpu_s(bench.browser) - cpu_before,
+            time.monotonic() - wall_before,
+        )
         played_s = page.evaluate("audio.context.currentTime") - played
         underruns = page.evaluate("audio.context.playbackStats?.underrunEvents ?? 0") - underruns
         page.evaluate("clearInterval(striking)")
@@ -446,8 +466,13 @@ def test_minute(seconds=60):
         busy = os.getloadavg()[0] / os.cpu_count()
         over = after["over_budget"] - before["over_budget"]
         print(f"{played_s:.1f} s of sound in {wall_s:.1f} s: {modes:.0f} modes at work, {after['strikes'] - before['strikes']} strikes,")
-        print(f"audio thread {100 * cpu_s / played_s:.1f} % of a core, {over} quanta over budget, {underruns} underruns of the browser, load {busy:.1f} a core")
-        assert errors == [] and after["gaps"] == before["gaps"] and after["resets"] == 0 and after["zeroed"] == 0 and after["faded"] == 0, (errors, after)
+        print(
+            f"audio thread {100 * cpu_s / played_s:.1f} % of a core, {over} quanta over budget, {underruns} underruns of the browser, load {busy:.1f} a core"
+        )
+        assert errors == [] and after["gaps"] == before["gaps"] and after["resets"] == 0 and after["zeroed"] == 0 and after["faded"] == 0, (
+            errors,
+            after,
+        )
         assert after["refused"] == 0 and after["overflows"] == 0, after
         assert after["strikes"] - before["strikes"] > 190 * played_s, after
         assert played_s > 0.98 * seconds, played_s
