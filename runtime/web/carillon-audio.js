@@ -6,7 +6,7 @@
 //   await cup.hit({ triangle: 12, barycentric: [0.3, 0.3, 0.4], mallet: 'hard-wood' });
 //
 // SI units; vectors are [x, y, z], z up; rotations are unit quaternions [w, x, y, z] of the frame of the mesh in the world. What is refused
-// rejects with an Error of one sentence, or comes as an 'error' event where nothing is awaited. Reference: docs/howto/sound-in-a-page.md.
+// rejects with an Error of one sentence, or comes as an 'error' event where nothing is awaited. What it costs: docs/performance-web.md.
 
 const kNotTurned = [1, 0, 0, 0], kCentre = [1 / 3, 1 / 3, 1 / 3];
 const kExact = 0, kSoon = 1;

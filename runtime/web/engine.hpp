@@ -40,7 +40,7 @@ struct PlaybackRequest {
   double from_s = 0.0;      // of the recording
 };
 
-/// What it keeps true: numbers of models and surfaces are the caller's, those of bodies the synthesiser's; whoever moves by hand is on a
+/// What it keeps true: numbers of models and surfaces are the caller's, those of bodies the synthesiser's; what hands move is on a
 /// way without jumps, no faster than kFastestMs where that can be; a contact by hand or of a recording that stopped has an end.
 class Engine {
  public:
