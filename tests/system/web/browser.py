@@ -205,7 +205,7 @@ class Page:
             raise BrowserError(f"{url}: not loaded within {self.browser.timeout_s} s")
 
     def evaluate(self, script, timeout_s=None):
-        """The value of an expression, or of the promise that it gives, as JSON carries it. Throws BrowserError with what the script threw."""
+        """The value of an expression, or of the promise that it gives, as JSON carries it. Throws BrowserError with what it threw."""
         params = {"expression": script, "awaitPromise": True, "returnByValue": True, "userGesture": True}
         answer = self.call("Runtime.evaluate", params, timeout_s)
         if "exceptionDetails" in answer:

@@ -233,7 +233,8 @@ def test_edits():
             # While it plays: the last of three wishes is heard.
             live = (
                 LOAD
-                + f"at(0.25, async () => {{ body.edit({{size_scale: 3}}); body.edit({{size_scale: 0.5}}); await body.edit({edits}); {STRIKE_AT % 0.4} }});"
+                + "at(0.25, async () => { body.edit({size_scale: 3}); body.edit({size_scale: 0.5}); "
+                + f"await body.edit({edits}); {STRIKE_AT % 0.4} }});"
             )
             late = {**scene, "strikes": [{"time_s": 0.4, "body": "a", **STRIKE}]}
             bench.compare(f"{name}, live", late, options, live)
@@ -279,9 +280,11 @@ def test_banks():
             """(async () => {
           const audio = await CarillonAudio.open({context: new OfflineAudioContext(2, 4800, 48000)});
           const whole = new Uint8Array(await (await fetch('a.hdf')).arrayBuffer()), said = [];
-          const attempt = async (bytes) => audio.addBank(bytes, 'cup.hdf').then((bank) => { bank.close(); return ''; }, (error) => error.message);
-          for (let cut = 0; cut < whole.length; cut += Math.max(1, Math.floor(whole.length / 150))) said.push(await attempt(whole.slice(0, cut)));
-          for (let at = 0; at < whole.length; at += Math.max(1, Math.floor(whole.length / 150))) {
+          const attempt = async (bytes) =>
+            audio.addBank(bytes, 'cup.hdf').then((bank) => { bank.close(); return ''; }, (error) => error.message);
+          const step = Math.max(1, Math.floor(whole.length / 150));
+          for (let cut = 0; cut < whole.length; cut += step) said.push(await attempt(whole.slice(0, cut)));
+          for (let at = 0; at < whole.length; at += step) {
             const bytes = whole.slice();
             bytes[at] ^= 0x41;
             said.push(await attempt(bytes));
@@ -327,7 +330,10 @@ def test_hard():
         check("a strike after nonsense", got["sound"], bench.render_file(make_scene()))
 
         # A storm: more strikes at once than a body has room for.
-        storm = "for (let k = 0; k < 20000; ++k) body.strike({triangle: k % 100, impulse_n_s: [0, 0, 0.01], duration_s: 1e-3, time_s: 0.1 + 1e-5 * k});"
+        storm = (
+            "for (let k = 0; k < 20000; ++k) "
+            "body.strike({triangle: k % 100, impulse_n_s: [0, 0, 0.01], duration_s: 1e-3, time_s: 0.1 + 1e-5 * k});"
+        )
         got = bench.render_page({"seconds": 0.6, **options}, LOAD + storm)
         counters = got["counters"]
         assert np.isfinite(got["sound"]).all() and counters["resets"] == 0, counters
@@ -444,7 +450,8 @@ def test_minute(seconds=60):
               ++window.strikes;
             }
             const angle = audio.time_s;
-            audio.setListener({position_m: [0.5 * Math.sin(angle), 0.5 * Math.cos(angle), 0], rotation: [Math.cos(angle / 2), 0, 0, Math.sin(angle / 2)]});
+            audio.setListener({position_m: [0.5 * Math.sin(angle), 0.5 * Math.cos(angle), 0],
+                               rotation: [Math.cos(angle / 2), 0, 0, Math.sin(angle / 2)]});
           }, 33);
         })()"""
         )
@@ -467,7 +474,8 @@ def test_minute(seconds=60):
         over = after["over_budget"] - before["over_budget"]
         print(f"{played_s:.1f} s of sound in {wall_s:.1f} s: {modes:.0f} modes at work, {after['strikes'] - before['strikes']} strikes,")
         print(
-            f"audio thread {100 * cpu_s / played_s:.1f} % of a core, {over} quanta over budget, {underruns} underruns of the browser, load {busy:.1f} a core"
+            f"audio thread {100 * cpu_s / played_s:.1f} % of a core, {over} quanta over budget, "
+            f"{underruns} underruns of the browser, load {busy:.1f} a core"
         )
         assert errors == [] and after["gaps"] == before["gaps"] and after["resets"] == 0 and after["zeroed"] == 0 and after["faded"] == 0, (
             errors,
@@ -476,7 +484,7 @@ def test_minute(seconds=60):
         assert after["refused"] == 0 and after["overflows"] == 0, after
         assert after["strikes"] - before["strikes"] > 190 * played_s, after
         assert played_s > 0.98 * seconds, played_s
-        # What the thread itself took must leave room; whether it got the core in time is the machine's affair, and only asked of an idle one.
+        # What the thread itself took must leave room. Whether it got the core in time depends on the machine, and is asked of an idle one.
         assert 0.0 < cpu_s < 0.5 * played_s, (cpu_s, played_s)
         if busy < 0.7:
             assert over <= 2 and underruns == 0, (over, underruns)
