@@ -467,7 +467,7 @@ Check check_material(const Bank& bank) {
 Check check_solve(const Bank& bank) {
   Faults faults;
   const Counts& counts = bank.counts;
-  if (bank.element != "T4" && bank.element != "T10" && bank.element != "analytic") faults.add("element is none of T4, T10 and analytic");
+  if (bank.element != "T4" && bank.element != "T10" && bank.element != "analytic") faults.add("element is neither T4 nor T10 nor analytic");
   if (bank.mass != "consistent" && bank.mass != "lumped") faults.add("mass is neither consistent nor lumped");
   if (counts.nodes < static_cast<std::int64_t>(bank.vertex_count()))
     faults.add("{} nodes are fewer than the vertices of the surface", counts.nodes);
