@@ -13,7 +13,7 @@ namespace carillon::analytic {
 class FlatBody : public KnownBody {
  public:
   /// grid intervals along the longest side.
-  Surface make_surface(int grid) const override { return make_slab(make_net(grid), thickness_m_); }
+  ClosedSurface make_surface(int grid) const override { return make_slab(make_net(grid), thickness_m_); }
   void calc_shapes(const Vec3& point_m, std::span<const Mode> modes, std::span<Vec3> phi) const override;
 
  protected:

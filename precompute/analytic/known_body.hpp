@@ -30,7 +30,7 @@ struct ModeList {
 };
 
 /// A closed surface, outward, in the frame of the job.
-struct Surface {
+struct ClosedSurface {
   std::vector<Vec3> vertices_m;
   std::vector<bank::Triangle> triangles;
 };
@@ -47,7 +47,7 @@ class KnownBody {
   virtual void calc_shapes(const Vec3& point_m, std::span<const Mode> modes, std::span<Vec3> phi) const = 0;
 
   /// The surface with `grid` intervals along the longest side.
-  virtual Surface make_surface(int grid) const = 0;
+  virtual ClosedSurface make_surface(int grid) const = 0;
   /// Intervals that suit modes up to these; flat bodies at most kMaxDefaultGrid.
   virtual int choose_grid(std::span<const Mode> modes) const = 0;
 

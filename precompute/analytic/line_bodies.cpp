@@ -81,7 +81,7 @@ void String::calc_shapes(const Vec3& point_m, std::span<const Mode> modes, std::
   }
 }
 
-Surface String::make_surface(int grid) const { return make_prism(length_m_, make_disc_section(diameter_m_), grid); }
+ClosedSurface String::make_surface(int grid) const { return make_prism(length_m_, make_disc_section(diameter_m_), grid); }
 
 int String::choose_grid(std::span<const Mode> modes) const {
   int half_waves = 1;
@@ -264,7 +264,7 @@ void Beam::calc_shapes(const Vec3& point_m, std::span<const Mode> modes, std::sp
   }
 }
 
-Surface Beam::make_surface(int grid) const {
+ClosedSurface Beam::make_surface(int grid) const {
   if (body_.diameter_m) return make_prism(body_.length_m, make_disc_section(*body_.diameter_m), grid);
   const double y = 0.5 * *body_.width_m, z = 0.5 * *body_.thickness_m;
   return make_prism(body_.length_m, {{0, -z}, {y, -z}, {y, 0}, {y, z}, {0, z}, {-y, z}, {-y, 0}, {-y, -z}}, grid);

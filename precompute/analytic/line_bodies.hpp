@@ -15,7 +15,7 @@ class String : public KnownBody {
   String(const job::StringBody& body, const material::Material& material);
   ModeList list_modes(double high_hz, std::int64_t max_modes) override;
   void calc_shapes(const Vec3& point_m, std::span<const Mode> modes, std::span<Vec3> phi) const override;
-  Surface make_surface(int grid) const override;
+  ClosedSurface make_surface(int grid) const override;
   int choose_grid(std::span<const Mode> modes) const override;
 
  private:
@@ -29,7 +29,7 @@ class Beam : public KnownBody {
   Beam(const job::BeamBody& body, const material::Material& material);
   ModeList list_modes(double high_hz, std::int64_t max_modes) override;
   void calc_shapes(const Vec3& point_m, std::span<const Mode> modes, std::span<Vec3> phi) const override;
-  Surface make_surface(int grid) const override;
+  ClosedSurface make_surface(int grid) const override;
   int choose_grid(std::span<const Mode> modes) const override;
 
  private:

@@ -185,7 +185,7 @@ Made make_bank(const job::JobSpec& job) {
   const std::size_t count = band.modes.size();
   Made made{{}, body->theory, body->method, {}, body->warnings};
   bank::Bank& bank = made.bank;
-  Surface surface = body->make_surface(job.analytic->grid.value_or(body->choose_grid(band.modes)));
+  ClosedSurface surface = body->make_surface(job.analytic->grid.value_or(body->choose_grid(band.modes)));
   if (static_cast<double>(surface.vertices_m.size()) * static_cast<double>(count) * 3.0 > kMaxNumbers)
     throw InputError(
         fmt::format("{}: {} modes at {} points make a bank of {:.1f} GB; lower the end of \"band_hz\", give \"max_modes\", or a "

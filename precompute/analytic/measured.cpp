@@ -215,8 +215,8 @@ void MeasuredObject::calc_shapes(const Vec3& point_m, std::span<const Mode> mode
   for (std::size_t m = 0; m < modes.size(); ++m) phi[m] = table_.gains[static_cast<std::size_t>(modes[m].index[0])][nearest] * normal;
 }
 
-Surface MeasuredObject::make_surface(int grid) const {
-  Surface surface;
+ClosedSurface MeasuredObject::make_surface(int grid) const {
+  ClosedSurface surface;
   std::map<std::array<int, 3>, std::int32_t> numbers;
   const auto get = [&](const std::array<int, 3>& at) {
     const auto [entry, is_new] = numbers.try_emplace(at, static_cast<std::int32_t>(surface.vertices_m.size()));

@@ -26,7 +26,7 @@ class MeasuredObject : public KnownBody {
   MeasuredObject(const job::MeasuredBody& body);
   ModeList list_modes(double high_hz, std::int64_t max_modes) override;
   void calc_shapes(const Vec3& point_m, std::span<const Mode> modes, std::span<Vec3> phi) const override;
-  Surface make_surface(int grid) const override;
+  ClosedSurface make_surface(int grid) const override;
   int choose_grid(std::span<const Mode>) const override { return 8; }
 
   const ModesTable& get_table() const { return table_; }

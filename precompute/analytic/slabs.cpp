@@ -46,8 +46,8 @@ Net make_disc_net(double radius_m, int rings) {
   return net;
 }
 
-Surface make_slab(const Net& net, double thickness_m) {
-  Surface surface;
+ClosedSurface make_slab(const Net& net, double thickness_m) {
+  ClosedSurface surface;
   const auto count = static_cast<std::int32_t>(net.points_m.size());
   for (const double z : {0.5 * thickness_m, -0.5 * thickness_m})
     for (const Point2& p : net.points_m) surface.vertices_m.push_back({p[0], p[1], z});
@@ -66,8 +66,8 @@ Surface make_slab(const Net& net, double thickness_m) {
   return surface;
 }
 
-Surface make_prism(double length_m, const std::vector<Point2>& section, int intervals) {
-  Surface surface;
+ClosedSurface make_prism(double length_m, const std::vector<Point2>& section, int intervals) {
+  ClosedSurface surface;
   const auto sides = static_cast<int>(section.size());
   for (int i = 0; i <= intervals; ++i)
     for (const Point2& p : section) surface.vertices_m.push_back({length_m * i / intervals, p[0], p[1]});

@@ -22,10 +22,10 @@ Net make_rectangle_net(double length_m, double width_m, int columns, int rows);
 Net make_disc_net(double radius_m, int rings);
 
 /// Both sides of a net at z = +-thickness / 2, and the rim between them.
-Surface make_slab(const Net& net, double thickness_m);
+ClosedSurface make_slab(const Net& net, double thickness_m);
 
 /// A straight body along x from the origin: `section` is a convex polygon in (y, z), counter-clockwise seen from +x.
-Surface make_prism(double length_m, const std::vector<Point2>& section, int intervals);
+ClosedSurface make_prism(double length_m, const std::vector<Point2>& section, int intervals);
 
 /// Of a slab of uniform density: mass, centre, inertia. Area, first and second moments are those of the net's triangles.
 bank::RigidBody calc_slab_rigid(const Net& net, double thickness_m, double mass_kg);

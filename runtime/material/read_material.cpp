@@ -364,8 +364,8 @@ Material read_material(base::Object material, const std::array<double, 2>& band_
   return read_one(std::move(material), band_hz, warnings, table, "");
 }
 
-Material read_material(base::Object& parent, std::string_view key, const std::array<double, 2>& band_hz,
-                       std::vector<std::string>& warnings, const std::string& fallback) {
+Material read_material(base::Object& parent, std::string_view key, const std::array<double, 2>& band_hz, std::vector<std::string>& warnings,
+                       const std::string& fallback) {
   const bool is_missing = !parent.has(key) && !fallback.empty();
   if (!is_missing && !parent.has_string(key)) return read_one(parent.object(key), band_hz, warnings, &MaterialTable::get(), fallback);
   const std::string name = is_missing ? fallback : parent.string(key);

@@ -22,7 +22,7 @@ Material read_material(base::Object material, const std::array<double, 2>& band_
 
 /// The same of the value of `key`: an object, or a name of the table that programs use. `fallback`: a name of that table, taken where the
 /// key is missing, and as "from" where an object gives a damping alone; empty: none.
-Material read_material(base::Object& parent, std::string_view key, const std::array<double, 2>& band_hz,
-                       std::vector<std::string>& warnings, const std::string& fallback = "");
+Material read_material(base::Object& parent, std::string_view key, const std::array<double, 2>& band_hz, std::vector<std::string>& warnings,
+                       const std::string& fallback = "");
 
 }  // namespace carillon::material

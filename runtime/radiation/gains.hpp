@@ -10,7 +10,7 @@
 namespace carillon::radiation {
 
 enum class GainKind {
-  kOsg02,  // the bank's own: one pulsating sphere, no cancellation (O'Brien, Shen, Gatchalian 2002)
+  kOsg02,   // the bank's own: one pulsating sphere, no cancellation (O'Brien, Shen, Gatchalian 2002)
   kSphere,  // spherical multipoles about the body's centre, with cancellation
   kVddp96   // no air at all: every mode as loud as its coordinate q, 1 Pa for 1 m kg^1/2 (van den Doel, Pai 1996, a_n = Psi_n / omega_n)
 };

@@ -241,7 +241,7 @@ TEST(FlatBodies, have_orthonormal_modes) {
     const std::size_t count = std::min<std::size_t>(12, list.modes.size());
     ASSERT_GE(count, 6u) << text;
     const std::span<const Mode> modes(list.modes.data(), count);
-    const Surface surface = body->make_surface(160);
+    const ClosedSurface surface = body->make_surface(160);
     const double density = body->rigid.mass_kg / body->rigid.volume_m3, thickness = surface.vertices_m[0][2] - surface.vertices_m.back()[2];
     std::vector<double> sums(count * count, 0.0);
     std::vector<Vec3> phi(count);
