@@ -29,7 +29,7 @@ struct Value {
   std::optional<std::int64_t> integer{};  // of a number, if it is whole and fits
   double number = 0.0;
   std::ptrdiff_t offset = 0;  // a place on its first line
-  std::ptrdiff_t end = 0;     // behind its last byte
+  std::ptrdiff_t end = 0;     // of a list or an object: behind its last byte
   std::string text{};
   std::vector<Value> items{};           // of a list
   std::vector<Member> members{};        // of an object, in the order of the text
@@ -42,7 +42,7 @@ struct Value {
 
 struct Member {
   std::string key;
-  std::ptrdiff_t offset = 0;  // behind the key
+  std::ptrdiff_t offset = 0;  // of the key
   Value value{};
 };
 
@@ -156,7 +156,7 @@ class Builder {
   std::ptrdiff_t get_offset() const { return stream_->src_ - stream_->head_; }
   bool add_integer(std::int64_t x) { return add({.kind = Value::Kind::kNumber, .integer = x, .number = static_cast<double>(x)}); }
   bool add(Value value) {
-    value.offset = value.end = get_offset();
+    value.offset = get_offset();
     Value& into = *open_.back();
     Value* place = &into;  // the root
     if (is_root_there_) place = into.is(Value::Kind::kList) ? &into.items.emplace_back() : &into.members.back().value;
@@ -520,6 +520,20 @@ std::size_t skip_space(std::string_view text, std::size_t at) {
   return at;
 }
 
+/// The byte behind the text in quotes that begins at `at`.
+std::size_t skip_quoted(std::string_view text, std::size_t at) {
+  for (++at; at < text.size() && text[at] != '"'; ++at)
+    if (text[at] == '\\') ++at;
+  return at + 1;
+}
+
+/// The byte behind the value that begins at `at`.
+std::size_t find_end(std::string_view text, std::size_t at, const Value& value) {
+  if (value.is(Value::Kind::kList) || value.is(Value::Kind::kObject)) return static_cast<std::size_t>(value.end);
+  if (value.is(Value::Kind::kText)) return skip_quoted(text, at);
+  return std::min(text.find_first_of(" \t\r\n,]}/", at), text.size());
+}
+
 }  // namespace
 
 Object::Excerpt Object::make_excerpt(const std::vector<std::string>& keys) {
@@ -533,10 +547,10 @@ Object::Excerpt Object::make_excerpt(const std::vector<std::string>& keys) {
     if (member != found[0]) excerpt.text += ", ";
     for (; line < data_->line_at(member->offset); ++line) excerpt.text += '\n';
     excerpt.text += fmt::format("\"{}\": ", member->key);
-    const std::size_t colon = skip_space(data_->text, static_cast<std::size_t>(member->offset));
+    const std::size_t colon = skip_space(data_->text, skip_quoted(data_->text, static_cast<std::size_t>(member->offset)));
     const std::size_t begin = skip_space(data_->text, colon + 1);
     for (; line < data_->line_at(static_cast<std::ptrdiff_t>(begin)); ++line) excerpt.text += '\n';
-    const std::string own = data_->text.substr(begin, static_cast<std::size_t>(member->value.end) - begin);
+    const std::string own = data_->text.substr(begin, find_end(data_->text, begin, member->value) - begin);
     line += static_cast<int>(std::count(own.begin(), own.end(), '\n'));
     excerpt.text += own;
   }
