@@ -47,6 +47,11 @@ Html make_tiles(const Subject& subject) {
 std::string describe_bars(const bank::Bank& bank) {
   const auto find_worst = [](const std::vector<double>& bars) { return *std::max_element(bars.begin(), bars.end()); };
   if (bank.mode_count() == 0) return "There are no frequencies that could be wrong";
+  if (bank.element == "analytic") {
+    std::string text = bank::describe_accuracy(bank);
+    text[0] = 'F';
+    return text;
+  }
   std::string text = bank.algebraic_error_cents.empty() ? "There are no bounds against the mesh"
                                                         : fmt::format("Frequencies are those of the mesh to {} (a bound)",
                                                                       format_cents(find_worst(bank.algebraic_error_cents)));
@@ -104,8 +109,9 @@ std::string explain_missing(const Subject& subject, std::string_view what) {
 
 Html make_head(const Subject& subject, std::string_view title) {
   const bank::Bank& bank = subject.bank;
-  Html out = html("<header>\n<h1>{}</h1>\n<p class=\"remark\">{}, bank of version {}.{}; {} elements, {} mass</p>\n", title,
-                  subject.file.filename().string(), subject.version[0], subject.version[1], bank.element, bank.mass);
+  Html out = html("<header>\n<h1>{}</h1>\n<p class=\"remark\">{}, bank of version {}.{}; {}</p>\n", title, subject.file.filename().string(),
+                  subject.version[0], subject.version[1],
+                  bank.element == "analytic" ? "known modes" : fmt::format("{} elements, {} mass", bank.element, bank.mass));
   const auto faults =
       std::count_if(subject.checks.begin(), subject.checks.end(), [](const bank::Check& one) { return !one.faults.empty(); });
   if (faults > 0) {

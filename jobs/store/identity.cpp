@@ -55,7 +55,8 @@ void drop_signs_of_zero(Json::Value& value) {
 /// A resolved job without paths on one line.
 std::string make_canonical(Json::Value root) {
   root.removeMember("mesh");
-  if (root["body"].isObject()) root["body"].removeMember("surface");
+  if (root["body"].isObject())
+    for (const char* path : {"surface", "modes_csv"}) root["body"].removeMember(path);
   if (root["body"].isNull()) root.removeMember("body");
   drop_signs_of_zero(root);
   Json::StreamWriterBuilder writer;

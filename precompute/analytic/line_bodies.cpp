@@ -149,7 +149,8 @@ void Beam::add_bending(Motion motion, double second_moment_m4, double high_hz, s
   const double depth = std::sqrt(12.0 * second_moment_m4 / area_m2_);
   const char axis = motion == kBendingY ? 'y' : 'z';
   const auto is_thick = [&](double beta) { return depth * beta / (pi * length) > kThickWaves; };
-  if (const auto thick = std::find_if(roots.begin(), roots.end(), is_thick); thick != roots.end())
+  const bool is_said = motion == kBendingZ && moment_y_m4_ == moment_z_m4_;
+  if (const auto thick = std::find_if(roots.begin(), roots.end(), is_thick); thick != roots.end() && !is_said)
     warnings.push_back(fmt::format(
         "bending along {}: from {:.0f} Hz on half a wavelength is less than four times the depth, and Euler-Bernoulli is several per cent "
         "sharp; \"theory\": \"timoshenko\" has shear and rotary inertia",

@@ -83,6 +83,8 @@ Columns read_names(const std::vector<std::string_view>& names, const std::string
       take(everywhere, i, name);
       columns.gains.push_back(i);
     } else if (const std::optional<Vec3> point = parse_point(name)) {
+      if (std::find(table.points_m.begin(), table.points_m.end(), *point) != table.points_m.end())
+        throw InputError(fmt::format("{}: the point \"{}\" is there twice; remove one", place, base::printable(std::string(name))));
       columns.gains.push_back(i);
       table.points_m.push_back(*point);
     } else {

@@ -260,9 +260,12 @@ std::string describe_accuracy(const Bank& bank) {
                ? std::string(unknown)
                : fmt::format("{} {:.2g} cent ({})", known, *std::max_element(cents.begin(), cents.end()), kind);
   };
-  if (bank.element == "analytic")
-    return describe_largest(bank.discretisation_error_cents, "frequencies are those of the theory to", "an estimate",
-                            "no estimates against the theory");
+  if (bank.element == "analytic") {
+    const std::vector<double>& cents = bank.discretisation_error_cents;
+    const bool is_exact = std::all_of(cents.begin(), cents.end(), [](double c) { return c == 0.0; });
+    return is_exact ? "frequencies are those of the theory, to rounding"
+                    : describe_largest(cents, "frequencies are those of the theory to", "an estimate", "no estimates against the theory");
+  }
   const bool is_corrected = !bank.corrected.is_empty();
   return describe_largest(bank.algebraic_error_cents, "frequencies are those of the mesh to", "a bound", "no bounds against the mesh") +
          describe_largest(is_corrected ? bank.corrected.error_cents : bank.discretisation_error_cents,

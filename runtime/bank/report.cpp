@@ -215,9 +215,12 @@ std::string format_info(const Bank& bank, const std::filesystem::path& file, std
                       bank.complete ? "complete" : "not all of the band", worst);
   text += fmt::format("surface   {} vertices, {} triangles, shapes of {} bytes a component\n", bank.vertex_count(), bank.triangles.size(),
                       bank.shape_bytes);
-  text += fmt::format("solve     {} elements, {} mass; {} nodes, {} tets, {} component{}, {} rigid modes deflated\n", bank.element,
-                      bank.mass, bank.counts.nodes, bank.counts.tets, bank.counts.components, bank.counts.components == 1 ? "" : "s",
-                      bank.counts.rigid_modes);
+  if (bank.element == "analytic")
+    text += fmt::format("solve     none: known modes at {} points, {} rigid modes\n", bank.counts.nodes, bank.counts.rigid_modes);
+  else
+    text += fmt::format("solve     {} elements, {} mass; {} nodes, {} tets, {} component{}, {} rigid modes deflated\n", bank.element,
+                        bank.mass, bank.counts.nodes, bank.counts.tets, bank.counts.components, bank.counts.components == 1 ? "" : "s",
+                        bank.counts.rigid_modes);
   text += fmt::format("proof     {}\naccuracy  {}\n", describe_completeness(bank), describe_accuracy(bank));
   text += fmt::format("material  E {:.5g} Pa, nu {:.4g}, rho {:.5g} kg/m^3{}\n", m.young_modulus_pa, m.poisson_ratio, m.density_kg_m3,
                       bank.regions.empty() ? "" : " (of the whole; several materials: --json)");

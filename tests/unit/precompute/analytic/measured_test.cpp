@@ -52,6 +52,8 @@ TEST_F(Table, that_is_wrong_is_refused_with_its_line) {
   EXPECT_THAT(find_fault("frequency_hz,decay_per_s\n1,2\n"), HasSubstr(":1: give a column gain"));
   EXPECT_THAT(find_fault("frequency_hz,decay_per_s,gain,0 0 0\n1,2,3,4\n"), HasSubstr("not both"));
   EXPECT_THAT(find_fault("frequency_hz,decay_per_s,gain,gain\n1,2,3,4\n"), HasSubstr("twice"));
+  EXPECT_THAT(find_fault("frequency_hz,decay_per_s,0 0 0,0 1 0,0 0.0 0\n1,2,3,4,5\n"),
+              HasSubstr(":1: the point \"0 0.0 0\" is there twice"));
   EXPECT_THAT(find_fault("frequency_hz,decay_per_s,gian\n1,2,3\n"), HasSubstr("column \"gian\" is not known"));
   EXPECT_THAT(find_fault(head + "440,2\n"), HasSubstr(":2: 2 values, and there are 3 columns"));
   EXPECT_THAT(find_fault(head + "440,2,x\n"), HasSubstr(":2: \"x\" is no finite number"));
