@@ -66,7 +66,12 @@ class Validation {
         heartbeat_(shows_progress && run_.comm.is_root()),
         base_bytes_(static_cast<double>(base::find_memory().resident)) {}
 
-  void run(const std::filesystem::path& job_file);
+  /// The job, read and checked.
+  const Run& open(const std::filesystem::path& job_file) {
+    open_job(run_, job_file, job::BankKey::optional);
+    return run_;
+  }
+  void run();
   Json::Value describe() const;
   std::string describe_for_people() const;
 
@@ -113,9 +118,8 @@ class Validation {
   std::vector<std::string> notes_;
 };
 
-void Validation::run(const std::filesystem::path& job_file) {
+void Validation::run() {
   if (run_.comm.size() > 1) throw InputError("--validate works on one rank: start carillon-precompute without mpirun");
-  open_job(run_, job_file, job::BankKey::optional);
   Setting setting = job::get_setting(run_.job);
   if (run_.job.accuracy_cents) {
     setting = find_first_setting(run_);
@@ -425,11 +429,10 @@ std::string Validation::describe_for_people() const {
 std::string validate_job(const comm::Communicator& comm, const std::filesystem::path& job_file, const RunOptions& options) {
   RunOptions silent = options;
   silent.quiet = true;
-  Run known(comm, silent);
-  open_job(known, job_file, job::BankKey::optional);
-  if (known.job.analytic) return validate_known_body(known);
   Validation validation(comm, silent, !options.quiet);
-  validation.run(job_file);
+  const Run& opened = validation.open(job_file);
+  if (opened.job.analytic) return validate_known_body(opened);
+  validation.run();
   return options.json ? write_json(validation.describe()) : validation.describe_for_people();
 }
 
