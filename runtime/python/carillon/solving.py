@@ -3,8 +3,10 @@ import json
 import os
 import pathlib
 import shutil
+import signal
 import subprocess
 import tempfile
+import threading
 import typing
 import warnings
 
@@ -44,10 +46,22 @@ def run(command: typing.List[str]) -> typing.Tuple[int, str]:
     """Exit code and what it prints on standard error. Whatever interrupts this (Ctrl-C) ends it, too."""
     if shutil.which(command[0]) is None:
         raise SystemError(f"{command[0]} is not along PATH; install it (package openmpi-bin)")
-    with subprocess.Popen(
-        command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=make_environment()
-    ) as solver:
+    # An interrupt inside Popen() would leave the solver running: it is noted, and raised once the solver can be ended.
+    interrupts: typing.List[int] = []
+    handler = signal.getsignal(signal.SIGINT) if threading.current_thread() is threading.main_thread() else None
+    if handler is not None:
+        signal.signal(signal.SIGINT, lambda number, _: interrupts.append(number))
+    try:
+        solver = subprocess.Popen(
+            command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=make_environment()
+        )
+    finally:
+        if handler is not None:
+            signal.signal(signal.SIGINT, handler)
+    with solver:
         try:
+            if interrupts:
+                signal.raise_signal(signal.SIGINT)
             _, said = solver.communicate()
         except BaseException:
             solver.terminate()
