@@ -76,7 +76,7 @@ class Stage:
         bank = json.loads(text)
         print(
             f"  {name}: {bank['element']}, {bank['counts']['nodes']} nodes, {bank['mode_count']} modes,"
-            f" {bank['corrected_frequencies_hz'][0]:.2f} Hz and up, {seconds:.1f} s"
+            f" {(bank['corrected_frequencies_hz'] or bank['frequencies_hz'])[0]:.2f} Hz and up, {seconds:.1f} s"
         )
         return bank
 
