@@ -74,7 +74,7 @@ double calc_angle(const Point2& tip, const Point2& a, const Point2& b) {
   return std::atan2(std::abs(static_cast<double>(cross(tip, a, b))), dot);
 }
 
-/// Lawson's flips: an inner edge whose opposite angles add up to more than a half turn gives way to the other diagonal, unless that joins
+/// Lawson's flips: an inner edge whose opposite angles add up to more than a half turn is replaced by the other diagonal, unless that joins
 /// two points that are to be apart.
 void flip_edges(Net& net, const std::vector<bool>& apart) {
   const auto is_marked = [&](std::int32_t v) { return static_cast<std::size_t>(v) < apart.size() && apart[static_cast<std::size_t>(v)]; };

@@ -141,7 +141,7 @@ TEST(KnownJobs, that_are_wrong_are_refused_in_words) {
   EXPECT_THAT(fault(R"({"string": {"length_m": 1}, "shape": "bar"})"), HasSubstr("already"));
   EXPECT_THAT(fault(R"({"string": {"length_m": 1, "tension_n": 5, "mass_kg_m": 1}})", R"(, "element": "T4")"),
               HasSubstr("bodies of elements"));
-  EXPECT_THAT(fault(R"({"string": {"length_m": 1, "tension_n": 5, "mass_kg_m": 1, "wieght": 3}})"), HasSubstr("wieght"));
+  EXPECT_THAT(fault(R"({"string": {"length_m": 1, "tension_n": 5, "mass_kg_m": 1, "weight_n": 3}})"), HasSubstr("weight_n"));
 }
 
 TEST(KnownJobs, resolve_to_themselves) {
