@@ -47,8 +47,8 @@ struct PutGains {
   double sphere_radius_m = 0.0;
   Limited limited{};
 };
-/// Puts the gains of a kind into a bank that has the decays with which it is played; those of kSphere are limited by them. Throws InputError
-/// as calc_gains() does.
+/// Puts the gains of a kind into a bank that has the decays with which it is played; those of kSphere are limited by them. Throws
+/// InputError as calc_gains() does.
 PutGains put_gains(bank::Bank& bank, GainKind kind);
 
 /// Radius [m] of the sphere that has the volume inside the outer surface, cavities and all. InputError as above.
