@@ -48,8 +48,8 @@ std::vector<Triangle> cut_ears(const std::vector<Point2>& p) {
   judge_all();
   while (ring.size() > 3) {
     auto best = std::max_element(quality.begin(), quality.end());
-    if (*best < 0.0) best = judge_all();  // corners that were in the way may have gone
-    if (*best < 0.0) throw InputError("the polygon is too thin somewhere to be cut into triangles; move its corners apart");
+    if (*best < 0.0) best = judge_all();  // corners that were in the way may have been removed
+    if (*best < 0.0) throw InputError("the polygon is too thin to be divided into triangles; move its corners apart");
     const auto at = static_cast<std::size_t>(best - quality.begin());
     const std::size_t n = ring.size();
     triangles.push_back({ring[(at + n - 1) % n], ring[at], ring[(at + 1) % n]});
@@ -74,7 +74,7 @@ double calc_angle(const Point2& tip, const Point2& a, const Point2& b) {
   return std::atan2(std::abs(static_cast<double>(cross(tip, a, b))), dot);
 }
 
-/// Lawson's flips: an inner edge whose opposite angles add up to more than a half turn gives way to the other diagonal, unless that joins
+/// Lawson's flips: an inner edge whose opposite angles add up to more than a half turn is replaced by the other diagonal, unless that joins
 /// two points that are to be apart.
 void flip_edges(Net& net, const std::vector<bool>& apart) {
   const auto is_marked = [&](std::int32_t v) { return static_cast<std::size_t>(v) < apart.size() && apart[static_cast<std::size_t>(v)]; };
@@ -145,7 +145,7 @@ void halve_edges(Net& net, double max_edge_m, const std::vector<bool>& apart) {
       continue;
     }
     if (net.triangles.size() > kMaxTriangles)
-      throw InputError("the polygon takes too many triangles; lower the end of \"band_hz\", or give \"max_modes\"");
+      throw InputError("the polygon needs too many triangles; lower the end of \"band_hz\", or give \"max_modes\"");
     // Rivara's path: from neighbour to neighbour across longest edges that are longer still, to an edge that is the longest on both sides.
     std::size_t t = work.back();
     auto [k, length] = longest(t);
