@@ -1,6 +1,6 @@
 // Method:     the id of jobs/store; carillon-precompute in a temporary folder of the cache, which then gets its name in one rename. Two
-//             that miss the same bank both solve it, and one of them publishes. The mesher may refuse the nodes of a preview and name
-//             others: those are remembered, so that the same body asks for them at once.
+//             that miss the same bank both solve it, and one of them publishes. If the mesher refuses the number of nodes of a
+//             preview and proposes another, that number is stored, so that the same body starts from it next time.
 // Source:     own.
 // Deviations: none.
 #include "jobs/cache/cache.hpp"
@@ -30,7 +30,7 @@ namespace fs = std::filesystem;
 constexpr const char* kCountFolder = "counts";  // of nodes, by the id of the preview that was asked for
 constexpr std::uint64_t kMaxCountBytes = 100;
 
-/// What a person calls the body.
+/// Name of the body for messages.
 std::string describe(const job::JobSpec& job) {
   const std::string body = job.analytic                           ? job::get_key(*job.analytic)
                            : job.body && !job.body->shape.empty() ? job.body->shape
@@ -85,7 +85,7 @@ class Maker {
   }
 
  private:
-  /// Empty: it is not there.
+  /// Empty: not found.
   fs::path find(const store::Id& id) const {
     std::error_code error;
     if (const fs::path own = store::find_default_store(); fs::exists(own / "VERSION", error)) {
@@ -169,7 +169,7 @@ fs::path find_default_cache() {
   if (cache != nullptr && fs::path(cache).is_absolute()) return fs::path(cache) / "carillon";
   const char* home = std::getenv("HOME");
   if (home != nullptr && fs::path(home).is_absolute()) return fs::path(home) / ".cache" / "carillon";
-  throw SystemError("there is no place for banks that are made on the way: neither XDG_CACHE_HOME nor HOME names a folder; set one");
+  throw SystemError("there is no folder for the cache of banks: neither XDG_CACHE_HOME nor HOME names one; set one of them");
 }
 
 Made find_or_make(const job::JobSpec& job, const std::string& solver, const fs::path& cache, bool is_quiet) {

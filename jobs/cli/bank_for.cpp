@@ -40,7 +40,7 @@ int make(const Shared& shared, const BankForOptions& options) {
 
 int run_bank_for(Shared& shared, const BankForOptions& options) {
   if (options.result.empty()) return make(shared, options);
-  // The program that asked says what is wrong, once.
+  // The calling program prints the message, once.
   base::Result result;
   int code = 0;
   try {

@@ -181,26 +181,28 @@ void add_hear(CLI::App& app, Shared& shared, Run& run) {
   hear::Order& hear = options->hear;
   CLI::App* command = app.add_subcommand(
       "hear",
-      "From an object to its sound: meshes it, finds its modes, strikes it in a few places, and writes a WAV, a spectrogram and a report. "
-      "What\nyou do not say (size, solid or wall, material) is assumed, and it says so.");
+      "Computes the sound of an object: meshes it, computes its modes, strikes it at four points, and writes a WAV, a spectrogram and a "
+      "report.\nWhat is not given (size, solid or wall, material) is assumed, and the assumptions are printed.");
   command->add_option("OBJECT", hear.object, "A surface (OBJ, STL, PLY, OFF, glTF, GLB) or a mesh (.msh, .vtu)");
-  command->add_option("--shape", hear.shape, "A parametric body in place of a file, with its dimensions: carillon-mesh --help has them");
+  command->add_option("--shape", hear.shape, "A parametric body instead of a file, with its dimensions: see carillon-mesh --help");
   command->add_option("-o,--output", hear.out, "The folder for all files (default: NAME-sound)");
-  command->add_option("--material", hear.materials, "By name (carillon materials); several with commas, each a sound of its own")
+  command
+      ->add_option("--material", hear.materials,
+                   "Name of the material (carillon materials); several, separated by commas, give one sound each")
       ->delimiter(',');
   command
       ->add_option("--height", hear.heights_m,
-                   "Makes the object so high, in metres (y is up; of a shape: its dimension); several with commas")
+                   "Height of the object in metres (y is up; of a shape: its dimension); several, separated by commas")
       ->delimiter(',');
   command->add_option("--scale", hear.scale, "Metres per unit of the file");
   command->add_option("--mallet", hear.mallet, "steel, hard-wood, plastic, rubber, hard-felt, soft-felt or yarn")->capture_default_str();
-  command->add_option("--accuracy", hear.accuracy_cents, "Refines until every mode is so near, in cents; without it a preview");
+  command->add_option("--accuracy", hear.accuracy_cents, "Refines until every error bar is within this many cents; without it a preview");
   command->add_flag("-q,--quiet", hear.is_quiet, "No progress");
   for (const std::string& name : list_dimensions()) {
     if (name == "height") continue;
     command->add_option_function<double>(
         "--" + name, [options, name](double value) { options->hear.dimensions[name] = value; },
-        name == "wall" ? "Thickness of a shell, in metres; of a surface, or a dimension of a shape" : "A dimension of shapes");
+        name == "wall" ? "Thickness of the wall of a surface or shape, in metres" : "A dimension of shapes");
   }
   set_work(*command, shared, run, options, run_hear);
 }
@@ -210,16 +212,17 @@ void add_explore(CLI::App& app, Shared& shared, Run& run) {
   explore::PageOrder& explore = options->explore;
   CLI::App* command = app.add_subcommand(
       "explore",
-      "Makes a page of bodies that one strikes, scrapes and hears: a folder that any web server can serve. Of a scene, what happens in it "
-      "is\nsimulated and played too. A folder that was made before is served as it is.");
-  command->add_option("BANK|SCENE|FOLDER", explore.subjects, "Banks, side by side; or one scene file (JSON); or a folder made before")
+      "Makes a web page on which bodies are struck, scraped and heard: a folder that any web server can serve. A scene is also\n"
+      "simulated, and the page plays it. With --serve, an existing folder is served as it is.");
+  command
+      ->add_option("BANK|SCENE|FOLDER", explore.subjects, "Banks, side by side; or one scene file (JSON); or a folder made by this command")
       ->required();
   command->add_option("-o,--output", explore.folder, "The folder (default: NAME-explore)");
-  command->add_option("--title", explore.title, "Of the page (default: the name of the bank or scene)");
+  command->add_option("--title", explore.title, "Title of the page (default: the name of the bank or scene)");
   command->add_option("--up", explore.up, "Axis of the meshes of banks that points up: y or z (default)")
       ->transform(CLI::CheckedTransformer(std::map<std::string, explore::Up>{{"y", explore::Up::kY}, {"z", explore::Up::kZ}}))
       ->option_text("AXIS");
-  command->add_flag("--whole", explore.keeps_banks, "Banks as they are, however large; else those above 4 MB are made smaller");
+  command->add_flag("--whole", explore.keeps_banks, "Keep banks as they are; without it those above 4 MB are reduced");
   CLI::Option* serves = command->add_flag("--serve", options->is_serving, "Serve it on this machine, until Ctrl-C");
   command->add_option("--port", options->port, "With --serve: the port (default: a free one)")->check(CLI::Range(1, 65535))->needs(serves);
   set_work(*command, shared, run, options, run_explore);
@@ -227,16 +230,17 @@ void add_explore(CLI::App& app, Shared& shared, Run& run) {
 
 void add_bank_for(CLI::App& app, Shared& shared, Run& run) {
   auto options = std::make_shared<BankForOptions>();
-  CLI::App* command = app.add_subcommand(
-      "bank-for",
-      "Prints the path of the bank of a body, which is computed if it is not there: a job without \"bank\", as the bodies of a scene are.\n"
-      "A body that says neither \"nodes\" nor \"accuracy_cents\" is a preview. Banks are kept in $XDG_CACHE_HOME/carillon, else "
-      "~/.cache/carillon,\nwhich may be removed at any time.");
+  CLI::App* command =
+      app.add_subcommand("bank-for",
+                         "Prints the path of the bank of a body, and computes the bank if it is missing. JOB is a job without \"bank\", "
+                         "like a body of a scene.\n"
+                         "A body without \"nodes\" and \"accuracy_cents\" is a preview. Banks are kept in $XDG_CACHE_HOME/carillon, else "
+                         "~/.cache/carillon,\nwhich may be removed at any time.");
   command->add_option("JOB", options->word, "Job file; - is standard input")->required();
   command->add_option("--cache", options->cache, "Keep banks in this folder");
-  command->add_option("--name", options->name, "The file that standard input comes from: messages name it, and paths start at its folder");
-  command->add_option("--first-line", options->first_line, "The line on which it begins there")->check(CLI::PositiveNumber);
-  command->add_option("--result", options->result, "Write how it ended to this file, a JSON object, in place of a message");
+  command->add_option("--name", options->name, "Name of the file on standard input, for messages; paths are relative to its folder");
+  command->add_option("--first-line", options->first_line, "Line of that file on which standard input begins")->check(CLI::PositiveNumber);
+  command->add_option("--result", options->result, "Write the result to this file, a JSON object, instead of printing a message");
   command->add_flag("-q,--quiet", options->is_quiet, "No progress");
   set_work(*command, shared, run, options, run_bank_for);
 }
@@ -245,9 +249,9 @@ void add_materials(CLI::App& app, Shared& shared, Run& run) {
   auto options = std::make_shared<MaterialsOptions>();
   CLI::App* command = app.add_subcommand(
       "materials",
-      "Lists the materials that \"material\" in a job or a scene may name, those of your own file first: $CARILLON_MATERIALS, else\n"
+      "Lists the names for \"material\" in jobs and scenes. Those of your own file come first: $CARILLON_MATERIALS, else\n"
       "~/.config/carillon/materials.json. With names: all constants and their sources.");
-  command->add_option("NAME", options->names, "These only, in full");
+  command->add_option("NAME", options->names, "Show only these, with all constants");
   set_work(*command, shared, run, options, run_materials);
 }
 
@@ -290,9 +294,9 @@ void add_report(CLI::App& app, Shared& shared, Run& run) {
                                          "a job that is done, or of any bank.\nExit code 1: not there yet.");
   command->add_option("JOB|BANK", options->word, "Job file (what it holds now), an id or its beginning, or, with -o, the file of a bank")
       ->required();
-  command->add_option("-o,--output", options->folder, "Write report.html, its pictures and the page to play it into this folder");
+  command->add_option("-o,--output", options->folder, "Write report.html, its pictures and the page of carillon explore into this folder");
   command->add_flag("--no-pictures", options->no_pictures, "Draw no pictures of the first modes");
-  command->add_flag("--no-page", options->no_page, "With -o: leave out the page on which the body is struck (carillon explore)");
+  command->add_flag("--no-page", options->no_page, "With -o: omit the page of carillon explore");
   set_work(*command, shared, run, options, run_report);
 }
 

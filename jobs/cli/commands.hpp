@@ -125,7 +125,7 @@ struct BankForOptions {
   std::filesystem::path name;  // of what comes on standard input, for messages and relative paths
   int first_line = 1;
   std::filesystem::path cache;   // empty: the default one
-  std::filesystem::path result;  // where it says how it ended, in place of a message; empty: nowhere
+  std::filesystem::path result;  // file for the result, instead of a message; empty: none
   bool is_quiet = false;
 };
 int run_bank_for(Shared& shared, const BankForOptions& options);

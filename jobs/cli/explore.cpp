@@ -57,7 +57,7 @@ int run_explore(Shared& shared, const ExploreOptions& options) {
     if (!options.is_serving || !explore::is_explorer(order.folder))
       throw InputError(fmt::format("{}: {}", order.folder.string(),
                                    options.is_serving ? "this folder was not made by carillon explore; give banks or a scene"
-                                                      : "a folder is only served: --serve; give banks or a scene to make one"));
+                                                      : "a folder can only be served, with --serve; give banks or a scene to make one"));
     root["folder"] = to_json(order.folder.string());
   } else {
     const explore::Explored made = explore::explore(order);

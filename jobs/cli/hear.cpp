@@ -36,12 +36,11 @@ Json::Value describe(const hear::Sound& sound) {
 
 void print(const hear::Sound& sound) {
   std::string text = fmt::format("{}: {} modes", show(sound.name), sound.mode_count);
-  if (!sound.is_complete) text += fmt::format(" up to {:.0f} Hz, and more above", sound.highest_hz);
-  text += std::isfinite(sound.worst_cents)
-              ? fmt::format(", frequencies to about {} cents (an estimate; the worst mode)", hear::format_cents(sound.worst_cents))
-              : std::string(", without error bars");
+  if (!sound.is_complete) text += fmt::format(" up to {:.0f} Hz, incomplete above", sound.highest_hz);
+  text += std::isfinite(sound.worst_cents) ? fmt::format(", error bars up to {} cents (estimates)", hear::format_cents(sound.worst_cents))
+                                           : std::string(", without error bars");
   if (sound.is_edited) text += "; scaled from another solve";
-  if (sound.poisson_cents > 0.0) text += fmt::format(", {} cents of it for Poisson's ratio", hear::format_cents(sound.poisson_cents));
+  if (sound.poisson_cents > 0.0) text += fmt::format(", of which {} cents for Poisson's ratio", hear::format_cents(sound.poisson_cents));
   fmt::print("\n{}\n", text);
   fmt::print("{:>5} {:>10} {:>8} {:>9} {:>9}\n", "mode", "Hz", "+-cents", "T60 [s]", "dB(A)");
   for (std::size_t m = 0; m < sound.modes.size(); ++m) {

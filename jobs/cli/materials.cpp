@@ -90,8 +90,7 @@ int run_materials(Shared& shared, const MaterialsOptions& options) {
     fmt::print("{:<18} {:<8} {:>9.4g} {:>6.3g} {:>8.5g} {:>9.2g}  {}\n", show(m.name), show(row->group), 1e-9 * m.young_modulus_pa,
                m.poisson_ratio, m.density_kg_m3, calc_loss_factor(m), m.orthotropic && names.empty() ? "" : names);
   }
-  fmt::print(
-      "Wood and bone: the isotropic solid nearest to them; `carillon materials oak` shows all constants and where they come from.\n");
+  fmt::print("Wood and bone: constants of the nearest isotropic solid; `carillon materials oak` shows all constants and their sources.\n");
   return 0;
 }
 

@@ -34,8 +34,8 @@ const material::Row* find_nearest(const material::MaterialTable& table, const ba
   return nearest;
 }
 
-/// What the body looks to be of: the material of the job behind the bank where it has a name; a material or a group that the name of the
-/// file has in it ("shelf_wood"); else the row of the table whose stiffness and density are nearest.
+/// The material for the look of the body: the named one of the job behind the bank; else a material or group in the name of the file
+/// ("shelf_wood"); else the row of the table whose stiffness and density are nearest.
 void find_material(const bank::Bank& bank, const fs::path& file, BankFacts& facts) {
   const material::MaterialTable& table = material::MaterialTable::get();
   const Json::Value job = parse_json(bank.provenance);
@@ -85,7 +85,7 @@ const BankFacts& Banks::add(const fs::path& file) {
   const fs::path whole = fs::weakly_canonical(file);
   if (const auto found = facts_.find(whole); found != facts_.end()) return found->second;
   const bank::Bank bank = bank::read_bank(file);
-  if (bank.mode_count() == 0) throw InputError(fmt::format("{}: the bank has no modes; nothing of it can be heard", file.string()));
+  if (bank.mode_count() == 0) throw InputError(fmt::format("{}: the bank has no modes, so it has no sound", file.string()));
   BankFacts facts;
   find_material(bank, file, facts);
   find_place(bank, facts);

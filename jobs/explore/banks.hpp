@@ -1,4 +1,4 @@
-// The banks of a page: small enough to be fetched, with what the page wants to know of each before it has it.
+// The banks of a page: small enough to be fetched, with the data of each that the page needs before it is loaded.
 #pragma once
 
 #include <json/json.h>
@@ -19,17 +19,17 @@ struct BankFacts {
   PackedBank packed;
   Vec3 low_m{}, high_m{};        // of the surface, in the frame of the mesh
   std::string material, group;   // the name of the table that it has or is nearest to, and its group
-  Vec3 loudest_m{};              // the vertex where a blow is heard most
+  Vec3 loudest_m{};              // the vertex where a blow is loudest
   std::array<int, 2> loudest{};  // the same place: a triangle, and which of its corners
 };
 
-/// Puts banks into a folder, each once. Large ones keep the modes that are heard and coarser shapes.
+/// Puts banks into a folder, each once. Large ones keep the most audible modes, with coarser shapes.
 class Banks {
  public:
   /// keeps_all: they are copied as they are.
   Banks(std::filesystem::path folder, bool keeps_all) : folder_(std::move(folder)), keeps_all_(keeps_all) {}
 
-  /// Throws InputError for what is no whole bank or has no modes.
+  /// Throws InputError for files that are no whole bank or have no modes.
   const BankFacts& add(const std::filesystem::path& file);
   /// In the order in which they were added.
   std::vector<PackedBank> list() const;

@@ -1,6 +1,6 @@
 // Method:     what is asked for becomes a scene; carillon-render checks it, simulates it and records its contacts; the folder gets scene,
-//             contacts, banks, page and sound engine. explore.json says what belongs to what. A scene that is silent by itself is tried
-//             with a blow on each body, to know how loud to play.
+//             contacts, banks, page and sound engine. explore.json says what belongs to what. For a scene that is silent by itself, a probe
+//             with a blow on each body determines the gain.
 // Source:     the Sonic Explorer of van den Doel and Pai 1996.
 // Deviations: theirs synthesised on the machine of the listener, in a program of its own; this one is a page.
 #include "jobs/explore/explore.hpp"
@@ -27,7 +27,7 @@ constexpr int kVersion = 1;  // of explore.json
 constexpr std::uint64_t kMaxSceneBytes = 16 << 20;
 constexpr const char *kAboutFile = "explore.json", *kSceneFile = "scene.json", *kContactsFile = "contacts.jsonl",
                      *kPackedContactsFile = "contacts.jsonl.gz", *kBankFolder = "banks";
-constexpr double kProbeGain = 0.35;  // of the gain that brings the probe's blows to full scale: hands strike harder at times
+constexpr double kProbeGain = 0.35;  // of the gain that brings the probe's blows to full scale: headroom for harder strikes
 
 bool is_bank(const fs::path& file) {
   std::array<char, 13> begin{};
@@ -46,7 +46,7 @@ fs::path find_place(const PageOrder& order) {
   if (folder.filename().empty()) folder = folder.parent_path();
   std::error_code error;
   if (!fs::exists(folder, error) || is_explorer(folder) || (fs::is_directory(folder, error) && fs::is_empty(folder, error))) return folder;
-  throw InputError(fmt::format("{}: something else is there; give another folder with -o", folder.string()));
+  throw InputError(fmt::format("{}: this folder was not made by carillon explore; give another one with -o", folder.string()));
 }
 
 fs::path find_page() { return base::find_data_folder("explore", "install Carillon with its page, or build it where npm is installed"); }
@@ -189,7 +189,7 @@ class Work {
 }  // namespace
 
 Explored explore(const PageOrder& order) {
-  if (order.subjects.empty()) throw InputError("say what to explore: banks, or a scene");
+  if (order.subjects.empty()) throw InputError("give banks or a scene");
   return Work(order).run();
 }
 

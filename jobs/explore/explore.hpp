@@ -1,4 +1,4 @@
-// The Sonic Explorer: a folder that any web server can serve, a page in which one strikes bodies and hears them.
+// The Sonic Explorer: a folder that any web server can serve, a page on which bodies are struck and heard.
 #pragma once
 
 #include <cstdint>
@@ -36,12 +36,12 @@ struct Explored {
   std::vector<std::string> warnings;  // of carillon-render, a line each
 };
 
-/// Makes the folder: page, sound engine, banks, scene and, where something happens in the scene, the contacts of its simulation, which
-/// carillon-render makes. It appears whole or not at all, in place of an earlier one of this program. Throws InputError for subjects that
+/// Makes the folder: page, sound engine, banks, scene and, for a scene with motion or strikes, the contacts of its simulation by
+/// carillon-render. It appears whole or not at all, in place of an earlier one of this program. Throws InputError for subjects that
 /// cannot be played and for a folder that holds something else, SystemError when page or engine are not installed or the disk refuses.
 Explored explore(const PageOrder& order);
 
-/// Whether page and sound engine are installed with this program; without, other commands leave the page out.
+/// Whether page and sound engine are installed with this program; otherwise other commands omit the page.
 bool is_installed();
 
 /// Whether explore() made this folder.

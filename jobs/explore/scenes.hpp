@@ -1,4 +1,4 @@
-// Scene files that a page needs: one of banks side by side, one that tries how loud bodies are.
+// Scene files for a page: one with banks side by side, one that probes how loud bodies are.
 #pragma once
 
 #include <json/json.h>
@@ -13,7 +13,7 @@ namespace carillon::explore {
 /// Bodies in a row along x, on the ground, and a listener in front of them. `names` and `facts` have one entry a body.
 Json::Value make_row(const std::vector<std::filesystem::path>& files, const std::vector<const BankFacts*>& facts, Up up);
 
-/// The scene with all bodies fixed and, in place of all that happens in it, one blow of a mallet on each where it is heard most. `files`:
+/// The scene with all bodies fixed and, instead of its events, one blow of a mallet on each at its loudest point. `files`:
 /// the banks of its bodies.
 Json::Value make_probe(Json::Value scene, const std::vector<std::filesystem::path>& files, const std::vector<const BankFacts*>& facts);
 

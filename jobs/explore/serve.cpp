@@ -58,7 +58,7 @@ int serve(const std::filesystem::path& folder, int port, const std::function<voi
                                      {"hdf", "application/octet-stream"}})
     server.set_file_extension_and_mimetype_mapping(ending, type);
   if (!server.set_mount_point("/", folder.string()))
-    throw SystemError(fmt::format("{}: this folder cannot be served; it is gone", folder.string()));
+    throw SystemError(fmt::format("{}: this folder does not exist any more", folder.string()));
   const int bound = port == 0 ? server.bind_to_any_port("127.0.0.1") : (server.bind_to_port("127.0.0.1", port) ? port : -1);
   if (bound <= 0)
     throw SystemError(port == 0 ? std::string("no port of the loopback address is free")

@@ -9,13 +9,13 @@
 namespace carillon::hear {
 namespace {
 
-// Objects that people strike: from a ring to a table.
+// Objects that are struck by hand: from a ring to a table.
 constexpr double kSmallestM = 0.005, kLargestM = 3.0;
-constexpr double kLeastM = 0.001, kMostM = 100.0;  // whatever was asked for
-constexpr double kHugeM = 10.0;                    // asked for, and not likely meant
+constexpr double kLeastM = 0.001, kMostM = 100.0;  // hard limits
+constexpr double kHugeM = 10.0;                    // given, but probably a mistake in the unit
 constexpr double kThinnestWall = 1.0 / 5000;       // of the body's largest extent
 constexpr double kNoWallM = 0.3;                   // and above: millimetres, if anything
-constexpr double kNormalisedM = 0.15;              // what a model without a unit is made
+constexpr double kNormalisedM = 0.15;              // size of a model without a unit
 
 struct Unit {
   const char* name;
@@ -28,7 +28,7 @@ std::string format_extent(const std::array<double, 3>& extent, double scale) {
   return fmt::format("{:.3g} x {:.3g} x {:.3g} m", extent[0] * scale, extent[1] * scale, extent[2] * scale);
 }
 
-/// From -1 to 1, or from 0 to 1: what programs make that scale to a unit of their own.
+/// From -1 to 1, or from 0 to 1: models that a program has normalised.
 bool is_normalised(double largest) { return std::abs(largest - 1.0) < 1e-3 || std::abs(largest - 2.0) < 1e-3; }
 
 bool is_gltf(const std::filesystem::path& file) {
@@ -45,46 +45,46 @@ double guess_scale(const Order& options, const SurfaceFacts& look, std::vector<s
     const char* const remedy =
         look.is_mesh ? "--scale, metres per unit of the file (0.001 for millimetres)" : "its --height in metres, or --scale";
     if (largest < kSmallestM || largest > kLargestM)
-      throw InputError(fmt::format("{}: it is {:.4g} m across, since {} in metres, which is the size of nothing one strikes; give {}",
+      throw InputError(fmt::format("{}: it is {:.4g} m across, since {} in metres, too small or too large to be struck by hand; give {}",
                                    options.object.string(), largest, what, remedy));
-    assumed.push_back(fmt::format("size: {}, since {} in metres; {} says otherwise", format_extent(look.extent, 1.0), what,
+    assumed.push_back(fmt::format("size: {}, since {} in metres; change it with {}", format_extent(look.extent, 1.0), what,
                                   look.is_mesh ? "--scale (0.001 for millimetres)" : "--height"));
     return 1.0;
   }
   if (is_normalised(largest)) {
     const double scale = kNormalisedM / largest;
     assumed.push_back(
-        fmt::format("size: {} is {:g} units across, which is no unit of length: it is made {:g} m ({}); --height or --scale says otherwise",
-                    file, largest, kNormalisedM, format_extent(look.extent, scale)));
+        fmt::format("size: {} is {:g} units across, a normalised size: scaled to {:g} m ({}); change it with --height or --scale", file,
+                    largest, kNormalisedM, format_extent(look.extent, scale)));
     return scale;
   }
   for (const Unit& unit : kUnits) {
     if (largest > unit.max || largest * unit.metres < kSmallestM) continue;
     assumed.push_back(fmt::format(
-        "size: {}, since {} is {:.4g} units across, which are taken for {}; --scale ({}) or --height says otherwise",
+        "size: {}, since {} is {:.4g} units across, which are taken for {}; change it with --scale ({}) or --height",
         format_extent(look.extent, unit.metres), file, largest, unit.name, unit.metres == 1.0 ? "0.001 for millimetres" : "1 for metres"));
     return unit.metres;
   }
-  throw InputError(
-      fmt::format("{}: it is {:.4g} units across, which is the size of nothing one strikes in metres, centimetres or millimetres; give its "
-                  "--height in metres, or --scale, metres per unit",
-                  options.object.string(), largest));
+  throw InputError(fmt::format(
+      "{}: it is {:.4g} units across: in metres, centimetres and millimetres too small or too large to be struck by hand; give its "
+      "--height in metres, or --scale, metres per unit",
+      options.object.string(), largest));
 }
 
 }  // namespace
 
 double find_scale(const Order& options, const SurfaceFacts& look, double height_m, std::vector<std::string>& assumed) {
   const double largest = *std::max_element(look.extent.begin(), look.extent.end());
-  if (!(largest > 0.0)) throw InputError(fmt::format("{}: all its points are one; check the file", options.object.string()));
+  if (!(largest > 0.0)) throw InputError(fmt::format("{}: all its points coincide; check the file", options.object.string()));
   if (height_m > 0.0 && !(look.extent[1] > 0.0))
     throw InputError(fmt::format("{}: it is flat across y, along which --height is measured; give --scale", options.object.string()));
   const double scale = height_m > 0.0 ? height_m / look.extent[1] : options.scale ? *options.scale : guess_scale(options, look, assumed);
   if (!(scale * largest >= kLeastM && scale * largest <= kMostM))
-    throw InputError(fmt::format("{}: it would be {:.3g} m across; bodies of {:g} to {:g} m are heard, check {}", options.object.string(),
+    throw InputError(fmt::format("{}: it would be {:.3g} m across, outside of {:g} to {:g} m; check {}", options.object.string(),
                                  scale * largest, kLeastM, kMostM, height_m > 0.0 ? "--height (metres)" : "--scale (metres per unit)"));
   if (scale * largest > kHugeM)
-    assumed.push_back(fmt::format("size: {}, as {} says, which is more than one strikes: is it in metres?",
-                                  format_extent(look.extent, scale), height_m > 0.0 ? "--height" : "--scale"));
+    assumed.push_back(fmt::format("size: {}, by {}, which is very large: is it in metres?", format_extent(look.extent, scale),
+                                  height_m > 0.0 ? "--height" : "--scale"));
   return scale;
 }
 
@@ -92,9 +92,8 @@ void check_wall(const Order& options, const SurfaceFacts& look, double scale) {
   const std::string file = options.object.string();
   if (!options.wall_m) {
     if (look.openings > 0)
-      throw InputError(
-          fmt::format("{}: it is an open surface ({} border{}), which has no thickness; say how thick it is, in metres: --wall 0.002", file,
-                      look.openings, look.openings == 1 ? "" : "s"));
+      throw InputError(fmt::format("{}: it is an open surface ({} border{}), which has no thickness; give one in metres: --wall 0.002",
+                                   file, look.openings, look.openings == 1 ? "" : "s"));
     return;
   }
   const double wall_m = *options.wall_m;

@@ -1,4 +1,4 @@
-// What an object is taken for that comes without size and wall.
+// Assumptions about an object without a given size and wall.
 #pragma once
 
 #include <array>
@@ -9,7 +9,7 @@
 
 namespace carillon::hear {
 
-/// What `carillon-mesh --look` says of a surface or a mesh.
+/// The output of `carillon-mesh --look` for a surface or a mesh.
 struct SurfaceFacts {
   bool is_mesh = false;  // of tetrahedra: extent is all that is known
   long long triangles = 0, parts = 0, openings = 0;
@@ -17,11 +17,11 @@ struct SurfaceFacts {
   double thickness = 0.0;          // of a surface that is both sides of a wall, in the file's units
 };
 
-/// Metres per unit of the file: as asked for, else guessed from the numbers; what was guessed is said in `assumed`. `height_m` is taken
-/// before the rest. Throws InputError where no unit makes sense.
+/// Metres per unit of the file: as given, else guessed from the extent; a guess is added to `assumed`. `height_m` has precedence. Throws
+/// InputError where no unit gives a plausible size.
 double find_scale(const Order& options, const SurfaceFacts& look, double height_m, std::vector<std::string>& assumed);
 
-/// Throws InputError where the wall that is asked for, or its absence, cannot be: an open surface without one, one thicker than the body.
+/// Throws InputError for an open surface without a wall, and for a wall too thick or too thin for the body.
 void check_wall(const Order& options, const SurfaceFacts& look, double scale);
 
 }  // namespace carillon::hear

@@ -52,7 +52,7 @@ constexpr double kSameCents = 5.0;                       // an edit that leaves 
 constexpr double kMinCents = 0.001, kMaxCents = 1200.0;  // of a job's accuracy_cents
 constexpr std::array<double, 2> kBandHz{20.0, 20000.0};
 
-/// What is harmless in the name of a file: letters and digits of any script, points and underscores.
+/// The characters that are safe in the name of a file: letters and digits of any script, points and underscores.
 std::string clean(const std::string& name) {
   const bool is_text = base::printable(name) == name;  // bytes that are no UTF-8 would be no JSON
   std::string text;
@@ -79,7 +79,7 @@ bool is_surface_file(const fs::path& file) {
   return std::find(kEndings.begin(), kEndings.end(), find_ending(file)) != kEndings.end();
 }
 
-/// Throws InputError where the object is no file of one, and says what else it is.
+/// Throws InputError if the object is no surface or mesh, with a remedy for files of other kinds.
 void check_object(const fs::path& object) {
   constexpr const char* kTakes = "a surface (.obj, .stl, .ply, .off, .gltf, .glb) or a mesh (.msh, .vtu, .mesh)";
   const std::string name = object.string(), ending = find_ending(object);
@@ -89,16 +89,16 @@ void check_object(const fs::path& object) {
   if (is_surface_file(object) || is_mesh_file(object)) return;
   if (ending == ".json" || ending == ".jsonl")
     throw InputError(
-        fmt::format("{}: no object, by its name, but a scene (carillon-render {} -o sound.wav plays one) or a job "
-                    "(carillon-precompute {} solves one); give {}",
+        fmt::format("{}: by its name no object, but a scene (play it: carillon-render {} -o sound.wav) or a job "
+                    "(solve it: carillon-precompute {}); give {}",
                     name, name, name, kTakes));
   if (ending == ".hdf" || ending == ".h5" || ending == ".hdf5" || ending == ".bank")
-    throw InputError(fmt::format("{}: a bank, by its name, which has its modes already; name it in a scene for carillon-render, or give {}",
-                                 name, kTakes));
-  throw InputError(fmt::format("{}: no file of an object, by its name; give {}, and convert other kinds first", name, kTakes));
+    throw InputError(fmt::format(
+        "{}: a bank, by its name; play it with carillon explore, name it in a scene for carillon-render, or give {}", name, kTakes));
+  throw InputError(fmt::format("{}: by its name no surface or mesh; give {}, and convert other formats first", name, kTakes));
 }
 
-/// A folder that one run at a time writes to. One that was made here and is still empty goes with it.
+/// A folder that one run at a time writes to. If it was made here and is still empty, it is removed at the end.
 class OutFolder {
  public:
   /// Throws InputError or SystemError where it cannot be made, or another run writes to it.
@@ -130,7 +130,7 @@ class OutFolder {
 struct Wish {
   const material::Material* material = nullptr;
   double height_m = 0.0;
-  double slowness = 0.0;  // how low it sounds, but for the shape: height over the speed of sound
+  double slowness = 0.0;  // height over the speed of sound: larger means lower frequencies
   std::string name = {};
 };
 
@@ -180,7 +180,7 @@ class Listening {
                                    is_shape() ? "a shape has its dimensions" : "a mesh has its size, which --scale changes"));
     if (!order_.heights_m.empty() && order_.scale) throw InputError("--height and --scale exclude each other; give one of them");
     if (order_.scale && is_shape()) throw InputError("--scale is for files; a shape has its dimensions in metres");
-    if (order_.wall_m && is_mesh()) throw InputError("--wall is for surfaces; a mesh is what it is");
+    if (order_.wall_m && is_mesh()) throw InputError("--wall is for surfaces; a mesh is already a volume");
     if (order_.wall_m && !(*order_.wall_m > 0.0)) throw InputError("--wall is a thickness in metres, above 0");
     for (const double height : order_.heights_m)
       if (!(height > 0.0) || !std::isfinite(height)) throw InputError("--height is in metres, above 0");
@@ -188,19 +188,19 @@ class Listening {
     if (order_.accuracy_cents && !(*order_.accuracy_cents >= kMinCents && *order_.accuracy_cents <= kMaxCents))
       throw InputError(fmt::format("--accuracy is in cents, from {:g} to {:g}", kMinCents, kMaxCents));
     if (order_.accuracy_cents && is_mesh())
-      throw InputError("--accuracy meshes the object again, finer: give its surface, or a finer mesh without --accuracy");
+      throw InputError("--accuracy needs a surface or a shape, to mesh it finer; give one, or a finer mesh without --accuracy");
     for (const std::string& name : order_.materials) (void)material::MaterialTable::get().require("--material", name);
     (void)material::require_mallet("--mallet", order_.mallet);
   }
 
-  /// What the file holds, and what is taken for granted.
+  /// Reads the file and notes what is assumed.
   void look() {
     stem_ = clean(is_shape() ? order_.shape : order_.object.stem().string());
     heard_.folder = fs::absolute(order_.out.empty() ? fs::path(stem_ + "-sound") : order_.out);
     if (order_.materials.empty()) {
       materials_ = {kDefaultMaterial};
-      heard_.assumed.push_back(
-          fmt::format("material: {}, since none is given; --material NAME, and `carillon materials` lists them", kDefaultMaterial));
+      heard_.assumed.push_back(fmt::format(
+          "material: {}, since none is given; choose another with --material NAME (`carillon materials` lists them)", kDefaultMaterial));
     } else {
       materials_ = order_.materials;
     }
@@ -217,8 +217,8 @@ class Listening {
     facts_.openings = root.integer("openings", 0, std::numeric_limits<long long>::max());
     facts_.thickness = root.has_number("thickness") ? root.number("thickness") : 0.0;
     if (!order_.wall_m && facts_.openings == 0)
-      heard_.assumed.push_back(facts_.thickness > 0.0 ? std::string("body: a closed wall with two sides, as the file has it")
-                                                      : std::string("body: solid; --wall T makes it a shell of T metres"));
+      heard_.assumed.push_back(facts_.thickness > 0.0 ? std::string("body: a wall, since the file has both of its sides")
+                                                      : std::string("body: solid; --wall T makes it a shell, T metres thick"));
   }
 
   std::vector<Wish> list_wishes() {
@@ -258,7 +258,8 @@ class Listening {
   void refine(const std::vector<Wish>& wishes) {
     double worst_cents = 0.0;
     for (const Sound& sound : heard_.sounds) worst_cents = std::max(worst_cents, sound.worst_cents);
-    const std::string preview = fmt::format("the preview, to about {} cents, is in {}", format_cents(worst_cents), heard_.folder.string());
+    const std::string preview =
+        fmt::format("the preview, with error bars up to {} cents, is in {}", format_cents(worst_cents), heard_.folder.string());
     if (worst_cents <= *order_.accuracy_cents) return;
     say(preview);
     solved_.clear();
@@ -372,12 +373,11 @@ class Listening {
   void play(Sound& sound) {
     const bank::Bank bank = bank::choose_frequencies(bank::read_bank(sound.bank), bank::Frequencies::kCorrected);
     if (bank.mode_count() == 0 || bank.freq_hz(0) > kBandHz[1])
-      throw InputError(
-          fmt::format("{}: it has no mode from {:g} to {:g} Hz: it is too small, or too stiff, to be heard; make it larger ({})",
-                      sound.name, kBandHz[0], kBandHz[1],
-                      is_shape()  ? "its dimensions"
-                      : is_mesh() ? "--scale"
-                                  : "--height, --scale"));
+      throw InputError(fmt::format("{}: it has no mode from {:g} to {:g} Hz, so it is inaudible; make it larger ({})", sound.name,
+                                   kBandHz[0], kBandHz[1],
+                                   is_shape()  ? "its dimensions"
+                                   : is_mesh() ? "--scale"
+                                               : "--height, --scale"));
     const std::vector<std::size_t> strikes = bank::find_strikes(bank, kStrikes);
     sound.mode_count = bank.mode_count();
     sound.highest_hz = bank.freq_hz(bank.mode_count() - 1);

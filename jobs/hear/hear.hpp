@@ -19,10 +19,10 @@ struct Order {
   std::map<std::string, double> dimensions;  // of the shape, by its names ("outer-radius")
   std::optional<double> wall_m;              // a shell of this thickness
   std::optional<double> scale;               // metres per unit of the file
-  std::vector<double> heights_m;             // the object is made so high (up: y); several: one after the other
+  std::vector<double> heights_m;             // of the object (up: y); several: one after the other
   std::vector<std::string> materials;        // names; empty: kDefaultMaterial
   std::string mallet = "hard-wood";
-  std::optional<double> accuracy_cents;  // refines the preview until every mode is so near; none: the preview is all
+  std::optional<double> accuracy_cents;  // refines the preview until every error bar is within it; none: preview only
   std::filesystem::path out;             // folder; empty: NAME-sound here
   bool is_quiet = false;                 // no progress on standard error
 };
@@ -36,7 +36,7 @@ struct HeardMode {
   double level_dba = 0.0;    // of its beginning, below that of the loudest
 };
 
-/// What came of one material and height.
+/// The result for one material and height.
 struct Sound {
   std::string name;  // "cup-steel-0.1m"
   std::string material;
@@ -54,18 +54,18 @@ struct Sound {
 struct Heard {
   std::filesystem::path folder, page;  // page: report.html of the first sound
   std::filesystem::path explorer;      // folder of the page on which all sounds are struck; empty: it is not installed
-  std::vector<std::string> assumed;    // what was not said and is taken, a sentence each
+  std::vector<std::string> assumed;    // assumptions, one line each
   std::array<double, 3> extent_m{};    // of the first sound's body
   std::vector<Sound> sounds;
   double seconds = 0.0;  // by the clock
 };
 
-/// An error bar as people read it: two digits, and whole cents from 10 on.
+/// An error bar for display: two digits, and whole cents from 10 on.
 std::string format_cents(double cents);
 
 /// Meshes, solves, plays: first a preview, then, where an accuracy is asked for, again on finer meshes. Files go to options.out, each whole
-/// or not at all, and no other call writes there meanwhile. Throws InputError (a sentence with the remedy), SolveError, SystemError; what
-/// the programs that it starts refuse is thrown with their message. SIGINT, SIGTERM and SIGHUP end them, and then this process.
+/// or not at all, and no other call writes there meanwhile. Throws InputError with the remedy, SolveError, SystemError; errors of the
+/// programs that it starts are thrown with their message. SIGINT, SIGTERM and SIGHUP end them, and then this process.
 Heard hear(const Order& options);
 
 }  // namespace carillon::hear

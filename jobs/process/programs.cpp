@@ -19,7 +19,7 @@ namespace carillon::process {
 namespace {
 
 /// The last line of what a program said of itself, without its name: "carillon-mesh: cup.obj: ..." or "carillon-precompute: error: ...";
-/// of one that said nothing of the kind, the last line.
+/// without one, the last line.
 std::string find_message(const std::string& errors, const std::string& program) {
   const std::string mark = program + ": ";
   const std::size_t at = errors.rfind(mark);
@@ -97,7 +97,7 @@ std::string Programs::run(const std::string& program, std::vector<std::string> w
   if (result.message.empty()) result.message = find_message(finished.errors, program);
   if (result.message.empty())
     result.message = finished.signal != 0 ? fmt::format("{} was ended by signal {}", program, finished.signal)
-                                          : fmt::format("{} ended with exit code {} and said nothing", program, finished.exit_code);
+                                          : fmt::format("{} ended with exit code {} and without a message", program, finished.exit_code);
   base::throw_error(result);
 }
 

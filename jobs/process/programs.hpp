@@ -20,7 +20,7 @@ class SignalWatch {
   static int get_signal();
 };
 
-/// Runs programs in a temporary folder of its own, which goes with it; what one of them refuses is thrown with its own words.
+/// Runs programs in a temporary folder, which the destructor removes; an error of a program is thrown with its message.
 class Programs {
  public:
   /// is_quiet: their progress is not shown. Throws SystemError where no folder can be made.

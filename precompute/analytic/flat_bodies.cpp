@@ -13,7 +13,7 @@ using std::numbers::pi;
 
 double square(double x) { return x * x; }
 
-/// Intervals along the longest side for so many half-waves along it: a multiple of ten.
+/// Intervals along the longest side for a number of half-waves along it: a multiple of ten.
 int choose_flat_grid(double half_waves) {
   const int wanted = 10 * static_cast<int>(std::ceil(0.4 * half_waves));
   return std::clamp(wanted, 40, kMaxDefaultGrid);
@@ -25,7 +25,7 @@ void warn_if_thick(double thickness_m, double rate, double high_hz, std::vector<
   if (hz < high_hz)
     warnings.push_back(
         fmt::format("above {:.0f} Hz a wavelength is less than ten thicknesses, and Kirchhoff's theory is several per cent "
-                    "sharp; elements (\"shape\": \"plate\") have shear and rotary inertia",
+                    "too high; finite elements (\"shape\": \"plate\") include shear and rotary inertia",
                     hz));
 }
 

@@ -114,8 +114,8 @@ class RitzPlate : public FlatBody {
 /// Mass per area and thickness of a membrane, of which the job gives one or both.
 std::array<double, 2> find_sheet(const job::MembraneBody& body, const material::Material& material);
 
-/// The wave number [1/m] below which at least so many modes lie, of a membrane or plate of this area and rim: Weyl's law with its second
-/// term, N = A k^2 / 4 pi - rim k / 4 pi, which is that of a fixed rim and the least of all.
+/// The wave number [1/m] below which there are at least that many modes, for a membrane or plate of this area and rim: Weyl's law with its
+/// second term, N = A k^2 / 4 pi - rim k / 4 pi, which is that of a fixed rim and the least of all.
 double find_wave_number(double area_m2, double rim_m, double modes);
 
 /// Flexural rigidity D = E h^3 / (12 (1 - nu^2)) over the mass per area [m^4/s^2].

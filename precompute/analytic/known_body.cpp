@@ -40,8 +40,8 @@ std::unique_ptr<KnownBody> make(const job::MeasuredBody& body, const material::M
 
 std::unique_ptr<KnownBody> make_known_body(const job::AnalyticBody& body, const material::Material& material) {
   if (material.orthotropic && body.kind.index() != 4)
-    throw InputError("the formulas are for materials that are the same in all directions, and \"" + material.name +
-                     "\" is not; take another, or elements (\"shape\")");
+    throw InputError("the formulas are for isotropic materials, and \"" + material.name +
+                     "\" is not; choose another, or finite elements (\"shape\")");
   return std::visit([&](const auto& kind) { return make(kind, material); }, body.kind);
 }
 

@@ -18,7 +18,7 @@ namespace carillon::analytic {
 /// One mode. `index` is the body's own numbering, such as half-waves along both sides.
 struct Mode {
   double lambda_rad2_s2 = 0.0;  // omega^2
-  double error_cents = 0.0;     // of the number against the theory: 0 for a formula, an estimate for a numerical method
+  double error_cents = 0.0;     // of the frequency against the theory: 0 for a formula, an estimate for a numerical method
   std::array<int, 4> index{};
   std::string name = {};  // "(1, 2)"
 };
@@ -40,7 +40,7 @@ class KnownBody {
  public:
   virtual ~KnownBody() = default;
 
-  /// All modes below `high_hz`; of more than `max_modes` at least the lowest so many. Throws SolveError, InputError (without the place of
+  /// All modes below `high_hz`; if there are more, at least the lowest `max_modes`. Throws SolveError, InputError (without the place of
   /// the job).
   virtual ModeList list_modes(double high_hz, std::int64_t max_modes) = 0;
   /// phi [kg^-1/2] of each mode at a point of the body, (modes). Points outside count as the nearest one of the rim.
@@ -55,15 +55,15 @@ class KnownBody {
   int rigid_modes = 0;                // motions without a frequency: 6 of a free body
   std::string theory;                 // "Euler-Bernoulli beam, ends free and clamped"
   std::string method;                 // how its modes were found, and why none is missing
-  std::vector<std::string> warnings;  // where the theory is not what the body does
+  std::vector<std::string> warnings;  // where the theory does not describe the body
 };
 
 inline constexpr int kMaxDefaultGrid = 80;  // of flat bodies: a multiple of ten, so that tenths of a side are vertices
 
-/// More are more than a body with such modes is for: a formula may give any number.
+/// Limit of the number of modes, since a formula may give any number.
 inline constexpr double kMaxListed = 100000;
 
-/// Before modes are listed: throws InputError when there are about so many up to high_hz, and that is too many.
+/// Before modes are listed: throws InputError if the estimated number of modes up to high_hz is too large.
 void check_mode_count(double count, double high_hz);
 
 /// The body of a job. Throws InputError without the job's place.

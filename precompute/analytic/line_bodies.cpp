@@ -153,7 +153,7 @@ void Beam::add_bending(Motion motion, double second_moment_m4, double high_hz, s
   if (const auto thick = std::find_if(roots.begin(), roots.end(), is_thick); thick != roots.end() && !is_said)
     warnings.push_back(fmt::format(
         "bending along {}: from {:.0f} Hz on half a wavelength is less than four times the depth, and Euler-Bernoulli is several per cent "
-        "sharp; \"theory\": \"timoshenko\" has shear and rotary inertia",
+        "too high; \"theory\": \"timoshenko\" includes shear and rotary inertia",
         axis, square(*thick) * rate / (2.0 * pi)));
   for (std::size_t n = 0; n < roots.size(); ++n) {
     modes.push_back({square(square(roots[n]) * rate),
@@ -178,8 +178,8 @@ void Beam::add_timoshenko(Motion motion, double second_moment_m4, double high_hz
   const int wanted = 20 + static_cast<int>(std::ceil(1.8 * std::min(waves, 1e6)));
   if (wanted > kMaxPolynomials)
     throw InputError(
-        fmt::format("the beam has about {:.0f} half-waves at {:g} Hz, more than Ritz's method is made for ({}); lower the end "
-                    "of \"band_hz\", or take \"theory\": \"euler-bernoulli\"",
+        fmt::format("the beam has about {:.0f} half-waves at {:g} Hz, more than Ritz's method can resolve ({}); lower the end "
+                    "of \"band_hz\", or use \"theory\": \"euler-bernoulli\"",
                     waves, high_hz, static_cast<int>((kMaxPolynomials - 20) / 1.8)));
   const auto solve = [&](int n, la::Matrix& vectors, la::Matrix& deflections, la::Matrix& slopes) {
     std::array<EndConditions, 2> w_ends, s_ends;

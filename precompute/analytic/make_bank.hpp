@@ -10,7 +10,7 @@ struct Made {
   bank::Bank bank;  // without its provenance
   std::string theory, method;
   std::vector<std::string> names;     // (m) of the modes: "(1, 2)"
-  std::vector<std::string> warnings;  // where the theory is not what the body does
+  std::vector<std::string> warnings;  // where the theory does not describe the body
 };
 
 /// The bank of job.analytic: the modes of its band, their shapes on its surface, gains and decays. Throws InputError, SolveError.

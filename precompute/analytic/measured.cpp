@@ -67,7 +67,7 @@ struct Columns {
 Columns read_names(const std::vector<std::string_view>& names, const std::string& place, ModesTable& table) {
   Columns columns;
   const auto take = [&](int& slot, int i, std::string_view name) {
-    if (slot >= 0) throw InputError(fmt::format("{}: column \"{}\" is there twice; remove one", place, name));
+    if (slot >= 0) throw InputError(fmt::format("{}: column \"{}\" occurs twice; remove one", place, name));
     slot = i;
   };
   int everywhere = -1;
@@ -146,7 +146,7 @@ ModesTable read_modes_table(const std::filesystem::path& file) {
       row.decay_per_s = get(columns->decay);
     }
     if (!(row.decay_per_s >= 0.0 && row.decay_per_s < 2.0 * std::numbers::pi * row.freq_hz))
-      throw InputError(fmt::format("{}: the decay is {:g} 1/s, and a mode of {:g} Hz swings from 0 to {:g} 1/s", place, row.decay_per_s,
+      throw InputError(fmt::format("{}: the decay is {:g} 1/s, but a mode of {:g} Hz swings from 0 to {:g} 1/s", place, row.decay_per_s,
                                    row.freq_hz, 2.0 * std::numbers::pi * row.freq_hz));
     for (const int column : columns->gains) {
       row.gains.push_back(get(column));
@@ -157,7 +157,7 @@ ModesTable read_modes_table(const std::filesystem::path& file) {
     rows.push_back(std::move(row));
   }
   if (!columns || rows.empty())
-    throw InputError(fmt::format("{}: a line of names and a line for each mode are wanted; there is no mode", file.string()));
+    throw InputError(fmt::format("{}: give a line of column names and a line per mode; there is no mode", file.string()));
   std::stable_sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.freq_hz < b.freq_hz; });
   for (Row& row : rows) {
     table.freq_hz.push_back(row.freq_hz);
@@ -188,7 +188,7 @@ MeasuredObject::MeasuredObject(const job::MeasuredBody& body) : table_(read_mode
   }
   rigid_modes = 6;
   theory = "measured modes";
-  method = fmt::format("the table {}: what it leaves out is not known", body.csv.filename().string());
+  method = fmt::format("the table {}; modes that it omits are unknown", body.csv.filename().string());
 }
 
 ModeList MeasuredObject::list_modes(double high_hz, std::int64_t) {

@@ -20,7 +20,7 @@ struct ModesTable {
 /// Reads and validates one. Throws InputError "file:line: ...".
 ModesTable read_modes_table(const std::filesystem::path& file);
 
-/// A box about the points, or about the origin, that rings as the table says: each vertex has the gain of the point that is nearest to it.
+/// A box about the points, or about the origin, with the modes of the table: each vertex has the gain of the nearest point.
 class MeasuredObject : public KnownBody {
  public:
   MeasuredObject(const job::MeasuredBody& body);

@@ -93,7 +93,7 @@ Polygon::Solved Polygon::solve(double max_kappa) {
   const double k = std::sqrt(max_kappa), edge = std::min(setting_.edge_radians / k, 0.34 * longest_m_);
   if (const double wanted = area_m2_ * max_kappa / (4.0 * pi); wanted > kMaxWanted)
     throw InputError(
-        fmt::format("the membrane has about {:.2g} modes up to the end of its band, more than finite elements are used for here "
+        fmt::format("the membrane has about {:.2g} modes up to the end of its band, more than the finite elements can resolve "
                     "({}); lower the end of \"band_hz\", or give \"max_modes\"",
                     wanted, kMaxWanted));
   elements_ = make_elements(k, edge);

@@ -117,7 +117,7 @@ ModeList RitzPlate::list_modes(double high_hz, std::int64_t max_modes) {
   const double unknowns = static_cast<double>(count(a)) * count(b) / (halves_x ? 2.0 : 1.0) / (halves_y ? 2.0 : 1.0);
   if (unknowns > kMaxUnknowns)
     throw InputError(
-        fmt::format("the plate has about {:.0f} by {:.0f} half-waves at {:g} Hz, more than Ritz's method is made for ({:.0f} unknowns, at "
+        fmt::format("the plate has about {:.0f} by {:.0f} half-waves at {:g} Hz, more than Ritz's method can resolve ({:.0f} unknowns, at "
                     "most {}); lower the end of \"band_hz\", or give \"max_modes\"",
                     k * a / pi, k * b / pi, list.complete_below_hz, unknowns, kMaxUnknowns));
   const double high = square(2.0 * pi * list.complete_below_hz);

@@ -48,8 +48,8 @@ std::vector<Triangle> cut_ears(const std::vector<Point2>& p) {
   judge_all();
   while (ring.size() > 3) {
     auto best = std::max_element(quality.begin(), quality.end());
-    if (*best < 0.0) best = judge_all();  // corners that were in the way may have gone
-    if (*best < 0.0) throw InputError("the polygon is too thin somewhere to be cut into triangles; move its corners apart");
+    if (*best < 0.0) best = judge_all();  // corners that were in the way may have been removed
+    if (*best < 0.0) throw InputError("the polygon is too thin to be divided into triangles; move its corners apart");
     const auto at = static_cast<std::size_t>(best - quality.begin());
     const std::size_t n = ring.size();
     triangles.push_back({ring[(at + n - 1) % n], ring[at], ring[(at + 1) % n]});
@@ -145,7 +145,7 @@ void halve_edges(Net& net, double max_edge_m, const std::vector<bool>& apart) {
       continue;
     }
     if (net.triangles.size() > kMaxTriangles)
-      throw InputError("the polygon takes too many triangles; lower the end of \"band_hz\", or give \"max_modes\"");
+      throw InputError("the polygon needs too many triangles; lower the end of \"band_hz\", or give \"max_modes\"");
     // Rivara's path: from neighbour to neighbour across longest edges that are longer still, to an edge that is the longest on both sides.
     std::size_t t = work.back();
     auto [k, length] = longest(t);

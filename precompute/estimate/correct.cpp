@@ -1,12 +1,12 @@
 // Method: lambda_h - lambda is the energy of the error, for a consistent mass and to first order, and the recovered strains give that
 //   energy: a share I of lambda_h. T10: lambda = lambda_h (1 + G) / (1 + I), without a constant that was fitted; G is Hadamard's shift to
-//   the smooth surface. T4 recover less, the more the coarser: two polynomials in I and the share L that a lumped mass takes, of first
-//   order 1 - I + L but for the constant of I, fitted to the bodies of docs/error-bars.md. Modes that are one eigenvalue to rounding have
-//   shapes that are any basis of a space: they get the mean of their parts, which does not depend on the basis. Bars: half of the mesh's
-//   bar around the corrected value, 0.4 of it for T4. Where the estimate is a large share of lambda the mesh's interval itself is kept,
-//   which lies below the mesh's frequency but for what lumping and geometry leave open (of T4 what of it is within 0.45 of the bar). Two
-//   meshes agree where |lambda' - lambda'_coarser| is less than half of what their corrections differ by. What no recovery sees in curved
-//   elements that are wide against their wall: parts.hpp, calc_excess().
+//   the smooth surface. T4 recover less, and less on coarser meshes: two polynomials in I and the share L that a lumped mass takes, of
+//   first order 1 - I + L but for the constant of I, fitted to the bodies of docs/error-bars.md. Modes that are one eigenvalue to rounding
+//   have shapes that are any basis of a space: they get the mean of their parts, which does not depend on the basis. Bars: half of the
+//   mesh's bar around the corrected value, 0.4 of it for T4. Where the estimate is a large share of lambda the mesh's interval itself is
+//   kept, which lies below the mesh's frequency but for what lumping and geometry leave open (of T4 what of it is within 0.45 of the bar).
+//   Two meshes agree where |lambda' - lambda'_coarser| is less than half of what their corrections differ by. For the part that recovery
+//   cannot detect in curved elements that are wide compared with their wall, see parts.hpp, calc_excess().
 // Source: Naga, Zhang and Zhou 2006, SIAM J. Sci. Comput. 28, 1289 (eigenvalues less the energy of the recovered error); Zienkiewicz and
 //   Zhu 1992.
 // Deviations: strains are recovered (error_bars.cpp), not displacements; the rational form instead of the difference keeps lambda > 0.
@@ -23,7 +23,7 @@ namespace {
 
 using bank::Correction;
 
-// Shares of lambda. Above the first the estimate is a tendency, above the second it says next to nothing.
+// Shares of lambda. Above the first the estimate is rough, above the second it is unreliable.
 constexpr double kRoughT4 = 0.5, kStiffT4 = 1.0, kRoughT10 = 0.3, kStiffT10 = 0.6;
 constexpr double kRoughWidthT4 = 0.45, kRoughWidthLumped = 0.5;                  // of the mesh's bar
 constexpr double kSingularShare = 0.25;                                          // of the estimate's energy
@@ -56,7 +56,7 @@ std::vector<ErrorParts> share_parts(const Level& level) {
   return shared;
 }
 
-/// What becomes of each mode, and what its bar must have at least.
+/// The verdict on each mode, and the least length of its bar.
 struct Verdict {
   std::vector<Correction> correction;  // (m)
   std::vector<double> least_cents;     // (m) by which a coarser mesh contradicts, of disputed modes; else 0
@@ -112,7 +112,7 @@ double calc_share_left(const ErrorParts& parts, Kind kind, bool is_lumped) {
 
 namespace {
 
-/// The corrections that follow from what becomes of each mode.
+/// The corrections that follow from the verdicts.
 Corrections correct(const Level& level, const std::vector<ErrorParts>& parts, const Verdict& verdict) {
   Corrections corrections;
   corrections.correction = verdict.correction;

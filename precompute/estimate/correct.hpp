@@ -1,4 +1,4 @@
-// Corrected frequencies: the estimate taken off, with bars of their own.
+// Corrected frequencies: those of the mesh with the estimated error removed, with bars of their own.
 #pragma once
 
 #include <cstddef>
@@ -11,7 +11,7 @@
 
 namespace carillon::estimate {
 
-/// The modes of one mesh and what the estimate says of them.
+/// The modes of one mesh and the estimates of their errors.
 struct Level {
   std::vector<double> lambda;     // (m) [rad^2/s^2], ascending, m > 0
   std::vector<ErrorParts> parts;  // (m)
@@ -32,7 +32,7 @@ Level predict_level(const Level& level, double power, bool keeps_geometry, doubl
 
 /// One entry a mode, in the order of the mesh's frequencies. Corrected ones are not in that order where modes change places.
 struct Corrections {
-  std::vector<double> lambda;  // (m) [rad^2/s^2] what is believed: corrected, or the mesh's
+  std::vector<double> lambda;  // (m) [rad^2/s^2] stated values: corrected, or the mesh's
   std::vector<double> cents;   // (m) bar: the k-th lowest of `lambda` is so near to the k-th true one, k as in ErrorBars; infinite where
                                // is_too_short()
   // (m) half the mesh's bar (T4: 0.4 of it) by one mesh, a quarter (a third of curved elements) by two, the mesh's own interval where it is

@@ -209,7 +209,7 @@ ErrorBars calc_error_bars(const comm::Communicator& comm, const partition::Local
     parts.doubt_noise = sum[6];
     level.parts.push_back(parts);
     const double cents = calc_cents(parts, level.kind);
-    parts.interpolation = parts.bent = 0.0;  // elements that cannot follow a mode are too stiff: the truth lies below
+    parts.interpolation = parts.bent = 0.0;  // elements that cannot represent a mode are too stiff: the true value is lower
     own.stated.push_back(0.0);
     own.low.push_back(-cents);
     own.high.push_back(cents);

@@ -43,7 +43,7 @@ struct ErrorBars {
   /// band too. Infinite where is_too_short().
   std::vector<double> discretisation_cents;
 
-  Level level;  // what they were made from: for predictions and for people
+  Level level;  // their input: for predictions and reports
 
   /// The same for corrected frequencies.
   Corrections corrected;

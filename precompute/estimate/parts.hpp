@@ -1,4 +1,4 @@
-// What the estimate says of one mode, and how it changes with the mesh.
+// The estimate of the error of one mode, and how it changes with the mesh.
 #pragma once
 
 #include <cstdint>
@@ -14,8 +14,8 @@ enum class Kind : std::uint8_t {
 
 /// The parts of the error of one eigenvalue as shares of it, without safety factors.
 struct ErrorParts {
-  double interpolation = 0.0;   // energy of the stress that the elements cannot follow, lambda_h - lambda > 0
-  double singular = 0.0;        // of it, what elements at inward edges and at rims of fixed faces have
+  double interpolation = 0.0;   // energy of the stress that the elements cannot represent, lambda_h - lambda > 0
+  double singular = 0.0;        // its part from elements at inward edges and at rims of fixed faces
   double bent = 0.0;            // of it, times the square of how far elements bend with the surface against their height (Surface::bend)
   double energy = 0.0;          // of the whole mode as the estimate sums it: 1 (0.99 for curved T10)
   double lumping = 0.0;         // of a lumped mass: lambda (consistent) - lambda (lumped)
@@ -32,7 +32,8 @@ double find_order(Kind kind);
 /// Smooth modes; a fixed face with its singular rim converges slower, which the safety factor covers for ratios down to about 1/4. Pure.
 ErrorParts predict_parts(const ErrorParts& parts, Kind kind, double order, double edge_ratio);
 
-/// The part of lambda that the elements take too much: of T10 with what no recovery sees where they bend far with a thin wall. Pure.
+/// The excess of lambda by the elements; for T10 with the part that recovery cannot detect where they are strongly curved in a thin wall.
+/// Pure.
 double calc_excess(const ErrorParts& parts, Kind kind);
 
 /// How far [cents] the true frequency can be from the mesh's, to either side, safety factors included. Pure.

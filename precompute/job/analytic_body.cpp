@@ -20,7 +20,7 @@ constexpr std::array<const char*, 4> kEdgeNames{"free", "hinged", "clamped", "sl
 double read_length(base::Object& object, const char* key) {
   const double value = object.number(key, base::kPositive);
   if (value < kMinLength || value > kMaxLength)
-    object.fail(key, fmt::format("lengths are metres, from {:g} to {:g}, and this is {:g}", kMinLength, kMaxLength, value));
+    object.fail(key, fmt::format("must be from {:g} to {:g} m, and is {:g}", kMinLength, kMaxLength, value));
   return value;
 }
 
@@ -55,7 +55,7 @@ std::array<Edge, N> read_edges(base::Object& object, const char* key, const std:
   for (std::size_t i = 0; i < entries.size(); ++i) {
     const auto found = std::find(kEdgeNames.begin(), kEdgeNames.end(), entries[i].text);
     if (found == kEdgeNames.end() || entries.size() != N)
-      object.fail(key, fmt::format("is one word for all, or {} for {}: free, hinged, clamped or sliding", N, order));
+      object.fail(key, fmt::format("must be one word for all, or {} for {}: free, hinged, clamped or sliding", N, order));
     edges[i] = static_cast<Edge>(found - kEdgeNames.begin());
   }
   return edges;
@@ -70,7 +70,7 @@ StringBody read_string(base::Object object) {
   if (!body.mass_kg_m && !body.diameter_m)
     object.fail("", "give \"mass_kg_m\" (an ideal string), \"diameter_m\" (a stiff one, its mass from the material's density), or both");
   if (body.diameter_m && *body.diameter_m > 0.5 * body.length_m)
-    object.fail("diameter_m", "is more than half of the length: that is no string; check the units");
+    object.fail("diameter_m", "is more than half of the length, so it is no string; check the units");
   object.finish();
   return body;
 }
@@ -83,10 +83,10 @@ BeamBody read_beam(base::Object object) {
   body.diameter_m = read_length_if(object, "diameter_m");
   if (body.diameter_m ? body.width_m || body.thickness_m : !(body.width_m && body.thickness_m))
     object.fail(body.diameter_m ? "diameter_m" : "",
-                "the section is \"width_m\" and \"thickness_m\" (a rectangle), or \"diameter_m\" (a disc)");
+                "give the section as \"width_m\" and \"thickness_m\" (a rectangle), or \"diameter_m\" (a circle)");
   const double depth = body.diameter_m ? *body.diameter_m : std::max(*body.width_m, *body.thickness_m);
   if (depth > 0.5 * body.length_m)
-    object.fail("", "the section is more than half of the length: beam theory is not for it; take \"shape\": \"box\"");
+    object.fail("", "the section is more than half of the length, too thick for beam theory; use \"shape\": \"box\"");
   body.ends = read_edges<2>(object, "ends", "x = 0 and x = length", Edge::free);
   body.is_timoshenko = object.choice_or("theory", {"euler-bernoulli", "timoshenko"}, "euler-bernoulli") == "timoshenko";
   if (object.has("motions")) {
@@ -96,7 +96,7 @@ BeamBody read_beam(base::Object object) {
                          : entry.text == "torsion" ? &body.has_torsion
                          : entry.text == "axial"   ? &body.has_axial
                                                    : nullptr;
-      if (flag == nullptr) object.fail("motions", "is a list of bending, torsion and axial");
+      if (flag == nullptr) object.fail("motions", "must be a list of bending, torsion and axial");
       *flag = true;
     }
     if (!body.has_bending && !body.has_torsion && !body.has_axial) object.fail("motions", "is empty; give bending, torsion or axial");
@@ -109,7 +109,7 @@ double cross(const std::array<double, 2>& o, const std::array<double, 2>& a, con
   return (a[0] - o[0]) * (b[1] - o[1]) - (a[1] - o[1]) * (b[0] - o[0]);
 }
 
-/// Two sides that meet, though they are no neighbours; or neighbours that fold back.
+/// Sides that meet without being neighbours, or neighbours that fold back.
 bool has_crossing(const std::vector<std::array<double, 2>>& p) {
   const std::size_t n = p.size();
   for (std::size_t i = 0; i < n; ++i)
@@ -135,14 +135,13 @@ bool has_crossing(const std::vector<std::array<double, 2>>& p) {
 void read_corners(base::Object& object, MembraneBody& body) {
   for (const auto& row : object.number_rows("corners_m", 2, kMaxCorners)) body.corners_m.push_back({row[0], row[1]});
   auto& p = body.corners_m;
-  if (p.size() < 3) object.fail("corners_m", fmt::format("a polygon has three corners or more, and this has {}", p.size()));
+  if (p.size() < 3) object.fail("corners_m", fmt::format("a polygon needs three corners or more, and this has {}", p.size()));
   std::array<double, 2> low = p[0], high = p[0];
   for (const auto& corner : p)
     for (int c = 0; c < 2; ++c) low[c] = std::min(low[c], corner[c]), high[c] = std::max(high[c], corner[c]);
   const double size = std::hypot(high[0] - low[0], high[1] - low[1]);
   if (!(size >= kMinLength && size <= kMaxLength) || std::abs(low[0]) > kMaxLength || std::abs(low[1]) > kMaxLength)
-    object.fail("corners_m",
-                fmt::format("lengths are metres, from {:g} to {:g}, and the polygon measures {:g}", kMinLength, kMaxLength, size));
+    object.fail("corners_m", fmt::format("the polygon must measure {:g} to {:g} m, and measures {:g}", kMinLength, kMaxLength, size));
   double twice = 0.0;
   for (std::size_t i = 0; i < p.size(); ++i) {
     const auto &a = p[i], &b = p[(i + 1) % p.size()];
@@ -172,7 +171,7 @@ MembraneBody read_membrane(base::Object object) {
   body.density_kg_m2 = object.number_if("density_kg_m2", base::kPositive);
   body.thickness_m = read_length_if(object, "thickness_m");
   if (!body.density_kg_m2 && !body.thickness_m)
-    object.fail("", "give \"density_kg_m2\", or \"thickness_m\" and a material, whose density then counts");
+    object.fail("", "give \"density_kg_m2\", or \"thickness_m\" and a material, for its density");
   object.finish();
   return body;
 }
@@ -193,7 +192,7 @@ PlateBody read_plate(base::Object object) {
   }
   body.thickness_m = read_length(object, "thickness_m");
   if (body.thickness_m > 0.25 * size)
-    object.fail("thickness_m", "is more than a quarter of the plate: plate theory is not for it; take \"shape\": \"plate\"");
+    object.fail("thickness_m", "is more than a quarter of the plate, too thick for plate theory; use \"shape\": \"plate\"");
   object.finish();
   return body;
 }
@@ -205,7 +204,7 @@ MeasuredBody read_measured(base::Object& object) {
   body.size_m = object.numbers<3>("size_m");
   for (const double length : body.size_m)
     if (!(length >= kMinLength && length <= kMaxLength))
-      object.fail("size_m", fmt::format("lengths are metres, from {:g} to {:g}, and one is {:g}", kMinLength, kMaxLength, length));
+      object.fail("size_m", fmt::format("must be from {:g} to {:g} m each, and one is {:g}", kMinLength, kMaxLength, length));
   return body;
 }
 

@@ -14,7 +14,7 @@
 
 namespace carillon::job {
 
-/// What an end of a beam or an edge of a plate is kept from: nothing; deflection; deflection and slope; slope.
+/// What is fixed at an end of a beam or an edge of a plate: nothing; deflection; deflection and slope; slope.
 enum class Edge { free, hinged, clamped, sliding };
 
 /// Along x from the origin, hinged at both ends, moving along y and z. One of tension_n and lowest_hz; diameter_m, mass_kg_m or both.
@@ -80,7 +80,7 @@ base::Json write_analytic(const AnalyticBody& body, const std::filesystem::path&
 
 /// "string", "beam", "membrane", "plate" or "modes_csv".
 const char* get_key(const AnalyticBody& body);
-/// The material that is taken where the job gives none; empty: it has to give one.
+/// The material if the job gives none; empty: the job must give one.
 const char* get_default_material(const AnalyticBody& body);
 
 const char* to_text(Edge edge);

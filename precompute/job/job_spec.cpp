@@ -149,7 +149,7 @@ void read_geometry(base::Object& job, JobSpec& spec) {
   if (spec.analytic) {
     for (const char* key : {"accuracy_cents", "element", "mass", "solver", "fixed", "materials"})
       if (job.has(key))
-        job.fail(key, fmt::format("is for bodies of elements, and the modes of a \"{}\" are known; remove it", get_key(*spec.analytic)));
+        job.fail(key, fmt::format("is for bodies of elements, but the modes of a \"{}\" are known; remove it", get_key(*spec.analytic)));
     return;
   }
   if (!spec.accuracy_cents) return;

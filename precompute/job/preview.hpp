@@ -1,4 +1,4 @@
-// A preview: a body meshed so that its modes are there within seconds, for those who do not say how accurate they are to be.
+// A preview: a body meshed so that its modes take seconds, where no accuracy is given.
 #pragma once
 
 #include <cstdint>
@@ -12,8 +12,8 @@ inline constexpr std::int64_t kPreviewSolidNodes = 16000, kPreviewWallNodes = 15
 inline constexpr std::int64_t kMaxPreviewNodes = 80000;
 inline constexpr int kPreviewModes = 200;
 
-/// Gives a job that says neither how fine its body is meshed nor how accurate its modes are to be the nodes and the number of modes of a
-/// preview. True: it is one. Jobs with a mesh, and bodies whose modes are known, stay as they are.
+/// Gives a job without a mesh size and an accuracy the nodes and the number of modes of a preview. True: it is one. Jobs with a mesh, and
+/// bodies whose modes are known, stay as they are.
 bool make_preview(JobSpec& job);
 
 /// Runs `work` with a count of nodes, and once more with the count that is possible where the mesher refuses the first. The count that was

@@ -56,7 +56,7 @@ void read_fineness(base::Object& body, Body& result) {
     body.fail("nodes", fmt::format("the mesher makes at most {} nodes, and this asks for {}; larger bodies come as a \"mesh\" file",
                                    kMaxNodes, *result.nodes));
   result.edge_m = read_length_if(body, "edge_m");
-  if (result.nodes && result.edge_m) body.fail("edge_m", "\"nodes\" says how fine the mesh is already; give one of them");
+  if (result.nodes && result.edge_m) body.fail("edge_m", "\"nodes\" is given already; give one of the two");
 }
 
 void read_surface(base::Object& body, Body& result) {
@@ -64,7 +64,7 @@ void read_surface(base::Object& body, Body& result) {
   result.wall_m = read_length_if(body, "wall_m");
   if (body.has("side")) {
     result.side = body.choice("side", {"middle", "outside", "inside"});
-    if (!result.wall_m) body.fail("side", "it says where a wall lies; give its thickness with \"wall_m\"");
+    if (!result.wall_m) body.fail("side", "is for walls; give the thickness with \"wall_m\"");
   }
   result.height_m = read_length_if(body, "height_m");
   result.scale = body.number_if("scale", base::kPositive);
@@ -119,7 +119,7 @@ Body read_body(base::Object body) {
 Body read_short_shape(base::Object shape) {
   const std::vector<std::string> keys = shape.keys(), names = list_shapes();
   if (keys.size() != 1)
-    shape.fail("", fmt::format("names one shape with its dimensions: {{\"bowl\": {{...}}}}, and this names {}", keys.size()));
+    shape.fail("", fmt::format("must name one shape with its dimensions, {{\"bowl\": {{...}}}}, and names {}", keys.size()));
   if (std::find(names.begin(), names.end(), keys[0]) == names.end()) {
     const std::string near = base::find_nearest(keys[0], names);
     shape.fail(keys[0], fmt::format("is no shape{}; there are {}", near.empty() ? "" : fmt::format(", did you mean \"{}\"?", near),

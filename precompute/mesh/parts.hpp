@@ -1,4 +1,4 @@
-// Union-find: things that hang together.
+// Union-find: connected components.
 #pragma once
 
 #include <cstddef>

@@ -37,7 +37,7 @@ struct CountSearch {
   double longest_m = 0;       // no edge longer than this is tried
   double tolerance = 0;       // largest relative error of a result
   double contented = 0;       // relative error at which the search ends
-  bool is_uncertain = false;  // the model is not to be trusted: the first mesh is a trial of a fifth of the nodes
+  bool is_uncertain = false;  // the model is uncertain: the first mesh is a trial with a fifth of the nodes
 };
 
 /// Makes meshes with make(edge), from `edge_m` on, until one has the count; a failure of make at long edges counts as too few of them.

@@ -175,7 +175,7 @@ class BoundedCurves : public CGAL::Mesh_domain_with_polyline_features_3<QueriedD
   mutable std::size_t balls_ = 0;
 };
 
-/// DelaunayBody by Mesh_3. Keeps true: a mesh depends on its sizes and on whether an earlier one touched itself, because refine() restarts
+/// DelaunayBody by Mesh_3. Invariant: a mesh depends on its sizes and on whether an earlier one touched itself, because refine() restarts
 /// CGAL's random numbers and the queries.
 class Mesh3Body final : public DelaunayBody {
   using Domain = BoundedCurves;
@@ -218,8 +218,8 @@ class Mesh3Body final : public DelaunayBody {
     if (!curves_.empty()) CGAL::Mesh_3::internal::init_c3t3_with_features(complex_, *domain_, *criteria_, false, sizes.max_nodes, &unused);
     insert_first_points(sizes.edge_m);
     max_nodes_ = sizes.max_nodes;
-    // To ask for a boundary that is a surface means to look at every edge again and again, and nearly all of it is one anyway. A few
-    // pinches are repaired for less; bodies that touch themselves have many, and then at every size.
+    // CGAL's manifold criterion tests every edge repeatedly, although nearly all of the boundary is a manifold anyway. A few pinches are
+    // cheaper to repair; bodies that touch themselves have many, and at every size.
     refine_complex(touches_ ? p::manifold() : p::non_manifold());
     if (!touches_ && count_pinches() > kMaxPinches) {
       touches_ = true;

@@ -30,7 +30,7 @@ constexpr int kSmoothings = 30;
 /// The shortest correction of `way` whose parts along the unit normals become `wanted`.
 Vec3 correct_way(Vec3 way, const std::vector<Vec3>& normals, double wanted) {
   Mat3 matrix{};
-  constexpr double kLeast = 1e-6;  // for directions that no normal has; the repetitions make good for it
+  constexpr double kLeast = 1e-6;  // regularisation for directions without a normal; the iterations compensate for it
   for (int i = 0; i < 3; ++i) matrix[i][i] = kLeast;
   for (const Vec3& n : normals)
     for (int i = 0; i < 3; ++i)
@@ -72,7 +72,7 @@ std::vector<Vec3> find_ways_out(const Skin& skin, const std::vector<std::array<V
 }
 
 struct Middle {
-  Vec3 at{}, low_at{}, way{};  // on the skin; on the low side, where it is known; the way out
+  Vec3 at{}, low_at{}, way{};  // on the skin; on the low side, where it is known; offset direction
 };
 
 class Extruder {
@@ -164,7 +164,7 @@ class Extruder {
     return true;
   }
 
-  /// Where prisms are folded over, the ways out lean less apart; what is left then is refused.
+  /// Where prisms are folded over, offset directions are smoothed; prisms that stay folded are refused.
   void smooth_ways() {
     std::vector<char> fixed(count(), 0);
     for (const auto& [a, b] : skin_.folds) fixed[a] = fixed[b] = 1;

@@ -1,4 +1,4 @@
-// A skin and a thickness to tetrahedra: one layer of prisms (or more), whose nodes follow the surface and not the wall. Std only.
+// A skin and a thickness to tetrahedra: one layer of prisms (or more), whose number depends on the surface and not on the wall. Std only.
 #pragma once
 
 #include <array>
@@ -12,13 +12,13 @@
 
 namespace carillon::mesher {
 
-/// A wall that cannot be made of this skin; what() is the end of a sentence that begins with what the wall is, and names a place.
+/// The skin cannot be extruded to this wall; what() is the predicate of a sentence about the wall and gives the place.
 struct WallError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
 struct Wall {
-  std::vector<std::array<double, 2>> levels_m;  // (P) where the two sides are, along the way out: {-t, 0} if the skin is the outside
+  std::vector<std::array<double, 2>> levels_m;  // (P) the two sides along the offset direction: {-t, 0} if the skin is the outside
   std::vector<Vec3> low_m = {};  // (P) in place of levels and ways: the points of the other side; the skin is the outside then
   int order = 2;
   int layers = 1;
@@ -38,7 +38,7 @@ struct Extruded {
   std::vector<std::array<std::int32_t, 2>> mid_nodes;
 };
 
-/// For every point of the skin the way out for one metre of wall: at folds the shortest one whose part along each side's normal is one
+/// For every point of the skin the offset direction per metre of wall: at folds the shortest one whose part along each side's normal is one
 /// (a mitre). Throws WallError for folds of less than 29 degrees between the sides.
 std::vector<Vec3> find_ways_out(const Skin& skin);
 

@@ -1,7 +1,7 @@
 // Method: edges whose faces turn by more than an angle are joined to curves, split where curves meet or bend. Short curves with a loose end
-//   are noise and go first, again and again, for spurs hide what they grow on. A curve counts as a sharp edge of the body if its two sides,
-//   each averaged over a patch the size of an element, still turn by that much, which on a noisy surface they do not. Where a good part of
-//   all edges is sharp and much of that begins, ends or meets anywhere, the surface is a scan, and none of its edges is the body's.
+//   are noise and are removed first, repeatedly, since spurs hide the curve that they branch from. A curve counts as a sharp edge of the
+//   body if its two sides, each averaged over a patch the size of an element, still turn by that much, which on a noisy surface they do
+//   not. Where many edges are sharp and many of them start, end or meet irregularly, the surface is a scan, and none of its edges is kept.
 // Source: our own; the angle threshold is common practice. Smoothing: Taubin, "A signal processing approach to fair surface design",
 //   SIGGRAPH 1995, with equal weights.
 // Deviations: no point is smoothed farther than a bound.
@@ -35,7 +35,7 @@ constexpr double kBendDeg = 30;
 // boxes, screws and letters have points of two and three.
 constexpr double kRoughPart = 0.05, kOddPart = 0.25;
 constexpr std::size_t kMinScan = 500;
-// One sweep of smoothing: a step that shrinks and one that swells again, and how many sweeps.
+// One sweep of smoothing: a step that shrinks and one that expands again, and how many sweeps.
 constexpr double kShrink = 0.5, kSwell = -0.53;
 constexpr int kSweeps = 6;
 // Faces whose normals cancel to less than this part of their area turn all the way around: the wall of a bore.

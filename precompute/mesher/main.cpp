@@ -154,8 +154,7 @@ void check_options(const Order& order) {
     if (!(value > 0.0) || !std::isfinite(value))
       throw InputError(fmt::format("--{} is {:g}; give a positive length in metres", name, value));
   }
-  if (!order.side.empty() && !order.lengths.contains("wall"))
-    throw InputError("--side says where a wall lies; give its thickness with --wall");
+  if (!order.side.empty() && !order.lengths.contains("wall")) throw InputError("--side is for walls; give the thickness with --wall");
   if (order.scale && order.lengths.contains("height")) throw InputError("--height and --scale exclude each other; give one of them");
   if (order.scale && (!(*order.scale > 0.0) || !std::isfinite(*order.scale))) {
     throw InputError(fmt::format("--scale is {:g}; give a positive factor, metres per unit of the file", *order.scale));
@@ -377,10 +376,9 @@ void make(int argc, char** argv, Order& order) {
   app.add_option("SURFACE", order.surface, "Closed surface, or with --wall an open one: OBJ, STL, PLY, OFF, glTF or GLB");
   app.add_option("--shape", order.shape, fmt::format("A parametric body in place of a surface: {}", fmt::join(list_shapes(), ", ")));
   app.add_option("-o,--output", order.out, "The mesh to write, Gmsh 4.1 (.msh); - is standard output");
-  app.add_flag(
-      "--look", order.look,
-      "Meshes nothing and prints what the file of a surface or a mesh holds, as JSON: triangles, extents in its own units, openings, "
-      "parts, and the thickness of a surface that is both sides of a wall; of a mesh nodes, tetrahedra and extents");
+  app.add_flag("--look", order.look,
+               "Prints the contents of a surface or mesh file as JSON, without meshing: triangles, extents in its own units, openings, "
+               "parts, and the thickness of a surface that is both sides of a wall; of a mesh nodes, tetrahedra and extents");
   app.add_option("--scale", order.scale, "Surface: metres per unit of the file");
   app.add_option("--up", order.up, "Surface: the axis along which --height is measured [y]")->check(CLI::IsMember({"x", "y", "z"}));
   app.add_option("--method", order.method,
@@ -388,7 +386,7 @@ void make(int argc, char** argv, Order& order) {
                  "one layer of elements) [auto]")
       ->check(CLI::IsMember({"auto", "delaunay", "stuffing", "extrude"}));
   app.add_option("--side", order.side,
-                 "Surface with --wall: which side of the wall it is, middle, outside or inside [of an open surface middle, else outside]")
+                 "With --wall: where the surface is in the wall, middle, outside or inside [open surface: middle; closed: outside]")
       ->check(CLI::IsMember({"middle", "outside", "inside"}));
   app.add_option("--nodes", order.nodes, "About how many nodes, mid-side nodes among them (within 10 %)");
   app.add_option("--edge", order.edge, "Length of the edges in metres, in place of --nodes");
@@ -431,7 +429,7 @@ void make(int argc, char** argv, Order& order) {
   }
   complete_radius(order);
   if (order.look) return print_look(order);
-  if (order.out.empty()) throw InputError("-o is missing: say where the mesh goes, a file that ends in .msh");
+  if (order.out.empty()) throw InputError("-o is missing: give the file for the mesh, whose name ends in .msh");
   make_mesh(order);
 }
 

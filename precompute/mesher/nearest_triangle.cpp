@@ -105,7 +105,7 @@ class Filler {
             for (std::int32_t x = std::max(i - 1, 0); x <= std::min(i + 1, size_[0] - 1); ++x) {
               const std::size_t to = at(x, y, z);
               Sample& other = samples_[to];
-              // What is nearer than this one has been here before, or will be.
+              // A nearer one has been processed before, or will be.
               if (other.nearest == f || other.square < here.square) continue;
               // By the triangle inequality the triangle is at least this far from there.
               const int steps = std::abs(x - i) + std::abs(y - j) + std::abs(z - k);

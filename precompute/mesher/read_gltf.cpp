@@ -1,6 +1,6 @@
-// Method:     The triangles of all meshes of the scene, moved by their nodes; what bends or moves the meshes is refused.
+// Method:     The triangles of all meshes of the scene, transformed by their nodes; skins, morph targets and animations are refused.
 // Source:     glTF 2.0 specification, Khronos 2021 (ISO/IEC 12113:2022): chapters 3.5 and 3.7 (nodes, meshes).
-// Deviations: materials, textures, lights and cameras are not looked at.
+// Deviations: materials, textures, lights and cameras are ignored.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -32,7 +32,7 @@ class Gltf {
 
   PolygonSoup read() {
     if (!root_.objects("animations").empty())
-      root_.fail("animations", "it is animated, and a body keeps its shape; export it still, without animations");
+      root_.fail("animations", "it is animated, but a body must be rigid; export it without animations");
     std::vector<base::Object> scenes = root_.objects("scenes");
     if (scenes.empty()) {
       for (std::size_t m = 0; m < meshes_.size(); ++m) add_mesh(m, kIdentity);
@@ -61,13 +61,13 @@ class Gltf {
 
   void add_node(std::size_t n, const Matrix& parent, int depth) {
     base::Object& node = nodes_[n];
-    if (is_used_[n]) node.fail("", fmt::format("node {} hangs in two places, or inside itself; export it again", n));
-    if (depth > kMaxDepth) node.fail("", fmt::format("nodes lie {} deep in each other; join them in a modeller", kMaxDepth));
+    if (is_used_[n]) node.fail("", fmt::format("node {} has two parents, or is inside itself; export it again", n));
+    if (depth > kMaxDepth) node.fail("", fmt::format("nodes are nested {} deep; join them in a modeller", kMaxDepth));
     is_used_[n] = true;
-    if (node.has("skin")) node.fail("skin", "its mesh is bent by bones (a skin), and a body keeps its shape; apply the pose in a modeller");
+    if (node.has("skin")) node.fail("skin", "its mesh is bent by bones (a skin), but a body must be rigid; apply the pose in a modeller");
     const Matrix own = gltf::multiply(parent, gltf::read_transform(node));
     if (std::optional<base::Object> extensions = node.object_if("extensions"); extensions && extensions->has("EXT_mesh_gpu_instancing"))
-      node.fail("extensions", "its mesh is drawn in many places (EXT_mesh_gpu_instancing); make copies of it in a modeller");
+      node.fail("extensions", "its mesh is drawn in many places (EXT_mesh_gpu_instancing); make real copies in a modeller");
     if (const auto mesh = gltf::find_index(node, "mesh", meshes_.size(), "mesh")) add_mesh(*mesh, own);
     for (const std::size_t child : list_nodes(node, "children")) add_node(child, own, depth + 1);
   }
@@ -77,7 +77,7 @@ class Gltf {
       constexpr long long kTriangles = 4, kStrip = 5, kFan = 6;
       const long long mode = primitive.integer_if("mode", 0, 6).value_or(kTriangles);
       if (mode < kTriangles) continue;  // points and lines
-      if (primitive.has("targets")) primitive.fail("targets", "it has morph targets, and a body keeps its shape; apply one in a modeller");
+      if (primitive.has("targets")) primitive.fail("targets", "it has morph targets, but a body must be rigid; apply one in a modeller");
       if (std::optional<base::Object> extensions = primitive.object_if("extensions"); extensions && extensions->has(gltf::kDraco))
         primitive.fail("extensions", fmt::format("its meshes are compressed ({}); export it without compression", gltf::kDraco));
       base::Object attributes = primitive.object("attributes");
@@ -88,7 +88,8 @@ class Gltf {
       for (std::size_t i = 0; i < points.count(); ++i) {
         const Vec3 p = gltf::move(matrix, {points.get(i, 0), points.get(i, 1), points.get(i, 2)});
         for (const double x : p)
-          if (!(std::abs(x) < kLargestCoordinate)) primitive.fail("", fmt::format("point {} of mesh {} lies nowhere: {}", i, m, x));
+          if (!(std::abs(x) < kLargestCoordinate))
+            primitive.fail("", fmt::format("point {} of mesh {} is not finite or too large: {}", i, m, x));
         soup_.points.push_back(p);
       }
       add_triangles(primitive, m, static_cast<std::int32_t>(first), points.count(),
@@ -111,7 +112,7 @@ class Gltf {
     if (corners / (kind == 0 ? 3 : 1) + soup_.counts.size() > static_cast<std::size_t>(kMaxTriangles)) refuse_size();
     const auto get = [&](std::size_t i) {
       const auto index = static_cast<std::size_t>(indices ? indices->get(i, 0) : static_cast<double>(i));
-      if (index >= points) primitive.fail("indices", fmt::format("mesh {} has {} points, and its index {} is {}", m, points, i, index));
+      if (index >= points) primitive.fail("indices", fmt::format("mesh {} has {} points, but its index {} is {}", m, points, i, index));
       return first + static_cast<std::int32_t>(index);
     };
     const std::size_t count = kind == 0 ? corners / 3 : corners < 3 ? 0 : corners - 2;

@@ -1,5 +1,5 @@
 // Reads a surface: picks the reader by the ending of the name and cuts what it found into triangles. The readers are our own
-// (surface_text.cpp, read_ply.cpp, read_stl.cpp, read_gltf.cpp), for files come from strangers.
+// (surface_text.cpp, read_ply.cpp, read_stl.cpp, read_gltf.cpp), since files are untrusted.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -101,7 +101,7 @@ TriangleSurface parse_surface(std::string_view bytes, const std::string& name, c
     first = last;
   }
   if (static_cast<std::int64_t>(surface.triangles.size()) > kMaxTriangles)
-    throw InputError(fmt::format("{}: {} ({} are in it)", name, kTooManyTriangles, surface.triangles.size()));
+    throw InputError(fmt::format("{}: {} (it has {})", name, kTooManyTriangles, surface.triangles.size()));
   if (surface.triangles.empty())
     throw InputError(
         fmt::format("{}: no triangles in it ({} points were read); a closed triangle surface is needed", name, surface.points.size()));

@@ -190,7 +190,7 @@ double calc_across(const Polyline& polygon) {
 /// The triangles of a polygon's points that fill it.
 std::vector<Triangle> fill_loop(const Polyline& polygon) {
   std::vector<Triangle> fill = fill_polygon(polygon);
-  if (fill.empty())  // a crack of no width: any triangles between its sides do
+  if (fill.empty())  // a crack of zero width: any triangles between its sides will do
     for (std::int32_t c = 1; c + 1 < static_cast<std::int32_t>(polygon.size()); ++c) fill.push_back({0, c, c + 1});
   return fill;
 }
@@ -359,7 +359,7 @@ std::string describe_hole(double across_m, double part, double area_part) {
                                               100 * kLargestHolesTogether, 100 * holes.area_m2 / (holes.surface_m2 + holes.area_m2));
   throw InputError(fmt::format(
       "{}: {} {}; a closed surface is needed, and {}: close it in a modeller, give the sheet a thickness with --wall (of a job's body: "
-      "\"wall_m\"), or have it closed with --close-holes {:.2g} (\"close_holes\")",
+      "\"wall_m\"), or close it with --close-holes {:.2g} (\"close_holes\")",
       options.surface.string(), which, describe_hole(holes.largest_across_m, holes.largest_part, area_part), limit,
       std::min(1.0, std::ceil(100 * holes.largest_part + 1) / 100)));
 }
@@ -409,9 +409,9 @@ std::optional<Sheet> find_sheet(const TriangleSurface& surface, const SurfaceOpt
   if (branch)
     sheet.fault = fmt::format("cannot branch: {} of its triangles meet in one edge {} (a T-junction)", branches, describe_place(*branch));
   else if (turn)
-    sheet.fault =
-        fmt::format("has no two sides, for the surface has only one, as a Moebius strip has: its triangles cannot be turned alike {}",
-                    describe_place(*turn));
+    sheet.fault = fmt::format(
+        "has no two sides: the surface is one-sided, like a Moebius strip, and its triangles cannot be oriented consistently {}",
+        describe_place(*turn));
   std::int32_t parts = 0;
   find_patches(find_edge_faces(sheet.surface.triangles), sheet.surface.triangles.size(), true, parts);
   report.components = parts;

@@ -25,7 +25,7 @@ struct SkinSizes {
   double margin_m = 0;
 };
 
-/// What keeps the points where they belong.
+/// Projections that keep the points on the surface.
 struct SkinPlaces {
   std::function<Vec3(const Vec3&)> on_surface;  // the point of the surface for one near it
   std::function<Vec3(const Vec3&)> on_fold;     // the same of its folds and borders

@@ -63,7 +63,7 @@ std::int64_t better_flat_elements(mesh::TetMesh& mesh, double angle_deg, const s
     const double before = calc_worst(v, -1e9);
     double best = before + 0.01;
     Vec3 best_place = start;
-    // Around the best place found so far, in ever smaller steps.
+    // Around the best place found so far, in decreasing steps.
     for (const double step : {0.3, 0.15, 0.07, 0.03}) {
       const Vec3 from = best_place;
       for (int n = 0; n < 27; ++n) {
@@ -112,7 +112,7 @@ std::int64_t better_flat_elements(mesh::TetMesh& mesh, double angle_deg, const s
     for (const auto& [angle, e] : flat)
       for (const std::int32_t v : mesh.tet(e))
         if (places[v] != Place::kFixed && is_flat(e) && move(v)) ++moves;
-    // Where none of its own nodes finds a better place, the next ones make room.
+    // Where none of its own nodes finds a better place, neighbouring nodes move.
     if (flat.size() <= kMany)
       for (const auto& [angle, e] : flat) {
         if (!is_flat(e)) continue;

@@ -247,7 +247,7 @@ mesh::TetMesh meet_count(const Body& body, const SurfaceOptions& options, double
   throw CountError("the count cannot be met", nearest, nearest);
 }
 
-/// What to ask for where a mesh with edges of that length is not the body.
+/// Proposes a size where a mesh with edges of that length does not represent the body.
 [[noreturn]] void throw_wrong(const SurfaceOptions& options, const Body& body, const WrongMesh& failure) {
   const double shorter = failure.edge_m / 1.4;
   const double nodes = std::max(body.model.calc_nodes(shorter), 1.5 * static_cast<double>(options.nodes.value_or(0)));
@@ -457,7 +457,7 @@ double find_first_edge(const Body& body, const SurfaceOptions& options) {
   return body.model.find_edge(options.nodes ? static_cast<double>(*options.nodes) : (options.order == 2 ? 30000 : 10000));
 }
 
-/// Takes the noise off a scan, as far as the elements cannot show it anyway.
+/// Smooths the noise of a scan, by less than the elements resolve.
 void smooth(Body& body, const SurfaceOptions& options, SurfaceReport& report) {
   body.is_scan = !report.wrapped && is_scan(body.repaired.surface, options.sharp_angle_deg);
   if (!body.is_scan) return;
@@ -541,12 +541,12 @@ bool extrude_wall(const ThinBody& body, const SurfaceOptions& options, SurfaceRe
 /// An open sheet with a wall.
 mesh::TetMesh make_sheet(Sheet sheet, const SurfaceOptions& options, SurfaceReport& report, Phases& phases) {
   const auto refuse = [&](const std::string& fault) {
-    throw InputError(fmt::format("{}: it is an open sheet, and its wall {}; change that in a modeller, or give a thinner wall",
+    throw InputError(fmt::format("{}: it is an open sheet, and its wall {}; correct it in a modeller, or give a thinner wall",
                                  options.surface.string(), fault));
   };
   if (!sheet.fault.empty()) refuse(sheet.fault);
   if (options.method == Method::kDelaunay || options.method == Method::kStuffing)
-    throw InputError(fmt::format("{}: it is an open sheet, whose wall only the method extrude makes", options.surface.string()));
+    throw InputError(fmt::format("{}: it is an open sheet, which needs --method extrude or auto", options.surface.string()));
   Body body;
   body.repaired = {std::move(sheet.surface), 0, false};
   phases.run("rounding", [&] { return round_to_height(body, options, report), 0; });
@@ -601,7 +601,7 @@ std::optional<mesh::TetMesh> make_thin(const Body& body, const SurfaceOptions& o
   if (!sides) {
     if (must)
       throw InputError(
-          fmt::format("{}: it is a closed surface and no thin wall; give --wall for the thickness of one", options.surface.string()));
+          fmt::format("{}: it is a closed surface and not a thin wall; give --wall for the thickness of a wall", options.surface.string()));
     return std::nullopt;
   }
   Body outer, inner;
@@ -644,7 +644,7 @@ mesh::TetMesh make_mesh(const SurfaceOptions& given, SurfaceReport& report, Phas
       return make_sheet(std::move(*sheet), options, report, phases);
     };
     if (options.method == Method::kExtrusion || (sheet->fault.empty() && sheet->report.components == 1)) return take();
-    try {  // many parts may be the soup of a closed body
+    try {  // many parts may be the triangle soup of a closed body
       body.repaired = phases.run("repairing", [&] { return repair_surface(raw, options, report); });
     } catch (const InputError&) {
       return take();
@@ -704,7 +704,7 @@ mesh::TetMesh make_mesh(const SurfaceOptions& given, SurfaceReport& report, Phas
       if (const std::string cut = find_cut(mesh, body, edge); !cut.empty())
         report.notes.push_back(
             fmt::format("Stuffing needs three cells through the thinnest place, and the body's length within 0.2 %, but the mesh {}: thin "
-                        "places may be cut short, and the error bars of the frequencies do not contain that; take Delaunay refinement, or "
+                        "places may be cut short, and the error bars of the frequencies do not include this; use Delaunay refinement, or "
                         "more nodes.",
                         cut));
       return mesh;

@@ -65,7 +65,7 @@ struct SurfaceReport {
   double largest_hole_part = 0, holes_area_part = 0;  // of all holes over that of the closed surface
   int facet_pieces = 1;              // into how many each facet's sides were cut to follow the smooth surface through its corners
   double doubt_m = 0;                // how far apart the facets and the smooth surface are where it is not known which is the body
-  double smoothed_m = 0;             // how far the farthest point of a scan was moved to take its noise off; 0: it is no scan
+  double smoothed_m = 0;             // largest displacement of a point when a scan was smoothed; 0: not a scan
   bool wrapped = false;              // the surface could not be repaired: its alpha wrap was meshed
   std::int64_t components = 0;       // of the input surface after repairing
   double scale = 1;                  // metres per unit of the file, as applied
@@ -128,12 +128,12 @@ void guard_program(const char* program);
 /// The report as lines for a person.
 std::string describe(const SurfaceReport& report);
 
-/// What a surface file holds, before it is meshed.
+/// Contents of a surface file, before meshing.
 struct SurfaceLook {
   std::int64_t triangles = 0;
   Vec3 extent{};              // in the file's units
   std::int64_t openings = 0;  // borders of an open surface; 0: closed, but for holes that would be closed
-  std::int64_t parts = 0;     // that do not hang together
+  std::int64_t parts = 0;     // that are not connected
   double thickness = 0.0;     // of a closed surface that is both sides of a wall, in the file's units; 0: it is none
 };
 

@@ -72,7 +72,7 @@ struct PolygonSoup {
 /// More points or corners than this are refused: indices are of 32 bits.
 constexpr std::int64_t kMaxPoints = 400'000'000;
 
-/// A surface of more triangles is refused: to repair one takes minutes, and what is heard is in far fewer.
+/// A surface of more triangles is refused: its repair takes minutes, and the sound needs far fewer.
 constexpr std::int64_t kMaxTriangles = 5'000'000;
 inline constexpr const char* kTooManyTriangles =
     "more than 5,000,000 triangles; reduce it in a modeller: a few hundred thousand triangles sound the same";

@@ -32,7 +32,7 @@
 namespace carillon::mesher {
 namespace {
 
-// Edges may be so many times as long as the wall is thick: beyond, unstructured triangles of second order lock.
+// Longest edge over the thickness of the wall: beyond, unstructured triangles of second order lock.
 constexpr double kMaxEdgePerWall = 8;
 constexpr double kWavesPerEdge = 12;
 constexpr double kRuleHz = 10000, kPlateSpeed = 5400;  // [m/s] of longitudinal waves in plates of steel, glass or aluminium
@@ -44,7 +44,7 @@ constexpr int kMaxAttempts = 8;
 constexpr double kRimRing = 0.7, kFoldRing = 0.2,
                  kFoldRingOfEdge = 0.5;  // walls from a rim to its ring, and from the inner corner of a fold
 constexpr double kRingFrom = 1.05;       // the mitre of a fold with a ring: it turns by 36 degrees
-constexpr double kNoiseLength = 2;       // edges: shorter folds that hang on nothing are noise
+constexpr double kNoiseLength = 2;       // edges: shorter isolated folds are noise
 constexpr std::size_t kScan = 2000;      // triangles of a surface whose sharp edges may be noise
 constexpr double kMaxHalfTurn = 1.32;    // of a fold that is mitred [radians]
 constexpr double kMaxVolumeError = 0.05, kMaxLost = 0.35;
@@ -134,7 +134,7 @@ class Source {
     double square, half;
   };
 
-  /// Folds that are shorter than elements and hang on nothing are noise; where they are many, all are.
+  /// Isolated folds that are shorter than elements are noise; where there are many, all are.
   void drop_noise(std::vector<Edge>& folds, double sharp_angle_deg, double edge_m) const {
     if (facets_.triangles.size() > kScan) {
       // Of a scan, only what is sharp at the size of elements too.
@@ -170,7 +170,7 @@ class Source {
           throw WallError(fmt::format("cannot branch: {} triangles meet in one edge at {} (a T-junction)", faces,
                                       format_place(0.5 * (facets_.points[t[c]] + facets_.points[t[(c + 1) % 3]]))));
       }
-    // The corners at a point hang together by edges, or it is shared.
+    // The corners at a point are connected by edges, or it is shared.
     const std::size_t count_of_corners = 3 * facets_.triangles.size();
     mesh::Parts parts(count_of_corners);
     std::unordered_map<Edge, std::array<std::int32_t, 2>, EdgeHash> first;  // by edge: the corners at its lower and its higher point
@@ -187,7 +187,8 @@ class Source {
     for (std::int32_t c = 0; c < static_cast<std::int32_t>(count_of_corners); ++c) {
       const std::int32_t v = facets_.triangles[c / 3][c % 3];
       if (part[v] >= 0 && part[v] != parts.find(c))
-        throw WallError(fmt::format("cannot hang on one point: two parts of the surface touch at {}", format_place(facets_.points[v])));
+        throw WallError(
+            fmt::format("cannot be connected at one point only: two parts of the surface touch at {}", format_place(facets_.points[v])));
       part[v] = parts.find(c);
     }
   }
@@ -606,7 +607,7 @@ std::optional<TwoSides> find_two_sides(const TriangleSurface& closed) {
   if (!(median < kMaxOfDiagonal * calc_box(closed.points).diagonal())) return std::nullopt;
   std::vector<char> thin(count, 0);
   for (std::size_t f = 0; f < count; ++f) thin[f] = way[f] < kMaxOfMedian * median;
-  // The sides: thin triangles that hang together by edges.
+  // The sides: thin triangles that are connected by edges.
   mesh::Parts parts(count);
   std::unordered_map<Edge, std::int32_t, EdgeHash> first;
   for (std::size_t f = 0; f < count; ++f) {

@@ -10,7 +10,7 @@
 
 namespace carillon::mesher {
 
-/// A surface that is open: what it encloses nothing of can only be given a thickness.
+/// An open surface, which encloses no volume and needs a thickness.
 struct Sheet {
   TriangleSurface surface;
   std::int64_t holes = 0;

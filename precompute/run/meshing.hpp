@@ -17,7 +17,7 @@ struct Fineness {
   std::optional<double> edge_m;
 };
 
-/// What the mesher says of a surface before it meshes.
+/// The mesher's report on a surface before it meshes.
 struct BodyEstimate {
   double volume_m3 = 0;
   double area_m2 = 0;  // of all skins

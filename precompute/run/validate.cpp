@@ -93,7 +93,7 @@ class Validation {
   std::int64_t get_max_modes() const {
     return solve_estimate_.modes.value_or(has_volume() ? std::llround(std::ceil(estimate_.high)) : *size_.modes);
   }
-  /// Of so many that are computed, those that the bank will hold.
+  /// Of those that are computed, the ones that the bank will hold.
   std::int64_t get_listed(std::int64_t modes) const {
     return run_.job.max_modes ? std::min<std::int64_t>(modes, *run_.job.max_modes) : modes;
   }

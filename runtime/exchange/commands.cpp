@@ -36,7 +36,8 @@ std::string find_format(const ExportWishes& wishes) {
   const std::string ending = lower_ending(wishes.out);
   if (ending == ".glb") return "glb";
   if (ending == ".dsp") return "faust";
-  throw InputError(fmt::format("{}: a GLB file ends in .glb, a Faust program in .dsp; name it so, or give --format", wishes.out.string()));
+  throw InputError(fmt::format("{}: the name of a GLB file ends in .glb, of a Faust program in .dsp; name it so, or give --format",
+                               wishes.out.string()));
 }
 
 /// "0.01,0,0.05"
@@ -48,7 +49,7 @@ Vec3 read_point(const std::string& word) {
     const auto read = std::from_chars(at, end, point[c]);
     const bool is_last = c == 2;
     if (read.ec != std::errc() || !std::isfinite(point[c]) || (is_last ? read.ptr != end : read.ptr == end || *read.ptr != ','))
-      throw InputError(fmt::format("--points {}: give X,Y,Z in metres, or how many points are wanted", word));
+      throw InputError(fmt::format("--points {}: give X,Y,Z in metres, or a number of points", word));
     at = read.ptr + 1;
   }
   return point;
@@ -67,7 +68,7 @@ void read_points(const std::vector<std::string>& words, FaustOptions& options) {
   for (const std::string& word : words) options.points_m.push_back(read_point(word));
 }
 
-/// A file that appears whole, or standard output; and where words about it go.
+/// Writes a file whole or not at all, or standard output; messages then go to standard error.
 template <class Fill>
 void write_output(const fs::path& out, const char* what, const Fill& fill) {
   if (base::is_standard_output(out)) {
@@ -83,8 +84,7 @@ void write_output(const fs::path& out, const char* what, const Fill& fill) {
 
 void check_other(const fs::path& in, const fs::path& out) {
   std::error_code error;
-  if (fs::equivalent(in, out, error))
-    throw InputError(fmt::format("{}: this would overwrite what is read; name another file", out.string()));
+  if (fs::equivalent(in, out, error)) throw InputError(fmt::format("{}: this would overwrite the input; name another file", out.string()));
 }
 
 }  // namespace
@@ -97,7 +97,7 @@ void run_export(const ExportWishes& wishes) {
   bank::Bank bank = bank::read_bank(wishes.bank);
   if (format == "glb") {
     for (const auto& [is_given, option] : {std::pair(!wishes.points.empty(), "--points"), {wishes.radiation != "sphere", "--radiation"}})
-      if (is_given) throw InputError(fmt::format("{} is for Faust; a GLB file has the whole surface and no gains", option));
+      if (is_given) throw InputError(fmt::format("{} is for Faust; a GLB file holds the whole surface and no gains", option));
     const std::size_t modes = bank.mode_count();
     if (wishes.modes) bank = bank::calc_reduced(bank, {.modes = wishes.modes});
     std::uint64_t bytes = 0;
@@ -120,8 +120,9 @@ void run_export(const ExportWishes& wishes) {
                                                      : radiation::GainKind::kSphere;
   const FaustProgram program = make_faust(bank, options);
   write_output(wishes.out, "Faust program", [&](const auto& sink) { sink(program.text); });
-  fmt::print(notes, "faust     {} of {} modes{}\n", program.modes, bank.mode_count(),
-             std::isfinite(program.left_out_db) ? fmt::format("; what is left out is {:.1f} dB(A) below all", -program.left_out_db) : "");
+  fmt::print(
+      notes, "faust     {} of {} modes{}\n", program.modes, bank.mode_count(),
+      std::isfinite(program.left_out_db) ? fmt::format("; the other modes are {:.1f} dB(A) below the total", -program.left_out_db) : "");
   for (std::size_t p = 0; p < program.points_m.size(); ++p)
     fmt::print(notes, "point {:<4}{:.5g}, {:.5g}, {:.5g} m\n", p, program.points_m[p][0], program.points_m[p][1], program.points_m[p][2]);
 }

@@ -6,8 +6,8 @@
 
 namespace carillon::exchange {
 
-/// sqrt(omega^2 - d^2) / 2 pi, with which an under-damped mode swings [Hz]; 0 of one that does not swing, or so slowly against its decay
-/// that the difference is lost in rounding (omega - d below 1e-6 omega).
+/// Damped frequency sqrt(omega^2 - d^2) / 2 pi [Hz]; 0 for over-damped modes and those within rounding of critical damping (omega - d below
+/// 1e-6 omega).
 inline double calc_damped_hz(double omega_rad_s, double decay_per_s) {
   constexpr double kLost = 1e-6;
   const double gap = omega_rad_s - decay_per_s;

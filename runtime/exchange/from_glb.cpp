@@ -1,8 +1,8 @@
 // Method:     Of a file with our extras: the arrays there, triangles and shapes from the extension, put together as those of a bank file
-//             are (bank::assemble_bank). What both places say has to agree. Of another program's: lambda = (2 pi f)^2 + d^2, shapes
+//             are (bank::assemble_bank). Values that are in both must agree. Of another program's: lambda = (2 pi f)^2 + d^2, shapes
 //             rounded to 16 bits; mass properties by the divergence theorem where the model has none.
 // Source:     KHR_audio_rigid_bodies, draft of 2026 (K. Hiner); integrals over a polyhedron: Tonon 2004.
-// Deviations: a scale of the node is taken in as it is at the beginning; its rotation and translation place the body and are no part of it.
+// Deviations: the scale of the node is applied to the body; its rotation and translation place the body and are ignored.
 #include <fmt/format.h>
 
 #include <Eigen/Dense>
@@ -34,11 +34,11 @@ namespace {
 using gltf::Component;
 
 constexpr std::size_t kMaxFields = 1000, kMaxListed = 10'000'000, kMaxNodes = 10'000'000;
-constexpr double kSameFreq = 1e-6;   // as far as float and a sum of squares may put a frequency off
-constexpr double kSameStep = 0.02;   // of a step of a shape, for a number that is whole but for its float
-constexpr double kSameLaw = 1e-5;    // of a decay in floats and its law
+constexpr double kSameFreq = 1e-6;   // relative error of a frequency in float, through a sum of squares
+constexpr double kSameStep = 0.02;   // of a step of a shape: rounding of an integer stored as float
+constexpr double kSameLaw = 1e-5;    // of a decay in float against its law
 constexpr double kSameScale = 1e-4;  // along the three axes of a node
-constexpr const char* kChanged = "was changed since carillon-bank wrote it; --plain takes what the extension itself says";
+constexpr const char* kChanged = "was changed since carillon-bank wrote it; --plain reads the extension alone";
 
 /// The model, as the extension has it.
 struct Model {
@@ -66,15 +66,15 @@ class Reader {
   base::Object find_extension() {
     std::optional<base::Object> extensions = root_.object_if("extensions");
     if (!extensions || !extensions->has(kExtension))
-      throw InputError(fmt::format("{}: it has no {}, and so no modes; carillon hear solves its surface", file_.name(), kExtension));
+      throw InputError(fmt::format("{}: it has no {}, and so no modes; compute them with carillon hear", file_.name(), kExtension));
     return extensions->object(kExtension);
   }
 
   base::Object choose_model(base::Object& extension) {
     std::vector<base::Object> models = extension.objects("modalModels");
-    if (models.empty()) extension.fail("modalModels", "there is no modal model in this file; export it with one");
+    if (models.empty()) extension.fail("modalModels", "this file has no modal model; export it with one");
     if (!reading_->model && models.size() > 1)
-      extension.fail("modalModels", fmt::format("there are {} models; say which with --model, from 0", models.size()));
+      extension.fail("modalModels", fmt::format("there are {} models; choose one with --model, from 0", models.size()));
     number_ = reading_->model.value_or(0);
     if (number_ >= models.size())
       extension.fail("modalModels", fmt::format("there is no model {}; there are {}, numbered from 0", number_, models.size()));
@@ -86,7 +86,8 @@ class Reader {
     std::vector<double> values(numbers.count());
     for (std::size_t i = 0; i < values.size(); ++i) {
       values[i] = numbers.get(i, 0);
-      if (!(std::isfinite(values[i]) && values[i] >= 0.0)) model.fail(key, fmt::format("number {} is {}, which is none", i, values[i]));
+      if (!(std::isfinite(values[i]) && values[i] >= 0.0))
+        model.fail(key, fmt::format("number {} is {}; it must be finite and not negative", i, values[i]));
     }
     return values;
   }
@@ -97,7 +98,7 @@ class Reader {
     for (std::size_t i = 0; i < rows.size(); ++i)
       for (std::size_t c = 0; c < 3; ++c) {
         rows[i][c] = scale * numbers.get(i, c);
-        if (!std::isfinite(rows[i][c])) owner.fail(key, fmt::format("row {} lies nowhere: {}", i, rows[i][c]));
+        if (!std::isfinite(rows[i][c])) owner.fail(key, fmt::format("row {} has a coordinate that is not finite: {}", i, rows[i][c]));
       }
     return rows;
   }
@@ -107,23 +108,23 @@ class Reader {
     model_.decay_per_s = read_scalars(model, "decayRates");
     const std::size_t modes = model_.freq_hz.size();
     if (model_.decay_per_s.size() != modes)
-      model.fail("decayRates", fmt::format("has {} numbers, and there are {} frequencies", model_.decay_per_s.size(), modes));
+      model.fail("decayRates", fmt::format("has {} numbers, but there are {} frequencies", model_.decay_per_s.size(), modes));
     for (std::size_t m = 0; m < modes; ++m)
-      if (!(model_.freq_hz[m] > 0.0)) model.fail("frequencies", fmt::format("number {} is 0, which no mode has", m));
+      if (!(model_.freq_hz[m] > 0.0)) model.fail("frequencies", fmt::format("number {} is 0; a frequency must be above 0", m));
     model_.positions = read_rows(model, "positions");
     const std::size_t points = model_.positions.size();
     model_.shapes = file_.read(model, "shapes", "VEC3", {Component::kFloat});
     if (model_.shapes.count() / points != modes || model_.shapes.count() % points != 0)
       model.fail("shapes",
-                 fmt::format("has {} rows, and {} modes at {} points have {}", model_.shapes.count(), modes, points, modes * points));
-    if (!model.has("indices"))
-      model.fail("", "the model has no \"indices\": its points are no surface, which a bank needs; export it with them");
+                 fmt::format("has {} rows, but {} modes at {} points need {}", model_.shapes.count(), modes, points, modes * points));
+    if (!model.has("indices")) model.fail("", "the model has no \"indices\", and a bank needs a surface; export it with them");
     const gltf::Numbers corners = file_.read(model, "indices", "SCALAR", gltf::kIndexTypes);
-    if (corners.count() % 3 != 0) model.fail("indices", fmt::format("{} corners make no triangles", corners.count()));
+    if (corners.count() % 3 != 0) model.fail("indices", fmt::format("{} corners are no whole number of triangles", corners.count()));
     model_.triangles.resize(corners.count() / 3);
     for (std::size_t i = 0; i < corners.count(); ++i) {
       const double v = corners.get(i, 0);
-      if (!(v < static_cast<double>(points))) model.fail("indices", fmt::format("index {} is {}, and there are {} points", i, v, points));
+      if (!(v < static_cast<double>(points)))
+        model.fail("indices", fmt::format("index {} is {}, but there are only {} points", i, v, points));
       model_.triangles[i / 3][i % 3] = static_cast<std::int32_t>(v);
     }
   }
@@ -138,7 +139,7 @@ class Reader {
         object.fail("modes", fmt::format("{:g} is no mode; there are {}", number, modes));
       list.push_back(static_cast<std::size_t>(number));
     }
-    if (list.size() != count) object.fail("modes", fmt::format("lists {} modes, and there are shapes of {}", list.size(), count));
+    if (list.size() != count) object.fail("modes", fmt::format("lists {} modes, but there are shapes of {}", list.size(), count));
     return list;
   }
 
@@ -148,7 +149,7 @@ class Reader {
     return value;
   }
 
-  /// The field of that name with so many numbers of 8 bytes.
+  /// The field of that name with `count` numbers of 8 bytes.
   const bank::FieldBytes& find_field(const char* name, std::size_t count) const {
     const auto found = fields_.find(name);
     if (found == fields_.end() || found->second.bytes.size() != count * sizeof(double) || found->second.field.dtype != "<f8")
@@ -158,7 +159,7 @@ class Reader {
 
   void read_fields(base::Object& own) {
     for (base::Object& entry : own.objects("fields")) {
-      if (fields_.size() > kMaxFields) own.fail("fields", "there are more than any bank has");
+      if (fields_.size() > kMaxFields) own.fail("fields", "there are more fields than a bank can have");
       bank::FieldBytes array;
       array.field.name = entry.string("name");
       array.field.dtype = entry.string("type");
@@ -169,7 +170,7 @@ class Reader {
         array.bytes = std::as_bytes(std::span(view.data(), view.size()));
       }
       const std::string name = array.field.name;
-      if (!fields_.emplace(name, array).second) entry.fail("name", fmt::format("\"{}\" is there twice: the file {}", name, kChanged));
+      if (!fields_.emplace(name, array).second) entry.fail("name", fmt::format("\"{}\" occurs twice: the file {}", name, kChanged));
     }
   }
 
@@ -177,7 +178,7 @@ class Reader {
     std::vector<std::int64_t> extents;
     if (entry.is_empty_list("shape")) return extents;
     for (const double n : entry.number_list("shape", 4)) {
-      if (!(n >= 0.0 && n <= 9e15 && n == std::floor(n))) entry.fail("shape", fmt::format("{:g} is no number of rows", n));
+      if (!(n >= 0.0 && n <= 9e15 && n == std::floor(n))) entry.fail("shape", fmt::format("{:g} is not a number of rows", n));
       extents.push_back(static_cast<std::int64_t>(n));
     }
     return extents;
@@ -190,7 +191,7 @@ class Reader {
     const bank::FieldBytes& scales = find_field("modes/shape_scale", mode_count);
     for (std::size_t k = 0; k < modes.size(); ++k) {
       const std::size_t m = modes[k];
-      if (is_known[m]) owner.fail("modes", fmt::format("mode {} is there twice: the file {}", m, kChanged));
+      if (is_known[m]) owner.fail("modes", fmt::format("mode {} occurs twice: the file {}", m, kChanged));
       is_known[m] = true;
       const double scale = get_double(scales, m);
       for (std::size_t v = 0; v < points; ++v)
@@ -198,7 +199,7 @@ class Reader {
           const double exact = scale > 0.0 ? shapes.get(k * points + v, c) / scale : shapes.get(k * points + v, c),
                        step = std::round(exact);
           if (!(std::abs(exact - step) <= kSameStep && std::abs(step) <= 32767.0))
-            owner.fail("shapes", fmt::format("mode {} at point {} is no whole number of its steps: the file {}", k, v, kChanged));
+            owner.fail("shapes", fmt::format("mode {} at point {} is not a whole number of steps: the file {}", k, v, kChanged));
           steps[(v * mode_count + m) * 3 + c] = static_cast<std::int16_t>(step);
         }
     }
@@ -208,7 +209,7 @@ class Reader {
     for (std::size_t v = 0; v < model_.positions.size(); ++v)
       for (std::size_t c = 0; c < 3; ++c)
         if (static_cast<double>(static_cast<float>(get_double(vertices, 3 * v + c))) != model_.positions[v][c])
-          throw InputError(fmt::format("{}: point {} is not where its extras have it: the file {}", file_.name(), v, kChanged));
+          throw InputError(fmt::format("{}: point {} differs from its extras: the file {}", file_.name(), v, kChanged));
   }
 
   /// Frequencies and decays of the extension are those of the bank that comes of the extras.
@@ -220,7 +221,7 @@ class Reader {
       const double decay = is_corrected ? bank.corrected.decay_per_s[modes[k]] : bank.decay_per_s[modes[k]];
       const double hz = calc_damped_hz(omega, decay);
       if (!(std::abs(model_.freq_hz[k] - hz) <= kSameFreq * hz && std::abs(model_.decay_per_s[k] - decay) <= kSameFreq * decay))
-        throw InputError(fmt::format("{}: mode {} has {:.7g} Hz, and its extras say {:.7g} Hz: the file {}", file_.name(), k,
+        throw InputError(fmt::format("{}: mode {} has {:.7g} Hz, but {:.7g} Hz in its extras: the file {}", file_.name(), k,
                                      model_.freq_hz[k], hz, kChanged));
     }
   }
@@ -229,7 +230,7 @@ class Reader {
     read_fields(own);
     const auto eigenvalues = fields_.find("modes/eigenvalue"), shape = fields_.find("modes/shape");
     if (eigenvalues == fields_.end() || shape == fields_.end() || shape->second.field.shape.size() != 3)
-      own.fail("fields", fmt::format("there are no eigenvalues or shapes among them: the file {}", kChanged));
+      own.fail("fields", fmt::format("eigenvalues or shapes are missing: the file {}", kChanged));
     const std::size_t mode_count = eigenvalues->second.bytes.size() / sizeof(double), points = model_.positions.size();
     compare_vertices(find_field("mesh/vertices", 3 * points));
     std::optional<base::Object> still = own.object_if("still");
@@ -237,7 +238,7 @@ class Reader {
     if (still) still_shapes = file_.read(*still, "shapes", "VEC3", {Component::kFloat});
     const std::size_t still_count = still_shapes.count() / points;
     if (still_shapes.count() % points != 0 || model_.freq_hz.size() + still_count != mode_count)
-      own.fail("modes", fmt::format("there are shapes of {} modes, and {} modes: the file {}", model_.freq_hz.size() + still_count,
+      own.fail("modes", fmt::format("there are shapes of {} modes, but {} modes: the file {}", model_.freq_hz.size() + still_count,
                                     mode_count, kChanged));
     std::vector<std::int16_t> steps(3 * mode_count * points);
     std::vector<bool> is_known(mode_count, false);
@@ -265,7 +266,7 @@ class Reader {
 
   // ---- a model of another program ----
 
-  /// By how much the first node that has the model enlarges it; 1 where none has.
+  /// The scale of the first node with the model; 1 if there is none.
   double find_scale() {
     std::vector<base::Object> nodes = root_.objects("nodes");
     std::vector<std::size_t> parent(nodes.size(), nodes.size());
@@ -282,14 +283,15 @@ class Reader {
     gltf::Matrix matrix = gltf::kIdentity;
     std::size_t steps = 0;
     for (std::size_t n = found.value_or(nodes.size()); n < nodes.size(); n = parent[n]) {
-      if (++steps > nodes.size()) nodes[n].fail("", fmt::format("node {} hangs inside itself; export it again", n));
+      if (++steps > nodes.size()) nodes[n].fail("", fmt::format("node {} is its own ancestor; export it again", n));
       matrix = gltf::multiply(gltf::read_transform(nodes[n]), matrix);
     }
     const std::array<double, 3> along{norm(Vec3{matrix[0], matrix[1], matrix[2]}), norm(Vec3{matrix[4], matrix[5], matrix[6]}),
                                       norm(Vec3{matrix[8], matrix[9], matrix[10]})};
     const auto [low, high] = std::minmax_element(along.begin(), along.end());
     if (!(*low > 0.0 && *high - *low <= kSameScale * *high))
-      nodes[*found].fail("", "its node is not scaled by the same along all axes, and no modes are known of such a body; apply the scale");
+      nodes[*found].fail(
+          "", "its node is not scaled by the same along all axes, which changes the modes; apply the scale, and compute them again");
     return *high;
   }
 
@@ -332,10 +334,10 @@ class Reader {
     }
     std::vector<base::Object> materials = extension.objects("acousticMaterials");
     const auto number = model.integer_if("material", 0, static_cast<long long>(materials.size()) - 1);
-    if (!number) model.fail("material", "the model names no material, whose stiffness contacts need; say what it is with --material NAME");
+    if (!number) model.fail("material", "the model names no material, and contacts need its stiffness; give --material NAME");
     base::Object& own = materials[static_cast<std::size_t>(*number)];
     for (const char* key : {"density", "youngsModulus", "poissonRatio"})
-      if (!own.has(key)) own.fail(key, fmt::format("the material of the model has no \"{}\"; say what it is with --material NAME", key));
+      if (!own.has(key)) own.fail(key, fmt::format("the material of the model has no \"{}\"; give --material NAME", key));
     material.density_kg_m3 = own.number("density", base::kPositive);
     material.young_modulus_pa = own.number("youngsModulus", base::kPositive);
     material.poisson_ratio = own.number("poissonRatio", {-1.0, 0.5});
@@ -348,7 +350,7 @@ class Reader {
   void read_mass(base::Object& model, double scale, bank::Bank& bank) {
     const Solid solid = calc_solid(bank);
     if (!(solid.volume_m3 > 0.0))
-      model.fail("indices", "its triangles enclose no volume, or face inward; a bank is of a closed surface that faces outward");
+      model.fail("indices", "its triangles enclose no volume or face inward; a bank needs a closed surface that faces outward");
     bank.rigid.volume_m3 = solid.volume_m3;
     bank.rigid.mass_kg = bank.material.density_kg_m3 * solid.volume_m3;
     bank.rigid.centre_m = solid.centre_m;
@@ -437,7 +439,8 @@ class Reader {
     bank.mass = "consistent";
     bank.provenance = base::Json::object().set("imported", kExtension).set("file", file_.name()).line();
     if (const std::vector<std::string> faults = bank::find_faults(bank); !faults.empty())
-      throw InputError(fmt::format("{}: no bank comes of its model: {}; correct it in the program that made it", file_.name(), faults[0]));
+      throw InputError(
+          fmt::format("{}: its model is not a valid bank: {}; correct it in the program that made it", file_.name(), faults[0]));
     return bank;
   }
 

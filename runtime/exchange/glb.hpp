@@ -1,5 +1,5 @@
-// A bank as a GLB file: the surface as a mesh, its modes as the draft extension KHR_audio_rigid_bodies, and what that cannot say as extras,
-// so that the same bank can be made of it again. docs/howto/export.md describes the file.
+// A bank as a GLB file: the surface as a mesh, its modes as the draft extension KHR_audio_rigid_bodies, and all other arrays as extras, so
+// that the same bank can be read back. docs/howto/export.md describes the file.
 #pragma once
 
 #include <cstddef>
@@ -20,20 +20,20 @@ struct GlbOptions {
   bool is_z_up = false;       // the node is turned so that the body's z points up, y in glTF; its own frame stays
 };
 
-/// Hands the file on in pieces, in order. Modes by falling audibility, at the frequencies that are played (corrected ones, where there are
-/// any). Modes that do not swing (over-damped) have no place in the extension and are among the extras.
-/// Throws InputError for a bank without modes, and for more than the 4 GiB that GLB can say.
+/// Writes the file to the sink in pieces, in order. Modes by falling audibility, at the frequencies that are played (corrected ones, where
+/// there are any). Over-damped modes have no place in the extension and are among the extras.
+/// Throws InputError for a bank without modes, and for more than the 4 GiB that GLB can hold.
 void write_glb(const bank::Bank& bank, const GlbOptions& options, const std::function<void(std::string_view)>& sink);
 
 struct GlbReading {
   std::optional<std::size_t> model{};            // its number, of a file of several
-  bool ignores_extras = false;                   // as of another program: what the extension itself says
+  bool ignores_extras = false;                   // read as a file of another program: the extension alone
   const material::Material* material = nullptr;  // of a model that names none
 };
 
-/// The bank of a GLB file; `name` is that of the file. Of one that write_glb() made it is the same bank, to the bit. Of another program's
-/// it is what the extension says: its surface, frequencies, decays and shapes (16 bits), mass properties, or those of the surface filled
-/// with the material. Throws InputError that begins with the name for what is damaged, was changed, or lacks what a bank needs.
+/// The bank of a GLB file; `name` is that of the file. From a file of write_glb() it is the same bank, bit for bit. From another
+/// program's it has the surface, frequencies, decays and shapes (16 bits) of the extension, and its mass properties, else those of the
+/// surface filled with the material. Throws InputError that begins with the name for files that are damaged, changed or incomplete.
 bank::Bank parse_glb(std::string_view bytes, const std::string& name, const GlbReading& reading = {});
 
 }  // namespace carillon::exchange

@@ -64,10 +64,10 @@ struct Wishes {
 
 void add_options(CLI::App& editing, Wishes& wishes) {
   editing.add_option("--material", wishes.material,
-                     "Of another material, by its name (carillon materials): its density, stiffness and damping; Poisson's ratio stays");
-  editing.add_option("--density", wishes.edits.density_scale, "Times this much")->capture_default_str();
-  editing.add_option("--stiffness", wishes.edits.stiffness_scale, "Times this much; Poisson's ratio stays")->capture_default_str();
-  editing.add_option("--size", wishes.edits.size_scale, "All lengths times this much")->capture_default_str();
+                     "Name of another material (carillon materials): takes its density, stiffness and damping; Poisson's ratio stays");
+  editing.add_option("--density", wishes.edits.density_scale, "Factor of the density")->capture_default_str();
+  editing.add_option("--stiffness", wishes.edits.stiffness_scale, "Factor of the stiffness; Poisson's ratio stays")->capture_default_str();
+  editing.add_option("--size", wishes.edits.size_scale, "Factor of all lengths")->capture_default_str();
   editing.add_option("--alphas", wishes.alphas, "Rayleigh damping in place of the bank's law: alpha1 [s] and alpha2 [1/s]")->expected(2);
   editing.add_option("--tan-phi", wishes.tan_phi,
                      "The same loss factor at all frequencies, in place of the bank's law (internal friction)");
@@ -81,11 +81,13 @@ void add_options(CLI::App& editing, Wishes& wishes) {
       .add_option("--caughey", wishes.caughey,
                   "Damping as a series of powers of lambda = omega^2, in place of the bank's law: POWER:COEFFICIENT, as many as there are")
       ->option_text("POWER:COEFFICIENT ...");
-  CLI::Option* modes = editing.add_option("--modes", wishes.reduction.modes, "Keep so many modes; the bank is no longer complete")
-                           ->check(CLI::PositiveNumber);
+  CLI::Option* modes =
+      editing.add_option("--modes", wishes.reduction.modes, "Number of modes to keep; the bank is then no longer complete")
+          ->check(CLI::PositiveNumber);
   editing
-      .add_option("--keep", wishes.keep,
-                  "Which: \"loudest\", the most audible ones of blows all over the body, or \"lowest\" in frequency, whose proof stays")
+      .add_option(
+          "--keep", wishes.keep,
+          "Which modes to keep: \"loudest\", the most audible for blows all over the body, or \"lowest\" in frequency, whose proof stays")
       ->check(CLI::IsMember({"loudest", "lowest"}))
       ->capture_default_str()
       ->needs(modes);
@@ -137,7 +139,7 @@ void read_damping(Wishes& wishes) {
   }
 }
 
-/// A name that says something else than a bank would be believed by other programs.
+/// Other programs rely on the extension: a name of another kind is refused.
 void check_bank_name(const std::filesystem::path& out) {
   constexpr std::array<std::string_view, 6> kExtensions{"", ".hdf", ".h5", ".hdf5", ".vtkhdf", ".bank"};
   std::string extension = out.extension().string();
@@ -169,23 +171,23 @@ void take_material(const bank::Bank& bank, Wishes& wishes) {
   if (const double cents = bank::calc_poisson_cents(bank, material); cents > kAudibleCents)
     fmt::print(
         stderr,
-        "carillon-bank: note: Poisson's ratio stays {:g}, and {} has {:g}: modes of torsion are off by {:.0f} cents, others by less; a "
-        "job with \"material\": \"{}\" has them right\n",
+        "carillon-bank: note: Poisson's ratio stays {:g}, but {} has {:g}: modes of torsion are off by {:.0f} cents, others by less; a "
+        "job with \"material\": \"{}\" takes its own ratio\n",
         bank.material.poisson_ratio, material.name, material.poisson_ratio, cents, material.name);
 }
 
 void add_export(CLI::App& app, exchange::ExportWishes& wishes) {
   app.add_option("BANK", wishes.bank, "The bank file")->required();
   app.add_option("-o,--output", wishes.out, "The file to write, .glb or .dsp; - is standard output")->required();
-  app.add_option("--format", wishes.format, "glb or faust, where the name of the file does not say")
-      ->check(CLI::IsMember({"glb", "faust"}));
-  app.add_option("--modes", wishes.modes, "The most audible so many; without it all (glb), or 100 (faust)")->check(CLI::PositiveNumber);
-  app.add_option("--points", wishes.points, "Where the body is struck (faust): X,Y,Z in metres, as many as there are; or how many (4)")
+  app.add_option("--format", wishes.format, "glb or faust; without it by the name of the file")->check(CLI::IsMember({"glb", "faust"}));
+  app.add_option("--modes", wishes.modes, "Number of modes, the most audible; without it all (glb), or 100 (faust)")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--points", wishes.points, "Points to strike (faust): X,Y,Z in metres each; or their number (4)")
       ->option_text("X,Y,Z ...");
-  app.add_option("--radiation", wishes.radiation, "How loud modes are (faust), as a scene's \"radiation\"")
+  app.add_option("--radiation", wishes.radiation, "Radiation model (faust), as \"radiation\" of a scene")
       ->check(CLI::IsMember({"sphere", "osg02", "vddp96"}))
       ->capture_default_str();
-  app.add_option("--name", wishes.name, "Of the body in the file; without it that of the bank's file");
+  app.add_option("--name", wishes.name, "Name of the body in the file; without it that of the bank's file");
   app.add_option_function<std::string>(
          "--up", [&wishes](const std::string& axis) { wishes.is_z_up = axis == "z"; },
          "The axis of the body that points up in the other program (glb), y or z; without it y")
@@ -195,9 +197,9 @@ void add_export(CLI::App& app, exchange::ExportWishes& wishes) {
 void add_import(CLI::App& app, exchange::ImportWishes& wishes) {
   app.add_option("GLB", wishes.glb, "The GLB file")->required();
   app.add_option("-o,--output", wishes.out, "The bank to write; - is standard output")->required();
-  app.add_option("--model", wishes.model, "Which modal model of the file, from 0");
-  app.add_option("--material", wishes.material, "Of a model that names none, by its name (carillon materials)");
-  app.add_flag("--plain", wishes.is_plain, "Take what the extension itself says, without what carillon-bank export has added");
+  app.add_option("--model", wishes.model, "Number of the modal model in the file, from 0");
+  app.add_option("--material", wishes.material, "Material of a model without one, by its name (carillon materials)");
+  app.add_flag("--plain", wishes.is_plain, "Read the extension alone, without the extras of carillon-bank export");
 }
 
 void edit(const std::string& file, const std::string& out, Wishes& wishes) {
@@ -240,12 +242,13 @@ int run(int argc, char** argv) {
   std::string file;
   bool json = false, all = false;
   std::size_t modes = 20;
-  CLI::App* info = app.add_subcommand("info", "What is in a bank: frequencies, damping, residuals, counts");
+  CLI::App* info = app.add_subcommand("info", "Shows a bank: frequencies, damping, residuals, counts");
   info->add_option("BANK", file, "The bank file")->required();
   info->add_flag("--json", json, "Everything but mesh and shapes, as JSON");
   info->add_flag("--all", all, "The record of the run that made it too: versions, seconds, memory, partition, solver");
   info->add_option("--modes", modes, "Rows of the table of modes")->capture_default_str();
-  CLI::App* checking = app.add_subcommand("check", "Is it whole and sane: one line per property; exit code 0 when it is, 2 otherwise");
+  CLI::App* checking =
+      app.add_subcommand("check", "Checks a bank, one line per property; exit code 0 if it is whole and sane, 2 otherwise");
   checking->add_option("BANK", file, "The bank file")->required();
   Wishes wishes;
   std::string edited;
@@ -257,11 +260,12 @@ int run(int argc, char** argv) {
   add_options(*editing, wishes);
   exchange::ExportWishes exported;
   CLI::App* exporting = app.add_subcommand(
-      "export", "The body for other programs: GLB (mesh and modes, KHR_audio_rigid_bodies) or Faust (the loudest modes at a few points)");
+      "export",
+      "Writes the body for other programs: GLB (mesh and modes, KHR_audio_rigid_bodies) or Faust (the loudest modes at a few points)");
   add_export(*exporting, exported);
   exchange::ImportWishes imported;
   CLI::App* importing =
-      app.add_subcommand("import", "The bank of a GLB file with KHR_audio_rigid_bodies; of one that export wrote, the same bank");
+      app.add_subcommand("import", "Reads a GLB file with KHR_audio_rigid_bodies as a bank; from a file of export, the same bank");
   add_import(*importing, imported);
   try {
     app.parse(argc, argv);

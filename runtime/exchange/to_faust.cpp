@@ -1,8 +1,8 @@
-// Method:     a mode answers a unit impulse with q' = e^(-d t) (cos(v t) - d / v sin(v t)), v = sqrt(omega^2 - d^2): a turning pair of
-// numbers,
-//             which stays in tune in single precision where two poles of a direct form do not. One that does not swing is two exponentials.
-//             The gain of a point, g phi . n, stands before the resonator, so that a body struck at one point rings on when the next blow
-//             comes at another. Modes are ranked by their A-weighted exposure within the ear's own time, at the point where it is largest.
+// Method:     a mode answers a unit impulse with q' = e^(-d t) (cos(v t) - d / v sin(v t)), v = sqrt(omega^2 - d^2): a rotated
+//             pair of states, which stays in tune in single precision, unlike the two poles of a direct form. An over-damped mode is two
+//             exponentials. The gain of a point, g phi . n, is applied before the resonator, so that a body struck at one point keeps
+//             ringing when the next blow comes at another. Modes are ranked by their A-weighted exposure within the ear's own time, at the
+//             point where it is largest.
 // Source:     docs/equations.md E4, E5, E7.
 // Deviations: within 5e-7 of critical damping a mode is taken 1e-6 stiffer than its damping.
 #include <fmt/format.h>
@@ -27,16 +27,16 @@ namespace carillon::exchange {
 namespace {
 
 constexpr double kCritical = 5e-7;    // of omega: nearer to critical damping
-constexpr std::size_t kGroup = 32;    // modes that are added up first: Faust takes a sum of many apart again for each term
+constexpr std::size_t kGroup = 32;    // modes per partial sum: Faust processes a long sum again for each of its terms
 constexpr double kUsualNs = 0.01;     // of a blow of the instrument
-constexpr double kUsualScale = 0.25;  // of full scale, that such a blow makes at most
+constexpr double kUsualScale = 0.25;  // of full scale: the peak of such a blow at most
 
 /// Faust as it stands in every file, behind the numbers of the body.
 constexpr const char* kResonators = R"(
 SR = min(192000.0, max(1.0, fconstant(int fSamplingFreq, <math.h>)));
 PI = 3.14159265358979323846;
 
-// A mode that swings, as it answers impulses: exp(-d t) (cos(v t) - d/v sin(v t)), v = sqrt(w^2 - d^2), w = 2 pi hz. Exact at any rate.
+// An under-damped mode, its impulse response: exp(-d t) (cos(v t) - d/v sin(v t)), v = sqrt(w^2 - d^2), w = 2 pi hz. Exact at any rate.
 swing(hz, d, gain) = *(gain * (w < PI * SR)) : (turn ~ (_, _)) : sound
 with {
   w = 2.0 * PI * hz;
@@ -47,7 +47,7 @@ with {
   sound(re, im) = re - im * (d / v);
 };
 
-// One that is damped too much to swing: two exponentials.
+// An over-damped mode: two exponentials.
 creep(hz, d, gain) = *(gain * (w < PI * SR)) <: fade(fast) * (fast / (fast - slow)) - fade(slow) * (slow / (fast - slow))
 with {
   w = 2.0 * PI * hz;
@@ -90,7 +90,7 @@ std::vector<Vec3> choose_points(const bank::Bank& bank, const FaustOptions& opti
 Place make_place(const bank::Bank& bank, const Vec3& point_m) {
   const bank::NearestPlace found = bank::find_nearest(bank, point_m);
   if (found.triangle < 0)
-    throw InputError(fmt::format("no place of the surface is near [{:g}, {:g}, {:g}]; give metres", point_m[0], point_m[1], point_m[2]));
+    throw InputError(fmt::format("[{:g}, {:g}, {:g}] is not near the surface; give metres", point_m[0], point_m[1], point_m[2]));
   const auto& corners = bank.triangles[static_cast<std::size_t>(found.triangle)];
   const auto get = [&](std::size_t c) { return bank.vertices_m[static_cast<std::size_t>(corners[c])]; };
   const Vec3 across = cross(get(1) - get(0), get(2) - get(0));
@@ -102,7 +102,7 @@ Place make_place(const bank::Bank& bank, const Vec3& point_m) {
   return place;
 }
 
-/// What is heard of mode m of a blow of 1 N s there [Pa^2 s].
+/// A-weighted exposure of mode m for a blow of 1 N s there [Pa^2 s].
 double calc_exposure(const bank::Bank& bank, const Place& place, std::size_t m) {
   const double pressure = bank::calc_a_weight(bank.freq_hz(m)) * place.gain[m];
   return pressure * pressure / (2.0 * (2.0 * bank.decay_per_s[m] + 1.0 / bank::kEarS));
@@ -123,7 +123,7 @@ std::string replace(std::string text, const std::string& from, const std::string
   return text.replace(at, from.size(), to);
 }
 
-/// Nothing that ends a text in quotes, or a comment.
+/// Without characters that end a quoted text or a comment.
 std::string clean(const std::string& name) {
   std::string text;
   for (const char c : name) text += c >= 0x20 && c != 0x7f && c != '"' && c != '\\' ? c : '_';
@@ -133,8 +133,8 @@ std::string clean(const std::string& name) {
 }  // namespace
 
 FaustProgram make_faust(const bank::Bank& given, const FaustOptions& options) {
-  if (given.mode_count() == 0) throw InputError("the bank has no modes, and so no sound");
-  if (options.modes == 0) throw InputError("a body of 0 modes is silent; ask for 1 or more");
+  if (given.mode_count() == 0) throw InputError("the bank has no modes, so it has no sound");
+  if (options.modes == 0) throw InputError("0 modes are silent; give 1 or more");
   bank::Bank bank = bank::choose_frequencies(given, bank::Frequencies::kCorrected);
   bank.radiation_gain = radiation::calc_gains(bank, options.radiation);
   if (options.radiation == radiation::GainKind::kSphere) (void)radiation::limit_gains(bank.radiation_gain, bank.decay_per_s);
@@ -184,7 +184,7 @@ FaustProgram make_faust(const bank::Bank& given, const FaustOptions& options) {
     for (const std::size_t m : kept) peak += std::abs(places[p].gain[m]);
     loudest = std::max(loudest, peak);
   }
-  text += fmt::format("\n// The gain of the point that is struck.\npoint = int(nentry(\"[1] point\", 0, 0, {}, 1));\nat(point{}) = {};\n",
+  text += fmt::format("\n// The gain of the struck point.\npoint = int(nentry(\"[1] point\", 0, 0, {}, 1));\nat(point{}) = {};\n",
                       places.size() - 1, arguments, sum);
   text += "\n// Of each mode: Hz (undamped), decay [1/s], pressure at 1 m for a blow of 1 N s at each point [Pa].\n";
   std::string groups;

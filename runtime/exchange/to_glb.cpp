@@ -2,7 +2,7 @@
 //             too. The arrays of the bank but surface and shapes go into the buffer as they are in a bank file (runtime/bank/layout.hpp).
 //             Shapes are exact as float: a whole number of up to 15 bits times the mode's scale.
 // Source:     KHR_audio_rigid_bodies, draft of 2026 (K. Hiner); glTF 2.0 specification.
-// Deviations: vertices have one normal, the mean of their triangles' by area: sharp edges are shaded round.
+// Deviations: vertices have one normal, the mean of their triangles' by area: sharp edges are shaded smoothly.
 #include <fmt/format.h>
 
 #include <Eigen/Dense>
@@ -96,7 +96,7 @@ Json list_modes(const std::vector<Played>& modes) {
   return list;
 }
 
-/// What makes the bank again: all arrays of its file but triangles and shapes.
+/// What restores the bank: all arrays of its file except triangles and shapes.
 Json add_extras(const bank::Bank& bank, const std::vector<Played>& swinging, const std::vector<Played>& still, gltf::Writer& writer) {
   Json own = Json::object(), fields = Json::array();
   own.set("version", fmt::format("{}.{}", bank::kVersionMajor, bank::find_version_minor(bank)));
@@ -122,13 +122,13 @@ void write_glb(const bank::Bank& bank, const GlbOptions& options, const std::fun
   for (const Played& played : list_played(bank))
     (calc_damped_hz(played.omega_rad_s, played.decay_per_s) > 0.0 ? swinging : still).push_back(played);
   if (swinging.empty())
-    throw InputError(fmt::format("the bank has no mode that swings ({} in all), and {} needs one", bank.mode_count(), kExtension));
+    throw InputError(fmt::format("the bank has no under-damped mode ({} in all), and {} needs one", bank.mode_count(), kExtension));
 
   gltf::Writer writer(version::describe("carillon-bank"));
   const int positions = writer.add_vertices(to_floats(bank.vertices_m), true);
   std::vector<Vec3> normals_of_vertices = bank::calc_vertex_normals(bank);
   for (Vec3& normal : normals_of_vertices)
-    if (!(norm(normal) > 0.0)) normal = {0.0, 1.0, 0.0};  // glTF wants unit vectors
+    if (!(norm(normal) > 0.0)) normal = {0.0, 1.0, 0.0};  // glTF requires unit vectors
   const int normals = writer.add_vertices(to_floats(normals_of_vertices), false);
   std::vector<std::int32_t> corners;
   for (const auto& triangle : bank.triangles) corners.insert(corners.end(), triangle.begin(), triangle.end());

@@ -1,5 +1,5 @@
-// Method:     base::Document reads the JSON. Numbers of a file that point at something are compared with what is there before they are
-// used. Source:     glTF 2.0 specification, Khronos 2021 (ISO/IEC 12113:2022): chapters 3.6 (buffers, views, accessors) and 4 (GLB).
+// Method:     base::Document reads the JSON. Indices, offsets and lengths are checked before they are used.
+// Source:     glTF 2.0 specification, Khronos 2021 (ISO/IEC 12113:2022): chapters 3.6 (buffers, views, accessors) and 4 (GLB).
 // Deviations: sparse accessors and compressed buffers are refused.
 #include "runtime/gltf/file.hpp"
 
@@ -30,7 +30,7 @@ std::uint32_t read_u32(std::string_view bytes, std::size_t at) {
   return value;
 }
 
-/// The bytes of base64; nothing where they are none.
+/// The bytes of a base64 text; nothing if it is invalid.
 std::optional<std::string> decode_base64(std::string_view text) {
   while (text.ends_with('=')) text.remove_suffix(1);
   std::string bytes;
@@ -54,7 +54,7 @@ std::optional<std::string> decode_base64(std::string_view text) {
   return bytes;
 }
 
-/// A URI without its escapes (RFC 3986, 2.1); nothing where one is none.
+/// A URI without its escapes (RFC 3986, 2.1); nothing if one is invalid.
 std::optional<std::string> decode_percent(std::string_view uri) {
   std::string text;
   for (std::size_t i = 0; i < uri.size(); ++i) {
@@ -74,7 +74,7 @@ std::optional<std::string> decode_percent(std::string_view uri) {
 /// Throws InputError for a text that would take too much memory.
 base::Document parse_json(std::string_view json, const std::string& name) {
   if (json.size() > kMaxTextBytes)
-    throw InputError(fmt::format("{}: its JSON has {} MiB, and {} are the most; export it as a .glb file, whose buffers are binary", name,
+    throw InputError(fmt::format("{}: its JSON has {} MiB, more than {}; export it as a .glb file, whose buffers are binary", name,
                                  json.size() >> 20, kMaxTextBytes >> 20));
   const auto values = std::count_if(json.begin(), json.end(), [](char c) { return c == ',' || c == '{' || c == '['; });
   if (static_cast<std::size_t>(values) > kMaxValues)
@@ -86,7 +86,7 @@ base::Document parse_json(std::string_view json, const std::string& name) {
 /// As find_index(), of a number that has to be there.
 std::size_t require_index(base::Object& object, const char* key, std::size_t size, const char* what) {
   const std::optional<std::size_t> index = find_index(object, key, size, what);
-  if (!index) object.fail("", fmt::format("\"{}\" is missing here, the number of a {}; export it again", key, what));
+  if (!index) object.fail("", fmt::format("\"{}\" is missing, the index of a {}; export it again", key, what));
   return *index;
 }
 
@@ -128,8 +128,7 @@ void File::open_buffers(std::optional<std::string_view> binary) {
   for (base::Object& buffer : buffers) {
     total += static_cast<std::uint64_t>(buffer.integer("byteLength", 1, kHuge));
     if (total > kMaxBufferBytes)
-      buffer.fail("byteLength",
-                  fmt::format("all buffers up to here have more than {} GiB; export the object alone", kMaxBufferBytes >> 30));
+      buffer.fail("byteLength", fmt::format("the buffers have more than {} GiB in all; export the object alone", kMaxBufferBytes >> 30));
   }
   for (std::size_t b = 0; b < buffers.size(); ++b) {
     base::Object& buffer = buffers[b];
@@ -137,13 +136,13 @@ void File::open_buffers(std::optional<std::string_view> binary) {
     if (!buffer.has("uri")) {
       if (b != 0 || !binary) buffer.fail("", fmt::format("buffer {} has no bytes: neither a \"uri\" nor a binary chunk", b));
       if (binary->size() < length)
-        buffer.fail("byteLength", fmt::format("buffer 0 has {} bytes, and the binary chunk {}", length, binary->size()));
+        buffer.fail("byteLength", fmt::format("buffer 0 has {} bytes, but the binary chunk {}", length, binary->size()));
       buffers_.emplace_back(binary->substr(0, length));
       continue;
     }
     owned_.push_back(std::make_unique<std::string>(read_uri(buffer)));
     if (owned_.back()->size() < length)
-      buffer.fail("byteLength", fmt::format("buffer {} has {} bytes, and its source {}", b, length, owned_.back()->size()));
+      buffer.fail("byteLength", fmt::format("buffer {} has {} bytes, but its source {}", b, length, owned_.back()->size()));
     buffers_.emplace_back(std::string_view(*owned_.back()).substr(0, length));
   }
 }
@@ -154,14 +153,14 @@ std::string File::read_uri(base::Object& buffer) const {
   if (uri.starts_with("data:")) {
     const std::size_t comma = uri.find(";base64,");
     const auto bytes = comma == std::string::npos ? std::nullopt : decode_base64(std::string_view(uri).substr(comma + 8));
-    if (!bytes) buffer.fail("uri", "its data are not base64; export it again");
+    if (!bytes) buffer.fail("uri", "its data is not base64; export it again");
     return *bytes;
   }
   const std::optional<std::string> decoded = decode_percent(uri);
   const std::filesystem::path file = decoded.value_or("");
   if (!decoded || decoded->empty() || file.is_absolute() || decoded->find("..") != std::string::npos ||
       decoded->find("://") != std::string::npos)
-    buffer.fail("uri", "is no file next to this one; put it there, or export one .glb file");
+    buffer.fail("uri", "is no file next to this one; put it there, or export a single .glb file");
   return base::read_file(std::filesystem::path(name_).parent_path() / file, "buffer of a glTF file", kMaxBufferBytes);
 }
 
@@ -193,8 +192,7 @@ Numbers File::read(base::Object& owner, const char* key, const char* type, std::
   numbers.is_normalised_ = accessor.boolean_or("normalized", false);
   numbers.count_ = static_cast<std::size_t>(accessor.integer("count", 1, kHuge));
   const std::size_t size = find_component_bytes(component) * (std::string_view(type) == "SCALAR" ? 1 : 3);
-  if (!accessor.has("bufferView"))
-    accessor.fail("", fmt::format("accessor {} has no \"bufferView\", and so no numbers; export it again", a));
+  if (!accessor.has("bufferView")) accessor.fail("", fmt::format("accessor {} has no \"bufferView\"; export it again", a));
   const std::size_t v = require_index(accessor, "bufferView", views_.size(), "bufferView");
   base::Object& view = views_[v];
   const std::string_view bytes = find_view(v, view);

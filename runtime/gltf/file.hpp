@@ -1,5 +1,5 @@
-// A glTF 2 file being read: its JSON, its buffers, and the numbers of its accessors. What a file says is checked against the bytes that are
-// there before any of them is read; what is in the JSON beyond accessors is the reader's own.
+// A glTF 2 file being read: its JSON, its buffers, and the numbers of its accessors. Lengths and offsets are checked before
+// bytes are read; the caller interprets the rest of the JSON.
 //
 //   gltf::File file = gltf::parse_glb(bytes, "body.glb");
 //   base::Object attributes = ...;                                   // of file.root()
@@ -24,8 +24,7 @@ namespace carillon::gltf {
 
 inline constexpr const char* kDraco = "KHR_draco_mesh_compression";
 
-/// The number of one of `size` things that `key` of `object` holds, if it is there. `what`: one of them. Throws InputError for a number
-/// that none has.
+/// The index that `key` of `object` holds, if it is there: below `size`, of a `what`. Throws InputError for an index out of range.
 std::optional<std::size_t> find_index(base::Object& object, const char* key, std::size_t size, const char* what);
 
 /// Types of the numbers in an accessor, by their numbers in the file.
@@ -41,11 +40,11 @@ inline constexpr std::initializer_list<Component> kIndexTypes{Component::kUnsign
 inline constexpr std::initializer_list<Component> kVertexTypes{Component::kByte,          Component::kUnsignedByte, Component::kShort,
                                                                Component::kUnsignedShort, Component::kUnsignedInt,  Component::kFloat};
 
-/// The numbers of an accessor where they lie: `count` entries of one (SCALAR), three (VEC3) ... numbers. They end with the file.
+/// View of the numbers of an accessor: `count` entries of one (SCALAR), three (VEC3) ... numbers. Valid as long as the file.
 class Numbers {
  public:
   std::size_t count() const { return count_; }
-  /// Number `c` of entry `i`, which is there; normalised ones are within -1 and 1.
+  /// Component `c` of entry `i`, both in range; normalised ones are within -1 and 1.
   double get(std::size_t i, std::size_t c) const {
     const char* at = bytes_.data() + i * stride_;
     switch (component_) {
@@ -83,7 +82,7 @@ class Numbers {
   bool is_normalised_ = false;
 };
 
-/// Every index of a buffer, a view or an accessor that it gives out has been found inside what holds it.
+/// Every buffer, view and accessor that it returns lies within its bytes.
 class File {
  public:
   base::Object root() const { return root_; }
@@ -112,8 +111,8 @@ class File {
   std::vector<std::unique_ptr<std::string>> owned_;
 };
 
-/// A GLB file, whose bytes outlive the result; `name` is that of the file, next to which others may lie that it names.
-/// Throws InputError for what is none, for glTF 1, for compressed meshes, and for buffers whose bytes are not there.
+/// A GLB file, whose bytes outlive the result; `name` is that of the file, and files that it names are next to it.
+/// Throws InputError for bytes that are no GLB file, for glTF 1, for compressed meshes, and for buffers whose bytes are not there.
 File parse_glb(std::string_view bytes, const std::string& name);
 /// The same of a .gltf file.
 File parse_text(std::string_view text, const std::string& name);

@@ -1,4 +1,4 @@
-// Where the nodes of a glTF file put what hangs on them.
+// Transforms of the nodes of a glTF file.
 #pragma once
 
 #include <array>
@@ -13,10 +13,10 @@ inline constexpr Matrix kIdentity{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1
 
 Matrix multiply(const Matrix& a, const Matrix& b);
 Vec3 move(const Matrix& m, const Vec3& p);
-/// Of its first three rows and columns: negative where it mirrors.
+/// Determinant of the first three rows and columns: negative for a reflection.
 double calc_determinant(const Matrix& m);
 
-/// A node's own "matrix", or its "translation", "rotation" and "scale". Throws InputError for a rotation that is none.
+/// A node's own "matrix", or its "translation", "rotation" and "scale". Throws InputError for an invalid rotation.
 Matrix read_transform(base::Object& node);
 
 }  // namespace carillon::gltf

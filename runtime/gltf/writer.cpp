@@ -117,7 +117,7 @@ void Writer::write_glb(const std::function<void(std::string_view)>& sink) const 
   const std::uint64_t length = kHeaderBytes + 2 * kChunkBytes + text.size() + buffer_.size() + padding;
   if (length > std::numeric_limits<std::uint32_t>::max())
     throw InputError(
-        fmt::format("the file would have {:.3g} GB, and GLB ends at 4.29 GB; keep fewer modes", 1e-9 * static_cast<double>(length)));
+        fmt::format("the file would have {:.3g} GB, and GLB allows 4.29 GB; keep fewer modes", 1e-9 * static_cast<double>(length)));
   std::string head(kMagic);
   put(head, kGlbVersion);
   put(head, static_cast<std::uint32_t>(length));

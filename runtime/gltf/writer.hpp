@@ -18,28 +18,28 @@
 
 namespace carillon::gltf {
 
-/// Lengths and offsets of what it holds agree at any time. Memory: the bytes of the buffer.
+/// Lengths and offsets are consistent at any time. Memory: the bytes of the buffer.
 class Writer {
  public:
   /// `generator`: the program, for "asset".
   explicit Writer(const std::string& generator);
 
-  /// Each adds a view and an accessor, and gives the accessor's number.
+  /// Each adds a view and an accessor, and returns the accessor's number.
   /// Rows of three, attributes of vertices. `has_bounds`: with "min" and "max", which positions need.
   int add_vertices(std::span<const float> rows, bool has_bounds);
   /// Corners of triangles, below `vertices`: 16 bits each where that many fit, else 32.
   int add_indices(std::span<const std::int32_t> corners, std::size_t vertices);
-  /// Numbers that no mesh has.
+  /// Numbers that are no vertex attribute.
   int add_scalars(std::span<const float> values);
-  /// Rows of three, block after block of so many: fill(block, numbers) writes all numbers of one.
+  /// Rows of three, in blocks: fill(block, numbers) writes all numbers of one block.
   int add_rows(std::size_t blocks, std::size_t rows, const std::function<void(std::size_t block, std::span<float> numbers)>& fill);
   /// Bytes as they are, at a multiple of 8; gives the view's number.
   int add_bytes(std::span<const std::byte> bytes);
 
-  /// The JSON but "asset", "buffers", "bufferViews" and "accessors".
+  /// The JSON except "asset", "buffers", "bufferViews" and "accessors".
   base::Json& json() { return json_; }
 
-  /// Hands the file on in pieces, in order. Throws InputError where it would have more than the 4 GiB that GLB can say.
+  /// Writes the file to the sink in pieces, in order. Throws InputError for more than the 4 GiB that GLB can hold.
   void write_glb(const std::function<void(std::string_view)>& sink) const;
 
  private:

@@ -27,7 +27,7 @@ const NamedMallet& require_mallet(std::string_view place, std::string_view name)
     if (mallet.name == name) return mallet;
     names += (names.empty() ? "" : ", ") + mallet.name;
   }
-  throw InputError(fmt::format("{}: \"{}\" is no known mallet; give one of {}, or in a scene its numbers", place, name, names));
+  throw InputError(fmt::format("{}: \"{}\" is no known mallet; give one of {}, or, in a scene, its numbers", place, name, names));
 }
 
 }  // namespace carillon::material

@@ -1,4 +1,4 @@
-// Mallets by name: heads of usual mass and size, for programs and scenes.
+// Mallets by name: heads of common mass and size, for programs and scenes.
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@
 
 namespace carillon::material {
 
-/// A sphere of a solid, or a felt whose force is K y^p where it is pressed in by y.
+/// A solid sphere, or a felt whose force is K y^p at a compression y.
 struct NamedMallet {
   std::string name;
   double mass_kg = 0.0;
@@ -22,7 +22,7 @@ struct NamedMallet {
 inline constexpr double kMalletSpeedMs = 1.0;
 
 const std::vector<NamedMallet>& get_mallets();
-/// Throws InputError that lists the names; `place` stands before it: an option, "file:line".
+/// Throws InputError that lists the names and begins with `place`: an option, "file:line".
 const NamedMallet& require_mallet(std::string_view place, std::string_view name);
 
 }  // namespace carillon::material

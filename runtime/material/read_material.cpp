@@ -313,10 +313,10 @@ bool has_elasticity(base::Object& material) {
          material.has("lame_lambda_pa") || material.has("lame_mu_pa");
 }
 
-/// The material that this one stands on.
+/// The material that this one starts from.
 Material read_from(base::Object& material, const MaterialTable* table, const std::string& fallback) {
   const std::string name = material.string_or("from", fallback);
-  if (table == nullptr) material.fail("from", "a material of this table cannot stand on another; give its constants");
+  if (table == nullptr) material.fail("from", "a material of this table cannot start from another; give its constants");
   Material result = table->require(material.find_place("from"), name).material;
   result.place = material.find_place("");
   return result;

@@ -13,10 +13,9 @@ namespace carillon::material {
 
 class MaterialTable;
 
-/// Reads and validates one material. {"from": NAME} stands on a material of `table` (null: none) and may replace its elasticity, the "axes"
-/// of an orthotropic one, "density_kg_m3" and "damping". The damping must not be negative anywhere on `band_hz`. What may be meant but
-/// seldom is (units of another system, no damping at all, damping under which nothing swings) is added to `warnings`, a line each. Throws
-/// InputError.
+/// Reads and validates one material. {"from": NAME} starts from a material of `table` (null: none) and may replace its elasticity, the
+/// "axes" of an orthotropic one, "density_kg_m3" and "damping". The damping must not be negative anywhere on `band_hz`. Implausible values
+/// (units of another system, no damping, over-damping of the band) are added to `warnings`, one line each. Throws InputError.
 Material read_material(base::Object material, const std::array<double, 2>& band_hz, std::vector<std::string>& warnings,
                        const MaterialTable* table = nullptr);
 

@@ -18,7 +18,7 @@ namespace {
 constexpr std::size_t kMaxRows = 10'000;
 constexpr std::array<double, 2> kBandHz{20.0, 20000.0};  // where a law may not be negative
 
-/// What of a name counts.
+/// The characters of a name that are compared.
 std::string fold(std::string_view name) {
   std::string folded;
   for (const char c : name)
@@ -47,14 +47,14 @@ MaterialTable MaterialTable::read(const base::Document& document, const Material
   MaterialTable table;
   std::vector<std::string> warnings;
   for (base::Object& object : root.objects("materials")) {
-    if (table.rows_.size() == kMaxRows) object.fail("", fmt::format("{} materials are the most of one file", kMaxRows));
+    if (table.rows_.size() == kMaxRows) object.fail("", fmt::format("a file may have {} materials at most", kMaxRows));
     Row row;
     const std::string name = object.string("name");
     if (fold(name).empty()) object.fail("name", "a material needs a name");
-    if (table.find(name) != nullptr) object.fail("name", fmt::format("\"{}\" is there already; give it another name", name));
+    if (table.find(name) != nullptr) object.fail("name", fmt::format("\"{}\" is already defined; give it another name", name));
     row.group = object.string_or("group", "own");
     for (const base::Entry& entry : object.entries("also", 100)) {
-      if (entry.object) object.fail("also", "holds other names, as texts");
+      if (entry.object) object.fail("also", "must be a list of other names, as texts");
       row.also.push_back(entry.text);
     }
     row.elasticity_source = object.string_or("elasticity_source", "");

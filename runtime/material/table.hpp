@@ -25,15 +25,15 @@ struct Row {
 class MaterialTable {
  public:
   /// The table of the repository, and in front of it the user's own: the file that $CARILLON_MATERIALS names, else carillon/materials.json
-  /// in $XDG_CONFIG_HOME or ~/.config, if it is there. Read at the first call. Throws InputError for a file that is wrong.
+  /// in $XDG_CONFIG_HOME or ~/.config, if it is there. Read at the first call. Throws InputError for an invalid file.
   static const MaterialTable& get();
-  /// Rows of a document {"materials": [...]}; a row may stand on one of `base`, which is put behind them. Throws InputError.
+  /// Rows of a document {"materials": [...]}; a row may start from one of `base`, whose rows follow. Throws InputError.
   static MaterialTable read(const base::Document& document, const MaterialTable* base = nullptr);
 
   const std::vector<Row>& rows() const { return rows_; }
   /// Null where there is none of that name.
   const Row* find(std::string_view name) const;
-  /// As find(), or an InputError that names the nearest one; `place` stands before it: an option, "file:line".
+  /// As find(), or an InputError that names the nearest one; it begins with `place`: an option, "file:line".
   const Row& require(std::string_view place, std::string_view name) const;
 
  private:

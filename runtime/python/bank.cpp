@@ -1,4 +1,4 @@
-// Method:     numpy arrays look into the memory of the bank (no copies) and cannot be written to.
+// Method:     numpy arrays are read-only views of the memory of the bank (no copies).
 // Source:     none.
 // Deviations: none.
 #include <fmt/format.h>
@@ -32,7 +32,7 @@ namespace py = pybind11;
 
 using Shape = std::vector<py::ssize_t>;
 
-/// A view of numbers that `owner` keeps alive; Python cannot write to it.
+/// Read-only view of numbers that `owner` keeps alive.
 template <typename T>
 py::array view(const T* numbers, const Shape& shape, const py::handle& owner) {
   py::array array(py::dtype::of<T>(), shape, numbers, owner);
@@ -175,11 +175,11 @@ void bind_bank(py::module_& module) {
   Class type(
       module, "Bank",
       "The modes of a body, as carillon-precompute writes them. m modes, V vertices and T triangles of the surface, in the frame of the "
-      "mesh. Arrays look into the bank and cannot be written to.");
+      "mesh. Stored arrays are read-only views.");
   type.def(
       py::init(&open), "file"_a, "frequencies"_a = "corrected",
-      "Reads a bank. frequencies: \"corrected\" has the estimated error of the mesh taken off where the bank knows it, \"mesh\" are those "
-      "that were solved for. Raises InputError for a file that is no whole bank.");
+      "Reads a bank. frequencies: \"corrected\" has the estimated error of the mesh removed, where the bank has it; \"mesh\" takes those "
+      "of the mesh. Raises InputError for a file that is no whole bank.");
   type.def_static("parse", &parse, "data"_a, "frequencies"_a = "corrected", "The same from the bytes of a file.");
   const auto array = [&](const char* name, auto&& find, const char* text) {
     type.def_property_readonly(
@@ -210,10 +210,10 @@ void bind_bank(py::module_& module) {
       "(m) float64: ||K phi - lambda M phi|| / (lambda ||M phi||).");
   array(
       "error_cents", [](const bank::Bank& b, const py::object&) { return make_bars(b, b.discretisation_error_cents); },
-      "(m) float64 [cent]: estimate of how far frequency_hz is from the body's; infinite where it is unknown.");
+      "(m) float64 [cent]: estimated distance of frequency_hz from that of the body; infinite where it is unknown.");
   array(
       "algebraic_error_cents", [](const bank::Bank& b, const py::object&) { return make_bars(b, b.algebraic_error_cents); },
-      "(m) float64 [cent]: bound on how far the solver is from the modes of the mesh; infinite where it is unknown.");
+      "(m) float64 [cent]: bound on the distance of the solver from the modes of the mesh; infinite where it is unknown.");
   array(
       "shape_steps",
       [](const bank::Bank& b, const py::object& self) {
@@ -227,9 +227,10 @@ void bind_bank(py::module_& module) {
            "Shapes on the surface, mass-normalised [kg^-1/2], float64: (V, 3) of one mode, (V, k, 3) of a slice or list of them, all "
            "without. A blow J [N s] at vertex v starts mode k with the velocity shapes(k)[v] @ J.");
   type.def("nearest", &find_nearest, "point_m"_a,
-           "The place on the surface that is nearest to a point: (triangle, barycentric (3), point_m (3), distance_m).");
+           "The point of the surface nearest to a point: (triangle, barycentric (3), point_m (3), distance_m).");
   type.def("edited", &edit, py::kw_only(), "material"_a = py::none(), "density"_a = 1.0, "stiffness"_a = 1.0, "size"_a = 1.0,
-           "The bank of the same body of another material by its name, or times these factors, without a solve. Poisson's ratio stays.");
+           "The bank of the same body in another material (a name), or with density, stiffness and size multiplied, without a solve. "
+           "Poisson's ratio stays.");
   type.def(
       "write",
       [](const SharedBank& bank, const std::filesystem::path& file) {
@@ -263,13 +264,13 @@ void bind_bank(py::module_& module) {
   number(
       "band_hz", [](const bank::Bank& b) { return std::pair(b.band_hz[0], b.band_hz[1]); }, "(low, high) [Hz]");
   number(
-      "complete", [](const bank::Bank& b) { return b.complete; }, "Whether every mode of band_hz is there.");
+      "complete", [](const bank::Bank& b) { return b.complete; }, "Whether every mode of band_hz is in the bank.");
   number(
       "element", [](const bank::Bank& b) { return b.element; }, "\"T4\", \"T10\" or \"analytic\".");
   type.def("__len__", [](const SharedBank& bank) { return bank.played->mode_count(); });
   type.def("__repr__", &describe);
-  module.def("find_bank", &find_bank, "file"_a, "text"_a, "Where a job writes its bank; None where it does not say.");
-  module.def("materials", &list_materials, "All materials that can be named, by name: dicts of SI values with their sources.");
+  module.def("find_bank", &find_bank, "file"_a, "text"_a, "The bank file of a job; None if it names none.");
+  module.def("materials", &list_materials, "All known materials, by name: dicts of SI values with their sources.");
 }
 
 }  // namespace carillon::python

@@ -37,8 +37,8 @@ PYBIND11_MODULE(_carillon, module) {
   module.attr("__version__") = version::get_number();
   input_error = make_exception(module, "InputError", PyExc_ValueError,
                                "A file, a number or an option cannot be used; the message names the place and the remedy.");
-  solve_error = make_exception(module, "SolveError", PyExc_RuntimeError, "The numerics did not deliver what was asked for.");
-  system_error = make_exception(module, "SystemError", PyExc_OSError, "The machine refused: disk, memory, a program that is missing.");
+  solve_error = make_exception(module, "SolveError", PyExc_RuntimeError, "The solver did not reach the required result.");
+  system_error = make_exception(module, "SystemError", PyExc_OSError, "The machine refused: disk, memory, a missing program.");
   py::register_exception_translator([](std::exception_ptr pointer) {
     try {
       if (pointer) std::rethrow_exception(pointer);

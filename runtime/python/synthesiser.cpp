@@ -157,13 +157,13 @@ class Instrument {
 
   SharedBank& require(int body) {
     const auto found = banks_.find(body);
-    if (found == banks_.end()) throw InputError(fmt::format("there is no body {}; add_body() gives their numbers", body));
+    if (found == banks_.end()) throw InputError(fmt::format("there is no body {}; add_body() returns the numbers of bodies", body));
     return found->second;
   }
 
   void push(const events::Event& event) {
     if (const char* fault = events::find_fault(event)) throw InputError(fmt::format("this cannot be played: {}", fault));
-    if (!get().push(event)) throw InputError("too many events wait; call process() between them");
+    if (!get().push(event)) throw InputError("too many events are queued; call process() between them");
   }
 
   double rate_hz_;
@@ -176,33 +176,33 @@ class Instrument {
 
 void bind_synthesiser(py::module_& module) {
   using py::literals::operator""_a;
-  py::class_<Instrument>(
-      module, "Synthesiser",
-      "Bodies that ring when they are struck, heard by microphones: the synthesiser of carillon-render and carillon-live, "
-      "played block by block. Times are seconds since the first frame; a strike or move without a time_s comes as early as "
-      "it can. Points and impulses are in the frame of the body's mesh.")
+  py::class_<Instrument>(module, "Synthesiser",
+                         "The synthesiser of carillon-render and carillon-live, block by block: bodies that are struck, and microphones. "
+                         "Times are seconds since the first frame; a strike or move without a time_s takes effect as soon as "
+                         "possible. Points and impulses are in the frame of the body's mesh.")
       .def(py::init<double, std::vector<Vec3>, const Vec3&, int>(), "rate_hz"_a = 48000.0,
            "microphones_m"_a = std::vector<Vec3>{{-0.1, 0.0, 0.0}, {0.1, 0.0, 0.0}}, "listener_m"_a = Vec3{}, "max_bodies"_a = 64,
-           "microphones_m: places from the listener [m], a channel each (1 or more); without them two ears 20 cm apart.")
+           "microphones_m: positions relative to the listener [m], one channel each (1 or more); default two ears 20 cm apart.")
       .def("add_body", &Instrument::add_body, "bank"_a, "position_m"_a = Vec3{0.0, 1.0, 0.0},
            "rotation"_a = events::Quaternion{1.0, 0.0, 0.0, 0.0}, "radiation"_a = "sphere", "effects"_a = py::none(),
-           "A new body with its centre of mass at a place [m], turned by a unit quaternion w x y z; its number. radiation and effects are "
-           "those of scene files.")
+           "Adds a body with its centre of mass at a position [m], rotated by a unit quaternion w x y z; returns its number. radiation and "
+           "effects are those of scene files.")
       .def("swap_bank", &Instrument::swap_bank, "body"_a, "bank"_a, "radiation"_a = "sphere",
-           "The body rings on as another of the same shape, usually an edited bank.")
-      .def("remove_body", &Instrument::remove_body, "body"_a, "It falls silent.")
+           "Replaces the bank of a body by one of the same shape, usually an edited one; the body keeps ringing.")
+      .def("remove_body", &Instrument::remove_body, "body"_a, "Removes a body; it falls silent.")
       .def("strike", &Instrument::strike, "body"_a, "impulse_n_s"_a, py::kw_only(), "point_m"_a = py::none(), "triangle"_a = py::none(),
            "duration_s"_a = 1e-3, "time_s"_a = py::none(),
-           "A blow [N s] with a pulse of this length about time_s, at the place of the surface that is nearest to a point [m], or the "
-           "middle "
-           "of a triangle.")
+           "A blow [N s] with a pulse of this length about time_s, at the point of the surface nearest to a point [m], or in the middle of "
+           "a "
+           "triangle.")
       .def("move", &Instrument::move, "body"_a, "position_m"_a, "velocity_m_s"_a = Vec3{}, "rotation"_a = events::Quaternion{1.0, 0, 0, 0},
-           "time_s"_a = py::none(), "Where its centre of mass is from then on [m, m/s].")
+           "time_s"_a = py::none(), "Sets position, velocity and rotation of a body from time_s on [m, m/s].")
       .def("process", &Instrument::process, "frames"_a, "The next frames: (frames, channels) float32 [Pa].")
       .def_property_readonly("rate_hz", &Instrument::get_rate_hz)
       .def_property_readonly("channels", &Instrument::get_channels)
-      .def_property_readonly("time_s", &Instrument::get_time_s, "Of the next frame [s].")
-      .def_property_readonly("counters", &Instrument::describe_counters, "dict: what was played, and what could not be.");
+      .def_property_readonly("time_s", &Instrument::get_time_s, "Time of the next frame [s].")
+      .def_property_readonly("counters", &Instrument::describe_counters,
+                             "dict: numbers of strikes, refused and late events, faults and others.");
 }
 
 }  // namespace carillon::python

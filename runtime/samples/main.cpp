@@ -35,7 +35,7 @@ void run(samples::SampleOptions& options, bool is_quiet) {
   if (is_quiet) return;
   fmt::print("samples     {}, {:.3g} MB\n", set.samples, 1e-6 * set.bytes);
   fmt::print("full scale  {:.4g} Pa at 1 m, at velocity 127\n", set.full_scale_pa);
-  fmt::print("layers      {}; a velocity is {:.1f} dB(A) from its own blow, in the mean\n", options.layers, set.error_db);
+  fmt::print("layers      {}; mean error of a velocity {:.1f} dB(A) relative to a blow at its speed\n", options.layers, set.error_db);
   for (const auto& file : set.instruments) fmt::print("instrument  {}\n", base::printable(file.string()));
 }
 
@@ -59,27 +59,27 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", version::describe("carillon-samples"));
   app.add_option("BANK", options.bank, "The bank file")->required();
   app.add_option("-o,--output", options.folder, "The folder for the instrument and its samples")->required();
-  app.add_option("--name", options.name, "Of the instrument; without it that of the bank's file");
-  CLI::Option* places = app.add_option("--places", options.places, "Strike it in so many places, far from each other")
+  app.add_option("--name", options.name, "Name of the instrument; without it that of the bank's file");
+  CLI::Option* places = app.add_option("--places", options.places, "Number of points to strike, far from each other")
                             ->check(CLI::Range(1, 64))
                             ->capture_default_str();
-  app.add_option("--at", at, "Strike it at these points: X Y Z in metres, three numbers each")->excludes(places)->option_text("X Y Z ...");
+  app.add_option("--at", at, "Points to strike: X Y Z in metres, three numbers each")->excludes(places)->option_text("X Y Z ...");
   app.add_option("--layers", options.layers, "Layers of velocity")->check(CLI::Range(1, 16))->capture_default_str();
-  app.add_option("--mallets", options.mallets,
-                 "By name, with commas between them: steel, hard-wood, plastic, rubber, hard-felt, soft-felt, yarn")
+  app.add_option("--mallets", options.mallets, "Names, separated by commas: steel, hard-wood, plastic, rubber, hard-felt, soft-felt, yarn")
       ->delimiter(',')
       ->capture_default_str();
-  app.add_option("--round-robin", options.round_robin, "Strikes around each place that take turns")
+  app.add_option("--round-robin", options.round_robin, "Number of alternating strikes around each point")
       ->check(CLI::Range(1, 16))
       ->capture_default_str();
-  app.add_option("--speed", options.speed_m_s, "Of the mallet at velocity 127, in m/s")->capture_default_str();
-  app.add_option("--keys", keys, "What a key is: \"places\", each at its own pitch, or \"pitches\", one body over the keyboard")
+  app.add_option("--speed", options.speed_m_s, "Speed of the mallet at velocity 127, in m/s")->capture_default_str();
+  app.add_option("--keys", keys,
+                 "What a key plays: \"places\", one struck point per key, or \"pitches\", one sound transposed over the keyboard")
       ->check(CLI::IsMember(samples::kKeysNames))
       ->capture_default_str();
-  app.add_option("--first-key", options.first_key, "The first key of places, 0 to 127; 60 is middle C")->capture_default_str();
-  app.add_option("--rate", options.rate_hz, "Sample rate")->check(CLI::Range(8000, 192000))->capture_default_str();
+  app.add_option("--first-key", options.first_key, "First key with --keys places, 0 to 127; 60 is middle C")->capture_default_str();
+  app.add_option("--rate", options.rate_hz, "Sample rate in Hz")->check(CLI::Range(8000, 192000))->capture_default_str();
   app.add_option("--format", format, "pcm16, pcm24, pcm32 or float")->check(CLI::IsMember(host::kSampleFormatNames))->capture_default_str();
-  app.add_option("--seconds", options.max_seconds, "Length of a sample at most; it ends at 80 dB below its peak")->capture_default_str();
+  app.add_option("--seconds", options.max_seconds, "Longest sample, in s; a sample ends 80 dB below its peak")->capture_default_str();
   app.add_flag("-q,--quiet", is_quiet, "Print nothing but errors");
   try {
     app.parse(argc, argv);

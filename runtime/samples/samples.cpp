@@ -102,7 +102,7 @@ class Maker {
     const SampleOptions& o = *options_;
     require(o.layers >= 1 && o.layers <= kMaxLayers, fmt::format("{} velocity layers; give 1 to {}", o.layers, kMaxLayers));
     require(o.round_robin >= 1 && o.round_robin <= kMaxRoundRobin,
-            fmt::format("{} strikes in turn; give 1 to {}", o.round_robin, kMaxRoundRobin));
+            fmt::format("{} alternating strikes; give 1 to {}", o.round_robin, kMaxRoundRobin));
     require(!o.mallets.empty() && o.mallets.size() <= kMaxMallets, fmt::format("{} mallets; give 1 to {}", o.mallets.size(), kMaxMallets));
     require(o.speed_m_s > 0.0 && o.speed_m_s <= 100.0, fmt::format("a mallet of {:g} m/s; give a speed up to 100 m/s", o.speed_m_s));
     require(o.max_seconds >= kShortestS && o.max_seconds <= 600.0,
@@ -128,7 +128,7 @@ class Maker {
     banks_ = host::read_banks(scene_);
     bank_ = scene_.bodies[0].spec.bank;
     if (bank_->mode_count() == 0 || bank_->triangles.empty())
-      throw InputError(fmt::format("{}: the bank has no modes, and so no sound", options_->bank.string()));
+      throw InputError(fmt::format("{}: the bank has no modes, so it has no sound", options_->bank.string()));
     scene_.microphones_m = {bank_->rigid.centre_m + Vec3{1.0, 0.0, 0.0}};
     low_ = high_ = bank_->vertices_m.front();
     for (const Vec3& x : bank_->vertices_m)
@@ -262,7 +262,7 @@ class Maker {
     double loudest = 0.0;
     const auto share = [&](const Sample& sample) { return layers_[static_cast<std::size_t>(sample.layer)].share(); };
     for (const Sample& sample : samples_) loudest = std::max(loudest, sample.peak_pa / share(sample));
-    if (!(loudest > 0.0)) throw InputError(fmt::format("{}: no strike makes it sound; strike it elsewhere", options_->bank.string()));
+    if (!(loudest > 0.0)) throw InputError(fmt::format("{}: all strikes are silent; choose other points", options_->bank.string()));
     const double gain = std::pow(10.0, kPeakDbfs / 20.0) / loudest;
     for (const Sample& sample : samples_) {
       host::SoundStore store(options_->rate_hz, 1);

@@ -1,20 +1,20 @@
-// The sound of a page: bodies that ring when they are struck, by Carillon's own synthesiser in WebAssembly.
+// The sound engine of a web page: bodies that sound when they are struck, by Carillon's synthesiser in WebAssembly.
 //
 //   const audio = await CarillonAudio.open();
 //   const bank = await audio.addBank(await (await fetch('cup.hdf')).arrayBuffer(), 'cup.hdf');
 //   const cup = await audio.addBody({ bank, name: 'cup', position_m: [0, 1, 0] });
 //   await cup.hit({ triangle: 12, barycentric: [0.3, 0.3, 0.4], mallet: 'hard-wood' });
 //
-// SI units; vectors are [x, y, z], z up; rotations are unit quaternions [w, x, y, z] of the frame of the mesh in the world. What is refused
-// rejects with an Error of one sentence, or comes as an 'error' event where nothing is awaited. What it costs: docs/performance-web.md.
+// SI units; vectors are [x, y, z], z up; rotations are unit quaternions [w, x, y, z] of the frame of the mesh in the world. Invalid
+// arguments reject with an Error of one sentence; errors outside of a call are 'error' events. Performance: docs/performance-web.md.
 
 const kNotTurned = [1, 0, 0, 0], kCentre = [1 / 3, 1 / 3, 1 / 3];
 const kExact = 0, kSoon = 1;
 const kLead_s = 0.15; // by which the events of a recorded scene are sent before it begins
 const kState = { begin: 0, hold: 1, end: 2 };
-const kHandImpedance_n_s_m = 1; // of a hand and its mallet, against what rings; an estimate
+const kHandImpedance_n_s_m = 1; // impedance of hand and mallet at the contact; an estimate
 
-/** SIMD of WebAssembly: a module of one instruction of it. */
+/** Whether the browser has SIMD of WebAssembly: validates a module with one such instruction. */
 function hasSimd() {
   return WebAssembly.validate(Uint8Array.of(0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 10, 1, 8, 0, 65, 0, 253, 15, 253, 98, 11));
 }
@@ -48,7 +48,7 @@ function rotate([w, a, b, c], x) {
   return [x[0] + w * t[0] + b * t[2] - c * t[1], x[1] + w * t[1] + c * t[0] - a * t[2], x[2] + w * t[2] + a * t[1] - b * t[0]];
 }
 
-/** Asks another thread and tells its answers apart. */
+/** Sends requests to another thread and matches the answers to them. */
 class Line {
   constructor(port, onMessage) {
     this.port = port;
@@ -103,7 +103,7 @@ class Touch {
     const { triangle, barycentric = kCentre, normal, force_n, slip_m_s, other_sweep_m_s, spin_rad_s, impedance_n_s_m, mallet, time_s } = this.fields;
     const sweep_m_s = this.fields.sweep_m_s ?? Math.hypot(...slip_m_s), { patches } = this.body;
     const patch_m = this.fields.patch_radius_m ?? (patches[mallet] ?? patches.steel) * Math.cbrt(Math.max(force_n, 1e-6));
-    // The upper half of the id keeps hands apart from recordings.
+    // The upper half of the id separates contacts by hand from those of recordings.
     this.body.audio.push(
       makeRow(3, time_s, [
         0x68616e64, this.id, this.body.number, -1, triangle, kState[state], ...barycentric, ...normal, ...slip_m_s, force_n, sweep_m_s, other_sweep_m_s,
@@ -111,7 +111,7 @@ class Touch {
       ]),
     );
   }
-  /** What has changed. */
+  /** Changes some fields of the contact. */
   move(fields) {
     if (!this.isOver) this.push('hold', fields);
   }
@@ -127,7 +127,7 @@ export class Body {
     Object.assign(this, { audio, id, spec, name: spec.name, bank: spec.bank });
   }
 
-  /** What scene files say of a body. */
+  /** The body as a scene file describes it. */
   describe() {
     const { name, position_m, rotation, fixed, effects, roughness_m, friction, supports = {} } = this.spec;
     const said = { name, bank: 'bank', position_m, quaternion: rotation, fixed, roughness_m, friction, ...supports };
@@ -177,12 +177,12 @@ export class Body {
     return this.audio.worker.ask({ type: 'levels', body: this.id, triangle, barycentric });
   }
 
-  /** Another material, size, density, stiffness or damping, while it rings. The last wish wins; resolves with the modes that it has then. */
+  /** Another material, size, density, stiffness or damping, while it rings. The last request applies; resolves with the modes after it. */
   async edit(edits) {
     this.wish = edits;
     this.editing ??= (async () => {
       try {
-        // Those who wait for the one before have theirs with the last.
+        // Earlier requests that still wait resolve with the last one.
         while (this.wish !== undefined) {
           const wish = this.wish;
           this.wish = undefined;
@@ -209,7 +209,7 @@ export class Body {
     this.audio.worker.ask({ type: 'ping', body: this.id, mode, pressure_pa, number: this.number }).catch((error) => this.audio.report(error.message));
   }
 
-  /** Where its centre of mass is: {position_m, velocity_m_s, rotation, time_s}. Without time_s it goes there at once, on a smooth way. */
+  /** Where its centre of mass is: {position_m, velocity_m_s, rotation, time_s}. Without time_s it moves there at once, along a smooth path. */
   setPosition(motion) {
     this.isMoved = true;
     this.audio.push(makeMotion(this.number, motion));
@@ -260,7 +260,7 @@ export class Recording {
     if (this.playback === playback) this.at_s = began_s;
     return began_s;
   }
-  /** Contacts end; what rings goes on. */
+  /** Contacts end; ringing modes continue. */
   stop() {
     if (this.playback === 0) return;
     this.stopped_s = this.time_s;
@@ -318,7 +318,7 @@ export class CarillonAudio extends EventTarget {
     const isOffline = typeof OfflineAudioContext !== 'undefined' && context instanceof OfflineAudioContext;
     Object.assign(this, { context, gain_per_pa, ground, bodies: new Set(), touches: 0, playbacks: 0, ids: 0, offset_s: 0 });
     this.listener = { position_m: [0, -1.5, 0.5], rotation: kNotTurned, ...listener };
-    if (!context.audioWorklet) throw new Error('this browser gives pages no audio worklet here; open the page by https or from this machine');
+    if (!context.audioWorklet) throw new Error('the browser has no AudioWorklet for this page; open it by https or from localhost');
     const find = (file) => new URL(file, import.meta.url);
     const file = (simd === 'auto' ? hasSimd() : simd) ? 'carillon.wasm' : 'carillon-plain.wasm';
     const [module] = await Promise.all([this.compile(find(file)), context.audioWorklet.addModule(find('carillon-worklet.js'))]);
@@ -332,7 +332,7 @@ export class CarillonAudio extends EventTarget {
       },
     });
     await new Promise((resolve, reject) => {
-      this.node.onprocessorerror = () => reject(new Error('the audio worklet could not be made'));
+      this.node.onprocessorerror = () => reject(new Error('the audio worklet cannot be created'));
       this.engine = new Line(this.node.port, (data) => {
         if (data.type === 'open') resolve();
         else if (data.type === 'state') this.hear(data);
@@ -433,7 +433,7 @@ export class CarillonAudio extends EventTarget {
     const facing = rotate(this.listener.rotation, [0, 1, 0]), { position_m } = this.listener;
     return JSON.stringify({ ...this.makeScene(), duration_s: Math.min(3600, Math.max(0.01, duration_s)), listener: { position_m, facing }, bodies: described });
   }
-  /** Which effects the bodies call for by what has happened, and why: {bodies: [{name, effects: {modal: {on, why, ...}, ...}}], changes}. */
+  /** Which effects the bodies need after the events so far, and why: {bodies: [{name, effects: {modal: {on, why, ...}, ...}}], changes}. */
   plan() {
     const bodies = [...this.bodies], numbers = bodies.map(({ number }) => number);
     if (bodies.length === 0) return Promise.resolve({ bodies: [], changes: [] });
@@ -454,7 +454,7 @@ export class CarillonAudio extends EventTarget {
     this.engine.tell({ type: 'budget', mode_samples_per_s, load_share });
   }
 
-  /** Once all that was sent so far has come to the audio thread. */
+  /** Resolves when the audio thread has received all messages so far. */
   async settled() {
     await this.engine.ask({ type: 'settle' });
   }

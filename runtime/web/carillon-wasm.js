@@ -1,4 +1,4 @@
-// A module of carillon.wasm and what it needs from outside: next to nothing. For worker and worklet alike, so without TextDecoder.
+// A module of carillon.wasm and its few imports. Worklets have no TextDecoder, so texts are decoded here.
 
 const kNotThere = 52; // ENOSYS of WASI
 
@@ -27,7 +27,7 @@ function encode(text) {
   return Uint8Array.from(bytes);
 }
 
-/** One sentence that the module gave. */
+/** An error message of the module. */
 export class Refusal extends Error {}
 
 export class Wasm {
@@ -72,7 +72,7 @@ export class Wasm {
     return from === 'env' ? () => -kNotThere : () => kNotThere;
   }
 
-  /** Calls a function with numbers, texts and typed arrays; of the last two it gets address and length. Throws Refusal with its sentence. */
+  /** Calls a function with numbers, texts and typed arrays; of the last two it gets address and length. Throws Refusal with its message. */
   call(name, ...args) {
     const { exports } = this, given = [], taken = [];
     try {

@@ -200,7 +200,7 @@ async function answer(data) {
   }
 }
 
-// What waits for the audio thread goes one after the other, lest what is made again overtake itself; blows do not wait for it.
+// Requests to the audio thread are sent one after the other, so that versions of a body arrive in order; blows do not wait for them.
 const kInTurn = new Set(['body', 'closeBody', 'closeBank', 'play']);
 let last = Promise.resolve();
 onmessage = ({ data }) => {

@@ -25,7 +25,7 @@ class CarillonProcessor extends AudioWorkletProcessor {
     }, this.port);
   }
 
-  /** Runs what may be refused. What is no refusal, a trap, ends the engine: there is silence from then on. */
+  /** Runs a request. A Refusal is reported; any other error, a trap, stops the engine, which is silent from then on. */
   try(work, port, id) {
     try {
       const result = work();

@@ -1,4 +1,4 @@
-// Method:     a synth::Synthesiser, with what hands need on top. What is moved by hand (the listener, a body) gets waypoints a little
+// Method:     a synth::Synthesiser with interactive input. What is moved by hand (the listener, a body) gets waypoints a little
 //             ahead of the sound, so that the way to the next one is known when the sound comes to the last; after a rest the place of the
 //             rest is a waypoint first. Recorded scenes are host::EventSchedulers, pushed kPushedS before they are due. One mark a block
 //             says that nothing earlier follows.
@@ -21,11 +21,11 @@ namespace {
 
 constexpr double kPushedS = 0.1;     // by which events of recordings are pushed before they are due
 constexpr double kMarginS = 0.01;    // by which waypoints and records of contacts are pushed earlier than strikes
-constexpr double kSoonS = 0.03;      // how far ahead of the sound the waypoints of hands lie: two pictures of a screen
+constexpr double kSoonS = 0.03;      // by which interactive waypoints are ahead of the sound: two frames of a display
 constexpr double kStepS = 0.002;     // between two waypoints at least
-constexpr double kFastestMs = 60.0;  // that hands move anything; further ahead than kFarAheadS they may be faster
+constexpr double kFastestMs = 60.0;  // of interactive motion; waypoints more than kFarAheadS ahead may be faster
 constexpr double kFarAheadS = 0.5;
-constexpr double kStillS = 0.06;                          // a hand that was not heard of for so long does not move
+constexpr double kStillS = 0.06;                          // without an update for this long, a contact has no slip
 constexpr std::size_t kMostBytes = std::size_t{3} << 30;  // of a surface
 
 double calc_distance(const Vec3& a, const Vec3& b) { return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]); }
@@ -63,7 +63,7 @@ void Engine::add_to_surface(int surface, std::span<const std::byte> bytes) {
     return values.size() == count;
   };
   if (add(to.surface->triangles, to.sizes.triangles) && add(to.surface->largest, to.sizes.largest)) add(to.surface->shape, to.sizes.shape);
-  if (!bytes.empty()) throw InputError("the surface is smaller than its bytes");
+  if (!bytes.empty()) throw InputError("the surface has more bytes than were announced");
 }
 
 void Engine::add_model(int model, int surface, std::span<const std::byte> tables) {
@@ -72,7 +72,7 @@ void Engine::add_model(int model, int surface, std::span<const std::byte> tables
   const Arriving& of = found->second;
   if (of.surface->triangles.size() != of.sizes.triangles || of.surface->largest.size() != of.sizes.largest ||
       of.surface->shape.size() != of.sizes.shape)
-    throw InputError("the surface is not there yet");
+    throw InputError("the surface is not complete yet");
   models_[model] = synth::Model::read_tables(tables, of.surface);
 }
 
@@ -199,7 +199,7 @@ bool Engine::touch_soon(const events::LastingContact& contact) {
   return true;
 }
 
-/// A contact of which nothing is heard falls; that of a hand that rests continues, without slip once it has been silent for a while.
+/// Prolongs each interactive contact with its last record; without slip once no update came for kStillS.
 void Engine::hold_contacts() {
   const double now_s = synthesiser_.get_horizon_s();
   for (auto& [key, contact] : hand_contacts_) {
@@ -323,7 +323,7 @@ void Engine::process(float* const* out, int channels, int frames) {
   const double now_s = synthesiser_.get_time_s();
   if (!playbacks_.empty()) advance_playbacks(now_s);
   if (!hand_contacts_.empty()) hold_contacts();
-  // Hands push at the horizon or later, recordings long before: nothing earlier than the end of what is made now follows.
+  // Interactive events are pushed at the horizon or later, recordings long before: no event before the end of this block follows.
   (void)synthesiser_.push(events::TimeWatermark{now_s + (std::max(frames, synth::kBlock) + 1) / rate_hz_});
   synthesiser_.process(out, channels, frames);
   synthesiser_.collect();

@@ -1,5 +1,5 @@
-// The sound of a page, as the audio thread of a browser plays it: models that another memory made, bodies that are struck, touched, edited
-// and moved by hand, and recorded scenes.
+// The sound engine of a page, on the audio thread of a browser: models made by the workshop, bodies that are struck, touched, edited and
+// moved interactively, and recorded scenes.
 //
 //   web::Engine engine({.rate_hz = 48000.0});
 //   engine.begin_surface(1, sizes), engine.add_to_surface(1, bytes), engine.add_model(1, 1, tables);
@@ -40,18 +40,18 @@ struct PlaybackRequest {
   double from_s = 0.0;      // of the recording
 };
 
-/// What it keeps true: numbers of models and surfaces are the caller's, those of bodies the synthesiser's; what hands move is on a
-/// way without jumps, no faster than kFastestMs where that can be; a contact by hand or of a recording that stopped has an end.
+/// Invariants: the caller numbers models and surfaces, the synthesiser bodies. What is moved interactively follows a path without jumps,
+/// not faster than kFastestMs where possible. Every interactive contact, and every contact of a stopped recording, gets an end.
 class Engine {
  public:
   /// Throws InputError as synth::Synthesiser does.
   explicit Engine(const synth::SynthesiserOptions& options);
 
-  /// Models come in pieces, so that no piece takes long. All throw InputError for numbers that are not there and for bytes that do not fit.
+  /// Models arrive in pieces, each of which takes little time. All throw InputError for unknown numbers and for bytes of a wrong size.
   void begin_surface(int surface, const SurfaceSizes& sizes);
   void add_to_surface(int surface, std::span<const std::byte> bytes);
   void add_model(int model, int surface, std::span<const std::byte> tables);
-  /// Bodies that play them keep them.
+  /// Bodies that use them keep them.
   void release_surface(int surface) { surfaces_.erase(surface); }
   void release_model(int model) { models_.erase(model); }
 
@@ -64,16 +64,16 @@ class Engine {
   void set_effects(int body, synth::EffectSet effects);
   void remove_body(int body);
 
-  /// Events of today (event_words.hpp). Returns how many could not be played; find_fault() says why the last of them. Throws InputError for
-  /// what are no rows.
+  /// Interactive events (event_words.hpp). Returns how many could not be played; find_fault() has the reason of the last one. Throws
+  /// InputError for malformed rows.
   int push(std::span<const double> words);
   const std::string& find_fault() const { return fault_; }
 
   /// Starts a recorded scene. Its events come in pieces, in the order of the file, at any time; those before from_s are left out. Throws
-  /// InputError for bodies that are not there.
+  /// InputError for unknown bodies.
   void begin_playback(int playback, const PlaybackRequest& request);
   void add_to_playback(int playback, std::span<const double> words);
-  /// What rings continues; contacts end. Nothing happens for a number that is not there.
+  /// Ringing modes continue; contacts end. An unknown number is ignored.
   void end_playback(int playback);
 
   /// The next frames, any number.
@@ -102,7 +102,7 @@ class Engine {
   using ContactKey = std::tuple<std::int32_t, std::uint64_t>;
   struct HandContact {
     events::LastingContact record;  // the last one
-    double asked_s = 0.0;           // of the engine: when the hand was heard of last
+    double asked_s = 0.0;           // of the engine: last update from the page
   };
   struct Playback {
     PlaybackRequest request;

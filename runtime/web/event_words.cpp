@@ -55,7 +55,7 @@ struct Reader {
   /// A whole number from `low` to `high`.
   double take_whole(double low, double high) {
     const double x = take();
-    if (!(x >= low && x <= high) || x != std::floor(x)) refuse("an index or a choice is none");
+    if (!(x >= low && x <= high) || x != std::floor(x)) refuse("an index or a choice is out of range");
     return x;
   }
   void field(double& x) { x = take(); }
@@ -131,7 +131,7 @@ void read_words(std::span<const double> words, const std::function<void(const ev
       refuse("its length does not fit");
     const std::span<const double> row = words.first(static_cast<std::size_t>(length)), fields = row.subspan(kHead);
     words = words.subspan(row.size());
-    if (row[2] != 0.0 && row[2] != 1.0) refuse("its timing is none");
+    if (row[2] != 0.0 && row[2] != 1.0) refuse("its timing is unknown");
     const Timing timing = row[2] == 0.0 ? Timing::kExact : Timing::kSoon;
     if (row[1] == 0.0)
       sink(read_event<0>(fields, row[3]), timing);
@@ -146,7 +146,7 @@ void read_words(std::span<const double> words, const std::function<void(const ev
     else if (row[1] == 5.0)
       sink(read_event<5>(fields, row[3]), timing);
     else
-      refuse("its kind is none");
+      refuse("its kind is unknown");
   }
 }
 

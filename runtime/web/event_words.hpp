@@ -13,7 +13,7 @@ namespace carillon::web {
 /// When an event is meant.
 enum class Timing {
   kExact,  // at its time
-  kSoon    // as soon as possible, and its time so much later [s]; a waypoint: to be there soon, on a smooth way
+  kSoon    // as soon as possible, later by its time [s]; a waypoint: reached soon, along a smooth path
 };
 
 /// An event as one row: its length in words, its kind, its Timing, its time [s], and its fields in the order of events.hpp, vectors one
@@ -21,8 +21,8 @@ enum class Timing {
 /// Kinds are the places of events::Event: 0 mark, 1 impulse, 2 force, 3 contact, 4 motion, 5 listener.
 void append_words(std::vector<double>& words, const events::Event& event, Timing timing = Timing::kExact);
 
-/// Gives the events of any number of rows to `sink` in their order. Throws InputError for what is no row: a length that does not fit, a
-/// kind or an index that is none. Numbers of events are not looked at (events::find_fault).
+/// Gives the events of any number of rows to `sink` in their order. Throws InputError for malformed rows: a wrong length, an
+/// unknown kind, an index out of range. The values of events are not checked (events::find_fault).
 void read_words(std::span<const double> words, const std::function<void(const events::Event&, Timing)>& sink);
 
 }  // namespace carillon::web

@@ -1,5 +1,5 @@
 // What JavaScript calls: numbers in, numbers out; texts and arrays at addresses of the module's memory.
-// Method:     one Engine or one Workshop a module. What throws gives -1, and its sentence is the text.
+// Method:     one Engine or one Workshop per module. An exception returns -1, and its message is the text.
 // Source:     none.
 // Deviations: none.
 #include <algorithm>
@@ -37,7 +37,7 @@ float* const channel_at[kChannels] = {channels[0],  channels[1],  channels[2],  
                                       channels[6],  channels[7],  channels[8],  channels[9], channels[10], channels[11],
                                       channels[12], channels[13], channels[14], channels[15]};
 
-/// The value of `work`, or -1 with a sentence in `text`.
+/// The value of `work`, or -1 with a message in `text`.
 template <class Work>
 int run(Work&& work) noexcept {
   try {
@@ -92,7 +92,7 @@ WEB_EXPORT(int, web_instructions)() {
 /// microphones_m: `count` numbers, three a place.
 WEB_EXPORT(int, web_open)(double rate_hz, const double* microphones_m, int count, int max_bodies, double roughness_m, double friction) {
   return run([&] {
-    if (count < 3 || count > 3 * kChannels || count % 3 != 0) throw InputError("a page has one to 16 microphones, three numbers each");
+    if (count < 3 || count > 3 * kChannels || count % 3 != 0) throw InputError("give 1 to 16 microphones, three numbers each");
     synth::SynthesiserOptions options{.rate_hz = rate_hz,
                                       .max_bodies = max_bodies,
                                       .max_strikes = 256,

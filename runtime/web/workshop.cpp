@@ -43,7 +43,7 @@ constexpr std::size_t kMostEvents = std::size_t{1} << 30;  // bytes of a plan's 
 
 Json to_json(const Vec3& x) { return Json::array(x); }
 
-/// What any reader of a mode wants; `error_cents` null where it is not known.
+/// One mode as JSON; `error_cents` null where it is not known.
 Json list_modes(const bank::Bank& bank) {
   Json modes = Json::array();
   for (std::size_t m = 0; m < bank.mode_count(); ++m) {
@@ -116,7 +116,7 @@ std::optional<bank::Edits> read_edits(const bank::Bank& bank, std::string_view t
 host::Scene read_scene(std::string_view text, std::size_t bodies) {
   host::Scene scene = host::parse_scene(base::parse_document(text, "scene"));
   if (scene.bodies.size() != bodies)
-    throw InputError(fmt::format("scene: describes {} bodies, and {} are meant", scene.bodies.size(), bodies));
+    throw InputError(fmt::format("scene: describes {} bodies, but {} are expected", scene.bodies.size(), bodies));
   return scene;
 }
 
@@ -170,7 +170,7 @@ Json list_patches(const bank::Bank& bank) {
 
 Workshop::Workshop(double rate_hz) : rate_hz_(rate_hz) {
   if (!(rate_hz >= 8000.0 && rate_hz <= 192000.0))
-    throw InputError(fmt::format("the sample rate is {:g} Hz; sound is made at 8000 to 192000 Hz", rate_hz));
+    throw InputError(fmt::format("the sample rate is {:g} Hz; give 8000 to 192000 Hz", rate_hz));
 }
 
 std::string Workshop::list_choices() const {
@@ -317,7 +317,7 @@ effect_selection::SceneFacts make_scene_facts(const host::Scene& scene) {
 synth::EffectSet Workshop::find_possible(int body) const {
   host::Scene scene = get_body(body).scene;
   const effect_selection::EffectSelector selector(make_scene_facts(scene));
-  // The listener of a page walks, though the scene says nothing of it, and whatever stands there is touched.
+  // The listener of a page moves and bodies are touched, even where the scene has neither.
   synth::EffectSet possible = selector.get_possible(0);
   const effect_selection::EffectOverrides& overrides = scene.bodies[0].overrides;
   if (overrides.automatic) {
@@ -331,7 +331,7 @@ std::string Workshop::make_blow(int body, std::string_view scene, std::int32_t t
                                 std::optional<double> time_s, int number, std::vector<double>& words) const {
   const MadeBody& made = get_body(body);
   host::Scene described = read_scene(scene, 1);
-  if (described.strikes.size() != 1) throw InputError("scene: a blow is one strike");
+  if (described.strikes.size() != 1) throw InputError("scene: give exactly one strike for a blow");
   check_place(*made.played, triangle);
   described.bodies[0].spec.bank = made.played.get();
   host::SceneStrike& strike = described.strikes[0];
@@ -366,7 +366,7 @@ void Workshop::make_ping(int body, int mode, double pressure_pa, int number, std
   const bank::Bank& b = *get_body(body).played;
   if (mode < 0 || static_cast<std::size_t>(mode) >= b.mode_count())
     throw InputError(fmt::format("there is no mode {}; the body has {}", mode, b.mode_count()));
-  if (!(pressure_pa >= 0.0) || !std::isfinite(pressure_pa)) throw InputError("a pressure is a number of Pa, 0 or more");
+  if (!(pressure_pa >= 0.0) || !std::isfinite(pressure_pa)) throw InputError("the pressure must be 0 Pa or more");
   events::Impulse impulse{.body = number};
   double largest = 0.0;
   Vec3 shape{};
@@ -409,7 +409,7 @@ std::string Workshop::make_plan(std::string_view scene, std::span<const int> bod
   }
   host::Events happened(base::Spool({}, "events", kMostEvents));
   std::vector<bool> struck(bodies.size(), false);
-  bool is_touched = false;  // by a hand, though nothing of the scene may move
+  bool is_touched = false;  // interactively, even if nothing in the scene moves
   read_words(words, [&](const events::Event& event, Timing) {
     happened.append(event);
     const auto note = [&](std::int32_t body) {

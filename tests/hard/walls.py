@@ -175,7 +175,7 @@ def one_sided():
     for i in range(n):
         for j in range(across):
             faces += [(at(i, j), at(i + 1, j), at(i + 1, j + 1)), (at(i, j), at(i + 1, j + 1), at(i, j + 1))]
-    refuse("one_sided", (points, faces), ["has only one", "Moebius", "at (", "modeller"], "--wall", 0.002)
+    refuse("one_sided", (points, faces), ["is one-sided", "Moebius", "at (", "modeller"], "--wall", 0.002)
 
 
 def wall_0_1_mm():

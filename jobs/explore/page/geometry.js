@@ -103,19 +103,19 @@ export function findBox(surface) {
   return { low, high, middle: scale(0.5, add(low, high)), size: norm(subtract(high, low)) };
 }
 
-/** Places of a body by names that need no eyes, as the listener in front of it sees it. rotation: of the body in the world.
+/** Named points of a body, as seen by a listener in front of it, for use without a pointer. rotation: of the body in the world.
  * loudest: {triangle, corner}. Each: {name, triangle, barycentric}. */
 export function findNamedPlaces(surface, rotation, loudest) {
   const box = findBox(surface), places = [];
   if (loudest) {
     const barycentric = [0, 0, 0];
     barycentric[loudest.corner] = 1;
-    places.push({ name: 'where it is loudest', triangle: loudest.triangle, barycentric });
+    places.push({ name: 'loudest point', triangle: loudest.triangle, barycentric });
   }
   const sides = { top: [0, 0, 1], front: [0, -1, 0], left: [-1, 0, 0], right: [1, 0, 0], back: [0, 1, 0], bottom: [0, 0, -1] };
   for (const [name, side] of Object.entries(sides)) {
     const outwards = rotateBack(rotation, side);
-    // A little off the middle: symmetric bodies have nodes of many modes there.
+    // A little off the middle, where symmetric bodies have nodal lines of many modes.
     const aside = scale(0.03 * box.size, normalise(cross(outwards, [0.36, 0.48, 0.8])));
     const hit = castRay(surface, add(add(box.middle, aside), scale(2 * box.size, outwards)), scale(-1, outwards));
     if (hit) places.push({ name, triangle: hit.triangle, barycentric: hit.barycentric });

@@ -1,4 +1,4 @@
-// Hands: pointer and keys over the picture become strikes, scrapes, presses, and turns of the view.
+// Input: pointer and keys over the picture become strikes, scrapes, presses, and turns of the view.
 import { add, normalise, scale, subtract, norm } from './geometry.js';
 
 const kMovedPx = 6; // further: a press has become a scrape
@@ -224,7 +224,7 @@ export class Hands {
     event.preventDefault();
   }
 
-  /** Moves the place by a step to the right and up, as it is seen. */
+  /** Moves the point to strike by a step to the right and up on the screen. */
   step(dx, dy) {
     if (!this.place) return this.view.dispatchEvent(new Event('first'));
     const { body } = this.place, { right, up } = this.view.orbit.findAxes(), eye = this.view.orbit.position_m;

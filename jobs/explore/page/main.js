@@ -1,4 +1,4 @@
-// The page of a folder made by carillon explore: reads what it shows, opens the sound engine, and lets one play.
+// The page of a folder made by carillon explore: reads scene and banks, opens the sound engine, and connects view and panel.
 import { View } from './view.js';
 import { ShownBody, makeLook } from './body.js';
 import { Player } from './player.js';
@@ -12,7 +12,7 @@ import { fromDegrees, norm, subtract } from './geometry.js';
 const kVersion = 1; // of explore.json
 const find = (id) => document.getElementById(id);
 
-/** One sentence in place of the page. */
+/** Shows one error message instead of the page. */
 function refuse(error) {
   find('cover').hidden = false;
   find('cover').classList.add('wrong');
@@ -59,7 +59,7 @@ async function fetchJson(name) {
   try {
     return JSON.parse(text);
   } catch {
-    throw new Error(`${name} is damaged: it is no JSON; make the folder again with carillon explore`);
+    throw new Error(`${name} is damaged: it is not valid JSON; make the folder again with carillon explore`);
   }
 }
 
@@ -67,10 +67,10 @@ async function fetchJson(name) {
 async function readFolder() {
   const about = await fetchJson('explore.json');
   if (about.carillon_explore !== kVersion)
-    throw new Error(`explore.json is of version ${about.carillon_explore}, and this page reads version ${kVersion}; make the folder again with carillon explore`);
+    throw new Error(`explore.json has version ${about.carillon_explore}, this page reads version ${kVersion}; make the folder again with carillon explore`);
   const scene = await fetchJson(about.scene);
   if (!Array.isArray(scene.bodies) || scene.bodies.length !== about.bodies?.length)
-    throw new Error(`${about.scene} and explore.json disagree; make the folder again with carillon explore`);
+    throw new Error(`${about.scene} and explore.json do not match; make the folder again with carillon explore`);
   return { about, scene };
 }
 
@@ -162,11 +162,11 @@ async function begin() {
     find('fold').setAttribute('aria-expanded', String(!isFolded));
     view.resize();
   });
-  // For scripts and tests: what is shown and was done.
+  // For scripts and tests.
   window.carillon = { about, scene, audio, player, view, hands, panel, transport, Recorder };
   find('cover').hidden = true;
   document.documentElement.dataset.state = 'ready';
-  panel.say(`${about.title} is ready to be played`);
+  panel.say(`${about.title} is ready`);
   view.draw();
 }
 

@@ -1,4 +1,4 @@
-// The controls at the side: what is struck and how, what the body is made of, its modes, what is computed, how loud.
+// The control panel: points and mallets, edits of the body, modes, effects, listener and volume.
 import { makeChoice, makeList, makeSlider } from './lists.js';
 import { findNamedPlaces } from './geometry.js';
 import { makeLook } from './body.js';
@@ -12,7 +12,7 @@ const kPlanS = 0.5;
 /** Two significant digits, without an exponent. */
 const short = (value) => Number(value.toPrecision(2)).toString();
 const describeCents = (cents) => (!Number.isFinite(cents) ? '–' : cents < 0.1 ? '< 0.1' : short(cents));
-const times = (value) => (value === 1 ? 'as it is' : `× ${value < 1 ? value.toFixed(2) : value.toFixed(value < 10 ? 2 : 0)}`);
+const times = (value) => (value === 1 ? 'unchanged' : `× ${value < 1 ? value.toFixed(2) : value.toFixed(value < 10 ? 2 : 0)}`);
 
 export class Panel {
   constructor(page) {
@@ -24,7 +24,7 @@ export class Panel {
     this.makeModes();
     this.makeSound();
     find('title').textContent = document.title = this.about.title;
-    find('about').textContent = `${this.about.made_by}. Sound and contacts are computed here, by the program that made this folder.`;
+    find('about').textContent = `${this.about.made_by}. This page computes the sound itself.`;
     this.select(0, true);
   }
 
@@ -49,10 +49,10 @@ export class Panel {
       void this.showLevels();
     });
     this.view.addEventListener('first', () => this.goTo(0));
-    this.view.addEventListener('edge', () => this.say('the edge of the body as it is seen'));
+    this.view.addEventListener('edge', () => this.say('visible edge of the body'));
   }
 
-  /** moves: the place that is struck goes to this body. */
+  /** moves: the point to strike moves to this body. */
   select(index, isQuiet = false, moves = true) {
     this.leaveMode();
     this.current = index;
@@ -112,8 +112,8 @@ export class Panel {
     let text;
     if (done.kind === 'strike') {
       const parts = [`${done.mallet.replace('-', ' ')} at ${short(done.speed_m_s)} m/s`];
-      if (done.contact_s > 0) parts.push(`${short(1000 * done.contact_s)} ms of contact`);
-      if (done.peak_n > 0) parts.push(`${short(done.peak_n)} N at most`);
+      if (done.contact_s > 0) parts.push(`contact time ${short(1000 * done.contact_s)} ms`);
+      if (done.peak_n > 0) parts.push(`peak force ${short(done.peak_n)} N`);
       text = parts.join(', ');
       this.say(`struck ${done.name}: ${text}`);
     } else {
@@ -128,7 +128,7 @@ export class Panel {
 
   makeEdit() {
     const select = find('material'), option = (value, text) => Object.assign(document.createElement('option'), { value, textContent: text });
-    select.append(option('', 'as it is'));
+    select.append(option('', 'unchanged'));
     const groups = new Map();
     for (const { name, group = '' } of this.player.audio.materials) {
       if (!groups.has(group)) groups.set(group, Object.assign(document.createElement('optgroup'), { label: group || 'materials' }));
@@ -154,7 +154,7 @@ export class Panel {
     });
   }
 
-  /** Sends what the sliders say, not more often than kEditS; the last word wins. */
+  /** Sends the values of the sliders, at most once every kEditS; the last values apply. */
   edit() {
     const body = this.body, { material, size, damping, stiffness, density } = body.edit;
     body.shown.setSize(2 ** size);
@@ -266,7 +266,7 @@ export class Panel {
     this.askPlan();
   }
 
-  /** The plan of the selector, not more often than kPlanS. */
+  /** The plan of the effect selection, at most once every kPlanS. */
   askPlan() {
     if (this.planning) return;
     this.planning = setTimeout(async () => {
@@ -300,6 +300,6 @@ export class Panel {
     this.spectrum.setRinging(speeds.map((speed) => Math.max(0, 1 + Math.log10(Math.max(1e-9, speed / this.loudest)) / 3)));
   }
   showEars(distance_m) {
-    find('ears').textContent = `${distance_m.toFixed(2)} m away, ${(1000 * distance_m / 343).toFixed(1)} ms`;
+    find('ears').textContent = `distance ${distance_m.toFixed(2)} m, delay ${(1000 * distance_m / 343).toFixed(1)} ms`;
   }
 }

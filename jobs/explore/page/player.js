@@ -1,4 +1,4 @@
-// What is played: bodies in the sound engine, hands on them, and what was done, for the panel and for scripts.
+// Bodies in the sound engine, strikes and contacts on them, and reports of these for the panel and for scripts.
 import { findNormal, findPoint, rotateBack, scale } from './geometry.js';
 
 const kKneeShare = 0.85; // full scale up to which the output is as it is; louder is bent, not cut

@@ -1,4 +1,4 @@
-// Hands what it hears to the page, some blocks at a time.
+// Passes its input to the page, some blocks at a time.
 const kFrames = 4096;
 
 class RecorderProcessor extends AudioWorkletProcessor {

@@ -1,4 +1,4 @@
-// The recorded contacts of a simulation: played by the sound engine, with the bodies where they are at the moment that is heard.
+// Recorded contacts of a simulation, played by the sound engine; the bodies are drawn at the time that is heard.
 
 export class Transport {
   /** recording: of the sound engine. elements: {section, play, position, clock}. */

@@ -1,4 +1,4 @@
-// The spectrum of what is heard over a logarithmic axis, with the modes of a body as marks that light up while they ring.
+// Spectrum of the sound over a logarithmic axis, with marks for the modes of a body that light up while they ring.
 const kLowHz = 20, kHighHz = 20000, kFloorDb = -110, kTopDb = -6;
 const kNearPx = 9;
 const kMarkDb = 60; // range of the heights of the marks
@@ -48,7 +48,7 @@ export class Spectrum extends EventTarget {
     this.show(nearest, true);
   }
 
-  /** Marks a mode; `asks`: says so to others, as when the pointer chose it. */
+  /** Marks a mode; `asks`: also sends an event, as when the pointer chose it. */
   show(mode, asks = false) {
     if (mode === this.shown) return;
     this.shown = mode;

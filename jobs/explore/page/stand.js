@@ -1,4 +1,4 @@
-// What a fixed body stands on or hangs from, drawn so that nothing floats. It has no sound and is not struck.
+// The stand or thread of a fixed body: drawn only, silent.
 import * as THREE from './three/three.module.min.js';
 import { add, dot, norm, rotate, scale, subtract } from './geometry.js';
 

@@ -1,4 +1,4 @@
-// The picture: bodies on a dark stage, the place that is struck, and what a place of the picture shows. It draws when something changes.
+// The picture: bodies on a dark stage, the point to strike, and which point of a body lies under a pixel. Draws only after changes.
 import * as THREE from './three/three.module.min.js';
 import { castRay, rotate, rotateBack, scale, add, norm, normalise, subtract, cross } from './geometry.js';
 import { makeStand } from './stand.js';

@@ -1,4 +1,4 @@
-"""Carillon in Python: banks as numpy arrays, jobs solved, scenes rendered, a synthesiser that is played by hand.
+"""Carillon in Python: banks as numpy arrays, jobs solved, scenes rendered, a synthesiser to play block by block.
 
     import carillon
     bank = carillon.solve({"body": {"shape": "bar", "length_m": 0.3, "width_m": 0.03, "thickness_m": 0.012}, "material": "steel"})
@@ -21,7 +21,7 @@ __all__ = ["Bank", "InputError", "SolveError", "Sound", "Synthesiser", "SystemEr
 
 
 class Sound(_typing.NamedTuple):
-    """What a scene sounds like: samples_pa (frames, channels) float32 [Pa], rate_hz."""
+    """The sound of a scene: samples_pa (frames, channels) float32 [Pa], rate_hz."""
 
     samples_pa: _numpy.ndarray
     rate_hz: int

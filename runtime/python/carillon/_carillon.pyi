@@ -1,4 +1,4 @@
-"""Types of the compiled part. Units are SI and stand in the names; (m), (V, 3) ... are shapes of arrays."""
+"""Types of the compiled part. Units are SI and part of the names; (m), (V, 3) ... are shapes of arrays."""
 import os
 from typing import Any, Dict, Iterable, List, Optional, Sequence, Tuple, Union
 
@@ -73,7 +73,7 @@ class Bank:
     def __len__(self) -> int: ...
 
 class Synthesiser:
-    """Bodies that ring when they are struck, heard by microphones."""
+    """A synthesiser: bodies that are struck, and microphones."""
 
     def __init__(
         self, rate_hz: float = 48000.0, microphones_m: Sequence[Vector] = ..., listener_m: Vector = ..., max_bodies: int = 64

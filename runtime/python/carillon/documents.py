@@ -15,7 +15,7 @@ def write_json(document: dict, what: str) -> str:
             return value.tolist()
         if isinstance(value, os.PathLike):
             return os.fspath(value)
-        raise InputError(f"{what}: {type(value).__name__} is nothing that JSON has; give numbers, texts, lists and dicts")
+        raise InputError(f"{what}: JSON has no type {type(value).__name__}; give numbers, texts, lists and dicts")
 
     try:
         return json.dumps(document, indent=1, allow_nan=False, default=to_plain)

@@ -18,7 +18,7 @@ SOLVER = "carillon-precompute"
 
 
 def find_program(name: str) -> str:
-    """A program of this installation, else along PATH. Raises SystemError."""
+    """A program of this installation, else of PATH. Raises SystemError."""
     prefixes = list(pathlib.Path(__file__).resolve().parents)[:-1]  # without the root: /bin is of the system
     own = next((prefix / "bin" / name for prefix in prefixes if (prefix / "bin" / name).is_file()), None)
     found = str(own) if own else shutil.which(name)
@@ -28,7 +28,7 @@ def find_program(name: str) -> str:
 
 
 def make_command(ranks: int) -> typing.List[str]:
-    """The words that start the solver on so many ranks."""
+    """The command that starts the solver on this number of ranks."""
     if ranks == 1:
         return [find_program(SOLVER)]
     return ["mpirun", "-np", str(ranks), "--bind-to", "none", "--oversubscribe", find_program(SOLVER)]
@@ -77,7 +77,7 @@ def raise_error(result: dict, code: int, said: str) -> typing.NoReturn:
     """The exception that the result file of a program describes (docs/howto/when-jobs-die.md)."""
     kinds = {"bad-input": InputError, "no-solution": SolveError}
     lines = [line for line in said.splitlines() if line.strip(" -")]
-    message = result.get("message") or (lines[-1] if lines else f"{SOLVER} ended with exit code {code} and said nothing")
+    message = result.get("message") or (lines[-1] if lines else f"{SOLVER} ended with exit code {code} and without a message")
     raise kinds.get(result.get("kind"), SystemError)(message)
 
 

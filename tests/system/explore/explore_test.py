@@ -211,7 +211,7 @@ class Explore(unittest.TestCase):
         self.refuse("changed.hdf", contains=("changed.hdf",))
         self.refuse("future.hdf", contains=("future.hdf", "9."))
         self.refuse("brass.hdf", "scene.json", contains=("scene.json",))
-        self.refuse("brass.hdf", "-o", "kept", contains=("kept", "something else is there"))
+        self.refuse("brass.hdf", "-o", "kept", contains=("kept", "not made by carillon explore"))
         self.assertEqual((self.root / "kept/mine.txt").read_text(), "mine")
         self.refuse("kept", "--serve", contains=("kept",))
         self.refuse("kept", contains=("--serve",))

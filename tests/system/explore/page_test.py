@@ -175,9 +175,9 @@ class PageTest(unittest.TestCase):
         tree = {(node["role"]["value"], node.get("name", {}).get("value", "")) for node in nodes if not node.get("ignored")}
         for wanted in (
             ("application", f"bar, {self.count_modes()} modes"),
-            ("listbox", "Places to strike; Enter strikes"),
+            ("listbox", "Points to strike; Enter strikes"),
             ("option", "top"),
-            ("option", "where it is loudest"),
+            ("option", "loudest point"),
             ("radiogroup", "Mallet"),
             ("radio", "soft felt"),
             ("listbox", "Modes"),

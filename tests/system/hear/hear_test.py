@@ -213,7 +213,7 @@ class Hear(unittest.TestCase):
         for words in ("taken for metres", "material: steel, since none is given", "body: solid", "a preview", "T60 [s]", "ball-steel.wav"):
             self.assertIn(words, said)
         (self.folder / "unit.off").write_text(make_ball(1, 3))
-        self.assertIn("no unit of length", self.call("hear", "-q", "unit.off"))
+        self.assertIn("a normalised size", self.call("hear", "-q", "unit.off"))
 
     def test_mistakes_end_in_a_sentence_with_the_remedy(self):
         (self.folder / "ball.off").write_text(make_ball(50, 2))
@@ -224,9 +224,9 @@ class Hear(unittest.TestCase):
         self.refuse("empty.glb", contains=("empty.glb", "the file is empty", "export it again"))
         self.refuse(".", contains=(".: a folder",))
         for name, words in (
-            ("s.json", "a scene (carillon-render"),
+            ("s.json", "a scene (play it: carillon-render"),
             ("b.hdf", "a bank, by its name"),
-            ("c.3ds", "convert other kinds first"),
+            ("c.3ds", "convert other formats first"),
         ):
             (self.folder / name).write_text("{}")
             self.refuse(name, contains=(name, words, ".obj, .stl"))

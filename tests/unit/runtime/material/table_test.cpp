@@ -193,7 +193,7 @@ TEST(MaterialTable, names_the_line_of_what_is_wrong_in_such_a_file) {
            std::pair{R"({"materials": [{"name": "a", "from": "b"}]})", "no known material"},
            {R"({"materials": [{"from": "steel"}]})", "name"},
            {R"({"materials": [{"name": " -", "from": "steel"}]})", "needs a name"},
-           {R"({"materials": [{"name": "x", "from": "steel"}, {"name": "X", "from": "steel"}]})", "there already"},
+           {R"({"materials": [{"name": "x", "from": "steel"}, {"name": "X", "from": "steel"}]})", "already defined"},
            {R"({"materials": [{"name": "x", "from": "steel", "colour": 3}]})", "colour"},
            {R"({"material": []})", "materials"},
            {R"({"materials": [{"name": "x", "also": [{}], "from": "steel"}]})", "as texts"},
