@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""Bodies whose modes are known, through the programs: figure 2 of van den Doel and Pai 1996 from the job to the rendered sound; banks of every
-kind pass the check and are played, struck and dropped; the queue computes them; input with mistakes gets one error.
+"""Bodies whose modes are known, through the programs: figure 2 of van den Doel and Pai 1996 from the job to the rendered sound; banks of
+every kind pass the check and are played, struck and dropped; the queue computes them; input with mistakes gets one error.
 
 usage: known_bodies.py BIN_DIR SOURCE_DIR
 """
@@ -152,8 +152,8 @@ def check_rendered_lines(folder):
 
 
 def check_brightness(folder):
-    """The known centroids of the modes' energies, rising towards the edge; and the centroid of the rendered sound against that of its lines,
-    in which modes of one frequency add up with their signs."""
+    """The known centroids of the modes' energies, rising towards the edge; and the centroid of the rendered sound against that of its
+    lines, in which modes of one frequency add up with their signs."""
     before = 0.0
     for row in list(csv.reader((DATA / "square_membrane_brightness.csv").open()))[1:]:
         point = float(row[0]), float(row[1])
