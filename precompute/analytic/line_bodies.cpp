@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -164,14 +165,14 @@ void Beam::add_bending(Motion motion, double second_moment_m4, double high_hz, s
   }
 }
 
-/// Unknowns: the deflection w and the slope times the radius of gyration, both in orthonormal polynomials, so that the mass is the identity
-/// times rho A L.
+/// Unknowns: the deflection w and L times the shear angle g = w' - slope, in Legendre polynomials of x / L. With g in place of the slope no
+/// large terms cancel in a thin beam: E I / L^3 (w'' - g')^2 + k G A / L g^2 of strain, rho A L w^2 + rho I / L (w' - g)^2 of mass.
 void Beam::add_timoshenko(Motion motion, double second_moment_m4, double high_hz, std::vector<Mode>& modes) {
   const double length = body_.length_m, nu = poisson_ratio_;
   const double correction = body_.diameter_m ? 6.0 * (1.0 + nu) / (7.0 + 6.0 * nu) : 10.0 * (1.0 + nu) / (12.0 + 11.0 * nu);  // Cowper 1966
-  const double shear = correction * shear_pa_ * area_m2_, bending = young_pa_ * second_moment_m4;
-  const double gyration = std::sqrt(second_moment_m4 / area_m2_), mass = density_kg_m3_ * area_m2_ * length;
-  const double rate = std::sqrt(bending / (density_kg_m3_ * area_m2_)) / square(length);
+  const double mass = density_kg_m3_ * area_m2_ * length, turning = density_kg_m3_ * second_moment_m4 / length;
+  const double bending = young_pa_ * second_moment_m4 / (length * length * length), shear = correction * shear_pa_ * area_m2_ / length;
+  const double rate = std::sqrt(young_pa_ * second_moment_m4 / (density_kg_m3_ * area_m2_)) / square(length);
   // Waves with shear are shorter than those without; up to where half a wavelength is the depth this is enough.
   const double slow_m_s = std::sqrt(correction * shear_pa_ / density_kg_m3_);
   const double waves = std::max(std::sqrt(2.0 * pi * high_hz / rate), 2.0 * pi * high_hz * length / slow_m_s) / pi;
@@ -181,44 +182,55 @@ void Beam::add_timoshenko(Motion motion, double second_moment_m4, double high_hz
         fmt::format("the beam has about {:.0f} half-waves at {:g} Hz, more than Ritz's method can resolve ({}); lower the end "
                     "of \"band_hz\", or use \"theory\": \"euler-bernoulli\"",
                     waves, high_hz, static_cast<int>((kMaxPolynomials - 20) / 1.8)));
-  const auto solve = [&](int n, la::Matrix& vectors, la::Matrix& deflections, la::Matrix& slopes) {
-    std::array<EndConditions, 2> w_ends, s_ends;
-    for (std::size_t end = 0; end < 2; ++end) {
-      w_ends[end].has_value = body_.ends[end] == job::Edge::hinged || body_.ends[end] == job::Edge::clamped;
-      s_ends[end].has_value = body_.ends[end] == job::Edge::sliding || body_.ends[end] == job::Edge::clamped;
+  const double high = square(2.0 * pi * high_hz), shift = 1e-3 * high;
+  /// lambda, ascending, and coefficients of w and g, columns of unit modal mass.
+  const auto solve = [&](int n, la::Matrix& shapes) {
+    const la::Matrix unit = la::Matrix::Identity(n, n), first = calc_products(n, 1, 1), second = calc_products(n, 2, 2);
+    const la::Matrix bend = calc_products(n, 2, 1), turn = calc_products(n, 1, 0);
+    la::Matrix stiffness(2 * n, 2 * n), weight(2 * n, 2 * n);
+    stiffness << bending * second, -bending * bend, -bending * bend.transpose(), bending * first + shear * unit;
+    weight << mass * unit + turning * first, -turning * turn, -turning * turn.transpose(), turning * unit;
+    std::vector<la::Vector> conditions;
+    for (int end = 0; end < 2; ++end) {
+      const job::Edge edge = body_.ends[static_cast<std::size_t>(end)];
+      la::Vector deflection = la::Vector::Zero(2 * n), slope = la::Vector::Zero(2 * n);
+      deflection.head(n) = calc_legendre(n, end);
+      slope << calc_legendre(n, end, 1), -calc_legendre(n, end);
+      if (edge == job::Edge::hinged || edge == job::Edge::clamped) conditions.push_back(deflection);
+      if (edge == job::Edge::sliding || edge == job::Edge::clamped) conditions.push_back(slope);
     }
-    deflections = make_conditioned_basis(n, w_ends);
-    slopes = make_conditioned_basis(n, s_ends);
-    const la::Matrix stiff = calc_products(n, 1, 1), mixed = calc_products(n, 1, 0);
-    const auto nw = deflections.cols(), ns = slopes.cols();
-    vectors.resize(nw + ns, nw + ns);
-    vectors.topLeftCorner(nw, nw) = shear / length * (deflections.transpose() * stiff * deflections);
-    vectors.bottomLeftCorner(ns, nw) = -shear / gyration * (deflections.transpose() * mixed * slopes).transpose();
-    vectors.topRightCorner(nw, ns) = vectors.bottomLeftCorner(ns, nw).transpose();
-    vectors.bottomRightCorner(ns, ns) = bending / (length * square(gyration)) * (slopes.transpose() * stiff * slopes);
-    vectors.bottomRightCorner(ns, ns).diagonal().array() += shear * length / square(gyration);
-    vectors /= mass;
-    la::Vector values(nw + ns);
+    const la::Matrix basis = make_null_space(2 * n, conditions);
+    const la::Matrix m = basis.transpose() * weight * basis;
+    // Of (K + shift M)^-1 M the lowest modes are the largest eigenvalues, which keep their digits however stiff the shear is.
+    const Eigen::LLT<la::Matrix> factor(basis.transpose() * stiffness * basis + shift * m);
+    if (factor.info() != Eigen::Success) throw SolveError("the dense factorisation failed on the beam");
+    la::Matrix inner = factor.matrixL().solve(m);
+    inner = factor.matrixL().solve(inner.transpose()).eval();
+    la::Matrix vectors = 0.5 * (inner + inner.transpose());
+    la::Vector values(vectors.rows());
     if (la::calc_eigenpairs_by_division(vectors, values) != 0) throw SolveError("the dense eigensolver failed on the beam");
-    return values;
+    Eigen::Index count = 0;
+    while (count < values.size() && values(values.size() - 1 - count) * (1.02 * high + shift) >= 1.0) ++count;
+    const la::Matrix last = vectors.rightCols(count).rowwise().reverse();
+    const la::Vector found = values.tail(count).reverse();
+    shapes = basis * factor.matrixU().solve(last) * found.cwiseSqrt().cwiseInverse().asDiagonal();
+    return la::Vector(found.cwiseInverse().array() - shift);
   };
-  la::Matrix vectors, deflections, slopes, coarse_vectors, coarse_deflections, coarse_slopes;
-  const la::Vector coarse = solve(wanted * 3 / 4, coarse_vectors, coarse_deflections, coarse_slopes);
-  const la::Vector fine = solve(wanted, vectors, deflections, slopes);
-  const double rounding = 1e-15 * fine(fine.size() - 1);
-  const auto nw = deflections.cols();
-  for (Eigen::Index k = count_mechanisms(body_.ends); k < fine.size() && fine(k) <= square(2.0 * pi * high_hz); ++k) {
+  la::Matrix shapes, ignored;
+  const la::Vector coarse = solve(wanted * 3 / 4, ignored), fine = solve(wanted, shapes);
+  for (Eigen::Index k = count_mechanisms(body_.ends); k < fine.size() && fine(k) <= high; ++k) {
+    const double rounding = 1e-14 * square(fine(k) + shift) / shift;
     const double apart = (k < coarse.size() ? std::abs(coarse(k) - fine(k)) : fine(k)) + rounding;
     const int n = static_cast<int>(k) + 1 - count_mechanisms(body_.ends);
     modes.push_back({fine(k),
                      600.0 * std::log2(1.0 + apart / fine(k)),
                      {motion, n, static_cast<int>(shapes_.size()), 0},
                      fmt::format("bending {}, {}", motion == kBendingY ? 'y' : 'z', n)});
-    const double scale = 1.0 / std::sqrt(mass);
-    la::Vector w = deflections * vectors.col(k).head(nw), s = slopes * vectors.col(k).tail(vectors.rows() - nw) / gyration;
-    const double sign =
-        std::abs(calc_legendre(wanted, 0.0).dot(w)) > 1e-3 ? calc_legendre(wanted, 0.0).dot(w) : calc_legendre(wanted, 0.0).dot(s);
-    shapes_.push_back({{}, std::copysign(scale, sign) * w, std::copysign(scale, sign) * s, 0.0});
+    const la::Vector w = shapes.col(k).head(wanted), g = shapes.col(k).tail(wanted);
+    const double at_end = calc_legendre(wanted, 0.0).dot(w),
+                 turned = calc_legendre(wanted, 0.0, 1).dot(w) - calc_legendre(wanted, 0.0).dot(g);
+    const double sign = std::copysign(1.0, std::abs(at_end) > 1e-6 * w.norm() ? at_end : turned);
+    shapes_.push_back({{}, sign * w, sign * g, 0.0});
   }
 }
 
@@ -239,7 +251,7 @@ void Beam::add_waves(Motion motion, double speed_m_s, double high_hz, std::vecto
 void Beam::calc_shapes(const Vec3& point_m, std::span<const Mode> modes, std::span<Vec3> phi) const {
   const double x = std::clamp(point_m[0] / body_.length_m, 0.0, 1.0), y = point_m[1], z = point_m[2];
   const double mass = density_kg_m3_ * area_m2_ * body_.length_m;
-  la::Vector polynomials;
+  la::Vector polynomials, derivatives;
   for (std::size_t m = 0; m < modes.size(); ++m) {
     const Shape& shape = shapes_[static_cast<std::size_t>(modes[m].index[2])];
     const int motion = modes[m].index[0];
@@ -250,9 +262,12 @@ void Beam::calc_shapes(const Vec3& point_m, std::span<const Mode> modes, std::sp
         phi[m][axis] = shape.function.calc(x) / std::sqrt(mass);
         continue;
       }
-      if (polynomials.size() != shape.deflection.size()) polynomials = calc_legendre(static_cast<int>(shape.deflection.size()), x);
+      if (polynomials.size() != shape.deflection.size()) {
+        polynomials = calc_legendre(static_cast<int>(shape.deflection.size()), x);
+        derivatives = calc_legendre(static_cast<int>(shape.deflection.size()), x, 1);
+      }
       phi[m][axis] = polynomials.dot(shape.deflection);
-      phi[m][0] = -(axis == 1 ? y : z) * polynomials.dot(shape.slope);
+      phi[m][0] = -(axis == 1 ? y : z) * (derivatives.dot(shape.deflection) - polynomials.dot(shape.shear)) / body_.length_m;
       continue;
     }
     const double wave = std::sqrt(2.0) * (is_fixed(0) ? std::sin(shape.wave * x) : std::cos(shape.wave * x));

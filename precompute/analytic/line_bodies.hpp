@@ -36,7 +36,7 @@ class Beam : public KnownBody {
   enum Motion { kBendingY = 1, kBendingZ = 2, kTorsion = 3, kAxial = 4 };
   struct Shape {
     BeamFunction function{};       // Euler-Bernoulli
-    la::Vector deflection, slope;  // Timoshenko: coefficients of Legendre polynomials
+    la::Vector deflection, shear;  // Timoshenko: coefficients of Legendre polynomials, of w and L times the shear angle
     double wave = 0.0;             // torsion, axial: half-waves times pi
   };
   void add_bending(Motion motion, double second_moment_m4, double high_hz, std::vector<Mode>& modes);

@@ -84,12 +84,16 @@ la::Matrix make_conditioned_basis(int n, const std::array<EndConditions, 2>& end
     if (ends[end].has_value) rows.push_back(calc_legendre(n, end, 0));
     if (ends[end].has_slope) rows.push_back(calc_legendre(n, end, 1));
   }
-  if (rows.empty()) return la::Matrix::Identity(n, n);
-  la::Matrix conditions(n, rows.size());
-  for (std::size_t r = 0; r < rows.size(); ++r) conditions.col(static_cast<Eigen::Index>(r)) = rows[r].normalized();
-  const Eigen::HouseholderQR<la::Matrix> qr(conditions);
+  return make_null_space(n, rows);
+}
+
+la::Matrix make_null_space(int n, const std::vector<la::Vector>& conditions) {
+  if (conditions.empty()) return la::Matrix::Identity(n, n);
+  la::Matrix columns(n, conditions.size());
+  for (std::size_t r = 0; r < conditions.size(); ++r) columns.col(static_cast<Eigen::Index>(r)) = conditions[r].normalized();
+  const Eigen::HouseholderQR<la::Matrix> qr(columns);
   const la::Matrix q = qr.householderQ() * la::Matrix::Identity(n, n);
-  return q.rightCols(n - static_cast<int>(rows.size()));
+  return q.rightCols(n - static_cast<int>(conditions.size()));
 }
 
 }  // namespace carillon::analytic

@@ -32,4 +32,7 @@ struct EndConditions {
 /// Columns: an orthonormal basis of the polynomials of degree below n that meet the conditions at 0 and at 1.
 la::Matrix make_conditioned_basis(int n, const std::array<EndConditions, 2>& ends);
 
+/// Columns: an orthonormal basis of the vectors of n numbers that are orthogonal to each of the conditions.
+la::Matrix make_null_space(int n, const std::vector<la::Vector>& conditions);
+
 }  // namespace carillon::analytic

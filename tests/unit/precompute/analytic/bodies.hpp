@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cmath>
-#include <fstream>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -25,27 +24,6 @@ inline std::string make_material(double young_pa, double poisson_ratio, double d
 inline std::unique_ptr<KnownBody> make(const job::JobSpec& job) { return make_known_body(*job.analytic, job.material); }
 
 inline double to_hz(const Mode& mode) { return std::sqrt(mode.lambda_rad2_s2) / (2.0 * std::numbers::pi); }
-
-/// A table of data/ without its head; cells as text.
-inline std::vector<std::vector<std::string>> read_rows(const std::string& name) {
-  std::ifstream file(std::string(CARILLON_ANALYTIC_DATA) + "/" + name);
-  std::vector<std::vector<std::string>> rows;
-  for (std::string line; std::getline(file, line);) {
-    std::vector<std::string> cells(1);
-    bool is_quoted = false;
-    for (const char c : line) {
-      if (c == '"')
-        is_quoted = !is_quoted;
-      else if (c == ',' && !is_quoted)
-        cells.emplace_back();
-      else if (c != '\r')
-        cells.back() += c;
-    }
-    rows.push_back(std::move(cells));
-  }
-  if (!rows.empty()) rows.erase(rows.begin());
-  return rows;
-}
 
 inline constexpr std::int64_t kAll = 1 << 30;
 

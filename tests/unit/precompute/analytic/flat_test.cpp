@@ -7,6 +7,7 @@
 #include "precompute/analytic/flat_bodies.hpp"
 #include "runtime/base/error.hpp"
 #include "tests/unit/precompute/analytic/bodies.hpp"
+#include "tests/unit/precompute/analytic/rows.hpp"
 
 namespace carillon::analytic {
 namespace {

@@ -7,6 +7,7 @@
 #include "precompute/analytic/line_bodies.hpp"
 #include "precompute/analytic/polynomials.hpp"
 #include "tests/unit/precompute/analytic/bodies.hpp"
+#include "tests/unit/precompute/analytic/rows.hpp"
 
 namespace carillon::analytic {
 namespace {
