@@ -24,7 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kVersion = 1;  // of explore.json
-constexpr std::uint64_t kMaxSceneBytes = 16 << 20;
+constexpr std::uint64_t kMaxSceneBytes = 16 << 20, kMaxTrajectoryBytes = std::uint64_t{1} << 30;
 constexpr const char *kAboutFile = "explore.json", *kSceneFile = "scene.json", *kContactsFile = "contacts.jsonl",
                      *kPackedContactsFile = "contacts.jsonl.gz", *kBankFolder = "banks";
 constexpr double kProbeGain = 0.35;  // of the gain that brings the probe's blows to full scale: headroom for harder strikes
@@ -60,6 +60,25 @@ std::string find_title(const PageOrder& order) {
   const fs::path first = fs::absolute(order.subjects.front());
   if (order.subjects.size() > 1) return fmt::format("{} and {} more", first.stem().string(), order.subjects.size() - 1);
   return first.filename() == "scene.json" ? first.parent_path().filename().string() : first.stem().string();
+}
+
+/// Whether a body is described in place of its bank. What is no scene has none: carillon-render says so.
+bool has_described_body(const Json::Value& scene) {
+  const Json::Value bodies = scene.isObject() ? scene["bodies"] : Json::Value();
+  return bodies.isArray() &&
+         std::any_of(bodies.begin(), bodies.end(), [](const Json::Value& body) { return body.isObject() && !body.isMember("bank"); });
+}
+
+/// Gives described bodies the banks that carillon-render has played, as its trajectory names them.
+void name_banks(Json::Value& scene, const Json::Value& trajectory) {
+  for (Json::ArrayIndex i = 0; i < scene["bodies"].size(); ++i) {
+    Json::Value& body = scene["bodies"][i];
+    if (body.isMember("bank")) continue;
+    for (const char* key :
+         {"shape", "body", "mesh", "mesh_scale", "material", "materials", "element", "accuracy_cents", "band_hz", "max_modes"})
+      body.removeMember(key);
+    body["bank"] = trajectory["bodies"][i]["bank"];
+  }
 }
 
 class Work {
@@ -99,9 +118,8 @@ class Work {
       return;
     }
     const fs::path& file = order_.subjects.front();
-    record(file);
-    scene_ = parse_json(base::read_file(file, "scene", kMaxSceneBytes));
-    for (Json::Value& body : scene_["bodies"]) add_bank(fs::absolute(file).parent_path() / body["bank"].asString());
+    scene_ = record(file);
+    for (const Json::Value& body : scene_["bodies"]) add_bank(fs::absolute(file).parent_path() / body["bank"].asString());
   }
 
   void add_bank(const fs::path& file) {
@@ -110,9 +128,18 @@ class Work {
     facts_.push_back(&facts);
   }
 
-  /// Simulates a scene file, which is checked by that, and keeps what happened.
-  void record(const fs::path& scene) {
-    report_ = render(scene, {"--record", path(kContactsFile).string()});
+  /// Simulates a scene file, which is checked by that, and keeps what happened. The scene that is returned names the bank of each body.
+  Json::Value record(const fs::path& file) {
+    Json::Value scene = parse_json(base::read_file(file, "scene", kMaxSceneBytes));
+    const fs::path trajectory = path(".trajectory.json");
+    std::vector<std::string> words{"--record", path(kContactsFile).string()};
+    const bool lacks_bank = has_described_body(scene);
+    if (lacks_bank) words.insert(words.end(), {"--trajectory", trajectory.string()});
+    report_ = render(file, words);
+    if (lacks_bank) {
+      name_banks(scene, parse_json(base::read_file(trajectory, "trajectory of carillon-render", kMaxTrajectoryBytes)));
+      fs::remove(trajectory);
+    }
     done_.duration_s = report_["duration_s"].asDouble();
     for (const Json::Value& warning : report_["warnings"]) done_.warnings.push_back(warning.asString());
     done_.has_recording = report_["peak_pa"].isNumeric() && report_["peak_pa"].asDouble() > 0.0;
@@ -121,6 +148,7 @@ class Work {
       compress_file(path(kContactsFile));
     else
       fs::remove(path(kContactsFile), error);
+    return scene;
   }
 
   /// The report of carillon-render on a scene file.

@@ -15,6 +15,7 @@ import socket
 import subprocess
 import tempfile
 import unittest
+import unittest.mock
 
 BIN = pathlib.Path(os.environ["CARILLON_BIN_DIR"])
 PAGE = BIN.parent / "share/carillon/explore"
@@ -132,6 +133,21 @@ class Explore(unittest.TestCase):
         self.assertEqual((self.root / "scene.wav").read_bytes(), (self.root / "folder.wav").read_bytes())
         report = json.loads((self.root / "report.json").read_text())
         self.assertAlmostEqual(self.read("fall", "explore.json")["gain_per_pa"], report["gain_per_pa"], delta=1e-6 * report["gain_per_pa"])
+
+    def test_a_body_that_is_described_is_computed_and_its_bank_comes_along(self):
+        drum = {"name": "drum", "body": {"membrane": {"shape": "circle", "radius_m": 0.2, "lowest_hz": 100, "density_kg_m2": 0.3}}}
+        drum |= {"material": "polyester film", "max_modes": 10, "fixed": True}
+        blow = {"time_s": 0.05, "body": "drum", "point_m": [0.1, 0, 0], "impulse_n_s": [0, 0, -0.01]}
+        bar = {"name": "bar", "bank": "brass.hdf", "fixed": True, "position_m": [1, 0, 0]}
+        (self.root / "described.json").write_text(json.dumps({"duration_s": 0.2, "bodies": [drum, bar], "strikes": [blow]}))
+        with tempfile.TemporaryDirectory() as cache, unittest.mock.patch.dict(os.environ, {"XDG_CACHE_HOME": cache}):
+            self.explore("described.json", "-o", "described")
+            self.call_render("described.json", "-o", "described.wav")
+        scene = self.read("described", "scene.json")
+        self.assertEqual([sorted(body) for body in scene["bodies"]], [["bank", "fixed", "name"], ["bank", "fixed", "name", "position_m"]])
+        self.assertFalse(list((self.root / "described").glob(".*")))
+        self.call_render("described/scene.json", "-o", "folder.wav")  # without the cache
+        self.assertEqual((self.root / "described.wav").read_bytes(), (self.root / "folder.wav").read_bytes())
 
     def test_large_banks_are_made_smaller_and_whole_ones_are_kept(self):
         subprocess.run([BIN / "make_example_bank", "large.hdf", "60", "60"], cwd=self.root, check=True)
