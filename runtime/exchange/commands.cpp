@@ -95,6 +95,7 @@ void run_export(const ExportWishes& wishes) {
   std::FILE* const notes = base::is_standard_output(wishes.out) ? stderr : stdout;
   const std::string name = wishes.name.empty() ? wishes.bank.stem().string() : wishes.name;
   bank::Bank bank = bank::read_bank(wishes.bank);
+  if (bank.mode_count() == 0) throw InputError(fmt::format("{}: the bank has no modes, and so no sound", wishes.bank.string()));
   if (format == "glb") {
     for (const auto& [is_given, option] : {std::pair(!wishes.points.empty(), "--points"), {wishes.radiation != "sphere", "--radiation"}})
       if (is_given) throw InputError(fmt::format("{} is for Faust; a GLB file holds the whole surface and no gains", option));

@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <exception>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -32,6 +33,9 @@
 namespace {
 
 using namespace carillon;
+
+constexpr int kMost = std::numeric_limits<int>::max();
+const CLI::Range kCounts(1, kMost);
 
 /// Prints every check. InputError when a fault was found, after all lines were printed.
 void check(const std::string& file) {
@@ -82,8 +86,7 @@ void add_options(CLI::App& editing, Wishes& wishes) {
                   "Damping as a series of powers of lambda = omega^2, in place of the bank's law: POWER:COEFFICIENT, as many as there are")
       ->option_text("POWER:COEFFICIENT ...");
   CLI::Option* modes =
-      editing.add_option("--modes", wishes.reduction.modes, "Number of modes to keep; the bank is then no longer complete")
-          ->check(CLI::PositiveNumber);
+      editing.add_option("--modes", wishes.reduction.modes, "Number of modes to keep; the bank is then no longer complete")->check(kCounts);
   editing
       .add_option(
           "--keep", wishes.keep,
@@ -180,8 +183,7 @@ void add_export(CLI::App& app, exchange::ExportWishes& wishes) {
   app.add_option("BANK", wishes.bank, "The bank file")->required();
   app.add_option("-o,--output", wishes.out, "The file to write, .glb or .dsp; - is standard output")->required();
   app.add_option("--format", wishes.format, "glb or faust; without it by the name of the file")->check(CLI::IsMember({"glb", "faust"}));
-  app.add_option("--modes", wishes.modes, "Number of modes, the most audible; without it all (glb), or 100 (faust)")
-      ->check(CLI::PositiveNumber);
+  app.add_option("--modes", wishes.modes, "Number of modes, the most audible; without it all (glb), or 100 (faust)")->check(kCounts);
   app.add_option("--points", wishes.points, "Points to strike (faust): X,Y,Z in metres each; or their number (4)")
       ->option_text("X,Y,Z ...");
   app.add_option("--radiation", wishes.radiation, "Radiation model (faust), as \"radiation\" of a scene")
@@ -197,7 +199,7 @@ void add_export(CLI::App& app, exchange::ExportWishes& wishes) {
 void add_import(CLI::App& app, exchange::ImportWishes& wishes) {
   app.add_option("GLB", wishes.glb, "The GLB file")->required();
   app.add_option("-o,--output", wishes.out, "The bank to write; - is standard output")->required();
-  app.add_option("--model", wishes.model, "Number of the modal model in the file, from 0");
+  app.add_option("--model", wishes.model, "Number of the modal model in the file, from 0")->check(CLI::Range(0, kMost));
   app.add_option("--material", wishes.material, "Material of a model without one, by its name (carillon materials)");
   app.add_flag("--plain", wishes.is_plain, "Read the extension alone, without the extras of carillon-bank export");
 }

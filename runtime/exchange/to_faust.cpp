@@ -26,10 +26,11 @@
 namespace carillon::exchange {
 namespace {
 
-constexpr double kCritical = 5e-7;    // of omega: nearer to critical damping
-constexpr std::size_t kGroup = 32;    // modes per partial sum: Faust processes a long sum again for each of its terms
-constexpr double kUsualNs = 0.01;     // of a blow of the instrument
-constexpr double kUsualScale = 0.25;  // of full scale: the peak of such a blow at most
+constexpr double kCritical = 5e-7;       // of omega: nearer to critical damping
+constexpr std::size_t kGroup = 32;       // modes per partial sum: Faust processes a long sum again for each of its terms
+constexpr double kFarthestShare = 0.25;  // of the body's extent: how far from the surface a point may lie
+constexpr double kUsualNs = 0.01;        // of a blow of the instrument
+constexpr double kUsualScale = 0.25;     // of full scale: the peak of such a blow at most
 
 /// Faust as it stands in every file, behind the numbers of the body.
 constexpr const char* kResonators = R"(
@@ -87,9 +88,16 @@ std::vector<Vec3> choose_points(const bank::Bank& bank, const FaustOptions& opti
   return points;
 }
 
+double calc_extent(const bank::Bank& bank) {
+  Vec3 low = bank.vertices_m.front(), high = low;
+  for (const Vec3& vertex : bank.vertices_m)
+    for (std::size_t c = 0; c < 3; ++c) low[c] = std::min(low[c], vertex[c]), high[c] = std::max(high[c], vertex[c]);
+  return norm(high - low);
+}
+
 Place make_place(const bank::Bank& bank, const Vec3& point_m) {
   const bank::NearestPlace found = bank::find_nearest(bank, point_m);
-  if (found.triangle < 0)
+  if (found.triangle < 0 || !(found.distance_m <= kFarthestShare * calc_extent(bank)))
     throw InputError(fmt::format("[{:g}, {:g}, {:g}] is not near the surface; give metres", point_m[0], point_m[1], point_m[2]));
   const auto& corners = bank.triangles[static_cast<std::size_t>(found.triangle)];
   const auto get = [&](std::size_t c) { return bank.vertices_m[static_cast<std::size_t>(corners[c])]; };

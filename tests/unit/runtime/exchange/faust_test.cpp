@@ -51,6 +51,7 @@ TEST(Faust, refuses_what_makes_no_sound) {
   EXPECT_THROW(make_faust(testing::make_cube_bank({}), {}), InputError);
   EXPECT_THROW(make_faust(testing::make_cube_bank({{820.0, 12.0, 0.3}}), {.modes = 0}), InputError);
   EXPECT_THROW(make_faust(testing::make_cube_bank({{820.0, 12.0, 0.3}}), {.points_m = std::vector<Vec3>(65)}), InputError);
+  EXPECT_THROW(make_faust(testing::make_cube_bank({{820.0, 12.0, 0.3}}), {.points_m = {{9.0, 9.0, 9.0}}}), InputError);
 }
 
 }  // namespace
