@@ -21,7 +21,8 @@ namespace {
 constexpr std::uint64_t kMaxBytes = 64 << 20;
 constexpr std::size_t kMaxRows = 40000, kMaxPoints = 10000;
 constexpr double kT60 = 6.907755278982137;  // ln 1000: decay times T60
-constexpr double kMaxGain = 1e9;
+constexpr double kMaxGain = 1e9, kFarthestM = 1e4;
+constexpr std::size_t kMaxShown = 80;  // characters of a cell, in a message
 
 std::string_view trim(std::string_view text) {
   const auto is_blank = [](char c) { return c == ' ' || c == '\t' || c == '\r' || c == '"'; };
@@ -84,14 +85,17 @@ Columns read_names(const std::vector<std::string_view>& names, const std::string
       columns.gains.push_back(i);
     } else if (const std::optional<Vec3> point = parse_point(name)) {
       if (std::find(table.points_m.begin(), table.points_m.end(), *point) != table.points_m.end())
-        throw InputError(fmt::format("{}: the point \"{}\" is there twice; remove one", place, base::printable(std::string(name))));
+        throw InputError(fmt::format("{}: the point \"{}\" is there twice; remove one", place, base::printable(name.substr(0, kMaxShown))));
+      if (std::any_of(point->begin(), point->end(), [](double x) { return std::abs(x) > kFarthestM; }))
+        throw InputError(fmt::format("{}: the point \"{}\" is too far away; its numbers are metres, up to {:g}", place,
+                                     base::printable(name.substr(0, kMaxShown)), kFarthestM));
       columns.gains.push_back(i);
       table.points_m.push_back(*point);
     } else {
       throw InputError(
           fmt::format("{}: column \"{}\" is not known; columns are frequency_hz, decay_per_s or t60_s, and gain or points such "
                       "as \"0.1 0 0.02\"",
-                      place, base::printable(std::string(name))));
+                      place, base::printable(name.substr(0, kMaxShown))));
     }
   }
   if (columns.freq < 0) throw InputError(fmt::format("{}: there is no column frequency_hz", place));
@@ -132,12 +136,12 @@ ModesTable read_modes_table(const std::filesystem::path& file) {
     const auto get = [&](int column) {
       const std::string_view cell = cells[static_cast<std::size_t>(column)];
       const std::optional<double> value = parse_number(cell);
-      if (!value) throw InputError(fmt::format("{}: \"{}\" is no finite number", place, base::printable(std::string(cell))));
+      if (!value) throw InputError(fmt::format("{}: \"{}\" is no finite number", place, base::printable(cell.substr(0, kMaxShown))));
       return *value;
     };
     Row row{get(columns->freq), 0.0, {}};
     if (!(row.freq_hz > 0.0 && row.freq_hz < 1e9))
-      throw InputError(fmt::format("{}: a frequency is {:g} Hz; give one above 0", place, row.freq_hz));
+      throw InputError(fmt::format("{}: a frequency is {:g} Hz; give one above 0 and below 1e9", place, row.freq_hz));
     if (columns->t60 >= 0) {
       const double t60 = get(columns->t60);
       if (!(t60 > 0.0)) throw InputError(fmt::format("{}: t60_s is {:g}; give one above 0", place, t60));

@@ -15,11 +15,12 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr double kMaxWanted = 20000;  // modes: hours
-constexpr double kSlow = 4.0;         // at a singular corner the last order gained as little as a fifth of the error
-constexpr double kMinError = 1e-12;   // relative, of the eigensolver
-constexpr double kDegenerate = 1e-7;  // relative distance of eigenvalues that may be one
-constexpr int kMaxRefined = 200;      // modes: what follows costs more than the elements do
+constexpr double kMaxWanted = 20000;         // modes: hours
+constexpr std::size_t kMaxElements = 60000;  // 18 GB; what so many modes take of a polygon that is not narrow
+constexpr double kSlow = 4.0;                // at a singular corner the last order gained as little as a fifth of the error
+constexpr double kMinError = 1e-12;          // relative, of the eigensolver
+constexpr double kDegenerate = 1e-7;         // relative distance of eigenvalues that may be one
+constexpr int kMaxRefined = 200;             // modes: what follows costs more than the elements do
 
 double square(double x) { return x * x; }
 
@@ -73,7 +74,7 @@ Net Polygon::make_elements(double k, double edge_m) const {
         std::min({edge_m, std::hypot(before[0] - at[0], before[1] - at[1]), std::hypot(after[0] - at[0], after[1] - at[1])});
     singular.push_back(is_singular(angles[c]) && count_rings(angles[c], k * side, setting_) > 0);
   }
-  Net net = triangulate(corners_m_, edge_m, singular);  // a triangle with two singular corners could not be graded to both
+  Net net = triangulate(corners_m_, edge_m, singular, kMaxElements);  // a triangle with two singular corners could not be graded to both
   std::vector<double> longest(corners_m_.size(), 0.0);
   for (const bank::Triangle& t : net.triangles)
     for (int c = 0; c < 3; ++c) {

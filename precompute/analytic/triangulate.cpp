@@ -1,5 +1,7 @@
 #include "precompute/analytic/triangulate.hpp"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -14,8 +16,6 @@ namespace {
 
 using Edge = std::pair<std::int32_t, std::int32_t>;
 using bank::Triangle;
-
-constexpr std::size_t kMaxTriangles = 400000;
 
 long double cross(const Point2& o, const Point2& a, const Point2& b) {
   return (static_cast<long double>(a[0]) - o[0]) * (static_cast<long double>(b[1]) - o[1]) -
@@ -111,7 +111,7 @@ void flip_edges(Net& net, const std::vector<bool>& apart) {
 
 /// Halves the longest edge of a triangle, and before that those of neighbours that are longer, until none is too long and no triangle has
 /// two of the points that are to be apart.
-void halve_edges(Net& net, double max_edge_m, const std::vector<bool>& apart) {
+void halve_edges(Net& net, double max_edge_m, const std::vector<bool>& apart, std::size_t max_triangles) {
   std::map<Edge, std::size_t> edges = list_edges(net.triangles);
   const auto longest = [&](std::size_t t) {
     const Triangle& v = net.triangles[t];
@@ -144,8 +144,11 @@ void halve_edges(Net& net, double max_edge_m, const std::vector<bool>& apart) {
       work.pop_back();
       continue;
     }
-    if (net.triangles.size() > kMaxTriangles)
-      throw InputError("the polygon needs too many triangles; lower the end of \"band_hz\", or give \"max_modes\"");
+    if (net.triangles.size() > max_triangles)
+      throw InputError(
+          fmt::format("the polygon takes more than {} triangles; make its narrowest part wider, or lower the end of "
+                      "\"band_hz\" or \"max_modes\"",
+                      max_triangles));
     // Rivara's path: from neighbour to neighbour across longest edges that are longer still, to an edge that is the longest on both sides.
     std::size_t t = work.back();
     auto [k, length] = longest(t);
@@ -181,10 +184,10 @@ std::vector<double> calc_angles(const std::vector<Point2>& p) {
   return angles;
 }
 
-Net triangulate(const std::vector<Point2>& corners_m, double max_edge_m, const std::vector<bool>& apart) {
+Net triangulate(const std::vector<Point2>& corners_m, double max_edge_m, const std::vector<bool>& apart, std::size_t max_triangles) {
   Net net{corners_m, cut_ears(corners_m)};
   flip_edges(net, {});
-  halve_edges(net, max_edge_m, apart);
+  halve_edges(net, max_edge_m, apart, max_triangles);
   flip_edges(net, apart);
   return net;
 }

@@ -12,6 +12,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kMinLength = 1e-6, kMaxLength = 1e4;  // [m]
+constexpr double kMinMass = 1e-15, kMaxMass = 1e12;    // [kg], [kg/m], [kg/m^2]
 constexpr int kMinGrid = 2, kMaxGrid = 1000;
 constexpr std::size_t kMaxCorners = 1000;
 constexpr std::array<const char*, 5> kKeys{"string", "beam", "membrane", "plate", "modes_csv"};
@@ -22,6 +23,17 @@ double read_length(base::Object& object, const char* key) {
   if (value < kMinLength || value > kMaxLength)
     object.fail(key, fmt::format("must be from {:g} to {:g} m, and is {:g}", kMinLength, kMaxLength, value));
   return value;
+}
+
+double read_mass(base::Object& object, const char* key) {
+  const double value = object.number(key, base::kPositive);
+  if (value < kMinMass || value > kMaxMass)
+    object.fail(key, fmt::format("masses are kilograms, from {:g} to {:g}, and this is {:g}", kMinMass, kMaxMass, value));
+  return value;
+}
+
+std::optional<double> read_mass_if(base::Object& object, const char* key) {
+  return object.has(key) ? std::optional(read_mass(object, key)) : std::nullopt;
 }
 
 std::optional<double> read_length_if(base::Object& object, const char* key) {
@@ -65,7 +77,7 @@ StringBody read_string(base::Object object) {
   StringBody body;
   body.length_m = read_length(object, "length_m");
   read_one_of(object, "tension_n", body.tension_n, "lowest_hz", body.lowest_hz);
-  body.mass_kg_m = object.number_if("mass_kg_m", base::kPositive);
+  body.mass_kg_m = read_mass_if(object, "mass_kg_m");
   body.diameter_m = read_length_if(object, "diameter_m");
   if (!body.mass_kg_m && !body.diameter_m)
     object.fail("", "give \"mass_kg_m\" (an ideal string), \"diameter_m\" (a stiff one, its mass from the material's density), or both");
@@ -168,7 +180,7 @@ MembraneBody read_membrane(base::Object object) {
     read_corners(object, body);
   }
   read_one_of(object, "tension_n_m", body.tension_n_m, "lowest_hz", body.lowest_hz);
-  body.density_kg_m2 = object.number_if("density_kg_m2", base::kPositive);
+  body.density_kg_m2 = read_mass_if(object, "density_kg_m2");
   body.thickness_m = read_length_if(object, "thickness_m");
   if (!body.density_kg_m2 && !body.thickness_m)
     object.fail("", "give \"density_kg_m2\", or \"thickness_m\" and a material, for its density");
@@ -200,7 +212,7 @@ PlateBody read_plate(base::Object object) {
 MeasuredBody read_measured(base::Object& object) {
   MeasuredBody body;
   body.csv = object.path("modes_csv");
-  body.mass_kg = object.number("mass_kg", base::kPositive);
+  body.mass_kg = read_mass(object, "mass_kg");
   body.size_m = object.numbers<3>("size_m");
   for (const double length : body.size_m)
     if (!(length >= kMinLength && length <= kMaxLength))

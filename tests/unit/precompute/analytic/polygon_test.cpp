@@ -54,6 +54,11 @@ void expect_net(const Net& net, double area) {
   EXPECT_EQ(net.points_m.size() + net.triangles.size(), (edges.size() + rim) / 2 + 1);
 }
 
+TEST(Triangulate, refuses_a_sliver_that_takes_too_many) {
+  const std::vector<Point2> sliver{{0, 0}, {1, 0}, {1, 1e-5}};
+  EXPECT_THROW(triangulate(sliver, 2e-6, {}, 1000), InputError);
+}
+
 TEST(Triangulate, fills_any_polygon) {
   for (const auto& polygon : {kSquare, kL, make_comb(5), make_comb(40)})
     for (const double edge : {10.0, 0.5, 0.21}) {
