@@ -19,11 +19,11 @@
 namespace carillon::base {
 namespace {
 
-struct Member;
-
-/// A value of JSON and where it stands in the text.
+/// A value of JSON and where it stands in the text; of a member of an object with its key.
 struct Value {
   enum class Kind : std::uint8_t { kNull, kBoolean, kNumber, kText, kList, kObject };
+  std::string key{};
+  std::ptrdiff_t key_offset = 0;
   Kind kind = Kind::kNull;
   bool is_true = false;
   std::optional<std::int64_t> integer{};  // of a number, if it is whole and fits
@@ -31,25 +31,18 @@ struct Value {
   std::ptrdiff_t offset = 0;  // a place on its first line
   std::ptrdiff_t end = 0;     // of a list or an object: behind its last byte
   std::string text{};
-  std::vector<Value> items{};           // of a list
-  std::vector<Member> members{};        // of an object, in the order of the text
-  std::vector<std::uint32_t> by_key{};  // their numbers, in the order of the keys
+  std::vector<Value> items{};           // of a list; members of an object, in the order of the text
+  std::vector<std::uint32_t> by_key{};  // numbers of the members, in the order of their keys
 
   bool is(Kind other) const { return kind == other; }
-  /// nullptr when there is none.
-  const Member* find(std::string_view key) const;
+  /// The member of an object; nullptr when there is none.
+  const Value* find(std::string_view wanted) const;
 };
 
-struct Member {
-  std::string key;
-  std::ptrdiff_t offset = 0;  // of the key
-  Value value{};
-};
-
-const Member* Value::find(std::string_view key) const {
-  const auto at = std::lower_bound(by_key.begin(), by_key.end(), key,
-                                   [this](std::uint32_t i, std::string_view wanted) { return members[i].key < wanted; });
-  return at != by_key.end() && members[*at].key == key ? &members[*at] : nullptr;
+const Value* Value::find(std::string_view wanted) const {
+  const auto at = std::lower_bound(by_key.begin(), by_key.end(), wanted,
+                                   [this](std::uint32_t i, std::string_view other) { return items[i].key < other; });
+  return at != by_key.end() && items[*at].key == wanted ? &items[*at] : nullptr;
 }
 
 }  // namespace
@@ -130,7 +123,7 @@ class Builder {
     return add({.kind = Value::Kind::kText, .text = std::string(text, size)});
   }
   bool Key(const char* text, rapidjson::SizeType size, bool) {
-    open_.back()->members.push_back({.key = std::string(text, size), .offset = get_offset()});
+    open_.back()->items.push_back({.key = std::string(text, size), .key_offset = get_offset()});
     return true;
   }
   bool StartObject() { return add({.kind = Value::Kind::kObject}); }
@@ -138,15 +131,15 @@ class Builder {
   bool EndArray(rapidjson::SizeType) { return close(); }
   bool EndObject(rapidjson::SizeType) {
     Value& object = *open_.back();
-    object.by_key.resize(object.members.size());
+    object.by_key.resize(object.items.size());
     std::iota(object.by_key.begin(), object.by_key.end(), 0U);
     std::stable_sort(object.by_key.begin(), object.by_key.end(),
-                     [&](std::uint32_t a, std::uint32_t b) { return object.members[a].key < object.members[b].key; });
+                     [&](std::uint32_t a, std::uint32_t b) { return object.items[a].key < object.items[b].key; });
     const auto twice = std::adjacent_find(object.by_key.begin(), object.by_key.end(),
-                                          [&](std::uint32_t a, std::uint32_t b) { return object.members[a].key == object.members[b].key; });
+                                          [&](std::uint32_t a, std::uint32_t b) { return object.items[a].key == object.items[b].key; });
     if (twice != object.by_key.end()) {
-      const Member& second = object.members[*(twice + 1)];
-      data_->fail(second.offset, fmt::format("the key \"{}\" is there twice; leave one of them", second.key.substr(0, 80)));
+      const Value& second = object.items[*(twice + 1)];
+      data_->fail(second.key_offset, fmt::format("the key \"{}\" is there twice; leave one of them", second.key.substr(0, 80)));
     }
     return close();
   }
@@ -159,7 +152,9 @@ class Builder {
     value.offset = get_offset();
     Value& into = *open_.back();
     Value* place = &into;  // the root
-    if (is_root_there_) place = into.is(Value::Kind::kList) ? &into.items.emplace_back() : &into.members.back().value;
+    if (is_root_there_) place = into.is(Value::Kind::kList) ? &into.items.emplace_back() : &into.items.back();
+    value.key = std::move(place->key);
+    value.key_offset = place->key_offset;
     *place = std::move(value);
     if (place->is(Value::Kind::kList) || place->is(Value::Kind::kObject)) {
       if (is_root_there_) open_.push_back(place);
@@ -299,11 +294,11 @@ bool Object::has(std::string_view key) {
   return json(value_).find(key) != nullptr;
 }
 
-bool Object::has_string(std::string_view key) { return has(key) && json(value_).find(key)->value.is(Value::Kind::kText); }
-bool Object::has_number(std::string_view key) { return has(key) && json(value_).find(key)->value.is(Value::Kind::kNumber); }
-bool Object::has_object(std::string_view key) { return has(key) && json(value_).find(key)->value.is(Value::Kind::kObject); }
+bool Object::has_string(std::string_view key) { return has(key) && json(value_).find(key)->is(Value::Kind::kText); }
+bool Object::has_number(std::string_view key) { return has(key) && json(value_).find(key)->is(Value::Kind::kNumber); }
+bool Object::has_object(std::string_view key) { return has(key) && json(value_).find(key)->is(Value::Kind::kObject); }
 bool Object::is_empty_list(std::string_view key) {
-  return has(key) && json(value_).find(key)->value.is(Value::Kind::kList) && json(value_).find(key)->value.items.empty();
+  return has(key) && json(value_).find(key)->is(Value::Kind::kList) && json(value_).find(key)->items.empty();
 }
 
 namespace {
@@ -316,8 +311,8 @@ std::string full_name(const std::string& name, std::string_view key) {
 }  // namespace
 
 void Object::fail(std::string_view key, const std::string& message) const {
-  const Member* member = key.empty() ? nullptr : json(value_).find(key);
-  if (member != nullptr) data_->fail(member->offset, fmt::format("\"{}\": {}", full_name(name_, key), message));
+  const Value* member = key.empty() ? nullptr : json(value_).find(key);
+  if (member != nullptr) data_->fail(member->key_offset, fmt::format("\"{}\": {}", full_name(name_, key), message));
   data_->fail(json(value_).offset, key.empty() ? message : fmt::format("\"{}\": {}", full_name(name_, key), message));
 }
 
@@ -368,7 +363,7 @@ const void* Object::require_value(std::string_view key) {
     fail(near, near.empty() ? fmt::format("\"{}\" is missing here; add it", key)
                             : fmt::format("unknown key; \"{}\" is required here: did you mean \"{}\"?", key, key));
   }
-  return &json(value_).find(key)->value;
+  return json(value_).find(key);
 }
 
 std::string Object::string(std::string_view key) {
@@ -412,7 +407,7 @@ std::optional<long long> Object::integer_if(std::string_view key, long long low,
 
 bool Object::boolean_or(std::string_view key, bool fallback) {
   if (!has(key)) return fallback;
-  const Value& value = json(value_).find(key)->value;
+  const Value& value = *json(value_).find(key);
   if (!value.is(Value::Kind::kBoolean)) fail(key, fmt::format("must be true or false, and is {}", kind_of(value)));
   return value.is_true;
 }
@@ -450,7 +445,7 @@ std::vector<std::vector<double>> Object::number_rows(std::string_view key, std::
 
 std::vector<Entry> Object::entries(std::string_view key, std::size_t max) {
   if (!has(key)) return {};
-  const Value& value = json(value_).find(key)->value;
+  const Value& value = *json(value_).find(key);
   std::vector<Entry> list;
   const auto add = [&](const Value& entry, const std::string& name) {
     const std::string place = fmt::format("{}:{}", data_->file.string(), data_->line_at(entry.offset));
@@ -471,8 +466,8 @@ std::vector<Entry> Object::entries(std::string_view key, std::size_t max) {
 }
 
 std::string Object::find_place(std::string_view key) const {
-  const Member* member = key.empty() ? nullptr : json(value_).find(key);
-  return fmt::format("{}:{}", data_->file.string(), data_->line_at(member != nullptr ? member->offset : json(value_).offset));
+  const Value* member = key.empty() ? nullptr : json(value_).find(key);
+  return fmt::format("{}:{}", data_->file.string(), data_->line_at(member != nullptr ? member->key_offset : json(value_).offset));
 }
 
 Object Object::object(std::string_view key) {
@@ -486,7 +481,7 @@ std::optional<Object> Object::object_if(std::string_view key) { return has(key) 
 std::vector<Object> Object::objects(std::string_view key) {
   std::vector<Object> list;
   if (!has(key)) return list;
-  const Value& value = json(value_).find(key)->value;
+  const Value& value = *json(value_).find(key);
   if (!value.is(Value::Kind::kList)) fail(key, fmt::format("must be a list in square brackets, and is {}", kind_of(value)));
   for (std::size_t i = 0; i < value.items.size(); ++i) {
     const Value& entry = value.items[i];
@@ -537,20 +532,20 @@ std::size_t find_end(std::string_view text, std::size_t at, const Value& value) 
 }  // namespace
 
 Object::Excerpt Object::make_excerpt(const std::vector<std::string>& keys) {
-  std::vector<const Member*> found;
+  std::vector<const Value*> found;
   for (const std::string& key : keys)
     if (has(key)) found.push_back(json(value_).find(key));
-  std::sort(found.begin(), found.end(), [](const Member* a, const Member* b) { return a->offset < b->offset; });
-  Excerpt excerpt{.text = "{", .first_line = found.empty() ? 1 : data_->line_at(found[0]->offset)};
+  std::sort(found.begin(), found.end(), [](const Value* a, const Value* b) { return a->key_offset < b->key_offset; });
+  Excerpt excerpt{.text = "{", .first_line = found.empty() ? 1 : data_->line_at(found[0]->key_offset)};
   int line = excerpt.first_line;
-  for (const Member* member : found) {
+  for (const Value* member : found) {
     if (member != found[0]) excerpt.text += ", ";
-    for (; line < data_->line_at(member->offset); ++line) excerpt.text += '\n';
+    for (; line < data_->line_at(member->key_offset); ++line) excerpt.text += '\n';
     excerpt.text += fmt::format("\"{}\": ", member->key);
-    const std::size_t colon = skip_space(data_->text, skip_quoted(data_->text, static_cast<std::size_t>(member->offset)));
+    const std::size_t colon = skip_space(data_->text, skip_quoted(data_->text, static_cast<std::size_t>(member->key_offset)));
     const std::size_t begin = skip_space(data_->text, colon + 1);
     for (; line < data_->line_at(static_cast<std::ptrdiff_t>(begin)); ++line) excerpt.text += '\n';
-    const std::string own = data_->text.substr(begin, find_end(data_->text, begin, member->value) - begin);
+    const std::string own = data_->text.substr(begin, find_end(data_->text, begin, *member) - begin);
     line += static_cast<int>(std::count(own.begin(), own.end(), '\n'));
     excerpt.text += own;
   }
@@ -560,7 +555,7 @@ Object::Excerpt Object::make_excerpt(const std::vector<std::string>& keys) {
 
 std::vector<std::string> Object::keys() const {
   std::vector<std::string> names;
-  for (const Member& member : json(value_).members) names.push_back(member.key);
+  for (const Value& member : json(value_).items) names.push_back(member.key);
   return names;
 }
 

@@ -187,7 +187,7 @@ INSTANTIATE_TEST_SUITE_P(
                "job.json:2:", "did you mean \"outer_radius_m\"?"},
         BadJob{"length_in_mm", with_body("\"shape\": \"tube\", \"length_m\": 50500"), "job.json:2:", "lengths are metres"},
         BadJob{"shape_and_surface", with_body("\"shape\": \"tube\", \"surface\": \"a.obj\""), "job.json:2:", "one of the two"},
-        BadJob{"nodes_and_edge", with_body("\"surface\": \"a.obj\", \"nodes\": 5000, \"edge_m\": 0.1"), "job.json:2:", "give one of them"},
+        BadJob{"nodes_and_edge", with_body("\"surface\": \"a.obj\", \"nodes\": 5000, \"edge_m\": 0.1"), "job.json:2:", "give one of the two"},
         BadJob{"bank_is_surface", "{\"bank\": \"a.obj\", \"material\": " + steel(kRayleigh) + ", \"body\": {\"surface\": \"a.obj\"}}",
                "job.json:1:", "overwrite the surface"},
         BadJob{"fixed_number", with_material("\"fixed\": [3]"), "job.json:3:", "a text or an object"}),
