@@ -265,7 +265,7 @@ class Hear(unittest.TestCase):
         self.refuse("b.msh", contains=("b.msh", "200 m across", "--scale", "0.001 for millimetres"))
         heard = self.hear("b.msh", "--scale", "0.001", "--material", "cork")
         self.assertTrue(all(abs(x - 0.2) < 0.02 for x in heard["extent_m"]), heard["extent_m"])
-        self.refuse("b.msh", "--accuracy", "10", contains=("--accuracy", "its surface"))
+        self.refuse("b.msh", "--accuracy", "10", contains=("--accuracy", "a surface or a shape"))
 
     def test_one_run_writes_to_a_folder(self):
         words = [BIN / "carillon", "hear", "-q", "--shape", "bowl", "--material", "glass", "-o", "out"]
