@@ -3,6 +3,7 @@
 
 #include <exception>
 #include <new>
+#include <utility>
 
 #include "runtime/base/error.hpp"
 #include "runtime/base/printable.hpp"
@@ -41,7 +42,7 @@ PYBIND11_MODULE(_carillon, module) {
   system_error = make_exception(module, "SystemError", PyExc_OSError, "The machine refused: disk, memory, a missing program.");
   py::register_exception_translator([](std::exception_ptr pointer) {
     try {
-      if (pointer) std::rethrow_exception(pointer);
+      if (pointer) std::rethrow_exception(std::move(pointer));
     } catch (const InputError& error) {
       set_error(input_error, error);
     } catch (const SolveError& error) {
