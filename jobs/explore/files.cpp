@@ -109,10 +109,18 @@ WholeFolder::~WholeFolder() {
 
 void WholeFolder::commit() {
   std::error_code error;
-  fs::remove_all(place_, error);
-  if (!error) fs::rename(path_, place_, error);
+  const fs::path before = path_.string() + ".before";  // an earlier folder is not removed until the new one is there
+  const bool has_before = fs::exists(place_, error);
+  if (has_before) fs::rename(place_, before, error);
   if (error) refuse(place_, error);
+  fs::rename(path_, place_, error);
+  if (error) {
+    std::error_code ignored;
+    if (has_before) fs::rename(before, place_, ignored);
+    refuse(place_, error);
+  }
   path_.clear();
+  if (has_before) fs::remove_all(before, error);
 }
 
 }  // namespace carillon::explore
