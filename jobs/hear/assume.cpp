@@ -3,8 +3,9 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
+
+#include "runtime/base/file.hpp"
 
 namespace carillon::hear {
 namespace {
@@ -32,8 +33,7 @@ std::string format_extent(const std::array<double, 3>& extent, double scale) {
 bool is_normalised(double largest) { return std::abs(largest - 1.0) < 1e-3 || std::abs(largest - 2.0) < 1e-3; }
 
 bool is_gltf(const std::filesystem::path& file) {
-  std::string ending = file.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return std::tolower(c); });
+  const std::string ending = base::find_extension(file);
   return ending == ".glb" || ending == ".gltf";
 }
 

@@ -63,26 +63,20 @@ std::string clean(const std::string& name) {
   return text.empty() || text[0] == '.' ? "object" + text : text;
 }
 
-std::string find_ending(const fs::path& file) {
-  std::string ending = file.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return std::tolower(c); });
-  return ending;
-}
-
 bool is_mesh_file(const fs::path& file) {
   constexpr std::array<std::string_view, 7> kEndings{".msh", ".vtu", ".vtk", ".mesh", ".node", ".ele", ".vtkhdf"};
-  return std::find(kEndings.begin(), kEndings.end(), find_ending(file)) != kEndings.end();
+  return std::find(kEndings.begin(), kEndings.end(), base::find_extension(file)) != kEndings.end();
 }
 
 bool is_surface_file(const fs::path& file) {
   constexpr std::array<std::string_view, 6> kEndings{".obj", ".stl", ".ply", ".off", ".gltf", ".glb"};
-  return std::find(kEndings.begin(), kEndings.end(), find_ending(file)) != kEndings.end();
+  return std::find(kEndings.begin(), kEndings.end(), base::find_extension(file)) != kEndings.end();
 }
 
 /// Throws InputError if the object is no surface or mesh, with a remedy for files of other kinds.
 void check_object(const fs::path& object) {
   constexpr const char* kTakes = "a surface (.obj, .stl, .ply, .off, .gltf, .glb) or a mesh (.msh, .vtu, .mesh)";
-  const std::string name = object.string(), ending = find_ending(object);
+  const std::string name = object.string(), ending = base::find_extension(object);
   std::error_code error;
   if (!fs::exists(object, error)) throw InputError(fmt::format("{}: no such file; give {}", name, kTakes));
   if (fs::is_directory(object, error)) throw InputError(fmt::format("{}: a folder; give the file of {} in it", name, kTakes));

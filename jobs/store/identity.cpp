@@ -102,10 +102,8 @@ Origin compare_origin(Json::Value root, const Request& request) {
 }
 
 std::string lower_ending(const fs::path& file) {
-  std::string ending = file.extension().string();
-  if (!ending.empty()) ending.erase(0, 1);
-  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return ending;
+  const std::string extension = base::find_extension(file);
+  return extension.empty() ? extension : extension.substr(1);
 }
 
 /// As the reader of meshes finds it: by the content if that is conclusive, else by the file extension.

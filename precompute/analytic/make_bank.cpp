@@ -141,26 +141,6 @@ void set_damping(bank::Bank& bank, const KnownBody& body, const job::JobSpec& jo
   }
 }
 
-/// The bank's own gain: the air that the outer surface moves, triangle by triangle without sign.
-void set_gains(bank::Bank& bank, std::span<const double> shapes) {
-  const std::size_t modes = bank.mode_count();
-  std::vector<double> flow(modes, 0.0);
-  double twice_area = 0.0;
-  for (const bank::Triangle& t : bank::find_outer_triangles(bank.vertices_m, bank.triangles)) {
-    const Vec3 normal = bank::calc_normal(bank.vertices_m, t);
-    twice_area += std::hypot(normal[0], normal[1], normal[2]);
-    const double* rows[3];
-    for (int k = 0; k < 3; ++k) rows[k] = &shapes[static_cast<std::size_t>(t[k]) * modes * 3];
-    for (std::size_t m = 0; m < modes; ++m) {
-      double through = 0.0;
-      for (std::size_t c = 0; c < 3; ++c) through += normal[c] * (rows[0][3 * m + c] + rows[1][3 * m + c] + rows[2][3 * m + c]);
-      flow[m] += std::abs(through) / 6.0;
-    }
-  }
-  for (std::size_t m = 0; m < modes; ++m)
-    bank.radiation_gain.push_back(bank::calc_radiation_gain(std::sqrt(bank.eigenvalue_rad2_s2[m]), flow[m], 0.5 * twice_area));
-}
-
 struct Found {
   std::unique_ptr<KnownBody> body;
   Band band;
@@ -210,7 +190,7 @@ Made make_bank(const job::JobSpec& job) {
   bank.rigid = body->rigid;
   bank.material = {job.material.young_modulus_pa, job.material.poisson_ratio, body->rigid.mass_kg / body->rigid.volume_m3, 0.0, 0.0};
   set_damping(bank, *body, job, band.modes);
-  set_gains(bank, shapes);
+  bank::set_radiation_gains(bank, shapes);
   bank::quantise_shapes(bank, shapes);
   bank.proof = std::move(band.proof);
   bank.counts = {static_cast<std::int64_t>(bank.vertices_m.size()), 1, 1, body->rigid_modes};

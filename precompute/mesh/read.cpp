@@ -45,12 +45,6 @@ MeshFormat find_format(std::string_view bytes, const std::string& name, const st
                                quote_excerpt(head.substr(0, head.find('\n'))), kReadable));
 }
 
-std::string lower_extension(const std::filesystem::path& file) {
-  std::string extension = file.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return std::tolower(c); });
-  return extension;
-}
-
 std::string_view view_of(std::span<const std::byte> bytes) { return {reinterpret_cast<const char*>(bytes.data()), bytes.size()}; }
 
 }  // namespace
@@ -70,7 +64,7 @@ TetMesh parse_mesh(std::span<const std::byte> bytes, const std::string& name, Me
 
 TetMesh read_mesh(const std::filesystem::path& file) {
   try {
-    const std::string extension = lower_extension(file);
+    const std::string extension = base::find_extension(file);
     if (extension == ".node" || extension == ".ele") {
       const auto partner = [&](const char* wanted) {
         return extension == wanted ? file : std::filesystem::path(file).replace_extension(wanted);

@@ -20,8 +20,7 @@ constexpr std::uint64_t kMaxBytes = 4ULL << 30;
 
 /// "obj", "stl", "ply", "off", "gltf" or "glb".
 std::string find_format(const std::filesystem::path& path) {
-  std::string ending = path.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string ending = base::find_extension(path);
   constexpr std::array<std::string_view, 6> kEndings{".obj", ".stl", ".ply", ".off", ".gltf", ".glb"};
   if (std::find(kEndings.begin(), kEndings.end(), ending) == kEndings.end())
     throw InputError(fmt::format("{}: a surface is read from .obj, .stl, .ply, .off, .gltf or .glb files, not from '{}'; convert it first",

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cctype>
 #include <cerrno>
 #include <cstring>
 #include <utility>
@@ -185,6 +186,12 @@ void write_file(const fs::path& file, std::string_view bytes) {
   WholeFile whole(file);
   whole.append(bytes);
   whole.commit();
+}
+
+std::string find_extension(const std::filesystem::path& file) {
+  std::string extension = file.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return std::tolower(c); });
+  return extension;
 }
 
 void check_writable(const fs::path& file, std::string_view what) {

@@ -54,6 +54,9 @@ class WholeFile {
   bool is_nameless_ = false;  // the temporary file has no name yet
 };
 
+/// The extension with its point, in lower case: ".obj" of "Cup.OBJ".
+std::string find_extension(const std::filesystem::path& file);
+
 /// Throws InputError unless `file` can be written: its folder exists (or can be made) and takes files, and `file` itself is no folder or
 /// device. Meant for before long work. `what` names the output in messages ("bank").
 void check_writable(const std::filesystem::path& file, std::string_view what);

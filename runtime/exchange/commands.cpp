@@ -25,15 +25,9 @@ namespace fs = std::filesystem;
 
 constexpr std::uint64_t kMaxGlbBytes = 1ULL << 32;
 
-std::string lower_ending(const fs::path& file) {
-  std::string ending = file.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return std::tolower(c); });
-  return ending;
-}
-
 std::string find_format(const ExportWishes& wishes) {
   if (!wishes.format.empty()) return wishes.format;
-  const std::string ending = lower_ending(wishes.out);
+  const std::string ending = base::find_extension(wishes.out);
   if (ending == ".glb") return "glb";
   if (ending == ".dsp") return "faust";
   throw InputError(fmt::format("{}: the name of a GLB file ends in .glb, of a Faust program in .dsp; name it so, or give --format",
@@ -116,9 +110,7 @@ void run_export(const ExportWishes& wishes) {
   FaustOptions options{.name = name};
   if (wishes.modes) options.modes = *wishes.modes;
   read_points(wishes.points, options);
-  options.radiation = wishes.radiation == "osg02"    ? radiation::GainKind::kOsg02
-                      : wishes.radiation == "vddp96" ? radiation::GainKind::kVddp96
-                                                     : radiation::GainKind::kSphere;
+  options.radiation = radiation::require_gain_kind("--radiation", wishes.radiation);
   const FaustProgram program = make_faust(bank, options);
   write_output(wishes.out, "Faust program", [&](const auto& sink) { sink(program.text); });
   fmt::print(

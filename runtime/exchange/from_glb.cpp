@@ -388,23 +388,6 @@ class Reader {
     bank.decay_per_s = law;
   }
 
-  /// As docs/equations.md (E5) has them for every bank.
-  static void find_gains(bank::Bank& bank) {
-    std::vector<double> flow(bank.mode_count(), 0.0);
-    double area_m2 = 0.0;
-    for (const bank::Triangle& triangle : bank::find_outer_triangles(bank.vertices_m, bank.triangles)) {
-      const Vec3 normal = bank::calc_normal(bank.vertices_m, triangle);
-      area_m2 += 0.5 * norm(normal);
-      for (std::size_t m = 0; m < bank.mode_count(); ++m) {
-        Vec3 sum{};
-        for (const std::int32_t v : triangle) sum = sum + bank.shape_at(static_cast<std::size_t>(v), m);
-        flow[m] += std::abs(dot(sum, normal)) / 6.0;
-      }
-    }
-    for (std::size_t m = 0; m < bank.mode_count(); ++m)
-      bank.radiation_gain.push_back(bank::calc_radiation_gain(std::sqrt(bank.eigenvalue_rad2_s2[m]), flow[m], area_m2));
-  }
-
   bank::Bank make(base::Object& extension, base::Object& model) {
     const std::size_t modes = model_.freq_hz.size(), points = model_.positions.size();
     const double scale = find_scale();
@@ -431,7 +414,7 @@ class Reader {
     bank.material = read_material(extension, model);
     read_mass(model, scale, bank);
     settle_damping(bank);
-    find_gains(bank);
+    bank::set_radiation_gains(bank, shapes);
     bank.counts = {.nodes = static_cast<std::int64_t>(points), .tets = 1, .components = 1, .rigid_modes = 6};
     bank.band_hz = {std::min(20.0, 0.99 * bank.freq_hz(0)), std::max(20000.0, 1.01 * bank.freq_hz(modes - 1))};
     bank.complete = false;

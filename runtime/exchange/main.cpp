@@ -23,11 +23,13 @@
 #include "runtime/bank/reduce.hpp"
 #include "runtime/bank/report.hpp"
 #include "runtime/bank/write.hpp"
+#include "runtime/base/file.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/base/standard_output.hpp"
 #include "runtime/exchange/commands.hpp"
 #include "runtime/material/solids.hpp"
 #include "runtime/material/table.hpp"
+#include "runtime/radiation/gains.hpp"
 #include "runtime/version/version.hpp"
 
 namespace {
@@ -145,8 +147,7 @@ void read_damping(Wishes& wishes) {
 /// Other programs rely on the extension: a name of another kind is refused.
 void check_bank_name(const std::filesystem::path& out) {
   constexpr std::array<std::string_view, 6> kExtensions{"", ".hdf", ".h5", ".hdf5", ".vtkhdf", ".bank"};
-  std::string extension = out.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return std::tolower(c); });
+  const std::string extension = base::find_extension(out);
   const bool is_bank = std::find(kExtensions.begin(), kExtensions.end(), extension) != kExtensions.end();
   const bool is_number =
       extension.size() > 1 && std::all_of(extension.begin() + 1, extension.end(), [](unsigned char c) { return std::isdigit(c); });
@@ -187,7 +188,7 @@ void add_export(CLI::App& app, exchange::ExportWishes& wishes) {
   app.add_option("--points", wishes.points, "Points to strike (faust): X,Y,Z in metres each; or their number (4)")
       ->option_text("X,Y,Z ...");
   app.add_option("--radiation", wishes.radiation, "Radiation model (faust), as \"radiation\" of a scene")
-      ->check(CLI::IsMember({"sphere", "osg02", "vddp96"}))
+      ->check(CLI::IsMember(radiation::kGainKindNames))
       ->capture_default_str();
   app.add_option("--name", wishes.name, "Name of the body in the file; without it that of the bank's file");
   app.add_option_function<std::string>(

@@ -144,8 +144,7 @@ FaustProgram make_faust(const bank::Bank& given, const FaustOptions& options) {
   if (given.mode_count() == 0) throw InputError("the bank has no modes, so it has no sound");
   if (options.modes == 0) throw InputError("0 modes are silent; give 1 or more");
   bank::Bank bank = bank::choose_frequencies(given, bank::Frequencies::kCorrected);
-  bank.radiation_gain = radiation::calc_gains(bank, options.radiation);
-  if (options.radiation == radiation::GainKind::kSphere) (void)radiation::limit_gains(bank.radiation_gain, bank.decay_per_s);
+  (void)radiation::put_gains(bank, options.radiation);
   const std::vector<Vec3> points_m = choose_points(bank, options);
   if (points_m.empty() || points_m.size() > kMaxFaustPoints)
     throw InputError(fmt::format("{} points; give 1 to {}", points_m.size(), kMaxFaustPoints));

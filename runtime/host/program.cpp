@@ -115,8 +115,7 @@ bool is_same_file(const fs::path& a, const fs::path& b) {
 
 /// WAV is what is written, so that is what the name says.
 void check_sound_name(const fs::path& file) {
-  std::string extension = file.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return std::tolower(c); });
+  const std::string extension = base::find_extension(file);
   if (file == "-" || extension == ".wav" || extension == ".wave") return;
   throw InputError(fmt::format("{}: the sound is written as WAV; give the output a name that ends in .wav", file.string()));
 }

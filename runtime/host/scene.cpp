@@ -629,7 +629,7 @@ Scene parse_scene(const base::Document& document) {
     }
   }
   scene.frequencies = static_cast<bank::Frequencies>(read_name(root, "frequencies", kFrequenciesNames, "corrected"));
-  scene.radiation = static_cast<radiation::GainKind>(read_name(root, "radiation", kGainKindNames, "sphere"));
+  scene.radiation = static_cast<radiation::GainKind>(read_name(root, "radiation", radiation::kGainKindNames, "sphere"));
   if (auto output = root.object_if("output")) scene.output = parse_output(*output);
   if (auto quality = root.object_if("quality")) scene.quality = parse_quality(*quality);
   root.finish();

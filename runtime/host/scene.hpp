@@ -27,9 +27,6 @@ enum class SampleFormat { kPcm16, kPcm24, kPcm32, kFloat };
 /// The names of --format and output.format, in the order of SampleFormat.
 inline const std::vector<std::string> kSampleFormatNames{"pcm16", "pcm24", "pcm32", "float"};
 
-/// The names of the key "radiation", in the order of radiation::GainKind.
-inline const std::vector<std::string> kGainKindNames{"osg02", "sphere", "vddp96"};
-
 /// The names of the key "frequencies", in the order of bank::Frequencies.
 inline const std::vector<std::string> kFrequenciesNames{"corrected", "mesh"};
 

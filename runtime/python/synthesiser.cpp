@@ -32,13 +32,6 @@ namespace py = pybind11;
 
 constexpr py::ssize_t kMaxFrames = 1 << 30, kPiece = 4096;
 
-radiation::GainKind to_gains(const std::string& name) {
-  if (name == "sphere") return radiation::GainKind::kSphere;
-  if (name == "osg02") return radiation::GainKind::kOsg02;
-  if (name == "vddp96") return radiation::GainKind::kVddp96;
-  throw InputError(fmt::format("radiation \"{}\": give \"sphere\", \"osg02\" or \"vddp96\"", name));
-}
-
 synth::EffectSet to_effects(const std::vector<std::string>& names) {
   synth::EffectSet effects;
   for (const std::string& name : names) {
@@ -51,7 +44,7 @@ synth::EffectSet to_effects(const std::vector<std::string>& names) {
 
 /// A bank as a body of it sounds: what fixes it takes of its modes what the bank says, as in carillon-render.
 std::shared_ptr<const synth::Model> make_model(const bank::Bank& bank, const std::string& kind_name, double rate_hz) {
-  const radiation::GainKind kind = to_gains(kind_name);
+  const radiation::GainKind kind = radiation::require_gain_kind("radiation", kind_name);
   const py::gil_scoped_release others_run;
   std::optional<bank::Bank> mounted;
   if (const support::Losses losses = support::calc_losses(bank, {}); !losses.is_empty()) support::apply(losses, mounted.emplace(bank));

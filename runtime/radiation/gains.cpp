@@ -251,6 +251,13 @@ double calc_sphere_radius_m(const bank::Bank& bank) {
   return calc_sphere_radius_of_skin(make_skin(bank));
 }
 
+GainKind require_gain_kind(std::string_view option, std::string_view name) {
+  const auto found = std::find(kGainKindNames.begin(), kGainKindNames.end(), name);
+  if (found == kGainKindNames.end())
+    throw InputError(std::string(option) + " \"" + std::string(name) + "\": give \"sphere\", \"osg02\" or \"vddp96\"");
+  return static_cast<GainKind>(found - kGainKindNames.begin());
+}
+
 PutGains put_gains(bank::Bank& bank, GainKind kind) {
   Radiation radiation = calc_radiation(bank, kind);
   bank.radiation_gain = std::move(radiation.gains);

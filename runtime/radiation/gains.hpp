@@ -3,6 +3,8 @@
 
 #include <cstddef>
 #include <span>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "runtime/bank/bank.hpp"
@@ -14,6 +16,11 @@ enum class GainKind {
   kSphere,  // spherical multipoles about the body's centre, with cancellation
   kVddp96   // no air at all: every mode as loud as its coordinate q, 1 Pa for 1 m kg^1/2 (van den Doel, Pai 1996, a_n = Psi_n / omega_n)
 };
+
+/// Their names in files and options, in the order of GainKind.
+inline const std::vector<std::string> kGainKindNames{"osg02", "sphere", "vddp96"};
+/// The kind of that name; `option` begins the message. Throws InputError.
+GainKind require_gain_kind(std::string_view option, std::string_view name);
 
 /// Multipoles that are resolved; what moves in finer patterns radiates as one of order kMaxLobes + 1.
 inline constexpr int kMaxLobes = 8;
