@@ -9,9 +9,11 @@
 #include <set>
 
 #include "jobs/explore/files.hpp"
+#include "jobs/report/record.hpp"
 #include "runtime/bank/bank.hpp"
 #include "runtime/bank/blows.hpp"
 #include "runtime/bank/reduce.hpp"
+#include "runtime/bank/surface.hpp"
 #include "runtime/material/table.hpp"
 
 namespace carillon::explore {
@@ -38,7 +40,7 @@ const material::Row* find_nearest(const material::MaterialTable& table, const ba
 /// ("shelf_wood"); else the row of the table whose stiffness and density are nearest.
 void find_material(const bank::Bank& bank, const fs::path& file, BankFacts& facts) {
   const material::MaterialTable& table = material::MaterialTable::get();
-  const Json::Value job = parse_json(bank.provenance);
+  const Json::Value job = report::parse_json(bank.provenance);
   const Json::Value& given = job.isObject() ? job["material"] : Json::Value::nullSingleton();
   const material::Row* row = nullptr;
   if (given.isString()) row = table.find(given.asString());
@@ -61,9 +63,9 @@ void find_material(const bank::Bank& bank, const fs::path& file, BankFacts& fact
 }
 
 void find_place(const bank::Bank& bank, BankFacts& facts) {
-  facts.low_m = facts.high_m = bank.vertices_m.front();
-  for (const Vec3& x : bank.vertices_m)
-    for (std::size_t c = 0; c < 3; ++c) facts.low_m[c] = std::min(facts.low_m[c], x[c]), facts.high_m[c] = std::max(facts.high_m[c], x[c]);
+  const auto [low, high] = bank::find_extent(bank.vertices_m);
+  facts.low_m = low;
+  facts.high_m = high;
   const std::size_t vertex = bank::find_strikes(bank, 1).front();
   facts.loudest_m = bank.vertices_m[vertex];
   for (std::size_t t = 0; t < bank.triangles.size(); ++t)
@@ -81,7 +83,7 @@ std::string describe(std::size_t before, std::size_t after, int bits) {
 
 }  // namespace
 
-const BankFacts& Banks::add(const fs::path& file) {
+const BankFacts& PageBanks::add(const fs::path& file) {
   const fs::path whole = fs::weakly_canonical(file);
   if (const auto found = facts_.find(whole); found != facts_.end()) return found->second;
   const bank::Bank bank = bank::read_bank(file);
@@ -109,7 +111,7 @@ const BankFacts& Banks::add(const fs::path& file) {
   return kept;
 }
 
-std::vector<PackedBank> Banks::list() const {
+std::vector<PackedBank> PageBanks::list() const {
   std::vector<PackedBank> packed;
   for (const BankFacts* facts : order_) packed.push_back(facts->packed);
   return packed;

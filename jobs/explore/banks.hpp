@@ -24,10 +24,10 @@ struct BankFacts {
 };
 
 /// Puts banks into a folder, each once. Large ones keep the most audible modes, with coarser shapes.
-class Banks {
+class PageBanks {
  public:
   /// keeps_all: they are copied as they are.
-  Banks(std::filesystem::path folder, bool keeps_all) : folder_(std::move(folder)), keeps_all_(keeps_all) {}
+  PageBanks(std::filesystem::path folder, bool keeps_all) : folder_(std::move(folder)), keeps_all_(keeps_all) {}
 
   /// Throws InputError for files that are no whole bank or have no modes.
   const BankFacts& add(const std::filesystem::path& file);

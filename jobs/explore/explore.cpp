@@ -14,8 +14,10 @@
 #include "jobs/explore/files.hpp"
 #include "jobs/explore/scenes.hpp"
 #include "jobs/process/programs.hpp"
+#include "jobs/report/record.hpp"
 #include "runtime/base/command.hpp"
 #include "runtime/base/file.hpp"
+#include "runtime/host/job_keys.hpp"
 #include "runtime/version/version.hpp"
 
 namespace carillon::explore {
@@ -74,9 +76,7 @@ void name_banks(Json::Value& scene, const Json::Value& trajectory) {
   for (Json::ArrayIndex i = 0; i < scene["bodies"].size(); ++i) {
     Json::Value& body = scene["bodies"][i];
     if (body.isMember("bank")) continue;
-    for (const char* key :
-         {"shape", "body", "mesh", "mesh_scale", "material", "materials", "element", "accuracy_cents", "band_hz", "max_modes"})
-      body.removeMember(key);
+    for (const char* key : host::kJobKeys) body.removeMember(key);
     body["bank"] = trajectory["bodies"][i]["bank"];
   }
 }
@@ -130,14 +130,14 @@ class Work {
 
   /// Simulates a scene file, which is checked by that, and keeps what happened. The scene that is returned names the bank of each body.
   Json::Value record(const fs::path& file) {
-    Json::Value scene = parse_json(base::read_file(file, "scene", kMaxSceneBytes));
+    Json::Value scene = report::parse_json(base::read_file(file, "scene", kMaxSceneBytes));
     const fs::path trajectory = path(".trajectory.json");
     std::vector<std::string> words{"--record", path(kContactsFile).string()};
     const bool lacks_bank = has_described_body(scene);
     if (lacks_bank) words.insert(words.end(), {"--trajectory", trajectory.string()});
     report_ = render(file, words);
     if (lacks_bank) {
-      name_banks(scene, parse_json(base::read_file(trajectory, "trajectory of carillon-render", kMaxTrajectoryBytes)));
+      name_banks(scene, report::parse_json(base::read_file(trajectory, "trajectory of carillon-render", kMaxTrajectoryBytes)));
       fs::remove(trajectory);
     }
     done_.duration_s = report_["duration_s"].asDouble();
@@ -156,7 +156,7 @@ class Work {
     const fs::path sound = path(".sound.wav"), report = path(".report.json");
     words.insert(words.begin(), {fs::absolute(scene).string(), "-q", "-o", sound.string(), "--report", report.string()});
     (void)programs_.run("carillon-render", words, false);
-    Json::Value root = parse_json(base::read_file(report, "report of carillon-render", kMaxSceneBytes));
+    Json::Value root = report::parse_json(base::read_file(report, "report of carillon-render", kMaxSceneBytes));
     std::error_code error;
     fs::remove(sound, error);
     fs::remove(report, error);
@@ -205,8 +205,8 @@ class Work {
 
   const PageOrder& order_;
   fs::path page_, engine_, place_;
-  WholeFolder folder_;
-  Banks banks_;
+  base::WholeFolder folder_;
+  PageBanks banks_;
   process::Programs programs_;
   Json::Value scene_, report_;
   std::vector<fs::path> files_;          // per body: its bank

@@ -5,9 +5,7 @@
 
 #include <cctype>
 #include <cerrno>
-#include <cstdlib>
 #include <cstring>
-#include <memory>
 #include <system_error>
 
 #include "runtime/base/file.hpp"
@@ -27,19 +25,6 @@ std::string make_name(std::string_view text) {
   std::string name;
   for (const char c : text) name += std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '.' || c == '_' ? c : '-';
   return name.empty() || name[0] == '.' ? "body" + name : name;
-}
-
-Json::Value parse_json(std::string_view text) {
-  Json::CharReaderBuilder builder;
-  builder["stackLimit"] = 64;
-  const std::unique_ptr<Json::CharReader> reader(builder.newCharReader());
-  Json::Value value;
-  std::string errors;
-  try {
-    if (reader->parse(text.data(), text.data() + text.size(), &value, &errors)) return value;
-  } catch (const Json::Exception&) {  // jsoncpp throws where it is nested too deep
-  }
-  return {};
 }
 
 std::string to_text(const Json::Value& value) {
@@ -87,40 +72,6 @@ std::uintmax_t calc_bytes(const fs::path& folder) {
   for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder))
     if (entry.is_regular_file()) bytes += entry.file_size();
   return bytes;
-}
-
-WholeFolder::WholeFolder(fs::path place) : place_(std::move(place)) {
-  std::error_code error;
-  for (fs::path above = place_.parent_path(); !above.empty() && !fs::exists(above, error); above = above.parent_path())
-    made_.push_back(above);
-  fs::create_directories(place_.parent_path(), error);
-  std::string path = (place_.parent_path() / ("." + place_.filename().string() + ".XXXXXX")).string();
-  if (error || ::mkdtemp(path.data()) == nullptr) refuse(place_, error ? error : std::error_code(errno, std::generic_category()));
-  path_ = path;
-  fs::permissions(path_, fs::perms(0755), error);
-}
-
-WholeFolder::~WholeFolder() {
-  std::error_code error;
-  if (path_.empty()) return;
-  fs::remove_all(path_, error);
-  for (const fs::path& above : made_) fs::remove(above, error);  // only those that are empty
-}
-
-void WholeFolder::commit() {
-  std::error_code error;
-  const fs::path before = path_.string() + ".before";  // an earlier folder is not removed until the new one is there
-  const bool has_before = fs::exists(place_, error);
-  if (has_before) fs::rename(place_, before, error);
-  if (error) refuse(place_, error);
-  fs::rename(path_, place_, error);
-  if (error) {
-    std::error_code ignored;
-    if (has_before) fs::rename(before, place_, ignored);
-    refuse(place_, error);
-  }
-  path_.clear();
-  if (has_before) fs::remove_all(before, error);
 }
 
 }  // namespace carillon::explore

@@ -7,6 +7,7 @@
 #include <httplib.h>
 #include <pthread.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <csignal>
@@ -37,6 +38,15 @@ class BlockedSignals {
   sigset_t signals_{}, before_{};
 };
 
+/// Whether a path of a request ends outside of the folder, by a symbolic link in it.
+bool leaves(const std::filesystem::path& folder, const std::string& path) {
+  std::error_code error;
+  const std::filesystem::path root = std::filesystem::canonical(folder, error);
+  const std::filesystem::path file =
+      std::filesystem::weakly_canonical(root / path.substr(std::min(path.find_first_not_of('/'), path.size())), error);
+  return error || std::mismatch(root.begin(), root.end(), file.begin(), file.end()).first != root.end();
+}
+
 }  // namespace
 
 int serve(const std::filesystem::path& folder, int port, const std::function<void(const std::string& address)>& on_ready) {
@@ -66,8 +76,12 @@ int serve(const std::filesystem::path& folder, int port, const std::function<voi
   const std::string by_number = fmt::format("127.0.0.1:{}", bound), by_name = fmt::format("localhost:{}", bound);
   server.set_pre_routing_handler([&](const httplib::Request& request, httplib::Response& response) {
     const std::string host = request.get_header_value("Host");
-    if (host == by_number || host == by_name) return httplib::Server::HandlerResponse::Unhandled;
-    response.status = 421;  // misdirected request
+    if (host != by_number && host != by_name)
+      response.status = 421;  // misdirected request
+    else if (leaves(folder, request.path))
+      response.status = 404;
+    else
+      return httplib::Server::HandlerResponse::Unhandled;
     return httplib::Server::HandlerResponse::Handled;
   });
   server.set_write_timeout(600);     // a browser that builds its picture may read nothing for long [s]

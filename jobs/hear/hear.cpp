@@ -29,6 +29,7 @@
 #include "runtime/bank/blows.hpp"
 #include "runtime/bank/corrected.hpp"
 #include "runtime/bank/of_material.hpp"
+#include "runtime/bank/surface.hpp"
 #include "runtime/base/descriptor.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/failure.hpp"
@@ -379,9 +380,7 @@ class Listening {
     sound.modes = list_modes(bank, strikes.front(), kListed);
     for (HeardMode& mode : sound.modes) mode.error_cents += sound.poisson_cents;
     for (const double cents : bank.discretisation_error_cents) sound.worst_cents = std::max(sound.worst_cents, cents + sound.poisson_cents);
-    Vec3 low = bank.vertices_m.front(), high = low;
-    for (const Vec3& x : bank.vertices_m)
-      for (int c = 0; c < 3; ++c) low[c] = std::min(low[c], x[c]), high[c] = std::max(high[c], x[c]);
+    const auto [low, high] = bank::find_extent(bank.vertices_m);
     const Vec3 middle = 0.5 * (low + high), extent = high - low;
     if (heard_.sounds.empty()) heard_.extent_m = {extent[0], extent[1], extent[2]};
     sound.scene = heard_.folder / (sound.name + "-scene.json");

@@ -1,6 +1,7 @@
 #include "precompute/analytic/polynomials.hpp"
 
 #include <Eigen/QR>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -22,17 +23,27 @@ la::Vector calc_legendre(int n, double x, int order) {
   return values;
 }
 
+namespace {
+
+/// P_n and P_(n-1) at t.
+std::array<double, 2> calc_legendre_pair(int n, double t) {
+  double now = 1.0, before = 0.0;
+  for (int k = 1; k <= n; ++k) {
+    const double next = ((2 * k - 1) * t * now - (k - 1) * before) / k;
+    before = now;
+    now = next;
+  }
+  return {now, before};
+}
+
+}  // namespace
+
 GaussRule make_gauss_rule(int n) {
   GaussRule rule;
   for (int i = 0; i < n; ++i) {
     double t = std::cos(std::numbers::pi * (i + 0.75) / (n + 0.5)), slope = 1.0;
     for (int step = 0; step < 100; ++step) {
-      double now = 1.0, before = 0.0;
-      for (int k = 1; k <= n; ++k) {
-        const double next = ((2 * k - 1) * t * now - (k - 1) * before) / k;
-        before = now;
-        now = next;
-      }
+      const auto [now, before] = calc_legendre_pair(n, t);
       slope = n * (t * now - before) / (t * t - 1.0);
       const double change = now / slope;
       t -= change;
@@ -50,12 +61,7 @@ std::vector<double> make_lobatto_points(int n) {
   for (int i = 1; i < n; ++i) {
     double t = -std::cos(std::numbers::pi * i / n);
     for (int step = 0; step < 100; ++step) {
-      double now = 1.0, before = 0.0;
-      for (int k = 1; k <= n; ++k) {
-        const double next = ((2 * k - 1) * t * now - (k - 1) * before) / k;
-        before = now;
-        now = next;
-      }
+      const auto [now, before] = calc_legendre_pair(n, t);
       // Newton's method on P_n', whose derivative follows from Legendre's equation.
       const double slope = n * (before - t * now) / (1.0 - t * t), bend = (2.0 * t * slope - n * (n + 1) * now) / (1.0 - t * t);
       const double change = slope / bend;

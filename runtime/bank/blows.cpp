@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "runtime/bank/reduce.hpp"
+#include "runtime/bank/surface.hpp"
 #include "runtime/base/vector.hpp"
 
 namespace carillon::bank {
@@ -17,14 +18,19 @@ namespace {
 constexpr double kHeard = 0.1;  // of the loudest vertex's power: struck where less is made, it would seem broken
 constexpr double kLoudest = 0.1;
 
+/// What a unit of motion of each mode is heard as, (m).
+std::vector<double> calc_weights(const Bank& bank) {
+  std::vector<double> weights(bank.mode_count());
+  for (std::size_t m = 0; m < weights.size(); ++m) weights[m] = calc_a_weight(bank.freq_hz(m)) * bank.radiation_gain[m];
+  return weights;
+}
+
 }  // namespace
 
 std::vector<Vec3> calc_vertex_normals(const Bank& bank) {
   std::vector<Vec3> normals(bank.vertex_count(), Vec3{});
-  for (const auto& t : bank.triangles) {
-    const Vec3 &a = bank.vertices_m[static_cast<std::size_t>(t[0])], &b = bank.vertices_m[static_cast<std::size_t>(t[1])],
-               &c = bank.vertices_m[static_cast<std::size_t>(t[2])];
-    const Vec3 normal = cross(b - a, c - a);
+  for (const Triangle& t : bank.triangles) {
+    const Vec3 normal = calc_normal(bank.vertices_m, t);
     for (const std::int32_t v : t) normals[static_cast<std::size_t>(v)] = normals[static_cast<std::size_t>(v)] + normal;
   }
   for (Vec3& n : normals)
@@ -33,17 +39,17 @@ std::vector<Vec3> calc_vertex_normals(const Bank& bank) {
 }
 
 std::vector<double> calc_blow_amplitudes(const Bank& bank, std::size_t vertex, const Vec3& direction) {
-  std::vector<double> amplitudes(bank.mode_count());
-  for (std::size_t m = 0; m < bank.mode_count(); ++m)
-    amplitudes[m] = calc_a_weight(bank.freq_hz(m)) * bank.radiation_gain[m] * std::abs(dot(bank.shape_at(vertex, m), direction));
+  std::vector<double> amplitudes = calc_weights(bank);
+  for (std::size_t m = 0; m < amplitudes.size(); ++m) amplitudes[m] *= std::abs(dot(bank.shape_at(vertex, m), direction));
   return amplitudes;
 }
 
 std::vector<std::size_t> find_strikes(const Bank& bank, std::size_t count) {
   const std::vector<Vec3> normals = calc_vertex_normals(bank);
+  const std::vector<double> weights = calc_weights(bank);
   std::vector<double> power(bank.vertex_count(), 0.0);
   for (std::size_t v = 0; v < power.size(); ++v)
-    for (const double a : calc_blow_amplitudes(bank, v, normals[v])) power[v] += a * a;
+    for (std::size_t m = 0; m < weights.size(); ++m) power[v] += std::pow(weights[m] * dot(bank.shape_at(v, m), normals[v]), 2);
   std::vector<std::size_t> chosen;
   if (power.empty()) return chosen;
   chosen.push_back(static_cast<std::size_t>(std::max_element(power.begin(), power.end()) - power.begin()));

@@ -43,6 +43,16 @@ Vec3 calc_normal(const std::vector<Vec3>& vertices_m, const Triangle& triangle) 
   return {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
 }
 
+std::array<Vec3, 2> find_extent(const std::vector<Vec3>& vertices_m) {
+  std::array<Vec3, 2> extent{vertices_m.front(), vertices_m.front()};
+  for (const Vec3& x : vertices_m)
+    for (std::size_t c = 0; c < 3; ++c) {
+      extent[0][c] = std::min(extent[0][c], x[c]);
+      extent[1][c] = std::max(extent[1][c], x[c]);
+    }
+  return extent;
+}
+
 std::vector<Triangle> find_outer_triangles(const std::vector<Vec3>& vertices_m, const std::vector<Triangle>& triangles) {
   const std::vector<std::int32_t> shell = find_shells(triangles, vertices_m.size());
   std::vector<double> volume(triangles.size(), 0.0);  // of a shell, at its first triangle: six times, about its own first corner

@@ -1,4 +1,4 @@
-// Which triangles of a surface face the open air.
+// The surface of a body: its box, its normals, and which of its triangles face the open air.
 #pragma once
 
 #include <array>
@@ -13,6 +13,9 @@ using Triangle = std::array<std::int32_t, 3>;
 
 /// Twice the area times the unit normal of a triangle [m^2].
 Vec3 calc_normal(const std::vector<Vec3>& vertices_m, const Triangle& triangle);
+
+/// The lowest and the highest corner of the box around the vertices of a bank that has some [m].
+std::array<Vec3, 2> find_extent(const std::vector<Vec3>& vertices_m);
 
 /// The triangles that face the open air, in their order: those of closed shells (connected through edges) that enclose a positive volume.
 /// The wall of a closed cavity encloses a negative one; it moves air that cannot get out. A body open to the outside, such as a bowl, is

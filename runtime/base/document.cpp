@@ -1,3 +1,4 @@
+// One text and all that is asked of it, by one tree of values; longer than most files.
 // Method: RapidJSON reads the text event by event; every value and every key is kept with the offset of its place, from which lines are
 // counted. Each Object remembers the keys that it was asked for, so the set of known keys is the set that the reading code really uses and
 // cannot drift from it.

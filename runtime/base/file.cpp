@@ -10,7 +10,9 @@
 #include <atomic>
 #include <cctype>
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
+#include <system_error>
 #include <utility>
 
 #include "runtime/base/descriptor.hpp"
@@ -186,6 +188,49 @@ void write_file(const fs::path& file, std::string_view bytes) {
   WholeFile whole(file);
   whole.append(bytes);
   whole.commit();
+}
+
+namespace {
+
+[[noreturn]] void refuse_folder(const std::filesystem::path& folder, const std::error_code& error) {
+  throw SystemError(fmt::format("{}: {}; make room, or choose another place", folder.string(), error.message()));
+}
+
+}  // namespace
+
+WholeFolder::WholeFolder(std::filesystem::path place) : place_(std::move(place)) {
+  std::error_code error;
+  for (std::filesystem::path above = place_.parent_path(); !above.empty() && !std::filesystem::exists(above, error);
+       above = above.parent_path())
+    made_.push_back(above);
+  std::filesystem::create_directories(place_.parent_path(), error);
+  std::string path = (place_.parent_path() / ("." + place_.filename().string() + ".XXXXXX")).string();
+  if (error || ::mkdtemp(path.data()) == nullptr) refuse_folder(place_, error ? error : std::error_code(errno, std::generic_category()));
+  path_ = path;
+  std::filesystem::permissions(path_, std::filesystem::perms(0755), error);
+}
+
+WholeFolder::~WholeFolder() {
+  std::error_code error;
+  if (path_.empty()) return;
+  std::filesystem::remove_all(path_, error);
+  for (const std::filesystem::path& above : made_) std::filesystem::remove(above, error);  // only those that are empty
+}
+
+void WholeFolder::commit() {
+  std::error_code error;
+  const std::filesystem::path before = path_.string() + ".before";  // an earlier folder is not removed until the new one is there
+  const bool has_before = std::filesystem::exists(place_, error);
+  if (has_before) std::filesystem::rename(place_, before, error);
+  if (error) refuse_folder(place_, error);
+  std::filesystem::rename(path_, place_, error);
+  if (error) {
+    std::error_code ignored;
+    if (has_before) std::filesystem::rename(before, place_, ignored);
+    refuse_folder(place_, error);
+  }
+  path_.clear();
+  if (has_before) std::filesystem::remove_all(before, error);
 }
 
 std::string find_extension(const std::filesystem::path& file) {

@@ -6,6 +6,7 @@
 #include <functional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "runtime/base/error.hpp"
 
@@ -52,6 +53,24 @@ class WholeFile {
   std::filesystem::path file_, temporary_;
   int descriptor_ = -1;
   bool is_nameless_ = false;  // the temporary file has no name yet
+};
+
+/// A folder that appears whole or not at all: it is filled under another name next to its place, and renamed by commit().
+class WholeFolder {
+ public:
+  /// Throws SystemError when the disk refuses.
+  explicit WholeFolder(std::filesystem::path place);
+  ~WholeFolder();
+  WholeFolder(const WholeFolder&) = delete;
+  WholeFolder& operator=(const WholeFolder&) = delete;
+
+  const std::filesystem::path& path() const { return path_; }
+  /// What stands at its place is removed. Throws SystemError.
+  void commit();
+
+ private:
+  std::filesystem::path place_, path_;
+  std::vector<std::filesystem::path> made_;  // folders above it that were not there, innermost first: they go with it
 };
 
 /// The extension with its point, in lower case: ".obj" of "Cup.OBJ".

@@ -17,6 +17,7 @@
 #include "runtime/bank/corrected.hpp"
 #include "runtime/bank/nearest.hpp"
 #include "runtime/bank/reduce.hpp"
+#include "runtime/bank/surface.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/sort_order.hpp"
 #include "runtime/base/vector.hpp"
@@ -88,20 +89,12 @@ std::vector<Vec3> choose_points(const bank::Bank& bank, const FaustOptions& opti
   return points;
 }
 
-double calc_extent(const bank::Bank& bank) {
-  Vec3 low = bank.vertices_m.front(), high = low;
-  for (const Vec3& vertex : bank.vertices_m)
-    for (std::size_t c = 0; c < 3; ++c) low[c] = std::min(low[c], vertex[c]), high[c] = std::max(high[c], vertex[c]);
-  return norm(high - low);
-}
-
 Place make_place(const bank::Bank& bank, const Vec3& point_m) {
   const bank::NearestPlace found = bank::find_nearest(bank, point_m);
-  if (found.triangle < 0 || !(found.distance_m <= kFarthestShare * calc_extent(bank)))
+  const auto [low, high] = bank::find_extent(bank.vertices_m);
+  if (found.triangle < 0 || !(found.distance_m <= kFarthestShare * norm(high - low)))
     throw InputError(fmt::format("[{:g}, {:g}, {:g}] is not near the surface; give metres", point_m[0], point_m[1], point_m[2]));
-  const auto& corners = bank.triangles[static_cast<std::size_t>(found.triangle)];
-  const auto get = [&](std::size_t c) { return bank.vertices_m[static_cast<std::size_t>(corners[c])]; };
-  const Vec3 across = cross(get(1) - get(0), get(2) - get(0));
+  const Vec3 across = bank::calc_normal(bank.vertices_m, bank.triangles[static_cast<std::size_t>(found.triangle)]);
   Place place{.point_m = found.point_m};
   if (norm(across) > 0.0) place.inward = -1.0 * normalise(across);
   const std::vector<double> shapes = bank::calc_shapes(bank, found.triangle, found.barycentric);

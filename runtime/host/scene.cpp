@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "runtime/base/vector.hpp"
+#include "runtime/host/job_keys.hpp"
 #include "runtime/material/mallets.hpp"
 #include "runtime/material/solids.hpp"
 #include "runtime/material/supports.hpp"
@@ -174,8 +175,7 @@ support::MountingRequest read_support(base::Object& body) {
 /// The bank of a body, or what a job says of one, which the solver's side reads.
 void read_bank_or_job(base::Object& object, SceneBody& body) {
   static const std::vector<std::string> kBodies{"shape", "body", "mesh"};
-  static const std::vector<std::string> kKeys{"shape",     "body",    "mesh",           "mesh_scale", "material",
-                                              "materials", "element", "accuracy_cents", "band_hz",    "max_modes"};
+  static const std::vector<std::string> kKeys(kJobKeys.begin(), kJobKeys.end());
   const bool is_described = std::any_of(kBodies.begin(), kBodies.end(), [&](const std::string& key) { return object.has(key); });
   if (!is_described || object.has("bank")) {
     for (const std::string& key : kKeys)

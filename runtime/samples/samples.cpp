@@ -17,6 +17,7 @@
 #include "runtime/bank/blows.hpp"
 #include "runtime/bank/nearest.hpp"
 #include "runtime/bank/reduce.hpp"
+#include "runtime/bank/surface.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/file.hpp"
 #include "runtime/base/vector.hpp"
@@ -33,6 +34,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr const char* kSampleFolder = "samples";
 constexpr int kVelocities = 127, kKeyCount = 128;
 constexpr std::size_t kMaxPlaces = 64, kMaxMallets = 16;
 constexpr int kMaxLayers = 16, kMaxRoundRobin = 16;
@@ -81,20 +83,38 @@ class Maker {
   }
 
   SampleSet run() {
+    const fs::path place = find_place();
     SampleSet set;
-    std::error_code error;
-    fs::create_directories(options_->folder / "samples", error);
-    if (error)
-      throw SystemError(
-          fmt::format("{}: the folder cannot be made: {}; give another one with -o", options_->folder.string(), error.message()));
     strike_all(set);
+    base::WholeFolder whole(place);
+    folder_ = whole.path();
+    fs::create_directory(folder_ / kSampleFolder);
     const double gain = write_waves(set);
     set.full_scale_pa = 1.0 / gain;
     write_instruments(set);
+    whole.commit();
+    for (fs::path& instrument : set.instruments) instrument = options_->folder / instrument.filename();
     return set;
   }
 
  private:
+  /// The folder, which may be there with an instrument of an earlier call and nothing else.
+  fs::path find_place() const {
+    fs::path place = fs::absolute(options_->folder).lexically_normal();
+    if (place.filename().empty()) place = place.parent_path();
+    std::error_code error;
+    if (!fs::exists(place, error)) return place;
+    bool is_ours = fs::is_directory(place, error);
+    if (is_ours)
+      for (const fs::directory_entry& entry : fs::directory_iterator(place, error))
+        is_ours = is_ours && (entry.path().filename() == kSampleFolder || base::find_extension(entry.path()) == ".sfz");
+    if (!is_ours || error)
+      throw InputError(
+          fmt::format("{}: other files are there, and the folder of an instrument is replaced as a whole; give another one with -o",
+                      options_->folder.string()));
+    return place;
+  }
+
   void check() const {
     const auto require = [](bool is_so, const std::string& message) {
       if (!is_so) throw InputError(message);
@@ -130,9 +150,8 @@ class Maker {
     if (bank_->mode_count() == 0 || bank_->triangles.empty())
       throw InputError(fmt::format("{}: the bank has no modes, so it has no sound", options_->bank.string()));
     scene_.microphones_m = {bank_->rigid.centre_m + Vec3{1.0, 0.0, 0.0}};
-    low_ = high_ = bank_->vertices_m.front();
-    for (const Vec3& x : bank_->vertices_m)
-      for (std::size_t c = 0; c < 3; ++c) low_[c] = std::min(low_[c], x[c]), high_[c] = std::max(high_[c], x[c]);
+    const auto [low, high] = bank::find_extent(bank_->vertices_m);
+    extent_m_ = norm(high - low);
   }
 
   void choose_places() {
@@ -151,12 +170,10 @@ class Maker {
   Vec3 find_point(std::size_t place, int turn) const {
     if (turn == 0) return points_[place];
     const bank::NearestPlace at = bank::find_nearest(*bank_, points_[place]);
-    const auto& corners = bank_->triangles[static_cast<std::size_t>(at.triangle)];
-    const auto get = [&](std::size_t c) { return bank_->vertices_m[static_cast<std::size_t>(corners[c])]; };
-    const Vec3 normal = cross(get(1) - get(0), get(2) - get(0));
+    const Vec3 normal = bank::calc_normal(bank_->vertices_m, bank_->triangles[static_cast<std::size_t>(at.triangle)]);
     if (!(norm(normal) > 0.0)) return points_[place];
     const Vec3 u = find_across(normalise(normal)), v = cross(normalise(normal), u);
-    const double angle = 2.0 * std::numbers::pi * turn / std::max(1, options_->round_robin - 1), far = kAround * norm(high_ - low_);
+    const double angle = 2.0 * std::numbers::pi * turn / std::max(1, options_->round_robin - 1), far = kAround * extent_m_;
     return bank::find_nearest(*bank_, at.point_m + far * std::cos(angle) * u + far * std::sin(angle) * v).point_m;
   }
 
@@ -251,7 +268,7 @@ class Maker {
     std::size_t end = sample.frames.size();
     while (end > 0 && std::abs(static_cast<double>(sample.frames[end - 1])) <= kSilence * sample.peak_pa) --end;
     sample.frames.resize(std::min(sample.frames.size(), std::max(end, static_cast<std::size_t>(kShortestS * options_->rate_hz))));
-    sample.file = fmt::format("samples/{}-{}-{}-v{}{}.wav", name_, options_->mallets[sample.mallet], sample.place + 1,
+    sample.file = fmt::format("{}/{}-{}-{}-v{}{}.wav", kSampleFolder, name_, options_->mallets[sample.mallet], sample.place + 1,
                               layers_[static_cast<std::size_t>(sample.layer)].middle,
                               options_->round_robin > 1 ? fmt::format("-r{}", sample.turn + 1) : "");
     return sample;
@@ -267,7 +284,7 @@ class Maker {
     for (const Sample& sample : samples_) {
       host::SoundStore store(options_->rate_hz, 1);
       store.append(sample.frames);
-      base::WholeFile file(options_->folder / sample.file);
+      base::WholeFile file(folder_ / sample.file);
       host::write_wav(store, gain / share(sample), options_->format, [&](std::string_view bytes) { file.append(bytes); });
       file.commit();
       set.bytes += static_cast<double>(host::calc_wav_bytes(1, options_->format, sample.frames.size()));
@@ -306,7 +323,7 @@ class Maker {
 
   void write_instruments(SampleSet& set) const {
     const auto write = [&](const std::string& name, const std::string& text) {
-      set.instruments.push_back(options_->folder / (name + ".sfz"));
+      set.instruments.push_back(folder_ / (name + ".sfz"));
       base::write_file(set.instruments.back(), text);
     };
     if (options_->keys == Keys::kPitches) {
@@ -337,12 +354,13 @@ class Maker {
   }
 
   const SampleOptions* options_;
+  fs::path folder_;  // where it is filled, until it is whole
   std::string name_;
   std::vector<Layer> layers_;
   host::Scene scene_;
   host::Banks banks_;
   const bank::Bank* bank_ = nullptr;
-  Vec3 low_{}, high_{};
+  double extent_m_ = 0.0;
   std::vector<Vec3> points_;
   std::vector<Sample> samples_;
   double error_sum_ = 0.0;

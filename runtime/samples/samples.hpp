@@ -17,7 +17,7 @@ enum class Keys { kPlaces, kPitches };
 inline const std::vector<std::string> kKeysNames{"places", "pitches"};
 
 struct SampleOptions {
-  std::filesystem::path bank, folder;  // the folder is made
+  std::filesystem::path bank, folder;  // the folder is made, whole or not at all
   std::string name;                    // of the instrument's file; empty: the stem of the bank's
   std::size_t places = 4;              // bank::find_strikes(), unless points_m names them
   std::vector<Vec3> points_m{};

@@ -14,6 +14,7 @@
 #include "runtime/bank/corrected.hpp"
 #include "runtime/bank/edits.hpp"
 #include "runtime/bank/of_material.hpp"
+#include "runtime/bank/surface.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/json.hpp"
@@ -140,10 +141,7 @@ Vec3 find_point(const bank::Bank& bank, std::int32_t triangle, const Vec3& baryc
 
 /// Out of the body; not of unit length where the triangle has no area.
 Vec3 find_normal(const bank::Bank& bank, std::int32_t triangle) {
-  const auto& corners = bank.triangles[static_cast<std::size_t>(triangle)];
-  const Vec3 &p = bank.vertices_m[static_cast<std::size_t>(corners[0])], &q = bank.vertices_m[static_cast<std::size_t>(corners[1])],
-             &r = bank.vertices_m[static_cast<std::size_t>(corners[2])];
-  const Vec3 across = cross(q - p, r - p);
+  const Vec3 across = bank::calc_normal(bank.vertices_m, bank.triangles[static_cast<std::size_t>(triangle)]);
   return (1.0 / std::max(norm(across), 1e-300)) * across;
 }
 

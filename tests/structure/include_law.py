@@ -133,7 +133,7 @@ LAW = {
     "jobs/report": (["runtime/base", "runtime/bank"], ["fmt", "json"]),
     "jobs/cache": (["runtime/base", "precompute/job", "jobs/process", "jobs/store"], ["fmt"]),
     "jobs/explore": (
-        ["runtime/base", "runtime/bank", "runtime/material", "runtime/version", "jobs/process"],
+        ["runtime/base", "runtime/bank", "runtime/material", "runtime/version", "runtime/host", "jobs/process", "jobs/report"],
         ["fmt", "json", "zlib", "httplib"],
     ),
     "jobs/hear": (

@@ -180,7 +180,19 @@ class SamplesTest(unittest.TestCase):
             done = run(BIN / "carillon-samples", *words, "-o", "none", "-q", cwd=self.folder, code=2)
             self.assertIn(said, done.stderr)
             self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
-            self.assertFalse((self.folder / "none" / "none.sfz").exists())
+            self.assertFalse((self.folder / "none").exists())
+
+    def test_the_folder_is_replaced_as_a_whole_and_never_one_with_other_files(self):
+        options = "--places 1 --layers 1 --seconds 0.2"
+        self.make(self.bank, "again", "--places 2 --layers 2 --seconds 0.2")
+        self.make(self.bank, "again", options)
+        files = sorted(path.name for path in (self.folder / "again").rglob("*") if path.is_file())
+        self.assertEqual(files, ["bar-hard-wood-1-v64.wav", "bar.sfz"])
+        (self.folder / "again" / "notes.txt").write_text("mine")
+        done = run(BIN / "carillon-samples", self.bank, "-o", "again", "-q", cwd=self.folder, code=2)
+        self.assertIn("other files are there", done.stderr)
+        self.assertEqual(sorted(path.name for path in (self.folder / "again").rglob("*") if path.is_file()), [*files, "notes.txt"])
+        self.assertEqual([path.name for path in self.folder.glob(".*")], [])
 
 
 if __name__ == "__main__":

@@ -190,6 +190,12 @@ class Explore(unittest.TestCase):
             response, body = server.get(path)
             self.assertEqual(response.status, 404, path)
             self.assertNotIn(b"secret", body.replace(path.encode(), b""))
+        (self.root / "served" / "out").symlink_to(self.root / "secret.txt")
+        (self.root / "served" / "in").symlink_to("scene.json")
+        self.assertEqual(server.get("/out")[0].status, 404)
+        self.assertEqual(server.get("/in")[0].status, 200)
+        for link in ("out", "in"):
+            (self.root / "served" / link).unlink()
         self.assertEqual(server.get("/scene.json", Host="evil.example")[0].status, 421)
         self.assertEqual(server.get("/scene.json", Host=f"localhost:{server.port}")[0].status, 200)
         for name in {info[4][0] for info in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)} - {"127.0.0.1"}:
