@@ -28,10 +28,10 @@ constexpr double kMaxTurn = 0.5;      // cosine: a collapse or a move may not tu
 constexpr double kMaxFlipTurn = 0.7;  // cosine, between the triangles before and after a flip
 constexpr double kMaxTilt = 0.35;     // of the normal at a border, radians
 constexpr double kSpeck = 0.02;       // of the wanted length's square: twice the area of a triangle that has no normal of its own
-constexpr double kMinSine = 0.3, kMinRingPart = 0.15, kMaxRingPart = 0.75;  // of edges at rings
-constexpr double kFlatFold = 0.98, kPerMitre = 1.3;                         // a fold that takes nothing; edges over what its mitre takes
-constexpr double kRoom = 0.13, kRoomShape = 0.1;                            // of a triangle between the mitres of folds, see make_room()
-constexpr double kMinHeight = 0.02;                                         // of a triangle's longest edge: flatter ones have no normal
+constexpr double kMinRingPart = 0.15, kMaxRingPart = 0.75;  // of edges at rings
+constexpr double kFlatFold = 0.98, kPerMitre = 1.3;         // a fold that takes nothing; edges over what its mitre takes
+constexpr double kRoom = 0.13, kRoomShape = 0.1;            // of a triangle between the mitres of folds, see make_room()
+constexpr double kMinHeight = 0.02;                         // of a triangle's longest edge: flatter ones have no normal
 
 Vec3 calc_unit(const Vec3& a) {
   const double length = norm(a);
@@ -92,9 +92,8 @@ class Remesher {
       along[a].push_back(b);
       along[b].push_back(a);
     }
-    struct Leaving {
-      Vec3 across{};  // unit: at right angles to one of the folds here
-      double sine = 1, distance = 0;
+    struct Leaving : LeavingEdge {
+      double distance = 0;
     };
     // Of the edge from a to b: each fold at a that it leaves by less than a right angle, and how far its ring is.
     const auto list_leaving = [&](std::int32_t a, std::int32_t b) {
@@ -104,10 +103,10 @@ class Remesher {
         const Vec3 side = calc_unit(x_[c] - x_[a]);
         const double cosine = dot(side, way);
         const Vec3 across = calc_unit(way - cosine * side);
-        if (cosine > 0)
-          leaving.push_back({across, std::max(std::sqrt(std::max(1 - cosine * cosine, 0.0)), kMinSine), distance_m(a, across)});
+        if (cosine > 0) leaving.push_back({{a, way, across, std::max(std::sqrt(std::max(1 - cosine * cosine, 0.0)), kMinSine)}});
       }
-      if (leaving.empty()) leaving.push_back({way, 1, distance_m(a, way)});
+      if (leaving.empty()) leaving.push_back({{a, way, way, 1}});
+      for (Leaving& one : leaving) one.distance = distance_m(one);
       return leaving;
     };
     // What lies between fold and ring is moved out to the ring.

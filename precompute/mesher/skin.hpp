@@ -40,8 +40,14 @@ std::vector<std::array<Vec3, 3>> find_skin_normals(const Skin& skin);
 Skin remesh(const Skin& skin, const SkinSizes& sizes, const SkinPlaces& places);
 
 /// Where edges leave a fold or border, a ring of narrow triangles follows it: each is cut at the distance from the fold that `distance_m`
-/// says for its point on it and the unit vector across the fold. Where that is 0, or nearly the whole edge, it stays.
-using RingDistance = std::function<double(std::int32_t point, const Vec3& across)>;
+/// says. Where that is 0, or nearly the whole edge, it stays.
+struct LeavingEdge {
+  std::int32_t point = 0;  // on the fold
+  Vec3 way{}, across{};    // unit: along the edge, and at right angles to the fold
+  double sine = 1;         // of the angle between edge and fold, at least kMinSine
+};
+inline constexpr double kMinSine = 0.3;
+using RingDistance = std::function<double(const LeavingEdge& edge)>;
 Skin add_rings(const Skin& skin, const SkinPlaces& places, const RingDistance& distance_m);
 
 /// Moves points and turns edges where a copy of a triangle, whose points lie `levels_m` along their `ways`, is folded over or much smaller

@@ -324,13 +324,15 @@ class ThinMesher {
     const std::vector<Vec3> low = low_source_ ? find_low(plain, ways) : std::vector<Vec3>{};
     std::vector<char> on_border(points, 0);
     for (const auto& [a, b] : find_border(plain.surface)) on_border[a] = on_border[b] = 1;
-    attempt.skin = add_rings(plain, places_, [&](std::int32_t v, const Vec3& across) {
-      const Vec3& out = ways[static_cast<std::size_t>(v)];
+    attempt.skin = add_rings(plain, places_, [&](const LeavingEdge& leaving) {
+      const std::int32_t v = leaving.point;
+      const Vec3 &out = ways[static_cast<std::size_t>(v)], &across = leaving.across;
       double distance = on_border[v] != 0 ? kRimRing * wall : 0;
       if (norm(out) > kRingFrom) {
-        // The mitre takes so much of the ring's side at the wall's inner corner.
+        // The mitre takes so much of the ring's side at the wall's inner corner. A measured corner lies off the plane of edge and fold
+        // where the wall is round, and counts along the edge.
         const auto point = static_cast<std::size_t>(v);
-        const double shift = low_source_ ? dot(low[point] - plain.surface.points[point], across)
+        const double shift = low_source_ ? dot(low[point] - plain.surface.points[point], leaving.way) / leaving.sine
                                          : std::max(levels_[0] * dot(out, across), levels_[1] * dot(out, across));
         distance = std::max(shift, 0.0) + calc_margin(edge_m);
       }
