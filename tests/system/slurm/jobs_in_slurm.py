@@ -3,6 +3,7 @@
 
 usage: jobs_in_slurm.py BIN_DIR CLUSTER_DIR CASE        exits 77 (skipped) when there is no cluster in CLUSTER_DIR
 """
+import contextlib
 import json
 import os
 import pathlib
@@ -15,8 +16,8 @@ import time
 BIN, CLUSTER, CASE = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]).resolve(), sys.argv[3]
 SCRIPT = pathlib.Path(__file__).resolve().parents[3] / "deploy/slurm/cluster"
 os.environ["SLURM_CONF"] = str(CLUSTER / "slurm.conf")
-QUICK, SLOW = 300, 20000  # nodes: a second of work, and half a minute
-MANY = [20, 250000]  # a band of 310 modes of 4000 nodes, found in several parts that are saved one by one
+QUICK = 300  # nodes: a second of work
+SLOW = {"nodes": 20000, "band_hz": [20, 400000]}  # ten seconds on two idle cores, found in several parts that are saved one by one
 
 
 def check(holds, text):
@@ -100,6 +101,19 @@ class Store:
             time.sleep(0.2)
 
 
+@contextlib.contextmanager
+def paused(pids):
+    """Stops processes meanwhile, so that what follows comes while they run, however fast they are."""
+    for pid in pids:
+        os.kill(pid, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        for pid in pids:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGCONT)
+
+
 def program(pid):
     try:
         return os.path.basename(os.readlink(f"/proc/{pid}/exe"))
@@ -151,8 +165,8 @@ def array(store):
 def cancel(store):
     """A job that runs and one that waits are cancelled; Slurm has neither any more. scancel is noticed too. retry asks again."""
     one, two = (
-        store.submit(store.write("one.json", SLOW), "--ranks", "2")[0],
-        store.submit(store.write("two.json", SLOW, 1), "--ranks", "2")[0],
+        store.submit(store.write("one.json", **SLOW), "--ranks", "2")[0],
+        store.submit(store.write("two.json", number=1, **SLOW), "--ranks", "2")[0],
     )
     store.wait_for_solver(one, 2)
     for job in (two, one):
@@ -171,16 +185,17 @@ def cancel(store):
 def time_limit(store):
     """Slurm's signal before the time limit: the job saves, is queued again by itself, continues, and its bank is that of a run in one
     piece."""
-    job = store.submit(store.write("slow.json", 4000, band_hz=MANY), "--ranks", "2", "--time-limit", "10m")[0]
-    store.wait_for_solver(job, 2)
+    job = store.submit(store.write("slow.json", **SLOW), "--ranks", "2", "--time-limit", "10m")[0]
+    ranks = store.wait_for_solver(job, 2)
     deadline = time.monotonic() + 100
     while not (store.status(job)["modes_done"] or 0) > 0:
         check(time.monotonic() < deadline, lambda: f"nothing is found: {store.status(job)}\n{store.log(job)}")
         time.sleep(0.1)
-    slurm_job = store.status(job)["slurm_job"]
-    limit = subprocess.run(["scontrol", "--oneliner", "show", "job", slurm_job], capture_output=True, text=True).stdout
-    check("TimeLimit=00:10:00" in limit, f"the limit is not Slurm's: {limit}")
-    subprocess.run(["scancel", "--batch", "--signal=USR1", slurm_job], check=True)
+    with paused(ranks):
+        slurm_job = store.status(job)["slurm_job"]
+        limit = subprocess.run(["scontrol", "--oneliner", "show", "job", slurm_job], capture_output=True, text=True).stdout
+        check("TimeLimit=00:10:00" in limit, f"the limit is not Slurm's: {limit}")
+        subprocess.run(["scancel", "--batch", "--signal=USR1", slurm_job], check=True)
     row = store.wait(job, "done", 150)
     check(row["slurm_job"] is None or row["slurm_job"] == slurm_job, f"another job of Slurm did it: {row}")
     check(
@@ -194,7 +209,7 @@ def time_limit(store):
 
 def killed_rank(store):
     """kill -9 of one rank: Slurm queues the job again, with a back-off, and it is done in the end."""
-    job = store.submit(store.write("slow.json", SLOW), "--ranks", "2")[0]
+    job = store.submit(store.write("slow.json", **SLOW), "--ranks", "2")[0]
     os.kill(store.wait_for_solver(job, 2)[0], signal.SIGKILL)
     store.wait(job, "done", 150)
     check(
@@ -218,19 +233,19 @@ def wait_until_saved(number):
 def killed_daemon(store):
     """kill -9 of the node's daemon and of the controller: the job continues, its state stays while there is no answer, and is right
     afterwards."""
-    job = store.submit(store.write("slow.json", SLOW), "--ranks", "2")[0]
-    store.wait_for_solver(job, 2)
-    wait_until_saved(store.wait(job, "running", 20)["slurm_job"])
-    cluster("kill", "slurmd")
-    cluster("kill", "slurmctld")
-    check(store.status(job)["state"] == "running", lambda: f"a controller that does not answer changed the state: {store.status(job)}")
-    waiting = store.submit(store.write("quick.json", QUICK, 1), "--ranks", "1")[0]
-    check(waiting["state"] == "queued" and waiting["slurm_job"] is None, f"handed over to no Slurm: {waiting}")
-    cluster("revive", "slurmctld")
-    cluster("revive", "slurmd")
-    deadline = time.monotonic() + 30
-    while subprocess.run(["scontrol", "ping"], capture_output=True, text=True).stdout.find("UP") < 0 and time.monotonic() < deadline:
-        time.sleep(0.2)
+    job = store.submit(store.write("slow.json", **SLOW), "--ranks", "2")[0]
+    with paused(store.wait_for_solver(job, 2)):
+        wait_until_saved(store.wait(job, "running", 20)["slurm_job"])
+        cluster("kill", "slurmd")
+        cluster("kill", "slurmctld")
+        check(store.status(job)["state"] == "running", lambda: f"a controller that does not answer changed the state: {store.status(job)}")
+        waiting = store.submit(store.write("quick.json", QUICK, 1), "--ranks", "1")[0]
+        check(waiting["state"] == "queued" and waiting["slurm_job"] is None, f"handed over to no Slurm: {waiting}")
+        cluster("revive", "slurmctld")
+        cluster("revive", "slurmd")
+        deadline = time.monotonic() + 30
+        while subprocess.run(["scontrol", "ping"], capture_output=True, text=True).stdout.find("UP") < 0 and time.monotonic() < deadline:
+            time.sleep(0.2)
     store.submit(store.folder / "quick.json")
     for ended in (job, waiting):
         store.wait(ended, "done", 150)
@@ -240,7 +255,7 @@ def killed_daemon(store):
 def lost_registry(store):
     """The registry is gone, and so is the number that Slurm gave: the job is found by its name, nothing is submitted twice, and --wait sees
     its end."""
-    job = store.submit(store.write("slow.json", SLOW), "--ranks", "2")[0]
+    job = store.submit(store.write("slow.json", **SLOW), "--ranks", "2")[0]
     numbers = list((store.folder / "store/slurm").glob("*/number"))
     check([file.read_text().strip() for file in numbers] == [job["slurm_job"]], f"the number is not written: {numbers}")
     for file in [*numbers, *(store.folder / "store").glob("registry.sqlite*")]:
@@ -256,7 +271,7 @@ def lost_registry(store):
 
 def memory_limit(store):
     """More memory than asked for: failed, the reason says so and what to do, and it is not tried again and again."""
-    job = store.submit(store.write("big.json", 4 * SLOW), "--ranks", "1", "--memory-gb", "0.06")[0]
+    job = store.submit(store.write("big.json", 80000), "--ranks", "1", "--memory-gb", "0.06")[0]
     row = store.wait(job, "failed", 100)
     check("memory" in row["reason"] and "memory_gb" in row["reason"], f"not the true reason: {row['reason']}")
     check(row["attempts"] == 1, f"tried again: {row}")
