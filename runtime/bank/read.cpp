@@ -17,7 +17,7 @@
 #include <numbers>
 
 #include "runtime/bank/bank.hpp"
-#include "runtime/bank/large.hpp"
+#include "runtime/base/large.hpp"
 #include "runtime/bank/layout.hpp"
 #include "runtime/bank/seal.hpp"
 #include "runtime/base/sha256.hpp"
@@ -200,7 +200,7 @@ void allocate(const Seal& seal, const std::string& name, Loaded& loaded) {
   if (bank.shape_bytes == 1) {
     form.narrow_shape.resize(vertices * modes * 3);
   } else {
-    reserve_large(bank.shape, vertices * modes * 3);  // load() appends
+    base::reserve_large(bank.shape, vertices * modes * 3);  // load() appends
   }
   const auto make_text = [&](const std::string& field, std::string& text) {
     const Extent& extent = get_extent(seal, field, name);

@@ -16,7 +16,7 @@
 #include <unordered_map>
 #include <utility>
 
-#include "runtime/bank/large.hpp"
+#include "runtime/base/large.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/synth/oscillator.hpp"
 
@@ -222,7 +222,7 @@ void Model::copy_shapes(const bank::Bank& bank) {
   surface_ = surface;
   surface->triangles = bank.triangles;
   const std::size_t columns = surface->columns = sound_.size() * kGroup + damped_.size();
-  bank::reserve_large(surface->shape, bank.vertex_count() * 3 * columns);
+  base::reserve_large(surface->shape, bank.vertex_count() * 3 * columns);
   std::vector<std::int16_t> row(3 * columns, 0);  // of a vertex; lanes without a mode stay 0
   std::vector<std::uint32_t> first, column;       // of each mode: its place in a vertex's row of the bank, and here
   for (std::size_t i = 0; i < modes_.size(); ++i) {

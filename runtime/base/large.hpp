@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace carillon::bank {
+namespace carillon::base {
 
 /// As values.reserve(count). Asks for large pages, where the system has them: a page of 4 KiB that is touched for the first time costs
 /// more than the writing of it. To append what comes then is cheaper than to overwrite zeros.
@@ -22,4 +22,4 @@ void reserve_large(std::vector<T>& values, std::size_t count) {
 #endif
 }
 
-}  // namespace carillon::bank
+}  // namespace carillon::base

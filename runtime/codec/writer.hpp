@@ -1,0 +1,35 @@
+// The other side of Reader.
+#pragma once
+
+#include <concepts>
+#include <cstdint>
+#include <cstring>
+#include <span>
+#include <vector>
+
+namespace carillon::codec {
+
+class Writer {
+ public:
+  template <class T>
+  requires std::integral<T> || std::floating_point<T>
+  void put(T value) {
+    bytes_.resize(bytes_.size() + sizeof value);
+    std::memcpy(bytes_.data() + bytes_.size() - sizeof value, &value, sizeof value);
+  }
+  template <class T>
+  void put_list(std::span<const T> values) {
+    for (const T value : values) put(value);
+  }
+  /// SystemError when there is no memory.
+  void put_block(std::span<const std::uint8_t> block);
+  /// values < 256^planes.
+  void put_planes(std::span<const std::uint32_t> values, int planes);
+
+  const std::vector<std::uint8_t>& get_bytes() const { return bytes_; }
+
+ private:
+  std::vector<std::uint8_t> bytes_;
+};
+
+}  // namespace carillon::codec
