@@ -10,8 +10,9 @@
 
 #include <algorithm>
 #include <cctype>
+#include <charconv>
 #include <cmath>
-#include <limits>
+#include <cstdlib>
 #include <numeric>
 
 #include "runtime/base/failure.hpp"
@@ -100,6 +101,28 @@ std::string join(const std::vector<std::string>& words) {
   return text;
 }
 
+/// The double that is nearest to a number of JSON; nothing when it is too large. By the standard library: RapidJSON's own conversion counts
+/// the leading zeros of 0, which is undefined.
+std::optional<double> to_double(std::string_view text) {
+#ifdef __cpp_lib_to_chars
+  double number = 0.0;
+  auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error == std::errc::result_out_of_range) {
+    // Too large or too small: a long double tells. Beyond that as well, it is small if its exponent is negative or its whole part 0.
+    long double wide = 0.0L;
+    const bool is_within = std::from_chars(text.data(), text.data() + text.size(), wide).ec == std::errc();
+    if (!is_within && text.find('-', 1) == std::string_view::npos && text.substr(text.starts_with('-') ? 1 : 0, 1) != "0")
+      return std::nullopt;
+    number = static_cast<double>(wide);
+    error = std::errc();
+  }
+  if (error != std::errc()) return std::nullopt;
+#else
+  const double number = std::strtod(std::string(text).c_str(), nullptr);  // WebAssembly, where there is but one locale
+#endif
+  return std::isfinite(number) ? std::optional(number) : std::nullopt;
+}
+
 /// Makes Values of the events of a rapidjson::Reader.
 class Builder {
  public:
@@ -107,19 +130,13 @@ class Builder {
 
   bool Null() { return add({}); }
   bool Bool(bool is_true) { return add({.kind = Value::Kind::kBoolean, .is_true = is_true}); }
-  bool Int(int x) { return add_integer(x); }
-  bool Uint(unsigned x) { return add_integer(x); }
-  bool Int64(std::int64_t x) { return add_integer(x); }
-  bool Uint64(std::uint64_t x) {
-    return x <= std::numeric_limits<std::int64_t>::max() ? add_integer(static_cast<std::int64_t>(x)) : Double(static_cast<double>(x));
-  }
-  bool Double(double x) {
-    constexpr double kBeyond = 9223372036854775808.0;  // 2^63
-    const bool is_whole = x == std::floor(x) && x >= -kBeyond && x < kBeyond;
-    return add(
-        {.kind = Value::Kind::kNumber, .integer = is_whole ? std::optional(static_cast<std::int64_t>(x)) : std::nullopt, .number = x});
-  }
-  bool RawNumber(const char*, rapidjson::SizeType, bool) { return false; }
+  bool RawNumber(const char* text, rapidjson::SizeType size, bool) { return add_number({text, size}); }
+  // Numbers come as text.
+  bool Int(int) { return false; }
+  bool Uint(unsigned) { return false; }
+  bool Int64(std::int64_t) { return false; }
+  bool Uint64(std::uint64_t) { return false; }
+  bool Double(double) { return false; }
   bool String(const char* text, rapidjson::SizeType size, bool) {
     return add({.kind = Value::Kind::kText, .text = std::string(text, size)});
   }
@@ -148,7 +165,19 @@ class Builder {
  private:
   /// Somewhere from the beginning of what was read last to the byte behind it: that a token lies on one line is what counts.
   std::ptrdiff_t get_offset() const { return stream_->src_ - stream_->head_; }
-  bool add_integer(std::int64_t x) { return add({.kind = Value::Kind::kNumber, .integer = x, .number = static_cast<double>(x)}); }
+  bool add_number(std::string_view text) {
+    std::int64_t integer = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), integer);
+    if (error == std::errc() && end == text.data() + text.size())
+      return add({.kind = Value::Kind::kNumber, .integer = integer, .number = static_cast<double>(integer)});
+    const std::optional<double> number = to_double(text);
+    if (!number) data_->fail(get_offset(), fmt::format("this is not JSON: the number {} is too large; correct it", text.substr(0, 40)));
+    constexpr double kBeyond = 9223372036854775808.0;  // 2^63
+    const bool is_whole = *number == std::floor(*number) && *number >= -kBeyond && *number < kBeyond;
+    return add({.kind = Value::Kind::kNumber,
+                .integer = is_whole ? std::optional(static_cast<std::int64_t>(*number)) : std::nullopt,
+                .number = *number});
+  }
   bool add(Value value) {
     value.offset = get_offset();
     Value& into = *open_.back();
@@ -279,7 +308,8 @@ Document parse_document(std::string_view text, const std::filesystem::path& file
   rapidjson::StringStream stream(data->text.c_str());
   Builder builder(*data, stream, data->root);
   rapidjson::Reader reader;
-  const rapidjson::ParseResult result = reader.Parse<rapidjson::kParseFullPrecisionFlag | rapidjson::kParseCommentsFlag>(stream, builder);
+  const rapidjson::ParseResult result =
+      reader.Parse<rapidjson::kParseNumbersAsStringsFlag | rapidjson::kParseCommentsFlag>(stream, builder);
   if (result.IsError()) fail_syntax(*data, result);
   if (!data->root.is(Value::Kind::kObject))
     throw InputError(

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+
 namespace {
 
 using carillon::InputError;
@@ -121,6 +123,37 @@ TEST(Document, numbers_are_those_of_json_and_nothing_else) {
   for (const char* bad : {"NaN", "Infinity", "inf", "nan", "True", "None"})
     EXPECT_NE(message_of([&] { parse(std::string("{\n\"a\": ") + bad + "}").number("a"); }).find("file.json:2"), std::string::npos) << bad;
   EXPECT_NE(message_of([] { parse("{\"a\": 0915}"); }).find("does not begin with a zero"), std::string::npos);
+}
+
+TEST(Document, numbers_are_the_nearest_doubles) {
+  // C's strtod is the oracle; zeros in long forms, halves between two doubles, and both ends of the range.
+  for (const char* text : {"0",
+                           "-0.0",
+                           "0e-30",
+                           "0e308",
+                           "0.00000000000000000000000000000000000000000e-5",
+                           "0.5",
+                           "-12.5e-3",
+                           "1E+22",
+                           "9007199254740993",
+                           "9007199254740993.0",
+                           "9223372036854775807",
+                           "9223372036854775808",
+                           "18446744073709551616",
+                           "1.7976931348623157e308",
+                           "2.2250738585072014e-308",
+                           "4.9e-324",
+                           "1e-400",
+                           "0.1234567890123456789012345678901",
+                           "123456789012345678901234567890",
+                           "-1e-5000"}) {
+    const double number = parse(std::string("{\"a\": ") + text + "}").number("a");
+    EXPECT_EQ(number, std::strtod(text, nullptr)) << text;
+  }
+  for (const char* text : {"1e309", "-1e309", "1.8e308", "1e99999"})
+    EXPECT_NE(message_of([&] { parse(std::string("{\n\"a\": ") + text + "}").number("a"); }).find("file.json:2: this is not JSON"),
+              std::string::npos)
+        << text;
 }
 
 TEST(Document, what_looks_like_a_number_in_texts_keys_and_comments_is_left_alone) {
