@@ -1,4 +1,4 @@
-// Vectors of kLanes floats (and half as many doubles) in every loop.
+// Vectors of kLanes floats (and half as many doubles) in every loop. The including source defines CARILLON_LANES.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -11,8 +11,9 @@ namespace {
 
 constexpr double kPerDistance2 = 0.3 * 0.3, kLinear = 100.0, kNugget = 1e-4;
 
-template <int kLanes>
+/// The loops of this instruction set.
 struct Kernels {
+  static constexpr int kLanes = CARILLON_LANES;
   typedef float Vector __attribute__((vector_size(4 * kLanes)));
   typedef std::int32_t Integers __attribute__((vector_size(4 * kLanes)));
   typedef std::int16_t Shorts __attribute__((vector_size(2 * kLanes)));

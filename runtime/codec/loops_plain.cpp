@@ -1,7 +1,8 @@
+#define CARILLON_LANES 4
 #include "runtime/codec/loops.inl"
 
 namespace carillon::codec {
 
-const Loops kLoopsPlain = Kernels<4>::kAll;
+const Loops kLoopsPlain = Kernels::kAll;
 
 }  // namespace carillon::codec
