@@ -24,7 +24,7 @@ set(CPACK_DEBIAN_RUNTIME_PACKAGE_DEPENDS fonts-dejavu-core)
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME carillon-runtime-dev)
 set(CPACK_COMPONENT_DEV_DESCRIPTION "Headers and libraries of Carillon's runtime, for C (carillon.h, pkg-config) and C++ (CMake)")
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
-set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "carillon-runtime (= ${PROJECT_VERSION}), libfmt-dev, libjsoncpp-dev, libhdf5-dev, libssl-dev")
+set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "carillon-runtime (= ${PROJECT_VERSION}), libfmt-dev, libjsoncpp-dev, libhdf5-dev, libdeflate-dev, libssl-dev")
 
 set(CPACK_DEBIAN_PRECOMPUTE_PACKAGE_NAME carillon-precompute)
 set(CPACK_COMPONENT_PRECOMPUTE_DESCRIPTION "Vibration modes of solid objects: carillon-precompute, carillon-mesh, carillon-draw and the queue carillon")

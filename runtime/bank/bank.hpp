@@ -17,8 +17,7 @@
 
 namespace carillon::bank {
 
-inline constexpr int kVersionMajor = 1;
-inline constexpr int kVersionMinor = 4;
+inline constexpr int kVersionMajor = 2;  // of packed banks; all others are 1.x
 
 /// Air, as OCE01 section 4 has it: radiation gains are made with it and sound travels in it.
 inline constexpr double kAirDensityKgM3 = 1.21;
@@ -116,6 +115,15 @@ struct Corrected {
   bool is_empty() const { return freq_hz.empty(); }
 };
 
+/// What is known of shapes that were packed: they are not quite what the solve found. W witnesses.
+struct Packing {
+  double error_db = 0.0;              // A-weighted exposure of the error of a hard blow along the normal over that of the blow itself, by
+                                      // calc_blow_exposure(), as means over the outer surface [dB]
+  double worst_db = 0.0;              // the same of the vertex of the outer surface where it is greatest
+  std::vector<std::int32_t> witness;  // (W) vertices of the outer surface whose shapes before packing are kept, for checks
+  std::vector<std::int16_t> witness_shape;  // (W, m, 3) in steps of shape_scale
+};
+
 /// Sizes of the solve behind the bank.
 struct Counts {
   std::int64_t nodes = 0;  // of the volume mesh as solved (mid-side nodes included)
@@ -142,6 +150,8 @@ struct Bank {
   std::vector<double> algebraic_error_cents;       // (m), or empty: unknown
   std::vector<double> discretisation_error_cents;  // (m), or empty: unknown; infinite: of this mode unknown
   Corrected corrected;                             // or empty: unknown; since 1.4
+
+  std::optional<Packing> packing;  // of a bank from a packed file, since 2.0; write_bank() leaves it out, edits drop it
 
   RigidBody rigid;
   Supports supports;  // of a body with fixed nodes, since 1.3
@@ -206,7 +216,8 @@ std::string describe_accuracy(const Bank& bank);
 
 /// Reads a bank. Throws InputError for anything that is not a whole bank of a version this reader knows: missing file, not a bank,
 /// newer major version, truncated or changed bytes (checksum), arrays that disagree, content that is not sane. Bytes are untrusted: no
-/// byte is interpreted by HDF5, and no more memory is taken than three times the file's length. SystemError when the disk fails to read.
+/// byte is interpreted by HDF5, and no more memory is taken than three times the file's length (of a packed bank, than 64 MiB or 4096 times
+/// it). SystemError when the disk fails to read.
 Bank read_bank(const std::filesystem::path& file);
 
 /// The same from bytes in memory; `name` stands for the file in messages.

@@ -68,6 +68,7 @@ Check check_arrays(const Bank& bank) {
     expect("correction", corrected.correction.size(), modes);
   }
   expect("shape", bank.shape.size(), vertices * modes * 3);
+  if (bank.packing) expect("pack/witness_shape", bank.packing->witness_shape.size(), bank.packing->witness.size() * modes * 3);
   const Supports& supports = bank.supports;
   expect("supports/centre_m", supports.centre_m.size(), supports.count());
   expect("supports/normal", supports.normal.size(), supports.count());
@@ -98,6 +99,10 @@ Check check_numbers(const Bank& bank) {
   look("radiation_gain", bank.radiation_gain.data(), bank.mode_count());
   look("shape_scale", bank.shape_scale.data(), bank.mode_count());
   look("band_hz", bank.band_hz.data(), 2);
+  if (bank.packing) {
+    look("pack/error_db", &bank.packing->error_db, 1);
+    look("pack/worst_db", &bank.packing->worst_db, 1);
+  }
   look("mass_kg", &bank.rigid.mass_kg, 1);
   look("centre_m", bank.rigid.centre_m.data(), 3);
   look("inertia_kg_m2", bank.rigid.inertia_kg_m2.data(), 9);

@@ -116,6 +116,7 @@ Bank calc_edited(const Bank& bank, const Edits& edits) {
   const double freq_scale = std::sqrt(eigenvalue_scale);
   const double area = calc_outer_area_m2(bank);
   Bank edited = bank;
+  edited.packing.reset();
   edited.material.young_modulus_pa *= k;
   edited.material.density_kg_m3 *= s;
   if (edits.alphas) {

@@ -227,7 +227,9 @@ std::uint64_t get_end_of_file(const Keeper& kept) {
 
 }  // namespace
 
-Hdf5Image make_hdf5_image(const Bank& bank, const std::vector<Field>& fields) {
+Hdf5Image make_hdf5_image(const Bank& bank, const FileForm& form) {
+  const std::vector<Field> fields = list_fields(bank, form);
+  const bool is_packed = form.is_packed;
   const Silence silence;
   const Id creation = make_properties(H5P_FILE_CREATE);
   require(H5Pset_userblock(creation, kSealBytes), "reserve the seal");
@@ -256,10 +258,10 @@ Hdf5Image make_hdf5_image(const Bank& bank, const std::vector<Field>& fields) {
       }
     }
     for (const Field& field : fields) image.extents.emplace(field.name, write_field(file, field));
-    write_vtk_views(file, bank);
+    if (!is_packed) write_vtk_views(file, bank);
     const Id root(H5Gopen2(file, "/", H5P_DEFAULT), H5Gclose, "the root");
     write_text_attribute(root, "format", "Carillon mode bank");
-    write_text_attribute(root, "version", fmt::format("{}.{}", kVersionMajor, find_version_minor(bank)));
+    write_text_attribute(root, "version", fmt::format("{}", fmt::join(find_version(bank, is_packed), ".")));
   } catch (...) {
     H5Fclose(file);
     std::free(keeper.memory);

@@ -21,7 +21,8 @@ struct Hdf5Image {
   std::map<std::string, Extent> extents;
 };
 
-/// Lays the arrays and the /VTKHDF views out as an HDF5 file. Not thread-safe (HDF5 is not). SystemError when HDF5 or memory fails.
-Hdf5Image make_hdf5_image(const Bank& bank, const std::vector<Field>& fields);
+/// Lays the arrays, and of a bank that is not packed the /VTKHDF views, out as an HDF5 file. Not thread-safe (HDF5 is not). SystemError
+/// when HDF5 or memory fails.
+Hdf5Image make_hdf5_image(const Bank& bank, const FileForm& form);
 
 }  // namespace carillon::bank

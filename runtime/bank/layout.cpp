@@ -98,6 +98,25 @@ void add_later_fields(const Bank& bank, const FileForm& form, std::vector<Field>
                       &proof.complete_below_hz});
 }
 
+/// What a packed bank has in place of mesh and shapes.
+void add_packed_fields(const Bank& bank, const FileForm& form, std::vector<Field>& fields) {
+  const Packing& packing = *bank.packing;
+  fields.insert(
+      fields.end(),
+      {{"mesh/packed", "|u1", find_shape(form.packed_surface), "1", "vertices and triangles, packed: docs/bank-format.md",
+        form.packed_surface.data()},
+       {"modes/packed_shape", "|u1", find_shape(form.packed_shape), "1", "shapes, packed: docs/bank-format.md", form.packed_shape.data()},
+       {"pack/error_db", "<f8", {}, "dB(A)", "error of a hard blow over the blow, mean over the surface", &packing.error_db},
+       {"pack/worst_db", "<f8", {}, "dB(A)", "the same where it is greatest", &packing.worst_db},
+       {"pack/witness", "<i4", find_shape(packing.witness), "1", "vertices whose shapes before packing are here", packing.witness.data()},
+       {"pack/witness_shape",
+        "<i2",
+        {packing.witness.size(), bank.mode_count(), 3},
+        "modes/shape_scale",
+        "their shapes before packing",
+        packing.witness_shape.data()}});
+}
+
 }  // namespace
 
 std::vector<Field> list_fields(const Bank& bank, const FileForm& form) {
@@ -108,21 +127,26 @@ std::vector<Field> list_fields(const Bank& bank, const FileForm& form) {
   const Material& material = bank.material;
   const Counts& counts = bank.counts;
   const bool is_narrow = bank.shape_bytes == 1;
-  std::vector<Field> fields{
-      {"mesh/vertices", "<f8", {vertices, 3}, "m", "surface vertices", bank.vertices_m.data()},
-      {"mesh/triangles", "<i4", {triangles, 3}, "1", "vertices of a triangle, counter-clockwise from outside", bank.triangles.data()},
+  std::vector<Field> fields;
+  if (!form.is_packed)
+    fields = {
+        {"mesh/vertices", "<f8", {vertices, 3}, "m", "surface vertices", bank.vertices_m.data()},
+        {"mesh/triangles", "<i4", {triangles, 3}, "1", "vertices of a triangle, counter-clockwise from outside", bank.triangles.data()},
+        {"modes/shape",
+         is_narrow ? "|i1" : "<i2",
+         {vertices, modes, 3},
+         "modes/shape_scale",
+         "phi = shape * shape_scale, mass-normalised",
+         is_narrow ? static_cast<const void*>(form.narrow_shape.data()) : bank.shape.data()}};
+  else
+    add_packed_fields(bank, form, fields);
+  const std::vector<Field> common{
       {"modes/eigenvalue", "<f8", {modes}, "rad^2/s^2", "lambda = omega^2, ascending", bank.eigenvalue_rad2_s2.data()},
       {"modes/frequency_hz", "<f8", {modes}, "Hz", "undamped, sqrt(lambda) / 2 pi", form.freq_hz.data()},
       {"modes/decay", "<f8", {modes}, "1/s", "d = (alpha1 lambda + alpha2) / 2", bank.decay_per_s.data()},
       {"modes/residual", "<f8", {modes}, "1", "||K phi - lambda M phi|| / (lambda ||M phi||)", bank.residual.data()},
       {"modes/radiation_gain", "<f8", {modes}, "Pa s m^-1 kg^-1/2", "pressure at 1 m for unit modal velocity", bank.radiation_gain.data()},
       {"modes/shape_scale", "<f8", {modes}, "kg^-1/2", "of one integer step of modes/shape", bank.shape_scale.data()},
-      {"modes/shape",
-       is_narrow ? "|i1" : "<i2",
-       {vertices, modes, 3},
-       "modes/shape_scale",
-       "phi = shape * shape_scale, mass-normalised",
-       is_narrow ? static_cast<const void*>(form.narrow_shape.data()) : bank.shape.data()},
       {"rigid/mass_kg", "<f8", {}, "kg", "mass", &rigid.mass_kg},
       {"rigid/centre_m", "<f8", {3}, "m", "centre of mass", rigid.centre_m.data()},
       {"rigid/inertia_kg_m2", "<f8", {3, 3}, "kg m^2", "about the centre of mass, axes of the mesh", rigid.inertia_kg_m2.data()},
@@ -142,6 +166,7 @@ std::vector<Field> list_fields(const Bank& bank, const FileForm& form) {
       {"solve/mass", text_type(form.mass), {}, "1", "consistent or lumped", form.mass.data()},
       {"provenance", text_type(form.provenance), {}, "1", "JSON text", form.provenance.data()},
   };
+  fields.insert(fields.end(), common.begin(), common.end());
   add_later_fields(bank, form, fields);
   return fields;
 }
@@ -162,8 +187,9 @@ FileForm make_file_form(const Bank& bank) {
   return form;
 }
 
-int find_version_minor(const Bank& bank) {
-  return !bank.corrected.is_empty() || bank.element == "analytic" ? 4 : bank.supports.count() > 0 ? 3 : bank.shape_bytes == 1 ? 2 : 1;
+std::array<int, 2> find_version(const Bank& bank, bool is_packed) {
+  if (is_packed) return {2, 0};
+  return {1, !bank.corrected.is_empty() || bank.element == "analytic" ? 4 : bank.supports.count() > 0 ? 3 : bank.shape_bytes == 1 ? 2 : 1};
 }
 
 std::uint64_t find_item_bytes(const std::string& dtype) {

@@ -1,6 +1,7 @@
 // The arrays of a bank, as one table that the writer and the reader of bank files share, and containers of other formats.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -35,6 +36,9 @@ struct FileForm {
   std::string proof_method;         // since 1.1, absent without a proof
   std::string supports;             // since 1.3, absent where nothing is fixed
   bool has_complete_below = false;  // since 1.4: Proof::complete_below_hz is there
+  // Since 2.0: in place of mesh and shapes what runtime/codec makes of them. The bank has its Packing.
+  bool is_packed = false;
+  std::vector<std::uint8_t> packed_surface, packed_shape;
 };
 
 /// The arrays of `bank` and `form` in the order of docs/bank-format.md; those that are not there (no proof, no error bars, a file of
@@ -55,8 +59,8 @@ struct FieldBytes {
 /// Throws InputError as parse_bank() does; `name` stands for the file.
 Bank assemble_bank(const std::vector<FieldBytes>& arrays, const std::string& name);
 
-/// The oldest minor version that can say what is in the bank: it is the file's, so that older readers read all that they can.
-int find_version_minor(const Bank& bank);
+/// Major and minor of the oldest version that can say what is in the bank: it is the file's, so that older readers read all that they can.
+std::array<int, 2> find_version(const Bank& bank, bool is_packed = false);
 
 /// Bytes of one value of `dtype`; 0 when it is none that banks use.
 std::uint64_t find_item_bytes(const std::string& dtype);

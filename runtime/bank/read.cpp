@@ -17,10 +17,12 @@
 #include <numbers>
 
 #include "runtime/bank/bank.hpp"
-#include "runtime/base/large.hpp"
 #include "runtime/bank/layout.hpp"
 #include "runtime/bank/seal.hpp"
+#include "runtime/base/large.hpp"
 #include "runtime/base/sha256.hpp"
+#include "runtime/codec/shapes.hpp"
+#include "runtime/codec/surface.hpp"
 
 namespace carillon::bank {
 namespace {
@@ -180,27 +182,40 @@ void allocate(const Seal& seal, const std::string& name, Loaded& loaded) {
   const auto check = [&](const char* field, const char* dtype, std::vector<std::uint64_t> shape) {
     check_extent({field, dtype, std::move(shape), "", "", nullptr}, get_extent(seal, field, name), name);
   };
-  const std::uint64_t vertices = get_rows(seal, "mesh/vertices", name);
-  const std::uint64_t triangles = get_rows(seal, "mesh/triangles", name);
-  check("mesh/vertices", "<f8", {vertices, 3});
-  check("mesh/triangles", "<i4", {triangles, 3});
   for (const char* field :
        {"modes/eigenvalue", "modes/frequency_hz", "modes/decay", "modes/residual", "modes/radiation_gain", "modes/shape_scale"}) {
     check(field, "<f8", {modes});
   }
-  bank.shape_bytes = get_extent(seal, "modes/shape", name).dtype == "|i1" ? 1 : 2;
-  check("modes/shape", bank.shape_bytes == 1 ? "|i1" : "<i2", {vertices, modes, 3});
-
-  bank.vertices_m.resize(vertices);
-  bank.triangles.resize(triangles);
+  form.is_packed = seal.extents.contains("mesh/packed");
+  if (form.is_packed) {
+    const std::uint64_t surface = get_rows(seal, "mesh/packed", name), shape = get_rows(seal, "modes/packed_shape", name);
+    const std::uint64_t witnesses = get_rows(seal, "pack/witness", name);
+    check("mesh/packed", "|u1", {surface});
+    check("modes/packed_shape", "|u1", {shape});
+    check("pack/witness", "<i4", {witnesses});
+    check("pack/witness_shape", "<i2", {witnesses, modes, 3});
+    form.packed_surface.resize(surface);
+    form.packed_shape.resize(shape);
+    bank.packing.emplace();
+    bank.packing->witness.resize(witnesses);
+    bank.packing->witness_shape.resize(witnesses * modes * 3);
+  } else {
+    const std::uint64_t vertices = get_rows(seal, "mesh/vertices", name);
+    const std::uint64_t triangles = get_rows(seal, "mesh/triangles", name);
+    check("mesh/vertices", "<f8", {vertices, 3});
+    check("mesh/triangles", "<i4", {triangles, 3});
+    bank.shape_bytes = get_extent(seal, "modes/shape", name).dtype == "|i1" ? 1 : 2;
+    check("modes/shape", bank.shape_bytes == 1 ? "|i1" : "<i2", {vertices, modes, 3});
+    bank.vertices_m.resize(vertices);
+    bank.triangles.resize(triangles);
+    if (bank.shape_bytes == 1)
+      form.narrow_shape.resize(vertices * modes * 3);
+    else
+      base::reserve_large(bank.shape, vertices * modes * 3);  // load() appends
+  }
   for (auto* array :
        {&bank.eigenvalue_rad2_s2, &bank.decay_per_s, &bank.residual, &bank.radiation_gain, &bank.shape_scale, &form.freq_hz}) {
     array->resize(modes);
-  }
-  if (bank.shape_bytes == 1) {
-    form.narrow_shape.resize(vertices * modes * 3);
-  } else {
-    base::reserve_large(bank.shape, vertices * modes * 3);  // load() appends
   }
   const auto make_text = [&](const std::string& field, std::string& text) {
     const Extent& extent = get_extent(seal, field, name);
@@ -268,10 +283,27 @@ Loaded load(const Seal& seal, const std::string& name, const Source& read) {
   return loaded;
 }
 
+/// Makes mesh and shapes of what is packed.
+void unpack(Bank& bank, const FileForm& form, const std::string& name) {
+  codec::Surface surface = codec::read_surface(std::as_bytes(std::span(form.packed_surface)), name);
+  for (const double scale : bank.shape_scale)
+    if (!std::isfinite(scale) || scale < 0.0)
+      throw InputError(fmt::format("{}: a scale of shapes is {}; copy or pack the bank again", name, scale));
+  bank.shape = codec::read_shapes(std::as_bytes(std::span(form.packed_shape)), surface, bank.shape_scale, name);
+  bank.vertices_m.reserve(surface.places.size());
+  for (std::size_t v = 0; v < surface.places.size(); ++v) bank.vertices_m.push_back(surface.find_vertex(v));
+  bank.triangles = std::move(surface.triangles);
+  for (const std::int32_t vertex : bank.packing->witness)
+    if (vertex < 0 || static_cast<std::size_t>(vertex) >= bank.vertex_count())
+      throw InputError(fmt::format("{}: pack/witness names vertex {}, and there are {}; copy or pack the bank again", name, vertex,
+                                   bank.vertex_count()));
+}
+
 /// Turns the file's form of things into the bank's.
 Bank finish(Loaded&& loaded, const std::string& name) {
   Bank& bank = loaded.bank;
   const FileForm& form = loaded.form;
+  if (form.is_packed) unpack(bank, form, name);
   if (form.complete > 1)
     throw InputError(fmt::format("{}: solve/complete is {}, neither 0 nor 1; write the bank again", name, form.complete));
   bank.complete = form.complete == 1;
@@ -371,6 +403,14 @@ std::array<int, 2> read_version(const std::filesystem::path& path) {
 std::vector<Vec3> read_shape_row(const std::filesystem::path& path, std::size_t vertex) {
   const File file(path);
   const Seal seal = file.read_seal();
+  if (seal.extents.contains("mesh/packed")) {  // no row stands alone
+    const Bank bank = read_bank(path);
+    if (vertex >= bank.vertex_count())
+      throw InputError(fmt::format("{}: no vertex {}; the bank has {}, numbered from 0", file.name(), vertex, bank.vertex_count()));
+    std::vector<Vec3> row;
+    for (std::size_t i = 0; i < bank.mode_count(); ++i) row.push_back(bank.shape_at(vertex, i));
+    return row;
+  }
   const std::uint64_t vertices = get_rows(seal, "mesh/vertices", file.name());
   const std::uint64_t modes = get_rows(seal, "modes/eigenvalue", file.name());
   const Extent& shape = get_extent(seal, "modes/shape", file.name());

@@ -84,14 +84,21 @@ double calc_a_weight(double freq_hz) noexcept {
   return 1.2589254 * gain;  // +2.000 dB
 }
 
-std::vector<double> calc_audibility(const Bank& bank) {
-  std::vector<double> exposure = calc_mean_squares(bank);
+std::vector<double> calc_blow_exposure(const Bank& bank) {
+  std::vector<double> exposure(bank.mode_count());
   for (std::size_t m = 0; m < exposure.size(); ++m) {
     const double cycles = bank.freq_hz(m) * kBlowS;
     const double pressure = calc_a_weight(bank.freq_hz(m)) * bank.radiation_gain[m] * std::exp(-kCurvature * cycles * cycles);
-    exposure[m] *= pressure * pressure / (2.0 * (2.0 * bank.decay_per_s[m] + 1.0 / kEarS));
+    exposure[m] = pressure * pressure / (2.0 * (2.0 * bank.decay_per_s[m] + 1.0 / kEarS));
   }
   return exposure;
+}
+
+std::vector<double> calc_audibility(const Bank& bank) {
+  std::vector<double> audibility = calc_mean_squares(bank);
+  const std::vector<double> exposure = calc_blow_exposure(bank);
+  for (std::size_t m = 0; m < audibility.size(); ++m) audibility[m] *= exposure[m];
+  return audibility;
 }
 
 Bank calc_reduced(const Bank& bank, const Reduction& reduction) {
@@ -100,6 +107,7 @@ Bank calc_reduced(const Bank& bank, const Reduction& reduction) {
     throw InputError(fmt::format("shapes of {} bits; give {} to {}", reduction.shape_bits, kMinShapeBits, kMaxShapeBits));
   }
   Bank reduced = bank;
+  reduced.packing.reset();
   if (const std::size_t count = reduction.modes.value_or(bank.mode_count()); count < bank.mode_count())
     reduction.keep == Keep::kLoudest ? keep_loudest(reduced, count) : keep_lowest(reduced, count);
   if (reduction.shape_bits < kMaxShapeBits) round_shapes(reduced, reduction.shape_bits);

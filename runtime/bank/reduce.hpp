@@ -16,6 +16,10 @@ inline constexpr double kEarS = 0.2;
 /// A-weighting as a factor of the amplitude, 1 at 1 kHz (IEC 61672-1:2013, E.4.2). 0 <= freq_hz.
 double calc_a_weight(double freq_hz) noexcept;
 
+/// What a hard blow (1 N s, 0.1 ms) at a place where the mode moves by 1 kg^-1/2 along the normal gives of it, (m) [Pa^2 s kg]: the
+/// A-weighted exposure at 1 m, within the ear's own time, by the bank's own gains. The bank is sane.
+std::vector<double> calc_blow_exposure(const Bank& bank);
+
 /// How much of each mode is heard, (m) [Pa^2 s]: the A-weighted exposure at 1 m, within the ear's own time, of a hard blow (1 N s, 0.1 ms)
 /// along the normal, averaged over all places of the surface. By the bank's own gains. The bank is sane.
 std::vector<double> calc_audibility(const Bank& bank);

@@ -86,8 +86,8 @@ Seal parse_seal(std::string_view head, std::uint64_t length, const std::string& 
   const auto minor = numbers.size() == 2 ? parse_number<int>(numbers[1]) : std::nullopt;
   if (!major || !minor) throw InputError(fmt::format("{}: damaged seal: line 1 names no version; copy or write the bank again", name));
   if (*major > kVersionMajor) {
-    throw InputError(fmt::format("{}: written as version {}.{}, this reader knows {}.x: update Carillon or write the bank again", name,
-                                 *major, *minor, kVersionMajor));
+    throw InputError(fmt::format("{}: written as version {}.{}, this reader knows 1.x and {}.x: update Carillon or write the bank again",
+                                 name, *major, *minor, kVersionMajor));
   }
   if (*major < 1)
     throw InputError(fmt::format("{}: damaged seal: there was never a version {}.{}; write the bank again", name, *major, *minor));
@@ -121,8 +121,8 @@ Seal parse_seal(std::string_view head, std::uint64_t length, const std::string& 
   return seal;
 }
 
-std::string format_seal_text(std::uint64_t length, int minor, const std::map<std::string, Extent>& extents) {
-  std::string text = fmt::format("{}{}.{}\nlength {}\n", kMagic, kVersionMajor, minor, length);
+std::string format_seal_text(std::uint64_t length, const std::array<int, 2>& version, const std::map<std::string, Extent>& extents) {
+  std::string text = fmt::format("{}{}.{}\nlength {}\n", kMagic, version[0], version[1], length);
   for (const auto& [name, extent] : extents) {
     text += fmt::format("field {} {} {}{}{}\n", name, extent.dtype, extent.offset, extent.shape.empty() ? "" : " ",
                         fmt::join(extent.shape, " "));

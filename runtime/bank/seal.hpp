@@ -38,7 +38,7 @@ struct Seal {
 /// shorter). Checks, in this order: magic, version, length, table. Not the digest. Throws InputError; `name` is the file.
 Seal parse_seal(std::string_view head, std::uint64_t length, const std::string& name);
 
-/// The text of a seal, kTextBytes long, for a file of `length` bytes and a minor version. InputError when the table does not fit.
-std::string format_seal_text(std::uint64_t length, int minor, const std::map<std::string, Extent>& extents);
+/// The text of a seal, kTextBytes long, for a file of `length` bytes and a version (major, minor). InputError when the table does not fit.
+std::string format_seal_text(std::uint64_t length, const std::array<int, 2>& version, const std::map<std::string, Extent>& extents);
 
 }  // namespace carillon::bank

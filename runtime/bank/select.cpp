@@ -43,6 +43,7 @@ std::vector<std::size_t> sort_modes(const Bank& bank) {
 }
 
 void select_modes(Bank& bank, const std::vector<std::size_t>& chosen) {
+  bank.packing.reset();
   const std::size_t before = bank.mode_count();
   std::vector<std::int16_t> row(chosen.size() * 3);
   for (std::size_t v = 0; v < bank.vertex_count(); ++v) {  // rows do not become longer, so that they may move down in place

@@ -45,11 +45,10 @@ void check_faults(const Bank& bank, const std::string& name) {
 
 /// Makes the sealed bytes of a bank without faults and hands them on.
 template <typename Use>
-void use_bytes(const Bank& bank, Use&& use) {
-  const FileForm form = make_file_form(bank);
-  const Hdf5Image image = make_hdf5_image(bank, list_fields(bank, form));
+void use_bytes(const Bank& bank, const FileForm& form, Use&& use) {
+  const Hdf5Image image = make_hdf5_image(bank, form);
   const std::span<std::byte> bytes = image.bytes;
-  const std::string text = format_seal_text(bytes.size(), find_version_minor(bank), image.extents);
+  const std::string text = format_seal_text(bytes.size(), find_version(bank, form.is_packed), image.extents);
   std::memcpy(bytes.data(), text.data(), kTextBytes);
   base::Sha256 digest;
   digest.add(bytes.first(kTextBytes));
@@ -59,18 +58,39 @@ void use_bytes(const Bank& bank, Use&& use) {
   use(std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
 }
 
+FileForm make_packed_form(const PackedBank& packed) {
+  FileForm form = make_file_form(packed.bank);
+  form.is_packed = true;
+  form.packed_surface = packed.surface;
+  form.packed_shape = packed.shape;
+  return form;
+}
+
 }  // namespace
 
 void write_bank(const Bank& bank, const fs::path& file) {
   check_faults(bank, file.string());
   const fs::path target = resolve_target(file);
-  use_bytes(bank, [&](std::string_view bytes) { base::write_file(target, bytes); });
+  use_bytes(bank, make_file_form(bank), [&](std::string_view bytes) { base::write_file(target, bytes); });
 }
 
 std::string make_bank_bytes(const Bank& bank) {
   check_faults(bank, "the bank");
   std::string made;
-  use_bytes(bank, [&](std::string_view bytes) { made = bytes; });
+  use_bytes(bank, make_file_form(bank), [&](std::string_view bytes) { made = bytes; });
+  return made;
+}
+
+void write_packed_bank(const PackedBank& packed, const fs::path& file) {
+  check_faults(packed.bank, file.string());
+  const fs::path target = resolve_target(file);
+  use_bytes(packed.bank, make_packed_form(packed), [&](std::string_view bytes) { base::write_file(target, bytes); });
+}
+
+std::string make_packed_bytes(const PackedBank& packed) {
+  check_faults(packed.bank, "the packed bank");
+  std::string made;
+  use_bytes(packed.bank, make_packed_form(packed), [&](std::string_view bytes) { made = bytes; });
   return made;
 }
 

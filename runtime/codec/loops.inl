@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 #include "runtime/codec/loops.hpp"
 #include "runtime/codec/rows.hpp"
@@ -87,10 +88,10 @@ struct Kernels {
     }
     for (int i = 0; i < count; ++i) {
       for (std::size_t k = 0; k < n; ++k) {
-        stencils[i].value[k] = b[0][k][i];
+        stencils[i].value[k] = static_cast<float>(b[0][k][i]);
         for (std::size_t c = 0; c < 3; ++c) {
-          stencils[i].gradient[c][k] = b[1 + c][k][i];
-          stencils[i].offset[k][c] = x[k][c][i];
+          stencils[i].gradient[c][k] = static_cast<float>(b[1 + c][k][i]);
+          stencils[i].offset[c][k] = static_cast<float>(x[k][c][i]);
         }
       }
     }
@@ -115,29 +116,84 @@ struct Kernels {
     }
   }
 
-  static void multiply(const float* const* rows, const float* matrix, std::size_t padded, float* row) {
-    constexpr std::size_t kVectors = kLanes == 4 ? 2 : 1;
-    for (std::size_t i = 0; i < padded; i += kVectors * kLanes) {
-      Vector sum[3][kVectors] = {};
-      const float* weight = matrix;
-      for (std::size_t k = 0; k < kNeighbours; ++k) {
-        const float* from = rows[k] + i;
-#pragma GCC unroll 3
-        for (std::size_t c = 0; c < 3; ++c, from += padded, weight += 3) {
-#pragma GCC unroll 2
-          for (std::size_t v = 0; v < kVectors; ++v) {
-            const Vector x = load(from + v * kLanes);
-#pragma GCC unroll 3
-            for (std::size_t to = 0; to < 3; ++to) sum[to][v] += weight[to] * x;
-          }
+  static void find_nearest(const Near& near, const Place& place, int reach, Neighbours& found) {
+    const int shift = std::max(reach - kReachBits, 0);
+    constexpr std::int32_t kFar = std::numeric_limits<std::int32_t>::max();
+    Integers number;
+    for (int i = 0; i < kLanes; ++i) number[i] = i;
+    Integers keys[Near::kMost / kLanes];
+    const std::size_t vectors = (near.count + kLanes - 1) / kLanes;
+    for (std::size_t i = 0; i < vectors; ++i) {
+      Integers x, y, z;
+      std::memcpy(&x, near.x.data() + i * kLanes, sizeof x);
+      std::memcpy(&y, near.y.data() + i * kLanes, sizeof y);
+      std::memcpy(&z, near.z.data() + i * kLanes, sizeof z);
+      x = (x - place[0]) >> shift;
+      y = (y - place[1]) >> shift;
+      z = (z - place[2]) >> shift;
+      keys[i] = ((x * x + y * y + z * z) << 7) | number;
+      number += kLanes;
+    }
+    for (std::size_t i = near.count; i < vectors * kLanes; ++i) keys[i / kLanes][static_cast<int>(i % kLanes)] = kFar;
+    // The rank of each key is the number of those below it.
+    std::int32_t by_rank[Near::kMost];
+    for (std::size_t i = 0; i < vectors; ++i) {
+      Integers rank = {};
+      for (std::size_t j = 0; j < near.count; ++j) rank -= Integers{} + keys[j / kLanes][static_cast<int>(j % kLanes)] < keys[i];
+      for (int lane = 0; lane < kLanes && i * kLanes + static_cast<std::size_t>(lane) < near.count; ++lane)
+        by_rank[rank[lane]] = near.vertex[i * kLanes + static_cast<std::size_t>(lane)];
+    }
+    std::copy_n(by_rank, kNeighbours, found.begin());
+  }
+
+  static void calc_matrix(const Stencil& stencil, const float* gradient, const float* differences, Matrix& matrix) {
+    for (std::size_t e = 0; e < 9; ++e) {
+      const std::size_t to = e / 3, from = e % 3;
+      float value = to == from ? 1.0F : 0.0F, g[3] = {gradient[e], gradient[9 + e], gradient[18 + e]};
+      float own[kNeighbours] = {};
+      if (differences != nullptr) {
+        for (std::size_t k = 0; k < kNeighbours; ++k) own[k] = differences[9 * k + e];
+        for (std::size_t k = 0; k < kNeighbours; ++k) {
+          value -= own[k];
+          for (std::size_t j = 0; j < 3; ++j) g[j] -= stencil.offset[j][k] * own[k];
         }
       }
+      float* const weights = matrix.data() + (from * 3 + to) * kNeighbours;
+      for (std::size_t k = 0; k < kNeighbours; ++k)
+        weights[k] = own[k] + stencil.value[k] * value + stencil.gradient[0][k] * g[0] + stencil.gradient[1][k] * g[1] +
+                     stencil.gradient[2][k] * g[2];
+    }
+  }
+
+  /// kVectors vectors of modes at `i`.
+  template <std::size_t kVectors>
+  static void multiply_some(const float* const* rows, const float* matrix, std::size_t padded, std::size_t i, float* row) {
+    Vector sum[3][kVectors] = {};
+    for (std::size_t k = 0; k < kNeighbours; ++k) {
+      const float* from = rows[k] + i;
 #pragma GCC unroll 3
-      for (std::size_t to = 0; to < 3; ++to) {
-#pragma GCC unroll 2
-        for (std::size_t v = 0; v < kVectors; ++v) store(row + to * padded + i + v * kLanes, sum[to][v]);
+      for (std::size_t c = 0; c < 3; ++c, from += padded) {
+        const float* const weight = matrix + 3 * c * kNeighbours + k;
+#pragma GCC unroll 4
+        for (std::size_t v = 0; v < kVectors; ++v) {
+          const Vector x = load(from + v * kLanes);
+#pragma GCC unroll 3
+          for (std::size_t to = 0; to < 3; ++to) sum[to][v] += weight[to * kNeighbours] * x;
+        }
       }
     }
+#pragma GCC unroll 3
+    for (std::size_t to = 0; to < 3; ++to) {
+#pragma GCC unroll 4
+      for (std::size_t v = 0; v < kVectors; ++v) store(row + to * padded + i + v * kLanes, sum[to][v]);
+    }
+  }
+
+  static void multiply(const float* const* rows, const float* matrix, std::size_t padded, float* row) {
+    constexpr std::size_t kMany = kLanes == 16 ? 4 : kLanes == 8 ? 3 : 2;  // sums of three axes fit the registers
+    std::size_t i = 0;
+    for (; i + kMany * kLanes <= padded; i += kMany * kLanes) multiply_some<kMany>(rows, matrix, padded, i, row);
+    for (; i < padded; i += kLanes) multiply_some<1>(rows, matrix, padded, i, row);
   }
 
   static float calc_energy(const float* row, std::size_t width) {
@@ -152,27 +208,32 @@ struct Kernels {
   }
 
   static void round(const float* row, const float* factor, std::size_t padded, std::int16_t* shape) {
-    for (std::size_t i = 0; i < padded; i += kLanes) {
-      std::int16_t steps[3][kLanes];
+    constexpr std::size_t kPiece = 64;
+    for (std::size_t begin = 0; begin < padded; begin += kPiece) {
+      const std::size_t count = std::min(kPiece, padded - begin);
+      std::int16_t steps[3][kPiece];
       for (std::size_t c = 0; c < 3; ++c) {
-        Vector x = load(row + c * padded + i) * load(factor + i);
-        x = x == x ? x : Vector{};  // of damaged coefficients
-        x = x > 32767.0F ? Vector{} + 32767.0F : x;
-        x = x < -32767.0F ? Vector{} - 32767.0F : x;
-        x += x < 0.0F ? Vector{} - 0.5F : Vector{} + 0.5F;
-        const Shorts s = __builtin_convertvector(__builtin_convertvector(x, Integers), Shorts);
-        std::memcpy(steps[c], &s, sizeof s);
+        for (std::size_t i = 0; i < count; i += kLanes) {
+          Vector x = load(row + c * padded + begin + i) * load(factor + begin + i);
+          x = x == x ? x : Vector{};  // of damaged coefficients
+          x = x > 32767.0F ? Vector{} + 32767.0F : x;
+          x = x < -32767.0F ? Vector{} - 32767.0F : x;
+          x += x < 0.0F ? Vector{} - 0.5F : Vector{} + 0.5F;
+          const Shorts s = __builtin_convertvector(__builtin_convertvector(x, Integers), Shorts);
+          std::memcpy(steps[c] + i, &s, sizeof s);
+        }
       }
-      std::int16_t* to = shape + 3 * i;
-      for (int j = 0; j < kLanes; ++j, to += 3) {
-        to[0] = steps[0][j];
-        to[1] = steps[1][j];
-        to[2] = steps[2][j];
+      std::int16_t* const to = shape + 3 * begin;
+      const std::int16_t *const x = steps[0], *const y = steps[1], *const z = steps[2];
+      for (std::size_t i = 0; i < count; ++i) {
+        to[3 * i] = x[i];
+        to[3 * i + 1] = y[i];
+        to[3 * i + 2] = z[i];
       }
     }
   }
 
-  static constexpr Loops kAll{calc_stencils, add_weighted, multiply, calc_energy, round};
+  static constexpr Loops kAll{calc_stencils, find_nearest, calc_matrix, add_weighted, multiply, calc_energy, round};
 };
 
 }  // namespace

@@ -1,5 +1,5 @@
-// Method: cells of a lattice, in buckets by a hash. The cells about a vertex are looked at ring by ring, until none further out can hold a
-//   nearer one; where two rings do not suffice, wider cells are looked at.
+// Method: cells of a lattice, in buckets by a hash. Two by two by two cells hold every place within half their width, and most within
+//   their width: prediction needs good neighbours that reader and writer agree on, and not the very nearest.
 #include "runtime/codec/neighbours.hpp"
 
 #include <algorithm>
@@ -9,12 +9,13 @@
 #include <limits>
 #include <numeric>
 
+#include "runtime/codec/loops.hpp"
+
 namespace carillon::codec {
 namespace {
 
-constexpr double kPerCell = 4.0;  // vertices of a cell, where the surface passes it
-constexpr std::int32_t kRings = 2;
-constexpr int kWider = 2;  // log2
+constexpr double kPerCell = 1.5;            // vertices of a cell, where the surface passes it
+constexpr int kWidest = kMaxCellShift + 2;  // two cells of this width hold the whole lattice
 
 std::uint32_t mix(const Place& cell) {
   std::uint32_t hash = static_cast<std::uint32_t>(cell[0]) * 0x9e3779b1U;
@@ -35,51 +36,6 @@ std::array<double, 3> calc_box(std::span<const Place> places) {
   return size;
 }
 
-using Candidate = std::pair<std::int64_t, std::int32_t>;  // square of the distance, vertex
-
-/// The nearest so far, ascending.
-class Nearest {
- public:
-  Nearest() { candidates_.fill({std::numeric_limits<std::int64_t>::max(), -1}); }
-  void take(const Candidate& candidate) {
-    if (!(candidate < candidates_.back())) return;
-    std::size_t i = kNeighbours - 1;
-    for (; i > 0 && candidate < candidates_[i - 1]; --i) candidates_[i] = candidates_[i - 1];
-    candidates_[i] = candidate;
-  }
-  std::int64_t get_farthest() const { return candidates_.back().first; }
-  /// Where too few were found, the first vertices of all.
-  Neighbours get_vertices() const {
-    Neighbours vertices;
-    for (std::size_t i = 0; i < kNeighbours; ++i)
-      vertices[i] = candidates_[i].second >= 0 ? candidates_[i].second : static_cast<std::int32_t>(i);
-    return vertices;
-  }
-
- private:
-  std::array<Candidate, kNeighbours> candidates_;
-};
-
-std::int64_t calc_square(const Place& a, const Place& b) {
-  std::int64_t sum = 0;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const std::int64_t d = std::int64_t{a[k]} - b[k];
-    sum += d * d;
-  }
-  return sum;
-}
-
-/// Calls look(cell) for the cells that are `ring` cells away.
-template <class Look>
-void for_each_of_ring(const Place& centre, std::int32_t ring, Look&& look) {
-  for (std::int32_t x = -ring; x <= ring; ++x) {
-    for (std::int32_t y = -ring; y <= ring; ++y) {
-      const bool is_side = std::abs(x) == ring || std::abs(y) == ring;
-      for (std::int32_t z = -ring; z <= ring; z += is_side ? 1 : 2 * ring) look({centre[0] + x, centre[1] + y, centre[2] + z});
-    }
-  }
-}
-
 }  // namespace
 
 int find_cell_shift(std::span<const Place> places) {
@@ -88,52 +44,68 @@ int find_cell_shift(std::span<const Place> places) {
   return std::clamp(static_cast<int>(std::lround(std::log2(width))), 0, kMaxCellShift);
 }
 
-NeighbourSearch::NeighbourSearch(std::span<const Place> known, int cell_shift) : known_(known) {
-  const std::array<double, 3> box = calc_box(known);
-  const double extent = *std::max_element(box.begin(), box.end());
-  std::vector<std::uint32_t> bucket(known.size());
-  for (int shift = cell_shift; grids_.empty() || std::ldexp(1.0, grids_.back().shift) < extent; shift += kWider) {
-    Grid grid;
-    grid.shift = std::min(shift, kMaxCellShift + 2);
-    grid.begin.assign(std::bit_ceil(known.size()) + 1, 0);
-    for (std::size_t v = 0; v < known.size(); ++v) {
-      bucket[v] = mix(find_cell(known[v], grid.shift)) & static_cast<std::uint32_t>(grid.begin.size() - 2);
-      ++grid.begin[bucket[v] + 1];
+static_assert(8 * NeighbourSearch::kMostOfCell <= Near::kMost);
+
+NeighbourSearch::NeighbourSearch(std::span<const Place> known, int cell_shift)
+    : known_(known), cell_shift_(cell_shift), near_(std::make_unique<Near>()) {}
+NeighbourSearch::~NeighbourSearch() = default;
+
+NeighbourSearch::Grid NeighbourSearch::make_grid(int shift) const {
+  Grid grid;
+  grid.shift = shift;
+  grid.begin.assign(std::bit_ceil(known_.size()) + 1, 0);
+  const auto last_bucket = static_cast<std::uint32_t>(grid.begin.size() - 2);
+  std::vector<std::uint32_t> bucket(known_.size());
+  for (std::size_t v = 0; v < known_.size(); ++v) {
+    bucket[v] = mix(find_cell(known_[v], shift)) & last_bucket;
+    ++grid.begin[bucket[v] + 1];
+  }
+  std::partial_sum(grid.begin.begin(), grid.begin.end(), grid.begin.begin());
+  grid.entries.resize(known_.size());
+  std::vector<std::uint32_t> next(grid.begin.begin(), grid.begin.end() - 1);
+  for (std::size_t v = 0; v < known_.size(); ++v) grid.entries[next[bucket[v]]++] = {known_[v], static_cast<std::int32_t>(v)};
+  return grid;
+}
+
+/// near_ of the eight cells from `low` on.
+void NeighbourSearch::gather(const Grid& grid, const Place& low) {
+  std::size_t& count = near_->count;
+  count = 0;
+  for (std::int32_t corner = 0; corner < 8; ++corner) {
+    const Place cell{low[0] + (corner & 1), low[1] + (corner >> 1 & 1), low[2] + (corner >> 2)};
+    const std::uint32_t bucket = mix(cell) & static_cast<std::uint32_t>(grid.begin.size() - 2);
+    const std::uint32_t first = grid.begin[bucket], last = std::min(grid.begin[bucket + 1], first + kMostOfCell);
+    for (std::uint32_t i = first; i < last; ++i) {
+      const Entry& entry = grid.entries[i];
+      if (find_cell(entry.place, grid.shift) != cell) continue;
+      near_->x[count] = entry.place[0];
+      near_->y[count] = entry.place[1];
+      near_->z[count] = entry.place[2];
+      near_->vertex[count++] = entry.vertex;
     }
-    std::partial_sum(grid.begin.begin(), grid.begin.end(), grid.begin.begin());
-    grid.vertices.resize(known.size());
-    std::vector<std::uint32_t> next(grid.begin.begin(), grid.begin.end() - 1);
-    for (std::size_t v = 0; v < known.size(); ++v) grid.vertices[next[bucket[v]]++] = static_cast<std::int32_t>(v);
-    grids_.push_back(std::move(grid));
   }
 }
 
-Neighbours NeighbourSearch::find(const Place& place) const {
-  Nearest nearest;
-  for (const Grid& grid : grids_) {
-    const Place centre = find_cell(place, grid.shift);
-    // Steps to the nearest side of the cell that it is in; a ring further out, every cell adds its width.
-    std::int64_t inside = std::numeric_limits<std::int64_t>::max();
-    for (std::size_t k = 0; k < 3; ++k) {
-      const std::int64_t low = place[k] - (std::int64_t{centre[k]} << grid.shift);
-      inside = std::min({inside, low, (std::int64_t{1} << grid.shift) - 1 - low});
+Neighbours NeighbourSearch::find(const Place& place) {
+  for (std::size_t g = 0;; ++g) {
+    if (g == grids_.size()) grids_.push_back(make_grid(cell_shift_ + static_cast<int>(g)));
+    const Grid& grid = grids_[g];
+    const std::int32_t half = grid.shift > 0 ? 1 << (grid.shift - 1) : 0;
+    const Place low = find_cell({place[0] - half, place[1] - half, place[2] - half}, grid.shift);
+    if (g != near_grid_ || low != near_low_) {
+      gather(grid, low);
+      near_grid_ = g;
+      near_low_ = low;
     }
-    nearest = {};
-    for (std::int32_t ring = 0; ring <= kRings; ++ring) {
-      for_each_of_ring(centre, ring, [&](const Place& cell) {
-        const std::uint32_t bucket = mix(cell) & static_cast<std::uint32_t>(grid.begin.size() - 2);
-        const std::uint32_t first = grid.begin[bucket], last = std::min(grid.begin[bucket + 1], first + kMostOfCell);
-        for (std::uint32_t i = first; i < last; ++i) {
-          const std::int32_t v = grid.vertices[i];
-          const Place& other = known_[static_cast<std::size_t>(v)];
-          if (find_cell(other, grid.shift) == cell) nearest.take({calc_square(place, other), v});
-        }
-      });
-      const std::int64_t reach = (std::int64_t{ring} << grid.shift) + inside;  // whatever is further out is further than this
-      if (nearest.get_farthest() <= reach * reach) return nearest.get_vertices();
+    Neighbours found;
+    if (near_->count >= kNeighbours) {
+      find_loops().find_nearest(*near_, place, grid.shift + 2, found);  // one and a half cells away at most
+      return found;
     }
+    if (grid.shift < kWidest) continue;
+    std::iota(found.begin(), found.end(), 0);  // of a crowd that is cut: any will do
+    return found;
   }
-  return nearest.get_vertices();
 }
 
 }  // namespace carillon::codec

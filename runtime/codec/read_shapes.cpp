@@ -14,6 +14,13 @@ namespace {
 
 constexpr std::size_t kGroup = 32;  // vertices that are read at once: numbers lie across the vertices in the file
 
+/// The numbers that one byte says.
+constexpr std::array<float, 256> kUnfolded = [] {
+  std::array<float, 256> numbers{};
+  for (std::uint32_t i = 0; i < 256; ++i) numbers[i] = static_cast<float>(unfold(i));
+  return numbers;
+}();
+
 /// Numbers of vertices, all first ones of all vertices, then all second ones ...
 class Numbers {
  public:
@@ -26,6 +33,10 @@ class Numbers {
   void take(std::size_t count) {
     for (std::size_t j = 0; j < numbers_; ++j) {
       const std::size_t from = j * vertices_ + first_;
+      if (planes_.size() == 1) {  // as a rule
+        for (std::size_t v = 0; v < count; ++v) tile_[v * numbers_ + j] = kUnfolded[planes_[0][from + v]];
+        continue;
+      }
       for (std::size_t v = 0; v < count; ++v) {
         std::uint32_t folded = 0;
         for (std::size_t plane = planes_.size(); plane-- > 0;) folded = folded << 8 | planes_[plane][from + v];
@@ -170,9 +181,7 @@ class ShapeReader {
       energy += energies_[static_cast<std::size_t>(neighbours[k])] / static_cast<float>(kNeighbours);
     }
     if (fit == Fit::kNone) {
-      std::array<float, kNeighbours> weights;
-      for (std::size_t k = 0; k < kNeighbours; ++k) weights[k] = static_cast<float>(stencil.value[k]);
-      return loops_.add_weighted(from.data(), weights.data(), row_.size(), row_.data());
+      return loops_.add_weighted(from.data(), stencil.value.data(), row_.size(), row_.data());
     }
     const float unit = share / std::sqrt(1.0F + energy);
     std::array<float, kGradientNumbers> of_gradient;
@@ -183,7 +192,8 @@ class ShapeReader {
     scale(gradient.get(), steps.gradient, of_gradient);
     const bool is_wide = fit == Fit::kDifferences;
     if (is_wide) scale(differences.get(), steps.differences, of_differences);
-    const Matrix matrix = calc_matrix(stencil, of_gradient, is_wide ? std::span<const float>(of_differences) : std::span<const float>());
+    Matrix matrix;
+    loops_.calc_matrix(stencil, of_gradient.data(), is_wide ? of_differences.data() : nullptr, matrix);
     loops_.multiply(from.data(), matrix.data(), rows_.get_padded(), row_.data());
   }
 

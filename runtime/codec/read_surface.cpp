@@ -105,8 +105,8 @@ Triangle cross_gate(const Gate& gate, const Border& border, Corners& corners, Ve
   return {gate.to, gate.from, third};
 }
 
-/// Puts the vertices into the order of their levels.
-void sort_levels(Surface& surface, const std::vector<std::uint8_t>& level, std::size_t levels, const Reader& reader) {
+/// Puts the vertices into the order of find_order().
+void sort_vertices(Surface& surface, const std::vector<std::uint8_t>& level, std::size_t levels, const Reader& reader) {
   surface.level_begin.assign(levels + 1, 0);
   for (const std::uint8_t l : level) {
     if (l >= levels) reader.fail(fmt::format("a vertex is of level {}, and there are {}", l, levels));
@@ -116,19 +116,54 @@ void sort_levels(Surface& surface, const std::vector<std::uint8_t>& level, std::
     if (surface.level_begin[l + 1] == 0) reader.fail(fmt::format("its level {} is empty", l));
     surface.level_begin[l + 1] += surface.level_begin[l];
   }
-  std::vector<std::size_t> next(surface.level_begin.begin(), surface.level_begin.end() - 1);
+  const std::vector<std::int32_t> order = find_order(surface.places, level);
   std::vector<std::int32_t> moved(level.size());
   std::vector<Place> places(level.size());
   for (std::size_t v = 0; v < level.size(); ++v) {
-    moved[v] = static_cast<std::int32_t>(next[level[v]]);
-    places[next[level[v]]++] = surface.places[v];
+    moved[static_cast<std::size_t>(order[v])] = static_cast<std::int32_t>(v);
+    places[v] = surface.places[static_cast<std::size_t>(order[v])];
   }
   surface.places = std::move(places);
   for (Triangle& triangle : surface.triangles)
     for (std::int32_t& corner : triangle) corner = moved[static_cast<std::size_t>(corner)];
 }
 
+/// The lowest 19 bits with two zeros behind each.
+std::uint64_t spread(std::uint64_t x) {
+  x &= 0x7ffffU;
+  x = (x | x << 32) & 0x1f00000000ffffU;
+  x = (x | x << 16) & 0x1f0000ff0000ffU;
+  x = (x | x << 8) & 0x100f00f00f00f00fU;
+  x = (x | x << 4) & 0x10c30c30c30c30c3U;
+  x = (x | x << 2) & 0x1249249249249249U;
+  return x;
+}
+
 }  // namespace
+
+std::vector<std::int32_t> find_order(std::span<const Place> places, std::span<const std::uint8_t> level) {
+  Place low{};
+  std::int32_t extent = 0;
+  for (std::size_t k = 0; k < 3 && !places.empty(); ++k) {
+    const auto [first, last] =
+        std::minmax_element(places.begin(), places.end(), [k](const Place& a, const Place& b) { return a[k] < b[k]; });
+    low[k] = (*first)[k];
+    extent = std::max(extent, (*last)[k] - low[k]);
+  }
+  int shift = 0;
+  while (extent >> shift >= 1 << 19) ++shift;
+  std::vector<std::pair<std::uint64_t, std::int32_t>> keys(places.size());
+  for (std::size_t v = 0; v < places.size(); ++v) {
+    std::uint64_t key = level[v];
+    key <<= 57;
+    for (std::size_t k = 0; k < 3; ++k) key |= spread(static_cast<std::uint64_t>((places[v][k] - low[k]) >> shift)) << k;
+    keys[v] = {key, static_cast<std::int32_t>(v)};
+  }
+  std::sort(keys.begin(), keys.end());
+  std::vector<std::int32_t> order(places.size());
+  for (std::size_t v = 0; v < places.size(); ++v) order[v] = keys[v].second;
+  return order;
+}
 
 Surface read_surface(std::span<const std::byte> bytes, const std::string& name) {
   Reader reader(bytes, name, "packed surface");
@@ -164,7 +199,7 @@ Surface read_surface(std::span<const std::byte> bytes, const std::string& name) 
   }
   corners.finish();
   surface.places = vertices.take();
-  sort_levels(surface, level, levels, reader);
+  sort_vertices(surface, level, levels, reader);
   return surface;
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "runtime/base/error.hpp"
+#include "runtime/base/large.hpp"
 #include "runtime/codec/inflate.hpp"
 
 namespace carillon::codec {
@@ -32,7 +33,9 @@ double Reader::get_positive(std::string_view name) {
 std::vector<std::uint8_t> Reader::get_block(std::size_t size) {
   const auto stream = take(get<std::uint32_t>());
   if (size / kMaxInflation > stream.size()) fail("a block is too short for what it shall hold");
-  std::vector<std::uint8_t> block(size);
+  std::vector<std::uint8_t> block;
+  base::reserve_large(block, size);
+  block.resize(size);
   if (!inflate({reinterpret_cast<const std::uint8_t*>(stream.data()), stream.size()}, block)) fail("a block is damaged");
   return block;
 }
@@ -41,6 +44,7 @@ std::vector<std::uint32_t> Reader::get_planes(std::size_t count, int planes) {
   std::vector<std::uint32_t> values;
   for (int plane = 0; plane < planes; ++plane) {
     const std::vector<std::uint8_t> bytes = get_block(count);
+    base::reserve_large(values, count);
     values.resize(count);
     for (std::size_t i = 0; i < count; ++i) values[i] |= static_cast<std::uint32_t>(bytes[i]) << (8 * plane);
   }

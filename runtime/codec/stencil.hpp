@@ -16,9 +16,9 @@ namespace carillon::codec {
 ///          any linear field pass. 1e-4 on the diagonal stands for the rounding of the neighbours.
 /// Source:  kriging: Matheron 1963; the covariance, an inverse multiquadric: Hardy 1971, positive definite by Micchelli 1986.
 struct Stencil {
-  std::array<double, kNeighbours> value{};                    // weights of the neighbours
-  std::array<std::array<double, kNeighbours>, 3> gradient{};  // along each axis
-  std::array<std::array<double, 3>, kNeighbours> offset{};    // of the neighbours, in units of h
+  std::array<float, kNeighbours> value{};                    // weights of the neighbours
+  std::array<std::array<float, kNeighbours>, 3> gradient{};  // along each axis
+  std::array<std::array<float, kNeighbours>, 3> offset{};    // of the neighbours along each axis, in units of h
 };
 
 /// The stencils of vertices at `centres` (n) with `neighbours` (n), which are among `places`. Any thread.
@@ -34,11 +34,8 @@ enum class Fit : std::uint8_t {
 };
 inline constexpr std::size_t kGradientNumbers = 27, kDifferenceNumbers = 9 * kNeighbours;
 
-/// The matrix that makes the prediction of a vertex of the rows of its neighbours: three weights, of its x, y and z, for each component of
-/// each neighbour in turn.
+/// What makes the prediction of a vertex of the rows of its neighbours: weights of the neighbours (K) for what each component of theirs
+/// gives to x, y and z, by component, then by x, y and z.
 using Matrix = std::array<float, 3 * 3 * kNeighbours>;
-
-/// gradient (27) and differences (108, or none): the coefficients.
-Matrix calc_matrix(const Stencil& stencil, std::span<const float> gradient, std::span<const float> differences);
 
 }  // namespace carillon::codec

@@ -22,7 +22,7 @@ inline constexpr std::size_t kMaxLevels = 32;
 struct Surface {
   Vec3 origin_m{};
   double step_m = 0.0;
-  std::vector<Place> places;             // (V), level by level, neighbours near each other within one
+  std::vector<Place> places;             // (V), level by level, and within one along a curve that fills space
   std::vector<Triangle> triangles;       // (T)
   std::vector<std::size_t> level_begin;  // (L + 1), from 0 to V: level l is [level_begin[l], level_begin[l + 1])
 
@@ -41,6 +41,9 @@ struct Surface {
 /// the border (Touma and Gotsman 1998 and Rossignac 1999 in kind), and seldom another one. A new vertex is predicted by the parallelogram
 /// with the triangle behind the edge (Touma and Gotsman).
 Surface read_surface(std::span<const std::byte> bytes, const std::string& name);
+
+/// The order of a packed surface: vertices by their levels, within a level by Morton's curve, and of one place as they come.
+std::vector<std::int32_t> find_order(std::span<const Place> places, std::span<const std::uint8_t> level);
 
 /// The bytes of a surface whose vertices and triangles may lie in any order, and the order in which read_surface() gives them.
 struct WrittenSurface {

@@ -20,10 +20,10 @@ class EdgeTable {
     for (std::size_t t = 0; t < triangles.size(); ++t)
       for (std::size_t k = 0; k < 3; ++k) edges_[next[static_cast<std::size_t>(triangles[t][k])]++] = static_cast<std::int32_t>(3 * t + k);
   }
-  /// Three times the triangle, plus the corner where the edge begins. The edge is there.
-  std::int32_t find(std::int32_t from, std::int32_t to) const {
+  /// Three times the triangle, plus the corner where the edge begins, of the first triangle that is not done. There is one.
+  std::int32_t find(std::int32_t from, std::int32_t to, const std::vector<bool>& is_done) const {
     std::size_t i = begin_[static_cast<std::size_t>(from)];
-    while (triangles_[edges_[i] / 3][(edges_[i] + 1) % 3] != to) ++i;
+    while (triangles_[edges_[i] / 3][(edges_[i] + 1) % 3] != to || is_done[static_cast<std::size_t>(edges_[i] / 3)]) ++i;
     return edges_[i];
   }
 
@@ -59,7 +59,7 @@ class Traversal {
         ++streams_.seeds;
         for (std::size_t k = 0; k < 3; ++k) corners[k] = name_corner(triangles_[first][k], nullptr);
       } else {
-        const std::int32_t edge = edges_.find(vertices_[gate->to], vertices_[gate->from]);
+        const std::int32_t edge = edges_.find(vertices_[gate->to], vertices_[gate->from], is_done);
         t = edge / 3;
         corners = {gate->to, gate->from, name_corner(triangles_[t][(edge + 2) % 3], gate)};
       }
@@ -140,10 +140,15 @@ WrittenSurface write_surface(const Vec3& origin_m, double step_m, const std::vec
 
   WrittenSurface written{{}, traversal.get_vertices(), traversal.get_triangles()};
   std::vector<std::uint8_t> levels_of;
-  for (const std::int32_t v : written.vertices) levels_of.push_back(level[static_cast<std::size_t>(v)]);
+  std::vector<Place> places_of;
+  for (const std::int32_t v : written.vertices) {
+    levels_of.push_back(level[static_cast<std::size_t>(v)]);
+    places_of.push_back(places[static_cast<std::size_t>(v)]);
+  }
   writer.put_block(levels_of);
-  std::stable_sort(written.vertices.begin(), written.vertices.end(),
-                   [&](std::int32_t a, std::int32_t b) { return level[static_cast<std::size_t>(a)] < level[static_cast<std::size_t>(b)]; });
+  const std::vector<std::int32_t> seen = written.vertices;
+  const std::vector<std::int32_t> order = find_order(places_of, levels_of);
+  for (std::size_t v = 0; v < order.size(); ++v) written.vertices[v] = seen[static_cast<std::size_t>(order[v])];
   written.bytes = writer.get_bytes();
   return written;
 }

@@ -20,6 +20,7 @@
 #include "runtime/bank/bank.hpp"
 #include "runtime/bank/edits.hpp"
 #include "runtime/bank/of_material.hpp"
+#include "runtime/bank/pack.hpp"
 #include "runtime/bank/reduce.hpp"
 #include "runtime/bank/report.hpp"
 #include "runtime/bank/write.hpp"
@@ -39,15 +40,33 @@ using namespace carillon;
 constexpr int kMost = std::numeric_limits<int>::max();
 const CLI::Range kCounts(1, kMost);
 
-/// Prints every check. InputError when a fault was found, after all lines were printed.
-void check(const std::string& file) {
+/// The error of a packed bank against the bank that it was made of.
+bank::Check check_original(const bank::Bank& packed, const std::string& original) {
+  bank::Check check{"original", "", {}};
+  try {
+    const bank::Packing found = bank::compare_packed(packed, bank::read_bank(original));
+    check.figure = bank::describe(found);
+    constexpr double kRoundingDb = 0.05;  // of figures that two machines find
+    if (found.error_db > packed.packing->error_db + kRoundingDb || found.worst_db > packed.packing->worst_db + kRoundingDb)
+      check.faults.push_back(fmt::format("less is stated: {}", bank::describe(*packed.packing)));
+  } catch (const InputError& error) {
+    check.faults.push_back(fmt::format("{}: {}", original, error.what()));
+  }
+  return check;
+}
+
+/// Prints every check. InputError when a fault was found, after all lines were printed. `original`: the bank that was packed, or empty.
+void check(const std::string& file, const std::string& original) {
   const bank::Bank bank = bank::read_bank_unchecked(file);
+  if (!original.empty() && !bank.packing) throw InputError(file + ": is not packed; leave --original out");
   fmt::print("ok      {:<12} length and SHA-256 agree\n", "seal");
   fmt::print("ok      {:<12} {}, known to this program\n", "version", fmt::join(bank::read_version(file), "."));
   std::size_t faults = 0;
   std::vector<bank::Check> checks = bank::calc_checks(bank);
   checks.push_back(bank::calc_regions_check(bank));
   checks.push_back(bank::calc_provenance_check(bank));
+  if (bank.packing && checks[0].faults.empty()) checks.push_back(bank::check_packing(bank));
+  if (!original.empty()) checks.push_back(check_original(bank, original));
   for (const bank::Check& check : checks) {
     fmt::print("{}", bank::format_check(check));
     faults += check.faults.size();
@@ -157,6 +176,16 @@ void check_bank_name(const std::filesystem::path& out) {
                     out.string()));
 }
 
+/// Refuses an output that is no place for a bank. True for standard output.
+bool check_output(const std::string& out) {
+  const bool is_piped = base::is_standard_output(out);
+  if (is_piped)
+    base::check_standard_output("bank");
+  else
+    check_bank_name(out);
+  return is_piped;
+}
+
 constexpr double kMaxAudibleHz = 20000.0;
 
 /// --material, with another damping where one is given too.
@@ -206,11 +235,7 @@ void add_import(CLI::App& app, exchange::ImportWishes& wishes) {
 }
 
 void edit(const std::string& file, const std::string& out, Wishes& wishes) {
-  const bool is_piped = base::is_standard_output(out);
-  if (is_piped)
-    base::check_standard_output("bank");
-  else
-    check_bank_name(out);
+  const bool is_piped = check_output(out);
   read_damping(wishes);
   wishes.reduction.keep = wishes.keep == "lowest" ? bank::Keep::kLowest : bank::Keep::kLoudest;
   const bool is_reduced = wishes.reduction.modes || wishes.reduction.shape_bits < bank::kMaxShapeBits;
@@ -235,6 +260,28 @@ void edit(const std::string& file, const std::string& out, Wishes& wishes) {
                bank.band_hz[0], bank.band_hz[1], kMaxAudibleHz * old_end_hz / bank.band_hz[1]);
 }
 
+void pack(const std::string& file, const std::string& out, double error_db) {
+  const bool is_piped = check_output(out);
+  const bank::PackedBank packed = bank::calc_packed(bank::read_bank(file), error_db);
+  if (is_piped)
+    base::write_standard_output(bank::make_packed_bytes(packed));
+  else
+    bank::write_packed_bank(packed, out);
+  const std::size_t bytes = packed.surface.size() + packed.shape.size();
+  fmt::print(is_piped ? stderr : stdout, "packed    {} bytes of shapes, {} of surface ({} in all): {}\n", packed.shape.size(),
+             packed.surface.size(), bytes, bank::describe(*packed.bank.packing));
+}
+
+void unpack(const std::string& file, const std::string& out) {
+  const bool is_piped = check_output(out);
+  const bank::Bank bank = bank::read_bank(file);
+  if (!bank.packing) throw InputError(file + ": is not packed; use it as it is");
+  if (is_piped)
+    base::write_standard_output(bank::make_bank_bytes(bank));
+  else
+    bank::write_bank(bank, out);
+}
+
 int run(int argc, char** argv) {
   CLI::App app("Looks at a mode bank, and edits it.");
   app.name("carillon-bank");
@@ -253,6 +300,22 @@ int run(int argc, char** argv) {
   CLI::App* checking =
       app.add_subcommand("check", "Checks a bank, one line per property; exit code 0 if it is whole and sane, 2 otherwise");
   checking->add_option("BANK", file, "The bank file")->required();
+  std::string original;
+  checking->add_option("--original", original, "The bank that a packed one was made of: its error is measured again");
+  double error_db = -60.0;
+  std::string packed;
+  CLI::App* packing = app.add_subcommand("pack", "Writes a bank with few bytes and a stated error, for pages and games");
+  packing->add_option("BANK", file, "The bank file")->required();
+  packing->add_option("OUT", packed, "The packed bank; - is standard output")->required();
+  packing
+      ->add_option("--error", error_db,
+                   "Error of a hard blow in the mean over the surface, A-weighted, against the blow itself [dB], from -90 to -10")
+      ->check(CLI::Range(bank::kMinPackError, bank::kMaxPackError))
+      ->capture_default_str();
+  std::string unpacked;
+  CLI::App* unpacking = app.add_subcommand("unpack", "Writes a packed bank as one that other programs read; its errors stay");
+  unpacking->add_option("BANK", file, "The packed bank")->required();
+  unpacking->add_option("OUT", unpacked, "The new bank file; - is standard output")->required();
   Wishes wishes;
   std::string edited;
   CLI::App* editing = app.add_subcommand(
@@ -276,7 +339,11 @@ int run(int argc, char** argv) {
     return app.exit(error) == 0 ? 0 : kExitInput;
   }
   if (*checking) {
-    check(file);
+    check(file, original);
+  } else if (*packing) {
+    pack(file, packed, error_db);
+  } else if (*unpacking) {
+    unpack(file, unpacked);
   } else if (*editing) {
     edit(file, edited, wishes);
   } else if (*exporting) {

@@ -99,7 +99,7 @@ Json list_modes(const std::vector<Played>& modes) {
 /// What restores the bank: all arrays of its file except triangles and shapes.
 Json add_extras(const bank::Bank& bank, const std::vector<Played>& swinging, const std::vector<Played>& still, gltf::Writer& writer) {
   Json own = Json::object(), fields = Json::array();
-  own.set("version", fmt::format("{}.{}", bank::kVersionMajor, bank::find_version_minor(bank)));
+  own.set("version", fmt::format("{}", fmt::join(bank::find_version(bank), ".")));
   const bank::FileForm form = bank::make_file_form(bank);
   for (const bank::Field& field : bank::list_fields(bank, form)) {
     if (field.name == "mesh/triangles") continue;
