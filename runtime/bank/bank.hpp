@@ -117,10 +117,10 @@ struct Corrected {
 
 /// What is known of shapes that were packed: they are not quite what the solve found. W witnesses.
 struct Packing {
-  double error_db = 0.0;              // A-weighted exposure of the error of a hard blow along the normal over that of the blow itself, by
-                                      // calc_blow_exposure(), as means over the outer surface [dB]
-  double worst_db = 0.0;              // the same of the vertex of the outer surface where it is greatest
-  std::vector<std::int32_t> witness;  // (W) vertices of the outer surface whose shapes before packing are kept, for checks
+  // A-weighted exposure of the error of a hard blow along the normal over that of the blow itself, by calc_blow_exposure() [dB(A)]:
+  double error_db = 0.0;                    // on 95 % of the outer surface, by area, it is no greater
+  double worst_db = 0.0;                    // at the vertex of the outer surface where it is greatest
+  std::vector<std::int32_t> witness;        // (W) vertices of the outer surface whose shapes before packing are kept, for checks
   std::vector<std::int16_t> witness_shape;  // (W, m, 3) in steps of shape_scale
 };
 

@@ -106,7 +106,7 @@ void add_packed_fields(const Bank& bank, const FileForm& form, std::vector<Field
       {{"mesh/packed", "|u1", find_shape(form.packed_surface), "1", "vertices and triangles, packed: docs/bank-format.md",
         form.packed_surface.data()},
        {"modes/packed_shape", "|u1", find_shape(form.packed_shape), "1", "shapes, packed: docs/bank-format.md", form.packed_shape.data()},
-       {"pack/error_db", "<f8", {}, "dB(A)", "error of a hard blow over the blow, mean over the surface", &packing.error_db},
+       {"pack/error_db", "<f8", {}, "dB(A)", "error of a hard blow over the blow: no greater on 95 % of the surface", &packing.error_db},
        {"pack/worst_db", "<f8", {}, "dB(A)", "the same where it is greatest", &packing.worst_db},
        {"pack/witness", "<i4", find_shape(packing.witness), "1", "vertices whose shapes before packing are here", packing.witness.data()},
        {"pack/witness_shape",

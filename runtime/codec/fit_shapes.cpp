@@ -45,15 +45,17 @@ struct Features {
 
 class Fitter {
  public:
-  Fitter(const Surface& surface, const Rows& wanted, std::size_t modes)
+  Fitter(const Surface& surface, const Rows& wanted, std::size_t modes, std::span<const std::uint8_t> fineness)
       : surface_(surface),
+        fineness_(fineness),
         wanted_(wanted),
         modes_(modes),
         padded_(static_cast<Eigen::Index>(wanted.get_padded())),
         rows_(surface.places.size(), modes),
         row_(wanted.get_width()) {}
 
-  FittedShapes run() {
+  FittedShapes run(std::size_t sampled) {
+    sampled_ = sampled;
     std::vector<LevelNumbers> levels;
     for (std::size_t level = 0; level < surface_.level_count(); ++level) levels.push_back(fit_level(level));
     return {std::move(levels), std::move(rows_)};
@@ -67,17 +69,23 @@ class Fitter {
     float cost = 0.0F;        // bits, and the error at their price
   };
 
+  void begin_vertex(std::size_t v) {
+    share_ = LevelSteps::calc_share(fineness_[v]);
+    step_ = share_ * level_step_;
+  }
+
   LevelNumbers fit_level(std::size_t level) {
     const std::size_t first = surface_.level_begin[level], end = surface_.level_begin[level + 1];
     const std::size_t from_finest = surface_.level_count() - 1 - level;
-    step_ = find_of_level(kResidualSteps, from_finest);
+    level_step_ = step_ = find_of_level(kResidualSteps, from_finest);
     rounding_ = find_of_level(kRounding, from_finest);
     LevelNumbers numbers;
-    numbers.steps.residual = step_;
+    numbers.steps.residual = level_step_;
     if (level == 0) {
       for (std::size_t v = first; v < end; ++v) {
         std::fill(row_.begin(), row_.end(), 0.0F);
-        numbers.kinds.push_back({Fit::kNone, add_residual(v, numbers), 0});
+        begin_vertex(v);
+        numbers.kinds.push_back({Fit::kNone, add_residual(v, numbers), fineness_[v]});
       }
       return numbers;
     }
@@ -90,7 +98,14 @@ class Fitter {
     for (std::size_t v = first; v < end; ++v) neighbours[v - first] = search.find(surface_.places[v]);
     calc_stencils(std::span(surface_.places).subspan(first, end - first), neighbours, surface_.places, stencils);
     set_coefficient_steps(neighbours, stencils, numbers.steps);
-    for (std::size_t v = first; v < end; ++v) fit_vertex(v, neighbours[v - first], stencils[v - first], numbers);
+    for (std::size_t v = first; v < end; ++v) {
+      if (from_finest > 0 || v % sampled_ == 0) {
+        fit_vertex(v, neighbours[v - first], stencils[v - first], numbers);
+      } else {
+        std::fill(row_.begin(), row_.end(), 0.0F);
+        rows_.append(row_);
+      }
+    }
     return numbers;
   }
 
@@ -137,7 +152,7 @@ class Fitter {
       differences += calc_log(kGradients, kFeatures - kGradients);
       count += 1.0;
     }
-    const double error = kCoefficientStep * static_cast<double>(step_) * std::sqrt(static_cast<double>(modes_));
+    const double error = kCoefficientStep * static_cast<double>(level_step_) * std::sqrt(static_cast<double>(modes_));
     steps.gradient = static_cast<float>(error / std::sqrt(kGradients) * std::exp(0.5 * gradient / count));
     steps.differences = static_cast<float>(error / std::sqrt(kFeatures) * std::exp(0.5 * differences / count));
   }
@@ -157,18 +172,18 @@ class Fitter {
   }
 
   Trial try_fit(Fit fit, const Field& left, const Eigen::MatrixXd& gram, const Eigen::MatrixXd& right, const LevelSteps& steps) const {
-    const Eigen::Index count = fit == Fit::kGradient ? kGradients : kFeatures;
-    const double unit = 1.0 / std::sqrt(1.0 + static_cast<double>(features_.energy));
+    const Eigen::Index count = gram.rows();
+    const double unit = static_cast<double>(share_) / std::sqrt(1.0 + static_cast<double>(features_.energy));
     Eigen::VectorXd step(count);
     for (Eigen::Index j = 0; j < count; ++j) step[j] = unit * static_cast<double>(j < kGradients ? steps.gradient : steps.differences);
-    Eigen::MatrixXd regular = gram.topLeftCorner(count, count);
+    Eigen::MatrixXd regular = gram;
     for (Eigen::Index j = 0; j < count; ++j) {
       const double weight = static_cast<double>(step_) / step[j];
       regular(j, j) += kPrior * weight * weight + 1e-12;
     }
     const Eigen::LLT<Eigen::MatrixXd> factor(regular);
     const Eigen::MatrixXd upper = factor.matrixU();
-    const Eigen::MatrixXd target = factor.matrixL().solve(right.topRows(count));
+    const Eigen::MatrixXd target = factor.matrixL().solve(right);
     Trial trial{fit, Eigen::MatrixXi(count, 3), 0.0F};
     Eigen::MatrixXd coefficients(count, 3);
     for (Eigen::Index to = 0; to < 3; ++to) {
@@ -188,18 +203,27 @@ class Fitter {
 
   void fit_vertex(std::size_t v, const Neighbours& neighbours, const Stencil& stencil, LevelNumbers& numbers) {
     calc_features(neighbours, stencil);
+    begin_vertex(v);
     const Field left = FieldMap(wanted_.get(v), padded_, 3) - features_.value;
     Trial best{Fit::kNone, {}, calc_cost(left)};
-    gram_.setZero(kFeatures, kFeatures);
-    gram_.selfadjointView<Eigen::Lower>().rankUpdate(features_.fields.transpose());
-    const Eigen::MatrixXd gram = Eigen::MatrixXf(gram_.selfadjointView<Eigen::Lower>()).cast<double>();
-    const Eigen::MatrixXd right = (features_.fields.transpose() * left).cast<double>();
-    for (const Fit fit : {Fit::kGradient, Fit::kDifferences}) {
-      Trial trial = try_fit(fit, left, gram, right, numbers.steps);
-      if (trial.cost < best.cost) best = std::move(trial);
+    // Less than this no trial costs: all its coefficients and all that is left are 0.
+    const auto find_least = [&](int features) {
+      return 3.0F * (static_cast<float>(features) * kZeroCoefficient + static_cast<float>(modes_) * kZeroResidual);
+    };
+    if (best.cost > find_least(kGradients)) {
+      const auto try_one = [&](Fit fit, int count) {
+        const auto fields = features_.fields.leftCols(count);
+        gram_.setZero(count, count);
+        gram_.selfadjointView<Eigen::Lower>().rankUpdate(fields.transpose());
+        const Eigen::MatrixXd gram = Eigen::MatrixXf(gram_.selfadjointView<Eigen::Lower>()).cast<double>();
+        Trial trial = try_fit(fit, left, gram, (fields.transpose() * left).cast<double>(), numbers.steps);
+        if (trial.cost < best.cost) best = std::move(trial);
+      };
+      try_one(Fit::kGradient, kGradients);
+      if (best.cost > find_least(kFeatures)) try_one(Fit::kDifferences, kFeatures);
     }
     predict(best, neighbours, stencil, numbers);
-    numbers.kinds.push_back({best.fit, add_residual(v, numbers), 0});
+    numbers.kinds.push_back({best.fit, add_residual(v, numbers), fineness_[v]});
   }
 
   /// As read_shapes() does it.
@@ -209,7 +233,7 @@ class Fitter {
     if (trial.fit == Fit::kNone) {
       return loops_.add_weighted(from.data(), stencil.value.data(), row_.size(), row_.data());
     }
-    const float unit = 1.0F / std::sqrt(1.0F + features_.energy);
+    const float unit = share_ / std::sqrt(1.0F + features_.energy);
     std::array<float, kGradientNumbers> of_gradient;
     std::array<float, kDifferenceNumbers> of_differences;
     // By field, then what it adds to, then its component.
@@ -254,19 +278,24 @@ class Fitter {
   }
 
   const Surface& surface_;
+  std::span<const std::uint8_t> fineness_;
   const Rows& wanted_;
-  std::size_t modes_;
+  std::size_t modes_, sampled_ = 1;
   Eigen::Index padded_;
   const Loops& loops_ = find_loops();
   Rows rows_;
   std::vector<float> row_;
   Features features_;
   Eigen::MatrixXf gathered_, gram_;
-  float step_ = 1.0F, rounding_ = 0.5F;  // of the level
+  float level_step_ = 1.0F, rounding_ = 0.5F;  // of the level
+  float share_ = 1.0F, step_ = 1.0F;           // of the vertex: its steps are `share_` of the level's
 };
 
 }  // namespace
 
-FittedShapes fit_shapes(const Surface& surface, const Rows& wanted, std::size_t modes) { return Fitter(surface, wanted, modes).run(); }
+FittedShapes fit_shapes(const Surface& surface, const Rows& wanted, std::size_t modes, std::span<const std::uint8_t> fineness,
+                        std::size_t sampled) {
+  return Fitter(surface, wanted, modes, fineness).run(sampled);
+}
 
 }  // namespace carillon::codec

@@ -10,7 +10,7 @@
 namespace carillon::codec {
 
 /// Numbers for write_shapes(), with which read_shapes() gives `wanted` (V), in the order of the surface and in steps of each mode, back to
-/// about a step in the mean; and what it gives, (V). `modes` of the rows count.
+/// about 2^(-fineness / 2) steps, with the fineness (V) of each vertex; and what it gives, (V). `modes` of the rows count.
 ///
 /// Method: of each vertex three predictions are tried, kriging alone and with coefficients of either kind (Fit), and the one is taken whose
 ///   numbers take the fewest bits for the error that stays (Lagrange's multiplier, with costs in bits of a geometric law). Coefficients are
@@ -20,6 +20,8 @@ struct FittedShapes {
   std::vector<LevelNumbers> levels;
   Rows rows;
 };
-FittedShapes fit_shapes(const Surface& surface, const Rows& wanted, std::size_t modes);
+/// sampled: of the finest level only the vertices with numbers divisible by it are fitted, the others stay at rest; for trials.
+FittedShapes fit_shapes(const Surface& surface, const Rows& wanted, std::size_t modes, std::span<const std::uint8_t> fineness,
+                        std::size_t sampled = 1);
 
 }  // namespace carillon::codec

@@ -58,10 +58,11 @@ class Numbers {
 class SparseResidual {
  public:
   SparseResidual(Reader& reader, std::size_t vertices, std::size_t numbers) : reader_(reader), numbers_(numbers) {
-    counts_ = reader.get_planes(vertices, 4);
+    counts_ = reader.get_numbers(vertices);
     const std::size_t total = reader.get<std::uint32_t>();
-    gaps_ = reader.get_planes(total, 4);
-    values_ = reader.get_planes(total, 4);
+    if (total > vertices * numbers) reader.fail("there are more residuals than numbers");
+    gaps_ = reader.get_numbers(total);
+    values_ = reader.get_numbers(total);
   }
   template <class Add>
   void take(Add&& add) {

@@ -14,7 +14,9 @@ class Corners {
  public:
   Corners(Reader& reader, std::size_t triangles, std::size_t seeds) : reader_(reader), count_(triangles + 2 * seeds) {
     symbols_ = reader.get_block((count_ + 3) / 4);
-    others_ = reader.get_planes(reader.get<std::uint32_t>(), 4);
+    const std::size_t others = reader.get<std::uint32_t>();
+    if (others > count_) reader.fail("more corners are named by number than there are");
+    others_ = reader.get_numbers(others);
   }
   Corner next() {
     if (at_ >= count_) reader_.fail("its triangles begin more often than is said");
@@ -40,7 +42,7 @@ class Corners {
 class Vertices {
  public:
   Vertices(Reader& reader, std::size_t count) : reader_(reader) {
-    const std::vector<std::uint32_t> folded = reader.get_planes(3 * count, 4);
+    const std::vector<std::uint32_t> folded = reader.get_numbers(3 * count);
     places_.resize(count);
     for (std::size_t i = 0; i < count; ++i)
       for (std::size_t k = 0; k < 3; ++k) places_[i][k] = unfold(folded[k * count + i]);

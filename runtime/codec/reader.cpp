@@ -40,12 +40,14 @@ std::vector<std::uint8_t> Reader::get_block(std::size_t size) {
   return block;
 }
 
-std::vector<std::uint32_t> Reader::get_planes(std::size_t count, int planes) {
+std::vector<std::uint32_t> Reader::get_numbers(std::size_t count) {
+  const int planes = get<std::uint8_t>();
+  if (planes > 4) fail(fmt::format("numbers of {} bytes", planes));
   std::vector<std::uint32_t> values;
+  base::reserve_large(values, count);
+  values.resize(count);
   for (int plane = 0; plane < planes; ++plane) {
     const std::vector<std::uint8_t> bytes = get_block(count);
-    base::reserve_large(values, count);
-    values.resize(count);
     for (std::size_t i = 0; i < count; ++i) values[i] |= static_cast<std::uint32_t>(bytes[i]) << (8 * plane);
   }
   return values;

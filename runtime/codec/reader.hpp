@@ -44,8 +44,8 @@ class Reader {
   }
   /// A block of so many bytes: four bytes that say how long its zlib stream is, and the stream.
   std::vector<std::uint8_t> get_block(std::size_t size);
-  /// So many numbers of `planes` bytes each, 1 to 4: a block of their lowest bytes, one of the next ...
-  std::vector<std::uint32_t> get_planes(std::size_t count, int planes);
+  /// So many numbers: how many bytes each has, 0 to 4, a block of their lowest bytes, one of the next ...
+  std::vector<std::uint32_t> get_numbers(std::size_t count);
   /// Nothing may follow.
   void finish();
 

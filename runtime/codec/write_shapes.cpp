@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <bit>
 
 #include "runtime/codec/reader.hpp"
 #include "runtime/codec/shapes.hpp"
@@ -9,15 +8,12 @@ namespace carillon::codec {
 namespace {
 
 /// values: (vertices, numbers). As Numbers reads them.
-void put_numbers(Writer& writer, std::span<const std::int32_t> values, std::size_t numbers) {
+void put_across(Writer& writer, std::span<const std::int32_t> values, std::size_t numbers) {
   const std::size_t vertices = values.size() / numbers;
   std::vector<std::uint32_t> folded(values.size());
-  std::uint32_t all = 0;
   for (std::size_t v = 0; v < vertices; ++v)
-    for (std::size_t j = 0; j < numbers; ++j) all |= folded[j * vertices + v] = fold(values[v * numbers + j]);
-  const int planes = (std::bit_width(all) + 7) / 8;
-  writer.put(static_cast<std::uint8_t>(planes));
-  writer.put_planes(folded, planes);
+    for (std::size_t j = 0; j < numbers; ++j) folded[j * vertices + v] = fold(values[v * numbers + j]);
+  writer.put_numbers(folded);
 }
 
 void put_sparse(Writer& writer, std::span<const std::int32_t> values, std::size_t numbers) {
@@ -36,16 +32,16 @@ void put_sparse(Writer& writer, std::span<const std::int32_t> values, std::size_
     }
     counts.push_back(static_cast<std::uint32_t>(folded.size() - before));
   }
-  writer.put_planes(counts, 4);
+  writer.put_numbers(counts);
   writer.put(static_cast<std::uint32_t>(folded.size()));
-  writer.put_planes(gaps, 4);
-  writer.put_planes(folded, 4);
+  writer.put_numbers(gaps);
+  writer.put_numbers(folded);
 }
 
 /// The shorter of the two forms, behind its number.
 void put_residual(Writer& writer, std::span<const std::int32_t> values, std::size_t numbers) {
   Writer dense, sparse;
-  put_numbers(dense, values, numbers);
+  put_across(dense, values, numbers);
   put_sparse(sparse, values, numbers);
   const bool is_sparse = sparse.get_bytes().size() < dense.get_bytes().size();
   writer.put(static_cast<std::uint8_t>(is_sparse ? 1 : 0));
@@ -68,8 +64,8 @@ std::vector<std::uint8_t> write_shapes(std::span<const float> step, std::span<co
     std::vector<std::uint8_t> kinds;
     for (const Kind kind : level.kinds) kinds.push_back(to_byte(kind));
     writer.put_block(kinds);
-    put_numbers(writer, level.gradient, kGradientNumbers);
-    put_numbers(writer, level.differences, kDifferenceNumbers);
+    put_across(writer, level.gradient, kGradientNumbers);
+    put_across(writer, level.differences, kDifferenceNumbers);
     put_residual(writer, level.residual, 3 * step.size());
   }
   return writer.get_bytes();

@@ -133,10 +133,10 @@ WrittenSurface write_surface(const Vec3& origin_m, double step_m, const std::vec
     fours[i / 4] = static_cast<std::uint8_t>(fours[i / 4] | (streams.corners[i] << (2 * (i % 4))));
   writer.put_block(fours);
   writer.put(static_cast<std::uint32_t>(streams.others.size()));
-  writer.put_planes(streams.others, 4);
+  writer.put_numbers(streams.others);
   std::vector<std::uint32_t> folded;
   for (const auto& axis : streams.places) folded.insert(folded.end(), axis.begin(), axis.end());
-  writer.put_planes(folded, 4);
+  writer.put_numbers(folded);
 
   WrittenSurface written{{}, traversal.get_vertices(), traversal.get_triangles()};
   std::vector<std::uint8_t> levels_of;

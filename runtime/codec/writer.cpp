@@ -2,6 +2,7 @@
 
 #include <libdeflate.h>
 
+#include <bit>
 #include <memory>
 
 #include "runtime/base/error.hpp"
@@ -23,7 +24,11 @@ void Writer::put_block(std::span<const std::uint8_t> block) {
   bytes_.insert(bytes_.end(), stream.begin(), stream.end());
 }
 
-void Writer::put_planes(std::span<const std::uint32_t> values, int planes) {
+void Writer::put_numbers(std::span<const std::uint32_t> values) {
+  std::uint32_t all = 0;
+  for (const std::uint32_t value : values) all |= value;
+  const int planes = (std::bit_width(all) + 7) / 8;
+  put(static_cast<std::uint8_t>(planes));
   std::vector<std::uint8_t> bytes(values.size());
   for (int plane = 0; plane < planes; ++plane) {
     for (std::size_t i = 0; i < values.size(); ++i) bytes[i] = static_cast<std::uint8_t>(values[i] >> (8 * plane));

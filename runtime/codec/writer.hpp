@@ -23,8 +23,8 @@ class Writer {
   }
   /// SystemError when there is no memory.
   void put_block(std::span<const std::uint8_t> block);
-  /// values < 256^planes.
-  void put_planes(std::span<const std::uint32_t> values, int planes);
+  /// As Reader::get_numbers() reads them.
+  void put_numbers(std::span<const std::uint32_t> values);
 
   const std::vector<std::uint8_t>& get_bytes() const { return bytes_; }
 

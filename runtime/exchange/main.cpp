@@ -309,7 +309,7 @@ int run(int argc, char** argv) {
   packing->add_option("OUT", packed, "The packed bank; - is standard output")->required();
   packing
       ->add_option("--error", error_db,
-                   "Error of a hard blow in the mean over the surface, A-weighted, against the blow itself [dB], from -90 to -10")
+                   "Error of a hard blow, A-weighted, against the blow itself [dB], on 95 % of the surface; from -90 to -10")
       ->check(CLI::Range(bank::kMinPackError, bank::kMaxPackError))
       ->capture_default_str();
   std::string unpacked;
