@@ -18,7 +18,7 @@ void flush() {
 
 void print(const explore::Explored& made) {
   for (const std::string& warning : made.warnings) fmt::print(stderr, "carillon: warning: {}\n", show_message(warning));
-  for (const explore::PackedBank& bank : made.banks)
+  for (const explore::PageBank& bank : made.banks)
     if (!bank.change.empty())
       fmt::print("{}: {} of {}: {}; --whole keeps all\n", show(bank.name), format_bytes(static_cast<double>(bank.bytes)),
                  format_bytes(static_cast<double>(bank.full_bytes)), bank.change);
@@ -35,7 +35,7 @@ Json::Value describe(const explore::Explored& made) {
   root["recording_s"] = made.has_recording ? Json::Value(made.duration_s) : Json::Value();
   root["warnings"] = to_json(made.warnings);
   root["banks"] = Json::arrayValue;
-  for (const explore::PackedBank& bank : made.banks) {
+  for (const explore::PageBank& bank : made.banks) {
     Json::Value& one = root["banks"].append(Json::objectValue);
     one["file"] = to_json(bank.name);
     one["bytes"] = Json::UInt64(bank.bytes);

@@ -12,8 +12,9 @@
 #include "jobs/report/record.hpp"
 #include "runtime/bank/bank.hpp"
 #include "runtime/bank/blows.hpp"
-#include "runtime/bank/reduce.hpp"
+#include "runtime/bank/pack.hpp"
 #include "runtime/bank/surface.hpp"
+#include "runtime/bank/write.hpp"
 #include "runtime/material/table.hpp"
 
 namespace carillon::explore {
@@ -22,8 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::uintmax_t kSmallBytes = 4'000'000;  // as it is
-constexpr std::size_t kModes = 200;
-constexpr int kShapeBits = 8;
+constexpr double kPackErrorDb = -60.0;             // of larger ones
 
 const material::Row* find_nearest(const material::MaterialTable& table, const bank::Material& material) {
   const material::Row* nearest = nullptr;
@@ -76,11 +76,6 @@ void find_place(const bank::Bank& bank, BankFacts& facts) {
       }
 }
 
-std::string describe(std::size_t before, std::size_t after, int bits) {
-  return after < before ? fmt::format("the {} most audible of {} modes, shapes of {} bits", after, before, bits)
-                        : fmt::format("shapes of {} bits", bits);
-}
-
 }  // namespace
 
 const BankFacts& PageBanks::add(const fs::path& file) {
@@ -91,30 +86,30 @@ const BankFacts& PageBanks::add(const fs::path& file) {
   BankFacts facts;
   find_material(bank, file, facts);
   find_place(bank, facts);
-  facts.packed.full_bytes = fs::file_size(file);
+  facts.kept.full_bytes = fs::file_size(file);
   std::set<std::string> taken;
-  for (const BankFacts* other : order_) taken.insert(other->packed.name);
+  for (const BankFacts* other : order_) taken.insert(other->kept.name);
   const std::string stem = make_name(file.stem().string());
-  facts.packed.name = stem + ".hdf";
-  for (int k = 2; taken.contains(facts.packed.name); ++k) facts.packed.name = fmt::format("{}-{}.hdf", stem, k);
-  const fs::path target = folder_ / facts.packed.name;
-  if (keeps_all_ || facts.packed.full_bytes <= kSmallBytes) {
+  facts.kept.name = stem + ".hdf";
+  for (int k = 2; taken.contains(facts.kept.name); ++k) facts.kept.name = fmt::format("{}-{}.hdf", stem, k);
+  const fs::path target = folder_ / facts.kept.name;
+  if (keeps_all_ || facts.kept.full_bytes <= kSmallBytes) {
     put_file(file, target);
   } else {
-    const bank::Bank reduced = bank::calc_reduced(bank, {.modes = kModes, .shape_bits = kShapeBits});
-    bank::write_bank(reduced, target);
-    facts.packed.change = describe(bank.mode_count(), reduced.mode_count(), kShapeBits);
+    const bank::PackedBank packed = bank::calc_packed(bank, kPackErrorDb, true);
+    bank::write_packed_bank(packed, target);
+    facts.kept.change = "packed, " + bank::describe(*packed.bank.packing);
   }
-  facts.packed.bytes = fs::file_size(target);
+  facts.kept.bytes = fs::file_size(target);
   const BankFacts& kept = facts_.emplace(whole, std::move(facts)).first->second;
   order_.push_back(&kept);
   return kept;
 }
 
-std::vector<PackedBank> PageBanks::list() const {
-  std::vector<PackedBank> packed;
-  for (const BankFacts* facts : order_) packed.push_back(facts->packed);
-  return packed;
+std::vector<PageBank> PageBanks::list() const {
+  std::vector<PageBank> banks;
+  for (const BankFacts* facts : order_) banks.push_back(facts->kept);
+  return banks;
 }
 
 }  // namespace carillon::explore

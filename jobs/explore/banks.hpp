@@ -16,14 +16,14 @@
 namespace carillon::explore {
 
 struct BankFacts {
-  PackedBank packed;
+  PageBank kept;
   Vec3 low_m{}, high_m{};        // of the surface, in the frame of the mesh
   std::string material, group;   // the name of the table that it has or is nearest to, and its group
   Vec3 loudest_m{};              // the vertex where a blow is loudest
   std::array<int, 2> loudest{};  // the same place: a triangle, and which of its corners
 };
 
-/// Puts banks into a folder, each once. Large ones keep the most audible modes, with coarser shapes.
+/// Puts banks into a folder, each once. Large ones are packed; their triangles keep the numbers that recorded contacts name.
 class PageBanks {
  public:
   /// keeps_all: they are copied as they are.
@@ -32,7 +32,7 @@ class PageBanks {
   /// Throws InputError for files that are no whole bank or have no modes.
   const BankFacts& add(const std::filesystem::path& file);
   /// In the order in which they were added.
-  std::vector<PackedBank> list() const;
+  std::vector<PageBank> list() const;
 
  private:
   std::filesystem::path folder_;

@@ -185,11 +185,11 @@ class Work {
     about["gain_per_pa"] = gain;
     for (Json::ArrayIndex i = 0; i < scene_["bodies"].size(); ++i) {
       const BankFacts& facts = *facts_[i];
-      scene_["bodies"][i]["bank"] = fmt::format("{}/{}", kBankFolder, facts.packed.name);
+      scene_["bodies"][i]["bank"] = fmt::format("{}/{}", kBankFolder, facts.kept.name);
       Json::Value body(Json::objectValue);
-      body["bank_bytes"] = Json::UInt64(facts.packed.bytes);
-      body["full_bytes"] = Json::UInt64(facts.packed.full_bytes);
-      body["change"] = facts.packed.change.empty() ? Json::Value() : Json::Value(facts.packed.change);
+      body["bank_bytes"] = Json::UInt64(facts.kept.bytes);
+      body["full_bytes"] = Json::UInt64(facts.kept.full_bytes);
+      body["change"] = facts.kept.change.empty() ? Json::Value() : Json::Value(facts.kept.change);
       body["material"] = facts.material;
       body["group"] = facts.group;
       body["loudest"]["triangle"] = facts.loudest[0];

@@ -21,7 +21,7 @@ struct PageOrder {
 };
 
 /// A bank as the folder has it.
-struct PackedBank {
+struct PageBank {
   std::string name;                          // of the file in the folder
   std::uintmax_t bytes = 0, full_bytes = 0;  // of the file, and of the one that was given
   std::string change;                        // what was left out; empty: nothing
@@ -29,7 +29,7 @@ struct PackedBank {
 
 struct Explored {
   std::filesystem::path folder;
-  std::vector<PackedBank> banks;
+  std::vector<PageBank> banks;
   std::uintmax_t bytes = 0;  // of all files
   bool has_recording = false;
   double duration_s = 0.0;            // of the recording

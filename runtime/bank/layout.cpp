@@ -115,6 +115,9 @@ void add_packed_fields(const Bank& bank, const FileForm& form, std::vector<Field
         "modes/shape_scale",
         "their shapes before packing",
         packing.witness_shape.data()}});
+  if (!form.packed_order.empty())
+    fields.push_back({"mesh/packed_order", "|u1", find_shape(form.packed_order), "1",
+                      "numbers of the triangles, packed: docs/bank-format.md", form.packed_order.data()});
 }
 
 }  // namespace

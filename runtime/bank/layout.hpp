@@ -38,7 +38,7 @@ struct FileForm {
   bool has_complete_below = false;  // since 1.4: Proof::complete_below_hz is there
   // Since 2.0: in place of mesh and shapes what runtime/codec makes of them. The bank has its Packing.
   bool is_packed = false;
-  std::vector<std::uint8_t> packed_surface, packed_shape;
+  std::vector<std::uint8_t> packed_surface, packed_shape, packed_order;  // order: perhaps empty
 };
 
 /// The arrays of `bank` and `form` in the order of docs/bank-format.md; those that are not there (no proof, no error bars, a file of

@@ -13,15 +13,15 @@ inline constexpr double kMinPackError = -90.0, kMaxPackError = -10.0;  // dB(A)
 
 struct PackedBank {
   Bank bank;  // what a reader will find: shapes and places with their errors, vertices and triangles in the order of the file
-  std::vector<std::uint8_t> surface, shape;  // as runtime/codec reads them
+  std::vector<std::uint8_t> surface, shape, order;  // as runtime/codec reads them; order: empty unless triangles keep their numbers
 };
 
 /// Packs shapes and surface so that the error of a hard blow is at most `error_db` (Packing::error_db), and nearly that. Modes that are
 /// heard more are kept more exactly, and so are places where a blow is heard less; walls of closed cavities may have 12 dB more. All
-/// triangles stay; vertices move by less than 1/30,000 of the body's size, and those without a triangle are left out. Frequencies, decays,
-/// gains and all else stay as they are. Throws InputError for an error out of range and for a bank without modes. The bank is sane. Takes
-/// seconds.
-PackedBank calc_packed(const Bank& bank, double error_db);
+/// triangles stay, in another order unless they `keep_numbers`, to which contact events refer; vertices move by less than 1/30,000 of the
+/// body's size, and those without a triangle are left out. Frequencies, decays, gains and all else stay as they are. Throws InputError for
+/// an error out of range and for a bank without modes. The bank is sane. Takes seconds.
+PackedBank calc_packed(const Bank& bank, double error_db, bool keep_numbers = false);
 
 /// The error of a bank that was unpacked against the one that was packed, without witnesses. Throws InputError when that is another. Both
 /// are sane.

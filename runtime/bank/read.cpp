@@ -196,6 +196,12 @@ void allocate(const Seal& seal, const std::string& name, Loaded& loaded) {
     check("pack/witness_shape", "<i2", {witnesses, modes, 3});
     form.packed_surface.resize(surface);
     form.packed_shape.resize(shape);
+    if (seal.extents.contains("mesh/packed_order")) {
+      const std::uint64_t order = get_rows(seal, "mesh/packed_order", name);
+      check("mesh/packed_order", "|u1", {order});
+      if (order == 0) throw InputError(name + ": mesh/packed_order is empty; copy or pack the bank again");
+      form.packed_order.resize(order);
+    }
     bank.packing.emplace();
     bank.packing->witness.resize(witnesses);
     bank.packing->witness_shape.resize(witnesses * modes * 3);
@@ -293,6 +299,7 @@ void unpack(Bank& bank, const FileForm& form, const std::string& name) {
   bank.vertices_m.reserve(surface.places.size());
   for (std::size_t v = 0; v < surface.places.size(); ++v) bank.vertices_m.push_back(surface.find_vertex(v));
   bank.triangles = std::move(surface.triangles);
+  if (!form.packed_order.empty()) codec::restore_order(std::as_bytes(std::span(form.packed_order)), bank.triangles, name);
   for (const std::int32_t vertex : bank.packing->witness)
     if (vertex < 0 || static_cast<std::size_t>(vertex) >= bank.vertex_count())
       throw InputError(fmt::format("{}: pack/witness names vertex {}, and there are {}; copy or pack the bank again", name, vertex,

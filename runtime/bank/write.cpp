@@ -63,6 +63,7 @@ FileForm make_packed_form(const PackedBank& packed) {
   form.is_packed = true;
   form.packed_surface = packed.surface;
   form.packed_shape = packed.shape;
+  form.packed_order = packed.order;
   return form;
 }
 

@@ -167,6 +167,24 @@ std::vector<std::int32_t> find_order(std::span<const Place> places, std::span<co
   return order;
 }
 
+void restore_order(std::span<const std::byte> bytes, std::vector<Triangle>& triangles, const std::string& name) {
+  Reader reader(bytes, name, "order of packed triangles");
+  const std::vector<std::uint32_t> steps = reader.get_numbers(triangles.size());
+  const std::vector<std::uint8_t> first = reader.get_block(triangles.size());
+  reader.finish();
+  std::vector<Triangle> before(triangles.size(), Triangle{-1, -1, -1});
+  std::int64_t t = 0;
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    t += unfold(steps[i]);
+    if (t < 0 || t >= static_cast<std::int64_t>(before.size())) reader.fail(fmt::format("triangle {} is out of range", i));
+    Triangle& triangle = before[static_cast<std::size_t>(t)];
+    if (triangle[0] >= 0) reader.fail(fmt::format("two triangles have the number {}", t));
+    if (first[i] > 2) reader.fail(fmt::format("triangle {} begins with its corner {}", i, first[i]));
+    for (std::size_t k = 0; k < 3; ++k) triangle[k] = triangles[i][(k + first[i]) % 3];
+  }
+  triangles = std::move(before);
+}
+
 Surface read_surface(std::span<const std::byte> bytes, const std::string& name) {
   Reader reader(bytes, name, "packed surface");
   if (const auto form = reader.get<std::uint8_t>(); form != 1) reader.fail(fmt::format("its form is {}, and this reader knows 1", form));

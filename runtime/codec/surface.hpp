@@ -34,6 +34,15 @@ struct Surface {
   }
 };
 
+/// What the triangles of a packed surface were before.
+struct TriangleOrder {
+  std::vector<std::int32_t> before;  // (T) the number that packed triangle i had
+  std::vector<std::uint8_t> first;   // (T) which of its corners now was the first
+};
+std::vector<std::uint8_t> write_order(const TriangleOrder& order);
+/// Puts triangles back. Untrusted as read_surface(): every number occurs once.
+void restore_order(std::span<const std::byte> bytes, std::vector<Triangle>& triangles, const std::string& name);
+
 /// Reads what write_surface() has written. Untrusted: InputError unless the bytes give such a surface, which need not be closed; it takes
 /// no more memory than find_most_unpacked() of the bytes. `name` is the file.
 ///

@@ -115,6 +115,19 @@ class Traversal {
 
 }  // namespace
 
+std::vector<std::uint8_t> write_order(const TriangleOrder& order) {
+  Writer writer;
+  std::vector<std::uint32_t> steps;
+  std::int32_t last = 0;
+  for (const std::int32_t t : order.before) {
+    steps.push_back(fold(t - last));
+    last = t;
+  }
+  writer.put_numbers(steps);
+  writer.put_block(order.first);
+  return writer.get_bytes();
+}
+
 WrittenSurface write_surface(const Vec3& origin_m, double step_m, const std::vector<Place>& places, const std::vector<Triangle>& triangles,
                              const std::vector<std::uint8_t>& level) {
   Traversal traversal(places, triangles);

@@ -297,7 +297,7 @@ SurfaceMark mark_surface(std::span<const Vec3> vertices_m, std::span<const std::
 }
 
 bool is_same_surface(const SurfaceMark& a, const SurfaceMark& b) {
-  constexpr double kSlack = 1e-6;  // of the size: the same surface with other rounding
+  constexpr double kSlack = 5e-5;  // of the size: the same surface with other rounding, or packed
   const double size = std::hypot(std::hypot(a.size_m[0], a.size_m[1], a.size_m[2]), std::hypot(b.size_m[0], b.size_m[1], b.size_m[2]));
   for (std::size_t k = 0; k < 3; ++k) {
     if (!(std::abs(a.size_m[k] - b.size_m[k]) <= kSlack * size) || !(std::abs(a.order_m[k] - b.order_m[k]) <= kSlack * size)) return false;

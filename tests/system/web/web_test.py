@@ -272,12 +272,19 @@ def test_edits():
 
 
 def test_banks():
-    """Bad banks give one sentence each, and the engine continues."""
+    """Bad banks, plain and packed, give one sentence each, and the engine continues."""
     with Bench() as bench:
-        bench.make_bank("a.hdf", 2, 8)
-        whole = (bench.folder / "a.hdf").read_bytes()
-        answer = bench.page.evaluate(
-            """(async () => {
+        bench.make_bank("plain.hdf", 2, 8)
+        run(BIN / "carillon-bank", "pack", bench.folder / "plain.hdf", bench.folder / "packed.hdf")
+        for name, version in (("plain.hdf", "1."), ("packed.hdf", "2.")):
+            damage_bank(bench, name, version)
+
+
+def damage_bank(bench, name, version):
+    (bench.folder / "a.hdf").write_bytes((bench.folder / name).read_bytes())
+    whole = (bench.folder / "a.hdf").read_bytes()
+    answer = bench.page.evaluate(
+        """(async () => {
           const audio = await CarillonAudio.open({context: new OfflineAudioContext(2, 4800, 48000)});
           const whole = new Uint8Array(await (await fetch('a.hdf')).arrayBuffer()), said = [];
           const attempt = async (bytes) =>
@@ -290,22 +297,37 @@ def test_banks():
             said.push(await attempt(bytes));
           }
           const text = new TextDecoder('latin1').decode(whole.subarray(0, 200)), version = whole.slice();
-          const at = text.indexOf('1.');
+          const at = text.indexOf('VERSION');
           version.set([0x39, 0x2e, 0x39], at);
           said.push(await attempt(version));
           said.push(await attempt(new TextEncoder().encode('<html>404</html>')));
           const bank = await audio.addBank(whole, 'cup.hdf'), body = await audio.addBody({bank});
           return {said, modes: body.modes.length, header: text};
-        })()""",
-            timeout_s=110,
-        )
-        good = [text for text in answer["said"] if not text]
-        assert good == [], f"{len(good)} of {len(answer['said'])} damaged banks were taken"
-        for text in answer["said"]:
-            assert text.startswith("cup.hdf") and "failed" not in text and "\n" not in text and len(text) < 400, text
-        assert "9.9" in answer["said"][-2], (answer["said"][-2], answer["header"])
-        assert answer["modes"] == 8 and len(answer["said"]) > 300, answer["modes"]
-        print(f"{len(answer['said'])} damaged banks of {len(whole)} bytes, a sentence each; the last: {answer['said'][-1]}")
+        })()""".replace(
+            "VERSION", version
+        ),
+        timeout_s=110,
+    )
+    good = [text for text in answer["said"] if not text]
+    assert good == [], f"{len(good)} of {len(answer['said'])} damaged banks were taken"
+    for text in answer["said"]:
+        assert text.startswith("cup.hdf") and "failed" not in text and "\n" not in text and len(text) < 400, text
+    assert "9.9" in answer["said"][-2], (answer["said"][-2], answer["header"])
+    assert answer["modes"] == 8 and len(answer["said"]) > 300, answer["modes"]
+    print(f"{len(answer['said'])} damaged banks of {len(whole)} bytes, a sentence each; the last: {answer['said'][-1]}")
+
+
+def test_packed():
+    """A packed bank sounds in the page as in carillon-render, and about as the bank that it was made of."""
+    with Bench() as bench:
+        bench.make_bank("whole.hdf", 20)
+        run(BIN / "carillon-bank", "pack", bench.folder / "whole.hdf", bench.folder / "a.hdf", "--error", "-50", "--keep-numbers")
+        assert (bench.folder / "a.hdf").stat().st_size < 0.3 * (bench.folder / "whole.hdf").stat().st_size
+        for simd in ("true", "false"):
+            options = {"listener": LISTENER, "simd": simd == "true"}
+            bench.compare(f"a packed bank, simd {simd}", make_scene(), options, LOAD + STRIKE_AT % 0.1)
+        whole = bench.render_file(make_scene(bodies=[{**BODY, "bank": "whole.hdf"}]))
+        check("packed with -50 dB(A) against the whole bank", bench.render_file(make_scene()), whole, -40.0)
 
 
 def test_hard():
