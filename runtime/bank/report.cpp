@@ -8,6 +8,7 @@
 #include <optional>
 #include <sstream>
 
+#include "runtime/bank/pack.hpp"
 #include "runtime/bank/select.hpp"
 #include "runtime/base/printable.hpp"
 
@@ -215,6 +216,7 @@ std::string format_info(const Bank& bank, const std::filesystem::path& file, std
                       bank.complete ? "complete" : "not all of the band", worst);
   text += fmt::format("surface   {} vertices, {} triangles, shapes of {} bytes a component\n", bank.vertex_count(), bank.triangles.size(),
                       bank.shape_bytes);
+  if (bank.packing) text += fmt::format("packed    {}\n", describe(*bank.packing));
   if (bank.element == "analytic")
     text += fmt::format("solve     none: known modes at {} points, {} rigid modes\n", bank.counts.nodes, bank.counts.rigid_modes);
   else
@@ -253,6 +255,10 @@ std::string format_info_json(const Bank& bank, const std::filesystem::path& file
   root["band_hz"] = make_list(bank.band_hz);
   root["complete"] = bank.complete;
   root["shape_bytes"] = bank.shape_bytes;
+  if (bank.packing) {
+    root["packing"]["error_db"] = bank.packing->error_db;
+    root["packing"]["worst_db"] = bank.packing->worst_db;
+  }
   root["element"] = bank.element;
   root["mass"] = bank.mass;
   Json::Value& counts = root["counts"];

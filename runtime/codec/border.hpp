@@ -39,6 +39,9 @@ class Border {
   std::int32_t find_right(const Gate& gate) const { return is_known(gate.to) && out_[gate.to] >= 0 ? gates_[out_[gate.to]].to : -1; }
   std::int32_t find_left(const Gate& gate) const { return is_known(gate.from) && in_[gate.from] >= 0 ? gates_[in_[gate.from]].from : -1; }
 
+  /// Gates that were passed in lists so far. A few for each triangle, unless very many gates are open at one vertex at once.
+  std::size_t count_passed() const { return passed_; }
+
   /// Its edges close the gates that they meet and open others. Corners are at least 0.
   void add(const Triangle& corners) {
     for (std::size_t k = 0; k < 3; ++k) {
@@ -54,10 +57,10 @@ class Border {
  private:
   bool is_known(std::int32_t vertex) const { return static_cast<std::size_t>(vertex) < out_.size(); }
 
-  std::int32_t find_open(std::int32_t from, std::int32_t to) const {
+  std::int32_t find_open(std::int32_t from, std::int32_t to) {
     if (!is_known(from)) return -1;
     std::int32_t gate = out_[from];
-    while (gate >= 0 && gates_[gate].to != to) gate = gates_[gate].next_out;
+    for (; gate >= 0 && gates_[gate].to != to; ++passed_) gate = gates_[gate].next_out;
     return gate;
   }
 
@@ -80,13 +83,13 @@ class Border {
   }
 
   void unlink(std::int32_t* link, std::int32_t number, std::int32_t Gate::*next) {
-    while (*link != number) link = &(gates_[*link].*next);
+    for (; *link != number; ++passed_) link = &(gates_[*link].*next);
     *link = gates_[number].*next;
   }
 
   std::vector<Gate> gates_;
   std::vector<std::int32_t> out_, in_;  // of a vertex, the last open gate that leaves and enters it; -1: none
-  std::size_t first_ = 0;
+  std::size_t first_ = 0, passed_ = 0;
 };
 
 }  // namespace carillon::codec

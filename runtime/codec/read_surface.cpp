@@ -9,6 +9,8 @@
 namespace carillon::codec {
 namespace {
 
+constexpr std::size_t kMostPassed = 256;  // gates that are passed for a triangle, in the mean: time shall be as the length
+
 /// The streams of the triangles, taken one symbol at a time.
 class Corners {
  public:
@@ -194,6 +196,7 @@ Surface read_surface(std::span<const std::byte> bytes, const std::string& name) 
   // 12 bytes of a place, again while they are sorted; 12 of a triangle and 36 of its share of the border.
   if (40 * std::uint64_t{vertex_count} + 64 * std::uint64_t{triangle_count} > find_most_unpacked(bytes.size()))
     reader.fail("it would become larger than any bank of its length");
+  if (seeds > triangle_count) reader.fail("it begins more often than it has triangles");
   if (levels == 0 || levels > kMaxLevels) reader.fail(fmt::format("it has {} levels; 1 to {} are possible", levels, kMaxLevels));
   Surface surface;
   for (double& x : surface.origin_m) {
@@ -215,6 +218,7 @@ Surface read_surface(std::span<const std::byte> bytes, const std::string& name) 
     if (triangle[0] == triangle[1] || triangle[1] == triangle[2] || triangle[2] == triangle[0])
       reader.fail(fmt::format("triangle {} has a vertex twice", t));
     border.add(triangle);
+    if (border.count_passed() > kMostPassed * (t + kMostPassed)) reader.fail("too many of its edges are open at one vertex");
     surface.triangles.push_back(triangle);
   }
   corners.finish();

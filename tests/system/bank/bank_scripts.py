@@ -1,6 +1,6 @@
 """Banks in the eyes of others: h5py by the words of docs/bank-format.md, VTK, and files that h5py made bad and sealed again.
 
-bank_scripts.py doc|vtk|bad|program. Finds the programs in $CARILLON_BIN_DIR and the page in $CARILLON_SOURCE_DIR.
+bank_scripts.py doc|vtk|bad|packed|program. Finds the programs in $CARILLON_BIN_DIR and the page in $CARILLON_SOURCE_DIR.
 """
 import json
 import os
@@ -164,7 +164,7 @@ def set_version(version):
 
 # What was done to a good bank before it was sealed again, and words of the message of `carillon-bank info`.
 BAD = [
-    ("newer major", set_version("2.0"), "written as version 2.0, this reader knows 1.x: update Carillon or write the bank again"),
+    ("newer major", set_version("3.0"), "written as version 3.0, this reader knows 1.x and 2.x: update Carillon or write the bank again"),
     ("much newer major", set_version("17.4"), "written as version 17.4"),
     ("version zero", set_version("0.9"), "never a version 0.9"),
     ("no version", set_version("one"), "line 1 names no version"),
@@ -213,6 +213,105 @@ BAD = [
     ("law without numbers", lambda bank: bank.__delitem__("damping/power"), "the array damping/power is missing"),
     ("chunked shape", lambda bank: recreate_chunked(bank, "modes/shape"), "gives an array that cannot be in this file"),
 ]
+
+
+# The same of a packed bank.
+BAD_PACKED = [
+    ("no surface", lambda bank: bank.__delitem__("mesh/packed"), "the array mesh/vertices is missing"),
+    ("no shapes", lambda bank: bank.__delitem__("modes/packed_shape"), "the array modes/packed_shape is missing"),
+    ("shapes cut", replace("modes/packed_shape", lambda b: b[:-5]), "packed shapes"),
+    ("shapes of nothing", replace("modes/packed_shape", lambda b: b[:0]), "packed shapes: ends too early"),
+    ("a surface of another form", put("mesh/packed", at(0, 9)), "packed surface: its form is 9, and this reader knows 1"),
+    ("2^32 - 1 vertices", put("mesh/packed", at(slice(2, 6), 255)), "packed surface: it would become larger than any bank of its length"),
+    ("2^32 - 1 modes", put("modes/packed_shape", at(slice(1, 5), 255)), "packed shapes: they are of 4294967295 modes, and the bank has"),
+    ("shapes damaged", put("modes/packed_shape", at(-40, 170)), "packed shapes"),
+    ("a surface as numbers", replace("mesh/packed", lambda b: b.astype("<i4")), "mesh/packed is <i4"),
+    ("NaN scale", put("modes/shape_scale", at(0, np.nan)), "scale of shapes is nan"),
+    ("a witness elsewhere", put("pack/witness", at(0, 2**31 - 1)), "pack/witness names vertex 2147483647"),
+    ("a witness before all", put("pack/witness", at(0, -1)), "pack/witness names vertex -1"),
+    ("witnesses of fewer modes", replace("pack/witness_shape", lambda s: s[:, :-1]), "pack/witness_shape is <i2 (24, 11, 3)"),
+    ("NaN error", put("pack/error_db", np.nan), "pack/error_db[0] is nan"),
+    ("order of fewer triangles", replace("mesh/packed_order", lambda b: b[:-9]), "order of packed triangles"),
+]
+
+
+def check_packed(folder):
+    """Packed banks: h5py sees what the page says of them; damage is found; the stated error cannot be made smaller than it is."""
+    whole, path, plain = f"{folder}/whole.hdf", f"{folder}/packed.hdf", f"{folder}/plain.hdf"
+    make_bank(whole, 12, 12, "corrected")
+    done = bank_program("pack", whole, path, "--error", "-40", "--keep-numbers")
+    assert done.returncode == 0 and done.stdout.startswith("packed ") and done.stderr == "", done
+    assert os.path.getsize(path) < 0.5 * os.path.getsize(whole)
+    done = bank_program("check", path, "--original", whole)
+    assert done.returncode == 0 and "ok      original     error at most -40." in done.stdout, done
+    assert "packed    error at most -40." in bank_program("info", path).stdout
+    assert bank_program("unpack", path, plain).returncode == 0 and bank_program("check", plain).returncode == 0
+    with h5py.File(whole) as old, h5py.File(path) as packed, h5py.File(plain) as new:
+        assert packed.attrs["version"] == "2.0" and "VTKHDF" not in packed and "mesh/vertices" not in packed
+        assert packed["mesh/packed"].dtype == np.uint8 and packed["modes/packed_shape"].dtype == np.uint8
+        same = [name for name, _ in datasets_of(old) if name not in ("mesh/vertices", "mesh/triangles", "modes/shape", "provenance")]
+        for name in same:
+            assert np.array_equal(old[name][()], packed[name][()]) and np.array_equal(old[name][()], new[name][()]), name
+        # Triangles keep their numbers, and their corners their places, to half a step of the lattice.
+        size = np.ptp(old["mesh/vertices"][:], axis=0).max()
+        corners = [bank["mesh/vertices"][:][bank["mesh/triangles"][:]] for bank in (old, new)]
+        assert np.abs(corners[0] - corners[1]).max() <= size / 32768 / 2 * 1.001
+        shapes = [bank["modes/shape"][:][bank["mesh/triangles"][:]] * bank["modes/shape_scale"][:][:, None] for bank in (old, new)]
+        error = np.sqrt(np.mean((shapes[0] - shapes[1]) ** 2) / np.mean(shapes[0] ** 2))
+        assert 1e-4 < error < 0.1, error  # not the same, and not another
+        # Witnesses are what was there before.
+        places = old["mesh/vertices"][:]
+        for vertex, rows in zip(packed["pack/witness"][:], packed["pack/witness_shape"][:]):
+            nearest = np.argmin(np.linalg.norm(places - new["mesh/vertices"][vertex], axis=1))
+            assert np.array_equal(rows, old["modes/shape"][nearest]), vertex
+    # Written to standard output, and packed again.
+    piped = subprocess.run([f"{BIN}/carillon-bank", "pack", whole, "-", "--error", "-40", "--keep-numbers"], capture_output=True)
+    assert piped.returncode == 0 and piped.stdout == open(path, "rb").read(), piped.stderr
+    assert bank_program("pack", path, f"{folder}/twice.hdf", "--error", "-30").returncode == 0
+    # Without numbers it is smaller; edits give plain banks.
+    assert bank_program("pack", whole, f"{folder}/loose.hdf", "--error", "-40").returncode == 0
+    assert os.path.getsize(f"{folder}/loose.hdf") < os.path.getsize(path)
+    assert bank_program("check", f"{folder}/loose.hdf", "--original", whole).returncode == 0
+    assert bank_program("edit", path, f"{folder}/large.hdf", "--size", "2").returncode == 0
+    assert "format 1.4" in bank_program("info", f"{folder}/large.hdf").stdout
+    for arguments, words in (
+        (["unpack", whole, plain], "is not packed; use it as it is"),
+        (["check", whole, "--original", whole], "is not packed; leave --original out"),
+        (["check", path, "--original", f"{folder}/none.hdf"], "no such file"),
+        (["pack", whole, f"{folder}/a.txt"], "a bank is an HDF5 file"),
+        (["pack", f"{folder}/none.hdf", f"{folder}/b.hdf"], "no such file"),
+        (["pack", whole, f"{folder}/b.hdf", "--error", "-100"], "--error"),
+        (["pack", whole, f"{folder}/b.hdf", "--error", "quiet"], "--error"),
+    ):
+        done = bank_program(*arguments)
+        assert done.returncode == 2 and words in done.stdout + done.stderr, (arguments, done)
+    assert not os.path.exists(f"{folder}/b.hdf") and not os.path.exists(f"{folder}/a.txt")
+
+    good, bad = open(path, "rb").read(), f"{folder}/bad.hdf"
+    for title, change, words in BAD_PACKED:
+        open(bad, "wb").write(good)
+        with h5py.File(bad, "r+") as bank:
+            change(bank)
+        run_snippet("seal_bank.py", bad)
+        done = bank_program("info", bad)
+        assert done.returncode == 2 and words in done.stderr and done.stderr.count("\n") == 1, (title, done)
+    # An error that is stated too small, and shapes of another bank, do not pass.
+    for title, change in (
+        ("a better error", lambda bank: [put(f"pack/{name}_db", -80.0)(bank) for name in ("error", "worst")]),
+        ("other shapes", put("pack/witness_shape", lambda s: s[::-1])),
+    ):
+        open(bad, "wb").write(good)
+        with h5py.File(bad, "r+") as bank:
+            change(bank)
+        run_snippet("seal_bank.py", bad)
+        done = bank_program("check", bad)
+        assert done.returncode == 2 and "FAULT   packing" in done.stdout, (title, done)
+    # Every change of a byte, and every cut, is found.
+    for place in list(range(4096, len(good), max(1, len(good) // 60))):
+        for damaged in (good[:place], good[:place] + bytes([good[place] ^ 0x10]) + good[place + 1 :]):
+            open(bad, "wb").write(damaged)
+            done = bank_program("info", bad)
+            assert done.returncode == 2 and done.stderr.count("\n") == 1, (place, done)
 
 
 def recreate_chunked(bank, name):
@@ -410,4 +509,4 @@ def check_program(folder):
 
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as scratch:
-        {"doc": check_doc, "vtk": check_vtk, "bad": check_bad, "program": check_program}[sys.argv[1]](scratch)
+        {"doc": check_doc, "vtk": check_vtk, "bad": check_bad, "packed": check_packed, "program": check_program}[sys.argv[1]](scratch)
