@@ -27,9 +27,10 @@ constexpr double kMostStep = 1.0;    // of a mode, over the mean motion of its v
 constexpr double kCavity = 16.0;     // error of walls that are no part of the outer surface, over that of the outer surface
 constexpr double kOfSurface = 0.95;  // on which the error is no greater than is stated
 constexpr double kNearEnough = 0.4;  // dB that the error may stay below what was asked for
-constexpr int kMostTries = 8;
-constexpr std::size_t kSampled = 8;  // one of so many vertices of the finest level counts in a trial
-constexpr double kFirstDb = -4.0;    // of the first trial, beyond what was asked for
+constexpr int kMostSampled = 5, kMostNear = 3, kMostTries = 20;  // trials of a sample, of all until it is near, and of all
+constexpr std::size_t kSampled = 8;                              // one of so many vertices of the finest level counts in a trial
+constexpr double kFirstDb = -4.0;                                // of the first trial, beyond what was asked for
+constexpr double kMostChange = 20.0, kFiner = 2.0;               // dB from one trial to the next, by secants and without
 constexpr std::size_t kWitnesses = 24;
 constexpr double kWitnessShare = 0.25;  // of the witnesses may lie above the stated error
 constexpr double kExactDb = -200.0;     // stands for no error at all
@@ -185,7 +186,8 @@ std::vector<double> calc_motion(const Bank& bank) {
 std::vector<double> calc_loudness(const Bank& bank, const Skin& skin, const std::vector<double>& weight) {
   std::vector<double> loudness(bank.vertex_count());
   for (std::size_t v = 0; v < loudness.size(); ++v)
-    loudness[v] = (skin.area_m2[v] > 0.0 ? 1.0 : kCavity) * calc_heard(weight, skin.normal[v], &bank.shape[v * bank.mode_count() * 3]);
+    loudness[v] =
+        (skin.area_m2[v] > 0.0 ? 1.0 : kCavity) * calc_heard(weight, skin.normal[v], bank.shape.data() + v * bank.mode_count() * 3);
   return loudness;
 }
 
@@ -251,8 +253,8 @@ Packing calc_error(const Bank& bank, const Skin& skin, const std::vector<double>
   double area = 0.0;
   for (std::size_t v = 0; v < bank.vertex_count(); ++v) {
     if (!(skin.area_m2[v] > 0.0) || !is_known[v]) continue;
-    const std::int16_t* own = &bank.shape[v * bank.mode_count() * 3];
-    const double missed = calc_heard(weight, skin.normal[v], own, &shape[v * bank.mode_count() * 3]);
+    const std::int16_t* own = bank.shape.data() + v * bank.mode_count() * 3;
+    const double missed = calc_heard(weight, skin.normal[v], own, shape.data() + v * bank.mode_count() * 3);
     errors.emplace_back(calc_db(missed, calc_heard(weight, skin.normal[v], own)), skin.area_m2[v]);
     area += skin.area_m2[v];
   }
@@ -290,34 +292,48 @@ class Packer {
 
   /// The bytes of the shapes, and fills `packing`.
   std::vector<std::uint8_t> run(double error_db, Packing& packing) {
+    const auto is_near = [&](double found_db) { return found_db <= error_db && found_db > error_db - kNearEnough; };
     double asked_db = error_db + kFirstDb, before_db = 0.0, found_before_db = 0.0;
-    std::vector<std::uint8_t> bytes;
-    bool is_sampled = true;
-    for (int tries = 0; tries < kMostTries; ++tries) {
-      const double found_db = is_sampled ? try_sampled(asked_db) : try_whole(asked_db, bytes, packing);
-      const bool is_near = found_db <= error_db && found_db > error_db - kNearEnough;
-      if (is_near && !is_sampled) break;
-      if (is_near) {
-        is_sampled = false;
-        continue;
-      }
-      const double slope =
-          tries > 0 && asked_db != before_db ? std::clamp((found_db - found_before_db) / (asked_db - before_db), 0.4, 1.5) : 1.0;
+    const auto find_next = [&](int tries, double found_db) {
+      const double slope = tries > 0 && asked_db != before_db ? (found_db - found_before_db) / (asked_db - before_db) : 1.0;
       before_db = asked_db;
       found_before_db = found_db;
-      asked_db += (error_db - 0.5 * kNearEnough - found_db) / slope;
-      if (tries + 3 >= kMostTries) is_sampled = false;
+      asked_db += std::clamp((error_db - 0.5 * kNearEnough - found_db) / std::clamp(slope, 0.4, 1.5), -kMostChange, kMostChange);
+    };
+    if (surface_.level_count() > 1) {
+      for (int tries = 0; tries < kMostSampled; ++tries) {
+        const double found_db = try_sampled(asked_db);
+        if (is_near(found_db)) break;
+        find_next(tries, found_db);
+      }
     }
-    if (packing.error_db > error_db || bytes.empty())
+    std::vector<std::uint8_t> best;
+    double least_db = std::numeric_limits<double>::infinity();
+    for (int tries = 0; tries < kMostTries; ++tries) {
+      Packing found;
+      std::vector<std::uint8_t> bytes;
+      const double found_db = try_whole(asked_db, bytes, found);
+      least_db = std::min(least_db, found_db);
+      if (found_db <= error_db && (best.empty() || bytes.size() < best.size())) {
+        best = std::move(bytes);
+        packing = found;
+      }
+      if (is_near(found_db) || (tries >= kMostNear && !best.empty())) break;
+      if (tries < kMostNear)
+        find_next(tries, found_db);
+      else
+        asked_db -= std::max(kFiner, found_db - error_db);  // of few vertices the error does not change smoothly
+    }
+    if (best.empty())
       throw InputError(
-          fmt::format("an error of {} dB(A) cannot be reached, {:.1f} is the least; use the bank as it is", error_db, packing.error_db));
+          fmt::format("an error of {} dB(A) cannot be reached, {:.1f} is the least; use the bank as it is", error_db, least_db));
     packing.witness = choose_witnesses(skin_, kWitnesses);
     const std::size_t width = 3 * bank_.mode_count();
     for (const std::int32_t v : packing.witness) {
       const auto row = bank_.shape.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(v) * width);
       packing.witness_shape.insert(packing.witness_shape.end(), row, row + static_cast<std::ptrdiff_t>(width));
     }
-    return bytes;
+    return best;
   }
 
  private:
@@ -398,8 +414,8 @@ Check check_packing(const Bank& bank) {
   double worst_db = kExactDb;
   for (std::size_t i = 0; i < packing.witness.size(); ++i) {
     const auto v = static_cast<std::size_t>(packing.witness[i]);
-    const std::int16_t* own = &packing.witness_shape[i * bank.mode_count() * 3];
-    const double missed = calc_heard(weight, skin.normal[v], own, &bank.shape[v * bank.mode_count() * 3]);
+    const std::int16_t* own = packing.witness_shape.data() + i * bank.mode_count() * 3;
+    const double missed = calc_heard(weight, skin.normal[v], own, bank.shape.data() + v * bank.mode_count() * 3);
     const double here_db = calc_db(missed, calc_heard(weight, skin.normal[v], own));
     worst_db = std::max(worst_db, here_db);
     if (here_db > packing.error_db + kRoundingDb) ++above;

@@ -19,7 +19,7 @@ import numpy as np
 from figure import hold
 
 TESTS = pathlib.Path(__file__).resolve().parents[1]
-for folder in ("system/exchange", "system/bank"):
+for folder in ("system/exchange", "system/bank", "bench/pack"):
     sys.path.insert(0, str(TESTS / folder))
 from bank_scripts import run_snippet  # noqa: E402
 from banks import BIN, make_bank, run  # noqa: E402
