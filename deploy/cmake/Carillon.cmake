@@ -179,13 +179,13 @@ function(carillon_script_test name)
     ENVIRONMENT "${CARILLON_MPI_ENVIRONMENT};CARILLON_BIN_DIR=${CMAKE_BINARY_DIR}/bin;CARILLON_SOURCE_DIR=${PROJECT_SOURCE_DIR}")
 endfunction()
 
-# carillon_fuzz(NAME SOURCES ... LINK libs... CORPUS dir [DICTIONARY file]): a libFuzzer target (clang only, CARILLON_FUZZ=ON) and a short CTest
+# carillon_fuzz(NAME SOURCES ... LINK libs... CORPUS dirs... [DICTIONARY file]): a libFuzzer target (clang only, CARILLON_FUZZ=ON) and a short CTest
 # run of it. A dictionary has the words of a format.
 function(carillon_fuzz name)
   if(NOT CARILLON_FUZZ)
     return()
   endif()
-  cmake_parse_arguments(arg "" "CORPUS;DICTIONARY" "SOURCES;LINK" ${ARGN})
+  cmake_parse_arguments(arg "" "DICTIONARY" "SOURCES;LINK;CORPUS" ${ARGN})
   if(arg_DICTIONARY)
     set(dictionary -dict=${arg_DICTIONARY})
   endif()

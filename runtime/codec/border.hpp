@@ -21,7 +21,7 @@ struct Gate {
 /// How the third corner of the next triangle is named.
 enum class Corner : std::uint8_t {
   kNew = 0,    // the next vertex
-  kRight = 1,  // where the border goes on behind the gate
+  kRight = 1,  // where the border continues behind the gate
   kLeft = 2,   // where it comes from before the gate
   kOther = 3,  // by its number
 };

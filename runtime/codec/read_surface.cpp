@@ -105,7 +105,7 @@ Triangle cross_gate(const Gate& gate, const Border& border, Corners& corners, Ve
       third = vertices.find_other(corners.next_other());
       break;
   }
-  if (third < 0) reader.fail("a triangle goes on where no border is");
+  if (third < 0) reader.fail("a triangle continues where no border is");
   return {gate.to, gate.from, third};
 }
 

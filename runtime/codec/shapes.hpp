@@ -41,7 +41,7 @@ struct LevelNumbers {
   LevelSteps steps;
   std::vector<Kind> kinds;                // (V of the level)
   std::vector<std::int32_t> gradient;     // (vertices of a fit, 27)
-  std::vector<std::int32_t> differences;  // (vertices of Fit::kDifferences, 108)
+  std::vector<std::int32_t> differences;  // (vertices of Fit::kDifferences, 90)
   std::vector<std::int32_t> residual;     // (vertices of a residual, m, 3)
 };
 

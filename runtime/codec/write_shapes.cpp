@@ -9,7 +9,7 @@ namespace {
 
 /// values: (vertices, numbers). As Numbers reads them.
 void put_across(Writer& writer, std::span<const std::int32_t> values, std::size_t numbers) {
-  const std::size_t vertices = values.size() / numbers;
+  const std::size_t vertices = values.empty() ? 0 : values.size() / numbers;
   std::vector<std::uint32_t> folded(values.size());
   for (std::size_t v = 0; v < vertices; ++v)
     for (std::size_t j = 0; j < numbers; ++j) folded[j * vertices + v] = fold(values[v * numbers + j]);

@@ -1,4 +1,4 @@
-// The other side of Reader.
+// Numbers and compressed blocks as bytes.
 #pragma once
 
 #include <concepts>
@@ -9,6 +9,7 @@
 
 namespace carillon::codec {
 
+/// Bytes as Reader takes them; the two change together.
 class Writer {
  public:
   template <class T>

@@ -313,7 +313,7 @@ int run(int argc, char** argv) {
       ->capture_default_str();
   bool keep_numbers = false;
   packing->add_flag("--keep-numbers", keep_numbers,
-                    "Triangles keep their numbers, to which recorded contacts and strikes of scenes refer; about 1.5 bytes a triangle");
+                    "Triangles keep their numbers, to which recorded contacts and strikes of scenes refer; about two bytes a triangle");
   std::string unpacked;
   CLI::App* unpacking = app.add_subcommand("unpack", "Writes a packed bank as one that other programs read; its errors stay");
   unpacking->add_option("BANK", file, "The packed bank")->required();

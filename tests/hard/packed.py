@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Hard cases of packed banks: shapes that are hard to predict, and files with faults. The truth is the bank before it was packed: its error
-is computed anew by numpy (tests/bench/pack/run), from the file that `carillon-bank unpack` writes.
+is computed again by numpy (tests/bench/pack/run), from the file that `carillon-bank unpack` writes.
 
 usage: packed.py CASE
 """
@@ -92,7 +92,7 @@ def packed_one_mode(folder):
 
 
 def packed_far_away(folder):
-    """A body a kilometre from the origin of its mesh: places are told from its own corner."""
+    """A body a kilometre from the origin of its mesh: places are counted from its own corner."""
     bank = make_bank(folder, "far", plate(0.004, 24), max_modes=60)
 
     def move(file):

@@ -28,6 +28,8 @@ LIBRARIES = {
     "cgal": ["CGAL/", "boost/"],
     "xml": ["pugixml.hpp"],
     "zlib": ["zlib.h"],
+    "deflate": ["libdeflate.h"],
+    "stb": ["stb_image.h"],
     "simbody": ["SimTKsimbody.h"],
     "sqlite": ["sqlite3.h"],
     "httplib": ["httplib.h"],
@@ -36,10 +38,11 @@ LIBRARIES = {
 # folder: (folders of ours that it may include, libraries that it may include). std and POSIX are free everywhere.
 LAW = {
     "runtime/base": ([], ["rapidjson", "fmt", "openssl"]),
+    "runtime/codec": (["runtime/base"], ["eigen", "fmt", "deflate", "stb"]),
     "runtime/gltf": (["runtime/base"], ["fmt"]),
     "runtime/material": (["runtime/base"], ["fmt"]),
     "runtime/version": ([], ["fmt"]),
-    "runtime/bank": (["runtime/base", "runtime/material", "runtime/version"], ["json", "fmt", "hdf5"]),
+    "runtime/bank": (["runtime/base", "runtime/codec", "runtime/material", "runtime/version"], ["json", "fmt", "hdf5"]),
     "runtime/support": (["runtime/base", "runtime/material", "runtime/bank"], ["fmt"]),
     "runtime/events": (["runtime/base"], ["fmt"]),
     "runtime/radiation": (["runtime/base", "runtime/bank"], []),

@@ -157,7 +157,10 @@ class Explore(unittest.TestCase):
         self.assertLess(small["bytes"], 0.5 * size)
         self.assertRegex(small["change"], r"^packed, error at most -60\.\d dB\(A\) on 95 % of the surface")
         checked = subprocess.run(
-            [BIN / "carillon-bank", "check", "small/banks/large.hdf", "--original", "large.hdf"], cwd=self.root, capture_output=True, text=True
+            [BIN / "carillon-bank", "check", "small/banks/large.hdf", "--original", "large.hdf"],
+            cwd=self.root,
+            capture_output=True,
+            text=True,
         )
         self.assertEqual(checked.returncode, 0, checked.stdout + checked.stderr)
         self.assertEqual((whole["bytes"], whole["change"]), (size, None))
