@@ -194,7 +194,7 @@ void expect_same(const Bank& a, const Bank& b) {
   EXPECT_EQ(a.packing->witness_shape, b.packing->witness_shape);
 }
 
-TEST(Pack, a_file_gives_the_bank_that_the_packer_has_foreseen) {
+TEST(Pack, a_file_gives_the_bank_that_the_packer_predicts) {
   const tests::Folder folder;
   const std::filesystem::path file = folder.path() / "packed.hdf";
   for (const Bank& bank : {example::make_bank(3, 7), example::make_first_bank(1, 2), example::make_corrected_bank(2, 9),
