@@ -281,12 +281,11 @@ def test_banks():
 
 
 def damage_bank(bench, name, version):
-    (bench.folder / "a.hdf").write_bytes((bench.folder / name).read_bytes())
-    whole = (bench.folder / "a.hdf").read_bytes()
+    whole = (bench.folder / name).read_bytes()
     answer = bench.page.evaluate(
         """(async () => {
           const audio = await CarillonAudio.open({context: new OfflineAudioContext(2, 4800, 48000)});
-          const whole = new Uint8Array(await (await fetch('a.hdf')).arrayBuffer()), said = [];
+          const whole = new Uint8Array(await (await fetch('NAME')).arrayBuffer()), said = [];
           const attempt = async (bytes) =>
             audio.addBank(bytes, 'cup.hdf').then((bank) => { bank.close(); return ''; }, (error) => error.message);
           const step = Math.max(1, Math.floor(whole.length / 150));
@@ -305,6 +304,8 @@ def damage_bank(bench, name, version):
           return {said, modes: body.modes.length, header: text};
         })()""".replace(
             "VERSION", version
+        ).replace(
+            "NAME", name
         ),
         timeout_s=110,
     )
