@@ -222,7 +222,8 @@ void add_explore(CLI::App& app, Shared& shared, Run& run) {
   command->add_option("--up", explore.up, "Axis of the meshes of banks that points up: y or z (default)")
       ->transform(CLI::CheckedTransformer(std::map<std::string, explore::Up>{{"y", explore::Up::kY}, {"z", explore::Up::kZ}}))
       ->option_text("AXIS");
-  command->add_flag("--whole", explore.keeps_banks, "Keep banks as they are; without it those above 4 MB are packed, with an error of -60 dB(A)");
+  command->add_flag("--whole", explore.keeps_banks,
+                    "Keep banks as they are; without it those above 4 MB are packed, with an error of -60 dB(A)");
   CLI::Option* serves = command->add_flag("--serve", options->is_serving, "Serve it on this machine, until Ctrl-C");
   command->add_option("--port", options->port, "With --serve: the port (default: a free one)")->check(CLI::Range(1, 65535))->needs(serves);
   set_work(*command, shared, run, options, run_explore);

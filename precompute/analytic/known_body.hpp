@@ -32,7 +32,7 @@ struct ModeList {
 /// A closed surface, outward, in the frame of the job.
 struct ClosedSurface {
   std::vector<Vec3> vertices_m;
-  std::vector<bank::Triangle> triangles;
+  std::vector<Triangle> triangles;
 };
 
 /// Vibration of one body by its theory. Invariant: calc_shapes() of modes that list_modes() gave is mass-normalised over the whole body.

@@ -107,7 +107,7 @@ std::optional<ParticularSolutions> ParticularSolutions::make(const std::vector<P
   const Net net = triangulate(p, 0.08 * longest);
   const std::size_t step = std::max<std::size_t>(1, net.triangles.size() / (kInsidePoints * (p.size() - 2) / 2));
   for (std::size_t t = 0; t < net.triangles.size(); t += step) {
-    const bank::Triangle& v = net.triangles[t];
+    const Triangle& v = net.triangles[t];
     Point2 middle{};
     for (int c = 0; c < 2; ++c) middle[c] = (net.points_m[v[0]][c] * 0.37 + net.points_m[v[1]][c] * 0.34 + net.points_m[v[2]][c] * 0.29);
     solutions.inside_.push_back(to_polar(middle));

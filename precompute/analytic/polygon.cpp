@@ -76,7 +76,7 @@ Net Polygon::make_elements(double k, double edge_m) const {
   }
   Net net = triangulate(corners_m_, edge_m, singular, kMaxElements);  // a triangle with two singular corners could not be graded to both
   std::vector<double> longest(corners_m_.size(), 0.0);
-  for (const bank::Triangle& t : net.triangles)
+  for (const Triangle& t : net.triangles)
     for (int c = 0; c < 3; ++c) {
       const auto corner = static_cast<std::size_t>(t[c]);
       if (corner >= corners_m_.size()) continue;
@@ -164,7 +164,7 @@ std::size_t Polygon::find_element(const Point2& x, double& r, double& s) const {
   const std::size_t count = elements_.triangles.size();
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t t = (last_element_ + i) % count;
-    const bank::Triangle& v = elements_.triangles[t];
+    const Triangle& v = elements_.triangles[t];
     const Point2 &a = elements_.points_m[v[0]], &b = elements_.points_m[v[1]], &c = elements_.points_m[v[2]];
     const double bx = b[0] - a[0], by = b[1] - a[1], cx = c[0] - a[0], cy = c[1] - a[1], twice = bx * cy - by * cx;
     const double one = ((x[0] - a[0]) * cy - (x[1] - a[1]) * cx) / twice, other = (bx * (x[1] - a[1]) - by * (x[0] - a[0])) / twice;
@@ -203,7 +203,7 @@ Net Polygon::make_net(int grid) const {
   for (std::size_t t = 0; t < whole.triangles.size(); ++t) {
     const int cell = static_cast<int>(t / 2), column = cell % (2 * half), row = cell / (2 * half);
     if (column >= half && row >= half) continue;
-    bank::Triangle triangle = whole.triangles[t];
+    Triangle triangle = whole.triangles[t];
     for (std::int32_t& v : triangle) {
       if (number[v] < 0) {
         number[v] = static_cast<std::int32_t>(net.points_m.size());

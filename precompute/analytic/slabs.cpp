@@ -52,7 +52,7 @@ ClosedSurface make_slab(const Net& net, double thickness_m) {
   for (const double z : {0.5 * thickness_m, -0.5 * thickness_m})
     for (const Point2& p : net.points_m) surface.vertices_m.push_back({p[0], p[1], z});
   std::map<std::pair<std::int32_t, std::int32_t>, bool> edges;  // directed
-  for (const bank::Triangle& t : net.triangles) {
+  for (const Triangle& t : net.triangles) {
     surface.triangles.push_back(t);
     surface.triangles.push_back({t[2] + count, t[1] + count, t[0] + count});
     for (int k = 0; k < 3; ++k) edges[{t[k], t[(k + 1) % 3]}] = true;
@@ -86,7 +86,7 @@ ClosedSurface make_prism(double length_m, const std::vector<Point2>& section, in
 
 bank::RigidBody calc_slab_rigid(const Net& net, double thickness_m, double mass_kg) {
   double area = 0.0, x = 0.0, y = 0.0, xx = 0.0, yy = 0.0, xy = 0.0;
-  for (const bank::Triangle& t : net.triangles) {
+  for (const Triangle& t : net.triangles) {
     const Point2 &a = net.points_m[t[0]], &b = net.points_m[t[1]], &c = net.points_m[t[2]];
     const double part = 0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]));
     const double sx = a[0] + b[0] + c[0], sy = a[1] + b[1] + c[1];

@@ -13,7 +13,7 @@ using Point2 = std::array<double, 2>;
 /// Triangles in the plane, counter-clockwise.
 struct Net {
   std::vector<Point2> points_m;
-  std::vector<bank::Triangle> triangles;
+  std::vector<Triangle> triangles;
 };
 
 /// A rectangle from the origin, cut into columns by rows and each cell in two.

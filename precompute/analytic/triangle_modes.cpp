@@ -35,7 +35,7 @@ Numbering number_nodes(const Net& net, const TriangleBasis& basis) {
   auto next = static_cast<std::int32_t>(net.points_m.size());
   std::map<std::pair<std::int32_t, std::int32_t>, std::int32_t> first_of_edge;
   std::map<std::pair<std::int32_t, std::int32_t>, int> uses;
-  for (const bank::Triangle& t : net.triangles) {
+  for (const Triangle& t : net.triangles) {
     std::vector<std::int32_t> nodes;
     for (const std::array<int, 3>& weights : basis.places()) {
       const auto zeros = std::count(weights.begin(), weights.end(), 0);
@@ -181,7 +181,7 @@ TriangleModes solve_triangles(const Net& net, const TriangleBasis& basis, double
   const PetscInt unknowns = (used + 2) / 3 * 3;
   std::vector<Eigen::Triplet<double, PetscInt>> stiff, heavy;
   for (std::size_t t = 0; t < net.triangles.size(); ++t) {
-    const bank::Triangle& v = net.triangles[t];
+    const Triangle& v = net.triangles[t];
     const Point2 &a = net.points_m[v[0]], &b = net.points_m[v[1]], &c = net.points_m[v[2]];
     // x = a + r (b - a) + s (c - a): gradients of r and s.
     const double bx = b[0] - a[0], by = b[1] - a[1], cx = c[0] - a[0], cy = c[1] - a[1], twice = bx * cy - by * cx;

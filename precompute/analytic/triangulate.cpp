@@ -15,7 +15,6 @@ namespace carillon::analytic {
 namespace {
 
 using Edge = std::pair<std::int32_t, std::int32_t>;
-using bank::Triangle;
 
 long double cross(const Point2& o, const Point2& a, const Point2& b) {
   return (static_cast<long double>(a[0]) - o[0]) * (static_cast<long double>(b[1]) - o[1]) -

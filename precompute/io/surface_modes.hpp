@@ -13,8 +13,6 @@
 
 namespace carillon::io {
 
-using bank::Triangle;
-
 /// The surface of the body, known to rank 0.
 struct Surface {
   std::vector<Vec3> vertices_m;     // (V) in the order of the mesh's nodes

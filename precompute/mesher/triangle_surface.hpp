@@ -10,13 +10,13 @@
 #include <vector>
 
 #include "precompute/mesh/tet_mesh.hpp"
+#include "runtime/base/triangle.hpp"
 
 namespace carillon::mesher {
 
 struct SurfaceReport;  // of surface.hpp, which the slow CGAL files need not see
 struct SurfaceOptions;
 
-using Triangle = std::array<std::int32_t, 3>;
 using Polyline = std::vector<Vec3>;
 
 using Edge = std::array<std::int32_t, 2>;  // the lower point first

@@ -6,10 +6,9 @@
 #include <vector>
 
 #include "runtime/bank/bank.hpp"
+#include "runtime/base/triangle.hpp"
 
 namespace carillon::bank {
-
-using Triangle = std::array<std::int32_t, 3>;
 
 /// Twice the area times the unit normal of a triangle [m^2].
 Vec3 calc_normal(const std::vector<Vec3>& vertices_m, const Triangle& triangle);

@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <vector>
 
-namespace carillon::codec {
+#include "runtime/base/triangle.hpp"
 
-using Triangle = std::array<std::int32_t, 3>;
+namespace carillon::codec {
 
 /// An edge of a triangle whose other side is still open. The triangle that closes it has the edge turned round.
 struct Gate {

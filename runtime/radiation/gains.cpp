@@ -88,7 +88,7 @@ std::array<double, kOrders + 1> calc_radiation_factors(double x) {
 
 /// The outer skin as a sphere.
 struct Skin {
-  std::vector<bank::Triangle> triangles;
+  std::vector<Triangle> triangles;
   std::vector<Vec3> normals_m2;  // area times unit normal
   Vec3 centre_m{};               // of the enclosed volume
   double radius_m = 0.0;         // of the sphere of the same area
@@ -102,7 +102,7 @@ Skin make_skin(const bank::Bank& bank) {
   const Vec3 base = bank.vertices_m[skin.triangles[0][0]];
   double area = 0.0, volume = 0.0;  // volume: six times
   Vec3 moment{};
-  for (const bank::Triangle& triangle : skin.triangles) {
+  for (const Triangle& triangle : skin.triangles) {
     Vec3 normal = bank::calc_normal(bank.vertices_m, triangle), sum{}, corner{};
     for (int k = 0; k < 3; ++k) {
       corner[k] = bank.vertices_m[triangle[0]][k] - base[k];
@@ -152,7 +152,7 @@ std::vector<Power> calc_powers(const bank::Bank& bank, const Skin& skin) {
     std::fill(harmonic.begin(), harmonic.end(), 0.0F);
     std::fill(block_squares.begin(), block_squares.end(), 0.0F);
     for (std::size_t t = first; t < std::min(first + kFlowBlock, skin.triangles.size()); ++t) {
-      const bank::Triangle& corners = skin.triangles[t];
+      const Triangle& corners = skin.triangles[t];
       const Vec3& normal = skin.normals_m2[t];
       const double area = std::sqrt(dot(normal, normal));
       if (!(area > 0.0)) continue;
@@ -206,7 +206,7 @@ double calc_sphere_radius_of_skin(const Skin& skin) { return std::cbrt(skin.volu
 void check_sizes(const bank::Bank& bank) {
   const std::size_t modes = bank.mode_count(), vertices = bank.vertex_count();
   bool inside = bank.shape.size() == 3 * vertices * modes && bank.shape_scale.size() == modes && bank.radiation_gain.size() == modes;
-  for (const bank::Triangle& triangle : bank.triangles)
+  for (const Triangle& triangle : bank.triangles)
     for (const std::int32_t v : triangle) inside = inside && v >= 0 && static_cast<std::size_t>(v) < vertices;
   if (!inside) throw InputError("the arrays of the bank disagree: shapes, gains and triangles do not belong together");
 }

@@ -12,11 +12,11 @@
 #include "runtime/bank/edges.hpp"
 #include "runtime/bank/triangle.hpp"
 #include "runtime/base/error.hpp"
+#include "runtime/base/triangle.hpp"
 
 namespace carillon::shape {
 namespace {
 
-using Triangle = std::array<std::int32_t, 3>;
 constexpr int kLeaf = 4;
 constexpr double kSame = 1e-13;  // relative: distances that are equal
 

@@ -16,8 +16,8 @@
 #include <unordered_map>
 #include <utility>
 
-#include "runtime/base/large.hpp"
 #include "runtime/base/error.hpp"
+#include "runtime/base/large.hpp"
 #include "runtime/synth/oscillator.hpp"
 
 namespace carillon::synth {

@@ -246,7 +246,7 @@ TEST(FlatBodies, have_orthonormal_modes) {
     const double density = body->rigid.mass_kg / body->rigid.volume_m3, thickness = surface.vertices_m[0][2] - surface.vertices_m.back()[2];
     std::vector<double> sums(count * count, 0.0);
     std::vector<Vec3> phi(count);
-    for (const bank::Triangle& t : surface.triangles) {
+    for (const Triangle& t : surface.triangles) {
       const Vec3 &a = surface.vertices_m[t[0]], &b = surface.vertices_m[t[1]], &c = surface.vertices_m[t[2]];
       const double area = 0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]));
       if (!(a[2] > 0 && b[2] > 0 && c[2] > 0)) continue;  // the upper side

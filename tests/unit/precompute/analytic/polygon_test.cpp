@@ -39,7 +39,7 @@ double calc_area(const std::vector<Point2>& p) {
 void expect_net(const Net& net, double area) {
   double sum = 0.0;
   std::map<std::pair<int, int>, int> edges;
-  for (const bank::Triangle& t : net.triangles) {
+  for (const Triangle& t : net.triangles) {
     const Point2 &a = net.points_m[t[0]], &b = net.points_m[t[1]], &c = net.points_m[t[2]];
     const double part = 0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]));
     EXPECT_GT(part, 0.0);
@@ -64,7 +64,7 @@ TEST(Triangulate, fills_any_polygon) {
     for (const double edge : {10.0, 0.5, 0.21}) {
       Net net = triangulate(polygon, edge);
       expect_net(net, calc_area(polygon));
-      for (const bank::Triangle& t : net.triangles)
+      for (const Triangle& t : net.triangles)
         for (int k = 0; k < 3; ++k) {
           const Point2 &a = net.points_m[t[k]], &b = net.points_m[t[(k + 1) % 3]];
           EXPECT_LE(std::hypot(b[0] - a[0], b[1] - a[1]), 1.5 * edge + (edge > 5.0 ? 10.0 : 0.0));
@@ -80,7 +80,7 @@ TEST(Triangulate, keeps_corners_apart) {
     for (int i = 0; i < n; ++i) round.push_back({std::cos(2 * pi * i / n), std::sin(2 * pi * i / n)});
     const Net net = triangulate(round, 0.4, std::vector<bool>(round.size(), true));
     expect_net(net, calc_area(round));
-    for (const bank::Triangle& t : net.triangles) EXPECT_LT(std::count_if(t.begin(), t.end(), [&](std::int32_t v) { return v < n; }), 2);
+    for (const Triangle& t : net.triangles) EXPECT_LT(std::count_if(t.begin(), t.end(), [&](std::int32_t v) { return v < n; }), 2);
   }
 }
 

@@ -23,19 +23,19 @@ void use(const codec::Surface& surface, std::span<const std::byte> shapes, std::
 
 void check(const codec::Surface& surface) {
   if (surface.level_begin.back() != surface.places.size()) __builtin_trap();
-  for (const codec::Triangle& triangle : surface.triangles)
+  for (const Triangle& triangle : surface.triangles)
     for (const std::int32_t v : triangle)
       if (v < 0 || static_cast<std::size_t>(v) >= surface.places.size()) __builtin_trap();
 }
 
 /// An order of triangles, of which the surface has some.
-void restore(std::span<const std::byte> order, std::vector<codec::Triangle> triangles) {
+void restore(std::span<const std::byte> order, std::vector<Triangle> triangles) {
   try {
     codec::restore_order(order, triangles, "input");
   } catch (const InputError&) {
     return;
   }
-  for (const codec::Triangle& triangle : triangles)
+  for (const Triangle& triangle : triangles)
     if (triangle[0] < 0) __builtin_trap();
 }
 

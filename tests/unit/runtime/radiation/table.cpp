@@ -16,7 +16,7 @@ constexpr int kLevel = 4;
 /// The formula of docs/equations.md E6 for a bank, as carillon-precompute writes it into banks.
 double calc_osg02_gain(const bank::Bank& bank, std::size_t mode) {
   double flow = 0.0, area = 0.0;
-  for (const bank::Triangle& triangle : bank.triangles) {
+  for (const Triangle& triangle : bank.triangles) {
     const carillon::Vec3 normal = bank::calc_normal(bank.vertices_m, triangle);
     double through = 0.0;
     for (const std::int32_t v : triangle)
