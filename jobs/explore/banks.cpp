@@ -93,7 +93,7 @@ const BankFacts& PageBanks::add(const fs::path& file) {
   facts.kept.name = stem + ".hdf";
   for (int k = 2; taken.contains(facts.kept.name); ++k) facts.kept.name = fmt::format("{}-{}.hdf", stem, k);
   const fs::path target = folder_ / facts.kept.name;
-  if (keeps_all_ || facts.kept.full_bytes <= kSmallBytes) {
+  if (keeps_all_ || bank.packing || facts.kept.full_bytes <= kSmallBytes) {
     put_file(file, target);
   } else {
     const bank::PackedBank packed = bank::calc_packed(bank, kPackErrorDb, true);

@@ -24,7 +24,7 @@ struct PageOrder {
 struct PageBank {
   std::string name;                          // of the file in the folder
   std::uintmax_t bytes = 0, full_bytes = 0;  // of the file, and of the one that was given
-  std::string change;                        // what was left out; empty: nothing
+  std::string change;                        // what was done to it; empty: nothing
 };
 
 struct Explored {

@@ -93,6 +93,8 @@ class Bank:
             raise InputError(f"{path}: this is no mode bank (it does not begin with 'CARILLON BANK'); make one with carillon-precompute")
         version = first[14:].decode("ascii", "replace")
         if version.split(".")[0] != "1":
+            if version.startswith("2."):
+                raise InputError(f"{path}: is a packed bank; carillon-bank unpack makes a plain one of it, which this program reads")
             raise InputError(f"{path}: bank version {version} is newer than 1.x, which this program reads; use a newer carillon-draw")
         if len(data) < 4096 or hashlib.sha256(data[:4032] + data[4096:]).hexdigest().encode() != data[4032:4096]:
             raise InputError(f"{path}: the bank is cut short or was changed (its SHA-256 disagrees); copy or compute it again")

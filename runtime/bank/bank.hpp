@@ -117,7 +117,8 @@ struct Corrected {
 
 /// What is known of shapes that were packed: they are not quite what the solve found. W witnesses.
 struct Packing {
-  // A-weighted exposure of the error of a hard blow along the normal over that of the blow itself, by calc_blow_exposure() [dB(A)]:
+  // A-weighted exposure of the error of a hard blow, within some degrees of the normal, relative to that of the blow itself, by
+  // calc_blow_exposure() [dB(A)]:
   double error_db = 0.0;                    // on 95 % of the outer surface, by area, it is no greater
   double worst_db = 0.0;                    // at the vertex of the outer surface where it is greatest
   std::vector<std::int32_t> witness;        // (W) vertices of the outer surface whose shapes before packing are kept, for checks

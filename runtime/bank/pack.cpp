@@ -1,6 +1,6 @@
-// Method:     all modes share the error equally, each weighed by what is heard of it (reverse water-filling), so a mode's step is inverse
-// to
-//             the root of its exposure; steps at a place are as the root of what is heard of a blow there. runtime/codec does the rest. The
+// Method:     all modes share the error equally, each weighed by what is heard of it (reverse water-filling): a mode's step is inverse to
+// the
+//             root of its exposure. Steps at a place are as the root of what is heard of a blow there. runtime/codec does the rest. The
 //             steps are scaled until the error that a reader finds is the one that was asked for.
 // Source:     reverse water-filling: Cover and Thomas, Elements of Information Theory, 10.3.3.
 // Deviations: the exposures of modes add, as in calc_audibility().
@@ -23,10 +23,12 @@ namespace {
 
 constexpr double kLatticePerSize = 32768.0, kLatticePerEdge = 8.0;  // steps of the lattice in the body's size, in its shortest edge
 constexpr double kMostLattice = 1 << 22;
-constexpr double kMostStep = 1.0;    // of a mode, over the mean motion of its vertices: none vanishes
-constexpr double kCavity = 16.0;     // error of walls that are no part of the outer surface, over that of the outer surface
-constexpr double kOfSurface = 0.95;  // on which the error is no greater than is stated
-constexpr double kNearEnough = 0.4;  // dB that the error may stay below what was asked for
+constexpr double kMostStep = 1.0;      // of a mode, over the mean motion of its vertices: none vanishes
+constexpr double kCavity = 16.0;       // error of walls that are no part of the outer surface, over that of the outer surface
+constexpr double kOffNormal = 0.0027;  // sin^2 of 3 degrees: no blow is quite along the normal of a vertex
+constexpr double kQuietest = 0x1p-20;  // what is heard at the loudest place times this is the least that counts, -60 dB
+constexpr double kOfSurface = 0.95;    // on which the error is no greater than is stated
+constexpr double kNearEnough = 0.4;    // dB that the error may stay below what was asked for
 constexpr int kMostSampled = 5, kMostNear = 3, kMostTries = 20;  // trials of a sample, of all until it is near, and of all
 constexpr std::size_t kSampled = 8;                              // one of so many vertices of the finest level counts in a trial
 constexpr double kFirstDb = -4.0;                                // of the first trial, beyond what was asked for
@@ -61,12 +63,16 @@ Skin find_skin(const Bank& bank) {
   return skin;
 }
 
+/// What is heard of a mode that moves by `x`, by a blow of unit weight.
+double calc_heard(const Vec3& normal, const Vec3& x) {
+  const double along = dot(x, normal);
+  return along * along + kOffNormal * dot(x, x);
+}
 /// What is heard of a blow at a vertex with these shapes (m, 3) [steps of shape_scale].
 double calc_heard(const std::vector<double>& weight, const Vec3& normal, const std::int16_t* shape) {
   double heard = 0.0;
   for (const double w : weight) {
-    const double along = shape[0] * normal[0] + shape[1] * normal[1] + shape[2] * normal[2];
-    heard += w * along * along;
+    heard += w * calc_heard(normal, {double(shape[0]), double(shape[1]), double(shape[2])});
     shape += 3;
   }
   return heard;
@@ -74,8 +80,7 @@ double calc_heard(const std::vector<double>& weight, const Vec3& normal, const s
 double calc_heard(const std::vector<double>& weight, const Vec3& normal, const std::int16_t* shape, const std::int16_t* other) {
   double heard = 0.0;
   for (const double w : weight) {
-    const double along = (shape[0] - other[0]) * normal[0] + (shape[1] - other[1]) * normal[1] + (shape[2] - other[2]) * normal[2];
-    heard += w * along * along;
+    heard += w * calc_heard(normal, {double(shape[0] - other[0]), double(shape[1] - other[1]), double(shape[2] - other[2])});
     shape += 3;
     other += 3;
   }
@@ -182,13 +187,17 @@ std::vector<double> calc_motion(const Bank& bank) {
   return motion;
 }
 
-/// What is heard of a blow at each vertex (V), as it weighs in the error: at walls of cavities it is taken for more.
-std::vector<double> calc_loudness(const Bank& bank, const Skin& skin, const std::vector<double>& weight) {
-  std::vector<double> loudness(bank.vertex_count());
-  for (std::size_t v = 0; v < loudness.size(); ++v)
-    loudness[v] =
-        (skin.area_m2[v] > 0.0 ? 1.0 : kCavity) * calc_heard(weight, skin.normal[v], bank.shape.data() + v * bank.mode_count() * 3);
-  return loudness;
+/// What is heard of a blow at each vertex (V), at least kQuietest of the loudest place. At walls of cavities it is taken for more.
+std::vector<double> calc_exposure(const Bank& bank, const Skin& skin, const std::vector<double>& weight) {
+  std::vector<double> exposure(bank.vertex_count());
+  double loudest = 0.0;
+  for (std::size_t v = 0; v < exposure.size(); ++v) {
+    exposure[v] = calc_heard(weight, skin.normal[v], bank.shape.data() + v * bank.mode_count() * 3);
+    if (skin.area_m2[v] > 0.0) loudest = std::max(loudest, exposure[v]);
+  }
+  for (std::size_t v = 0; v < exposure.size(); ++v)
+    exposure[v] = std::max(exposure[v], kQuietest * loudest) * (skin.area_m2[v] > 0.0 ? 1.0 : kCavity);
+  return exposure;
 }
 
 /// Steps that give each mode the same share of `error` times what is heard at the loudest place, which is `loudest` [kg^-1/2].
@@ -205,10 +214,10 @@ std::vector<float> calc_steps(const Bank& bank, const std::vector<double>& weigh
 }
 
 /// How much finer than at the loudest place shapes are kept at each (V): as the root of what is heard there.
-std::vector<std::uint8_t> calc_fineness(const std::vector<double>& loudness, double loudest) {
+std::vector<std::uint8_t> calc_fineness(const std::vector<double>& exposure, double loudest) {
   std::vector<std::uint8_t> fineness;
-  for (const double heard : loudness) {
-    const double halvings = heard > 0.0 ? std::log2(loudest / heard) : static_cast<double>(codec::kMaxFineness);
+  for (const double heard : exposure) {
+    const double halvings = heard > 0.0 ? std::log2(loudest / heard) : 0.0;
     fineness.push_back(static_cast<std::uint8_t>(std::clamp(std::lround(halvings), 0L, static_cast<long>(codec::kMaxFineness))));
   }
   return fineness;
@@ -229,7 +238,7 @@ codec::Rows make_rows(const Bank& bank, const std::vector<float>& step) {
   return rows;
 }
 
-/// The shapes that read_shapes() makes of rows, at the vertices that `is_known`.
+/// As read_shapes() makes them of rows but in double precision, at the vertices that `is_known`.
 std::vector<std::int16_t> make_shape(const Bank& bank, const codec::Rows& rows, const std::vector<float>& step,
                                      const std::vector<bool>& is_known) {
   std::vector<std::int16_t> shape(bank.shape.size(), 0);
@@ -250,12 +259,13 @@ std::vector<std::int16_t> make_shape(const Bank& bank, const codec::Rows& rows, 
 Packing calc_error(const Bank& bank, const Skin& skin, const std::vector<double>& weight, const std::vector<std::int16_t>& shape,
                    const std::vector<bool>& is_known) {
   std::vector<std::pair<double, double>> errors;  // [dB], with their areas
+  const std::vector<double> exposure = calc_exposure(bank, skin, weight);
   double area = 0.0;
   for (std::size_t v = 0; v < bank.vertex_count(); ++v) {
     if (!(skin.area_m2[v] > 0.0) || !is_known[v]) continue;
     const std::int16_t* own = bank.shape.data() + v * bank.mode_count() * 3;
     const double missed = calc_heard(weight, skin.normal[v], own, shape.data() + v * bank.mode_count() * 3);
-    errors.emplace_back(calc_db(missed, calc_heard(weight, skin.normal[v], own)), skin.area_m2[v]);
+    errors.emplace_back(calc_db(missed, exposure[v]), skin.area_m2[v]);
     area += skin.area_m2[v];
   }
   std::sort(errors.begin(), errors.end());
@@ -285,9 +295,9 @@ class Packer {
  public:
   Packer(const Bank& bank, const codec::Surface& surface)
       : bank_(bank), surface_(surface), skin_(find_skin(bank)), weight_(calc_weights(bank)) {
-    const std::vector<double> loudness = calc_loudness(bank, skin_, weight_);
-    for (std::size_t v = 0; v < loudness.size(); ++v) loudest_ = std::max(loudest_, loudness[v]);
-    fineness_ = calc_fineness(loudness, loudest_);
+    const std::vector<double> exposure = calc_exposure(bank, skin_, weight_);
+    for (const double heard : exposure) loudest_ = std::max(loudest_, heard);
+    fineness_ = calc_fineness(exposure, loudest_);
   }
 
   /// The bytes of the shapes, and fills `packing`.
@@ -325,8 +335,8 @@ class Packer {
         asked_db -= std::max(kFiner, found_db - error_db);  // of few vertices the error does not change smoothly
     }
     if (best.empty())
-      throw InputError(
-          fmt::format("an error of {} dB(A) cannot be reached, {:.1f} is the least; use the bank as it is", error_db, least_db));
+      throw InputError(fmt::format("an error of {} dB(A) cannot be reached, the least that was found is {:.1f}; use the bank as it is",
+                                   error_db, least_db));
     packing.witness = choose_witnesses(skin_, kWitnesses);
     const std::size_t width = 3 * bank_.mode_count();
     for (const std::int32_t v : packing.witness) {
@@ -373,6 +383,7 @@ class Packer {
 }  // namespace
 
 std::string describe(const Packing& packing) {
+  if (packing.worst_db <= kExactDb) return "no error";
   return fmt::format("error at most {:.1f} dB(A) on 95 % of the surface, {:.1f} at the worst place", packing.error_db, packing.worst_db);
 }
 
@@ -405,18 +416,27 @@ Packing compare_packed(const Bank& packed, const Bank& original) {
   return calc_error(exact, find_skin(exact), calc_weights(exact), packed.shape, std::vector<bool>(exact.vertex_count(), true));
 }
 
+Check check_original(const Bank& packed, const Bank& original) {
+  const Packing found = compare_packed(packed, original);
+  Check check{"original", describe(found), {}};
+  if (found.error_db > packed.packing->error_db + kRoundingDb || found.worst_db > packed.packing->worst_db + kRoundingDb)
+    check.faults.push_back(fmt::format("{}; less is stated: {}", describe(found), describe(*packed.packing)));
+  return check;
+}
+
 Check check_packing(const Bank& bank) {
   const Packing& packing = *bank.packing;
   Check check{"packing", describe(packing), {}};
   const Skin skin = find_skin(bank);
-  const std::vector<double> weight = calc_weights(bank);
+  const std::vector<double> weight = calc_weights(bank), exposure = calc_exposure(bank, skin, weight);
+  const double quietest = kQuietest * (exposure.empty() ? 0.0 : *std::max_element(exposure.begin(), exposure.end()));
   std::size_t above = 0;
   double worst_db = kExactDb;
   for (std::size_t i = 0; i < packing.witness.size(); ++i) {
     const auto v = static_cast<std::size_t>(packing.witness[i]);
     const std::int16_t* own = packing.witness_shape.data() + i * bank.mode_count() * 3;
     const double missed = calc_heard(weight, skin.normal[v], own, bank.shape.data() + v * bank.mode_count() * 3);
-    const double here_db = calc_db(missed, calc_heard(weight, skin.normal[v], own));
+    const double here_db = calc_db(missed, std::max(calc_heard(weight, skin.normal[v], own), quietest));
     worst_db = std::max(worst_db, here_db);
     if (here_db > packing.error_db + kRoundingDb) ++above;
     if (here_db > packing.worst_db + kRoundingDb)

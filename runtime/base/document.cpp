@@ -108,7 +108,8 @@ std::optional<double> to_double(std::string_view text) {
   double number = 0.0;
   auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
   if (error == std::errc::result_out_of_range) {
-    // Too large or too small: a long double decides. Beyond that as well, it is small if its exponent is negative or its whole part 0.
+    // Too large or too small: a long double decides. Beyond that as well, it is small if its exponent is negative or its whole part 0,
+    // since RapidJSON takes no exponent above 308.
     long double wide = 0.0L;
     const bool is_within = std::from_chars(text.data(), text.data() + text.size(), wide).ec == std::errc();
     if (!is_within && text.find('-', 1) == std::string_view::npos && text.substr(text.starts_with('-') ? 1 : 0, 1) != "0")

@@ -6,7 +6,7 @@
 
 namespace carillon::codec {
 
-/// No stream of the format is shorter than this share of what it holds (Deutsch, RFC 1951: a match of 258 bytes takes two bits).
+/// No stream of the format holds more than so many times its length (Deutsch, RFC 1951: a match of 258 bytes takes two bits).
 inline constexpr std::size_t kMaxInflation = 1032;
 
 /// What so many packed bytes may become in memory, at most: a file of some kilobytes cannot take all memory of a machine. Shapes of a

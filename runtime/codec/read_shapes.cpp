@@ -60,7 +60,8 @@ class SparseResidual {
   SparseResidual(Reader& reader, std::size_t vertices, std::size_t numbers) : reader_(reader), numbers_(numbers) {
     counts_ = reader.get_numbers(vertices);
     const std::size_t total = reader.get<std::uint32_t>();
-    if (total > vertices * numbers) reader.fail("there are more residuals than numbers");
+    // None of them is 0, so that they take bytes.
+    if (total > vertices * numbers || total / kMaxInflation > reader.get_left()) reader.fail("there are more residuals than numbers");
     gaps_ = reader.get_numbers(total);
     values_ = reader.get_numbers(total);
   }
@@ -71,7 +72,6 @@ class SparseResidual {
       if (at_ >= values_.size() || gaps_[at_] >= numbers_ - place) reader_.fail("a residual lies outside of its vertex");
       place += gaps_[at_];
       add(place, static_cast<float>(unfold(values_[at_])));
-      if (place + 1 == numbers_ && i + 1 < counts_[vertex_]) reader_.fail("a vertex has more residuals than numbers");
     }
     ++vertex_;
   }
@@ -231,9 +231,11 @@ std::vector<std::int16_t> read_shapes(std::span<const std::byte> bytes, const Su
     reader.fail(fmt::format("they have {} levels, and the surface {}", levels, surface.level_count()));
   if (surface.level_count() > 1 && surface.level_begin[1] < kNeighbours)
     reader.fail(fmt::format("their coarsest level has {} vertices; {} are needed", surface.level_begin[1], kNeighbours));
-  // 18 bytes a vertex and mode: 6 of the shape and 12 of its row; 48 for each mode and level.
+  // 18 bytes a vertex and mode, 6 of the shape and 12 of its row, and 24 a vertex of each grid of a search.
   const auto most = static_cast<double>(find_most_unpacked(bytes.size()));
-  if (18.0 * (static_cast<double>(vertices) + 256.0) * (static_cast<double>(modes) + kRowUnit) > most + (64 << 20))
+  if (18.0 * (static_cast<double>(vertices) + 256.0) * (static_cast<double>(modes) + kRowUnit) +
+          24.0 * (kMaxCellShift + 3) * static_cast<double>(vertices) >
+      most + (64 << 20))
     reader.fail(fmt::format("{} modes at {} vertices are more than any bank of this length becomes", modes, vertices));
 
   const std::vector<float> step = reader.get_list<float>(modes);

@@ -193,8 +193,8 @@ Surface read_surface(std::span<const std::byte> bytes, const std::string& name) 
   const std::size_t levels = reader.get<std::uint8_t>();
   const std::size_t vertex_count = reader.get<std::uint32_t>(), triangle_count = reader.get<std::uint32_t>();
   const std::size_t seeds = reader.get<std::uint32_t>();
-  // 12 bytes of a place, again while they are sorted; 12 of a triangle and 36 of its share of the border.
-  if (40 * std::uint64_t{vertex_count} + 64 * std::uint64_t{triangle_count} > find_most_unpacked(bytes.size()))
+  // 12 bytes of a place, again while they are sorted, and 24 of its order; 12 of a triangle, and three gates of 24 while their list grows.
+  if (48 * std::uint64_t{vertex_count} + 156 * std::uint64_t{triangle_count} > find_most_unpacked(bytes.size()))
     reader.fail("it would become larger than any bank of its length");
   if (seeds > triangle_count) reader.fail("it begins more often than it has triangles");
   if (levels == 0 || levels > kMaxLevels) reader.fail(fmt::format("it has {} levels; 1 to {} are possible", levels, kMaxLevels));

@@ -46,6 +46,7 @@ class Reader {
   std::vector<std::uint8_t> get_block(std::size_t size);
   /// So many numbers: how many bytes each has, 0 to 4, a block of their lowest bytes, one of the next ...
   std::vector<std::uint32_t> get_numbers(std::size_t count);
+  std::size_t get_left() const { return bytes_.size(); }
   /// Nothing may follow.
   void finish();
 

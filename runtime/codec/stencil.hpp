@@ -11,10 +11,9 @@ namespace carillon::codec {
 
 /// The best linear prediction of a smooth field at a vertex from its neighbours, and of its gradient there times their mean distance h.
 ///
-/// Method:  kriging with the covariance 1 / (1 + (0.3 r)^2) + 100 (1 + x . x'), r and x in units of h about the vertex; the second term
-/// lets
-///          any linear field pass. 1e-4 on the diagonal stands for the rounding of the neighbours.
-/// Source:  kriging: Matheron 1963; the covariance, an inverse multiquadric: Hardy 1971, positive definite by Micchelli 1986.
+/// Method:  kriging with the covariance 1 / (1 + (0.3 r)^2) + 100 (1 + x . x'), r and x in units of h about the vertex; the second term is
+///          for linear fields. 1e-4 on the diagonal stands for the rounding of the neighbours.
+/// Source:  kriging: Matheron 1963; the covariance, an inverse multiquadric: Hardy 1971, positive definite by Schoenberg 1938.
 struct Stencil {
   std::array<float, kNeighbours> value{};                    // weights of the neighbours
   std::array<std::array<float, kNeighbours>, 3> gradient{};  // along each axis

@@ -40,25 +40,20 @@ using namespace carillon;
 constexpr int kMost = std::numeric_limits<int>::max();
 const CLI::Range kCounts(1, kMost);
 
-/// The error of a packed bank against the bank that it was made of.
-bank::Check check_original(const bank::Bank& packed, const std::string& original) {
-  bank::Check check{"original", "", {}};
-  try {
-    const bank::Packing found = bank::compare_packed(packed, bank::read_bank(original));
-    check.figure = bank::describe(found);
-    constexpr double kRoundingDb = 0.05;  // of figures that two machines find
-    if (found.error_db > packed.packing->error_db + kRoundingDb || found.worst_db > packed.packing->worst_db + kRoundingDb)
-      check.faults.push_back(fmt::format("less is stated: {}", bank::describe(*packed.packing)));
-  } catch (const InputError& error) {
-    check.faults.push_back(fmt::format("{}: {}", original, error.what()));
-  }
-  return check;
-}
-
 /// Prints every check. InputError when a fault was found, after all lines were printed. `original`: the bank that was packed, or empty.
 void check(const std::string& file, const std::string& original) {
   const bank::Bank bank = bank::read_bank_unchecked(file);
   if (!original.empty() && !bank.packing) throw InputError(file + ": is not packed; leave --original out");
+  std::optional<bank::Check> against;
+  if (!original.empty()) {
+    const bank::Bank whole = bank::read_bank(original);
+    if (whole.packing) throw InputError(original + ": is packed itself; give the bank that was packed");
+    try {
+      against = bank::check_original(bank, whole);
+    } catch (const InputError& error) {
+      throw InputError(fmt::format("{}: {}", original, error.what()));
+    }
+  }
   fmt::print("ok      {:<12} length and SHA-256 agree\n", "seal");
   fmt::print("ok      {:<12} {}, known to this program\n", "version", fmt::join(bank::read_version(file), "."));
   std::size_t faults = 0;
@@ -66,13 +61,15 @@ void check(const std::string& file, const std::string& original) {
   checks.push_back(bank::calc_regions_check(bank));
   checks.push_back(bank::calc_provenance_check(bank));
   if (bank.packing && checks[0].faults.empty()) checks.push_back(bank::check_packing(bank));
-  if (!original.empty()) checks.push_back(check_original(bank, original));
+  if (against) checks.push_back(*against);
   for (const bank::Check& check : checks) {
     fmt::print("{}", bank::format_check(check));
     faults += check.faults.size();
   }
   std::fflush(stdout);
-  if (faults > 0) throw InputError(fmt::format("{}: {} fault{}; compute the bank again", file, faults, faults == 1 ? "" : "s"));
+  if (faults > 0)
+    throw InputError(
+        fmt::format("{}: {} fault{}; {} the bank again", file, faults, faults == 1 ? "" : "s", bank.packing ? "pack" : "compute"));
   fmt::print("{}\n{}\n{}: whole and sane\n", bank::describe_completeness(bank), bank::describe_accuracy(bank), base::printable(file));
 }
 
@@ -262,7 +259,9 @@ void edit(const std::string& file, const std::string& out, Wishes& wishes) {
 
 void pack(const std::string& file, const std::string& out, double error_db, bool keep_numbers) {
   const bool is_piped = check_output(out);
-  const bank::PackedBank packed = bank::calc_packed(bank::read_bank(file), error_db, keep_numbers);
+  const bank::Bank bank = bank::read_bank(file);
+  if (bank.packing) throw InputError(file + ": is packed already; give the bank that was packed");
+  const bank::PackedBank packed = bank::calc_packed(bank, error_db, keep_numbers);
   if (is_piped)
     base::write_standard_output(bank::make_packed_bytes(packed));
   else

@@ -172,7 +172,8 @@ with tempfile.TemporaryDirectory() as name:
     (folder / "text.hdf").write_text("hello")
     data = (folder / "ball.hdf").read_bytes()
     (folder / "short.hdf").write_bytes(data[:-100])
-    (folder / "newer.hdf").write_bytes(data.replace(b"CARILLON BANK 1.0", b"CARILLON BANK 2.0", 1))
+    (folder / "newer.hdf").write_bytes(data.replace(b"CARILLON BANK 1.0", b"CARILLON BANK 3.0", 1))
+    (folder / "packed.hdf").write_bytes(data.replace(b"CARILLON BANK 1.0", b"CARILLON BANK 2.0", 1))
     (folder / "broken.json").write_text('{\n  "bodies": [,]\n}')
     (folder / "empty.json").write_text('{"bodies": []}')
     (folder / "poor.json").write_text('{"bodies": [{"name": "a", "bank": "ball.hdf", "fixed": true, "poses": []}]}')
@@ -183,7 +184,8 @@ with tempfile.TemporaryDirectory() as name:
         (["modes", "absent.hdf", "-o", "x.png"], ["absent.hdf", "No such file"]),
         (["modes", "text.hdf", "-o", "x.png"], ["text.hdf", "no mode bank"]),
         (["modes", "short.hdf", "-o", "x.png"], ["short.hdf", "SHA-256"]),
-        (["modes", "newer.hdf", "-o", "x.png"], ["newer.hdf", "version 2.0"]),
+        (["modes", "newer.hdf", "-o", "x.png"], ["newer.hdf", "version 3.0"]),
+        (["modes", "packed.hdf", "-o", "x.png"], ["packed.hdf", "carillon-bank unpack"]),
         (["modes", "ball.hdf", "-o", "x.png", "--modes", "1,5"], ["no mode 5", "which has 4", "1 to 4"]),
         (["modes", "ball.hdf", "-o", "x.png", "--modes", "0"], ["no mode 0", "1 to 4"]),
         (["modes", "ball.hdf", "-o", "x.png", "--modes", "first"], ["'first'", "1 to 4"]),

@@ -77,17 +77,22 @@ Error calc_error(const Bank& packed, const Bank& original, double size_m) {
       areas[v] += norm(twice) / 6.0;
     }
   }
+  // Of a blow three degrees off the normal; nothing is heard less than 2^-20 of the loudest place.
+  const auto weigh = [&](const Vec3& x, const Vec3& n) { return std::pow(dot(x, n), 2) + 0.0027 * dot(x, x); };
+  std::vector<double> heard(packed.vertex_count(), 0.0), missed(packed.vertex_count(), 0.0);
+  for (std::size_t v = 0; v < packed.vertex_count(); ++v) {
+    const Vec3 n = normalise(normals[v]);
+    for (std::size_t m = 0; m < packed.mode_count(); ++m) {
+      const Vec3 was = original.shape_at(from[v], m), is = packed.shape_at(v, m);
+      heard[v] += exposure[m] * weigh(was, n);
+      missed[v] += exposure[m] * weigh(is - was, n);
+    }
+  }
+  const double quietest = *std::max_element(heard.begin(), heard.end()) / 1048576.0;
   std::vector<std::pair<double, double>> errors;
   double all = 0.0;
   for (std::size_t v = 0; v < packed.vertex_count(); ++v) {
-    const Vec3 n = normalise(normals[v]);
-    double heard = 0.0, missed = 0.0;
-    for (std::size_t m = 0; m < packed.mode_count(); ++m) {
-      const Vec3 was = original.shape_at(from[v], m), is = packed.shape_at(v, m);
-      heard += exposure[m] * std::pow(dot(was, n), 2);
-      missed += exposure[m] * std::pow(dot(is - was, n), 2);
-    }
-    errors.emplace_back(missed > 0.0 ? 10.0 * std::log10(missed / heard) : -200.0, areas[v]);
+    errors.emplace_back(missed[v] > 0.0 ? 10.0 * std::log10(missed[v] / std::max(heard[v], quietest)) : -200.0, areas[v]);
     all += areas[v];
   }
   std::sort(errors.begin(), errors.end());
@@ -146,7 +151,8 @@ TEST(Pack, places_that_are_fixed_stay_at_rest) {
     const PackedBank packed = calc_packed(bank, asked_db);
     EXPECT_LT(packed.bank.packing->worst_db, asked_db + 40.0);
     for (std::size_t v = 0; v < packed.bank.vertex_count(); ++v)
-      for (std::size_t i = 0; packed.bank.vertices_m[v][2] > 0.0801 && i < 27; ++i) ASSERT_EQ(packed.bank.shape[27 * v + i], 0) << v;
+      for (std::size_t i = 0; packed.bank.vertices_m[v][2] > 0.0801 && i < 27; ++i)
+        ASSERT_LE(std::abs(packed.bank.shape[27 * v + i]), 6) << v;  // of 32767: 60 dB below the loudest place, less the error
     EXPECT_EQ(check_packing(packed.bank).faults, std::vector<std::string>{});
   }
 }
