@@ -149,10 +149,10 @@ TEST(Pack, places_that_are_fixed_stay_at_rest) {
   ASSERT_EQ(find_faults(bank), std::vector<std::string>{});
   for (const double asked_db : {-30.0, -60.0, -80.0}) {
     const PackedBank packed = calc_packed(bank, asked_db);
-    EXPECT_LT(packed.bank.packing->worst_db, asked_db + 40.0);
+    EXPECT_LT(packed.bank.packing->worst_db, asked_db + 20.0);
     for (std::size_t v = 0; v < packed.bank.vertex_count(); ++v)
       for (std::size_t i = 0; packed.bank.vertices_m[v][2] > 0.0801 && i < 27; ++i)
-        ASSERT_LE(std::abs(packed.bank.shape[27 * v + i]), 6) << v;  // of 32767: 60 dB below the loudest place, less the error
+        ASSERT_LE(std::abs(packed.bank.shape[27 * v + i]), 33) << v;  // a thousandth of the largest
     EXPECT_EQ(check_packing(packed.bank).faults, std::vector<std::string>{});
   }
 }
