@@ -1,7 +1,6 @@
-// Method:     all modes share the error equally, each weighed by what is heard of it (reverse water-filling): a mode's step is inverse to
-// the
-//             root of its exposure. Steps at a place are as the root of what is heard of a blow there. runtime/codec does the rest. The
-//             steps are scaled until the error that a reader finds is the one that was asked for.
+// Method:     all modes share the error equally, each weighed by what is heard of it (reverse water-filling): a mode's step is inverse
+//             to the root of its exposure. Steps at a place are as the root of what is heard of a blow there. runtime/codec does the
+//             rest. The steps are scaled until the error that a reader finds is the one that was asked for.
 // Source:     reverse water-filling: Cover and Thomas, Elements of Information Theory, 10.3.3.
 // Deviations: the exposures of modes add, as in calc_audibility().
 #include "runtime/bank/pack.hpp"
@@ -95,6 +94,13 @@ std::vector<double> calc_weights(const Bank& bank) {
   return weight;
 }
 
+/// Appends the row of a vertex (m, 3) to shapes.
+void append_row(const Bank& bank, std::int32_t vertex, std::vector<std::int16_t>& shape) {
+  const std::size_t width = 3 * bank.mode_count();
+  const auto row = bank.shape.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(vertex) * width);
+  shape.insert(shape.end(), row, row + static_cast<std::ptrdiff_t>(width));
+}
+
 /// The bank without vertices that no triangle has.
 Bank drop_unused(const Bank& bank) {
   std::vector<std::int32_t> moved(bank.vertex_count(), -1);
@@ -104,13 +110,11 @@ Bank drop_unused(const Bank& bank) {
   Bank used = bank;
   used.vertices_m.clear();
   used.shape.clear();
-  const std::size_t width = 3 * bank.mode_count();
   for (std::size_t v = 0; v < moved.size(); ++v) {
     if (moved[v] < 0) continue;
     moved[v] = static_cast<std::int32_t>(used.vertices_m.size());
     used.vertices_m.push_back(bank.vertices_m[v]);
-    const auto row = bank.shape.begin() + static_cast<std::ptrdiff_t>(v * width);
-    used.shape.insert(used.shape.end(), row, row + static_cast<std::ptrdiff_t>(width));
+    append_row(bank, static_cast<std::int32_t>(v), used.shape);
   }
   for (Triangle& triangle : used.triangles)
     for (std::int32_t& v : triangle) v = moved[static_cast<std::size_t>(v)];
@@ -125,8 +129,8 @@ struct PackedSurface {
 };
 
 /// What the triangles of `surface` were, those of a bank whose vertices are now at `moved`.
-codec::TriangleOrder find_order(const codec::Surface& surface, const std::vector<std::int32_t>& before,
-                                const std::vector<Triangle>& triangles, const std::vector<std::int32_t>& moved) {
+codec::TriangleOrder find_triangle_order(const codec::Surface& surface, const std::vector<std::int32_t>& before,
+                                         const std::vector<Triangle>& triangles, const std::vector<std::int32_t>& moved) {
   codec::TriangleOrder order{before, {}};
   for (std::size_t i = 0; i < before.size(); ++i) {
     const std::int32_t corner = moved[static_cast<std::size_t>(triangles[static_cast<std::size_t>(before[i])][0])];
@@ -154,20 +158,16 @@ PackedSurface pack_surface(const Bank& original, bool keep_numbers) {
     for (std::size_t k = 0; k < 3; ++k) places[v][k] = static_cast<std::int32_t>(std::lround((bank.vertices_m[v][k] - low[k]) / step_m));
   const codec::WrittenSurface written =
       codec::write_surface(low, step_m, places, bank.triangles, codec::find_levels(bank.vertices_m, area_m2));
-  const std::size_t width = 3 * bank.mode_count();
   std::vector<std::int16_t> shape;
   shape.reserve(bank.shape.size());
-  for (const std::int32_t v : written.vertices) {
-    const auto row = bank.shape.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(v) * width);
-    shape.insert(shape.end(), row, row + static_cast<std::ptrdiff_t>(width));
-  }
+  for (const std::int32_t v : written.vertices) append_row(bank, v, shape);
   bank.shape = std::move(shape);
   codec::Surface surface = codec::read_surface(std::as_bytes(std::span(written.bytes)), "the packed surface");
   std::vector<std::uint8_t> order;
   if (keep_numbers) {
     std::vector<std::int32_t> moved(bank.vertex_count());
     for (std::size_t v = 0; v < moved.size(); ++v) moved[static_cast<std::size_t>(written.vertices[v])] = static_cast<std::int32_t>(v);
-    order = codec::write_order(find_order(surface, written.triangles, bank.triangles, moved));
+    order = codec::write_order(find_triangle_order(surface, written.triangles, bank.triangles, moved));
   }
   bank.triangles = surface.triangles;
   if (keep_numbers) codec::restore_order(std::as_bytes(std::span(order)), bank.triangles, "the packed surface");
@@ -187,18 +187,21 @@ std::vector<double> calc_motion(const Bank& bank) {
   return motion;
 }
 
-/// What is heard of a blow at each vertex (V), at least kQuietest of the loudest place. At walls of cavities it is taken for more.
-std::vector<double> calc_exposure(const Bank& bank, const Skin& skin, const std::vector<double>& weight) {
-  std::vector<double> exposure(bank.vertex_count());
-  double loudest = 0.0;
-  for (std::size_t v = 0; v < exposure.size(); ++v) {
-    exposure[v] = calc_heard(weight, skin.normal[v], bank.shape.data() + v * bank.mode_count() * 3);
-    if (skin.area_m2[v] > 0.0) loudest = std::max(loudest, exposure[v]);
+/// Blows at all vertices, and what is heard of them.
+struct Blows {
+  Skin skin;
+  std::vector<double> weight;    // (m) calc_weights()
+  std::vector<double> exposure;  // (V) at least `quietest`
+  double quietest = 0.0;         // kQuietest of the loudest place of the outer surface
+
+  explicit Blows(const Bank& bank) : skin(find_skin(bank)), weight(calc_weights(bank)), exposure(bank.vertex_count()) {
+    for (std::size_t v = 0; v < exposure.size(); ++v) {
+      exposure[v] = calc_heard(weight, skin.normal[v], bank.shape.data() + v * bank.mode_count() * 3);
+      if (skin.area_m2[v] > 0.0) quietest = std::max(quietest, kQuietest * exposure[v]);
+    }
+    for (double& heard : exposure) heard = std::max(heard, quietest);
   }
-  for (std::size_t v = 0; v < exposure.size(); ++v)
-    exposure[v] = std::max(exposure[v], kQuietest * loudest) * (skin.area_m2[v] > 0.0 ? 1.0 : kCavity);
-  return exposure;
-}
+};
 
 /// Steps that give each mode the same share of `error` times what is heard at the loudest place, which is `loudest` [kg^-1/2].
 std::vector<float> calc_steps(const Bank& bank, const std::vector<double>& weight, double loudest, double error) {
@@ -255,18 +258,18 @@ std::vector<std::int16_t> make_shape(const Bank& bank, const codec::Rows& rows, 
   return shape;
 }
 
-/// The error of shapes (V, m, 3) against those of the bank, at the vertices that `is_known`. Without witnesses.
-Packing calc_error(const Bank& bank, const Skin& skin, const std::vector<double>& weight, const std::vector<std::int16_t>& shape,
+/// The error of shapes (V, m, 3) against those of the bank, at the vertices that `is_known`, on areas that are given (V) [m^2]. Without
+/// witnesses.
+Packing calc_error(const Bank& bank, const Blows& blows, const std::vector<double>& area_m2, const std::vector<std::int16_t>& shape,
                    const std::vector<bool>& is_known) {
   std::vector<std::pair<double, double>> errors;  // [dB], with their areas
-  const std::vector<double> exposure = calc_exposure(bank, skin, weight);
   double area = 0.0;
   for (std::size_t v = 0; v < bank.vertex_count(); ++v) {
-    if (!(skin.area_m2[v] > 0.0) || !is_known[v]) continue;
-    const std::int16_t* own = bank.shape.data() + v * bank.mode_count() * 3;
-    const double missed = calc_heard(weight, skin.normal[v], own, shape.data() + v * bank.mode_count() * 3);
-    errors.emplace_back(calc_db(missed, exposure[v]), skin.area_m2[v]);
-    area += skin.area_m2[v];
+    if (!(area_m2[v] > 0.0) || !is_known[v]) continue;
+    const std::size_t row = v * bank.mode_count() * 3;
+    const double missed = calc_heard(blows.weight, blows.skin.normal[v], bank.shape.data() + row, shape.data() + row);
+    errors.emplace_back(calc_db(missed, blows.exposure[v]), area_m2[v]);
+    area += area_m2[v];
   }
   std::sort(errors.begin(), errors.end());
   Packing packing;
@@ -293,10 +296,12 @@ std::vector<std::int32_t> choose_witnesses(const Skin& skin, std::size_t count) 
 /// Finds the scale of the steps with which a packed bank has the error that is asked for, by secants.
 class Packer {
  public:
-  Packer(const Bank& bank, const codec::Surface& surface)
-      : bank_(bank), surface_(surface), skin_(find_skin(bank)), weight_(calc_weights(bank)) {
-    const std::vector<double> exposure = calc_exposure(bank, skin_, weight_);
-    for (const double heard : exposure) loudest_ = std::max(loudest_, heard);
+  Packer(const Bank& bank, const codec::Surface& surface) : bank_(bank), surface_(surface), blows_(bank) {
+    std::vector<double> exposure = blows_.exposure;
+    for (std::size_t v = 0; v < exposure.size(); ++v) {
+      if (!(blows_.skin.area_m2[v] > 0.0)) exposure[v] *= kCavity;
+      loudest_ = std::max(loudest_, exposure[v]);
+    }
     fineness_ = calc_fineness(exposure, loudest_);
   }
 
@@ -337,17 +342,15 @@ class Packer {
     if (best.empty())
       throw InputError(fmt::format("an error of {} dB(A) cannot be reached, the least that was found is {:.1f}; use the bank as it is",
                                    error_db, least_db));
-    packing.witness = choose_witnesses(skin_, kWitnesses);
-    const std::size_t width = 3 * bank_.mode_count();
-    for (const std::int32_t v : packing.witness) {
-      const auto row = bank_.shape.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(v) * width);
-      packing.witness_shape.insert(packing.witness_shape.end(), row, row + static_cast<std::ptrdiff_t>(width));
-    }
+    packing.witness = choose_witnesses(blows_.skin, kWitnesses);
+    for (const std::int32_t v : packing.witness) append_row(bank_, v, packing.witness_shape);
     return best;
   }
 
  private:
-  std::vector<float> make_steps(double asked_db) const { return calc_steps(bank_, weight_, loudest_, std::pow(10.0, asked_db / 10.0)); }
+  std::vector<float> make_steps(double asked_db) const {
+    return calc_steps(bank_, blows_.weight, loudest_, std::pow(10.0, asked_db / 10.0));
+  }
 
   /// The error of the coarser levels and a sample of the finest one.
   double try_sampled(double asked_db) const {
@@ -357,9 +360,9 @@ class Packer {
     const std::vector<float> step = make_steps(asked_db);
     const codec::FittedShapes fitted = codec::fit_shapes(surface_, make_rows(bank_, step), bank_.mode_count(), fineness_, kSampled);
     // Of what is known the finest level is too small a part.
-    Skin skin = skin_;
-    for (std::size_t v = finest; v < is_known.size(); ++v) skin.area_m2[v] *= static_cast<double>(kSampled);
-    return calc_error(bank_, skin, weight_, make_shape(bank_, fitted.rows, step, is_known), is_known).error_db;
+    std::vector<double> area_m2 = blows_.skin.area_m2;
+    for (std::size_t v = finest; v < is_known.size(); ++v) area_m2[v] *= static_cast<double>(kSampled);
+    return calc_error(bank_, blows_, area_m2, make_shape(bank_, fitted.rows, step, is_known), is_known).error_db;
   }
 
   double try_whole(double asked_db, std::vector<std::uint8_t>& bytes, Packing& packing) const {
@@ -368,15 +371,14 @@ class Packer {
     bytes = codec::write_shapes(step, fitted.levels);
     const std::vector<std::int16_t> shape =
         codec::read_shapes(std::as_bytes(std::span(bytes)), surface_, bank_.shape_scale, "the packed shapes");
-    packing = calc_error(bank_, skin_, weight_, shape, std::vector<bool>(bank_.vertex_count(), true));
+    packing = calc_error(bank_, blows_, blows_.skin.area_m2, shape, std::vector<bool>(bank_.vertex_count(), true));
     return packing.error_db;
   }
 
   const Bank& bank_;
   const codec::Surface& surface_;
-  Skin skin_;
-  std::vector<double> weight_;
-  double loudest_ = 0.0;
+  Blows blows_;
+  double loudest_ = 0.0;  // of all vertices, walls of cavities as they weigh
   std::vector<std::uint8_t> fineness_;
 };
 
@@ -413,7 +415,8 @@ Packing compare_packed(const Bank& packed, const Bank& original) {
                     "packed",
                     packed.vertex_count(), packed.triangles.size(), packed.mode_count(), exact.vertex_count(), exact.triangles.size(),
                     exact.mode_count()));
-  return calc_error(exact, find_skin(exact), calc_weights(exact), packed.shape, std::vector<bool>(exact.vertex_count(), true));
+  const Blows blows(exact);
+  return calc_error(exact, blows, blows.skin.area_m2, packed.shape, std::vector<bool>(exact.vertex_count(), true));
 }
 
 Check check_original(const Bank& packed, const Bank& original) {
@@ -427,16 +430,15 @@ Check check_original(const Bank& packed, const Bank& original) {
 Check check_packing(const Bank& bank) {
   const Packing& packing = *bank.packing;
   Check check{"packing", describe(packing), {}};
-  const Skin skin = find_skin(bank);
-  const std::vector<double> weight = calc_weights(bank), exposure = calc_exposure(bank, skin, weight);
-  const double quietest = kQuietest * (exposure.empty() ? 0.0 : *std::max_element(exposure.begin(), exposure.end()));
+  const Blows blows(bank);
   std::size_t above = 0;
   double worst_db = kExactDb;
   for (std::size_t i = 0; i < packing.witness.size(); ++i) {
     const auto v = static_cast<std::size_t>(packing.witness[i]);
     const std::int16_t* own = packing.witness_shape.data() + i * bank.mode_count() * 3;
-    const double missed = calc_heard(weight, skin.normal[v], own, bank.shape.data() + v * bank.mode_count() * 3);
-    const double here_db = calc_db(missed, std::max(calc_heard(weight, skin.normal[v], own), quietest));
+    const Vec3& normal = blows.skin.normal[v];
+    const double missed = calc_heard(blows.weight, normal, own, bank.shape.data() + v * bank.mode_count() * 3);
+    const double here_db = calc_db(missed, std::max(calc_heard(blows.weight, normal, own), blows.quietest));
     worst_db = std::max(worst_db, here_db);
     if (here_db > packing.error_db + kRoundingDb) ++above;
     if (here_db > packing.worst_db + kRoundingDb)

@@ -36,7 +36,7 @@ float find_of_level(const std::array<float, N>& values, std::size_t from_finest)
 float calc_size_bits(float q) { return 2.0F * std::log2(q); }
 
 /// Of a vertex: the fields of its neighbours by the stencil. Columns: gradient along j of component c at 3 c + j, and behind those the
-/// difference of neighbour k at 9 + 12 c + k.
+/// difference of neighbour k at kGradients + kNeighbours c + k.
 struct Features {
   Field value;             // prediction by kriging alone
   Eigen::MatrixXf fields;  // (padded, kFeatures)
@@ -230,9 +230,7 @@ class Fitter {
   void predict(const Trial& trial, const Neighbours& neighbours, const Stencil& stencil, LevelNumbers& numbers) {
     std::array<const float*, kNeighbours> from;
     for (std::size_t k = 0; k < kNeighbours; ++k) from[k] = rows_.get(static_cast<std::size_t>(neighbours[k]));
-    if (trial.fit == Fit::kNone) {
-      return loops_.add_weighted(from.data(), stencil.value.data(), row_.size(), row_.data());
-    }
+    if (trial.fit == Fit::kNone) return loops_.add_weighted(from.data(), stencil.value.data(), row_.size(), row_.data());
     const float unit = share_ / std::sqrt(1.0F + features_.energy);
     std::array<float, kGradientNumbers> of_gradient;
     std::array<float, kDifferenceNumbers> of_differences;

@@ -235,6 +235,31 @@ BAD_PACKED = [
 ]
 
 
+def check_contacts(folder, whole, packed, loose):
+    """Contacts that were recorded on the whole bank play on a packed one that keeps the numbers, and on no other."""
+
+    def render(bank, *options):
+        scene = {"duration_s": 0.3, "bodies": [{"name": "a", "bank": bank, "fixed": True}], "listener": {"position_m": [1, 1, 1]}}
+        scene["strikes"] = [{"time_s": 0.1, "body": "a", "triangle": 7, "impulse_n_s": [0.01, -0.02, 0.03]}]
+        if "--contacts" in options:
+            del scene["strikes"]
+        scene["output"] = {"gain": 0.01, "format": "float"}
+        open(f"{folder}/scene.json", "w").write(json.dumps(scene))
+        words = [f"{BIN}/carillon-render", f"{folder}/scene.json", "-o", f"{folder}/sound.wav", *options]
+        done = subprocess.run(words, capture_output=True, text=True, timeout=60)
+        return done, np.frombuffer(open(f"{folder}/sound.wav", "rb").read()[-8 * 14400 :], "<f4") if done.returncode == 0 else None
+
+    contacts = f"{folder}/contacts.jsonl"
+    done, expected = render(whole, "--record", contacts)
+    assert done.returncode == 0, done
+    done, sound = render(packed, "--contacts", contacts)
+    assert done.returncode == 0, done
+    ratio = np.sum((sound - expected) ** 2.0) / np.sum(expected**2.0)
+    assert 0 < ratio < 0.01, ratio  # an oblique blow; at another triangle it would be about 1
+    done, _ = render(loose, "--contacts", contacts)
+    assert done.returncode == 2 and "contacts.jsonl" in done.stderr, done
+
+
 def check_packed(folder):
     """Packed banks: h5py sees what the page says of them; damage is found; the stated error cannot be made smaller than it is."""
     whole, path, plain = f"{folder}/whole.hdf", f"{folder}/packed.hdf", f"{folder}/plain.hdf"
@@ -273,6 +298,7 @@ def check_packed(folder):
     assert bank_program("check", f"{folder}/loose.hdf", "--original", whole).returncode == 0
     assert bank_program("edit", path, f"{folder}/large.hdf", "--size", "2").returncode == 0
     assert "format 1.4" in bank_program("info", f"{folder}/large.hdf").stdout
+    check_contacts(folder, whole, path, f"{folder}/loose.hdf")
     for arguments, words in (
         (["unpack", whole, plain], "is not packed; use it as it is"),
         (["check", whole, "--original", whole], "is not packed; leave --original out"),

@@ -373,9 +373,9 @@ class Sounds(Case):
 
 class Module(unittest.TestCase):
     def test_the_stub_has_what_the_module_has(self):
-        stub = ast.parse((pathlib.Path(carillon.__file__).parent / "_carillon.pyi").read_text())
+        declared = ast.parse((pathlib.Path(carillon.__file__).parent / "_carillon.pyi").read_text())
         compiled = carillon._carillon
-        stated = {node.name: node for node in stub.body if isinstance(node, (ast.ClassDef, ast.FunctionDef))}
+        stated = {node.name: node for node in declared.body if isinstance(node, (ast.ClassDef, ast.FunctionDef))}
         self.assertEqual(set(stated), {name for name in vars(compiled) if not name.startswith("_")})
 
         def list_words(function):

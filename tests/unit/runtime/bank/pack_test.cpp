@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <numeric>
 #include <random>
 
 #include "runtime/bank/edits.hpp"
@@ -141,6 +142,30 @@ TEST(Pack, a_ball_takes_less_than_a_fifth_of_its_bytes_and_fewer_for_a_greater_e
   const std::size_t coarse = make_packed_bytes(calc_packed(bank, -30.0)).size(), fine = make_packed_bytes(calc_packed(bank, -50.0)).size();
   EXPECT_LT(5 * fine, raw);
   EXPECT_LT(coarse, fine);
+}
+
+// What goes in comes out: what is heard of blows all over the body, the triangles, the area and the volume.
+TEST(Pack, conserves_what_is_heard_in_all_and_the_volume) {
+  const Bank bank = make_ball_bank(3, 9);
+  const auto calc_volume_m3 = [](const Bank& of) {
+    double six = 0.0;
+    for (const auto& [a, b, c] : of.triangles) six += dot(of.vertices_m[a], cross(of.vertices_m[b], of.vertices_m[c]));
+    return six / 6.0;
+  };
+  const auto calc_heard = [](const Bank& of) {
+    const std::vector<double> heard = calc_audibility(of);
+    return std::accumulate(heard.begin(), heard.end(), 0.0);
+  };
+  for (const double asked_db : {-30.0, -50.0, -70.0}) {
+    const Bank packed = calc_packed(bank, asked_db).bank;
+    EXPECT_EQ(packed.triangles.size(), bank.triangles.size());
+    EXPECT_EQ(packed.vertex_count(), bank.vertex_count());
+    EXPECT_EQ(packed.mode_count(), bank.mode_count());
+    EXPECT_NEAR(calc_volume_m3(packed) / calc_volume_m3(bank), 1.0, 1e-5);
+    // |E' - E| <= 2 sqrt(E e) + e, with the error e of all places.
+    const double error = std::pow(10.0, packed.packing->worst_db / 20.0);
+    EXPECT_NEAR(calc_heard(packed) / calc_heard(bank), 1.0, 2.0 * error + error * error) << asked_db;
+  }
 }
 
 // What is not heard at a place that cannot move must not become heard.

@@ -13,6 +13,7 @@
 
 #include "runtime/codec/levels.hpp"
 #include "runtime/codec/surface.hpp"
+#include "tests/unit/runtime/radiation/sphere_bank.hpp"
 
 namespace carillon::codec::example {
 
@@ -25,29 +26,8 @@ inline Mesh make_tetrahedron() { return {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0
 
 /// 10 * 4^divisions + 2 vertices on a sphere.
 inline Mesh make_ball(int divisions, double radius_m = 1.0) {
-  Mesh mesh;
-  const double g = (1.0 + std::sqrt(5.0)) / 2.0;
-  mesh.vertices_m = {{-1, g, 0},  {1, g, 0},  {-1, -g, 0}, {1, -g, 0}, {0, -1, g},  {0, 1, g},
-                     {0, -1, -g}, {0, 1, -g}, {g, 0, -1},  {g, 0, 1},  {-g, 0, -1}, {-g, 0, 1}};
-  mesh.triangles = {{0, 11, 5}, {0, 5, 1}, {0, 1, 7}, {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4}, {11, 10, 2}, {10, 7, 6}, {7, 1, 8},
-                    {3, 9, 4},  {3, 4, 2}, {3, 2, 6}, {3, 6, 8},  {3, 8, 9},   {4, 9, 5}, {2, 4, 11}, {6, 2, 10},  {8, 6, 7},  {9, 8, 1}};
-  for (int i = 0; i < divisions; ++i) {
-    std::map<std::pair<std::int32_t, std::int32_t>, std::int32_t> middles;
-    const auto find_middle = [&](std::int32_t a, std::int32_t b) {
-      const auto [entry, is_new] = middles.try_emplace(std::minmax(a, b), static_cast<std::int32_t>(mesh.vertices_m.size()));
-      if (is_new) mesh.vertices_m.push_back(0.5 * (mesh.vertices_m[a] + mesh.vertices_m[b]));
-      return entry->second;
-    };
-    std::vector<Triangle> finer;
-    for (const auto& [a, b, c] : mesh.triangles) {
-      const std::int32_t ab = find_middle(a, b), bc = find_middle(b, c), ca = find_middle(c, a);
-      finer.insert(finer.end(), {{a, ab, ca}, {ab, b, bc}, {ca, bc, c}, {ab, bc, ca}});
-    }
-    mesh.triangles = std::move(finer);
-    for (Vec3& x : mesh.vertices_m) x = normalise(x);
-  }
-  for (Vec3& x : mesh.vertices_m) x = radius_m * normalise(x);
-  return mesh;
+  const bank::Bank bank = testing::make_sphere_surface(radius_m, divisions);
+  return {bank.vertices_m, bank.triangles};
 }
 
 inline Mesh make_torus(std::int32_t around, std::int32_t across) {
