@@ -223,7 +223,7 @@ def wait_until_saved(number):
     """slurmctld writes its jobs some seconds after a change; killed before that it forgets them, and gives their numbers away again."""
     saved = pathlib.Path(os.environ["SLURM_CONF"]).parent / "state/job_state"
     since = time.time()
-    subprocess.run(["scontrol", "update", f"JobId={number}", "TimeLimit+=1"], check=True)
+    subprocess.run(["scontrol", "update", f"JobId={number}", "TimeLimit=300"], check=True)
     deadline = time.monotonic() + 30
     while not saved.exists() or saved.stat().st_mtime < since:
         check(time.monotonic() < deadline, "slurmctld does not write its state")
