@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "runtime/bank/multipoles.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/vector.hpp"
 
@@ -151,6 +152,8 @@ struct Bank {
   std::vector<double> algebraic_error_cents;       // (m), or empty: unknown
   std::vector<double> discretisation_error_cents;  // (m), or empty: unknown; infinite: of this mode unknown
   Corrected corrected;                             // or empty: unknown; since 1.4
+
+  Multipoles multipoles;  // or empty: the air was not solved; since 1.5
 
   std::optional<Packing> packing;  // of a bank from a packed file, since 2.0; write_bank() leaves it out, edits drop it
 
