@@ -1,6 +1,7 @@
 // What the air takes of a mode.
 #pragma once
 
+#include <cmath>
 #include <numbers>
 
 #include "runtime/bank/bank.hpp"
@@ -11,6 +12,12 @@ namespace carillon::bank {
 /// directions: it carries away 4 pi (g q')^2 / (2 rho c) of the mode's q'^2 / 2, which is d_r = 2 pi g^2 / (rho c).
 constexpr double calc_radiation_decay(double gain) noexcept {
   return 2.0 * std::numbers::pi * gain * gain / (kAirDensityKgM3 * kSoundSpeedMs);
+}
+
+/// The gain whose calc_radiation_decay() is this decay [1/s], 0 or more: the root mean square over all directions of the far field at 1 m,
+/// for unit modal velocity [Pa s m^-1 kg^-1/2].
+inline double calc_gain_of_decay(double decay_per_s) noexcept {
+  return std::sqrt(kAirDensityKgM3 * kSoundSpeedMs * decay_per_s / (2.0 * std::numbers::pi));
 }
 
 }  // namespace carillon::bank

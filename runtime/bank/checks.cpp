@@ -67,6 +67,15 @@ Check check_arrays(const Bank& bank) {
     expect("corrected_error_cents", corrected.error_cents.size(), modes);
     expect("correction", corrected.correction.size(), modes);
   }
+  if (const Multipoles& air = bank.multipoles; !air.is_empty()) {
+    expect("radiation/order", air.order.size(), modes);
+    expect("radiation/freq_hz", air.freq_hz.size(), modes);
+    expect("radiation/scale", air.scale.size(), modes);
+    expect("radiation/decay", air.decay_per_s.size(), modes);
+    expect("radiation/added_mass", air.added_mass.size(), modes);
+    expect("radiation/error_db", air.error_db.size(), modes);
+    if (const std::string fault = find_order_fault(air); !fault.empty()) faults.add("{}", fault);
+  }
   expect("shape", bank.shape.size(), vertices * modes * 3);
   if (bank.packing) expect("pack/witness_shape", bank.packing->witness_shape.size(), bank.packing->witness.size() * modes * 3);
   const Supports& supports = bank.supports;
@@ -128,6 +137,18 @@ Check check_numbers(const Bank& bank) {
   look_all("supports/thickness_m", supports.thickness_m);
   look_all("support_reaction", supports.reaction);
   look_all("support_energy", supports.energy);
+  if (const Multipoles& air = bank.multipoles; !air.is_empty()) {
+    look("radiation/centre_m", air.centre_m.data(), 3);
+    look("radiation/radius_m", &air.radius_m, 1);
+    look("radiation/nearest_m", &air.nearest_m, 1);
+    look("radiation/air_density_kg_m3", &air.air_density_kg_m3, 1);
+    look("radiation/sound_speed_ms", &air.sound_speed_ms, 1);
+    look_all("radiation/freq_hz", air.freq_hz);
+    look_all("radiation/scale", air.scale);
+    look_all("radiation/decay", air.decay_per_s);
+    look_all("radiation/added_mass", air.added_mass);
+    look_all("radiation/error_db", air.error_db);
+  }
   if (bank.proof) {
     look_all("proof/cut_hz", bank.proof->cut_hz);
     look_all("proof/margin", bank.proof->margin);
@@ -187,19 +208,24 @@ void check_law(const Bank& bank, Faults& faults) {
 Check check_decay(const Bank& bank) {
   Faults faults;
   check_law(bank, faults);
-  const bool has_law = bank.damping.law != "mixed" && faults.empty();
+  const bool is_played = bank.multipoles.is_in_decay;  // no law has what radiation adds
+  const bool has_law = bank.damping.law != "mixed" && faults.empty() && !is_played;
   double worst = 0.0;
   for (std::size_t i = 0; i < bank.mode_count(); ++i) {
     const double d = bank.decay_per_s[i];
     if (!(d >= 0.0)) faults.add("decay[{}] is {:.6g} 1/s, negative", i, d);
     if (d > kMaxDecayPerS) faults.add("decay[{}] is {:.3g} 1/s, more than any damping makes ({:.0e})", i, d, kMaxDecayPerS);
+    if (is_played && !(d >= bank.multipoles.decay_per_s[i]))
+      faults.add("decay[{}] is {:.9g} 1/s, and radiation alone takes {:.9g}", i, d, bank.multipoles.decay_per_s[i]);
     if (!has_law) continue;
     const double law = calc_decay(bank.damping, bank.material, bank.eigenvalue_rad2_s2[i]);
     if (!(std::abs(d - law) <= kLawTolerance * law)) faults.add("decay[{}] is {:.9g} 1/s, and the damping law gives {:.9g}", i, d, law);
     if (law > 0.0) worst = std::max(worst, std::abs(d / law - 1.0));
   }
   return {"damping",
-          has_law ? fmt::format("law {}, to {:.1e}", bank.damping.law, worst) : std::string("several materials, decays not negative"),
+          has_law     ? fmt::format("law {}, to {:.1e}", bank.damping.law, worst)
+          : is_played ? std::string("with radiation, decays not below it")
+                      : std::string("several materials, decays not negative"),
           faults.take()};
 }
 
@@ -265,7 +291,7 @@ double calc_area(const Bank& bank) {
   return 0.5 * twice;
 }
 
-Check check_gains(const Bank& bank) {
+Check check_radiation(const Bank& bank) {
   Faults faults;
   double largest = 0.0;
   const double area = calc_area(bank);
@@ -277,7 +303,12 @@ Check check_gains(const Bank& bank) {
       faults.add("radiation_gain[{}] is {:.3g}, and a surface of this size and motion has {:.3g} at most", i, bank.radiation_gain[i], max);
     largest = std::max(largest, bank.radiation_gain[i]);
   }
-  return {"radiation", fmt::format("largest gain {:.4g} Pa s m^-1 kg^-1/2", largest), faults.take()};
+  Check check{"radiation", fmt::format("largest gain {:.4g} Pa s m^-1 kg^-1/2", largest), faults.take()};
+  if (bank.multipoles.is_empty()) return check;
+  Check multipoles = check_multipoles(bank);
+  check.figure += "; " + multipoles.figure;
+  for (std::string& fault : multipoles.faults) check.faults.push_back(std::move(fault));
+  return check;
 }
 
 Check check_shapes(const Bank& bank) {
@@ -496,7 +527,7 @@ Check check_solve(const Bank& bank) {
 std::vector<Check> calc_checks(const Bank& bank) {
   std::vector<Check> checks{check_arrays(bank)};
   if (!checks[0].faults.empty()) return checks;
-  for (const auto check : {check_numbers, check_eigenvalues, check_band, check_decay, check_corrected, check_residuals, check_gains,
+  for (const auto check : {check_numbers, check_eigenvalues, check_band, check_decay, check_corrected, check_residuals, check_radiation,
                            check_shapes, check_surface, check_rigid_body, check_supports, check_material, check_solve}) {
     checks.push_back(check(bank));
   }

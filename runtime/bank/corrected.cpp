@@ -1,6 +1,7 @@
 // Method:     shapes stay, frequencies change: reactions, which are lambda times mass times phi, and what the radiation gain has of the
-//             frequency, follow.
-// Source:     docs/equations.md E6, E7; docs/error-bars.md.
+//             frequency, follow. Of a bank with multipoles frequencies are those in air; radiation adds its decay, and the gain is the one
+//             that radiates as much.
+// Source:     docs/equations.md E6, E7, E10; docs/error-bars.md.
 // Deviations: none.
 #include "runtime/bank/corrected.hpp"
 
@@ -9,8 +10,10 @@
 #include <numbers>
 #include <utility>
 
+#include "runtime/bank/air.hpp"
 #include "runtime/bank/radiation_gain.hpp"
 #include "runtime/bank/select.hpp"
+#include "runtime/base/sort_order.hpp"
 
 namespace carillon::bank {
 
@@ -32,9 +35,10 @@ const char* describe(Correction correction) {
   return "unknown";
 }
 
-Bank calc_corrected(Bank bank) {
-  if (bank.corrected.is_empty()) return bank;
-  if (const std::vector<std::size_t> order = sort_modes(bank); !std::is_sorted(order.begin(), order.end())) select_modes(bank, order);
+namespace {
+
+/// Corrected frequencies and decays take the place of the mesh's. The order is right already.
+void take_corrected(Bank& bank) {
   Corrected corrected = std::exchange(bank.corrected, {});
   const double area = calc_outer_area_m2(bank);
   const std::size_t reactions = 6 * bank.supports.count();
@@ -46,13 +50,48 @@ Bank calc_corrected(Bank bank) {
     for (std::size_t i = m * reactions; i < (m + 1) * reactions; ++i) bank.supports.reaction[i] *= force;
   }
   bank.decay_per_s = std::move(corrected.decay_per_s);
+  bank.multipoles.is_in_decay = false;
   bank.discretisation_error_cents = std::move(corrected.error_cents);
+}
+
+/// Decays and gains of a bank with multipoles become those in air.
+void add_radiation(Bank& bank) {
+  Multipoles& air = bank.multipoles;
+  for (std::size_t m = 0; m < bank.mode_count(); ++m) {
+    if (!air.is_in_decay) bank.decay_per_s[m] += air.decay_per_s[m];
+    bank.radiation_gain[m] = calc_gain_of_decay(air.decay_per_s[m]);
+  }
+  air.is_in_decay = true;
+}
+
+}  // namespace
+
+std::vector<std::size_t> sort_played_modes(const Bank& bank) {
+  return bank.multipoles.is_empty() ? sort_modes(bank) : base::find_sort_order(bank.multipoles.freq_hz);
+}
+
+Bank calc_corrected(Bank bank) {
+  const bool has_air = !bank.multipoles.is_empty();
+  if (bank.corrected.is_empty() && !has_air) return bank;
+  if (const std::vector<std::size_t> order = sort_played_modes(bank); !std::is_sorted(order.begin(), order.end()))
+    select_modes(bank, order);
+  if (!bank.corrected.is_empty()) take_corrected(bank);
+  if (has_air) {
+    // Reactions stay: they are what the elastic body, whose shape is the same, gives its supports.
+    for (std::size_t m = 0; m < bank.mode_count(); ++m) {
+      const double omega = 2.0 * std::numbers::pi * bank.multipoles.freq_hz[m];
+      bank.eigenvalue_rad2_s2[m] = omega * omega;
+    }
+    add_radiation(bank);
+  }
   bank.proof.reset();
   return bank;
 }
 
 Bank choose_frequencies(Bank bank, Frequencies frequencies) {
-  return frequencies == Frequencies::kCorrected ? calc_corrected(std::move(bank)) : bank;
+  if (frequencies == Frequencies::kCorrected) return calc_corrected(std::move(bank));
+  if (!bank.multipoles.is_empty()) add_radiation(bank);
+  return bank;
 }
 
 }  // namespace carillon::bank

@@ -2,7 +2,12 @@
 //             k, g the scales of density, stiffness and size: lambda' = lambda k / (s g^2), phi' = phi / sqrt(s g^3). Of the radiation gain
 //             the flow, the integral of |phi . n| over the surface, is proportional to phi' g^2; what depends on the frequency is written
 //             again.
-// Source:     docs/equations.md E6, E7.
+//             Multipoles, of another size g of the same material: omega' = omega / g, so that k' = k / g, and k' R' = k R with R' = g R.
+//             The pressure p' at g x solves the same equation, with dp'/dn = i omega' rho phi' on the surface. With p' = b p this is
+//             b / g dp/dn = i (omega / g) rho g^(-3/2) phi, so b = g^(-3/2): coefficients, which are pressures on the sphere, go with
+//             g^(-3/2). Decay, sum |c|^2 / (2 rho c k^2): g^(-3) g^2 = 1 / g. Added mass, of p / (i omega) times phi over the surface:
+//             g^(-3/2) g g^(-3/2) g^2 = 1. Frequencies in air, f / sqrt(1 + added mass), go with 1 / g.
+// Source:     docs/equations.md E6, E7, E10.
 // Deviations: none.
 #include "runtime/bank/edits.hpp"
 
@@ -16,6 +21,7 @@
 #include <string_view>
 #include <system_error>
 
+#include "runtime/bank/air.hpp"
 #include "runtime/bank/radiation_gain.hpp"
 
 namespace carillon::bank {
@@ -77,6 +83,21 @@ void check(const Bank& bank, const Edits& edits) {
   }
 }
 
+/// Whether modes have another wave number in air over the size of the body.
+bool changes_waves(const Edits& edits) { return edits.density_scale != 1.0 || edits.stiffness_scale != 1.0; }
+
+/// Multipoles of the body in another size.
+void scale_size(Multipoles& air, double g) {
+  for (double& x : air.centre_m) x *= g;
+  air.radius_m *= g;
+  air.nearest_m *= g;
+  for (std::size_t m = 0; m < air.order.size(); ++m) {
+    air.freq_hz[m] /= g;
+    air.scale[m] /= std::sqrt(g * g * g);
+    air.decay_per_s[m] /= g;
+  }
+}
+
 /// Bank::regions with the volumes of a body that is as many times larger.
 std::string scale_volumes(const std::string& regions, double scale) {
   constexpr std::string_view kKey = "\"volume_m3\":";
@@ -108,6 +129,12 @@ std::string format_law(const Damping& law) {
 
 }  // namespace
 
+std::string describe_dropped(const Bank& bank, const Edits& edits) {
+  if (!changes_waves(edits) || bank.multipoles.is_empty()) return {};
+  return "radiation: dropped, as modes of another density or stiffness meet the air at other wave numbers; for the edited body's own, "
+         "compute its job again";
+}
+
 Bank calc_edited(const Bank& bank, const Edits& edits) {
   check(bank, edits);
   const double s = edits.density_scale, k = edits.stiffness_scale, g = edits.size_scale;
@@ -117,6 +144,11 @@ Bank calc_edited(const Bank& bank, const Edits& edits) {
   const double area = calc_outer_area_m2(bank);
   Bank edited = bank;
   edited.packing.reset();
+  if (changes_waves(edits))
+    edited.multipoles = {};
+  else
+    scale_size(edited.multipoles, g);
+  const Multipoles& air = edited.multipoles;
   edited.material.young_modulus_pa *= k;
   edited.material.density_kg_m3 *= s;
   if (edits.alphas) {
@@ -141,6 +173,10 @@ Bank calc_edited(const Bank& bank, const Edits& edits) {
     edited.shape_scale[m] *= shape_scale;
     edited.radiation_gain[m] *= calc_radiation_gain(std::sqrt(edited.eigenvalue_rad2_s2[m]), shape_scale * g * g, area * g * g) /
                                 calc_radiation_gain(std::sqrt(bank.eigenvalue_rad2_s2[m]), 1.0, area);
+    if (air.is_in_decay) {  // a bank that choose_frequencies() has made stays one
+      edited.decay_per_s[m] += air.decay_per_s[m];
+      edited.radiation_gain[m] = calc_gain_of_decay(air.decay_per_s[m]);
+    }
   }
   for (Vec3& vertex : edited.vertices_m) {
     for (double& x : vertex) x *= g;
@@ -166,6 +202,7 @@ Bank calc_edited(const Bank& bank, const Edits& edits) {
   edited.provenance = fmt::format(R"({{"edits": {{"density_scale": {}, "stiffness_scale": {}, "size_scale": {})", s, k, g);
   if (edits.alphas) edited.provenance += fmt::format(R"(, "alpha1_s": {}, "alpha2_per_s": {})", (*edits.alphas)[0], (*edits.alphas)[1]);
   if (edits.damping) edited.provenance += format_law(*edits.damping);
+  if (!describe_dropped(bank, edits).empty()) edited.provenance += R"(, "radiation": "dropped")";
   edited.provenance += bank.provenance.empty() ? "}}" : fmt::format(R"(}}, "of": {}}})", bank.provenance);
   return edited;
 }

@@ -29,6 +29,12 @@ class Faults {
   std::size_t count_ = 0;
 };
 
+/// What is wrong with the orders of multipoles or the number of their coefficients; empty when nothing is.
+std::string find_order_fault(const Multipoles& multipoles);
+
+/// Multipoles whose array sizes agree: a part of the check "radiation".
+Check check_multipoles(const Bank& bank);
+
 /// Error bars: none is negative.
 Check check_error_bars(const Bank& bank);
 

@@ -22,6 +22,34 @@ std::vector<std::uint64_t> find_shape(const Vector& values) {
 /// A text of the file has at least one byte.
 std::string pad_text(const std::string& text) { return text.empty() ? std::string(1, '\0') : text; }
 
+/// What came with version 1.5.
+void add_radiation_fields(const Multipoles& air, const FileForm& form, std::vector<Field>& fields) {
+  const auto add_number = [&](const char* name, const char* units, const char* meaning, const double& value) {
+    fields.push_back({name, "<f8", {}, units, meaning, &value});
+  };
+  const auto add_list = [&](const char* name, const char* units, const char* meaning, const std::vector<double>& values) {
+    fields.push_back({name, "<f8", find_shape(values), units, meaning, values.data()});
+  };
+  fields.push_back({"radiation/centre_m", "<f8", {3}, "m", "of the sphere around the surface", air.centre_m.data()});
+  add_number("radiation/radius_m", "m", "of the sphere, R", air.radius_m);
+  add_number("radiation/nearest_m", "m", "from the centre: radiation/error_db is stated from there outward", air.nearest_m);
+  add_number("radiation/air_density_kg_m3", "kg/m^3", "of the air", air.air_density_kg_m3);
+  add_number("radiation/sound_speed_ms", "m/s", "in the air", air.sound_speed_ms);
+  add_list("radiation/freq_hz", "Hz", "of the mode in air, undamped", air.freq_hz);
+  fields.push_back({"radiation/order", "<i4", find_shape(air.order), "1", "L of the mode: (L + 1)^2 coefficients", air.order.data()});
+  add_list("radiation/scale", "Pa s m^-1 kg^-1/2", "of one integer step of the mode's coefficients", air.scale);
+  fields.push_back({"radiation/coefficient",
+                    "<i2",
+                    {air.coefficient.size() / 2, 2},
+                    "radiation/scale",
+                    "pressure on the sphere, real and imaginary part, mode by mode: docs/bank-format.md",
+                    air.coefficient.data()});
+  add_list("radiation/decay", "1/s", "what radiation adds to the decay", air.decay_per_s);
+  add_list("radiation/added_mass", "1", "of the air, over the modal mass", air.added_mass);
+  add_list("radiation/error_db", "dB", "of the pressure, rms over directions, over its rms", air.error_db);
+  fields.push_back({"radiation/method", text_type(form.radiation_method), {}, "1", "how the air was solved", form.radiation_method.data()});
+}
+
 /// What came with version 1.1.
 void add_later_fields(const Bank& bank, const FileForm& form, std::vector<Field>& fields) {
   const auto add_errors = [&](const char* name, const char* meaning, const std::vector<double>& cents) {
@@ -73,6 +101,7 @@ void add_later_fields(const Bank& bank, const FileForm& form, std::vector<Field>
                     "share of the strain energy within one thickness of the patch",
                     s.energy.data()}});
   }
+  if (!bank.multipoles.is_empty()) add_radiation_fields(bank.multipoles, form, fields);
   if (!bank.proof) return;
   const Proof& proof = *bank.proof;
   const auto& rigid = proof.rigid_per_component;
@@ -190,13 +219,15 @@ FileForm make_file_form(const Bank& bank) {
   form.regions = bank.regions;
   if (bank.supports.count() > 0) form.supports = pad_text(bank.supports.text);
   if (bank.proof) form.proof_method = pad_text(bank.proof->method);
+  if (!bank.multipoles.is_empty()) form.radiation_method = pad_text(bank.multipoles.method);
   form.has_complete_below = bank.proof && bank.proof->complete_below_hz > 0.0;
   if (bank.shape_bytes == 1) form.narrow_shape.assign(bank.shape.begin(), bank.shape.end());  // within -127 and 127: find_faults()
   return form;
 }
 
 std::array<int, 2> find_version(const Bank& bank, bool is_packed) {
-  if (is_packed) return {2, 0};
+  if (is_packed) return {2, bank.multipoles.is_empty() ? 0 : 1};
+  if (!bank.multipoles.is_empty()) return {1, 5};
   return {1, !bank.corrected.is_empty() || bank.element == "analytic" ? 4 : bank.supports.count() > 0 ? 3 : bank.shape_bytes == 1 ? 2 : 1};
 }
 

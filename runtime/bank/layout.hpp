@@ -35,6 +35,7 @@ struct FileForm {
   std::string regions;              // since 1.1, perhaps absent
   std::string proof_method;         // since 1.1, absent without a proof
   std::string supports;             // since 1.3, absent where nothing is fixed
+  std::string radiation_method;     // since 1.5, absent without multipoles
   bool has_complete_below = false;  // since 1.4: Proof::complete_below_hz is there
   // Since 2.0: in place of mesh and shapes what runtime/codec makes of them. The bank has its Packing.
   bool is_packed = false;

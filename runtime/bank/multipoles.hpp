@@ -1,7 +1,10 @@
 // What each mode sends into the air, as multipoles about the centre of a sphere around the body.
 #pragma once
 
+#include <complex>
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -28,10 +31,37 @@ struct Multipoles {
   std::vector<double> error_db;           // (M) of the pressure, rms over directions, relative to its rms, from nearest_m outward: what
                                           // interpolation over k, the order and rounding leave out; not the error of the surface mesh
   std::string method;                     // in words: boundary elements, unknowns, wave numbers, half space
+  bool is_in_decay = false;               // in memory only: Bank::decay_per_s has decay_per_s in it (choose_frequencies())
 
   bool is_empty() const { return order.empty(); }
 };
 
 inline constexpr std::int32_t kMaxOrder = 120;
+
+/// (L + 1)^2 of a mode of order L, 0 <= L.
+constexpr std::size_t count_coefficients(std::int32_t order) noexcept {
+  return (static_cast<std::size_t>(order) + 1) * (static_cast<std::size_t>(order) + 1);
+}
+
+/// |h_l(x)| for l = 0 .. order, (order + 1). 0 < x; infinite where a double does not hold it. DLMF 10.51.1.
+std::vector<double> calc_hankel_sizes(double x, std::int32_t order);
+
+/// What the coefficients of a mode say of its decay by radiation.
+struct CoefficientDecay {
+  double decay_per_s = 0.0;    // sum of |a_lm / h_l(k R)|^2 / (2 rho c k^2): the power at q' = 1, over twice the energy 1/2
+  double root_rounding = 0.0;  // [s^-1/2] the root of the decay of the same coefficients before they were rounded is no further away
+};
+
+/// Of every mode (M), at freq_hz in the air of the multipoles. The orders lie in 0 .. kMaxOrder, and there are as many coefficients as they
+/// ask for. docs/equations.md E10.
+std::vector<CoefficientDecay> calc_coefficient_decays(const Multipoles& multipoles);
+
+/// Appends order, scale and coefficients of a mode with the coefficients a_lm [Pa s m^-1 kg^-1/2], (L + 1)^2 in the order l^2 + l + m: the
+/// scale is the largest component over 32767, 0 where all are 0, and each is rounded to the nearest step. Its other values are left to the
+/// caller. Throws InputError for an order out of range, another number of coefficients and one that is not finite.
+void add_coefficients(Multipoles& multipoles, std::int32_t order, std::span<const std::complex<double>> coefficients);
+
+/// The modes `chosen`, in that order. Nothing at all where none is chosen.
+Multipoles select_multipoles(const Multipoles& multipoles, const std::vector<std::size_t>& chosen);
 
 }  // namespace carillon::bank

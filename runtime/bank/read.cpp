@@ -161,6 +161,24 @@ void allocate_later(const Seal& seal, const std::string& name, Loaded& loaded, c
     make_table("modes/support_reaction", {modes, count, 6}, supports.reaction, modes * count * 6);
     make_table("modes/support_energy", {modes, count}, supports.energy, modes * count);
   }
+  if (has_group(seal, "radiation")) {
+    Multipoles& air = bank.multipoles;
+    const std::uint64_t modes = bank.mode_count(), coefficients = get_rows(seal, "radiation/coefficient", name);
+    const auto make_values = [&](const char* field, const char* dtype, auto& values) {
+      check_extent({field, dtype, {modes}, "", "", nullptr}, get_extent(seal, field, name), name);
+      values.resize(modes);
+    };
+    make_values("radiation/freq_hz", "<f8", air.freq_hz);
+    make_values("radiation/order", "<i4", air.order);
+    make_values("radiation/scale", "<f8", air.scale);
+    make_values("radiation/decay", "<f8", air.decay_per_s);
+    make_values("radiation/added_mass", "<f8", air.added_mass);
+    make_values("radiation/error_db", "<f8", air.error_db);
+    check_extent({"radiation/coefficient", "<i2", {coefficients, 2}, "", "", nullptr}, get_extent(seal, "radiation/coefficient", name),
+                 name);
+    air.coefficient.resize(2 * coefficients);
+    make_text("radiation/method", loaded.form.radiation_method);
+  }
   if (!has_group(seal, "proof")) return;
   Proof& proof = bank.proof.emplace();
   make_list("proof/cut_hz", "<f8", proof.cut_hz);
@@ -322,6 +340,10 @@ Bank finish(Loaded&& loaded, const std::string& name) {
   bank.regions = trim(form.regions);
   bank.supports.text = trim(form.supports);
   if (bank.proof) bank.proof->method = trim(form.proof_method);
+  if (bank.multipoles.is_empty())
+    bank.multipoles = {};  // of a bank without modes
+  else
+    bank.multipoles.method = trim(form.radiation_method);
   for (std::size_t i = 0; i < bank.mode_count(); ++i) {
     const double freq_hz = std::sqrt(bank.eigenvalue_rad2_s2[i]) / (2.0 * std::numbers::pi);
     const bool agrees = std::abs(form.freq_hz[i] - freq_hz) <= 1e-9 * std::abs(freq_hz);

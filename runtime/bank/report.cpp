@@ -129,6 +129,39 @@ std::string format_damping(const Bank& bank) {
   return text + ", weighed by each material's part of the energies";
 }
 
+/// What info says of the multipoles of a bank that has some.
+struct RadiationFacts {
+  std::int32_t lowest = 0, highest = 0;  // order
+  std::size_t bytes = 0;                 // of orders, scales and coefficients
+  double worst_db = 0.0;                 // stated error
+  std::size_t strong = 0;                // modes of whose damping radiation is more than half
+  double cents = 0.0;                    // by which the mass of the air lowers a mode, the largest of either sign
+};
+
+RadiationFacts find_radiation_facts(const Bank& bank) {
+  const Multipoles& air = bank.multipoles;
+  const auto [low, high] = std::minmax_element(air.order.begin(), air.order.end());
+  RadiationFacts facts{*low, *high, 12 * air.order.size() + 2 * air.coefficient.size(), -HUGE_VAL, 0, 0.0};
+  for (std::size_t m = 0; m < air.order.size(); ++m) {
+    facts.worst_db = std::max(facts.worst_db, air.error_db[m]);
+    const double material = bank.corrected.is_empty() ? bank.decay_per_s[m] : bank.corrected.decay_per_s[m];
+    if (air.decay_per_s[m] > material) ++facts.strong;
+    if (const double cents = 600.0 * std::log2(1.0 + air.added_mass[m]); std::abs(cents) > std::abs(facts.cents)) facts.cents = cents;
+  }
+  return facts;
+}
+
+std::string format_radiation(const Bank& bank) {
+  const RadiationFacts facts = find_radiation_facts(bank);
+  const Multipoles& air = bank.multipoles;
+  std::string text = fmt::format("radiation {}\n", air.method.empty() ? "by an unknown method" : base::printable(air.method));
+  text += fmt::format("          order {} to {}, {}, error at most {:.1f} dB from {:.4g} m outward\n", facts.lowest, facts.highest,
+                      format_bytes(facts.bytes), facts.worst_db, air.nearest_m);
+  text += fmt::format("          more than half of the damping of {} of {} modes; the mass of the air lowers one by {:.2g} cents\n",
+                      facts.strong, bank.mode_count(), facts.cents);
+  return text;
+}
+
 template <class Range>
 Json::Value make_list(const Range& values) {
   Json::Value list(Json::arrayValue);
@@ -159,6 +192,14 @@ Json::Value make_mode(const Bank& bank, std::size_t i) {
     mode["correction"] = describe(corrected.correction[i]);
   }
   mode["radiation_gain"] = bank.radiation_gain[i];
+  if (const Multipoles& air = bank.multipoles; !air.is_empty()) {
+    Json::Value& radiation = mode["radiation"];
+    radiation["frequency_hz"] = air.freq_hz[i];
+    radiation["order"] = air.order[i];
+    radiation["decay_per_s"] = air.decay_per_s[i];
+    radiation["added_mass"] = air.added_mass[i];
+    radiation["error_db"] = air.error_db[i];
+  }
   mode["shape_scale"] = bank.shape_scale[i];
   return mode;
 }
@@ -227,6 +268,7 @@ std::string format_info(const Bank& bank, const std::filesystem::path& file, std
   text += fmt::format("material  E {:.5g} Pa, nu {:.4g}, rho {:.5g} kg/m^3{}\n", m.young_modulus_pa, m.poisson_ratio, m.density_kg_m3,
                       bank.regions.empty() ? "" : " (of the whole; several materials: --json)");
   text += fmt::format("damping   {}\n", format_damping(bank));
+  if (!bank.multipoles.is_empty()) text += format_radiation(bank);
   text += fmt::format("rigid     {:.6g} kg, {:.6g} m^3, centre ({:.5g}, {:.5g}, {:.5g}) m\n", rigid.mass_kg, rigid.volume_m3,
                       rigid.centre_m[0], rigid.centre_m[1], rigid.centre_m[2]);
   text += fmt::format("inertia   xx {:.5g}, yy {:.5g}, zz {:.5g}, xy {:.3g}, xz {:.3g}, yz {:.3g} kg m^2\n", inertia[0], inertia[4],
@@ -278,6 +320,20 @@ std::string format_info_json(const Bank& bank, const std::filesystem::path& file
   material["damping"] = make_damping(bank);
   if (const auto regions = parse_json(bank.regions); !bank.regions.empty())
     material["regions"] = regions ? *regions : Json::Value(bank.regions);
+  if (const Multipoles& air = bank.multipoles; !air.is_empty()) {
+    const RadiationFacts facts = find_radiation_facts(bank);
+    Json::Value& radiation = root["radiation"];
+    radiation["method"] = air.method;
+    radiation["centre_m"] = make_list(air.centre_m);
+    radiation["radius_m"] = air.radius_m;
+    radiation["nearest_m"] = air.nearest_m;
+    radiation["air_density_kg_m3"] = air.air_density_kg_m3;
+    radiation["sound_speed_ms"] = air.sound_speed_ms;
+    radiation["bytes"] = Json::UInt64(facts.bytes);
+    radiation["worst_error_db"] = facts.worst_db;
+    radiation["modes_mostly_damped_by_it"] = Json::UInt64(facts.strong);
+    radiation["largest_added_mass_cents"] = facts.cents;
+  }
   root["proof"] = bank.proof ? make_proof(*bank.proof) : Json::Value();
   root["frequencies_hz"] = Json::Value(Json::arrayValue);
   root["corrected_frequencies_hz"] = Json::Value(Json::arrayValue);

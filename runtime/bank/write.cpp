@@ -37,6 +37,8 @@ fs::path resolve_target(const fs::path& file) {
 
 /// Throws InputError for a bank that is not sane; `name` stands for it in the message.
 void check_faults(const Bank& bank, const std::string& name) {
+  if (bank.multipoles.is_in_decay)  // a reader would add radiation a second time
+    throw InputError(name + ": this bank is as it is played in air and is not written; write the one that choose_frequencies() was given");
   const auto faults = find_faults(bank);
   if (faults.empty()) return;
   throw InputError(fmt::format("{}: this bank is not sane and is not written: {}{}", name, faults[0],

@@ -16,6 +16,7 @@
 #include <numeric>
 #include <vector>
 
+#include "runtime/bank/corrected.hpp"
 #include "runtime/bank/layout.hpp"
 #include "runtime/bank/radiation_gain.hpp"
 #include "runtime/bank/surface.hpp"
@@ -212,13 +213,14 @@ class Reader {
           throw InputError(fmt::format("{}: point {} differs from its extras: the file {}", file_.name(), v, kChanged));
   }
 
-  /// Frequencies and decays of the extension are those of the bank that comes of the extras.
+  /// Frequencies and decays of the extension are those with which the bank that comes of the extras is played.
   void compare_modes(const bank::Bank& bank, const std::vector<std::size_t>& modes) {
+    const bank::Bank played = bank::calc_corrected(bank);
+    const std::vector<std::size_t> order = bank::sort_played_modes(bank);
+    std::vector<std::size_t> place(order.size());  // of a mode of the bank among those that are played
+    for (std::size_t i = 0; i < order.size(); ++i) place[order[i]] = i;
     for (std::size_t k = 0; k < modes.size(); ++k) {
-      const bool is_corrected = !bank.corrected.is_empty();
-      const double omega =
-          is_corrected ? 2.0 * std::numbers::pi * bank.corrected.freq_hz[modes[k]] : std::sqrt(bank.eigenvalue_rad2_s2[modes[k]]);
-      const double decay = is_corrected ? bank.corrected.decay_per_s[modes[k]] : bank.decay_per_s[modes[k]];
+      const double omega = std::sqrt(played.eigenvalue_rad2_s2[place[modes[k]]]), decay = played.decay_per_s[place[modes[k]]];
       const double hz = calc_damped_hz(omega, decay);
       if (!(std::abs(model_.freq_hz[k] - hz) <= kSameFreq * hz && std::abs(model_.decay_per_s[k] - decay) <= kSameFreq * decay))
         throw InputError(fmt::format("{}: mode {} has {:.7g} Hz, but {:.7g} Hz in its extras: the file {}", file_.name(), k,

@@ -241,6 +241,7 @@ void edit(const std::string& file, const std::string& out, Wishes& wishes) {
   const bank::Edits& e = wishes.edits;
   const bool is_edited = e.density_scale != 1.0 || e.stiffness_scale != 1.0 || e.size_scale != 1.0 || e.alphas || e.damping;
   const double old_end_hz = bank.band_hz[1];
+  const std::string dropped = bank::describe_dropped(bank, e);
   if (is_edited || !is_reduced) bank = bank::calc_edited(bank, e);  // first: what is heard most may change
   if (const auto question = material::ask_about_solid(bank.material.young_modulus_pa, bank.material.density_kg_m3))
     fmt::print(stderr, "carillon-bank: warning: {}\n", base::printable(*question));
@@ -249,6 +250,7 @@ void edit(const std::string& file, const std::string& out, Wishes& wishes) {
     base::write_standard_output(bank::make_bank_bytes(bank));
   else
     bank::write_bank(bank, out);
+  if (!dropped.empty()) fmt::print(is_piped ? stderr : stdout, "{}\n", dropped);
   if (bank.band_hz[1] < std::min(old_end_hz, kMaxAudibleHz))
     fmt::print(is_piped ? stderr : stdout,
                "band      now {:.5g} to {:.5g} Hz: nothing above is in the bank; for more, compute the job again with a \"band_hz\" up to "

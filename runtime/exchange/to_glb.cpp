@@ -9,14 +9,12 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 #include <vector>
 
 #include "runtime/bank/blows.hpp"
 #include "runtime/bank/corrected.hpp"
 #include "runtime/bank/layout.hpp"
 #include "runtime/bank/reduce.hpp"
-#include "runtime/bank/select.hpp"
 #include "runtime/base/json.hpp"
 #include "runtime/base/sort_order.hpp"
 #include "runtime/base/vector.hpp"
@@ -46,9 +44,7 @@ struct Played {
 
 /// By falling audibility.
 std::vector<Played> list_played(const bank::Bank& bank) {
-  std::vector<std::size_t> modes(bank.mode_count());
-  std::iota(modes.begin(), modes.end(), std::size_t{0});
-  if (!bank.corrected.is_empty()) modes = bank::sort_modes(bank);  // the order in which choose_frequencies() has them
+  const std::vector<std::size_t> modes = bank::sort_played_modes(bank);
   const bank::Bank played = bank::choose_frequencies(bank, bank::Frequencies::kCorrected);
   std::vector<double> silence = bank::calc_audibility(played);
   for (double& audibility : silence) audibility = -audibility;

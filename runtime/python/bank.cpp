@@ -78,8 +78,8 @@ bank::Frequencies to_frequencies(const std::string& name) {
 SharedBank make_shared(bank::Bank bank, bank::Frequencies frequencies, std::string name) {
   SharedBank shared{.stored = std::make_shared<bank::Bank>(std::move(bank)), .played = {}, .name = std::move(name)};
   shared.is_corrected = frequencies == bank::Frequencies::kCorrected;
-  const bool is_other = shared.is_corrected && !shared.stored->corrected.is_empty();
-  shared.played = is_other ? std::make_shared<bank::Bank>(bank::calc_corrected(*shared.stored)) : shared.stored;
+  const bool is_other = (shared.is_corrected && !shared.stored->corrected.is_empty()) || !shared.stored->multipoles.is_empty();
+  shared.played = is_other ? std::make_shared<bank::Bank>(bank::choose_frequencies(*shared.stored, frequencies)) : shared.stored;
   return shared;
 }
 

@@ -71,6 +71,8 @@ WORDS = [
     "roughness",
     "rolling",
     "two_ears",
+    "directivity",
+    "ground_reflection",
     "begin",
     "hold",
     "end",

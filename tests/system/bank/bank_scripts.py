@@ -83,6 +83,18 @@ def check_doc(folder):
     assert sealed[4096:] == again[4096:]
     assert bank_program("check", path).returncode == 0
 
+    # The same for the air, whose decays are those of the formula of the page.
+    air = f"{folder}/air.hdf"
+    make_bank(air, 3, 12, "radiation")
+    sealed = open(air, "rb").read()
+    run_snippet("seal_bank.py", air)
+    assert lines(sealed) == lines(open(air, "rb").read())
+    with h5py.File(air) as bank:
+        group = {name: item[()] for name, item in bank["radiation"].items()}
+        for name, item in bank["radiation"].items():
+            assert item.attrs["units"] and item.attrs["meaning"] and name in page, name
+    assert np.allclose(calc_decays(group), group["decay"], rtol=1e-3), (calc_decays(group), group["decay"])
+
     # A stranger's own bank: every array copied by h5py into a new file of his.
     other = f"{folder}/stranger.hdf"
     with h5py.File(path) as bank, h5py.File(other, "w", userblock_size=4096) as copy:
@@ -92,6 +104,22 @@ def check_doc(folder):
     run_snippet("seal_bank.py", other)
     done = bank_program("check", other)
     assert done.returncode == 0, done.stderr
+
+
+def calc_decays(air):
+    """Of the multipoles, with |h_l|^2 as a finite sum (DLMF 10.49.18)."""
+    decays, first = [], 0
+    for freq, order, scale in zip(air["freq_hz"], air["order"], air["scale"]):
+        k, power = 2 * np.pi * freq / air["sound_speed_ms"], 0.0
+        x2 = (k * air["radius_m"]) ** 2
+        for l in range(order + 1):
+            steps = air["coefficient"][first : first + 2 * l + 1].astype(float)
+            first += 2 * l + 1
+            factors = [(2 * j - 1) / (2 * j) * (l + j) * (l - j + 1) / x2 for j in range(1, l + 1)]
+            power += (steps**2).sum() * scale**2 / (np.cumprod([1.0, *factors]).sum() / x2)
+        decays.append(power / (2 * air["air_density_kg_m3"] * air["sound_speed_ms"] * k**2))
+    assert first == len(air["coefficient"])
+    return np.array(decays)
 
 
 def datasets_of(bank):
@@ -423,6 +451,21 @@ def check_program(folder):
         assert np.array_equal(info["rigid"]["inertia_kg_m2"], bank["rigid/inertia_kg_m2"][:])
     assert info["mode_count"] == 30 and len(info["frequencies_hz"]) == 30 and info["counts"]["rigid_modes"] == 6
     assert info["provenance"]["run"]["stations"][1]["seconds"] == 12.25 and info["bytes"] == os.path.getsize(path)
+
+    air, other = f"{folder}/air.hdf", f"{folder}/other.hdf"
+    make_bank(air, 2, 12, "radiation")
+    info = json.loads(bank_program("info", "--json", air).stdout)
+    with h5py.File(air) as bank:
+        for name, key in (("freq_hz", "frequency_hz"), ("order", "order"), ("decay", "decay_per_s"), ("added_mass", "added_mass")):
+            assert [mode["radiation"][key] for mode in info["modes"]] == bank[f"radiation/{name}"][:].tolist(), name
+        assert info["radiation"]["radius_m"] == bank["radiation/radius_m"][()]
+    assert "order 1 to 4" in bank_program("info", air).stdout and "multipoles of order 1 to 4" in bank_program("check", air).stdout
+    for arguments, is_kept in ((["--size", "2"], True), (["--tan-phi", "0.01"], True), (["--density", "1.1"], False)):
+        done = bank_program("edit", air, other, *arguments)
+        assert done.returncode == 0 and ("radiation: dropped" in done.stdout) != is_kept, done
+        with h5py.File(other) as bank:
+            assert ("radiation" in bank) == is_kept
+        assert bank_program("check", other).returncode == 0
 
     page = bank_program("info", "--modes", "3", path).stdout
     assert "provenance" not in page and "peak_bytes" not in page and "--all" in page and len(page.splitlines()) <= 22, page

@@ -8,6 +8,7 @@
 #include <tuple>
 
 #include "runtime/bank/bank.hpp"
+#include "tests/unit/runtime/bank/sphere_multipoles.hpp"
 
 namespace carillon::bank::example {
 
@@ -146,7 +147,15 @@ inline Bank make_corrected_bank(int n = 2, std::size_t modes = 9) {
   return bank;
 }
 
-/// The same with its ends x = 0 and x = 0.3 m fixed, as version 1.3 has it: made-up reactions, the second end half of the first.
+/// The same with multipoles, as version 1.5 has it.
+inline Bank make_radiating_bank(int n = 2, std::size_t modes = 9) {
+  Bank bank = make_corrected_bank(n, modes);
+  add_multipoles(bank);
+  return bank;
+}
+
+/// The bank of make_bank() with its ends x = 0 and x = 0.3 m fixed, as version 1.3 has it: made-up reactions, the second end half of the
+/// first.
 inline Bank make_supported_bank(int n = 2, std::size_t modes = 5) {
   Bank bank = make_bank(n, modes);
   Supports& supports = bank.supports;

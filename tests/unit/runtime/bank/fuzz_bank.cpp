@@ -4,6 +4,7 @@
 #include <string>
 
 #include "runtime/bank/bank.hpp"
+#include "runtime/bank/corrected.hpp"
 #include "runtime/bank/seal.hpp"
 #include "tests/unit/runtime/bank/seal_again.hpp"
 
@@ -21,6 +22,7 @@ void read(std::span<const std::byte> bytes) {
       for (std::size_t vertex = 0; vertex < bank.vertex_count(); ++vertex) sum += bank.shape_at(vertex, mode)[2];
     }
     for (const auto& triangle : bank.triangles) sum += bank.vertices_m[static_cast<std::size_t>(triangle[0])][0];
+    if (!bank.multipoles.is_empty()) sum += bank::calc_corrected(bank).radiation_gain.back();
     volatile double sink = sum;
     (void)sink;
   } catch (const InputError&) {

@@ -1,0 +1,99 @@
+// What makes the multipoles of a bank sane.
+// Method:     a body that radiates through a sphere lies within it; the decay by radiation is the power of the far field, found again from
+//             the coefficients, to what rounding them leaves open. In a half space the field is that of the body and its mirror image, and
+//             the body makes half of the power: then all decays are half.
+// Source:     docs/equations.md E10.
+// Deviations: the sphere may be left by what packing moves vertices (sqrt(3) / 2 of a lattice step, 5.3e-5 of the radius): a packed bank
+//             that was unpacked says nothing of it any more.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "runtime/bank/faults.hpp"
+
+namespace carillon::bank {
+namespace {
+
+constexpr double kOutside = 1e-4;        // of the radius
+constexpr double kMaxDetuning = 0.3;     // of the frequency that is played, for the mass of the air
+constexpr double kRootTolerance = 1e-9;  // of the root of a decay, for arithmetic
+constexpr double kMaxAir = 1e5;          // kg/m^3, m/s: beyond any gas
+constexpr double kMaxLengthM = 1e7, kMaxHz = 1e12, kMaxDecayPerS = 1e32;
+
+void check_sphere(const Bank& bank, Faults& faults) {
+  const Multipoles& air = bank.multipoles;
+  if (!(air.radius_m > 0.0 && air.radius_m <= kMaxLengthM))
+    return faults.add("radiation/radius_m is {:.6g} m, which is none", air.radius_m);
+  if (!(air.nearest_m >= air.radius_m && air.nearest_m <= kMaxLengthM))
+    faults.add("radiation/nearest_m is {:.6g} m, not between the radius of {:.6g} m and {:.0e}", air.nearest_m, air.radius_m, kMaxLengthM);
+  for (const auto& [name, value] : {std::pair("air_density_kg_m3", air.air_density_kg_m3), std::pair("sound_speed_ms", air.sound_speed_ms)})
+    if (!(value > 0.0 && value <= kMaxAir)) faults.add("radiation/{} is {:.6g}, that of no gas", name, value);
+  double farthest = 0.0;
+  for (const auto& triangle : bank.triangles)
+    for (const std::int32_t v : triangle)
+      if (v >= 0 && static_cast<std::size_t>(v) < bank.vertex_count())  // others are reported elsewhere
+        farthest = std::max(farthest, norm(bank.vertices_m[static_cast<std::size_t>(v)] - air.centre_m));
+  if (!(farthest <= air.radius_m * (1.0 + kOutside)))
+    faults.add("the surface reaches to {:.9g} m from radiation/centre_m, and the sphere has a radius of {:.9g} m", farthest, air.radius_m);
+}
+
+/// The frequency that the mode has without air [Hz], or with it where the bank is played.
+double find_hz(const Bank& bank, std::size_t mode) { return bank.corrected.is_empty() ? bank.freq_hz(mode) : bank.corrected.freq_hz[mode]; }
+
+void check_mode(const Bank& bank, std::size_t i, Faults& faults) {
+  const Multipoles& air = bank.multipoles;
+  const double hz = find_hz(bank, i);
+  if (!(air.freq_hz[i] > 0.0 && air.freq_hz[i] <= kMaxHz && std::abs(air.freq_hz[i] - hz) <= kMaxDetuning * hz))
+    faults.add("radiation/freq_hz[{}] is {:.6g} Hz, and the mode has {:.6g} Hz: too far apart", i, air.freq_hz[i], hz);
+  if (!(air.scale[i] >= 0.0)) faults.add("radiation/scale[{}] is {:.6g}, negative", i, air.scale[i]);
+  if (!(air.decay_per_s[i] >= 0.0 && air.decay_per_s[i] <= kMaxDecayPerS))
+    faults.add("radiation/decay[{}] is {:.6g} 1/s, which is none", i, air.decay_per_s[i]);
+  if (!(air.added_mass[i] > -1.0)) faults.add("radiation/added_mass[{}] is {:.6g}, not above -1", i, air.added_mass[i]);
+  if (!(air.error_db[i] <= 0.0)) faults.add("radiation/error_db[{}] is {:.6g} dB, more than the sound itself", i, air.error_db[i]);
+}
+
+/// Compares the decays with the share of the far field's power that goes into the air; the largest relative difference.
+double check_decays(const Multipoles& air, const std::vector<CoefficientDecay>& found, double share, Faults& faults) {
+  double worst = 0.0;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const double wanted = share * found[i].decay_per_s, root = std::sqrt(wanted), rounding = std::sqrt(share) * found[i].root_rounding;
+    const double off = std::abs(std::sqrt(air.decay_per_s[i]) - root);
+    if (!std::isfinite(root) || !(off <= rounding * (1.0 + kRootTolerance) + kRootTolerance * root))
+      faults.add("radiation/decay[{}] is {:.9g} 1/s, and the coefficients radiate {:.9g}", i, air.decay_per_s[i], wanted);
+    if (wanted > 0.0) worst = std::max(worst, std::abs(air.decay_per_s[i] / wanted - 1.0));
+  }
+  return worst;
+}
+
+}  // namespace
+
+std::string find_order_fault(const Multipoles& multipoles) {
+  std::uint64_t wanted = 0;  // where std::size_t has 32 bits, orders of a hostile file would pass them
+  for (std::size_t i = 0; i < multipoles.order.size(); ++i) {
+    const std::int32_t order = multipoles.order[i];
+    if (order < 0 || order > kMaxOrder) return fmt::format("radiation/order[{}] is {}, outside 0 to {}", i, order, kMaxOrder);
+    wanted += 2 * count_coefficients(order);
+  }
+  if (multipoles.coefficient.size() == wanted) return {};
+  return fmt::format("arrays disagree: radiation/coefficient holds {} values and {} are wanted", multipoles.coefficient.size(), wanted);
+}
+
+Check check_multipoles(const Bank& bank) {
+  const Multipoles& air = bank.multipoles;
+  if (air.is_empty()) return {"multipoles", "none", {}};
+  Faults faults;
+  check_sphere(bank, faults);
+  for (std::size_t i = 0; i < bank.mode_count(); ++i) check_mode(bank, i, faults);
+  if (!faults.empty()) return {"multipoles", "", faults.take()};
+  const std::vector<CoefficientDecay> found = calc_coefficient_decays(air);
+  Faults of_whole, of_half;
+  const double whole_off = check_decays(air, found, 1.0, of_whole), half_off = check_decays(air, found, 0.5, of_half);
+  const bool is_half = !of_whole.empty() && of_half.empty();
+  const auto [low, high] = std::minmax_element(air.order.begin(), air.order.end());
+  const std::string figure = fmt::format("multipoles of order {} to {}, which make the decays to {:.1e}{}", *low, *high,
+                                         is_half ? half_off : whole_off, is_half ? " (half a space)" : "");
+  return {"multipoles", figure, is_half ? std::vector<std::string>{} : of_whole.take()};
+}
+
+}  // namespace carillon::bank
