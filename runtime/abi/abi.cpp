@@ -3,6 +3,7 @@
 // Source:     none.
 // Deviations: none.
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstring>
@@ -132,6 +133,7 @@ void write(T ours, T* given) {
 template <>
 carillon_model_options make_default() {
   carillon_model_options options{};
+  options.radiation = CARILLON_RADIATION_AUTO;
   options.rate_hz = 48000.0;
   return options;
 }
@@ -218,7 +220,9 @@ carillon_motion make_default() {
   return motion;
 }
 
-static_assert(CARILLON_EFFECT_COUNT == synth::kEffectCount && CARILLON_TWO_EARS == 1 << static_cast<int>(synth::Effect::kTwoEars) &&
+static_assert(CARILLON_EFFECT_COUNT + CARILLON_LATER_EFFECT_COUNT == synth::kEffectCount &&
+              CARILLON_TWO_EARS == 1 << static_cast<int>(synth::Effect::kTwoEars) &&
+              CARILLON_GROUND_REFLECTION == 1 << static_cast<int>(synth::Effect::kGroundReflection) &&
               CARILLON_ACCELERATION_NOISE == 1 << static_cast<int>(synth::Effect::kAccelerationNoise));
 
 carillon::Vec3 to_vector(const double* x) { return {x[0], x[1], x[2]}; }
@@ -374,10 +378,12 @@ carillon_status carillon_model_make(const carillon_bank* bank, const carillon_mo
   if (model != nullptr) *model = nullptr;
   if (bank == nullptr || model == nullptr || !ours)
     return refuse("carillon_model_make: bank and model must not be NULL, options must be initialised", message, message_size);
-  if (ours->radiation != CARILLON_RADIATION_SPHERE && ours->radiation != CARILLON_RADIATION_OSG02)
+  static constexpr std::array kKinds{radiation::GainKind::kSphere, radiation::GainKind::kOsg02, radiation::GainKind::kBem,
+                                     radiation::GainKind::kAuto};  // in the order of carillon_radiation
+  if (ours->radiation < 0 || ours->radiation >= static_cast<std::int32_t>(kKinds.size()))
     return refuse("carillon_model_make: options.radiation is none of carillon_radiation", message, message_size);
   return run(message, message_size, [&] {
-    const auto kind = ours->radiation == CARILLON_RADIATION_SPHERE ? radiation::GainKind::kSphere : radiation::GainKind::kOsg02;
+    const radiation::GainKind kind = radiation::choose_gain_kind(bank->bank, kKinds[static_cast<std::size_t>(ours->radiation)]);
     std::vector<double> gains = radiation::calc_gains(bank->bank, kind);
     // What fixes the body takes of its modes what the bank says; a bank without losses is not copied.
     std::optional<bank::Bank> mounted;
@@ -643,8 +649,12 @@ carillon_status carillon_get_effect_counters(const carillon_synth* synth, int32_
   if (synth == nullptr || !read(counters)) return CARILLON_BAD_ARGUMENT;
   const synth::EffectCounters ours = synth->synthesiser.get_effect_counters(body);
   carillon_effect_counters given{};
-  std::copy(ours.units.begin(), ours.units.end(), given.units);
-  std::copy(ours.bytes.begin(), ours.bytes.end(), given.bytes);
+  const auto put = [](const synth::PerEffect<std::int64_t>& values, std::int64_t* first, std::int64_t* later) {
+    std::copy_n(values.begin(), CARILLON_EFFECT_COUNT, first);
+    std::copy_n(values.begin() + CARILLON_EFFECT_COUNT, CARILLON_LATER_EFFECT_COUNT, later);
+  };
+  put(ours.units, given.units, given.later_units);
+  put(ours.bytes, given.bytes, given.later_bytes);
   write(given, counters);
   return CARILLON_OK;
 }

@@ -26,7 +26,7 @@ extern "C" {
 
 /* Grows with every function and field that is added. The number in the name of libcarillon.so.2 is another one, which changes only when
  * programs would have to be compiled again. */
-#define CARILLON_ABI_VERSION 6
+#define CARILLON_ABI_VERSION 7
 
 /* That of the library. */
 CARILLON_API uint32_t carillon_abi_version(void);
@@ -108,8 +108,10 @@ CARILLON_API carillon_status carillon_bank_edit(const carillon_bank* bank, const
 /* ---- Models: a bank made ready for a sample rate. [any], not on an audio thread. */
 
 typedef enum carillon_radiation {
-  CARILLON_RADIATION_SPHERE = 0, /* spherical multipoles of the body's surface */
-  CARILLON_RADIATION_OSG02 = 1   /* the bank's own gains (O'Brien, Shen, Gatchalian 2002) */
+  CARILLON_RADIATION_SPHERE = 0, /* as if the body's surface lay on a sphere */
+  CARILLON_RADIATION_OSG02 = 1,  /* of a pulsating sphere: the bank's own gains (O'Brien, Shen, Gatchalian 2002) */
+  CARILLON_RADIATION_BEM = 2,    /* of the bank's multipoles; CARILLON_BAD_INPUT where it has none */
+  CARILLON_RADIATION_AUTO = 3    /* CARILLON_RADIATION_BEM for a bank with multipoles, CARILLON_RADIATION_SPHERE for others */
 } carillon_radiation;
 
 typedef struct carillon_model_options {
@@ -118,7 +120,7 @@ typedef struct carillon_model_options {
   double rate_hz;
 } carillon_model_options;
 
-/* 48 kHz, CARILLON_RADIATION_SPHERE. */
+/* 48 kHz, CARILLON_RADIATION_AUTO. */
 #define carillon_model_options_init(options) carillon_model_options_init_sized((options), sizeof(carillon_model_options))
 CARILLON_API void carillon_model_options_init_sized(carillon_model_options* options, size_t size);
 CARILLON_API carillon_status carillon_model_make(const carillon_bank* bank, const carillon_model_options* options, carillon_model** model,
@@ -168,9 +170,12 @@ typedef enum carillon_effect {
   CARILLON_ACCELERATION_NOISE = 32,
   CARILLON_AIR_DELAY = 64,
   CARILLON_DOPPLER = 128,
-  CARILLON_TWO_EARS = 256
+  CARILLON_TWO_EARS = 256,
+  CARILLON_DIRECTIVITY = 512,       /* of a bank with multipoles; CARILLON_BAD_INPUT for a model without */
+  CARILLON_GROUND_REFLECTION = 1024 /* of scenes with a floor; here there is none, and it is CARILLON_BAD_INPUT */
 } carillon_effect;
-#define CARILLON_EFFECT_COUNT 9
+#define CARILLON_EFFECT_COUNT 9       /* the first ones, to CARILLON_TWO_EARS */
+#define CARILLON_LATER_EFFECT_COUNT 2 /* those behind them */
 
 typedef struct carillon_body_options {
   uint32_t size;
@@ -364,6 +369,8 @@ typedef struct carillon_effect_counters {
   uint32_t reserved;
   int64_t units[CARILLON_EFFECT_COUNT]; /* modal: mode-samples; hertz_pulse: pulses; the others: samples */
   int64_t bytes[CARILLON_EFFECT_COUNT];
+  int64_t later_units[CARILLON_LATER_EFFECT_COUNT]; /* directivity: transfers looked up; ground_reflection: samples */
+  int64_t later_bytes[CARILLON_LATER_EFFECT_COUNT];
 } carillon_effect_counters;
 
 #define carillon_effect_counters_init(counters) carillon_effect_counters_init_sized((counters), sizeof(carillon_effect_counters))

@@ -91,7 +91,7 @@ void run_export(const ExportWishes& wishes) {
   bank::Bank bank = bank::read_bank(wishes.bank);
   if (bank.mode_count() == 0) throw InputError(fmt::format("{}: the bank has no modes, and so no sound", wishes.bank.string()));
   if (format == "glb") {
-    for (const auto& [is_given, option] : {std::pair(!wishes.points.empty(), "--points"), {wishes.radiation != "sphere", "--radiation"}})
+    for (const auto& [is_given, option] : {std::pair(!wishes.points.empty(), "--points"), {wishes.radiation != "auto", "--radiation"}})
       if (is_given) throw InputError(fmt::format("{} is for Faust; a GLB file holds the whole surface and no gains", option));
     const std::size_t modes = bank.mode_count();
     if (wishes.modes) bank = bank::calc_reduced(bank, {.modes = wishes.modes});

@@ -13,7 +13,7 @@ struct ExportWishes {
   std::string format;                // "glb", "faust"; empty: by the ending of `out`
   std::optional<std::size_t> modes;  // glb: all without it; faust: FaustOptions::modes
   std::vector<std::string> points;   // "X,Y,Z" in metres, or one count
-  std::string radiation = "sphere";
+  std::string radiation = "auto";
   std::string name;  // empty: the stem of the bank's file
   bool is_z_up = false;
 };

@@ -17,7 +17,7 @@ struct FaustOptions {
   std::size_t modes = 100;       // number of modes: the loudest for blows at the points; all if there are fewer
   std::vector<Vec3> points_m{};  // in the frame of the mesh; the nearest points of the surface are struck. Empty: bank::find_strikes()
   std::size_t point_count = kDefaultFaustPoints;  // of those
-  radiation::GainKind radiation = radiation::GainKind::kSphere;
+  radiation::GainKind radiation = radiation::GainKind::kAuto;
 };
 
 struct FaustProgram {

@@ -44,7 +44,7 @@ synth::EffectSet to_effects(const std::vector<std::string>& names) {
 
 /// A bank as a body of it sounds: what fixes it takes of its modes what the bank says, as in carillon-render.
 std::shared_ptr<const synth::Model> make_model(const bank::Bank& bank, const std::string& kind_name, double rate_hz) {
-  const radiation::GainKind kind = radiation::require_gain_kind("radiation", kind_name);
+  const radiation::GainKind kind = radiation::choose_gain_kind(bank, radiation::require_gain_kind("radiation", kind_name));
   const py::gil_scoped_release others_run;
   std::optional<bank::Bank> mounted;
   if (const support::Losses losses = support::calc_losses(bank, {}); !losses.is_empty()) support::apply(losses, mounted.emplace(bank));
@@ -177,10 +177,10 @@ void bind_synthesiser(py::module_& module) {
            "microphones_m"_a = std::vector<Vec3>{{-0.1, 0.0, 0.0}, {0.1, 0.0, 0.0}}, "listener_m"_a = Vec3{}, "max_bodies"_a = 64,
            "microphones_m: positions relative to the listener [m], one channel each (1 or more); default two ears 20 cm apart.")
       .def("add_body", &Instrument::add_body, "bank"_a, "position_m"_a = Vec3{0.0, 1.0, 0.0},
-           "rotation"_a = events::Quaternion{1.0, 0.0, 0.0, 0.0}, "radiation"_a = "sphere", "effects"_a = py::none(),
+           "rotation"_a = events::Quaternion{1.0, 0.0, 0.0, 0.0}, "radiation"_a = "auto", "effects"_a = py::none(),
            "Adds a body with its centre of mass at a position [m], rotated by a unit quaternion w x y z; returns its number. radiation and "
            "effects are those of scene files.")
-      .def("swap_bank", &Instrument::swap_bank, "body"_a, "bank"_a, "radiation"_a = "sphere",
+      .def("swap_bank", &Instrument::swap_bank, "body"_a, "bank"_a, "radiation"_a = "auto",
            "Replaces the bank of a body by one of the same shape, usually an edited one; the body keeps ringing.")
       .def("remove_body", &Instrument::remove_body, "body"_a, "Removes a body; it falls silent.")
       .def("strike", &Instrument::strike, "body"_a, "impulse_n_s"_a, py::kw_only(), "point_m"_a = py::none(), "triangle"_a = py::none(),

@@ -218,17 +218,39 @@ std::vector<double> calc_gains_of_coordinates(const bank::Bank& bank) {
   return gains;
 }
 
+std::vector<double> calc_gains_of_multipoles(const bank::Bank& bank) {
+  const bank::Multipoles& air = bank.multipoles;
+  if (air.is_empty())
+    throw InputError(
+        "radiation \"bem\": the bank has no multipoles; solve its job with the air, or give \"sphere\", \"osg02\" or \"vddp96\"");
+  if (air.decay_per_s.size() != bank.mode_count()) throw InputError("the arrays of the bank's multipoles disagree");
+  std::vector<double> gains;
+  for (const double decay_per_s : air.decay_per_s) gains.push_back(bank::calc_gain_of_decay(decay_per_s));
+  return gains;
+}
+
 }  // namespace
 
 std::vector<double> calc_gains(const bank::Bank& bank, GainKind kind) {
   check_sizes(bank);
-  if (kind == GainKind::kVddp96) return calc_gains_of_coordinates(bank);
-  return kind == GainKind::kOsg02 ? bank.radiation_gain : calc_gains_of_skin(bank, make_skin(bank));
+  switch (choose_gain_kind(bank, kind)) {
+    case GainKind::kOsg02:
+      return bank.radiation_gain;
+    case GainKind::kVddp96:
+      return calc_gains_of_coordinates(bank);
+    case GainKind::kBem:
+      return calc_gains_of_multipoles(bank);
+    case GainKind::kSphere:
+    case GainKind::kAuto:
+      break;
+  }
+  return calc_gains_of_skin(bank, make_skin(bank));
 }
 
 Radiation calc_radiation(const bank::Bank& bank, GainKind kind) {
   check_sizes(bank);
   const Skin skin = make_skin(bank);
+  kind = choose_gain_kind(bank, kind);
   std::vector<double> gains = kind == GainKind::kSphere ? calc_gains_of_skin(bank, skin) : calc_gains(bank, kind);
   return {std::move(gains), calc_sphere_radius_of_skin(skin)};
 }
@@ -254,11 +276,17 @@ double calc_sphere_radius_m(const bank::Bank& bank) {
 GainKind require_gain_kind(std::string_view option, std::string_view name) {
   const auto found = std::find(kGainKindNames.begin(), kGainKindNames.end(), name);
   if (found == kGainKindNames.end())
-    throw InputError(std::string(option) + " \"" + std::string(name) + "\": give \"sphere\", \"osg02\" or \"vddp96\"");
+    throw InputError(std::string(option) + " \"" + std::string(name) + "\": give \"auto\", \"bem\", \"sphere\", \"osg02\" or \"vddp96\"");
   return static_cast<GainKind>(found - kGainKindNames.begin());
 }
 
+GainKind choose_gain_kind(const bank::Bank& bank, GainKind wish) {
+  if (wish != GainKind::kAuto) return wish;
+  return bank.multipoles.is_empty() ? GainKind::kSphere : GainKind::kBem;
+}
+
 PutGains put_gains(bank::Bank& bank, GainKind kind) {
+  kind = choose_gain_kind(bank, kind);
   Radiation radiation = calc_radiation(bank, kind);
   bank.radiation_gain = std::move(radiation.gains);
   PutGains put{.sphere_radius_m = radiation.sphere_radius_m};

@@ -14,13 +14,17 @@ namespace carillon::radiation {
 enum class GainKind {
   kOsg02,   // the bank's own: one pulsating sphere, no cancellation (O'Brien, Shen, Gatchalian 2002)
   kSphere,  // spherical multipoles about the body's centre, with cancellation
-  kVddp96   // no air at all: every mode as loud as its coordinate q, 1 Pa for 1 m kg^1/2 (van den Doel, Pai 1996, a_n = Psi_n / omega_n)
+  kVddp96,  // no air at all: every mode as loud as its coordinate q, 1 Pa for 1 m kg^1/2 (van den Doel, Pai 1996, a_n = Psi_n / omega_n)
+  kBem,     // of the bank's multipoles, which boundary elements found: from the decay by radiation (bank::calc_gain_of_decay())
+  kAuto     // kBem for a bank with multipoles, kSphere for others
 };
 
 /// Their names in files and options, in the order of GainKind.
-inline const std::vector<std::string> kGainKindNames{"osg02", "sphere", "vddp96"};
+inline const std::vector<std::string> kGainKindNames{"osg02", "sphere", "vddp96", "bem", "auto"};
 /// The kind of that name; `option` begins the message. Throws InputError.
 GainKind require_gain_kind(std::string_view option, std::string_view name);
+/// What a bank is played with: the wish, or what kAuto stands for.
+GainKind choose_gain_kind(const bank::Bank& bank, GainKind wish);
 
 /// Multipoles that are resolved; what moves in finer patterns radiates as one of order kMaxLobes + 1.
 inline constexpr int kMaxLobes = 8;
@@ -28,7 +32,8 @@ inline constexpr int kMaxLobes = 8;
 /// The pressure amplitude at 1 m [Pa] for unit modal velocity (q' = 1 m kg^1/2 / s) of every mode, (m); for kSphere the root mean square
 /// over all directions of the far field, taken back to 1 m. kSphere is exact for a sphere that moves in patterns of order kMaxLobes and
 /// below, to what the 16-bit shapes hold: nothing below 1e-6 of the pressure of a pulsating sphere of the same velocity is to be trusted.
-/// Throws InputError when arrays of the bank disagree or its surface has no outside. Not for an audio thread; any other, several at once.
+/// The same mean for kBem, of the true shape. Throws InputError when arrays of the bank disagree, its surface has no outside, or kBem is
+/// asked of a bank without multipoles. Not for an audio thread; any other, several at once.
 std::vector<double> calc_gains(const bank::Bank& bank, GainKind kind);
 
 /// Both of a bank at once, for the price of one: the gains as calc_gains() gives them, and calc_sphere_radius_m().
@@ -54,8 +59,9 @@ struct PutGains {
   double sphere_radius_m = 0.0;
   Limited limited{};
 };
-/// Puts the gains of a kind into a bank that has the decays with which it is played; those of kSphere are limited by them. Throws
-/// InputError as calc_gains() does.
+/// Puts the gains of a kind into a bank that has the decays with which it is played (bank::choose_frequencies()); those of kSphere are
+/// limited by them. Those of kBem are not: what they radiate is in the decays. The decays stay as they are for every kind: a bank with
+/// multipoles that is played as a sphere fades as in its air. Throws InputError as calc_gains() does.
 PutGains put_gains(bank::Bank& bank, GainKind kind);
 
 /// Radius [m] of the sphere that has the volume inside the outer surface, cavities and all. InputError as above.

@@ -210,12 +210,15 @@ static void check_models(const carillon_bank* bank, carillon_model** model) {
   carillon_model* other;
   carillon_model_options_init(&options);
   carillon_model_options_init(NULL);
+  CHECK(options.radiation == CARILLON_RADIATION_AUTO);
   CHECK(carillon_model_make(bank, &options, model, message, sizeof message) == CARILLON_OK);
   CHECK(carillon_model_mode_count(*model) > 0 && carillon_model_mode_count(*model) <= carillon_bank_mode_count(bank));
   options.radiation = CARILLON_RADIATION_OSG02;
   CHECK(carillon_model_make(bank, &options, &other, NULL, 0) == CARILLON_OK);
   carillon_model_release(other);
   options.radiation = 77;
+  CHECK(carillon_model_make(bank, &options, &other, NULL, 0) == CARILLON_BAD_ARGUMENT && other == NULL);
+  options.radiation = -1;
   CHECK(carillon_model_make(bank, &options, &other, NULL, 0) == CARILLON_BAD_ARGUMENT && other == NULL);
   options.radiation = 0;
   options.rate_hz = -1;
@@ -526,6 +529,7 @@ static void check_bodies(const carillon_bank* bank, const carillon_model* model)
   carillon_effect_counters_init(NULL);
   CHECK(carillon_get_effect_counters(synth, body, &effects) == CARILLON_OK && effects.units[0] > 0 && effects.bytes[0] > 0);
   CHECK(effects.units[5] == 0 && effects.bytes[5] == 0);
+  CHECK(effects.later_units[0] == 0 && effects.later_bytes[0] == 0 && effects.later_units[1] == 0 && effects.later_bytes[1] == 0);
   CHECK(carillon_get_effect_counters(synth, 99, &effects) == CARILLON_OK && effects.units[0] == 0);
   CHECK(carillon_get_effect_counters(synth, body, NULL) == CARILLON_BAD_ARGUMENT &&
         carillon_get_effect_counters(NULL, 0, &effects) == CARILLON_BAD_ARGUMENT);

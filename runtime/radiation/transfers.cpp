@@ -1,0 +1,179 @@
+// Method:     T = sum over l of F_l(r) sum over m of a_lm Y_lm(d), F_l = h_l(k r) / h_l(k R) e^{-i k (r - R)}. Harmonics once for all
+// modes:
+//             rows of normalised Legendre functions by recurrence in l. 16 modes at a time, one in a lane: their multipoles lie side by
+//             side as 16-bit steps, and those of a row are multiplied by the same harmonic. F_l by the recurrence of h_l upward in l, which
+//             is stable for it, divided by h_l(k R) at each step, so that nothing overflows: the steps u_l = h_{l-1}(k R) / h_l(k R) are
+//             made here in double precision by 1 / u_{l+1} = (2 l + 1) / (k R) - u_l, u_0 = i.
+// Source:     DLMF 10.51 (recurrences of spherical Bessel functions); Holmes & Featherstone, J. Geodesy 76 (2002), eq. 11 (Legendre
+//             functions by rows).
+// Deviations: the highest orders of a group of modes are omitted where they are 86 dB below the rest, as most of those are far away that
+//             the field needs near the sphere.
+#include "runtime/radiation/transfers.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+#include <numeric>
+
+namespace carillon::radiation {
+namespace {
+
+using Complex = std::complex<double>;
+using std::numbers::pi;
+
+void check(const bank::Multipoles& air, std::size_t modes) {
+  if (air.is_empty()) throw InputError("the bank has no multipoles: its modes were solved without the air");
+  bool fits = air.order.size() == modes && air.freq_hz.size() == modes && air.scale.size() == modes && air.radius_m > 0.0 &&
+              air.sound_speed_ms > 0.0;
+  std::size_t needed = 0;
+  for (const std::int32_t order : air.order) {
+    fits = fits && order >= 0 && order <= bank::kMaxOrder;
+    if (fits) needed += 2 * bank::count_coefficients(order);
+  }
+  for (const double freq_hz : air.freq_hz) fits = fits && freq_hz > 0.0;
+  if (!fits || air.coefficient.size() != needed) throw InputError("the arrays of the bank's multipoles disagree");
+}
+
+/// u_l = h_{l-1}(x) / h_l(x), l = 0 .. order.
+std::vector<Complex> calc_steps(double x, int order) {
+  std::vector<Complex> steps{Complex(0.0, 1.0)};
+  for (int l = 0; l < order; ++l) steps.push_back(1.0 / ((2.0 * l + 1.0) / x - steps.back()));
+  return steps;
+}
+
+/// Where harmonic number i of order l, m = i - l, lies in the row of a group.
+std::size_t find_place(int l, int i) { return static_cast<std::size_t>(i >= l ? i - l : l + (l - i)); }
+
+}  // namespace
+
+Transfers::Transfers(const bank::Bank& bank, [[maybe_unused]] base::Instructions best)
+    : calc_harmonics_(calc_harmonics_plain), calc_transfers_(calc_transfers_plain) {
+#if defined(__x86_64__)
+  best = std::min(best, base::find_instructions());
+  if (best == base::Instructions::kAvx512) {
+    calc_harmonics_ = calc_harmonics_avx512;
+    calc_transfers_ = calc_transfers_avx512;
+  } else if (best == base::Instructions::kAvx2) {
+    calc_harmonics_ = calc_harmonics_avx2;
+    calc_transfers_ = calc_transfers_avx2;
+  }
+#endif
+  const bank::Multipoles& air = bank.multipoles;
+  const std::size_t modes = bank.mode_count();
+  check(air, modes);
+  centre_m_ = air.centre_m;
+  radius_m_ = air.radius_m;
+  orders_.assign(air.order.begin(), air.order.end());
+  rms_.resize(modes);
+  slots_.resize(modes);
+  std::vector<std::size_t> first(modes), sorted(modes);  // the first coefficient of each mode; modes by window and order
+  for (std::size_t m = 0, at = 0; m < modes; ++m) {
+    first[m] = at;
+    at += 2 * bank::count_coefficients(orders_[m]);
+  }
+  std::iota(sorted.begin(), sorted.end(), std::size_t{0});
+  for (std::size_t window = 0; window < modes; window += kWindow)
+    std::stable_sort(sorted.begin() + static_cast<std::ptrdiff_t>(window),
+                     sorted.begin() + static_cast<std::ptrdiff_t>(std::min(window + kWindow, modes)),
+                     [&](std::size_t a, std::size_t b) { return orders_[a] < orders_[b]; });
+  for (std::size_t begin = 0; begin < modes; begin += kTransferLanes) {
+    const std::size_t end = std::min(begin + kTransferLanes, modes);
+    const int order = orders_[sorted[end - 1]];
+    TransferGroup group{.inverse_k_m = {}, .scale = {}, .first_line = lines_.size(), .first_radial = radial_.size(), .order = order};
+    lines_.resize(lines_.size() + bank::count_coefficients(order));
+    radial_.resize(radial_.size() + static_cast<std::size_t>(order) + 1);
+    for (std::size_t lane = 0; lane < kTransferLanes; ++lane) {
+      const bool is_mode = begin + lane < end;
+      const std::size_t mode = sorted[is_mode ? begin + lane : begin];
+      const double k = 2.0 * pi * air.freq_hz[mode] / air.sound_speed_ms, x = k * radius_m_;
+      const std::vector<Complex> steps = calc_steps(x, order);
+      group.inverse_k_m[lane] = static_cast<float>(1.0 / k);
+      RadialLine* const radial = &radial_[group.first_radial];
+      for (std::size_t l = 0; l < steps.size(); ++l) {
+        radial[l].step_re[lane] = static_cast<float>(steps[l].real());
+        radial[l].step_im[lane] = static_cast<float>(steps[l].imag());
+      }
+      if (!is_mode) continue;
+      slots_[mode] = static_cast<std::int32_t>(begin + lane);
+      group.scale[lane] = static_cast<float>(air.scale[mode] / 65536.0);
+      const std::int16_t* from = &air.coefficient[first[mode]];
+      double power = 0.0,
+             decay = 1.0;  // decay: |F_l| r / R far away, which the steps multiply up, as h_l there differ by their phases only
+      for (int l = 0; l <= orders_[mode]; ++l) {
+        double sum = 0.0;
+        for (int i = 0; i <= 2 * l; ++i, from += 2) {
+          lines_[group.first_line + static_cast<std::size_t>(l * l) + find_place(l, i)].steps[lane] =
+              from[1] * 65536 + static_cast<std::uint16_t>(from[0]);
+          sum += static_cast<double>(from[0]) * from[0] + static_cast<double>(from[1]) * from[1];
+        }
+        radial[l].level[lane] = static_cast<float>(std::sqrt(sum / (4.0 * pi)));
+        if (l > 0) decay *= std::abs(steps[static_cast<std::size_t>(l)]);
+        power += sum / (4.0 * pi) * decay * decay;
+      }
+      rms_[mode] = radius_m_ * air.scale[mode] * std::sqrt(power);
+    }
+    groups_.push_back(group);
+  }
+  const int highest = modes == 0 ? 0 : *std::max_element(orders_.begin(), orders_.end());
+  diagonal_.assign(1, 0.0);
+  for (int l = 1; l <= highest; ++l) {
+    diagonal_.push_back(std::sqrt((2.0 * l + 1.0) / (2.0 * l)));
+    for (int m = 0; m < l; ++m) {
+      const double n = static_cast<double>(l - m) * (l + m), before = static_cast<double>(l - 1 - m) * (l - 1 + m);
+      ahead_.push_back(std::sqrt((2.0 * l - 1.0) * (2.0 * l + 1.0) / n));
+      behind_.push_back(m + 1 == l ? 0.0 : std::sqrt((2.0 * l + 1.0) * before / ((2.0 * l - 3.0) * n)));
+    }
+  }
+}
+
+void Transfers::evaluate(const Vec3& place_m, std::span<const std::int32_t> modes, std::span<std::complex<float>> transfer) const noexcept {
+  int order = -1;
+  const auto find_group = [this](std::int32_t slot) -> const TransferGroup& {
+    return groups_[static_cast<std::size_t>(slot / kTransferLanes)];
+  };
+  for (const std::int32_t mode : modes) order = std::max(order, find_group(slots_[static_cast<std::size_t>(mode)]).order);
+  if (order < 0) return;
+
+  const Vec3 way = place_m - centre_m_;
+  const double distance = std::sqrt(dot(way, way)), across = std::sqrt(way[0] * way[0] + way[1] * way[1]);
+  const double r = std::max(distance, kNearestRadii * radius_m_);
+  alignas(64) std::array<float, (bank::kMaxOrder + 1) * (bank::kMaxOrder + 1)> harmonics;
+  calc_harmonics_({.ahead = ahead_.data(),
+                   .behind = behind_.data(),
+                   .diagonal = diagonal_.data(),
+                   .cosine = distance > 0.0 ? way[2] / distance : 1.0,
+                   .sine = distance > 0.0 ? across / distance : 0.0,
+                   .turn_cosine = across > 0.0 ? way[0] / across : 1.0,
+                   .turn_sine = across > 0.0 ? way[1] / across : 0.0,
+                   .order = order},
+                  harmonics.data());
+
+  alignas(64) std::array<float, (bank::kMaxOrder + 1) * 3 * kTransferLanes> radial;
+  alignas(64) std::array<float, kWindow> re, im;  // of the window of the last mode, where `done` has the bit of the group
+  static_assert(kWindow == 64 * kTransferLanes);
+  std::uint64_t done = 0;
+  std::int32_t window = -1;
+  for (std::size_t i = 0; i < modes.size(); ++i) {
+    const std::int32_t slot = slots_[static_cast<std::size_t>(modes[i])], place = slot % kWindow, lane = place % kTransferLanes;
+    if (slot / kWindow != window) {
+      window = slot / kWindow;
+      done = 0;
+    }
+    if (const std::uint64_t bit = std::uint64_t{1} << (place / kTransferLanes); (done & bit) == 0) {
+      const TransferGroup& group = find_group(slot);
+      calc_transfers_({.group = &group,
+                       .lines = &lines_[group.first_line],
+                       .steps = &radial_[group.first_radial],
+                       .harmonics = harmonics.data(),
+                       .nearness = static_cast<float>(radius_m_ / r),
+                       .inverse_r = static_cast<float>(1.0 / r),
+                       .radial = radial.data()},
+                      &re[static_cast<std::size_t>(place - lane)], &im[static_cast<std::size_t>(place - lane)]);
+      done |= bit;
+    }
+    transfer[i] = {re[static_cast<std::size_t>(place)], im[static_cast<std::size_t>(place)]};
+  }
+}
+
+}  // namespace carillon::radiation

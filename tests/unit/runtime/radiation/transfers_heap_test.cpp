@@ -1,0 +1,56 @@
+// Transfers::evaluate() takes no memory: operator new is replaced by one that counts. A program of its own, so that no other test is
+// disturbed.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <complex>
+#include <cstdlib>
+#include <new>
+#include <numeric>
+#include <vector>
+
+#include "runtime/radiation/transfers.hpp"
+#include "tests/unit/runtime/radiation/multipole_bank.hpp"
+
+namespace {
+std::atomic<long> g_allocations{0};
+}
+
+[[gnu::noinline]] void* operator new(std::size_t size) {
+  ++g_allocations;
+  if (void* memory = std::malloc(size)) return memory;
+  throw std::bad_alloc();
+}
+[[gnu::noinline]] void* operator new(std::size_t size, std::align_val_t align) {
+  ++g_allocations;
+  const auto a = static_cast<std::size_t>(align);
+  if (void* memory = std::aligned_alloc(a, (size + a - 1) / a * a)) return memory;
+  throw std::bad_alloc();
+}
+[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory, std::align_val_t) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory, std::size_t, std::align_val_t) noexcept { std::free(memory); }
+
+namespace carillon::radiation {
+namespace {
+
+TEST(TransfersHeap, EvaluatingTakesNoMemoryAndNeverThrows) {
+  bank::Bank bank = testing::make_empty_multipoles();
+  for (const int order : {0, 7, 120, 3})
+    testing::add_multipoles(bank, 1.0 + order, std::vector<testing::Complex>(static_cast<std::size_t>((order + 1) * (order + 1)), 0.1));
+  const long before_making = g_allocations;
+  const Transfers transfers(bank);
+  EXPECT_GT(g_allocations - before_making, 0) << "the counter sees nothing";
+  std::vector<std::int32_t> modes(4);
+  std::iota(modes.begin(), modes.end(), 0);
+  std::vector<std::complex<float>> transfer(4);
+  static_assert(noexcept(transfers.evaluate(Vec3{}, modes, transfer)));
+  const long before = g_allocations;
+  for (int i = 0; i < 20; ++i) transfers.evaluate({0.1 * i, 0.3, -0.2}, modes, transfer);
+  EXPECT_EQ(g_allocations - before, 0);
+  EXPECT_GT(std::abs(transfer[2]), 0.0F);
+}
+
+}  // namespace
+}  // namespace carillon::radiation
