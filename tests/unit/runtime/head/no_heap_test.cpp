@@ -1,0 +1,83 @@
+// EarFilter::process takes no memory: operator new is replaced by one that counts. A program of its own, so that no other test is
+// disturbed.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <cstdlib>
+#include <new>
+#include <vector>
+
+#include "runtime/head/ear_filter.hpp"
+#include "runtime/head/sphere.hpp"
+
+namespace {
+std::atomic<long> g_allocations{0};
+}
+
+[[gnu::noinline]] void* operator new(std::size_t size) {
+  ++g_allocations;
+  if (void* memory = std::malloc(size)) return memory;
+  throw std::bad_alloc();
+}
+[[gnu::noinline]] void* operator new(std::size_t size, std::align_val_t align) {
+  ++g_allocations;
+  const auto a = static_cast<std::size_t>(align);
+  if (void* memory = std::aligned_alloc(a, (size + a - 1) / a * a)) return memory;
+  throw std::bad_alloc();
+}
+[[gnu::noinline]] void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
+  ++g_allocations;
+  return std::malloc(size);
+}
+[[gnu::noinline]] void operator delete(void* memory, const std::nothrow_t&) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory, std::align_val_t) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory, std::size_t, std::align_val_t) noexcept { std::free(memory); }
+
+namespace carillon::head {
+namespace {
+
+/// Six directions along the axes: a head that is looked up by direction, without a file.
+std::shared_ptr<const Head> make_cross() {
+  Head::Content head{.sample_rate_hz = 48000.0, .taps = 32, .responses = {}, .delays = {}, .lookup = ByAngle{}};
+  std::vector<Vec3> unit;
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    for (const double side : {1.0, -1.0}) {
+      unit.emplace_back();
+      unit.back()[axis] = side;
+    }
+  for (std::size_t i = 0; i < 2 * unit.size(); ++i) {
+    head.delays.push_back(3.0 * static_cast<double>(i));
+    for (int n = 0; n < head.taps; ++n) head.responses.push_back(n == kOnset ? 1.0F + static_cast<float>(i) : 0.0F);
+  }
+  head.lookup = ByDirection{Directions(unit, "cross")};
+  return std::make_shared<const Head>(std::move(head));
+}
+
+TEST(HeadWithoutHeap, TheCounterSeesAllocations) {
+  const long before = g_allocations;
+  auto* memory = new std::vector<double>(1000);
+  EXPECT_GE(g_allocations - before, 2);
+  delete memory;
+}
+
+TEST(HeadWithoutHeap, ProcessingTakesNoMemory) {
+  for (const auto& head : {make_sphere(48000.0), make_cross()}) {
+    EarFilter filter(head);
+    std::vector<double> input(200, 1.0), left(200), right(200);
+    const long before = g_allocations;
+    for (int i = 0; i < 500; ++i) {
+      const auto size = static_cast<std::size_t>(1 + i % 200);
+      const Vec3 direction{std::cos(0.1 * i), std::sin(0.1 * i), std::cos(0.37 * i)};
+      filter.process(direction, std::span(input).first(size), std::span(left).first(size), std::span(right).first(size));
+      if (i == 300) filter.reset();
+    }
+    EXPECT_EQ(g_allocations - before, 0);
+    EXPECT_NE(left[0], 0.0);
+  }
+}
+
+}  // namespace
+}  // namespace carillon::head
