@@ -41,6 +41,12 @@ Size find_size(const store::Store& store, const store::Request& request) {
           fs::file_size(store.input_file(store::require_id(request.input_sha256, "request.json"), request.input_format), error));
       if (!error) size = {cost::estimate_file_size(bytes, is_quadratic), true};
     }
+    if (job.has("radiation")) {
+      constexpr std::int64_t kAirNodes = 4500;  // "skin_nodes" that are not given
+      std::optional<base::Object> air = job.has_object("radiation") ? job.object_if("radiation") : std::nullopt;
+      size.problem.air_nodes = air && air->has_number("skin_nodes") ? std::llround(air->number("skin_nodes")) : kAirNodes;
+      if (job.has_string("radiation") && job.string("radiation") == "none") size.problem.air_nodes = 0;
+    }
     if (job.has_number("accuracy_cents")) size = {cost::refine(size.problem, cost::kRefinementGrowth), false};
   } catch (const InputError&) {
   }

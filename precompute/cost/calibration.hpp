@@ -40,11 +40,16 @@ inline constexpr double kBasisNumber = 1.2e-10, kSmallNumber = 4e-10;
 inline constexpr double kCheckNumber = 2e-8, kCheckPair = 1e-10;
 inline constexpr double kThinCorrection = 0.5;  // of the iteration: low modes of thin bodies are refined by another solve
 inline constexpr double kErrorMode = 1.5e-8, kErrorQuadraticMode = 9e-8, kErrorTet = 6e-6;
+// The air: measured on the bunny of 4,502 nodes and on a plate of 5,538 (docs/decisions/radiation-solve.md).
+inline constexpr double kAirNode = 1e-3, kAirEntry = 5e-8, kAirProduct = 2e-9;
+inline constexpr double kAirWaves = 45;   // wave numbers, where there are more modes
+inline constexpr double kAirReaders = 4;  // wave numbers that a mode reads then
 inline constexpr double kCollectNumber = 1e-8, kWriteNumber = 5e-9;
 inline constexpr double kMultiplyAddsPerSecond = 4.9e9;  // of the kernel of measure_speed() there
 
 // Bytes.
 inline constexpr double kProgramBytes = 57e6;                                     // of a rank without a mesh
+inline constexpr double kAirMatrixBytes = 1.1e9;                                  // of one rank, beyond which ranks share the rows
 inline constexpr double kRankBytes = 10e6;                                        // what MPI holds for each
 inline constexpr double kMeshBytesPerTet = 200, kQuadraticMeshBytesPerTet = 600;  // mesh, partition and surface
 inline constexpr double kCopiesShare = 0.42;  // of K and M as PETSc stores them: the same by blocks of nodes

@@ -23,6 +23,12 @@ double calc_search_bytes(const ProblemSize& size) {
   return kNumber * static_cast<double>(size.unknowns) * static_cast<double>(m + columns);
 }
 
+/// Of one rank: the matrix in single precision, twenty directions of GMRES for thirty-two modes, the velocities.
+double calc_air_bytes(const ProblemSize& size) {
+  const auto nodes = static_cast<double>(size.air_nodes), modes = static_cast<double>(*size.modes);
+  return std::min(8 * nodes * nodes, kAirMatrixBytes) + nodes * (20 * 32 * 8 + 60 * modes);
+}
+
 double find_growth(int ranks) {
   const double doublings = std::log2(static_cast<double>(ranks));
   const auto index = static_cast<std::size_t>(doublings);
@@ -62,7 +68,8 @@ double calc_peak_bytes(const MemoryParts& parts, const ProblemSize& known, int r
   const bool is_dense = size.is_dense || size.unknowns <= kDenseRows;
   const double dense = is_dense ? (kDenseCopies * ranks + kDenseWork) * kNumber * unknowns * unknowns : 0;
   const double own = std::max(parts.assembled + (is_dense ? 0 : sparse), parts.read_peak) - parts.program;
-  return ranks * (parts.program + kRankBytes) + find_growth(ranks) * own + dense;
+  const double modes = ranks * (parts.program + kRankBytes) + find_growth(ranks) * own + dense;
+  return std::max(modes, ranks * (parts.program + kRankBytes + calc_air_bytes(size)));
 }
 
 double predict_bytes(const ProblemSize& known, int ranks) { return calc_peak_bytes(predict_parts(known), known, ranks); }

@@ -12,6 +12,7 @@ struct ProblemSize {
   std::int64_t tets = 0;
   std::int64_t unknowns = 0;
   std::int64_t surface_nodes = 0;
+  std::int64_t air_nodes = 0;  // of the surface outside which the air is solved; 0: it is not
   bool is_quadratic = true;
   bool is_thin = false;         // slenderness above kVerySlender: low modes are refined by another solve
   bool is_dense = false;        // solved by LAPACK, whatever its size

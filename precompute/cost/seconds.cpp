@@ -19,6 +19,14 @@ double calc_factorisation(const ProblemSize& size) {
   return kFactorFlop * size.factor_flops + kFactorEntry * to_double(size.factor_entries);
 }
 
+/// Static integrals once; then each wave number has the matrix, and the products with the modes that read it.
+double predict_air(const ProblemSize& size) {
+  if (size.air_nodes == 0) return 0.0;
+  const double nodes = to_double(size.air_nodes), modes = to_double(*size.modes), waves = std::min(modes, kAirWaves);
+  const double readers = modes > kAirWaves ? kAirReaders * modes : modes;
+  return kAirNode * nodes + nodes * nodes * (kAirEntry * waves + kAirProduct * readers);
+}
+
 }  // namespace
 
 double predict_factorisation_seconds(const ProblemSize& known) { return calc_factorisation(complete(known)); }
@@ -38,6 +46,7 @@ PhaseSeconds predict_seconds(const ProblemSize& known) {
   seconds.errors = (is_quadratic ? kErrorQuadraticMode : kErrorMode) * tets * modes + kErrorTet * tets;
   seconds.collect = kCollectNumber * surface;
   seconds.write = kWriteNumber * surface;
+  seconds.air = predict_air(size);
   if (size.unknowns <= kDenseRows) return seconds;
   const double solves = to_double(predict_solves(*size.modes));
   const double columns = solves / to_double(count_slices(*size.modes));  // of one basis
@@ -55,7 +64,7 @@ PhaseSeconds calc_wall(const PhaseSeconds& cpu, const ProblemSize& size, int ran
   PhaseSeconds wall = cpu;
   for (double PhaseSeconds::*phase :
        {&PhaseSeconds::partition, &PhaseSeconds::assemble, &PhaseSeconds::analyse, &PhaseSeconds::factor, &PhaseSeconds::solve,
-        &PhaseSeconds::orthogonalise, &PhaseSeconds::check, &PhaseSeconds::errors, &PhaseSeconds::collect})
+        &PhaseSeconds::orthogonalise, &PhaseSeconds::check, &PhaseSeconds::errors, &PhaseSeconds::collect, &PhaseSeconds::air})
     wall.*phase /= ranks;
   if (size.is_read_by_all) wall.read /= ranks;
   return wall;

@@ -17,10 +17,11 @@ struct PhaseSeconds {
   double check = 0;  // residuals, orthonormality
   double errors = 0;
   double collect = 0;
+  double air = 0;
   double write = 0;
 
   double sum_modes() const { return analyse + factor + solve + orthogonalise + check; }
-  double sum() const { return read + partition + assemble + sum_modes() + errors + collect + write; }
+  double sum() const { return read + partition + assemble + sum_modes() + errors + collect + air + write; }
 };
 
 /// CPU seconds on the machine of the calibrated table; divide by measure_speed() for this one. What is unknown of the size is estimated.

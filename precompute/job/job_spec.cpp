@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "precompute/job/read_body.hpp"
 #include "runtime/material/read_material.hpp"
@@ -18,6 +19,9 @@ constexpr std::size_t kLongestName = 200;  // bytes
 constexpr long long kMaxRanks = 1'000'000;
 constexpr double kMaxGb = 1e9, kMaxSeconds = 1e9;
 constexpr double kMinScale = 1e-9, kMaxScale = 1e6;
+constexpr long long kMinSkin = 100, kMaxSkin = 200'000;
+constexpr double kMinAirDb = -80.0, kMaxAirDb = -20.0;
+constexpr double kMinNormal = 1e-100, kMaxNormal = 1e100;
 constexpr double kMinCents = 1e-3, kMaxCents = 1200;
 
 /// The words of a schema and their meaning; a job may write `words` only.
@@ -49,6 +53,7 @@ const Words<Factorisation> kFactorisations{{{"automatic", Factorisation::automat
                                             {"ldlt", Factorisation::ldlt},
                                             {"mumps", Factorisation::mumps},
                                             {"cholmod", Factorisation::cholmod}}};
+const Words<Radiation> kRadiations{{{"none", Radiation::none}, {"auto", Radiation::automatic}, {"bem", Radiation::bem}}};
 
 Fixed read_fixed(base::Object fixed) {
   Fixed result;
@@ -116,6 +121,26 @@ void read_solver(base::Object& job, JobSpec& spec) {
   solver->finish();
 }
 
+void read_air(base::Object& job, JobSpec& spec) {
+  if (!job.has_object("radiation")) {
+    spec.air.method = kRadiations.read(job, "radiation", spec.air.method);
+    return;
+  }
+  base::Object air = job.object("radiation");
+  spec.air.method = kRadiations.read(air, "method", Radiation::bem);
+  if (auto nodes = air.integer_if("skin_nodes", kMinSkin, kMaxSkin)) spec.air.skin_nodes = static_cast<int>(*nodes);
+  spec.air.error_db = air.number_or("error_db", spec.air.error_db, {kMinAirDb, kMaxAirDb});
+  if (auto half = air.object_if("half_space")) {
+    spec.air.half_space = HalfSpace{half->numbers<3>("point_m"), half->numbers<3>("normal")};
+    const auto& n = spec.air.half_space->normal;
+    const double length = std::hypot(n[0], n[1], n[2]);
+    if (!(length > kMinNormal && length < kMaxNormal))
+      half->fail("normal", "must be a direction, [0, 0, 1] for a floor below the body, and is 0");
+    half->finish();
+  }
+  air.finish();
+}
+
 void read_resources(base::Object& job, JobSpec& spec) {
   auto resources = job.object_if("resources");
   if (!resources) return;
@@ -147,7 +172,7 @@ void read_geometry(base::Object& job, JobSpec& spec) {
                                          kMinScale, kMaxScale, spec.mesh_scale));
   }
   if (spec.analytic) {
-    for (const char* key : {"accuracy_cents", "element", "mass", "solver", "fixed", "materials"})
+    for (const char* key : {"accuracy_cents", "element", "mass", "solver", "fixed", "materials", "radiation"})
       if (job.has(key))
         job.fail(key, fmt::format("is for bodies of elements, but the modes of a \"{}\" are known; remove it", get_key(*spec.analytic)));
     return;
@@ -199,6 +224,7 @@ JobSpec read_root(base::Object job, const fs::path& file, BankKey bank) {
   if (auto count = job.integer_if("max_modes", 1, 40000)) spec.max_modes = static_cast<int>(*count);
   spec.fixed = read_all_fixed(job);
   read_solver(job, spec);
+  read_air(job, spec);
   read_resources(job, spec);
   job.ignore("run");
   job.finish();
@@ -235,5 +261,6 @@ std::string to_text(Element element) { return kElements.find(element); }
 std::string to_text(Mass mass) { return kMasses.find(mass); }
 std::string to_text(Method method) { return kMethods.find(method); }
 std::string to_text(Factorisation factorisation) { return kFactorisations.find(factorisation); }
+std::string to_text(Radiation radiation) { return kRadiations.find(radiation); }
 
 }  // namespace carillon::job

@@ -24,6 +24,24 @@ enum class Method { automatic, block_lanczos, krylov_schur, dense };
 /// Which sparse factorisation serves shift-invert. automatic: our L D L^T, and MUMPS where that proves unstable.
 enum class Factorisation { automatic, ldlt, mumps, cholmod };
 
+/// What becomes of the sound of the modes in the air. none: gains from the motion of the surface alone; bem: boundary elements; automatic:
+/// boundary elements for the bodies that need them.
+enum class Radiation { none, automatic, bem };
+
+/// A rigid plane beside the body, which is on the side that the normal shows to.
+struct HalfSpace {
+  std::array<double, 3> point_m{};
+  std::array<double, 3> normal{};  // as given, not 0
+};
+
+/// How the air outside the body is solved.
+struct Air {
+  Radiation method = Radiation::none;
+  int skin_nodes = 4500;    // of the surface; a finer one is coarsened
+  double error_db = -40.0;  // of the interpolation over the wave number, in each mode
+  std::optional<HalfSpace> half_space = {};
+};
+
 /// Nodes whose displacement is zero: a named node set of the mesh, or all nodes inside a closed axis-parallel box.
 struct Fixed {
   std::optional<std::string> node_set = {};
@@ -76,6 +94,7 @@ struct JobSpec {
   std::optional<double> accuracy_cents;  // in place of element, the mesh's size and tolerance: those are then the program's to choose
   Method method = Method::automatic;     // solver.method
   Factorisation factorisation = Factorisation::automatic;  // solver.factorisation
+  Air air;                                                 // "radiation"
   Resources resources;
   std::vector<std::string> warnings;  // "file:line: ..." of numbers that may be meant, but seldom are
 };
@@ -106,5 +125,6 @@ std::string to_text(Element element);
 std::string to_text(Mass mass);
 std::string to_text(Method method);
 std::string to_text(Factorisation factorisation);
+std::string to_text(Radiation radiation);
 
 }  // namespace carillon::job

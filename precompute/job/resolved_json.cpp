@@ -115,6 +115,18 @@ Json::Value write_fixed(const std::vector<Fixed>& list) {
   return root.size() == 1 ? root[0] : root;
 }
 
+Json::Value write_air(const Air& air) {
+  Json::Value root;
+  root["method"] = to_text(air.method);
+  root["skin_nodes"] = air.skin_nodes;
+  root["error_db"] = air.error_db;
+  if (air.half_space) {
+    root["half_space"]["point_m"] = to_json(air.half_space->point_m);
+    root["half_space"]["normal"] = to_json(air.half_space->normal);
+  }
+  return root;
+}
+
 /// How the modes of a body of elements are found.
 void write_solve(const JobSpec& job, Json::Value& root) {
   root["mass"] = to_text(job.mass);
@@ -127,6 +139,7 @@ void write_solve(const JobSpec& job, Json::Value& root) {
   }
   root["solver"]["method"] = to_text(job.method);
   root["solver"]["factorisation"] = to_text(job.factorisation);
+  if (job.air.method != Radiation::none) root["radiation"] = write_air(job.air);
 }
 
 }  // namespace

@@ -21,6 +21,7 @@
 #include "precompute/mesh/curved.hpp"
 #include "precompute/mesh/read.hpp"
 #include "precompute/mesh/write.hpp"
+#include "precompute/mesher/coarsen.hpp"
 #include "precompute/mesher/surface.hpp"
 #include "precompute/mesher/triangle_surface.hpp"
 #include "precompute/shapes/shapes.hpp"
@@ -48,6 +49,7 @@ struct Order {
   bool straight = false, facets = false;
   bool estimate = false;
   bool look = false;
+  std::optional<std::int64_t> coarsen;
   bool quiet = false;
 };
 
@@ -350,6 +352,18 @@ bool is_mesh_name(const std::filesystem::path& file) {
   return std::find(kEndings.begin(), kEndings.end(), ending) != kEndings.end();
 }
 
+/// --coarsen
+void write_coarse(const Order& order) {
+  if (order.surface.empty()) throw InputError("--coarsen is for surfaces; give a file");
+  if (order.out.empty()) throw InputError("-o is missing: give the file for the surface, whose name ends in .off");
+  const mesher::TriangleSurface coarse =
+      mesher::coarsen(mesher::read_surface(order.surface), static_cast<std::size_t>(std::max<std::int64_t>(*order.coarsen, 0)));
+  std::string text = fmt::format("OFF\n{} {} 0\n", coarse.points.size(), coarse.triangles.size());
+  for (const Vec3& p : coarse.points) text += fmt::format("{:.17g} {:.17g} {:.17g}\n", p[0], p[1], p[2]);
+  for (const Triangle& t : coarse.triangles) text += fmt::format("3 {} {} {}\n", t[0], t[1], t[2]);
+  base::write_file(order.out, text);
+}
+
 /// --look
 void print_look(const Order& order) {
   if (order.surface.empty()) throw InputError("--look is for surfaces and meshes; give a file");
@@ -379,6 +393,8 @@ void make(int argc, char** argv, Order& order) {
   app.add_flag("--look", order.look,
                "Prints the contents of a surface or mesh file as JSON, without meshing: triangles, extents in its own units, openings, "
                "parts, and the thickness of a surface that is both sides of a wall; of a mesh nodes, tetrahedra and extents");
+  app.add_option("--coarsen", order.coarsen,
+                 "Writes the closed surface with about so many corners to an OFF file, the volume kept, without meshing");
   app.add_option("--scale", order.scale, "Surface: metres per unit of the file");
   app.add_option("--up", order.up, "Surface: the axis along which --height is measured [y]")->check(CLI::IsMember({"x", "y", "z"}));
   app.add_option("--method", order.method,
@@ -429,6 +445,7 @@ void make(int argc, char** argv, Order& order) {
   }
   complete_radius(order);
   if (order.look) return print_look(order);
+  if (order.coarsen) return write_coarse(order);
   if (order.out.empty()) throw InputError("-o is missing: give the file for the mesh, whose name ends in .msh");
   make_mesh(order);
 }

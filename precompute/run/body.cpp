@@ -188,6 +188,13 @@ std::optional<std::int64_t> find_computed_count(const job::JobSpec& job) {
   return static_cast<std::int64_t>(estimate::find_computed_count(static_cast<std::size_t>(*job.max_modes)));
 }
 
+/// Of a job that asks for the air; "auto" may leave it out.
+std::int64_t find_air_nodes(const job::JobSpec& job, std::int64_t surface_nodes) {
+  if (job.air.method == job::Radiation::none) return 0;
+  const std::int64_t nodes = std::min<std::int64_t>(job.air.skin_nodes, surface_nodes > 0 ? surface_nodes : job.air.skin_nodes);
+  return job.air.half_space ? 2 * nodes : nodes;
+}
+
 cost::ProblemSize estimate_size(const job::JobSpec& job, const Setting& setting) {
   const bool is_quadratic = setting.element == job::Element::T10;
   cost::ProblemSize size;
@@ -200,6 +207,7 @@ cost::ProblemSize estimate_size(const job::JobSpec& job, const Setting& setting)
     size = cost::estimate_file_size(error ? 0 : bytes, is_quadratic, setting.refinements);
   }
   size.modes = find_computed_count(job);
+  size.air_nodes = find_air_nodes(job, 0);
   return size;
 }
 
@@ -211,6 +219,7 @@ cost::ProblemSize find_problem_size(const Run& run, const Setting& setting, cons
   size.tets = body.pieces.tets;
   size.unknowns = 3 * body.pieces.free_nodes;
   size.surface_nodes = static_cast<std::int64_t>(body.surface.vertices_m.size());
+  size.air_nodes = find_air_nodes(run.job, size.surface_nodes);
   for (const RunPhase& phase : run.log.get_phases())
     if (phase.name == "read") size.read_seconds = phase.seconds;
   return size;

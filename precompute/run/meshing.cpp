@@ -11,6 +11,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <functional>
 #include <string_view>
 #include <vector>
@@ -21,6 +22,7 @@
 #include "runtime/base/command.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/failure.hpp"
+#include "runtime/base/file.hpp"
 #include "runtime/base/result.hpp"
 
 namespace carillon::run {
@@ -85,11 +87,15 @@ std::optional<BodyEstimate> take_estimate(std::string& errors, std::string_view 
   return estimate;
 }
 
-mesh::TetMesh mesh_surface(const job::Body& body, int order, const Fineness& fineness, Patience* patience) {
+std::string make_folder() {
   std::string folder = (fs::temp_directory_path() / "carillon-mesh-XXXXXX").string();
   if (::mkdtemp(folder.data()) == nullptr)
     throw SystemError(fmt::format("{}: cannot make a temporary folder: {}", folder, std::strerror(errno)));
-  const std::string file = folder + "/body.msh";
+  return folder;
+}
+
+mesh::TetMesh mesh_surface(const job::Body& body, int order, const Fineness& fineness, Patience* patience) {
+  const std::string file = make_folder() + "/body.msh";
   Cleanup cleanup(file);
   std::vector<std::string> words{
       base::require_program("carillon-mesh").string(), body.surface.string(), "-o", file, "--order", std::to_string(order), "--quiet"};
@@ -170,6 +176,34 @@ mesh::TetMesh make_body_mesh(const job::Body& body, int order, const Fineness& f
   } catch (const InputError& error) {
     throw InputError(fmt::format("{}: key 'body': {}", body.place, error.what()));
   }
+}
+
+std::pair<std::vector<Vec3>, std::vector<Triangle>> coarsen_surface(const std::vector<Vec3>& nodes_m,
+                                                                    const std::vector<Triangle>& triangles, std::size_t nodes) {
+  const std::string folder = make_folder(), file = folder + "/fine.off", coarse = folder + "/coarse.off";
+  Cleanup cleanup(file);
+  std::string text = fmt::format("OFF\n{} {} 0\n", nodes_m.size(), triangles.size());
+  for (const Vec3& p : nodes_m) text += fmt::format("{:.17g} {:.17g} {:.17g}\n", p[0], p[1], p[2]);
+  for (const Triangle& t : triangles) text += fmt::format("3 {} {} {}\n", t[0], t[1], t[2]);
+  base::write_file(file, text);
+  const base::Finished ended = run_mesher(
+      {base::require_program("carillon-mesh").string(), file, "--coarsen", std::to_string(nodes), "-o", coarse, "--quiet"}, cleanup, {});
+  std::ifstream stream(coarse);
+  std::pair<std::vector<Vec3>, std::vector<Triangle>> made;
+  std::string word;
+  std::size_t points = 0, facets = 0, none = 0;
+  if (ended.exit_code == 0 && stream >> word >> points >> facets >> none) {
+    made.first.resize(points);
+    made.second.resize(facets);
+    for (Vec3& p : made.first) stream >> p[0] >> p[1] >> p[2];
+    for (Triangle& t : made.second) stream >> none >> t[0] >> t[1] >> t[2];
+  }
+  const bool is_read = !made.second.empty() && !stream.fail();
+  ::unlink(coarse.c_str());
+  if (!is_read)
+    throw InputError(fmt::format("the surface of {} nodes cannot be coarsened to {}: {}; give \"radiation\" a larger \"skin_nodes\"",
+                                 nodes_m.size(), nodes, ended.errors.empty() ? "carillon-mesh gave no reason" : ended.errors));
+  return made;
 }
 
 std::string describe(const job::Body& body, const Fineness& fineness) {

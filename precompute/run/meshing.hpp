@@ -5,9 +5,13 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "precompute/job/job_spec.hpp"
 #include "precompute/mesh/tet_mesh.hpp"
+#include "runtime/base/triangle.hpp"
+#include "runtime/base/vector.hpp"
 
 namespace carillon::run {
 
@@ -38,6 +42,10 @@ struct Patience {
 /// dies. With `patience`, a surface that is not meshed in time gives an empty mesh and patience->estimate; InputError when not even that
 /// is known some seconds later.
 mesh::TetMesh make_body_mesh(const job::Body& body, int order, const Fineness& fineness, Patience* patience = nullptr);
+
+/// A closed surface with about `nodes` nodes, its volume kept, by the program carillon-mesh. Not collective. Throws as make_body_mesh().
+std::pair<std::vector<Vec3>, std::vector<Triangle>> coarsen_surface(const std::vector<Vec3>& nodes_m,
+                                                                    const std::vector<Triangle>& triangles, std::size_t nodes);
 
 /// "bar, 20000 nodes" or "bunny.obj, edges of 0.002 m", for people.
 std::string describe(const job::Body& body, const Fineness& fineness);

@@ -17,6 +17,7 @@
 #include "precompute/io/surface_modes.hpp"
 #include "precompute/petsc/session.hpp"
 #include "precompute/run/accuracy.hpp"
+#include "precompute/run/air.hpp"
 #include "precompute/run/bank_content.hpp"
 #include "precompute/run/body.hpp"
 #include "precompute/run/describe_run.hpp"
@@ -104,7 +105,7 @@ std::string describe_result(const bank::Bank& bank) {
 }
 
 /// The time of writing the bank is in <bank>.resolved.json only: the record in the bank is made before.
-RunSummary write_outputs(Run& run, const AccurateBody& found, bank::Bank bank) {
+RunSummary write_outputs(Run& run, const AccurateBody& found, const AirReport& air, bank::Bank bank) {
   RunSummary summary;
   summary.bank = run.job.bank;
   summary.resolved = job::find_resolved_path(run.job.bank);
@@ -113,6 +114,11 @@ RunSummary write_outputs(Run& run, const AccurateBody& found, bank::Bank bank) {
   const auto make_record = [&](const Measured& measured) {
     Json::Value record = describe_run(run, found.setting, found.body, found.solved, measured);
     if (run.job.accuracy_cents) record["accuracy"] = describe_accuracy(found.report);
+    if (!air.why.empty()) {
+      record["air"]["solved"] = air.is_solved;
+      record["air"]["why"] = air.why;
+      if (!air.result.empty()) record["air"]["result"] = air.result;
+    }
     if (!summary.warning.empty()) record["warnings"].append(summary.warning);
     return job::resolved_json(run.job, folder, write_json(record));
   };
@@ -181,9 +187,11 @@ RunSummary carry_out(Run& run, const fs::path& job_file) {
   open_checkpoint(run);
   AccurateBody found = run.job.accuracy_cents ? solve_to_accuracy(run) : solve_once(run);
   check_options_used(run.comm);
-  if (run.checkpoint) run.checkpoint->finish();
+  if (run.checkpoint && run.job.air.method == job::Radiation::none) run.checkpoint->finish();
   bank::Bank bank = collect_bank(run, found);
-  RunSummary summary = write_outputs(run, found, std::move(bank));
+  const AirReport air = add_air(run, bank);
+  if (run.checkpoint) run.checkpoint->finish();
+  RunSummary summary = write_outputs(run, found, air, std::move(bank));
   if (run.checkpoint) run.checkpoint->remove();
   if (run.progress) run.progress->finish();
   return summary;

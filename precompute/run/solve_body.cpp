@@ -25,11 +25,11 @@ void begin_checkpoint(Run& run, const Setting& setting, const Body& body) {
   run.checkpoint->begin(setting, io::find_system_fingerprint(run.comm, job, setting, body.pieces.local), body.pieces.local);
 }
 
-/// Between two stages, with all modes. Throws eigen::Stopped when the run was asked to stop.
-void save_if_requested(Run& run, const eigen::Modes& modes) {
+/// Between two stages, with all modes; `must` saves them in any case. Throws eigen::Stopped when the run was asked to stop.
+void save_if_requested(Run& run, const eigen::Modes& modes, bool must = false) {
   if (!run.checkpoint) return;
   const eigen::CheckpointRequest request = run.checkpoint->vote();
-  if (request.stop || request.save) eigen::save_modes(modes, run.checkpoint->get());
+  if (request.stop || request.save || must) eigen::save_modes(modes, run.checkpoint->get());
   if (request.stop) throw eigen::Stopped();
 }
 
@@ -43,7 +43,7 @@ SolvedBody solve_body(Run& run, const Setting& setting, Body& body) {
   solved.modes = find_modes(run, setting, body, system);
   save_if_requested(run, solved.modes);
   solved.errors = calc_errors(run, body, system, solved.modes);
-  save_if_requested(run, solved.modes);
+  save_if_requested(run, solved.modes, run.job.air.method != job::Radiation::none);  // the air may take longer than the modes did
   if (run.checkpoint) run.checkpoint->end();
   solved.properties = std::move(system.properties);
   return solved;

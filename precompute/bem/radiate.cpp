@@ -1,0 +1,212 @@
+// Method:     power by the multipoles, which is exact where the surface's p v* cancels to nothing; added mass by the mean of p v over the
+//             surface. A plane that reflects: the body and its mirror image, which move alike.
+// Source:     docs/equations.md E10.
+// Deviations: none.
+#include "precompute/bem/radiate.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "precompute/bem/answers_file.hpp"
+#include "precompute/bem/expansion.hpp"
+#include "precompute/bem/transfer.hpp"
+#include "runtime/bank/surface.hpp"
+#include "runtime/base/error.hpp"
+
+namespace carillon::bem {
+namespace {
+
+using Double = std::complex<double>;
+
+/// Behind the plane, as far as it is before it.
+Vec3 mirror(const Plane& plane, const Vec3& place) { return place - (2.0 * dot(place - plane.point_m, plane.normal)) * plane.normal; }
+
+/// The mirror image beside the body: a closed surface again, that moves alike.
+void add_mirror_image(const Plane& plane, Radiator& radiator) {
+  const std::size_t nodes = radiator.nodes_m.size(), facets = radiator.triangles.size(), row = radiator.count_modes();
+  for (std::size_t i = 0; i < nodes; ++i) {
+    if (!(dot(radiator.nodes_m[i] - plane.point_m, plane.normal) > 0.0))
+      throw InputError("\"half_space\": the body is not wholly on the side of the plane that its normal shows to; move the plane");
+    radiator.nodes_m.push_back(mirror(plane, radiator.nodes_m[i]));
+  }
+  const auto shift = static_cast<std::int32_t>(nodes);
+  for (std::size_t t = 0; t < facets; ++t) {
+    const auto [a, b, c] = radiator.triangles[t];
+    radiator.triangles.push_back({a + shift, c + shift, b + shift});
+    for (const std::size_t corner : {0U, 2U, 1U})
+      for (std::size_t m = 0; m < row; ++m) radiator.velocity.push_back(radiator.velocity[(t * 3 + corner) * row + m]);
+  }
+  radiator.sphere = find_enclosing_sphere(radiator.nodes_m);
+}
+
+/// Squared sizes of the fields by order: far away, and at the nearest distance.
+struct Tail {
+  std::vector<double> far, near;  // [l], what orders above l make of the whole
+};
+
+Tail calc_tail(const Sounding& mode, double k, double radius, double nearest) {
+  const std::vector<double> here = calc_log_hankel(k * radius, mode.order), there = calc_log_hankel(k * nearest, mode.order);
+  std::vector<double> power(here.size());
+  for (std::size_t i = 0, l = 0; i < mode.coefficient.size(); ++i) {
+    if (i == count_harmonics(static_cast<int>(l))) ++l;
+    power[l] += std::norm(mode.coefficient[i]);
+  }
+  Tail tail{std::vector<double>(power.size()), std::vector<double>(power.size())};
+  double far = 0.0, near = 0.0;
+  for (std::size_t l = power.size(); l-- > 0;) {
+    tail.far[l] = far;
+    tail.near[l] = near;
+    far += power[l] * std::exp(2.0 * (here[0] - here[l]));
+    near += power[l] * std::exp(2.0 * (there[l] - here[l]));
+  }
+  for (double& x : tail.far) x = far > 0.0 ? x / far : 0.0;
+  for (double& x : tail.near) x = near > 0.0 ? x / near : 0.0;
+  return tail;
+}
+
+/// The added mass of a mode over its modal mass. A half space is solved with the mirror image, which takes as much.
+double calc_added_mass(const Sounding& mode, const AirOptions& options) {
+  return -(options.half_space ? 0.5 : 1.0) * options.air_density_kg_m3 * mode.reaction.real();
+}
+
+/// Appends a mode that was solved at k.
+void add_mode(const Sounding& mode, double k, const AirOptions& options, bank::Multipoles& multipoles) {
+  const double radius = multipoles.radius_m, target = std::pow(10.0, options.order_db / 10.0);
+  const Tail tail = calc_tail(mode, k, radius, multipoles.nearest_m);
+  std::size_t order = 0;
+  while (order + 1 < tail.far.size() && std::max(tail.far[order], tail.near[order]) > target) ++order;
+  const std::vector<double> hankel = calc_log_hankel(k * radius, static_cast<int>(order));
+  const std::vector<Double> phase = calc_hankel_phase(k * radius, static_cast<int>(order));
+  const Double by_velocity(0.0, k * options.sound_speed_ms * options.air_density_kg_m3);
+  std::vector<Double> pressure;
+  double power = 0.0;
+  for (std::size_t l = 0; l <= order; ++l)
+    for (std::size_t i = l * l; i < (l + 1) * (l + 1); ++i) {
+      power += std::norm(mode.coefficient[i]) * std::exp(-2.0 * hankel[l]);
+      pressure.push_back(by_velocity * phase[l] * mode.coefficient[i]);
+    }
+  bank::add_coefficients(multipoles, static_cast<std::int32_t>(order), pressure);
+  const double half = options.half_space ? 0.5 : 1.0;  // the image sends out as much, into the other side
+  multipoles.freq_hz.push_back(k * options.sound_speed_ms / (2.0 * std::numbers::pi));
+  multipoles.decay_per_s.push_back(half * options.air_density_kg_m3 * options.sound_speed_ms / 2.0 * power);
+  multipoles.added_mass.push_back(calc_added_mass(mode, options));
+  // Of the power far away, before what rounding adds.
+  multipoles.error_db.push_back(std::pow(10.0, mode.interpolation_db / 10.0) + std::max(tail.far[order], tail.near[order]) +
+                                options.solve.tolerance * options.solve.tolerance);
+}
+
+/// Makes decibels of the errors, with what rounding adds to them far away.
+void finish_errors(const AirOptions& options, bank::Multipoles& multipoles) {
+  const std::vector<bank::CoefficientDecay> decays = bank::calc_coefficient_decays(multipoles);
+  for (std::size_t m = 0; m < decays.size(); ++m) {
+    const double root = decays[m].root_rounding, decay = decays[m].decay_per_s;
+    const double rounding = decay > 0.0 ? root * root / (3.0 * decay) : 0.0;
+    multipoles.error_db[m] = std::min(0.0, 10.0 * std::log10(multipoles.error_db[m] + rounding));
+    if (decay > 0.0) multipoles.decay_per_s[m] = (options.half_space ? 0.5 : 1.0) * decay;
+  }
+}
+
+}  // namespace
+
+std::vector<double> find_played_freq_hz(const bank::Bank& bank) {
+  if (!bank.corrected.is_empty()) return bank.corrected.freq_hz;
+  std::vector<double> freq_hz;
+  for (std::size_t m = 0; m < bank.mode_count(); ++m) freq_hz.push_back(bank.freq_hz(m));
+  return freq_hz;
+}
+
+Radiator make_radiator(const bank::Bank& bank, std::span<const double> freq_hz, const AirOptions& options) {
+  Radiator radiator;
+  const std::vector<Triangle> outer = bank::find_outer_triangles(bank.vertices_m, bank.triangles);
+  if (outer.empty()) throw InputError("the surface of the body has no outside: no closed shell of it encloses a volume");
+  std::vector<std::int32_t> number(bank.vertex_count(), -1);
+  const std::size_t modes = bank.mode_count();
+  for (const Triangle& triangle : outer) {
+    Triangle made{};
+    for (std::size_t c = 0; c < 3; ++c) {
+      std::int32_t& known = number[triangle[c]];
+      if (known < 0) {
+        known = static_cast<std::int32_t>(radiator.nodes_m.size());
+        radiator.nodes_m.push_back(bank.vertices_m[triangle[c]]);
+      }
+      made[c] = known;
+    }
+    radiator.triangles.push_back(made);
+    const Vec3 twice = bank::calc_normal(bank.vertices_m, triangle);
+    const double size = norm(twice);
+    const Vec3 normal = size > 0.0 ? (1.0 / size) * twice : Vec3{};
+    for (std::size_t c = 0; c < 3; ++c) {
+      const std::int16_t* step = &bank.shape[static_cast<std::size_t>(triangle[c]) * modes * 3];
+      for (std::size_t m = 0; m < modes; ++m, step += 3)
+        radiator.velocity.push_back(
+            static_cast<float>(bank.shape_scale[m] * (step[0] * normal[0] + step[1] * normal[1] + step[2] * normal[2])));
+    }
+  }
+  radiator.sphere = find_enclosing_sphere(radiator.nodes_m);
+  for (const double f : freq_hz) radiator.wave_number_1_m.push_back(2.0 * std::numbers::pi * f / options.sound_speed_ms);
+  if (options.coarsen && radiator.nodes_m.size() > options.most_nodes) {
+    auto [nodes, triangles] = options.coarsen(radiator.nodes_m, radiator.triangles, options.most_nodes);
+    radiator = transfer(radiator, std::move(nodes), std::move(triangles));
+  }
+  if (options.half_space) add_mirror_image(*options.half_space, radiator);
+  return radiator;
+}
+
+double calc_roundness(const bank::Bank& bank) {
+  double area = 0.0, volume = 0.0;
+  const std::vector<Triangle> outer = bank::find_outer_triangles(bank.vertices_m, bank.triangles);
+  if (outer.empty()) return 0.0;
+  const Vec3 base = bank.vertices_m[outer[0][0]];
+  for (const Triangle& triangle : outer) {
+    const Vec3 twice = bank::calc_normal(bank.vertices_m, triangle);
+    area += norm(twice) / 2.0;
+    volume += dot(bank.vertices_m[triangle[0]] - base, twice) / 6.0;
+  }
+  return 36.0 * std::numbers::pi * volume * volume / (area * area * area);
+}
+
+bank::Multipoles calc_multipoles(const comm::Communicator& comm, const bank::Bank& bank, const AirOptions& options, Keeper keeper,
+                                 const std::filesystem::path& answers) {
+  const std::vector<double> played = find_played_freq_hz(bank);
+  const Radiator radiator = comm.agree([&] { return comm.is_root() ? make_radiator(bank, played, options) : Radiator{}; });
+  Options solve = options.solve;
+  solve.shift = [&](double k, const Sounding& mode) {
+    const double mass = calc_added_mass(mode, options);
+    return mass >= kShiftMass ? k / std::sqrt(1.0 + mass) : k;
+  };
+  std::optional<AnswersFile> file;
+  if (comm.is_root() && !answers.empty()) {
+    file.emplace(answers, calc_fingerprint(radiator, solve));
+    keeper.read = [&] { return file->read(); };
+    keeper.save = [&](const WaveAnswer& answer) { file->save(answer); };
+  }
+  const Solution solution = solve_air(comm, radiator, solve, keeper);
+  return comm.agree([&] {
+    bank::Multipoles multipoles;
+    if (!comm.is_root() || solution.modes.empty()) return multipoles;
+    multipoles.centre_m = solution.sphere.centre_m;
+    multipoles.radius_m = solution.sphere.radius_m;
+    multipoles.nearest_m = options.solve.nearest_over_radius * solution.sphere.radius_m;
+    multipoles.air_density_kg_m3 = options.air_density_kg_m3;
+    multipoles.sound_speed_ms = options.sound_speed_ms;
+    for (std::size_t m = 0; m < played.size(); ++m) {
+      add_mode(solution.modes[m], solution.wave_number_1_m[m], options, multipoles);
+      if (multipoles.added_mass.back() > kMostMass)
+        throw InputError(
+            fmt::format("mode {} at {:.1f} Hz: the air adds {:.2f} of its own mass: a membrane or a sheet this light moves with "
+                        "the air, which this method cannot do; leave the air out with \"radiation\": \"none\"",
+                        m + 1, played[m], multipoles.added_mass.back()));
+    }
+    finish_errors(options, multipoles);
+    if (file) file->remove();
+    multipoles.method = fmt::format("boundary elements (Burton-Miller, Galerkin), {} unknowns, {} wave numbers{}", solution.unknowns,
+                                    solution.wave_numbers, options.half_space ? ", half space" : "");
+    return multipoles;
+  });
+}
+
+}  // namespace carillon::bem

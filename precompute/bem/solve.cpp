@@ -1,0 +1,379 @@
+// Method:     a wave number at a time: matrix in single precision, GMRES for the modes that read it, multipoles. Modes are interpolated
+// over
+//             the wave number; where three and four wave numbers disagree by more than is asked, one more is put between.
+// Source:     docs/equations.md E10.
+// Deviations: none.
+#include "precompute/bem/solve.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <numeric>
+#include <set>
+#include <utility>
+
+#include "precompute/bem/equations.hpp"
+#include "precompute/bem/expansion.hpp"
+#include "precompute/bem/gmres.hpp"
+#include "precompute/bem/wave_numbers.hpp"
+#include "runtime/base/error.hpp"
+
+namespace carillon::bem {
+namespace {
+
+using Single = std::complex<float>;
+using Double = std::complex<double>;
+
+constexpr int kRounds = 40;  // of refinement
+constexpr std::int32_t kMostOrder = 110;
+
+/// Ranks that share wave numbers: each has some of the rows.
+class Group {
+ public:
+  Group(const comm::Communicator& comm, std::size_t unknowns, double matrix_bytes, std::size_t wave_numbers) {
+    const double bytes = 8.0 * static_cast<double>(unknowns) * static_cast<double>(unknowns);
+    const auto by_memory = static_cast<int>(std::min(1e6, std::ceil(bytes / matrix_bytes)));
+    const int by_number = comm.size() / static_cast<int>(std::clamp<std::size_t>(wave_numbers, 1, 1000000));
+    size_ = std::clamp(std::max(by_memory, by_number), 1, comm.size());
+    count_ = comm.size() / size_;
+    number_ = std::min(comm.rank() / size_, count_ - 1);
+    MPI_Comm_split(comm, number_, comm.rank(), &comm_);
+    MPI_Comm_rank(comm_, &rank_);
+    int ranks = 1;
+    MPI_Comm_size(comm_, &ranks);
+    const std::size_t blocks = (unknowns + kBlockRows - 1) / kBlockRows;
+    for (int r = 0; r <= ranks; ++r)
+      first_.push_back(std::min(unknowns, blocks * static_cast<std::size_t>(r) / static_cast<std::size_t>(ranks) * kBlockRows));
+  }
+  ~Group() { MPI_Comm_free(&comm_); }
+  Group(const Group&) = delete;
+  Group& operator=(const Group&) = delete;
+
+  int get_number() const { return number_; }
+  int count() const { return count_; }
+  bool is_first() const { return rank_ == 0; }
+  /// The first rank of a group, among all.
+  int find_first_rank(int number) const { return number * size_; }
+  std::size_t get_first() const { return first_[static_cast<std::size_t>(rank_)]; }
+  std::size_t get_last() const { return first_[static_cast<std::size_t>(rank_) + 1]; }
+
+  /// All rows of what each rank has its own of.
+  void gather(const Sides& mine, Sides& all) const {
+    const std::size_t row = 2 * all.padded;
+    std::vector<int> counts, places;
+    for (std::size_t r = 0; r + 1 < first_.size(); ++r) {
+      counts.push_back(static_cast<int>((first_[r + 1] - first_[r]) * row));
+      places.push_back(static_cast<int>(first_[r] * row));
+    }
+    MPI_Allgatherv(mine.values.data(), static_cast<int>(mine.values.size()), MPI_FLOAT, all.values.data(), counts.data(), places.data(),
+                   MPI_FLOAT, comm_);
+  }
+
+ private:
+  MPI_Comm comm_ = MPI_COMM_NULL;
+  int size_ = 1, number_ = 0, count_ = 1, rank_ = 0;
+  std::vector<std::size_t> first_;  // row of each rank, and the end
+};
+
+/// Integral of p v over the surface, for each side.
+std::vector<Double> calc_reactions(const BoundaryEquations& equations, const std::vector<Single>& pressure,
+                                   std::span<const std::int32_t> sides) {
+  std::vector<Double> reactions(sides.size());
+  const std::span<const float> velocity = equations.get_velocity();
+  const std::size_t count = equations.count_velocities();
+  const std::vector<Facet>& facets = equations.get_surface().get_facets();
+  for (std::size_t t = 0; t < facets.size(); ++t)
+    for (std::size_t i = 0; i < 3; ++i)
+      for (std::size_t j = 0; j < 3; ++j) {
+        const double mass = facets[t].area_m2 / (i == j ? 6.0 : 12.0);
+        const Single* p = &pressure[static_cast<std::size_t>(facets[t].corners[i]) * sides.size()];
+        for (std::size_t m = 0; m < sides.size(); ++m)
+          reactions[m] += mass * static_cast<double>(velocity[(t * 3 + j) * count + static_cast<std::size_t>(sides[m])]) * Double(p[m]);
+      }
+  return reactions;
+}
+
+WaveAnswer solve_wave(const BoundaryEquations& equations, const Group& group, double k, std::int32_t order,
+                      const std::vector<std::int32_t>& sides, double tolerance) {
+  WaveAnswer answer{.k = k, .modes = {}, .products = 0, .residual = 0.0};
+  const std::size_t unknowns = equations.get_surface().count_nodes();
+  LinearSystem system;
+  equations.assemble(k, sides, group.get_first(), group.get_last(), system);
+  Sides mine(system.count_rows(), sides.size()), right(unknowns, sides.size()), pressures(unknowns, sides.size());
+  const BlockInverse inverse(system);
+  Sides own_right(system.right, system.count_rows(), sides.size());
+  inverse.apply(own_right);
+  group.gather(own_right, right);
+  const Multiply multiply = [&](const Sides& x, Sides& y) {
+    system.multiply(x, mine);
+    inverse.apply(mine);
+    group.gather(mine, y);
+  };
+  const GmresResult result = solve_gmres(multiply, right, {.tolerance = tolerance}, pressures);
+  answer.products = result.products;
+  answer.residual = result.residual;
+  if (!result.is_converged)
+    throw SolveError(
+        fmt::format("the pressure on the surface does not converge at {:.6g} Hz: residual {:.1e} after {} products of GMRES, asked {:.0e}; "
+                    "a surface with "
+                    "slivers or folds can do that: mesh it anew (carillon-mesh), or leave the air out with \"radiation\": \"none\"",
+                    k * 343.0 / (2.0 * 3.141592653589793), result.residual, result.products, tolerance));
+  if (!group.is_first()) return answer;
+  const Sphere& sphere = equations.get_sphere();
+  const std::vector<Single> pressure = pressures.list();
+  const std::vector<Double> expansion =
+      calc_expansion(equations.get_surface(), sphere, k, order, pressure, equations.get_velocity(), equations.count_velocities(), sides);
+  const std::vector<Double> reactions = calc_reactions(equations, pressure, sides);
+  const std::vector<double> hankel = calc_log_hankel(k * sphere.radius_m, order);
+  const std::size_t harmonics = count_harmonics(order);
+  for (std::size_t m = 0; m < sides.size(); ++m) {
+    Answer& mode = answer.modes[sides[m]];
+    mode.order = order;
+    mode.reaction = reactions[m];
+    mode.coefficient.resize(harmonics);
+    for (int l = 0; l <= order; ++l) {
+      const double size = std::exp(hankel[static_cast<std::size_t>(l)]);
+      for (std::size_t i = count_harmonics(l - 1); i < count_harmonics(l); ++i)
+        mode.coefficient[i] = Single(expansion[m * harmonics + i] * size);
+    }
+  }
+  return answer;
+}
+
+// ---- between ranks ----
+
+/// The answer of a rank, on rank 0.
+WaveAnswer bring_home(const comm::Communicator& comm, int from, const WaveAnswer& answer) {
+  if (from == 0) return comm.is_root() ? answer : WaveAnswer{};
+  if (comm.rank() == from) {
+    const std::vector<double> packed = pack(answer);
+    const auto size = static_cast<std::int64_t>(packed.size());
+    MPI_Send(&size, 1, MPI_INT64_T, 0, 1, comm);
+    MPI_Send(packed.data(), static_cast<int>(size), MPI_DOUBLE, 0, 2, comm);
+  } else if (comm.is_root()) {
+    std::int64_t size = 0;
+    MPI_Recv(&size, 1, MPI_INT64_T, from, 1, comm, MPI_STATUS_IGNORE);
+    std::vector<double> packed(static_cast<std::size_t>(size));
+    MPI_Recv(packed.data(), static_cast<int>(size), MPI_DOUBLE, from, 2, comm, MPI_STATUS_IGNORE);
+    return unpack(packed).value();
+  }
+  return {};
+}
+
+// ---- interpolation ----
+
+/// |h_l(k r)| / |h_l(k R)| squared, of what a coefficient counts at distance r; far away, over that of order 0: 1 / |h_l(k R)|^2.
+struct Spread {
+  std::vector<double> near, far;
+};
+
+Spread calc_spread(double k, double radius, double nearest, std::int32_t order) {
+  const std::vector<double> here = calc_log_hankel(k * radius, order), there = calc_log_hankel(k * nearest, order);
+  Spread spread;
+  for (std::size_t l = 0; l < here.size(); ++l) {
+    spread.near.push_back(std::exp(2.0 * (there[l] - here[l])));
+    spread.far.push_back(std::exp(2.0 * (here[0] - here[l])));
+  }
+  return spread;
+}
+
+Sounding interpolate(const std::vector<const Answer*>& answers, const Stencil& stencil, const Spread& spread) {
+  Sounding sounding;
+  for (const Answer* answer : answers) sounding.order = std::max(sounding.order, answer->order);
+  const std::size_t harmonics = count_harmonics(sounding.order);
+  sounding.coefficient.resize(harmonics);
+  double sum_near = 0.0, sum_far = 0.0, error_near = 0.0, error_far = 0.0;
+  for (std::int32_t l = 0; l <= sounding.order; ++l) {
+    const double near = spread.near[static_cast<std::size_t>(l)], far = spread.far[static_cast<std::size_t>(l)];
+    for (std::size_t i = count_harmonics(l - 1); i < count_harmonics(l); ++i) {
+      Double fine{}, coarse{};
+      for (std::size_t n = 0; n < answers.size(); ++n) {
+        if (i >= answers[n]->coefficient.size()) continue;
+        const Double value(answers[n]->coefficient[i]);
+        fine += stencil.weights[n] * value;
+        coarse += stencil.weights_without_farthest[n] * value;
+      }
+      sounding.coefficient[i] = fine;
+      sum_near += near * std::norm(fine);
+      sum_far += far * std::norm(fine);
+      error_near += near * std::norm(fine - coarse);
+      error_far += far * std::norm(fine - coarse);
+    }
+  }
+  for (std::size_t n = 0; n < answers.size(); ++n) sounding.reaction += stencil.weights[n] * answers[n]->reaction;
+  const double worst = std::max(sum_near > 0.0 ? error_near / sum_near : 0.0, sum_far > 0.0 ? error_far / sum_far : 0.0);
+  sounding.interpolation_db = 10.0 * std::log10(std::max(worst, 1e-30));
+  return sounding;
+}
+
+Radiator share(const comm::Communicator& comm, const Radiator& radiator) {
+  return {comm.broadcast(radiator.nodes_m), comm.broadcast(radiator.triangles), comm.broadcast(radiator.velocity),
+          comm.broadcast(radiator.wave_number_1_m), comm.broadcast(radiator.sphere)};
+}
+
+/// The velocities in the order of the surface's facets and corners.
+std::vector<float> reorder(const Surface& surface, const Radiator& radiator) {
+  const std::size_t row = radiator.count_modes();
+  std::vector<float> velocity(surface.count_facets() * 3 * row);
+  for (std::size_t t = 0; t < surface.count_facets(); ++t) {
+    const auto from = static_cast<std::size_t>(surface.get_facet_sources()[t]) * 3 * row;
+    std::copy_n(radiator.velocity.begin() + static_cast<std::ptrdiff_t>(from), 3 * row,
+                velocity.begin() + static_cast<std::ptrdiff_t>(t * 3 * row));
+  }
+  return velocity;
+}
+
+}  // namespace
+
+std::vector<double> pack(const WaveAnswer& answer) {
+  std::vector<double> packed{answer.k, static_cast<double>(answer.products), answer.residual, static_cast<double>(answer.modes.size())};
+  for (const auto& [mode, found] : answer.modes) {
+    packed.insert(packed.end(),
+                  {static_cast<double>(mode), static_cast<double>(found.order), found.reaction.real(), found.reaction.imag()});
+    for (const Single& x : found.coefficient) {
+      packed.push_back(x.real());
+      packed.push_back(x.imag());
+    }
+  }
+  return packed;
+}
+
+std::optional<WaveAnswer> unpack(std::span<const double> packed) {
+  const auto is_count = [](double x, double most) { return x >= 0.0 && x <= most && x == std::floor(x); };
+  if (packed.size() < 4 || !(packed[0] > 0.0) || !is_count(packed[1], 1e6) || !is_count(packed[3], 1e6)) return std::nullopt;
+  WaveAnswer answer{.k = packed[0], .modes = {}, .products = static_cast<std::int32_t>(packed[1]), .residual = packed[2]};
+  std::size_t at = 4;
+  for (auto left = static_cast<std::size_t>(packed[3]); left > 0; --left) {
+    if (packed.size() - at < 4 || !is_count(packed[at], 1e6) || !is_count(packed[at + 1], kMostOrder)) return std::nullopt;
+    Answer& mode = answer.modes[static_cast<std::int32_t>(packed[at])];
+    mode.order = static_cast<std::int32_t>(packed[at + 1]);
+    mode.reaction = {packed[at + 2], packed[at + 3]};
+    mode.coefficient.clear();
+    at += 4;
+    if ((packed.size() - at) / 2 < count_harmonics(mode.order)) return std::nullopt;
+    for (std::size_t i = 0; i < count_harmonics(mode.order); ++i, at += 2)
+      mode.coefficient.emplace_back(static_cast<float>(packed[at]), static_cast<float>(packed[at + 1]));
+  }
+  if (at != packed.size()) return std::nullopt;
+  return answer;
+}
+
+std::int32_t find_order(double k_radius) { return std::min(kMostOrder, static_cast<std::int32_t>(std::ceil(k_radius)) + 12); }
+
+Solution solve_air(const comm::Communicator& comm, const Radiator& radiator_of_root, const Options& options, const Keeper& keeper) {
+  const Radiator radiator = share(comm, radiator_of_root);
+  Solution solution;
+  if (radiator.count_modes() == 0) return solution;
+  const auto [surface, equations] = [&] {
+    auto made = comm.agree([&] { return std::make_unique<Surface>(radiator.nodes_m, radiator.triangles); });
+    auto found = comm.agree(
+        [&] { return std::make_unique<BoundaryEquations>(*made, radiator.sphere, reorder(*made, radiator), radiator.count_modes()); });
+    return std::pair(std::move(made), std::move(found));
+  }();
+  std::vector<double> modes = radiator.wave_number_1_m;
+  solution.sphere = equations->get_sphere();
+  solution.unknowns = surface->count_nodes();
+  const double radius = solution.sphere.radius_m, nearest = options.nearest_over_radius * radius;
+  WaveNumbers waves(modes, radius, options.step);
+  const Group group(comm, solution.unknowns, options.matrix_bytes, waves.get().size());
+  std::map<double, WaveAnswer> answers;  // on rank 0
+  const auto add_answer = [&](WaveAnswer answer) {
+    WaveAnswer& all = answers[answer.k];
+    all.k = answer.k;
+    all.products = std::max(all.products, answer.products);
+    all.residual = std::max(all.residual, answer.residual);
+    all.modes.merge(answer.modes);
+  };
+  comm.agree([&] {
+    if (!comm.is_root() || !keeper.read) return;
+    for (WaveAnswer& kept : keeper.read()) add_answer(std::move(kept));
+  });
+  solution.modes.resize(modes.size());
+  bool is_shifted = !options.shift;
+  for (int round = 0;; ++round) {
+    // What is still to be solved: (wave number, modes). The same on all ranks.
+    std::vector<Stencil> stencils;
+    std::map<std::int32_t, std::set<std::int32_t>> readers;
+    std::vector<std::int32_t> orders(waves.get().size());
+    for (std::size_t m = 0; m < modes.size(); ++m) {
+      stencils.push_back(waves.find_stencil(modes[m]));
+      for (const std::int32_t node : stencils.back().nodes) {
+        readers[node].insert(static_cast<std::int32_t>(m));
+        orders[static_cast<std::size_t>(node)] = std::max(orders[static_cast<std::size_t>(node)], find_order(modes[m] * radius));
+      }
+    }
+    std::vector<std::int32_t> wanted = comm.broadcast([&] {
+      std::vector<std::int32_t> list;  // wave number, count, modes ...
+      for (const auto& [node, who] : readers) {
+        const auto known = answers.find(waves.get()[static_cast<std::size_t>(node)]);
+        std::vector<std::int32_t> lacking;
+        for (const std::int32_t m : who)
+          if (known == answers.end() || !known->second.modes.contains(m)) lacking.push_back(m);
+        if (lacking.empty()) continue;
+        list.insert(list.end(), {node, static_cast<std::int32_t>(lacking.size())});
+        list.insert(list.end(), lacking.begin(), lacking.end());
+      }
+      return list;
+    });
+    std::vector<std::pair<std::int32_t, std::vector<std::int32_t>>> work;
+    for (std::size_t at = 0; at < wanted.size(); at += 2 + static_cast<std::size_t>(wanted[at + 1]))
+      work.emplace_back(wanted[at], std::vector<std::int32_t>(wanted.begin() + static_cast<std::ptrdiff_t>(at) + 2,
+                                                              wanted.begin() + static_cast<std::ptrdiff_t>(at) + 2 + wanted[at + 1]));
+    for (std::size_t first = 0; first < work.size(); first += static_cast<std::size_t>(group.count())) {
+      const std::size_t mine = first + static_cast<std::size_t>(group.get_number());
+      const WaveAnswer answer = comm.agree([&] {
+        if (mine >= work.size()) return WaveAnswer{};
+        const auto node = static_cast<std::size_t>(work[mine].first);
+        return solve_wave(*equations, group, waves.get()[node], orders[node], work[mine].second, options.tolerance);
+      });
+      for (int number = 0; number < group.count() && first + static_cast<std::size_t>(number) < work.size(); ++number) {
+        WaveAnswer home = bring_home(comm, group.find_first_rank(number), answer);
+        comm.agree([&] {
+          if (!comm.is_root()) return;
+          if (keeper.save) keeper.save(home);
+          add_answer(std::move(home));
+        });
+      }
+      const std::size_t done = std::min(work.size(), first + static_cast<std::size_t>(group.count()));
+      if (comm.is_root() && keeper.report)
+        keeper.report(fmt::format("{}{} of {} wave numbers", round == 0 ? "" : "refinement, ", done, work.size()),
+                      static_cast<double>(done) / static_cast<double>(work.size()));
+      const bool is_stopped =
+          comm.broadcast(static_cast<std::int32_t>(comm.is_root() && keeper.is_stop_asked && keeper.is_stop_asked())) != 0;
+      if (is_stopped) throw Stopped();
+    }
+    std::vector<std::int32_t> wrong = comm.broadcast([&] {
+      std::vector<std::int32_t> list(modes.size());
+      for (std::size_t m = 0; m < modes.size(); ++m) {
+        std::vector<const Answer*> read;
+        for (const std::int32_t node : stencils[m].nodes)
+          read.push_back(&answers.at(waves.get()[static_cast<std::size_t>(node)]).modes.at(static_cast<std::int32_t>(m)));
+        std::int32_t order = 0;
+        for (const Answer* one : read) order = std::max(order, one->order);
+        solution.modes[m] = interpolate(read, stencils[m], calc_spread(modes[m], radius, nearest, order));
+        list[m] = static_cast<std::int32_t>(solution.modes[m].interpolation_db > options.error_db);
+      }
+      return list;
+    });
+    if (round < kRounds && waves.refine(modes, std::vector<bool>(wrong.begin(), wrong.end()))) continue;
+    if (std::exchange(is_shifted, true)) break;
+    std::vector<double> shifted = comm.broadcast([&] {
+      std::vector<double> list;
+      for (std::size_t m = 0; m < modes.size(); ++m) list.push_back(options.shift(modes[m], solution.modes[m]));
+      return list;
+    });
+    if (shifted == modes) break;
+    modes = std::move(shifted);
+  }
+  solution.wave_number_1_m = modes;
+  for (const auto& [k, answer] : answers) {
+    ++solution.wave_numbers;
+    solution.products = std::max(solution.products, answer.products);
+    solution.residual = std::max(solution.residual, answer.residual);
+  }
+  return solution;
+}
+
+}  // namespace carillon::bem

@@ -1,0 +1,97 @@
+// The air outside a body, for all of its modes.
+#pragma once
+
+#include <complex>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "precompute/bem/surface.hpp"
+#include "precompute/comm/communicator.hpp"
+
+namespace carillon::bem {
+
+/// What moves, and how: rank 0's is broadcast. n modes.
+struct Radiator {
+  std::vector<Vec3> nodes_m;
+  std::vector<Triangle> triangles;
+  std::vector<float> velocity;          // (T, 3, n) normal velocity at the corners for unit modal velocity [kg^-1/2]
+  std::vector<double> wave_number_1_m;  // (n) of each mode
+  Sphere sphere{};                      // around the nodes: the multipoles are about its centre
+
+  std::size_t count_modes() const { return wave_number_1_m.size(); }
+};
+
+struct Options {
+  double step = 0.75;                // mean step of k R between wave numbers
+  double error_db = -40.0;           // that interpolation may make in any mode; more wave numbers where it makes more
+  double nearest_over_radius = 2.0;  // from where on, in radii
+  double tolerance = 1e-4;           // of GMRES
+  /// The wave number of a mode that the air shifts, from what was found at its own; empty: none is.
+  std::function<double(double k, const struct Sounding&)> shift;
+  double matrix_bytes = 1073741824.0;  // of one rank; several share a wave number where it takes more
+};
+
+/// One mode at one wave number, with dp/dn = v.
+struct Answer {
+  std::int32_t order = 0;
+  std::vector<std::complex<float>> coefficient;  // (order + 1)^2: c_lm |h_l(k R)|
+  std::complex<double> reaction;                 // integral of p v over the surface
+};
+
+/// What one wave number gave: the modes that were asked for. What is kept between runs.
+struct WaveAnswer {
+  double k = 0.0;
+  std::map<std::int32_t, Answer> modes;
+  std::int32_t products = 0;  // of GMRES
+  double residual = 0.0;
+};
+
+/// As numbers, for files and messages.
+std::vector<double> pack(const WaveAnswer& answer);
+/// Nothing where the numbers are no answer.
+std::optional<WaveAnswer> unpack(std::span<const double> packed);
+
+/// Where answers are kept, for runs that resume; any of them may be empty. On rank 0.
+struct Keeper {
+  std::function<std::vector<WaveAnswer>()> read;
+  std::function<void(const WaveAnswer&)> save;
+  /// "wave number 12 of 40": after each, with the share that is done.
+  std::function<void(const std::string&, double)> report;
+  /// True: stop, throw Stopped on all ranks.
+  std::function<bool()> is_stop_asked;
+};
+
+struct Stopped {};
+
+/// One mode in the air, at its own wave number, for unit modal velocity q' and dp/dn = v.
+struct Sounding {
+  std::int32_t order = 0;
+  std::vector<std::complex<double>> coefficient;  // (order + 1)^2: c_lm |h_l(k R)|
+  std::complex<double> reaction;
+  double interpolation_db = -300.0;  // error by the rule of wave_numbers.hpp, the larger of far away and at the nearest distance
+};
+
+struct Solution {
+  Sphere sphere;
+  std::vector<Sounding> modes;          // (n)
+  std::vector<double> wave_number_1_m;  // (n) at which they were solved
+  std::size_t unknowns = 0;
+  std::size_t wave_numbers = 0;
+  std::int32_t products = 0;  // of the wave number that took most
+  double residual = 0.0;      // the largest
+};
+
+/// Solves the air for all modes. Wave numbers are dealt to groups of ranks; the result has the same bits on any number of them. Collective;
+/// the solution is rank 0's. Throws on all ranks: InputError for a surface that cannot be, SolveError where an iteration does not converge,
+/// Stopped.
+Solution solve_air(const comm::Communicator& comm, const Radiator& radiator, const Options& options, const Keeper& keeper = {});
+
+/// The order up to which fields are expanded at k R.
+std::int32_t find_order(double k_radius);
+
+}  // namespace carillon::bem

@@ -1,0 +1,91 @@
+#include "precompute/run/air.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <optional>
+#include <utility>
+
+#include "precompute/bem/radiate.hpp"
+#include "precompute/eigen/checkpoint.hpp"
+#include "precompute/run/interrupt.hpp"
+#include "precompute/run/meshing.hpp"
+
+namespace carillon::run {
+namespace {
+
+/// Whether boundary elements are called for, and why; of rank 0.
+AirReport choose(const Run& run, const bank::Bank& bank) {
+  if (run.job.air.method == job::Radiation::bem) return {true, "the job asks for it", {}};
+  const double roundness = bem::calc_roundness(bank);
+  const std::string measure = fmt::format("its surface is that of a body of roundness {:.2f}", roundness);
+  if (bank.mode_count() == 0) return {false, "there is no mode", {}};
+  if (roundness < bem::kCompact)
+    return {true, fmt::format("{}, below {:g}: flat, thin or open bodies do not radiate as a sphere does", measure, bem::kCompact), {}};
+  return {false, fmt::format("{}, and from {:g} on the gains of a sphere do", measure, bem::kCompact), {}};
+}
+
+bem::AirOptions make_options(const job::Air& air) {
+  bem::AirOptions options;
+  options.solve.error_db = air.error_db;
+  options.most_nodes = static_cast<std::size_t>(air.skin_nodes);
+  options.coarsen = coarsen_surface;
+  if (air.half_space) options.half_space = bem::Plane{air.half_space->point_m, normalise(air.half_space->normal)};
+  return options;
+}
+
+std::string describe_multipoles(const bank::Multipoles& multipoles) {
+  if (multipoles.is_empty()) return "no mode";
+  const auto worst = std::max_element(multipoles.error_db.begin(), multipoles.error_db.end());
+  const auto heaviest = std::max_element(multipoles.added_mass.begin(), multipoles.added_mass.end());
+  return fmt::format("{}\nerror at most {:.1f} dB (mode {}), orders up to {}, added mass up to {:.2g}", multipoles.method, *worst,
+                     worst - multipoles.error_db.begin() + 1, *std::max_element(multipoles.order.begin(), multipoles.order.end()),
+                     *heaviest);
+}
+
+}  // namespace
+
+AirReport add_air(Run& run, bank::Bank& bank) {
+  AirReport report;
+  if (run.job.air.method == job::Radiation::none) return report;
+  run.log.begin("air", "sound outside the body");
+  run.comm.agree([&] {
+    if (run.comm.is_root()) report = choose(run, bank);
+  });
+  report.is_solved = run.comm.broadcast(static_cast<std::int32_t>(report.is_solved)) != 0;
+  run.log.print(fmt::format("boundary elements: {}; {}", report.is_solved ? "yes" : "no", report.why));
+  if (!report.is_solved) {
+    run.log.end();
+    return report;
+  }
+  bem::Keeper keeper;
+  keeper.report = [&run, tenths = 0](const std::string& text, double share) mutable {
+    const int now = static_cast<int>(10.0 * share);
+    if (std::exchange(tenths, now) != now) run.log.print(text);
+  };
+  std::filesystem::path answers;
+  if (run.checkpoint) {
+    answers = run.options.checkpoint;
+    answers += ".air";
+    keeper.is_stop_asked = is_stop_asked;
+    set_news(true);
+  }
+  try {
+    const std::string source = run.comm.broadcast(run.job.file.string());
+    bank::Multipoles found = name_errors(
+        source, run, [&] { return bem::calc_multipoles(run.comm, bank, make_options(run.job.air), std::move(keeper), answers); });
+    if (run.comm.is_root()) {
+      report.result = describe_multipoles(found);
+      run.log.print(report.result);
+      bank.multipoles = std::move(found);
+    }
+  } catch (const bem::Stopped&) {
+    throw eigen::Stopped();
+  }
+  run.log.end();
+  return report;
+}
+
+}  // namespace carillon::run
