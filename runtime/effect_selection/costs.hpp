@@ -19,6 +19,7 @@ struct Costs {
   double dipole_ear_sample_ns = 9.0;   // in addition, for the three histories of acceleration noise
   double click_sample_ns = 4.0;        // one body that clicks
   double force_sample_ns = 15.0;       // one lasting contact, one sample
+  double transfer_ns = 80.0;           // directivity: one mode looked up for one microphone
 };
 
 /// Runs a made-up body for some milliseconds. [main-thread]

@@ -44,6 +44,7 @@ double calc_norm(const Vec3& x) { return std::hypot(x[0], x[1], x[2]); }
 /// What an effect acts on: without it there is nothing to do. None for kModal and kAirDelay.
 std::optional<Effect> find_base(Effect effect) {
   if (kContactEffects.has(effect)) return Effect::kModal;
+  if (effect == Effect::kDirectivity) return Effect::kModal;
   if (effect == Effect::kDoppler) return Effect::kAirDelay;
   return std::nullopt;
 }
@@ -127,6 +128,9 @@ struct EffectSelector::State {
     body.possible = body.possible.without(effect);
     body.reason[effect] = reason;
   }
+  void reflect(Body& body, double time_s);
+  void call_directivity(Body& body, const StrikeSound& sound, double until_s);
+  void call_directivity(Body& body, double spread_db, double until_s);
   double find_ways(const Body& body, double time_s);
   void call(Body& body, Effect effect, double share, double until_s, SelectionReason reason) {
     call(body, effect, share, until_s, reason, facts.thresholds.audible_share);
@@ -188,6 +192,8 @@ void EffectSelector::State::find_possible(std::size_t number) {
   Body& body = bodies[number];
   body.possible = synth::kCompiledEffects;
   if (of.fixed) refuse(body, Effect::kAccelerationNoise, {.rule = Rule::kFixed});
+  if (of.bank->multipoles.is_empty()) refuse(body, Effect::kDirectivity, {.rule = Rule::kNoMultipoles});
+  if (!facts.floor) refuse(body, Effect::kGroundReflection, {.rule = Rule::kNoFloor});
   if (facts.microphones_m.size() < 2) refuse(body, Effect::kTwoEars, {.rule = Rule::kOneMicrophone});
   if (!facts.moves) {
     for (const Effect effect : kContactEffects) refuse(body, effect, {.rule = Rule::kNoContact});
@@ -267,6 +273,22 @@ void EffectSelector::State::look(Body& body, double time_s) {
   call(body, Effect::kDoppler, wave * moved * wave * moved, time_s + travel_s,
        {.rule = moved > limit_m ? Rule::kMoving : Rule::kStill, .value = moved, .limit = limit_m});
   if (moved > limit_m) body.anchor_m = way_m;
+  if (facts.floor && body.possible.has(Effect::kGroundReflection)) reflect(body, time_s);
+}
+
+/// What the floor adds to the sound on its straight way.
+void EffectSelector::State::reflect(Body& body, double time_s) {
+  const synth::Floor& floor = *facts.floor;
+  const Vec3 ear = listener.find(time_s).position_m;
+  double share = 0.0, farthest_m = 0.0;
+  for (std::size_t m = 0; m < way_m.size(); ++m) {
+    const Vec3 mirrored = floor.mirror(ear + facts.microphones_m[m]);
+    const double distance_m = std::max(calc_norm(mirrored - body.position_m), synth::kNearestM);
+    share = std::max(share, std::pow(floor.reflection * way_m[m] / distance_m, 2.0));
+    farthest_m = std::max(farthest_m, distance_m);
+  }
+  call(body, Effect::kGroundReflection, share, body.sounds_until_s + farthest_m / bank::kSoundSpeedMs,
+       {.rule = Rule::kReflected, .value = to_db(share), .limit = to_db(facts.thresholds.audible_share)});
 }
 
 /// A pulse that comes in pieces is judged by all of it that is known.
@@ -351,7 +373,31 @@ double EffectSelector::State::call_modes(Body& body, const BodyFacts& of, const 
        counts ? SelectionReason{.rule = Rule::kHeard, .value = sound.modal_db, .distance_m = sound.distance_m}
               : SelectionReason{.rule = Rule::kChange, .value = to_db(share), .limit = to_db(facts.thresholds.audible_share)});
   if (sound.levels.mean_hz > body.mean_hz) body.mean_hz = sound.levels.mean_hz;
+  call_directivity(body, sound, end_s + sound.travel_s);
   return end_s;
+}
+
+/// How much the level of what was struck varies over directions: modes by their exposures, `amplitude_pa` of the strike.
+void EffectSelector::State::call_directivity(Body& body, const StrikeSound& sound, double until_s) {
+  if (!body.possible.has(Effect::kDirectivity)) return;
+  if (const double clear_db = sound.limit_db + kDirectionClearDb; !(sound.modal_db > clear_db)) {
+    call(body, Effect::kDirectivity, 0.0, kNever,
+         {.rule = Rule::kFaint, .value = sound.modal_db, .limit = clear_db, .distance_m = sound.distance_m});
+    return;
+  }
+  const std::span<const BankLevels::Mode> modes = body.bank->get_modes();
+  double spread = 0.0, all = 0.0;
+  for (std::size_t m = 0; m < modes.size(); ++m) {
+    const double exposure = std::pow(amplitude_pa[m] * modes[m].weight, 2.0) / modes[m].decay_per_s;
+    spread += exposure * modes[m].spread_db;
+    all += exposure;
+  }
+  call_directivity(body, all > 0.0 ? spread / all : body.bank->get_spread_db(), until_s);
+}
+
+void EffectSelector::State::call_directivity(Body& body, double spread_db, double until_s) {
+  call(body, Effect::kDirectivity, spread_db, until_s,
+       {.rule = spread_db > kDirectionDb ? Rule::kDirected : Rule::kSameAllRound, .value = spread_db, .limit = kDirectionDb}, kDirectionDb);
 }
 
 /// Whether the acceleration noise of a body that is not fixed is heard. Returns until when the body sounds by it.
@@ -497,6 +543,7 @@ bool EffectSelector::State::offer(Body& body, const events::LastingContact& cont
   const bool slides = offer(Effect::kRoughness, std::min(slip, sweep)), rolls = offer(Effect::kRolling, sweep * (1.0 - sliding));
   if (slides || rolls) {
     call(body, Effect::kModal, 1.0, time_s, {.rule = Rule::kSlip, .value = std::max(slip, sweep), .limit = kCreepMs});
+    call_directivity(body, body.bank->get_spread_db(), time_s);
     body.sounds_until_s = std::max(body.sounds_until_s, time_s + kHoldS);
     body.driven_until_s = time_s + kRecordGapS;
     if (body.mean_hz == 0.0) body.mean_hz = 4000.0;  // where a mean frequency is not known the ear is at its best
@@ -512,6 +559,7 @@ void EffectSelector::State::apply(const events::LastingContact& contact) {
   if (const double end_s = ring(body, contact); end_s > contact.time_s) {
     call(body, Effect::kModal, 1.0, end_s + find_ways(body, contact.time_s) / bank::kSoundSpeedMs,
          {.rule = Rule::kSlip, .value = calc_norm(contact.slip_m_s), .limit = kCreepMs});
+    call_directivity(body, body.bank->get_spread_db(), end_s + find_ways(body, contact.time_s) / bank::kSoundSpeedMs);
     body.sounds_until_s = std::max(body.sounds_until_s, end_s);
     look(body, contact.time_s);
   }
@@ -570,7 +618,7 @@ EffectSet EffectSelector::State::decide(const BodyFacts& of, Body& body, double 
     if (base && !set.has(*base) && !of.overrides.on.has(effect)) set = set.without(effect);
   }
   if (!set.has(Effect::kModal) && !set.has(Effect::kAccelerationNoise)) {
-    for (const Effect effect : {Effect::kHertzPulse, Effect::kAirDelay, Effect::kDoppler, Effect::kTwoEars}) {
+    for (const Effect effect : {Effect::kHertzPulse, Effect::kAirDelay, Effect::kDoppler, Effect::kTwoEars, Effect::kGroundReflection}) {
       if (!of.overrides.on.has(effect)) set = set.without(effect);
     }
   }
@@ -591,6 +639,13 @@ void EffectSelector::State::add_costs(Body& body) {
   add(Effect::kAirDelay, costs.ear_sample_ns);
   add(Effect::kTwoEars, (all - 1.0) * costs.ear_sample_ns);
   add(Effect::kDoppler, ears * (costs.moving_ear_sample_ns - costs.ear_sample_ns));
+  const bool moves = body.now.has(Effect::kDoppler);
+  const double reflected = body.now.has(Effect::kGroundReflection) ? 2.0 : 1.0, modes = static_cast<double>(body.bank->get_modes().size());
+  const double dipoles_ns = body.now.has(Effect::kAccelerationNoise) ? costs.dipole_ear_sample_ns : 0.0;
+  add(Effect::kGroundReflection, ears * ((moves ? costs.moving_ear_sample_ns : costs.ear_sample_ns) + dipoles_ns));
+  // Every ear sounds the modes by itself, twice where its weights change, which then are looked up once a block.
+  add(Effect::kDirectivity,
+      ears * reflected * modes * (moves ? 2.0 * costs.mode_sample_ns + costs.transfer_ns / synth::kBlock : costs.mode_sample_ns));
   add(Effect::kAccelerationNoise, ears * costs.dipole_ear_sample_ns + costs.click_sample_ns);
   // What modes cost that a contact drives is in the first of its effects, as it is where it is measured.
   double driven_ns = kDrivenModeSampleNs * static_cast<double>(body.bank->get_modes().size());

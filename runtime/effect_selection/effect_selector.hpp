@@ -12,6 +12,7 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,7 @@
 #include "runtime/events/events.hpp"
 #include "runtime/synth/contact_forces.hpp"
 #include "runtime/synth/effects.hpp"
+#include "runtime/synth/floor.hpp"
 #include "runtime/synth/trajectory.hpp"
 
 namespace carillon::effect_selection {
@@ -39,6 +41,10 @@ inline constexpr double kThumpShare = 0.259;
 /// the loudest strike so far as well, since files are played louder than life: at 90 dB(A) that is 20 dB(A), less than a quiet room has.
 inline constexpr double kInaudibleDb = 0.0;
 inline constexpr double kBelowLoudestDb = 70.0;
+/// Directivity is called for when the level of its modes varies over directions by so much (standard deviation, dB, each mode by its part
+/// of the exposure), the least that is heard, and the body is so far above what is not heard that this is heard.
+inline constexpr double kDirectionDb = 1.0;
+inline constexpr double kDirectionClearDb = 10.0;
 /// Slower than this nothing slides or rolls: synth::ContactForces gives no force then.
 inline constexpr double kCreepMs = 2e-4;
 /// A ring that a lasting contact drives is random: its amplitude is this much above its root mean square at times.
@@ -83,6 +89,7 @@ struct SceneFacts {
   std::vector<synth::PathPoint> listener{{}};  // its way, as far as it is known; at least one place
   SelectionThresholds thresholds{};
   synth::ContactSurface ground = synth::kGroundSurface;
+  std::optional<synth::Floor> floor{};  // that reflects
 };
 
 /// The numbers that decided, and what they mean.
@@ -107,7 +114,13 @@ struct SelectionReason {
     kNoContact,  // no contact lasts
     kNoSlip,     // value: speed [m/s], limit
     kSlip,
-    kAirTravel  // value: distance [m]
+    kAirTravel,     // value: distance [m]
+    kNoMultipoles,  // the bank does not say what goes where
+    kSameAllRound,  // value: standard deviation of the level over directions [dB], limit
+    kDirected,      // the same
+    kFaint,         // value: level [dB(A)], limit: of what has directions, distance [m]
+    kNoFloor,       // none that reflects
+    kReflected      // value: level of what the floor adds [dB], limit
   };
   Rule rule = Rule::kNotStruck;
   double value = 0.0, limit = 0.0, distance_m = 0.0;

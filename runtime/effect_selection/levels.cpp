@@ -1,6 +1,8 @@
 // Method:     a mode of amplitude p and decay d has the exposure p^2 / 4 d. A pulse multiplies each mode by its spectrum, and its own
 //             spectrum by the transfer function of a pushed sphere gives the click; exposures of both by A-weighted sums over frequency
 //             (Parseval).
+//             How much louder a mode is in some directions than in others: its transfers at points of a spiral on a sphere, which have the
+//             same area each.
 // Source:     transform of sin^nu: Gradshteyn & Ryzhik 3.631.1; A-weighting: IEC 61672-1:2013; sphere: Morse & Ingard 1968, 7.2.
 // Deviations: modes are taken to be orthogonal, which their beats are not within a short time.
 #include "runtime/effect_selection/levels.hpp"
@@ -8,9 +10,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <complex>
 #include <numbers>
 
+#include "runtime/base/vector.hpp"
 #include "runtime/radiation/gains.hpp"
+#include "runtime/radiation/transfers.hpp"
+#include "runtime/synth/effects.hpp"
 
 namespace carillon::effect_selection {
 namespace {
@@ -74,6 +80,7 @@ BankLevels::BankLevels(const bank::Bank& bank, double rate_hz, double sphere_rad
     const double slow = d > omega ? d - std::sqrt((d - omega) * (d + omega)) : d;
     modes_.push_back({static_cast<int>(m), freq, std::max(slow, 1e-9), std::abs(bank.radiation_gain[m]), calc_a_weight(freq)});
   }
+  if (synth::kCompiledEffects.has(synth::Effect::kDirectivity) && !bank.multipoles.is_empty()) find_spreads();
   radius_m_ = sphere_radius_m > 0.0 ? sphere_radius_m : radiation::calc_sphere_radius_m(bank);
   // p(f) = rho c a / m T |s T / ((s T)^2 + 2 s T + 2)| J P(f) at 1 m, T = a / c; its exposure is twice the integral of |p|^2 over f > 0.
   const double turn = radius_m_ / bank::kSoundSpeedMs;
@@ -91,6 +98,44 @@ BankLevels::BankLevels(const bank::Bank& bank, double rate_hz, double sphere_rad
     const double transfer = 2.0 * pi * freq * calc_a_weight(freq);
     push_.push_back({freq, 2.0 * transfer * transfer * freq * width});
   }
+}
+
+/// Far away; nulls count as 20 dB below the mean power of a mode, where others would fill them.
+void BankLevels::find_spreads() {
+  constexpr int kDirections = 96;
+  constexpr double kDeepest = 0.01;
+  const radiation::Transfers transfers(*bank_);
+  std::vector<std::int32_t> numbers;
+  for (const Mode& mode : modes_) numbers.push_back(mode.index);
+  std::vector<std::complex<float>> transfer(modes_.size());
+  std::vector<double> power(modes_.size() * kDirections), mean(modes_.size());
+  const double distance_m = 10.0 + 20.0 * transfers.get_radius_m();
+  for (std::size_t i = 0; i < kDirections; ++i) {
+    const double z = 1.0 - (2.0 * static_cast<double>(i) + 1.0) / kDirections, across = std::sqrt(1.0 - z * z);
+    const double angle = pi * (3.0 - std::sqrt(5.0)) * static_cast<double>(i);
+    const Vec3 direction{across * std::cos(angle), across * std::sin(angle), z};
+    transfers.evaluate(transfers.get_centre_m() + distance_m * direction, numbers, transfer);
+    for (std::size_t m = 0; m < modes_.size(); ++m) {
+      power[m * kDirections + i] = static_cast<double>(std::norm(transfer[m]));
+      mean[m] += power[m * kDirections + i] / kDirections;
+    }
+  }
+  double all = 0.0;
+  for (std::size_t m = 0; m < modes_.size(); ++m) {
+    if (!(mean[m] > 0.0)) continue;
+    double sum = 0.0, squares = 0.0;
+    for (std::size_t i = 0; i < kDirections; ++i) {
+      const double level = 10.0 * std::log10(std::max(power[m * kDirections + i] / mean[m], kDeepest));
+      sum += level;
+      squares += level * level;
+    }
+    sum /= kDirections;
+    modes_[m].spread_db = std::sqrt(std::max(0.0, squares / kDirections - sum * sum));
+    const double share = mean[m] * modes_[m].weight * modes_[m].weight;
+    spread_db_ += share * modes_[m].spread_db;
+    all += share;
+  }
+  if (all > 0.0) spread_db_ /= all;
 }
 
 bool BankLevels::calc_projections(std::int32_t triangle, const Vec3& barycentric, const Vec3& direction,

@@ -42,10 +42,13 @@ class BankLevels {
     double decay_per_s = 0.0;  // of the slower root
     double gain_pa = 0.0;      // absolute value
     double weight = 0.0;       // A-weighting
+    double spread_db = 0.0;    // standard deviation of its level over directions, by the multipoles of the bank; 0 without
   };
   std::span<const Mode> get_modes() const { return modes_; }
   const bank::Bank& get_bank() const { return *bank_; }
   double get_radius_m() const { return radius_m_; }  // of the sphere of the outer volume
+  /// Mean of Mode::spread_db over the modes, each by its power at equal velocities.
+  double get_spread_db() const { return spread_db_; }
 
   /// |phi_m . direction| of every mode of get_modes() at a point of a triangle. False, and nothing is written, when there is no such
   /// triangle.
@@ -66,7 +69,9 @@ class BankLevels {
 
  private:
   const bank::Bank* bank_;
-  double radius_m_ = 0.0, highest_hz_ = 0.0;
+  void find_spreads();
+
+  double radius_m_ = 0.0, highest_hz_ = 0.0, spread_db_ = 0.0;
   std::vector<Mode> modes_;
   struct Band {
     double freq_hz, pa2_s;  // of a unit impulse without length

@@ -66,6 +66,19 @@ std::string describe(const SelectionReason& r) {
       return fmt::format("{:.3g} m/s, more than {:g} mm/s", r.value, 1e3 * r.limit);
     case Rule::kAirTravel:
       return fmt::format("{:.2f} m to the nearest microphone, {:.2f} ms", r.value, 1e3 * r.value / bank::kSoundSpeedMs);
+    case Rule::kNoMultipoles:
+      return "the bank has no multipoles";
+    case Rule::kSameAllRound:
+    case Rule::kDirected:
+      return fmt::format("level varies over directions by {:.1f} dB, {} than {:.0f} dB", r.value, r.value > r.limit ? "more" : "less",
+                         r.limit);
+    case Rule::kFaint:
+      return fmt::format("{} at {:.2f} m, too faint for directions below {}", format_level(r.value), r.distance_m, format_level(r.limit));
+    case Rule::kNoFloor:
+      return "no ground reflects";
+    case Rule::kReflected:
+      return fmt::format("the ground adds {:.1f} dB of the straight sound, {} than {:.0f} dB", r.value, r.value > r.limit ? "more" : "less",
+                         r.limit);
   }
   return "";
 }

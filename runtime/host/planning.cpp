@@ -31,6 +31,7 @@ effect_selection::SceneFacts make_facts(const Scene& scene, const Microphones& m
   facts.moves = moves;
   facts.thresholds = scene.quality.thresholds;
   facts.ground = make_ground(scene);
+  facts.floor = find_floor(scene);
   if (scene.microphones_m.empty()) {
     facts.listener = scene.listener.path;
     if (facts.listener.empty()) facts.listener.push_back({0.0, scene.listener.position_m});

@@ -1,7 +1,7 @@
 // Method:     the bodies of the scene in a synthesiser, to which the events are pushed block by block; its latency is cut off the
 //             beginning.
 // Source:     OCE01 (two receivers 20 cm apart or a list of them).
-// Deviations: heads do not shade; the ground does not reflect.
+// Deviations: heads do not shade.
 #include "runtime/host/render.hpp"
 
 #include <algorithm>
@@ -191,7 +191,10 @@ double calc_reach_m(const Scene& scene, const Microphones& microphones, const Ve
   double path_m = 0.0, offset_m = 0.0;
   for (const synth::PathPoint& place : scene.listener.path) path_m = std::max(path_m, calc_distance(place.position_m, base));
   for (const Vec3& x : microphones.offset_m) offset_m = std::max(offset_m, std::hypot(x[0], x[1], x[2]));
-  return path_m + offset_m + 1.0;
+  // By way of a floor it is farther by at most twice the height of who hears.
+  double height_m = 0.0;
+  if (const std::optional<synth::Floor> floor = find_floor(scene)) height_m = std::max(0.0, floor->calc_height_m(base)) + path_m + offset_m;
+  return path_m + offset_m + 2.0 * height_m + 1.0;
 }
 
 /// A scene whose events are all known, rendered block by block.

@@ -116,7 +116,7 @@ synth::EffectSet read_names(base::Object& object, std::string_view key) {
   return effects;
 }
 
-/// "auto"; a list: exactly these; or {"base": "auto", "on": [...], "off": [...]}.
+/// "auto"; a list: exactly these; or {"base": "auto", "on": [...], "off": [...], "doppler": true, ...}.
 effect_selection::EffectOverrides read_effects(base::Object& object) {
   effect_selection::EffectOverrides overrides;
   if (object.has_string("effects")) {
@@ -135,6 +135,17 @@ effect_selection::EffectOverrides read_effects(base::Object& object) {
   keys.choice_or("base", {"auto"}, "auto");
   if (keys.has("on")) overrides.on = read_names(keys, "on");
   if (keys.has("off")) overrides.off = read_names(keys, "off");
+  for (const synth::Effect effect : kPlayableEffects) {
+    const char* name = synth::get_name(effect);
+    if (!keys.has(name)) continue;
+    if (keys.has_string(name)) {
+      keys.choice_or(name, {"auto"}, "auto");
+      continue;
+    }
+    synth::EffectSet& set = keys.boolean_or(name, false) ? overrides.on : overrides.off;
+    if (set.has(effect)) keys.fail(name, fmt::format("is in \"{}\" already; keep one of them", &set == &overrides.on ? "on" : "off"));
+    set = set.with(effect);
+  }
   for (const synth::Effect effect : overrides.on.common(overrides.off)) {
     keys.fail("off", fmt::format("names \"{}\", and so does \"on\"; keep one of them", synth::get_name(effect)));
   }
@@ -241,7 +252,7 @@ const material::Material* take_material(base::Object& object, Solid& solid) {
   return &material;
 }
 
-contact::GroundSpec parse_ground(base::Object& object, std::vector<std::string>& warnings) {
+contact::GroundSpec parse_ground(base::Object& object, std::optional<double>& reflection, std::vector<std::string>& warnings) {
   contact::GroundSpec ground;
   if (const material::Material* material = take_material(object, ground)) ground.density_kg_m3 = material->density_kg_m3;
   ground.height_m = read_within(object, "height_m", ground.height_m, -kFarthestM, kFarthestM);
@@ -257,6 +268,7 @@ contact::GroundSpec parse_ground(base::Object& object, std::vector<std::string>&
   ground.restitution = read_within(object, "restitution", ground.restitution, 0.0, 1.0);
   ground.friction = read_within(object, "friction", ground.friction, 0.0, 10.0);
   ground.roughness_m = read_within(object, "roughness_m", ground.roughness_m, 0.0, kRoughestM);
+  if (object.has("reflection")) reflection = read_within(object, "reflection", 1.0, 0.0, 1.0);
   object.finish();
   return ground;
 }
@@ -575,7 +587,32 @@ Quality parse_quality(base::Object& object) {
   return quality;
 }
 
+/// The ground reflects where it says how much, or where a body is to be heard reflected; then all who hear must be above it.
+void check_floor(base::Object& root, Scene& scene) {
+  const auto wants = [](const effect_selection::EffectOverrides& overrides) { return overrides.on.has(synth::Effect::kGroundReflection); };
+  const bool is_wanted =
+      std::any_of(scene.bodies.begin(), scene.bodies.end(), [&](const SceneBody& body) { return wants(body.overrides); });
+  if (is_wanted && !scene.ground)
+    root.fail("effects", "names \"ground_reflection\", and the scene has no \"ground\"; add one, or leave it out");
+  if (is_wanted && !scene.reflection) scene.reflection = 1.0;
+  const std::optional<synth::Floor> floor = find_floor(scene);
+  if (!floor) return;
+  const auto check = [&](const char* key, const Vec3& place) {
+    if (floor->calc_height_m(place) < 0.0)
+      root.fail(key, fmt::format("is below the ground, which reflects, at a height of {:g} m; put it above", place[2]));
+  };
+  for (const Vec3& place : scene.microphones_m) check("microphones", place);
+  if (!scene.microphones_m.empty()) return;
+  if (scene.listener.path.empty()) check("listener", scene.listener.position_m);
+  for (const synth::PathPoint& point : scene.listener.path) check("listener", point.position_m);
+}
+
 }  // namespace
+
+std::optional<synth::Floor> find_floor(const Scene& scene) {
+  if (!scene.ground || !scene.reflection) return std::nullopt;
+  return synth::Floor{.point_m = {0.0, 0.0, scene.ground->height_m}, .reflection = *scene.reflection};
+}
 
 Scene read_scene(const std::filesystem::path& file) {
   return parse_scene(base::read_document(file, fmt::format("a scene may hold {} bodies and {} strikes", kMaxBodies, kMaxStrikes)));
@@ -591,7 +628,7 @@ Scene parse_scene(const base::Document& document) {
   }
   scene.sample_rate_hz = static_cast<int>(root.integer_if("sample_rate_hz", 8000, 192000).value_or(scene.sample_rate_hz));
   scene.gravity_m_s2 = read_vector(root, "gravity_m_s2", scene.gravity_m_s2, 1e4);
-  if (auto ground = root.object_if("ground")) scene.ground = parse_ground(*ground, scene.warnings);
+  if (auto ground = root.object_if("ground")) scene.ground = parse_ground(*ground, scene.reflection, scene.warnings);
 
   std::vector<base::Object> bodies = root.objects("bodies");
   if (bodies.empty()) {
@@ -628,8 +665,9 @@ Scene parse_scene(const base::Document& document) {
       scene.microphones_m.push_back(read_place(root, "microphones", row));
     }
   }
+  check_floor(root, scene);
   scene.frequencies = static_cast<bank::Frequencies>(read_name(root, "frequencies", kFrequenciesNames, "corrected"));
-  scene.radiation = static_cast<radiation::GainKind>(read_name(root, "radiation", radiation::kGainKindNames, "sphere"));
+  scene.radiation = static_cast<radiation::GainKind>(read_name(root, "radiation", radiation::kGainKindNames, "auto"));
   if (auto output = root.object_if("output")) scene.output = parse_output(*output);
   if (auto quality = root.object_if("quality")) scene.quality = parse_quality(*quality);
   root.finish();

@@ -18,6 +18,7 @@
 #include "runtime/radiation/gains.hpp"
 #include "runtime/support/losses.hpp"
 #include "runtime/synth/effects.hpp"
+#include "runtime/synth/floor.hpp"
 #include "runtime/synth/kernels.hpp"
 #include "runtime/synth/trajectory.hpp"
 
@@ -127,13 +128,14 @@ struct Scene {
   int sample_rate_hz = 48000;
   Vec3 gravity_m_s2{0.0, 0.0, -9.81};
   std::optional<contact::GroundSpec> ground;
+  std::optional<double> reflection;  // of the ground, 0..1, for ground_reflection; nothing: it is silent
   std::vector<SceneBody> bodies;
   std::vector<contact::JointSpec> joints;
   std::vector<contact::CordSpec> cords;
   std::vector<SceneStrike> strikes;  // in the order of the file
   SceneListener listener;
   std::vector<Vec3> microphones_m;  // places in the world, a channel each, instead of the listener's ears
-  radiation::GainKind radiation = radiation::GainKind::kSphere;
+  radiation::GainKind radiation = radiation::GainKind::kAuto;
   bank::Frequencies frequencies = bank::Frequencies::kCorrected;  // of the banks, that are played
   effect_selection::EffectOverrides overrides;                    // the key "effects"
   synth::EffectSet effects = kDefaultEffects;                     // of all bodies where they are not planned
@@ -150,6 +152,9 @@ Scene read_scene(const std::filesystem::path& file);
 Scene parse_scene(const base::Document& document);
 
 /// Channels of the sound: microphones, or two ears.
+/// The ground as sound meets it; nothing where it is silent.
+std::optional<synth::Floor> find_floor(const Scene& scene);
+
 std::size_t count_channels(const Scene& scene);
 
 /// The places of the left and the right ear at the beginning: the line between them is level when the listener does not look straight up or

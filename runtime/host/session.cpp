@@ -4,6 +4,7 @@
 #include <limits>
 #include <map>
 
+#include "runtime/base/error.hpp"
 #include "runtime/host/planning.hpp"
 #include "runtime/host/pose.hpp"
 #include "runtime/radiation/gains.hpp"
@@ -26,6 +27,10 @@ Session::Session(const Scene& scene, const std::vector<const bank::Bank*>& banks
     std::shared_ptr<const synth::Model>& model = models[banks[i]];
     if (!model) model = make_model(*banks[i], scene.bodies[i], rate_hz, has_clicks);
     models_.push_back(model);
+    if (scene.bodies[i].overrides.on.has(synth::Effect::kDirectivity) && model->get_directivity() == nullptr)
+      throw InputError(scene.bodies[i].place +
+                       ": \"effects\" names \"directivity\", which needs a bank with multipoles, and this body's has none; make its bank "
+                       "with them, or leave the effect out");
   }
 }
 
@@ -35,7 +40,8 @@ synth::SynthesiserOptions Session::make_options() const {
           .listener_m = microphones_.centre.find(0.0).position_m,
           .max_bodies = std::max(1, static_cast<int>(models_.size())),
           .budget = calc_budget(scene_->quality, rate_hz_),
-          .ground = make_ground(*scene_)};
+          .ground = make_ground(*scene_),
+          .floor = find_floor(*scene_)};
 }
 
 synth::BodySettings Session::make_settings(std::size_t body, synth::EffectSet effects) const {
@@ -57,6 +63,9 @@ void Session::add_body(const synth::BodySettings& settings) { synthesiser_->add_
 
 synth::EffectSet find_effects(const Scene& scene, std::size_t body, synth::EffectSet effects) {
   effects = effects.common(synth::kCompiledEffects);
+  const bank::Bank* bank = scene.bodies[body].spec.bank;
+  if (bank == nullptr || bank->multipoles.is_empty()) effects = effects.without(synth::Effect::kDirectivity);
+  if (!find_floor(scene)) effects = effects.without(synth::Effect::kGroundReflection);
   if (scene.bodies[body].spec.fixed) effects = effects.without(synth::Effect::kAccelerationNoise);
   if (!scene.microphones_m.empty()) effects = effects.with(synth::EffectSet{synth::Effect::kTwoEars}.common(synth::kCompiledEffects));
   return effects;

@@ -45,7 +45,8 @@ class Session {
   std::size_t added_ = 0;
 };
 
-/// What of its effects a body of the scene can have: nothing pushes one that is fixed, and microphones stay where they are put.
+/// What of its effects a body of the scene can have: nothing pushes one that is fixed, and microphones stay where they are put; directivity
+/// is of banks with multipoles, ground_reflection of scenes whose ground reflects.
 synth::EffectSet find_effects(const Scene& scene, std::size_t body, synth::EffectSet effects);
 
 /// By how much a strike must be known before it begins: a click starts at the side of the body that is nearest to the listener.

@@ -53,6 +53,16 @@ struct alignas(64) ColumnStates {
   float re[kColumns][kGroup], im[kColumns][kGroup];
 };
 
+/// A complex number for each mode, by which its state is multiplied.
+struct alignas(64) ModeWeight {
+  float re[kGroup], im[kGroup];
+};
+
+/// The state of each mode at each sample of a sub-block, of what acts in it.
+struct alignas(64) SampleStates {
+  float re[kSubBlock][kGroup], im[kSubBlock][kGroup];
+};
+
 /// A pulse within one sub-block.
 struct PulseBlock {
   const std::int16_t* row[kStrikeRows];  // [mode]
@@ -111,6 +121,16 @@ struct Kernels {
   /// their dampings, kept below the mode's angle; e is linear between both ends.
   void (*drive)(const StrikeTable* strike, const RotationTable* turn, const ContactBlock& drive, int sub_block, ModeState* state,
                 ColumnStates* starts, int groups, float* out) noexcept;
+  /// emit() of the starts times a weight each.
+  void (*emit_weighted)(const SoundTable* sound, const ColumnStates* starts, const ModeWeight* weight, int groups, int first,
+                        int sub_blocks, float* out) noexcept;
+  /// strike() and drive(), to the same bits, which also add to `kept` the states that they sound.
+  void (*strike_and_keep)(const StrikeTable* strike, const RotationTable* turn, const PulseBlock& touch, int sub_block, ModeState* state,
+                          ColumnStates* starts, int groups, float* out, SampleStates* kept) noexcept;
+  void (*drive_and_keep)(const StrikeTable* strike, const RotationTable* turn, const ContactBlock& drive, int sub_block, ModeState* state,
+                         ColumnStates* starts, int groups, float* out, SampleStates* kept) noexcept;
+  /// Adds the sum over the modes of the real parts of weight times kept state to out, kSubBlock samples.
+  void (*weigh)(const ModeWeight* weight, const SampleStates* kept, int groups, float* out) noexcept;
   /// A sub-block of what an ear hears through taps that stay: kTaps + kSubBlock - 1 samples to kSubBlock.
   void (*convolve)(const float* taps, const float* samples, float* out) noexcept;
   /// And through taps that move.

@@ -58,6 +58,7 @@ constexpr int kVectors = 4, kHeldColumns = 3;
 
 }  // namespace
 
-const Kernels kAvx2Kernels{Isa::kAvx2, advance, emit, ring, strike, drive, convolve, read};
+const Kernels kAvx2Kernels{Isa::kAvx2,    advance,         emit,           ring,  strike,   drive,
+                           emit_weighted, strike_and_keep, drive_and_keep, weigh, convolve, read};
 
 }  // namespace carillon::synth

@@ -59,6 +59,7 @@ constexpr int kVectors = 2, kHeldColumns = 8;
 
 }  // namespace
 
-const Kernels kAvx512Kernels{Isa::kAvx512, advance, emit, ring, strike, drive, convolve, read};
+const Kernels kAvx512Kernels{Isa::kAvx512,  advance,         emit,           ring,  strike,   drive,
+                             emit_weighted, strike_and_keep, drive_and_keep, weigh, convolve, read};
 
 }  // namespace carillon::synth

@@ -190,6 +190,52 @@ void emit(const SoundTable* sound, const ColumnStates* starts, int groups, int f
   add_sums(sums, sub_blocks * kEach, out);
 }
 
+void emit_weighted(const SoundTable* sound, const ColumnStates* starts, const ModeWeight* weight, int groups, int first, int sub_blocks,
+                   float* out) noexcept {
+  if (groups == 0) return;
+  Sums sums;
+  ColumnStates weighted[kTile];
+  const int begin = first * kEach, end = begin + sub_blocks * kEach;
+  for (int tile = 0; tile < groups; tile += kTile) {
+    const int count = groups - tile < kTile ? groups - tile : kTile;
+    for (int g = 0; g < count; ++g) {
+      const ColumnStates& from = starts[tile + g];
+#pragma GCC unroll 2
+      for (int m = 0; m < kGroup; m += F::kWidth) {
+        const F c = F::load(weight[tile + g].re + m), s = F::load(weight[tile + g].im + m);
+        for (int q = begin; q < end; ++q) {
+          const F re = F::load(from.re[q] + m), im = F::load(from.im[q] + m);
+          less(re * c, im, s).store(weighted[g].re[q] + m);
+          fma(re, s, im * c).store(weighted[g].im[q] + m);
+        }
+      }
+    }
+    add_tile(sound + tile, weighted, count, begin, end - begin, tile == 0, sums);
+  }
+  add_sums(sums, end - begin, out);
+}
+
+void weigh(const ModeWeight* weight, const SampleStates* kept, int groups, float* out) noexcept {
+  for (int n = 0; n < kSubBlock; ++n) {
+    F sum = F::zero();
+    for (int g = 0; g < groups; ++g) {
+      for (int m = 0; m < kGroup; m += F::kWidth) {
+        sum = fma(F::load(weight[g].re + m), F::load(kept[g].re[n] + m), sum);
+        sum = less(sum, F::load(weight[g].im + m), F::load(kept[g].im[n] + m));
+      }
+    }
+    float lane[F::kWidth];
+    sum.store(lane);
+    out[n] += add_lanes<F::kWidth>(lane);
+  }
+}
+
+/// Adds to the states of a sample those of the modes in the lanes from `lane` on.
+inline void keep(SampleStates& kept, int sample, int lane, F re, F im) noexcept {
+  (F::load(kept.re[sample] + lane) + re).store(kept.re[sample] + lane);
+  (F::load(kept.im[sample] + lane) + im).store(kept.im[sample] + lane);
+}
+
 void ring(const SoundTable* sound, const RotationTable* turn, ModeState* state, int groups, float* out) noexcept {
   if (groups == 0) return;
   for (int g = 0; g < groups && g < kStatesAhead; ++g) call_for(state[g]);
@@ -234,8 +280,9 @@ inline void add_later(const RotationTable& turn, int lane, F x, F y, int sub_blo
   (D::load(ringing.im + lane) + D::widen(later.im[kColumns - first])).store(ringing.im + lane);
 }
 
-void strike(const StrikeTable* strike, const RotationTable* turn, const PulseBlock& touch, int sub_block, ModeState* state,
-            ColumnStates* starts, int groups, float* out) noexcept {
+template <bool kKeeps>
+inline void strike_modes(const StrikeTable* strike, const RotationTable* turn, const PulseBlock& touch, int sub_block, ModeState* state,
+                         ColumnStates* starts, int groups, float* out, SampleStates* kept) noexcept {
   alignas(64) float sum[kSubBlock * F::kWidth] = {};
   for (int m = 0; m < groups * kGroup; m += F::kWidth) {
     const int lane = m % kGroup;
@@ -268,6 +315,7 @@ void strike(const StrikeTable* strike, const RotationTable* turn, const PulseBlo
       x = turned;
       float* at = sum + n * F::kWidth;
       fma(out_re, x, fma(out_im, y, F::load(at))).store(at);
+      if constexpr (kKeeps) keep(kept[m / kGroup], n, lane, x, y);
     }
     for (int n = touch.last; n < kSubBlock; ++n) {
       const F turned = less(x * turn_re, y, turn_im);
@@ -275,12 +323,23 @@ void strike(const StrikeTable* strike, const RotationTable* turn, const PulseBlo
       x = turned;
       float* at = sum + n * F::kWidth;
       fma(out_re, x, fma(out_im, y, F::load(at))).store(at);
+      if constexpr (kKeeps) keep(kept[m / kGroup], n, lane, x, y);
     }
     // At the start of the next sub-block, and from there on.
     const F re = less(x * turn_re, y, turn_im), im = fma(x, turn_im, y * turn_re);
     add_later(later, lane, re, im, sub_block, ringing, start);
   }
   for (int n = 0; n < kSubBlock; ++n) out[n] += add_lanes<F::kWidth>(sum + n * F::kWidth);
+}
+
+void strike(const StrikeTable* strike, const RotationTable* turn, const PulseBlock& touch, int sub_block, ModeState* state,
+            ColumnStates* starts, int groups, float* out) noexcept {
+  strike_modes<false>(strike, turn, touch, sub_block, state, starts, groups, out, nullptr);
+}
+
+void strike_and_keep(const StrikeTable* strike, const RotationTable* turn, const PulseBlock& touch, int sub_block, ModeState* state,
+                     ColumnStates* starts, int groups, float* out, SampleStates* kept) noexcept {
+  strike_modes<true>(strike, turn, touch, sub_block, state, starts, groups, out, kept);
 }
 
 /// A mode's damping over a sample by one end of all contacts, as the contract of Kernels::drive has it.
@@ -299,9 +358,9 @@ inline F calc_damping(const ContactBlock& drive, int end, int mode, F scale, F a
   return p / (F::all(1.0F) + p);
 }
 
-template <bool kForces, bool kDamps>
+template <bool kForces, bool kDamps, bool kKeeps>
 inline void drive_modes(const StrikeTable* strike, const RotationTable* turn, const ContactBlock& drive, int sub_block, ModeState* state,
-                        ColumnStates* starts, int groups, float* out) noexcept {
+                        ColumnStates* starts, int groups, float* out, SampleStates* kept) noexcept {
   alignas(64) float sum[kSubBlock * F::kWidth] = {};
   for (int m = 0; m < groups * kGroup; m += F::kWidth) {
     const int lane = m % kGroup;
@@ -336,7 +395,7 @@ inline void drive_modes(const StrikeTable* strike, const RotationTable* turn, co
     }
     F damping = F::zero(), last_damping = F::zero();
     F ring_re = F::zero(), ring_im = F::zero();  // what rings already, while it is damped
-    D kept = D::all(1.0);                        // of its amplitude
+    D left = D::all(1.0);                        // of its amplitude
     if constexpr (kDamps) {
       const F angle = F::load(table.angle + lane);
       damping = calc_damping(drive, 0, m, scale, angle);
@@ -344,24 +403,25 @@ inline void drive_modes(const StrikeTable* strike, const RotationTable* turn, co
       ring_re = F::load(start.re[sub_block * kEach] + lane);
       ring_im = F::load(start.im[sub_block * kEach] + lane);
       fma(out_re, ring_re, fma(out_im, ring_im, F::load(sum))).store(sum);
+      if constexpr (kKeeps) keep(kept[m / kGroup], 0, lane, ring_re, ring_im);
     }
     F x = F::zero(), y = F::zero();  // what the force makes
     for (int n = 1; n <= kSubBlock; ++n) {
-      F keep = F::zero();
+      F keeps = F::zero();
       if constexpr (kDamps) {
         const float share = (static_cast<float>(n) - 0.5F) / kSubBlock;
         const F lost = fma(F::all(share), last_damping, F::all(1.0F - share) * damping);
-        keep = less(F::all(1.0F), F::all(1.0F), lost);
-        const F re = less(ring_re * turn_re, ring_im, turn_im) * keep, im = fma(ring_re, turn_im, ring_im * turn_re) * keep;
+        keeps = less(F::all(1.0F), F::all(1.0F), lost);
+        const F re = less(ring_re * turn_re, ring_im, turn_im) * keeps, im = fma(ring_re, turn_im, ring_im * turn_re) * keeps;
         ring_re = re;
         ring_im = im;
-        kept = less(kept, kept, D::widen(lost));
+        left = less(left, left, D::widen(lost));
       }
       if constexpr (kForces) {
         F re = less(x * turn_re, y, turn_im), im = fma(x, turn_im, y * turn_re);
         if constexpr (kDamps) {
-          re = re * keep;
-          im = im * keep;
+          re = re * keeps;
+          im = im * keeps;
         }
         x = fma(first_re, force[n - 1], fma(second_re, force[n], re));
         y = fma(first_im, force[n - 1], fma(second_im, force[n], im));
@@ -369,28 +429,40 @@ inline void drive_modes(const StrikeTable* strike, const RotationTable* turn, co
       if (n < kSubBlock) {
         float* at = sum + n * F::kWidth;
         fma(out_re, x + ring_re, fma(out_im, y + ring_im, F::load(at))).store(at);
+        if constexpr (kKeeps) keep(kept[m / kGroup], n, lane, x + ring_re, y + ring_im);
       }
     }
     if constexpr (kDamps) {
-      const F keep = kept.narrow();
+      const F keeps = left.narrow();
       for (int q = (sub_block + 1) * kEach; q < kColumns; ++q) {
-        (F::load(start.re[q] + lane) * keep).store(start.re[q] + lane);
-        (F::load(start.im[q] + lane) * keep).store(start.im[q] + lane);
+        (F::load(start.re[q] + lane) * keeps).store(start.re[q] + lane);
+        (F::load(start.im[q] + lane) * keeps).store(start.im[q] + lane);
       }
-      (D::load(ringing.re + lane) * kept).store(ringing.re + lane);
-      (D::load(ringing.im + lane) * kept).store(ringing.im + lane);
+      (D::load(ringing.re + lane) * left).store(ringing.re + lane);
+      (D::load(ringing.im + lane) * left).store(ringing.im + lane);
     }
     if constexpr (kForces) add_later(later, lane, x, y, sub_block, ringing, start);
   }
   for (int n = 0; n < kSubBlock; ++n) out[n] += add_lanes<F::kWidth>(sum + n * F::kWidth);
 }
 
+template <bool kKeeps>
+inline void drive_any(const StrikeTable* strike, const RotationTable* turn, const ContactBlock& what, int sub_block, ModeState* state,
+                      ColumnStates* starts, int groups, float* out, SampleStates* kept) noexcept {
+  if (what.forces && what.damps)
+    drive_modes<true, true, kKeeps>(strike, turn, what, sub_block, state, starts, groups, out, kept);
+  else if (what.forces)
+    drive_modes<true, false, kKeeps>(strike, turn, what, sub_block, state, starts, groups, out, kept);
+  else if (what.damps)
+    drive_modes<false, true, kKeeps>(strike, turn, what, sub_block, state, starts, groups, out, kept);
+}
+
 void drive(const StrikeTable* strike, const RotationTable* turn, const ContactBlock& what, int sub_block, ModeState* state,
            ColumnStates* starts, int groups, float* out) noexcept {
-  if (what.forces && what.damps)
-    drive_modes<true, true>(strike, turn, what, sub_block, state, starts, groups, out);
-  else if (what.forces)
-    drive_modes<true, false>(strike, turn, what, sub_block, state, starts, groups, out);
-  else if (what.damps)
-    drive_modes<false, true>(strike, turn, what, sub_block, state, starts, groups, out);
+  drive_any<false>(strike, turn, what, sub_block, state, starts, groups, out, nullptr);
+}
+
+void drive_and_keep(const StrikeTable* strike, const RotationTable* turn, const ContactBlock& what, int sub_block, ModeState* state,
+                    ColumnStates* starts, int groups, float* out, SampleStates* kept) noexcept {
+  drive_any<true>(strike, turn, what, sub_block, state, starts, groups, out, kept);
 }

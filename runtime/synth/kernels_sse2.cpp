@@ -59,6 +59,7 @@ constexpr int kVectors = 8, kHeldColumns = 1;
 
 }  // namespace
 
-const Kernels kSse2Kernels{Isa::kSse2, advance, emit, ring, strike, drive, convolve, read};
+const Kernels kSse2Kernels{Isa::kSse2,    advance,         emit,           ring,  strike,   drive,
+                           emit_weighted, strike_and_keep, drive_and_keep, weigh, convolve, read};
 
 }  // namespace carillon::synth

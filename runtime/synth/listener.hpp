@@ -2,20 +2,24 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "runtime/events/events.hpp"
+#include "runtime/synth/floor.hpp"
 #include "runtime/synth/trajectory.hpp"
 
 namespace carillon::synth {
 
 /// Where the listener is over time, and how it is turned. What it keeps true: microphone m, which is at offset o from a listener that is
 /// not turned, is at get_track(m) + o, so that receivers need not know of turns; as long as no events::Listener was turned all tracks are
-/// one. Between waypoints every microphone goes its own cubic way. [audio-thread] but for the constructor.
+/// one. Between waypoints every microphone goes its own cubic way. With a floor there are the mirrored tracks too, to which the mirrored
+/// offsets belong. [audio-thread] but for the constructor.
 class ListenerTracks {
  public:
   /// Takes memory for `capacity` waypoints of each of the microphones [m from the listener] and of their middle.
-  ListenerTracks(std::size_t capacity, const std::vector<Vec3>& microphones_m, const Vec3& position_m);
+  ListenerTracks(std::size_t capacity, const std::vector<Vec3>& microphones_m, const Vec3& position_m,
+                 const std::optional<Floor>& floor = std::nullopt);
 
   /// False, and nothing has changed, when it is earlier than the last or not finite.
   bool push(const events::Listener& listener) noexcept;
@@ -23,13 +27,22 @@ class ListenerTracks {
   const Trajectory& get_track(std::size_t microphone) const noexcept { return is_turned_ ? turned_[microphone].track : centre_; }
   /// Of the middle of the microphones.
   const Trajectory& get_middle_track() const noexcept { return get_track(turned_.size() - 1); }
+  /// The same beyond the floor; for tracks with a floor only.
+  const Trajectory& get_mirrored_track(std::size_t microphone) const noexcept {
+    return is_turned_ ? turned_[microphone].mirrored : mirrored_centre_;
+  }
+  const Trajectory& get_mirrored_middle_track() const noexcept { return get_mirrored_track(turned_.size() - 1); }
+  const std::optional<Floor>& get_floor() const noexcept { return floor_; }
 
  private:
   struct Turned {
     Vec3 offset_m{};
-    Trajectory track;
+    Trajectory track, mirrored;
   };
-  Trajectory centre_;
+  void push_mirrored(Trajectory& mirrored, const Waypoint& waypoint) noexcept;
+
+  std::optional<Floor> floor_;
+  Trajectory centre_, mirrored_centre_;
   std::vector<Turned> turned_;  // of the microphones, then of their middle; empty tracks as long as nothing is turned
   bool is_turned_ = false;
   double last_s_ = 0.0;

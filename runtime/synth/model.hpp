@@ -15,6 +15,10 @@
 #include "runtime/synth/kernels.hpp"
 #include "runtime/synth/pulse.hpp"
 
+namespace carillon::radiation {
+class Transfers;
+}
+
 namespace carillon::synth {
 
 /// The surface of a body as strikes need it: which vertices a triangle has, and how the modes move there. Models of one body may share it.
@@ -34,6 +38,19 @@ struct ModelOptions {
   /// A model of the same body, before its bank was edited: where both have the same modes, they stand in its order and share its surface,
   /// which is most of the memory. Which modes are dropped first is then the order of that model.
   const class Model* like = nullptr;
+  /// What the modes send into each direction, for Effect::kDirectivity; nullptr: made of the bank's multipoles where it has them.
+  std::shared_ptr<const radiation::Transfers> transfers = nullptr;
+};
+
+/// What a Model has for Effect::kDirectivity, where the bank has multipoles.
+struct ModelDirectivity {
+  std::shared_ptr<const radiation::Transfers> transfers;
+  std::vector<SoundTable> sound;                  // of modes whose sound is the real part of their state
+  std::vector<float> tilt;                        // (ringing modes) t, where 1 + i t times the state is the velocity
+  std::vector<float> level;                       // (ringing modes) 1; 0 for modes that are not heard (make_solo)
+  std::vector<std::array<float, kGroup>> weight;  // as Model has them, with the loudest direction in place of the gain
+  std::vector<float> reach;
+  Vec3 offset_m{};  // from the centre of mass to that of the multipoles, axes of the mesh
 };
 
 /// Immutable; any number of voices on any threads may share one.
@@ -65,6 +82,10 @@ class Model {
   double get_sphere_radius_m() const { return sphere_radius_m_; }
   /// E / (1 - nu^2) of the bank's material [Pa].
   double get_plane_strain_modulus_pa() const { return plane_strain_modulus_pa_; }
+  /// nullptr where the bank has no multipoles, or this build not the effect.
+  const ModelDirectivity* get_directivity() const { return directivity_.get(); }
+  /// Centre of mass in the frame of the mesh.
+  const Vec3& get_centre_m() const { return centre_m_; }
   /// Memory of the tables, which all voices share.
   std::size_t calc_bytes() const;
 
@@ -88,7 +109,7 @@ class Model {
   const std::shared_ptr<const ModelSurface>& get_surface() const { return surface_; }
 
   /// All but the surface as bytes, for another program of the same build: a WebAssembly module makes models in one memory and plays them
-  /// in another. No file format.
+  /// in another. No file format. Without what directivity needs: the model that is read has no transfers and refuses that effect.
   std::vector<std::byte> write_tables() const;
   /// The model of these bytes and its surface. Throws InputError for bytes that are no model's of this build, or do not fit the surface.
   /// Takes no longer than copying the bytes does.
@@ -104,6 +125,7 @@ class Model {
 
  private:
   friend class ContactForces;
+  friend class Directivity;
   friend class Voice;
 
   struct Mode {
@@ -115,12 +137,14 @@ class Model {
   bool has_modes_of(const Model& other) const;
   void copy_shapes(const bank::Bank& bank);
   void find_bounds();
+  void add_directivity(std::shared_ptr<const radiation::Transfers> transfers);
   const std::int16_t* get_row(std::int32_t vertex, int axis) const {
     return surface_->shape.data() + (static_cast<std::size_t>(vertex) * 3 + static_cast<std::size_t>(axis)) * surface_->columns;
   }
 
   double rate_hz_ = 0.0;
   double mass_kg_ = 0.0, sphere_radius_m_ = 0.0;
+  Vec3 centre_m_{};
   double plane_strain_modulus_pa_ = 0.0;
   std::vector<Mode> modes_;
   int ringing_ = 0;  // modes in groups, the first of modes_; the rest is damped_
@@ -131,6 +155,7 @@ class Model {
   std::vector<float> reach_;                       // Pa at 1 m per N s: what a strike can make of a group, or of a later one
   std::vector<DampedMode> damped_;                 // ascending in substeps; those that follow come first
   std::shared_ptr<const ModelSurface> surface_;
+  std::shared_ptr<const ModelDirectivity> directivity_;
 };
 
 }  // namespace carillon::synth

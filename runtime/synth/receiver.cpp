@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "runtime/base/vector.hpp"
+#include "runtime/radiation/transfers.hpp"
 
 namespace carillon::synth {
 namespace {
@@ -168,30 +169,46 @@ void Cubic::evaluate(int first, std::span<double> out) const noexcept {
   }
 }
 
-Receiver::Receiver(const Vec3& offset_m, double sample_rate_hz, EffectSet effects, Isa isa)
-    : offset_m_(offset_m), rate_hz_(sample_rate_hz), effects_(effects), kernels_(&get_kernels(isa)) {
+Receiver::Receiver(const Vec3& offset_m, double sample_rate_hz, EffectSet effects, Isa isa, double sphere_m)
+    : offset_m_(offset_m), rate_hz_(sample_rate_hz), effects_(effects), kernels_(&get_kernels(isa)), sphere_m_(sphere_m) {
   get_sinc_table();  // built here, not in process()
+}
+
+/// The way of what arrives at a time, through the air or without it; from the sphere, where there is one.
+PathState Receiver::calc_way(const Source& source, const Trajectory& listener, double time_s) const noexcept {
+  PathState way = has(effects_, Effect::kAirDelay) ? calc_path_state(*source.track, listener, offset_m_, time_s)
+                                                   : calc_straight_way(*source.track, listener, offset_m_, time_s);
+  if (!kCompiledEffects.has(Effect::kDirectivity) || sphere_m_ == 0.0) return way;
+  way.spreading_1_m = 1.0;
+  way.spreading_slope = 0.0;
+  if (!has(effects_, Effect::kAirDelay)) return way;
+  way.delay_s -= sphere_m_ / kSoundSpeedMs;
+  if (const double least_s = (radiation::kNearestRadii - 1.0) * sphere_m_ / kSoundSpeedMs; way.delay_s < least_s) {
+    way.delay_s = least_s;
+    way.delay_slope = 0.0;
+  }
+  return way;
 }
 
 void Receiver::begin(const Source& source, const Trajectory& listener, std::int64_t sample) noexcept {
   if (!has(effects_, Effect::kAirDelay)) return;
-  first_delay_s_ = calc_path_state(*source.track, listener, offset_m_, static_cast<double>(sample - kLatency) / rate_hz_).delay_s;
+  first_delay_s_ = calc_way(source, listener, static_cast<double>(sample - kLatency) / rate_hz_).delay_s;
   is_placed_ = true;
 }
 
 double Receiver::calc_delay_s(const Source& source, const Trajectory& listener, std::int64_t sample) const noexcept {
   if (!has(effects_, Effect::kAirDelay)) return 0.0;
   if (!has(effects_, Effect::kDoppler) && is_placed_) return first_delay_s_;
-  return calc_path_state(*source.track, listener, offset_m_, static_cast<double>(sample - kLatency) / rate_hz_).delay_s;
+  return calc_way(source, listener, static_cast<double>(sample - kLatency) / rate_hz_).delay_s;
 }
 
 /// Of what arrives at a border of sub-blocks, with the effects that this ear has.
 PathState Receiver::find_path_state(const Source& source, const Trajectory& listener, std::int64_t border, double& travel_s) noexcept {
   const double arrival_s = static_cast<double>(border * kSubBlock - kLatency) / rate_hz_;
   travel_s = 0.0;
-  if (!has(effects_, Effect::kAirDelay)) return calc_straight_way(*source.track, listener, offset_m_, arrival_s);
-  PathState way = calc_path_state(*source.track, listener, offset_m_, arrival_s);
-  travel_s = way.delay_s;
+  PathState way = calc_way(source, listener, arrival_s);
+  if (!has(effects_, Effect::kAirDelay)) return way;
+  travel_s = way.delay_s + sphere_m_ / kSoundSpeedMs;
   if (!is_placed_) first_delay_s_ = way.delay_s;
   is_placed_ = true;
   if (!has(effects_, Effect::kDoppler)) {

@@ -19,7 +19,7 @@ inline constexpr double kNearestM = 0.05;  // a source never counts as nearer th
 /// What a body sends out, and from where. None of it is owned.
 struct Source {
   const Trajectory* track = nullptr;
-  const DelayLine* monopole = nullptr;       // Pa at 1 m, all round
+  const DelayLine* monopole = nullptr;       // Pa at 1 m, all round; Pa at the microphone where the receiver has a sphere
   std::array<const DelayLine*, 3> dipole{};  // Pa at 1 m along x, y, z of the world, cosine elsewhere; or nullptr
 };
 
@@ -59,7 +59,10 @@ class Receiver {
 
   /// `offset_m`: of the microphone from the listener, in the axes of the world. Of the effects kAirDelay and kDoppler are looked at:
   /// without the first sound takes no time, without the second it takes as long as at the beginning, wherever its source goes.
-  Receiver(const Vec3& offset_m, double sample_rate_hz, EffectSet effects = {Effect::kAirDelay, Effect::kDoppler}, Isa isa = Isa::kBest);
+  /// `sphere_m`: 0, or the radius of the sphere about the source from which the sound sets out with its spreading already in it, as
+  /// radiation::Transfers gives it: it takes (r - R) / c and loses nothing on its way.
+  Receiver(const Vec3& offset_m, double sample_rate_hz, EffectSet effects = {Effect::kAirDelay, Effect::kDoppler}, Isa isa = Isa::kBest,
+           double sphere_m = 0.0);
 
   /// Says where the first sample is: without kDoppler its sound takes as long for ever. Without a call it is the first that is processed.
   /// [audio-thread]
@@ -75,6 +78,7 @@ class Receiver {
 
  private:
   PathState find_path_state(const Source& source, const Trajectory& listener, std::int64_t border, double& travel_s) noexcept;
+  PathState calc_way(const Source& source, const Trajectory& listener, double time_s) const noexcept;
   void find_path_states(const Source& source, const Trajectory& listener, std::int64_t sub_block) noexcept;
   void process_still(const Source& source, std::int64_t sample, std::span<double> received_pa) noexcept;
   void process_moving(const Source& source, std::int64_t sample, std::span<double> received_pa) const noexcept;
@@ -83,6 +87,7 @@ class Receiver {
   double rate_hz_ = 0.0;
   EffectSet effects_;
   const Kernels* kernels_ = nullptr;
+  double sphere_m_ = 0.0;
   std::int64_t sub_block_ = -1;  // of which `from_` is the beginning and `to_` the end
   PathState from_, to_;
   Cubic delay_, spreading_;  // between them [samples], [1/m]

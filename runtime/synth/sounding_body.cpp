@@ -12,11 +12,13 @@
 #include <utility>
 
 #include "runtime/base/error.hpp"
+#include "runtime/radiation/transfers.hpp"
 
 namespace carillon::synth {
 namespace {
 
-constexpr EffectSet kOfPropagation{Effect::kModal, Effect::kAccelerationNoise, Effect::kAirDelay, Effect::kDoppler, Effect::kTwoEars};
+constexpr EffectSet kOfPropagation{Effect::kModal,   Effect::kAccelerationNoise, Effect::kAirDelay,        Effect::kDoppler,
+                                   Effect::kTwoEars, Effect::kDirectivity,       Effect::kGroundReflection};
 
 /// Whether a build and a body have an effect: false without a look where the build has not.
 constexpr bool has(EffectSet effects, Effect effect) { return kCompiledEffects.has(effect) && effects.has(effect); }
@@ -29,37 +31,13 @@ constexpr bool needs_contacts(EffectSet effects) { return has(effects, Effect::k
 /// The first of a set, or another where it is empty.
 constexpr Effect find_first(EffectSet effects, Effect otherwise) { return effects.is_empty() ? otherwise : *effects.begin(); }
 
-std::unique_ptr<Propagation> make_propagation(EffectSet effects, const BodyFrame& frame) {
-  auto propagation = std::make_unique<Propagation>();
-  propagation->effects = effects;
-  const double longest_m = effects.has(Effect::kAirDelay) ? frame.longest_m : 0.0;
-  const auto make_history = [&] { return std::make_unique<DelayLine>(longest_m, frame.rate_hz, kBlock); };
-  if (effects.has(Effect::kModal)) propagation->monopole = make_history();
-  propagation->source.monopole = propagation->monopole.get();
-  for (std::size_t k = 0; k < 3 && effects.has(Effect::kAccelerationNoise); ++k) {
-    propagation->dipole[k] = make_history();
-    propagation->source.dipole[k] = propagation->dipole[k].get();
-  }
-  if (effects.has(Effect::kTwoEars)) {
-    propagation->ears.reserve(frame.microphones_m.size());
-    for (const Vec3& place : frame.microphones_m) propagation->ears.emplace_back(place, frame.rate_hz, effects);
-  } else {
-    propagation->ears.emplace_back(calc_middle(frame.microphones_m), frame.rate_hz, effects);
-  }
-  return propagation;
-}
-
-/// Of a propagation's ear, which stands for all microphones where the body is heard without two ears.
-const Trajectory& find_ear_track(const Propagation& propagation, const ListenerTracks& listener, std::size_t ear) noexcept {
-  return has(propagation.effects, Effect::kTwoEars) ? listener.get_track(ear) : listener.get_middle_track();
+/// Whether the sound of two models of a body with directivity sets out from one sphere.
+bool has_same_sphere(const Model& a, const Model& b) {
+  const ModelDirectivity &one = *a.get_directivity(), &other = *b.get_directivity();
+  return one.offset_m == other.offset_m && one.transfers->get_radius_m() == other.transfers->get_radius_m();
 }
 
 }  // namespace
-
-bool Propagation::is_silent() const noexcept {
-  if (monopole && !monopole->is_silent()) return false;
-  return !dipole[0] || (dipole[0]->is_silent() && dipole[1]->is_silent() && dipole[2]->is_silent());
-}
 
 EffectBytes BodyChange::calc_bytes() const {
   EffectBytes bytes;
@@ -69,6 +47,7 @@ EffectBytes BodyChange::calc_bytes() const {
         static_cast<std::int64_t>(sizeof(BodyAccelerationNoise) - sizeof(AccelerationNoise) + acceleration_noise->noise.calc_bytes() +
                                   acceleration_noise->attitude.get_bytes());
   }
+  if (directivity) bytes[Effect::kDirectivity] += static_cast<std::int64_t>(directivity->calc_bytes());
   if (contacts) bytes[Effect::kRoughness] += static_cast<std::int64_t>(contacts->calc_bytes());
   if (!propagation) return bytes;
   // What a delay line holds beyond one without travel time belongs to the travel time.
@@ -80,9 +59,16 @@ EffectBytes BodyChange::calc_bytes() const {
   if (propagation->monopole) add(*propagation->monopole, Effect::kModal);
   for (const auto& delay_line : propagation->dipole)
     if (delay_line) add(*delay_line, Effect::kAccelerationNoise);
-  const Effect source = propagation->monopole ? Effect::kModal : Effect::kAccelerationNoise;
+  const Effect source = propagation->monopole || propagation->directed ? Effect::kModal : Effect::kAccelerationNoise;
   bytes[source] += static_cast<std::int64_t>(sizeof(Propagation) + sizeof(Receiver));
   bytes[Effect::kTwoEars] += static_cast<std::int64_t>((propagation->ears.size() - 1) * sizeof(Receiver));
+  bytes[Effect::kGroundReflection] += static_cast<std::int64_t>(propagation->mirrored.size() * sizeof(Receiver));
+  if (!propagation->directed) return bytes;
+  bytes[Effect::kDirectivity] += static_cast<std::int64_t>(propagation->directed->calc_bytes());
+  for (const DelayLine& line : propagation->directed->get_lines()) {
+    bytes[Effect::kDirectivity] += static_cast<std::int64_t>(still.get_bytes());
+    bytes[Effect::kAirDelay] += static_cast<std::int64_t>(line.get_bytes() - still.get_bytes());
+  }
   return bytes;
 }
 
@@ -94,9 +80,20 @@ SoundingBody::SoundingBody(std::shared_ptr<const Model> model, BodyFrame frame, 
 
 void SoundingBody::check(EffectSet effects, const Model& model) {
   check_compiled(effects);
+  if (has(effects, Effect::kDirectivity) && model.get_directivity() == nullptr)
+    throw InputError(
+        "directivity needs a bank with multipoles, which this body's has not; make the bank with them, or leave the effect out");
   if (!effects.has(Effect::kAccelerationNoise)) return;
   if (!(model.get_sphere_radius_m() > 0.0 && model.get_mass_kg() > 0.0))
     throw InputError("acceleration_noise needs a body with a mass and a volume; the bank of this one gives none");
+}
+
+PropagationOptions SoundingBody::make_propagation_options() const {
+  return {.rate_hz = frame_.rate_hz,
+          .microphones_m = frame_.microphones_m,
+          .longest_m = frame_.longest_m,
+          .max_waypoints = frame_.max_waypoints,
+          .floor = frame_.floor};
 }
 
 std::unique_ptr<BodyChange> SoundingBody::make_change(EffectSet from, EffectSet to, std::shared_ptr<const Model> model) {
@@ -123,7 +120,13 @@ std::unique_ptr<BodyChange> SoundingBody::make_change(EffectSet from, EffectSet 
     change->contacts = std::make_unique<ContactForces>(model, ContactForcesOptions{.surface = frame_.surface, .effects = to});
   }
   const bool sounds = to.has(Effect::kModal) || to.has(Effect::kAccelerationNoise);
-  if (to.common(kOfPropagation) != from.common(kOfPropagation) && sounds) change->propagation = make_propagation(to, frame_);
+  bool changes_air = to.common(kOfPropagation) != from.common(kOfPropagation);
+  const auto is_directed = [](EffectSet effects) { return has(effects, Effect::kDirectivity) && effects.has(Effect::kModal); };
+  if (change->inherits && is_directed(from)) {
+    change->directivity = std::make_unique<Directivity>(model, count_ears(from, make_propagation_options()));
+    changes_air = changes_air || (is_directed(to) && !has_same_sphere(*model_, *model));
+  }
+  if (changes_air && sounds) change->propagation = make_propagation(to, make_propagation_options(), model);
   model_ = std::move(model);
   return change;
 }
@@ -134,6 +137,12 @@ void SoundingBody::apply(BodyChange& change, const ListenerTracks& listener, std
   change_ = &change;
   effects_ = change.effects;
   if (change.voice) {
+    if (kCompiledEffects.has(Effect::kDirectivity) && change.directivity && propagation_ && propagation_->directed && change.handover) {
+      // The propagation that is there continues with the modes of the new model.
+      change.directivity->take_over(*propagation_->directed->weights, change.handover->get_old_modes());
+      change.voice->direct(change.directivity.get(), nullptr);
+      std::swap(propagation_->directed->weights, change.directivity);
+    }
     if (voice_ && change.handover)
       change.voice->take_over(*voice_, *change.handover);
     else
@@ -154,15 +163,31 @@ void SoundingBody::apply(BodyChange& change, const ListenerTracks& listener, std
   }
   surface_.modulus_pa = change.modulus_pa;
   put_contacts(change);
-  if (!change.propagation) return;
+  if (!change.propagation) return direct_voice();
   std::swap(next_propagation_, change.propagation);
   next_propagation_->source.track = &track_;
   next_propagation_->first = sample;
-  if (next_propagation_->monopole) next_propagation_->monopole->push_silence(sample);
-  for (const auto& delay_line : next_propagation_->dipole)
-    if (delay_line) delay_line->push_silence(sample);
-  for (std::size_t m = 0; m < next_propagation_->ears.size(); ++m)
-    next_propagation_->ears[m].begin(next_propagation_->source, find_ear_track(*next_propagation_, listener, m), sample);
+  next_propagation_->push_silence(sample);
+  Propagation& next = *next_propagation_;
+  for (std::size_t m = 0; m < next.ears.size(); ++m) next.ears[m].begin(next.source, next.find_track(listener, m, false), sample);
+  for (std::size_t m = 0; m < next.mirrored.size(); ++m) next.mirrored[m].begin(next.source, next.find_track(listener, m, true), sample);
+  if (kCompiledEffects.has(Effect::kDirectivity) && next.directed) {
+    DirectedSound& directed = *next.directed;
+    directed.begin(track_, turned_s_, rotation_);
+    for (std::size_t e = 0; e < directed.get_ear_count(); ++e)
+      directed.get_receiver(e).begin(directed.make_source(e), directed.find_track(listener, e), sample);
+  }
+  direct_voice();
+}
+
+/// The modes sound to the ears that there are.
+void SoundingBody::direct_voice() noexcept {
+  if (!kCompiledEffects.has(Effect::kDirectivity) || !voice_) return;
+  std::array<Directivity*, 2> weights{};
+  std::size_t count = 0;
+  for (const Propagation* path : {propagation_.get(), next_propagation_.get()})
+    if (path != nullptr && path->directed) weights[count++] = path->directed->weights.get();
+  voice_->direct(weights[0], weights[1]);
 }
 
 /// Contacts begin, change what they do, or fall.
@@ -185,15 +210,8 @@ void SoundingBody::put_contacts(BodyChange& change) noexcept {
 bool SoundingBody::is_filled(const Propagation& propagation, const ListenerTracks& listener, std::int64_t sample) const noexcept {
   if (!propagation_ || propagation_->is_silent()) return true;
   const std::int64_t filled = sample - propagation.first;
-  const DelayLine& delay_line = propagation.monopole ? *propagation.monopole : *propagation.dipole[0];
-  double longest_s = 0.0;
-  if (has(propagation.effects, Effect::kAirDelay)) {
-    for (std::size_t m = 0; m < propagation.ears.size(); ++m) {
-      const Trajectory& track = find_ear_track(propagation, listener, m);
-      longest_s = std::max(longest_s, propagation.ears[m].calc_delay_s(propagation.source, track, sample));
-    }
-  }
-  const double needed = longest_s * frame_.rate_hz + Receiver::kLatency + kTaps + kBlock;
+  const DelayLine& delay_line = propagation.get_line();
+  const double needed = propagation.calc_longest_s(listener, sample) * frame_.rate_hz + Receiver::kLatency + kTaps + kBlock;
   return static_cast<double>(filled) >= needed || filled >= delay_line.get_size();
 }
 
@@ -216,6 +234,7 @@ BodyChange* SoundingBody::finish_change(const ListenerTracks& listener, std::int
   }
   if (!has(effects_, Effect::kModal)) change_->voice = std::move(voice_);
   if (!has(effects_, Effect::kAccelerationNoise)) change_->acceleration_noise = std::move(acceleration_noise_);
+  direct_voice();
   return std::exchange(change_, nullptr);
 }
 
@@ -244,10 +263,7 @@ void SoundingBody::wake(std::int64_t sample) noexcept {
   rendered_ = sample;
   if (voice_) voice_->skip(slept);
   if (acceleration_noise_) acceleration_noise_->noise.skip(slept);
-  if (!propagation_) return;
-  if (propagation_->monopole) propagation_->monopole->push_silence(slept);
-  for (const auto& delay_line : propagation_->dipole)
-    if (delay_line) delay_line->push_silence(slept);
+  if (propagation_) propagation_->push_silence(slept);
 }
 
 bool SoundingBody::take(const events::Impulse& impulse, std::int64_t sample) noexcept {
@@ -316,6 +332,9 @@ bool SoundingBody::take(const events::BodyMotion& motion) noexcept {
   rotation_ = motion.rotation;
   if (kCompiledEffects.has(Effect::kAccelerationNoise) && acceleration_noise_)
     acceleration_noise_->attitude.push(motion.time_s, motion.rotation);
+  if (!kCompiledEffects.has(Effect::kDirectivity)) return true;
+  for (Propagation* path : {propagation_.get(), next_propagation_.get()})
+    if (path != nullptr && path->directed) path->directed->push(motion);
   return true;
 }
 
@@ -347,7 +366,14 @@ Effect SoundingBody::make_modal_sound(std::span<float> mono) noexcept {
     for (const float p : mono) work_.peak_pa = std::max(work_.peak_pa, std::abs(p));
   }
   for (Propagation* path : {propagation_.get(), next_propagation_.get()}) {
-    if (path == nullptr || !path->monopole) continue;
+    if (path == nullptr) continue;
+    if (kCompiledEffects.has(Effect::kDirectivity) && path->directed) {
+      if (is_idle)
+        path->directed->push_silence(static_cast<std::int64_t>(mono.size()));
+      else
+        path->directed->push_sound(mono.size());
+    }
+    if (!path->monopole) continue;
     if (is_idle)
       path->monopole->push_silence(static_cast<std::int64_t>(mono.size()));
     else
@@ -385,13 +411,29 @@ void SoundingBody::make_acceleration_noise(const std::array<std::span<float>, 3>
   }
 }
 
-void SoundingBody::make_sound(std::size_t count, BodyScratch& scratch, TickFunction ticks) noexcept {
+/// Where the modes sound, weights for this block.
+void SoundingBody::begin_directed_block(std::int64_t sample, const ListenerTracks& listener) noexcept {
+  if (voice_->is_idle()) return;
+  for (Propagation* path : {propagation_.get(), next_propagation_.get()}) {
+    if (path == nullptr || !path->directed) continue;
+    const std::int64_t before = path->directed->weights->get_evaluations();
+    path->directed->begin_block(sample, track_, listener);
+    work_.units[Effect::kDirectivity] += path->directed->weights->get_evaluations() - before;
+  }
+}
+
+void SoundingBody::make_sound(std::int64_t sample, std::size_t count, const ListenerTracks& listener, BodyScratch& scratch,
+                              TickFunction ticks) noexcept {
   std::uint64_t started = ticks != nullptr ? ticks() : 0;
   const auto end_part = [&](Effect effect) {
     if (ticks == nullptr) return;
     const std::uint64_t now = ticks();
     work_.ticks[effect] += static_cast<std::int64_t>(now - std::exchange(started, now));
   };
+  if (kCompiledEffects.has(Effect::kDirectivity) && voice_ && voice_->is_directed()) {
+    begin_directed_block(sample, listener);
+    end_part(Effect::kDirectivity);
+  }
   if (kCompiledEffects.has(Effect::kModal) && voice_) end_part(make_modal_sound(std::span(scratch.mono).first(count)));
   if (kCompiledEffects.has(Effect::kAccelerationNoise) && acceleration_noise_) {
     std::array<std::span<float>, 3> dipole;
@@ -401,44 +443,73 @@ void SoundingBody::make_sound(std::size_t count, BodyScratch& scratch, TickFunct
   }
 }
 
+/// What one ear hears, times a level, into the mix of its microphone, or of all where they are not `apart`. Returns how many samples came
+/// by a way that changes.
+int SoundingBody::hear_ear(Receiver& ear, const Source& source, const Trajectory& track, std::size_t microphone, double level,
+                           std::int64_t sample, std::size_t count, int fade, bool apart, BodyScratch& scratch, Mix& mix) noexcept {
+  if (apart && fade == 0 && level == 1.0) return ear.process(source, track, sample, std::span(mix[microphone]).first(count));
+  const std::span<double> heard = std::span(scratch.heard).first(count);
+  std::fill(heard.begin(), heard.end(), 0.0);
+  const int moved = ear.process(source, track, sample, heard);
+  const auto begin = static_cast<int>(sample % kBlock);
+  for (std::size_t n = 0; n < count && fade != 0; ++n) {
+    const double u = (begin + static_cast<int>(n)) / static_cast<double>(kBlock), in = u * u * (3.0 - 2.0 * u);
+    heard[n] *= fade > 0 ? in : 1.0 - in;
+  }
+  if (level != 1.0)
+    for (double& p : heard) p *= level;
+  for (std::size_t c = apart ? microphone : 0; c < (apart ? microphone + 1 : mix.size()); ++c)
+    for (std::size_t n = 0; n < count; ++n) mix[c][n] += heard[n];
+  return moved;
+}
+
 /// `fade`: 0 none, 1 in, -1 out.
 void SoundingBody::hear(Propagation& propagation, std::int64_t sample, std::size_t count, const ListenerTracks& listener, int fade,
                         BodyScratch& scratch, Mix& mix, TickFunction ticks) noexcept {
   if (propagation.is_silent()) return;
   std::uint64_t started = ticks != nullptr ? ticks() : 0;
   const bool apart = has(propagation.effects, Effect::kTwoEars);
-  const std::span<double> heard = std::span(scratch.heard).first(count);
-  for (std::size_t m = 0; m < propagation.ears.size(); ++m) {
-    const Trajectory& track = find_ear_track(propagation, listener, m);
-    int moved = 0;
-    if (apart && fade == 0) {
-      moved = propagation.ears[m].process(propagation.source, track, sample, std::span(mix[m]).first(count));
+  const auto add_work = [&](Effect sends, std::size_t m, bool is_mirrored, int moved) {
+    if (is_mirrored) {
+      work_.units[Effect::kGroundReflection] += static_cast<std::int64_t>(count);
     } else {
-      std::fill(heard.begin(), heard.end(), 0.0);
-      moved = propagation.ears[m].process(propagation.source, track, sample, heard);
-      const auto begin = static_cast<int>(sample % kBlock);
-      for (std::size_t n = 0; n < count && fade != 0; ++n) {
-        const double u = (begin + static_cast<int>(n)) / static_cast<double>(kBlock), in = u * u * (3.0 - 2.0 * u);
-        heard[n] *= fade > 0 ? in : 1.0 - in;
-      }
-      for (std::size_t c = apart ? m : 0; c < (apart ? m + 1 : mix.size()); ++c)
-        for (std::size_t n = 0; n < count; ++n) mix[c][n] += heard[n];
+      if (has(propagation.effects, Effect::kAirDelay)) work_.units[Effect::kAirDelay] += static_cast<std::int64_t>(count);
+      if (has(propagation.effects, Effect::kDoppler)) work_.units[Effect::kDoppler] += moved;
+      if (m > 0) work_.units[Effect::kTwoEars] += static_cast<std::int64_t>(count);
     }
-    if (has(propagation.effects, Effect::kAirDelay)) work_.units[Effect::kAirDelay] += static_cast<std::int64_t>(count);
-    if (has(propagation.effects, Effect::kDoppler)) work_.units[Effect::kDoppler] += moved;
-    if (m > 0) work_.units[Effect::kTwoEars] += static_cast<std::int64_t>(count);
-    if (ticks == nullptr) continue;
+    if (ticks == nullptr) return;
     const std::uint64_t now = ticks();
-    const Effect sends = propagation.monopole ? Effect::kModal : Effect::kAccelerationNoise;
     const Effect carries = moved > 0 ? Effect::kDoppler : has(propagation.effects, Effect::kAirDelay) ? Effect::kAirDelay : sends;
-    work_.ticks[m > 0 ? Effect::kTwoEars : carries] += static_cast<std::int64_t>(now - std::exchange(started, now));
+    work_.ticks[is_mirrored ? Effect::kGroundReflection
+                : m > 0     ? Effect::kTwoEars
+                            : carries] += static_cast<std::int64_t>(now - std::exchange(started, now));
+  };
+  const Effect sends = propagation.monopole ? Effect::kModal : Effect::kAccelerationNoise;
+  for (std::size_t m = 0; m < propagation.ears.size() && (propagation.monopole || propagation.dipole[0]); ++m) {
+    const Trajectory& track = propagation.find_track(listener, m, false);
+    add_work(sends, m, false, hear_ear(propagation.ears[m], propagation.source, track, m, 1.0, sample, count, fade, apart, scratch, mix));
+    if (!kCompiledEffects.has(Effect::kGroundReflection) || propagation.mirrored.empty()) continue;
+    const Trajectory& mirrored = propagation.find_track(listener, m, true);
+    add_work(sends, m, true,
+             hear_ear(propagation.mirrored[m], propagation.source, mirrored, m, listener.get_floor()->reflection, sample, count, fade,
+                      apart, scratch, mix));
+  }
+  if (!kCompiledEffects.has(Effect::kDirectivity) || !propagation.directed) return;
+  DirectedSound& directed = *propagation.directed;
+  for (std::size_t e = 0; e < directed.get_ear_count(); ++e) {
+    const std::size_t m = directed.find_microphone(e);
+    const bool is_mirrored = directed.is_mirrored(e);
+    const double level = is_mirrored ? listener.get_floor()->reflection : 1.0;
+    add_work(Effect::kDirectivity, m, is_mirrored,
+             hear_ear(directed.get_receiver(e), directed.make_source(e), directed.find_track(listener, e), m, level, sample, count, fade,
+                      apart, scratch, mix));
   }
 }
 
 void SoundingBody::render(std::int64_t sample, std::size_t count, const ListenerTracks& listener, BodyScratch& scratch, Mix& mix,
                           TickFunction ticks) noexcept {
   wake(sample);
-  make_sound(count, scratch, ticks);
+  make_sound(sample, count, listener, scratch, ticks);
   if (propagation_) hear(*propagation_, sample, count, listener, fading_ ? -1 : 0, scratch, mix, ticks);
   if (next_propagation_ && fading_) hear(*next_propagation_, sample, count, listener, 1, scratch, mix, ticks);
   rendered_ = sample + static_cast<std::int64_t>(count);

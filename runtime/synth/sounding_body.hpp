@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -16,6 +17,7 @@
 #include "runtime/synth/kernels.hpp"
 #include "runtime/synth/listener.hpp"
 #include "runtime/synth/model.hpp"
+#include "runtime/synth/propagation.hpp"
 #include "runtime/synth/receiver.hpp"
 #include "runtime/synth/trajectory.hpp"
 #include "runtime/synth/voice.hpp"
@@ -33,6 +35,7 @@ struct BodyFrame {
   Isa isa = Isa::kBest;
   ContactSurface surface{};
   bool audits_energy = false;
+  std::optional<Floor> floor = std::nullopt;
 };
 
 /// Memory that belongs to effects. What lasting contacts need counts as that of roughness here, whichever of the three effects need it.
@@ -45,18 +48,6 @@ struct BodyAccelerationNoise {
   std::int64_t first = 0;  // sample of the scene with which it began
 };
 
-/// The propagation of a body's sound: what it emitted, and the receivers that read it.
-struct Propagation {
-  EffectSet effects;
-  std::unique_ptr<DelayLine> monopole;               // with modes
-  std::array<std::unique_ptr<DelayLine>, 3> dipole;  // with acceleration noise
-  std::vector<Receiver> ears;                        // one a microphone, or one for all without two ears
-  std::int64_t first = 0;                            // sample of the scene with which it began
-  Source source;
-
-  bool is_silent() const noexcept;
-};
-
 /// Modules on their way into a body, and what they took the place of on its way out. Made and destroyed on the main thread.
 struct BodyChange {
   EffectSet effects;
@@ -64,9 +55,10 @@ struct BodyChange {
   std::unique_ptr<BodyAccelerationNoise> acceleration_noise;
   std::unique_ptr<Propagation> propagation;
   std::unique_ptr<ContactForces> contacts;
-  double modulus_pa = 0.0;                  // of the surface
-  bool inherits = false;                    // voice, contacts and acceleration_noise take the place of those there
-  std::unique_ptr<VoiceHandover> handover;  // for the voice
+  double modulus_pa = 0.0;                   // of the surface
+  bool inherits = false;                     // voice, contacts and acceleration_noise take the place of those there
+  std::unique_ptr<VoiceHandover> handover;   // for the voice
+  std::unique_ptr<Directivity> directivity;  // for the propagation that is there, of the voice
 
   EffectBytes calc_bytes() const;
 };
@@ -142,11 +134,17 @@ class SoundingBody {
   bool play(const Strike& strike, bool has_length, bool is_new, std::int64_t sample) noexcept;
   void wake(std::int64_t sample) noexcept;
   void put_contacts(BodyChange& change) noexcept;
+  PropagationOptions make_propagation_options() const;
+  void direct_voice() noexcept;
   Effect make_modal_sound(std::span<float> mono) noexcept;
+  void begin_directed_block(std::int64_t sample, const ListenerTracks& listener) noexcept;
   void make_acceleration_noise(const std::array<std::span<float>, 3>& dipole) noexcept;
-  void make_sound(std::size_t count, BodyScratch& scratch, TickFunction ticks) noexcept;
+  void make_sound(std::int64_t sample, std::size_t count, const ListenerTracks& listener, BodyScratch& scratch,
+                  TickFunction ticks) noexcept;
   void hear(Propagation& propagation, std::int64_t sample, std::size_t count, const ListenerTracks& listener, int fade,
             BodyScratch& scratch, Mix& mix, TickFunction ticks) noexcept;
+  int hear_ear(Receiver& ear, const Source& source, const Trajectory& track, std::size_t microphone, double level, std::int64_t sample,
+               std::size_t count, int fade, bool apart, BodyScratch& scratch, Mix& mix) noexcept;
   bool is_filled(const Propagation& propagation, const ListenerTracks& listener, std::int64_t sample) const noexcept;
 
   std::shared_ptr<const Model> model_;  // the main thread's

@@ -34,6 +34,11 @@ SynthesiserOptions check(SynthesiserOptions options) {
   for (const double x : options.listener_m)
     if (!std::isfinite(x)) refuse("a listener at a finite place");
   if (const char* fault = find_fault(options.ground); fault != nullptr) throw InputError(std::string("ground: ") + fault);
+  if (const auto& floor = options.floor; floor) {
+    if (const char* fault = find_fault(*floor); fault != nullptr) throw InputError(std::string("floor: ") + fault);
+    for (const Vec3& place : options.microphones_m)
+      if (floor->calc_height_m(options.listener_m + place) < 0.0) refuse("microphones above its floor");
+  }
   if (options.max_bodies < 1 || options.max_bodies > kMaxBodies) refuse("room for one to 1,048,576 bodies");
   if (options.max_strikes < 1 || options.max_forces < 0 || options.max_waypoints < 2 || options.ring_events < 1)
     refuse("room for strikes, waypoints and events");
@@ -73,7 +78,7 @@ class Synthesiser::Pipe {
 Synthesiser::Synthesiser(SynthesiserOptions options)
     : options_(check(std::move(options))),
       ring_(static_cast<std::size_t>(options_.ring_events)),
-      listener_(static_cast<std::size_t>(options_.max_waypoints), options_.microphones_m, options_.listener_m),
+      listener_(static_cast<std::size_t>(options_.max_waypoints), options_.microphones_m, options_.listener_m, options_.floor),
       allowed_(options_.budget) {
   const auto bodies = static_cast<std::size_t>(options_.max_bodies);
   // A number comes, changes and goes in at most three commands, and two come back.
@@ -95,8 +100,14 @@ void Synthesiser::check_model(const Model* model) const {
                      std::to_string(options_.rate_hz) + " Hz");
 }
 
+void Synthesiser::check_floor(EffectSet effects) const {
+  if (effects.has(Effect::kGroundReflection) && !options_.floor)
+    throw InputError("ground_reflection needs a floor; give the synthesiser one, or leave the effect out");
+}
+
 int Synthesiser::add_body(std::shared_ptr<const Model> model, const BodySettings& settings) {
   check_model(model.get());
+  check_floor(settings.effects);
   if (events::find_fault(events::BodyMotion{.position_m = settings.position_m, .rotation = settings.rotation}) != nullptr)
     throw InputError("a body must be at a finite place, turned by a unit quaternion");
   if (!(settings.longest_m >= 0.0 && settings.longest_m < 1e5) || settings.max_waypoints < 0)
@@ -118,7 +129,8 @@ int Synthesiser::add_body(std::shared_ptr<const Model> model, const BodySettings
                 .silence_pa = settings.silence_pa,
                 .isa = settings.isa,
                 .surface = settings.surface,
-                .audits_energy = settings.audits_energy},
+                .audits_energy = settings.audits_energy,
+                .floor = options_.floor},
       settings.position_m, settings.rotation);
   auto change = body->make_change({}, settings.effects);
   Published& published = published_bodies_[free];
@@ -160,6 +172,7 @@ std::size_t Synthesiser::find_free() const {
 void Synthesiser::set_effects(int body, EffectSet effects) {
   collect();
   Owned& owned = owned_[check_owned(body)];
+  check_floor(effects);
   // Refused here, whether it has to wait or not.
   if (owned.wanted_model != nullptr)
     SoundingBody::check(effects, *owned.wanted_model);
@@ -184,9 +197,14 @@ EffectSet Synthesiser::get_effects(int body) const { return owned_[check_owned(b
 void Synthesiser::send_change(int number) {
   Owned& owned = owned_[static_cast<std::size_t>(number)];
   if (owned.change != nullptr || owned.is_leaving || (owned.wanted == owned.effects && owned.wanted_model == nullptr)) return;
-  owned.change = owned.wanted_model == nullptr ? owned.body->make_change(owned.effects, owned.wanted)
-                                               : owned.body->make_change(owned.effects, owned.wanted, owned.wanted_model);
-  owned.wanted_model.reset();
+  // Directivity goes first where the new model cannot have it.
+  const bool waits = owned.effects.has(Effect::kDirectivity) && !owned.wanted.has(Effect::kDirectivity);
+  if (owned.wanted_model == nullptr || waits) {
+    owned.change = owned.body->make_change(owned.effects, owned.wanted);
+  } else {
+    owned.change = owned.body->make_change(owned.effects, owned.wanted, owned.wanted_model);
+    owned.wanted_model.reset();
+  }
   owned.effects = owned.wanted;
   const EffectBytes more = owned.change->calc_bytes();
   for (const Effect effect : EffectSet::all()) owned.bytes[effect] += more[effect];

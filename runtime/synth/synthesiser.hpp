@@ -17,6 +17,7 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -45,6 +46,7 @@ struct SynthesiserOptions {
   double longest_m = 60.0;                                  // what is further away is not heard
   double budget = std::numeric_limits<double>::infinity();  // set_budget()
   ContactSurface ground = kGroundSurface;                   // what contacts touch whose other body is none
+  std::optional<Floor> floor = std::nullopt;                // what bodies with Effect::kGroundReflection are reflected by
   /// A counter of time, for what effects cost; nullptr: nothing is measured, and nothing paid for that.
   TickFunction ticks = nullptr;
 };
@@ -67,11 +69,12 @@ struct EffectCounters {
   /// Work: of modal mode-samples, of hertz_pulse pulses, of roughness and rolling samples of the texture that both read, contact by
   /// contact, of contact_damping samples in which a contact is at work, of acceleration_noise samples (of three dipoles), of air_delay
   /// samples that an ear read with travel time, of doppler those whose travel time changed, of two_ears those of the second microphone and
-  /// all further.
+  /// all further, of directivity transfers that were looked up, of ground_reflection samples that mirrored ears read.
   PerEffect<std::int64_t> units{};
   /// Of SynthesiserOptions::ticks. What pulses cost is in modal, and what modes cost while a contact is at work is in the first of
   /// roughness, rolling and contact_damping that the body has, as are their bytes; an ear's time is that of doppler where the way changes,
-  /// else of air_delay, else of what it hears, and of two_ears for the second microphone and all further.
+  /// else of air_delay, else of what it hears, and of two_ears for the second microphone and all further. That of mirrored ears is in
+  /// ground_reflection; to multiply the modes with what directivity looked up is in modal.
   PerEffect<std::int64_t> ticks{};
   EffectBytes bytes{};  // without the model, which bodies share, and without what a body has that has no effects
 };
@@ -203,6 +206,7 @@ class Synthesiser {
   class Pipe;
 
   void check_model(const Model* model) const;
+  void check_floor(EffectSet effects) const;
   std::size_t check_owned(int body) const;
   std::size_t find_free() const;
   void send_change(int number);

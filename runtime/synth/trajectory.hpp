@@ -34,6 +34,7 @@ class Trajectory {
 
   bool is_still() const { return count_ < 2; }
 
+  std::size_t get_bytes() const noexcept { return waypoints_.size() * sizeof(Waypoint); }
   /// How many waypoints it remembers, and one of them: 0 is the oldest.
   std::size_t get_count() const { return count_; }
   const Waypoint& get_waypoint(std::size_t i) const { return get(i); }

@@ -80,6 +80,7 @@ void Voice::render(int sub_blocks) noexcept {
   if (start % kBlock == 0) begin_block();
   horizon_ += sub_blocks * kSubBlock;
   rendered_ = held_ = sub_blocks * kSubBlock;
+  if (is_directed()) for_directed([this](Directivity& ears) { ears.clear(rendered_); });
   silent_ = !is_awake() && !fading_ && strikes_.is_empty() && (!kHasContacts || contacts_ == nullptr || contacts_->is_resting());
   if (silent_) return;
   const bool touched = kHasContacts && contacts_ != nullptr && !contacts_->is_idle();
@@ -104,7 +105,8 @@ void Voice::begin_block() noexcept {
 /// the starts after it.
 void Voice::render_sub_blocks(std::int64_t start, int sub_blocks, bool struck_at_all, bool touched) noexcept {
   const auto first = static_cast<int>(start % kBlock / kSubBlock);
-  const bool whole = sub_blocks == kSubBlocks && !struck_at_all && !touched;
+  const bool directed = is_directed();
+  const bool whole = sub_blocks == kSubBlocks && !struck_at_all && !touched && !directed;  // the starts are kept for the ears
   if (live_ > 0 && whole) {
     kernels_->ring(model_->sound_.data(), model_->turn_.data(), state_.data(), live_, block_.data());
   } else if (live_ > 0 && first == 0) {
@@ -121,22 +123,57 @@ void Voice::render_sub_blocks(std::int64_t start, int sub_blocks, bool struck_at
       while (made < sub_blocks && !touched && !struck && !strikes_.acts(start + made * kSubBlock, kSubBlock));
       if (live_ > 0 && !(drive != nullptr && drive->damps))
         kernels_->emit(model_->sound_.data(), starts_.data(), live_, first + q, made - q, out);
+      if (directed && live_ > 0 && !(drive != nullptr && drive->damps))
+        for_directed([&](Directivity& ears) { ears.emit(*kernels_, starts_.data(), live_, first + q, made - q, q * kSubBlock); });
     }
     add_acting(sample, first + q, drive, struck, out);
+    if (directed) add_directed(first + q, q * kSubBlock);
     int bad = 0;
     for (int n = 0; n < kSubBlock; ++n) bad |= static_cast<int>(!(std::abs(out[n]) <= std::numeric_limits<float>::max()));
     if (bad != 0) {
       reset();
       std::fill(block_.begin() + q * kSubBlock, block_.begin() + rendered_, 0.0F);
+      if (directed) for_directed([&](Directivity& ears) { ears.silence(q * kSubBlock); });
       break;
     }
   }
 }
 
+/// Where the states of what acts in this sub-block are kept for the ears: of all live groups, those not yet used zero; nullptr: nowhere.
+SampleStates* Voice::find_kept() noexcept {
+  if (!is_directed()) return nullptr;
+  SampleStates* kept = directed_[0]->get_kept().data();
+  for (; kept_ < live_; ++kept_) kept[kept_] = SampleStates{};
+  return kept;
+}
+
+/// What the ears hear in a sub-block in addition to what rings.
+void Voice::add_directed(int sub_block, int offset) noexcept {
+  const int groups = std::exchange(kept_, 0);
+  for_directed([&](Directivity& ears) {
+    if (groups > 0) ears.weigh(*kernels_, directed_[0]->get_kept().data(), groups, sub_block, offset);
+    if (fading_) ears.add_fade(sub_block, offset);
+  });
+}
+
+/// Of the modes that do not ring, where some do or may.
+void Voice::add_damped(std::int64_t sample, bool struck, const ContactForces* contacts, int sub_block, float* out) noexcept {
+  if (!is_directed()) return damped_.add(sample, strikes_, struck, contacts, out);
+  alignas(64) std::array<float, kSubBlock> sound{};
+  damped_.add(sample, strikes_, struck, contacts, sound.data());
+  for (std::size_t n = 0; n < sound.size(); ++n) out[n] += sound[n];
+  if (damped_.is_live())
+    for_directed([&](Directivity& ears) { ears.add_damped(sound.data(), sub_block, static_cast<int>(out - block_.data())); });
+}
+
 /// What contacts and strikes add in one sub-block, with the damped modes and what fades out.
 void Voice::add_acting(std::int64_t sample, int sub_block, const ContactBlock* drive, bool struck, float* out) noexcept {
   if (drive != nullptr && live_ > 0) {
-    kernels_->drive(model_->strike_.data(), model_->turn_.data(), *drive, sub_block, state_.data(), starts_.data(), live_, out);
+    if (SampleStates* kept = find_kept(); kept != nullptr)
+      kernels_->drive_and_keep(model_->strike_.data(), model_->turn_.data(), *drive, sub_block, state_.data(), starts_.data(), live_, out,
+                               kept);
+    else
+      kernels_->drive(model_->strike_.data(), model_->turn_.data(), *drive, sub_block, state_.data(), starts_.data(), live_, out);
     count_work(live_, kSubBlock);
   }
   if (struck) {
@@ -145,7 +182,7 @@ void Voice::add_acting(std::int64_t sample, int sub_block, const ContactBlock* d
   }
   count_work(live_, kSubBlock);
   const bool driven = drive != nullptr && drive->forces;
-  if (struck || driven || damped_.is_live()) damped_.add(sample, strikes_, struck, driven ? contacts_ : nullptr, out);
+  if (struck || driven || damped_.is_live()) add_damped(sample, struck, driven ? contacts_ : nullptr, sub_block, out);
   if (!fading_) return;
   for (int n = 0; n < kSubBlock; ++n) out[n] += fade_[sub_block * kSubBlock + n];
 }
@@ -158,7 +195,7 @@ void Voice::wake(int groups) noexcept {
 /// Up to which group a strike can be heard above the floor.
 int Voice::find_reach(float strength_n_s) const noexcept {
   if (!(floor_pa_ > 0.0F)) return groups_;
-  const auto& reach = model_->reach_;
+  const auto& reach = is_directed() ? model_->directivity_->reach : model_->reach_;
   const auto last = std::partition_point(reach.begin(), reach.end(), [&](float pa) { return pa * strength_n_s >= floor_pa_; });
   return std::max(1, static_cast<int>(last - reach.begin()));
 }
@@ -170,7 +207,11 @@ void Voice::limit_touch(double begin, double end) noexcept {
 }
 
 void Voice::play_touch(int sub_block, float* out) noexcept {
-  kernels_->strike(model_->strike_.data(), model_->turn_.data(), touch_, sub_block, state_.data(), starts_.data(), live_, out);
+  if (SampleStates* kept = find_kept(); kept != nullptr)
+    kernels_->strike_and_keep(model_->strike_.data(), model_->turn_.data(), touch_, sub_block, state_.data(), starts_.data(), live_, out,
+                              kept);
+  else
+    kernels_->strike(model_->strike_.data(), model_->turn_.data(), touch_, sub_block, state_.data(), starts_.data(), live_, out);
   count_work(live_, kSubBlock);
 }
 
@@ -233,9 +274,10 @@ void Voice::cull() noexcept {
   }
 #endif
   const double share = silence_pa_ / static_cast<double>(groups_ + 1);
+  const auto& weights = get_weights();
   for (; live_ > 0; --live_) {
     ModeState& state = state_[static_cast<std::size_t>(live_ - 1)];
-    const auto& weight = model_->weight_[static_cast<std::size_t>(live_ - 1)];
+    const auto& weight = weights[static_cast<std::size_t>(live_ - 1)];
     double bound = 0.0;
     for (int lane = 0; lane < kGroup; ++lane) {
       bound += static_cast<double>(weight[lane]) * std::sqrt(state.re[lane] * state.re[lane] + state.im[lane] * state.im[lane]);
@@ -248,9 +290,10 @@ void Voice::cull() noexcept {
 
 std::span<const float> Voice::measure(float nearness) noexcept {
   float largest = 0.0F;
+  const auto& weights = get_weights();
   for (int g = live_ - 1; g >= 0; --g) {
     const ModeState& state = state_[static_cast<std::size_t>(g)];
-    const auto& weight = model_->weight_[static_cast<std::size_t>(g)];
+    const auto& weight = weights[static_cast<std::size_t>(g)];
     std::array<float, kGroup> size;
     for (int lane = 0; lane < kGroup; ++lane) {
       const auto re = static_cast<float>(state.re[lane]), im = static_cast<float>(state.im[lane]);
@@ -269,7 +312,17 @@ void Voice::fade_out(int groups) noexcept {
   const int gone = live_ - groups;
   if (!fading_) fade_.fill(0.0F);
   block_.fill(0.0F);  // not yet in use
-  kernels_->ring(model_->sound_.data() + groups, model_->turn_.data() + groups, state_.data() + groups, gone, block_.data());
+  if (is_directed()) {
+    ColumnStates* starts = starts_.data() + groups;
+    kernels_->advance(model_->turn_.data() + groups, state_.data() + groups, starts, gone);
+    kernels_->emit(model_->sound_.data() + groups, starts, gone, 0, kSubBlocks, block_.data());
+    for_directed([&](Directivity& ears) {
+      if (!fading_) ears.clear_fade();
+      ears.add_to_fade(*kernels_, ears, starts, groups, gone, 1.0F, true);
+    });
+  } else {
+    kernels_->ring(model_->sound_.data() + groups, model_->turn_.data() + groups, state_.data() + groups, gone, block_.data());
+  }
   count_work(gone, kBlock);
   for (int n = 0; n < kBlock; ++n) fade_[n] += block_[n] * (1.0F - static_cast<float>(n) / kBlock);
   std::fill(state_.begin() + groups, state_.begin() + live_, ModeState{});

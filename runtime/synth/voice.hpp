@@ -16,6 +16,7 @@
 #include "runtime/events/events.hpp"
 #include "runtime/synth/contact_forces.hpp"
 #include "runtime/synth/damped_modes.hpp"
+#include "runtime/synth/directivity.hpp"
 #include "runtime/synth/kernels.hpp"
 #include "runtime/synth/model.hpp"
 #include "runtime/synth/strike_queue.hpp"
@@ -46,6 +47,8 @@ class VoiceHandover {
  public:
   /// Modes are the same when they have the same number in the bank. [main-thread]
   VoiceHandover(const Model& from, const Model& to);
+  /// By mode of `to`, that of `from`; -1: none.
+  std::span<const int> get_old_modes() const noexcept { return from_mode_; }
 
  private:
   friend class Voice;
@@ -73,6 +76,11 @@ class Voice {
   /// Contacts that last act from the next sub-block on, or no more (nullptr). They must be of this voice's model and outlive their use.
   /// What is attached first hears of its first sample; release() before it is taken away, or a force is cut off. [audio-thread]
   void attach(ContactForces* contacts) noexcept { contacts_ = contacts; }
+
+  /// What is sounded goes to the ears of these, too (nullptr: none), which must be of this voice's model, outlive their use and be at the
+  /// weights of the block in which process() is called, whose calls then take whole sub-blocks of one block each. [audio-thread]
+  void direct(Directivity* first, Directivity* second) noexcept { directed_ = {first, second}; }
+  bool is_directed() const noexcept { return kCompiledEffects.has(Effect::kDirectivity) && directed_[0] != nullptr; }
 
   /// Adds the pressure at 1 m [Pa] of the next pressure_pa.size() samples. A body without energy costs nothing.
   /// Denormal numbers are flushed to zero inside; the caller's setting is put back.
@@ -102,7 +110,8 @@ class Voice {
 
   /// Takes the place of another voice: at its time, with its strikes, each mode with the energy and the phase of its predecessor. The
   /// sound goes over within a block. At the start of a block of the other voice, which is of no more use afterwards; of a voice that is
-  /// as it was made. A strike under way on a triangle that the model has not is refused. [audio-thread]
+  /// as it was made. A strike under way on a triangle that the model has not is refused. What the other one sends to ears is faded over
+  /// for those of this one, which have taken over the weights. [audio-thread]
   void take_over(Voice& other, VoiceHandover& handover) noexcept;
 
   /// Samples processed so far: the number of the next sample.
@@ -156,7 +165,19 @@ class Voice {
   double calc_ringing_energy_j(int mode) const noexcept;
   DampedState get_mode_state(int mode) const noexcept;
   void set_mode_state(int mode, const DampedState& state) noexcept;
-  void ring_out(std::span<ModeState> states, std::span<DampedState> damped, float sign, std::array<float, kBlock>& out) const noexcept;
+  void ring_out(std::span<ModeState> states, std::span<DampedState> damped, float sign, std::array<float, kBlock>& out,
+                const Directivity* weights, Directivity* fades) noexcept;
+  template <class Work>
+  void for_directed(Work&& work) noexcept {
+    for (Directivity* ears : directed_)
+      if (ears != nullptr) work(*ears);
+  }
+  SampleStates* find_kept() noexcept;
+  void add_directed(int sub_block, int offset) noexcept;
+  void add_damped(std::int64_t sample, bool struck, const ContactForces* contacts, int sub_block, float* out) noexcept;
+  const std::vector<std::array<float, kGroup>>& get_weights() const noexcept {
+    return is_directed() ? model_->directivity_->weight : model_->weight_;
+  }
 
   std::shared_ptr<const Model> model_;
   const Kernels* kernels_ = nullptr;
@@ -177,7 +198,9 @@ class Voice {
   double energy_j_ = 0.0;             // at the start of the block, where it is audited
   std::vector<Radiation> radiation_;  // of the ringing modes, where it is audited
   ContactForces* contacts_ = nullptr;
-  VoiceCounters counters_;  // without those of strikes_
+  std::array<Directivity*, 2> directed_{};  // the first is there when one is
+  int kept_ = 0;                            // groups whose states are kept in this sub-block
+  VoiceCounters counters_;                  // without those of strikes_
   StrikeQueue strikes_;
   DampedModes damped_;
   std::vector<ModeState> state_;      // zero beyond live_

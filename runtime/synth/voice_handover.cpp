@@ -49,21 +49,32 @@ void Voice::set_mode_state(int mode, const DampedState& state) noexcept {
 }
 
 /// Adds `sign` times what the modes sound over the next block when nothing strikes them; the states advance.
-void Voice::ring_out(std::span<ModeState> states, std::span<DampedState> damped, float sign,
-                     std::array<float, kBlock>& out) const noexcept {
+/// `weights`: by which they sound to the ears of `fades`; nullptr: to none.
+void Voice::ring_out(std::span<ModeState> states, std::span<DampedState> damped, float sign, std::array<float, kBlock>& out,
+                     const Directivity* weights, Directivity* fades) noexcept {
   alignas(64) std::array<float, kBlock> sound{};
-  if (!states.empty()) {
-    kernels_->ring(model_->sound_.data(), model_->turn_.data(), states.data(), static_cast<int>(states.size()), sound.data());
+  const auto groups = static_cast<int>(states.size());
+  const bool directed = kCompiledEffects.has(Effect::kDirectivity) && weights != nullptr;
+  if (groups > 0 && directed) {
+    kernels_->advance(model_->turn_.data(), states.data(), starts_.data(), groups);
+    kernels_->emit(model_->sound_.data(), starts_.data(), groups, 0, kSubBlocks, sound.data());
+    fades->add_to_fade(*kernels_, *weights, starts_.data(), 0, groups, sign, false);
+  } else if (groups > 0) {
+    kernels_->ring(model_->sound_.data(), model_->turn_.data(), states.data(), groups, sound.data());
   }
+  alignas(64) std::array<float, kBlock> overdamped{};
   for (std::size_t i = 0; i < damped.size(); ++i) {
     const auto& m = model_->damped_[i];
     DampedState& s = damped[i];
     if (s.q == 0.0 && s.v == 0.0) continue;
-    for (float& p : sound) {
+    for (std::size_t n = 0; n < sound.size(); ++n) {
       s = {m.qq * s.q + m.qv * s.v, m.vq * s.q + m.vv * s.v};
-      p += static_cast<float>(m.gain * s.v);
+      const auto p = static_cast<float>(m.gain * s.v);
+      sound[n] += p;
+      overdamped[n] += p;
     }
   }
+  if (directed) fades->add_damped_to_fade(*weights, overdamped.data(), sign);
   for (std::size_t n = 0; n < out.size(); ++n) out[n] += sign * sound[n];
 }
 
@@ -88,12 +99,17 @@ void Voice::take_over(Voice& other, VoiceHandover& handover) noexcept {
   const auto count = static_cast<std::size_t>(live_);
   std::copy(other.damped_.get_states().begin(), other.damped_.get_states().end(), handover.old_damped_.begin());
   // Copies are rung out; the states themselves begin the block.
-  other.ring_out(std::span(other.state_).first(static_cast<std::size_t>(other.live_)), handover.old_damped_, 1.0F, fade_);
+  const bool directed = is_directed() && other.is_directed();
+  Directivity* ears = directed ? directed_[0] : nullptr;
+  if (directed) ears->clear_fade();
+  other.ring_out(std::span(other.state_).first(static_cast<std::size_t>(other.live_)), handover.old_damped_, 1.0F, fade_,
+                 directed ? other.directed_[0] : nullptr, ears);
   std::copy_n(state_.begin(), count, handover.states_.begin());
   std::copy(damped_.get_states().begin(), damped_.get_states().end(), handover.damped_.begin());
-  ring_out(std::span(handover.states_).first(count), handover.damped_, -1.0F, fade_);
+  ring_out(std::span(handover.states_).first(count), handover.damped_, -1.0F, fade_, ears, ears);
   count_work(other.live_ + live_, kBlock);
   for (int n = 0; n < kBlock; ++n) fade_[n] *= 1.0F - static_cast<float>(n) / kBlock;
+  if (directed) ears->let_fade_fall();
 }
 
 }  // namespace carillon::synth

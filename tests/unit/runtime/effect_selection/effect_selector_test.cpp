@@ -477,6 +477,91 @@ TEST(EffectSelector, PhysicsRecordsContactsOnlyWhereAPlanMayHangOnThem) {
   EXPECT_FALSE(EffectSelector(stage.facts).needs_contacts());
 }
 
+/// Multipoles of the cube's one mode.
+void give_multipoles(bank::Bank& bank, const std::vector<double>& multipoles) {
+  constexpr double kRadius = 0.09;
+  bank.multipoles = {};
+  bank.multipoles.radius_m = bank.multipoles.nearest_m = kRadius;
+  bank.multipoles.air_density_kg_m3 = 1.2;
+  bank.multipoles.sound_speed_ms = bank::kSoundSpeedMs;
+  bank.multipoles.freq_hz = {1000.0};
+  bank.multipoles.order = {static_cast<int>(std::sqrt(static_cast<double>(multipoles.size()))) - 1};
+  bank.multipoles.scale = {0.05 / kRadius / 1000.0};
+  for (const double a : multipoles) {
+    bank.multipoles.coefficient.push_back(static_cast<std::int16_t>(1000.0 * a));
+    bank.multipoles.coefficient.push_back(0);
+  }
+  bank.multipoles.decay_per_s = bank.multipoles.added_mass = {0.0};
+  bank.multipoles.error_db = {-60.0};
+}
+
+// The level of a dipole has 20 log |cos|, evenly over the cosine, cut at -20 dB of its mean power: its standard deviation by quadrature.
+TEST(EffectSelector, DirectivityIsForBodiesThatSendMoreOneWayThanAnother) {
+  double sum = 0.0, squares = 0.0;
+  constexpr int kSteps = 100000;
+  for (int i = 0; i < kSteps; ++i) {
+    const double cosine = (i + 0.5) / kSteps, level = 10.0 * std::log10(std::max(3.0 * cosine * cosine, 0.01));
+    sum += level / kSteps;
+    squares += level * level / kSteps;
+  }
+  const double spread_db = std::sqrt(squares - sum * sum);
+  Stage stage;
+  const auto play_blow = [&](double impulse_n_s) {
+    EffectSelector selector(stage.facts);
+    selector.watch(make_strike(0.5, impulse_n_s));
+    const bool is_on = find_effects(selector.advance(10.0), 0.5).has(Effect::kDirectivity);
+    const EffectPlan plan = selector.get_plan(0)[Effect::kDirectivity];
+    EXPECT_EQ(plan.cost_us > 0.0, is_on);
+    return std::pair(is_on, plan.reason);
+  };
+  EXPECT_EQ(describe(play_blow(0.01).second), "the bank has no multipoles");
+  give_multipoles(stage.bank, {1.0, 0.02, 0.02, 0.0});
+  const auto [round_on, round] = play_blow(0.01);
+  EXPECT_FALSE(round_on);
+  EXPECT_EQ(round.rule, SelectionReason::Rule::kSameAllRound);
+  give_multipoles(stage.bank, {0.0, 0.0, 1.0, 0.0});
+  const auto [dipole_on, dipole] = play_blow(0.01);
+  EXPECT_TRUE(dipole_on);
+  EXPECT_EQ(dipole.rule, SelectionReason::Rule::kDirected);
+  EXPECT_NEAR(dipole.value, spread_db, 0.25);
+  // Next to one that is 65 dB louder no direction of it is heard.
+  bank::Bank other = make_cube_bank({{1000.0, 20.0, 0.05}});
+  SceneFacts two = stage.facts;
+  two.bodies.push_back(two.bodies[0]);
+  two.bodies[1].bank = &other;
+  for (const double below_db : {50.0, 65.0}) {
+    EffectSelector selector(two);
+    const double loud_n_s = 1e-6;
+    events::Impulse loud = make_strike(0.4, loud_n_s);
+    loud.body = 1;
+    selector.watch(loud);
+    selector.watch(make_strike(0.5, loud_n_s * std::pow(10.0, -below_db / 20.0)));
+    const auto changes = selector.advance(10.0);
+    EXPECT_TRUE(find_effects(changes, 0.5).has(Effect::kModal));
+    EXPECT_EQ(find_effects(changes, 0.5).has(Effect::kDirectivity), below_db < 60.0);
+    EXPECT_EQ(selector.get_plan(0)[Effect::kDirectivity].reason.rule,
+              below_db < 60.0 ? SelectionReason::Rule::kDirected : SelectionReason::Rule::kFaint);
+  }
+  stage.body().overrides.off = {Effect::kDirectivity};
+  EXPECT_FALSE(play_blow(0.01).first);
+}
+
+TEST(EffectSelector, TheGroundIsHeardWhereItReflectsEnough) {
+  Stage stage;
+  const auto has_ground = [&] { return find_effects(play(stage.facts, {make_strike(0.5, 0.01)}), 0.5).has(Effect::kGroundReflection); };
+  EXPECT_FALSE(has_ground());
+  stage.facts.floor = synth::Floor{.point_m = {0.0, 0.0, -1.0}};
+  EXPECT_TRUE(has_ground());
+  EffectSelector selector(stage.facts);
+  selector.watch(make_strike(0.5, 0.01));
+  selector.advance(10.0);
+  // Of the two ears the farther one has the ways more alike: its squared distance and 4 m^2 more, twice the height.
+  const double straight = 0.5 * 0.5 + 4.0;
+  EXPECT_NEAR(selector.get_plan(0)[Effect::kGroundReflection].reason.value, 10.0 * std::log10(straight / (straight + 4.0)), 1e-6);
+  stage.facts.floor->reflection = 1e-3;
+  EXPECT_FALSE(has_ground());
+}
+
 TEST(EffectSelector, NothingIsStruckAndNothingMoves) {
   Stage stage;
   stage.body().struck = false;

@@ -16,6 +16,7 @@
 #include "runtime/host/sound_file.hpp"
 #include "tests/unit/runtime/host/heard.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
+#include "tests/unit/runtime/synth/multipole_cube.hpp"
 
 namespace carillon::host {
 namespace {
@@ -162,6 +163,38 @@ TEST(Render, AListenerThatWalksTakesItsEarsAlong) {
       const double t = n / 48000.0, r = std::hypot(ear == 0 ? 0.9 : 1.1, -3.0 + 10.0 * t);
       ASSERT_NEAR(sound.pressure_pa[ear][n], 2.0 / r * std::cos(2 * pi * 1000.0 * (t - 0.01 - r / 343.0)), 5e-4 * 2.0 / r)
           << ear << " " << n;
+    }
+  }
+}
+
+// A dipole along z, turned by its pose to x, above a ground that throws half of the pressure back.
+TEST(Render, DirectivityAndTheGroundAreThoseOfTheScene) {
+  constexpr double kFreq = 1000.0, kRadius = 0.09, k = 2.0 * pi * kFreq / 343.0;
+  Case c({{kFreq, 0.0, 2.0}}, {0.0, 0.0, 0.0}, 0.1);
+  testing::give_multipoles(c.bank, {testing::make_dipole(1.0)}, kRadius);
+  c.scene.bodies[0].spec.bank = &c.bank;
+  const double half = std::sqrt(0.5);
+  for (contact::Pose& pose : c.simulation.poses[0]) pose.rotation = {half, 0.0, half, 0.0};
+  c.scene.bodies[0].spec.initial.rotation = {half, 0.0, half, 0.0};
+  c.scene.microphones_m = {{2.0, 0.0, 0.0}, {0.0, 2.0, 0.0}, {-2.0, 0.0, 0.3}, {1.2, 1.6, 0.0}};
+  c.scene.ground.emplace().height_m = -1.0;
+  for (const bool reflects : {false, true}) {
+    if (reflects) c.scene.reflection = 0.5;
+    c.scene.effects = kDefaultEffects.with(synth::Effect::kDirectivity);
+    if (reflects) c.scene.effects = c.scene.effects.with(synth::Effect::kGroundReflection);
+    const Heard sound = c.render();
+    for (std::size_t e = 0; e < c.scene.microphones_m.size(); ++e) {
+      std::complex<double> expected;  // of e^{i omega t}
+      for (const double level : {1.0, reflects ? 0.5 : 0.0}) {
+        Vec3 place = c.scene.microphones_m[e];
+        if (level < 1.0) place[2] = -2.0 - place[2];
+        const double r = norm(place);
+        expected += level * std::conj(testing::calc_dipole_fall(k * r, k * kRadius)) * (place[0] / r);
+      }
+      for (int n = 9600; n < 23000; ++n) {
+        ASSERT_NEAR(sound.pressure_pa[e][n], std::real(expected * std::polar(1.0, 2.0 * pi * kFreq * (n / 48000.0 - 0.1))), 1e-4)
+            << e << " " << n;
+      }
     }
   }
 }

@@ -169,8 +169,9 @@ TEST(Scene, WhatIsLeftOutHasItsDefault) {
   EXPECT_FALSE(scene.ground.has_value());
   EXPECT_EQ(scene.listener.ear_distance_m, 0.2);
   EXPECT_EQ(scene.output.format, SampleFormat::kPcm24);
-  EXPECT_EQ(scene.radiation, radiation::GainKind::kSphere);
+  EXPECT_EQ(scene.radiation, radiation::GainKind::kAuto);
   EXPECT_EQ(parse("{\"duration_s\": 2, \"radiation\": \"osg02\", " + kBody + "}").radiation, radiation::GainKind::kOsg02);
+  EXPECT_EQ(parse("{\"duration_s\": 2, \"radiation\": \"bem\", " + kBody + "}").radiation, radiation::GainKind::kBem);
   EXPECT_EQ(parse("{\"duration_s\": 2, \"output\": {\"gain\": 0.25}, " + kBody + "}").output.gain_per_pa, 0.25);
   EXPECT_EQ(parse("{\"duration_s\": 2, \"output\": {\"gain\": \"auto\"}, " + kBody + "}").output.gain_per_pa, std::nullopt);
 }
@@ -215,7 +216,7 @@ TEST(Scene, EffectsAreThoseOfTheList) {
       parse_effects(R"(["modal", "hertz_pulse", "acceleration_noise", "air_delay", "doppler", "two_ears", "roughness", "rolling",
     "contact_damping"])");
   EXPECT_FALSE(list.automatic);
-  EXPECT_EQ(list.on, kPlayableEffects);
+  EXPECT_EQ(list.on, kPlayableEffects.without({Effect::kDirectivity, Effect::kGroundReflection}));
   EXPECT_EQ(parse_effects(R"(["doppler"])").on, synth::EffectSet{Effect::kDoppler});
   EXPECT_FALSE(parse_effects("[]").automatic);
   const auto some = parse_effects(R"({"base": "auto", "on": ["acceleration_noise"], "off": ["doppler", "two_ears"]})");
@@ -223,6 +224,31 @@ TEST(Scene, EffectsAreThoseOfTheList) {
   EXPECT_EQ(some.on, synth::EffectSet{Effect::kAccelerationNoise});
   EXPECT_EQ(some.off, (synth::EffectSet{Effect::kDoppler, Effect::kTwoEars}));
   EXPECT_TRUE(parse_effects("{}").automatic);
+  const auto named = parse_effects(R"({"directivity": true, "doppler": false, "two_ears": "auto", "off": ["rolling"]})");
+  EXPECT_TRUE(named.automatic);
+  EXPECT_EQ(named.on, synth::EffectSet{Effect::kDirectivity});
+  EXPECT_EQ(named.off, (synth::EffectSet{Effect::kDoppler, Effect::kRolling}));
+  for (const char* wrong : {R"({"directivity": true, "off": ["directivity"]})", R"({"directivity": true, "on": ["directivity"]})",
+                            R"({"directivity": "yes"})", R"({"directivities": true})"})
+    EXPECT_THROW(parse_effects(wrong), InputError) << wrong;
+}
+
+TEST(Scene, TheGroundReflectsWhereItSaysSo) {
+  const auto parse_ground = [](const std::string& ground, const std::string& more = "") {
+    return parse("{\"duration_s\": 2, " + kBody + ", \"ground\": " + ground + more + "}");
+  };
+  EXPECT_FALSE(find_floor(parse_ground("{}")).has_value());
+  EXPECT_FALSE(find_floor(parse("{\"duration_s\": 2, " + kBody + "}")).has_value());
+  const auto floor = find_floor(parse_ground(R"({"height_m": -0.5, "reflection": 0.8})"));
+  ASSERT_TRUE(floor.has_value());
+  EXPECT_EQ(floor->reflection, 0.8);
+  EXPECT_EQ(floor->calc_height_m({3.0, 2.0, 1.0}), 1.5);
+  EXPECT_EQ(find_floor(parse_ground("{}", R"(, "effects": {"ground_reflection": true})"))->reflection, 1.0);
+  EXPECT_THROW(parse_ground(R"({"reflection": 1.1})"), InputError);
+  EXPECT_THROW(parse_ground(R"({"reflection": 1})", R"(, "microphones": [[0, 0, 1], [0, 0, -0.1]])"), InputError);
+  EXPECT_NO_THROW(parse_ground("{}", R"(, "microphones": [[0, 0, 1], [0, 0, -0.1]])"));
+  EXPECT_THROW(parse_ground(R"({"height_m": 0.6, "reflection": 1})"), InputError) << "the listener is at 0.5 m";
+  EXPECT_THROW(parse("{\"duration_s\": 2, " + kBody + R"(, "effects": {"ground_reflection": true}})"), InputError);
 }
 
 TEST(Scene, ABodyMayHaveEffectsOfItsOwn) {

@@ -9,6 +9,7 @@
 #include <complex>
 #include <cstring>
 #include <random>
+#include <utility>
 #include <vector>
 
 namespace carillon::synth {
@@ -212,6 +213,78 @@ TEST(Kernels, AStrikeAddsItsAnswerAndLeavesItToTheRestOfThePeriod) {
   }
 }
 
+// What is weighted before it is emitted.
+TEST(Kernels, EmitWeightedIsEmitOfTheProducts) {
+  for (const Isa isa : list_isas()) {
+    const Kernels& kernels = get_kernels(isa);
+    for (const int count : kCounts) {
+      Invented invented(count);
+      kernels.advance(invented.turn.data(), invented.state.data(), invented.starts.data(), invented.groups);
+      std::vector<ModeWeight> weight(invented.sound.size());
+      std::mt19937 random(13);
+      std::uniform_real_distribution<float> number(-1.0F, 1.0F);
+      for (auto& group : weight) {
+        for (int l = 0; l < kGroup; ++l) group.re[l] = number(random), group.im[l] = number(random);
+      }
+      for (const auto& [first, sub_blocks] : {std::pair(0, 4), std::pair(1, 2), std::pair(3, 1)}) {
+        std::vector<float> out(static_cast<std::size_t>(kBlock), 0.5F);
+        kernels.emit_weighted(invented.sound.data(), invented.starts.data(), weight.data(), invented.groups, first, sub_blocks, out.data());
+        for (int n = 0; n < kBlock; ++n) {
+          double expected = 0.5, size = 1.0;
+          for (int m = 0; m < count && n < sub_blocks * kSubBlock; ++m) {
+            const std::size_t g = static_cast<std::size_t>(m / kGroup);
+            const int l = m % kGroup, k = n % kColumn;
+            const Complex z = get_start(invented, g, l, first * kEach + n / kColumn) * Complex(weight[g].re[l], weight[g].im[l]);
+            const double a = z.real() * static_cast<double>(invented.sound[g].wave[l / 2][0][k][l % 2]);
+            const double b = z.imag() * static_cast<double>(invented.sound[g].wave[l / 2][1][k][l % 2]);
+            expected += a + b;
+            size += std::abs(a) + std::abs(b);
+          }
+          ASSERT_NEAR(out[static_cast<std::size_t>(n)], expected, 3e-6 * size) << get_name(isa) << ", " << count << ", " << sub_blocks;
+        }
+      }
+    }
+  }
+}
+
+/// The weight that is the sound of a mode's table, out_re re + out_im im.
+std::vector<ModeWeight> make_weight(const Invented& of) {
+  std::vector<ModeWeight> weight(of.strike.size());
+  for (std::size_t g = 0; g < weight.size(); ++g) {
+    for (int l = 0; l < kGroup; ++l) weight[g].re[l] = of.strike[g].out_re[l], weight[g].im[l] = -of.strike[g].out_im[l];
+  }
+  return weight;
+}
+
+// The states that are kept, two pulses together, weighed as the table has it, are the sound that is made from them; all else is as without.
+TEST(Kernels, WhatAStrikeKeepsIsWhatItSounds) {
+  for (const Isa isa : list_isas()) {
+    const Kernels& kernels = get_kernels(isa);
+    for (const int count : kCounts) {
+      Invented plain(count), kept(count);
+      std::vector<float> sound(kSubBlock, 0.0F), same(kSubBlock, 0.0F), weighed(kSubBlock, 0.0F);
+      std::vector<SampleStates> states(plain.sound.size(), SampleStates{});
+      for (int pulse = 0; pulse < 2; ++pulse) {
+        plain.touch.first = kept.touch.first = 3 + 9 * pulse;
+        kernels.strike(plain.strike.data(), plain.turn.data(), plain.touch, 1, plain.state.data(), plain.starts.data(), plain.groups,
+                       sound.data());
+        kernels.strike_and_keep(kept.strike.data(), kept.turn.data(), kept.touch, 1, kept.state.data(), kept.starts.data(), kept.groups,
+                                same.data(), states.data());
+      }
+      ASSERT_EQ(sound, same);
+      ASSERT_EQ(std::memcmp(plain.state.data(), kept.state.data(), sizeof(ModeState) * kept.state.size()), 0);
+      ASSERT_EQ(std::memcmp(plain.starts.data(), kept.starts.data(), sizeof(ColumnStates) * kept.starts.size()), 0);
+      kernels.weigh(make_weight(kept).data(), states.data(), kept.groups, weighed.data());
+      double size = 0.0;
+      for (const SampleStates& group : states)
+        for (const auto& lanes : group.re)
+          for (const float x : lanes) size = std::max(size, static_cast<double>(std::abs(x)) * count);
+      ASSERT_EQ(size > 0.0, count > 0);
+      for (std::size_t n = 0; n < sound.size(); ++n) ASSERT_NEAR(weighed[n], sound[n], 3e-6 * size) << get_name(isa) << ", " << count;
+    }
+  }
+}
+
 TEST(Kernels, ADriveAddsItsForcesAndTakesItsShareOfWhatRings) {
   std::mt19937 random(11);
   std::uniform_real_distribution<float> number(-1.0F, 1.0F);
@@ -244,6 +317,18 @@ TEST(Kernels, ADriveAddsItsForcesAndTakesItsShareOfWhatRings) {
           std::vector<float> out(kSubBlock, 0.25F);
           get_kernels(isa).drive(now.strike.data(), now.turn.data(), drive, sub_block, now.state.data(), now.starts.data(), now.groups,
                                  out.data());
+          Invented kept = before;
+          std::vector<SampleStates> states(kept.sound.size(), SampleStates{});
+          std::vector<float> same(kSubBlock, 0.25F), weighed(kSubBlock, 0.25F);
+          for (int c = 0; c < drive.contacts; ++c) {
+            for (ContactEnd& push : drive.push[c])
+              for (int r = 0; r < kStrikeRows; ++r) push.row[r] = kept.rows.data() + kept.row((r + c) % kStrikeRows);
+          }
+          get_kernels(isa).drive_and_keep(kept.strike.data(), kept.turn.data(), drive, sub_block, kept.state.data(), kept.starts.data(),
+                                          kept.groups, same.data(), states.data());
+          ASSERT_EQ(out, same);
+          ASSERT_EQ(std::memcmp(now.state.data(), kept.state.data(), sizeof(ModeState) * kept.state.size()), 0);
+          get_kernels(isa).weigh(make_weight(kept).data(), states.data(), kept.groups, weighed.data());
           std::vector<double> expected(kSubBlock, 0.25);
           double size = 1.0;
           for (int m = 0; m < count; ++m) {
@@ -297,7 +382,10 @@ TEST(Kernels, ADriveAddsItsForcesAndTakesItsShareOfWhatRings) {
             }
             for (int q = 0; q < (sub_block + 1) * kEach; ++q) ASSERT_EQ(now.starts[g].re[q][l], before.starts[g].re[q][l]);
           }
-          for (std::size_t n = 0; n < expected.size(); ++n) ASSERT_NEAR(out[n], expected[n], 2e-6 * size) << get_name(isa) << ", " << count;
+          for (std::size_t n = 0; n < expected.size(); ++n) {
+            ASSERT_NEAR(out[n], expected[n], 2e-6 * size) << get_name(isa) << ", " << count;
+            ASSERT_NEAR(weighed[n], expected[n], 2e-6 * size) << get_name(isa) << ", " << count;
+          }
         }
       }
     }

@@ -21,6 +21,7 @@
 #include "runtime/synth/synthesiser.hpp"
 #include "runtime/synth/voice.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
+#include "tests/unit/runtime/synth/multipole_cube.hpp"
 
 namespace {
 std::atomic<long> g_allocations{0}, g_bytes{0};
@@ -116,13 +117,15 @@ TEST(NoHeap, StrikingAndProcessingTakeNoMemory) {
 TEST(NoHeap, EffectsTakeTheMemoryThatTheirCountersSay) {
   std::vector<testing::InventedMode> modes;
   for (int m = 0; m < 300; ++m) modes.push_back({100.0 + 60.0 * m, 30.0});
-  const auto model = Model::make(testing::make_cube_bank(modes));
+  bank::Bank bank = testing::make_cube_bank(modes);
+  testing::give_multipoles(bank, std::vector<testing::ModeMultipoles>(modes.size(), testing::make_dipole(1.0)), 0.09);
+  const auto model = Model::make(bank);
   const auto sum = [](const Synthesiser& synthesiser, int body) {
     std::int64_t bytes = 0;
     for (const std::int64_t more : synthesiser.get_effect_counters(body).bytes) bytes += more;
     return static_cast<double>(bytes);
   };
-  Synthesiser synthesiser({.max_waypoints = 2});
+  Synthesiser synthesiser({.max_waypoints = 2, .floor = Floor{}});
   synthesiser.add_body(model, {.effects = kCompiledEffects});  // and with it the tables that all share
   long before = g_bytes;
   const int silent = synthesiser.add_body(model, {.effects = {}});
@@ -173,6 +176,40 @@ TEST(NoHeap, AWholeSceneTakesNoMemoryWhileItPlays) {
   EXPECT_EQ(g_allocations - before, 0);
   EXPECT_GT(synthesiser.get_counters().strikes, 0);
   EXPECT_GT(synthesiser.get_counters().faded, 0);
+}
+
+// A body that turns above a floor, sliding and struck, gets other models and effects while it sounds.
+TEST(NoHeap, DirectivityTakesNoMemoryWhileItPlays) {
+  std::vector<testing::InventedMode> modes;
+  for (int m = 0; m < 50; ++m) modes.push_back({150.0 + 250.0 * m, 30.0 + (m % 7 == 0 ? 1e5 : 0.0)});
+  bank::Bank bank = testing::make_cube_bank(modes);
+  std::array<std::shared_ptr<const Model>, 2> models;
+  for (std::size_t i = 0; i < 2; ++i) {
+    testing::give_multipoles(bank, std::vector<testing::ModeMultipoles>(modes.size(), testing::make_dipole(1.0)), 0.09 + 0.01 * i);
+    models[i] = Model::make(bank);
+  }
+  constexpr EffectSet kAll = kDefaultEffects.with({Effect::kDirectivity, Effect::kGroundReflection, Effect::kRoughness});
+  Synthesiser synthesiser({.max_strikes = 8, .ring_events = 64, .floor = Floor{.point_m = {0.0, 0.0, -1.0}}});
+  const int body = synthesiser.add_body(models[0], {.position_m = {1.0, 2.0, 0.0}, .effects = kAll});
+  std::vector<float> left(300), right(300);
+  const std::array<float*, 2> out{left.data(), right.data()};
+  synthesiser.process(out.data(), 2, 128);
+  long before = g_allocations;
+  for (int i = 0; i < 300; ++i) {
+    if (i % 40 == 0) {  // the main thread may
+      const long until_now = g_allocations;
+      synthesiser.swap_model(body, models[static_cast<std::size_t>(i / 40 % 2)]);
+      synthesiser.set_effects(body, i % 80 == 0 ? kAll : kAll.without(Effect::kDirectivity));
+      before += g_allocations - until_now;
+    }
+    const double time_s = synthesiser.get_horizon_s(), half = 0.01 * i;
+    synthesiser.push(events::Impulse{.time_s = time_s, .body = body, .impulse_n_s = {0.0, 0.0, 1.0}, .duration_s = 1e-3});
+    synthesiser.push(events::BodyMotion{time_s, body, {1.0, 2.0, 0.001 * i}, {}, {std::cos(half), 0.0, std::sin(half), 0.0}});
+    synthesiser.set_budget(i % 60 < 30 ? 20.0 * 48000.0 : 1e12);
+    synthesiser.process(out.data(), 2, 1 + i);
+  }
+  EXPECT_EQ(g_allocations - before, 0);
+  EXPECT_GT(synthesiser.get_effect_counters(body).units[Effect::kDirectivity], 1000);
 }
 
 // In a child that the kernel kills at the first system call but read, write and exit.

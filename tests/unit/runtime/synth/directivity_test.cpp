@@ -1,0 +1,671 @@
+// The effects directivity and ground_reflection against closed forms of monopoles and dipoles.
+#include "runtime/synth/directivity.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <complex>
+#include <functional>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "runtime/base/error.hpp"
+#include "runtime/synth/synthesiser.hpp"
+#include "tests/unit/runtime/synth/cube_bank.hpp"
+#include "tests/unit/runtime/synth/multipole_cube.hpp"
+
+namespace carillon::synth {
+namespace {
+
+using std::numbers::pi;
+using Complex = std::complex<double>;
+using Sound = std::vector<std::vector<float>>;
+constexpr double kRate = 48000.0, kC = bank::kSoundSpeedMs;
+constexpr int kStruck = 480;  // sample at which a body is struck
+constexpr EffectSet kDirected = kDefaultEffects.with(Effect::kDirectivity);
+
+/// What is played: one body of a bank, and what happens to it.
+struct Scene {
+  bank::Bank bank;
+  std::vector<Vec3> microphones_m;
+  EffectSet effects = kDirected;
+  Vec3 position_m{};
+  events::Quaternion rotation{1.0, 0.0, 0.0, 0.0};
+  std::optional<Floor> floor = std::nullopt;
+  std::vector<events::Event> events{};
+  int frames = 4800, block = 128;
+  double budget = std::numeric_limits<double>::infinity();
+  Isa isa = Isa::kBest;
+  std::function<void(Synthesiser&, int)> meddle = nullptr;  // after half of the frames
+};
+
+Sound play(const Scene& scene, EffectCounters* counters = nullptr) {
+  SynthesiserOptions options{.rate_hz = kRate, .microphones_m = scene.microphones_m, .max_waypoints = 4096, .ring_events = 16384};
+  options.floor = scene.floor;
+  options.budget = scene.budget;
+  Synthesiser synthesiser(options);
+  const int body =
+      synthesiser.add_body(Model::make(scene.bank, {.rate_hz = kRate}),
+                           {.position_m = scene.position_m, .rotation = scene.rotation, .effects = scene.effects, .isa = scene.isa});
+  for (const auto& event : scene.events) synthesiser.push(event);
+  Sound out(scene.microphones_m.size(), std::vector<float>(static_cast<std::size_t>(scene.frames)));
+  bool has_meddled = scene.meddle == nullptr;
+  for (int done = 0; done < scene.frames;) {
+    const int count = std::min(scene.block, scene.frames - done);
+    std::vector<float*> at;
+    for (auto& channel : out) at.push_back(channel.data() + done);
+    synthesiser.process(at.data(), static_cast<int>(at.size()), count);
+    done += count;
+    synthesiser.collect();
+    if (!has_meddled && 2 * done >= scene.frames) {
+      scene.meddle(synthesiser, body);
+      has_meddled = true;
+    }
+  }
+  if (counters != nullptr) *counters = synthesiser.get_effect_counters(body);
+  return out;
+}
+
+events::Impulse make_blow(double duration_s = 0.0, int sample = kStruck) {
+  return {.time_s = sample / kRate, .body = 0, .impulse_n_s = {0.0, 0.0, 1.0}, .duration_s = duration_s};
+}
+
+/// A mode that rings for ever after a blow, with velocity cos(omega t).
+Scene make_tone(double freq_hz, const testing::ModeMultipoles& multipoles, double radius_m, std::vector<Vec3> microphones_m) {
+  Scene scene{.bank = testing::make_cube_bank({{freq_hz, 0.0}}), .microphones_m = std::move(microphones_m), .events = {make_blow()}};
+  testing::give_multipoles(scene.bank, {multipoles}, radius_m);
+  return scene;
+}
+
+/// The amplitude of a steady tone, times e^{i phase} of its cosine since the blow and the latency, by least squares.
+Complex measure(const std::vector<float>& sound, double freq_hz, std::size_t from = 2400) {
+  double cc = 0.0, cs = 0.0, ss = 0.0, pc = 0.0, ps = 0.0;
+  for (std::size_t n = from; n < sound.size(); ++n) {
+    const double angle = 2.0 * pi * freq_hz * (static_cast<double>(n) - kStruck - Synthesiser::kLatency) / kRate;
+    const double c = std::cos(angle), s = std::sin(angle), p = static_cast<double>(sound[n]);
+    cc += c * c, cs += c * s, ss += s * s, pc += p * c, ps += p * s;
+  }
+  const double det = cc * ss - cs * cs;
+  return {(pc * ss - ps * cs) / det, -(ps * cc - pc * cs) / det};  // Re(X e^{i angle}) = Re X cos - Im X sin
+}
+
+double calc_rms(const std::vector<float>& x, std::size_t from = 0) {
+  double sum = 0.0;
+  for (std::size_t n = from; n < x.size(); ++n) sum += static_cast<double>(x[n]) * static_cast<double>(x[n]);
+  return std::sqrt(sum / static_cast<double>(x.size() - from));
+}
+
+double calc_difference_db(const std::vector<float>& x, const std::vector<float>& reference, std::size_t from = 0) {
+  std::vector<float> rest(x.size());
+  for (std::size_t n = 0; n < x.size(); ++n) rest[n] = x[n] - reference[n];
+  return 20.0 * std::log10(calc_rms(rest, from) / calc_rms(reference, from) + 1e-30);
+}
+
+void expect_as_by_gains(Scene scene, double bound_db);
+
+double to_db(double x) { return 20.0 * std::log10(x + 1e-30); }
+
+events::Quaternion turn_about(const Vec3& axis, double angle) {
+  const double s = std::sin(0.5 * angle);
+  return {std::cos(0.5 * angle), s * axis[0], s * axis[1], s * axis[2]};
+}
+
+// A pulsating sphere is heard as its gain is, at the same time.
+TEST(Directivity, AMonopoleIsHeardAsItsGain) {
+  constexpr double kFreq = 1500.0, kRadius = 0.1;
+  Scene scene = make_tone(kFreq, testing::make_monopole(1.0, kFreq, kRadius), kRadius, {{0.0, 0.5, 0.0}, {2.0, 0.3, -1.0}});
+  const Sound directed = play(scene);
+  scene.effects = kDefaultEffects;
+  const Sound plain = play(scene);
+  for (std::size_t e = 0; e < 2; ++e) EXPECT_LT(calc_difference_db(directed[e], plain[e], 1200), -80.0) << e;
+}
+
+// The velocity of the sphere is that of its mode over sqrt(4 pi) a: whatever it is, the pressure on it leads by 45 degrees at ka = 1.
+TEST(Directivity, PressureOfAPulsatingSphereLeadsItsVelocityByFortyFiveDegrees) {
+  constexpr double kRadius = 0.2, kFreq = kC / (2.0 * pi * kRadius);
+  // p / v = rho c (k^2 a^2 - i k a) / (1 + k^2 a^2), signs of e^{-i omega t} (research of the sphere: Morse & Ingard 7.1).
+  const Complex pressure = testing::kAirDensity * kC * Complex(0.5, -0.5);
+  const double distance = 4.0;
+  Scene scene = make_tone(kFreq, {pressure * std::sqrt(4.0 * pi)}, kRadius, {{0.0, distance, 0.0}});
+  const Complex heard = measure(play(scene)[0], kFreq);
+  const double on_the_way = 2.0 * pi * kFreq * (distance - kRadius) / kC;
+  const Complex at_the_sphere = heard * std::polar(distance / kRadius, on_the_way);
+  EXPECT_NEAR(std::arg(at_the_sphere) * 180.0 / pi, 45.0, 0.5);
+  EXPECT_NEAR(std::abs(at_the_sphere), std::abs(pressure), 1e-3 * std::abs(pressure));
+}
+
+TEST(Directivity, ADipoleHasItsCosineAndItsNearField) {
+  constexpr double kRadius = 0.1, kFreq = 900.0, k = 2.0 * pi * kFreq / kC;
+  const Complex pressure(0.7, -0.4);
+  std::vector<Vec3> microphones;
+  std::vector<double> cosines, distances;
+  for (const double r : {1.1 * kRadius, 10.0 * kRadius}) {
+    for (const double angle : {0.0, 60.0, 90.0, 180.0}) {
+      const double a = angle * pi / 180.0;
+      microphones.push_back({r * std::sin(a), 0.0, r * std::cos(a)});
+      cosines.push_back(std::cos(a));
+      distances.push_back(r);
+    }
+  }
+  const Sound heard = play(make_tone(kFreq, testing::make_dipole(pressure), kRadius, microphones));
+  for (std::size_t e = 0; e < microphones.size(); ++e) {
+    const Complex fall = testing::calc_dipole_fall(k * distances[e], k * kRadius);
+    const Complex expected = std::conj(pressure * cosines[e] * fall);
+    EXPECT_LT(to_db(std::abs(measure(heard[e], kFreq) - expected) / std::abs(pressure * fall)), -60.0) << e;
+  }
+}
+
+// The body's frame, and the centre of the multipoles away from the centre of mass.
+TEST(Directivity, ATurnedBodyAndACentreAside) {
+  constexpr double kRadius = 0.05, kFreq = 1200.0, k = 2.0 * pi * kFreq / kC;
+  const Vec3 centre{0.02, -0.01, 0.03}, position{0.4, 1.0, -0.2};
+  const events::Quaternion rotation = turn_about(normalise(Vec3{1.0, 2.0, -0.5}), 1.1);
+  Scene scene{.bank = testing::make_cube_bank({{kFreq, 0.0}}),
+              .microphones_m = {{0.0, 0.0, 0.0}, {2.0, 1.0, 0.7}},
+              .position_m = position,
+              .rotation = rotation,
+              .events = {make_blow()}};
+  scene.bank.rigid.centre_m = {0.005, 0.004, -0.003};
+  testing::give_multipoles(scene.bank, {testing::make_dipole(1.0)}, kRadius, centre);
+  const Vec3 from = position + turn(rotation, centre - scene.bank.rigid.centre_m), axis = turn(rotation, {0.0, 0.0, 1.0});
+  const Sound heard = play(scene);
+  for (std::size_t e = 0; e < 2; ++e) {
+    const Vec3 way = scene.microphones_m[e] - from;
+    const double r = norm(way);
+    const Complex fall = testing::calc_dipole_fall(k * r, k * kRadius);
+    EXPECT_LT(to_db(std::abs(measure(heard[e], kFreq) - std::conj(fall) * (dot(way, axis) / r)) / std::abs(fall)), -60.0) << e;
+  }
+}
+
+/// A body at the origin that turns about x, with a waypoint every 10 ms.
+std::vector<events::Event> make_turn(double rad_s, double length_s) {
+  std::vector<events::Event> events{};
+  for (int i = 0; i * 0.01 <= length_s; ++i)
+    events.push_back(events::BodyMotion{i * 0.01, 0, {}, {}, turn_about({1.0, 0.0, 0.0}, rad_s * i * 0.01)});
+  return events;
+}
+
+// Lobes cos(L phi) about the axis z, about which the body turns: the sound goes up and down as cos(L angle) when it leaves. What is heard
+// differs from that by a tone whose amplitude has no step: it is found from two samples a quarter of a period apart.
+TEST(Directivity, ATurningBodyIsHeardAsItTurns) {
+  constexpr double kRadius = 0.05, kFreq = 2000.0, kTurn = 10.0, kDistance = 1.5;
+  for (const int order : {1, 4, 12}) {
+    testing::ModeMultipoles multipoles(static_cast<std::size_t>((order + 1) * (order + 1)));
+    multipoles.back() = 1.0;  // m = L: cos(L phi) sin^L(theta)
+    Scene scene = make_tone(kFreq, multipoles, kRadius, {{kDistance, 0.0, 0.0}});
+    scene.frames = 24000;
+    for (int i = 0; i * 0.01 <= 0.6; ++i)
+      scene.events.push_back(events::BodyMotion{i * 0.01, 0, {}, {}, turn_about({0.0, 0.0, 1.0}, kTurn * i * 0.01)});
+    const Sound heard = play(scene);
+    // The tone of the body that stands still at its loudest, and the lobes that go by when the sound leaves.
+    Scene still = make_tone(kFreq, multipoles, kRadius, {{kDistance, 0.0, 0.0}});
+    const Complex loudest = measure(play(still)[0], kFreq);
+    double error = 0.0, power = 0.0, step = 0.0;
+    constexpr std::size_t kQuarter = 6;
+    static_assert(4 * kQuarter * kFreq == kRate);
+    std::vector<Complex> off;
+    for (std::size_t n = 0; n < heard[0].size(); ++n) {
+      const double t = (static_cast<double>(n) - Synthesiser::kLatency) / kRate, left = t - (kDistance - kRadius) / kC;
+      const Complex turned = std::polar(1.0, 2.0 * pi * kFreq * (t - kStruck / kRate));
+      const double expected = std::real(loudest * turned) * std::cos(order * kTurn * left);
+      const double rest = static_cast<double>(heard[0][n]) - expected;
+      off.emplace_back(rest, n < kQuarter ? 0.0 : off[n - kQuarter].real());
+      if (n < 1200) continue;
+      error += rest * rest;
+      power += expected * expected;
+      const Complex unturned = off[n] * std::conj(turned), before = off[n - 1] * std::conj(turned) * std::polar(1.0, 0.5 * pi / kQuarter);
+      step = std::max(step, std::abs(unturned - before));
+    }
+    RecordProperty("error_db_" + std::to_string(order), std::to_string(10.0 * std::log10(error / power)));
+    RecordProperty("step_db_" + std::to_string(order), std::to_string(to_db(step / std::abs(loudest))));
+    EXPECT_LT(10.0 * std::log10(error / power), -40.0) << order;
+    EXPECT_LT(to_db(step / std::abs(loudest)), -60.0) << order;
+  }
+}
+
+// A body that passes a microphone, turning: the second difference of a low tone stays what a smooth sound has.
+TEST(Directivity, ABodyThatPassesDoesNotClick) {
+  constexpr double kRadius = 0.05, kFreq = 200.0;
+  Scene scene = make_tone(kFreq, testing::make_dipole(1.0), kRadius, {{0.0, 0.3, 0.1}});
+  scene.frames = 48000;
+  for (int i = 0; i <= 100; ++i) {
+    const double t = 0.01 * i;
+    scene.events.push_back(
+        events::BodyMotion{t, 0, {4.0 * (t - 0.5), 0.0, 0.0}, {4.0, 0.0, 0.0}, turn_about(normalise(Vec3{1.0, 1.0, 0.3}), 12.0 * t)});
+  }
+  const Sound heard = play(scene);
+  double peak = 0.0, bend = 0.0;
+  for (std::size_t n = 1300; n + 1 < heard[0].size(); ++n) {
+    peak = std::max(peak, std::abs(static_cast<double>(heard[0][n])));
+    bend = std::max(bend, std::abs(static_cast<double>(heard[0][n + 1]) - 2.0 * static_cast<double>(heard[0][n]) +
+                                   static_cast<double>(heard[0][n - 1])));
+  }
+  const double omega = 2.0 * pi * kFreq / kRate;
+  EXPECT_LT(bend, 1.5 * omega * omega * peak);  // of the tone alone: once; -63 dB of the peak
+}
+
+// With transfers that are the gains the delay, the spreading and the shift of a body that passes, turning, are those without directivity;
+// of a listener that walks what is left out, its own way while the sound travels, is 10 mm of 0.5 m here.
+TEST(Directivity, WhatMovesIsHeardAsByGains) {
+  for (const bool walks : {false, true}) {
+    Scene scene{.bank = testing::make_cube_bank({{1000.0, 0.0}, {2300.0, 1.0}}), .microphones_m = {{0.0, 0.5, 0.1}, {1.0, 0.7, 0.0}}};
+    std::vector<testing::ModeMultipoles> multipoles;
+    for (std::size_t m = 0; m < 2; ++m) multipoles.push_back({1.0 / 1e-6 * std::sqrt(4.0 * pi)});
+    testing::give_multipoles(scene.bank, multipoles, 1e-6);
+    scene.frames = 48000;
+    scene.events = {make_blow()};
+    for (int i = 0; i <= 100; ++i) {
+      const double t = 0.01 * i;
+      if (walks) {
+        scene.events.emplace_back(events::Listener{
+            .time_s = t, .position_m = {2.0 * (t - 0.5), 0.0, 0.0}, .velocity_m_s = {2.0, 0.0, 0.0}, .rotation = {1, 0, 0, 0}});
+      } else {
+        scene.events.emplace_back(
+            events::BodyMotion{t, 0, {4.0 * (t - 0.5), 0.0, 0.0}, {4.0, 0.0, 0.0}, turn_about(normalise(Vec3{1.0, 1.0, 0.3}), 12.0 * t)});
+      }
+    }
+    expect_as_by_gains(scene, walks ? -40.0 : -50.0);
+  }
+}
+
+// What arrives at a sphere of microphones is what radiation takes: all the energy of modes that lose none otherwise.
+TEST(Directivity, EnergyThatIsHeardIsThatOfTheBlow) {
+  constexpr double kRadius = 0.1, kDistance = 5.0;
+  const std::array<double, 2> freq{1500.0, 2300.0};
+  std::vector<testing::ModeMultipoles> multipoles{{0.3, Complex(0.1, 0.2), 1.0, -0.4, 0.2, Complex(0.0, 0.5), 0.3, 0.1, -0.6},
+                                                  {0.1, 0.6, Complex(-0.2, 0.9), 0.3}};
+  std::vector<testing::InventedMode> modes;
+  for (std::size_t m = 0; m < 2; ++m) {
+    // P = sum of |c_lm|^2 / (2 rho c k^2), c_lm = a_lm / h_l(kR), by the orthonormal Y_lm of the far field (Williams 1999, 6.81); the
+    // energy at unit velocity is 1/2, so that P is the decay.
+    const double k = 2.0 * pi * freq[m] / kC, x = k * kRadius;
+    double sum = 0.0;
+    for (std::size_t i = 0; i < multipoles[m].size(); ++i) {
+      const int l = i == 0 ? 0 : i < 4 ? 1 : 2;
+      const double h2 = l == 0   ? 1.0 / (x * x)
+                        : l == 1 ? (1.0 + 1.0 / (x * x)) / (x * x)
+                                 : (1.0 + 3.0 / (x * x) + 9.0 / (x * x * x * x)) / (x * x);  // |h_l|^2, DLMF 10.49.18
+      sum += std::norm(multipoles[m][i]) / h2;
+    }
+    const double decay = sum / (2.0 * testing::kAirDensity * kC * k * k), wanted = 20.0 + 10.0 * static_cast<double>(m);
+    for (auto& a : multipoles[m]) a *= std::sqrt(wanted / decay);
+    modes.push_back({freq[m], wanted});
+  }
+  Scene scene{.bank = testing::make_cube_bank(modes), .microphones_m = {}, .events = {make_blow()}, .frames = 24000};
+  testing::give_multipoles(scene.bank, multipoles, kRadius);
+  // Gauss-Legendre of four, exact to degree 7, times eight around.
+  const std::array<double, 4> z{-0.8611363115940526, -0.3399810435848563, 0.3399810435848563, 0.8611363115940526};
+  const std::array<double, 4> w{0.3478548451374538, 0.6521451548625461, 0.6521451548625461, 0.3478548451374538};
+  std::vector<double> weights;
+  for (std::size_t i = 0; i < 4; ++i) {
+    for (int j = 0; j < 8; ++j) {
+      const double s = std::sqrt(1.0 - z[i] * z[i]), phi = 2.0 * pi * j / 8.0;
+      scene.microphones_m.push_back(kDistance * Vec3{s * std::cos(phi), s * std::sin(phi), z[i]});
+      weights.push_back(w[i] * 2.0 * pi / 8.0);
+    }
+  }
+  const Sound heard = play(scene);
+  double energy = 0.0;
+  for (std::size_t e = 0; e < heard.size(); ++e)
+    for (const float p : heard[e])
+      energy += weights[e] * static_cast<double>(p) * static_cast<double>(p) * kDistance * kDistance / (testing::kAirDensity * kC * kRate);
+  EXPECT_NEAR(energy, 2 * 0.5, 0.02);
+}
+
+/// Many modes, some of them overdamped, whose transfers are their gains over the distance: a sphere so small that all is real.
+Scene make_gains_scene() {
+  std::vector<testing::InventedMode> modes = testing::make_many_modes(60);
+  for (std::size_t m = 0; m < modes.size(); m += 20) modes[m].decay_per_s = 3.0 * 2.0 * pi * modes[m].freq_hz;
+  for (std::size_t m = 0; m < modes.size(); ++m) modes[m].gain = 1e-2 * (m % 3 == 0 ? -1.0 : 1.0) / (1.0 + 0.1 * static_cast<double>(m));
+  Scene scene{.bank = testing::make_cube_bank(modes), .microphones_m = {{0.0, 1.0, 0.0}, {0.5, 1.2, 0.0}}, .frames = 9600};
+  std::vector<testing::ModeMultipoles> multipoles;
+  constexpr double kRadius = 1e-6;
+  for (const auto& mode : modes) multipoles.push_back({mode.gain / kRadius * std::sqrt(4.0 * pi)});
+  testing::give_multipoles(scene.bank, multipoles, kRadius);
+  for (int i = 0; i < 12; ++i) scene.events.emplace_back(make_blow(i % 2 == 0 ? 0.0 : 1.1e-3, kStruck + 413 * i));
+  return scene;
+}
+
+void expect_as_by_gains(Scene scene, double bound_db) {
+  const Sound directed = play(scene);
+  scene.effects = scene.effects.without(Effect::kDirectivity);
+  const Sound plain = play(scene);
+  for (std::size_t e = 0; e < directed.size(); ++e) {
+    ASSERT_GT(calc_rms(plain[e]), 0.0);
+    EXPECT_LT(calc_difference_db(directed[e], plain[e]), bound_db) << e;
+  }
+}
+
+// Rounding of multipoles apart, 16 bits of one number, it is the same sound: -90 dB.
+TEST(Directivity, BlowsWhoseTransfersAreTheGainsSoundAsByGains) { expect_as_by_gains(make_gains_scene(), -85.0); }
+
+TEST(Directivity, EveryInstructionSetSoundsTheSame) {
+  for (const Isa isa : {Isa::kPlain, Isa::kSse2, Isa::kAvx2, Isa::kAvx512}) {
+    Scene scene = make_gains_scene();
+    scene.isa = isa;
+    expect_as_by_gains(scene, -85.0);
+  }
+}
+
+TEST(Directivity, ForcesAndLastingContactsSoundAsByGains) {
+  Scene scene = make_gains_scene();
+  scene.effects = kDirected.with(kContactEffects);
+  scene.frames = 19200;
+  for (int i = 0; i < 20; ++i) {
+    events::LastingContact contact{.time_s = 0.02 + 0.01 * i, .id = 7, .body = 0, .triangle = 2};
+    contact.state = i == 0 ? events::ContactState::kBegin : i == 19 ? events::ContactState::kEnd : events::ContactState::kHold;
+    contact.barycentric = {0.3, 0.3, 0.4};
+    contact.normal = {0.0, 0.0, 1.0};
+    contact.slip_m_s = {0.4, 0.0, 0.0};
+    contact.force_n = 5.0;
+    contact.sweep_m_s = 0.4;
+    contact.patch_radius_m = 1e-4;
+    contact.impedance_n_s_m = 40.0;
+    scene.events.emplace_back(contact);
+  }
+  events::Force force{.time_s = 0.1, .body = 0, .triangle = 3};
+  force.barycentric = {0.2, 0.5, 0.3};
+  force.step_s = 1e-4;
+  force.count = 5;
+  for (int k = 0; k < 5; ++k) force.impulse_n_s[static_cast<std::size_t>(k)] = {0.01F * static_cast<float>(k), 0.02F, -0.03F};
+  scene.events.emplace_back(force);
+  std::stable_sort(scene.events.begin(), scene.events.end(), [](const events::Event& a, const events::Event& b) {
+    const auto time = [](const events::Event& event) { return std::visit([](const auto& e) { return e.time_s; }, event); };
+    return time(a) < time(b);
+  });
+  expect_as_by_gains(scene, -80.0);
+}
+
+// What the budget takes away fades out at the ears, too.
+TEST(Directivity, ABudgetThatTakesModesAwaySoundsAsByGains) {
+  Scene scene = make_gains_scene();
+  scene.meddle = [](Synthesiser& synthesiser, int) { synthesiser.set_budget(16.0 * kRate); };
+  // Which modes go is not the same: with directivity the loudest direction counts. With one group left it is.
+  expect_as_by_gains(scene, -60.0);
+}
+
+TEST(Directivity, AnotherModelContinuesAtTheEars) {
+  Scene scene = make_gains_scene();
+  scene.meddle = [&](Synthesiser& synthesiser, int body) {
+    bank::Bank other = scene.bank;
+    for (double& lambda : other.eigenvalue_rad2_s2) lambda *= 1.1;
+    for (double& decay : other.decay_per_s) decay *= 2.0;
+    synthesiser.swap_model(body, Model::make(other, {.rate_hz = kRate}));
+  };
+  expect_as_by_gains(scene, -60.0);
+}
+
+// The sphere of the multipoles changes its size with the body: the sound sets out from another place, and what is heard goes over to that.
+TEST(Directivity, AnotherSizeIsHeardFromAnotherSphere) {
+  Scene scene = make_gains_scene();
+  scene.meddle = [&](Synthesiser& synthesiser, int body) {
+    bank::Bank other = scene.bank;
+    std::vector<testing::ModeMultipoles> multipoles;
+    constexpr double kRadius = 2e-6;
+    for (const double gain : other.radiation_gain) multipoles.push_back({gain / kRadius * std::sqrt(4.0 * pi)});
+    testing::give_multipoles(other, multipoles, kRadius);
+    synthesiser.swap_model(body, Model::make(other, {.rate_hz = kRate}));
+  };
+  expect_as_by_gains(scene, -60.0);
+}
+
+// Model and effect change together, to a bank that has no multipoles: directivity goes first.
+TEST(Directivity, GoesBeforeAModelThatCannotHaveIt) {
+  Scene scene = make_gains_scene();
+  scene.meddle = [&](Synthesiser& synthesiser, int body) {
+    bank::Bank other = scene.bank;
+    other.multipoles = {};
+    const auto model = Model::make(other, {.rate_hz = kRate});
+    if (synthesiser.get_effects(body).has(Effect::kDirectivity)) {
+      EXPECT_THROW(synthesiser.swap_model(body, model), InputError);
+    }
+    synthesiser.set_effects(body, kDefaultEffects);
+    synthesiser.swap_model(body, model);
+  };
+  expect_as_by_gains(scene, -60.0);
+}
+
+// A body turns while it is silent: struck again it is heard from its new side at once.
+TEST(Directivity, ABodyThatTurnedInItsSleepIsHeardAsItLies) {
+  constexpr double kFreq = 1000.0, kRadius = 0.05;
+  Scene scene = make_tone(kFreq, testing::make_dipole(1.0), kRadius, {{0.0, 0.0, 1.0}});
+  scene.bank.decay_per_s[0] = 2000.0;
+  scene.frames = 14400;
+  scene.events.emplace_back(events::BodyMotion{0.10, 0, {}, {}, {1.0, 0.0, 0.0, 0.0}});
+  scene.events.emplace_back(events::BodyMotion{0.15, 0, {}, {}, turn_about({0.0, 1.0, 0.0}, 0.5 * pi)});
+  scene.events.emplace_back(make_blow(0.0, 9633));  // in the middle of a block
+  const std::vector<float> heard = play(scene)[0];
+  double first = 0.0, second = 0.0;
+  for (std::size_t n = 0; n < heard.size(); ++n)
+    (n < 4800 ? first : second) = std::max(n < 4800 ? first : second, static_cast<double>(std::abs(heard[n])));
+  EXPECT_GT(first, 0.0);
+  EXPECT_LT(second, 1e-3 * first);
+}
+
+// What becomes no number is silenced at the ears as well.
+TEST(Directivity, NoNumbersAreSilence) {
+  Scene scene = make_gains_scene();
+  scene.events[4] = events::Impulse{.time_s = 0.05, .body = 0, .impulse_n_s = {0.0, 0.0, 1e42}};
+  // The blow clears what waits, too; what was before is heard.
+  for (const auto& channel : play(scene)) {
+    double loudest = 0.0;
+    for (const float p : channel) loudest = std::max(loudest, std::isfinite(p) ? static_cast<double>(std::abs(p)) : 1e30);
+    EXPECT_GT(loudest, 0.01);
+    EXPECT_LT(loudest, 1.0);
+    EXPECT_EQ(channel.back(), 0.0F);
+  }
+}
+
+// It comes and goes while a body sounds: both are the same sound here, so nothing is to be heard of it.
+TEST(Directivity, ItComesAndGoesWithoutAClick) {
+  Scene scene = make_gains_scene();
+  scene.effects = kDefaultEffects;
+  const Sound plain = play(scene);
+  for (const bool comes : {true, false}) {
+    scene.effects = comes ? kDefaultEffects : kDirected;
+    scene.meddle = [comes](Synthesiser& synthesiser, int body) { synthesiser.set_effects(body, comes ? kDirected : kDefaultEffects); };
+    const Sound changed = play(scene);
+    for (std::size_t e = 0; e < plain.size(); ++e) EXPECT_LT(calc_difference_db(changed[e], plain[e]), -80.0) << comes << e;
+  }
+}
+
+TEST(Directivity, BlocksOfAnySizeGiveTheSameBits) {
+  Scene scene = make_gains_scene();
+  testing::give_multipoles(scene.bank, std::vector<testing::ModeMultipoles>(60, testing::ModeMultipoles{0.1, 0.5, Complex(1.0, -0.2), 0.3}),
+                           0.06);
+  scene.effects = kDirected.with(Effect::kGroundReflection);
+  scene.floor = Floor{.point_m = {0.0, 0.0, -1.0}};
+  for (const auto& event : make_turn(7.0, 0.2)) scene.events.push_back(event);
+  const Sound whole = play(scene);
+  for (const int block : {1, 37, 96, 480, 4800}) {
+    scene.block = block;
+    EXPECT_EQ(play(scene), whole) << block;
+  }
+}
+
+// A body that stands still looks up each mode once an ear; one that turns does so again and again, up to the bound.
+TEST(Directivity, WhatStandsStillIsLookedUpOnce) {
+  Scene scene = make_gains_scene();
+  EffectCounters counters;
+  play(scene, &counters);
+  const int ringing = Model::make(scene.bank, {.rate_hz = kRate})->get_ringing_mode_count();
+  EXPECT_EQ(counters.units[Effect::kDirectivity], 2 * ringing);
+  EXPECT_GT(counters.bytes[Effect::kDirectivity], 0);
+  EXPECT_EQ(counters.units[Effect::kGroundReflection], 0);
+  testing::give_multipoles(scene.bank, std::vector<testing::ModeMultipoles>(60, testing::make_dipole(1.0)), 0.06);
+  for (const auto& event : make_turn(5.0, 0.2)) scene.events.push_back(event);
+  play(scene, &counters);
+  const std::int64_t blocks = scene.frames / kBlock;
+  EXPECT_GT(counters.units[Effect::kDirectivity], 4 * ringing);
+  EXPECT_LT(counters.units[Effect::kDirectivity], 2 * ringing * blocks / 4);  // 0.25 rad are 18 blocks at 5 rad/s
+}
+
+// Thirty-two ears of a body that turns fast are more than there is room for.
+TEST(Directivity, LookingUpIsBounded) {
+  Scene scene = make_gains_scene();
+  testing::give_multipoles(scene.bank, std::vector<testing::ModeMultipoles>(60, testing::make_dipole(1.0)), 0.06);
+  scene.microphones_m.clear();
+  for (int e = 0; e < 32; ++e) scene.microphones_m.push_back({std::cos(0.2 * e), std::sin(0.2 * e), 0.3});
+  for (const auto& event : make_turn(200.0, 0.2)) scene.events.push_back(event);
+  EffectCounters counters;
+  play(scene, &counters);
+  const std::int64_t blocks = scene.frames / kBlock, all = 32 * 60;
+  EXPECT_LE(counters.units[Effect::kDirectivity], all + blocks * Directivity::kEvaluations);
+}
+
+// A mode without a gain, silent at the ear when the body is struck, is heard once the body has turned: it is not dropped before.
+TEST(Directivity, WhatIsLoudElsewhereIsNotDropped) {
+  constexpr double kFreq = 1000.0, kRadius = 0.05;
+  Scene scene = make_tone(kFreq, testing::make_dipole(1.0), kRadius, {{1.0, 0.0, 0.0}});
+  scene.bank.radiation_gain[0] = 0.0;
+  scene.frames = 24000;
+  scene.events.emplace_back(events::BodyMotion{0.2, 0, {}, {}, {1.0, 0.0, 0.0, 0.0}});
+  scene.events.emplace_back(events::BodyMotion{0.4, 0, {}, {}, turn_about({0.0, 1.0, 0.0}, 0.5 * pi)});
+  const std::vector<float> heard = play(scene)[0];
+  const double k = 2.0 * pi * kFreq / kC, loudest = std::abs(testing::calc_dipole_fall(k, k * kRadius));
+  EXPECT_LT(std::abs(measure({heard.begin(), heard.begin() + 9000}, kFreq)), 1e-3 * loudest);
+  EXPECT_NEAR(std::abs(measure(heard, kFreq, 20000)), loudest, 1e-3 * loudest);
+}
+
+TEST(Directivity, NeedsABankWithMultipoles) {
+  const auto model = Model::make(testing::make_cube_bank({{400.0, 5.0}}), {.rate_hz = kRate});
+  Synthesiser synthesiser({.rate_hz = kRate});
+  EXPECT_THROW(synthesiser.add_body(model, {.effects = kDirected}), InputError);
+  EXPECT_NO_THROW(synthesiser.add_body(model, {.effects = kDefaultEffects}));
+}
+
+// 20 cm from each ear the solo of a mode is that mode alone.
+TEST(Directivity, ASoloIsOneMode) {
+  Scene scene = make_gains_scene();
+  const auto model = Model::make(scene.bank, {.rate_hz = kRate});
+  const auto solo = Model::make_solo(*model, 25);
+  bank::Bank alone = scene.bank;
+  for (std::size_t m = 0; m < alone.mode_count(); ++m)
+    if (m != 25) alone.radiation_gain[m] = 0.0;
+  scene.meddle = [&](Synthesiser& synthesiser, int body) { synthesiser.swap_model(body, solo); };
+  const Sound directed = play(scene);
+  scene.effects = kDefaultEffects;
+  const Sound plain = play(scene);
+  EXPECT_LT(calc_difference_db(directed[0], plain[0], 6000), -60.0);
+}
+
+TEST(GroundReflection, DoublesThePressureOnTheFloor) {
+  for (const bool directed : {false, true}) {
+    constexpr double kFreq = 1100.0, kRadius = 0.05;
+    Scene scene = make_tone(kFreq, testing::make_dipole(1.0), kRadius, {{1.5, 0.4, 0.0}});
+    scene.position_m = {0.0, 0.0, 0.7};
+    scene.effects = directed ? kDirected : kDefaultEffects;
+    const Sound free = play(scene);
+    scene.effects = scene.effects.with(Effect::kGroundReflection);
+    scene.floor = Floor{};
+    const Sound heard = play(scene);
+    ASSERT_GT(calc_rms(free[0]), 0.0);
+    double worst = 0.0, peak = 0.0;
+    for (std::size_t n = 0; n < heard[0].size(); ++n) {
+      worst = std::max(worst, std::abs(static_cast<double>(heard[0][n]) - 2.0 * static_cast<double>(free[0][n])));
+      peak = std::max(peak, std::abs(static_cast<double>(free[0][n])));
+    }
+    EXPECT_LT(worst, 1e-5 * peak) << directed;
+  }
+}
+
+// Two ways, of which the longer is lengthened by odd halves of a wave in the nulls; a floor on the side, and one that swallows.
+TEST(GroundReflection, CombsTheSound) {
+  const Vec3 ear{2.0, 0.0, 1.2}, body{0.0, 0.3, 0.8};
+  const Floor slanted{.point_m = {0.1, 0.0, -0.4}, .normal = normalise(Vec3{0.2, -0.1, 1.0}), .reflection = 0.6};
+  for (const Floor& floor : {Floor{}, slanted}) {
+    const double straight = norm(ear - body), mirrored = norm(floor.mirror(ear) - body);
+    for (const double halves : {1.0, 2.0, 3.0, 3.5, 5.0}) {
+      const double freq = halves * 0.5 * kC / (mirrored - straight), k = 2.0 * pi * freq / kC;
+      Scene scene = make_tone(freq, testing::make_monopole(1.0, freq, 1e-3), 1e-3, {ear});
+      scene.position_m = body;
+      scene.floor = floor;
+      const Complex expected = std::polar(1.0 / straight, -k * straight) + floor.reflection * std::polar(1.0 / mirrored, -k * mirrored);
+      for (const bool directed : {false, true}) {
+        scene.effects = (directed ? kDirected : kDefaultEffects).with(Effect::kGroundReflection);
+        const Complex heard = measure(play(scene)[0], freq);
+        EXPECT_LT(to_db(std::abs(heard - expected) * straight), -60.0) << halves << directed;
+        if (halves == 1.0 && floor.reflection == 1.0) {
+          EXPECT_NEAR(std::abs(heard), 1.0 / straight - 1.0 / mirrored, 1e-3);
+        }
+      }
+    }
+  }
+}
+
+// A dipole sends something else down than it sends to the ear.
+TEST(GroundReflection, IsOfWhatTheBodySendsDown) {
+  constexpr double kRadius = 0.05, kFreq = 1700.0, k = 2.0 * pi * kFreq / kC;
+  const Vec3 ear{1.0, 0.5, 0.4}, body{0.0, 0.0, 0.9};
+  Scene scene = make_tone(kFreq, testing::make_dipole(1.0), kRadius, {ear});
+  scene.position_m = body;
+  scene.floor = Floor{};
+  scene.effects = kDirected.with(Effect::kGroundReflection);
+  Complex expected{};
+  for (const Vec3& place : {ear, Vec3{ear[0], ear[1], -ear[2]}}) {
+    const Vec3 way = place - body;
+    expected += std::conj(testing::calc_dipole_fall(k * norm(way), k * kRadius)) * (way[2] / norm(way));
+  }
+  EXPECT_LT(to_db(std::abs(measure(play(scene)[0], kFreq) - expected) / std::abs(expected)), -60.0);
+}
+
+// With a listener that walks and turns, and the click of a body as a whole: two ears on the floor hear it twice.
+TEST(GroundReflection, FollowsTheListenerAndReflectsTheClick) {
+  Scene scene = make_tone(700.0, testing::make_monopole(1.0, 700.0, 0.01), 0.01, {{-0.1, 0.0, 0.0}, {0.1, 0.0, 0.0}});
+  scene.events = {make_blow(3e-4)};
+  scene.position_m = {0.3, 0.8, 0.5};
+  for (int i = 0; i <= 10; ++i) {
+    scene.events.emplace_back(events::Listener{.time_s = 0.01 * i,
+                                               .position_m = {0.02 * i, 0.0, 0.0},
+                                               .velocity_m_s = {2.0, 0.0, 0.0},
+                                               .rotation = turn_about({0, 0, 1}, 0.1 * i)});
+  }
+  scene.effects = kDefaultEffects.with(Effect::kAccelerationNoise);
+  const Sound free = play(scene);
+  scene.effects = scene.effects.with(Effect::kGroundReflection);
+  scene.floor = Floor{};
+  const Sound heard = play(scene);
+  for (std::size_t e = 0; e < 2; ++e) {
+    std::vector<float> twice(free[e]);
+    for (float& p : twice) p *= 2.0F;
+    EXPECT_LT(calc_difference_db(heard[e], twice), -100.0);
+  }
+}
+
+TEST(GroundReflection, RefusesWhatCannotBe) {
+  const auto model = Model::make(testing::make_cube_bank({{400.0, 5.0}}), {.rate_hz = kRate});
+  Synthesiser without({.rate_hz = kRate});
+  EXPECT_THROW(without.add_body(model, {.effects = kDefaultEffects.with(Effect::kGroundReflection)}), InputError);
+  SynthesiserOptions options{.rate_hz = kRate};
+  options.floor = Floor{.point_m = {0.0, 0.0, 0.5}};
+  EXPECT_THROW(Synthesiser{options}, InputError);  // ears below
+  options.floor = Floor{.normal = {0.0, 0.0, 2.0}};
+  EXPECT_THROW(Synthesiser{options}, InputError);
+  options.floor = Floor{.reflection = 1.5};
+  EXPECT_THROW(Synthesiser{options}, InputError);
+}
+
+TEST(GroundReflection, OffItHoldsNothing) {
+  Scene scene = make_gains_scene();
+  scene.effects = kDefaultEffects;
+  scene.floor = Floor{.point_m = {0.0, 0.0, -1.0}};
+  EffectCounters off, on;
+  play(scene, &off);
+  scene.effects = kDefaultEffects.with(Effect::kGroundReflection);
+  play(scene, &on);
+  EXPECT_EQ(off.units[Effect::kGroundReflection], 0);
+  EXPECT_EQ(off.bytes[Effect::kGroundReflection], 0);
+  EXPECT_EQ(off.bytes[Effect::kDirectivity], 0);
+  EXPECT_GT(on.units[Effect::kGroundReflection], 0);
+  EXPECT_GT(on.bytes[Effect::kGroundReflection], 0);
+  EXPECT_EQ(on.units[Effect::kAirDelay], off.units[Effect::kAirDelay]);
+}
+
+}  // namespace
+}  // namespace carillon::synth
