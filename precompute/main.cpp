@@ -15,6 +15,7 @@
 #include <thread>
 
 #include "precompute/petsc/session.hpp"
+#include "precompute/run/air.hpp"
 #include "precompute/run/enter_folder.hpp"
 #include "precompute/run/estimate.hpp"
 #include "precompute/run/interrupt.hpp"
@@ -91,6 +92,9 @@ struct CommandLine {
         ->check(CLI::Range(0.0, 1e9))
         ->capture_default_str();
     app.add_option("--bank", options.bank, "write the bank to this file, whatever the job says")->check(named);
+    app.add_option("--radiate", options.radiate,
+                   "in place of a job: solve the air outside the body of this bank, and write the bank with its multipoles to --bank")
+        ->check(named);
     app.add_option("--result", result, "write how the run ended to this file, a JSON object (docs/howto/when-jobs-die.md)")->check(named);
     app.add_option("--folder", options.folder, "work in folder NAME below ROOT, to which no link below ROOT leads")
         ->expected(2)
@@ -123,7 +127,7 @@ struct CommandLine {
     options.solver_options.assign(argv + std::min(own + 1, argc), argv + argc);
     try {
       app.parse(own, argv);
-      if (job.empty() && estimate.empty()) throw CLI::RequiredError("JOB");
+      if (job.empty() && estimate.empty() && options.radiate.empty()) throw CLI::RequiredError("JOB");
     } catch (const CLI::ParseError& caught) {
       error = caught;
     }
@@ -155,7 +159,8 @@ base::Result carry_out(const petsc::Session& session, const CommandLine& words) 
     if (speaks) fmt::print("{}", table);
     return {};
   }
-  const run::RunSummary summary = run::run_job(PETSC_COMM_WORLD, words.job, words.options);
+  const run::RunSummary summary = words.options.radiate.empty() ? run::run_job(PETSC_COMM_WORLD, words.job, words.options)
+                                                                : run::radiate_bank(PETSC_COMM_WORLD, words.options);
   if (summary.is_stopped) {
     if (speaks) fmt::print(stderr, "carillon-precompute: {}\n", base::printable(summary.result));
     return {base::ResultKind::checkpointed, summary.result};

@@ -25,7 +25,7 @@ using Double = std::complex<double>;
 /// Behind the plane, as far as it is before it.
 Vec3 mirror(const Plane& plane, const Vec3& place) { return place - (2.0 * dot(place - plane.point_m, plane.normal)) * plane.normal; }
 
-/// The mirror image beside the body: a closed surface again, that moves alike.
+/// The mirror image next to the body: a closed surface again, that moves alike.
 void add_mirror_image(const Plane& plane, Radiator& radiator) {
   const std::size_t nodes = radiator.nodes_m.size(), facets = radiator.triangles.size(), row = radiator.count_modes();
   for (std::size_t i = 0; i < nodes; ++i) {

@@ -116,10 +116,10 @@ WaveAnswer solve_wave(const BoundaryEquations& equations, const Group& group, do
   answer.residual = result.residual;
   if (!result.is_converged)
     throw SolveError(
-        fmt::format("the pressure on the surface does not converge at {:.6g} Hz: residual {:.1e} after {} products of GMRES, asked {:.0e}; "
-                    "a surface with "
-                    "slivers or folds can do that: mesh it anew (carillon-mesh), or leave the air out with \"radiation\": \"none\"",
-                    k * 343.0 / (2.0 * 3.141592653589793), result.residual, result.products, tolerance));
+        fmt::format("the pressure on the surface does not converge at k = {:.6g} 1/m: residual {:.1e} after {} products of GMRES, asked "
+                    "{:.0e}; slivers or folds of the surface can do that: mesh it again (carillon-mesh), or leave the air out with "
+                    "\"radiation\": \"none\"",
+                    k, result.residual, result.products, tolerance));
   if (!group.is_first()) return answer;
   const Sphere& sphere = equations.get_sphere();
   const std::vector<Single> pressure = pressures.list();

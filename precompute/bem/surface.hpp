@@ -32,7 +32,7 @@ struct EdgePoint {
 /// space; nodes and edges are numbered in the order in which the facets meet them; there is no facet without an area.
 class Surface {
  public:
-  /// Numbers nodes and facets anew. Throws InputError when a number is not finite, and when no facet has an area.
+  /// Gives nodes and facets other numbers. Throws InputError when a number is not finite, and when no facet has an area.
   Surface(std::span<const Vec3> nodes_m, std::span<const Triangle> triangles);
 
   const std::vector<Vec3>& get_nodes() const { return nodes_m_; }

@@ -28,7 +28,7 @@ enum class Factorisation { automatic, ldlt, mumps, cholmod };
 /// boundary elements for the bodies that need them.
 enum class Radiation { none, automatic, bem };
 
-/// A rigid plane beside the body, which is on the side that the normal shows to.
+/// A rigid plane next to the body, which is on the side that the normal shows to.
 struct HalfSpace {
   std::array<double, 3> point_m{};
   std::array<double, 3> normal{};  // as given, not 0

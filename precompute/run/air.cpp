@@ -12,6 +12,7 @@
 #include "precompute/eigen/checkpoint.hpp"
 #include "precompute/run/interrupt.hpp"
 #include "precompute/run/meshing.hpp"
+#include "runtime/base/file.hpp"
 
 namespace carillon::run {
 namespace {
@@ -46,6 +47,28 @@ std::string describe_multipoles(const bank::Multipoles& multipoles) {
 }
 
 }  // namespace
+
+RunSummary radiate_bank(const comm::Communicator& comm, const RunOptions& options) {
+  Run run(comm, options);
+  run.job.air.method = job::Radiation::bem;
+  run.job.file = options.radiate;
+  bank::Bank bank;
+  RunSummary summary;
+  comm.agree([&] {
+    if (options.bank.empty()) throw InputError("--bank is missing: give the file for the bank with its multipoles");
+    if (!comm.is_root()) return;
+    bank = bank::read_bank(options.radiate);
+    base::check_writable(options.bank, "bank");
+  });
+  const AirReport report = add_air(run, bank);
+  comm.agree([&] {
+    if (!comm.is_root()) return;
+    bank::write_bank(bank, options.bank);
+    summary.bank = options.bank;
+    summary.result = report.result;
+  });
+  return summary;
+}
 
 AirReport add_air(Run& run, bank::Bank& bank) {
   AirReport report;

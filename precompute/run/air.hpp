@@ -4,6 +4,7 @@
 #include <string>
 
 #include "precompute/run/run.hpp"
+#include "precompute/run/run_job.hpp"
 #include "runtime/bank/bank.hpp"
 
 namespace carillon::run {
@@ -19,5 +20,9 @@ struct AirReport {
 /// kept next to the checkpoint, if there is one, until all are solved. Phase "air". Collective. Throws on every rank: InputError,
 /// SolveError, SystemError; eigen::Stopped when a signal asked for a checkpoint.
 AirReport add_air(Run& run, bank::Bank& bank);
+
+/// Reads the bank options.radiate, adds the multipoles of all modes by boundary elements, and writes it to options.bank, which may be the
+/// same file. The same bytes on any number of ranks. Collective. Throws as run_job().
+RunSummary radiate_bank(const comm::Communicator& comm, const RunOptions& options);
 
 }  // namespace carillon::run

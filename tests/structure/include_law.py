@@ -210,6 +210,7 @@ LAW = {
         ["runtime/base", "runtime/bank", "runtime/material", "precompute/job", "precompute/petsc", "precompute/la", "precompute/eigen"],
         ["fmt", "petsc", "eigen"],
     ),
+    "precompute/bem": (["runtime/base", "runtime/bank", "precompute/comm"], ["fmt", "eigen"]),
     "precompute/io": (
         [
             "runtime/base",
@@ -242,6 +243,7 @@ LAW = {
             "precompute/estimate",
             "precompute/eigen",
             "precompute/analytic",
+            "precompute/bem",
             "precompute/cost",
             "precompute/io",
         ],
