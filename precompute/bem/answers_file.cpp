@@ -97,7 +97,7 @@ void AnswersFile::remove() {
   whole_bytes_ = 0;
 }
 
-std::array<unsigned char, 32> calc_fingerprint(const Radiator& radiator, const Options& options) {
+std::array<unsigned char, 32> calc_fingerprint(const Radiator& radiator, const AirSolveOptions& options) {
   base::Sha256 hash;
   const auto add = [&](const auto& values) { hash.add(std::as_bytes(std::span(values))); };
   hash.add(kMagic);

@@ -31,6 +31,6 @@ class AnswersFile {
 };
 
 /// Of the radiator and what of the options and of the program decides the answers.
-std::array<unsigned char, 32> calc_fingerprint(const Radiator& radiator, const Options& options);
+std::array<unsigned char, 32> calc_fingerprint(const Radiator& radiator, const AirSolveOptions& options);
 
 }  // namespace carillon::bem

@@ -96,7 +96,7 @@ void BlockInverse::apply(Sides& rows) const {
 
 double calc_coupling(double k, double radius_m) { return 1.0 / std::max(k, 1.0 / radius_m); }
 
-BoundaryEquations::BoundaryEquations(const Surface& surface, const Sphere& sphere, std::vector<float> velocity, std::size_t count)
+BoundaryEquations::BoundaryEquations(const RadiatingSurface& surface, const Sphere& sphere, std::vector<float> velocity, std::size_t count)
     : surface_(surface),
       velocity_(std::move(velocity)),
       count_(count),

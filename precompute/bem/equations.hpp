@@ -51,13 +51,13 @@ class BoundaryEquations {
  public:
   /// `velocity`: (T, 3, n) normal velocities at the corners of the facets of `surface`; `sphere` is around it. The surface must outlive
   /// this.
-  BoundaryEquations(const Surface& surface, const Sphere& sphere, std::vector<float> velocity, std::size_t count);
+  BoundaryEquations(const RadiatingSurface& surface, const Sphere& sphere, std::vector<float> velocity, std::size_t count);
 
   /// The rows first .. last - 1 at wave number k > 0 [1/m] with q = v of the velocities `sides`. A row has the same bits whatever the
   /// range.
   void assemble(double k, std::span<const std::int32_t> sides, std::size_t first, std::size_t last, LinearSystem& system) const;
 
-  const Surface& get_surface() const { return surface_; }
+  const RadiatingSurface& get_surface() const { return surface_; }
   const Sphere& get_sphere() const { return sphere_; }
   std::size_t count_velocities() const { return count_; }
   /// (T, 3, n)
@@ -80,7 +80,7 @@ class BoundaryEquations {
   std::vector<float> make_sources(const PatchData& patch, std::span<const std::int32_t> sides, std::size_t padded) const;
   void add_sparse(double k, double coupling, std::span<const std::int32_t> sides, LinearSystem& system) const;
 
-  const Surface& surface_;
+  const RadiatingSurface& surface_;
   std::vector<float> velocity_;
   std::size_t count_ = 0;
   Sphere sphere_;

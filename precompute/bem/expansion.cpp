@@ -150,7 +150,7 @@ std::vector<Complex> calc_hankel_phase(double x, int order) {
   return phase;
 }
 
-std::vector<Complex> calc_expansion(const Surface& surface, const Sphere& sphere, double k, int order,
+std::vector<Complex> calc_expansion(const RadiatingSurface& surface, const Sphere& sphere, double k, int order,
                                     std::span<const std::complex<float>> pressure, std::span<const float> velocity, std::size_t count,
                                     std::span<const std::int32_t> sides) {
   constexpr std::size_t kRun = 128;

@@ -19,7 +19,7 @@ inline constexpr std::size_t count_harmonics(int order) {
 /// the surface: with dp/dn = v,
 ///   c_lm = i k integral of [ p dn(j_l(kr) Y_lm) - v j_l(kr) Y_lm ] dS,      p = sum c_lm h_l(kr) Y_lm outside the sphere.
 /// `pressure`: (N, n) at the nodes; `velocity`: (T, 3, count) at the corners of the facets, of which `sides` are the n. Midpoint rule.
-std::vector<std::complex<double>> calc_expansion(const Surface& surface, const Sphere& sphere, double k, int order,
+std::vector<std::complex<double>> calc_expansion(const RadiatingSurface& surface, const Sphere& sphere, double k, int order,
                                                  std::span<const std::complex<float>> pressure, std::span<const float> velocity,
                                                  std::size_t count, std::span<const std::int32_t> sides);
 

@@ -173,7 +173,7 @@ bank::Multipoles calc_multipoles(const comm::Communicator& comm, const bank::Ban
                                  const std::filesystem::path& answers) {
   const std::vector<double> played = find_played_freq_hz(bank);
   const Radiator radiator = comm.agree([&] { return comm.is_root() ? make_radiator(bank, played, options) : Radiator{}; });
-  Options solve = options.solve;
+  AirSolveOptions solve = options.solve;
   solve.shift = [&](double k, const Sounding& mode) {
     const double mass = calc_added_mass(mode, options);
     return mass >= kShiftMass ? k / std::sqrt(1.0 + mass) : k;
@@ -184,7 +184,7 @@ bank::Multipoles calc_multipoles(const comm::Communicator& comm, const bank::Ban
     keeper.read = [&] { return file->read(); };
     keeper.save = [&](const WaveAnswer& answer) { file->save(answer); };
   }
-  const Solution solution = solve_air(comm, radiator, solve, keeper);
+  const AirSolution solution = solve_air(comm, radiator, solve, keeper);
   return comm.agree([&] {
     bank::Multipoles multipoles;
     if (!comm.is_root() || solution.modes.empty()) return multipoles;

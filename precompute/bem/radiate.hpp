@@ -20,7 +20,7 @@ struct Plane {
 };
 
 struct AirOptions {
-  Options solve;
+  AirSolveOptions solve;
   double air_density_kg_m3 = bank::kAirDensityKgM3;
   double sound_speed_ms = bank::kSoundSpeedMs;
   std::optional<Plane> half_space;

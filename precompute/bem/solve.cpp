@@ -117,7 +117,8 @@ WaveAnswer solve_wave(const BoundaryEquations& equations, const Group& group, do
   if (!result.is_converged)
     throw SolveError(
         fmt::format("the pressure on the surface does not converge at k = {:.6g} 1/m: residual {:.1e} after {} products of GMRES, asked "
-                    "{:.0e}; slivers or folds of the surface can do that: mesh it again (carillon-mesh), or leave the air out with "
+                    "{:.0e}; a skin too coarse for the wave can do that (\"skin_nodes\"), and slivers or folds of the surface: mesh it "
+                    "again, or leave the air out with "
                     "\"radiation\": \"none\"",
                     k, result.residual, result.products, tolerance));
   if (!group.is_first()) return answer;
@@ -214,7 +215,7 @@ Radiator share(const comm::Communicator& comm, const Radiator& radiator) {
 }
 
 /// The velocities in the order of the surface's facets and corners.
-std::vector<float> reorder(const Surface& surface, const Radiator& radiator) {
+std::vector<float> reorder(const RadiatingSurface& surface, const Radiator& radiator) {
   const std::size_t row = radiator.count_modes();
   std::vector<float> velocity(surface.count_facets() * 3 * row);
   for (std::size_t t = 0; t < surface.count_facets(); ++t) {
@@ -262,16 +263,14 @@ std::optional<WaveAnswer> unpack(std::span<const double> packed) {
 
 std::int32_t find_order(double k_radius) { return std::min(kMostOrder, static_cast<std::int32_t>(std::ceil(k_radius)) + 12); }
 
-Solution solve_air(const comm::Communicator& comm, const Radiator& radiator_of_root, const Options& options, const Keeper& keeper) {
+AirSolution solve_air(const comm::Communicator& comm, const Radiator& radiator_of_root, const AirSolveOptions& options,
+                      const Keeper& keeper) {
   const Radiator radiator = share(comm, radiator_of_root);
-  Solution solution;
+  AirSolution solution;
   if (radiator.count_modes() == 0) return solution;
-  const auto [surface, equations] = [&] {
-    auto made = comm.agree([&] { return std::make_unique<Surface>(radiator.nodes_m, radiator.triangles); });
-    auto found = comm.agree(
-        [&] { return std::make_unique<BoundaryEquations>(*made, radiator.sphere, reorder(*made, radiator), radiator.count_modes()); });
-    return std::pair(std::move(made), std::move(found));
-  }();
+  const auto surface = comm.agree([&] { return std::make_unique<RadiatingSurface>(radiator.nodes_m, radiator.triangles); });
+  const auto equations = comm.agree(
+      [&] { return std::make_unique<BoundaryEquations>(*surface, radiator.sphere, reorder(*surface, radiator), radiator.count_modes()); });
   std::vector<double> modes = radiator.wave_number_1_m;
   solution.sphere = equations->get_sphere();
   solution.unknowns = surface->count_nodes();
@@ -342,7 +341,7 @@ Solution solve_air(const comm::Communicator& comm, const Radiator& radiator_of_r
                       static_cast<double>(done) / static_cast<double>(work.size()));
       const bool is_stopped =
           comm.broadcast(static_cast<std::int32_t>(comm.is_root() && keeper.is_stop_asked && keeper.is_stop_asked())) != 0;
-      if (is_stopped) throw Stopped();
+      if (is_stopped) throw SolveStopped();
     }
     std::vector<std::int32_t> wrong = comm.broadcast([&] {
       std::vector<std::int32_t> list(modes.size());

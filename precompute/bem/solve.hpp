@@ -26,7 +26,7 @@ struct Radiator {
   std::size_t count_modes() const { return wave_number_1_m.size(); }
 };
 
-struct Options {
+struct AirSolveOptions {
   double step = 0.75;                // mean step of k R between wave numbers
   double error_db = -40.0;           // that interpolation may make in any mode; more wave numbers where it makes more
   double nearest_over_radius = 2.0;  // from where on, in radii
@@ -62,11 +62,11 @@ struct Keeper {
   std::function<void(const WaveAnswer&)> save;
   /// "wave number 12 of 40": after each, with the share that is done.
   std::function<void(const std::string&, double)> report;
-  /// True: stop, throw Stopped on all ranks.
+  /// True: stop, throw SolveStopped on all ranks.
   std::function<bool()> is_stop_asked;
 };
 
-struct Stopped {};
+struct SolveStopped {};
 
 /// One mode in the air, at its own wave number, for unit modal velocity q' and dp/dn = v.
 struct Sounding {
@@ -76,7 +76,7 @@ struct Sounding {
   double interpolation_db = -300.0;  // error by the rule of wave_numbers.hpp, the larger of far away and at the nearest distance
 };
 
-struct Solution {
+struct AirSolution {
   Sphere sphere;
   std::vector<Sounding> modes;          // (n)
   std::vector<double> wave_number_1_m;  // (n) at which they were solved
@@ -88,8 +88,8 @@ struct Solution {
 
 /// Solves the air for all modes. Wave numbers are dealt to groups of ranks; the result has the same bits on any number of them. Collective;
 /// the solution is rank 0's. Throws on all ranks: InputError for a surface that cannot be, SolveError where an iteration does not converge,
-/// Stopped.
-Solution solve_air(const comm::Communicator& comm, const Radiator& radiator, const Options& options, const Keeper& keeper = {});
+/// SolveStopped.
+AirSolution solve_air(const comm::Communicator& comm, const Radiator& radiator, const AirSolveOptions& options, const Keeper& keeper = {});
 
 /// The order up to which fields are expanded at k R.
 std::int32_t find_order(double k_radius);

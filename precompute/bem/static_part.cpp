@@ -53,7 +53,7 @@ std::vector<OuterPoint> make_rule(bool is_fine) {
 /// The facets whose centroids are near a place: buckets of facets of one size class each.
 class Neighbours {
  public:
-  explicit Neighbours(const Surface& surface) : facets_(surface.get_facets()) {
+  explicit Neighbours(const RadiatingSurface& surface) : facets_(surface.get_facets()) {
     for (const Facet& facet : facets_)
       centroids_.push_back((1.0 / 3.0) * (surface.get_nodes()[facet.corners[0]] + surface.get_nodes()[facet.corners[1]] +
                                           surface.get_nodes()[facet.corners[2]]));
@@ -126,7 +126,7 @@ struct Pair {
   double adjoint[3][3] = {};       // of lambda_i lambda_j d(1 / R) / dn_x
 };
 
-void add_exact(const Surface& surface, const Facet& outer, const Facet& inner, const std::vector<OuterPoint>& rule, Pair& pair) {
+void add_exact(const RadiatingSurface& surface, const Facet& outer, const Facet& inner, const std::vector<OuterPoint>& rule, Pair& pair) {
   const std::vector<Vec3>& nodes = surface.get_nodes();
   const std::array<Vec3, 3> corners{nodes[inner.corners[0]], nodes[inner.corners[1]], nodes[inner.corners[2]]};
   for (const OuterPoint& point : rule) {
@@ -146,7 +146,7 @@ void add_exact(const Surface& surface, const Facet& outer, const Facet& inner, c
   }
 }
 
-void subtract_midpoints(const Surface& surface, const Facet& outer, const Facet& inner, Pair& pair) {
+void subtract_midpoints(const RadiatingSurface& surface, const Facet& outer, const Facet& inner, Pair& pair) {
   const std::vector<EdgePoint>& points = surface.get_points();
   const double area = outer.area_m2 * inner.area_m2 / 9.0;
   for (std::size_t s = 0; s < 3; ++s)
@@ -174,7 +174,7 @@ std::size_t StaticPart::calc_bytes() const {
          (single.size() + adjoint.size()) * sizeof(double);
 }
 
-StaticPart make_static_part(const Surface& surface, std::span<const float> velocity, std::size_t count) {
+StaticPart make_static_part(const RadiatingSurface& surface, std::span<const float> velocity, std::size_t count) {
   const std::vector<Facet>& facets = surface.get_facets();
   const std::size_t nodes = surface.count_nodes();
   const Neighbours neighbours(surface);

@@ -30,6 +30,6 @@ struct StaticPart {
 
 /// `velocity`: (T, 3, n) at the corners of each facet, linear between them. The inner integrals are in closed form, so that walls much
 /// thinner than a facet are no harder than others.
-StaticPart make_static_part(const Surface& surface, std::span<const float> velocity, std::size_t count);
+StaticPart make_static_part(const RadiatingSurface& surface, std::span<const float> velocity, std::size_t count);
 
 }  // namespace carillon::bem

@@ -102,7 +102,7 @@ Sphere find_enclosing_sphere(std::span<const Vec3> points_m) {
   return sphere;
 }
 
-Surface::Surface(std::span<const Vec3> nodes_m, std::span<const Triangle> triangles) {
+RadiatingSurface::RadiatingSurface(std::span<const Vec3> nodes_m, std::span<const Triangle> triangles) {
   std::vector<std::int32_t> kept;
   std::vector<Vec3> centroids;
   for (std::size_t t = 0; t < triangles.size(); ++t) {
@@ -149,20 +149,20 @@ Surface::Surface(std::span<const Vec3> nodes_m, std::span<const Triangle> triang
   }
 }
 
-double Surface::calc_area_m2() const {
+double RadiatingSurface::calc_area_m2() const {
   double area = 0.0;
   for (const Facet& facet : facets_) area += facet.area_m2;
   return area;
 }
 
-double Surface::calc_volume_m3() const {
+double RadiatingSurface::calc_volume_m3() const {
   double volume = 0.0;
   const Vec3 base = nodes_m_[0];
   for (const Facet& facet : facets_) volume += dot(nodes_m_[facet.corners[0]] - base, facet.normal) * facet.area_m2 / 3.0;
   return volume;
 }
 
-double Surface::calc_longest_edge_m() const {
+double RadiatingSurface::calc_longest_edge_m() const {
   double longest = 0.0;
   for (const Facet& facet : facets_) longest = std::max(longest, facet.size_m);
   return longest;

@@ -30,10 +30,10 @@ struct EdgePoint {
 
 /// Closed, oriented surfaces with N nodes, T facets and E = 3 T / 2 edges. What it keeps true: facets that are near in the list are near in
 /// space; nodes and edges are numbered in the order in which the facets meet them; there is no facet without an area.
-class Surface {
+class RadiatingSurface {
  public:
   /// Gives nodes and facets other numbers. Throws InputError when a number is not finite, and when no facet has an area.
-  Surface(std::span<const Vec3> nodes_m, std::span<const Triangle> triangles);
+  RadiatingSurface(std::span<const Vec3> nodes_m, std::span<const Triangle> triangles);
 
   const std::vector<Vec3>& get_nodes() const { return nodes_m_; }
   const std::vector<Facet>& get_facets() const { return facets_; }

@@ -1,4 +1,6 @@
-// Method:     CGAL's edge collapse: cost is the length of the edge, placement that of Lindstrom and Turk.
+// Method:     CGAL's edge collapse: cost is the length of the edge, placement that of Lindstrom and Turk where it stays near the edge;
+// other
+//             edges stay.
 // Source:     P. Lindstrom, G. Turk, Fast and memory efficient polygonal simplification, IEEE Visualization 1998.
 // Deviations: their cost, which leaves few triangles on flat faces, is for pictures; waves need them everywhere.
 #include "precompute/mesher/coarsen.hpp"
@@ -9,6 +11,8 @@
 #include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/Edge_length_cost.h>
 #include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/LindstromTurk_placement.h>
 #include <CGAL/Surface_mesh_simplification/edge_collapse.h>
+
+#include <optional>
 
 #include "runtime/base/error.hpp"
 
@@ -33,6 +37,23 @@ class StopAtEdges {
   std::size_t edges_;
 };
 
+/// The placement of Lindstrom and Turk, but none far from the edge: at rims of thin bodies it would go outward to make up for their volume.
+class NearPlacement {
+ public:
+  template <typename Profile>
+  std::optional<Kernel::Point_3> operator()(const Profile& profile) const {
+    const auto placed = placement_(profile);
+    if (!placed) return std::nullopt;
+    const Kernel::Segment_3 edge(profile.p0(), profile.p1());
+    const double farthest = kFarthest * kFarthest * edge.squared_length();
+    return CGAL::squared_distance(*placed, edge) > farthest ? std::nullopt : std::optional(*placed);
+  }
+
+ private:
+  static constexpr double kFarthest = 0.1;  // edges
+  SMS::LindstromTurk_placement<Mesh> placement_;
+};
+
 }  // namespace
 
 TriangleSurface coarsen(const TriangleSurface& surface, std::size_t corners) {
@@ -48,7 +69,7 @@ TriangleSurface coarsen(const TriangleSurface& surface, std::size_t corners) {
   if (!CGAL::is_closed(mesh)) throw InputError("--coarsen: the surface is open");
   if (mesh.number_of_vertices() > corners)
     SMS::edge_collapse(mesh, StopAtEdges(3 * corners),
-                       CGAL::parameters::get_cost(SMS::Edge_length_cost<Mesh>()).get_placement(SMS::LindstromTurk_placement<Mesh>()));
+                       CGAL::parameters::get_cost(SMS::Edge_length_cost<Mesh>()).get_placement(NearPlacement()));
   mesh.collect_garbage();
   TriangleSurface coarse;
   for (const auto vertex : mesh.vertices()) {

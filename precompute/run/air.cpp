@@ -104,7 +104,7 @@ AirReport add_air(Run& run, bank::Bank& bank) {
       run.log.print(report.result);
       bank.multipoles = std::move(found);
     }
-  } catch (const bem::Stopped&) {
+  } catch (const bem::SolveStopped&) {
     throw eigen::Stopped();
   }
   run.log.end();

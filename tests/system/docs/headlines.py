@@ -15,6 +15,7 @@ GROUPS = {
     "meshes": "bad, extreme and odd meshes",
     "materials": "extreme materials",
     "spectra": "dense, clustered and wide spectra",
+    "air": "radiation by boundary elements",
     "time": "long times, contacts, joints, sound",
     "formats": "formats of other programs",
     "cross": "answers of other solvers and engines",

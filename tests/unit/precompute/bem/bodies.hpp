@@ -21,7 +21,7 @@ struct Skin {
   std::vector<Vec3> nodes_m;
   std::vector<Triangle> triangles;
 
-  Surface make_surface() const { return Surface(nodes_m, triangles); }
+  RadiatingSurface make_surface() const { return RadiatingSurface(nodes_m, triangles); }
 };
 
 inline double calc_volume(const Skin& skin) {

@@ -61,7 +61,7 @@ inline double to_db(double ratio) { return 20.0 * std::log10(std::max(ratio, 1e-
 
 /// (T, 3, n) from `find`(place, normal of the facet, number).
 template <typename Find>
-std::vector<float> sample_corners(const Surface& surface, std::size_t count, const Find& find) {
+std::vector<float> sample_corners(const RadiatingSurface& surface, std::size_t count, const Find& find) {
   std::vector<float> velocity;
   for (const Facet& facet : surface.get_facets())
     for (const std::int32_t node : facet.corners)

@@ -23,7 +23,7 @@ using testing::Skin;
 using testing::to_db;
 
 /// Velocity z of the unit normal from the middle of the ball that a place is on.
-Outcome solve_rigid(const Surface& surface, double k) {
+Outcome solve_rigid(const RadiatingSurface& surface, double k) {
   const BoundaryEquations equations(
       surface, find_enclosing_sphere(surface.get_nodes()),
       testing::sample_corners(surface, 1, [](const Vec3& place, const Vec3&, std::size_t) { return normalise(place)[2]; }), 1);
@@ -79,7 +79,7 @@ TEST(hard_surfaces, needles_and_slivers_change_nothing) {
                                                             {"a sliver", split_triangle(ball, {0.5, 0.5 - thin, thin})}};
       for (const auto& [name, skin] : skins) {
         ASSERT_TRUE(testing::is_closed(skin));
-        const Surface surface = skin.make_surface();
+        const RadiatingSurface surface = skin.make_surface();
         ASSERT_EQ(surface.count_facets(), ball.triangles.size() + 2);
         const Outcome outcome = solve_rigid(surface, k);
         const double error = find_error_db(outcome, k);
@@ -97,7 +97,7 @@ TEST(hard_surfaces, two_balls_radiate_as_their_images_say) {
   const double gap = 0.5, k = 0.02;
   const Skin ball = make_ball(5, 1.0), both = testing::join(ball, ball, {2.0 + gap, 0.0, 0.0});
   ASSERT_TRUE(testing::is_closed(both));
-  const Surface surface = both.make_surface();
+  const RadiatingSurface surface = both.make_surface();
   EXPECT_NEAR(surface.calc_volume_m3(), 8.0 / 3.0 * std::numbers::pi, 1e-9);
   const BoundaryEquations equations(
       surface, find_enclosing_sphere(surface.get_nodes()),
@@ -117,7 +117,7 @@ TEST(hard_surfaces, two_balls_radiate_as_their_images_say) {
 }
 
 TEST(hard_surfaces, far_too_coarse_meshes_still_converge) {
-  const Surface surface = make_ball(8, 1.0).make_surface();
+  const RadiatingSurface surface = make_ball(8, 1.0).make_surface();
   for (const double k : {25.0, 40.0}) {
     const Outcome outcome = solve_rigid(surface, k);
     EXPECT_TRUE(outcome.gmres.is_converged) << k;
@@ -127,7 +127,7 @@ TEST(hard_surfaces, far_too_coarse_meshes_still_converge) {
 }
 
 TEST(hard_surfaces, very_low_wave_numbers_have_the_pressure_of_the_closed_form) {
-  const Surface surface = make_ball(8, 1.0).make_surface();
+  const RadiatingSurface surface = make_ball(8, 1.0).make_surface();
   for (const double k : {1e-4, 1e-6}) {
     const Outcome outcome = solve_rigid(surface, k);
     EXPECT_TRUE(outcome.gmres.is_converged);

@@ -68,7 +68,7 @@ Complex calc_slope(const Sources& sources, double k, const Vec3& x, const Vec3& 
 }
 
 /// (T, 3, 2): on each facet the linear function nearest to dp/dn in the mean square, by seven points; real and imaginary part.
-std::vector<float> project(const Surface& surface, const Sources& sources, double k) {
+std::vector<float> project(const RadiatingSurface& surface, const Sources& sources, double k) {
   const double root = std::sqrt(15.0);
   std::vector<float> velocity;
   for (const Facet& facet : surface.get_facets()) {
@@ -106,7 +106,7 @@ struct Errors {
 };
 
 Errors find_errors(const Skin& skin, const Sources& sources, double k) {
-  const Surface surface = skin.make_surface();
+  const RadiatingSurface surface = skin.make_surface();
   const BoundaryEquations equations(surface, find_enclosing_sphere(surface.get_nodes()), project(surface, sources, k), 2);
   const Outcome outcome = testing::solve(equations, k);
   EXPECT_TRUE(outcome.gmres.is_converged);

@@ -56,16 +56,16 @@ Radiator make_ringing_ball(int divisions, std::size_t modes, double low, double 
   });
 }
 
-Options make_options(double step, double error_db = -40.0) {
-  Options options;
+AirSolveOptions make_options(double step, double error_db = -40.0) {
+  AirSolveOptions options;
   options.step = step;
   options.error_db = error_db;
   return options;
 }
 
 /// Ranks share a wave number where its matrix takes more.
-Options limit_memory(double matrix_bytes) {
-  Options options;
+AirSolveOptions limit_memory(double matrix_bytes) {
+  AirSolveOptions options;
   options.matrix_bytes = matrix_bytes;
   return options;
 }
@@ -80,7 +80,7 @@ bool are_same(const Sounding& a, const Sounding& b) {
   return a.order == b.order && a.coefficient == b.coefficient && a.reaction == b.reaction && a.interpolation_db == b.interpolation_db;
 }
 
-void expect_same(const Solution& found, const Solution& wanted, const std::string& what) {
+void expect_same(const AirSolution& found, const AirSolution& wanted, const std::string& what) {
   if (tests::get_rank() != 0) return;
   ASSERT_EQ(found.modes.size(), wanted.modes.size()) << what;
   for (std::size_t m = 0; m < found.modes.size(); ++m) EXPECT_TRUE(are_same(found.modes[m], wanted.modes[m])) << what << ", mode " << m;
@@ -107,30 +107,30 @@ struct Notes {
 TEST(solve_air, has_the_same_bits_on_any_number_of_ranks) {
   // Three blocks of rows: of four ranks that share a wave number one has none.
   const Radiator radiator = make_ringing_ball(6, 18, 1.0, 7.0);
-  const Solution alone = solve_air(MPI_COMM_SELF, radiator, {});
+  const AirSolution alone = solve_air(MPI_COMM_SELF, radiator, {});
   ASSERT_LT(alone.wave_numbers, radiator.count_modes());
   EXPECT_EQ(alone.unknowns, 362U);
-  const Solution dealt = solve_air(MPI_COMM_WORLD, keep_on_root(radiator), {});
+  const AirSolution dealt = solve_air(MPI_COMM_WORLD, keep_on_root(radiator), {});
   expect_same(dealt, alone, "a wave number for each rank");
-  const Solution shared = solve_air(MPI_COMM_WORLD, keep_on_root(radiator), limit_memory(1.0));
+  const AirSolution shared = solve_air(MPI_COMM_WORLD, keep_on_root(radiator), limit_memory(1.0));
   expect_same(shared, alone, "a wave number for all ranks");
-  const Solution pairs = solve_air(MPI_COMM_WORLD, keep_on_root(radiator), limit_memory(8.0 * 362.0 * 362.0 / 1.5));
+  const AirSolution pairs = solve_air(MPI_COMM_WORLD, keep_on_root(radiator), limit_memory(8.0 * 362.0 * 362.0 / 1.5));
   expect_same(pairs, alone, "a wave number for two ranks");
 }
 
 TEST(solve_air, of_one_mode_is_shared_by_all_ranks) {
   const Radiator radiator = make_ringing_ball(4, 1, 2.0, 3.0);
-  const Solution alone = solve_air(MPI_COMM_SELF, radiator, {});
+  const AirSolution alone = solve_air(MPI_COMM_SELF, radiator, {});
   EXPECT_EQ(alone.wave_numbers, 1U);
   expect_same(solve_air(MPI_COMM_WORLD, keep_on_root(radiator), {}), alone, "one mode");
 }
 
 TEST(solve_air, resumes_with_the_same_bits_and_solves_nothing_twice) {
   const Radiator radiator = make_ringing_ball(4, 40, 1.0, 9.0);
-  Options options = make_options(1.0, -45.0);
+  AirSolveOptions options = make_options(1.0, -45.0);
   options.shift = calc_shifted;  // so that a wave number is asked for more modes later
   Notes first;
-  const Solution whole = solve_air(MPI_COMM_WORLD, keep_on_root(radiator), options, first.make_keeper());
+  const AirSolution whole = solve_air(MPI_COMM_WORLD, keep_on_root(radiator), options, first.make_keeper());
   if (tests::get_rank() == 0) {
     std::set<double> distinct;
     for (const WaveAnswer& answer : first.saved) distinct.insert(answer.k);
@@ -148,7 +148,7 @@ TEST(solve_air, resumes_with_the_same_bits_and_solves_nothing_twice) {
     Notes stopped, rest;
     stopped.most_saved = part;
     if (tests::get_rank() != 0) stopped.most_saved = std::numeric_limits<int>::max();  // rank 0 alone is asked
-    EXPECT_THROW(solve_air(MPI_COMM_WORLD, keep_on_root(radiator), options, stopped.make_keeper()), Stopped);
+    EXPECT_THROW(solve_air(MPI_COMM_WORLD, keep_on_root(radiator), options, stopped.make_keeper()), SolveStopped);
     rest.given = stopped.saved;
     expect_same(solve_air(MPI_COMM_WORLD, keep_on_root(radiator), options, rest.make_keeper()), whole, "half was kept");
     if (tests::get_rank() == 0) {
@@ -192,8 +192,8 @@ TEST(solve_air, states_an_error_of_interpolation_that_holds) {
   constexpr double kFloorDb = -70.0;
   constexpr std::size_t kModes = 100;
   const Radiator radiator = make_ringing_ball(7, kModes, 1.0, 20.0);
-  const Solution found = solve_air(MPI_COMM_WORLD, keep_on_root(radiator), {});
-  const Solution wanted = solve_air(MPI_COMM_WORLD, keep_on_root(radiator), make_options(1e-3));
+  const AirSolution found = solve_air(MPI_COMM_WORLD, keep_on_root(radiator), {});
+  const AirSolution wanted = solve_air(MPI_COMM_WORLD, keep_on_root(radiator), make_options(1e-3));
   if (tests::get_rank() != 0) return;
   ASSERT_EQ(wanted.wave_numbers, kModes);
   ASSERT_LT(found.wave_numbers, kModes / 2);
@@ -213,12 +213,12 @@ TEST(solve_air, states_an_error_of_interpolation_that_holds) {
 
 TEST(solve_air, follows_modes_that_the_air_shifts) {
   const Radiator radiator = make_ringing_ball(4, 16, 1.0, 5.0);
-  Options options;
+  AirSolveOptions options;
   options.shift = calc_shifted;
-  const Solution found = solve_air(MPI_COMM_WORLD, keep_on_root(radiator), options);
+  const AirSolution found = solve_air(MPI_COMM_WORLD, keep_on_root(radiator), options);
   Radiator moved = keep_on_root(radiator);
   if (tests::get_rank() == 0) moved.wave_number_1_m = found.wave_number_1_m;
-  const Solution wanted = solve_air(MPI_COMM_WORLD, moved, make_options(1e-3));
+  const AirSolution wanted = solve_air(MPI_COMM_WORLD, moved, make_options(1e-3));
   if (tests::get_rank() != 0) return;
   int shifted = 0;
   for (std::size_t m = 0; m < 16; ++m) {
@@ -235,7 +235,7 @@ TEST(reaction, of_a_ball_is_its_added_mass) {
   const Radiator radiator = make_radiator(make_ball(9, 1.0), {0.1, 0.1001, 0.1002}, [](const Vec3& place, const Vec3&, std::size_t m) {
     return calc_harmonic(static_cast<int>(m), 0, normalise(place));
   });
-  const Solution found = solve_air(MPI_COMM_WORLD, keep_on_root(radiator), {});
+  const AirSolution found = solve_air(MPI_COMM_WORLD, keep_on_root(radiator), {});
   if (tests::get_rank() != 0) return;
   for (const int l : orders) {
     const double k = radiator.wave_number_1_m[static_cast<std::size_t>(l)];
@@ -248,7 +248,7 @@ TEST(reaction, of_a_ball_is_its_added_mass) {
 
 TEST(reaction, conserves_energy) {
   const Radiator radiator = make_ringing_ball(8, 5, 0.8, 6.0);
-  const Solution found = solve_air(MPI_COMM_WORLD, keep_on_root(radiator), {});
+  const AirSolution found = solve_air(MPI_COMM_WORLD, keep_on_root(radiator), {});
   if (tests::get_rank() != 0) return;
   for (std::size_t m = 0; m < 5; ++m) {
     const double k = radiator.wave_number_1_m[m];
@@ -267,7 +267,7 @@ TEST(reaction, of_a_thin_disc_is_that_of_lamb) {
   const Skin disc = testing::revolve(testing::divide({{0.0, -half}, {1.0, -half}, {1.0, half}, {0.0, half}}, spacing), spacing);
   ASSERT_TRUE(testing::is_closed(disc));
   const Radiator radiator = make_radiator(disc, {0.05}, [](const Vec3&, const Vec3& normal, std::size_t) { return normal[2]; });
-  const Solution found = solve_air(MPI_COMM_WORLD, keep_on_root(radiator), {});
+  const AirSolution found = solve_air(MPI_COMM_WORLD, keep_on_root(radiator), {});
   if (tests::get_rank() != 0) return;
   EXPECT_NEAR(-found.modes[0].reaction.real() / (8.0 / 3.0), 1.0, 0.015);
 }

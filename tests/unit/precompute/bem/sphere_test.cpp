@@ -46,7 +46,7 @@ class Spheres {
                                   }),
                    get_harmonics().size()) {}
 
-  const Surface& get_surface() const { return surface_; }
+  const RadiatingSurface& get_surface() const { return surface_; }
   const Outcome& solve(double k) {
     const auto [found, is_new] = outcomes_.try_emplace(k);
     if (is_new) found->second = testing::solve(equations_, k);
@@ -54,7 +54,7 @@ class Spheres {
   }
 
  private:
-  Surface surface_;
+  RadiatingSurface surface_;
   BoundaryEquations equations_;
   std::map<double, Outcome> outcomes_;
 };
@@ -147,7 +147,7 @@ TEST(sphere, has_the_pressure_of_the_closed_form_on_its_surface) {
 
 TEST(expansion, finds_the_coefficients_of_waves_about_its_centre) {
   // A wave h_l Y_lm on a ball that is not at its centre, pressure and slope given: the integrals must give back 1 for (l, m), else 0.
-  const Surface surface = make_ball(24, 1.0).make_surface();
+  const RadiatingSurface surface = make_ball(24, 1.0).make_surface();
   const Sphere sphere{.centre_m = {0.15, -0.1, 0.2}, .radius_m = 1.3};
   const double k = 2.0;
   const std::vector<Harmonic> waves{{0, 0}, {1, 1}, {2, -1}, {3, 3}};

@@ -23,13 +23,13 @@ using testing::make_box;
 using testing::Skin;
 
 TEST(surface, has_the_volume_and_the_area_of_a_ball_and_of_a_box) {
-  const Surface ball = make_ball(12, 0.3).make_surface();
+  const RadiatingSurface ball = make_ball(12, 0.3).make_surface();
   EXPECT_EQ(ball.count_nodes(), 1442U);
   EXPECT_EQ(ball.count_facets(), 2880U);
   EXPECT_EQ(ball.count_points(), 4320U);
   EXPECT_NEAR(ball.calc_volume_m3() / (4.0 / 3.0 * std::numbers::pi * 0.027), 1.0, 1e-9);
   EXPECT_NEAR(ball.calc_area_m2() / (4.0 * std::numbers::pi * 0.09), 1.0, 3e-3);
-  const Surface box = make_box({0.3, 0.2, 0.01}, {30, 20, 1}).make_surface();
+  const RadiatingSurface box = make_box({0.3, 0.2, 0.01}, {30, 20, 1}).make_surface();
   EXPECT_NEAR(box.calc_volume_m3(), 6e-4, 1e-15);
   EXPECT_NEAR(box.calc_area_m2(), 0.13, 1e-12);
   EXPECT_NEAR(box.calc_longest_edge_m(), 0.01 * std::numbers::sqrt2, 1e-12);
@@ -37,7 +37,7 @@ TEST(surface, has_the_volume_and_the_area_of_a_ball_and_of_a_box) {
 
 TEST(surface, keeps_facets_and_says_where_they_were) {
   const Skin skin = make_ball(5, 1.0);
-  const Surface surface = skin.make_surface();
+  const RadiatingSurface surface = skin.make_surface();
   std::set<std::int32_t> sources(surface.get_facet_sources().begin(), surface.get_facet_sources().end());
   EXPECT_EQ(sources.size(), skin.triangles.size());
   for (std::size_t t = 0; t < surface.count_facets(); ++t) {
@@ -66,7 +66,7 @@ TEST(surface, drops_facets_without_an_area) {
   skin.nodes_m.push_back(0.5 * (skin.nodes_m[first[0]] + skin.nodes_m[first[1]]));
   skin.triangles.push_back({first[0], first[1], static_cast<std::int32_t>(nodes)});
   skin.triangles.push_back({first[0], first[0], first[1]});
-  const Surface surface = skin.make_surface();
+  const RadiatingSurface surface = skin.make_surface();
   EXPECT_EQ(surface.count_facets(), triangles);
   EXPECT_EQ(surface.count_nodes(), nodes);
   for (const std::int32_t source : surface.get_facet_sources()) EXPECT_LT(source, static_cast<std::int32_t>(triangles));
@@ -78,7 +78,7 @@ TEST(surface, refuses_numbers_that_are_not_finite_and_surfaces_without_facets) {
     skin.nodes_m[7][1] = bad;
     EXPECT_THROW(skin.make_surface(), InputError);
   }
-  EXPECT_THROW(Surface({}, {}), InputError);
+  EXPECT_THROW(RadiatingSurface({}, {}), InputError);
   EXPECT_THROW((Skin{{Vec3{0, 0, 0}, Vec3{1, 0, 0}, Vec3{2, 0, 0}}, {{0, 1, 2}}}.make_surface()), InputError);
 }
 

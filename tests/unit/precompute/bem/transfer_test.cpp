@@ -91,7 +91,7 @@ TEST(transfer, to_facets_of_any_size_radiates_as_the_field_itself) {
   for (const int divisions : {9, 12}) {
     const Skin coarse = make_ball(divisions, 1.0);
     const Radiator found = transfer(fine, coarse.nodes_m, coarse.triangles), exact = make_radiator(coarse, orders.size(), find);
-    const Surface surface = coarse.make_surface();
+    const RadiatingSurface surface = coarse.make_surface();
     for (const double k : {0.3, 3.0}) {
       const auto radiate = [&](const Radiator& radiator) {
         std::vector<float> velocity;
