@@ -12,8 +12,6 @@
 #include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/LindstromTurk_placement.h>
 #include <CGAL/Surface_mesh_simplification/edge_collapse.h>
 
-#include <optional>
-
 #include "runtime/base/error.hpp"
 
 namespace carillon::mesher {
@@ -41,12 +39,12 @@ class StopAtEdges {
 class NearPlacement {
  public:
   template <typename Profile>
-  std::optional<Kernel::Point_3> operator()(const Profile& profile) const {
-    const auto placed = placement_(profile);
-    if (!placed) return std::nullopt;
+  auto operator()(const Profile& profile) const {
+    auto placed = placement_(profile);
+    if (!placed) return placed;
     const Kernel::Segment_3 edge(profile.p0(), profile.p1());
-    const double farthest = kFarthest * kFarthest * edge.squared_length();
-    return CGAL::squared_distance(*placed, edge) > farthest ? std::nullopt : std::optional(*placed);
+    if (CGAL::squared_distance(*placed, edge) > kFarthest * kFarthest * edge.squared_length()) placed.reset();
+    return placed;
   }
 
  private:

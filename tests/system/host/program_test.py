@@ -259,14 +259,14 @@ class RenderProgram(unittest.TestCase):
         report = json.loads((self.root / "off-report.json").read_text())
         on = 0
         for body in report["per_body"]:
-            self.assertEqual(len(body["effects"]), 9)
+            self.assertEqual(len(body["effects"]), 11)
             for name, effect in body["effects"].items():
                 if effect["on_s"] == 0.0:
                     self.assertEqual((effect["units"], effect["measured_us_per_s"]), (0, 0), f"{body['name']} {name}")
                 on += effect["on_s"] > 0.0 and effect["units"] > 0
         self.assertGreaterEqual(on, 3)
         cube, far = (body["effects"] for body in report["per_body"])
-        self.assertEqual([far[name]["on_s"] for name in far], [0.0] * 9)
+        self.assertEqual([far[name]["on_s"] for name in far], [0.0] * 11)
         self.assertEqual(cube["doppler"]["why"], "the scene says so")
         self.assertTrue(any(change["effect"] == "modal" and change["on"] for change in report["changes"]))
 

@@ -23,6 +23,7 @@ WEB = BIN.parent / "share" / "carillon" / "web"
 HERE = pathlib.Path(__file__).parent
 EFFECTS = ["modal", "hertz_pulse", "air_delay", "doppler", "two_ears"]
 CONTACTS = ["roughness", "rolling", "contact_damping"]
+OTHERS = ["acceleration_noise", "directivity", "ground_reflection"]
 LATENCY = 16  # frames by which the engine is behind a file
 LIMIT_DB = -90.0  # what is asked for is -60
 
@@ -199,7 +200,7 @@ def test_scenes():
             expected = np.interp(0.5, [m["time_s"] for m in mine], [m["position_m"][k] for m in mine])
             assert abs(extra["pose"]["position_m"][k] - expected) < 1e-9, (k, extra["pose"], expected)
         effects = extra["plan"]["bodies"][0]["effects"]
-        assert effects["modal"]["why"] and set(effects) == set(EFFECTS + CONTACTS + ["acceleration_noise"]), effects
+        assert effects["modal"]["why"] and set(effects) == set(EFFECTS + CONTACTS + OTHERS), effects
 
         wrong = contacts.read_text().replace('"body": 0', '"body": 7', 1)
         (bench.folder / "wrong.jsonl").write_text(wrong)
