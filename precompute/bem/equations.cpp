@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <limits>
 #include <memory>
 #include <numbers>
 #include <numeric>
@@ -81,6 +82,21 @@ BlockInverse::BlockInverse(const LinearSystem& system) {
     if (!inverse.allFinite()) inverse.setIdentity();
     blocks_.emplace_back(inverse.data(), inverse.data() + inverse.size());
   }
+}
+
+double solve_directly(const LinearSystem& system, Sides& solution) {
+  using Matrix = Eigen::Matrix<std::complex<float>, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  const auto unknowns = static_cast<Eigen::Index>(system.unknowns), sides = static_cast<Eigen::Index>(system.sides);
+  const Eigen::Map<const Matrix> matrix(system.matrix.data(), unknowns, unknowns), right(system.right.data(), unknowns, sides);
+  const Eigen::PartialPivLU<Matrix> factors(matrix);
+  Matrix found = factors.solve(right);
+  found += factors.solve(Matrix(right - matrix * found));
+  solution = Sides(std::span(found.data(), static_cast<std::size_t>(found.size())), system.unknowns, system.sides);
+  const Matrix left = right - matrix * found;
+  double worst = 0.0;
+  for (Eigen::Index m = 0; m < sides; ++m)
+    if (const double size = right.col(m).norm(); size > 0.0) worst = std::max(worst, static_cast<double>(left.col(m).norm()) / size);
+  return found.allFinite() ? worst : std::numeric_limits<double>::infinity();
 }
 
 void BlockInverse::apply(Sides& rows) const {

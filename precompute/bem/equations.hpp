@@ -30,6 +30,10 @@ struct LinearSystem {
   void multiply(const Sides& x, Sides& y) const;
 };
 
+/// Solves a system of all rows by LU with one step of refinement, for where an iteration does not converge: at the resonances of open
+/// cavities. Returns the residual of the worst side, relative to its right side.
+double solve_directly(const LinearSystem& system, Sides& solution);
+
 /// The inverses of the diagonal blocks of a system, kBlockRows each: nodes of a block are neighbours, so that they hold most of the
 /// hypersingular part. A block that is singular counts as the identity.
 class BlockInverse {

@@ -43,6 +43,25 @@ void add_mirror_image(const Plane& plane, Radiator& radiator) {
   radiator.sphere = find_enclosing_sphere(radiator.nodes_m);
 }
 
+/// Facets are as long as the edge of an even triangle of their mean area.
+void check_facets(const Radiator& radiator, const AirOptions& options) {
+  double area = 0.0;
+  for (const auto& [a, b, c] : radiator.triangles)
+    area += 0.5 * norm(cross(radiator.nodes_m[b] - radiator.nodes_m[a], radiator.nodes_m[c] - radiator.nodes_m[a]));
+  const double edge = std::sqrt(area / static_cast<double>(radiator.triangles.size()) * 4.0 / std::sqrt(3.0));
+  const double k =
+      radiator.wave_number_1_m.empty() ? 0.0 : *std::max_element(radiator.wave_number_1_m.begin(), radiator.wave_number_1_m.end());
+  const double facets = 2.0 * std::numbers::pi / (k * edge);
+  if (!(facets < kFewFacets)) return;
+  const auto wanted = std::ceil(static_cast<double>(radiator.nodes_m.size()) * kFewFacets * kFewFacets / (facets * facets));
+  const std::string text = fmt::format(
+      "the surface of {} nodes is too coarse for the air at {:.0f} Hz: {:.1f} facets per wavelength; give "
+      "\"radiation\" a \"skin_nodes\" of {:.0f} or more, and the body a mesh as fine, or end the band lower",
+      radiator.nodes_m.size(), k * options.sound_speed_ms / (2.0 * std::numbers::pi), facets, wanted);
+  if (facets < kFewestFacets) throw InputError(text);
+  if (options.warn) options.warn(text);
+}
+
 /// Squared sizes of the fields by order: far away, and at the nearest distance.
 struct Tail {
   std::vector<double> far, near;  // [l], what orders above l make of the whole
@@ -152,6 +171,7 @@ Radiator make_radiator(const bank::Bank& bank, std::span<const double> freq_hz, 
     auto [nodes, triangles] = options.coarsen(radiator.nodes_m, radiator.triangles, options.most_nodes);
     radiator = transfer(radiator, std::move(nodes), std::move(triangles));
   }
+  check_facets(radiator, options);
   if (options.half_space) add_mirror_image(*options.half_space, radiator);
   return radiator;
 }

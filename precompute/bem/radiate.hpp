@@ -28,14 +28,19 @@ struct AirOptions {
   /// Gives a closed surface about so many nodes, and keeps its volume. Rank 0 alone; may be empty: no surface is coarsened.
   std::function<std::pair<std::vector<Vec3>, std::vector<Triangle>>(const std::vector<Vec3>&, const std::vector<Triangle>&, std::size_t)>
       coarsen;
-  double order_db = -46.0;  // what the orders that are left out make, at the nearest distance and far away
+  std::function<void(const std::string&)> warn;  // one line, of rank 0; may be empty
+  double order_db = -46.0;                       // what the orders that are left out make, at the nearest distance and far away
 };
 
 /// From this added mass on a mode is shifted; from the second on modes are coupled by the air; beyond the third the air is no small change.
 inline constexpr double kShiftMass = 0.01, kCoupleMass = 0.1, kMostMass = 0.3;
 
+/// Facets per wavelength of the fastest mode: fewer than the first are refused, fewer than the second warned of.
+inline constexpr double kFewestFacets = 1.0, kFewFacets = 2.0;
+
 /// The surface of the bank that faces the open air, with the normal velocities of all modes on it, at the wave numbers of the frequencies
-/// that are played. `freq_hz`: of the modes. Throws InputError where the surface has no outside. Rank 0 alone.
+/// that are played. `freq_hz`: of the modes. Throws InputError where the surface has no outside, and
+/// where it is too coarse for the waves. Rank 0 alone.
 Radiator make_radiator(const bank::Bank& bank, std::span<const double> freq_hz, const AirOptions& options);
 
 /// The frequencies at which a bank is played: corrected ones where it has them.
@@ -52,6 +57,6 @@ bank::Multipoles calc_multipoles(const comm::Communicator& comm, const bank::Ban
 /// outer surface encloses, squared: 36 pi V^2 / A^3, 1 for a sphere, 0.52 for a cube, 0.02 for a plate.
 double calc_roundness(const bank::Bank& bank);
 /// Below it, "auto" takes boundary elements.
-inline constexpr double kCompact = 0.25;
+inline constexpr double kCompact = 0.4;
 
 }  // namespace carillon::bem

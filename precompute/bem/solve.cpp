@@ -26,7 +26,8 @@ namespace {
 using Single = std::complex<float>;
 using Double = std::complex<double>;
 
-constexpr int kRounds = 40;  // of refinement
+constexpr double kDirectResidual = 1e-3;  // of a solve by LU, in single precision
+constexpr int kRounds = 40;               // of refinement
 constexpr std::int32_t kMostOrder = 110;
 
 /// Ranks that share wave numbers: each has some of the rows.
@@ -54,6 +55,8 @@ class Group {
   int get_number() const { return number_; }
   int count() const { return count_; }
   bool is_first() const { return rank_ == 0; }
+  /// One rank has the whole matrix.
+  bool has_all_rows() const { return first_.size() == 2; }
   /// The first rank of a group, among all.
   int find_first_rank(int number) const { return number * size_; }
   std::size_t get_first() const { return first_[static_cast<std::size_t>(rank_)]; }
@@ -111,7 +114,11 @@ WaveAnswer solve_wave(const BoundaryEquations& equations, const Group& group, do
     inverse.apply(mine);
     group.gather(mine, y);
   };
-  const GmresResult result = solve_gmres(multiply, right, {.tolerance = tolerance}, pressures);
+  GmresResult result = solve_gmres(multiply, right, {.tolerance = tolerance}, pressures);
+  if (!result.is_converged && group.has_all_rows()) {
+    result.residual = solve_directly(system, pressures);
+    result.is_converged = result.residual <= kDirectResidual;
+  }
   answer.products = result.products;
   answer.residual = result.residual;
   if (!result.is_converged)

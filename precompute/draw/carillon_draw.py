@@ -1,9 +1,10 @@
 #!/usr/bin/python3
 """carillon-draw: pictures of mode banks and of simulated scenes, drawn off-screen with VTK.
 
-One file, so that it runs wherever it is copied to; two parts: pictures of modes, pictures of scenes, and what both share.
+One file, so that it runs wherever it is copied to; three parts: pictures of modes, of their directivity, of scenes, and what all share.
 
     carillon-draw modes BANK -o OUT.png [--modes 1,2,3] [--up x|y|z]
+    carillon-draw directivity BANK -o OUT.png [--modes 1,2,3] [--up x|y|z]
     carillon-draw scene TRAJECTORY.json -o OUT.png
 
 Exit codes: 0 done, 2 the input cannot be used, 4 the machine refused.
@@ -31,6 +32,9 @@ import numpy
 VERSION = "unknown"  # what the build writes here
 STANDARD_OUTPUT = pathlib.Path("-")
 SUPERSAMPLING = 2  # pixels drawn per pixel written, along each side
+RANGE_DB = 30.0  # of a directivity balloon, from its centre to its largest radius
+FLOOR_DB = -120.0  # of a far level: what is lower counts as this, so that a silent direction has a level
+MAX_ORDER = 120  # of multipoles (runtime/bank/multipoles.hpp)
 TEXT = (0.16, 0.17, 0.20)
 BACKGROUND = ((1.0, 1.0, 1.0), (0.90, 0.92, 0.95))  # top, bottom
 # viridis (van der Walt and Smith 2015), nine of its colours; equal steps look equal.
@@ -149,6 +153,106 @@ class Bank:
             raise InputError(f"{self.path}: mode {number} has a displacement that is no finite number; run carillon-bank check on it")
         largest = numpy.abs(steps).max(initial=0.0)
         return steps / largest if largest > 0 and scale != 0 else numpy.zeros_like(steps)
+
+
+class Multipoles:
+    """The group radiation/ of a bank, what its modes send into the air: every mode of the bank has one order and (order + 1)^2 finite
+    coefficients."""
+
+    def __init__(self, bank):
+        path = bank.path
+        try:
+            with h5py.File(path, "r") as file:
+                if "radiation" not in file:
+                    raise InputError(
+                        f"{path}: the bank has no multipoles, so that nothing is known of directions; add them with"
+                        f' \'carillon-precompute --radiate {path} --bank OUT.hdf\', or with "radiation": "bem" in the job'
+                    )
+                group = file["radiation"]
+                self.centre_m = numpy.asarray(group["centre_m"][:], dtype=float)
+                self.radius_m, self.sound_speed_ms = float(group["radius_m"][()]), float(group["sound_speed_ms"][()])
+                self.freq_hz, scale = (numpy.asarray(group[key][:], dtype=float) for key in ("freq_hz", "scale"))
+                self.order = numpy.asarray(group["order"][:], dtype=int)
+                steps = numpy.asarray(group["coefficient"][:], dtype=float)
+        except (OSError, KeyError, TypeError, ValueError, AttributeError, OverflowError, RuntimeError, MemoryError) as error:
+            raise InputError(f"{path}: the multipoles cannot be read ({error}); run carillon-bank check on it") from None
+
+        def refuse(what):
+            raise InputError(f"{path}: {what}; run carillon-bank check on it")
+
+        modes = (len(bank.freq_hz),)
+        if self.centre_m.shape != (3,) or not self.order.shape == self.freq_hz.shape == scale.shape == modes:
+            refuse("multipoles and modes do not fit each other")
+        if ((self.order < 0) | (self.order > MAX_ORDER)).any() or steps.shape != (((self.order + 1) ** 2).sum(), 2):
+            refuse("the orders of the multipoles do not fit their coefficients")
+        numbers = [self.centre_m, self.freq_hz, scale, numpy.array([self.radius_m, self.sound_speed_ms])]
+        if not all(numpy.isfinite(values).all() for values in numbers):
+            refuse("a multipole is no finite number")
+        if not (self.radius_m > 0 and self.sound_speed_ms > 0 and (self.freq_hz > 0).all()):
+            refuse("the air has a radius, a frequency or a speed of sound that is not above 0")
+        self.first = numpy.concatenate([[0], numpy.cumsum((self.order + 1) ** 2)])
+        # Levels are relative to the mode's largest: only whether the scale is 0 counts.
+        self.coefficient = (steps[:, 0] + 1j * steps[:, 1]) * numpy.repeat(scale > 0, (self.order + 1) ** 2)
+
+    def calc_far(self, number, polar, azimuth):
+        """The far pressure of mode `number`, counted from 1, in the directions polar (from z) x azimuth (from x to y) of the mesh's frame;
+        complex, any scale."""
+        order = int(self.order[number - 1])
+        waves = 2 * math.pi * self.freq_hz[number - 1] / self.sound_speed_ms * self.radius_m
+        coefficient = self.coefficient[self.first[number - 1] : self.first[number]]
+        return calc_far_pattern(coefficient, order, waves, polar, azimuth)
+
+
+def calc_inverse_hankels(x, order):
+    """(-i)^(l + 1) / h_l(x) for l = 0 .. order: a multipole on the sphere, seen from far away. h_l by upward recurrence (DLMF 10.51.1),
+    which is stable for it; by ratios, so that what is too large for a number becomes 0 here."""
+    ratio = 1 / x - 1j  # h_1 / h_0
+    inverse = [x * numpy.exp(-1j * x)]  # h_0 = -i e^(ix) / x
+    for l in range(1, order + 1):
+        inverse.append(-1j * inverse[-1] / ratio)
+        ratio = (2 * l + 1) / x - 1 / ratio
+    return numpy.array(inverse)
+
+
+def calc_far_pattern(coefficient, order, waves, polar, azimuth):
+    """sum of a_lm (-i)^(l + 1) / h_l(kR) Y_lm over l <= order, |m| <= l: the far pressure times k r e^(-ikr) (runtime/bank/multipoles.hpp),
+    in the directions polar x azimuth. coefficient: a_lm at l^2 + l + m. waves: kR > 0. Y_lm: real, orthonormal, cos m phi for m >= 0,
+    sin |m| phi for m < 0 (docs/equations.md E10), by the recurrence of the normalised associated Legendre functions."""
+    inverse = calc_inverse_hankels(waves, order)
+    x, sine = numpy.cos(polar), numpy.sin(polar)
+    rings, around = [], []  # the pattern is the sum over m of one times the other
+    diagonal = numpy.full(len(polar), math.sqrt(0.25 / math.pi))  # P_mm, the sine included
+    for m in range(order + 1):
+        before, here, factor = numpy.zeros_like(x), diagonal, 0.0
+        cosines, sines = numpy.zeros(len(polar), dtype=complex), numpy.zeros(len(polar), dtype=complex)
+        for l in range(m, order + 1):
+            middle = l * l + l
+            cosines += coefficient[middle + m] * inverse[l] * here
+            sines += coefficient[middle - m] * inverse[l] * here
+            following = math.sqrt((4 * (l + 1) ** 2 - 1) / ((l + 1) ** 2 - m * m))
+            before, here, factor = here, following * (x * here - factor * before), 1 / following
+        norm = math.sqrt(2) if m else 1.0
+        rings += [norm * cosines, norm * sines]
+        around += [numpy.cos(m * azimuth), numpy.sin(m * azimuth)]
+        diagonal = diagonal * sine * math.sqrt((2 * m + 3) / (2 * m + 2))
+    rings, around = numpy.array(rings).T, numpy.array(around)
+    return rings.real @ around + 1j * (rings.imag @ around)
+
+
+def calc_levels(pattern):
+    """Levels in dB relative to the largest, FLOOR_DB or more; None where nothing is sent."""
+    size = numpy.abs(pattern)
+    if not size.max() > 0:
+        return None
+    return 20 * numpy.log10(numpy.maximum(size / size.max(), 10 ** (FLOOR_DB / 20)))
+
+
+def make_equal_areas(order):
+    """Polar angles and azimuths of directions that stand for equal parts of the sphere, for means of a pattern of this order. None lies
+    where symmetric bodies send nothing: a level has no bound there, and one direction would count for more than its part. The spread of a
+    dipole is found within 0.1 dB."""
+    rings = max(720, 8 * order)
+    return numpy.arccos(1 - (2 * numpy.arange(rings) + 1) / rings), math.pi * (numpy.arange(2 * rings) + 0.382) / rings
 
 
 class Trajectory:
@@ -526,11 +630,13 @@ def draw_modes(bank, numbers, up):
         renderer.AddActor2D(make_text(f"{bank.freq_hz[number - 1]:,.1f} Hz", 0.5, 42 / height, 26))
         row, column = divmod(index, columns)
         canvas[row * height : (row + 1) * height, column * width : (column + 1) * width] = draw([renderer, above], width, height)
-    canvas[rows * height :] = draw_legend(canvas.shape[1], legend, colours, bank)
+    note = f"{bank.path.name}   ·   {bank.note}   ·   grey: undeformed; displacements exaggerated"
+    canvas[rows * height :] = draw_legend(canvas.shape[1], legend, colours, ("at rest", "largest displacement"), note)
     return canvas
 
 
-def draw_legend(width, height, colours, bank):
+def draw_legend(width, height, colours, ends, note):
+    """A bar of all colours between the words of its two ends, and a note below."""
     renderer = make_renderer()
     renderer.SetBackground(1.0, 1.0, 1.0)
     renderer.SetBackground2(1.0, 1.0, 1.0)
@@ -550,18 +656,107 @@ def draw_legend(width, height, colours, bank):
     camera.SetPosition(0.5, 0.025 - 14 * pixel, 1)
     camera.SetParallelScale(0.5 * height * pixel)
     middle = 0.5 + 14 / height
-    renderer.AddActor2D(make_text("at rest", 0.5 - (180 + 48) / width, middle, 19))
-    renderer.AddActor2D(make_text("largest displacement", 0.5 + (180 + 108) / width, middle, 19))
-    renderer.AddActor2D(
-        make_text(
-            f"{bank.path.name}   ·   {bank.note}   ·   grey: undeformed; displacements exaggerated",
-            0.5,
-            18 / height,
-            16,
-            colour=(0.42, 0.44, 0.48),
-        )
-    )
+    for text, side in zip(ends, (-1, 1)):
+        renderer.AddActor2D(make_text(text, 0.5 + side * (180 + 18 + 4.5 * len(text)) / width, middle, 19))
+    renderer.AddActor2D(make_text(note, 0.5, 18 / height, 16, colour=(0.42, 0.44, 0.48)))
     return draw([renderer], width, height)
+
+
+# ------------------------------------------------------------------ directivity
+
+
+BODY_RADIUS = 0.24  # of the sphere around the body, where 1 is the largest radius of the balloon
+
+
+def make_directions(order):
+    """Polar angles from 0 to pi and azimuths all around, in equal steps: 16 a wave of the highest order, enough for a smooth picture."""
+    steps = max(180, 8 * order)
+    return numpy.linspace(0, math.pi, steps + 1), 2 * math.pi * numpy.arange(2 * steps) / (2 * steps)
+
+
+def make_balloon(levels, polar, azimuth):
+    """Vertices, triangles and colours 0 .. 1 of the surface whose radius and colour are the level over RANGE_DB."""
+    radius = numpy.clip(1 + levels / RANGE_DB, 0, 1)
+    sine, cosine = numpy.sin(polar)[:, None], numpy.cos(polar)[:, None]
+    directions = numpy.stack([sine * numpy.cos(azimuth), sine * numpy.sin(azimuth), cosine * numpy.ones_like(azimuth)], axis=-1)
+    rows, columns = radius.shape
+    a = numpy.arange(rows * columns).reshape(rows, columns)[:-1]
+    b = numpy.roll(a, -1, axis=1)  # the next azimuth; below: the next polar angle
+    triangles = numpy.concatenate(
+        [
+            numpy.stack(corners, -1)[part].reshape(-1, 3)
+            for corners, part in [((a, a + columns, b + columns), slice(None, -1)), ((a, b + columns, b), slice(1, None))]
+        ]
+    )
+    return (radius[..., None] * directions).reshape(-1, 3), triangles, radius.ravel()
+
+
+def make_ring(view, radius):
+    """A circle about the centre, in the plane of the picture."""
+    angle = numpy.linspace(0, 2 * math.pi, 181)
+    return radius * (numpy.outer(numpy.cos(angle), view.axes[0]) + numpy.outer(numpy.sin(angle), view.axes[1]))
+
+
+def make_polyline(points, colour, width):
+    line = make_line(points, 0.5 * width, colour)
+    return make_flat(line)
+
+
+def make_glass(surface, toward, colours):
+    """A surface that is seen through where it faces the eye and not where it turns away, coloured by its scalars."""
+    normals = to_numpy(surface.GetPointData().GetNormals())
+    level = to_numpy(surface.GetPointData().GetScalars())
+    facing = numpy.abs(normals @ toward)
+    rgba = numpy.empty((len(level), 4))
+    for channel in range(3):
+        rgba[:, channel] = numpy.interp(level, numpy.linspace(0, 1, len(VIRIDIS)), VIRIDIS[:, channel])
+    rgba[:, 3] = 0.46 + 0.50 * (1 - facing) ** 1.5
+    surface.GetPointData().SetScalars(to_vtk((255 * rgba).astype(numpy.uint8), deep=True))
+    actor = make_actor(surface)
+    actor.GetMapper().ScalarVisibilityOn()
+    actor.GetMapper().SetColorModeToDirectScalars()
+    actor.ForceTranslucentOn()
+    return actor
+
+
+def draw_directivity(bank, air, numbers, up):
+    triangles = drop_cavities(bank.vertices, bank.triangles)
+    body = (bank.vertices - air.centre_m) * BODY_RADIUS / air.radius_m
+    view = View(up, body[numpy.unique(triangles)], 28, 20)
+    colours = make_colours()
+    columns, width, height = choose_panels(len(numbers), 1.0)
+    rows = math.ceil(len(numbers) / columns)
+    legend = 84
+    canvas = numpy.full((rows * height + legend, columns * width, 3), 255.0)
+    for index, number in enumerate(numbers):
+        order = int(air.order[number - 1])
+        polar, azimuth = make_directions(order)
+        levels = calc_levels(air.calc_far(number, polar, azimuth))
+        renderer, above = make_renderer(), make_renderer()
+        renderer.GradientBackgroundOff()
+        renderer.SetBackground(1.0, 1.0, 1.0)
+        reach = numpy.full(3, 1.06)
+        pixel = view.aim(renderer, -reach, reach, width, height, (30, 30, 110, 20))
+        above.SetActiveCamera(renderer.GetActiveCamera())
+        above.SetMaximumNumberOfPeels(8)
+        for step in range(3):
+            radius = 1 - 10 * step / RANGE_DB
+            renderer.AddActor(make_polyline(make_ring(view, radius), (0.72, 0.75, 0.80), 1.6 * pixel))
+        above.AddActor(make_actor(make_surface(body, triangles), (0.96, 0.42, 0.26)))
+        spread = "silent"
+        if levels is not None:
+            spread = f"spread {calc_levels(air.calc_far(number, *make_equal_areas(order))).std():.1f} dB"
+            vertices, faces, level = make_balloon(levels, polar, azimuth)
+            above.AddActor(make_glass(make_surface(vertices, faces, level, crease_deg=180.0), view.axes[2], colours))
+        above.ResetCameraClippingRange(-2, 2, -2, 2, -2, 2)
+        renderer.AddActor2D(make_text(f"Mode {number}", 0.5, 80 / height, 30, bold=True))
+        label = f"{air.freq_hz[number - 1]:,.1f} Hz, order {order}, {spread}"
+        renderer.AddActor2D(make_text(label, 0.5, 42 / height, min(24, 1.75 * width / len(label))))
+        row, column = divmod(index, columns)
+        canvas[row * height : (row + 1) * height, column * width : (column + 1) * width] = draw([renderer, above], width, height)
+    note = f"{bank.path.name}   ·   far away, about the body in the middle   ·   rings: 0, -10 and -20 dB"
+    canvas[rows * height :] = draw_legend(canvas.shape[1], legend, colours, (f"-{RANGE_DB:.0f} dB", "0 dB, the loudest direction"), note)
+    return canvas
 
 
 # ------------------------------------------------------------------ scene
@@ -810,28 +1005,37 @@ class Parser(argparse.ArgumentParser):
 def run():
     parser = Parser(prog="carillon-draw", description="Draws mode banks and simulated scenes.")
     parser.add_argument("--version", action="version", version=f"carillon-draw {VERSION}")
-    commands = parser.add_subparsers(dest="command", required=True, metavar="modes|scene", parser_class=Parser)
+    commands = parser.add_subparsers(dest="command", required=True, metavar="modes|directivity|scene", parser_class=Parser)
     modes = commands.add_parser("modes", help="modes of a bank as deformed bodies", allow_abbrev=False)
+    directivity = commands.add_parser("directivity", help="how loud each mode is in every direction, far away", allow_abbrev=False)
     modes.add_argument("bank", metavar="BANK")
-    modes.add_argument("-o", "--output", required=True, type=pathlib.Path, metavar="OUT.png")
-    modes.add_argument("--modes", metavar="1,2,3", help="which modes, counted from 1 [the first three]")
-    modes.add_argument("--up", choices="xyz", default="y", help="the axis of the mesh that points up in the picture [y]")
+    directivity.add_argument("bank", metavar="BANK", help="with multipoles, as carillon-precompute --radiate writes it")
+    for command in (modes, directivity):
+        command.add_argument("-o", "--output", required=True, type=pathlib.Path, metavar="OUT.png")
+        command.add_argument("--modes", metavar="1,2,3", help="which modes, counted from 1 [the first three]")
+        command.add_argument("--up", choices="xyz", default="y", help="the axis of the mesh that points up in the picture [y]")
     scene = commands.add_parser("scene", help="the bodies of a simulated scene along their ways", allow_abbrev=False)
     scene.add_argument("trajectory", metavar="TRAJECTORY.json", help="written by carillon-render --trajectory")
     scene.add_argument("-o", "--output", required=True, type=pathlib.Path, metavar="OUT.png")
-    for command in (modes, scene):
+    for command in (modes, directivity, scene):
         command.add_argument("--result", type=pathlib.Path, metavar="FILE", help="write how the program ended to this file, a JSON object")
     arguments = parser.parse_args()
 
     check_output(arguments.output)
-    if arguments.command == "modes":
-        bank = Bank(arguments.bank)
-        numbers = parse_modes(arguments.modes, bank)
-    else:
+    if arguments.command == "scene":
         trajectory = Trajectory(arguments.trajectory)
+    else:
+        bank = Bank(arguments.bank)
+        air = Multipoles(bank) if arguments.command == "directivity" else None
+        numbers = parse_modes(arguments.modes, bank)
     open_display()
     load_vtk()
-    image = draw_modes(bank, numbers, "xyz".index(arguments.up)) if arguments.command == "modes" else draw_scene(trajectory)
+    if arguments.command == "modes":
+        image = draw_modes(bank, numbers, "xyz".index(arguments.up))
+    elif arguments.command == "directivity":
+        image = draw_directivity(bank, air, numbers, "xyz".index(arguments.up))
+    else:
+        image = draw_scene(trajectory)
     write_png(image, arguments.output)
     piped = arguments.output == STANDARD_OUTPUT
     print(

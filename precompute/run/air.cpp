@@ -83,6 +83,8 @@ AirReport add_air(Run& run, bank::Bank& bank) {
     run.log.end();
     return report;
   }
+  bem::AirOptions options = make_options(run.job.air);
+  options.warn = [&run](const std::string& text) { run.log.warn(text); };
   bem::Keeper keeper;
   keeper.report = [&run, tenths = 0](const std::string& text, double share) mutable {
     const int now = static_cast<int>(10.0 * share);
@@ -97,8 +99,8 @@ AirReport add_air(Run& run, bank::Bank& bank) {
   }
   try {
     const std::string source = run.comm.broadcast(run.job.file.string());
-    bank::Multipoles found = name_errors(
-        source, run, [&] { return bem::calc_multipoles(run.comm, bank, make_options(run.job.air), std::move(keeper), answers); });
+    bank::Multipoles found =
+        name_errors(source, run, [&] { return bem::calc_multipoles(run.comm, bank, options, std::move(keeper), answers); });
     if (run.comm.is_root()) {
       report.result = describe_multipoles(found);
       run.log.print(report.result);

@@ -1,6 +1,9 @@
 #!/usr/bin/python3
 """Draws small banks and a small scene, and reads the pictures back: they have to show what was put into them."""
+import importlib.machinery
+import importlib.util
 import json
+import math
 import os
 import pathlib
 import shutil
@@ -16,6 +19,7 @@ import numpy
 import make_bank
 
 PROGRAM = pathlib.Path(os.environ["CARILLON_BIN_DIR"]) / "carillon-draw"
+AIR_BANK = pathlib.Path(__file__).parents[2] / "unit/runtime/bank/pinned/version_1_5.hdf"
 faults = []
 
 
@@ -76,12 +80,100 @@ def count_like(image, colour, reach=0.06):
     return int(((cosine > 1 - reach) & (strength > 40)).sum())
 
 
+def split_panels(image, count):
+    """Panels of a picture of directivity, without their labels, as carillon-draw arranges them."""
+    columns, width, height = load_program().choose_panels(count, 1.0)
+    corners = [(index // columns * height, index % columns * width) for index in range(count)]
+    return [image[y : y + height - 112, x : x + width] for y, x in corners]
+
+
+def measure_ink(image):
+    """Width and height of all that is not grey, in pixels: balloon and body, not the rings."""
+    ink = numpy.ptp(image.astype(int), axis=2) > 40
+    return numpy.ptp(numpy.flatnonzero(ink.any(axis=0))) + 1, numpy.ptp(numpy.flatnonzero(ink.any(axis=1))) + 1
+
+
 def spoil(source, target, change):
     """A copy of a bank with `change` made to its HDF5 part, sealed again."""
     shutil.copy(folder / source, folder / target)
     with h5py.File(folder / target, "r+") as bank:
         change(bank)
     make_bank.seal(folder / target)
+
+
+def load_program():
+    """The program as a module, for what it computes before it draws."""
+    sys.dont_write_bytecode = True
+    loader = importlib.machinery.SourceFileLoader("carillon_draw", str(PROGRAM))
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader("carillon_draw", loader))
+    loader.exec_module(module)
+    return module
+
+
+def check_patterns():
+    """Far patterns against closed forms: (-i)^(l + 1) / h_l of orders 0 to 2 and real harmonics, both written out."""
+    draw = load_program()
+    polar, azimuth = numpy.linspace(0, math.pi, 181), 2 * math.pi * numpy.arange(360) / 360
+    x = numpy.sin(polar)[:, None] * numpy.cos(azimuth)
+    y = numpy.sin(polar)[:, None] * numpy.sin(azimuth)
+    z = numpy.cos(polar)[:, None] + 0 * azimuth
+    third = math.sqrt(3 / (4 * math.pi))
+    fifth = math.sqrt(15 / (4 * math.pi))
+    harmonics = [math.sqrt(0.25 / math.pi) + 0 * x, third * y, third * z, third * x]
+    harmonics += [fifth * x * y, fifth * y * z, math.sqrt(5 / (16 * math.pi)) * (3 * z * z - 1), fifth * x * z, fifth / 2 * (x * x - y * y)]
+    for waves in (0.05, 1.3, 9.0):
+        x0 = waves  # DLMF 10.49.6
+        hankel = [-1j / x0, -(x0 + 1j) / x0**2, 1j * (x0**2 + 3j * x0 - 3) / x0**3]
+        inverse = [(-1j) ** (l + 1) / (h * numpy.exp(1j * x0)) for l, h in enumerate(hankel)]
+        for index, harmonic in enumerate(harmonics):
+            alone = numpy.zeros(9, dtype=complex)
+            alone[index] = 2 - 1j
+            order = math.isqrt(index)
+            wanted = (2 - 1j) * inverse[order] * harmonic
+            found = draw.calc_far_pattern(alone, 2, waves, polar, azimuth)
+            error = numpy.abs(found - wanted).max() / numpy.abs(wanted).max()
+            expect(error < 1e-12, f"pattern of number {index} at kR {waves}: off by {error:.1e}")
+
+    # High orders: on the axis only m = 0 is left, with sqrt((2 l + 1) / 4 pi); the squares of an order add up to (2 l + 1) / 4 pi.
+    order = 60
+    inverse = draw.calc_inverse_hankels(70.0, order)
+    for l in (3, 20, 60):
+        alone = numpy.zeros((order + 1) ** 2, dtype=complex)
+        alone[l * l : (l + 1) ** 2] = 1.0
+        top = draw.calc_far_pattern(alone, order, 70.0, polar, azimuth)[0] / inverse[l]
+        expect(numpy.abs(top - math.sqrt((2 * l + 1) / (4 * math.pi))).max() < 1e-11, f"harmonics of order {l} on the axis")
+        square = 0
+        for m in range(2 * l + 1):
+            alone[:] = 0
+            alone[l * l + m] = 1
+            square = square + numpy.abs(draw.calc_far_pattern(alone, order, 70.0, polar[40:42], azimuth[:5]) / inverse[l]) ** 2
+        expect(numpy.abs(square - (2 * l + 1) / (4 * math.pi)).max() < 1e-10, f"Unsoeld's sum of the harmonics of order {l}")
+    expect(numpy.isfinite(draw.calc_inverse_hankels(1e-3, 120)).all(), "orders that send nothing are no numbers")
+
+    # ln |cos| over directions has the standard deviation 1, along any axis: no null may count for more than its share.
+    for number, (coefficient, order, wanted) in enumerate(
+        [([1], 0, 0.0), ([0, 0, 1, 0], 1, 8.6859), ([0, 0, 0, 1], 1, 8.6859), ([0, 1, 0, 0], 1, 8.6859), ([0, 1, -2, 0.5], 1, 8.6859)]
+    ):
+        rings, sectors = draw.make_equal_areas(order)
+        spread = draw.calc_levels(draw.calc_far_pattern(numpy.array(coefficient), order, 1.0, rings, sectors)).std()
+        expect(abs(spread - wanted) < 0.1, f"spread of pattern {number}: {spread:.3f} dB, not {wanted}")
+    expect(draw.calc_levels(0j * z) is None, "a mode that sends nothing has levels")
+
+    # The closed surface: outward, and the volume of what its radii enclose.
+    for levels, volume in [(0 * z, 4 / 3 * math.pi), (-15 + 0 * z, 4 / 3 * math.pi / 8), (-15 * (1 - z), math.pi / 3)]:
+        vertices, triangles, colour = draw.make_balloon(levels, polar, azimuth)
+        a, b, c = (vertices[triangles[:, corner]] for corner in range(3))
+        found = numpy.einsum("ij,ij->", a, numpy.cross(b, c)) / 6
+        expect(abs(found / volume - 1) < 1e-3, f"balloon: volume {found:.4f}, not {volume:.4f}")
+        expect(numpy.allclose(colour, 1 + levels.ravel() / 30), "balloon: the colour is another level than the radius")
+
+
+def write_dipoles(bank):
+    """Mode 1 a dipole along z, mode 2 one along x, mode 3 a monopole, mode 4 silent."""
+    coefficient = numpy.zeros(bank["radiation/coefficient"].shape, "<i2")
+    coefficient[[2, 4 + 3, 4 + 9]] = (0, 20000)
+    bank["radiation/coefficient"][:] = coefficient
+    bank["radiation/scale"][3] = 0.0
 
 
 with tempfile.TemporaryDirectory() as name:
@@ -104,6 +196,22 @@ with tempfile.TemporaryDirectory() as name:
             expect(count_like(part, (253, 231, 37)) > 1000, f"modes: nothing moves much in column {column}")
         edges = numpy.concatenate([image[0], image[-1], image[:, 0], image[:, -1]])
         expect(edges.min() > 240, "modes: something is cut off at the edge of the picture")
+
+    # What modes send: a dipole along the axis that points up, one across it, a monopole, nothing.
+    check_patterns()
+    shutil.copy(AIR_BANK, folder / "air.hdf")
+    spoil("air.hdf", "dipoles.hdf", write_dipoles)
+    done = run("directivity", "dipoles.hdf", "-o", "air.png", "--modes", "1,2,3,4", "--up", "z", folder=folder)
+    expect(done.returncode == 0, f"directivity: exit code {done.returncode}: {done.stderr}")
+    if done.returncode == 0:
+        image = read_png(folder / "air.png")
+        expect(image.shape[1] >= 1600, f"directivity: the picture is {image.shape[1]} pixels wide")
+        panels = split_panels(image, 4)
+        tall, wide, round_, silent = (measure_ink(panel) for panel in panels)
+        expect(tall[1] > 1.3 * tall[0], f"directivity: a dipole along the axis up covers {tall[0]} x {tall[1]} pixels")
+        expect(wide[0] > 1.15 * wide[1], f"directivity: a dipole across covers {wide[0]} x {wide[1]} pixels")
+        expect(abs(round_[0] / round_[1] - 1) < 0.03, f"directivity: a monopole covers {round_[0]} x {round_[1]} pixels")
+        expect(silent[0] < 0.5 * round_[0], f"directivity: a silent mode covers {silent[0]} x {silent[1]} pixels")
 
     # A ball that falls on a shelf above the ground.
     poses = [[t, 0.0, 0.0, 0.5 - 4.9 * t * t, 1, 0, 0, 0] for t in numpy.linspace(0, 0.3, 40)]
@@ -158,6 +266,11 @@ with tempfile.TemporaryDirectory() as name:
         del bank[key]
         bank[key] = value
 
+    spoil("air.hdf", "order.hdf", lambda bank: bank["radiation/order"].__setitem__(0, 2))
+    spoil("air.hdf", "high.hdf", lambda bank: bank["radiation/order"].__setitem__(0, -1))
+    spoil("air.hdf", "slow.hdf", lambda bank: bank["radiation/sound_speed_ms"].__setitem__((), 0.0))
+    spoil("air.hdf", "loud.hdf", lambda bank: bank["radiation/scale"].__setitem__(0, numpy.nan))
+    spoil("air.hdf", "part.hdf", lambda bank: bank.__delitem__("radiation/coefficient"))
     spoil("ball.hdf", "few.hdf", lambda bank: replace(bank, "modes/shape", numpy.zeros((3, 4, 3), "<i2")))
     spoil("ball.hdf", "words.hdf", lambda bank: replace(bank, "modes/frequency_hz", numpy.array([b"a"] * 4)))
     spoil("ball.hdf", "flat.hdf", lambda bank: replace(bank, "mesh/triangles", numpy.zeros(9, "<i4")))
@@ -193,6 +306,14 @@ with tempfile.TemporaryDirectory() as name:
         (["modes", "ball.hdf", "-o", "nowhere/x.png"], ["nowhere", "no such folder"]),
         (["modes", "ball.hdf"], ["-o/--output", "--help"]),
         (["modes", "ball.hdf", "-o", "x.png", "--mode", "1"], ["--mode", "--help"]),
+        (["directivity", "ball.hdf", "-o", "x.png"], ["ball.hdf", "no multipoles", "carillon-precompute --radiate", '"radiation": "bem"']),
+        (["directivity", "absent.hdf", "-o", "x.png"], ["absent.hdf", "No such file"]),
+        (["directivity", "air.hdf", "-o", "x.png", "--modes", "5"], ["no mode 5", "1 to 4"]),
+        (["directivity", "order.hdf", "-o", "x.png"], ["order.hdf", "orders", "carillon-bank check"]),
+        (["directivity", "high.hdf", "-o", "x.png"], ["high.hdf", "orders"]),
+        (["directivity", "slow.hdf", "-o", "x.png"], ["slow.hdf", "speed of sound"]),
+        (["directivity", "loud.hdf", "-o", "x.png"], ["loud.hdf", "finite"]),
+        (["directivity", "part.hdf", "-o", "x.png"], ["part.hdf", "coefficient"]),
         (["scene", "absent.json", "-o", "x.png"], ["absent.json", "No such file"]),
         (["scene", "broken.json", "-o", "x.png"], ["broken.json", "line 2"]),
         (["scene", "empty.json", "-o", "x.png"], ["empty.json", "no bodies"]),

@@ -10,6 +10,8 @@
 #include <random>
 #include <vector>
 
+#include "precompute/bem/equations.hpp"
+
 namespace carillon::bem {
 namespace {
 
@@ -185,6 +187,33 @@ TEST(gmres, gives_the_same_bits_each_time) {
   solve_gmres(make_multiply(matrix), pack(right), {}, one);
   solve_gmres(make_multiply(matrix), pack(right), {}, two);
   EXPECT_EQ(one.values, two.values);
+}
+
+TEST(solve_directly, is_the_dense_solution_to_single_precision) {
+  constexpr std::size_t kUnknowns = 60, kSides = 3;
+  std::mt19937 random(7);
+  std::normal_distribution<double> number;
+  Eigen::MatrixXcd matrix(kUnknowns, kUnknowns), right(kUnknowns, kSides);
+  for (auto* block : {&matrix, &right})
+    for (Eigen::Index i = 0; i < block->size(); ++i) block->data()[i] = {number(random), number(random)};
+  matrix += 5.0 * Eigen::MatrixXcd::Identity(kUnknowns, kUnknowns);
+  LinearSystem system;
+  system.unknowns = system.last = kUnknowns;
+  system.sides = kSides;
+  for (std::size_t i = 0; i < kUnknowns; ++i) {
+    for (std::size_t j = 0; j < kUnknowns; ++j)
+      system.matrix.emplace_back(matrix(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)));
+    for (std::size_t m = 0; m < kSides; ++m) system.right.emplace_back(right(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(m)));
+  }
+  Sides solution;
+  EXPECT_LT(solve_directly(system, solution), 1e-5);
+  const Eigen::MatrixXcd exact = matrix.partialPivLu().solve(right);
+  for (std::size_t i = 0; i < kUnknowns; ++i)
+    for (std::size_t m = 0; m < kSides; ++m) {
+      const auto wanted = exact(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(m));
+      EXPECT_NEAR(solution.get_real(i)[m], wanted.real(), 1e-5 * exact.norm());
+      EXPECT_NEAR(solution.get_imaginary(i)[m], wanted.imag(), 1e-5 * exact.norm());
+    }
 }
 
 }  // namespace
