@@ -92,9 +92,6 @@ struct CommandLine {
         ->check(CLI::Range(0.0, 1e9))
         ->capture_default_str();
     app.add_option("--bank", options.bank, "write the bank to this file, whatever the job says")->check(named);
-    app.add_option("--radiate", options.radiate,
-                   "in place of a job: solve the air outside the body of this bank, and write the bank with its multipoles to --bank")
-        ->check(named);
     app.add_option("--result", result, "write how the run ended to this file, a JSON object (docs/howto/when-jobs-die.md)")->check(named);
     app.add_option("--folder", options.folder, "work in folder NAME below ROOT, to which no link below ROOT leads")
         ->expected(2)
@@ -121,6 +118,10 @@ struct CommandLine {
     app.add_option("--estimate", estimate,
                    "print what a problem of this size would cost, as JSON: '{\"element\": \"T10\", \"nodes\": 9000, \"modes\": 100}'")
         ->type_name("SIZE");
+    app.add_option("--radiate", options.radiate,
+                   "in place of a job: solve the air outside the body of this bank, and write the bank with its multipoles to --bank")
+        ->check(named)
+        ->excludes("JOB", "--matrices", "--progress", "--validate", "--at", "--estimate");
     app.set_version_flag("--version", version::describe("carillon-precompute"));
     // What follows "--" is for PETSc and SLEPc.
     const int own = static_cast<int>(std::find(argv, argv + argc, std::string_view("--")) - argv);

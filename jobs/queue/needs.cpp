@@ -42,9 +42,8 @@ Size find_size(const store::Store& store, const store::Request& request) {
       if (!error) size = {cost::estimate_file_size(bytes, is_quadratic), true};
     }
     if (job.has("radiation")) {
-      constexpr std::int64_t kAirNodes = 4500;  // "skin_nodes" that are not given
       std::optional<base::Object> air = job.has_object("radiation") ? job.object_if("radiation") : std::nullopt;
-      size.problem.air_nodes = air && air->has_number("skin_nodes") ? std::llround(air->number("skin_nodes")) : kAirNodes;
+      size.problem.air_nodes = air && air->has_number("skin_nodes") ? std::llround(air->number("skin_nodes")) : cost::kAirNodes;
       if (job.has_string("radiation") && job.string("radiation") == "none") size.problem.air_nodes = 0;
     }
     if (job.has_number("accuracy_cents")) size = {cost::refine(size.problem, cost::kRefinementGrowth), false};

@@ -19,6 +19,7 @@
 #include "jobs/outcome/outcome.hpp"
 #include "jobs/registry/rows.hpp"
 #include "jobs/store/files.hpp"
+#include "runtime/base/descriptor.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/file.hpp"
 
@@ -178,12 +179,7 @@ void append_submissions(const store::Store& store, const std::vector<Submission>
   if (info.st_size > 0) [[maybe_unused]]
     const ssize_t got = ::pread(fd, &last, 1, info.st_size - 1);
   if (last != '\n') text.insert(0, "\n");  // behind a line that was cut
-  int error = 0;
-  for (std::string_view left = text; !left.empty() && error == 0;) {
-    const ssize_t put = ::write(fd, left.data(), left.size());
-    if (put > 0) left.remove_prefix(static_cast<std::size_t>(put));
-    if (put < 0 && errno != EINTR) error = errno;
-  }
+  int error = base::write_all(fd, text);
   if (error == 0 && ::fsync(fd) != 0) error = errno;
   ::close(fd);
   if (error != 0) store::throw_errno(file, "write", error);

@@ -29,13 +29,8 @@ std::string read_bytes(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
 }
 
-void write_all(const std::filesystem::path& file, int descriptor, std::string_view bytes) {
-  while (!bytes.empty()) {
-    const ssize_t written = ::write(descriptor, bytes.data(), bytes.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) throw SystemError(fmt::format("{}: cannot be written: {}", file.string(), std::strerror(errno)));
-    bytes.remove_prefix(static_cast<std::size_t>(written));
-  }
+[[noreturn]] void refuse(const std::filesystem::path& file, int error) {
+  throw SystemError(fmt::format("{}: cannot be written: {}", file.string(), std::strerror(error)));
 }
 
 /// The answers of the file in order, and where the last whole one ends; 0 when the file is not of this fingerprint.
@@ -74,10 +69,10 @@ std::vector<WaveAnswer> AnswersFile::read() const { return parse(read_bytes(file
 void AnswersFile::save(const WaveAnswer& answer) {
   const bool is_new = whole_bytes_ == 0;
   const base::Descriptor descriptor(::open(file_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666));
-  if (descriptor.get() < 0) throw SystemError(fmt::format("{}: cannot be written: {}", file_.string(), std::strerror(errno)));
+  if (descriptor.get() < 0) refuse(file_, errno);
   // What is behind the last whole answer, of a run that was killed while it wrote, goes.
   if (::ftruncate(descriptor.get(), static_cast<off_t>(whole_bytes_)) != 0 || ::lseek(descriptor.get(), 0, SEEK_END) < 0)
-    throw SystemError(fmt::format("{}: cannot be written: {}", file_.string(), std::strerror(errno)));
+    refuse(file_, errno);
   const std::vector<double> numbers = pack(answer);
   const std::uint64_t count = numbers.size();
   std::string record(sizeof count + count * sizeof(double), '\0');
@@ -86,8 +81,8 @@ void AnswersFile::save(const WaveAnswer& answer) {
   const base::Sha256::Hash hash = base::calc_sha256(record);
   record.append(reinterpret_cast<const char*>(hash.data()), hash.size());
   if (is_new) record.insert(0, std::string(kMagic) + std::string(view(fingerprint_)));
-  write_all(file_, descriptor.get(), record);
-  if (::fdatasync(descriptor.get()) != 0) throw SystemError(fmt::format("{}: cannot be written: {}", file_.string(), std::strerror(errno)));
+  if (const int error = base::write_all(descriptor.get(), record); error != 0) refuse(file_, error);
+  if (::fdatasync(descriptor.get()) != 0) refuse(file_, errno);
   whole_bytes_ += record.size();
 }
 

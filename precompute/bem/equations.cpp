@@ -1,7 +1,6 @@
 // Method:     Galerkin, hat functions; the midpoint rule for all pairs of facets, sixteen that test against a patch at a time (tile.hpp),
-// and
-//             the sparse static part (static_part.hpp). No right side is ever a matrix: velocities pass over the kernels while those are in
-//             the cache.
+//             and the sparse static part (static_part.hpp). No right side is ever a matrix: velocities pass over the kernels while those
+//             are in the cache.
 // Source:     A. Burton, G. Miller (1971); by parts: A. Maue (1949), docs/equations.md E10.
 // Deviations: alpha is capped at low wave numbers, where i / k would spoil the pressure on the surface.
 #include "precompute/bem/equations.hpp"
@@ -40,6 +39,8 @@ MultiplyRows find_multiply() {
   return multiply_rows_plain;
 }
 
+using Matrix = Eigen::Matrix<std::complex<float>, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
 struct Free {
   void operator()(float* memory) const { std::free(memory); }
 };
@@ -73,7 +74,6 @@ void LinearSystem::multiply(const Sides& x, Sides& y) const {
 }
 
 BlockInverse::BlockInverse(const LinearSystem& system) {
-  using Matrix = Eigen::Matrix<std::complex<float>, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   for (std::size_t first = system.first; first < system.last; first += kBlockRows) {
     const auto rows = static_cast<Eigen::Index>(std::min(kBlockRows, system.last - first));
     const Eigen::Map<const Matrix, 0, Eigen::OuterStride<>> block(&system.matrix[(first - system.first) * system.unknowns + first], rows,
@@ -85,7 +85,6 @@ BlockInverse::BlockInverse(const LinearSystem& system) {
 }
 
 double solve_directly(const LinearSystem& system, Sides& solution) {
-  using Matrix = Eigen::Matrix<std::complex<float>, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   const auto unknowns = static_cast<Eigen::Index>(system.unknowns), sides = static_cast<Eigen::Index>(system.sides);
   const Eigen::Map<const Matrix> matrix(system.matrix.data(), unknowns, unknowns), right(system.right.data(), unknowns, sides);
   const Eigen::PartialPivLU<Matrix> factors(matrix);

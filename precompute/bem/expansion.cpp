@@ -140,6 +140,16 @@ std::vector<double> calc_log_hankel(double x, int order) {
   return logs;
 }
 
+Spread calc_spread(double k, double radius_m, double nearest_m, int order) {
+  const std::vector<double> here = calc_log_hankel(k * radius_m, order), there = calc_log_hankel(k * nearest_m, order);
+  Spread spread;
+  for (std::size_t l = 0; l < here.size(); ++l) {
+    spread.near.push_back(std::exp(2.0 * (there[l] - here[l])));
+    spread.far.push_back(std::exp(2.0 * (here[0] - here[l])));
+  }
+  return spread;
+}
+
 std::vector<Complex> calc_hankel_phase(double x, int order) {
   const std::vector<Complex> ratio = calc_hankel_ratios(x, order);
   std::vector<Complex> phase{Complex(std::sin(x), -std::cos(x))};  // h_0 = - i e^{ix} / x

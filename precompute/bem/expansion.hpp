@@ -31,4 +31,10 @@ std::vector<double> calc_log_hankel(double x, int order);
 /// Their phase: h_l / |h_l|.
 std::vector<std::complex<double>> calc_hankel_phase(double x, int order);
 
+/// What a coefficient c_lm |h_l(k R)| counts, squared: at the distance `nearest_m`, and far away, there over what one of order 0 does.
+struct Spread {
+  std::vector<double> near, far;  // (order + 1)
+};
+Spread calc_spread(double k, double radius_m, double nearest_m, int order);
+
 }  // namespace carillon::bem

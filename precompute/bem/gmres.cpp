@@ -108,7 +108,7 @@ GmresResult solve_gmres(const Multiply& multiply, const Sides& right, const Gmre
   if (sides == 0) return {.products = 0, .residual = 0.0, .is_converged = true};
   const std::vector<double> wanted = calc_norms(right);
   Sides work(right.unknowns, sides), residual(right);
-  std::vector<Double> products, factors(sides);
+  std::vector<Double> factors(sides);
   if (std::any_of(solution.values.begin(), solution.values.end(), [](float x) { return x != 0.0F; })) {
     multiply(solution, work);
     ++result.products;

@@ -62,28 +62,18 @@ void check_facets(const Radiator& radiator, const AirOptions& options) {
   if (options.warn) options.warn(text);
 }
 
-/// Squared sizes of the fields by order: far away, and at the nearest distance.
-struct Tail {
-  std::vector<double> far, near;  // [l], what orders above l make of the whole
-};
-
-Tail calc_tail(const Sounding& mode, double k, double radius, double nearest) {
-  const std::vector<double> here = calc_log_hankel(k * radius, mode.order), there = calc_log_hankel(k * nearest, mode.order);
-  std::vector<double> power(here.size());
-  for (std::size_t i = 0, l = 0; i < mode.coefficient.size(); ++i) {
-    if (i == count_harmonics(static_cast<int>(l))) ++l;
-    power[l] += std::norm(mode.coefficient[i]);
+/// [l]: what the orders above l make of the whole, squared; the larger of far away and at the nearest distance.
+std::vector<double> calc_tail(const Sounding& mode, const Spread& spread) {
+  std::vector<double> tail(spread.far.size());
+  for (const std::vector<double>* counts : {&spread.far, &spread.near}) {
+    std::vector<double> above(tail.size());
+    double sum = 0.0;
+    for (std::size_t l = tail.size(); l-- > 0;) {
+      above[l] = sum;
+      for (std::size_t i = l * l; i < (l + 1) * (l + 1); ++i) sum += (*counts)[l] * std::norm(mode.coefficient[i]);
+    }
+    for (std::size_t l = 0; l < tail.size(); ++l) tail[l] = std::max(tail[l], sum > 0.0 ? above[l] / sum : 0.0);
   }
-  Tail tail{std::vector<double>(power.size()), std::vector<double>(power.size())};
-  double far = 0.0, near = 0.0;
-  for (std::size_t l = power.size(); l-- > 0;) {
-    tail.far[l] = far;
-    tail.near[l] = near;
-    far += power[l] * std::exp(2.0 * (here[0] - here[l]));
-    near += power[l] * std::exp(2.0 * (there[l] - here[l]));
-  }
-  for (double& x : tail.far) x = far > 0.0 ? x / far : 0.0;
-  for (double& x : tail.near) x = near > 0.0 ? x / near : 0.0;
   return tail;
 }
 
@@ -92,40 +82,32 @@ double calc_added_mass(const Sounding& mode, const AirOptions& options) {
   return -(options.half_space ? 0.5 : 1.0) * options.air_density_kg_m3 * mode.reaction.real();
 }
 
-/// Appends a mode that was solved at k.
-void add_mode(const Sounding& mode, double k, const AirOptions& options, bank::Multipoles& multipoles) {
+/// Appends a mode that was solved at k to a residual. Its error is still a ratio of powers, without rounding, and its decay not yet there.
+void add_mode(const Sounding& mode, double k, double residual, const AirOptions& options, bank::Multipoles& multipoles) {
   const double radius = multipoles.radius_m, target = std::pow(10.0, options.order_db / 10.0);
-  const Tail tail = calc_tail(mode, k, radius, multipoles.nearest_m);
+  const std::vector<double> tail = calc_tail(mode, calc_spread(k, radius, multipoles.nearest_m, mode.order));
   std::size_t order = 0;
-  while (order + 1 < tail.far.size() && std::max(tail.far[order], tail.near[order]) > target) ++order;
-  const std::vector<double> hankel = calc_log_hankel(k * radius, static_cast<int>(order));
+  while (order + 1 < tail.size() && tail[order] > target) ++order;
   const std::vector<Double> phase = calc_hankel_phase(k * radius, static_cast<int>(order));
   const Double by_velocity(0.0, k * options.sound_speed_ms * options.air_density_kg_m3);
   std::vector<Double> pressure;
-  double power = 0.0;
   for (std::size_t l = 0; l <= order; ++l)
-    for (std::size_t i = l * l; i < (l + 1) * (l + 1); ++i) {
-      power += std::norm(mode.coefficient[i]) * std::exp(-2.0 * hankel[l]);
-      pressure.push_back(by_velocity * phase[l] * mode.coefficient[i]);
-    }
+    for (std::size_t i = l * l; i < (l + 1) * (l + 1); ++i) pressure.push_back(by_velocity * phase[l] * mode.coefficient[i]);
   bank::add_coefficients(multipoles, static_cast<std::int32_t>(order), pressure);
-  const double half = options.half_space ? 0.5 : 1.0;  // the image sends out as much, into the other side
   multipoles.freq_hz.push_back(k * options.sound_speed_ms / (2.0 * std::numbers::pi));
-  multipoles.decay_per_s.push_back(half * options.air_density_kg_m3 * options.sound_speed_ms / 2.0 * power);
   multipoles.added_mass.push_back(calc_added_mass(mode, options));
-  // Of the power far away, before what rounding adds.
-  multipoles.error_db.push_back(std::pow(10.0, mode.interpolation_db / 10.0) + std::max(tail.far[order], tail.near[order]) +
-                                options.solve.tolerance * options.solve.tolerance);
+  multipoles.error_db.push_back(std::pow(10.0, mode.interpolation_db / 10.0) + tail[order] + residual * residual);
 }
 
-/// Makes decibels of the errors, with what rounding adds to them far away.
-void finish_errors(const AirOptions& options, bank::Multipoles& multipoles) {
+/// Decays by the coefficients as they are kept, and errors in decibels, with what rounding adds to them far away.
+void add_decays(const AirOptions& options, bank::Multipoles& multipoles) {
+  const double half = options.half_space ? 0.5 : 1.0;  // the image sends out as much, into the other side
   const std::vector<bank::CoefficientDecay> decays = bank::calc_coefficient_decays(multipoles);
   for (std::size_t m = 0; m < decays.size(); ++m) {
     const double root = decays[m].root_rounding, decay = decays[m].decay_per_s;
     const double rounding = decay > 0.0 ? root * root / (3.0 * decay) : 0.0;
     multipoles.error_db[m] = std::min(0.0, 10.0 * std::log10(multipoles.error_db[m] + rounding));
-    if (decay > 0.0) multipoles.decay_per_s[m] = (options.half_space ? 0.5 : 1.0) * decay;
+    multipoles.decay_per_s.push_back(half * decay);
   }
 }
 
@@ -177,15 +159,10 @@ Radiator make_radiator(const bank::Bank& bank, std::span<const double> freq_hz, 
 }
 
 double calc_roundness(const bank::Bank& bank) {
-  double area = 0.0, volume = 0.0;
   const std::vector<Triangle> outer = bank::find_outer_triangles(bank.vertices_m, bank.triangles);
   if (outer.empty()) return 0.0;
-  const Vec3 base = bank.vertices_m[outer[0][0]];
-  for (const Triangle& triangle : outer) {
-    const Vec3 twice = bank::calc_normal(bank.vertices_m, triangle);
-    area += norm(twice) / 2.0;
-    volume += dot(bank.vertices_m[triangle[0]] - base, twice) / 6.0;
-  }
+  const RadiatingSurface surface(bank.vertices_m, outer);
+  const double volume = surface.calc_volume_m3(), area = surface.calc_area_m2();
   return 36.0 * std::numbers::pi * volume * volume / (area * area * area);
 }
 
@@ -213,15 +190,16 @@ bank::Multipoles calc_multipoles(const comm::Communicator& comm, const bank::Ban
     multipoles.nearest_m = options.solve.nearest_over_radius * solution.sphere.radius_m;
     multipoles.air_density_kg_m3 = options.air_density_kg_m3;
     multipoles.sound_speed_ms = options.sound_speed_ms;
+    const double residual = std::max(solve.tolerance, solution.residual);
     for (std::size_t m = 0; m < played.size(); ++m) {
-      add_mode(solution.modes[m], solution.wave_number_1_m[m], options, multipoles);
+      add_mode(solution.modes[m], solution.wave_number_1_m[m], residual, options, multipoles);
       if (multipoles.added_mass.back() > kMostMass)
         throw InputError(
             fmt::format("mode {} at {:.1f} Hz: the air adds {:.2f} of its own mass: a membrane or a sheet this light moves with "
                         "the air, which this method cannot do; leave the air out with \"radiation\": \"none\"",
                         m + 1, played[m], multipoles.added_mass.back()));
     }
-    finish_errors(options, multipoles);
+    add_decays(options, multipoles);
     if (file) file->remove();
     multipoles.method = fmt::format("boundary elements (Burton-Miller, Galerkin), {} unknowns, {} wave numbers{}", solution.unknowns,
                                     solution.wave_numbers, options.half_space ? ", half space" : "");

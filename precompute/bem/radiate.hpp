@@ -24,7 +24,7 @@ struct AirOptions {
   double air_density_kg_m3 = bank::kAirDensityKgM3;
   double sound_speed_ms = bank::kSoundSpeedMs;
   std::optional<Plane> half_space;
-  std::size_t most_nodes = 4500;  // of the surface; one that has more is coarsened
+  std::size_t most_nodes = 0;  // of the surface, where it is coarsened; one that has more is
   /// Gives a closed surface about so many nodes, and keeps its volume. Rank 0 alone; may be empty: no surface is coarsened.
   std::function<std::pair<std::vector<Vec3>, std::vector<Triangle>>(const std::vector<Vec3>&, const std::vector<Triangle>&, std::size_t)>
       coarsen;

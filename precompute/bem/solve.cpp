@@ -1,6 +1,6 @@
-// Method:     a wave number at a time: matrix in single precision, GMRES for the modes that read it, multipoles. Modes are interpolated
-// over
-//             the wave number; where three and four wave numbers disagree by more than is asked, one more is put between.
+// Method:     a wave number at a time: matrix in single precision, GMRES for the modes that read it, multipoles; LU where GMRES fails.
+//             Modes are interpolated over the wave number; where three and four wave numbers disagree by more than is asked, one more is
+//             put between.
 // Source:     docs/equations.md E10.
 // Deviations: none.
 #include "precompute/bem/solve.hpp"
@@ -33,50 +33,41 @@ constexpr std::int32_t kMostOrder = 110;
 /// Ranks that share wave numbers: each has some of the rows.
 class Group {
  public:
-  Group(const comm::Communicator& comm, std::size_t unknowns, double matrix_bytes, std::size_t wave_numbers) {
+  Group(const comm::Communicator& comm, std::size_t unknowns, double matrix_bytes, std::size_t wave_numbers)
+      : fits_one_rank_(8.0 * static_cast<double>(unknowns) * static_cast<double>(unknowns) <= matrix_bytes) {
     const double bytes = 8.0 * static_cast<double>(unknowns) * static_cast<double>(unknowns);
     const auto by_memory = static_cast<int>(std::min(1e6, std::ceil(bytes / matrix_bytes)));
     const int by_number = comm.size() / static_cast<int>(std::clamp<std::size_t>(wave_numbers, 1, 1000000));
-    size_ = std::clamp(std::max(by_memory, by_number), 1, comm.size());
-    count_ = comm.size() / size_;
-    number_ = std::min(comm.rank() / size_, count_ - 1);
-    MPI_Comm_split(comm, number_, comm.rank(), &comm_);
-    MPI_Comm_rank(comm_, &rank_);
-    int ranks = 1;
-    MPI_Comm_size(comm_, &ranks);
+    const int size = std::clamp(std::max(by_memory, by_number), 1, comm.size());
+    count_ = comm.size() / size;
+    number_ = std::min(comm.rank() / size, count_ - 1);
+    MPI_Comm_split(comm, number_, comm.rank(), &owned_);
+    comm_.emplace(owned_);
     const std::size_t blocks = (unknowns + kBlockRows - 1) / kBlockRows;
-    for (int r = 0; r <= ranks; ++r)
-      first_.push_back(std::min(unknowns, blocks * static_cast<std::size_t>(r) / static_cast<std::size_t>(ranks) * kBlockRows));
+    for (int r = 0; r <= comm_->size(); ++r)
+      first_.push_back(std::min(unknowns, blocks * static_cast<std::size_t>(r) / static_cast<std::size_t>(comm_->size()) * kBlockRows));
   }
-  ~Group() { MPI_Comm_free(&comm_); }
+  ~Group() { MPI_Comm_free(&owned_); }
   Group(const Group&) = delete;
   Group& operator=(const Group&) = delete;
 
   int get_number() const { return number_; }
   int count() const { return count_; }
-  bool is_first() const { return rank_ == 0; }
-  /// One rank has the whole matrix.
-  bool has_all_rows() const { return first_.size() == 2; }
-  /// The first rank of a group, among all.
-  int find_first_rank(int number) const { return number * size_; }
-  std::size_t get_first() const { return first_[static_cast<std::size_t>(rank_)]; }
-  std::size_t get_last() const { return first_[static_cast<std::size_t>(rank_) + 1]; }
+  bool is_first() const { return comm_->is_root(); }
+  bool has_all_rows() const { return comm_->size() == 1; }
+  /// Each rank may take the whole matrix.
+  bool fits_one_rank() const { return fits_one_rank_; }
+  std::size_t get_first() const { return first_[static_cast<std::size_t>(comm_->rank())]; }
+  std::size_t get_last() const { return first_[static_cast<std::size_t>(comm_->rank()) + 1]; }
 
   /// All rows of what each rank has its own of.
-  void gather(const Sides& mine, Sides& all) const {
-    const std::size_t row = 2 * all.padded;
-    std::vector<int> counts, places;
-    for (std::size_t r = 0; r + 1 < first_.size(); ++r) {
-      counts.push_back(static_cast<int>((first_[r + 1] - first_[r]) * row));
-      places.push_back(static_cast<int>(first_[r] * row));
-    }
-    MPI_Allgatherv(mine.values.data(), static_cast<int>(mine.values.size()), MPI_FLOAT, all.values.data(), counts.data(), places.data(),
-                   MPI_FLOAT, comm_);
-  }
+  void gather(const Sides& mine, Sides& all) const { all.values = comm_->all_gather(mine.values); }
 
  private:
-  MPI_Comm comm_ = MPI_COMM_NULL;
-  int size_ = 1, number_ = 0, count_ = 1, rank_ = 0;
+  MPI_Comm owned_ = MPI_COMM_NULL;
+  std::optional<comm::Communicator> comm_;
+  bool fits_one_rank_;
+  int number_ = 0, count_ = 1;
   std::vector<std::size_t> first_;  // row of each rank, and the end
 };
 
@@ -115,7 +106,8 @@ WaveAnswer solve_wave(const BoundaryEquations& equations, const Group& group, do
     group.gather(mine, y);
   };
   GmresResult result = solve_gmres(multiply, right, {.tolerance = tolerance}, pressures);
-  if (!result.is_converged && group.has_all_rows()) {
+  if (!result.is_converged && (group.has_all_rows() || group.fits_one_rank())) {
+    if (!group.has_all_rows()) equations.assemble(k, sides, 0, unknowns, system);  // each of the group alike
     result.residual = solve_directly(system, pressures);
     result.is_converged = result.residual <= kDirectResidual;
   }
@@ -150,42 +142,7 @@ WaveAnswer solve_wave(const BoundaryEquations& equations, const Group& group, do
   return answer;
 }
 
-// ---- between ranks ----
-
-/// The answer of a rank, on rank 0.
-WaveAnswer bring_home(const comm::Communicator& comm, int from, const WaveAnswer& answer) {
-  if (from == 0) return comm.is_root() ? answer : WaveAnswer{};
-  if (comm.rank() == from) {
-    const std::vector<double> packed = pack(answer);
-    const auto size = static_cast<std::int64_t>(packed.size());
-    MPI_Send(&size, 1, MPI_INT64_T, 0, 1, comm);
-    MPI_Send(packed.data(), static_cast<int>(size), MPI_DOUBLE, 0, 2, comm);
-  } else if (comm.is_root()) {
-    std::int64_t size = 0;
-    MPI_Recv(&size, 1, MPI_INT64_T, from, 1, comm, MPI_STATUS_IGNORE);
-    std::vector<double> packed(static_cast<std::size_t>(size));
-    MPI_Recv(packed.data(), static_cast<int>(size), MPI_DOUBLE, from, 2, comm, MPI_STATUS_IGNORE);
-    return unpack(packed).value();
-  }
-  return {};
-}
-
 // ---- interpolation ----
-
-/// |h_l(k r)| / |h_l(k R)| squared, of what a coefficient counts at distance r; far away, over that of order 0: 1 / |h_l(k R)|^2.
-struct Spread {
-  std::vector<double> near, far;
-};
-
-Spread calc_spread(double k, double radius, double nearest, std::int32_t order) {
-  const std::vector<double> here = calc_log_hankel(k * radius, order), there = calc_log_hankel(k * nearest, order);
-  Spread spread;
-  for (std::size_t l = 0; l < here.size(); ++l) {
-    spread.near.push_back(std::exp(2.0 * (there[l] - here[l])));
-    spread.far.push_back(std::exp(2.0 * (here[0] - here[l])));
-  }
-  return spread;
-}
 
 Sounding interpolate(const std::vector<const Answer*>& answers, const Stencil& stencil, const Spread& spread) {
   Sounding sounding;
@@ -334,14 +291,21 @@ AirSolution solve_air(const comm::Communicator& comm, const Radiator& radiator_o
         const auto node = static_cast<std::size_t>(work[mine].first);
         return solve_wave(*equations, group, waves.get()[node], orders[node], work[mine].second, options.tolerance);
       });
-      for (int number = 0; number < group.count() && first + static_cast<std::size_t>(number) < work.size(); ++number) {
-        WaveAnswer home = bring_home(comm, group.find_first_rank(number), answer);
-        comm.agree([&] {
-          if (!comm.is_root()) return;
+      const std::vector<double> packed = comm.all_gather([&] {
+        std::vector<double> own;
+        if (mine >= work.size() || !group.is_first()) return own;
+        own = pack(answer);
+        own.insert(own.begin(), static_cast<double>(own.size()));
+        return own;
+      });
+      comm.agree([&] {
+        if (!comm.is_root()) return;
+        for (std::size_t at = 0; at < packed.size(); at += 1 + static_cast<std::size_t>(packed[at])) {
+          WaveAnswer home = unpack(std::span(packed).subspan(at + 1, static_cast<std::size_t>(packed[at]))).value();
           if (keeper.save) keeper.save(home);
           add_answer(std::move(home));
-        });
-      }
+        }
+      });
       const std::size_t done = std::min(work.size(), first + static_cast<std::size_t>(group.count()));
       if (comm.is_root() && keeper.report)
         keeper.report(fmt::format("{}{} of {} wave numbers", round == 0 ? "" : "refinement, ", done, work.size()),

@@ -4,7 +4,11 @@
 #include <cstdint>
 #include <optional>
 
+#include "precompute/job/job_spec.hpp"
+
 namespace carillon::cost {
+
+inline constexpr std::int64_t kAirNodes = job::kSkinNodes;
 
 /// What is known of a run. Zeros and empty ones are unknown; complete() estimates them from the rest.
 struct ProblemSize {

@@ -34,11 +34,13 @@ struct HalfSpace {
   std::array<double, 3> normal{};  // as given, not 0
 };
 
+inline constexpr int kSkinNodes = 4500;  // of the surface outside which the air is solved, unless a job gives another number
+
 /// How the air outside the body is solved.
 struct Air {
   Radiation method = Radiation::none;
-  int skin_nodes = 4500;    // of the surface; a finer one is coarsened
-  double error_db = -40.0;  // of the interpolation over the wave number, in each mode
+  int skin_nodes = kSkinNodes;  // of the surface; a finer one is coarsened
+  double error_db = -40.0;      // of the interpolation over the wave number, in each mode
   std::optional<HalfSpace> half_space = {};
 };
 

@@ -60,7 +60,14 @@ RunSummary radiate_bank(const comm::Communicator& comm, const RunOptions& option
     bank = bank::read_bank(options.radiate);
     base::check_writable(options.bank, "bank");
   });
-  const AirReport report = add_air(run, bank);
+  AirReport report;
+  try {
+    report = add_air(run, bank);
+  } catch (const eigen::Stopped&) {
+    summary.is_stopped = true;
+    summary.result = fmt::format("stopped by {}; the same command resumes from {}", find_stop_name(), options.checkpoint.string());
+    return summary;
+  }
   comm.agree([&] {
     if (!comm.is_root()) return;
     bank::write_bank(bank, options.bank);
@@ -91,9 +98,9 @@ AirReport add_air(Run& run, bank::Bank& bank) {
     if (std::exchange(tenths, now) != now) run.log.print(text);
   };
   std::filesystem::path answers;
-  if (run.checkpoint) {
+  if (!run.options.checkpoint.empty()) {
     answers = run.options.checkpoint;
-    answers += ".air";
+    if (run.checkpoint) answers += ".air";  // that of the modes has the name
     keeper.is_stop_asked = is_stop_asked;
     set_news(true);
   }

@@ -22,7 +22,7 @@ struct AirReport {
 AirReport add_air(Run& run, bank::Bank& bank);
 
 /// Reads the bank options.radiate, adds the multipoles of all modes by boundary elements, and writes it to options.bank, which may be the
-/// same file. The same bytes on any number of ranks. Collective. Throws as run_job().
+/// same file. The same bytes on any number of ranks. Resumes from options.checkpoint. Collective. Throws as run_job().
 RunSummary radiate_bank(const comm::Communicator& comm, const RunOptions& options);
 
 }  // namespace carillon::run

@@ -3,6 +3,7 @@
 
 #include <unistd.h>
 
+#include <string_view>
 #include <utility>
 
 namespace carillon::base {
@@ -28,5 +29,8 @@ class Descriptor {
  private:
   int value_;
 };
+
+/// Writes all bytes, in as many calls as that takes. 0, or the errno of what went wrong; ENOSPC where nothing more is taken.
+int write_all(int descriptor, std::string_view bytes) noexcept;
 
 }  // namespace carillon::base

@@ -129,8 +129,9 @@ int link_nameless(int descriptor, const fs::path& name) {
   return ::linkat(AT_FDCWD, self.c_str(), AT_FDCWD, name.c_str(), AT_SYMLINK_FOLLOW) == 0 ? 0 : errno;
 }
 
-/// 0 or errno.
-int write_all(int descriptor, std::string_view bytes) {
+}  // namespace
+
+int write_all(int descriptor, std::string_view bytes) noexcept {
   while (!bytes.empty()) {
     const ssize_t put = ::write(descriptor, bytes.data(), bytes.size());
     if (put < 0 && errno == EINTR) continue;
@@ -139,8 +140,6 @@ int write_all(int descriptor, std::string_view bytes) {
   }
   return 0;
 }
-
-}  // namespace
 
 WholeFile::WholeFile(fs::path file) : file_(std::move(file)), temporary_(make_temporary_name(file_)) {
   ::unlink(temporary_.c_str());  // of a process with our number that was killed; O_EXCL then follows no planted link
