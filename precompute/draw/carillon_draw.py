@@ -702,7 +702,7 @@ def make_polyline(points, colour, width):
     return make_flat(line)
 
 
-def make_glass(surface, toward, colours):
+def make_glass(surface, toward):
     """A surface that is seen through where it faces the eye and not where it turns away, coloured by its scalars."""
     normals = to_numpy(surface.GetPointData().GetNormals())
     level = to_numpy(surface.GetPointData().GetScalars())
@@ -747,7 +747,7 @@ def draw_directivity(bank, air, numbers, up):
         if levels is not None:
             spread = f"spread {calc_levels(air.calc_far(number, *make_equal_areas(order))).std():.1f} dB"
             vertices, faces, level = make_balloon(levels, polar, azimuth)
-            above.AddActor(make_glass(make_surface(vertices, faces, level, crease_deg=180.0), view.axes[2], colours))
+            above.AddActor(make_glass(make_surface(vertices, faces, level, crease_deg=180.0), view.axes[2]))
         above.ResetCameraClippingRange(-2, 2, -2, 2, -2, 2)
         renderer.AddActor2D(make_text(f"Mode {number}", 0.5, 80 / height, 30, bold=True))
         label = f"{air.freq_hz[number - 1]:,.1f} Hz, order {order}, {spread}"

@@ -122,10 +122,13 @@ bool has_group(const Seal& seal, const std::string& group) {
 /// The same for what came with version 1.1; what is not there stays as Bank's initialisers have it.
 template <class MakeText>
 void allocate_later(const Seal& seal, const std::string& name, Loaded& loaded, const MakeText& make_text) {
+  const auto make_table = [&](const char* field, const char* dtype, std::vector<std::uint64_t> shape, auto& values, std::uint64_t size) {
+    check_extent({field, dtype, std::move(shape), "", "", nullptr}, get_extent(seal, field, name), name);
+    values.resize(size);
+  };
   const auto make_list = [&](const char* field, const char* dtype, auto& values) {
     const std::uint64_t rows = get_rows(seal, field, name);
-    check_extent({field, dtype, {rows}, "", "", nullptr}, get_extent(seal, field, name), name);
-    values.resize(rows);
+    make_table(field, dtype, {rows}, values, rows);
   };
   Bank& bank = loaded.bank;
   for (auto [field, cents] : {std::pair("modes/algebraic_error_cents", &bank.algebraic_error_cents),
@@ -150,33 +153,23 @@ void allocate_later(const Seal& seal, const std::string& name, Loaded& loaded, c
     make_text("supports/text", loaded.form.supports);
     Supports& supports = bank.supports;
     const std::uint64_t count = get_rows(seal, "supports/area_m2", name), modes = bank.mode_count();
-    const auto make_table = [&](const char* field, std::vector<std::uint64_t> shape, auto& values, std::uint64_t size) {
-      check_extent({field, "<f8", std::move(shape), "", "", nullptr}, get_extent(seal, field, name), name);
-      values.resize(size);
-    };
-    make_table("supports/centre_m", {count, 3}, supports.centre_m, count);
-    make_table("supports/normal", {count, 3}, supports.normal, count);
-    make_table("supports/area_m2", {count}, supports.area_m2, count);
-    make_table("supports/thickness_m", {count}, supports.thickness_m, count);
-    make_table("modes/support_reaction", {modes, count, 6}, supports.reaction, modes * count * 6);
-    make_table("modes/support_energy", {modes, count}, supports.energy, modes * count);
+    make_table("supports/centre_m", "<f8", {count, 3}, supports.centre_m, count);
+    make_table("supports/normal", "<f8", {count, 3}, supports.normal, count);
+    make_table("supports/area_m2", "<f8", {count}, supports.area_m2, count);
+    make_table("supports/thickness_m", "<f8", {count}, supports.thickness_m, count);
+    make_table("modes/support_reaction", "<f8", {modes, count, 6}, supports.reaction, modes * count * 6);
+    make_table("modes/support_energy", "<f8", {modes, count}, supports.energy, modes * count);
   }
   if (has_group(seal, "radiation")) {
     Multipoles& air = bank.multipoles;
     const std::uint64_t modes = bank.mode_count(), coefficients = get_rows(seal, "radiation/coefficient", name);
-    const auto make_values = [&](const char* field, const char* dtype, auto& values) {
-      check_extent({field, dtype, {modes}, "", "", nullptr}, get_extent(seal, field, name), name);
-      values.resize(modes);
-    };
-    make_values("radiation/freq_hz", "<f8", air.freq_hz);
-    make_values("radiation/order", "<i4", air.order);
-    make_values("radiation/scale", "<f8", air.scale);
-    make_values("radiation/decay", "<f8", air.decay_per_s);
-    make_values("radiation/added_mass", "<f8", air.added_mass);
-    make_values("radiation/error_db", "<f8", air.error_db);
-    check_extent({"radiation/coefficient", "<i2", {coefficients, 2}, "", "", nullptr}, get_extent(seal, "radiation/coefficient", name),
-                 name);
-    air.coefficient.resize(2 * coefficients);
+    make_table("radiation/freq_hz", "<f8", {modes}, air.freq_hz, modes);
+    make_table("radiation/order", "<i4", {modes}, air.order, modes);
+    make_table("radiation/scale", "<f8", {modes}, air.scale, modes);
+    make_table("radiation/decay", "<f8", {modes}, air.decay_per_s, modes);
+    make_table("radiation/added_mass", "<f8", {modes}, air.added_mass, modes);
+    make_table("radiation/error_db", "<f8", {modes}, air.error_db, modes);
+    make_table("radiation/coefficient", "<i2", {coefficients, 2}, air.coefficient, 2 * coefficients);
     make_text("radiation/method", loaded.form.radiation_method);
   }
   if (!has_group(seal, "proof")) return;

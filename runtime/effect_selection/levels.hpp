@@ -68,9 +68,9 @@ class BankLevels {
   ClickLevels calc_click_levels(double impulse_n_s, events::PulseShape shape, double duration_s) const;
 
  private:
-  const bank::Bank* bank_;
   void find_spreads();
 
+  const bank::Bank* bank_;
   double radius_m_ = 0.0, highest_hz_ = 0.0, spread_db_ = 0.0;
   std::vector<Mode> modes_;
   struct Band {

@@ -19,8 +19,8 @@
 
 namespace carillon::head {
 
-inline constexpr int kOnset =
-    16;  // the sample of a response at which its sound begins, about; what comes before is ripple of the band limit
+/// The sample of a response at which its sound begins, about; what comes before is ripple of the band limit.
+inline constexpr int kOnset = 16;
 inline constexpr int kMaxTaps = 8192;
 inline constexpr double kMinRateHz = 8000.0, kMaxRateHz = 384000.0;
 

@@ -1,6 +1,5 @@
 // Method:     the child process calls libmysofa, checks all sizes and writes the numbers, or the reason why there are none, to a pipe. What
-// the
-//             parent takes from there is bounded, and only counted, never interpreted.
+//             the parent takes from there is bounded, and only counted, never interpreted.
 // Source:     AES69-2015 (SOFA).
 // Deviations: none.
 #include "runtime/head/parse_sofa.hpp"
@@ -25,6 +24,7 @@
 #include <span>
 #include <string_view>
 
+#include "runtime/base/descriptor.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/head/head.hpp"
 #include "runtime/head/sofa.hpp"
@@ -32,7 +32,6 @@
 namespace carillon::head {
 namespace {
 
-constexpr std::size_t kMaxSamples = std::size_t{1} << 27U;     // of all responses
 constexpr std::uint64_t kMaxMemory = std::uint64_t{4} << 30U;  // bytes that the child takes in addition to what is there
 constexpr std::size_t kBytesPerS = 2000000;                    // a tenth of what libmysofa reads of a compressed file
 constexpr std::size_t kMaxWords = 1000;                        // bytes of a reason
@@ -104,14 +103,7 @@ struct Header {
 };
 
 bool write_all(int pipe, const void* bytes, std::size_t count) noexcept {
-  for (const char* at = static_cast<const char*>(bytes); count > 0;) {
-    const ssize_t written = ::write(pipe, at, count);
-    if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) return false;
-    at += written;
-    count -= static_cast<std::size_t>(written);
-  }
-  return true;
+  return base::write_all(pipe, {static_cast<const char*>(bytes), count}) == 0;
 }
 
 bool read_all(int pipe, void* bytes, std::size_t count) noexcept {

@@ -7,6 +7,8 @@
 
 namespace carillon::head {
 
+inline constexpr std::size_t kMaxSamples = std::size_t{1} << 27U;  // of all responses
+
 /// What a file of SimpleFreeFieldHRIR holds; all finite, and as many as the sizes say.
 struct SofaFile {
   double sample_rate_hz = 0.0;

@@ -5,27 +5,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "runtime/base/kaiser_sinc.hpp"
 
 namespace carillon::head {
 namespace {
 
-constexpr double kKaiserBeta = 9.0;  // stop band -90 dB
-
-double calc_bessel_i0(double x) {
-  double term = 1.0, sum = 1.0;
-  for (int k = 1; term > 1e-17 * sum; ++k) {
-    term *= 0.25 * x * x / (static_cast<double>(k) * k);
-    sum += term;
-  }
-  return sum;
-}
-
-double calc_value(double x) {
-  const double sinc = x == 0.0 ? 1.0 : std::sin(std::numbers::pi * x) / (std::numbers::pi * x);
-  const double within = std::max(0.0, 1.0 - (x / kSincHalf) * (x / kSincHalf));
-  return sinc * calc_bessel_i0(kKaiserBeta * std::sqrt(within)) / calc_bessel_i0(kKaiserBeta);
-}
+double calc_value(double x) { return base::calc_kaiser_sinc(x, kSincHalf) / base::calc_bessel_i0(base::kKaiserBeta); }
 
 }  // namespace
 

@@ -34,10 +34,9 @@ namespace carillon::head {
 namespace {
 
 constexpr std::uint64_t kMaxBytes = std::uint64_t{1} << 29U;
-constexpr std::size_t kMaxSamples = std::size_t{1} << 27U;  // of all responses
-constexpr double kThreshold = 0.15;                         // of the peak: here a response begins
-constexpr int kRaster = 16;                                 // places a sample that are looked at
-constexpr double kTail = 1e-6;                              // of the energy of a response
+constexpr double kThreshold = 0.15;  // of the peak: here a response begins
+constexpr int kRaster = 16;          // places a sample that are looked at
+constexpr double kTail = 1e-6;       // of the energy of a response
 constexpr double kLevelFromHz = 400.0, kLevelToHz = 800.0;
 constexpr double kPoleRad = 0.2618;  // 15 degrees
 constexpr double kRingRad = 0.0175;  // a ring is no thicker than 1 degree

@@ -151,10 +151,10 @@ Scene read_scene(const std::filesystem::path& file);
 /// "file:line: ..." for anything that is not a scene.
 Scene parse_scene(const base::Document& document);
 
-/// Channels of the sound: microphones, or two ears.
 /// The ground as sound meets it; nothing where it is silent.
 std::optional<synth::Floor> find_floor(const Scene& scene);
 
+/// Channels of the sound: microphones, or two ears.
 std::size_t count_channels(const Scene& scene);
 
 /// The places of the left and the right ear at the beginning: the line between them is level when the listener does not look straight up or

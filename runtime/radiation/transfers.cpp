@@ -1,9 +1,8 @@
-// Method:     T = sum over l of F_l(r) sum over m of a_lm Y_lm(d), F_l = h_l(k r) / h_l(k R) e^{-i k (r - R)}. Harmonics once for all
-// modes:
-//             rows of normalised Legendre functions by recurrence in l. 16 modes at a time, one in a lane: their multipoles lie side by
-//             side as 16-bit steps, and those of a row are multiplied by the same harmonic. F_l by the recurrence of h_l upward in l, which
-//             is stable for it, divided by h_l(k R) at each step, so that nothing overflows: the steps u_l = h_{l-1}(k R) / h_l(k R) are
-//             made here in double precision by 1 / u_{l+1} = (2 l + 1) / (k R) - u_l, u_0 = i.
+// Method:     T = sum over l of F_l(r) sum over m of a_lm Y_lm(d), F_l = h_l(k r) / h_l(k R) e^{-i k (r - R)}. Harmonics once
+//             for all modes: rows of normalised Legendre functions by recurrence in l. 16 modes at a time, one in a lane: their multipoles
+//             lie side by side as 16-bit steps, and those of a row are multiplied by the same harmonic. F_l by the recurrence of h_l upward
+//             in l, which is stable for it, divided by h_l(k R) at each step, so that nothing overflows: the steps u_l = h_{l-1}(k R) /
+//             h_l(k R) are made here in double precision by 1 / u_{l+1} = (2 l + 1) / (k R) - u_l, u_0 = i.
 // Source:     DLMF 10.51 (recurrences of spherical Bessel functions); Holmes & Featherstone, J. Geodesy 76 (2002), eq. 11 (Legendre
 //             functions by rows).
 // Deviations: the highest orders of a group of modes are omitted where they are 86 dB below the rest, as most of those are far away that
@@ -98,8 +97,8 @@ Transfers::Transfers(const bank::Bank& bank, [[maybe_unused]] base::Instructions
       slots_[mode] = static_cast<std::int32_t>(begin + lane);
       group.scale[lane] = static_cast<float>(air.scale[mode] / 65536.0);
       const std::int16_t* from = &air.coefficient[first[mode]];
-      double power = 0.0,
-             decay = 1.0;  // decay: |F_l| r / R far away, which the steps multiply up, as h_l there differ by their phases only
+      double power = 0.0;
+      double decay = 1.0;  // |F_l| r / R far away, which the steps multiply up, as h_l there differ by their phases only
       for (int l = 0; l <= orders_[mode]; ++l) {
         double sum = 0.0;
         for (int i = 0; i <= 2 * l; ++i, from += 2) {

@@ -1,8 +1,7 @@
 // Method:     p at an ear is Re(conj(T) v), v = (1 + i d / omega_d) z the analytic velocity of a mode: the state z is multiplied by a
-// weight,
-//             then sounded by the table of a mode whose sound is the real part of its state. A weight that goes linearly from W to W + D
-//             over a block gives A + u B, A the sound by W and B that by D, u from 0 to 1: what is heard has no steps. Next weights are
-//             looked up at a place that is predicted; the line between two of them errs by (L angle)^2 / 8 at most.
+//             weight, then sounded by the table of a mode whose sound is the real part of its state. A weight that goes linearly from W
+//             to W + D over a block gives A + u B, A the sound by W and B that by D, u from 0 to 1: what is heard has no steps. Next
+//             weights are looked up at a place that is predicted; the line between two of them errs by (L angle)^2 / 8 at most.
 // Source:     docs/equations.md E4, E10.
 // Deviations: T is that of a mode that rings for ever at its frequency: a strike's first cycles and a decay within few cycles are not.
 #include "runtime/synth/directivity.hpp"
@@ -70,10 +69,10 @@ Directivity::Directivity(std::shared_ptr<const Model> model, std::size_t ears)
 /// From the centre of the multipoles, `blocks` blocks after the first sample of this one: as body and ear move in it, on and on.
 Vec3 Directivity::find_place(const Ear& ear, const BlockPoses& poses, int blocks) const noexcept {
   const auto along = [=](const std::array<Vec3, 2>& x) { return x[0] + static_cast<double>(blocks) * (x[1] - x[0]); };
-  const events::Quaternion turned = multiply(turn_back(poses.rotation[0]), poses.rotation[1]);
-  const events::Quaternion rotation = blocks == 0   ? poses.rotation[0]
-                                      : blocks == 1 ? poses.rotation[1]
-                                                    : multiply(poses.rotation[0], repeat(turned, blocks));
+  const auto predict = [&] {
+    return multiply(poses.rotation[0], repeat(multiply(turn_back(poses.rotation[0]), poses.rotation[1]), blocks));
+  };
+  const events::Quaternion rotation = blocks == 0 ? poses.rotation[0] : blocks == 1 ? poses.rotation[1] : predict();
   Vec3 place = turn(turn_back(rotation), along(ear.world_m) - along(poses.position_m)) - radiation_->offset_m;
   const double distance = norm(place);
   if (distance >= nearest_m_) return place;
@@ -180,7 +179,7 @@ int Directivity::refresh(Ear& ear, int left, int least, const BlockPoses& poses)
   const std::size_t count = ear.modes.size();
   int found = 0;
   bool waits = false;
-  for (std::size_t i = 0; i < count && !waits; ++i) {
+  for (std::size_t i = 0; i < count; ++i) {
     const std::size_t m = ear.cursor + i < count ? ear.cursor + i : ear.cursor + i - count;
     const Mode& mode = ear.modes[m];
     if (mode.left > 0) continue;

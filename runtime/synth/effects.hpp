@@ -96,6 +96,8 @@ class EffectSet {
 
 /// What this build can play. Code of other effects is not in it.
 inline constexpr EffectSet kCompiledEffects = EffectSet::from_mask(CARILLON_EFFECTS_MASK);
+/// Whether this build and a set have an effect: false without a look at the set where the build has not.
+constexpr bool has(EffectSet effects, Effect effect) { return kCompiledEffects.has(effect) && effects.has(effect); }
 
 /// What contacts that last make of the surfaces that touch.
 inline constexpr EffectSet kContactEffects{Effect::kRoughness, Effect::kRolling, Effect::kContactDamping};

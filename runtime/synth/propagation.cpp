@@ -1,6 +1,5 @@
-// Method:     delay lines that receivers read. A floor is heard by a mirrored receiver for each. With directivity each receiver has a line
-// of
-//             its own, filled for its place (directivity.hpp), whose sound sets out from the sphere of the multipoles.
+// Method:     delay lines that receivers read. A floor is heard by a mirrored receiver for each. With directivity each receiver has a
+//             line of its own, filled for its place (directivity.hpp), whose sound sets out from the sphere of the multipoles.
 // Source:     J. B. Allen et al. 1979, Image method for efficiently simulating small-room acoustics (the mirrored microphone).
 // Deviations: the floor is rigid but for one factor, and has no end; the radiation of the body itself is that of free space.
 #include "runtime/synth/propagation.hpp"
@@ -12,8 +11,12 @@
 namespace carillon::synth {
 namespace {
 
-/// Whether a build and a body have an effect: false without a look where the build has not.
-constexpr bool has(EffectSet effects, Effect effect) { return kCompiledEffects.has(effect) && effects.has(effect); }
+/// The track to which an ear's offset belongs; one ear stands for all microphones where they are not `apart`.
+const Trajectory& find_ear_track(const ListenerTracks& listener, bool apart, std::size_t microphone, bool is_mirrored) noexcept {
+  if (kCompiledEffects.has(Effect::kGroundReflection) && is_mirrored)
+    return apart ? listener.get_mirrored_track(microphone) : listener.get_mirrored_middle_track();
+  return apart ? listener.get_track(microphone) : listener.get_middle_track();
+}
 
 }  // namespace
 
@@ -59,10 +62,7 @@ void DirectedSound::push(const events::BodyMotion& motion) noexcept {
 }
 
 const Trajectory& DirectedSound::find_track(const ListenerTracks& listener, std::size_t ear) const noexcept {
-  const std::size_t microphone = find_microphone(ear);
-  if (kCompiledEffects.has(Effect::kGroundReflection) && is_mirrored(ear))
-    return apart_ ? listener.get_mirrored_track(microphone) : listener.get_mirrored_middle_track();
-  return apart_ ? listener.get_track(microphone) : listener.get_middle_track();
+  return find_ear_track(listener, apart_, find_microphone(ear), is_mirrored(ear));
 }
 
 void DirectedSound::begin_block(std::int64_t sample, const Trajectory& track, const ListenerTracks& listener) noexcept {
@@ -112,10 +112,7 @@ void Propagation::push_silence(std::int64_t samples) noexcept {
 }
 
 const Trajectory& Propagation::find_track(const ListenerTracks& listener, std::size_t ear, bool is_mirrored) const noexcept {
-  const bool apart = has(effects, Effect::kTwoEars);
-  if (kCompiledEffects.has(Effect::kGroundReflection) && is_mirrored)
-    return apart ? listener.get_mirrored_track(ear) : listener.get_mirrored_middle_track();
-  return apart ? listener.get_track(ear) : listener.get_middle_track();
+  return find_ear_track(listener, has(effects, Effect::kTwoEars), ear, is_mirrored);
 }
 
 double Propagation::calc_longest_s(const ListenerTracks& listener, std::int64_t sample) const noexcept {

@@ -12,9 +12,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <vector>
 
+#include "runtime/base/kaiser_sinc.hpp"
 #include "runtime/base/vector.hpp"
 #include "runtime/radiation/transfers.hpp"
 
@@ -22,19 +22,8 @@ namespace carillon::synth {
 namespace {
 
 constexpr int kPhases = 512;
-constexpr double kFarthest = 1e12;   // samples; keeps what follows within integers
-constexpr double kKaiserBeta = 9.0;  // stop band -90 dB
+constexpr double kFarthest = 1e12;  // samples; keeps what follows within integers
 using Taps = std::array<float, kTaps>;
-
-/// Its power series (Abramowitz and Stegun 9.6.12), for 0 <= x <= kKaiserBeta: std::cyl_bessel_i is not in every C++ library.
-double calc_bessel_i0(double x) {
-  double term = 1.0, sum = 1.0;
-  for (int k = 1; term > 1e-17 * sum; ++k) {
-    term *= 0.25 * x * x / (static_cast<double>(k) * k);
-    sum += term;
-  }
-  return sum;
-}
 
 std::vector<Taps> make_sinc_table() {
   std::vector<Taps> table(kPhases + 1);
@@ -43,11 +32,8 @@ std::vector<Taps> make_sinc_table() {
     std::array<double, kTaps> taps{};
     double total = 0.0;
     for (int tap = 0; tap < kTaps; ++tap) {
-      // Tap `tap` sits at sample floor(t) - half + 1 + tap; x is its distance from t.
-      const double x = tap - half + 1.0 - static_cast<double>(phase) / kPhases;
-      const double sinc = x == 0.0 ? 1.0 : std::sin(std::numbers::pi * x) / (std::numbers::pi * x);
-      const double w = std::max(0.0, 1.0 - (x / half) * (x / half));
-      taps[tap] = sinc * calc_bessel_i0(kKaiserBeta * std::sqrt(w));
+      // Tap `tap` sits at sample floor(t) - half + 1 + tap.
+      taps[tap] = base::calc_kaiser_sinc(tap - half + 1.0 - static_cast<double>(phase) / kPhases, half);
       total += taps[tap];
     }
     for (int tap = 0; tap < kTaps; ++tap) table[phase][tap] = static_cast<float>(taps[tap] / total);
@@ -94,9 +80,6 @@ bool read_row(const Kernels& kernels, const DelayLine& sent, std::int64_t first,
   std::copy_n(whole.begin(), row.size(), row.begin());
   return true;
 }
-
-/// Whether a build and an ear have an effect.
-constexpr bool has(EffectSet effects, Effect effect) { return kCompiledEffects.has(effect) && effects.has(effect); }
 
 /// The way of a sound that takes no time.
 PathState calc_straight_way(const Trajectory& source, const Trajectory& listener, const Vec3& offset_m, double time_s) noexcept {

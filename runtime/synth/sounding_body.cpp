@@ -20,9 +20,6 @@ namespace {
 constexpr EffectSet kOfPropagation{Effect::kModal,   Effect::kAccelerationNoise, Effect::kAirDelay,        Effect::kDoppler,
                                    Effect::kTwoEars, Effect::kDirectivity,       Effect::kGroundReflection};
 
-/// Whether a build and a body have an effect: false without a look where the build has not.
-constexpr bool has(EffectSet effects, Effect effect) { return kCompiledEffects.has(effect) && effects.has(effect); }
-
 constexpr EffectSet kOfContacts = kContactEffects.common(kCompiledEffects);
 
 /// Whether lasting contacts do anything: they act on modes.

@@ -121,10 +121,11 @@ void Voice::render_sub_blocks(std::int64_t start, int sub_blocks, bool struck_at
     if (q == made) {
       do ++made;
       while (made < sub_blocks && !touched && !struck && !strikes_.acts(start + made * kSubBlock, kSubBlock));
-      if (live_ > 0 && !(drive != nullptr && drive->damps))
+      if (live_ > 0 && !(drive != nullptr && drive->damps)) {
         kernels_->emit(model_->sound_.data(), starts_.data(), live_, first + q, made - q, out);
-      if (directed && live_ > 0 && !(drive != nullptr && drive->damps))
-        for_directed([&](Directivity& ears) { ears.emit(*kernels_, starts_.data(), live_, first + q, made - q, q * kSubBlock); });
+        if (directed)
+          for_directed([&](Directivity& ears) { ears.emit(*kernels_, starts_.data(), live_, first + q, made - q, q * kSubBlock); });
+      }
     }
     add_acting(sample, first + q, drive, struck, out);
     if (directed) add_directed(first + q, q * kSubBlock);

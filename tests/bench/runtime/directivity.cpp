@@ -63,9 +63,9 @@ void play(const char* name, const std::shared_ptr<const synth::Model>& model, sy
       synthesiser.push(
           events::BodyMotion{pushed_s, body, {0.0, 1.5, 0.0}, {}, {std::cos(half), 0.6 * std::sin(half), 0.0, 0.8 * std::sin(half)}});
     }
-    const double begin = base::read_clock_ns(CLOCK_THREAD_CPUTIME_ID);
+    const double begin = base::get_thread_cpu_s();
     synthesiser.process(out.data(), 2, synth::kBlock);
-    if (block >= 20) spent.push_back(1e-3 * (base::read_clock_ns(CLOCK_THREAD_CPUTIME_ID) - begin));
+    if (block >= 20) spent.push_back(1e6 * (base::get_thread_cpu_s() - begin));
   }
   std::sort(spent.begin(), spent.end());
   const auto pick = [&](double share) { return spent[static_cast<std::size_t>(share * (static_cast<double>(spent.size()) - 1.0))]; };

@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <complex>
 #include <cstring>
@@ -15,6 +14,8 @@
 #include <numeric>
 #include <random>
 #include <vector>
+
+#include "runtime/base/clock.hpp"
 
 namespace {
 
@@ -53,9 +54,9 @@ double time_us(const radiation::Transfers& transfers, double distance_m, int rou
   for (int i = 0; i < rounds; ++i) {
     const double angle = 0.01 * i;
     const Vec3 place{distance_m * 0.6 * std::cos(angle), distance_m * 0.6 * std::sin(angle), distance_m * 0.8};
-    const auto begin = std::chrono::steady_clock::now();
+    const double begin = base::get_thread_cpu_s();
     transfers.evaluate(place, modes, transfer);
-    times.push_back(std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - begin).count());
+    times.push_back(1e6 * (base::get_thread_cpu_s() - begin));
   }
   std::nth_element(times.begin(), times.begin() + rounds / 2, times.end());
   return times[static_cast<std::size_t>(rounds / 2)];

@@ -1,3 +1,4 @@
+// One field of a bank, followed through all that is done to banks, with the same example throughout; longer than most files.
 // Multipoles of a bank: what they radiate, their way through files, and what becomes of them when a bank is cut, edited and played.
 #include "runtime/bank/multipoles.hpp"
 

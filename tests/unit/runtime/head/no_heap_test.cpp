@@ -1,43 +1,17 @@
-// EarFilter::process takes no memory: operator new is replaced by one that counts. A program of its own, so that no other test is
-// disturbed.
+// EarFilter::process takes no memory. A program of its own, as tests/support/heap_counter.hpp asks.
 #include <gtest/gtest.h>
 
-#include <atomic>
 #include <cmath>
-#include <cstdlib>
-#include <new>
 #include <vector>
 
 #include "runtime/head/ear_filter.hpp"
 #include "runtime/head/sphere.hpp"
-
-namespace {
-std::atomic<long> g_allocations{0};
-}
-
-[[gnu::noinline]] void* operator new(std::size_t size) {
-  ++g_allocations;
-  if (void* memory = std::malloc(size)) return memory;
-  throw std::bad_alloc();
-}
-[[gnu::noinline]] void* operator new(std::size_t size, std::align_val_t align) {
-  ++g_allocations;
-  const auto a = static_cast<std::size_t>(align);
-  if (void* memory = std::aligned_alloc(a, (size + a - 1) / a * a)) return memory;
-  throw std::bad_alloc();
-}
-[[gnu::noinline]] void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
-  ++g_allocations;
-  return std::malloc(size);
-}
-[[gnu::noinline]] void operator delete(void* memory, const std::nothrow_t&) noexcept { std::free(memory); }
-[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
-[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
-[[gnu::noinline]] void operator delete(void* memory, std::align_val_t) noexcept { std::free(memory); }
-[[gnu::noinline]] void operator delete(void* memory, std::size_t, std::align_val_t) noexcept { std::free(memory); }
+#include "tests/support/heap_counter.hpp"
 
 namespace carillon::head {
 namespace {
+
+using tests::g_allocations;
 
 /// Six directions along the axes: a head that is looked up by direction, without a file.
 std::shared_ptr<const Head> make_cross() {

@@ -53,17 +53,11 @@ inline bank::Bank make_empty_multipoles() {
 /// Appends a mode with these (L + 1)^2 coefficients, rounded to 16 bits of the largest component, and a decay that is no part of the test.
 inline void add_multipoles(bank::Bank& bank, double ka, std::span<const Complex> coefficients) {
   bank::Multipoles& air = bank.multipoles;
-  double largest = 0.0;
-  for (const Complex& a : coefficients) largest = std::max({largest, std::abs(a.real()), std::abs(a.imag())});
-  const double scale = largest / 32767.0;
   const double freq_hz = ka / kSphereRadius * bank::kSoundSpeedMs / (2.0 * std::numbers::pi);
   bank.eigenvalue_rad2_s2.push_back(std::pow(2.0 * std::numbers::pi * freq_hz, 2));
   air.freq_hz.push_back(freq_hz);
-  air.order.push_back(static_cast<std::int32_t>(std::lround(std::sqrt(static_cast<double>(coefficients.size())))) - 1);
-  air.scale.push_back(scale);
-  for (const Complex& a : coefficients)
-    for (const double component : {a.real(), a.imag()})
-      air.coefficient.push_back(static_cast<std::int16_t>(std::lround(component / scale)));
+  bank::add_coefficients(air, static_cast<std::int32_t>(std::lround(std::sqrt(static_cast<double>(coefficients.size())))) - 1,
+                         coefficients);
   air.decay_per_s.push_back(1.0);
   air.added_mass.push_back(0.0);
   air.error_db.push_back(-60.0);

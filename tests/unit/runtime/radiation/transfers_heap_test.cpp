@@ -1,39 +1,18 @@
-// Transfers::evaluate() takes no memory: operator new is replaced by one that counts. A program of its own, so that no other test is
-// disturbed.
+// Transfers::evaluate() takes no memory. A program of its own, as tests/support/heap_counter.hpp asks.
 #include <gtest/gtest.h>
 
-#include <atomic>
 #include <complex>
-#include <cstdlib>
-#include <new>
 #include <numeric>
 #include <vector>
 
 #include "runtime/radiation/transfers.hpp"
+#include "tests/support/heap_counter.hpp"
 #include "tests/unit/runtime/radiation/multipole_bank.hpp"
-
-namespace {
-std::atomic<long> g_allocations{0};
-}
-
-[[gnu::noinline]] void* operator new(std::size_t size) {
-  ++g_allocations;
-  if (void* memory = std::malloc(size)) return memory;
-  throw std::bad_alloc();
-}
-[[gnu::noinline]] void* operator new(std::size_t size, std::align_val_t align) {
-  ++g_allocations;
-  const auto a = static_cast<std::size_t>(align);
-  if (void* memory = std::aligned_alloc(a, (size + a - 1) / a * a)) return memory;
-  throw std::bad_alloc();
-}
-[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
-[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
-[[gnu::noinline]] void operator delete(void* memory, std::align_val_t) noexcept { std::free(memory); }
-[[gnu::noinline]] void operator delete(void* memory, std::size_t, std::align_val_t) noexcept { std::free(memory); }
 
 namespace carillon::radiation {
 namespace {
+
+using tests::g_allocations;
 
 TEST(TransfersHeap, EvaluatingTakesNoMemoryAndNeverThrows) {
   bank::Bank bank = testing::make_empty_multipoles();

@@ -1,4 +1,5 @@
-// The effects directivity and ground_reflection against closed forms of monopoles and dipoles.
+// The effects directivity and ground_reflection against closed forms of monopoles and dipoles. Both are tried alone and together on one
+// way to play a body: longer than most files.
 #include "runtime/synth/directivity.hpp"
 
 #include <gtest/gtest.h>

@@ -1,9 +1,9 @@
 // Multipoles by hand for the bank of cube_bank.hpp.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 #include <complex>
+#include <cstdint>
 #include <numbers>
 #include <vector>
 
@@ -25,15 +25,8 @@ inline void give_multipoles(bank::Bank& bank, const std::vector<ModeMultipoles>&
   air.air_density_kg_m3 = kAirDensity;
   air.sound_speed_ms = bank::kSoundSpeedMs;
   for (std::size_t m = 0; m < modes.size(); ++m) {
-    double largest = 0.0;
-    for (const auto& a : modes[m]) largest = std::max({largest, std::abs(a.real()), std::abs(a.imag())});
     air.freq_hz.push_back(std::sqrt(bank.eigenvalue_rad2_s2[m]) / (2.0 * std::numbers::pi));
-    air.order.push_back(static_cast<std::int32_t>(std::lround(std::sqrt(static_cast<double>(modes[m].size())))) - 1);
-    air.scale.push_back(largest / 32767.0);
-    for (const auto& a : modes[m]) {
-      air.coefficient.push_back(static_cast<std::int16_t>(std::lround(a.real() / air.scale.back())));
-      air.coefficient.push_back(static_cast<std::int16_t>(std::lround(a.imag() / air.scale.back())));
-    }
+    bank::add_coefficients(air, static_cast<std::int32_t>(std::lround(std::sqrt(static_cast<double>(modes[m].size())))) - 1, modes[m]);
     air.decay_per_s.push_back(0.0);
     air.added_mass.push_back(0.0);
     air.error_db.push_back(-60.0);

@@ -1,5 +1,4 @@
-// process() and strike() take no memory and make no system call: operator new is replaced by one that counts. A program of its own, so that
-// no other test is disturbed.
+// process() and strike() take no memory and make no system call. A program of its own, as tests/support/heap_counter.hpp asks.
 #include <gtest/gtest.h>
 #include <linux/seccomp.h>
 #include <sys/prctl.h>
@@ -9,10 +8,7 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
-#include <cstdlib>
-#include <new>
 #include <vector>
 
 #include "runtime/synth/acceleration_noise.hpp"
@@ -20,39 +16,15 @@
 #include "runtime/synth/receiver.hpp"
 #include "runtime/synth/synthesiser.hpp"
 #include "runtime/synth/voice.hpp"
+#include "tests/support/heap_counter.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 #include "tests/unit/runtime/synth/multipole_cube.hpp"
 
-namespace {
-std::atomic<long> g_allocations{0}, g_bytes{0};
-}
-
-[[gnu::noinline]] void* operator new(std::size_t size) {
-  ++g_allocations;
-  g_bytes += static_cast<long>(size);
-  if (void* memory = std::malloc(size)) return memory;
-  throw std::bad_alloc();
-}
-[[gnu::noinline]] void* operator new(std::size_t size, std::align_val_t align) {
-  ++g_allocations;
-  g_bytes += static_cast<long>(size);
-  const auto a = static_cast<std::size_t>(align);
-  if (void* memory = std::aligned_alloc(a, (size + a - 1) / a * a)) return memory;
-  throw std::bad_alloc();
-}
-[[gnu::noinline]] void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
-  ++g_allocations;
-  g_bytes += static_cast<long>(size);
-  return std::malloc(size);
-}
-[[gnu::noinline]] void operator delete(void* memory, const std::nothrow_t&) noexcept { std::free(memory); }
-[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
-[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
-[[gnu::noinline]] void operator delete(void* memory, std::align_val_t) noexcept { std::free(memory); }
-[[gnu::noinline]] void operator delete(void* memory, std::size_t, std::align_val_t) noexcept { std::free(memory); }
-
 namespace carillon::synth {
 namespace {
+
+using tests::g_allocations;
+using tests::g_bytes;
 
 TEST(NoHeap, TheCounterSeesAllocations) {
   const long before = g_allocations;
@@ -204,12 +176,23 @@ TEST(NoHeap, DirectivityTakesNoMemoryWhileItPlays) {
     }
     const double time_s = synthesiser.get_horizon_s(), half = 0.01 * i;
     synthesiser.push(events::Impulse{.time_s = time_s, .body = body, .impulse_n_s = {0.0, 0.0, 1.0}, .duration_s = 1e-3});
+    synthesiser.push(events::LastingContact{.time_s = time_s,
+                                            .id = 7,
+                                            .body = body,
+                                            .normal = {0.0, 0.0, 1.0},
+                                            .slip_m_s = {0.2, 0.0, 0.0},
+                                            .force_n = 1.0,
+                                            .sweep_m_s = 0.2,
+                                            .other_sweep_m_s = 0.2,
+                                            .patch_radius_m = 1e-5,
+                                            .impedance_n_s_m = 1.0});
     synthesiser.push(events::BodyMotion{time_s, body, {1.0, 2.0, 0.001 * i}, {}, {std::cos(half), 0.0, std::sin(half), 0.0}});
     synthesiser.set_budget(i % 60 < 30 ? 20.0 * 48000.0 : 1e12);
     synthesiser.process(out.data(), 2, 1 + i);
   }
   EXPECT_EQ(g_allocations - before, 0);
   EXPECT_GT(synthesiser.get_effect_counters(body).units[Effect::kDirectivity], 1000);
+  EXPECT_GT(synthesiser.get_effect_counters(body).units[Effect::kRoughness], 0);
 }
 
 // In a child that the kernel kills at the first system call but read, write and exit.
