@@ -9,19 +9,35 @@ straight line is fitted by least squares through the logarithm of its envelope (
 """
 import argparse
 import pathlib
-import wave
+import struct
 
 import numpy
 
 
+def read_chunks(file):
+    """The chunks of a RIFF file: {name: bytes}."""
+    data = pathlib.Path(file).read_bytes()
+    if data[:4] != b"RIFF" or data[8:12] != b"WAVE":
+        raise SystemExit(f"{file} is no WAV file")
+    chunks, at = {}, 12
+    while at + 8 <= len(data):
+        name, size = struct.unpack_from("<4sI", data, at)
+        chunks[name] = data[at + 8 : at + 8 + size]
+        at += 8 + size + size % 2
+    return chunks
+
+
 def read_wav(file):
-    """(rate, samples of full scale 1 as (N, channels)) of a PCM file of 16 or 24 bits."""
-    with wave.open(str(file)) as sound:
-        width, channels = sound.getsampwidth(), sound.getnchannels()
-        raw = numpy.frombuffer(sound.readframes(sound.getnframes()), dtype=numpy.uint8).reshape(-1, width)
-        value = sum(raw[:, i].astype(numpy.int64) << (8 * i) for i in range(width))
-        value = numpy.where(value >= 1 << (8 * width - 1), value - (1 << (8 * width)), value)
-        return sound.getframerate(), value.reshape(-1, channels) / float(1 << (8 * width - 1))
+    """(rate, samples of full scale 1 as (N, channels)) of a PCM file of 16 or 24 bits, or of floats of 32 bits."""
+    chunks = read_chunks(file)
+    kind, channels, rate, _, _, bits = struct.unpack_from("<HHIIHH", chunks[b"fmt "])
+    if kind == 3:
+        return rate, numpy.frombuffer(chunks[b"data"], dtype="<f4").reshape(-1, channels).astype(float)
+    width = bits // 8
+    raw = numpy.frombuffer(chunks[b"data"], dtype=numpy.uint8).reshape(-1, width)
+    value = sum(raw[:, i].astype(numpy.int64) << (8 * i) for i in range(width))
+    value = numpy.where(value >= 1 << (8 * width - 1), value - (1 << (8 * width)), value)
+    return rate, value.reshape(-1, channels) / float(1 << (8 * width - 1))
 
 
 def calc_spectrum(samples, rate):

@@ -64,6 +64,16 @@ std::string find_title(const PageOrder& order) {
   return first.filename() == "scene.json" ? first.parent_path().filename().string() : first.stem().string();
 }
 
+/// Frees the ears of a listener with a head, which the sound engine has not. Whether there was one.
+bool take_head(Json::Value& scene) {
+  if (!scene.isMember("listener")) return false;
+  Json::Value& listener = scene["listener"];
+  const bool has_head = listener["ears"] == "hrtf";
+  listener.removeMember("ears");
+  listener.removeMember("sofa");
+  return has_head;
+}
+
 /// Whether a body is described in place of its bank. What is no scene has none: carillon-render says so.
 bool has_described_body(const Json::Value& scene) {
   const Json::Value bodies = scene.isObject() ? scene["bodies"] : Json::Value();
@@ -142,6 +152,7 @@ class Work {
     }
     done_.duration_s = report_["duration_s"].asDouble();
     for (const Json::Value& warning : report_["warnings"]) done_.warnings.push_back(warning.asString());
+    if (take_head(scene)) done_.warnings.emplace_back("listener: pages have no heads; on this one the ears are free");
     done_.has_recording = report_["peak_pa"].isNumeric() && report_["peak_pa"].asDouble() > 0.0;
     std::error_code error;
     if (done_.has_recording)

@@ -20,7 +20,7 @@
 namespace carillon::bem {
 namespace {
 
-constexpr std::string_view kMagic = "carillon answers 1\n";
+constexpr std::string_view kMagic = "carillon answers 2\n";
 constexpr std::size_t kHead = kMagic.size() + 32, kHashBytes = 32;
 constexpr std::uint64_t kMostNumbers = 100'000'000;
 
@@ -100,13 +100,18 @@ std::array<unsigned char, 32> calc_fingerprint(const Radiator& radiator, const A
   add(radiator.triangles);
   add(radiator.velocity);
   add(radiator.wave_number_1_m);
-  const std::array<double, 7> numbers{options.step,
-                                      options.error_db,
-                                      options.nearest_over_radius,
-                                      options.tolerance,
-                                      radiator.sphere.radius_m,
-                                      static_cast<double>(radiator.nodes_m.size()),
-                                      static_cast<double>(radiator.triangles.size())};
+  const CouplingOptions coupling = options.coupling.value_or(CouplingOptions{});
+  const std::array<double, 11> numbers{options.step,
+                                       options.error_db,
+                                       options.nearest_over_radius,
+                                       options.tolerance,
+                                       radiator.sphere.radius_m,
+                                       static_cast<double>(radiator.rigid),
+                                       coupling.has_rows ? 1.0 : 0.0,
+                                       coupling.density_kg_m3,
+                                       coupling.kept,
+                                       static_cast<double>(radiator.nodes_m.size()),
+                                       static_cast<double>(radiator.triangles.size())};
   add(numbers);
   add(radiator.sphere.centre_m);
   return hash.finish();

@@ -14,6 +14,7 @@
 #include "precompute/bem/answers_file.hpp"
 #include "precompute/bem/expansion.hpp"
 #include "precompute/bem/transfer.hpp"
+#include "runtime/bank/mixing.hpp"
 #include "runtime/bank/surface.hpp"
 #include "runtime/base/error.hpp"
 
@@ -22,12 +23,14 @@ namespace {
 
 using Double = std::complex<double>;
 
+constexpr double kNearTop = 0.7;  // of the highest frequency: modes that lie as near to others beyond the band
+
 /// Behind the plane, as far as it is before it.
 Vec3 mirror(const Plane& plane, const Vec3& place) { return place - (2.0 * dot(place - plane.point_m, plane.normal)) * plane.normal; }
 
 /// The mirror image next to the body: a closed surface again, that moves alike.
 void add_mirror_image(const Plane& plane, Radiator& radiator) {
-  const std::size_t nodes = radiator.nodes_m.size(), facets = radiator.triangles.size(), row = radiator.count_modes();
+  const std::size_t nodes = radiator.nodes_m.size(), facets = radiator.triangles.size(), row = radiator.count_motions();
   for (std::size_t i = 0; i < nodes; ++i) {
     if (!(dot(radiator.nodes_m[i] - plane.point_m, plane.normal) > 0.0))
       throw InputError("\"half_space\": the body is not wholly on the side of the plane that its normal shows to; move the plane");
@@ -77,9 +80,49 @@ std::vector<double> calc_tail(const Sounding& mode, const Spread& spread) {
   return tail;
 }
 
-/// The added mass of a mode over its modal mass. A half space is solved with the mirror image, which takes as much.
+/// Added mass over minus a reaction. A half space is solved with the mirror image, which takes as much.
+double find_density(const AirOptions& options) { return (options.half_space ? 0.5 : 1.0) * options.air_density_kg_m3; }
+
+/// The added mass of a mode over its modal mass.
 double calc_added_mass(const Sounding& mode, const AirOptions& options) {
-  return -(options.half_space ? 0.5 : 1.0) * options.air_density_kg_m3 * mode.reaction.real();
+  return mode.mixture.is_empty() ? -find_density(options) * mode.reaction.real() : mode.mixture.added_mass;
+}
+
+void add_mixture(const Sounding& mode, bank::Mixing& mixing) {
+  if (mode.mixture.is_empty()) return;
+  mixing.count.push_back(static_cast<std::int32_t>(mode.mixture.motions.size()));
+  mixing.motion.insert(mixing.motion.end(), mode.mixture.motions.begin(), mode.mixture.motions.end());
+  mixing.part.insert(mixing.part.end(), mode.mixture.parts.begin(), mode.mixture.parts.end());
+}
+
+/// Rigid motions with which modes may be coupled: those of one free body.
+std::size_t count_rigid(const bank::Bank& bank) {
+  return bank.counts.components == 1 && bank.counts.rigid_modes == static_cast<std::int64_t>(bank::kRigidMotions) ? bank::kRigidMotions : 0;
+}
+
+/// Refuses what moves with the air rather than in it.
+void check_mass(std::size_t mode, double freq_hz, double mass) {
+  if (mass > kMostMass)
+    throw InputError(
+        fmt::format("mode {} at {:.1f} Hz: the air adds {:.2f} of its own mass: a membrane or a sheet this light moves with "
+                    "the air, which this method cannot do; leave the air out with \"radiation\": \"none\"",
+                    mode + 1, freq_hz, mass));
+}
+
+/// Warns of modes with much air near the end of the band: those beyond it, which the bank has not, would mix in.
+void warn_of_band(const bank::Multipoles& multipoles, std::span<const double> freq_hz, const AirOptions& options) {
+  const double top = *std::max_element(freq_hz.begin(), freq_hz.end());
+  double most = 0.0, lowest = top;
+  for (std::size_t m = 0; m < freq_hz.size(); ++m) {
+    if (freq_hz[m] < kNearTop * top || multipoles.added_mass[m] < kCoupleMass) continue;
+    most = std::max(most, multipoles.added_mass[m]);
+    lowest = std::min(lowest, freq_hz[m]);
+  }
+  if (options.warn && most > 0.0)
+    options.warn(fmt::format(
+        "modes from {:.4g} Hz on, near the end of the band, have an added mass of up to {:.2f}: modes beyond the band, which the "
+        "bank has not, would mix with them in air; end the band an octave above what you need",
+        lowest, most));
 }
 
 /// Appends a mode that was solved at k to a residual. Its error is still a ratio of powers, without rounding, and its decay not yet there.
@@ -96,6 +139,7 @@ void add_mode(const Sounding& mode, double k, double residual, const AirOptions&
   bank::add_coefficients(multipoles, static_cast<std::int32_t>(order), pressure);
   multipoles.freq_hz.push_back(k * options.sound_speed_ms / (2.0 * std::numbers::pi));
   multipoles.added_mass.push_back(calc_added_mass(mode, options));
+  add_mixture(mode, multipoles.mixing);
   multipoles.error_db.push_back(std::pow(10.0, mode.interpolation_db / 10.0) + tail[order] + residual * residual);
 }
 
@@ -120,12 +164,30 @@ std::vector<double> find_played_freq_hz(const bank::Bank& bank) {
   return freq_hz;
 }
 
-Radiator make_radiator(const bank::Bank& bank, std::span<const double> freq_hz, const AirOptions& options) {
+double calc_mass_bound(const Radiator& radiator, const AirOptions& options) {
+  std::vector<double> squares(radiator.count_motions());  // integrals over the surface, of linear functions
+  for (std::size_t t = 0; t < radiator.triangles.size(); ++t) {
+    const auto& [a, b, c] = radiator.triangles[t];
+    const double area = 0.5 * norm(cross(radiator.nodes_m[b] - radiator.nodes_m[a], radiator.nodes_m[c] - radiator.nodes_m[a]));
+    const float* v = &radiator.velocity[t * 3 * squares.size()];
+    for (std::size_t m = 0; m < squares.size(); ++m) {
+      const double x = v[m], y = v[squares.size() + m], z = v[2 * squares.size() + m];
+      squares[m] += area / 6.0 * (x * x + y * y + z * z + x * y + y * z + z * x);
+    }
+  }
+  squares.resize(radiator.count_modes());
+  const double most = squares.empty() ? 0.0 : *std::max_element(squares.begin(), squares.end());
+  return find_density(options) * radiator.sphere.radius_m * most;
+}
+
+Radiator make_radiator(const bank::Bank& bank, std::span<const double> freq_hz, const AirOptions& options, bool has_rigid) {
   Radiator radiator;
   const std::vector<Triangle> outer = bank::find_outer_triangles(bank.vertices_m, bank.triangles);
   if (outer.empty()) throw InputError("the surface of the body has no outside: no closed shell of it encloses a volume");
   std::vector<std::int32_t> number(bank.vertex_count(), -1);
   const std::size_t modes = bank.mode_count();
+  if (has_rigid) radiator.rigid = count_rigid(bank);
+  const bank::RigidMotions rigid(bank.rigid);
   for (const Triangle& triangle : outer) {
     Triangle made{};
     for (std::size_t c = 0; c < 3; ++c) {
@@ -145,6 +207,8 @@ Radiator make_radiator(const bank::Bank& bank, std::span<const double> freq_hz, 
       for (std::size_t m = 0; m < modes; ++m, step += 3)
         radiator.velocity.push_back(
             static_cast<float>(bank.shape_scale[m] * (step[0] * normal[0] + step[1] * normal[1] + step[2] * normal[2])));
+      for (std::size_t r = 0; r < radiator.rigid; ++r)
+        radiator.velocity.push_back(static_cast<float>(dot(rigid.find(r, bank.vertices_m[triangle[c]]), normal)));
     }
   }
   radiator.sphere = find_enclosing_sphere(radiator.nodes_m);
@@ -169,19 +233,46 @@ double calc_roundness(const bank::Bank& bank) {
 bank::Multipoles calc_multipoles(const comm::Communicator& comm, const bank::Bank& bank, const AirOptions& options, Keeper keeper,
                                  const std::filesystem::path& answers) {
   const std::vector<double> played = find_played_freq_hz(bank);
-  const Radiator radiator = comm.agree([&] { return comm.is_root() ? make_radiator(bank, played, options) : Radiator{}; });
+  bool may_couple = false;  // on rank 0 first
+  Radiator radiator = comm.agree([&] {
+    if (!comm.is_root()) return Radiator{};
+    Radiator made = make_radiator(bank, played, options);
+    may_couple = calc_mass_bound(made, options) >= kCoupleMass;
+    return may_couple ? make_radiator(bank, played, options, true) : made;
+  });
+  may_couple = comm.broadcast(static_cast<std::int32_t>(may_couple)) != 0;
   AirSolveOptions solve = options.solve;
   solve.shift = [&](double k, const Sounding& mode) {
     const double mass = calc_added_mass(mode, options);
     return mass >= kShiftMass ? k / std::sqrt(1.0 + mass) : k;
   };
+  solve.coupling = CouplingOptions{.density_kg_m3 = find_density(options)};
+  solve.coupling->is_called_for = [&](const std::vector<Sounding>& modes) {
+    double most = 0.0;
+    for (std::size_t m = 0; m < modes.size(); ++m) {
+      const double mass = calc_added_mass(modes[m], options);
+      check_mass(m, played[m], mass);
+      most = std::max(most, mass);
+    }
+    return most >= kCoupleMass;
+  };
+  solve.coupling->has_rows = may_couple;
   std::optional<AnswersFile> file;
   if (comm.is_root() && !answers.empty()) {
     file.emplace(answers, calc_fingerprint(radiator, solve));
     keeper.read = [&] { return file->read(); };
     keeper.save = [&](const WaveAnswer& answer) { file->save(answer); };
   }
-  const AirSolution solution = solve_air(comm, radiator, solve, keeper);
+  AirSolution solution = solve_air(comm, radiator, solve, keeper);
+  if (comm.broadcast(static_cast<std::int32_t>(solution.lacks_rows)) != 0) {  // a resonance of the air: once more, with all that it takes
+    solve.coupling->has_rows = true;
+    comm.agree([&] {
+      if (!comm.is_root()) return;
+      radiator = make_radiator(bank, played, options, true);
+      if (file) file.emplace(answers, calc_fingerprint(radiator, solve));
+    });
+    solution = solve_air(comm, radiator, solve, keeper);
+  }
   return comm.agree([&] {
     bank::Multipoles multipoles;
     if (!comm.is_root() || solution.modes.empty()) return multipoles;
@@ -193,16 +284,15 @@ bank::Multipoles calc_multipoles(const comm::Communicator& comm, const bank::Ban
     const double residual = std::max(solve.tolerance, solution.residual);
     for (std::size_t m = 0; m < played.size(); ++m) {
       add_mode(solution.modes[m], solution.wave_number_1_m[m], residual, options, multipoles);
-      if (multipoles.added_mass.back() > kMostMass)
-        throw InputError(
-            fmt::format("mode {} at {:.1f} Hz: the air adds {:.2f} of its own mass: a membrane or a sheet this light moves with "
-                        "the air, which this method cannot do; leave the air out with \"radiation\": \"none\"",
-                        m + 1, played[m], multipoles.added_mass.back()));
+      check_mass(m, played[m], multipoles.added_mass.back());
     }
+    const bool is_coupled = !multipoles.mixing.is_empty();
+    if (is_coupled) warn_of_band(multipoles, played, options);
     add_decays(options, multipoles);
     if (file) file->remove();
-    multipoles.method = fmt::format("boundary elements (Burton-Miller, Galerkin), {} unknowns, {} wave numbers{}", solution.unknowns,
-                                    solution.wave_numbers, options.half_space ? ", half space" : "");
+    multipoles.method = fmt::format("boundary elements (Burton-Miller, Galerkin), {} unknowns, {} wave numbers{}{}", solution.unknowns,
+                                    solution.wave_numbers, options.half_space ? ", half space" : "",
+                                    is_coupled ? fmt::format(", modes coupled (reciprocal to {:.1e})", solution.reciprocity) : "");
     return multipoles;
   });
 }

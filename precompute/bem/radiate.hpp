@@ -32,23 +32,29 @@ struct AirOptions {
   double order_db = -46.0;                       // what the orders that are left out make, at the nearest distance and far away
 };
 
-/// From this added mass on a mode is shifted; from the second on modes are coupled by the air; beyond the third the air is no small change.
-inline constexpr double kShiftMass = 0.01, kCoupleMass = 0.1, kMostMass = 0.3;
+/// From this added mass on a mode is shifted; where one mode of a bank reaches the second, all of them are coupled by the air; beyond the
+/// third, modes of the body without air, and as many as the bank has, no longer make up those in air.
+inline constexpr double kShiftMass = 0.01, kCoupleMass = 0.1, kMostMass = 1.0;
 
 /// Facets per wavelength of the fastest mode: fewer than the first are refused, fewer than the second warned of.
 inline constexpr double kFewestFacets = 1.0, kFewFacets = 2.0;
 
 /// The surface of the bank that faces the open air, with the normal velocities of all modes on it, at the wave numbers of the frequencies
-/// that are played. `freq_hz`: of the modes. Throws InputError where the surface has no outside, and
-/// where it is too coarse for the waves. Rank 0 alone.
-Radiator make_radiator(const bank::Bank& bank, std::span<const double> freq_hz, const AirOptions& options);
+/// that are played. `freq_hz`: of the modes. With `has_rigid` the rigid motions of one free body are there too. Throws InputError
+/// where the surface has no outside, and where it is too coarse for the waves. Rank 0 alone.
+Radiator make_radiator(const bank::Bank& bank, std::span<const double> freq_hz, const AirOptions& options, bool has_rigid = false);
+
+/// The largest added mass that a mode can have without a resonance of the air: a sphere around the body, all of whose surface moves in
+/// step, has it. Where it reaches kCoupleMass, modes may have to be coupled.
+double calc_mass_bound(const Radiator& radiator, const AirOptions& options);
 
 /// The frequencies at which a bank is played: corrected ones where it has them.
 std::vector<double> find_played_freq_hz(const bank::Bank& bank);
 
 /// Multipoles of all modes of `bank`, which rank 0 alone has and gets; damping and added mass from them. Modes whose added mass is
-/// kShiftMass or more are solved at their frequency in air. Collective. Throws on all ranks as solve_air(), and InputError where the added
-/// mass is above kMostMass: a membrane needs another method.
+/// kShiftMass or more are solved at their frequency in air; where one has kCoupleMass, all modes are coupled, with each other and with the
+/// rigid motions of a free body, and the multipoles are those of the mixtures. Collective. Throws on all ranks as solve_air(), and
+/// InputError where the added mass is above kMostMass: a membrane needs another method.
 /// `answers`: a file in which wave numbers that are solved are kept, and from which a run resumes; empty: none. It is gone at the end.
 bank::Multipoles calc_multipoles(const comm::Communicator& comm, const bank::Bank& bank, const AirOptions& options, Keeper keeper = {},
                                  const std::filesystem::path& answers = {});

@@ -33,7 +33,7 @@ Radiator transfer(const Radiator& fine, std::vector<Vec3> nodes_m, std::vector<T
   coarse.vertices_m = std::move(nodes_m);
   coarse.triangles = std::move(triangles);
   const bank::SurfaceTree tree(coarse);
-  const std::size_t modes = fine.count_modes(), facets = coarse.triangles.size();
+  const std::size_t modes = fine.count_motions(), facets = coarse.triangles.size();
   std::vector<double> moments(facets * 3 * modes), flow(facets * modes);
   std::vector<Mat3> gram(facets);
   for (std::size_t t = 0; t < fine.triangles.size(); ++t) {
@@ -58,7 +58,8 @@ Radiator transfer(const Radiator& fine, std::vector<Vec3> nodes_m, std::vector<T
                     .triangles = coarse.triangles,
                     .velocity = {},
                     .wave_number_1_m = fine.wave_number_1_m,
-                    .sphere = fine.sphere};
+                    .sphere = fine.sphere,
+                    .rigid = fine.rigid};
   for (const Vec3& node : radiator.nodes_m)
     radiator.sphere.radius_m = std::max(radiator.sphere.radius_m, norm(node - radiator.sphere.centre_m));
   radiator.velocity.resize(facets * 3 * modes);

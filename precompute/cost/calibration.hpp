@@ -44,11 +44,17 @@ inline constexpr double kErrorMode = 1.5e-8, kErrorQuadraticMode = 9e-8, kErrorT
 inline constexpr double kAirNode = 1e-3, kAirEntry = 5e-8, kAirProduct = 2e-9;
 inline constexpr double kAirWaves = 45;   // wave numbers, where there are more modes
 inline constexpr double kAirReaders = 4;  // wave numbers that a mode reads then
+// Coupled modes: one solve for each pair up to so many modes, for each of so many fields a mode beyond (precompute/condense); of a solve,
+// of the strains of a field, and of a product of two fields at a point; then the search for points, by the square of the modes.
+inline constexpr int kModesOfAllPairs = 40;
+inline constexpr double kFieldsPerMode = 8;
+inline constexpr double kCouplingSolveEntry = 1.5e-10, kCouplingPoint = 5e-8, kCouplingProduct = 2e-10, kCouplingSearch = 1e-3;
 inline constexpr double kCollectNumber = 1e-8, kWriteNumber = 5e-9;
 inline constexpr double kMultiplyAddsPerSecond = 4.9e9;  // of the kernel of measure_speed() there
 
 // Bytes.
 inline constexpr double kProgramBytes = 57e6;                                     // of a rank without a mesh
+inline constexpr double kCouplingColumns = 14;                                    // fields at all points, for each coupled mode
 inline constexpr double kAirMatrixBytes = 1.1e9;                                  // of one rank, beyond which ranks share the rows
 inline constexpr double kRankBytes = 10e6;                                        // what MPI holds for each
 inline constexpr double kMeshBytesPerTet = 200, kQuadraticMeshBytesPerTet = 600;  // mesh, partition and surface

@@ -29,6 +29,14 @@ double calc_air_bytes(const ProblemSize& size) {
   return std::min(8 * nodes * nodes, kAirMatrixBytes) + nodes * (20 * 32 * 8 + 60 * modes);
 }
 
+/// Of all ranks together: answers of all pairs at the nodes and their products, or the fields of sampled motions at the points.
+double calc_coupling_bytes(const ProblemSize& size) {
+  const double n = size.coupled_modes, pairs = n * (n + 1) / 2;
+  if (size.coupled_modes <= kModesOfAllPairs) return kNumber * pairs * (static_cast<double>(size.unknowns) + pairs);
+  const double rows = (size.is_quadratic ? 24.0 : 6.0) * static_cast<double>(size.tets);
+  return kNumber * rows * kCouplingColumns * n;
+}
+
 double find_growth(int ranks) {
   const double doublings = std::log2(static_cast<double>(ranks));
   const auto index = static_cast<std::size_t>(doublings);
@@ -69,7 +77,11 @@ double calc_peak_bytes(const MemoryParts& parts, const ProblemSize& known, int r
   const double dense = is_dense ? (kDenseCopies * ranks + kDenseWork) * kNumber * unknowns * unknowns : 0;
   const double own = std::max(parts.assembled + (is_dense ? 0 : sparse), parts.read_peak) - parts.program;
   const double modes = ranks * (parts.program + kRankBytes) + find_growth(ranks) * own + dense;
-  return std::max(modes, ranks * (parts.program + kRankBytes + calc_air_bytes(size)));
+  const double coupled = size.coupled_modes == 0 ? 0
+                                                 : ranks * (parts.program + kRankBytes) +
+                                                       find_growth(ranks) * (parts.assembled - parts.program + parts.factor) +
+                                                       kNumber * unknowns * static_cast<double>(*size.modes) + calc_coupling_bytes(size);
+  return std::max({modes, coupled, ranks * (parts.program + kRankBytes + calc_air_bytes(size))});
 }
 
 double predict_bytes(const ProblemSize& known, int ranks) { return calc_peak_bytes(predict_parts(known), known, ranks); }

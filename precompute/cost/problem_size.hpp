@@ -17,6 +17,7 @@ struct ProblemSize {
   std::int64_t unknowns = 0;
   std::int64_t surface_nodes = 0;
   std::int64_t air_nodes = 0;  // of the surface outside which the air is solved; 0: it is not
+  int coupled_modes = 0;       // whose quartic energy is condensed; 0: none
   bool is_quadratic = true;
   bool is_thin = false;         // slenderness above kVerySlender: low modes are refined by another solve
   bool is_dense = false;        // solved by LAPACK, whatever its size

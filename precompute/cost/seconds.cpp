@@ -27,7 +27,23 @@ double predict_air(const ProblemSize& size) {
   return kAirNode * nodes + nodes * nodes * (kAirEntry * waves + kAirProduct * readers);
 }
 
+/// One factorisation, and loads, solves and products of the fields.
+double predict_coupling(const ProblemSize& size) {
+  if (size.coupled_modes == 0) return 0.0;
+  const double n = size.coupled_modes, pairs = n * (n + 1) / 2, tets = to_double(size.tets);
+  const double factorisation = calc_factorisation(size) + (size.is_quadratic ? kAssembleQuadraticTet : kAssembleTet) * tets;
+  const double points = size.is_quadratic ? 4 * tets : tets;
+  const double fields = predict_coupling_solves(size.coupled_modes);
+  return factorisation + fields * (kCouplingSolveEntry * to_double(size.factor_entries) + kCouplingPoint * points) +
+         kCouplingProduct * points * pairs * fields + (size.coupled_modes > kModesOfAllPairs ? kCouplingSearch * n * n : 0.0);
+}
+
 }  // namespace
+
+double predict_coupling_solves(int modes) {
+  const double n = modes;
+  return modes <= kModesOfAllPairs ? n * (n + 1) / 2 : kFieldsPerMode * n;
+}
 
 double predict_factorisation_seconds(const ProblemSize& known) { return calc_factorisation(complete(known)); }
 
@@ -47,6 +63,7 @@ PhaseSeconds predict_seconds(const ProblemSize& known) {
   seconds.collect = kCollectNumber * surface;
   seconds.write = kWriteNumber * surface;
   seconds.air = predict_air(size);
+  seconds.coupling = predict_coupling(size);
   if (size.unknowns <= kDenseRows) return seconds;
   const double solves = to_double(predict_solves(*size.modes));
   const double columns = solves / to_double(count_slices(*size.modes));  // of one basis
@@ -64,7 +81,7 @@ PhaseSeconds calc_wall(const PhaseSeconds& cpu, const ProblemSize& size, int ran
   PhaseSeconds wall = cpu;
   for (double PhaseSeconds::*phase :
        {&PhaseSeconds::partition, &PhaseSeconds::assemble, &PhaseSeconds::analyse, &PhaseSeconds::factor, &PhaseSeconds::solve,
-        &PhaseSeconds::orthogonalise, &PhaseSeconds::check, &PhaseSeconds::errors, &PhaseSeconds::collect, &PhaseSeconds::air})
+        &PhaseSeconds::orthogonalise, &PhaseSeconds::check, &PhaseSeconds::errors, &PhaseSeconds::coupling, &PhaseSeconds::collect, &PhaseSeconds::air})
     wall.*phase /= ranks;
   if (size.is_read_by_all) wall.read /= ranks;
   return wall;

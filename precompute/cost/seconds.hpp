@@ -16,16 +16,20 @@ struct PhaseSeconds {
   double orthogonalise = 0;
   double check = 0;  // residuals, orthonormality
   double errors = 0;
+  double coupling = 0;  // quartic energy of coupled modes
   double collect = 0;
   double air = 0;
   double write = 0;
 
   double sum_modes() const { return analyse + factor + solve + orthogonalise + check; }
-  double sum() const { return read + partition + assemble + sum_modes() + errors + collect + air + write; }
+  double sum() const { return read + partition + assemble + sum_modes() + errors + coupling + collect + air + write; }
 };
 
 /// CPU seconds on the machine of the calibrated table; divide by measure_speed() for this one. What is unknown of the size is estimated.
 PhaseSeconds predict_seconds(const ProblemSize& size);
+
+/// Right-hand sides of the quartic energy of so many coupled modes.
+double predict_coupling_solves(int modes);
 
 /// One factorisation of it.
 double predict_factorisation_seconds(const ProblemSize& size);

@@ -22,6 +22,7 @@ constexpr double kMinScale = 1e-9, kMaxScale = 1e6;
 constexpr long long kMinSkin = 100, kMaxSkin = 200'000;
 constexpr double kMinAirDb = -80.0, kMaxAirDb = -20.0;
 constexpr double kMinNormal = 1e-100, kMaxNormal = 1e100;
+constexpr double kMinEnergyError = 1e-6, kMaxEnergyError = 0.1;
 constexpr double kMinCents = 1e-3, kMaxCents = 1200;
 
 /// The words of a schema and their meaning; a job may write `words` only.
@@ -53,7 +54,7 @@ const Words<Factorisation> kFactorisations{{{"automatic", Factorisation::automat
                                             {"ldlt", Factorisation::ldlt},
                                             {"mumps", Factorisation::mumps},
                                             {"cholmod", Factorisation::cholmod}}};
-const Words<Radiation> kRadiations{{{"none", Radiation::none}, {"auto", Radiation::automatic}, {"bem", Radiation::bem}}};
+const Words<AirMethod> kAirMethods{{{"none", AirMethod::none}, {"auto", AirMethod::automatic}, {"bem", AirMethod::bem}}};
 
 Fixed read_fixed(base::Object fixed) {
   Fixed result;
@@ -123,11 +124,11 @@ void read_solver(base::Object& job, JobSpec& spec) {
 
 void read_air(base::Object& job, JobSpec& spec) {
   if (!job.has_object("radiation")) {
-    spec.air.method = kRadiations.read(job, "radiation", spec.air.method);
+    spec.air.method = kAirMethods.read(job, "radiation", spec.air.method);
     return;
   }
   base::Object air = job.object("radiation");
-  spec.air.method = kRadiations.read(air, "method", Radiation::bem);
+  spec.air.method = kAirMethods.read(air, "method", AirMethod::bem);
   if (auto nodes = air.integer_if("skin_nodes", kMinSkin, kMaxSkin)) spec.air.skin_nodes = static_cast<int>(*nodes);
   spec.air.error_db = air.number_or("error_db", spec.air.error_db, {kMinAirDb, kMaxAirDb});
   if (auto half = air.object_if("half_space")) {
@@ -139,6 +140,27 @@ void read_air(base::Object& job, JobSpec& spec) {
     half->finish();
   }
   air.finish();
+}
+
+void read_nonlinear(base::Object& job, JobSpec& spec) {
+  if (!job.has("nonlinear")) return;
+  if (!job.has_object("nonlinear"))
+    job.fail("nonlinear", "is an object: {\"modes\": 30, \"below_hz\": 3000, \"energy_error\": 1e-3}, each of which may be left out");
+  base::Object nonlinear = job.object("nonlinear");
+  Nonlinear& found = spec.nonlinear.emplace();
+  if (auto modes = nonlinear.integer_if("modes", 1, kMaxCoupledModes)) found.modes = static_cast<int>(*modes);
+  if (spec.max_modes && found.modes > *spec.max_modes) {
+    if (nonlinear.has("modes"))
+      nonlinear.fail("modes", fmt::format("couples {} modes, and \"max_modes\" keeps {}; ask for fewer, or keep more", found.modes,
+                                          *spec.max_modes));
+    found.modes = *spec.max_modes;
+  }
+  found.below_hz = nonlinear.number_or("below_hz", found.below_hz, base::kPositive);
+  if (found.below_hz <= spec.band_hz[0] || found.below_hz > kMaxHz)
+    nonlinear.fail("below_hz", fmt::format("is the highest frequency of a coupled mode, in Hz, above {:g} where \"band_hz\" begins, and is {:g}",
+                                           spec.band_hz[0], found.below_hz));
+  found.energy_error = nonlinear.number_or("energy_error", found.energy_error, {kMinEnergyError, kMaxEnergyError});
+  nonlinear.finish();
 }
 
 void read_resources(base::Object& job, JobSpec& spec) {
@@ -172,7 +194,7 @@ void read_geometry(base::Object& job, JobSpec& spec) {
                                          kMinScale, kMaxScale, spec.mesh_scale));
   }
   if (spec.analytic) {
-    for (const char* key : {"accuracy_cents", "element", "mass", "solver", "fixed", "materials", "radiation"})
+    for (const char* key : {"accuracy_cents", "element", "mass", "solver", "fixed", "materials", "radiation", "nonlinear"})
       if (job.has(key))
         job.fail(key, fmt::format("is for bodies of elements, but the modes of a \"{}\" are known; remove it", get_key(*spec.analytic)));
     return;
@@ -225,6 +247,7 @@ JobSpec read_root(base::Object job, const fs::path& file, BankKey bank) {
   spec.fixed = read_all_fixed(job);
   read_solver(job, spec);
   read_air(job, spec);
+  read_nonlinear(job, spec);
   read_resources(job, spec);
   job.ignore("run");
   job.finish();
@@ -261,6 +284,6 @@ std::string to_text(Element element) { return kElements.find(element); }
 std::string to_text(Mass mass) { return kMasses.find(mass); }
 std::string to_text(Method method) { return kMethods.find(method); }
 std::string to_text(Factorisation factorisation) { return kFactorisations.find(factorisation); }
-std::string to_text(Radiation radiation) { return kRadiations.find(radiation); }
+std::string to_text(AirMethod method) { return kAirMethods.find(method); }
 
 }  // namespace carillon::job

@@ -26,7 +26,7 @@ enum class Factorisation { automatic, ldlt, mumps, cholmod };
 
 /// What becomes of the sound of the modes in the air. none: gains from the motion of the surface alone; bem: boundary elements; automatic:
 /// boundary elements for the bodies that need them.
-enum class Radiation { none, automatic, bem };
+enum class AirMethod { none, automatic, bem };
 
 /// A rigid plane next to the body, which is on the side that the normal shows to.
 struct HalfSpace {
@@ -38,10 +38,19 @@ inline constexpr int kSkinNodes = 4500;  // of the surface outside which the air
 
 /// How the air outside the body is solved.
 struct Air {
-  Radiation method = Radiation::none;
+  AirMethod method = AirMethod::none;
   int skin_nodes = kSkinNodes;  // of the surface; a finer one is coarsened
   double error_db = -40.0;      // of the interpolation over the wave number, in each mode
   std::optional<HalfSpace> half_space = {};
+};
+
+inline constexpr int kMaxCoupledModes = 400;
+
+/// Which modes large motion couples, and how exactly their energy is stored.
+struct Nonlinear {
+  int modes = 50;              // at most; the lowest that bend or twist
+  double below_hz = 3000.0;    // of them
+  double energy_error = 1e-2;  // relative, of the energy that is stored: 1e-3 takes twice as much to play
 };
 
 /// Nodes whose displacement is zero: a named node set of the mesh, or all nodes inside a closed axis-parallel box.
@@ -97,6 +106,7 @@ struct JobSpec {
   Method method = Method::automatic;     // solver.method
   Factorisation factorisation = Factorisation::automatic;  // solver.factorisation
   Air air;                                                 // "radiation"
+  std::optional<Nonlinear> nonlinear;                      // empty: the bank is linear
   Resources resources;
   std::vector<std::string> warnings;  // "file:line: ..." of numbers that may be meant, but seldom are
 };
@@ -127,6 +137,6 @@ std::string to_text(Element element);
 std::string to_text(Mass mass);
 std::string to_text(Method method);
 std::string to_text(Factorisation factorisation);
-std::string to_text(Radiation radiation);
+std::string to_text(AirMethod method);
 
 }  // namespace carillon::job

@@ -127,6 +127,14 @@ Json::Value write_air(const Air& air) {
   return root;
 }
 
+Json::Value write_nonlinear(const Nonlinear& nonlinear) {
+  Json::Value root;
+  root["modes"] = nonlinear.modes;
+  root["below_hz"] = nonlinear.below_hz;
+  root["energy_error"] = nonlinear.energy_error;
+  return root;
+}
+
 /// How the modes of a body of elements are found.
 void write_solve(const JobSpec& job, Json::Value& root) {
   root["mass"] = to_text(job.mass);
@@ -139,7 +147,8 @@ void write_solve(const JobSpec& job, Json::Value& root) {
   }
   root["solver"]["method"] = to_text(job.method);
   root["solver"]["factorisation"] = to_text(job.factorisation);
-  if (job.air.method != Radiation::none) root["radiation"] = write_air(job.air);
+  if (job.air.method != AirMethod::none) root["radiation"] = write_air(job.air);
+  if (job.nonlinear) root["nonlinear"] = write_nonlinear(*job.nonlinear);
 }
 
 }  // namespace

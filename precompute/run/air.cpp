@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -12,20 +13,44 @@
 #include "precompute/eigen/checkpoint.hpp"
 #include "precompute/run/interrupt.hpp"
 #include "precompute/run/meshing.hpp"
+#include "runtime/bank/air.hpp"
 #include "runtime/base/file.hpp"
+#include "runtime/radiation/gains.hpp"
 
 namespace carillon::run {
 namespace {
 
+/// From this ratio of the decay by radiation to that by the material on, "auto" takes boundary elements: without them the mode would ring
+/// 1.3 times as long. Measured by tests/bench/air (docs/reports/radiation.md).
+constexpr double kLostToAir = 0.3;
+
+/// The largest ratio of the decay by radiation to that by the material, of all modes, by the gains of a sphere of the same surface: within
+/// a factor of two of the true one for compact bodies.
+double calc_loss_ratio(const bank::Bank& bank) {
+  const std::vector<double>& decay_per_s = bank.corrected.is_empty() ? bank.decay_per_s : bank.corrected.decay_per_s;
+  const std::vector<double> gains = radiation::calc_gains(bank, radiation::GainKind::kSphere);
+  double ratio = 0.0;
+  for (std::size_t m = 0; m < gains.size(); ++m) {
+    const double by_air = bank::calc_radiation_decay(gains[m]);
+    if (by_air > 0.0) ratio = std::max(ratio, decay_per_s[m] > 0.0 ? by_air / decay_per_s[m] : std::numeric_limits<double>::infinity());
+  }
+  return ratio;
+}
+
 /// Whether boundary elements are called for, and why; of rank 0.
 AirReport choose(const Run& run, const bank::Bank& bank) {
-  if (run.job.air.method == job::Radiation::bem) return {true, "the job asks for it", {}};
+  if (run.job.air.method == job::AirMethod::bem) return {true, "the job asks for it", {}};
   const double roundness = bem::calc_roundness(bank);
   const std::string measure = fmt::format("its surface is that of a body of roundness {:.2f}", roundness);
   if (bank.mode_count() == 0) return {false, "there is no mode", {}};
   if (roundness < bem::kCompact)
     return {true, fmt::format("{}, below {:g}: flat, thin or open bodies do not radiate as a sphere does", measure, bem::kCompact), {}};
-  return {false, fmt::format("{}, and from {:g} on the gains of a sphere do", measure, bem::kCompact), {}};
+  const double ratio = calc_loss_ratio(bank);
+  const std::string loss =
+      fmt::format("by the gains of a sphere the air takes up to {:.2g} times what the material takes from a mode", ratio);
+  if (ratio > kLostToAir)
+    return {true, fmt::format("{}, but {}, above {:g}: without it modes ring too long", measure, loss, kLostToAir), {}};
+  return {false, fmt::format("{}, and from {:g} on the gains of a sphere do; {}", measure, bem::kCompact, loss), {}};
 }
 
 bem::AirOptions make_options(const job::Air& air) {
@@ -50,7 +75,7 @@ std::string describe_multipoles(const bank::Multipoles& multipoles) {
 
 RunSummary radiate_bank(const comm::Communicator& comm, const RunOptions& options) {
   Run run(comm, options);
-  run.job.air.method = job::Radiation::bem;
+  run.job.air.method = job::AirMethod::bem;
   run.job.file = options.radiate;
   bank::Bank bank;
   RunSummary summary;
@@ -79,7 +104,7 @@ RunSummary radiate_bank(const comm::Communicator& comm, const RunOptions& option
 
 AirReport add_air(Run& run, bank::Bank& bank) {
   AirReport report;
-  if (run.job.air.method == job::Radiation::none) return report;
+  if (run.job.air.method == job::AirMethod::none) return report;
   run.log.begin("air", "sound outside the body");
   run.comm.agree([&] {
     if (run.comm.is_root()) report = choose(run, bank);

@@ -190,7 +190,7 @@ std::optional<std::int64_t> find_computed_count(const job::JobSpec& job) {
 
 /// Of a job that asks for the air; "auto" may leave it out.
 std::int64_t find_air_nodes(const job::JobSpec& job, std::int64_t surface_nodes) {
-  if (job.air.method == job::Radiation::none) return 0;
+  if (job.air.method == job::AirMethod::none) return 0;
   const std::int64_t nodes = std::min<std::int64_t>(job.air.skin_nodes, surface_nodes > 0 ? surface_nodes : job.air.skin_nodes);
   return job.air.half_space ? 2 * nodes : nodes;
 }
@@ -208,6 +208,7 @@ cost::ProblemSize estimate_size(const job::JobSpec& job, const Setting& setting)
   }
   size.modes = find_computed_count(job);
   size.air_nodes = find_air_nodes(job, 0);
+  if (job.nonlinear) size.coupled_modes = job.nonlinear->modes;
   return size;
 }
 
@@ -220,6 +221,7 @@ cost::ProblemSize find_problem_size(const Run& run, const Setting& setting, cons
   size.unknowns = 3 * body.pieces.free_nodes;
   size.surface_nodes = static_cast<std::int64_t>(body.surface.vertices_m.size());
   size.air_nodes = find_air_nodes(run.job, size.surface_nodes);
+  if (run.job.nonlinear) size.coupled_modes = run.job.nonlinear->modes;
   for (const RunPhase& phase : run.log.get_phases())
     if (phase.name == "read") size.read_seconds = phase.seconds;
   return size;

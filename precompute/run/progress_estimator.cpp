@@ -14,15 +14,15 @@
 namespace carillon::run {
 namespace {
 
-constexpr std::array<std::string_view, 8> kPhases{"read", "partition", "assemble", "modes", "errors", "collect", "air", "write"};
-constexpr int kModes = 3, kCollect = 5;
+constexpr std::array<std::string_view, 9> kPhases{"read", "partition", "assemble", "modes", "errors", "coupling", "collect", "air", "write"};
+constexpr int kModes = 3, kAfterTrials = 5;
 constexpr double kTrustSeconds = 0.5;  // weight of the predictions against what is measured
 constexpr double kNearEnd = 0.95;      // of a part whose time is up and which continues
 constexpr double kMax = 99.9;          // per cent, before the end
 constexpr double kTrialShare = 0.5;    // of the rest: for a trial after which others may follow
 
-std::array<double, 8> list(const cost::PhaseSeconds& costs) {
-  return {costs.read, costs.partition, costs.assemble, costs.sum_modes(), costs.errors, costs.collect, costs.air, costs.write};
+std::array<double, 9> list(const cost::PhaseSeconds& costs) {
+  return {costs.read, costs.partition, costs.assemble, costs.sum_modes(), costs.errors, costs.coupling, costs.collect, costs.air, costs.write};
 }
 
 double calc_factorisations(const eigen::Progress& progress) {
@@ -41,7 +41,7 @@ void ProgressEstimator::begin(const std::string& phase, double seconds) {
     start_s_ = seconds;
     progress_ = {};
   }
-  if (phase_ >= kCollect && is_trial_) {  // It was the last trial.
+  if (phase_ >= kAfterTrials && is_trial_) {  // It was the last trial.
     is_trial_ = false;
     start_percent_ = percent_;
   }
@@ -94,7 +94,7 @@ double ProgressEstimator::calc_step() const {
 }
 
 ProgressEstimator::Share ProgressEstimator::calc_share(double seconds) const {
-  const std::array<double, 8> prices = list(costs_);
+  const std::array<double, 9> prices = list(costs_);
   double done = 0;
   double all = 0;
   for (int i = 0; i < static_cast<int>(prices.size()); ++i) {

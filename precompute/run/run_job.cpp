@@ -20,6 +20,7 @@
 #include "precompute/run/air.hpp"
 #include "precompute/run/bank_content.hpp"
 #include "precompute/run/body.hpp"
+#include "precompute/run/coupling.hpp"
 #include "precompute/run/describe_run.hpp"
 #include "precompute/run/interrupt.hpp"
 #include "precompute/run/known_body.hpp"
@@ -105,7 +106,7 @@ std::string describe_result(const bank::Bank& bank) {
 }
 
 /// The time of writing the bank is in <bank>.resolved.json only: the record in the bank is made before.
-RunSummary write_outputs(Run& run, const AccurateBody& found, const AirReport& air, bank::Bank bank) {
+RunSummary write_outputs(Run& run, const AccurateBody& found, const AirReport& air, const CouplingReport& coupling, bank::Bank bank) {
   RunSummary summary;
   summary.bank = run.job.bank;
   summary.resolved = job::find_resolved_path(run.job.bank);
@@ -119,6 +120,7 @@ RunSummary write_outputs(Run& run, const AccurateBody& found, const AirReport& a
       record["air"]["why"] = air.why;
       if (!air.result.empty()) record["air"]["result"] = air.result;
     }
+    if (!coupling.result.empty()) record["coupling"] = coupling.result;
     if (!summary.warning.empty()) record["warnings"].append(summary.warning);
     return job::resolved_json(run.job, folder, write_json(record));
   };
@@ -187,11 +189,13 @@ RunSummary carry_out(Run& run, const fs::path& job_file) {
   open_checkpoint(run);
   AccurateBody found = run.job.accuracy_cents ? solve_to_accuracy(run) : solve_once(run);
   check_options_used(run.comm);
-  if (run.checkpoint && run.job.air.method == job::Radiation::none) run.checkpoint->finish();
+  if (run.checkpoint && run.job.air.method == job::AirMethod::none && !run.job.nonlinear) run.checkpoint->finish();
+  const CouplingReport coupling = couple_modes(run, found);
   bank::Bank bank = collect_bank(run, found);
+  bank.quartic = coupling.energy;
   const AirReport air = add_air(run, bank);
   if (run.checkpoint) run.checkpoint->finish();
-  RunSummary summary = write_outputs(run, found, air, std::move(bank));
+  RunSummary summary = write_outputs(run, found, air, coupling, std::move(bank));
   if (run.checkpoint) run.checkpoint->remove();
   if (run.progress) run.progress->finish();
   return summary;

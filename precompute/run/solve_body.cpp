@@ -25,6 +25,9 @@ void begin_checkpoint(Run& run, const Setting& setting, const Body& body) {
   run.checkpoint->begin(setting, io::find_system_fingerprint(run.comm, job, setting, body.pieces.local), body.pieces.local);
 }
 
+/// After the modes and their errors.
+bool is_more_to_come(const job::JobSpec& job) { return job.air.method != job::AirMethod::none || job.nonlinear.has_value(); }
+
 /// Between two stages, with all modes; `must` saves them in any case. Throws eigen::Stopped when the run was asked to stop.
 void save_if_requested(Run& run, const eigen::Modes& modes, bool must = false) {
   if (!run.checkpoint) return;
@@ -43,7 +46,7 @@ SolvedBody solve_body(Run& run, const Setting& setting, Body& body) {
   solved.modes = find_modes(run, setting, body, system);
   save_if_requested(run, solved.modes);
   solved.errors = calc_errors(run, body, system, solved.modes);
-  save_if_requested(run, solved.modes, run.job.air.method != job::Radiation::none);  // the air may take longer than the modes did
+  save_if_requested(run, solved.modes, is_more_to_come(run.job));  // which may take longer than the modes did
   if (run.checkpoint) run.checkpoint->end();
   solved.properties = std::move(system.properties);
   return solved;

@@ -18,6 +18,14 @@ void check_method(const Run& run, std::int64_t unknowns) {
                                run.job.file.string(), eigen::kMaxDenseUnknowns, unknowns));
 }
 
+/// Refuses before anything is solved.
+void check_pieces(const Run& run, const Body& body) {
+  if (!run.job.nonlinear || body.pieces.components == 1) return;
+  throw InputError(fmt::format("{}: \"nonlinear\" couples the modes of one piece, and the body has {}: solve each as a body of its own, or "
+                               "leave \"nonlinear\" out",
+                               run.job.file.string(), body.pieces.components));
+}
+
 /// Elements that cannot bend without straining in the one way that the solid hardly allows are too stiff; docs/elements.md.
 void warn_of_locking(Run& run, const material::Material& material, bool is_linear) {
   constexpr double kStiff = 50;
@@ -42,6 +50,7 @@ void warn_of_locking(Run& run, const material::Material& material, bool is_linea
 
 AssembledSystem assemble_system(Run& run, const Setting& setting, const Body& body) {
   check_method(run, 3 * body.pieces.free_nodes);
+  check_pieces(run, body);
   run.log.begin("assemble", fmt::format("{} unknowns, {}, {} mass", 3 * body.pieces.free_nodes, job::to_text(setting.element),
                                         job::to_text(run.job.mass)));
   const partition::LocalMesh& mesh = body.pieces.local;

@@ -359,7 +359,7 @@ void Validation::predict_time() {
   const double predicted_here = costs_.read + costs_.partition + costs_.assemble;
   using Phases = cost::PhaseSeconds;
   for (double Phases::*phase : {&Phases::analyse, &Phases::factor, &Phases::solve, &Phases::orthogonalise, &Phases::check, &Phases::errors,
-                                &Phases::collect, &Phases::air, &Phases::write})
+                                &Phases::coupling, &Phases::collect, &Phases::air, &Phases::write})
     costs_.*phase *= pace;
   const double here = assembled_s_ > 0 ? assembled_s_ / std::max(predicted_here, 1e-9) : pace;
   for (double Phases::*phase : {&Phases::read, &Phases::partition, &Phases::assemble}) costs_.*phase *= here;

@@ -25,6 +25,7 @@
 #include "runtime/base/chance.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/events/events.hpp"
+#include "runtime/head/sphere.hpp"
 #include "runtime/radiation/gains.hpp"
 #include "runtime/support/losses.hpp"
 #include "runtime/synth/load_keeper.hpp"
@@ -99,6 +100,10 @@ carillon_status refuse(const char* text, char* message, size_t message_size) {
 /// The sizes that structures had first: no caller's is smaller. Once one has grown, its first size stands here.
 template <typename T>
 constexpr std::size_t kMinSize = sizeof(T);
+template <>
+constexpr std::size_t kMinSize<carillon_options> = offsetof(carillon_options, head_radius_m);
+template <>
+constexpr std::size_t kMinSize<carillon_effect_counters> = offsetof(carillon_effect_counters, head_units);
 
 template <typename T>
 T make_default() {
@@ -220,7 +225,9 @@ carillon_motion make_default() {
   return motion;
 }
 
-static_assert(CARILLON_EFFECT_COUNT + CARILLON_LATER_EFFECT_COUNT == synth::kEffectCount &&
+static_assert(CARILLON_EFFECT_COUNT + CARILLON_LATER_EFFECT_COUNT + 2 == synth::kEffectCount &&
+              CARILLON_NONLINEAR == 1 << static_cast<int>(synth::Effect::kNonlinear) &&
+              CARILLON_HEAD == 1 << static_cast<int>(synth::Effect::kHead) &&
               CARILLON_TWO_EARS == 1 << static_cast<int>(synth::Effect::kTwoEars) &&
               CARILLON_GROUND_REFLECTION == 1 << static_cast<int>(synth::Effect::kGroundReflection) &&
               CARILLON_ACCELERATION_NOISE == 1 << static_cast<int>(synth::Effect::kAccelerationNoise));
@@ -425,6 +432,13 @@ carillon_status carillon_create(const carillon_options* options, carillon_synth*
       ours.microphones_m.clear();
       for (int32_t m = 0; m < given->microphone_count; ++m) ours.microphones_m.push_back(to_vector(given->microphones_m[m]));
     }
+    if (given->head_radius_m != 0.0) {
+      ours.head = synth::ListeningHead{.head = head::make_sphere(ours.rate_hz, {.radius_m = given->head_radius_m})};
+      if (ours.microphones_m.size() == 2)
+        ours.head->rotation = synth::calc_level_head_rotation(ours.microphones_m[0], ours.microphones_m[1]);
+    }
+    if (given->floor_reflection != 0.0)
+      ours.floor = synth::Floor{.point_m = {0.0, 0.0, given->floor_height_m}, .reflection = given->floor_reflection};
     *synth = new carillon_synth(std::move(ours));
   });
 }
@@ -655,6 +669,10 @@ carillon_status carillon_get_effect_counters(const carillon_synth* synth, int32_
   };
   put(ours.units, given.units, given.later_units);
   put(ours.bytes, given.bytes, given.later_bytes);
+  given.head_units = ours.units[synth::Effect::kHead];
+  given.head_bytes = ours.bytes[synth::Effect::kHead];
+  given.nonlinear_units = ours.units[synth::Effect::kNonlinear];
+  given.nonlinear_bytes = ours.bytes[synth::Effect::kNonlinear];
   write(given, counters);
   return CARILLON_OK;
 }

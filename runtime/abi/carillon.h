@@ -26,7 +26,7 @@ extern "C" {
 
 /* Grows with every function and field that is added. The number in the name of libcarillon.so.2 is another one, which changes only when
  * programs would have to be compiled again. */
-#define CARILLON_ABI_VERSION 7
+#define CARILLON_ABI_VERSION 8
 
 /* That of the library. */
 CARILLON_API uint32_t carillon_abi_version(void);
@@ -146,9 +146,14 @@ typedef struct carillon_options {
   double budget;             /* carillon_set_budget */
   double ground_roughness_m; /* rms height of what contacts touch whose other body is none */
   double ground_friction;    /* Coulomb */
+  double head_radius_m;  /* of a head in the middle of two microphones, left and right, for CARILLON_HEAD: a rigid sphere with ears, upright
+                            (z) as long as the listener is not turned; 0.03 to 0.3, of an average head 0.0875; 0: none */
+  double floor_height_m; /* z of a rigid floor, for CARILLON_GROUND_REFLECTION; bodies and microphones are above */
+  double floor_reflection; /* the share of the pressure that it throws back, 0..1; 0: there is no floor */
 } carillon_options;
 
-/* 48 kHz, two ears, 64 bodies, 64 strikes a body, 4096 events, 60 m, 64 waypoints, no limit to the work, smooth concrete. */
+/* 48 kHz, two ears, 64 bodies, 64 strikes a body, 4096 events, 60 m, 64 waypoints, no limit to the work, smooth concrete, no head, no
+ * floor. */
 #define carillon_options_init(options) carillon_options_init_sized((options), sizeof(carillon_options))
 CARILLON_API void carillon_options_init_sized(carillon_options* options, size_t size);
 
@@ -171,11 +176,13 @@ typedef enum carillon_effect {
   CARILLON_AIR_DELAY = 64,
   CARILLON_DOPPLER = 128,
   CARILLON_TWO_EARS = 256,
-  CARILLON_DIRECTIVITY = 512,       /* of a bank with multipoles; CARILLON_BAD_INPUT for a model without */
-  CARILLON_GROUND_REFLECTION = 1024 /* of scenes with a floor; here there is none, and it is CARILLON_BAD_INPUT */
+  CARILLON_DIRECTIVITY = 512,        /* of a bank with multipoles; CARILLON_BAD_INPUT for a model without */
+  CARILLON_GROUND_REFLECTION = 1024, /* CARILLON_BAD_INPUT where floor_reflection is 0 */
+  CARILLON_HEAD = 2048,              /* with CARILLON_TWO_EARS; CARILLON_BAD_INPUT where head_radius_m is 0 */
+  CARILLON_NONLINEAR = 4096          /* of a bank with a nonlinear energy; CARILLON_BAD_INPUT for a model without */
 } carillon_effect;
 #define CARILLON_EFFECT_COUNT 9       /* the first ones, to CARILLON_TWO_EARS */
-#define CARILLON_LATER_EFFECT_COUNT 2 /* those behind them */
+#define CARILLON_LATER_EFFECT_COUNT 2 /* those behind them, to CARILLON_GROUND_REFLECTION */
 
 typedef struct carillon_body_options {
   uint32_t size;
@@ -191,7 +198,7 @@ typedef struct carillon_body_options {
 } carillon_body_options;
 
 /* At the origin, not turned, fine machined metal, the usual effects: all that this library can play but those of contacts that last, which
-   take memory, and CARILLON_ACCELERATION_NOISE. */
+   take memory, CARILLON_ACCELERATION_NOISE, and those that need something of the bank or the scene. */
 #define carillon_body_options_init(options) carillon_body_options_init_sized((options), sizeof(carillon_body_options))
 CARILLON_API void carillon_body_options_init_sized(carillon_body_options* options, size_t size);
 /* [main] carillon_add_body with all that can be chosen. */
@@ -371,6 +378,10 @@ typedef struct carillon_effect_counters {
   int64_t bytes[CARILLON_EFFECT_COUNT];
   int64_t later_units[CARILLON_LATER_EFFECT_COUNT]; /* directivity: transfers looked up; ground_reflection: samples */
   int64_t later_bytes[CARILLON_LATER_EFFECT_COUNT];
+  int64_t head_units; /* samples */
+  int64_t head_bytes;
+  int64_t nonlinear_units; /* coupled modes times samples */
+  int64_t nonlinear_bytes;
 } carillon_effect_counters;
 
 #define carillon_effect_counters_init(counters) carillon_effect_counters_init_sized((counters), sizeof(carillon_effect_counters))

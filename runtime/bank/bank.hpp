@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "runtime/bank/multipoles.hpp"
+#include "runtime/bank/quartic_energy.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/vector.hpp"
 
@@ -154,6 +155,7 @@ struct Bank {
   Corrected corrected;                             // or empty: unknown; since 1.4
 
   Multipoles multipoles;  // or empty: the air was not solved; since 1.5
+  QuarticEnergy quartic;  // or empty: motion counts as linear; since 1.7
 
   std::optional<Packing> packing;  // of a bank from a packed file, since 2.0; write_bank() leaves it out, edits drop it
 

@@ -1,7 +1,7 @@
 // What makes the multipoles of a bank sane.
 // Method:     a body that radiates through a sphere lies within it; the decay by radiation is the power of the far field, found again from
 //             the coefficients, to what rounding them leaves open. In a half space the field is that of the body and its mirror image, and
-//             the body makes half of the power: then all decays are half.
+//             the body makes half of the power: then all decays are half. Modes that the air couples are sums with unit modal mass.
 // Source:     docs/equations.md E10.
 // Deviations: the sphere may be left by what packing moves vertices (sqrt(3) / 2 of a lattice step, 5.3e-5 of the radius): a packed bank
 //             that was unpacked says nothing of it any more.
@@ -11,12 +11,14 @@
 #include <numbers>
 
 #include "runtime/bank/faults.hpp"
+#include "runtime/bank/mixing.hpp"
 
 namespace carillon::bank {
 namespace {
 
 constexpr double kOutside = 1e-4;        // of the radius
-constexpr double kMaxDetuning = 0.3;     // of the frequency that is played, for the mass of the air
+constexpr double kMaxDetuning = 0.4;     // of the frequency that is played, for the mass of the air
+constexpr double kMassTolerance = 1e-6;  // of the modal mass of a mode in air
 constexpr double kRootTolerance = 1e-9;  // of the root of a decay, for arithmetic
 constexpr double kMaxAir = 1e5;          // kg/m^3, m/s: beyond any gas
 constexpr double kMaxLengthM = 1e7, kMaxHz = 1e12, kMaxDecayPerS = 1e32;
@@ -53,6 +55,21 @@ void check_mode(const Bank& bank, std::size_t i, Faults& faults) {
   if (!(air.error_db[i] <= 0.0)) faults.add("radiation/error_db[{}] is {:.6g} dB, more than the sound itself", i, air.error_db[i]);
 }
 
+/// Modes that the air couples have unit modal mass, the air's in it. Parts of how many modes, at most, there are in one.
+std::int32_t check_mixing(const Multipoles& air, Faults& faults) {
+  std::size_t at = 0;
+  std::int32_t most = 0;
+  for (std::size_t i = 0; i < air.mixing.count.size(); ++i) {
+    double squares = 0.0;
+    for (std::int32_t k = 0; k < air.mixing.count[i]; ++k, ++at) squares += air.mixing.part[at] * air.mixing.part[at];
+    most = std::max(most, air.mixing.count[i]);
+    const double mass = squares * (1.0 + air.added_mass[i]);
+    if (!(std::abs(mass - 1.0) <= kMassTolerance))
+      faults.add("the parts of mode {} (radiation/mixing_part) have a modal mass of {:.9g} in air, and it is 1", i, mass);
+  }
+  return most;
+}
+
 /// Compares the decays with the share of the far field's power that goes into the air; the largest relative difference.
 double check_decays(const Multipoles& air, const std::vector<CoefficientDecay>& found, double share, Faults& faults) {
   double worst = 0.0;
@@ -79,20 +96,39 @@ std::string find_order_fault(const Multipoles& multipoles) {
   return fmt::format("arrays disagree: radiation/coefficient holds {} values and {} are wanted", multipoles.coefficient.size(), wanted);
 }
 
+std::string find_mixing_fault(const Mixing& mixing) {
+  const auto motions = static_cast<std::int64_t>(mixing.count.size() + kRigidMotions);
+  std::size_t at = 0;
+  for (std::size_t i = 0; i < mixing.count.size(); ++i) {
+    const std::int32_t count = mixing.count[i];
+    if (count < 1 || static_cast<std::size_t>(count) > mixing.motion.size() - at)
+      return fmt::format("radiation/mixing_count[{}] is {}, and {} parts are left", i, count, mixing.motion.size() - at);
+    for (std::int64_t k = 0, before = -1; k < count; ++k, before = mixing.motion[at++])
+      if (mixing.motion[at] <= before || mixing.motion[at] >= motions)
+        return fmt::format("radiation/mixing_motion[{}] is {}: not above the one before it, or no motion of the {} there are", at,
+                           mixing.motion[at], motions);
+  }
+  if (at != mixing.motion.size())
+    return fmt::format("arrays disagree: radiation/mixing_motion holds {} values and {} are wanted", mixing.motion.size(), at);
+  return {};
+}
+
 Check check_multipoles(const Bank& bank) {
   const Multipoles& air = bank.multipoles;
   if (air.is_empty()) return {"multipoles", "none", {}};
   Faults faults;
   check_sphere(bank, faults);
   for (std::size_t i = 0; i < bank.mode_count(); ++i) check_mode(bank, i, faults);
+  const std::int32_t parts = check_mixing(air, faults);
   if (!faults.empty()) return {"multipoles", "", faults.take()};
   const std::vector<CoefficientDecay> found = calc_coefficient_decays(air);
   Faults of_whole, of_half;
   const double whole_off = check_decays(air, found, 1.0, of_whole), half_off = check_decays(air, found, 0.5, of_half);
   const bool is_half = !of_whole.empty() && of_half.empty();
   const auto [low, high] = std::minmax_element(air.order.begin(), air.order.end());
-  const std::string figure = fmt::format("multipoles of order {} to {}, which make the decays to {:.1e}{}", *low, *high,
-                                         is_half ? half_off : whole_off, is_half ? " (half a space)" : "");
+  const std::string figure =
+      fmt::format("multipoles of order {} to {}, which make the decays to {:.1e}{}{}", *low, *high, is_half ? half_off : whole_off,
+                  is_half ? " (half a space)" : "", parts > 0 ? fmt::format("; modes coupled, of {} at most", parts) : "");
   return {"multipoles", figure, is_half ? std::vector<std::string>{} : of_whole.take()};
 }
 

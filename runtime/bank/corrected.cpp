@@ -1,6 +1,6 @@
-// Method:     shapes stay, frequencies change: reactions, which are lambda times mass times phi, and what the radiation gain has of the
-//             frequency, follow. Of a bank with multipoles frequencies are those in air; radiation adds its decay, and the gain is the one
-//             that radiates as much.
+// Method:     shapes stay, but for those of modes that the air couples (mixing.hpp); frequencies change: reactions, which are lambda times
+//             mass times phi, and what the radiation gain has of the frequency, follow. Of a bank with multipoles frequencies are those in
+//             air; radiation adds its decay, and the gain is the one that radiates as much.
 // Source:     docs/equations.md E6, E7, E10; docs/error-bars.md.
 // Deviations: none.
 #include "runtime/bank/corrected.hpp"
@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "runtime/bank/air.hpp"
+#include "runtime/bank/mixing.hpp"
 #include "runtime/bank/radiation_gain.hpp"
 #include "runtime/bank/select.hpp"
 #include "runtime/base/sort_order.hpp"
@@ -54,13 +55,37 @@ void take_corrected(Bank& bank) {
   bank.discretisation_error_cents = std::move(corrected.error_cents);
 }
 
+/// The nonlinear energy of modes that are played at these frequencies.
+void scale_nonlinear(Bank& bank, const std::vector<double>& freq_hz) {
+  if (bank.quartic.is_empty()) return;
+  std::vector<double> factor;
+  for (std::size_t m = 0; m < bank.mode_count(); ++m) factor.push_back(freq_hz[m] / bank.freq_hz(m));
+  scale_frequencies(bank.quartic, factor);
+}
+
+/// The nonlinear energy of the modes that mix_modes() will make; parts of modes that have none of it are left out.
+void mix_nonlinear(Bank& bank) {
+  const Mixing& mixing = bank.multipoles.mixing;
+  if (bank.quartic.is_empty() || mixing.is_empty()) return;
+  const std::size_t n = bank.quartic.mode_count();
+  std::vector<std::size_t> place(bank.mode_count() + kRigidMotions, n);
+  for (std::size_t i = 0; i < n; ++i) place[static_cast<std::size_t>(bank.quartic.modes[i])] = i;
+  std::vector<double> parts(n * n);
+  std::size_t at = 0;
+  for (std::size_t m = 0; m < mixing.count.size(); ++m)
+    for (std::int32_t k = 0; k < mixing.count[m]; ++k, ++at) {
+      const std::size_t to = place[m], from = place[static_cast<std::size_t>(mixing.motion[at])];
+      if (to < n && from < n) parts[to * n + from] = mixing.part[at];
+    }
+  combine_modes(bank.quartic, parts);
+}
+
 /// Decays and gains of a bank with multipoles become those in air.
 void add_radiation(Bank& bank) {
   Multipoles& air = bank.multipoles;
-  for (std::size_t m = 0; m < bank.mode_count(); ++m) {
+  for (std::size_t m = 0; m < bank.mode_count(); ++m)
     if (!air.is_in_decay) bank.decay_per_s[m] += air.decay_per_s[m];
-    bank.radiation_gain[m] = calc_gain_of_decay(air.decay_per_s[m]);
-  }
+  bank.radiation_gain = calc_far_gains(air);
   air.is_in_decay = true;
 }
 
@@ -75,9 +100,12 @@ Bank calc_corrected(Bank bank) {
   if (bank.corrected.is_empty() && !has_air) return bank;
   if (const std::vector<std::size_t> order = sort_played_modes(bank); !std::is_sorted(order.begin(), order.end()))
     select_modes(bank, order);
+  if (bank.multipoles.mixing.is_empty()) scale_nonlinear(bank, has_air ? bank.multipoles.freq_hz : bank.corrected.freq_hz);
   if (!bank.corrected.is_empty()) take_corrected(bank);
   if (has_air) {
-    // Reactions stay: they are what the elastic body, whose shape is the same, gives its supports.
+    mix_nonlinear(bank);
+    mix_modes(bank);
+    // Reactions are those of the elastic body, at the frequencies that it has alone.
     for (std::size_t m = 0; m < bank.mode_count(); ++m) {
       const double omega = 2.0 * std::numbers::pi * bank.multipoles.freq_hz[m];
       bank.eigenvalue_rad2_s2[m] = omega * omega;
@@ -90,7 +118,11 @@ Bank calc_corrected(Bank bank) {
 
 Bank choose_frequencies(Bank bank, Frequencies frequencies) {
   if (frequencies == Frequencies::kCorrected) return calc_corrected(std::move(bank));
-  if (!bank.multipoles.is_empty()) add_radiation(bank);
+  if (!bank.multipoles.is_empty()) {
+    mix_nonlinear(bank);
+    mix_modes(bank);  // what the multipoles are of
+    add_radiation(bank);
+  }
   return bank;
 }
 

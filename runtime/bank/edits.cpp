@@ -7,7 +7,7 @@
 //             b / g dp/dn = i (omega / g) rho g^(-3/2) phi, so b = g^(-3/2): coefficients, which are pressures on the sphere, go with
 //             g^(-3/2). Decay, sum |c|^2 / (2 rho c k^2): g^(-3) g^2 = 1 / g. Added mass, of p / (i omega) times phi over the surface:
 //             g^(-3/2) g g^(-3/2) g^2 = 1. Frequencies in air, f / sqrt(1 + added mass), go with 1 / g.
-// Source:     docs/equations.md E6, E7, E10.
+// Source:     docs/equations.md E6, E7, E10, E12.
 // Deviations: none.
 #include "runtime/bank/edits.hpp"
 
@@ -148,6 +148,7 @@ Bank calc_edited(const Bank& bank, const Edits& edits) {
     edited.multipoles = {};
   else
     scale_size(edited.multipoles, g);
+  scale_energy(edited.quartic, s, k, g);
   const Multipoles& air = edited.multipoles;
   edited.material.young_modulus_pa *= k;
   edited.material.density_kg_m3 *= s;
@@ -173,11 +174,9 @@ Bank calc_edited(const Bank& bank, const Edits& edits) {
     edited.shape_scale[m] *= shape_scale;
     edited.radiation_gain[m] *= calc_radiation_gain(std::sqrt(edited.eigenvalue_rad2_s2[m]), shape_scale * g * g, area * g * g) /
                                 calc_radiation_gain(std::sqrt(bank.eigenvalue_rad2_s2[m]), 1.0, area);
-    if (air.is_in_decay) {  // a bank that choose_frequencies() has made stays one
-      edited.decay_per_s[m] += air.decay_per_s[m];
-      edited.radiation_gain[m] = calc_gain_of_decay(air.decay_per_s[m]);
-    }
+    if (air.is_in_decay) edited.decay_per_s[m] += air.decay_per_s[m];
   }
+  if (air.is_in_decay) edited.radiation_gain = calc_far_gains(air);  // a bank that choose_frequencies() has made stays one
   for (Vec3& vertex : edited.vertices_m) {
     for (double& x : vertex) x *= g;
   }

@@ -32,8 +32,14 @@ class Faults {
 /// What is wrong with the orders of multipoles or the number of their coefficients; empty when nothing is.
 std::string find_order_fault(const Multipoles& multipoles);
 
+/// What is wrong with the counts and numbers of a mixture; empty when nothing is.
+std::string find_mixing_fault(const Mixing& mixing);
+
 /// Multipoles whose array sizes agree: a part of the check "radiation".
 Check check_multipoles(const Bank& bank);
+
+/// A nonlinear energy whose array sizes agree: none of its numbers is out of range, and the elastic energy is never negative.
+Check check_quartic(const Bank& bank);
 
 /// Error bars: none is negative.
 Check check_error_bars(const Bank& bank);

@@ -69,6 +69,7 @@ Id make_string_type(std::size_t bytes) {
 
 Id make_type(const std::string& dtype) {
   if (dtype == "<f8") return {H5Tcopy(H5T_IEEE_F64LE), H5Tclose, "a type"};
+  if (dtype == "<f4") return {H5Tcopy(H5T_IEEE_F32LE), H5Tclose, "a type"};
   if (dtype == "<i8") return {H5Tcopy(H5T_STD_I64LE), H5Tclose, "a type"};
   if (dtype == "<i4") return {H5Tcopy(H5T_STD_I32LE), H5Tclose, "a type"};
   if (dtype == "<i2") return {H5Tcopy(H5T_STD_I16LE), H5Tclose, "a type"};

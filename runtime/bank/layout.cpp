@@ -22,7 +22,7 @@ std::vector<std::uint64_t> find_shape(const Vector& values) {
 /// A text of the file has at least one byte.
 std::string pad_text(const std::string& text) { return text.empty() ? std::string(1, '\0') : text; }
 
-/// What came with version 1.5.
+/// What came with versions 1.5 and 1.6.
 void add_radiation_fields(const Multipoles& air, const FileForm& form, std::vector<Field>& fields) {
   const auto add_number = [&](const char* name, const char* units, const char* meaning, const double& value) {
     fields.push_back({name, "<f8", {}, units, meaning, &value});
@@ -47,7 +47,45 @@ void add_radiation_fields(const Multipoles& air, const FileForm& form, std::vect
   add_list("radiation/decay", "1/s", "what radiation adds to the decay", air.decay_per_s);
   add_list("radiation/added_mass", "1", "of the air, over the modal mass", air.added_mass);
   add_list("radiation/error_db", "dB", "of the pressure, rms over directions, over its rms", air.error_db);
+  if (const Mixing& mixing = air.mixing; !mixing.is_empty()) {
+    fields.push_back({"radiation/mixing_count", "<i4", find_shape(mixing.count), "1", "parts of the mode in air", mixing.count.data()});
+    fields.push_back({"radiation/mixing_motion", "<i4", find_shape(mixing.motion), "1",
+                      "number of the mode without air that the part is of; from the number of modes on, rigid motions",
+                      mixing.motion.data()});
+    add_list("radiation/mixing_part", "1", "of that motion in the mode in air", mixing.part);
+  }
   fields.push_back({"radiation/method", text_type(form.radiation_method), {}, "1", "how the air was solved", form.radiation_method.data()});
+}
+
+/// What came with version 1.7.
+void add_nonlinear_fields(const QuarticEnergy& energy, const FileForm& form, std::vector<Field>& fields) {
+  const std::uint64_t modes = energy.mode_count(), rows = energy.row_count(), points = energy.point_count();
+  fields.push_back({"nonlinear/modes", "<i4", {modes}, "1", "numbers of the coupled modes", energy.modes.data()});
+  fields.push_back({"nonlinear/form", text_type(form.nonlinear_form), {}, "1", "rows or points", form.nonlinear_form.data()});
+  if (energy.is_of_points()) {
+    fields.push_back({"nonlinear/G",
+                      "<f4",
+                      {points, energy.gradient_count(), modes},
+                      "m^-1 kg^-1/2",
+                      "gradients of the modes at the points",
+                      energy.gradient.data()});
+    fields.push_back({"nonlinear/stress", "<f4", {rows, points, energy.strain_count()}, "J^1/2", "of each row", energy.stress.data()});
+    fields.push_back({"nonlinear/weight", "<f8", {points}, "1", "of the points", energy.weight.data()});
+  } else {
+    fields.push_back({"nonlinear/A",
+                      "<f4",
+                      {rows, count_pairs(energy.mode_count())},
+                      "J^1/2 m^-2 kg^-1",
+                      "symmetric matrices, upper triangle by columns",
+                      energy.rows.data()});
+  }
+  if (!energy.linear.empty())
+    fields.push_back({"nonlinear/linear", "<f8", {rows, modes}, "J^1/2 m^-1 kg^-1/2", "of a curved body", energy.linear.data()});
+  fields.push_back({"nonlinear/rest_energy_j", "<f8", {}, "J", "added to keep the energy positive", &energy.rest_energy_j});
+  fields.push_back({"nonlinear/error", "<f8", {}, "1", "of the energy by its points", &energy.error});
+  fields.push_back(
+      {"nonlinear/membrane_ratio", "<f8", {}, "1", "highest coupled frequency over the lowest condensed one", &energy.membrane_ratio});
+  fields.push_back({"nonlinear/thickness_m", "<f8", {}, "m", "by which amplitudes are judged", &energy.thickness_m});
 }
 
 /// What came with version 1.1.
@@ -102,6 +140,7 @@ void add_later_fields(const Bank& bank, const FileForm& form, std::vector<Field>
                     s.energy.data()}});
   }
   if (!bank.multipoles.is_empty()) add_radiation_fields(bank.multipoles, form, fields);
+  if (!bank.quartic.is_empty()) add_nonlinear_fields(bank.quartic, form, fields);
   if (!bank.proof) return;
   const Proof& proof = *bank.proof;
   const auto& rigid = proof.rigid_per_component;
@@ -220,20 +259,23 @@ FileForm make_file_form(const Bank& bank) {
   if (bank.supports.count() > 0) form.supports = pad_text(bank.supports.text);
   if (bank.proof) form.proof_method = pad_text(bank.proof->method);
   if (!bank.multipoles.is_empty()) form.radiation_method = pad_text(bank.multipoles.method);
+  if (!bank.quartic.is_empty()) form.nonlinear_form = bank.quartic.is_of_points() ? "points" : "rows";
   form.has_complete_below = bank.proof && bank.proof->complete_below_hz > 0.0;
   if (bank.shape_bytes == 1) form.narrow_shape.assign(bank.shape.begin(), bank.shape.end());  // within -127 and 127: find_faults()
   return form;
 }
 
 std::array<int, 2> find_version(const Bank& bank, bool is_packed) {
-  if (is_packed) return {2, bank.multipoles.is_empty() ? 0 : 1};
-  if (!bank.multipoles.is_empty()) return {1, 5};
+  if (!bank.quartic.is_empty()) return is_packed ? std::array{2, 3} : std::array{1, 7};
+  const bool is_mixed = !bank.multipoles.mixing.is_empty();
+  if (is_packed) return {2, bank.multipoles.is_empty() ? 0 : is_mixed ? 2 : 1};
+  if (!bank.multipoles.is_empty()) return {1, is_mixed ? 6 : 5};
   return {1, !bank.corrected.is_empty() || bank.element == "analytic" ? 4 : bank.supports.count() > 0 ? 3 : bank.shape_bytes == 1 ? 2 : 1};
 }
 
 std::uint64_t find_item_bytes(const std::string& dtype) {
   if (dtype == "<f8" || dtype == "<i8") return 8;
-  if (dtype == "<i4") return 4;
+  if (dtype == "<i4" || dtype == "<f4") return 4;
   if (dtype == "<i2") return 2;
   if (dtype == "|u1" || dtype == "|i1") return 1;
   if (dtype.size() < 3 || dtype.size() > 12 || dtype.substr(0, 2) != "|S") return 0;

@@ -15,7 +15,7 @@ namespace carillon::bank {
 /// An array of the file and the memory that holds it.
 struct Field {
   std::string name;                  // path inside the HDF5 file, "mesh/vertices"
-  std::string dtype;                 // as numpy writes it: "<f8", "<i8", "<i4", "<i2", "|i1", "|u1", "|S10" (text of 10 bytes)
+  std::string dtype;                 // as numpy writes it: "<f8", "<i8", "<f4", "<i4", "<i2", "|i1", "|u1", "|S10" (text of 10 bytes)
   std::vector<std::uint64_t> shape;  // empty for a scalar
   std::string units;                 // "1" when dimensionless
   std::string meaning;
@@ -36,6 +36,7 @@ struct FileForm {
   std::string proof_method;         // since 1.1, absent without a proof
   std::string supports;             // since 1.3, absent where nothing is fixed
   std::string radiation_method;     // since 1.5, absent without multipoles
+  std::string nonlinear_form;       // since 1.7, absent without a nonlinear energy: "rows" or "points"
   bool has_complete_below = false;  // since 1.4: Proof::complete_below_hz is there
   // Since 2.0: in place of mesh and shapes what runtime/codec makes of them. The bank has its Packing.
   bool is_packed = false;

@@ -1,5 +1,4 @@
-// Method:     h_l by its recurrence, upwards: where j_l falls, y_l grows and |h_l| with it, so that errors grow no faster than what is
-//             sought. The factor e^{i x}, which all h_l have, is left out. A component that was rounded is off by half a step at most, a
+// Method:     h_l by its recurrence (runtime/base/hankel.hpp). A component that was rounded is off by half a step at most, a
 //             coefficient by scale / sqrt(2); the root of the decay is a norm of the coefficients, so that it is off by no more than the
 //             norm of these.
 // Source:     DLMF 10.49.6, 10.51.1; docs/equations.md E10.
@@ -14,21 +13,17 @@
 #include <numbers>
 #include <utility>
 
+#include "runtime/bank/air.hpp"
 #include "runtime/bank/bank.hpp"
+#include "runtime/bank/mixing.hpp"
+#include "runtime/base/hankel.hpp"
 
 namespace carillon::bank {
 
 std::vector<double> calc_hankel_sizes(double x, std::int32_t order) {
-  std::vector<double> sizes(static_cast<std::size_t>(order) + 1, std::numeric_limits<double>::infinity());
-  std::complex<double> here(0.0, -1.0 / x), next(-1.0 / x, -1.0 / (x * x));
-  for (std::size_t l = 0; l < sizes.size(); ++l) {
-    const double size = std::abs(here);
-    if (!std::isfinite(size)) break;
-    sizes[l] = size;
-    const std::complex<double> after = (2.0 * static_cast<double>(l) + 3.0) / x * next - here;
-    here = next;
-    next = after;
-  }
+  std::vector<double> sizes;
+  for (const std::complex<double>& quotient : base::calc_hankel_quotients(x, order))
+    sizes.push_back(sizes.empty() ? 1.0 / x : sizes.back() / std::abs(quotient));
   return sizes;
 }
 
@@ -52,6 +47,21 @@ std::vector<CoefficientDecay> calc_coefficient_decays(const Multipoles& multipol
   return decays;
 }
 
+bool is_half_space(const Multipoles& multipoles) {
+  double carried = 0.0, lost = 0.0;
+  for (const CoefficientDecay& found : calc_coefficient_decays(multipoles)) carried += found.decay_per_s;
+  for (const double decay : multipoles.decay_per_s) lost += decay;
+  return carried > 1.5 * lost && carried < 2.5 * lost;
+}
+
+std::vector<double> calc_far_gains(const Multipoles& multipoles) {
+  const double share = is_half_space(multipoles) ? 2.0 : 1.0;
+  std::vector<double> gains;
+  for (const double decay : multipoles.decay_per_s)
+    gains.push_back(calc_gain_of_decay(share * decay, multipoles.air_density_kg_m3, multipoles.sound_speed_ms));
+  return gains;
+}
+
 void add_coefficients(Multipoles& multipoles, std::int32_t order, std::span<const std::complex<double>> coefficients) {
   if (order < 0 || order > kMaxOrder)
     throw InputError(fmt::format("multipoles of order {}; it must lie within 0 and {}", order, kMaxOrder));
@@ -73,6 +83,42 @@ void add_coefficients(Multipoles& multipoles, std::int32_t order, std::span<cons
   }
 }
 
+namespace {
+
+Mixing select_mixing(const Multipoles& multipoles, const std::vector<std::size_t>& chosen) {
+  const Mixing& mixing = multipoles.mixing;
+  if (mixing.is_empty()) return {};
+  const std::size_t modes = mixing.count.size();
+  std::vector<std::int32_t> place(modes + kRigidMotions, -1);
+  for (std::size_t i = 0; i < chosen.size(); ++i) place[chosen[i]] = static_cast<std::int32_t>(i);
+  for (std::size_t r = 0; r < kRigidMotions; ++r) place[modes + r] = static_cast<std::int32_t>(chosen.size() + r);
+  std::vector<std::size_t> first{0};
+  for (const std::int32_t count : mixing.count) first.push_back(first.back() + static_cast<std::size_t>(count));
+  Mixing selected;
+  for (const std::size_t mode : chosen) {
+    std::vector<std::pair<std::int32_t, double>> parts;
+    double squares = 0.0;
+    for (std::size_t k = first[mode]; k < first[mode + 1]; ++k) {
+      const std::int32_t motion = place[static_cast<std::size_t>(mixing.motion[k])];
+      if (motion < 0) continue;
+      parts.emplace_back(motion, mixing.part[k]);
+      squares += mixing.part[k] * mixing.part[k];
+    }
+    const bool is_whole = parts.size() == first[mode + 1] - first[mode];
+    std::sort(parts.begin(), parts.end());
+    if (squares == 0.0) parts = {{place[mode], squares = 1.0}};  // of all its parts only others were left out
+    const double factor = is_whole ? 1.0 : 1.0 / std::sqrt(squares * (1.0 + multipoles.added_mass[mode]));
+    for (const auto& [motion, part] : parts) {
+      selected.motion.push_back(motion);
+      selected.part.push_back(factor * part);
+    }
+    selected.count.push_back(static_cast<std::int32_t>(parts.size()));
+  }
+  return selected;
+}
+
+}  // namespace
+
 Multipoles select_multipoles(const Multipoles& multipoles, const std::vector<std::size_t>& chosen) {
   if (chosen.empty() || multipoles.is_empty()) return {};
   std::vector<std::size_t> first{0};  // of the components of each mode
@@ -82,6 +128,7 @@ Multipoles select_multipoles(const Multipoles& multipoles, const std::vector<std
     const std::vector<double> all = std::exchange(*values, {});
     for (const std::size_t mode : chosen) values->push_back(all[mode]);
   }
+  selected.mixing = select_mixing(multipoles, chosen);
   selected.order.clear();
   selected.coefficient.clear();
   for (const std::size_t mode : chosen) {

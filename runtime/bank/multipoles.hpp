@@ -12,6 +12,16 @@
 
 namespace carillon::bank {
 
+/// The modes of a body that the air couples, as sums of its modes without air: mode i moves with phi'_i = sum of part_ij phi_j, and has
+/// unit modal mass together with the air, part^T (1 + M_a) part = 1. M modes, K parts; docs/equations.md E10.
+struct Mixing {
+  std::vector<std::int32_t> count;   // (M) parts of the mode, at least one
+  std::vector<std::int32_t> motion;  // (K) mode by mode, ascending in each: a mode j < M, or M + r for rigid motion r (mixing.hpp)
+  std::vector<double> part;          // (K) of that motion
+
+  bool is_empty() const { return count.empty(); }
+};
+
 /// The pressure outside the body that each mode makes, per unit modal velocity (q' = 1 m kg^1/2 / s), solved by boundary elements
 /// (precompute/radiation). Signs of e^{-i omega t}. On and outside the sphere, at distance r from its centre in the direction d:
 ///   p(r, d) = sum over l <= order, |m| <= l of  a_lm  h_l(k r) / h_l(k R)  Y_lm(d),      k = 2 pi freq_hz / sound_speed_ms,  R = radius_m
@@ -30,6 +40,7 @@ struct Multipoles {
   std::vector<double> added_mass;         // (M) of the air, over the modal mass
   std::vector<double> error_db;           // (M) of the pressure, rms over directions, relative to its rms, from nearest_m outward: what
                                           // interpolation over k, the order and rounding leave out; not the error of the surface mesh
+  Mixing mixing;                          // or empty: the air does not couple the modes; since 1.6
   std::string method;                     // in words: boundary elements, unknowns, wave numbers, half space
   bool is_in_decay = false;               // in memory only: Bank::decay_per_s has decay_per_s in it (choose_frequencies())
 
@@ -56,12 +67,21 @@ struct CoefficientDecay {
 /// ask for. docs/equations.md E10.
 std::vector<CoefficientDecay> calc_coefficient_decays(const Multipoles& multipoles);
 
+/// Whether the air was that above a rigid plane. Then the field is that of the body and its mirror image, and the body makes half of the
+/// power that the coefficients carry: the decays of all modes together tell.
+bool is_half_space(const Multipoles& multipoles);
+
+/// Of every mode (M), the root mean square of the far field over the directions into which it goes, taken back to 1 m, per unit modal
+/// velocity [Pa]: of the decay by radiation, in the air of the multipoles. Into a half space as much power is twice the square.
+std::vector<double> calc_far_gains(const Multipoles& multipoles);
+
 /// Appends order, scale and coefficients of a mode with the coefficients a_lm [Pa s m^-1 kg^-1/2], (L + 1)^2 in the order l^2 + l + m: the
 /// scale is the largest component over 32767, 0 where all are 0, and each is rounded to the nearest step. Its other values are left to the
 /// caller. Throws InputError for an order out of range, another number of coefficients and one that is not finite.
 void add_coefficients(Multipoles& multipoles, std::int32_t order, std::span<const std::complex<double>> coefficients);
 
-/// The modes `chosen`, in that order. Nothing at all where none is chosen.
+/// The modes `chosen`, in that order. Nothing at all where none is chosen. Parts of modes that are not chosen are lost to a mixture; what
+/// is left has unit modal mass again, with the added mass that is stated.
 Multipoles select_multipoles(const Multipoles& multipoles, const std::vector<std::size_t>& chosen);
 
 }  // namespace carillon::bank

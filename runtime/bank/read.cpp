@@ -170,7 +170,36 @@ void allocate_later(const Seal& seal, const std::string& name, Loaded& loaded, c
     make_table("radiation/added_mass", "<f8", {modes}, air.added_mass, modes);
     make_table("radiation/error_db", "<f8", {modes}, air.error_db, modes);
     make_table("radiation/coefficient", "<i2", {coefficients, 2}, air.coefficient, 2 * coefficients);
+    if (seal.extents.contains("radiation/mixing_count")) {
+      const std::uint64_t parts = get_rows(seal, "radiation/mixing_motion", name);
+      make_table("radiation/mixing_count", "<i4", {modes}, air.mixing.count, modes);
+      make_table("radiation/mixing_motion", "<i4", {parts}, air.mixing.motion, parts);
+      make_table("radiation/mixing_part", "<f8", {parts}, air.mixing.part, parts);
+    }
     make_text("radiation/method", loaded.form.radiation_method);
+  }
+  if (has_group(seal, "nonlinear")) {
+    QuarticEnergy& energy = bank.quartic;
+    make_list("nonlinear/modes", "<i4", energy.modes);
+    make_text("nonlinear/form", loaded.form.nonlinear_form);
+    const std::uint64_t modes = energy.modes.size();
+    std::uint64_t rows = 0;
+    if (seal.extents.contains("nonlinear/A")) {
+      rows = get_rows(seal, "nonlinear/A", name);
+      make_table("nonlinear/A", "<f4", {rows, count_pairs(modes)}, energy.rows, rows * count_pairs(modes));
+    } else {
+      const Extent& gradient = get_extent(seal, "nonlinear/G", name);
+      const std::uint64_t points = get_rows(seal, "nonlinear/weight", name);
+      const std::uint64_t parts = gradient.shape.size() == 3 && gradient.shape[1] == 6 ? 6 : 9, strains = parts == 6 ? 3 : 6;
+      rows = get_rows(seal, "nonlinear/stress", name);
+      make_table("nonlinear/G", "<f4", {points, parts, modes}, energy.gradient, points * parts * modes);
+      make_table("nonlinear/stress", "<f4", {rows, points, strains}, energy.stress, rows * points * strains);
+      make_table("nonlinear/weight", "<f8", {points}, energy.weight, points);
+    }
+    if (seal.extents.contains("nonlinear/linear")) make_table("nonlinear/linear", "<f8", {rows, modes}, energy.linear, rows * modes);
+    // list_fields() divides by these: a shape of zero extent has no bytes that would bound the others.
+    if (const std::string fault = find_size_fault(energy); energy.is_empty() || !fault.empty())
+      throw InputError(fmt::format("{}: {}; write the bank again", name, fault.empty() ? "nonlinear/modes names no mode" : fault));
   }
   if (!has_group(seal, "proof")) return;
   Proof& proof = bank.proof.emplace();
@@ -337,6 +366,10 @@ Bank finish(Loaded&& loaded, const std::string& name) {
     bank.multipoles = {};  // of a bank without modes
   else
     bank.multipoles.method = trim(form.radiation_method);
+  if (const std::string form_name = trim(form.nonlinear_form);
+      !bank.quartic.is_empty() && form_name != (bank.quartic.is_of_points() ? "points" : "rows"))
+    throw InputError(fmt::format("{}: nonlinear/form is \"{}\", and its arrays are those of the form \"{}\"; write the bank again", name,
+                                 form_name, bank.quartic.is_of_points() ? "points" : "rows"));
   for (std::size_t i = 0; i < bank.mode_count(); ++i) {
     const double freq_hz = std::sqrt(bank.eigenvalue_rad2_s2[i]) / (2.0 * std::numbers::pi);
     const bool agrees = std::abs(form.freq_hz[i] - freq_hz) <= 1e-9 * std::abs(freq_hz);

@@ -136,16 +136,18 @@ struct RadiationFacts {
   double worst_db = 0.0;                 // stated error
   std::size_t strong = 0;                // modes of whose damping radiation is more than half
   double cents = 0.0;                    // by which the mass of the air lowers a mode, the largest of either sign
+  std::int32_t parts = 0;                // of the mode in air that has most, where the air couples modes
 };
 
 RadiationFacts find_radiation_facts(const Bank& bank) {
   const Multipoles& air = bank.multipoles;
   const auto [low, high] = std::minmax_element(air.order.begin(), air.order.end());
-  RadiationFacts facts{*low, *high, 12 * air.order.size() + 2 * air.coefficient.size(), -HUGE_VAL, 0, 0.0};
+  RadiationFacts facts{*low, *high, 12 * air.order.size() + 2 * air.coefficient.size(), -HUGE_VAL, 0, 0.0, 0};
   for (std::size_t m = 0; m < air.order.size(); ++m) {
     facts.worst_db = std::max(facts.worst_db, air.error_db[m]);
     const double material = bank.corrected.is_empty() ? bank.decay_per_s[m] : bank.corrected.decay_per_s[m];
     if (air.decay_per_s[m] > material) ++facts.strong;
+    if (!air.mixing.is_empty()) facts.parts = std::max(facts.parts, air.mixing.count[m]);
     if (const double cents = 600.0 * std::log2(1.0 + air.added_mass[m]); std::abs(cents) > std::abs(facts.cents)) facts.cents = cents;
   }
   return facts;
@@ -159,7 +161,27 @@ std::string format_radiation(const Bank& bank) {
                       format_bytes(facts.bytes), facts.worst_db, air.nearest_m);
   text += fmt::format("          more than half of the damping of {} of {} modes; the mass of the air lowers one by {:.2g} cents\n",
                       facts.strong, bank.mode_count(), facts.cents);
+  if (facts.parts > 0)
+    text += fmt::format("          coupled by the air: a mode is a sum of up to {} motions of the body without it\n", facts.parts);
   return text;
+}
+
+/// "rows" or "points".
+const char* get_form(const QuarticEnergy& energy) { return energy.is_of_points() ? "points" : "rows"; }
+
+std::size_t count_bytes(const QuarticEnergy& energy) {
+  return 4 * (energy.rows.size() + energy.gradient.size() + energy.stress.size()) + 8 * (energy.weight.size() + energy.linear.size());
+}
+
+std::string format_nonlinear(const QuarticEnergy& energy) {
+  std::string text =
+      fmt::format("nonlinear {} coupled modes, {} row{}", energy.mode_count(), energy.row_count(), energy.row_count() == 1 ? "" : "s");
+  if (energy.is_of_points()) text += fmt::format(" at {} points, energy to {:.1e}", energy.point_count(), energy.error);
+  text += fmt::format(", {}, {}", energy.linear.empty() ? "flat" : "curved", format_bytes(count_bytes(energy)));
+  if (energy.membrane_ratio > kMaxMembraneRatio)
+    text += fmt::format("\n          the highest coupled mode is at {:.2g} of the lowest condensed one: above {:g} its inertia counts",
+                        energy.membrane_ratio, kMaxMembraneRatio);
+  return text + "\n";
 }
 
 template <class Range>
@@ -199,6 +221,7 @@ Json::Value make_mode(const Bank& bank, std::size_t i) {
     radiation["decay_per_s"] = air.decay_per_s[i];
     radiation["added_mass"] = air.added_mass[i];
     radiation["error_db"] = air.error_db[i];
+    if (!air.mixing.is_empty()) radiation["coupled_modes"] = air.mixing.count[i];
   }
   mode["shape_scale"] = bank.shape_scale[i];
   return mode;
@@ -269,6 +292,7 @@ std::string format_info(const Bank& bank, const std::filesystem::path& file, std
                       bank.regions.empty() ? "" : " (of the whole; several materials: --json)");
   text += fmt::format("damping   {}\n", format_damping(bank));
   if (!bank.multipoles.is_empty()) text += format_radiation(bank);
+  if (!bank.quartic.is_empty()) text += format_nonlinear(bank.quartic);
   text += fmt::format("rigid     {:.6g} kg, {:.6g} m^3, centre ({:.5g}, {:.5g}, {:.5g}) m\n", rigid.mass_kg, rigid.volume_m3,
                       rigid.centre_m[0], rigid.centre_m[1], rigid.centre_m[2]);
   text += fmt::format("inertia   xx {:.5g}, yy {:.5g}, zz {:.5g}, xy {:.3g}, xz {:.3g}, yz {:.3g} kg m^2\n", inertia[0], inertia[4],
@@ -333,6 +357,19 @@ std::string format_info_json(const Bank& bank, const std::filesystem::path& file
     radiation["worst_error_db"] = facts.worst_db;
     radiation["modes_mostly_damped_by_it"] = Json::UInt64(facts.strong);
     radiation["largest_added_mass_cents"] = facts.cents;
+    radiation["most_coupled_modes"] = facts.parts;
+  }
+  if (const QuarticEnergy& energy = bank.quartic; !energy.is_empty()) {
+    Json::Value& nonlinear = root["nonlinear"];
+    nonlinear["form"] = get_form(energy);
+    nonlinear["coupled_modes"] = Json::UInt64(energy.mode_count());
+    nonlinear["rows"] = Json::UInt64(energy.row_count());
+    nonlinear["points"] = Json::UInt64(energy.point_count());
+    nonlinear["is_curved"] = !energy.linear.empty();
+    nonlinear["bytes"] = Json::UInt64(count_bytes(energy));
+    nonlinear["energy_error"] = energy.error;
+    nonlinear["membrane_ratio"] = energy.membrane_ratio;
+    nonlinear["thickness_m"] = energy.thickness_m;
   }
   root["proof"] = bank.proof ? make_proof(*bank.proof) : Json::Value();
   root["frequencies_hz"] = Json::Value(Json::arrayValue);

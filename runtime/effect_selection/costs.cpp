@@ -12,7 +12,9 @@
 #include <vector>
 
 #include "runtime/base/clock.hpp"
+#include "runtime/head/sphere.hpp"
 #include "runtime/synth/acceleration_noise.hpp"
+#include "runtime/synth/head_ears.hpp"
 #include "runtime/synth/receiver.hpp"
 #include "runtime/synth/voice.hpp"
 
@@ -112,6 +114,21 @@ double time_ear(bool moves, bool has_dipoles) {
   return std::max(0.0, with - without) / kBlocks;
 }
 
+/// A head's ears, ns a block.
+double time_head(bool moves) {
+  synth::HeadEars ears(head::make_sphere(kRateHz));
+  std::array<double, synth::kSubBlock> sound{}, left{}, right{};
+  for (std::size_t n = 0; n < sound.size(); ++n) sound[n] = std::sin(0.7 * static_cast<double>(n));
+  double angle = 0.3;
+  return time_ns([&] {
+           for (int b = 0; b < kBlocks * synth::kSubBlocks; ++b) {
+             if (moves) angle += 1e-3;
+             ears.process({std::cos(angle), std::sin(angle), 0.1}, sound, true, left, right);
+           }
+         }) /
+         kBlocks;
+}
+
 double time_click() {
   synth::AccelerationNoise click(0.02, 0.01, kRateHz);
   std::array<std::array<float, kBlock>, 3> blocks{};
@@ -149,6 +166,8 @@ Costs measure_costs() {
   costs.ear_sample_ns = share(time_ear(false, false), kBlock);
   costs.moving_ear_sample_ns = std::max(costs.ear_sample_ns, share(time_ear(true, false), kBlock));
   costs.dipole_ear_sample_ns = share(time_ear(false, true) - costs.ear_sample_ns * kBlock, kBlock);
+  costs.head_sample_ns = share(time_head(false), kBlock);
+  costs.moving_head_sample_ns = std::max(costs.head_sample_ns, share(time_head(true), kBlock));
   costs.click_sample_ns = share(time_click(), kBlock);
   return costs;
 }

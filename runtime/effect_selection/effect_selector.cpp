@@ -19,6 +19,7 @@
 #include <utility>
 
 #include "runtime/base/error.hpp"
+#include "runtime/synth/propagation.hpp"
 #include "runtime/synth/pulse.hpp"
 #include "runtime/synth/receiver.hpp"
 
@@ -41,12 +42,26 @@ constexpr double kDrivenModeSampleNs = 1.2;
 
 double calc_norm(const Vec3& x) { return std::hypot(x[0], x[1], x[2]); }
 
-/// What an effect acts on: without it there is nothing to do. None for kModal and kAirDelay.
+/// What an effect acts on: without it there is nothing to do.
 std::optional<Effect> find_base(Effect effect) {
   if (kContactEffects.has(effect)) return Effect::kModal;
-  if (effect == Effect::kDirectivity) return Effect::kModal;
+  if (effect == Effect::kDirectivity || effect == Effect::kNonlinear) return Effect::kModal;
+  if (effect == Effect::kHead) return Effect::kTwoEars;
   if (effect == Effect::kDoppler) return Effect::kAirDelay;
   return std::nullopt;
+}
+
+/// Numbers of the matrices that are multiplied for a sample of coupled modes.
+double count_multiplications(const bank::QuarticEnergy& energy) {
+  const double modes = static_cast<double>(energy.mode_count()), rows = static_cast<double>(energy.row_count());
+  if (energy.is_of_points()) {
+    const double points = static_cast<double>(energy.point_count());
+    return 2.0 * points * (static_cast<double>(energy.gradient_count()) * modes + static_cast<double>(energy.strain_count()) * rows);
+  }
+  // Rows without anything off their diagonals count as diagonals.
+  double off = 0.0;
+  for (const float entry : energy.rows) off += static_cast<double>(entry != 0.0F);
+  return 2.0 * std::max(off, rows * modes);
 }
 
 double to_db(double share) { return 10.0 * std::log10(std::max(share, 1e-30)); }
@@ -66,7 +81,11 @@ struct EffectSelector::State {
     double mean_hz = 0.0;                   // of what is heard of it
     double ring_pa2_s = 0.0, ring_s = 0.0;  // modal exposure of its strikes, falling by 60 dB a second since ring_s
     std::vector<double> quiet_s;            // per mode of the bank's levels: when it is not heard any more
-    std::vector<double> anchor_m;           // ways to the microphones by which kDoppler is judged
+    std::vector<double> self;               // per coupled mode of the bank: sum of A_ii^2, bank::calc_self_coupling()
+    std::vector<double> swing;              // per coupled mode: amplitude of q [m kg^1/2] that strikes have left, at swing_s
+    double swing_s = 0.0;
+    double coupling_ns = 0.0;      // of a sample
+    std::vector<double> anchor_m;  // ways to the microphones by which kDoppler is judged
     synth::PerEffect<double> until_s{};
     synth::PerEffect<double> share{};          // the loudest call so far
     synth::PerEffect<SelectionReason> reason;  // of that call
@@ -131,6 +150,7 @@ struct EffectSelector::State {
   void reflect(Body& body, double time_s);
   void call_directivity(Body& body, const StrikeSound& sound, double until_s);
   void call_directivity(Body& body, double spread_db, double until_s);
+  void call_nonlinear(Body& body, const events::Impulse& impulse, double until_s);
   double find_ways(const Body& body, double time_s);
   void call(Body& body, Effect effect, double share, double until_s, SelectionReason reason) {
     call(body, effect, share, until_s, reason, facts.thresholds.audible_share);
@@ -169,7 +189,7 @@ EffectSelector::EffectSelector(SceneFacts facts, const Costs& costs) : state_(st
     const BodyFacts& of = s.facts.bodies[i];
     if (of.bank == nullptr) throw InputError(fmt::format("the plan of \"{}\" needs its bank", of.name));
     auto& levels = s.banks[of.bank];
-    if (!levels) levels = std::make_unique<BankLevels>(*of.bank, s.facts.rate_hz, of.sphere_radius_m);
+    if (!levels) levels = std::make_unique<BankLevels>(*of.bank, s.facts.rate_hz, of.sphere_radius_m, of.transfers.get());
     State::Body& body = s.bodies[i];
     body.bank = levels.get();
     body.position_m = of.position_m;
@@ -177,6 +197,12 @@ EffectSelector::EffectSelector(SceneFacts facts, const Costs& costs) : state_(st
     body.share.fill(-1.0);
     for (const Effect effect : kContactEffects) body.reason[effect] = {.rule = Rule::kNoContact};
     body.quiet_s.assign(levels->get_modes().size(), kNever);
+    if (const bank::QuarticEnergy& energy = of.bank->quartic; !energy.is_empty()) {
+      body.self = bank::calc_self_coupling(energy);
+      body.swing.assign(energy.mode_count(), 0.0);
+      body.coupling_ns =
+          costs.coupled_mode_ns * static_cast<double>(energy.mode_count()) + costs.coupling_ns * count_multiplications(energy);
+    }
     body.nearest_m = s.find_ways(body, 0.0);
     body.anchor_m = s.way_m;
     s.find_possible(i);
@@ -193,7 +219,9 @@ void EffectSelector::State::find_possible(std::size_t number) {
   body.possible = synth::kCompiledEffects;
   if (of.fixed) refuse(body, Effect::kAccelerationNoise, {.rule = Rule::kFixed});
   if (of.bank->multipoles.is_empty()) refuse(body, Effect::kDirectivity, {.rule = Rule::kNoMultipoles});
+  if (of.bank->quartic.is_empty()) refuse(body, Effect::kNonlinear, {.rule = Rule::kNoEnergy});
   if (!facts.floor) refuse(body, Effect::kGroundReflection, {.rule = Rule::kNoFloor});
+  if (!facts.has_head) refuse(body, Effect::kHead, {.rule = Rule::kNoHead});
   if (facts.microphones_m.size() < 2) refuse(body, Effect::kTwoEars, {.rule = Rule::kOneMicrophone});
   if (!facts.moves) {
     for (const Effect effect : kContactEffects) refuse(body, effect, {.rule = Rule::kNoContact});
@@ -269,6 +297,10 @@ void EffectSelector::State::look(Body& body, double time_s) {
   if (way_m.size() > 1) {
     call(body, Effect::kTwoEars, wave * apart * wave * apart, end_s,
          {.rule = apart > limit_m ? Rule::kOtherWay : Rule::kSameWay, .value = apart, .limit = limit_m});
+  }
+  // A head changes what each ear hears by decibels, wherever the body is.
+  if (facts.has_head) {
+    for (const Effect effect : {Effect::kTwoEars, Effect::kHead}) call(body, effect, 1e30, end_s, {.rule = Rule::kByHead});
   }
   call(body, Effect::kDoppler, wave * moved * wave * moved, time_s + travel_s,
        {.rule = moved > limit_m ? Rule::kMoving : Rule::kStill, .value = moved, .limit = limit_m});
@@ -400,6 +432,32 @@ void EffectSelector::State::call_directivity(Body& body, double spread_db, doubl
        {.rule = spread_db > kDirectionDb ? Rule::kDirected : Rule::kSameAllRound, .value = spread_db, .limit = kDirectionDb}, kDirectionDb);
 }
 
+/// By how much what strikes have left of swinging raises a coupled mode that swings alone: of q'' + lambda q + 2 a^2 q^3 = 0 with the
+/// amplitude q, alpha = 2 a^2 q^2 / lambda, the frequency grows by 3 alpha / 8 to first order. `projection` holds that of the strike.
+void EffectSelector::State::call_nonlinear(Body& body, const events::Impulse& impulse, double until_s) {
+  if (!body.possible.has(Effect::kNonlinear)) return;
+  const bank::Bank& bank = body.bank->get_bank();
+  const std::vector<std::int32_t>& coupled = bank.quartic.modes;
+  const std::span<const BankLevels::Mode> modes = body.bank->get_modes();
+  const double passed_s = std::max(0.0, impulse.time_s - body.swing_s);
+  body.swing_s = std::max(body.swing_s, impulse.time_s);
+  double cents = 0.0, soft_s = kNever;
+  for (std::size_t i = 0, m = 0; i < coupled.size(); ++i) {
+    while (m < modes.size() && modes[m].index < coupled[i]) ++m;
+    if (m == modes.size() || modes[m].index != coupled[i]) continue;
+    const auto mode = static_cast<std::size_t>(coupled[i]);
+    const double lambda = bank.eigenvalue_rad2_s2[mode], decay_per_s = std::max(modes[m].decay_per_s, 1e-9);
+    const double pulse = calc_pulse_spectrum(impulse.shape, modes[m].freq_hz * impulse.duration_s);
+    body.swing[i] = body.swing[i] * std::exp(-decay_per_s * passed_s) + projection[m] * pulse / std::sqrt(lambda);
+    const double alpha = 2.0 * body.self[i] * body.swing[i] * body.swing[i] / lambda;
+    const double raised = 1200.0 / std::numbers::ln2 * 0.375 * alpha;
+    cents = std::max(cents, raised);
+    if (raised > kHardeningCents) soft_s = std::max(soft_s, impulse.time_s + std::log(raised / kHardeningCents) / (2.0 * decay_per_s));
+  }
+  call(body, Effect::kNonlinear, cents, std::min(soft_s, until_s), {.rule = Rule::kHardens, .value = cents, .limit = kHardeningCents},
+       kHardeningCents);
+}
+
 /// Whether the acceleration noise of a body that is not fixed is heard. Returns until when the body sounds by it.
 double EffectSelector::State::call_acceleration_noise(Body& body, const BodyFacts& of, const StrikeSound& sound) {
   if (!(sound.click_db > sound.limit_db)) {
@@ -424,6 +482,7 @@ void EffectSelector::State::apply(const events::Impulse& impulse, double work_ns
   if (!body.bank->calc_projections(impulse.triangle, impulse.barycentric, impulse.impulse_n_s, projection)) return;
   const StrikeSound sound = hear(body, of, impulse);
   double end_s = call_modes(body, of, sound, work_ns);
+  if (end_s != kNever) call_nonlinear(body, impulse, end_s + sound.travel_s);
   if (!of.fixed) end_s = std::max(end_s, call_acceleration_noise(body, of, sound));
   if (end_s == kNever) {
     call(body, Effect::kHertzPulse, 0.0, kNever, {.rule = Rule::kTooQuiet, .value = sound.modal_db, .limit = sound.limit_db});
@@ -618,7 +677,8 @@ EffectSet EffectSelector::State::decide(const BodyFacts& of, Body& body, double 
     if (base && !set.has(*base) && !of.overrides.on.has(effect)) set = set.without(effect);
   }
   if (!set.has(Effect::kModal) && !set.has(Effect::kAccelerationNoise)) {
-    for (const Effect effect : {Effect::kHertzPulse, Effect::kAirDelay, Effect::kDoppler, Effect::kTwoEars, Effect::kGroundReflection}) {
+    for (const Effect effect :
+         {Effect::kHertzPulse, Effect::kAirDelay, Effect::kDoppler, Effect::kTwoEars, Effect::kGroundReflection, Effect::kHead}) {
       if (!of.overrides.on.has(effect)) set = set.without(effect);
     }
   }
@@ -631,21 +691,24 @@ void EffectSelector::State::add_costs(Body& body) {
   const double travel_s = body.nearest_m / bank::kSoundSpeedMs;
   if (time_s > body.sounds_until_s + travel_s || time_s >= facts.duration_s) return;
   const double samples = kTickS * facts.rate_hz, all = static_cast<double>(facts.microphones_m.size());
-  const double ears = body.now.has(Effect::kTwoEars) ? all : 1.0;
+  const bool has_head = synth::has_head(body.now);
+  const double ears = body.now.has(Effect::kTwoEars) && !has_head ? all : 1.0;
   const auto add = [&](Effect effect, double ns) {
     if (body.now.has(effect)) body.plan.effects[effect].cost_us += 1e-3 * samples * ns;
   };
   add(Effect::kModal, costs.voice_sample_ns);
   add(Effect::kAirDelay, costs.ear_sample_ns);
-  add(Effect::kTwoEars, (all - 1.0) * costs.ear_sample_ns);
+  add(Effect::kTwoEars, (ears - 1.0) * costs.ear_sample_ns);
   add(Effect::kDoppler, ears * (costs.moving_ear_sample_ns - costs.ear_sample_ns));
   const bool moves = body.now.has(Effect::kDoppler);
   const double reflected = body.now.has(Effect::kGroundReflection) ? 2.0 : 1.0, modes = static_cast<double>(body.bank->get_modes().size());
   const double dipoles_ns = body.now.has(Effect::kAccelerationNoise) ? costs.dipole_ear_sample_ns : 0.0;
   add(Effect::kGroundReflection, ears * ((moves ? costs.moving_ear_sample_ns : costs.ear_sample_ns) + dipoles_ns));
+  if (has_head) add(Effect::kHead, reflected * (moves ? costs.moving_head_sample_ns : costs.head_sample_ns));
   // Every ear sounds the modes by itself, twice where its weights change, which then are looked up once a block.
   add(Effect::kDirectivity,
       ears * reflected * modes * (moves ? 2.0 * costs.mode_sample_ns + costs.transfer_ns / synth::kBlock : costs.mode_sample_ns));
+  add(Effect::kNonlinear, body.coupling_ns);
   add(Effect::kAccelerationNoise, ears * costs.dipole_ear_sample_ns + costs.click_sample_ns);
   // What modes cost that a contact drives is in the first of its effects, as it is where it is measured.
   double driven_ns = kDrivenModeSampleNs * static_cast<double>(body.bank->get_modes().size());

@@ -45,6 +45,8 @@ inline constexpr double kBelowLoudestDb = 70.0;
 /// of the exposure), the least that is heard, and the body is so far above what is not heard that this is heard.
 inline constexpr double kDirectionDb = 1.0;
 inline constexpr double kDirectionClearDb = 10.0;
+/// Nonlinear motion is called for when a strike makes a coupled mode stiffer by so much, the least that is heard of a lone tone.
+inline constexpr double kHardeningCents = 3.0;
 /// Slower than this nothing slides or rolls: synth::ContactForces gives no force then.
 inline constexpr double kCreepMs = 2e-4;
 /// A ring that a lasting contact drives is random: its amplitude is this much above its root mean square at times.
@@ -73,6 +75,8 @@ struct BodyFacts {
   std::string name;
   const bank::Bank* bank = nullptr;  // with the gains that it is played with; must outlive the selector
   double sphere_radius_m = 0.0;      // radiation::calc_sphere_radius_m(*bank); 0: to be worked out
+  /// Of the bank's multipoles; nullptr: to be made. Looked at in the constructor only.
+  std::shared_ptr<const radiation::Transfers> transfers = nullptr;
   bool fixed = false;
   bool struck = false;  // by the scene itself
   Vec3 position_m{};    // of the centre of mass, at the beginning
@@ -90,6 +94,7 @@ struct SceneFacts {
   SelectionThresholds thresholds{};
   synth::ContactSurface ground = synth::kGroundSurface;
   std::optional<synth::Floor> floor{};  // that reflects
+  bool has_head = false;                // the listener, in the middle of two microphones
 };
 
 /// The numbers that decided, and what they mean.
@@ -120,7 +125,11 @@ struct SelectionReason {
     kDirected,      // the same
     kFaint,         // value: level [dB(A)], limit: of what has directions, distance [m]
     kNoFloor,       // none that reflects
-    kReflected      // value: level of what the floor adds [dB], limit
+    kReflected,     // value: level of what the floor adds [dB], limit
+    kNoHead,        // of the listener's
+    kByHead,        // the body is heard, and by a head
+    kNoEnergy,      // the bank does not say what large motion makes of its modes
+    kHardens        // value: how much higher the strike makes a coupled mode [cent], limit
   };
   Rule rule = Rule::kNotStruck;
   double value = 0.0, limit = 0.0, distance_m = 0.0;

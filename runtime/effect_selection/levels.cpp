@@ -68,7 +68,7 @@ double calc_level_db(double exposure_pa2_s) noexcept {
   return 10.0 * std::log10(std::max(exposure_pa2_s, 0.0) / (kEarS * kReferencePa * kReferencePa));
 }
 
-BankLevels::BankLevels(const bank::Bank& bank, double rate_hz, double sphere_radius_m)
+BankLevels::BankLevels(const bank::Bank& bank, double rate_hz, double sphere_radius_m, const radiation::Transfers* transfers)
     : bank_(&bank), highest_hz_(std::min(kHighestHz, 0.5 * rate_hz)) {
   double lowest_hz = 0.0;
   for (std::size_t m = 0; m < bank.mode_count(); ++m) {
@@ -80,7 +80,12 @@ BankLevels::BankLevels(const bank::Bank& bank, double rate_hz, double sphere_rad
     const double slow = d > omega ? d - std::sqrt((d - omega) * (d + omega)) : d;
     modes_.push_back({static_cast<int>(m), freq, std::max(slow, 1e-9), std::abs(bank.radiation_gain[m]), calc_a_weight(freq)});
   }
-  if (synth::kCompiledEffects.has(synth::Effect::kDirectivity) && !bank.multipoles.is_empty()) find_spreads();
+  if (synth::kCompiledEffects.has(synth::Effect::kDirectivity) && !bank.multipoles.is_empty()) {
+    if (transfers != nullptr)
+      find_spreads(*transfers);
+    else
+      find_spreads(radiation::Transfers(bank));
+  }
   radius_m_ = sphere_radius_m > 0.0 ? sphere_radius_m : radiation::calc_sphere_radius_m(bank);
   // p(f) = rho c a / m T |s T / ((s T)^2 + 2 s T + 2)| J P(f) at 1 m, T = a / c; its exposure is twice the integral of |p|^2 over f > 0.
   const double turn = radius_m_ / bank::kSoundSpeedMs;
@@ -101,10 +106,9 @@ BankLevels::BankLevels(const bank::Bank& bank, double rate_hz, double sphere_rad
 }
 
 /// Far away; nulls count as 20 dB below the mean power of a mode, where others would fill them.
-void BankLevels::find_spreads() {
+void BankLevels::find_spreads(const radiation::Transfers& transfers) {
   constexpr int kDirections = 96;
   constexpr double kDeepest = 0.01;
-  const radiation::Transfers transfers(*bank_);
   std::vector<std::int32_t> numbers;
   for (const Mode& mode : modes_) numbers.push_back(mode.index);
   std::vector<std::complex<float>> transfer(modes_.size());

@@ -8,6 +8,10 @@
 #include "runtime/bank/reduce.hpp"
 #include "runtime/events/events.hpp"
 
+namespace carillon::radiation {
+class Transfers;
+}
+
 namespace carillon::effect_selection {
 
 inline constexpr double kReferencePa = 20e-6;
@@ -34,7 +38,8 @@ struct ClickLevels {
 class BankLevels {
  public:
   /// Modes from kLowestHz to the lower of kHighestHz and half the rate. `bank` with the gains that it is played with; it must outlive this.
-  BankLevels(const bank::Bank& bank, double rate_hz, double sphere_radius_m = 0.0);
+  /// `transfers`: of the bank's multipoles, or nullptr: made here where it has them.
+  BankLevels(const bank::Bank& bank, double rate_hz, double sphere_radius_m = 0.0, const radiation::Transfers* transfers = nullptr);
 
   struct Mode {
     int index = 0;  // in the bank
@@ -68,7 +73,7 @@ class BankLevels {
   ClickLevels calc_click_levels(double impulse_n_s, events::PulseShape shape, double duration_s) const;
 
  private:
-  void find_spreads();
+  void find_spreads(const radiation::Transfers& transfers);
 
   const bank::Bank* bank_;
   double radius_m_ = 0.0, highest_hz_ = 0.0, spread_db_ = 0.0;

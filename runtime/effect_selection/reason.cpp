@@ -79,6 +79,14 @@ std::string describe(const SelectionReason& r) {
     case Rule::kReflected:
       return fmt::format("the ground adds {:.1f} dB of the straight sound, {} than {:.0f} dB", r.value, r.value > r.limit ? "more" : "less",
                          r.limit);
+    case Rule::kNoHead:
+      return "the listener's ears are free";
+    case Rule::kByHead:
+      return "the listener has a head";
+    case Rule::kNoEnergy:
+      return "the bank has no nonlinear energy";
+    case Rule::kHardens:
+      return fmt::format("a strike raises a mode by {:.3g} cents, {} than {:g}", r.value, r.value > r.limit ? "more" : "less", r.limit);
   }
   return "";
 }

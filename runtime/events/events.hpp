@@ -8,11 +8,12 @@
 #include <cstdint>
 #include <variant>
 
+#include "runtime/base/quaternion.hpp"
 #include "runtime/base/vector.hpp"
 
 namespace carillon::events {
 
-using Quaternion = std::array<double, 4>;  // w x y z, unit
+using carillon::Quaternion;
 
 /// Course of a contact force in time: sin^1.5 (Hertz), or the Gaussian of O'Brien, Shen and Gatchalian 2002, of the same variance.
 enum class PulseShape : std::uint8_t { kHertz, kGaussian };

@@ -245,12 +245,16 @@ void edit(const std::string& file, const std::string& out, Wishes& wishes) {
   if (is_edited || !is_reduced) bank = bank::calc_edited(bank, e);  // first: what is heard most may change
   if (const auto question = material::ask_about_solid(bank.material.young_modulus_pa, bank.material.density_kg_m3))
     fmt::print(stderr, "carillon-bank: warning: {}\n", base::printable(*question));
+  const std::size_t coupled = bank.quartic.mode_count();
   if (is_reduced) bank = bank::calc_reduced(bank, wishes.reduction);
   if (is_piped)
     base::write_standard_output(bank::make_bank_bytes(bank));
   else
     bank::write_bank(bank, out);
   if (!dropped.empty()) fmt::print(is_piped ? stderr : stdout, "{}\n", dropped);
+  if (bank.quartic.mode_count() < coupled)
+    fmt::print(is_piped ? stderr : stdout, "nonlinear {} of {} coupled modes are left; \"--keep lowest\" keeps those of the lowest modes\n",
+               bank.quartic.mode_count(), coupled);
   if (bank.band_hz[1] < std::min(old_end_hz, kMaxAudibleHz))
     fmt::print(is_piped ? stderr : stdout,
                "band      now {:.5g} to {:.5g} Hz: nothing above is in the bank; for more, compute the job again with a \"band_hz\" up to "

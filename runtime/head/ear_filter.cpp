@@ -45,6 +45,16 @@ void EarFilter::reset() noexcept {
   for (Line* line : {&input_, &ears_[0], &ears_[1]}) std::fill(line->samples.begin(), line->samples.end(), 0.0F);
 }
 
+int EarFilter::get_length() const noexcept { return head_->get_taps() + static_cast<int>(head_->get_max_delay()) + 1 + kSincTaps; }
+
+std::size_t EarFilter::calc_bytes() const noexcept {
+  std::size_t bytes = sizeof(EarFilter) + input_.samples.capacity() * sizeof(float);
+  for (const Filter& filter : filters_)
+    for (const auto& response : filter.response) bytes += response.capacity() * sizeof(float);
+  for (const Line& ear : ears_) bytes += ear.samples.capacity() * sizeof(float);
+  return bytes;
+}
+
 void EarFilter::set(Filter& filter, const std::array<Blend, 2>& blend) const noexcept {
   filter.blend = blend;
   for (std::size_t ear = 0; ear < 2; ++ear) {
@@ -57,7 +67,7 @@ void EarFilter::set(Filter& filter, const std::array<Blend, 2>& blend) const noe
     loops_->blend(rows, blend[ear].weight.data(), head_->get_taps(), filter.response[ear].data());
     delay = std::clamp(delay, 0.0, head_->get_max_delay());
     filter.whole[ear] = static_cast<int>(delay);
-    Sinc::get().make_delay(delay - filter.whole[ear], filter.fraction[ear]);
+    base::Sinc::get().make_delay(delay - filter.whole[ear], filter.fraction[ear]);
   }
 }
 

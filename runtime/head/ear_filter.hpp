@@ -7,11 +7,13 @@
 #include <span>
 #include <vector>
 
+#include "runtime/base/sinc.hpp"
 #include "runtime/head/convolve.hpp"
 #include "runtime/head/head.hpp"
-#include "runtime/head/sinc.hpp"
 
 namespace carillon::head {
+
+using base::kSincTaps;
 
 /// From the pressure at the middle of a head to that at its ears; one for each body and listener. What it keeps true: every sample that
 /// came in is heard with the response and the delay of the direction at its time, or with both of two directions while one fades into the
@@ -36,6 +38,10 @@ class EarFilter {
   void reset() noexcept;
 
   const Head& get_head() const noexcept { return *head_; }
+  /// Samples, one of the input and those behind it, in which that one is heard.
+  int get_length() const noexcept;
+  /// Memory of its own.
+  std::size_t calc_bytes() const noexcept;
 
  private:
   /// What one direction does, for both ears.

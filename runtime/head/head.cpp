@@ -5,7 +5,7 @@
 #include <numbers>
 #include <utility>
 
-#include "runtime/head/sinc.hpp"
+#include "runtime/base/sinc.hpp"
 
 namespace carillon::head {
 namespace {
@@ -24,10 +24,10 @@ Blend find_by_angle(const ByAngle& head, const Vec3& direction, const Vec3& ear)
 
 Head::Head(Content content) : content_(std::move(content)) {
   max_delay_ = *std::max_element(content_.delays.begin(), content_.delays.end());
-  Sinc::get();  // so that no audio thread makes it
+  base::Sinc::get();  // so that no audio thread makes it
 }
 
-int Head::get_latency() const noexcept { return kOnset + kSincHalf - 1 + content_.origin_samples; }
+int Head::get_latency() const noexcept { return kOnset + base::kSincHalf - 1 + content_.origin_samples; }
 
 std::array<Blend, 2> Head::find(const Vec3& direction) const noexcept {
   if (const auto* by_angle = std::get_if<ByAngle>(&content_.lookup))

@@ -22,9 +22,9 @@
 #include "runtime/base/error.hpp"
 #include "runtime/base/file.hpp"
 #include "runtime/base/printable.hpp"
+#include "runtime/base/sinc.hpp"
 #include "runtime/head/convolve.hpp"
 #include "runtime/head/parse_sofa.hpp"
-#include "runtime/head/sinc.hpp"
 #include "runtime/head/sphere.hpp"
 
 namespace carillon::head {
@@ -101,11 +101,11 @@ double find_onset(std::span<const float> response) {
   float peak = 0.0F;
   for (const float value : response) peak = std::max(peak, std::abs(value));
   if (peak == 0.0F) return 0.0;
-  const Sinc& sinc = Sinc::get();
+  const base::Sinc& sinc = base::Sinc::get();
   const auto read = [&](double place) {
-    const auto first = static_cast<std::ptrdiff_t>(std::floor(place)) - kSincHalf + 1;
+    const auto first = static_cast<std::ptrdiff_t>(std::floor(place)) - base::kSincHalf + 1;
     double sum = 0.0;
-    for (std::ptrdiff_t k = std::max<std::ptrdiff_t>(first, 0); k < first + kSincTaps && k < std::ssize(response); ++k)
+    for (std::ptrdiff_t k = std::max<std::ptrdiff_t>(first, 0); k < first + base::kSincTaps && k < std::ssize(response); ++k)
       sum += static_cast<double>(response[static_cast<std::size_t>(k)]) * sinc.evaluate(place - static_cast<double>(k));
     return std::abs(sum);
   };
@@ -124,8 +124,8 @@ double find_onset(std::span<const float> response) {
 
 /// Sample n of `to` is the response at (n - kOnset) / ratio + onset, over ratio.
 void resample(std::span<const float> response, double onset, double ratio, std::span<float> to) {
-  const Sinc& sinc = Sinc::get();
-  const double band = std::min(1.0, ratio), reach = kSincHalf / band;
+  const base::Sinc& sinc = base::Sinc::get();
+  const double band = std::min(1.0, ratio), reach = base::kSincHalf / band;
   for (std::size_t n = 0; n < to.size(); ++n) {
     const double place = (static_cast<double>(n) - kOnset) / ratio + onset;
     const auto first = static_cast<std::ptrdiff_t>(std::ceil(place - reach)), last = static_cast<std::ptrdiff_t>(std::floor(place + reach));

@@ -17,7 +17,6 @@
 
 #include "runtime/base/error.hpp"
 #include "runtime/head/convolve.hpp"
-#include "runtime/head/sinc.hpp"
 
 namespace carillon::head {
 namespace {

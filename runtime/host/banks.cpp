@@ -4,6 +4,7 @@
 
 #include "runtime/bank/corrected.hpp"
 #include "runtime/host/missing_banks.hpp"
+#include "runtime/radiation/transfers.hpp"
 
 namespace carillon::host {
 namespace {
@@ -42,6 +43,7 @@ Banks read_banks(Scene& scene, bool is_quiet) {
         const radiation::PutGains put = radiation::put_gains(slot->bank, scene.radiation);
         slot->sphere_radius_m = put.sphere_radius_m;
         slot->limited = put.limited;
+        slot->transfers = radiation::make_transfers(slot->bank);
       } catch (const InputError& error) {
         throw InputError(fmt::format("{}: the bank of body \"{}\": {}", place, body.name, error.what()));
       }
@@ -52,6 +54,7 @@ Banks read_banks(Scene& scene, bool is_quiet) {
     body.spec.bank = &slot->bank;
     body.sphere_radius_m = slot->sphere_radius_m;
     body.limited = slot->limited;
+    body.transfers = slot->transfers;
   }
   return banks;
 }

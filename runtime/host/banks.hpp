@@ -16,6 +16,7 @@ struct ReadBank {
   bank::Bank bank;
   double sphere_radius_m = 0.0;
   radiation::Limited limited;
+  std::shared_ptr<const radiation::Transfers> transfers;  // nullptr without multipoles
 };
 /// By file, and what carries the body (support::write_key()).
 using Banks = std::map<std::pair<std::filesystem::path, std::string>, std::unique_ptr<ReadBank>>;

@@ -1,5 +1,10 @@
 #include "runtime/host/microphones.hpp"
 
+#include <array>
+
+#include "runtime/head/sofa.hpp"
+#include "runtime/head/sphere.hpp"
+
 namespace carillon::host {
 
 Microphones make_microphones(const Scene& scene) {
@@ -13,6 +18,15 @@ Microphones make_microphones(const Scene& scene) {
     microphones.offset_m.push_back(ear);
   }
   return microphones;
+}
+
+std::optional<synth::ListeningHead> make_head(const Scene& scene, double rate_hz) {
+  if (!synth::kCompiledEffects.has(synth::Effect::kHead) || !has_head(scene)) return std::nullopt;
+  const SceneListener& listener = scene.listener;
+  const std::array<Vec3, 2> ears = calc_ears(listener);
+  return synth::ListeningHead{.head = listener.sofa.empty() ? head::make_sphere(rate_hz, {.radius_m = 0.5 * listener.ear_distance_m})
+                                                            : head::read_sofa(listener.sofa, rate_hz),
+                              .rotation = synth::calc_head_rotation(listener.facing, ears[0] - ears[1])};
 }
 
 std::vector<events::Listener> list_listener_path(const Microphones& microphones) {

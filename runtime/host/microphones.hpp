@@ -1,10 +1,12 @@
 // Where a scene is heard.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "runtime/events/events.hpp"
 #include "runtime/host/scene.hpp"
+#include "runtime/synth/listener.hpp"
 #include "runtime/synth/trajectory.hpp"
 
 namespace carillon::host {
@@ -16,6 +18,10 @@ struct Microphones {
 };
 
 Microphones make_microphones(const Scene& scene);
+
+/// The head in the middle of the listener's ears; nothing where they are free. Throws InputError, which begins with the file's name, for a
+/// file that is no head's (head::read_sofa). Takes some milliseconds.
+std::optional<synth::ListeningHead> make_head(const Scene& scene, double rate_hz);
 
 /// The path of the centre from time 0 on, as events in order of time; none when it stays where it is.
 std::vector<events::Listener> list_listener_path(const Microphones& microphones);

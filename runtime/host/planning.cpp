@@ -32,6 +32,7 @@ effect_selection::SceneFacts make_facts(const Scene& scene, const Microphones& m
   facts.thresholds = scene.quality.thresholds;
   facts.ground = make_ground(scene);
   facts.floor = find_floor(scene);
+  facts.has_head = has_head(scene);
   if (scene.microphones_m.empty()) {
     facts.listener = scene.listener.path;
     if (facts.listener.empty()) facts.listener.push_back({0.0, scene.listener.position_m});
@@ -43,6 +44,7 @@ effect_selection::SceneFacts make_facts(const Scene& scene, const Microphones& m
     facts.bodies.push_back({.name = body.name,
                             .bank = body.spec.bank,
                             .sphere_radius_m = body.sphere_radius_m,
+                            .transfers = body.transfers,
                             .fixed = body.spec.fixed,
                             .struck = struck,
                             .position_m = calc_world_point(body.spec.initial, body.spec.bank->rigid.centre_m),

@@ -251,6 +251,7 @@ class Run {
     check_outputs(options, scene_);
     if (!options.plan) check_room(scene_, options.wav);
     banks_ = read_banks(scene_, options.quiet);
+    if (!scene_.listener.sofa.empty()) make_head(scene_, scene_.sample_rate_hz);  // before the physics, for its errors
     for (const SceneBody& body : scene_.bodies) body_banks_.push_back(body.spec.bank);
     figures_.bodies = scene_.bodies.size();
   }

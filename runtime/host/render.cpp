@@ -224,7 +224,7 @@ class Rendering {
 
   /// Renders so many samples, without those of the latency at the beginning, into the outlet.
   void render(std::size_t samples, Outlet& outlet) {
-    constexpr std::size_t kLatency = synth::Synthesiser::kLatency;
+    const auto latency = static_cast<std::size_t>(synthesiser_->get_latency());
     const auto rate_hz = static_cast<double>(options_->rate_hz);
     std::vector<std::array<float, kBlock>> blocks(session_.get_microphones().offset_m.size());
     std::vector<const float*> heard(blocks.size());
@@ -235,12 +235,14 @@ class Rendering {
       effects_.apply(static_cast<double>(start + kBlock) / rate_hz, *synthesiser_);
       playback_.push_until(static_cast<double>(start + kBlock) / rate_hz, *synthesiser_);
       synthesiser_->process(out.data(), static_cast<int>(out.size()), static_cast<int>(count));
-      const std::size_t skipped = std::min(count, start < kLatency ? kLatency - start : 0);
+      const std::size_t skipped = std::min(count, start < latency ? latency - start : 0);
       for (std::size_t c = 0; c < out.size(); ++c) heard[c] = blocks[c].data() + skipped;
       outlet.add(heard, count - skipped);
       if (options_->progress) options_->progress(static_cast<double>(start + count) / static_cast<double>(samples));
     }
   }
+
+  std::size_t get_latency() const { return static_cast<std::size_t>(synthesiser_->get_latency()); }
 
   /// What the synthesiser has counted.
   void count(Sound& sound) const {
@@ -324,7 +326,7 @@ Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks
   Outlet outlet(store, frames, options.fades_end);
   const double began_s = base::get_process_cpu_s();
   const std::uint64_t ticks_ns = synth::get_cpu_ticks_cost_ns();
-  rendering.render(frames + synth::Synthesiser::kLatency, outlet);
+  rendering.render(frames + rendering.get_latency(), outlet);
   sound.seconds_playing_cpu = std::max(0.0, base::get_process_cpu_s() - began_s - outlet.get_seconds_cpu() -
                                                 1e-9 * static_cast<double>(synth::get_cpu_ticks_cost_ns() - ticks_ns));
   outlet.finish(sound);

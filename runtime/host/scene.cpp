@@ -13,6 +13,7 @@
 #include <span>
 #include <utility>
 
+#include "runtime/base/quaternion.hpp"
 #include "runtime/base/vector.hpp"
 #include "runtime/host/job_keys.hpp"
 #include "runtime/material/mallets.hpp"
@@ -31,6 +32,8 @@ constexpr std::size_t kLongestName = 200;  // bytes
 constexpr double kMaxSpeedMs = 300.0;      // below the speed of sound in air
 constexpr double kMaxSpinRadS = 1e4;
 constexpr double kMaxEarDistanceM = 10.0;
+constexpr double kHeadWidthM = 0.175;  // of the average head of Duda and Martens 1998
+constexpr double kNarrowestHeadM = 0.06, kWidestHeadM = 0.6;
 constexpr std::size_t kMaxWaypoints = 100000;
 constexpr std::size_t kMaxMicrophones = 16;
 constexpr std::size_t kMaxHolders = 1000;
@@ -42,13 +45,6 @@ constexpr double kStiffestGroundPa = 1e13;  // ten times a diamond
 constexpr double kFeltRestitution = 0.7;    // our estimate; piano hammers lose about half of their energy
 constexpr double kDensestKgM3 = 22600.0;    // osmium
 constexpr double kRoughestM = 1e-3;         // what is higher is no roughness but a shape
-
-using Quaternion = std::array<double, 4>;
-
-Quaternion multiply(const Quaternion& a, const Quaternion& b) {
-  return {a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3], a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-          a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1], a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]};
-}
 
 /// Turns about the fixed axes of the world, x first, then y, then z.
 Quaternion calc_rotation(const Vec3& degrees) {
@@ -520,7 +516,33 @@ std::vector<synth::PathPoint> read_path(base::Object& object, std::string_view k
   return path;
 }
 
-SceneListener parse_listener(base::Object& object) {
+/// The position of the text of `key` among names.
+std::size_t read_name(base::Object& object, std::string_view key, const std::vector<std::string>& names, const std::string& fallback) {
+  const std::string name = object.choice_or(key, names, fallback);
+  return static_cast<std::size_t>(std::find(names.begin(), names.end(), name) - names.begin());
+}
+
+/// What the ears of a listener are: free, on a sphere or on a measured head.
+void parse_ears(base::Object& object, SceneListener& listener, std::vector<std::string>& warnings) {
+  listener.ears = static_cast<Ears>(read_name(object, "ears", kEarsNames, "free"));
+  if (listener.ears == Ears::kFree) {
+    if (object.has("sofa")) object.fail("sofa", "is a head's file; it goes with \"ears\": \"hrtf\", or leave it out");
+    listener.ear_distance_m = read_within(object, "ear_distance_m", listener.ear_distance_m, 0.0, kMaxEarDistanceM);
+    return;
+  }
+  if (object.has("sofa")) {
+    listener.sofa = object.path("sofa");
+    if (object.has("ear_distance_m")) object.fail("ear_distance_m", "is that of the head in \"sofa\"; leave it out");
+    listener.ear_distance_m = kHeadWidthM;
+  } else {
+    listener.ear_distance_m = read_within(object, "ear_distance_m", kHeadWidthM, kNarrowestHeadM, kWidestHeadM);
+  }
+  if (kPlayableEffects.has(synth::Effect::kHead)) return;
+  listener.ears = Ears::kFree;
+  warnings.push_back(object.find_place("ears") + ": this build has no heads (the effect \"head\"); the ears are heard as free ones");
+}
+
+SceneListener parse_listener(base::Object& object, std::vector<std::string>& warnings) {
   SceneListener listener;
   if (object.has("path")) {
     if (object.has("position_m")) object.fail("path", "says the same thing as \"position_m\"; keep one of them");
@@ -529,7 +551,7 @@ SceneListener parse_listener(base::Object& object) {
   } else {
     listener.position_m = read_vector(object, "position_m", listener.position_m, kFarthestM);
   }
-  listener.ear_distance_m = read_within(object, "ear_distance_m", listener.ear_distance_m, 0.0, kMaxEarDistanceM);
+  parse_ears(object, listener, warnings);
   Vec3 direction = listener.facing;
   std::string key = "facing";
   if (object.has("look_at_m")) {
@@ -545,12 +567,6 @@ SceneListener parse_listener(base::Object& object) {
   for (int k = 0; k < 3; ++k) listener.facing[k] = direction[k] / length;
   object.finish();
   return listener;
-}
-
-/// The position of the text of `key` among names.
-std::size_t read_name(base::Object& object, std::string_view key, const std::vector<std::string>& names, const std::string& fallback) {
-  const std::string name = object.choice_or(key, names, fallback);
-  return static_cast<std::size_t>(std::find(names.begin(), names.end(), name) - names.begin());
 }
 
 Output parse_output(base::Object& object) {
@@ -585,6 +601,16 @@ Quality parse_quality(base::Object& object) {
   quality.instructions = static_cast<synth::Isa>(read_name(object, "instructions", kInstructionNames, "best"));
   object.finish();
   return quality;
+}
+
+/// A body that is to be heard by a head needs one; where effects are not planned, all are.
+void check_head(base::Object& root, Scene& scene) {
+  const bool is_wanted = std::any_of(scene.bodies.begin(), scene.bodies.end(),
+                                     [](const SceneBody& body) { return body.overrides.on.has(synth::Effect::kHead); });
+  if (is_wanted && !has_head(scene))
+    root.fail("effects", "names \"head\", and the listener has none; give it \"ears\": \"hrtf\", or leave \"head\" out");
+  if (has_head(scene) && scene.overrides.automatic && !scene.overrides.off.has(synth::Effect::kHead))
+    scene.effects = scene.effects.with(synth::Effect::kHead);
 }
 
 /// The ground reflects where it says how much, or where a body is to be heard reflected; then all who hear must be above it.
@@ -658,13 +684,14 @@ Scene parse_scene(const base::Document& document) {
     root.fail("strikes", fmt::format("lists {} strikes; a scene may hold {}", strikes.size(), kMaxStrikes));
   }
   for (base::Object& object : strikes) scene.strikes.push_back(parse_strike(object, scene, names));
-  if (auto listener = root.object_if("listener")) scene.listener = parse_listener(*listener);
+  if (auto listener = root.object_if("listener")) scene.listener = parse_listener(*listener, scene.warnings);
   if (root.has("microphones")) {
     if (root.has("listener")) root.fail("microphones", "takes the place of \"listener\"; keep one of them");
     for (const std::vector<double>& row : root.number_rows("microphones", 3, kMaxMicrophones)) {
       scene.microphones_m.push_back(read_place(root, "microphones", row));
     }
   }
+  check_head(root, scene);
   check_floor(root, scene);
   scene.frequencies = static_cast<bank::Frequencies>(read_name(root, "frequencies", kFrequenciesNames, "corrected"));
   scene.radiation = static_cast<radiation::GainKind>(read_name(root, "radiation", radiation::kGainKindNames, "auto"));
@@ -673,6 +700,8 @@ Scene parse_scene(const base::Document& document) {
   root.finish();
   return scene;
 }
+
+bool has_head(const Scene& scene) { return scene.microphones_m.empty() && scene.listener.ears == Ears::kHrtf; }
 
 std::size_t count_channels(const Scene& scene) { return scene.microphones_m.empty() ? 2 : scene.microphones_m.size(); }
 

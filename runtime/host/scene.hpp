@@ -31,6 +31,10 @@ inline const std::vector<std::string> kSampleFormatNames{"pcm16", "pcm24", "pcm3
 /// The names of the key "frequencies", in the order of bank::Frequencies.
 inline const std::vector<std::string> kFrequenciesNames{"corrected", "mesh"};
 
+/// The names of the key "ears" of a listener, in the order of Ears.
+enum class Ears { kFree, kHrtf };
+inline const std::vector<std::string> kEarsNames{"free", "hrtf"};
+
 /// The names of the key "kind" of a joint, in the order of joints::Kind.
 inline const std::vector<std::string> kJointNames{"weld", "hinge", "slider", "universal", "ball"};
 
@@ -48,17 +52,18 @@ struct Mounting {
 
 struct SceneBody {
   std::string name;
-  std::string place;                            // "file:line", for messages
-  std::filesystem::path bank;                   // absolute; empty: `job` describes the body
-  base::Object::Excerpt job{};                  // keys of a job, for `carillon bank-for`
-  contact::BodySpec spec;                       // spec.bank is filled when the banks are read
-  effect_selection::EffectOverrides overrides;  // its own key "effects", or the scene's
-  support::MountingRequest support{};           // its keys "on", "joint", "loss", "supports" and "held"
-  std::string support_place;                    // "file:line" of the first of them, for messages
-  Mounting mounting;                            // what they, or the bank's own supports, take of its modes
-  double sphere_radius_m = 0.0;                 // of its bank, when that is read: radiation::calc_sphere_radius_m()
-  radiation::Limited limited;                   // gains of its modes that its damping would not allow
-  double variation = 0.0;                       // its own key "variation", or the scene's: how much equal strikes differ, 0..1
+  std::string place;                                        // "file:line", for messages
+  std::filesystem::path bank;                               // absolute; empty: `job` describes the body
+  base::Object::Excerpt job{};                              // keys of a job, for `carillon bank-for`
+  contact::BodySpec spec;                                   // spec.bank is filled when the banks are read
+  effect_selection::EffectOverrides overrides;              // its own key "effects", or the scene's
+  support::MountingRequest support{};                       // its keys "on", "joint", "loss", "supports" and "held"
+  std::string support_place;                                // "file:line" of the first of them, for messages
+  Mounting mounting;                                        // what they, or the bank's own supports, take of its modes
+  double sphere_radius_m = 0.0;                             // of its bank, when that is read: radiation::calc_sphere_radius_m()
+  std::shared_ptr<const radiation::Transfers> transfers{};  // of its bank, when that is read and has multipoles
+  radiation::Limited limited;                               // gains of its modes that its damping would not allow
+  double variation = 0.0;                                   // its own key "variation", or the scene's: how much equal strikes differ, 0..1
 };
 
 /// F = K y^p of a felt that is pressed in by y.
@@ -96,7 +101,9 @@ struct SceneListener {
   Vec3 position_m{0.0, -1.5, 0.5};     // between the ears; at the beginning
   std::vector<synth::PathPoint> path;  // of the listener when it moves
   Vec3 facing{0.0, 1.0, 0.0};          // unit vector
-  double ear_distance_m = 0.2;         // OCE01
+  double ear_distance_m = 0.2;         // OCE01; with a head: the width of the sphere
+  Ears ears = Ears::kFree;
+  std::filesystem::path sofa;  // absolute; of a measured head; empty: a rigid sphere
 };
 
 struct Output {
@@ -153,6 +160,9 @@ Scene parse_scene(const base::Document& document);
 
 /// The ground as sound meets it; nothing where it is silent.
 std::optional<synth::Floor> find_floor(const Scene& scene);
+
+/// Whether there is a head between the ears.
+bool has_head(const Scene& scene);
 
 /// Channels of the sound: microphones, or two ears.
 std::size_t count_channels(const Scene& scene);

@@ -15,13 +15,13 @@ namespace {
 std::shared_ptr<const synth::Model> make_model(const bank::Bank& bank, const SceneBody& body, double rate_hz, bool has_clicks) {
   double radius_m = has_clicks ? body.sphere_radius_m : 0.0;
   if (has_clicks && radius_m == 0.0) radius_m = radiation::calc_sphere_radius_m(bank);
-  return synth::Model::make(bank, {.rate_hz = rate_hz, .sphere_radius_m = radius_m});
+  return synth::Model::make(bank, {.rate_hz = rate_hz, .sphere_radius_m = radius_m, .transfers = body.transfers});
 }
 
 }  // namespace
 
 Session::Session(const Scene& scene, const std::vector<const bank::Bank*>& banks, double rate_hz, bool has_clicks)
-    : scene_(&scene), banks_(banks), rate_hz_(rate_hz), microphones_(make_microphones(scene)) {
+    : scene_(&scene), banks_(banks), rate_hz_(rate_hz), microphones_(make_microphones(scene)), head_(make_head(scene, rate_hz)) {
   std::map<const bank::Bank*, std::shared_ptr<const synth::Model>> models;
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
     std::shared_ptr<const synth::Model>& model = models[banks[i]];
@@ -31,6 +31,10 @@ Session::Session(const Scene& scene, const std::vector<const bank::Bank*>& banks
       throw InputError(scene.bodies[i].place +
                        ": \"effects\" names \"directivity\", which needs a bank with multipoles, and this body's has none; make its bank "
                        "with them, or leave the effect out");
+    if (scene.bodies[i].overrides.on.has(synth::Effect::kNonlinear) && model->get_nonlinear() == nullptr)
+      throw InputError(scene.bodies[i].place +
+                       ": \"effects\" names \"nonlinear\", which needs a bank with a nonlinear energy, and this body's has none; make its "
+                       "bank with it, or leave the effect out");
   }
 }
 
@@ -41,7 +45,8 @@ synth::SynthesiserOptions Session::make_options() const {
           .max_bodies = std::max(1, static_cast<int>(models_.size())),
           .budget = calc_budget(scene_->quality, rate_hz_),
           .ground = make_ground(*scene_),
-          .floor = find_floor(*scene_)};
+          .floor = find_floor(*scene_),
+          .head = head_};
 }
 
 synth::BodySettings Session::make_settings(std::size_t body, synth::EffectSet effects) const {
@@ -65,7 +70,9 @@ synth::EffectSet find_effects(const Scene& scene, std::size_t body, synth::Effec
   effects = effects.common(synth::kCompiledEffects);
   const bank::Bank* bank = scene.bodies[body].spec.bank;
   if (bank == nullptr || bank->multipoles.is_empty()) effects = effects.without(synth::Effect::kDirectivity);
+  if (bank == nullptr || bank->quartic.is_empty()) effects = effects.without(synth::Effect::kNonlinear);
   if (!find_floor(scene)) effects = effects.without(synth::Effect::kGroundReflection);
+  if (!has_head(scene)) effects = effects.without(synth::Effect::kHead);
   if (scene.bodies[body].spec.fixed) effects = effects.without(synth::Effect::kAccelerationNoise);
   if (!scene.microphones_m.empty()) effects = effects.with(synth::EffectSet{synth::Effect::kTwoEars}.common(synth::kCompiledEffects));
   return effects;

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "runtime/bank/bank.hpp"
@@ -19,13 +20,13 @@ namespace carillon::host {
 class Session {
  public:
   /// Makes the models. banks[i] belongs to scene.bodies[i]; scene and banks must outlive the result. `has_clicks`: models know the radius
-  /// that acceleration noise needs.
+  /// that acceleration noise needs. Throws as make_head() does.
   Session(const Scene& scene, const std::vector<const bank::Bank*>& banks, double rate_hz, bool has_clicks);
 
   const Microphones& get_microphones() const { return microphones_; }
   const synth::Model& get_model(std::size_t body) const { return *models_[body]; }
 
-  /// Rate, microphones, listener, number of bodies, budget and ground of the scene.
+  /// Rate, microphones, head, listener, number of bodies, budget and ground of the scene.
   synth::SynthesiserOptions make_options() const;
   /// Place at the start, silence, surface and instructions of a body with these effects.
   synth::BodySettings make_settings(std::size_t body, synth::EffectSet effects) const;
@@ -40,13 +41,14 @@ class Session {
   std::vector<const bank::Bank*> banks_;
   double rate_hz_;
   Microphones microphones_;
+  std::optional<synth::ListeningHead> head_;
   std::vector<std::shared_ptr<const synth::Model>> models_;  // per body
   std::unique_ptr<synth::Synthesiser> synthesiser_;
   std::size_t added_ = 0;
 };
 
 /// What of its effects a body of the scene can have: nothing pushes one that is fixed, and microphones stay where they are put; directivity
-/// is of banks with multipoles, ground_reflection of scenes whose ground reflects.
+/// is of banks with multipoles, ground_reflection of scenes whose ground reflects, head of listeners that have one.
 synth::EffectSet find_effects(const Scene& scene, std::size_t body, synth::EffectSet effects);
 
 /// By how much a strike must be known before it begins: a click starts at the side of the body that is nearest to the listener.

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "runtime/events/events.hpp"
+#include "runtime/head/sphere.hpp"
 #include "runtime/python/module.hpp"
 #include "runtime/python/shared_bank.hpp"
 #include "runtime/radiation/gains.hpp"
@@ -57,14 +58,25 @@ std::shared_ptr<const synth::Model> make_model(const bank::Bank& bank, const std
 /// A synthesiser, and the surfaces that are struck. Calls of process() wait for each other; all others hold Python's lock.
 class Instrument {
  public:
-  Instrument(double rate_hz, std::vector<Vec3> microphones_m, const Vec3& listener_m, int max_bodies)
-      : rate_hz_(rate_hz),
-        synthesiser_(std::make_unique<synth::Synthesiser>(synth::SynthesiserOptions{
-            .rate_hz = rate_hz, .microphones_m = std::move(microphones_m), .listener_m = listener_m, .max_bodies = max_bodies})) {}
+  Instrument(double rate_hz, std::vector<Vec3> microphones_m, const Vec3& listener_m, int max_bodies,
+             const std::optional<double>& head_radius_m, const std::optional<double>& floor_reflection, double floor_height_m)
+      : rate_hz_(rate_hz), has_head_(head_radius_m.has_value()), has_floor_(floor_reflection.has_value()) {
+    synth::SynthesiserOptions options{
+        .rate_hz = rate_hz, .microphones_m = std::move(microphones_m), .listener_m = listener_m, .max_bodies = max_bodies};
+    if (head_radius_m) {
+      options.head = synth::ListeningHead{.head = head::make_sphere(rate_hz, {.radius_m = *head_radius_m})};
+      if (options.microphones_m.size() == 2)
+        options.head->rotation = synth::calc_level_head_rotation(options.microphones_m[0], options.microphones_m[1]);
+    }
+    if (floor_reflection) options.floor = synth::Floor{.point_m = {0.0, 0.0, floor_height_m}, .reflection = *floor_reflection};
+    synthesiser_ = std::make_unique<synth::Synthesiser>(std::move(options));
+  }
 
   int add_body(const SharedBank& bank, const Vec3& position_m, const events::Quaternion& rotation, const std::string& radiation,
                const std::optional<std::vector<std::string>>& effects) {
     synth::BodySettings settings{.position_m = position_m, .rotation = rotation};
+    if (has_head_) settings.effects = settings.effects.with(synth::Effect::kHead);
+    if (has_floor_) settings.effects = settings.effects.with(synth::Effect::kGroundReflection);
     if (effects) settings.effects = to_effects(*effects);
     const int body = get().add_body(make_model(*bank.played, radiation, rate_hz_), settings);
     banks_[body] = bank;
@@ -160,6 +172,7 @@ class Instrument {
   }
 
   double rate_hz_;
+  bool has_head_, has_floor_;
   std::unique_ptr<synth::Synthesiser> synthesiser_;
   std::map<int, SharedBank> banks_;  // of the bodies, by number
   std::mutex playing_;
@@ -173,9 +186,14 @@ void bind_synthesiser(py::module_& module) {
                          "The synthesiser of carillon-render and carillon-live, block by block: bodies that are struck, and microphones. "
                          "Times are seconds since the first frame; a strike or move without a time_s takes effect as soon as "
                          "possible. Points and impulses are in the frame of the body's mesh.")
-      .def(py::init<double, std::vector<Vec3>, const Vec3&, int>(), "rate_hz"_a = 48000.0,
-           "microphones_m"_a = std::vector<Vec3>{{-0.1, 0.0, 0.0}, {0.1, 0.0, 0.0}}, "listener_m"_a = Vec3{}, "max_bodies"_a = 64,
-           "microphones_m: positions relative to the listener [m], one channel each (1 or more); default two ears 20 cm apart.")
+      .def(py::init<double, std::vector<Vec3>, const Vec3&, int, const std::optional<double>&, const std::optional<double>&, double>(),
+           "rate_hz"_a = 48000.0, "microphones_m"_a = std::vector<Vec3>{{-0.1, 0.0, 0.0}, {0.1, 0.0, 0.0}}, "listener_m"_a = Vec3{},
+           "max_bodies"_a = 64, "head_radius_m"_a = py::none(), "floor_reflection"_a = py::none(), "floor_height_m"_a = 0.0,
+           "microphones_m: positions relative to the listener [m], one channel each (1 or more); default two ears 20 cm apart. "
+           "head_radius_m: a head between two microphones, left and right, a rigid sphere (0.0875 is average), upright; bodies then have "
+           "the effect \"head\" by default. floor_reflection: share of the pressure, 0..1, that a rigid floor z = floor_height_m throws "
+           "back; "
+           "bodies then have \"ground_reflection\" by default.")
       .def("add_body", &Instrument::add_body, "bank"_a, "position_m"_a = Vec3{0.0, 1.0, 0.0},
            "rotation"_a = events::Quaternion{1.0, 0.0, 0.0, 0.0}, "radiation"_a = "auto", "effects"_a = py::none(),
            "Adds a body with its centre of mass at a position [m], rotated by a unit quaternion w x y z; returns its number. radiation and "

@@ -18,7 +18,9 @@
 #include <utility>
 
 #include "runtime/bank/air.hpp"
+#include "runtime/bank/multipoles.hpp"
 #include "runtime/bank/surface.hpp"
+#include "runtime/base/hankel.hpp"
 #include "runtime/base/instructions.hpp"
 #include "runtime/base/vector.hpp"
 #include "runtime/radiation/flow.hpp"
@@ -72,17 +74,15 @@ std::array<double, kHarmonics> calc_harmonics(const Recurrence& recurrence, cons
   return harmonics;
 }
 
-/// 1 / |h_l'(x)| for l = 0 .. kMaxLobes + 1, h_l the spherical Hankel function of x > 0: upward recurrence, which is stable for h.
+/// 1 / |h_l'(x)| for l = 0 .. kMaxLobes + 1, h_l the spherical Hankel function of x > 0.
 std::array<double, kOrders + 1> calc_radiation_factors(double x) {
-  using Complex = std::complex<double>;
-  std::array<Complex, kOrders + 1> h;
-  const Complex wave = std::polar(1.0, x);
-  h[0] = Complex(0.0, -1.0) * wave / x;
-  h[1] = -wave * Complex(1.0 / x, 1.0 / (x * x));
-  for (std::size_t l = 1; l + 1 < h.size(); ++l) h[l + 1] = (2.0 * l + 1.0) / x * h[l] - h[l - 1];
+  const std::vector<std::complex<double>> quotients = base::calc_hankel_quotients(x, static_cast<int>(kOrders));
   std::array<double, kOrders + 1> factors;
-  factors[0] = 1.0 / std::abs(h[1]);  // h_0' = -h_1
-  for (std::size_t l = 1; l < h.size(); ++l) factors[l] = 1.0 / std::abs(h[l - 1] - (l + 1.0) / x * h[l]);
+  double size = 1.0 / x;  // |h_l|
+  for (std::size_t l = 0; l < factors.size(); ++l) {
+    if (l > 0) size /= std::abs(quotients[l]);
+    factors[l] = 1.0 / (size * std::abs(quotients[l] - (static_cast<double>(l) + 1.0) / x));
+  }
   return factors;
 }
 
@@ -224,9 +224,7 @@ std::vector<double> calc_gains_of_multipoles(const bank::Bank& bank) {
     throw InputError(
         "radiation \"bem\": the bank has no multipoles; solve its job with the air, or give \"sphere\", \"osg02\" or \"vddp96\"");
   if (air.decay_per_s.size() != bank.mode_count()) throw InputError("the arrays of the bank's multipoles disagree");
-  std::vector<double> gains;
-  for (const double decay_per_s : air.decay_per_s) gains.push_back(bank::calc_gain_of_decay(decay_per_s));
-  return gains;
+  return bank::calc_far_gains(air);
 }
 
 }  // namespace

@@ -15,7 +15,7 @@ enum class GainKind {
   kOsg02,   // the bank's own: one pulsating sphere, no cancellation (O'Brien, Shen, Gatchalian 2002)
   kSphere,  // spherical multipoles about the body's centre, with cancellation
   kVddp96,  // no air at all: every mode as loud as its coordinate q, 1 Pa for 1 m kg^1/2 (van den Doel, Pai 1996, a_n = Psi_n / omega_n)
-  kBem,     // of the bank's multipoles, which boundary elements found: from the decay by radiation (bank::calc_gain_of_decay())
+  kBem,     // of the bank's multipoles, which boundary elements found (bank::calc_far_gains())
   kAuto     // kBem for a bank with multipoles, kSphere for others
 };
 

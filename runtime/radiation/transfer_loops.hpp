@@ -8,8 +8,9 @@
 namespace carillon::radiation {
 
 inline constexpr int kTransferLanes = 16;  // modes that are evaluated together
+inline constexpr int kTransferPlaces = 2;  // places that are; more need more registers than there are
 
-/// One multipole of every mode of a group, in steps: the imaginary part in the upper half of a number, the real part in the lower one.
+/// One multipole of every mode of a group, in steps: 65536 times the imaginary part plus the real part.
 struct alignas(64) MultipoleLine {
   std::int32_t steps[kTransferLanes];
 };
@@ -29,8 +30,11 @@ struct alignas(64) TransferGroup {
   int order;                    // the highest of its modes
 };
 
+inline constexpr int kHarmonicsPadding = 8;  // numbers that vectors reach beyond the end
+
 /// A direction, and the factors of the recurrence of the normalised associated Legendre functions: row l of `ahead` and `behind` begins at
-/// l (l - 1) / 2 and has m = 0 .. l - 1; P_lm = ahead cos P_(l-1)m - behind P_(l-2)m, P_ll = diagonal[l] sin P_(l-1)(l-1).
+/// l (l - 1) / 2 and has m = 0 .. l - 1; P_lm = ahead cos P_(l-1)m - behind P_(l-2)m, P_ll = diagonal[l] sin P_(l-1)(l-1). Both
+/// are finite for kHarmonicsPadding numbers more.
 struct HarmonicWork {
   const double* ahead;
   const double* behind;
@@ -40,27 +44,35 @@ struct HarmonicWork {
   int order;
 };
 
-/// The real orthonormal harmonics of all orders to work.order, (order + 1)^2 in the sequence of TransferGroup. What is below 1e-20 is 0.
+/// The real orthonormal harmonics of all orders to work.order, (order + 1)^2 in the sequence of TransferGroup, and room for
+/// kHarmonicsPadding more. What is below 1e-20 is 0.
 using CalcHarmonics = void (*)(const HarmonicWork& work, float* harmonics);
 
-/// A group at a distance. `radial` has room for (order + 1, 3, kTransferLanes).
+/// A place. `radial` has room for (order + 1, 3, kTransferLanes), `re` and `im` for T of every mode of the group.
+struct TransferPlace {
+  const float* harmonics;     // to the order of the group
+  float nearness, inverse_r;  // R / r, 1 / r [1/m]
+  float* radial;
+  float *re, *im;
+};
+
+/// A group at one place or two.
 struct TransferWork {
   const TransferGroup* group;
   const MultipoleLine* lines;  // of the group
   const RadialLine* steps;     // of the group
-  const float* harmonics;      // to the order of the group
-  float nearness, inverse_r;   // R / r, 1 / r [1/m]
-  float* radial;
+  TransferPlace places[kTransferPlaces];
+  int count;  // of places
 };
 
-/// T of every mode of the group, (kTransferLanes) each.
-using CalcTransfers = void (*)(const TransferWork& work, float* re, float* im);
+/// T of every mode of the group at each place.
+using CalcTransfers = void (*)(const TransferWork& work);
 
 void calc_harmonics_plain(const HarmonicWork& work, float* harmonics);
 void calc_harmonics_avx2(const HarmonicWork& work, float* harmonics);
 void calc_harmonics_avx512(const HarmonicWork& work, float* harmonics);
-void calc_transfers_plain(const TransferWork& work, float* re, float* im);
-void calc_transfers_avx2(const TransferWork& work, float* re, float* im);
-void calc_transfers_avx512(const TransferWork& work, float* re, float* im);
+void calc_transfers_plain(const TransferWork& work);
+void calc_transfers_avx2(const TransferWork& work);
+void calc_transfers_avx512(const TransferWork& work);
 
 }  // namespace carillon::radiation

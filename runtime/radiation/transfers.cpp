@@ -1,8 +1,8 @@
 // Method:     T = sum over l of F_l(r) sum over m of a_lm Y_lm(d), F_l = h_l(k r) / h_l(k R) e^{-i k (r - R)}. Harmonics once
-//             for all modes: rows of normalised Legendre functions by recurrence in l. 16 modes at a time, one in a lane: their multipoles
-//             lie side by side as 16-bit steps, and those of a row are multiplied by the same harmonic. F_l by the recurrence of h_l upward
-//             in l, which is stable for it, divided by h_l(k R) at each step, so that nothing overflows: the steps u_l = h_{l-1}(k R) /
-//             h_l(k R) are made here in double precision by 1 / u_{l+1} = (2 l + 1) / (k R) - u_l, u_0 = i.
+//             for all modes: rows of normalised Legendre functions by recurrence in l. 16 modes at a time, one in a lane, at one place or
+//             two: their multipoles lie side by side as 16-bit steps, and those of a row are multiplied by the same harmonic. F_l by the
+//             recurrence of h_l upward in l, which is stable for it, divided by h_l(k R) at each step, so that nothing overflows: the steps
+//             u_l = h_{l-1}(k R) / h_l(k R) are made in double precision (runtime/base/hankel.hpp).
 // Source:     DLMF 10.51 (recurrences of spherical Bessel functions); Holmes & Featherstone, J. Geodesy 76 (2002), eq. 11 (Legendre
 //             functions by rows).
 // Deviations: the highest orders of a group of modes are omitted where they are 86 dB below the rest, as most of those are far away that
@@ -14,6 +14,8 @@
 #include <cstddef>
 #include <numbers>
 #include <numeric>
+
+#include "runtime/base/hankel.hpp"
 
 namespace carillon::radiation {
 namespace {
@@ -32,13 +34,6 @@ void check(const bank::Multipoles& air, std::size_t modes) {
   }
   for (const double freq_hz : air.freq_hz) fits = fits && freq_hz > 0.0;
   if (!fits || air.coefficient.size() != needed) throw InputError("the arrays of the bank's multipoles disagree");
-}
-
-/// u_l = h_{l-1}(x) / h_l(x), l = 0 .. order.
-std::vector<Complex> calc_steps(double x, int order) {
-  std::vector<Complex> steps{Complex(0.0, 1.0)};
-  for (int l = 0; l < order; ++l) steps.push_back(1.0 / ((2.0 * l + 1.0) / x - steps.back()));
-  return steps;
 }
 
 /// Where harmonic number i of order l, m = i - l, lies in the row of a group.
@@ -65,6 +60,7 @@ Transfers::Transfers(const bank::Bank& bank, [[maybe_unused]] base::Instructions
   radius_m_ = air.radius_m;
   orders_.assign(air.order.begin(), air.order.end());
   rms_.resize(modes);
+  turn_orders_.resize(modes);
   slots_.resize(modes);
   std::vector<std::size_t> first(modes), sorted(modes);  // the first coefficient of each mode; modes by window and order
   for (std::size_t m = 0, at = 0; m < modes; ++m) {
@@ -86,7 +82,7 @@ Transfers::Transfers(const bank::Bank& bank, [[maybe_unused]] base::Instructions
       const bool is_mode = begin + lane < end;
       const std::size_t mode = sorted[is_mode ? begin + lane : begin];
       const double k = 2.0 * pi * air.freq_hz[mode] / air.sound_speed_ms, x = k * radius_m_;
-      const std::vector<Complex> steps = calc_steps(x, order);
+      const std::vector<Complex> steps = base::calc_hankel_quotients(x, order);
       group.inverse_k_m[lane] = static_cast<float>(1.0 / k);
       RadialLine* const radial = &radial_[group.first_radial];
       for (std::size_t l = 0; l < steps.size(); ++l) {
@@ -99,17 +95,23 @@ Transfers::Transfers(const bank::Bank& bank, [[maybe_unused]] base::Instructions
       const std::int16_t* from = &air.coefficient[first[mode]];
       double power = 0.0;
       double decay = 1.0;  // |F_l| r / R far away, which the steps multiply up, as h_l there differ by their phases only
+      double near = 1.0;   // the same at kTurnRadii
+      const std::vector<Complex> outer = base::calc_hankel_quotients(kTurnRadii * x, order);
+      double turned = 0.0, all = 0.0;
       for (int l = 0; l <= orders_[mode]; ++l) {
         double sum = 0.0;
         for (int i = 0; i <= 2 * l; ++i, from += 2) {
-          lines_[group.first_line + static_cast<std::size_t>(l * l) + find_place(l, i)].steps[lane] =
-              from[1] * 65536 + static_cast<std::uint16_t>(from[0]);
+          lines_[group.first_line + static_cast<std::size_t>(l * l) + find_place(l, i)].steps[lane] = from[1] * 65536 + from[0];
           sum += static_cast<double>(from[0]) * from[0] + static_cast<double>(from[1]) * from[1];
         }
         radial[l].level[lane] = static_cast<float>(std::sqrt(sum / (4.0 * pi)));
         if (l > 0) decay *= std::abs(steps[static_cast<std::size_t>(l)]);
         power += sum / (4.0 * pi) * decay * decay;
+        if (l > 0) near *= std::abs(steps[static_cast<std::size_t>(l)] / outer[static_cast<std::size_t>(l)]);
+        turned += sum * near * near * l * l;
+        all += sum * near * near;
       }
+      turn_orders_[mode] = all > 0.0 ? std::sqrt(turned / all) : 0.0;
       rms_[mode] = radius_m_ * air.scale[mode] * std::sqrt(power);
     }
     groups_.push_back(group);
@@ -124,9 +126,22 @@ Transfers::Transfers(const bank::Bank& bank, [[maybe_unused]] base::Instructions
       behind_.push_back(m + 1 == l ? 0.0 : std::sqrt((2.0 * l + 1.0) * before / ((2.0 * l - 3.0) * n)));
     }
   }
+  ahead_.resize(ahead_.size() + kHarmonicsPadding);
+  behind_.resize(behind_.size() + kHarmonicsPadding);
 }
 
-void Transfers::evaluate(const Vec3& place_m, std::span<const std::int32_t> modes, std::span<std::complex<float>> transfer) const noexcept {
+std::size_t Transfers::calc_bytes() const noexcept {
+  return sizeof(Transfers) + orders_.capacity() * sizeof(int) + (rms_.capacity() + turn_orders_.capacity()) * sizeof(double) +
+         slots_.capacity() * sizeof(std::int32_t) + groups_.capacity() * sizeof(TransferGroup) + lines_.capacity() * sizeof(MultipoleLine) +
+         radial_.capacity() * sizeof(RadialLine) + (ahead_.capacity() + behind_.capacity() + diagonal_.capacity()) * sizeof(double);
+}
+
+std::shared_ptr<const Transfers> make_transfers(const bank::Bank& bank) {
+  return bank.multipoles.is_empty() ? nullptr : std::make_shared<const Transfers>(bank);
+}
+
+void Transfers::evaluate_at(std::span<const Vec3> places_m, std::span<const std::int32_t> modes,
+                            const std::array<std::span<std::complex<float>>, 2>& transfers) const noexcept {
   int order = -1;
   const auto find_group = [this](std::int32_t slot) -> const TransferGroup& {
     return groups_[static_cast<std::size_t>(slot / kTransferLanes)];
@@ -134,23 +149,36 @@ void Transfers::evaluate(const Vec3& place_m, std::span<const std::int32_t> mode
   for (const std::int32_t mode : modes) order = std::max(order, find_group(slots_[static_cast<std::size_t>(mode)]).order);
   if (order < 0) return;
 
-  const Vec3 way = place_m - centre_m_;
-  const double distance = std::sqrt(dot(way, way)), across = std::sqrt(way[0] * way[0] + way[1] * way[1]);
-  const double r = std::max(distance, kNearestRadii * radius_m_);
-  alignas(64) std::array<float, (bank::kMaxOrder + 1) * (bank::kMaxOrder + 1)> harmonics;
-  calc_harmonics_({.ahead = ahead_.data(),
-                   .behind = behind_.data(),
-                   .diagonal = diagonal_.data(),
-                   .cosine = distance > 0.0 ? way[2] / distance : 1.0,
-                   .sine = distance > 0.0 ? across / distance : 0.0,
-                   .turn_cosine = across > 0.0 ? way[0] / across : 1.0,
-                   .turn_sine = across > 0.0 ? way[1] / across : 0.0,
-                   .order = order},
-                  harmonics.data());
-
-  alignas(64) std::array<float, (bank::kMaxOrder + 1) * 3 * kTransferLanes> radial;
-  alignas(64) std::array<float, kWindow> re, im;  // of the window of the last mode, where `done` has the bit of the group
   static_assert(kWindow == 64 * kTransferLanes);
+  struct Room {
+    alignas(64) std::array<float, (bank::kMaxOrder + 1) * (bank::kMaxOrder + 1) + kHarmonicsPadding> harmonics;
+    alignas(64) std::array<float, (bank::kMaxOrder + 1) * 3 * kTransferLanes> radial;
+    alignas(64) std::array<float, kWindow> re, im;  // of the window of the last mode, where `done` has the bit of the group
+  };
+  std::array<Room, kTransferPlaces> rooms;
+  TransferWork work;
+  work.count = static_cast<int>(places_m.size());
+  for (std::size_t p = 0; p < places_m.size(); ++p) {
+    const Vec3 way = places_m[p] - centre_m_;
+    const double distance = std::sqrt(dot(way, way)), across = std::sqrt(way[0] * way[0] + way[1] * way[1]);
+    const double r = std::max(distance, kNearestRadii * radius_m_);
+    calc_harmonics_({.ahead = ahead_.data(),
+                     .behind = behind_.data(),
+                     .diagonal = diagonal_.data(),
+                     .cosine = distance > 0.0 ? way[2] / distance : 1.0,
+                     .sine = distance > 0.0 ? across / distance : 0.0,
+                     .turn_cosine = across > 0.0 ? way[0] / across : 1.0,
+                     .turn_sine = across > 0.0 ? way[1] / across : 0.0,
+                     .order = order},
+                    rooms[p].harmonics.data());
+    work.places[p] = {.harmonics = rooms[p].harmonics.data(),
+                      .nearness = static_cast<float>(radius_m_ / r),
+                      .inverse_r = static_cast<float>(1.0 / r),
+                      .radial = rooms[p].radial.data(),
+                      .re = nullptr,
+                      .im = nullptr};
+  }
+
   std::uint64_t done = 0;
   std::int32_t window = -1;
   for (std::size_t i = 0; i < modes.size(); ++i) {
@@ -161,17 +189,18 @@ void Transfers::evaluate(const Vec3& place_m, std::span<const std::int32_t> mode
     }
     if (const std::uint64_t bit = std::uint64_t{1} << (place / kTransferLanes); (done & bit) == 0) {
       const TransferGroup& group = find_group(slot);
-      calc_transfers_({.group = &group,
-                       .lines = &lines_[group.first_line],
-                       .steps = &radial_[group.first_radial],
-                       .harmonics = harmonics.data(),
-                       .nearness = static_cast<float>(radius_m_ / r),
-                       .inverse_r = static_cast<float>(1.0 / r),
-                       .radial = radial.data()},
-                      &re[static_cast<std::size_t>(place - lane)], &im[static_cast<std::size_t>(place - lane)]);
+      work.group = &group;
+      work.lines = &lines_[group.first_line];
+      work.steps = &radial_[group.first_radial];
+      for (std::size_t p = 0; p < places_m.size(); ++p) {
+        work.places[p].re = &rooms[p].re[static_cast<std::size_t>(place - lane)];
+        work.places[p].im = &rooms[p].im[static_cast<std::size_t>(place - lane)];
+      }
+      calc_transfers_(work);
       done |= bit;
     }
-    transfer[i] = {re[static_cast<std::size_t>(place)], im[static_cast<std::size_t>(place)]};
+    for (std::size_t p = 0; p < places_m.size(); ++p)
+      transfers[p][i] = {rooms[p].re[static_cast<std::size_t>(place)], rooms[p].im[static_cast<std::size_t>(place)]};
   }
 }
 

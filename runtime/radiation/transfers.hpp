@@ -3,7 +3,9 @@
 
 #include <array>
 #include <complex>
+#include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -16,6 +18,8 @@ namespace carillon::radiation {
 /// Nearer to the centre than this, in radii of the multipoles, the place in the same direction at this distance counts: series diverge
 /// inside the sphere.
 inline constexpr double kNearestRadii = 1.05;
+/// From here on, in radii, get_turn_order() holds.
+inline constexpr double kTurnRadii = 2.0;
 
 /// The transfer T of each mode of a bank at a place x in the frame of the mesh, at the distance r from the centre of the multipoles: the
 /// pressure there per unit modal velocity (q' = 1 m kg^1/2 / s), without the travel from the sphere of radius R,
@@ -39,17 +43,32 @@ class Transfers {
   int get_mode_count() const noexcept { return static_cast<int>(orders_.size()); }
   const Vec3& get_centre_m() const noexcept { return centre_m_; }
   double get_radius_m() const noexcept { return radius_m_; }
-  /// L of a mode: T changes over directions about as fast as e^{i L angle}.
+  /// L of a mode: T changes over directions as fast as e^{i L angle} at most.
   int get_order(int mode) const noexcept { return orders_[static_cast<std::size_t>(mode)]; }
+  /// The same in the root mean square over the orders of a mode, by their power at kTurnRadii: from there on it changes no faster.
+  double get_turn_order(int mode) const noexcept { return turn_orders_[static_cast<std::size_t>(mode)]; }
   /// Of the far field of a mode, the root mean square over directions, taken back to 1 m [Pa at unit modal velocity]: what GainKind::kBem
   /// has from the decay, here from the multipoles.
   double get_rms(int mode) const noexcept { return rms_[static_cast<std::size_t>(mode)]; }
 
+  /// Memory.
+  std::size_t calc_bytes() const noexcept;
+
   /// T of the modes of these numbers, 0 <= number < get_mode_count(), in any order (ascending numbers cost least; 16 modes of similar order
-  /// are evaluated together), into `transfer` of the same size. For audio threads: no heap, 90 kB of stack.
-  void evaluate(const Vec3& place_m, std::span<const std::int32_t> modes, std::span<std::complex<float>> transfer) const noexcept;
+  /// are evaluated together), into `transfer` of the same size. For audio threads: no heap, 170 kB of stack.
+  void evaluate(const Vec3& place_m, std::span<const std::int32_t> modes, std::span<std::complex<float>> transfer) const noexcept {
+    evaluate_at(std::span(&place_m, 1), modes, {transfer, {}});
+  }
+  /// The same at two places, for two thirds of the price.
+  void evaluate(const std::array<Vec3, 2>& places_m, std::span<const std::int32_t> modes,
+                const std::array<std::span<std::complex<float>>, 2>& transfers) const noexcept {
+    evaluate_at(places_m, modes, transfers);
+  }
 
  private:
+  void evaluate_at(std::span<const Vec3> places_m, std::span<const std::int32_t> modes,
+                   const std::array<std::span<std::complex<float>>, 2>& transfers) const noexcept;
+
   /// A place of a mode: modes of a window of kWindow are sorted by order, then cut in groups.
   static constexpr int kWindow = 1024;
 
@@ -57,6 +76,7 @@ class Transfers {
   double radius_m_ = 0.0;
   std::vector<int> orders_;          // (modes)
   std::vector<double> rms_;          // (modes)
+  std::vector<double> turn_orders_;  // (modes)
   std::vector<std::int32_t> slots_;  // (modes) group times kTransferLanes plus lane; windows begin at multiples of kWindow
   std::vector<TransferGroup> groups_;
   std::vector<MultipoleLine> lines_;
@@ -65,5 +85,8 @@ class Transfers {
   CalcHarmonics calc_harmonics_;
   CalcTransfers calc_transfers_;
 };
+
+/// Of a bank, to be shared by all that play it; nullptr where it has no multipoles. Throws InputError where its arrays disagree.
+std::shared_ptr<const Transfers> make_transfers(const bank::Bank& bank);
 
 }  // namespace carillon::radiation

@@ -9,6 +9,6 @@ constexpr int kLanes = 8;
 namespace carillon::radiation {
 
 void calc_harmonics_avx2(const HarmonicWork& work, float* harmonics) { calc_harmonics(work, harmonics); }
-void calc_transfers_avx2(const TransferWork& work, float* re, float* im) { calc_transfers(work, re, im); }
+void calc_transfers_avx2(const TransferWork& work) { calc_transfers(work); }
 
 }  // namespace carillon::radiation

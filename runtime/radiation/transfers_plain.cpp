@@ -9,6 +9,6 @@ constexpr int kLanes = 4;
 namespace carillon::radiation {
 
 void calc_harmonics_plain(const HarmonicWork& work, float* harmonics) { calc_harmonics(work, harmonics); }
-void calc_transfers_plain(const TransferWork& work, float* re, float* im) { calc_transfers(work, re, im); }
+void calc_transfers_plain(const TransferWork& work) { calc_transfers(work); }
 
 }  // namespace carillon::radiation

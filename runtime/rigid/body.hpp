@@ -7,16 +7,17 @@
 #include <memory>
 #include <vector>
 
+#include "runtime/base/quaternion.hpp"
 #include "runtime/base/vector.hpp"
 #include "runtime/impact/modes.hpp"
 #include "runtime/shape/touch.hpp"
 
 namespace carillon::rigid {
 
-using Quaternion = std::array<double, 4>;  // w x y z, unit
+using carillon::multiply;
+using carillon::Quaternion;
 
 Mat3 make_rotation(const Quaternion& q);
-Quaternion multiply(const Quaternion& a, const Quaternion& b);
 /// Of a rotation vector [rad], in full.
 Quaternion make_turn(const Vec3& turn);
 Quaternion normalise(const Quaternion& q);

@@ -1,7 +1,8 @@
 // Method:     p at an ear is Re(conj(T) v), v = (1 + i d / omega_d) z the analytic velocity of a mode: the state z is multiplied by a
-//             weight, then sounded by the table of a mode whose sound is the real part of its state. A weight that goes linearly from W
-//             to W + D over a block gives A + u B, A the sound by W and B that by D, u from 0 to 1: what is heard has no steps. Next
-//             weights are looked up at a place that is predicted; the line between two of them errs by (L angle)^2 / 8 at most.
+//             weight, then sounded by the table of a mode whose sound is the real part of its state. A weight W + u D + u (u - 1) / 2 C
+//             over a block gives A + u B + u (u - 1) / 2 E, A the sound by W, B that by D and E that by C, u from 0 to 1: what is heard
+//             has no steps. From block to block W grows by D and D by C, a parabola by forward differences. Next weights are looked up at
+//             a place that is predicted; C is the second divided difference of the last weight, this one and the next.
 // Source:     docs/equations.md E4, E10.
 // Deviations: T is that of a mode that rings for ever at its frequency: a strike's first cycles and a decay within few cycles are not.
 #include "runtime/synth/directivity.hpp"
@@ -11,6 +12,7 @@
 #include <limits>
 
 #include "runtime/base/error.hpp"
+#include "runtime/base/quaternion.hpp"
 #include "runtime/base/vector.hpp"
 #include "runtime/radiation/transfers.hpp"
 #include "runtime/synth/receiver.hpp"
@@ -22,13 +24,7 @@ namespace {
 constexpr double kStill = 1e-3;      // of kTurn / L: what moves less since a weight was looked up needs no other
 constexpr double kPredicted = 0.15;  // of the way of a plan: what goes further astray was not predicted
 constexpr double kNowhere = 1e30;    // a place that was never looked up
-
-events::Quaternion turn_back(const events::Quaternion& q) noexcept { return {q[0], -q[1], -q[2], -q[3]}; }
-
-events::Quaternion multiply(const events::Quaternion& a, const events::Quaternion& b) noexcept {
-  return {a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3], a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-          a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1], a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]};
-}
+constexpr double kBends = 1.5;       // rad of a way times L: on longer ones the curvature of the last says nothing
 
 /// A turn done `times` times.
 events::Quaternion repeat(const events::Quaternion& q, int times) noexcept {
@@ -38,45 +34,64 @@ events::Quaternion repeat(const events::Quaternion& q, int times) noexcept {
   return {std::cos(half), scale * q[1], scale * q[2], scale * q[3]};
 }
 
+/// Of a curvature at a share of a block.
+float find_bend_share(float u) noexcept { return 0.5F * u * (u - 1.0F); }
+
 /// Share of a block at the first sample of a sub-block.
 float find_share(int sub_block) noexcept { return static_cast<float>(sub_block * kSubBlock) / kBlock; }
 
 }  // namespace
 
-Directivity::Directivity(std::shared_ptr<const Model> model, std::size_t ears)
-    : model_(std::move(model)), radiation_(model_->get_directivity()), ears_(ears) {
+Directivity::Directivity(std::shared_ptr<const Model> model, std::size_t ears, int phase)
+    : model_(std::move(model)), radiation_(model_->get_directivity()), phase_(phase), ears_(ears) {
   if (radiation_ == nullptr)
     throw InputError("directivity needs a bank with multipoles; make it with \"radiation\" in its job, or leave the effect out");
   const auto modes = static_cast<std::size_t>(model_->get_ringing_mode_count());
   const std::size_t groups = radiation_->sound.size();
   orders_.reserve(modes);
   for (std::size_t m = 0; m < modes; ++m) {
-    orders_.push_back(radiation_->transfers->get_order(model_->get_bank_mode(static_cast<int>(m))));
-    highest_ = std::max(highest_, orders_.back());
+    const int mode = model_->get_bank_mode(static_cast<int>(m)), order = radiation_->transfers->get_order(mode);
+    orders_.push_back({order, static_cast<int>(std::ceil(radiation_->transfers->get_turn_order(mode)))});
+    highest_ = std::max(highest_, order);
   }
   nearest_m_ = std::max(radiation::kNearestRadii * radiation_->transfers->get_radius_m(), kNearestM);
   for (Ear& ear : ears_) {
     ear.weight.assign(groups, ModeWeight{});
     ear.step.assign(groups, ModeWeight{});
+    ear.bend.assign(groups, ModeWeight{});
     ear.modes.resize(modes);
+    for (auto& list : ear.due) list.reserve(modes);
   }
   kept_.resize(groups);
-  for (auto& list : due_) list.reserve(modes);
+  first_.reserve(modes);
   bank_modes_.reserve(modes);
-  transfers_.resize(modes);
+  for (auto& room : transfers_) room.resize(modes);
 }
 
 /// From the centre of the multipoles, `blocks` blocks after the first sample of this one: as body and ear move in it, on and on.
 Vec3 Directivity::find_place(const Ear& ear, const BlockPoses& poses, int blocks) const noexcept {
   const auto along = [=](const std::array<Vec3, 2>& x) { return x[0] + static_cast<double>(blocks) * (x[1] - x[0]); };
   const auto predict = [&] {
-    return multiply(poses.rotation[0], repeat(multiply(turn_back(poses.rotation[0]), poses.rotation[1]), blocks));
+    return multiply(poses.rotation[0], repeat(multiply(find_inverse(poses.rotation[0]), poses.rotation[1]), blocks));
   };
   const events::Quaternion rotation = blocks == 0 ? poses.rotation[0] : blocks == 1 ? poses.rotation[1] : predict();
-  Vec3 place = turn(turn_back(rotation), along(ear.world_m) - along(poses.position_m)) - radiation_->offset_m;
+  Vec3 place = turn(find_inverse(rotation), along(ear.world_m) - along(poses.position_m)) - radiation_->offset_m;
   const double distance = norm(place);
   if (distance >= nearest_m_) return place;
   return distance > 0.0 ? (nearest_m_ / distance) * place : Vec3{0.0, 0.0, nearest_m_};
+}
+
+/// The way of a mode is over, wherever its weight is.
+void Directivity::end_way(Ear& ear, std::size_t m) noexcept {
+  Mode& mode = ear.modes[m];
+  mode.left = 0;
+  set_weight(ear.step, m, {});
+  --ear.plans[static_cast<std::size_t>(mode.ahead)].modes;
+  --ear.ramping;
+  if (!mode.bends) return;
+  set_weight(ear.bend, m, {});
+  mode.bends = false;
+  --ear.bending;
 }
 
 /// What was under way in the block before is a block further.
@@ -87,55 +102,87 @@ void Directivity::finish_block(Ear& ear) noexcept {
     if (mode.left == 0) continue;
     if (--mode.left > 0) {
       set_weight(ear.weight, m, get_weight(ear.weight, m) + get_weight(ear.step, m));
+      if (mode.bends) set_weight(ear.step, m, get_weight(ear.step, m) + get_weight(ear.bend, m));
       continue;
     }
     set_weight(ear.weight, m, mode.target);
-    set_weight(ear.step, m, {});
-    --ear.plans[static_cast<std::size_t>(mode.ahead)].modes;
-    --ear.ramping;
+    mode.ended = block_;
+    end_way(ear, m);
   }
 }
 
-/// Looks up the weights of modes at a place and sends them on their way there, 2^ahead blocks; -1: puts them there.
-void Directivity::look_up(Ear& ear, std::span<const int> modes, const Vec3& place_m, int ahead) noexcept {
+/// A mode begins its way to a weight, 2^ahead blocks long, with the curvature that its last way and this one have together.
+void Directivity::set_out(Ear& ear, std::size_t m, Complex target, int ahead) noexcept {
+  Mode& mode = ear.modes[m];
+  const int blocks = 1 << ahead;
+  const float share = 1.0F / static_cast<float>(blocks);
+  const Complex way = target - get_weight(ear.weight, m);
+  const Complex slope(share * way.real(), share * way.imag());
+  Complex step = slope;
+  if (ear.steady && mode.ended == block_ && bends_[static_cast<std::size_t>(orders_[m][is_far_])]) {
+    const float between = 2.0F / static_cast<float>(blocks + (1 << mode.ahead));  // of the middles of both ways
+    const Complex change = slope - mode.slope, bend(between * change.real(), between * change.imag());
+    const float half = 0.5F * static_cast<float>(blocks - 1);
+    step -= Complex(half * bend.real(), half * bend.imag());
+    set_weight(ear.bend, m, bend);
+    mode.bends = true;
+    ++ear.bending;
+  }
+  set_weight(ear.step, m, step);
+  mode.target = target;
+  mode.slope = slope;
+  mode.left = static_cast<std::int16_t>(blocks);
+  mode.ahead = static_cast<std::int8_t>(ahead);
+  ++ear.ramping;
+  ++ear.plans[static_cast<std::size_t>(ahead)].modes;
+}
+
+/// Looks up the weights of modes at the places of one ear or two and sends them on their way there, 2^ahead blocks; -1: puts them there.
+void Directivity::look_up(std::span<Ear> ears, std::span<const int> modes, const std::array<Vec3, 2>& places_m, int ahead) noexcept {
   if (modes.empty()) return;
   bank_modes_.clear();
   for (const int m : modes) bank_modes_.push_back(model_->get_bank_mode(m));
-  const std::span<Complex> transfers = std::span(transfers_).first(modes.size());
-  radiation_->transfers->evaluate(place_m + radiation_->transfers->get_centre_m(), bank_modes_, transfers);
-  evaluations_ += static_cast<std::int64_t>(modes.size());
-  for (std::size_t i = 0; i < modes.size(); ++i) {
-    const auto m = static_cast<std::size_t>(modes[i]);
-    const float re = transfers[i].real(), im = -transfers[i].imag(), tilt = radiation_->tilt[m], level = radiation_->level[m];
-    Complex weight(level * (re - tilt * im), level * (im + tilt * re));
-    if (!(std::abs(weight.real()) + std::abs(weight.imag()) <= std::numeric_limits<float>::max())) weight = {};
-    Mode& mode = ear.modes[m];
-    mode.place_m = place_m;
-    if (ahead < 0) {
-      set_weight(ear.weight, m, weight);
-      continue;
+  const radiation::Transfers& transfers = *radiation_->transfers;
+  const Vec3& centre_m = transfers.get_centre_m();
+  const std::array<std::span<Complex>, 2> found{std::span(transfers_[0]).first(modes.size()), std::span(transfers_[1]).first(modes.size())};
+  if (ears.size() == 2)
+    transfers.evaluate({places_m[0] + centre_m, places_m[1] + centre_m}, bank_modes_, found);
+  else
+    transfers.evaluate(places_m[0] + centre_m, bank_modes_, found[0]);
+  evaluations_ += static_cast<std::int64_t>(modes.size() * ears.size());
+  for (std::size_t e = 0; e < ears.size(); ++e) {
+    for (std::size_t i = 0; i < modes.size(); ++i) {
+      const auto m = static_cast<std::size_t>(modes[i]);
+      const float re = found[e][i].real(), im = -found[e][i].imag(), tilt = radiation_->tilt[m], level = radiation_->level[m];
+      Complex weight(level * (re - tilt * im), level * (im + tilt * re));
+      if (!(std::abs(weight.real()) + std::abs(weight.imag()) <= std::numeric_limits<float>::max())) weight = {};
+      ears[e].modes[m].place_m = places_m[e];
+      if (ahead < 0)
+        set_weight(ears[e].weight, m, weight);
+      else
+        set_out(ears[e], m, weight, ahead);
     }
-    mode.target = weight;
-    mode.left = static_cast<std::int16_t>(1 << ahead);
-    mode.ahead = static_cast<std::int16_t>(ahead);
-    const Complex way = weight - get_weight(ear.weight, m);
-    const float share = 1.0F / static_cast<float>(1 << ahead);
-    set_weight(ear.step, m, {share * way.real(), share * way.imag()});
-    ++ear.ramping;
-    ++ear.plans[static_cast<std::size_t>(ahead)].modes;
   }
 }
 
-void Directivity::begin_again(Ear& ear) noexcept {
-  for (auto& step : ear.step) step = ModeWeight{};
-  for (Mode& mode : ear.modes) mode.left = 0;
-  for (Plan& plan : ear.plans) plan.modes = 0;
-  ear.ramping = 0;
+/// Puts all weights where they belong, of which it looks up `left` at most; how many it has.
+int Directivity::begin_again(Ear& ear, int left) noexcept {
+  for (std::size_t m = 0; m < ear.modes.size(); ++m) {
+    if (ear.modes[m].left > 0) end_way(ear, m);
+    ear.modes[m].ended = -1;
+  }
   ear.settled = false;
-  std::vector<int>& all = due_[0];
-  all.clear();
-  for (int m = 0; m < static_cast<int>(ear.modes.size()); ++m) all.push_back(m);
-  look_up(ear, all, ear.place_m[0], -1);
+  first_.clear();
+  const int modes = static_cast<int>(ear.modes.size()), count = std::min(modes, left);
+  for (int m = 0; m < count; ++m) first_.push_back(m);
+  look_up(std::span(&ear, 1), first_, {ear.place_m[0], {}}, -1);
+  for (auto m = static_cast<std::size_t>(count); m < ear.modes.size(); ++m) {
+    const double rms = radiation_->transfers->get_rms(model_->get_bank_mode(static_cast<int>(m))) * ear.spreading;
+    const float re = radiation_->level[m] * static_cast<float>(rms);
+    set_weight(ear.weight, m, {re, re * radiation_->tilt[m]});
+    ear.modes[m].place_m = {kNowhere, kNowhere, kNowhere};
+  }
+  return count;
 }
 
 /// Ends what is under way in another direction than was predicted.
@@ -149,33 +196,16 @@ void Directivity::drop_plans(Ear& ear) noexcept {
     for (std::size_t m = 0; m < ear.modes.size(); ++m) {
       Mode& mode = ear.modes[m];
       if (mode.left == 0 || mode.ahead != static_cast<int>(c)) continue;
-      mode.left = 0;
+      end_way(ear, m);
       mode.place_m = {kNowhere, kNowhere, kNowhere};  // the weight is on its way between two
-      set_weight(ear.step, m, {});
-      --ear.ramping;
     }
-    plan.modes = 0;
   }
 }
 
-/// Looks up what has to be, at most `left`, at least 2^least blocks ahead; how many it has.
-int Directivity::refresh(Ear& ear, int left, int least, const BlockPoses& poses) noexcept {
-  const Vec3 &now = ear.place_m[0], &next = ear.place_m[1];
-  const double r = norm(now), turned = norm(cross(now, next)) / (r * norm(next)), nearer = std::abs(std::log(norm(next) / r));
-  const double angle = std::asin(std::min(1.0, turned)), radius = radiation_->transfers->get_radius_m();
-  // A class begins in blocks of its own rhythm, so that all its modes are predicted together.
-  int most = 0;
-  while (most < kLongest && block_ % (1 << (most + 1)) == 0) ++most;
-  std::array<Vec3, kLongest + 1> to;
-  for (int c = 0; c <= most; ++c) to[static_cast<std::size_t>(c)] = find_place(ear, poses, 1 << c);
-  std::array<std::uint8_t, bank::kMaxOrder + 1> by_order;
-  for (int order = 0; order <= highest_; ++order) {
-    const double change = std::max(1, order) * angle + (1.0 + order * radius / r) * nearer;
-    int c = 0;
-    while (c < most && (change * (2 << c) <= kTurn || c < least)) ++c;
-    by_order[static_cast<std::size_t>(order)] = static_cast<std::uint8_t>(c);
-  }
-  for (auto& list : due_) list.clear();
+/// Finds what is due, at most `left`, at least 2^least blocks ahead; how much that is.
+int Directivity::find_due(Ear& ear, int left, int least, const std::array<std::uint8_t, bank::kMaxOrder + 1>& by_order) noexcept {
+  for (auto& list : ear.due) list.clear();
+  const double r = norm(ear.place_m[0]);
   const std::size_t count = ear.modes.size();
   int found = 0;
   bool waits = false;
@@ -183,49 +213,100 @@ int Directivity::refresh(Ear& ear, int left, int least, const BlockPoses& poses)
     const std::size_t m = ear.cursor + i < count ? ear.cursor + i : ear.cursor + i - count;
     const Mode& mode = ear.modes[m];
     if (mode.left > 0) continue;
-    const std::size_t c = by_order[static_cast<std::size_t>(orders_[m])];
-    const Vec3 moved = to[c] - mode.place_m;
-    const double still = kStill * kTurn * r / std::max(1, orders_[m]);
+    // The first way after a change goes straight on: half as far.
+    const bool is_first = !ear.steady || mode.ended != block_;
+    const int wanted = by_order[static_cast<std::size_t>(orders_[m][is_far_])];
+    const auto c = static_cast<std::size_t>(std::max(wanted - static_cast<int>(is_first && wanted > least), 0));
+    const Vec3 moved = ear.to_m[c] - mode.place_m;
+    const double still = kStill * kTurn * r / std::max(1, orders_[m][0]);
     if (dot(moved, moved) <= still * still) continue;
+    ++demand_;
     if (found == left) {
-      ear.cursor = m;
+      if (!waits) ear.cursor = m;
       waits = true;
-      break;
+      continue;
     }
-    due_[c].push_back(static_cast<int>(m));
+    ear.due[c].push_back(static_cast<int>(m));
     ++found;
   }
   if (!waits) ear.cursor = 0;
-  for (std::size_t c = 0; c < due_.size(); ++c) {
-    if (due_[c].empty()) continue;
-    ear.plans[c].begin = block_;
-    ear.plans[c].from_m = now;
-    ear.plans[c].to_m = to[c];
-    look_up(ear, due_[c], to[c], static_cast<int>(c));
-  }
   ear.settled = !waits && found == 0 && ear.ramping == 0;
+  return found;
+}
+
+/// Looks up what is due of one ear or of two, which go together as long as they can, at least 2^least blocks ahead.
+int Directivity::refresh(std::span<Ear> ears, int left, int least, const BlockPoses& poses) noexcept {
+  // A class begins in blocks of its own rhythm, so that all its modes are predicted together.
+  const std::int64_t rhythm = block_ + phase_;
+  int most = 0, found = 0;
+  while (most < kLongest && rhythm % (1 << (most + 1)) == 0) ++most;
+  const double radius = radiation_->transfers->get_radius_m();
+  std::array<std::uint8_t, bank::kMaxOrder + 1> by_order{};
+  bends_.fill(true);
+  is_far_ = std::all_of(ears.begin(), ears.end(), [&](const Ear& ear) {
+    return std::min(norm(ear.place_m[0]), norm(ear.place_m[1])) >= radiation::kTurnRadii * radius;
+  });
+  for (Ear& ear : ears) {
+    const Vec3 &now = ear.place_m[0], &next = ear.place_m[1];
+    const double r = norm(now), turned = norm(cross(now, next)) / (r * norm(next)), nearer = std::abs(std::log(norm(next) / r));
+    const double angle = std::asin(std::min(1.0, turned));
+    for (int c = 0; c <= most; ++c) ear.to_m[static_cast<std::size_t>(c)] = find_place(ear, poses, 1 << c);
+    for (int order = 0; order <= highest_; ++order) {
+      const double change = std::max(1, order) * angle + (1.0 + order * radius / r) * nearer;
+      int c = 0;
+      while (c < most && (change * (2 << c) <= kTurn || c < least)) ++c;
+      std::uint8_t& both = by_order[static_cast<std::size_t>(order)];
+      both = &ear == &ears.front() ? static_cast<std::uint8_t>(c) : std::min(both, static_cast<std::uint8_t>(c));
+      bends_[static_cast<std::size_t>(order)] = bends_[static_cast<std::size_t>(order)] && change * (1 << c) <= kBends;
+    }
+  }
+  for (std::size_t e = 0; e < ears.size(); ++e)
+    found += find_due(ears[e], (left - found) / static_cast<int>(ears.size() - e), least, by_order);
+  for (std::size_t c = 0; c < ears[0].due.size(); ++c) {
+    for (Ear& ear : ears) {
+      if (ear.due[c].empty()) continue;
+      ear.plans[c].begin = block_;
+      ear.plans[c].from_m = ear.place_m[0];
+      ear.plans[c].to_m = ear.to_m[c];
+    }
+    if (ears.size() == 2 && ears[0].due[c] == ears[1].due[c]) {
+      look_up(ears, ears[0].due[c], {ears[0].to_m[c], ears[1].to_m[c]}, static_cast<int>(c));
+      continue;
+    }
+    for (Ear& ear : ears) look_up(std::span(&ear, 1), ear.due[c], {ear.to_m[c], {}}, static_cast<int>(c));
+  }
   return found;
 }
 
 void Directivity::begin_block(std::int64_t block, const BlockPoses& poses) noexcept {
   const bool follows = block == block_ + 1;
   block_ = block;
-  int left = kEvaluations, least = 0;
+  demand_ = 0;
+  const int all = std::max(share_, static_cast<int>(ears_.size()));
+  int left = all, least = 0;
   // Where all together are too many for a block, weights are looked up further ahead.
-  while (static_cast<std::size_t>(kEvaluations << least) < ears_.size() * orders_.size() && least < kLongest) ++least;
-  for (std::size_t e = 0; e < ears_.size(); ++e) {
-    Ear& ear = ears_[e];
-    if (follows) finish_block(ear);
-    const Vec3 before = ear.place_m[1];
-    ear.place_m = {find_place(ear, poses, 0), find_place(ear, poses, 1)};
-    ear.spreading = 1.0 / norm(ear.place_m[0]);
-    ear.spreading_step = 1.0 / norm(ear.place_m[1]) - ear.spreading;
-    if (!follows) begin_again(ear);
-    if (follows && ear.settled && ear.place_m[1] == before && ear.place_m[0] == before) continue;
-    drop_plans(ear);
+  while (static_cast<std::size_t>(all) << least < ears_.size() * orders_.size() && least < kLongest) ++least;
+  for (std::size_t first = 0; first < ears_.size(); first += 2) {
+    const std::span<Ear> ears = std::span(ears_).subspan(first, std::min<std::size_t>(2, ears_.size() - first));
     // The ears that come later have their share, too.
-    const int share = left / static_cast<int>(ears_.size() - e);
-    left -= refresh(ear, share, least, poses);
+    int share = left * static_cast<int>(ears.size()) / static_cast<int>(ears_.size() - first);
+    left -= share;
+    bool rests = true;
+    for (Ear& ear : ears) {
+      if (follows) finish_block(ear);
+      const Vec3 before = ear.place_m[1], way = before - ear.place_m[0];
+      ear.place_m = {find_place(ear, poses, 0), find_place(ear, poses, 1)};
+      const Vec3 now = ear.place_m[1] - ear.place_m[0];
+      ear.steady = follows && norm(now - way) <= kPredicted * norm(now);
+      ear.spreading = 1.0 / norm(ear.place_m[0]);
+      ear.spreading_step = 1.0 / norm(ear.place_m[1]) - ear.spreading;
+      if (!follows) share -= begin_again(ear, share / static_cast<int>(&ears.back() - &ear + 1));
+      if (follows && ear.settled && ear.place_m[1] == before && ear.place_m[0] == before) continue;
+      drop_plans(ear);
+      rests = false;
+    }
+    if (!rests) share -= refresh(ears, share, least, poses);
+    left += share;
   }
 }
 
@@ -256,28 +337,37 @@ void Directivity::silence(int from) noexcept {
   for (Ear& ear : ears_) std::fill(ear.sound.begin() + from, ear.sound.end(), 0.0F);
 }
 
-void Directivity::emit(const Kernels& kernels, const ColumnStates* starts, int groups, int first, int sub_blocks, int offset) noexcept {
-  for (Ear& ear : ears_) {
-    float* out = ear.sound.data() + offset;
-    kernels.emit_weighted(radiation_->sound.data(), starts, ear.weight.data(), groups, first, sub_blocks, out);
-    if (ear.ramping == 0) continue;
+/// Adds the sound of an ear over sub-blocks, by groups from `group` on, of which `table` and `starts` are the first.
+void Directivity::sound(const Ear& ear, const Kernels& kernels, const SoundTable* table, const ColumnStates* starts, int group, int groups,
+                        int first, int sub_blocks, float* out) const noexcept {
+  kernels.emit_weighted(table, starts, ear.weight.data() + group, groups, first, sub_blocks, out);
+  const float begin = find_share(first);
+  const auto add = [&](const std::vector<ModeWeight>& weights, auto&& part) {
     alignas(64) std::array<float, kBlock> change{};
-    kernels.emit_weighted(radiation_->sound.data(), starts, ear.step.data(), groups, first, sub_blocks, change.data());
-    const float begin = find_share(first);
+    kernels.emit_weighted(table, starts, weights.data() + group, groups, first, sub_blocks, change.data());
     for (int n = 0; n < sub_blocks * kSubBlock; ++n)
-      out[n] += (begin + static_cast<float>(n) / kBlock) * change[static_cast<std::size_t>(n)];
-  }
+      out[n] += part(begin + static_cast<float>(n) / kBlock) * change[static_cast<std::size_t>(n)];
+  };
+  if (ear.ramping > 0) add(ear.step, [](float u) { return u; });
+  if (ear.bending > 0) add(ear.bend, find_bend_share);
+}
+
+void Directivity::emit(const Kernels& kernels, const ColumnStates* starts, int groups, int first, int sub_blocks, int offset) noexcept {
+  for (Ear& ear : ears_) sound(ear, kernels, radiation_->sound.data(), starts, 0, groups, first, sub_blocks, ear.sound.data() + offset);
 }
 
 void Directivity::weigh(const Kernels& kernels, const SampleStates* kept, int groups, int sub_block, int offset) noexcept {
   for (Ear& ear : ears_) {
     float* out = ear.sound.data() + offset;
     kernels.weigh(ear.weight.data(), kept, groups, out);
-    if (ear.ramping == 0) continue;
-    alignas(64) std::array<float, kSubBlock> change{};
-    kernels.weigh(ear.step.data(), kept, groups, change.data());
     const float begin = find_share(sub_block);
-    for (int n = 0; n < kSubBlock; ++n) out[n] += (begin + static_cast<float>(n) / kBlock) * change[static_cast<std::size_t>(n)];
+    const auto add = [&](const std::vector<ModeWeight>& weights, auto&& part) {
+      alignas(64) std::array<float, kSubBlock> change{};
+      kernels.weigh(weights.data(), kept, groups, change.data());
+      for (int n = 0; n < kSubBlock; ++n) out[n] += part(begin + static_cast<float>(n) / kBlock) * change[static_cast<std::size_t>(n)];
+    };
+    if (ear.ramping > 0) add(ear.step, [](float u) { return u; });
+    if (ear.bending > 0) add(ear.bend, find_bend_share);
   }
 }
 
@@ -304,14 +394,9 @@ void Directivity::add_to_fade(const Kernels& kernels, const Directivity& weights
                               float sign, bool falls) noexcept {
   for (std::size_t e = 0; e < ears_.size() && e < weights.ears_.size(); ++e) {
     const Ear& from = weights.ears_[e];
-    alignas(64) std::array<float, kBlock> sound{}, change{};
-    const SoundTable* table = weights.radiation_->sound.data() + group;
-    kernels.emit_weighted(table, starts, from.weight.data() + group, groups, 0, kSubBlocks, sound.data());
-    if (from.ramping > 0) kernels.emit_weighted(table, starts, from.step.data() + group, groups, 0, kSubBlocks, change.data());
-    for (std::size_t n = 0; n < kBlock; ++n) {
-      const float u = static_cast<float>(n) / kBlock;
-      ears_[e].fade[n] += sign * (falls ? 1.0F - u : 1.0F) * (sound[n] + u * change[n]);
-    }
+    alignas(64) std::array<float, kBlock> whole{};
+    weights.sound(from, kernels, weights.radiation_->sound.data() + group, starts, group, groups, 0, kSubBlocks, whole.data());
+    for (std::size_t n = 0; n < kBlock; ++n) ears_[e].fade[n] += sign * (falls ? 1.0F - static_cast<float>(n) / kBlock : 1.0F) * whole[n];
   }
 }
 
@@ -327,11 +412,13 @@ void Directivity::let_fade_fall() noexcept {
 
 std::size_t Directivity::calc_bytes() const noexcept {
   std::size_t bytes = sizeof(Directivity) + ears_.capacity() * sizeof(Ear) + kept_.capacity() * sizeof(SampleStates) +
-                      orders_.capacity() * sizeof(int) + transfers_.capacity() * sizeof(Complex) +
-                      bank_modes_.capacity() * sizeof(std::int32_t);
-  for (const auto& list : due_) bytes += list.capacity() * sizeof(int);
-  for (const Ear& ear : ears_)
-    bytes += (ear.weight.capacity() + ear.step.capacity()) * sizeof(ModeWeight) + ear.modes.capacity() * sizeof(Mode);
+                      orders_.capacity() * sizeof(orders_[0]) + bank_modes_.capacity() * sizeof(std::int32_t) +
+                      first_.capacity() * sizeof(int);
+  for (const auto& room : transfers_) bytes += room.capacity() * sizeof(Complex);
+  for (const Ear& ear : ears_) {
+    for (const auto& list : ear.due) bytes += list.capacity() * sizeof(int);
+    bytes += (ear.weight.capacity() + ear.step.capacity() + ear.bend.capacity()) * sizeof(ModeWeight) + ear.modes.capacity() * sizeof(Mode);
+  }
   return bytes;
 }
 

@@ -26,25 +26,37 @@ struct BlockPoses {
 /// ear's place when the sound leaves, not when it arrives: the ear's own movement in the time between is left out (at 1 m/s and 3 m
 /// that is 9 mm of its way). Modes near and above critical damping have no frequency: they are heard by their gain and 1 / r.
 ///
-/// Weights go linearly. A mode's next one is looked up ahead of time, where body and ear will be by their movement in this block, 1 to
-/// 16 blocks ahead, so that the place turns by kTurn / L and comes nearer or farther by as little: the line between two weights then
-/// stays within -40 dB. Of modes for which a block is longer than that, L above 9 at 10 rad/s, it errs by (L angle)^2 / 8, the angle being
-/// that of a block: -22 dB at L = 30. What moves in another way than was predicted is looked up again. Where nothing moves nothing is
-/// looked up. In a block at most kEvaluations are, of the most audible modes first and in turn; modes that have to wait stay as they are.
-/// In the first block that sounds all are looked up at once.
+/// Weights go by parabolas, without steps. A mode's next one is looked up ahead of time, where body and ear will be by their movement in
+/// this block, 1 to 16 blocks ahead, so that the place turns by kTurn / L' and comes nearer or farther by as little, L' being
+/// radiation::Transfers::get_turn_order(), and L within kTurnRadii; its curvature is that of the way from the last weight to this one and
+/// on to the next. With x = m angle, the angle being that of the way to the next weight, a lobe cos(m phi) then errs by x^3 / 16, and by
+/// x^2 / 8, a line, where the movement has just begun or changed: so far a way is half as long. What moves in another way than was
+/// predicted is looked up again. Where nothing moves nothing is looked up.
 ///
-/// What it keeps true: in the block `get_block()` weights are those of that block; they depend on poses and block numbers only, so that the
-/// sizes of calls do not change a bit. Memory is taken in the constructor only. One thread at a time; nothing throws but the constructor.
+/// In a block as many transfers are looked up as set_share() says at most. Where all modes together are more, they are looked up farther
+/// ahead, up to 16 blocks; beyond that the most audible ones come first and then all in turn, and those that wait stay as they are. In the
+/// first block that sounds all are looked up at once; those for which there is no share begin with their root mean square over directions.
+///
+/// What it keeps true: in the block `get_block()` weights are those of that block; they depend on poses, shares and block numbers only, so
+/// that the sizes of calls do not change a bit. Memory is taken in the constructor only. One thread at a time; nothing throws but the
+/// constructor.
 class Directivity {
  public:
-  static constexpr int kEvaluations = 1024;  // transfers of a body in a block
-  static constexpr double kTurn = 0.25;      // rad
+  static constexpr int kEvaluations = 1024;  // transfers in a block as long as set_share() was not called
+  static constexpr double kTurn = 0.6;       // rad
 
-  /// Throws InputError for a model without transfers. [main-thread]
-  Directivity(std::shared_ptr<const Model> model, std::size_t ears);
+  /// Ways of 2, 4 .. 16 blocks begin in blocks whose number plus `phase` is a multiple of as many, so that bodies of different phases take
+  /// turns. Throws InputError for a model without transfers. [main-thread]
+  Directivity(std::shared_ptr<const Model> model, std::size_t ears, int phase = 0);
 
-  /// Where an ear is in the world at the first sample of a block and at that of the next; before begin_block().
+  /// Ears 0 and 1, 2 and 3 .. are looked up together: those of one head cost least. Where an ear is in the world at the first sample of a
+  /// block and at that of the next; before begin_block().
   void set_ear(std::size_t ear, const Vec3& begin_m, const Vec3& end_m) noexcept { ears_[ear].world_m = {begin_m, end_m}; }
+
+  /// Transfers that may be looked up in a block, from the next one on; one an ear at least.
+  void set_share(int transfers) noexcept { share_ = transfers; }
+  /// Transfers that were due in the last block, whether there was a share for them or not.
+  int get_demand() const noexcept { return demand_; }
 
   /// Puts the weights of a block there. A block that does not follow the last begins again: nothing sounds that could click.
   void begin_block(std::int64_t block, const BlockPoses& poses) noexcept;
@@ -92,9 +104,12 @@ class Directivity {
 
   struct Mode {
     Complex target;
-    Vec3 place_m{};          // where its last weight was looked up
-    std::int16_t left = 0;   // blocks until the target
-    std::int16_t ahead = 0;  // its class
+    Complex slope;            // of the way to it, straight on, a block
+    Vec3 place_m{};           // where its last weight was looked up
+    std::int64_t ended = -1;  // block that began where the last way ended
+    std::int16_t left = 0;    // blocks until the target
+    std::int8_t ahead = 0;    // its class
+    bool bends = false;       // its way has a curvature
   };
   /// What was predicted for the modes of a class.
   struct Plan {
@@ -106,20 +121,29 @@ class Directivity {
     std::array<Vec3, 2> world_m{};
     std::array<Vec3, 2> place_m{};         // from the centre of the multipoles, axes of the mesh
     std::vector<ModeWeight> weight, step;  // at the first sample of the block, and what is added up to that of the next
+    std::vector<ModeWeight> bend;          // what is added to step from a block to the next
     std::vector<Mode> modes;
     std::array<Plan, kLongest + 1> plans{};
-    int ramping = 0;                               // modes on their way
-    bool settled = false;                          // at place_m[1] nothing is to be done
-    double spreading = 0.0, spreading_step = 0.0;  // 1 / r
-    std::size_t cursor = 0;                        // mode that is next when there are too many
+    std::array<Vec3, kLongest + 1> to_m{};             // where it will be in as many blocks as a class has
+    std::array<std::vector<int>, kLongest + 1> due{};  // modes by class
+    int ramping = 0, bending = 0;                      // modes on their way; of them those with a curvature
+    bool steady = false;                               // the place moves about as in the block before
+    bool settled = false;                              // at place_m[1] nothing is to be done
+    double spreading = 0.0, spreading_step = 0.0;      // 1 / r
+    std::size_t cursor = 0;                            // mode that is next when there are too many
     alignas(64) std::array<float, kBlock> sound{}, fade{};
   };
 
   void finish_block(Ear& ear) noexcept;
-  void look_up(Ear& ear, std::span<const int> modes, const Vec3& place_m, int ahead) noexcept;
-  void begin_again(Ear& ear) noexcept;
+  void look_up(std::span<Ear> ears, std::span<const int> modes, const std::array<Vec3, 2>& places_m, int ahead) noexcept;
+  void set_out(Ear& ear, std::size_t mode, Complex target, int ahead) noexcept;
+  void end_way(Ear& ear, std::size_t mode) noexcept;
+  int begin_again(Ear& ear, int left) noexcept;
   void drop_plans(Ear& ear) noexcept;
-  int refresh(Ear& ear, int left, int least, const BlockPoses& poses) noexcept;
+  int find_due(Ear& ear, int left, int least, const std::array<std::uint8_t, bank::kMaxOrder + 1>& by_order) noexcept;
+  int refresh(std::span<Ear> ears, int left, int least, const BlockPoses& poses) noexcept;
+  void sound(const Ear& ear, const Kernels& kernels, const SoundTable* table, const ColumnStates* starts, int group, int groups, int first,
+             int sub_blocks, float* out) const noexcept;
   Vec3 find_place(const Ear& ear, const BlockPoses& poses, int blocks) const noexcept;
   void set_weight(std::vector<ModeWeight>& weights, std::size_t mode, Complex x) noexcept {
     weights[mode / kGroup].re[mode % kGroup] = x.real();
@@ -131,15 +155,17 @@ class Directivity {
 
   std::shared_ptr<const Model> model_;
   const ModelDirectivity* radiation_ = nullptr;  // of the model
-  std::vector<int> orders_;                      // of the ringing modes
-  int highest_ = 0;
+  std::vector<std::array<int, 2>> orders_;       // of the ringing modes: L, and what counts of it far away
+  bool is_far_ = false;                          // of the ears that are looked up
+  int highest_ = 0, phase_ = 0, share_ = kEvaluations, demand_ = 0;
   double nearest_m_ = 0.0;
   std::int64_t block_ = -2;
   std::vector<Ear> ears_;
   std::vector<SampleStates> kept_;
-  std::array<std::vector<int>, kLongest + 1> due_;  // room: modes by class
-  std::vector<std::int32_t> bank_modes_;            // room
-  std::vector<Complex> transfers_;                  // room
+  std::array<bool, bank::kMaxOrder + 1> bends_{};  // orders of which a way that begins may have a curvature
+  std::vector<int> first_;                         // room: modes
+  std::vector<std::int32_t> bank_modes_;           // room
+  std::array<std::vector<Complex>, 2> transfers_;  // room
   std::int64_t evaluations_ = 0;
 };
 

@@ -11,7 +11,7 @@
 
 // The effects of this build, bit i for effect i; the CMake option CARILLON_EFFECTS gives it.
 #ifndef CARILLON_EFFECTS_MASK
-#define CARILLON_EFFECTS_MASK 0x7ff
+#define CARILLON_EFFECTS_MASK 0x1fff
 #endif
 
 namespace carillon::synth {
@@ -27,12 +27,14 @@ enum class Effect : std::uint8_t {
   kDoppler,
   kTwoEars,
   kDirectivity,
-  kGroundReflection
+  kGroundReflection,
+  kHead,
+  kNonlinear
 };
-inline constexpr int kEffectCount = 11;
+inline constexpr int kEffectCount = 13;
 
 /// As scene files call it: "modal", "hertz_pulse", "roughness", "rolling", "contact_damping", "acceleration_noise", "air_delay", "doppler",
-/// "two_ears", "directivity", "ground_reflection".
+/// "two_ears", "directivity", "ground_reflection", "head", "nonlinear".
 const char* get_name(Effect effect) noexcept;
 std::optional<Effect> find_effect(std::string_view name) noexcept;
 

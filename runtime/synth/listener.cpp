@@ -5,6 +5,7 @@
 #include "runtime/synth/listener.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "runtime/base/vector.hpp"
@@ -14,7 +15,47 @@ namespace {
 
 constexpr events::Quaternion kNotTurned{1.0, 0.0, 0.0, 0.0};
 
+Vec3 turn_back(const events::Quaternion& rotation, const Vec3& x) noexcept {
+  return turn({rotation[0], -rotation[1], -rotation[2], -rotation[3]}, x);
+}
+
 }  // namespace
+
+events::Quaternion calc_head_rotation(const Vec3& forward, const Vec3& left) noexcept {
+  const double length = norm(forward);
+  if (!(length > 0.0) || !std::isfinite(length)) return kNotTurned;
+  const Vec3 x = (1.0 / length) * forward, across = left - dot(left, x) * x;
+  const double width = norm(across);
+  if (!(width > 0.0) || !std::isfinite(width)) return kNotTurned;
+  const Vec3 y = (1.0 / width) * across, z = cross(x, y);
+  // The matrix of columns x, y, z as a quaternion: of four times the squares of its parts the largest is taken first, since it is above 0.
+  const std::array<double, 4> squares{1.0 + x[0] + y[1] + z[2], 1.0 + x[0] - y[1] - z[2], 1.0 - x[0] + y[1] - z[2],
+                                      1.0 - x[0] - y[1] + z[2]};
+  events::Quaternion rotation{};
+  const auto largest = static_cast<std::size_t>(std::max_element(squares.begin(), squares.end()) - squares.begin());
+  switch (largest) {
+    case 0:
+      rotation = {squares[0], y[2] - z[1], z[0] - x[2], x[1] - y[0]};
+      break;
+    case 1:
+      rotation = {y[2] - z[1], squares[1], y[0] + x[1], z[0] + x[2]};
+      break;
+    case 2:
+      rotation = {z[0] - x[2], y[0] + x[1], squares[2], z[1] + y[2]};
+      break;
+    default:
+      rotation = {x[1] - y[0], z[0] + x[2], z[1] + y[2], squares[3]};
+  }
+  double square = 0.0;
+  for (const double part : rotation) square += part * part;
+  for (double& part : rotation) part /= std::sqrt(square);
+  return rotation;
+}
+
+events::Quaternion calc_level_head_rotation(const Vec3& left_m, const Vec3& right_m) noexcept {
+  const Vec3 left = left_m - right_m;
+  return calc_head_rotation(cross(left, {0.0, 0.0, 1.0}), left);
+}
 
 Vec3 calc_middle(const std::vector<Vec3>& places) {
   Vec3 middle{};
@@ -24,13 +65,19 @@ Vec3 calc_middle(const std::vector<Vec3>& places) {
 }
 
 ListenerTracks::ListenerTracks(std::size_t capacity, const std::vector<Vec3>& microphones_m, const Vec3& position_m,
-                               const std::optional<Floor>& floor)
-    : floor_(floor), centre_(capacity), mirrored_centre_(floor ? capacity : 1) {
+                               const std::optional<Floor>& floor, const std::optional<ListeningHead>& head)
+    : floor_(floor), centre_(capacity), mirrored_centre_(floor ? capacity : 1), attitude_(head ? capacity : 1) {
   const auto add = [&](const Vec3& place) { turned_.push_back({place, Trajectory(capacity), Trajectory(floor_ ? capacity : 1)}); };
   for (const Vec3& place : microphones_m) add(place);
   add(calc_middle(microphones_m));
   centre_.push({.position_m = position_m});
   push_mirrored(mirrored_centre_, {.position_m = position_m});
+  if (head) head_rotation_ = head->rotation;
+  attitude_.push(0.0, kNotTurned);
+}
+
+Vec3 ListenerTracks::find_in_head(const Vec3& direction, double time_s) const noexcept {
+  return turn_back(head_rotation_, turn_back(attitude_.find(time_s), direction));
 }
 
 /// A cubic way through mirrored waypoints is the mirrored way. Does nothing without a floor.
@@ -61,6 +108,7 @@ bool ListenerTracks::push(const events::Listener& listener) noexcept {
     one.track.push(waypoint);
     push_mirrored(one.mirrored, waypoint);
   }
+  attitude_.push(listener.time_s, listener.rotation);
   last_s_ = listener.time_s;
   last_rotation_ = listener.rotation;
   return true;

@@ -20,6 +20,7 @@
 #include "runtime/base/large.hpp"
 #include "runtime/radiation/transfers.hpp"
 #include "runtime/synth/effects.hpp"
+#include "runtime/synth/nonlinear_modes.hpp"
 #include "runtime/synth/oscillator.hpp"
 
 namespace carillon::synth {
@@ -121,6 +122,7 @@ std::shared_ptr<const Model> Model::make(const bank::Bank& bank, const ModelOpti
   model->find_bounds();
   if (kCompiledEffects.has(Effect::kDirectivity) && (options.transfers != nullptr || !bank.multipoles.is_empty()))
     model->add_directivity(options.transfers != nullptr ? options.transfers : std::make_shared<const radiation::Transfers>(bank));
+  if (kCompiledEffects.has(Effect::kNonlinear)) model->add_nonlinear(bank.quartic);
   return model;
 }
 
@@ -174,6 +176,38 @@ void Model::add_ringing_mode(const Mode& mode) {
     strike.force_re[j][lane] = static_cast<float>(cre[j]);
     strike.force_im[j][lane] = static_cast<float>(cim[j]);
   }
+}
+
+/// Modes that do not ring, or not below the Nyquist frequency, take no part.
+void Model::add_nonlinear(const bank::QuarticEnergy& energy) {
+  std::vector<std::pair<std::size_t, int>> ringing;  // number in the bank, here
+  for (int m = 0; m < ringing_; ++m) ringing.emplace_back(static_cast<std::size_t>(get_bank_mode(m)), m);
+  std::sort(ringing.begin(), ringing.end());
+  std::vector<std::size_t> numbers;
+  for (const auto& [number, mode] : ringing) numbers.push_back(number);
+  auto made = std::make_shared<ModelNonlinear>();
+  made->energy = bank::select_coupled(energy, numbers);
+  if (made->energy.is_empty()) return;
+  made->strike = strike_;
+  for (const std::int32_t place : made->energy.modes) {
+    const int m = ringing[static_cast<std::size_t>(place)].second;
+    const Mode& mode = modes_[static_cast<std::size_t>(m)];
+    made->mode.push_back(m);
+    made->constants.push_back({mode.lambda, mode.decay});
+    made->groups = std::max(made->groups, m / kGroup + 1);
+    made->strike[static_cast<std::size_t>(m / kGroup)].scale[m % kGroup] = 0.0F;
+    const double omega = std::sqrt(mode.lambda), omega_d = std::sqrt((omega - mode.decay) * (omega + mode.decay));
+    const auto points = get_chebyshev_points();
+    Moments re{}, im{};
+    for (int k = 0; k < kMoments; ++k) {
+      const double age = (1.0 - points[k]) / rate_hz_;
+      re[k] = std::exp(-mode.decay * age) * std::cos(omega_d * age);
+      im[k] = std::exp(-mode.decay * age) * std::sin(omega_d * age);
+    }
+    made->force_re.push_back(calc_chebyshev_coefficients(re));
+    made->force_im.push_back(calc_chebyshev_coefficients(im));
+  }
+  nonlinear_ = made;
 }
 
 void Model::add_damped_modes(const std::vector<Mode>& modes) {
@@ -459,7 +493,13 @@ std::size_t Model::calc_bytes() const {
   return sound_.size() * (sizeof(SoundTable) + sizeof(RotationTable) + sizeof(StrikeTable) + sizeof(weight_[0]) + sizeof(reach_[0])) +
          damped_.size() * sizeof(DampedMode) + modes_.size() * sizeof(Mode) + surface_->triangles.size() * sizeof(surface_->triangles[0]) +
          surface_->shape.size() * sizeof(surface_->shape[0]) + surface_->largest.size() * sizeof(surface_->largest[0]) +
-         (directivity_ ? directivity_->sound.size() * (sizeof(SoundTable) + sizeof(weight_[0]) + sizeof(reach_[0])) : 0);
+         (nonlinear_ ? nonlinear_->strike.size() * sizeof(StrikeTable) +
+                           4 * (nonlinear_->energy.rows.size() + nonlinear_->energy.gradient.size() + nonlinear_->energy.stress.size())
+                     : 0) +
+         (directivity_
+              ? directivity_->sound.size() * (sizeof(SoundTable) + sizeof(weight_[0]) + sizeof(reach_[0])) +
+                    (directivity_->tilt.size() + directivity_->level.size()) * sizeof(float) + directivity_->transfers->calc_bytes()
+              : 0);
 }
 
 }  // namespace carillon::synth

@@ -53,6 +53,8 @@ struct ModelDirectivity {
   Vec3 offset_m{};  // from the centre of mass to that of the multipoles, axes of the mesh
 };
 
+struct ModelNonlinear;  // nonlinear_modes.hpp
+
 /// Immutable; any number of voices on any threads may share one.
 class Model {
  public:
@@ -71,6 +73,8 @@ class Model {
   double get_eigenvalue_rad2_s2(int mode) const { return modes_[static_cast<std::size_t>(mode)].lambda; }
   double get_decay_per_s(int mode) const { return modes_[static_cast<std::size_t>(mode)].decay; }
   double get_gain(int mode) const { return modes_[static_cast<std::size_t>(mode)].gain; }
+  /// kg^-1/2 per step of the rows of find_rows().
+  double get_scale(int mode) const { return modes_[static_cast<std::size_t>(mode)].scale; }
   int get_bank_mode(int mode) const { return modes_[static_cast<std::size_t>(mode)].bank_mode; }
   /// How many of them ring: the first ones.
   int get_ringing_mode_count() const { return ringing_; }
@@ -84,9 +88,11 @@ class Model {
   double get_plane_strain_modulus_pa() const { return plane_strain_modulus_pa_; }
   /// nullptr where the bank has no multipoles, or this build not the effect.
   const ModelDirectivity* get_directivity() const { return directivity_.get(); }
+  /// nullptr where the bank has no nonlinear energy of modes that ring, or this build not the effect.
+  const ModelNonlinear* get_nonlinear() const { return nonlinear_.get(); }
   /// Centre of mass in the frame of the mesh.
   const Vec3& get_centre_m() const { return centre_m_; }
-  /// Memory of the tables, which all voices share.
+  /// Memory of the tables, which all voices share, with the transfers, which models of one bank may.
   std::size_t calc_bytes() const;
 
   /// A mode at, near or above critical damping, as (q, q'). Stiff ones take several substeps a sample while a pulse acts; those whose fast
@@ -109,7 +115,7 @@ class Model {
   const std::shared_ptr<const ModelSurface>& get_surface() const { return surface_; }
 
   /// All but the surface as bytes, for another program of the same build: a WebAssembly module makes models in one memory and plays them
-  /// in another. No file format. Without what directivity needs: the model that is read has no transfers and refuses that effect.
+  /// in another. No file format. Without what directivity and nonlinear motion need: the model that is read refuses these effects.
   std::vector<std::byte> write_tables() const;
   /// The model of these bytes and its surface. Throws InputError for bytes that are no model's of this build, or do not fit the surface.
   /// Takes no longer than copying the bytes does.
@@ -138,6 +144,7 @@ class Model {
   void copy_shapes(const bank::Bank& bank);
   void find_bounds();
   void add_directivity(std::shared_ptr<const radiation::Transfers> transfers);
+  void add_nonlinear(const bank::QuarticEnergy& energy);
   const std::int16_t* get_row(std::int32_t vertex, int axis) const {
     return surface_->shape.data() + (static_cast<std::size_t>(vertex) * 3 + static_cast<std::size_t>(axis)) * surface_->columns;
   }
@@ -156,6 +163,7 @@ class Model {
   std::vector<DampedMode> damped_;                 // ascending in substeps; those that follow come first
   std::shared_ptr<const ModelSurface> surface_;
   std::shared_ptr<const ModelDirectivity> directivity_;
+  std::shared_ptr<const ModelNonlinear> nonlinear_;
 };
 
 }  // namespace carillon::synth

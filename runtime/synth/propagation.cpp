@@ -1,11 +1,14 @@
 // Method:     delay lines that receivers read. A floor is heard by a mirrored receiver for each. With directivity each receiver has a
-//             line of its own, filled for its place (directivity.hpp), whose sound sets out from the sphere of the multipoles.
+//             line of its own, filled for its place (directivity.hpp), whose sound sets out from the sphere of the multipoles. A head has
+//             one receiver in its middle and one for each mirrored way, each with filters of its own: what the floor reflects comes from
+//             below.
 // Source:     J. B. Allen et al. 1979, Image method for efficiently simulating small-room acoustics (the mirrored microphone).
 // Deviations: the floor is rigid but for one factor, and has no end; the radiation of the body itself is that of free space.
 #include "runtime/synth/propagation.hpp"
 
 #include <algorithm>
 
+#include "runtime/head/head.hpp"
 #include "runtime/radiation/transfers.hpp"
 
 namespace carillon::synth {
@@ -18,25 +21,38 @@ const Trajectory& find_ear_track(const ListenerTracks& listener, bool apart, std
   return apart ? listener.get_track(microphone) : listener.get_middle_track();
 }
 
+/// Whether every microphone has an ear.
+bool are_apart(EffectSet effects) noexcept { return effects.has(Effect::kTwoEars) && !has_head(effects); }
+
+/// Samples by which receivers of these effects are later than they have to be, so that they are as late as a head.
+int calc_more_latency(EffectSet effects, const PropagationOptions& options) {
+  return options.head && !has_head(effects) ? options.head->head->get_latency() : 0;
+}
+
+/// What a delay line has to hold.
+double calc_longest_m(EffectSet effects, const PropagationOptions& options) {
+  return (effects.has(Effect::kAirDelay) ? options.longest_m : 0.0) + calc_more_latency(effects, options) / options.rate_hz * kSoundSpeedMs;
+}
+
 }  // namespace
 
 DirectedSound::DirectedSound(const std::shared_ptr<const Model>& model, const std::vector<Vec3>& offsets_m, std::size_t straight,
                              const PropagationOptions& options, EffectSet effects)
-    : weights(std::make_unique<Directivity>(model, offsets_m.size())),
+    : weights(std::make_unique<Directivity>(model, offsets_m.size(), options.phase)),
       straight_(straight),
-      apart_(effects.has(Effect::kTwoEars)),
+      apart_(are_apart(effects)),
       rate_hz_(options.rate_hz),
       offset_m_(model->get_directivity()->offset_m),
       offsets_m_(offsets_m),
       attitude_(static_cast<std::size_t>(options.max_waypoints)),
       centre_(static_cast<std::size_t>(options.max_waypoints)) {
-  const double longest_m = effects.has(Effect::kAirDelay) ? options.longest_m : 0.0;
+  const double longest_m = calc_longest_m(effects, options);
   const double sphere_m = model->get_directivity()->transfers->get_radius_m();
   lines_.reserve(offsets_m.size());
   receivers_.reserve(offsets_m.size());
   for (const Vec3& offset : offsets_m) {
     lines_.emplace_back(longest_m, options.rate_hz, kBlock);
-    receivers_.emplace_back(offset, options.rate_hz, effects, Isa::kBest, sphere_m);
+    receivers_.emplace_back(offset, options.rate_hz, effects, Isa::kBest, sphere_m, calc_more_latency(effects, options));
   }
 }
 
@@ -99,6 +115,10 @@ std::size_t DirectedSound::calc_bytes() const noexcept {
 }
 
 bool Propagation::is_silent() const noexcept {
+  return has_silent_lines() && std::all_of(head.begin(), head.end(), [](const HeadEars& ears) { return ears.is_silent(); });
+}
+
+bool Propagation::has_silent_lines() const noexcept {
   if (monopole && !monopole->is_silent()) return false;
   if (kCompiledEffects.has(Effect::kDirectivity) && directed && !directed->is_silent()) return false;
   return !dipole[0] || (dipole[0]->is_silent() && dipole[1]->is_silent() && dipole[2]->is_silent());
@@ -112,7 +132,7 @@ void Propagation::push_silence(std::int64_t samples) noexcept {
 }
 
 const Trajectory& Propagation::find_track(const ListenerTracks& listener, std::size_t ear, bool is_mirrored) const noexcept {
-  return find_ear_track(listener, has(effects, Effect::kTwoEars), ear, is_mirrored);
+  return find_ear_track(listener, are_apart(effects), ear, is_mirrored);
 }
 
 double Propagation::calc_longest_s(const ListenerTracks& listener, std::int64_t sample) const noexcept {
@@ -125,15 +145,17 @@ double Propagation::calc_longest_s(const ListenerTracks& listener, std::int64_t 
   return longest_s;
 }
 
+bool has_head(EffectSet effects) noexcept { return has(effects, Effect::kHead) && effects.has(Effect::kTwoEars); }
+
 std::size_t count_ears(EffectSet effects, const PropagationOptions& options) noexcept {
-  return (effects.has(Effect::kTwoEars) ? options.microphones_m.size() : 1) * (has(effects, Effect::kGroundReflection) ? 2 : 1);
+  return (are_apart(effects) ? options.microphones_m.size() : 1) * (has(effects, Effect::kGroundReflection) ? 2 : 1);
 }
 
 std::unique_ptr<Propagation> make_propagation(EffectSet effects, const PropagationOptions& options,
                                               const std::shared_ptr<const Model>& model) {
   auto propagation = std::make_unique<Propagation>();
   propagation->effects = effects;
-  const double longest_m = effects.has(Effect::kAirDelay) ? options.longest_m : 0.0;
+  const double longest_m = calc_longest_m(effects, options);
   const auto make_history = [&] { return std::make_unique<DelayLine>(longest_m, options.rate_hz, kBlock); };
   const bool is_directed = has(effects, Effect::kDirectivity) && effects.has(Effect::kModal);
   if (effects.has(Effect::kModal) && !is_directed) propagation->monopole = make_history();
@@ -142,14 +164,21 @@ std::unique_ptr<Propagation> make_propagation(EffectSet effects, const Propagati
     propagation->dipole[k] = make_history();
     propagation->source.dipole[k] = propagation->dipole[k].get();
   }
-  std::vector<Vec3> offsets = effects.has(Effect::kTwoEars) ? options.microphones_m : std::vector<Vec3>{calc_middle(options.microphones_m)};
+  std::vector<Vec3> offsets = are_apart(effects) ? options.microphones_m : std::vector<Vec3>{calc_middle(options.microphones_m)};
   const std::size_t straight = offsets.size();
   propagation->ears.reserve(straight);
-  for (const Vec3& place : offsets) propagation->ears.emplace_back(place, options.rate_hz, effects);
+  const auto add = [&](std::vector<Receiver>& ears, const Vec3& place) {
+    ears.emplace_back(place, options.rate_hz, effects, Isa::kBest, 0.0, calc_more_latency(effects, options));
+  };
+  for (const Vec3& place : offsets) add(propagation->ears, place);
   if (has(effects, Effect::kGroundReflection)) {
     for (std::size_t m = 0; m < straight; ++m) offsets.push_back(options.floor->mirror_direction(offsets[m]));
     propagation->mirrored.reserve(straight);
-    for (std::size_t m = straight; m < offsets.size(); ++m) propagation->mirrored.emplace_back(offsets[m], options.rate_hz, effects);
+    for (std::size_t m = straight; m < offsets.size(); ++m) add(propagation->mirrored, offsets[m]);
+  }
+  if (has_head(effects)) {
+    propagation->head.reserve(offsets.size());
+    for (std::size_t way = 0; way < offsets.size(); ++way) propagation->head.emplace_back(options.head->head);
   }
   if (is_directed) propagation->directed = std::make_unique<DirectedSound>(model, offsets, straight, options, effects);
   return propagation;

@@ -13,6 +13,7 @@
 #include "runtime/synth/directivity.hpp"
 #include "runtime/synth/effects.hpp"
 #include "runtime/synth/floor.hpp"
+#include "runtime/synth/head_ears.hpp"
 #include "runtime/synth/listener.hpp"
 #include "runtime/synth/model.hpp"
 #include "runtime/synth/receiver.hpp"
@@ -25,7 +26,9 @@ struct PropagationOptions {
   std::vector<Vec3> microphones_m;  // from the listener
   double longest_m = 0.0;
   int max_waypoints = 0;
-  std::optional<Floor> floor;  // for kGroundReflection
+  std::optional<Floor> floor;         // for kGroundReflection
+  std::optional<ListeningHead> head;  // for kHead; what does not go through it is heard as late
+  int phase = 0;                      // of Directivity
 };
 
 /// The modes' sound with directivity: a delay line of its own for each ear, and for each mirrored one behind them. What it keeps true: the
@@ -78,7 +81,8 @@ class DirectedSound {
 };
 
 /// What it keeps true: all its delay lines have the same samples. Without directivity modes send one sound all round, with it one to each
-/// ear; acceleration noise sends its three dipoles in both cases. With ground reflection there is a mirrored ear for each.
+/// ear; acceleration noise sends its three dipoles in both cases. With ground reflection there is a mirrored ear for each. With a head
+/// there is one ear, in its middle, and what arrives there goes through the head in the direction from which it comes.
 struct Propagation {
   EffectSet effects;
   std::unique_ptr<DelayLine> monopole;               // with modes that send the same all round
@@ -86,10 +90,13 @@ struct Propagation {
   std::unique_ptr<DirectedSound> directed;           // with modes that do not
   std::vector<Receiver> ears;                        // one a microphone, or one for all without two ears
   std::vector<Receiver> mirrored;                    // with ground reflection as many, of monopole and dipole
+  std::vector<HeadEars> head;                        // with a head: of what comes straight, and of what the ground reflects
   std::int64_t first = 0;                            // sample of the scene with which it began
   Source source;
 
   bool is_silent() const noexcept;
+  /// Nothing is on its way to the ears, though a head may still sound.
+  bool has_silent_lines() const noexcept;
   void push_silence(std::int64_t samples) noexcept;
   const DelayLine& get_line() const noexcept { return monopole ? *monopole : directed ? directed->get_line() : *dipole[0]; }
   /// The way of its longest sound at a sample [s]; 0 without travel time. [audio-thread]
@@ -98,7 +105,10 @@ struct Propagation {
   const Trajectory& find_track(const ListenerTracks& listener, std::size_t ear, bool is_mirrored) const noexcept;
 };
 
-/// How many ears a body of these effects has, with the mirrored ones.
+/// Whether a body of these effects is heard through a head.
+bool has_head(EffectSet effects) noexcept;
+
+/// How many ears a body of these effects has, with the mirrored ones; a head counts as one.
 std::size_t count_ears(EffectSet effects, const PropagationOptions& options) noexcept;
 
 /// Throws InputError for directivity of a model without transfers. [main-thread]

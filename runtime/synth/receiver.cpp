@@ -12,50 +12,18 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <vector>
 
-#include "runtime/base/kaiser_sinc.hpp"
+#include "runtime/base/sinc.hpp"
 #include "runtime/base/vector.hpp"
 #include "runtime/radiation/transfers.hpp"
 
 namespace carillon::synth {
 namespace {
 
-constexpr int kPhases = 512;
+constexpr int kPhases = base::kSincPhases;
 constexpr double kFarthest = 1e12;  // samples; keeps what follows within integers
 using Taps = std::array<float, kTaps>;
-
-std::vector<Taps> make_sinc_table() {
-  std::vector<Taps> table(kPhases + 1);
-  const double half = kTaps / 2;
-  for (int phase = 0; phase <= kPhases; ++phase) {
-    std::array<double, kTaps> taps{};
-    double total = 0.0;
-    for (int tap = 0; tap < kTaps; ++tap) {
-      // Tap `tap` sits at sample floor(t) - half + 1 + tap.
-      taps[tap] = base::calc_kaiser_sinc(tap - half + 1.0 - static_cast<double>(phase) / kPhases, half);
-      total += taps[tap];
-    }
-    for (int tap = 0; tap < kTaps; ++tap) table[phase][tap] = static_cast<float>(taps[tap] / total);
-  }
-  return table;
-}
-
-const std::vector<Taps>& get_sinc_table() {
-  static const std::vector<Taps> table = make_sinc_table();
-  return table;
-}
-
-Taps calc_taps(double phase) noexcept {
-  const double scaled = phase * kPhases;
-  const int index = std::min(static_cast<int>(scaled), kPhases - 1);
-  const auto mix = static_cast<float>(scaled - index);
-  const Taps& a = get_sinc_table()[static_cast<std::size_t>(index)];
-  const Taps& b = get_sinc_table()[static_cast<std::size_t>(index) + 1];
-  Taps taps;
-  for (int tap = 0; tap < kTaps; ++tap) taps[tap] = a[tap] + mix * (b[tap] - a[tap]);
-  return taps;
-}
+static_assert(kTaps == base::kSincTaps);
 
 /// A sub-block or less of what comes by one phase. False when all is silence.
 bool read_row(const Kernels& kernels, const DelayLine& sent, std::int64_t first, const Taps& taps, std::span<float> row) noexcept {
@@ -152,9 +120,14 @@ void Cubic::evaluate(int first, std::span<double> out) const noexcept {
   }
 }
 
-Receiver::Receiver(const Vec3& offset_m, double sample_rate_hz, EffectSet effects, Isa isa, double sphere_m)
-    : offset_m_(offset_m), rate_hz_(sample_rate_hz), effects_(effects), kernels_(&get_kernels(isa)), sphere_m_(sphere_m) {
-  get_sinc_table();  // built here, not in process()
+Receiver::Receiver(const Vec3& offset_m, double sample_rate_hz, EffectSet effects, Isa isa, double sphere_m, int more_latency)
+    : offset_m_(offset_m),
+      rate_hz_(sample_rate_hz),
+      effects_(effects),
+      kernels_(&get_kernels(isa)),
+      sphere_m_(sphere_m),
+      latency_(kLatency + more_latency) {
+  base::Sinc::get();  // built here, not in process()
 }
 
 /// The way of what arrives at a time, through the air or without it; from the sphere, where there is one.
@@ -175,19 +148,19 @@ PathState Receiver::calc_way(const Source& source, const Trajectory& listener, d
 
 void Receiver::begin(const Source& source, const Trajectory& listener, std::int64_t sample) noexcept {
   if (!has(effects_, Effect::kAirDelay)) return;
-  first_delay_s_ = calc_way(source, listener, static_cast<double>(sample - kLatency) / rate_hz_).delay_s;
+  first_delay_s_ = calc_way(source, listener, static_cast<double>(sample - latency_) / rate_hz_).delay_s;
   is_placed_ = true;
 }
 
 double Receiver::calc_delay_s(const Source& source, const Trajectory& listener, std::int64_t sample) const noexcept {
   if (!has(effects_, Effect::kAirDelay)) return 0.0;
   if (!has(effects_, Effect::kDoppler) && is_placed_) return first_delay_s_;
-  return calc_way(source, listener, static_cast<double>(sample - kLatency) / rate_hz_).delay_s;
+  return calc_way(source, listener, static_cast<double>(sample - latency_) / rate_hz_).delay_s;
 }
 
 /// Of what arrives at a border of sub-blocks, with the effects that this ear has.
 PathState Receiver::find_path_state(const Source& source, const Trajectory& listener, std::int64_t border, double& travel_s) noexcept {
-  const double arrival_s = static_cast<double>(border * kSubBlock - kLatency) / rate_hz_;
+  const double arrival_s = static_cast<double>(border * kSubBlock - latency_) / rate_hz_;
   travel_s = 0.0;
   PathState way = calc_way(source, listener, arrival_s);
   if (!has(effects_, Effect::kAirDelay)) return way;
@@ -217,12 +190,12 @@ void Receiver::find_path_states(const Source& source, const Trajectory& listener
     from_ = find_path_state(source, listener, sub_block, travel_s_);
   sub_block_ = sub_block;
   // Where nothing has moved since this was sent, nothing changes until the end.
-  const double arrival_s = static_cast<double>(sub_block * kSubBlock - kLatency) / rate_hz_;
+  const double arrival_s = static_cast<double>(sub_block * kSubBlock - latency_) / rate_hz_;
   const bool rests = from_.delay_slope == 0.0 && from_.spreading_slope == 0.0 && source.track->is_still_from(arrival_s - travel_s_) &&
                      listener.is_still_from(arrival_s);
   to_ = rests ? from_ : find_path_state(source, listener, sub_block + 1, travel_s_);
   const double width_s = kSubBlock / rate_hz_;
-  delay_ = Cubic::make(rate_hz_ * from_.delay_s + kLatency, kSubBlock * from_.delay_slope, rate_hz_ * to_.delay_s + kLatency,
+  delay_ = Cubic::make(rate_hz_ * from_.delay_s + latency_, kSubBlock * from_.delay_slope, rate_hz_ * to_.delay_s + latency_,
                        kSubBlock * to_.delay_slope);
   spreading_ = Cubic::make(from_.spreading_1_m, width_s * from_.spreading_slope, to_.spreading_1_m, width_s * to_.spreading_slope);
   for (std::size_t k = 0; k < 3; ++k) {
@@ -255,7 +228,7 @@ void Receiver::process_still(const Source& source, std::int64_t sample, std::spa
   const std::int64_t first = sample - static_cast<std::int64_t>(whole) - kTaps / 2 + 1;
   if (whole - delay != phase_) {
     phase_ = whole - delay;
-    taps_ = calc_taps(phase_);
+    base::Sinc::get().make_delay(phase_, taps_);
   }
   const auto begin = static_cast<int>(sample % kSubBlock);
   const std::size_t count = received_pa.size();
@@ -289,7 +262,7 @@ void Receiver::process_moving(const Source& source, std::int64_t sample, std::sp
   std::array<std::int64_t, kSubBlock> first;
   std::array<Reading, kSubBlock> readings;
   std::int64_t lowest = std::numeric_limits<std::int64_t>::max(), highest = std::numeric_limits<std::int64_t>::min();
-  const float* table = get_sinc_table().data()->data();
+  const float* table = base::Sinc::get().get_taps(0);
   for (std::size_t i = 0; i < count; ++i) {
     readings[i].sources = 0;
     if (!(delay[i] < kFarthest)) return;

@@ -50,19 +50,20 @@ struct Cubic {
   void evaluate(int first, std::span<double> out) const noexcept;
 };
 
-/// One source heard by one microphone. Sample n of the output is what arrives at time (n - kLatency) / rate. Invariant: delay, level and
-/// direction are exact at the ends of each sub-block and cubic in between, however the calls divide the samples.
+/// One source heard by one microphone. Sample n of the output is what arrives at time (n - get_latency()) / rate. Invariant: delay, level
+/// and direction are exact at the ends of each sub-block and cubic in between, however the calls divide the samples.
 class Receiver {
  public:
-  static constexpr int kLatency = kTaps / 2;          // samples by which the output lags behind
+  static constexpr int kLatency = kTaps / 2;          // samples by which the output lags behind at least
   static constexpr int kSubBlock = synth::kSubBlock;  // samples between two ways; cubic in time between
 
   /// `offset_m`: of the microphone from the listener, in the axes of the world. Of the effects kAirDelay and kDoppler are looked at:
   /// without the first sound takes no time, without the second it takes as long as at the beginning, wherever its source goes.
   /// `sphere_m`: 0, or the radius of the sphere about the source from which the sound sets out with its spreading already in it, as
-  /// radiation::Transfers gives it: it takes (r - R) / c and loses nothing on its way.
+  /// radiation::Transfers gives it: it takes (r - R) / c and loses nothing on its way. `more_latency` >= 0: samples by which the output
+  /// lags in addition, so that it comes with that of receivers whose sound goes through something else.
   Receiver(const Vec3& offset_m, double sample_rate_hz, EffectSet effects = {Effect::kAirDelay, Effect::kDoppler}, Isa isa = Isa::kBest,
-           double sphere_m = 0.0);
+           double sphere_m = 0.0, int more_latency = 0);
 
   /// Says where the first sample is: without kDoppler its sound takes as long for ever. Without a call it is the first that is processed.
   /// [audio-thread]
@@ -76,6 +77,11 @@ class Receiver {
   /// that stand still are cheap. [audio-thread]: no heap, no lock, no throw.
   int process(const Source& source, const Trajectory& listener, std::int64_t sample, std::span<double> received_pa) noexcept;
 
+  int get_latency() const noexcept { return latency_; }
+  /// From the source, where it was when it sent what arrives at the end of the sub-block that was processed last, to the microphone; of any
+  /// length, and none where both are at one place. [audio-thread]
+  const Vec3& get_direction() const noexcept { return to_.direction; }
+
  private:
   PathState find_path_state(const Source& source, const Trajectory& listener, std::int64_t border, double& travel_s) noexcept;
   PathState calc_way(const Source& source, const Trajectory& listener, double time_s) const noexcept;
@@ -88,6 +94,7 @@ class Receiver {
   EffectSet effects_;
   const Kernels* kernels_ = nullptr;
   double sphere_m_ = 0.0;
+  int latency_ = kLatency;
   std::int64_t sub_block_ = -1;  // of which `from_` is the beginning and `to_` the end
   PathState from_, to_;
   Cubic delay_, spreading_;  // between them [samples], [1/m]

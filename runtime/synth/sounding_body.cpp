@@ -17,8 +17,8 @@
 namespace carillon::synth {
 namespace {
 
-constexpr EffectSet kOfPropagation{Effect::kModal,   Effect::kAccelerationNoise, Effect::kAirDelay,        Effect::kDoppler,
-                                   Effect::kTwoEars, Effect::kDirectivity,       Effect::kGroundReflection};
+constexpr EffectSet kOfPropagation{Effect::kModal,   Effect::kAccelerationNoise, Effect::kAirDelay,         Effect::kDoppler,
+                                   Effect::kTwoEars, Effect::kDirectivity,       Effect::kGroundReflection, Effect::kHead};
 
 constexpr EffectSet kOfContacts = kContactEffects.common(kCompiledEffects);
 
@@ -34,11 +34,23 @@ bool has_same_sphere(const Model& a, const Model& b) {
   return one.offset_m == other.offset_m && one.transfers->get_radius_m() == other.transfers->get_radius_m();
 }
 
+/// From 0 to 1 over a block, or back.
+double calc_fade(Fade fade, std::int64_t sample) noexcept {
+  if (fade == Fade::kNone) return 1.0;
+  if (fade == Fade::kUnheard) return 0.0;
+  const double u = static_cast<double>(sample % kBlock) / kBlock, in = u * u * (3.0 - 2.0 * u);
+  return fade == Fade::kIn ? in : 1.0 - in;
+}
+
 }  // namespace
 
 EffectBytes BodyChange::calc_bytes() const {
   EffectBytes bytes;
-  if (voice) bytes[Effect::kModal] += static_cast<std::int64_t>(voice->calc_bytes());
+  if (voice) {
+    const auto nonlinear = static_cast<std::int64_t>(voice->calc_nonlinear_bytes());
+    bytes[Effect::kModal] += static_cast<std::int64_t>(voice->calc_bytes()) - nonlinear;
+    bytes[Effect::kNonlinear] += nonlinear;
+  }
   if (acceleration_noise) {
     bytes[Effect::kAccelerationNoise] +=
         static_cast<std::int64_t>(sizeof(BodyAccelerationNoise) - sizeof(AccelerationNoise) + acceleration_noise->noise.calc_bytes() +
@@ -47,11 +59,12 @@ EffectBytes BodyChange::calc_bytes() const {
   if (directivity) bytes[Effect::kDirectivity] += static_cast<std::int64_t>(directivity->calc_bytes());
   if (contacts) bytes[Effect::kRoughness] += static_cast<std::int64_t>(contacts->calc_bytes());
   if (!propagation) return bytes;
-  // What a delay line holds beyond one without travel time belongs to the travel time.
+  // What a delay line holds beyond one without travel time belongs to the travel time, or to the wait for what goes through a head.
   const DelayLine still(0.0, 1.0, kBlock);
+  const Effect waits = propagation->effects.has(Effect::kAirDelay) ? Effect::kAirDelay : Effect::kModal;
   const auto add = [&](const DelayLine& delay_line, Effect effect) {
     bytes[effect] += static_cast<std::int64_t>(sizeof(DelayLine) + still.get_bytes());
-    bytes[Effect::kAirDelay] += static_cast<std::int64_t>(delay_line.get_bytes() - still.get_bytes());
+    bytes[waits] += static_cast<std::int64_t>(delay_line.get_bytes() - still.get_bytes());
   };
   if (propagation->monopole) add(*propagation->monopole, Effect::kModal);
   for (const auto& delay_line : propagation->dipole)
@@ -60,11 +73,12 @@ EffectBytes BodyChange::calc_bytes() const {
   bytes[source] += static_cast<std::int64_t>(sizeof(Propagation) + sizeof(Receiver));
   bytes[Effect::kTwoEars] += static_cast<std::int64_t>((propagation->ears.size() - 1) * sizeof(Receiver));
   bytes[Effect::kGroundReflection] += static_cast<std::int64_t>(propagation->mirrored.size() * sizeof(Receiver));
+  for (const HeadEars& ears : propagation->head) bytes[Effect::kHead] += static_cast<std::int64_t>(ears.calc_bytes());
   if (!propagation->directed) return bytes;
   bytes[Effect::kDirectivity] += static_cast<std::int64_t>(propagation->directed->calc_bytes());
   for (const DelayLine& line : propagation->directed->get_lines()) {
     bytes[Effect::kDirectivity] += static_cast<std::int64_t>(still.get_bytes());
-    bytes[Effect::kAirDelay] += static_cast<std::int64_t>(line.get_bytes() - still.get_bytes());
+    bytes[waits] += static_cast<std::int64_t>(line.get_bytes() - still.get_bytes());
   }
   return bytes;
 }
@@ -80,6 +94,9 @@ void SoundingBody::check(EffectSet effects, const Model& model) {
   if (has(effects, Effect::kDirectivity) && model.get_directivity() == nullptr)
     throw InputError(
         "directivity needs a bank with multipoles, which this body's has not; make the bank with them, or leave the effect out");
+  if (has(effects, Effect::kNonlinear) && model.get_nonlinear() == nullptr)
+    throw InputError(
+        "nonlinear needs a bank with a nonlinear energy, which this body's has not; make the bank with it, or leave the effect out");
   if (!effects.has(Effect::kAccelerationNoise)) return;
   if (!(model.get_sphere_radius_m() > 0.0 && model.get_mass_kg() > 0.0))
     throw InputError("acceleration_noise needs a body with a mass and a volume; the bank of this one gives none");
@@ -90,7 +107,9 @@ PropagationOptions SoundingBody::make_propagation_options() const {
           .microphones_m = frame_.microphones_m,
           .longest_m = frame_.longest_m,
           .max_waypoints = frame_.max_waypoints,
-          .floor = frame_.floor};
+          .floor = frame_.floor,
+          .head = frame_.head,
+          .phase = frame_.phase};
 }
 
 std::unique_ptr<BodyChange> SoundingBody::make_change(EffectSet from, EffectSet to, std::shared_ptr<const Model> model) {
@@ -99,13 +118,16 @@ std::unique_ptr<BodyChange> SoundingBody::make_change(EffectSet from, EffectSet 
   change->effects = to;
   change->inherits = model != model_;
   const auto lacks = [&](Effect effect) { return to.has(effect) && (change->inherits || !from.has(effect)); };
-  if (lacks(Effect::kModal)) {
+  // Modes that large motion couples are in a voice of another make.
+  const bool couples = has(to, Effect::kNonlinear) != has(from, Effect::kNonlinear);
+  if (lacks(Effect::kModal) || (couples && to.has(Effect::kModal))) {
     change->voice = std::make_unique<Voice>(model, VoiceOptions{.max_strikes = frame_.max_strikes,
                                                                 .max_forces = frame_.max_forces,
                                                                 .silence_pa = frame_.silence_pa,
                                                                 .isa = frame_.isa,
+                                                                .is_nonlinear = has(to, Effect::kNonlinear),
                                                                 .audits_energy = frame_.audits_energy});
-    if (change->inherits && from.has(Effect::kModal)) change->handover = std::make_unique<VoiceHandover>(*model_, *model);
+    if ((change->inherits || couples) && from.has(Effect::kModal)) change->handover = std::make_unique<VoiceHandover>(*model_, *model);
   }
   if (lacks(Effect::kAccelerationNoise)) {
     change->acceleration_noise = std::make_unique<BodyAccelerationNoise>(BodyAccelerationNoise{
@@ -120,7 +142,7 @@ std::unique_ptr<BodyChange> SoundingBody::make_change(EffectSet from, EffectSet 
   bool changes_air = to.common(kOfPropagation) != from.common(kOfPropagation);
   const auto is_directed = [](EffectSet effects) { return has(effects, Effect::kDirectivity) && effects.has(Effect::kModal); };
   if (change->inherits && is_directed(from)) {
-    change->directivity = std::make_unique<Directivity>(model, count_ears(from, make_propagation_options()));
+    change->directivity = std::make_unique<Directivity>(model, count_ears(from, make_propagation_options()), frame_.phase);
     changes_air = changes_air || (is_directed(to) && !has_same_sphere(*model_, *model));
   }
   if (changes_air && sounds) change->propagation = make_propagation(to, make_propagation_options(), model);
@@ -140,6 +162,7 @@ void SoundingBody::apply(BodyChange& change, const ListenerTracks& listener, std
       change.voice->direct(change.directivity.get(), nullptr);
       std::swap(propagation_->directed->weights, change.directivity);
     }
+    if (voice_ && change.handover && !change.directivity) change.voice->direct_as(*voice_);
     if (voice_ && change.handover)
       change.voice->take_over(*voice_, *change.handover);
     else
@@ -196,10 +219,12 @@ void SoundingBody::put_contacts(BodyChange& change) noexcept {
     voice_->attach(contacts_.get());
   } else if (contacts_ && needs_contacts(effects_)) {
     contacts_->set_effects(effects_);
-  } else if (contacts_ && change.inherits) {  // of the old model
+    if (voice_) voice_->attach(contacts_.get());  // which may be another voice of the same model
+  } else if (contacts_ && change.inherits) {      // of the old model
     change.contacts = std::move(contacts_);
   } else if (contacts_) {
     contacts_->release();
+    if (voice_) voice_->attach(contacts_.get());
   }
 }
 
@@ -208,8 +233,11 @@ bool SoundingBody::is_filled(const Propagation& propagation, const ListenerTrack
   if (!propagation_ || propagation_->is_silent()) return true;
   const std::int64_t filled = sample - propagation.first;
   const DelayLine& delay_line = propagation.get_line();
-  const double needed = propagation.calc_longest_s(listener, sample) * frame_.rate_hz + Receiver::kLatency + kTaps + kBlock;
-  return static_cast<double>(filled) >= needed || filled >= delay_line.get_size();
+  const double needed =
+      propagation.calc_longest_s(listener, sample) * frame_.rate_hz + propagation.ears.front().get_latency() + kTaps + kBlock;
+  // What is in a head's filters has come from full lines.
+  const std::int64_t full = filled - (propagation.head.empty() ? 0 : propagation.head.front().get_length());
+  return static_cast<double>(full) >= needed || full >= delay_line.get_size();
 }
 
 BodyChange* SoundingBody::finish_change(const ListenerTracks& listener, std::int64_t sample) noexcept {
@@ -353,6 +381,7 @@ Effect SoundingBody::make_modal_sound(std::span<float> mono) noexcept {
     work_.energy_rise = std::max(work_.energy_rise, after.energy_rise);
     work_.radiated_j += after.radiated_j - before.radiated_j;
     work_.units[Effect::kModal] += after.mode_samples - before.mode_samples;
+    work_.units[Effect::kNonlinear] += after.coupled_samples - before.coupled_samples;
     if (touched) {
       const std::int64_t textured = contacts_->get_counters().samples - contact_samples;
       if (has(effects_, Effect::kRoughness)) work_.units[Effect::kRoughness] += textured;
@@ -408,6 +437,27 @@ void SoundingBody::make_acceleration_noise(const std::array<std::span<float>, 3>
   }
 }
 
+bool SoundingBody::is_directed() const noexcept {
+  const auto has_it = [](const std::unique_ptr<Propagation>& path) { return path && path->directed; };
+  return has_it(propagation_) || has_it(next_propagation_);
+}
+
+int SoundingBody::find_transfer_need(std::int64_t sample) noexcept {
+  int demand = 0;
+  for (const Propagation* path : {propagation_.get(), next_propagation_.get()})
+    if (path != nullptr && path->directed && path->directed->weights->get_block() == sample / kBlock - 1)
+      demand += path->directed->weights->get_demand();
+  return transfer_need_ = TransferBudget::find_need(transfer_need_, demand);
+}
+
+void SoundingBody::set_transfer_share(const TransferBudget& budget) noexcept {
+  int paths = 0;
+  for (const Propagation* path : {propagation_.get(), next_propagation_.get()})
+    paths += static_cast<int>(path != nullptr && path->directed);
+  for (const Propagation* path : {propagation_.get(), next_propagation_.get()})
+    if (path != nullptr && path->directed) path->directed->weights->set_share(budget.find_share(transfer_need_) / paths);
+}
+
 /// Where the modes sound, weights for this block.
 void SoundingBody::begin_directed_block(std::int64_t sample, const ListenerTracks& listener) noexcept {
   if (voice_->is_idle()) return;
@@ -443,16 +493,12 @@ void SoundingBody::make_sound(std::int64_t sample, std::size_t count, const List
 /// What one ear hears, times a level, into the mix of its microphone, or of all where they are not `apart`. Returns how many samples came
 /// by a way that changes.
 int SoundingBody::hear_ear(Receiver& ear, const Source& source, const Trajectory& track, std::size_t microphone, double level,
-                           std::int64_t sample, std::size_t count, int fade, bool apart, BodyScratch& scratch, Mix& mix) noexcept {
-  if (apart && fade == 0 && level == 1.0) return ear.process(source, track, sample, std::span(mix[microphone]).first(count));
+                           std::int64_t sample, std::size_t count, Fade fade, bool apart, BodyScratch& scratch, Mix& mix) noexcept {
+  if (apart && fade == Fade::kNone && level == 1.0) return ear.process(source, track, sample, std::span(mix[microphone]).first(count));
   const std::span<double> heard = std::span(scratch.heard).first(count);
   std::fill(heard.begin(), heard.end(), 0.0);
   const int moved = ear.process(source, track, sample, heard);
-  const auto begin = static_cast<int>(sample % kBlock);
-  for (std::size_t n = 0; n < count && fade != 0; ++n) {
-    const double u = (begin + static_cast<int>(n)) / static_cast<double>(kBlock), in = u * u * (3.0 - 2.0 * u);
-    heard[n] *= fade > 0 ? in : 1.0 - in;
-  }
+  for (std::size_t n = 0; n < count && fade != Fade::kNone; ++n) heard[n] *= calc_fade(fade, sample + static_cast<std::int64_t>(n));
   if (level != 1.0)
     for (double& p : heard) p *= level;
   for (std::size_t c = apart ? microphone : 0; c < (apart ? microphone + 1 : mix.size()); ++c)
@@ -460,26 +506,32 @@ int SoundingBody::hear_ear(Receiver& ear, const Source& source, const Trajectory
   return moved;
 }
 
-/// `fade`: 0 none, 1 in, -1 out.
-void SoundingBody::hear(Propagation& propagation, std::int64_t sample, std::size_t count, const ListenerTracks& listener, int fade,
+/// What an ear has done, and how long it took.
+void SoundingBody::count_ear(const Propagation& propagation, Effect sends, std::size_t microphone, bool is_mirrored, int moved,
+                             std::size_t count, std::int64_t ticks) noexcept {
+  const bool has_delay = has(propagation.effects, Effect::kAirDelay);
+  if (is_mirrored) {
+    work_.units[Effect::kGroundReflection] += static_cast<std::int64_t>(count);
+  } else {
+    if (has_delay) work_.units[Effect::kAirDelay] += static_cast<std::int64_t>(count);
+    if (has(propagation.effects, Effect::kDoppler)) work_.units[Effect::kDoppler] += moved;
+    if (microphone > 0) work_.units[Effect::kTwoEars] += static_cast<std::int64_t>(count);
+  }
+  const Effect carries = moved > 0 ? Effect::kDoppler : has_delay ? Effect::kAirDelay : sends;
+  work_.ticks[is_mirrored ? Effect::kGroundReflection : microphone > 0 ? Effect::kTwoEars : carries] += ticks;
+}
+
+void SoundingBody::hear(Propagation& propagation, std::int64_t sample, std::size_t count, const ListenerTracks& listener, Fade fade,
                         BodyScratch& scratch, Mix& mix, TickFunction ticks) noexcept {
   if (propagation.is_silent()) return;
+  if (kCompiledEffects.has(Effect::kHead) && !propagation.head.empty())
+    return hear_by_head(propagation, sample, count, listener, fade, scratch, mix, ticks);
+  if (fade == Fade::kUnheard) return;
   std::uint64_t started = ticks != nullptr ? ticks() : 0;
   const bool apart = has(propagation.effects, Effect::kTwoEars);
   const auto add_work = [&](Effect sends, std::size_t m, bool is_mirrored, int moved) {
-    if (is_mirrored) {
-      work_.units[Effect::kGroundReflection] += static_cast<std::int64_t>(count);
-    } else {
-      if (has(propagation.effects, Effect::kAirDelay)) work_.units[Effect::kAirDelay] += static_cast<std::int64_t>(count);
-      if (has(propagation.effects, Effect::kDoppler)) work_.units[Effect::kDoppler] += moved;
-      if (m > 0) work_.units[Effect::kTwoEars] += static_cast<std::int64_t>(count);
-    }
-    if (ticks == nullptr) return;
-    const std::uint64_t now = ticks();
-    const Effect carries = moved > 0 ? Effect::kDoppler : has(propagation.effects, Effect::kAirDelay) ? Effect::kAirDelay : sends;
-    work_.ticks[is_mirrored ? Effect::kGroundReflection
-                : m > 0     ? Effect::kTwoEars
-                            : carries] += static_cast<std::int64_t>(now - std::exchange(started, now));
+    const std::uint64_t now = ticks != nullptr ? ticks() : 0;
+    count_ear(propagation, sends, m, is_mirrored, moved, count, static_cast<std::int64_t>(now - std::exchange(started, now)));
   };
   const Effect sends = propagation.monopole ? Effect::kModal : Effect::kAccelerationNoise;
   for (std::size_t m = 0; m < propagation.ears.size() && (propagation.monopole || propagation.dipole[0]); ++m) {
@@ -503,12 +555,75 @@ void SoundingBody::hear(Propagation& propagation, std::int64_t sample, std::size
   }
 }
 
+/// What arrives in the middle of the head straight, and then by way of the floor, each through the head's ears in the direction from which
+/// it comes. All that the body sends comes from one direction: that of its centre of mass, or of its multipoles where it sends nothing
+/// else.
+void SoundingBody::hear_by_head(Propagation& propagation, std::int64_t sample, std::size_t count, const ListenerTracks& listener, Fade fade,
+                                BodyScratch& scratch, Mix& mix, TickFunction ticks) noexcept {
+  const bool is_loud = !propagation.has_silent_lines(), has_whole = propagation.monopole || propagation.dipole[0];
+  const Effect sends = propagation.monopole ? Effect::kModal : has_whole ? Effect::kAccelerationNoise : Effect::kDirectivity;
+  for (std::size_t way = 0; way < propagation.head.size(); ++way) {
+    const bool is_mirrored = way > 0;
+    const double level = is_mirrored ? listener.get_floor()->reflection : 1.0;
+    std::uint64_t started = ticks != nullptr ? ticks() : 0;
+    const std::span<double> arrived = std::span(scratch.heard).first(count);
+    std::fill(arrived.begin(), arrived.end(), 0.0);
+    std::array<Vec3, kSubBlocks> direction{};  // from the body, at the end of each sub-block
+    int moved = 0;
+    const auto hear_one = [&](Receiver& ear, const Source& source, const Trajectory& track, bool is_first) {
+      for (std::size_t n = 0; n < count; n += kSubBlock) {
+        const std::span<double> piece = arrived.subspan(n, std::min<std::size_t>(kSubBlock, count - n));
+        const int changed = ear.process(source, track, sample + static_cast<std::int64_t>(n), piece);
+        if (!is_first) continue;
+        moved += changed;
+        direction[n / kSubBlock] = ear.get_direction();
+      }
+    };
+    if (has_whole)
+      hear_one(is_mirrored ? propagation.mirrored[0] : propagation.ears[0], propagation.source,
+               propagation.find_track(listener, 0, is_mirrored), true);
+    if (kCompiledEffects.has(Effect::kDirectivity) && propagation.directed) {
+      DirectedSound& directed = *propagation.directed;
+      hear_one(directed.get_receiver(way), directed.make_source(way), directed.find_track(listener, way), !has_whole);
+    }
+    std::uint64_t now = ticks != nullptr ? ticks() : 0;
+    count_ear(propagation, sends, 0, is_mirrored, moved, count, static_cast<std::int64_t>(now - std::exchange(started, now)));
+    if (level != 1.0)
+      for (double& p : arrived) p *= level;
+
+    std::array<std::span<double>, 2> ears{std::span(mix[0]).first(count), std::span(mix[1]).first(count)};
+    if (fade != Fade::kNone) {
+      for (std::size_t e = 0; e < 2; ++e) {
+        ears[e] = std::span(scratch.by_head[e]).first(count);
+        std::fill(ears[e].begin(), ears[e].end(), 0.0);
+      }
+    }
+    for (std::size_t n = 0; n < count; n += kSubBlock) {
+      const std::size_t size = std::min<std::size_t>(kSubBlock, count - n);
+      Vec3 from = -1.0 * direction[n / kSubBlock];
+      if (is_mirrored) from = listener.get_floor()->mirror_direction(from);
+      const double end_s = static_cast<double>(sample + static_cast<std::int64_t>(n + size) - Receiver::kLatency) / frame_.rate_hz;
+      propagation.head[way].process(listener.find_in_head(from, end_s), arrived.subspan(n, size), is_loud, ears[0].subspan(n, size),
+                                    ears[1].subspan(n, size));
+    }
+    if (fade == Fade::kIn || fade == Fade::kOut) {
+      for (std::size_t n = 0; n < count; ++n) {
+        const double share = calc_fade(fade, sample + static_cast<std::int64_t>(n));
+        for (std::size_t e = 0; e < 2; ++e) mix[e][n] += share * ears[e][n];
+      }
+    }
+    work_.units[Effect::kHead] += static_cast<std::int64_t>(count);
+    now = ticks != nullptr ? ticks() : 0;
+    work_.ticks[Effect::kHead] += static_cast<std::int64_t>(now - started);
+  }
+}
+
 void SoundingBody::render(std::int64_t sample, std::size_t count, const ListenerTracks& listener, BodyScratch& scratch, Mix& mix,
                           TickFunction ticks) noexcept {
   wake(sample);
   make_sound(sample, count, listener, scratch, ticks);
-  if (propagation_) hear(*propagation_, sample, count, listener, fading_ ? -1 : 0, scratch, mix, ticks);
-  if (next_propagation_ && fading_) hear(*next_propagation_, sample, count, listener, 1, scratch, mix, ticks);
+  if (propagation_) hear(*propagation_, sample, count, listener, fading_ ? Fade::kOut : Fade::kNone, scratch, mix, ticks);
+  if (next_propagation_) hear(*next_propagation_, sample, count, listener, fading_ ? Fade::kIn : Fade::kUnheard, scratch, mix, ticks);
   rendered_ = sample + static_cast<std::int64_t>(count);
 }
 

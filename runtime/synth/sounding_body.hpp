@@ -20,6 +20,7 @@
 #include "runtime/synth/propagation.hpp"
 #include "runtime/synth/receiver.hpp"
 #include "runtime/synth/trajectory.hpp"
+#include "runtime/synth/transfer_budget.hpp"
 #include "runtime/synth/voice.hpp"
 
 namespace carillon::synth {
@@ -36,6 +37,8 @@ struct BodyFrame {
   ContactSurface surface{};
   bool audits_energy = false;
   std::optional<Floor> floor = std::nullopt;
+  std::optional<ListeningHead> head = std::nullopt;
+  int phase = 0;  // of Directivity
 };
 
 /// Memory that belongs to effects. What lasting contacts need counts as that of roughness here, whichever of the three effects need it.
@@ -79,9 +82,13 @@ struct BodyScratch {
   std::array<float, kBlock> mono{};
   std::array<std::array<float, kBlock>, 3> dipole{};
   std::array<double, kBlock> heard{};
+  std::array<std::array<double, kBlock>, 2> by_head{};
 };
 
 using Mix = std::vector<std::array<double, kBlock>>;  // per microphone
+
+/// How what is heard of a propagation changes over a block. What is unheard is made and goes nowhere.
+enum class Fade : std::uint8_t { kNone, kIn, kOut, kUnheard };
 
 /// What it keeps true: it has the modules of its effects and no others; every module has done the same samples (rendered_); while a change
 /// is under way the old and the new propagation sound together, and one fades into the other within one block. [main-thread] makes modules,
@@ -126,6 +133,11 @@ class SoundingBody {
   /// Its modes; nullptr without.
   Voice* get_voice() noexcept { return voice_.get(); }
   const Voice* get_voice() const noexcept { return voice_.get(); }
+  /// Whether it has Directivity, or goes over to it or from it.
+  bool is_directed() const noexcept;
+  /// At the first sample of a block: transfers that it needs, TransferBudget; then its share of them.
+  int find_transfer_need(std::int64_t sample) noexcept;
+  void set_transfer_share(const TransferBudget& budget) noexcept;
   /// How many pascals 1 Pa at 1 m is at the nearest microphone, at a sample.
   float calc_nearness(const ListenerTracks& listener, std::int64_t sample) const noexcept;
 
@@ -141,10 +153,14 @@ class SoundingBody {
   void make_acceleration_noise(const std::array<std::span<float>, 3>& dipole) noexcept;
   void make_sound(std::int64_t sample, std::size_t count, const ListenerTracks& listener, BodyScratch& scratch,
                   TickFunction ticks) noexcept;
-  void hear(Propagation& propagation, std::int64_t sample, std::size_t count, const ListenerTracks& listener, int fade,
+  void hear(Propagation& propagation, std::int64_t sample, std::size_t count, const ListenerTracks& listener, Fade fade,
             BodyScratch& scratch, Mix& mix, TickFunction ticks) noexcept;
   int hear_ear(Receiver& ear, const Source& source, const Trajectory& track, std::size_t microphone, double level, std::int64_t sample,
-               std::size_t count, int fade, bool apart, BodyScratch& scratch, Mix& mix) noexcept;
+               std::size_t count, Fade fade, bool apart, BodyScratch& scratch, Mix& mix) noexcept;
+  void hear_by_head(Propagation& propagation, std::int64_t sample, std::size_t count, const ListenerTracks& listener, Fade fade,
+                    BodyScratch& scratch, Mix& mix, TickFunction ticks) noexcept;
+  void count_ear(const Propagation& propagation, Effect sends, std::size_t microphone, bool is_mirrored, int moved, std::size_t count,
+                 std::int64_t ticks) noexcept;
   bool is_filled(const Propagation& propagation, const ListenerTracks& listener, std::int64_t sample) const noexcept;
 
   std::shared_ptr<const Model> model_;  // the main thread's
@@ -162,6 +178,7 @@ class SoundingBody {
   bool fading_ = false;        // from air_ to next_air_, in this block
   std::int64_t first_ = 0;     // sample of the scene with which the voice began
   std::int64_t rendered_ = 0;  // samples of the scene that all modules have done
+  int transfer_need_ = 0;
   BodyWork work_;
 };
 

@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "runtime/base/error.hpp"
+#include "runtime/head/head.hpp"
 #include "runtime/synth/fp_guard.hpp"
 
 namespace carillon::synth {
@@ -39,10 +40,16 @@ SynthesiserOptions check(SynthesiserOptions options) {
     for (const Vec3& place : options.microphones_m)
       if (floor->calc_height_m(options.listener_m + place) < 0.0) refuse("microphones above its floor");
   }
+  if (options.head) {
+    if (options.microphones_m.size() != 2) refuse("two microphones, left and right, where it has a head");
+    if (options.head->head == nullptr || options.head->head->get_sample_rate_hz() != options.rate_hz)
+      refuse("a head that is made for its sample rate");
+  }
   if (options.max_bodies < 1 || options.max_bodies > kMaxBodies) refuse("room for one to 1,048,576 bodies");
   if (options.max_strikes < 1 || options.max_forces < 0 || options.max_waypoints < 2 || options.ring_events < 1)
     refuse("room for strikes, waypoints and events");
   if (!(options.longest_m > 0.0 && options.longest_m < 1e5)) refuse("a longest distance below 100 km");
+  if (!(options.transfers_per_s > 0.0 && options.transfers_per_s < 1e15)) refuse("a positive number of transfers_per_s");
   return options;
 }
 
@@ -78,7 +85,8 @@ class Synthesiser::Pipe {
 Synthesiser::Synthesiser(SynthesiserOptions options)
     : options_(check(std::move(options))),
       ring_(static_cast<std::size_t>(options_.ring_events)),
-      listener_(static_cast<std::size_t>(options_.max_waypoints), options_.microphones_m, options_.listener_m, options_.floor),
+      listener_(static_cast<std::size_t>(options_.max_waypoints), options_.microphones_m, options_.listener_m, options_.floor,
+                options_.head),
       allowed_(options_.budget) {
   const auto bodies = static_cast<std::size_t>(options_.max_bodies);
   // A number comes, changes and goes in at most three commands, and two come back.
@@ -89,6 +97,7 @@ Synthesiser::Synthesiser(SynthesiserOptions options)
   playing_.resize(bodies);
   awake_.resize((bodies + 63) / 64);
   mix_.resize(options_.microphones_m.size());
+  if (options_.head) latency_ += options_.head->head->get_latency();
 }
 
 Synthesiser::~Synthesiser() = default;
@@ -100,14 +109,17 @@ void Synthesiser::check_model(const Model* model) const {
                      std::to_string(options_.rate_hz) + " Hz");
 }
 
-void Synthesiser::check_floor(EffectSet effects) const {
+/// That what effects need of the scene is there.
+void Synthesiser::check_surroundings(EffectSet effects) const {
+  if (effects.has(Effect::kHead) && !options_.head)
+    throw InputError("head needs a listener with a head; give the synthesiser one, or leave the effect out");
   if (effects.has(Effect::kGroundReflection) && !options_.floor)
     throw InputError("ground_reflection needs a floor; give the synthesiser one, or leave the effect out");
 }
 
 int Synthesiser::add_body(std::shared_ptr<const Model> model, const BodySettings& settings) {
   check_model(model.get());
-  check_floor(settings.effects);
+  check_surroundings(settings.effects);
   if (events::find_fault(events::BodyMotion{.position_m = settings.position_m, .rotation = settings.rotation}) != nullptr)
     throw InputError("a body must be at a finite place, turned by a unit quaternion");
   if (!(settings.longest_m >= 0.0 && settings.longest_m < 1e5) || settings.max_waypoints < 0)
@@ -130,7 +142,9 @@ int Synthesiser::add_body(std::shared_ptr<const Model> model, const BodySettings
                 .isa = settings.isa,
                 .surface = settings.surface,
                 .audits_energy = settings.audits_energy,
-                .floor = options_.floor},
+                .floor = options_.floor,
+                .head = options_.head,
+                .phase = number},
       settings.position_m, settings.rotation);
   auto change = body->make_change({}, settings.effects);
   Published& published = published_bodies_[free];
@@ -172,7 +186,7 @@ std::size_t Synthesiser::find_free() const {
 void Synthesiser::set_effects(int body, EffectSet effects) {
   collect();
   Owned& owned = owned_[check_owned(body)];
-  check_floor(effects);
+  check_surroundings(effects);
   // Refused here, whether it has to wait or not.
   if (owned.wanted_model != nullptr)
     SoundingBody::check(effects, *owned.wanted_model);
@@ -257,9 +271,29 @@ void Synthesiser::set_awake(int number) noexcept {
   awake_[static_cast<std::size_t>(number) / 64] |= std::uint64_t{1} << (static_cast<unsigned>(number) % 64U);
 }
 
+/// Whenever bodies come, change or go.
+void Synthesiser::count_directed() noexcept {
+  if (!kCompiledEffects.has(Effect::kDirectivity)) return;
+  directed_ = static_cast<int>(
+      std::count_if(playing_.begin(), playing_.end(), [](const SoundingBody* body) { return body != nullptr && body->is_directed(); }));
+}
+
+/// At the start of a block: how many transfers each body may look up in it.
+void Synthesiser::share_transfers() noexcept {
+  if (!kCompiledEffects.has(Effect::kDirectivity) || directed_ == 0) return;
+  std::int64_t needs = 0;
+  for (SoundingBody* body : playing_)
+    if (body != nullptr) needs += body->find_transfer_need(sample_);
+  transfers_.begin(options_.transfers_per_s * kBlock / options_.rate_hz, directed_, needs);
+  for (SoundingBody* body : playing_)
+    if (body != nullptr) body->set_transfer_share(transfers_);
+}
+
 void Synthesiser::apply_commands() noexcept {
   Command command;
+  bool changes = false;
   while (commands_->pop(command)) {
+    changes = true;
     SoundingBody*& place = playing_[static_cast<std::size_t>(command.number)];
     if (command.removes) {
       place = nullptr;
@@ -270,6 +304,7 @@ void Synthesiser::apply_commands() noexcept {
       set_awake(command.number);
     }
   }
+  if (changes) count_directed();
 }
 
 /// Calls `work(number, body)` for every body that is awake, in the order of their numbers; those for which it returns false fall asleep.
@@ -363,10 +398,15 @@ void Synthesiser::take_events() noexcept {
 
 /// Changes of effects that are over go back, at the beginning of a block.
 void Synthesiser::finish_changes() noexcept {
-  for_awake([this](int number, SoundingBody& body) {
-    if (BodyChange* change = body.finish_change(listener_, sample_)) gone_->push({.body = &body, .change = change, .number = number});
+  bool changes = false;
+  for_awake([&](int number, SoundingBody& body) {
+    if (BodyChange* change = body.finish_change(listener_, sample_)) {
+      gone_->push({.body = &body, .change = change, .number = number});
+      changes = true;
+    }
     return true;
   });
+  if (changes) count_directed();
 }
 
 /// The floor for strikes in this block, whether the body is awake since its beginning or not; and no body wakes more modes than the whole
@@ -438,6 +478,7 @@ void Synthesiser::render(int samples) noexcept {
     finish_changes();
     watch_marks();
     keep_budget();
+    share_transfers();
   }
   for (auto& mix : mix_) std::fill_n(mix.begin(), samples, 0.0);
   for_awake([&](int number, SoundingBody& body) {

@@ -29,6 +29,7 @@
 #include "runtime/synth/model.hpp"
 #include "runtime/synth/receiver.hpp"
 #include "runtime/synth/sounding_body.hpp"
+#include "runtime/synth/transfer_budget.hpp"
 
 namespace carillon::synth {
 
@@ -45,8 +46,15 @@ struct SynthesiserOptions {
   int ring_events = 4096;                                   // that may wait between two calls of process()
   double longest_m = 60.0;                                  // what is further away is not heard
   double budget = std::numeric_limits<double>::infinity();  // set_budget()
-  ContactSurface ground = kGroundSurface;                   // what contacts touch whose other body is none
-  std::optional<Floor> floor = std::nullopt;                // what bodies with Effect::kGroundReflection are reflected by
+  /// Of Effect::kDirectivity: transfers that all bodies together look up in a second; in a block a quarter more at most. By default those
+  /// of 22 bodies with 228 modes and two ears that turn as fast as they like, at 48 kHz. Where bodies need n times as many, each is looked
+  /// up every n-th block on average: its modes are that old, or go so long from one weight to the next (Directivity, TransferBudget).
+  double transfers_per_s = 2.4e6;
+  ContactSurface ground = kGroundSurface;     // what contacts touch whose other body is none
+  std::optional<Floor> floor = std::nullopt;  // what bodies with Effect::kGroundReflection are reflected by
+  /// What bodies with Effect::kHead and Effect::kTwoEars are heard through, in the middle of microphones_m, which are two: left and right.
+  /// With it all that is heard comes later (get_latency()), whichever bodies have the effect.
+  std::optional<ListeningHead> head = std::nullopt;
   /// A counter of time, for what effects cost; nullptr: nothing is measured, and nothing paid for that.
   TickFunction ticks = nullptr;
 };
@@ -69,12 +77,14 @@ struct EffectCounters {
   /// Work: of modal mode-samples, of hertz_pulse pulses, of roughness and rolling samples of the texture that both read, contact by
   /// contact, of contact_damping samples in which a contact is at work, of acceleration_noise samples (of three dipoles), of air_delay
   /// samples that an ear read with travel time, of doppler those whose travel time changed, of two_ears those of the second microphone and
-  /// all further, of directivity transfers that were looked up, of ground_reflection samples that mirrored ears read.
+  /// all further, of directivity transfers that were looked up, of ground_reflection samples that mirrored ears read, of head samples that
+  /// went through one, straight and mirrored, for both ears, of nonlinear coupled modes times samples.
   PerEffect<std::int64_t> units{};
   /// Of SynthesiserOptions::ticks. What pulses cost is in modal, and what modes cost while a contact is at work is in the first of
   /// roughness, rolling and contact_damping that the body has, as are their bytes; an ear's time is that of doppler where the way changes,
   /// else of air_delay, else of what it hears, and of two_ears for the second microphone and all further. That of mirrored ears is in
-  /// ground_reflection; to multiply the modes with what directivity looked up is in modal.
+  /// ground_reflection; to multiply the modes with what directivity looked up is in modal, and so are coupled modes. A head's filters are
+  /// in head, and what arrives in its middle is one ear.
   PerEffect<std::int64_t> ticks{};
   EffectBytes bytes{};  // without the model, which bodies share, and without what a body has that has no effects
 };
@@ -152,12 +162,14 @@ class Synthesiser {
   bool push(const events::Event& event) noexcept { return ring_.push(event); }
 
   /// The next frames of up to as many channels as there are microphones; further channels are silent. out[c] has room for `frames` numbers.
-  /// Frame n is what arrives at (n - kLatency) / rate. Any number of frames, in any order, gives the same bits, as long as events come
+  /// Frame n is what arrives at (n - get_latency()) / rate. Any number of frames, in any order, gives the same bits, as long as events come
   /// before the horizon. No frames: takes the events out of the ring, so that there is room for more. [audio-thread]: no heap, no lock, no
   /// system call, no throw.
   void process(float* const* out, int channels, int frames) noexcept;
 
-  static constexpr int kLatency = Receiver::kLatency;
+  static constexpr int kLatency = Receiver::kLatency;  // without a head
+  /// Frames by which what is heard lags behind. [any-thread]
+  int get_latency() const noexcept { return latency_; }
   /// Events that fit into the ring between two calls of process(). [any-thread]
   std::size_t get_ring_room() const noexcept { return ring_.get_room(); }
   int get_microphone_count() const { return static_cast<int>(options_.microphones_m.size()); }
@@ -206,7 +218,7 @@ class Synthesiser {
   class Pipe;
 
   void check_model(const Model* model) const;
-  void check_floor(EffectSet effects) const;
+  void check_surroundings(EffectSet effects) const;
   std::size_t check_owned(int body) const;
   std::size_t find_free() const;
   void send_change(int number);
@@ -230,10 +242,13 @@ class Synthesiser {
   void for_awake(Work&& work) noexcept;
   void publish(int number) noexcept;
   void keep_budget() noexcept;
+  void count_directed() noexcept;
+  void share_transfers() noexcept;
   void give_floor(SoundingBody& body) noexcept;
   void publish_counters() noexcept;
 
   SynthesiserOptions options_;
+  int latency_ = kLatency;
   events::EventRing ring_;
   std::unique_ptr<Pipe<Command>> commands_;
   std::unique_ptr<Pipe<Command>> gone_;
@@ -252,6 +267,8 @@ class Synthesiser {
   Budget budget_;
   bool limited_ = false;           // voices have floors
   std::int64_t spent_before_ = 0;  // mode-samples up to the last block
+  TransferBudget transfers_;
+  int directed_ = 0;  // bodies with directivity
   std::atomic<double> allowed_;
   SynthesiserCounters work_;  // the audio thread's
   std::atomic<float> gain_{1.0F};

@@ -48,6 +48,11 @@ Voice::Voice(std::shared_ptr<const Model> model, VoiceOptions options)
   state_.resize(model_->sound_.size());
   starts_.resize(model_->sound_.size());
   bounds_.resize(model_->sound_.size());
+  if (options.is_nonlinear) {
+    if (!kCompiledEffects.has(Effect::kNonlinear) || model_->get_nonlinear() == nullptr)
+      throw InputError("nonlinear motion needs a bank with a nonlinear energy, which this body's has not");
+    nonlinear_ = std::make_unique<NonlinearModes>(*model_);
+  }
   if (!audits_) return;
   radiation_.resize(static_cast<std::size_t>(model_->ringing_));
   for (std::size_t m = 0; m < radiation_.size(); ++m) {
@@ -167,14 +172,22 @@ void Voice::add_damped(std::int64_t sample, bool struck, const ContactForces* co
     for_directed([&](Directivity& ears) { ears.add_damped(sound.data(), sub_block, static_cast<int>(out - block_.data())); });
 }
 
+/// Of the modes that large motion couples, where there are some: to the ears by the groups in which they would ring.
+void Voice::add_nonlinear(std::int64_t sample, bool struck, const ContactBlock* drive, float* out) noexcept {
+  if (!nonlinear_->is_live() && !struck && drive == nullptr) return;
+  if (is_directed()) wake(nonlinear_->get_group_count());
+  nonlinear_->add(sample, strikes_, struck, drive, out, find_kept(), live_);
+  counters_.coupled_samples += static_cast<std::int64_t>(nonlinear_->get_limit()) * kSubBlock;
+}
+
 /// What contacts and strikes add in one sub-block, with the damped modes and what fades out.
 void Voice::add_acting(std::int64_t sample, int sub_block, const ContactBlock* drive, bool struck, float* out) noexcept {
   if (drive != nullptr && live_ > 0) {
     if (SampleStates* kept = find_kept(); kept != nullptr)
-      kernels_->drive_and_keep(model_->strike_.data(), model_->turn_.data(), *drive, sub_block, state_.data(), starts_.data(), live_, out,
+      kernels_->drive_and_keep(get_strike_tables(), model_->turn_.data(), *drive, sub_block, state_.data(), starts_.data(), live_, out,
                                kept);
     else
-      kernels_->drive(model_->strike_.data(), model_->turn_.data(), *drive, sub_block, state_.data(), starts_.data(), live_, out);
+      kernels_->drive(get_strike_tables(), model_->turn_.data(), *drive, sub_block, state_.data(), starts_.data(), live_, out);
     count_work(live_, kSubBlock);
   }
   if (struck) {
@@ -184,6 +197,7 @@ void Voice::add_acting(std::int64_t sample, int sub_block, const ContactBlock* d
   count_work(live_, kSubBlock);
   const bool driven = drive != nullptr && drive->forces;
   if (struck || driven || damped_.is_live()) add_damped(sample, struck, driven ? contacts_ : nullptr, sub_block, out);
+  if (is_nonlinear()) add_nonlinear(sample, struck, drive, out);
   if (!fading_) return;
   for (int n = 0; n < kSubBlock; ++n) out[n] += fade_[sub_block * kSubBlock + n];
 }
@@ -209,10 +223,10 @@ void Voice::limit_touch(double begin, double end) noexcept {
 
 void Voice::play_touch(int sub_block, float* out) noexcept {
   if (SampleStates* kept = find_kept(); kept != nullptr)
-    kernels_->strike_and_keep(model_->strike_.data(), model_->turn_.data(), touch_, sub_block, state_.data(), starts_.data(), live_, out,
+    kernels_->strike_and_keep(get_strike_tables(), model_->turn_.data(), touch_, sub_block, state_.data(), starts_.data(), live_, out,
                               kept);
   else
-    kernels_->strike(model_->strike_.data(), model_->turn_.data(), touch_, sub_block, state_.data(), starts_.data(), live_, out);
+    kernels_->strike(get_strike_tables(), model_->turn_.data(), touch_, sub_block, state_.data(), starts_.data(), live_, out);
   count_work(live_, kSubBlock);
 }
 
@@ -287,6 +301,7 @@ void Voice::cull() noexcept {
     state = ModeState{};
   }
   damped_.drop_below(share);
+  if (is_nonlinear()) nonlinear_->drop_below(share);
 }
 
 std::span<const float> Voice::measure(float nearness) noexcept {
@@ -331,7 +346,13 @@ void Voice::fade_out(int groups) noexcept {
   fading_ = true;
 }
 
-void Voice::set_limit(int modes) noexcept { limit_ = std::clamp((modes + kGroup - 1) / kGroup, std::min(1, groups_), groups_); }
+void Voice::set_limit(int modes) noexcept {
+  limit_ = std::clamp((modes + kGroup - 1) / kGroup, std::min(1, groups_), groups_);
+  if (!is_nonlinear()) return;
+  // Coupling costs the most: what a limit leaves of the modes it leaves of the coupled ones, the lowest.
+  const double share = std::clamp(modes / static_cast<double>(std::max(1, model_->ringing_)), 0.0, 1.0);
+  nonlinear_->set_limit(static_cast<int>(share * nonlinear_->get_count()));
+}
 
 /// At the start of a block: holds the energy against that of the block before, when nothing acted in it.
 void Voice::audit() noexcept {
@@ -349,6 +370,7 @@ void Voice::audit() noexcept {
 void Voice::reset() noexcept {
   std::fill(state_.begin(), state_.end(), ModeState{});
   damped_.reset();
+  if (is_nonlinear()) nonlinear_->reset();
   live_ = 0;
   fading_ = inherits_ = false;
   strikes_.clear();
@@ -357,7 +379,8 @@ void Voice::reset() noexcept {
 
 std::size_t Voice::calc_bytes() const {
   return sizeof(Voice) + strikes_.calc_bytes() + damped_.calc_bytes() + state_.capacity() * sizeof(ModeState) +
-         starts_.capacity() * sizeof(ColumnStates) + bounds_.capacity() * sizeof(float) + radiation_.capacity() * sizeof(Radiation);
+         starts_.capacity() * sizeof(ColumnStates) + bounds_.capacity() * sizeof(float) + radiation_.capacity() * sizeof(Radiation) +
+         calc_nonlinear_bytes();
 }
 
 VoiceCounters Voice::get_counters() const noexcept {
@@ -367,7 +390,8 @@ VoiceCounters Voice::get_counters() const noexcept {
 }
 
 int Voice::get_live_mode_count() const {
-  return std::min(live_ * kGroup, model_->ringing_) + (damped_.is_live() ? static_cast<int>(damped_.get_count()) : 0);
+  return (is_nonlinear() && nonlinear_->is_live() ? nonlinear_->get_count() : 0) + std::min(live_ * kGroup, model_->ringing_) +
+         (damped_.is_live() ? static_cast<int>(damped_.get_count()) : 0);
 }
 
 double Voice::calc_ringing_energy_j(int m) const noexcept {
@@ -391,6 +415,13 @@ void Voice::measure_amplitudes(std::span<float> by_bank_mode) const noexcept {
     const double omega = std::sqrt(mode.lambda);
     put(m, std::hypot(state.re[m % kGroup], state.im[m % kGroup]) / std::sqrt((omega - mode.decay) * (omega + mode.decay)));
   }
+  if (is_nonlinear() && nonlinear_->is_live())
+    for (const int m : model_->get_nonlinear()->mode) {
+      const DampedState state = get_mode_state(m);
+      const auto& mode = model_->modes_[static_cast<std::size_t>(m)];
+      const double omega = std::sqrt(mode.lambda), omega_d = std::sqrt((omega - mode.decay) * (omega + mode.decay));
+      put(m, std::hypot(state.v + mode.decay * state.q, omega_d * state.q) / omega_d);
+    }
   if (!damped_.is_live()) return;
   for (int m = model_->ringing_; m < model_->get_mode_count(); ++m) put(m, std::abs(get_mode_state(m).q));
 }
@@ -398,7 +429,7 @@ void Voice::measure_amplitudes(std::span<float> by_bank_mode) const noexcept {
 double Voice::calc_energy_j() const noexcept {
   double energy = 0.0;
   for (int m = 0; m < std::min(live_ * kGroup, model_->ringing_); ++m) energy += calc_ringing_energy_j(m);
-  return energy + damped_.calc_energy_j();
+  return energy + damped_.calc_energy_j() + (is_nonlinear() ? nonlinear_->calc_energy_j() : 0.0);
 }
 
 }  // namespace carillon::synth

@@ -19,6 +19,7 @@
 #include "runtime/synth/directivity.hpp"
 #include "runtime/synth/kernels.hpp"
 #include "runtime/synth/model.hpp"
+#include "runtime/synth/nonlinear_modes.hpp"
 #include "runtime/synth/strike_queue.hpp"
 
 namespace carillon::synth {
@@ -28,14 +29,16 @@ struct VoiceOptions {
   int max_forces = 256;       // events::Forces that may; a pulse of an impact is a few, a long one some dozens
   double silence_pa = 1e-10;  // below this bound on its pressure at 1 m (-106 dB re 20 uPa) a body sleeps
   Isa isa = Isa::kBest;
+  bool is_nonlinear = false;   // coupled modes of the model move as Effect::kNonlinear has it
   bool audits_energy = false;  // VoiceCounters::energy_rise and radiated_j
 };
 
 struct VoiceCounters : StrikeCounters {
-  std::int64_t resets = 0;        // times that the state was not finite and was cleared
-  std::int64_t mode_samples = 0;  // work done: modes x samples, whole groups
-  double energy_rise = 0.0;       // the largest share by which the energy rose over a block in which nothing acted; 0 unless asked for
-  double radiated_j = 0.0;        // share of what damping took from what rang at the start of each block; 0 unless asked for
+  std::int64_t resets = 0;           // times that the state was not finite and was cleared
+  std::int64_t mode_samples = 0;     // work done: modes x samples, whole groups
+  std::int64_t coupled_samples = 0;  // coupled modes x samples while they moved
+  double energy_rise = 0.0;          // the largest share by which the energy rose over a block in which nothing acted; 0 unless asked for
+  double radiated_j = 0.0;           // share of what damping took from what rang at the start of each block; 0 unless asked for
 };
 
 /// The share of a mode's damping that is sound: d_r = bank::calc_radiation_decay(gain) of the bank's decay d, which counts as all there
@@ -63,7 +66,7 @@ class VoiceHandover {
 /// Memory is taken in the constructor only. One thread at a time.
 class Voice {
  public:
-  /// Throws InputError when the silence is not a positive number.
+  /// Throws InputError when the silence is not a positive number, and for nonlinear motion of a model without a nonlinear energy.
   explicit Voice(std::shared_ptr<const Model> model, VoiceOptions options = {});
 
   /// Registers a pulse. Times are since the first sample of this voice; `body` and `other` of the impulse are not looked at. False when it
@@ -114,6 +117,9 @@ class Voice {
   /// for those of this one, which have taken over the weights. [audio-thread]
   void take_over(Voice& other, VoiceHandover& handover) noexcept;
 
+  /// Sounds to the ears to which another voice of the same model does. [audio-thread]
+  void direct_as(const Voice& other) noexcept { directed_ = other.directed_; }
+
   /// Samples processed so far: the number of the next sample.
   std::int64_t get_position() const { return horizon_ - held_; }
   /// The first sample that a new strike can still reach: less than kSubBlock samples ahead of the position unless calls ask for whole
@@ -124,13 +130,17 @@ class Voice {
   int get_live_mode_count() const;
   int get_live_group_count() const { return live_; }
   int get_group_count() const { return groups_; }
-  bool is_awake() const { return live_ > 0 || damped_.is_live(); }
+  bool is_awake() const { return live_ > 0 || damped_.is_live() || (is_nonlinear() && nonlinear_->is_live()); }
+  bool is_nonlinear() const noexcept { return kCompiledEffects.has(Effect::kNonlinear) && nonlinear_ != nullptr; }
+  /// Modes that are coupled at this moment, of those that the model couples: fewer under a limit.
+  int get_coupled_count() const noexcept { return is_nonlinear() ? nonlinear_->get_limit() : 0; }
   /// Nothing sounds, nothing is to come and nothing is left in the block: process() would only give zeros.
   bool is_idle() const {
     return !is_awake() && !fading_ && !inherits_ && strikes_.is_empty() && held_ == 0 && (contacts_ == nullptr || contacts_->is_resting());
   }
   /// Advances an idle voice by a multiple of kSubBlock samples without output. [audio-thread]
   void skip(std::int64_t samples) noexcept { horizon_ += samples; }
+  std::size_t calc_nonlinear_bytes() const noexcept { return nonlinear_ ? nonlinear_->calc_bytes() : 0; }  // of all that is below
   /// Memory that this voice has taken, without that of the model.
   std::size_t calc_bytes() const;
   VoiceCounters get_counters() const noexcept;
@@ -165,6 +175,7 @@ class Voice {
   double calc_ringing_energy_j(int mode) const noexcept;
   DampedState get_mode_state(int mode) const noexcept;
   void set_mode_state(int mode, const DampedState& state) noexcept;
+  void put_ringing_state(int mode, const DampedState& state) noexcept;
   void ring_out(std::span<ModeState> states, std::span<DampedState> damped, float sign, std::array<float, kBlock>& out,
                 const Directivity* weights, Directivity* fades) noexcept;
   template <class Work>
@@ -175,6 +186,10 @@ class Voice {
   SampleStates* find_kept() noexcept;
   void add_directed(int sub_block, int offset) noexcept;
   void add_damped(std::int64_t sample, bool struck, const ContactForces* contacts, int sub_block, float* out) noexcept;
+  void add_nonlinear(std::int64_t sample, bool struck, const ContactBlock* drive, float* out) noexcept;
+  const StrikeTable* get_strike_tables() const noexcept {
+    return is_nonlinear() ? model_->get_nonlinear()->strike.data() : model_->strike_.data();
+  }
   const std::vector<std::array<float, kGroup>>& get_weights() const noexcept {
     return is_directed() ? model_->directivity_->weight : model_->weight_;
   }
@@ -203,9 +218,10 @@ class Voice {
   VoiceCounters counters_;                  // without those of strikes_
   StrikeQueue strikes_;
   DampedModes damped_;
-  std::vector<ModeState> state_;      // zero beyond live_
-  std::vector<ColumnStates> starts_;  // out of date beyond live_, and once a whole block was rendered
-  std::vector<float> bounds_;         // of measure()
+  std::unique_ptr<NonlinearModes> nonlinear_;  // or none
+  std::vector<ModeState> state_;               // zero beyond live_
+  std::vector<ColumnStates> starts_;           // out of date beyond live_, and once a whole block was rendered
+  std::vector<float> bounds_;                  // of measure()
   PulseBlock touch_;
   alignas(64) std::array<float, kBlock> block_{}, fade_{};
 };

@@ -28,6 +28,7 @@ VoiceHandover::VoiceHandover(const Model& from, const Model& to) {
 
 DampedState Voice::get_mode_state(int mode) const noexcept {
   if (mode >= model_->ringing_) return damped_.get_states()[static_cast<std::size_t>(mode - model_->ringing_)];
+  if (const int place = is_nonlinear() ? nonlinear_->find_place(mode) : -1; place >= 0) return nonlinear_->get_state(place);
   const auto& m = model_->modes_[static_cast<std::size_t>(mode)];
   const ModeState& state = state_[static_cast<std::size_t>(mode / kGroup)];
   const double omega = std::sqrt(m.lambda);
@@ -40,6 +41,15 @@ void Voice::set_mode_state(int mode, const DampedState& state) noexcept {
     damped_.set_state(static_cast<std::size_t>(mode - model_->ringing_), state);
     return;
   }
+  if (const int place = is_nonlinear() ? nonlinear_->find_place(mode) : -1; place >= 0) {
+    nonlinear_->set_state(place, state);
+    return;
+  }
+  put_ringing_state(mode, state);
+}
+
+/// Into its lane of the groups.
+void Voice::put_ringing_state(int mode, const DampedState& state) noexcept {
   const auto& m = model_->modes_[static_cast<std::size_t>(mode)];
   ModeState& group = state_[static_cast<std::size_t>(mode / kGroup)];
   const double omega = std::sqrt(m.lambda);
@@ -96,6 +106,12 @@ void Voice::take_over(Voice& other, VoiceHandover& handover) noexcept {
     const double q = old.q * std::sqrt(other.model_->modes_[static_cast<std::size_t>(from)].lambda) / omega;
     set_mode_state(static_cast<int>(m), {q, old.v});
   }
+  // Modes that are coupled ring out as those in groups do, in both voices: what one of them sounds beyond that is heard from the first
+  // sample on. Their lanes are put back to rest.
+  if (other.is_nonlinear())
+    for (const int m : other.model_->get_nonlinear()->mode) other.put_ringing_state(m, other.get_mode_state(m));
+  if (is_nonlinear())
+    for (const int m : model_->get_nonlinear()->mode) put_ringing_state(m, get_mode_state(m));
   const auto count = static_cast<std::size_t>(live_);
   std::copy(other.damped_.get_states().begin(), other.damped_.get_states().end(), handover.old_damped_.begin());
   // Copies are rung out; the states themselves begin the block.
@@ -106,6 +122,9 @@ void Voice::take_over(Voice& other, VoiceHandover& handover) noexcept {
                  directed ? other.directed_[0] : nullptr, ears);
   std::copy_n(state_.begin(), count, handover.states_.begin());
   std::copy(damped_.get_states().begin(), damped_.get_states().end(), handover.damped_.begin());
+  if (is_nonlinear())
+    for (const int m : model_->get_nonlinear()->mode)
+      state_[static_cast<std::size_t>(m / kGroup)].re[m % kGroup] = state_[static_cast<std::size_t>(m / kGroup)].im[m % kGroup] = 0.0;
   ring_out(std::span(handover.states_).first(count), handover.damped_, -1.0F, fade_, ears, ears);
   count_work(other.live_ + live_, kBlock);
   for (int n = 0; n < kBlock; ++n) fade_[n] *= 1.0F - static_cast<float>(n) / kBlock;

@@ -73,6 +73,8 @@ WORDS = [
     "two_ears",
     "directivity",
     "ground_reflection",
+    "head",
+    "hrtf",
     "begin",
     "hold",
     "end",

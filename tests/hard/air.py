@@ -16,6 +16,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 from scipy.interpolate import LinearNDInterpolator
+from scipy.linalg import eigh
 from scipy.special import h1vp, sph_harm, spherical_jn, spherical_yn
 
 import solids
@@ -126,17 +127,23 @@ def calc_sphere_powers(air, radius_m, side, most):
     return powers
 
 
+def calc_screen_operator(x, y, step):
+    """(cells, cells) flow through the middle of each cell by a jump of the potential of 1 on each."""
+    matrix = np.zeros((len(x), len(x)))
+    for sx in (-1, 1):
+        for sy in (-1, 1):
+            u, v = x[:, None] - x + sx * step[0] / 2, y[:, None] - y + sy * step[1] / 2
+            matrix += sx * sy * np.hypot(u, v) / (4 * math.pi * u * v)
+    return matrix
+
+
 def calc_screen_masses(length, width, cells, speed):
     """(M) rho times the integral of jump of the potential times speed over a screen without thickness in still air of infinite sound speed:
     constant jumps on cells, collocation at their middles (hypersingular integral in closed form). `speed(x, y)`: (n, M)."""
     step = np.array([length, width]) / cells
     x, y = ((np.arange(n) + 0.5) * d - n * d / 2 for n, d in zip(cells, step))
     x, y = (g.ravel() for g in np.meshgrid(x, y, indexing="ij"))
-    matrix = np.zeros((len(x), len(x)))
-    for sx in (-1, 1):
-        for sy in (-1, 1):
-            u, v = x[:, None] - x + sx * step[0] / 2, y[:, None] - y + sy * step[1] / 2
-            matrix += sx * sy * np.hypot(u, v) / (4 * math.pi * u * v)
+    matrix = calc_screen_operator(x, y, step)
     moved = speed(x, y)
     jump = np.linalg.solve(matrix, moved)
     return RHO * step.prod() * np.abs((jump * moved).sum(0))
@@ -154,6 +161,83 @@ def thin_plate(folder):
         coarse, fine = (calc_screen_masses(length, width, np.array([3, 2]) * n, lambda x, y: field(np.c_[x, y])) for n in (10, 20))
         part = f"added mass against a screen, relative; {'own' if skin_nodes > 2500 else 'coarsened'} skin"
         hold("thin_plate", np.abs(air.added_mass / (2 * fine - coarse) - 1).max(), bound, part)
+
+
+def read_mixing(path, count):
+    """(M, M + 6) parts of the modes without air, and of the rigid motions after them, in each mode in air."""
+    mixing = np.zeros((count, count + 6))
+    with h5py.File(path) as bank:
+        at = 0
+        for mode, parts in enumerate(bank["radiation/mixing_count"][:]):
+            mixing[mode, bank["radiation/mixing_motion"][at : at + parts]] = bank["radiation/mixing_part"][at : at + parts]
+            at += parts
+    return mixing
+
+
+def calc_screen_matrix(length, width, cells, speed):
+    """(M, M) the masses of calc_screen_masses(), also between motions."""
+    step = np.array([length, width]) / cells
+    x, y = ((np.arange(n) + 0.5) * d - n * d / 2 for n, d in zip(cells, step))
+    x, y = (g.ravel() for g in np.meshgrid(x, y, indexing="ij"))
+    moved = speed(x, y)
+    jump = np.linalg.solve(calc_screen_operator(x, y, step), moved)
+    mass = RHO * step.prod() * jump.T @ moved
+    return np.sign(mass[0, 0]) * (mass + mass.T) / 2
+
+
+def light_plate(folder):
+    """Foam of half a millimetre: the air adds 0.2 to 0.8 of the modes' own mass, mixes them, and makes the free plate yield. Against the
+    eigenproblem of modes and rigid motions with the air's mass on a screen without thickness, extrapolated from two grids; against the
+    momentum of plate and air together, which stays zero; and against more modes."""
+    length, width, thickness = 0.3, 0.2, 0.0005
+    plate = {"shape": "plate", "length_m": length, "width_m": width, "thickness_m": thickness, "nodes": 2500}
+    for density, young_pa in ((400.0, 2.56e8), (150.0, 1e8)):
+        job = {"body": plate, "material": soft(young_pa, density)}
+        air = radiate(folder, "plate", 20000, **job, band_hz=[0.5, 25])
+        count = len(air.k)
+        mixing = read_mixing(folder / "plate.hdf", count)
+        with h5py.File(folder / "plate.hdf") as bank:
+            alone_hz = bank["modes/corrected_frequency_hz"][:]
+            mass, inertia = bank["rigid/mass_kg"][()], bank["rigid/inertia_kg_m2"][:]
+        upper = air.vertices_m[:, 2] > 0.49 * thickness
+        field = LinearNDInterpolator(air.vertices_m[upper, :2], air.shape[upper, :, 2])
+
+        def speed(x, y):
+            return np.c_[field(np.c_[x, y]), np.full(len(x), mass**-0.5), y / inertia[0, 0] ** 0.5, -x / inertia[1, 1] ** 0.5]
+
+        coarse, fine = (calc_screen_matrix(length, width, np.array([3, 2]) * n, speed) for n in (10, 20))
+        whole = np.eye(count + 3) + 2 * fine - coarse
+        squares, exact = eigh(np.diag(np.append(alone_hz, [0, 0, 0]) ** 2), whole)
+        found = mixing[:, list(range(count)) + [count + 2, count + 3, count + 4]]
+        overlap = np.abs(found @ whole @ exact)
+        own = overlap.argmax(1)
+        assert len(set(own)) == count, own
+        name = f"{density:.0f} kg/m3"
+        hold("light_plate", np.abs(air.freq_hz / np.sqrt(squares[own]) - 1).max(), 0.0015, f"{name}, frequency, relative")
+        angle = np.sqrt(np.abs(1 - overlap.max(1) ** 2 / np.einsum("mi,ij,mj->m", found, whole, found)))
+        hold("light_plate", angle.max(), 0.006, f"{name}, sine of the angle between shapes")
+        alone = alone_hz / np.sqrt(np.diag(whole)[:count])  # what each mode would do without the others
+        missed = np.abs(alone / np.sqrt(squares[own]) - 1).max()
+        assert missed > 4 * 0.0015 and 0.15 < air.added_mass.min() and air.added_mass.max() < 0.8, (missed, air.added_mass)
+        # The force on the air is that which shakes the plate: a dipole, less the air that the plate takes the place of.
+        shaken = np.abs(mixing[:, count + 2]) > 0.01
+        omega = 2 * math.pi * air.freq_hz
+        force = omega * math.sqrt(mass) * np.abs(mixing[:, count + 2]) * (1 - RHO / density)
+        dipole = np.array([abs(air.calc_far(m, 1)[2]) for m in range(count)])
+        wanted = air.k**2 * force / (4 * math.pi) * math.sqrt(4 * math.pi / 3)
+        assert shaken.sum() >= 3
+        hold("light_plate", np.abs(dipole[shaken] / wanted[shaken] - 1).max(), 0.01, f"{name}, dipole by the momentum, relative")
+    # Of the lightest, which mixes most.
+    more = radiate(folder, "more", 20000, **job, band_hz=[0.5, 60])
+    kept = alone_hz < 0.7 * alone_hz.max()
+    assert kept.sum() >= 5 and len(more.k) > 2 * count
+    cents = 1200 * np.log2(air.freq_hz / more.freq_hz[:count])[kept]
+    hold("light_plate", np.abs(cents).max(), 2.5, f"{name}, cents by modes beyond the band, below 0.7 of it")
+    level = 10 * np.log10(air.decay / more.decay[:count])[kept]
+    hold("light_plate", np.abs(level).max(), 0.3, f"{name}, dB of power by modes beyond the band, below 0.7 of it")
+    text = run_job(folder, "heavy", 2, body=plate, material=soft(5e7, 80.0), band_hz=[0.5, 10], radiation="bem")
+    (line,) = [line for line in text.splitlines() if "error:" in line]
+    hold_refusal("light_plate", line, ["heavy.json", "the air adds", "membrane", '"radiation": "none"'], "80 kg/m3")
 
 
 def find_breathing(air, count=1):

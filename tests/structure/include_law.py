@@ -48,13 +48,24 @@ LAW = {
     "runtime/events": (["runtime/base"], ["fmt"]),
     "runtime/radiation": (["runtime/base", "runtime/bank"], []),
     "runtime/head": (["runtime/base"], ["fmt", "mysofa"]),
+    "runtime/recording": (["runtime/base"], ["fmt"]),
+    "runtime/nonlinear": (["runtime/base", "runtime/bank"], ["fmt"]),
     "runtime/exchange": (
         ["runtime/base", "runtime/gltf", "runtime/material", "runtime/version", "runtime/bank", "runtime/radiation"],
         ["fmt", "cli", "eigen"],
     ),
-    "runtime/synth": (["runtime/base", "runtime/bank", "runtime/events", "runtime/radiation"], []),
-    "runtime/effect_selection": (["runtime/base", "runtime/bank", "runtime/events", "runtime/radiation", "runtime/synth"], ["fmt"]),
-    "runtime/abi": (["runtime/base", "runtime/bank", "runtime/support", "runtime/events", "runtime/radiation", "runtime/synth"], []),
+    "runtime/synth": (
+        ["runtime/base", "runtime/bank", "runtime/events", "runtime/radiation", "runtime/head", "runtime/nonlinear"],
+        [],
+    ),
+    "runtime/effect_selection": (
+        ["runtime/base", "runtime/bank", "runtime/events", "runtime/radiation", "runtime/head", "runtime/synth"],
+        ["fmt"],
+    ),
+    "runtime/abi": (
+        ["runtime/base", "runtime/bank", "runtime/support", "runtime/events", "runtime/radiation", "runtime/head", "runtime/synth"],
+        [],
+    ),
     "runtime/impact": (["runtime/base"], []),
     "runtime/shape": (["runtime/base", "runtime/bank"], []),
     "runtime/joints": (["runtime/base"], ["fmt", "simbody"]),
@@ -74,6 +85,7 @@ LAW = {
             "runtime/impact",
             "runtime/joints",
             "runtime/radiation",
+            "runtime/head",
             "runtime/synth",
             "runtime/effect_selection",
             "runtime/contact",
@@ -101,6 +113,7 @@ LAW = {
             "runtime/support",
             "runtime/events",
             "runtime/radiation",
+            "runtime/head",
             "runtime/synth",
             "runtime/effect_selection",
             "runtime/host",
@@ -210,7 +223,23 @@ LAW = {
         ["runtime/base", "runtime/bank", "runtime/material", "precompute/job", "precompute/petsc", "precompute/la", "precompute/eigen"],
         ["fmt", "petsc", "eigen"],
     ),
+    "precompute/condense": (
+        [
+            "runtime/base",
+            "runtime/bank",
+            "partition",
+            "precompute/mesh",
+            "precompute/comm",
+            "precompute/petsc",
+            "precompute/la",
+            "precompute/fem",
+            "precompute/eigen",
+        ],
+        ["fmt", "petsc", "eigen"],
+    ),
+    "precompute/emission": (["runtime/base", "runtime/recording", "precompute/comm"], ["fmt", "hdf5"]),
     "precompute/bem": (["runtime/base", "runtime/bank", "precompute/comm"], ["fmt", "eigen"]),
+    "precompute/transient": (["runtime/base", "partition", "precompute/mesh", "precompute/comm"], ["fmt", "mpi"]),
     "precompute/io": (
         [
             "runtime/base",
@@ -231,6 +260,7 @@ LAW = {
             "runtime/base",
             "runtime/version",
             "runtime/bank",
+            "runtime/radiation",
             "precompute/job",
             "partition",
             "precompute/mesh",
@@ -244,6 +274,7 @@ LAW = {
             "precompute/eigen",
             "precompute/analytic",
             "precompute/bem",
+            "precompute/condense",
             "precompute/cost",
             "precompute/io",
         ],
@@ -253,7 +284,9 @@ LAW = {
 }
 # Finer than folders: the only files that may include these.
 ONLY_IN = {
-    "hdf5": re.compile(r"^(runtime/bank/[a-z0-9_]+\.cpp|precompute/run/run_log\.cpp|precompute/vtkhdf/main\.cpp)$"),
+    "hdf5": re.compile(
+        r"^(runtime/bank/[a-z0-9_]+\.cpp|precompute/emission/surface_file\.cpp|precompute/run/run_log\.cpp|precompute/vtkhdf/main\.cpp)$"
+    ),
     "cgal": re.compile(r"^precompute/mesher/[a-z0-9_]+\.(cpp|hpp)$"),
 }
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')

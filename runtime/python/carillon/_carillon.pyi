@@ -76,7 +76,14 @@ class Synthesiser:
     """A synthesiser: bodies that are struck, and microphones."""
 
     def __init__(
-        self, rate_hz: float = 48000.0, microphones_m: Sequence[Vector] = ..., listener_m: Vector = ..., max_bodies: int = 64
+        self,
+        rate_hz: float = 48000.0,
+        microphones_m: Sequence[Vector] = ...,
+        listener_m: Vector = ...,
+        max_bodies: int = 64,
+        head_radius_m: float | None = None,
+        floor_reflection: float | None = None,
+        floor_height_m: float = 0.0,
     ) -> None: ...
     def add_body(
         self, bank: Bank, position_m: Vector = ..., rotation: Vector = ..., radiation: str = "auto", effects: Optional[List[str]] = None

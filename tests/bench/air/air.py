@@ -110,6 +110,10 @@ class Air:
             gains.append(AIR_DENSITY_KG_M3 * SOUND_SPEED_MS / k * np.sqrt((power[:, m] / sizes**2).sum() / (4 * np.pi)))
         return np.array(gains)
 
+    def calc_sphere_decays(self):
+        """Decay by radiation that those gains are [1/s]."""
+        return 2 * np.pi * self.calc_sphere_gains() ** 2 / (AIR_DENSITY_KG_M3 * SOUND_SPEED_MS)
+
     def calc_true_gains(self):
         return np.sqrt(self.decay_per_s * AIR_DENSITY_KG_M3 * SOUND_SPEED_MS / (2 * np.pi))
 

@@ -288,6 +288,9 @@ class Sounds(Case):
         samples, rate = carillon.render(scene)
         numpy.testing.assert_array_equal(samples, ours.samples_pa)
         self.assertEqual(carillon.render(scene, rate_hz=22050).samples_pa.shape, (22050, 2))
+        by_head = carillon.render({**scene, "listener": {"ears": "hrtf"}}).samples_pa
+        self.assertEqual(by_head.shape, samples.shape)
+        self.assertGreater(abs(by_head - samples).max(), 0.02 * abs(samples).max())
         self.assertEqual(count_files(), before)
 
     def test_scenes_that_are_wrong_are_one_message(self):
@@ -296,6 +299,7 @@ class Sounds(Case):
         scene["bodies"][0].pop("rotation_axis_angle")
         self.refuse(carillon.InputError, lambda: carillon.render({**scene, "duration_s": float("nan")}), "finite")
         self.refuse(carillon.InputError, lambda: carillon.render({**scene, "strikes": [{"time_s": 0}]}), "body")
+        self.refuse(carillon.InputError, lambda: carillon.render({**scene, "listener": {"ears": "hrtf", "sofa": "no.sofa"}}), "no.sofa")
         self.refuse(carillon.InputError, lambda: carillon.render("none.json"), "none.json")
         self.refuse(carillon.InputError, lambda: carillon.render(scene, rate_hz=7), "rate_hz")
         pathlib.Path("cut.hdf").write_bytes(self.bank_file.read_bytes()[:6000])
@@ -325,6 +329,29 @@ class Sounds(Case):
         delays = [(first - shift) / rate - 0.01 for shift in range(-2, 40)]
         worst = min(abs(expect(delay) - pressure)[first + 40 :].max() for delay in delays)
         self.assertLess(worst, 1e-4 * abs(pressure).max())
+
+    def test_a_head_hears_what_is_on_its_left_louder_there(self):
+        bank = carillon.Bank(self.bank_file)
+        synthesiser = carillon.Synthesiser(head_radius_m=0.0875)
+        synthesiser.strike(synthesiser.add_body(bank, [-2, 0, 0]), [0, 0, 0.01], triangle=0, time_s=0.005)
+        left, right = (synthesiser.process(9600).astype(float) ** 2).sum(axis=0)
+        self.assertGreater(left, 1.5 * right)
+        self.refuse(carillon.InputError, lambda: carillon.Synthesiser(head_radius_m=1), "radius")
+        self.refuse(carillon.InputError, lambda: carillon.Synthesiser(microphones_m=[[0, 0, 0]], head_radius_m=0.09), "two microphones")
+        self.refuse(carillon.InputError, lambda: carillon.Synthesiser().add_body(bank, effects=["modal", "two_ears", "head"]), "head")
+
+    def test_a_floor_doubles_the_pressure_that_is_heard_on_it(self):
+        bank = carillon.Bank(self.bank_file)
+        squares = []
+        for floor in ({}, {"floor_reflection": 1.0, "floor_height_m": -0.5}):
+            synthesiser = carillon.Synthesiser(microphones_m=[[0, 0, -0.5]], **floor)
+            synthesiser.strike(synthesiser.add_body(bank, [0, 2, 0]), [0, 0, 0.01], triangle=0, time_s=0.005)
+            squares.append((synthesiser.process(9600).astype(float) ** 2).sum())
+        self.assertAlmostEqual(squares[1] / squares[0], 4, delta=0.01)
+        self.refuse(carillon.InputError, lambda: carillon.Synthesiser(floor_reflection=1.5, floor_height_m=-1), "reflection")
+        self.refuse(carillon.InputError, lambda: carillon.Synthesiser(floor_reflection=1, floor_height_m=2), "above")
+        effects = ["modal", "ground_reflection"]
+        self.refuse(carillon.InputError, lambda: carillon.Synthesiser().add_body(bank, effects=effects), "floor")
 
     def test_the_synthesiser_plays_blocks_edits_and_bodies(self):
         bank = carillon.Bank(self.bank_file)

@@ -214,6 +214,25 @@ class Study(unittest.TestCase):
             self.assertIn(expected, result.stderr)
             self.assertFalse((self.folder / "accuracy").exists(), words)
 
+    def test_the_air_is_nearer_the_truth_with_more_nodes_and_wave_numbers(self):
+        result = call(self.folder, "--quick", "--only", "air", "-o", "air")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        out = self.folder / "air"
+        for table, costs in (("skins", "nodes of the skin"), ("errors", "wave numbers")):
+            rows = read(out / f"air-{table}.csv")
+            shown = [float(row["worst"]) for row in rows if row["worst"] != "-"]
+            patterns = [float(row["pattern: median, dB"]) for row in rows[:-1]]
+            self.assertEqual(patterns, sorted(patterns, reverse=True), table)
+            self.assertLess(patterns[-1], -35)
+            self.assertEqual(len(shown), len(rows) - 1)
+            sizes = [int(row[costs].split()[0].replace(",", "")) for row in rows]
+            self.assertEqual(sizes, sorted(set(sizes)), table)
+        orders = [float(row["bytes a mode"]) for row in read(out / "air-orders.csv")]
+        self.assertEqual(orders, sorted(orders))
+        report = json.loads((out / "report.json").read_text())["sections"][0]
+        self.assertEqual(len(report["findings"]), 3)
+        xml.dom.minidom.parse(str(out / "air-price.svg"))
+
     def test_without_numpy_only_the_sections_that_need_it_are_missing(self):
         for words, code, expected in ((("advise", "--help"), 0, "--cents"), (("accuracy", "--only", "playing"), 2, "python3-numpy")):
             result = subprocess.run(

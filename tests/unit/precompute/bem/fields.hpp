@@ -81,10 +81,9 @@ struct Outcome {
   }
 };
 
-inline Outcome solve(const BoundaryEquations& equations, double k) {
-  const std::size_t unknowns = equations.get_surface().count_nodes(), count = equations.count_velocities();
-  std::vector<std::int32_t> sides(count);
-  std::iota(sides.begin(), sides.end(), 0);
+/// For the velocities `sides`.
+inline Outcome solve(const BoundaryEquations& equations, double k, const std::vector<std::int32_t>& sides) {
+  const std::size_t unknowns = equations.get_surface().count_nodes(), count = sides.size();
   LinearSystem system;
   equations.assemble(k, sides, 0, unknowns, system);
   const BlockInverse inverse(system);
@@ -99,8 +98,15 @@ inline Outcome solve(const BoundaryEquations& equations, double k) {
   outcome.pressure = pressure.list();
   outcome.order = find_order(k * equations.get_sphere().radius_m);
   outcome.expansion = calc_expansion(equations.get_surface(), equations.get_sphere(), k, outcome.order, outcome.pressure,
-                                     equations.get_velocity(), count, sides);
+                                     equations.get_velocity(), equations.count_velocities(), sides);
   return outcome;
+}
+
+/// For all velocities.
+inline Outcome solve(const BoundaryEquations& equations, double k) {
+  std::vector<std::int32_t> sides(equations.count_velocities());
+  std::iota(sides.begin(), sides.end(), 0);
+  return solve(equations, k, sides);
 }
 
 }  // namespace carillon::bem::testing

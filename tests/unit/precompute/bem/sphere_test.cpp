@@ -1,146 +1,111 @@
 // Vibrating spheres against the closed form, and expansions against fields that are known.
-// With dp/dn = Y_lm on a sphere of radius 1: p = h_l(kr) / (k h_l'(k)) Y_lm. P. Morse, K. Ingard, Theoretical Acoustics (1968), 7.2.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <map>
 #include <numbers>
-#include <utility>
 #include <vector>
 
 #include "precompute/bem/equations.hpp"
 #include "precompute/bem/expansion.hpp"
 #include "tests/unit/precompute/bem/bodies.hpp"
 #include "tests/unit/precompute/bem/fields.hpp"
+#include "tests/unit/precompute/bem/spheres.hpp"
 
 namespace carillon::bem {
 namespace {
 
 using testing::calc_hankel;
-using testing::calc_hankel_slope;
 using testing::calc_harmonic;
 using testing::Complex;
+using testing::find_exact;
+using testing::Harmonic;
 using testing::make_ball;
 using testing::Outcome;
 using testing::sample_corners;
-using testing::to_db;
+using testing::Spheres;
 
-using Harmonic = std::pair<int, int>;  // l, m
+/// All orders to 8, each by one harmonic: cosines, sines, and those that no meridian cuts.
+const std::vector<Harmonic> kHarmonics{{0, 0}, {1, -1}, {2, 1}, {3, 2}, {4, -3}, {5, 0}, {6, 5}, {7, -4}, {8, 3}};
 
-const std::vector<Harmonic>& get_harmonics() {
-  static const std::vector<Harmonic> harmonics{{0, 0}, {1, 0}, {1, -1}, {2, 0}, {2, 1}, {3, 0}, {3, 2}};
-  return harmonics;
+/// 4,002 nodes: fine enough for patterns of order 8.
+Spheres& get_fine_spheres() {
+  static Spheres spheres(20, kHarmonics);
+  return spheres;
 }
-
-/// One sphere of 1,442 nodes for all tests here, solved once at each wave number.
-class Spheres {
- public:
-  Spheres()
-      : surface_(make_ball(12, 1.0).make_surface()),
-        equations_(surface_, find_enclosing_sphere(surface_.get_nodes()),
-                   sample_corners(surface_, get_harmonics().size(),
-                                  [](const Vec3& place, const Vec3&, std::size_t m) {
-                                    return calc_harmonic(get_harmonics()[m].first, get_harmonics()[m].second, normalise(place));
-                                  }),
-                   get_harmonics().size()) {}
-
-  const RadiatingSurface& get_surface() const { return surface_; }
-  const Outcome& solve(double k) {
-    const auto [found, is_new] = outcomes_.try_emplace(k);
-    if (is_new) found->second = testing::solve(equations_, k);
-    return found->second;
-  }
-
- private:
-  RadiatingSurface surface_;
-  BoundaryEquations equations_;
-  std::map<double, Outcome> outcomes_;
-};
-
+/// 1,442 nodes.
 Spheres& get_spheres() {
-  static Spheres spheres;
+  static Spheres spheres(12, kHarmonics);
   return spheres;
 }
 
-Complex find_exact(int l, double k) { return 1.0 / (k * calc_hankel_slope(l, k)); }
-
-/// rms error over directions at distance r, or far away (r = 0), in dB of the field.
-double find_error_db(const Outcome& outcome, std::size_t side, double k, double r) {
-  const auto [l, m] = get_harmonics()[side];
-  const std::span<const Complex> found = outcome.get_coefficients(side);
-  double error = 0.0;
-  const auto weigh = [&](int order) { return r > 0.0 ? std::abs(calc_hankel(order, k * r)) : 1.0; };
-  for (int order = 0; order <= outcome.order; ++order)
-    for (int n = -order; n <= order; ++n) {
-      const Complex wanted = order == l && n == m ? find_exact(l, k) : Complex();
-      const double size = weigh(order) * std::abs(found[static_cast<std::size_t>(order * order + order + n)] - wanted);
-      error += size * size;
-    }
-  return to_db(std::sqrt(error) / (weigh(l) * std::abs(find_exact(l, k))));
-}
-
-constexpr double kFictitious = 4.493409457909064;  // zero of j_1; those of j_0 are multiples of pi
-
 TEST(sphere, sends_out_what_the_closed_form_says) {
-  const std::vector<double> limits{-45.0, -45.0, -40.0, -38.0};
-  for (const double k : {0.01, 0.1, 1.0, std::numbers::pi, kFictitious, 10.0}) {
-    const Outcome& outcome = get_spheres().solve(k);
+  Spheres& spheres = get_fine_spheres();
+  for (const double k : {0.01, 0.1, 1.0, 3.0, 10.0}) {
+    const Outcome& outcome = spheres.solve(k);
     EXPECT_TRUE(outcome.gmres.is_converged);
     EXPECT_LE(outcome.gmres.products, 30) << k;
-    for (std::size_t side = 0; side < get_harmonics().size(); ++side) {
-      const int l = get_harmonics()[side].first;
-      const double near = find_error_db(outcome, side, k, 2.0), far = find_error_db(outcome, side, k, 0.0);
-      EXPECT_LE(near, limits[static_cast<std::size_t>(l)]) << "k " << k << ", l " << l;
-      // Far away, order 0 that single precision leaves is as loud as a mode that radiates 1e-5 of what order 0 would.
-      if (std::abs(find_exact(l, k)) > 1e-4 * std::abs(find_exact(0, k))) {
-        EXPECT_LE(far, limits[static_cast<std::size_t>(l)]) << "k " << k << ", l " << l;
-      }
-    }
-  }
-}
-
-TEST(sphere, is_no_worse_at_fictitious_frequencies_than_near_them) {
-  for (const double k : {std::numbers::pi, kFictitious}) {
-    const Outcome &at = get_spheres().solve(k), &below = get_spheres().solve(0.96 * k), &above = get_spheres().solve(1.04 * k);
-    for (std::size_t side = 0; side < get_harmonics().size(); ++side) {
-      const double error = find_error_db(at, side, k, 0.0);
-      const double there = std::max(find_error_db(below, side, 0.96 * k, 0.0), find_error_db(above, side, 1.04 * k, 0.0));
-      EXPECT_LE(error, there + 1.0) << "k " << k << ", l " << get_harmonics()[side].first;
+    for (std::size_t side = 0; side < kHarmonics.size(); ++side) {
+      const int l = kHarmonics[side].first;
+      // The finer the pattern, the more of it the facets turn into low orders, which radiate far better: h^2 of order 8 is 1.7 % of the
+      // pressure on the surface, and -31 to -35 dB of that at two radii.
+      const double limit_db = l <= 5 ? -55.0 : l <= 7 ? -40.0 : -30.0;
+      EXPECT_LE(spheres.find_error_db(side, k, 2.0), limit_db) << "k " << k << ", l " << l;
+      // Far away, what single precision leaves of order 0 is louder than an order that hardly radiates.
+      if (spheres.find_share(side, k) < 1e-2) continue;
+      EXPECT_LE(spheres.find_error_db(side, k, 0.0), std::min(limit_db, -40.0)) << "k " << k << ", l " << l;
     }
   }
 }
 
 TEST(sphere, radiates_the_power_that_the_closed_form_says) {
-  for (const double k : {0.1, 1.0, std::numbers::pi, 10.0}) {
-    const Outcome& outcome = get_spheres().solve(k);
-    for (std::size_t side = 0; side < get_harmonics().size(); ++side) {
-      const int l = get_harmonics()[side].first;
-      if (l > 2) continue;
-      // Power over rho c / 2 times the integral of the squared velocity, which is 1: Re(i h_l / h_l').
-      double efficiency = 0.0;
-      for (const Complex& c : outcome.get_coefficients(side)) efficiency += std::norm(c);
-      const double wanted = (Complex(0, 1) * calc_hankel(l, k) / calc_hankel_slope(l, k)).real();
-      EXPECT_NEAR(efficiency / wanted, 1.0, 0.01) << "k " << k << ", l " << l;
+  Spheres& spheres = get_fine_spheres();
+  std::size_t held = 0;
+  for (const double k : {0.1, 1.0, 3.0, 10.0}) {
+    for (std::size_t side = 0; side < kHarmonics.size(); ++side) {
+      if (spheres.find_share(side, k) < 1e-4) continue;  // the power of a share of 1e-4 is 1e-8 of that of order 0
+      EXPECT_NEAR(spheres.find_power_ratio(side, k), 1.0, 0.01) << "k " << k << ", l " << kHarmonics[side].first;
+      ++held;
     }
+  }
+  EXPECT_GE(held, 26U);  // l = 0 to 2, 0 to 5, and twice 0 to 8 and more
+}
+
+TEST(sphere, is_no_worse_at_fictitious_frequencies_than_near_them) {
+  // Zeros of j_0 to j_4: wave numbers at which the air inside a soft sphere resonates, and the plain equation has no unique solution.
+  const std::vector<double> zeros{std::numbers::pi,  4.493409457909064, 5.763459196894550, 2.0 * std::numbers::pi, 6.987932000500519,
+                                  7.725251836937707, 8.182561452571243, 9.095011330476355, 3.0 * std::numbers::pi};
+  for (const double k : zeros) {
+    const std::vector<double> neighbours{0.98 * k, 1.02 * k};
+    for (const double near : neighbours)
+      for (const double zero : zeros) ASSERT_GT(std::abs(near / zero - 1.0), 0.01) << "a neighbour of " << k << " is fictitious itself";
+    for (std::size_t side = 0; side < kHarmonics.size(); ++side) {
+      for (const double distance : {0.0, 2.0}) {
+        const double there = std::max(get_spheres().find_error_db(side, neighbours[0], distance),
+                                      get_spheres().find_error_db(side, neighbours[1], distance));
+        EXPECT_LE(get_spheres().find_error_db(side, k, distance), there + 1.0) << "k " << k << ", l " << kHarmonics[side].first;
+      }
+    }
+    EXPECT_TRUE(get_spheres().solve(k).gmres.is_converged);
   }
 }
 
 TEST(sphere, has_the_pressure_of_the_closed_form_on_its_surface) {
-  for (const double k : {0.1, 1.0, kFictitious}) {
-    const Outcome& outcome = get_spheres().solve(k);
-    const std::size_t count = get_harmonics().size();
+  Spheres& spheres = get_fine_spheres();
+  for (const double k : {0.01, 0.1, 1.0, 3.0, 10.0}) {
+    const Outcome& outcome = spheres.solve(k);
+    const std::size_t count = kHarmonics.size();
     for (std::size_t side = 0; side < count; ++side) {
-      const auto [l, m] = get_harmonics()[side];
+      const auto [l, m] = kHarmonics[side];
       const Complex factor = calc_hankel(l, k) * find_exact(l, k);
       double error = 0.0, all = 0.0;
       for (std::size_t i = 0; i < outcome.pressure.size() / count; ++i) {
-        const Complex wanted = factor * calc_harmonic(l, m, normalise(get_spheres().get_surface().get_nodes()[i]));
+        const Complex wanted = factor * calc_harmonic(l, m, normalise(spheres.get_surface().get_nodes()[i]));
         error += std::norm(Complex(outcome.pressure[i * count + side]) - wanted);
         all += std::norm(wanted);
       }
-      EXPECT_LT(std::sqrt(error / all), 0.015) << "k " << k << ", l " << l;
+      EXPECT_LT(std::sqrt(error / all), l <= 5 ? 0.01 : 0.02) << "k " << k << ", l " << l;
     }
   }
 }
@@ -185,7 +150,7 @@ TEST(expansion, finds_the_coefficients_of_waves_about_its_centre) {
 }
 
 TEST(expansion, has_the_functions_of_bessel_and_hankel) {
-  for (const double x : {1e-3, 0.1, 1.0, std::numbers::pi, kFictitious, 12.0, 40.0}) {
+  for (const double x : {1e-3, 0.1, 1.0, std::numbers::pi, 4.493409457909064, 12.0, 40.0}) {
     const std::vector<double> bessel = calc_bessel(x, 30), logs = calc_log_hankel(x, 30);
     const std::vector<Complex> phases = calc_hankel_phase(x, 30);
     for (int l = 0; l <= 30; ++l) {

@@ -61,6 +61,23 @@ TEST(Seconds, more_modes_and_more_nodes_cost_more) {
   EXPECT_GT(predict_seconds(thin).check, predict_seconds(make_size(5000)).check + predict_factorisation_seconds(thin));
 }
 
+TEST(Seconds, coupled_modes_cost_more_time_and_memory) {
+  ProblemSize size = make_size(5000);
+  const double alone = predict_bytes(size, 1);
+  EXPECT_EQ(predict_seconds(size).coupling, 0);
+  double before = 0;
+  for (const int modes : {10, 30, 60, 120}) {
+    size.coupled_modes = modes;
+    const PhaseSeconds seconds = predict_seconds(size);
+    EXPECT_GT(seconds.coupling, before) << modes;
+    EXPECT_GE(seconds.sum(), seconds.coupling);
+    EXPECT_GE(predict_bytes(size, 1), alone);
+    before = seconds.coupling;
+  }
+  EXPECT_GT(predict_bytes(size, 1), alone);
+  EXPECT_EQ(predict_coupling_solves(30), 465);
+}
+
 TEST(Seconds, an_empty_band_is_counted_and_not_searched) {
   ProblemSize empty = make_size(5000);
   empty.modes = 0;

@@ -44,6 +44,28 @@ TEST(JobSpec, resources_are_read_and_are_no_part_of_the_resolved_job) {
     EXPECT_THROW(parse_job(job_with(std::string(", \"resources\": ") + bad), "/jobs/job.json"), InputError) << bad;
 }
 
+TEST(JobSpec, nonlinear_is_read_strictly_and_is_part_of_the_resolved_job) {
+  EXPECT_FALSE(parse_job(job_with(""), "/jobs/job.json").nonlinear);
+  const JobSpec plain = parse_job(job_with(R"(, "nonlinear": {})"), "/jobs/job.json");
+  ASSERT_TRUE(plain.nonlinear);
+  EXPECT_EQ(plain.nonlinear->modes, 50);
+  EXPECT_EQ(plain.nonlinear->below_hz, 3000.0);
+  EXPECT_EQ(plain.nonlinear->energy_error, 1e-2);
+  const JobSpec job = parse_job(job_with(R"(, "nonlinear": {"modes": 30, "below_hz": 2000, "energy_error": 1e-3})"), "/jobs/job.json");
+  EXPECT_EQ(job.nonlinear->modes, 30);
+  EXPECT_EQ(job.nonlinear->below_hz, 2000.0);
+  EXPECT_EQ(job.nonlinear->energy_error, 1e-3);
+  const std::string text = resolved_json(job, "/jobs", "");
+  EXPECT_EQ(resolved_json(parse_job(text, "/jobs/b.bank.resolved.json"), "/jobs", ""), text);
+  EXPECT_EQ(parse_job(job_with(R"(, "max_modes": 20, "nonlinear": {})"), "/jobs/job.json").nonlinear->modes, 20);
+  for (const char* bad : {"true", "\"stretch\"", "{\"modes\": 0}", "{\"modes\": 401}", "{\"below_hz\": 10}", "{\"below_hz\": -1}",
+                          "{\"energy_error\": 0.5}", "{\"energy_error\": 0}", "{\"mode\": 3}", "{\"modes\": 30}, \"max_modes\": 20"})
+    EXPECT_THROW(parse_job(job_with(std::string(", \"nonlinear\": ") + bad), "/jobs/job.json"), InputError) << bad;
+  const char* known = R"({"body": {"membrane": {"shape": "circle", "radius_m": 0.2, "lowest_hz": 200, "density_kg_m2": 0.3}},
+                          "bank": "b", "nonlinear": {}})";
+  EXPECT_THROW(parse_job(known, "/jobs/job.json"), InputError);
+}
+
 TEST(JobSpec, a_bank_may_be_left_out_only_where_a_store_keeps_it) {
   const std::string text = "{\"mesh\": \"m.msh\", " + kMaterial + "}";
   EXPECT_TRUE(parse_job(text, "/jobs/job.json", BankKey::optional).bank.empty());

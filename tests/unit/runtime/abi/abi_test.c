@@ -614,6 +614,107 @@ static void check_synth(const carillon_model* model) {
   carillon_destroy(NULL);
 }
 
+/* On a floor the pressure is twice that without one; programs that know of none have none. */
+static void check_floor(const carillon_model* model) {
+  static float heard[128];
+  static const double on_it[1][3] = {{0, 0, -0.5}};
+  float* const out[1] = {heard};
+  carillon_options options;
+  carillon_body_options body_options;
+  carillon_impulse impulse;
+  carillon_synth* synth;
+  int32_t body;
+  int i, n, with;
+  double squares[2] = {0, 0};
+  for (with = 0; with < 2; ++with) {
+    carillon_options_init(&options);
+    CHECK(options.floor_reflection == 0);
+    options.microphones_m = on_it;
+    options.microphone_count = 1;
+    options.floor_height_m = -0.5;
+    options.floor_reflection = with;
+    carillon_body_options_init(&body_options);
+    CHECK((body_options.effects & CARILLON_GROUND_REFLECTION) == 0);
+    if (with) body_options.effects |= CARILLON_GROUND_REFLECTION;
+    body_options.position_m[1] = 2;
+    CHECK(carillon_create(&options, &synth, message, sizeof message) == CARILLON_OK);
+    CHECK(carillon_add_body_with(synth, model, &body_options, &body, message, sizeof message) == CARILLON_OK);
+    carillon_impulse_init(&impulse);
+    impulse.body = body;
+    impulse.time_s = 0.01;
+    impulse.impulse_n_s[2] = 1e-3;
+    CHECK(carillon_push_impulse(synth, &impulse) == CARILLON_OK);
+    for (i = 0; i < 40; ++i) {
+      carillon_process(synth, out, 1, 128);
+      for (n = 0; n < 128; ++n) squares[with] += (double)heard[n] * heard[n];
+    }
+    if (!with) {
+      body_options.effects |= CARILLON_GROUND_REFLECTION;
+      CHECK(carillon_add_body_with(synth, model, &body_options, &body, message, sizeof message) == CARILLON_BAD_INPUT &&
+            strstr(message, "floor") != NULL);
+    }
+    carillon_destroy(synth);
+  }
+  CHECK(squares[0] > 0 && squares[1] > 3.99 * squares[0] && squares[1] < 4.01 * squares[0]);
+  options.floor_reflection = -1;
+  CHECK(carillon_create(&options, &synth, message, sizeof message) == CARILLON_BAD_INPUT && strstr(message, "reflection") != NULL);
+  carillon_options_init_sized(&options, offsetof(carillon_options, floor_height_m));
+  options.floor_reflection = -1; /* is not looked at */
+  CHECK(carillon_create(&options, &synth, message, sizeof message) == CARILLON_OK);
+  carillon_destroy(synth);
+}
+
+/* A body on the left is louder there by a head, and what programs know that were built before heads has none. */
+static void check_head(const carillon_model* model) {
+  static float left[128], right[128];
+  static const double middle[1][3] = {{0, 0, 0}};
+  float* const out[2] = {left, right};
+  carillon_options options;
+  carillon_body_options body_options;
+  carillon_effect_counters effects;
+  carillon_impulse impulse;
+  carillon_synth* synth;
+  int32_t body;
+  int i, n;
+  double loud = 0, soft = 0;
+  carillon_options_init_sized(&options, offsetof(carillon_options, head_radius_m));
+  options.head_radius_m = -1; /* is not looked at */
+  CHECK(carillon_create(&options, &synth, message, sizeof message) == CARILLON_OK);
+  carillon_body_options_init(&body_options);
+  CHECK((body_options.effects & CARILLON_HEAD) == 0);
+  body_options.effects |= CARILLON_HEAD;
+  body_options.position_m[0] = -2;
+  CHECK(carillon_add_body_with(synth, model, &body_options, &body, message, sizeof message) == CARILLON_BAD_INPUT && message[0] != '\0');
+  carillon_destroy(synth);
+  carillon_options_init(&options);
+  CHECK(options.head_radius_m == 0);
+  options.head_radius_m = 0.0875;
+  CHECK(carillon_create(&options, &synth, message, sizeof message) == CARILLON_OK);
+  CHECK(carillon_add_body_with(synth, model, &body_options, &body, message, sizeof message) == CARILLON_OK);
+  carillon_impulse_init(&impulse);
+  impulse.body = body;
+  impulse.time_s = 0.01;
+  impulse.impulse_n_s[2] = 1e-3;
+  CHECK(carillon_push_impulse(synth, &impulse) == CARILLON_OK);
+  for (i = 0; i < 40; ++i) {
+    carillon_process(synth, out, 2, 128);
+    for (n = 0; n < 128; ++n) {
+      loud += (double)left[n] * left[n];
+      soft += (double)right[n] * right[n];
+    }
+  }
+  CHECK(loud > 1.2 * soft && soft > 0);
+  carillon_effect_counters_init(&effects);
+  CHECK(carillon_get_effect_counters(synth, body, &effects) == CARILLON_OK && effects.head_units > 1000 && effects.head_bytes > 1000);
+  carillon_destroy(synth);
+  options.head_radius_m = 5;
+  CHECK(carillon_create(&options, &synth, message, sizeof message) == CARILLON_BAD_INPUT && strstr(message, "radius") != NULL);
+  options.head_radius_m = 0.0875;
+  options.microphones_m = middle;
+  options.microphone_count = 1;
+  CHECK(carillon_create(&options, &synth, message, sizeof message) == CARILLON_BAD_INPUT && strstr(message, "two microphones") != NULL);
+}
+
 int main(int argc, char** argv) {
   carillon_bank* bank = NULL;
   carillon_model* model = NULL;
@@ -633,6 +734,8 @@ int main(int argc, char** argv) {
   check_forces(model);
   check_contacts(model);
   check_surfaces(model);
+  check_head(model);
+  check_floor(model);
   carillon_model_release(model);
   return failures == 0 ? 0 : 1;
 }

@@ -562,6 +562,66 @@ TEST(EffectSelector, TheGroundIsHeardWhereItReflectsEnough) {
   EXPECT_FALSE(has_ground());
 }
 
+TEST(EffectSelector, AHeadHearsWhateverIsHeard) {
+  Stage stage;
+  const auto play_strike = [&](double impulse_n_s) {
+    EffectSelector selector(stage.facts);
+    selector.watch(make_strike(0.5, impulse_n_s));
+    const auto changes = selector.advance(10.0);
+    return std::pair(find_effects(changes, 0.5), selector.get_plan(0));
+  };
+  const auto [free, without] = play_strike(0.01);
+  EXPECT_FALSE(free.has(Effect::kHead));
+  EXPECT_EQ(without[Effect::kHead].cost_us, 0.0);
+  EXPECT_EQ(describe(without[Effect::kHead].reason), "the listener's ears are free");
+  stage.facts.has_head = true;
+  stage.facts.microphones_m = {{1e-9, 0.0, 0.0}, {-1e-9, 0.0, 0.0}};  // ways that are the same
+  const auto [heard, with] = play_strike(0.01);
+  EXPECT_TRUE(heard.has(Effect::kHead) && heard.has(Effect::kTwoEars));
+  EXPECT_GT(with[Effect::kHead].cost_us, 0.0);
+  EXPECT_EQ(with[Effect::kTwoEars].cost_us, 0.0) << "the head has one receiver";
+  EXPECT_EQ(describe(with[Effect::kHead].reason), "the listener has a head");
+  EXPECT_FALSE(find_effects(EffectSelector(stage.facts).advance(10.0), 0.5).has(Effect::kHead)) << "of a body that is silent";
+  stage.body().overrides.off = {Effect::kTwoEars};
+  const auto [mono, deaf] = play_strike(0.01);
+  EXPECT_FALSE(mono.has(Effect::kHead));
+  EXPECT_EQ(deaf[Effect::kHead].reason.rule, SelectionReason::Rule::kNeedsOther);
+}
+
+TEST(EffectSelector, NonlinearMotionIsThatOfABlowThatRaisesAMode) {
+  Stage stage;
+  const auto play_strike = [&](double impulse_n_s) {
+    EffectSelector selector(stage.facts);
+    selector.watch(make_strike(0.5, impulse_n_s));
+    const auto changes = selector.advance(10.0);
+    return std::pair(find_effects(changes, 0.5), selector.get_plan(0)[Effect::kNonlinear]);
+  };
+  const auto [linear, none] = play_strike(1.0);
+  EXPECT_FALSE(linear.has(Effect::kNonlinear));
+  EXPECT_EQ(describe(none.reason), "the bank has no nonlinear energy");
+  bank::Bank bank = *stage.body().bank;
+  bank.quartic.modes = {0};
+  bank.quartic.rows = {1e7F};
+  stage.body().bank = &bank;
+  const auto [hard, high] = play_strike(1.0);
+  EXPECT_TRUE(hard.has(Effect::kNonlinear) && hard.has(Effect::kModal));
+  EXPECT_EQ(high.reason.rule, SelectionReason::Rule::kHardens);
+  EXPECT_GT(high.cost_us, 0.0);
+  // Cents go with the square of the blow: where it is just too soft it is off, and it costs nothing.
+  const double just = std::sqrt(kHardeningCents / high.reason.value);
+  EXPECT_TRUE(play_strike(1.01 * just).first.has(Effect::kNonlinear));
+  const auto [soft, low] = play_strike(0.99 * just);
+  EXPECT_FALSE(soft.has(Effect::kNonlinear));
+  EXPECT_NEAR(low.reason.value, 0.99 * 0.99 * kHardeningCents, 1e-6);
+  EXPECT_EQ(low.cost_us, 0.0);
+  EXPECT_EQ(describe(low.reason), "a strike raises a mode by 2.94 cents, less than 3");
+  // Twice as hard: longer, by the time in which the amplitude falls to a half.
+  const double decay_per_s = bank.decay_per_s[0];
+  EXPECT_NEAR(play_strike(16.0 * just).second.on_s - play_strike(8.0 * just).second.on_s, std::log(2.0) / decay_per_s, 2.0 * kTickS);
+  stage.body().overrides.off = {Effect::kNonlinear};
+  EXPECT_FALSE(play_strike(1.0).first.has(Effect::kNonlinear));
+}
+
 TEST(EffectSelector, NothingIsStruckAndNothingMoves) {
   Stage stage;
   stage.body().struck = false;

@@ -8,12 +8,18 @@
 #include <cmath>
 #include <complex>
 #include <cstdio>
+#include <cstdlib>
 #include <fstream>
 #include <limits>
 #include <numbers>
+#include <string>
 
+#include "runtime/base/error.hpp"
+#include "runtime/head/sofa.hpp"
 #include "runtime/host/report.hpp"
 #include "runtime/host/sound_file.hpp"
+#include "tests/support/folder.hpp"
+#include "tests/unit/runtime/head/oracle.hpp"
 #include "tests/unit/runtime/host/heard.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 #include "tests/unit/runtime/synth/multipole_cube.hpp"
@@ -196,6 +202,56 @@ TEST(Render, DirectivityAndTheGroundAreThoseOfTheScene) {
             << e << " " << n;
       }
     }
+  }
+}
+
+/// A tone of 2 Pa at 1 m, 2 m to the left of a listener that looks along -x.
+Case make_case_with_head() {
+  Case c({{1500.0, 0.0, 2.0}}, {0.0, -2.0, 0.0}, 0.1);
+  c.scene.listener.facing = {-1.0, 0.0, 0.0};
+  c.scene.listener.ears = Ears::kHrtf;
+  c.scene.listener.ear_distance_m = 0.18;
+  c.scene.effects = kDefaultEffects.with(synth::Effect::kHead);
+  return c;
+}
+
+// The sphere has the width of the ears, looks where the listener does, and is heard at the time of the scene: its latency is cut off.
+TEST(Render, AHeadHearsAsTheSceneTurnsIt) {
+  const Case c = make_case_with_head();
+  const Heard sound = c.render();
+  ASSERT_EQ(sound.pressure_pa[0].size(), 24000u);
+  constexpr double k = 2.0 * pi * 1500.0 / 343.0;
+  for (std::size_t ear = 0; ear < 2; ++ear) {
+    const double angle = (ear == 0 ? 10.0 : 170.0) * pi / 180.0;  // ears lie 10 degrees behind the middle
+    const std::complex<double> at_ear = std::polar(1.0, -2.0 * k) * head::testing::calc_rigid_sphere(k * 0.09, angle);
+    for (std::size_t n = 9600; n < 23000; ++n) {
+      const double t = static_cast<double>(n) / 48000.0 - 0.1;
+      ASSERT_NEAR(sound.pressure_pa[ear][n], std::real(at_ear * std::polar(1.0, 2.0 * pi * 1500.0 * t)), 5e-3) << ear << " " << n;
+    }
+  }
+}
+
+// The head of a file whose law is known: an ear hears a source in the direction d with the level 1 +- 0.5 d_y.
+TEST(Render, AMeasuredHeadIsThatOfItsFile) {
+  if (!head::has_sofa()) GTEST_SKIP() << "built without SOFA";
+  const tests::Folder folder;
+  Case c = make_case_with_head();
+  c.scene.listener.sofa = folder / "head.sofa";
+  const std::string script = std::string(CARILLON_SOURCE_DIR) + "/tests/unit/runtime/head/write_sofa.py ";
+  ASSERT_EQ(std::system(("/usr/bin/python3 " + script + c.scene.listener.sofa.string() + " step=30").c_str()), 0)
+      << "python3-h5py is needed";
+  const Heard sound = c.render();
+  std::array<double, 2> peak{};
+  for (std::size_t ear = 0; ear < 2; ++ear)
+    for (std::size_t n = 9600; n < 23000; ++n) peak[ear] = std::max(peak[ear], std::abs(static_cast<double>(sound.pressure_pa[ear][n])));
+  EXPECT_NEAR(peak[0] / peak[1], 3.0, 0.05);
+
+  std::ofstream(c.scene.listener.sofa) << "no head";
+  try {
+    c.render();
+    FAIL() << "a file that is none was read";
+  } catch (const InputError& error) {
+    EXPECT_EQ(std::string(error.what()).rfind(c.scene.listener.sofa.string() + ": ", 0), 0u) << error.what();
   }
 }
 

@@ -8,6 +8,7 @@
 #include <sstream>
 #include <string>
 
+#include "runtime/host/microphones.hpp"
 #include "runtime/host/pose.hpp"
 
 namespace carillon::host {
@@ -176,6 +177,30 @@ TEST(Scene, WhatIsLeftOutHasItsDefault) {
   EXPECT_EQ(parse("{\"duration_s\": 2, \"output\": {\"gain\": \"auto\"}, " + kBody + "}").output.gain_per_pa, std::nullopt);
 }
 
+TEST(Scene, AListenerMayHaveAHead) {
+  const auto parse_listener = [](const std::string& keys, const std::string& more = "") {
+    return parse("{\"duration_s\": 2, \"listener\": {" + keys + "}, " + kBody + more + "}");
+  };
+  const Scene free = parse_listener("\"ears\": \"free\"");
+  EXPECT_FALSE(has_head(free));
+  EXPECT_FALSE(has_head(parse("{\"duration_s\": 2, " + kBody + "}")));
+  EXPECT_FALSE(free.effects.has(synth::Effect::kHead));
+  EXPECT_FALSE(make_head(free, 48000.0).has_value());
+  const Scene sphere = parse_listener("\"ears\": \"hrtf\"");
+  EXPECT_TRUE(has_head(sphere));
+  EXPECT_TRUE(sphere.effects.has(synth::Effect::kHead));
+  EXPECT_EQ(sphere.listener.ear_distance_m, 0.175);
+  EXPECT_TRUE(sphere.listener.sofa.empty());
+  EXPECT_TRUE(sphere.warnings.empty());
+  EXPECT_EQ(parse_listener("\"ears\": \"hrtf\", \"ear_distance_m\": 0.2").listener.ear_distance_m, 0.2);
+  const Scene measured = parse_listener("\"ears\": \"hrtf\", \"sofa\": \"heads/mine.sofa\"");
+  EXPECT_TRUE(measured.listener.sofa.is_absolute());
+  EXPECT_EQ(measured.listener.sofa.filename(), "mine.sofa");
+  EXPECT_FALSE(parse_listener("\"ears\": \"hrtf\"", ", \"effects\": {\"head\": false}").effects.has(synth::Effect::kHead));
+  EXPECT_FALSE(parse_listener("\"ears\": \"hrtf\"", ", \"effects\": [\"modal\"]").effects.has(synth::Effect::kHead));
+  EXPECT_TRUE(parse_listener("\"ears\": \"hrtf\"", ", \"effects\": [\"two_ears\", \"head\"]").effects.has(synth::Effect::kHead));
+}
+
 TEST(Scene, AnglesTurnAboutTheFixedAxesXThenYThenZ) {
   const Scene scene =
       parse(R"({"duration_s": 1, "bodies": [{"name": "a", "bank": "a.h5", "rotation_deg": [90, 0, 90], "position_m": [1, 2, 3]}]})");
@@ -216,7 +241,7 @@ TEST(Scene, EffectsAreThoseOfTheList) {
       parse_effects(R"(["modal", "hertz_pulse", "acceleration_noise", "air_delay", "doppler", "two_ears", "roughness", "rolling",
     "contact_damping"])");
   EXPECT_FALSE(list.automatic);
-  EXPECT_EQ(list.on, kPlayableEffects.without({Effect::kDirectivity, Effect::kGroundReflection}));
+  EXPECT_EQ(list.on, kPlayableEffects.without({Effect::kDirectivity, Effect::kGroundReflection, Effect::kHead, Effect::kNonlinear}));
   EXPECT_EQ(parse_effects(R"(["doppler"])").on, synth::EffectSet{Effect::kDoppler});
   EXPECT_FALSE(parse_effects("[]").automatic);
   const auto some = parse_effects(R"({"base": "auto", "on": ["acceleration_noise"], "off": ["doppler", "two_ears"]})");
@@ -413,6 +438,19 @@ INSTANTIATE_TEST_SUITE_P(
                  with_root("\"listener\": {\"facing\": [1, 0, 0], \"look_at_m\": [1, 1, 1]}"),
                  {"look_at_m", "facing", "keep one"}},
         BadScene{"giant_head", with_root("\"listener\": {\"ear_distance_m\": 11}"), {"ear_distance_m", "from 0 to 10"}},
+        BadScene{"ears_of_an_elf", with_root("\"listener\": {\"ears\": \"pointed\"}"), {"ears", "free", "hrtf"}},
+        BadScene{"file_without_head", with_root("\"listener\": {\"sofa\": \"a.sofa\"}"), {":2:", "sofa", "\"ears\": \"hrtf\""}},
+        BadScene{"file_as_number", with_root("\"listener\": {\"ears\": \"hrtf\", \"sofa\": 3}"), {"sofa"}},
+        BadScene{"head_of_two_widths",
+                 with_root("\"listener\": {\"ears\": \"hrtf\", \"sofa\": \"a.sofa\", \"ear_distance_m\": 0.18}"),
+                 {"ear_distance_m", "leave it out"}},
+        BadScene{"head_of_a_giant",
+                 with_root("\"listener\": {\"ears\": \"hrtf\", \"ear_distance_m\": 0.7}"),
+                 {"ear_distance_m", "from 0.06 to 0.6"}},
+        BadScene{"heard_by_no_head", with_root("\"effects\": {\"head\": true}"), {"head", "\"ears\": \"hrtf\""}},
+        BadScene{"heard_by_no_head_but_microphones",
+                 with_root("\"effects\": {\"on\": [\"head\"]}, \"microphones\": [[0, 0, 1], [0, 0, 2]]"),
+                 {"head", "\"ears\": \"hrtf\""}},
         BadScene{"gain_word", with_root("\"output\": {\"gain\": \"loud\"}"), {"gain", "auto", "number"}},
         BadScene{"gain_list", with_root("\"output\": {\"gain\": [1]}"), {"gain", "auto", "number"}},
         BadScene{"gain_zero", with_root("\"output\": {\"gain\": 0}"), {"gain", "greater than 0"}},

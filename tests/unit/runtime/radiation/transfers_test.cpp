@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "runtime/bank/multipoles.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/radiation/gains.hpp"
 #include "tests/unit/runtime/radiation/multipole_bank.hpp"
@@ -192,6 +193,44 @@ TEST(Transfers, AnySelectionInAnyOrderIsTheSame) {
   transfers.evaluate(place, {}, {});
 }
 
+TEST(Transfers, TwoPlacesAtOnceAreTheSame) {
+  const bank::Bank bank = make_random_bank(50, 30);
+  const std::array<Vec3, 2> places{kSphereCentre + Vec3{0.4, 0.2, -0.1}, kSphereCentre + Vec3{-1.0, 2.0, 0.3}};
+  for (const base::Instructions instructions : find_instruction_sets()) {
+    const Transfers transfers(bank, instructions);
+    const std::vector<std::int32_t> modes{3, 0, 49, 17, 18, 3};
+    std::array<std::vector<std::complex<float>>, 2> both;
+    for (auto& one : both) one.resize(modes.size());
+    transfers.evaluate(places, modes, {both[0], both[1]});
+    for (std::size_t p = 0; p < 2; ++p) {
+      const auto alone = evaluate(transfers, places[p] - kSphereCentre);
+      const double distance = norm(places[p] - kSphereCentre);
+      for (std::size_t i = 0; i < modes.size(); ++i)
+        EXPECT_LT(std::abs(Complex(both[p][i]) - alone[static_cast<std::size_t>(modes[i])]) * distance, 1e-4 * transfers.get_rms(modes[i]))
+            << modes[i];
+    }
+  }
+}
+
+// One order alone is its own; of two orders of equal power at twice the radius the mean square counts.
+TEST(Transfers, TheOrderOfTurnsIsThatOfThePowerAtTwiceTheRadius) {
+  bank::Bank bank = testing::make_empty_multipoles();
+  std::vector<Complex> alone(36), two(36);
+  alone[5 * 5 + 3] = {1.0, 0.5};
+  constexpr double kKa = 4.0;
+  const auto fall = [](int l) {
+    return std::abs(testing::calc_hankel(l, static_cast<long double>(2.0 * kKa)) / testing::calc_hankel(l, static_cast<long double>(kKa)));
+  };
+  two[1 + 1] = 1.0;
+  two[5 * 5 + 2] = static_cast<double>(fall(1) / fall(5));
+  add_multipoles(bank, kKa, alone);
+  add_multipoles(bank, kKa, two);
+  const Transfers transfers(bank);
+  EXPECT_NEAR(transfers.get_turn_order(0), 5.0, 1e-12);
+  EXPECT_NEAR(transfers.get_turn_order(1), std::sqrt((1.0 + 25.0) / 2.0), 1e-3);
+  EXPECT_EQ(transfers.get_order(1), 5);
+}
+
 TEST(Transfers, InsideTheSphereThePlaceOnItCounts) {
   const Transfers transfers(make_random_bank(40, 12));
   for (const Vec3& direction : make_directions(10)) {
@@ -252,12 +291,42 @@ TEST(Transfers, TheMeanOverDirectionsFarAwayIsTheGainOfTheDecay) {
   }
 }
 
+// A body above a rigid plane makes half of the power that its field and the mirrored one carry: the mean over the half space is that of the
+// whole field, and so is the gain. In another air as much decay is another pressure.
+TEST(Transfers, TheGainIsTheMeanOfAHalfSpaceAndInTheAirOfTheBank) {
+  for (const bool is_half : {false, true}) {
+    bank::Bank bank = make_random_bank(30, 9);
+    bank.multipoles.air_density_kg_m3 = 0.9;
+    bank.multipoles.sound_speed_ms = 390.0;
+    const std::vector<bank::CoefficientDecay> carried = bank::calc_coefficient_decays(bank.multipoles);
+    for (std::size_t m = 0; m < carried.size(); ++m) bank.multipoles.decay_per_s[m] = (is_half ? 0.5 : 1.0) * carried[m].decay_per_s;
+    bank.radiation_gain.assign(bank.mode_count(), 0.0);
+    bank.shape_scale.assign(bank.mode_count(), 0.0);
+    EXPECT_EQ(bank::is_half_space(bank.multipoles), is_half);
+    const std::vector<double> gains = calc_gains(bank, GainKind::kBem);
+    const Transfers transfers(bank);
+    constexpr double kFar = 1000.0;
+    std::vector<double> squares(bank.mode_count());
+    for (const auto& [z, weight] : make_gauss(12)) {
+      for (int turn = 0; turn < 24; ++turn) {
+        const double across = std::sqrt(1.0 - z * z), angle = 2.0 * pi * turn / 24;
+        const auto found = evaluate(transfers, kFar * Vec3{across * std::cos(angle), across * std::sin(angle), z});
+        for (std::size_t m = 0; m < squares.size(); ++m) squares[m] += weight / 48.0 * std::norm(found[m]);
+      }
+    }
+    for (std::size_t m = 0; m < squares.size(); ++m) EXPECT_NEAR(kFar * std::sqrt(squares[m]) / gains[m], 1.0, 1e-3) << m;
+  }
+}
+
 TEST(Transfers, SaysWhatItHolds) {
   const bank::Bank bank = make_random_bank(20, 9);
   const Transfers transfers(bank);
   EXPECT_EQ(transfers.get_mode_count(), 20);
   EXPECT_EQ(transfers.get_centre_m(), kSphereCentre);
   EXPECT_EQ(transfers.get_radius_m(), kSphereRadius);
+  EXPECT_GT(transfers.calc_bytes(), 2 * bank.multipoles.coefficient.size());
+  EXPECT_EQ(make_transfers(bank::Bank{}), nullptr);
+  EXPECT_EQ(make_transfers(bank)->get_mode_count(), 20);
   for (int m = 0; m < 20; ++m) EXPECT_EQ(transfers.get_order(m), bank.multipoles.order[static_cast<std::size_t>(m)]);
 }
 

@@ -11,6 +11,7 @@
 #include <cmath>
 #include <vector>
 
+#include "runtime/head/sphere.hpp"
 #include "runtime/synth/acceleration_noise.hpp"
 #include "runtime/synth/contact_forces.hpp"
 #include "runtime/synth/receiver.hpp"
@@ -31,6 +32,27 @@ TEST(NoHeap, TheCounterSeesAllocations) {
   auto* memory = new std::vector<double>(1000);
   EXPECT_GE(g_allocations - before, 2);
   delete memory;
+}
+
+TEST(NoHeap, ModesThatLargeMotionCouplesTakeNoMemory) {
+  std::vector<testing::InventedMode> modes;
+  for (int m = 0; m < 30; ++m) modes.push_back({100.0 + 90.0 * m, 5.0});
+  bank::Bank bank = testing::make_cube_bank(modes);
+  for (int m = 0; m < 20; ++m) bank.quartic.modes.push_back(m);
+  for (std::size_t i = 0; i < 2 * bank::count_pairs(20); ++i) bank.quartic.rows.push_back(i % 3 == 0 ? 1e6F : -3e5F);
+  const auto model = Model::make(bank);
+  Voice body(model, {.is_nonlinear = true});
+  std::vector<float> sent(128);
+  const long before = g_allocations;
+  for (int i = 0; i < 300; ++i) {
+    if (i % 10 == 0)
+      body.strike(
+          {.time_s = (static_cast<double>(body.get_position()) + 30.3) / 48000.0, .impulse_n_s = {0.0, 0.0, 0.3}, .duration_s = 2e-3});
+    body.set_limit(i % 50 == 0 ? 16 : 1000);
+    body.process(sent);
+  }
+  EXPECT_EQ(g_allocations - before, 0);
+  EXPECT_GT(body.get_counters().coupled_samples, 1000);
 }
 
 TEST(NoHeap, StrikingAndProcessingTakeNoMemory) {
@@ -91,13 +113,15 @@ TEST(NoHeap, EffectsTakeTheMemoryThatTheirCountersSay) {
   for (int m = 0; m < 300; ++m) modes.push_back({100.0 + 60.0 * m, 30.0});
   bank::Bank bank = testing::make_cube_bank(modes);
   testing::give_multipoles(bank, std::vector<testing::ModeMultipoles>(modes.size(), testing::make_dipole(1.0)), 0.09);
+  bank.quartic.modes = {0, 1};
+  bank.quartic.rows = {1e6F, 1e6F, 1e6F};
   const auto model = Model::make(bank);
   const auto sum = [](const Synthesiser& synthesiser, int body) {
     std::int64_t bytes = 0;
     for (const std::int64_t more : synthesiser.get_effect_counters(body).bytes) bytes += more;
     return static_cast<double>(bytes);
   };
-  Synthesiser synthesiser({.max_waypoints = 2, .floor = Floor{}});
+  Synthesiser synthesiser({.max_waypoints = 2, .floor = Floor{}, .head = ListeningHead{head::make_sphere(48000.0)}});
   synthesiser.add_body(model, {.effects = kCompiledEffects});  // and with it the tables that all share
   long before = g_bytes;
   const int silent = synthesiser.add_body(model, {.effects = {}});
@@ -106,7 +130,8 @@ TEST(NoHeap, EffectsTakeTheMemoryThatTheirCountersSay) {
   for (int e = 0; e < kEffectCount; ++e) {
     const auto effect = static_cast<Effect>(e);
     if (!kCompiledEffects.has(effect)) continue;
-    const EffectSet effects = EffectSet{Effect::kModal}.with(effect);
+    EffectSet effects = EffectSet{Effect::kModal}.with(effect);
+    if (effect == Effect::kHead) effects = effects.with(Effect::kTwoEars);
     before = g_bytes;
     const int body = synthesiser.add_body(model, {.effects = effects});
     EXPECT_NEAR(static_cast<double>(g_bytes - before), sum(synthesiser, body), 2500.0) << get_name(effect);
@@ -150,7 +175,7 @@ TEST(NoHeap, AWholeSceneTakesNoMemoryWhileItPlays) {
   EXPECT_GT(synthesiser.get_counters().faded, 0);
 }
 
-// A body that turns above a floor, sliding and struck, gets other models and effects while it sounds.
+// A body that turns above a floor, sliding and struck, heard by a head that turns, gets other models and effects while it sounds.
 TEST(NoHeap, DirectivityTakesNoMemoryWhileItPlays) {
   std::vector<testing::InventedMode> modes;
   for (int m = 0; m < 50; ++m) modes.push_back({150.0 + 250.0 * m, 30.0 + (m % 7 == 0 ? 1e5 : 0.0)});
@@ -160,8 +185,11 @@ TEST(NoHeap, DirectivityTakesNoMemoryWhileItPlays) {
     testing::give_multipoles(bank, std::vector<testing::ModeMultipoles>(modes.size(), testing::make_dipole(1.0)), 0.09 + 0.01 * i);
     models[i] = Model::make(bank);
   }
-  constexpr EffectSet kAll = kDefaultEffects.with({Effect::kDirectivity, Effect::kGroundReflection, Effect::kRoughness});
-  Synthesiser synthesiser({.max_strikes = 8, .ring_events = 64, .floor = Floor{.point_m = {0.0, 0.0, -1.0}}});
+  constexpr EffectSet kAll = kDefaultEffects.with({Effect::kDirectivity, Effect::kGroundReflection, Effect::kRoughness, Effect::kHead});
+  Synthesiser synthesiser({.max_strikes = 8,
+                           .ring_events = 64,
+                           .floor = Floor{.point_m = {0.0, 0.0, -1.0}},
+                           .head = ListeningHead{head::make_sphere(48000.0)}});
   const int body = synthesiser.add_body(models[0], {.position_m = {1.0, 2.0, 0.0}, .effects = kAll});
   std::vector<float> left(300), right(300);
   const std::array<float*, 2> out{left.data(), right.data()};
@@ -171,7 +199,7 @@ TEST(NoHeap, DirectivityTakesNoMemoryWhileItPlays) {
     if (i % 40 == 0) {  // the main thread may
       const long until_now = g_allocations;
       synthesiser.swap_model(body, models[static_cast<std::size_t>(i / 40 % 2)]);
-      synthesiser.set_effects(body, i % 80 == 0 ? kAll : kAll.without(Effect::kDirectivity));
+      synthesiser.set_effects(body, i % 80 == 0 ? kAll : kAll.without(i % 160 == 40 ? Effect::kDirectivity : Effect::kHead));
       before += g_allocations - until_now;
     }
     const double time_s = synthesiser.get_horizon_s(), half = 0.01 * i;
@@ -187,11 +215,13 @@ TEST(NoHeap, DirectivityTakesNoMemoryWhileItPlays) {
                                             .patch_radius_m = 1e-5,
                                             .impedance_n_s_m = 1.0});
     synthesiser.push(events::BodyMotion{time_s, body, {1.0, 2.0, 0.001 * i}, {}, {std::cos(half), 0.0, std::sin(half), 0.0}});
+    synthesiser.push(events::Listener{.time_s = time_s, .rotation = {std::cos(half), 0.0, 0.0, std::sin(half)}});
     synthesiser.set_budget(i % 60 < 30 ? 20.0 * 48000.0 : 1e12);
     synthesiser.process(out.data(), 2, 1 + i);
   }
   EXPECT_EQ(g_allocations - before, 0);
   EXPECT_GT(synthesiser.get_effect_counters(body).units[Effect::kDirectivity], 1000);
+  EXPECT_GT(synthesiser.get_effect_counters(body).units[Effect::kHead], 1000);
   EXPECT_GT(synthesiser.get_effect_counters(body).units[Effect::kRoughness], 0);
 }
 
@@ -199,8 +229,11 @@ TEST(NoHeap, DirectivityTakesNoMemoryWhileItPlays) {
 TEST(NoHeap, AWholeSceneMakesNoSystemCallWhileItPlays) {
   std::vector<testing::InventedMode> modes;
   for (int m = 0; m < 30; ++m) modes.push_back({150.0 + 250.0 * m, 30.0 + (m % 9 == 0 ? 1e5 : 0.0)});
-  Synthesiser synthesiser({.max_bodies = 4, .budget = 50.0 * 48000.0});
-  for (int b = 0; b < 4; ++b) synthesiser.add_body(Model::make(testing::make_cube_bank(modes)), {.position_m = {1.0, 2.0, 0.0}});
+  Synthesiser synthesiser({.max_bodies = 4, .budget = 50.0 * 48000.0, .head = ListeningHead{head::make_sphere(48000.0)}});
+  for (int b = 0; b < 4; ++b) {
+    const EffectSet effects = b < 2 ? kDefaultEffects : kDefaultEffects.with(Effect::kHead);
+    synthesiser.add_body(Model::make(testing::make_cube_bank(modes)), {.position_m = {1.0, 2.0, 0.0}, .effects = effects});
+  }
   std::array<float, 256> left{}, right{};
   const std::array<float*, 2> out{left.data(), right.data()};
   const pid_t child = fork();

@@ -1,17 +1,37 @@
 // Method:     the value between samples is the sum of 32 samples under a sinc and a Kaiser window, from tables.
 // Source:     Kaiser 1974 (window); Abramowitz and Stegun 9.6.12 (I0, its power series).
 // Deviations: none.
-#include "runtime/head/sinc.hpp"
+#include "runtime/base/sinc.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
-#include "runtime/base/kaiser_sinc.hpp"
-
-namespace carillon::head {
+namespace carillon::base {
 namespace {
 
-double calc_value(double x) { return base::calc_kaiser_sinc(x, kSincHalf) / base::calc_bessel_i0(base::kKaiserBeta); }
+constexpr double kKaiserBeta = 9.0;  // stop band -90 dB
+
+/// The modified Bessel function I0 by its power series (Abramowitz and Stegun 9.6.12), for 0 <= x <= kKaiserBeta: std::cyl_bessel_i is not
+/// in every C++ library.
+double calc_bessel_i0(double x) {
+  double term = 1.0, sum = 1.0;
+  for (int k = 1; term > 1e-17 * sum; ++k) {
+    term *= 0.25 * x * x / (static_cast<double>(k) * k);
+    sum += term;
+  }
+  return sum;
+}
+
+/// sin(pi x) / (pi x) under the window, at x samples from the middle, -half <= x <= half; calc_bessel_i0(kKaiserBeta) in the middle.
+/// Kaiser 1974.
+double calc_kaiser_sinc(double x, double half) {
+  const double sinc = x == 0.0 ? 1.0 : std::sin(std::numbers::pi * x) / (std::numbers::pi * x);
+  const double within = std::max(0.0, 1.0 - (x / half) * (x / half));
+  return sinc * calc_bessel_i0(kKaiserBeta * std::sqrt(within));
+}
+
+double calc_value(double x) { return calc_kaiser_sinc(x, kSincHalf) / calc_bessel_i0(kKaiserBeta); }
 
 }  // namespace
 
@@ -26,7 +46,7 @@ Sinc::Sinc() {
     std::array<double, kSincTaps> taps{};
     double total = 0.0;
     for (std::size_t j = 0; j < kSincTaps; ++j) {
-      taps[j] = calc_value(kSincHalf - 1.0 + static_cast<double>(phase) / kSincPhases - static_cast<double>(j));
+      taps[j] = calc_kaiser_sinc(static_cast<double>(j) - kSincHalf + 1.0 - static_cast<double>(phase) / kSincPhases, kSincHalf);
       total += taps[j];
     }
     for (std::size_t j = 0; j < kSincTaps; ++j) delays_[phase][j] = static_cast<float>(taps[j] / total);
@@ -49,4 +69,4 @@ void Sinc::make_delay(double fraction, std::array<float, kSincTaps>& taps) const
   for (std::size_t j = 0; j < kSincTaps; ++j) taps[j] = before[j] + mix * (after[j] - before[j]);
 }
 
-}  // namespace carillon::head
+}  // namespace carillon::base

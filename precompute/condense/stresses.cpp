@@ -1,0 +1,414 @@
+// Method:     Of all pairs: the Gram matrix of s_ij, in units of equal energy (q_i = g_i / omega_i), by its eigenvectors. Of many modes: the
+//             fields of random motions, orthonormalised block by block, until the fields of other motions lie in what they span. There
+//             <s_r, s_ij> = <s_r, E_ij>, since s_r does no work on what was condensed: no pair needs a solve.
+// Source:     docs/equations.md E13; Halko, Martinsson, Tropp, SIAM Review 53, 2011 (randomised range finder).
+// Deviations: Of the work of stresses on displacements that are condensed, what the stresses of the modes themselves do on products of a
+//             mode's rotation and a condensed one's is left out: of order (thickness x wave number)² in flat bodies.
+#include "precompute/condense/stresses.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "precompute/condense/products.hpp"
+#include "runtime/base/chance.hpp"
+#include "runtime/base/error.hpp"
+
+namespace carillon::condense {
+namespace {
+
+constexpr double kLeastShare = 1e-12;      // of the trace: fields below are rounding
+constexpr int kPairsAtOnce = 64;           // right-hand sides of a solve
+constexpr std::int64_t kRowsAtOnce = 768;  // of the elements whose stresses are multiplied together
+constexpr int kHeldOut = 48;
+constexpr std::uint64_t kTest = 1;           // seeds: of the motions held out; others follow
+
+std::ptrdiff_t to_index(std::size_t value) { return static_cast<std::ptrdiff_t>(value); }
+
+/// Calls visit(first element, last, rows) for runs of elements.
+template <typename Visit>
+void for_chunks(const Strains& strains, Visit&& visit) {
+  for (std::int32_t e = 0; e < strains.element_count();) {
+    std::int32_t end = e + 1;
+    while (end < strains.element_count() && strains.first_row(end + 1) - strains.first_row(e) <= kRowsAtOnce) ++end;
+    visit(e, end, strains.first_row(end) - strains.first_row(e));
+    e = end;
+  }
+}
+
+/// c += a^T b, c symmetric in the end: the upper part of its blocks.
+void add_products(const la::Matrix& a, std::ptrdiff_t rows, la::Matrix& c) {
+  constexpr std::ptrdiff_t kBlock = 256;
+  for (std::ptrdiff_t j = 0; j < c.cols(); j += kBlock) {
+    const std::ptrdiff_t n = std::min(kBlock, c.cols() - j);
+    la::gemm(la::Transpose::kYes, j + n, static_cast<int>(n), rows, 1, a.data(), a.rows(), a.col(j).data(), a.rows(), 1, c.col(j).data(),
+             c.rows());
+  }
+}
+
+void mirror(la::Matrix& c) {
+  for (std::ptrdiff_t j = 0; j < c.cols(); ++j)
+    for (std::ptrdiff_t i = 0; i < j; ++i) c(j, i) = c(i, j);
+}
+
+void add_loads(const Strains& strains, std::int32_t e, const RowMatrix& forces, Nodal& loads) {
+  const auto nodes = strains.nodes(e);
+  const std::ptrdiff_t width = forces.cols();
+  for (std::size_t i = 0; i < nodes.size(); ++i)
+    Eigen::Map<RowMatrix>(loads.data() + static_cast<std::ptrdiff_t>(nodes[i]) * 3 * width, 3, width) += forces.middleRows(3 * to_index(i), 3);
+}
+
+std::size_t count_nodal(const CoupledBody& body, std::ptrdiff_t width) {
+  return body.shapes.size() / static_cast<std::size_t>(body.pairs.modes) * static_cast<std::size_t>(width);
+}
+
+/// Units in which all modes have the same energy: what a pair's products are multiplied by.
+la::Vector calc_pair_scale(const std::vector<double>& omega) {
+  const Pairs pairs{to_index(omega.size())};
+  la::Vector scale(pairs.count());
+  for (std::ptrdiff_t i = 0; i < pairs.modes; ++i)
+    for (std::ptrdiff_t j = i; j < pairs.modes; ++j)
+      scale[pairs.find(i, j)] = 1 / (omega[static_cast<std::size_t>(i)] * omega[static_cast<std::size_t>(j)]);
+  return scale;
+}
+
+void fill_products(Samples& samples) {
+  const Pairs pairs{samples.q.rows()};
+  samples.products.resize(pairs.count(), samples.q.cols());
+  for (std::ptrdiff_t i = 0; i < pairs.modes; ++i)
+    for (std::ptrdiff_t j = i; j < pairs.modes; ++j)
+      samples.products.row(pairs.find(i, j)) = samples.q.row(i).cwiseProduct(samples.q.row(j));
+}
+
+/// The entry of largest magnitude of each row becomes positive: eigenvectors have no sign of their own.
+void fix_signs(StressFields& fields) {
+  for (std::ptrdiff_t r = 0; r < fields.form.rows(); ++r) {
+    std::ptrdiff_t at = 0;
+    fields.form.row(r).cwiseAbs().maxCoeff(&at);
+    if (fields.form(r, at) >= 0) continue;
+    fields.form.row(r) *= -1;
+    fields.linear.row(r) *= -1;
+    if (fields.values.size() > 0) fields.values.col(r) *= -1;
+  }
+}
+
+/// Flat bodies have no cubic part: what the mesh has of it is set to nothing.
+void set_curvature(StressFields& fields, const std::vector<double>& omega) {
+  fields.curvature = calc_curvature(fields.linear, omega);
+  if (fields.curvature >= kCurved) return;
+  fields.linear.setZero();
+  fields.cubic.setZero();
+}
+
+void keep_first(StressFields& fields, std::ptrdiff_t count) {
+  fields.form.conservativeResize(count, Eigen::NoChange);
+  fields.linear.conservativeResize(count, Eigen::NoChange);
+}
+
+/// The fields of the motions q, (rows, columns of q), and their work on the kept modes.
+la::Matrix calc_sample_fields(const CoupledBody& body, const la::Matrix& q, la::Matrix* work, std::int64_t& solves) {
+  const auto width = static_cast<int>(q.cols());
+  const Strains& strains = body.strains;
+  la::Matrix fields = body.comm.agree([&] { return la::Matrix(strains.first_row(strains.element_count()), width); });
+  Nodal loads = body.comm.agree([&] { return Nodal(count_nodal(body, width), 0.0); });
+  ElementPoints points;
+  RowMatrix shape, motion, gradients, linear, z;
+  const RowMatrix combine = q;
+  for (std::int32_t e = 0; e < strains.element_count(); ++e) {
+    strains.calc_points(e, points);
+    strains.gather(e, body.shapes.data(), body.pairs.modes, shape);
+    motion.noalias() = shape * combine;
+    Strains::calc_gradients(points, motion, gradients);
+    strains.calc_square_strains(e, points, gradients, z);
+    strains.calc_linear(e, points, linear);
+    fields.middleRows(strains.first_row(e), strains.row_count(e)) = z;
+    motion.noalias() = linear.transpose() * z;
+    add_loads(strains, e, motion, loads);
+  }
+  const la::Matrix on_kept = body.answer.solve(loads, width);
+  if (work != nullptr) *work = on_kept;
+  solves += width;
+  for (std::int32_t e = 0; e < strains.element_count(); ++e) {
+    strains.calc_points(e, points);
+    strains.calc_linear(e, points, linear);
+    strains.gather(e, loads.data(), width, motion);
+    fields.middleRows(strains.first_row(e), strains.row_count(e)).noalias() -= linear * motion;
+  }
+  return fields;
+}
+
+la::Columns to_columns(la::Matrix& m) { return {m.data(), m.rows(), std::max<std::ptrdiff_t>(m.rows(), 1), static_cast<int>(m.cols())}; }
+
+/// What of `fields` is not yet in `basis` is added to it, orthonormal. Returns the squares of the norms of what was left of each field.
+la::Vector extend(const comm::Communicator& comm, la::Matrix fields, double least, la::Matrix& basis) {
+  la::Vector left;
+  for (int pass = 0; pass < 2; ++pass) {
+    if (basis.cols() > 0) {
+      const la::Matrix products = la::multiply_transposed(comm, to_columns(basis), to_columns(fields));
+      la::subtract_product(to_columns(basis), products.data(), static_cast<int>(products.rows()), to_columns(fields));
+    }
+    if (pass == 0) left = la::multiply_transposed(comm, to_columns(fields), to_columns(fields)).diagonal();
+  }
+  for (int pass = 0; pass < 2; ++pass) {  // the first leaves what rounding of large fields did to small ones
+    la::Matrix gram = la::multiply_transposed(comm, to_columns(fields), to_columns(fields));
+    la::Vector values;
+    if (la::calc_eigenpairs(gram, values) != 0) throw SolveError("internal: the fields of sampled motions have no orthonormal basis");
+    const std::ptrdiff_t count = (values.array() > (pass == 0 ? least : 0.0)).count(), drop = values.size() - count;
+    for (std::ptrdiff_t r = 0; r < count; ++r) gram.col(drop + r) /= std::sqrt(values[drop + r]);
+    fields = multiply(fields, gram.rightCols(count));
+    if (count == 0) return left;
+  }
+  const std::ptrdiff_t before = basis.cols();
+  basis.conservativeResize(fields.rows(), before + fields.cols());
+  basis.rightCols(fields.cols()) = fields;
+  return left;
+}
+
+/// The scaled linear strains of the modes, (rows of this rank, N).
+la::Matrix calc_mode_strains(const CoupledBody& body) {
+  const Strains& strains = body.strains;
+  la::Matrix values = body.comm.agree([&] { return la::Matrix(strains.first_row(strains.element_count()), body.pairs.modes); });
+  ElementPoints points;
+  RowMatrix shape, linear;
+  for (std::int32_t e = 0; e < strains.element_count(); ++e) {
+    strains.calc_points(e, points);
+    strains.gather(e, body.shapes.data(), body.pairs.modes, shape);
+    strains.calc_linear(e, points, linear);
+    values.middleRows(strains.first_row(e), strains.row_count(e)).noalias() = linear * shape;
+  }
+  return values;
+}
+
+/// <basis, E_ij> of all pairs and all ranks: (columns of basis, pairs).
+la::Matrix calc_form(const CoupledBody& body, const la::Matrix& basis) {
+  const Strains& strains = body.strains;
+  const std::ptrdiff_t pairs = body.pairs.count(), modes = body.pairs.modes;
+  la::Matrix sums = body.comm.agree([&] { return la::Matrix(la::Matrix::Zero(basis.cols(), pairs)); });
+  ElementPoints points;
+  RowMatrix shape, gradients, z;
+  for_chunks(strains, [&](std::int32_t begin, std::int32_t end, std::int64_t rows) {
+    la::Matrix chunk(rows, pairs);
+    for (std::int32_t e = begin; e < end; ++e) {
+      strains.calc_points(e, points);
+      strains.gather(e, body.shapes.data(), modes, shape);
+      Strains::calc_gradients(points, shape, gradients);
+      strains.calc_pair_strains(e, points, gradients, body.pairs, 0, pairs, z);
+      chunk.middleRows(strains.first_row(e) - strains.first_row(begin), strains.row_count(e)) = z;
+    }
+    la::gemm(la::Transpose::kYes, basis.cols(), static_cast<int>(pairs), rows, 1, basis.data() + strains.first_row(begin), basis.rows(),
+             chunk.data(), rows, 1, sums.data(), sums.rows());
+  });
+  body.comm.sum(la::entries(sums));
+  return sums;
+}
+
+}  // namespace
+
+Samples make_samples(const std::vector<double>& omega, int count, std::uint64_t seed) {
+  Samples samples;
+  samples.q.resize(to_index(omega.size()), count);
+  std::uint64_t state = base::scramble(seed);
+  for (double& q : la::entries(samples.q)) {
+    const double u = 1 - base::to_unit(base::draw(state)), angle = 2 * std::numbers::pi * base::to_unit(base::draw(state));
+    q = std::sqrt(-2 * std::log(u)) * std::cos(angle);
+  }
+  for (std::size_t i = 0; i < omega.size(); ++i) samples.q.row(to_index(i)) /= omega[i];
+  fill_products(samples);
+  return samples;
+}
+
+Samples make_single_samples(const std::vector<double>& omega) {
+  Samples samples;
+  samples.q.setZero(to_index(omega.size()), to_index(omega.size()));
+  for (std::size_t i = 0; i < omega.size(); ++i) samples.q(to_index(i), to_index(i)) = 1 / omega[i];
+  fill_products(samples);
+  return samples;
+}
+
+Samples join(const Samples& a, const Samples& b) {
+  Samples samples;
+  samples.q.resize(a.q.rows(), a.q.cols() + b.q.cols());
+  samples.q << a.q, b.q;
+  fill_products(samples);
+  return samples;
+}
+
+double calc_error(const la::Vector& energy, const la::Vector& cubic, const la::Vector& full, const la::Vector& full_cubic) {
+  constexpr double kLeastEnergy = 0.01;  // of the mean: what is softer is not heard beside the others
+  const double least = kLeastEnergy * full.mean(), norm = full_cubic.norm();
+  const double worst = ((energy - full).array().abs() / full.array().max(least)).maxCoeff();
+  return norm > 0 ? std::max(worst, (cubic - full_cubic).norm() / norm) : worst;
+}
+
+double calc_curvature(const la::Matrix& linear, const std::vector<double>& omega) {
+  la::Matrix scaled = linear;
+  for (std::size_t i = 0; i < omega.size(); ++i) scaled.col(to_index(i)) /= omega[i];
+  la::Matrix square = scaled.transpose() * scaled;
+  la::Vector values;
+  if (la::calc_eigenpairs(square, values) != 0) throw SolveError("internal: the linear part of the fields has no singular values");
+  return std::sqrt(std::max(values[values.size() - 1], 0.0));
+}
+
+std::ptrdiff_t find_rank(const StressFields& fields, double& error) {
+  const la::Matrix eta = multiply(fields.form, fields.tests.products), bias = fields.linear * fields.tests.q;
+  la::Vector energy = la::Vector::Zero(fields.full.size()), cubic = energy;
+  const double wanted = error;
+  std::ptrdiff_t rank = 0;
+  while ((error = calc_error(energy, cubic, fields.full, fields.cubic)) > wanted && rank < fields.form.rows()) {
+    energy += 0.5 * eta.row(rank).transpose().array().square().matrix();
+    cubic += eta.row(rank).cwiseProduct(bias.row(rank)).transpose();
+    ++rank;
+  }
+  return rank;
+}
+
+Gram calc_gram(const CoupledBody& body) {
+  const Strains& strains = body.strains;
+  const std::ptrdiff_t pairs = body.pairs.count(), modes = body.pairs.modes;
+  Gram gram = body.comm.agree([&] {
+    return Gram{la::Matrix::Zero(pairs, pairs), la::Matrix::Zero(modes, pairs), Nodal(count_nodal(body, pairs), 0.0)};
+  });
+  ElementPoints points;
+  RowMatrix shape, gradients, linear, z, forces;
+  for (std::ptrdiff_t first = 0; first < pairs; first += kPairsAtOnce) {
+    const std::ptrdiff_t width = std::min<std::ptrdiff_t>(kPairsAtOnce, pairs - first);
+    body.proceed(static_cast<double>(first) / static_cast<double>(pairs));
+    Nodal loads = body.comm.agree([&] { return Nodal(count_nodal(body, width), 0.0); });
+    for (std::int32_t e = 0; e < strains.element_count(); ++e) {
+      strains.calc_points(e, points);
+      strains.gather(e, body.shapes.data(), modes, shape);
+      Strains::calc_gradients(points, shape, gradients);
+      strains.calc_pair_strains(e, points, gradients, body.pairs, first, width, z);
+      strains.calc_linear(e, points, linear);
+      forces.noalias() = linear.transpose() * z;
+      add_loads(strains, e, forces, loads);
+    }
+    gram.work.middleCols(first, width) = body.answer.solve(loads, static_cast<int>(width));
+    const std::size_t rows = loads.size() / static_cast<std::size_t>(width);
+    for (std::size_t row = 0; row < rows; ++row)
+      std::copy_n(loads.begin() + to_index(row) * width, width, gram.theta.begin() + to_index(row) * pairs + first);
+  }
+  for_chunks(strains, [&](std::int32_t begin, std::int32_t end, std::int64_t rows) {
+    la::Matrix chunk(rows, pairs);
+    for (std::int32_t e = begin; e < end; ++e) {
+      strains.calc_points(e, points);
+      strains.gather(e, body.shapes.data(), modes, shape);
+      Strains::calc_gradients(points, shape, gradients);
+      strains.calc_pair_strains(e, points, gradients, body.pairs, 0, pairs, z);
+      strains.calc_linear(e, points, linear);
+      strains.gather(e, gram.theta.data(), pairs, forces);
+      z.noalias() -= linear * forces;
+      chunk.middleRows(strains.first_row(e) - strains.first_row(begin), strains.row_count(e)) = z;
+    }
+    add_products(chunk, rows, gram.values);
+  });
+  body.comm.sum(la::entries(gram.values));
+  mirror(gram.values);
+  return gram;
+}
+
+StressFields calc_fields_of_pairs(const CoupledBody& body, double error, bool wants_values) {
+  const std::ptrdiff_t pairs = body.pairs.count();
+  const Gram gram = calc_gram(body);
+  const la::Vector scale = calc_pair_scale(body.omega);
+  la::Matrix vectors = scale.asDiagonal() * gram.values * scale.asDiagonal();
+  const double trace = vectors.trace();
+  la::Vector values;
+  if (la::calc_eigenpairs_by_division(vectors, values) != 0) throw SolveError("internal: the Gram matrix has no eigenvectors");
+  StressFields fields;
+  fields.solves = pairs;
+  const std::ptrdiff_t rank = (values.array() > kLeastShare * trace).count();
+  // s_r = sum of s_ij x_ij,r: coordinates of equal energy, so that the fields are orthonormal
+  la::Matrix combine(pairs, rank);
+  fields.form.resize(rank, pairs);
+  for (std::ptrdiff_t r = 0; r < rank; ++r) {
+    const std::ptrdiff_t at = pairs - 1 - r;
+    const double root = std::sqrt(values[at]);
+    fields.form.row(r) = root * vectors.col(at).cwiseQuotient(scale).transpose();
+    combine.col(r) = vectors.col(at).cwiseProduct(scale) / root;
+  }
+  fields.linear = (gram.work * combine).transpose();
+  const Samples& tests = fields.tests = join(make_single_samples(body.omega), make_samples(body.omega, kHeldOut, kTest));
+  fields.full = 0.5 * tests.products.cwiseProduct(gram.values * tests.products).colwise().sum().transpose();
+  fields.cubic = tests.q.cwiseProduct(gram.work * tests.products).colwise().sum().transpose();
+  set_curvature(fields, body.omega);
+  fields.error = error;
+  const std::ptrdiff_t kept = find_rank(fields, fields.error);
+  if (wants_values) {
+    const Strains& strains = body.strains;
+    fields.values.resize(strains.first_row(strains.element_count()), kept);
+    ElementPoints points;
+    RowMatrix shape, gradients, linear, z, theta;
+    const RowMatrix x = combine.leftCols(kept);
+    for (std::int32_t e = 0; e < strains.element_count(); ++e) {
+      strains.calc_points(e, points);
+      strains.gather(e, body.shapes.data(), body.pairs.modes, shape);
+      Strains::calc_gradients(points, shape, gradients);
+      strains.calc_pair_strains(e, points, gradients, body.pairs, 0, pairs, z);
+      strains.calc_linear(e, points, linear);
+      strains.gather(e, gram.theta.data(), pairs, theta);
+      z.noalias() -= linear * theta;
+      fields.values.middleRows(strains.first_row(e), strains.row_count(e)).noalias() = z * x;
+    }
+  }
+  keep_first(fields, kept);
+  fix_signs(fields);
+  return fields;
+}
+
+StressFields calc_fields_of_samples(const CoupledBody& body, double error) {
+  const std::ptrdiff_t pairs = body.pairs.count();
+  StressFields fields;
+  const Samples singles = make_single_samples(body.omega), others = make_samples(body.omega, kHeldOut, kTest);
+  fields.tests = join(singles, others);
+  la::Matrix work;
+  body.proceed(0.0);
+  la::Matrix tests = calc_sample_fields(body, fields.tests.q, &work, fields.solves);
+  fields.full = 0.5 * la::multiply_transposed(body.comm, to_columns(tests), to_columns(tests)).diagonal();
+  fields.cubic = fields.tests.q.cwiseProduct(work).colwise().sum().transpose();
+  const double least = kLeastShare * 2 * fields.full.mean();
+  la::Matrix basis(tests.rows(), 0);
+  extend(body.comm, tests.leftCols(singles.q.cols()), least, basis);
+  la::Matrix held_out = tests.rightCols(kHeldOut), mode_strains = calc_mode_strains(body);
+  const la::Vector energy = fields.full.tail(kHeldOut);
+  const la::Vector cubic = fields.cubic.tail(kHeldOut);
+  double start = 0;
+  for (std::uint64_t seed = 0; basis.cols() < pairs; ++seed) {
+    // What is left of the motions that are held out, relative to their energy
+    const la::Matrix eta = la::multiply_transposed(body.comm, to_columns(basis), to_columns(held_out));
+    fields.linear = la::multiply_transposed(body.comm, to_columns(basis), to_columns(mode_strains));
+    double left = ((2 * energy - eta.colwise().squaredNorm().transpose()).array() / (2 * energy).array()).maxCoeff();
+    if (calc_curvature(fields.linear, body.omega) >= kCurved) {
+      const la::Vector found = (fields.linear * others.q).cwiseProduct(eta).colwise().sum().transpose();
+      left = std::max(left, (found - cubic).norm() / cubic.norm());
+    }
+    if (start == 0) start = std::max(left, error);
+    if (left <= 0.2 * error) break;
+    body.proceed(std::clamp(std::log(start / left) / std::log(start / (0.2 * error)), 0.0, 1.0));
+    const std::ptrdiff_t before = basis.cols();
+    extend(body.comm, calc_sample_fields(body, make_samples(body.omega, kPairsAtOnce, kTest + 1 + seed).q, nullptr, fields.solves), least,
+           basis);
+    if (basis.cols() == before) break;
+  }
+  fields.form = calc_form(body, basis);
+  fields.linear = la::multiply_transposed(body.comm, to_columns(basis), to_columns(mode_strains));
+  set_curvature(fields, body.omega);
+  // The fields in the order of their energy
+  const la::Vector scale = calc_pair_scale(body.omega);
+  const la::Matrix scaled = fields.form * scale.asDiagonal();
+  const la::Matrix columns = scaled.transpose();
+  la::Matrix vectors = multiply_transposed(columns, columns);
+  la::Vector values;
+  if (la::calc_eigenpairs_by_division(vectors, values) != 0) throw SolveError("internal: the Gram matrix has no eigenvectors");
+  const la::Matrix turned = vectors.rowwise().reverse();
+  fields.form = multiply_transposed(turned, fields.form);
+  fields.linear = (turned.transpose() * fields.linear).eval();
+  fields.error = error;
+  const std::ptrdiff_t kept = find_rank(fields, fields.error);
+  keep_first(fields, kept);
+  fields.values = multiply(basis, turned.leftCols(kept));
+  fix_signs(fields);
+  return fields;
+}
+
+}  // namespace carillon::condense

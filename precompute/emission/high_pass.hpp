@@ -1,0 +1,25 @@
+// The DC blocker of OCE01 eq. 9.
+#pragma once
+
+namespace carillon::emission {
+
+inline constexpr double kAlpha2001 = 0.1;  // as printed: a corner of 738 Hz at 44,100 Hz
+
+/// Of a corner (-3 dB) in Hz: alpha = 1 - exp(-2 pi f / fs); 0 Hz lets everything pass.
+double calc_alpha(double corner_hz, double sample_rate_hz);
+
+/// One signal: p_i = (1 - alpha) p_{i-1} + g_i - g_{i-1}, and p_0 = 0: what is constant from the beginning is never heard.
+struct HighPass {
+  double g = 0.0, p = 0.0;
+  bool has_begun = false;
+
+  double next(double value, double alpha) {
+    if (alpha == 0.0) return value;
+    p = has_begun ? (1.0 - alpha) * p + (value - g) : 0.0;
+    g = value;
+    has_begun = true;
+    return p;
+  }
+};
+
+}  // namespace carillon::emission

@@ -1,0 +1,10 @@
+#include "precompute/emission/loops.hpp"
+
+namespace carillon::emission {
+namespace {
+#include "precompute/emission/loops.inl"
+}  // namespace
+
+const Loops kLoopsPlain{add_places, add_rows, calc_derivatives, sum_frames, scatter};
+
+}  // namespace carillon::emission

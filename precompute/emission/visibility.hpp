@@ -1,0 +1,37 @@
+// Whether one place sees another past surfaces.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "runtime/base/vector.hpp"
+
+namespace carillon::emission {
+
+using Corners = std::array<Vec3, 3>;  // of a triangle, m
+
+/// Triangles under a tree of boxes. What it keeps true: an answer depends on the list of triangles alone, not on who asks.
+class Visibility {
+ public:
+  Visibility() = default;
+  explicit Visibility(std::span<const Corners> triangles);
+
+  /// True when no triangle but `own` (a number in the list, or -1) is met by the straight way between the two.
+  bool is_free(const Vec3& from, const Vec3& to, std::int64_t own) const;
+
+ private:
+  struct Box {
+    Vec3 low, high;
+    std::int32_t first = 0, count = 0;  // of order_, when it is a leaf
+    std::int32_t second = 0;            // the other child; the first follows
+  };
+  void split(std::size_t begin, std::size_t end);
+
+  std::vector<Corners> triangles_;
+  std::vector<std::int32_t> order_;
+  std::vector<Box> boxes_;
+};
+
+}  // namespace carillon::emission

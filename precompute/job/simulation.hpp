@@ -1,0 +1,149 @@
+// A job of carillon-simulate: bodies that deform and move, what strikes them, who listens. Reference: docs/howto/simulate.md.
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "precompute/job/job_spec.hpp"
+#include "runtime/base/vector.hpp"
+
+namespace carillon::job {
+
+/// Nodes by a name of the mesh, or all inside a closed axis-parallel box in the axes of the body's mesh.
+struct NodeGroup {
+  std::string node_set = {};  // empty: the box
+  std::array<Vec3, 2> box_m{};
+  std::string place = {};  // "file:line" of the job, for messages
+};
+
+/// Nodes that follow a path: rows [t, x, y, z], displacement [m] from where they start, twice continuously differentiable in between, at
+/// rest before and after.
+struct Drive {
+  NodeGroup nodes;
+  std::vector<std::array<double, 4>> path;
+};
+
+/// A thin sheet by its middle surface.
+struct Sheet {
+  std::string shape = {};            // "rectangle" or "disc"
+  double length_m = 0, width_m = 0;  // of a rectangle, along x and y
+  double radius_m = 0;               // of a disc
+  double bow_m = 0;                  // rise of the middle of a rectangle over its ends at -x and +x, of a circular arc; no stress
+  int cells = 24;                    // along the longer side, or the diameter
+  double thickness_m = 0;
+};
+
+/// How stress follows from strain. stvk: Saint Venant-Kirchhoff (OCE01).
+enum class Law { stvk };
+
+/// A body of the simulation. One of mesh, body and sheet is given.
+struct SimulatedBody {
+  std::string name;
+  std::string place;  // "file:line" of the job, for messages
+  std::filesystem::path mesh = {};
+  double mesh_scale = 1.0;
+  std::optional<Body> body = {};
+  std::optional<Sheet> sheet = {};
+  Element element = Element::T10;
+  Law law = Law::stvk;
+  Material material;              // isotropic, Rayleigh damping
+  std::vector<NodeGroup> fixed;   // do not move; of a sheet: clamped
+  std::vector<NodeGroup> hinged;  // of a sheet: do not move, and turn freely
+  std::vector<Drive> drives;
+  Vec3 position_m{};                              // of the mesh's origin
+  Vec3 rotation_deg{};                            // about the fixed axes of the world: x first, then y, then z
+  Vec3 velocity_m_s{}, angular_velocity_rad_s{};  // at the start, about the centre of mass
+  bool sounds = true;
+};
+
+/// A rigid ball that strikes.
+struct Striker {
+  std::string place;
+  double radius_m = 0, mass_kg = 0;
+  Vec3 position_m{}, velocity_m_s{};
+};
+
+/// A rigid thing in the way, at rest.
+struct Plane {
+  Vec3 point_m{}, normal{0, 0, 1};  // unit, to the free side
+};
+struct Ball {
+  Vec3 centre_m{};
+  double radius_m = 0;
+};
+struct Block {
+  Vec3 min_m{}, max_m{};
+};
+struct Obstacle {
+  std::string place;
+  std::variant<Plane, Ball, Block> form;
+};
+
+/// Of all contacts.
+struct ContactSpec {
+  double stiffness = 0.5;    // kappa: penalty over E*/l, the modulus over the local edge
+  double restitution = 1.0;  // of a slow impact on something rigid: what is lost in the contact itself
+  double friction = 0.3;     // Coulomb
+};
+
+/// A force on a small place.
+struct Blow {
+  std::string place;
+  std::size_t body = 0;
+  double time_s = 0;  // middle
+  Vec3 point_m{};     // its nearest point of the surface, in the axes of the body's mesh
+  Vec3 impulse_n_s{};
+  double duration_s = 0;  // of a raised cosine
+};
+
+enum class SurfaceSound { kirchhoff, rayleigh, paper2001 };
+
+/// Receivers: two ears, or microphones.
+struct Receivers {
+  Vec3 position_m{0.0, -1.5, 0.5};
+  Vec3 facing{0.0, 1.0, 0.0};  // unit
+  double ear_distance_m = 0.2;
+  std::vector<Vec3> microphones_m;  // in place of the ears
+  double cardioid = 0.0;            // q of (1 - q) + q cos: 0 omnidirectional, 0.5 cardioid
+};
+
+struct SimulationSpec {
+  std::filesystem::path file;
+  double duration_s = 0;
+  int sample_rate_hz = 48000;
+  std::optional<double> step_s;  // none: chosen
+  Vec3 gravity_m_s2{};           // 0: none
+  double settle_s = 0;           // gravity grows from 0 in this time
+  std::vector<SimulatedBody> bodies;
+  std::vector<Striker> strikers;
+  std::vector<Obstacle> obstacles;
+  ContactSpec contact;
+  std::vector<Blow> blows;
+  Receivers receivers;
+  SurfaceSound radiation = SurfaceSound::kirchhoff;
+  bool visibility = false;
+  double high_pass_hz = 20;
+  double motion_hz = 60;                                 // frames a second of `motion`
+  std::filesystem::path sound, surface, motion, record;  // absolute; empty: not wanted. record: energy book and figures of the run, JSON
+  Resources resources;
+  std::vector<std::string> warnings;
+};
+
+/// True when the text is a job of carillon-simulate: an object with the key "simulate".
+bool is_simulation(std::string_view text);
+
+/// Reads and validates. Throws InputError. Not collective.
+SimulationSpec parse_simulation(std::string_view text, const std::filesystem::path& file);
+SimulationSpec read_simulation(const std::filesystem::path& file);
+
+/// A law of loss as Rayleigh's with the same loss at both frequencies. Material laws but Rayleigh's are played so by carillon-simulate.
+Material make_rayleigh(const Material& material, double low_hz, double high_hz);
+
+std::string to_text(SurfaceSound radiation);
+
+}  // namespace carillon::job

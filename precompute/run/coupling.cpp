@@ -1,0 +1,119 @@
+#include "precompute/run/coupling.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+#include "precompute/condense/condense.hpp"
+#include "precompute/fem/assemble.hpp"
+#include "runtime/base/sort_order.hpp"
+#include "runtime/base/vector.hpp"
+
+namespace carillon::run {
+namespace {
+
+static_assert(job::kMaxCoupledModes == condense::kMaxModes && static_cast<std::size_t>(condense::kMaxModes) <= bank::kMaxCoupledModes);
+
+/// The modes that the bank will have, ascending: bank::keep_lowest() leaves those of the lowest corrected frequencies.
+std::vector<std::int32_t> find_kept_modes(const Run& run, const SolvedBody& solved) {
+  std::vector<double> freq_hz;
+  for (const double lambda : solved.errors.bars.corrected.lambda) freq_hz.push_back(std::sqrt(lambda) / (2 * std::numbers::pi));
+  if (freq_hz.empty()) freq_hz = solved.modes.lambda;
+  std::vector<std::int32_t> kept;
+  for (const std::size_t mode : base::find_sort_order(freq_hz)) kept.push_back(static_cast<std::int32_t>(mode));
+  if (run.job.max_modes) kept.resize(std::min(kept.size(), static_cast<std::size_t>(*run.job.max_modes)));
+  std::sort(kept.begin(), kept.end());
+  return kept;
+}
+
+/// Twice the volume over the surface: the thickness of a sheet.
+double calc_thickness(const Surface& surface, double volume_m3) {
+  double area_m2 = 0;
+  for (const auto& t : surface.triangles) {
+    const Vec3 &a = surface.vertices_m[static_cast<std::size_t>(t[0])], &b = surface.vertices_m[static_cast<std::size_t>(t[1])],
+               &c = surface.vertices_m[static_cast<std::size_t>(t[2])];
+    area_m2 += 0.5 * norm(cross(b - a, c - a));
+  }
+  return area_m2 > 0 ? 2 * volume_m3 / area_m2 : 0.0;
+}
+
+condense::Options make_options(Run& run, const AccurateBody& found, std::vector<std::int32_t> kept) {
+  condense::Options options;
+  options.modes = std::min(run.job.nonlinear->modes, static_cast<int>(kept.size()));
+  options.below_hz = run.job.nonlinear->below_hz;
+  options.energy_error = run.job.nonlinear->energy_error;
+  options.eligible = std::move(kept);
+  options.thickness_m =
+      run.comm.broadcast([&] { return calc_thickness(found.body.surface, found.solved.properties.rigid.volume_m3); });
+  options.report = [&run, tenths = 0](const std::string& text, double share) mutable {
+    const int now = static_cast<int>(10.0 * share);
+    if (std::exchange(tenths, now) != now) run.log.print(text);
+  };
+  return options;
+}
+
+std::string describe(const condense::Result& result) {
+  const bank::QuarticEnergy& energy = result.energy;
+  return fmt::format("{} coupled modes up to {:.0f} Hz of {} that bend or twist, {} {}{}, error {:.1e}, {} solves; {}", energy.mode_count(),
+                     result.top_hz, result.bending_count, energy.row_count(), energy.row_count() == 1 ? "field" : "fields",
+                     energy.is_of_points() ? fmt::format(" at {} points", energy.point_count()) : "", energy.error, result.solves,
+                     energy.linear.empty() ? "flat" : fmt::format("curved ({:.2g})", result.curvature));
+}
+
+void warn(Run& run, const condense::Result& result) {
+  const job::Nonlinear& asked = *run.job.nonlinear;
+  if (result.energy.is_empty()) {
+    run.log.warn(
+        fmt::format("no mode below {:g} Hz bends or twists something slender: the bank stays linear, and \"nonlinear\" can be removed",
+                    asked.below_hz));
+    return;
+  }
+  if (static_cast<int>(result.energy.mode_count()) < asked.modes && !result.splits_pair)
+    run.log.print(fmt::format("{} modes bend or twist below {:g} Hz, fewer than the {} that \"nonlinear\" asks for",
+                              result.energy.mode_count(), asked.below_hz, asked.modes));
+  if (result.splits_pair) run.log.print("one mode fewer is coupled than asked for: the next two have one frequency, and go together");
+  if (result.energy.membrane_ratio > bank::kMaxMembraneRatio) {
+    const std::string cause =
+        result.membrane_hz > 0
+            ? fmt::format("stretching begins at {:.0f} Hz, and the highest coupled mode has {:.0f} Hz", result.membrane_hz, result.top_hz)
+            : fmt::format("no mode of the band stretches the body, and the highest coupled mode has {:.0f} Hz", result.top_hz);
+    run.log.warn(fmt::format("{}: above half of it the inertia of stretching, which is left out, is heard; {}", cause,
+                             result.membrane_hz > 0 ? "lower \"nonlinear.below_hz\"" : "a wider \"band_hz\" would tell"));
+  }
+}
+
+}  // namespace
+
+CouplingReport couple_modes(Run& run, const AccurateBody& found) {
+  CouplingReport report;
+  if (!run.job.nonlinear) return report;
+  run.log.begin("coupling", fmt::format("quartic energy of {} modes below {:g} Hz", run.job.nonlinear->modes, run.job.nonlinear->below_hz));
+  const SolvedBody& solved = found.solved;
+  const std::vector<std::int32_t> kept = find_kept_modes(run, solved);
+  const condense::Options options = make_options(run, found, kept);
+  const condense::Result result = name_errors(found.body.source, run, [&] {
+    if (solved.modes.lambda.empty()) throw InputError("\"nonlinear\" couples modes, and none lies in the band: widen \"band_hz\"");
+    const fem::Materials& materials = solved.properties.materials;
+    const fem::System system = fem::assemble(run.comm, found.body.pieces.local, materials, run.job.mass);
+    return condense::condense_modes(run.comm,
+                                    {found.body.pieces.local, materials, system.stiffness, system.mass, solved.modes.lambda,
+                                     solved.modes.shapes, found.body.pieces.components},
+                                    options);
+  });
+  warn(run, result);
+  if (run.comm.is_root() && !result.energy.is_empty()) {
+    report.energy = result.energy;
+    report.result = describe(result);
+    run.log.print(report.result);
+    for (std::int32_t& mode : report.energy.modes)
+      mode = static_cast<std::int32_t>(std::lower_bound(kept.begin(), kept.end(), mode) - kept.begin());
+  }
+  run.log.end();
+  return report;
+}
+
+}  // namespace carillon::run

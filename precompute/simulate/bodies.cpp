@@ -1,0 +1,360 @@
+#include "precompute/simulate/bodies.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <set>
+#include <variant>
+
+#include "precompute/mesh/check.hpp"
+#include "precompute/mesh/read.hpp"
+#include "precompute/run/meshing.hpp"
+#include "runtime/base/error.hpp"
+
+namespace carillon::simulate {
+namespace {
+
+constexpr double kMostStrikeDistance = 0.05;  // of a body's extent, between a blow's point and the skin
+
+/// Runs `work` for a body; its InputError gets the line of the job.
+template <typename Work>
+auto name_place(const std::string& place, Work&& work) {
+  try {
+    return work();
+  } catch (const InputError& error) {
+    if (std::string_view(error.what()).starts_with(place)) throw;
+    throw InputError(fmt::format("{}: {}", place, error.what()));
+  }
+}
+
+transient::Law make_law(const job::Material& material) {
+  const double lambda = material.lame_lambda_pa(), mu = material.lame_mu_pa();
+  return {lambda, mu, material.alpha1_s * lambda, material.alpha1_s * mu, material.density_kg_m3};
+}
+
+/// In the axes of the body's mesh. Rank 0.
+mesh::TetMesh make_mesh(const job::SimulatedBody& body) {
+  const int order = body.element == job::Element::T10 ? 2 : 1;
+  mesh::TetMesh mesh;
+  if (body.body) {
+    mesh = run::make_body_mesh(*body.body, order, {body.body->nodes, body.body->edge_m});
+  } else {
+    mesh = mesh::read_mesh(body.mesh);
+    for (Vec3& x : mesh.nodes_m) x = body.mesh_scale * x;
+  }
+  mesh::check_mesh(mesh, fmt::format("body \"{}\"", body.name));
+  if (order == 2 && mesh.order == 1) mesh = mesh::to_quadratic(mesh);
+  if (order == 1 && mesh.order == 2) mesh = mesh::to_linear(mesh);
+  return mesh;
+}
+
+std::vector<std::int32_t> find_group(const mesh::TetMesh& mesh, const job::NodeGroup& group) {
+  return name_place(group.place, [&] {
+    std::vector<std::int32_t> nodes = group.node_set.empty() ? mesh::find_fixed_nodes(mesh, group.box_m[0], group.box_m[1])
+                                                             : mesh::find_fixed_nodes(mesh, group.node_set);
+    return nodes;
+  });
+}
+
+/// A list of nodes on a line?
+bool is_line(const std::vector<Vec3>& nodes_m, const std::vector<std::int32_t>& nodes) {
+  const auto at = [&](std::size_t i) { return nodes_m[static_cast<std::size_t>(nodes[i])]; };
+  std::size_t far = 0;
+  for (std::size_t i = 1; i < nodes.size(); ++i)
+    if (norm(at(i) - at(0)) > norm(at(far) - at(0))) far = i;
+  const double length = norm(at(far) - at(0));
+  if (!(length > 0)) return true;
+  const Vec3 along = (1.0 / length) * (at(far) - at(0));
+  return std::all_of(nodes.begin(), nodes.end(), [&](std::int32_t node) {
+    const Vec3 way = nodes_m[static_cast<std::size_t>(node)] - at(0);
+    return norm(way - dot(way, along) * along) < 1e-6 * length;
+  });
+}
+
+/// What rank 0 knows of a body. Nodes of `held` are those of the mesh; of a sheet its vertices, then its edges and ghosts.
+struct Made {
+  transient::AnyBody body;
+  struct Held {
+    std::vector<std::int32_t> nodes;
+    std::vector<std::array<double, 4>> rows;  // of the path
+    bool is_hinge = false;
+  };
+  std::vector<Held> held;
+  Vec3 centre_m{};
+};
+
+/// The groups of a body that are held, each node once: those that follow paths, one by one, then those that are fixed, then the hinged.
+struct HeldGroups {
+  std::vector<Made::Held> driven;
+  std::vector<std::int32_t> fixed, hinged;
+};
+
+HeldGroups find_held(const job::SimulatedBody& body, const mesh::TetMesh& mesh) {
+  HeldGroups held;
+  std::set<std::int32_t> driven, fixed, hinged;
+  for (const job::Drive& drive : body.drives) {
+    Made::Held group{find_group(mesh, drive.nodes), drive.path, false};
+    for (const std::int32_t node : group.nodes)
+      if (!driven.insert(node).second)
+        throw InputError(fmt::format("{}: a node of this drive follows another path already; drive each node once", drive.nodes.place));
+    held.driven.push_back(std::move(group));
+  }
+  for (const job::NodeGroup& group : body.fixed)
+    for (const std::int32_t node : find_group(mesh, group)) {
+      if (driven.contains(node))
+        throw InputError(fmt::format("{}: a node that is fixed here follows a path, too; take it out of one of the two", group.place));
+      fixed.insert(node);
+    }
+  for (const job::NodeGroup& group : body.hinged)
+    for (const std::int32_t node : find_group(mesh, group)) {
+      if (driven.contains(node) || fixed.contains(node))
+        throw InputError(
+            fmt::format("{}: a node that is hinged here is fixed or follows a path, too; take it out of one of the two", group.place));
+      hinged.insert(node);
+    }
+  held.fixed.assign(fixed.begin(), fixed.end());
+  held.hinged.assign(hinged.begin(), hinged.end());
+  return held;
+}
+
+Made make_solid(const job::SimulatedBody& body) {
+  Made made;
+  transient::SolidBody solid;
+  solid.name = body.name;
+  solid.mesh = name_place(body.place, [&] { return make_mesh(body); });
+  solid.law = make_law(body.material);
+  solid.mass_damping_per_s = body.material.alpha2_per_s;
+  mesh::TetMesh& mesh = solid.mesh;
+  HeldGroups held = find_held(body, mesh);
+  made.held = std::move(held.driven);
+  if (!held.fixed.empty()) {
+    const bool is_hinge = body.drives.empty() && is_line(mesh.nodes_m, held.fixed);
+    made.held.push_back({std::move(held.fixed), {}, is_hinge});
+  }
+  const Placement placement = find_placement(body);
+  for (Vec3& x : mesh.nodes_m) x = placement.place(x);
+  double volume = 0;
+  for (std::int64_t e = 0; e < mesh.tet_count(); ++e) {
+    const auto tet = mesh.tet(e);
+    std::array<Vec3, 4> at{};
+    for (std::size_t c = 0; c < 4; ++c) at[c] = mesh.nodes_m[static_cast<std::size_t>(tet[c])];
+    const double v = dot(at[1] - at[0], cross(at[2] - at[0], at[3] - at[0])) / 6.0;
+    volume += v;
+    made.centre_m = made.centre_m + 0.25 * v * (at[0] + at[1] + at[2] + at[3]);
+  }
+  made.centre_m = (1.0 / volume) * made.centre_m;
+  made.body = std::move(solid);
+  return made;
+}
+
+/// Holds what a clamp holds besides vertices: the angles of all edges between clamped vertices, and the ghosts behind those of the rim,
+/// which go where both ends of their edge go.
+void hold_directions(const std::string& place, const transient::SheetElements& elements, const std::vector<std::int32_t>& group_of,
+                     Made& made, std::vector<std::int32_t>& fixed_nodes) {
+  const auto find_group_of = [&](std::int32_t vertex) { return group_of[static_cast<std::size_t>(vertex)]; };
+  for (std::size_t e = 0; e < elements.edge.size(); ++e)
+    if (find_group_of(elements.edge[e][0]) >= 0 && find_group_of(elements.edge[e][1]) >= 0)
+      fixed_nodes.push_back(elements.vertices + static_cast<std::int32_t>(e));
+  for (const auto& nodes : elements.nodes)
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::int32_t ghost = nodes[3 + i];
+      if (ghost < elements.vertices + elements.edges) continue;
+      const std::int32_t group = find_group_of(nodes[(i + 1) % 3]);
+      if (group != find_group_of(nodes[(i + 2) % 3]))
+        throw InputError(
+            fmt::format("{}: an edge of the rim joins two groups of nodes that are held apart; leave a free vertex between them", place));
+      if (static_cast<std::size_t>(group) < made.held.size())
+        made.held[static_cast<std::size_t>(group)].nodes.push_back(ghost);
+      else
+        fixed_nodes.push_back(ghost);
+    }
+}
+
+Made make_sheet(const job::SimulatedBody& body) {
+  Made made;
+  const job::Sheet& described = *body.sheet;
+  transient::SheetBody sheet;
+  sheet.name = body.name;
+  sheet.mesh = name_place(body.place, [&] {
+    return described.shape == "disc" ? transient::make_disc(described.radius_m, described.cells)
+                                     : transient::make_rectangle(described.length_m, described.width_m, described.cells, described.bow_m);
+  });
+  sheet.law = {body.material.lame_lambda_pa(), body.material.lame_mu_pa(), body.material.density_kg_m3, described.thickness_m,
+               body.material.alpha1_s};
+  sheet.mass_damping_per_s = body.material.alpha2_per_s;
+  // Groups are found as those of solids are.
+  mesh::TetMesh vertices;
+  vertices.nodes_m = sheet.mesh.vertices_m;
+  vertices.node_sets = sheet.mesh.node_sets;
+  HeldGroups held = find_held(body, vertices);
+  std::vector<std::int32_t> group_of(vertices.nodes_m.size(), -1);  // clamped: the group
+  sheet.clamped.resize(vertices.nodes_m.size());
+  const auto clamp = [&](const std::vector<std::int32_t>& nodes, std::size_t group) {
+    for (const std::int32_t node : nodes) {
+      group_of[static_cast<std::size_t>(node)] = static_cast<std::int32_t>(group);
+      sheet.clamped[static_cast<std::size_t>(node)] = true;
+    }
+  };
+  for (std::size_t g = 0; g < held.driven.size(); ++g) clamp(held.driven[g].nodes, g);
+  clamp(held.fixed, held.driven.size());
+  const bool is_hinge = held.driven.empty() && held.fixed.empty() && is_line(vertices.nodes_m, held.hinged);
+  made.held = std::move(held.driven);
+  // Angles are no places: they stay as they are where vertices follow a path.
+  hold_directions(body.place, transient::make_elements(sheet.mesh, sheet.clamped), group_of, made, held.fixed);
+  if (!held.fixed.empty()) made.held.push_back({std::move(held.fixed), {}, false});
+  if (!held.hinged.empty()) made.held.push_back({std::move(held.hinged), {}, is_hinge});
+  const Placement placement = find_placement(body);
+  for (Vec3& x : sheet.mesh.vertices_m) x = placement.place(x);
+  double area = 0;
+  for (const Triangle& triangle : sheet.mesh.triangles) {
+    std::array<Vec3, 3> at{};
+    for (std::size_t c = 0; c < 3; ++c) at[c] = sheet.mesh.vertices_m[static_cast<std::size_t>(triangle[c])];
+    const double a = 0.5 * norm(cross(at[1] - at[0], at[2] - at[0]));
+    area += a;
+    made.centre_m = made.centre_m + (a / 3.0) * (at[0] + at[1] + at[2]);
+  }
+  made.centre_m = (1.0 / area) * made.centre_m;
+  made.body = std::move(sheet);
+  return made;
+}
+
+std::string describe(const transient::AnyBody& body) {
+  if (const auto* solid = std::get_if<transient::SolidBody>(&body))
+    return fmt::format("body \"{}\": {} nodes, {} elements (T{})", solid->name, solid->mesh.nodes_m.size(), solid->mesh.tet_count(),
+                       solid->mesh.nodes_per_tet());
+  const auto& sheet = std::get<transient::SheetBody>(body);
+  return fmt::format("body \"{}\": {} vertices, {} triangles (sheet)", sheet.name, sheet.mesh.vertices_m.size(),
+                     sheet.mesh.triangles.size());
+}
+
+/// Rank 0's lists on every rank.
+void share(const comm::Communicator& comm, const std::vector<Made>& made, const transient::Assembly& assembly, Bodies& bodies) {
+  struct Entry {
+    std::int32_t hold, node;
+  };
+  struct Row {
+    std::int32_t hold;
+    double at[4];
+  };
+  struct Kind {
+    std::int32_t is_hinge;
+  };
+  std::vector<Entry> entries;
+  std::vector<Row> rows;
+  std::vector<Kind> kinds;
+  if (comm.is_root())
+    for (std::size_t b = 0; b < made.size(); ++b)
+      for (const Made::Held& held : made[b].held) {
+        const auto hold = static_cast<std::int32_t>(kinds.size());
+        const transient::Assembly::Body& body = assembly.bodies[b];
+        for (const std::int32_t node : held.nodes)
+          entries.push_back({hold, body.is_sheet ? body.first_node + node : body.node_of_mesh[static_cast<std::size_t>(node)]});
+        for (const auto& row : held.rows) rows.push_back({hold, {row[0], row[1], row[2], row[3]}});
+        kinds.push_back({held.is_hinge ? 1 : 0});
+      }
+  entries = comm.broadcast(std::move(entries));
+  rows = comm.broadcast(std::move(rows));
+  kinds = comm.broadcast(std::move(kinds));
+  bodies.holds.resize(kinds.size());
+  std::vector<std::vector<transient::PathRow>> paths(kinds.size());
+  for (const Entry& entry : entries) bodies.holds[static_cast<std::size_t>(entry.hold)].nodes.push_back(entry.node);
+  for (const Row& row : rows) paths[static_cast<std::size_t>(row.hold)].push_back({row.at[0], {row.at[1], row.at[2], row.at[3]}});
+  for (std::size_t h = 0; h < kinds.size(); ++h) {
+    if (!paths[h].empty()) bodies.holds[h].path = transient::Path(std::move(paths[h]));
+    bodies.holds[h].is_hinge = kinds[h].is_hinge != 0;
+  }
+}
+
+void add_blows(const job::SimulationSpec& spec, Bodies& bodies) {
+  const transient::Assembly& assembly = *bodies.assembly;
+  for (const job::Blow& blow : spec.blows) {
+    const auto& body = assembly.bodies[blow.body];
+    const Placement placement = find_placement(spec.bodies[blow.body]);
+    double distance = 0, extent = 0;
+    transient::Impulse impulse;
+    impulse.time_s = blow.time_s - 0.5 * blow.duration_s;
+    impulse.duration_s = blow.duration_s;
+    impulse.impulse_n_s = placement.rotation * blow.impulse_n_s;
+    impulse.shares = find_shares(assembly, static_cast<std::int32_t>(blow.body), placement.place(blow.point_m), &distance);
+    for (std::int32_t n = body.first_node; n < body.last_node; ++n)
+      extent = std::max(extent, norm(assembly.nodes_m[static_cast<std::size_t>(n)] - bodies.centre_m[blow.body]));
+    if (distance > kMostStrikeDistance * extent)
+      throw InputError(
+          fmt::format("{}: \"point_m\" is {:.3g} m from the surface of body \"{}\"; give a point on it, in the axes of its mesh",
+                      blow.place, distance, body.name));
+    bodies.impulses.push_back(std::move(impulse));
+  }
+}
+
+}  // namespace
+
+Placement find_placement(const job::SimulatedBody& body) {
+  Mat3 total{Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double angle = body.rotation_deg[axis] * std::numbers::pi / 180.0, c = std::cos(angle), s = std::sin(angle);
+    Mat3 turn{Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}};
+    const std::size_t j = (axis + 1) % 3, k = (axis + 2) % 3;
+    turn[j][j] = turn[k][k] = c;
+    turn[j][k] = -s;
+    turn[k][j] = s;
+    total = turn * total;
+  }
+  return {total, body.position_m};
+}
+
+Bodies make_bodies(const comm::Communicator& comm, const job::SimulationSpec& spec, const std::function<void(const std::string&)>& report) {
+  std::vector<Made> made(spec.bodies.size());
+  comm.agree([&] {
+    if (!comm.is_root()) return;
+    for (std::size_t b = 0; b < spec.bodies.size(); ++b) {
+      made[b] = spec.bodies[b].sheet ? make_sheet(spec.bodies[b]) : make_solid(spec.bodies[b]);
+      report(describe(made[b].body));
+    }
+  });
+  std::vector<transient::AnyBody> moving;
+  std::vector<Vec3> centres;
+  for (Made& one : made) {
+    moving.push_back(std::move(one.body));
+    centres.push_back(one.centre_m);
+  }
+  Bodies bodies;
+  bodies.assembly = std::make_shared<const transient::Assembly>(transient::make_assembly(comm, moving));
+  bodies.centre_m = comm.broadcast(std::move(centres));
+  share(comm, made, *bodies.assembly, bodies);
+  comm.agree([&] { add_blows(spec, bodies); });
+  return bodies;
+}
+
+std::vector<std::array<std::int32_t, 3>> list_skin_triangles(const transient::Assembly& assembly, std::int32_t body) {
+  std::vector<std::array<std::int32_t, 3>> triangles;
+  for (const auto& [a, b, c, ab, bc, ca] : transient::list_skin(assembly, body)) {
+    if (ab < 0) {
+      triangles.push_back({a, b, c});
+    } else {
+      triangles.push_back({a, ab, ca});
+      triangles.push_back({ab, b, bc});
+      triangles.push_back({ca, bc, c});
+      triangles.push_back({ab, bc, ca});
+    }
+  }
+  return triangles;
+}
+
+transient::TouchSurface make_touch_surface(const transient::Assembly& assembly, const job::SimulationSpec& spec) {
+  std::vector<std::array<std::int32_t, 3>> triangles;
+  std::vector<std::int32_t> body_of_triangle;
+  std::vector<double> modulus, reach;
+  for (std::size_t b = 0; b < assembly.bodies.size(); ++b) {
+    const auto own = list_skin_triangles(assembly, static_cast<std::int32_t>(b));
+    triangles.insert(triangles.end(), own.begin(), own.end());
+    body_of_triangle.insert(body_of_triangle.end(), own.size(), static_cast<std::int32_t>(b));
+    const job::Material& material = spec.bodies[b].material;
+    modulus.push_back(material.young_modulus_pa / (1.0 - material.poisson_ratio * material.poisson_ratio));
+    reach.push_back(spec.bodies[b].sheet ? 0.5 * spec.bodies[b].sheet->thickness_m : 0.0);
+  }
+  return transient::make_touch_surface(assembly.nodes_m, triangles, body_of_triangle, modulus, reach, spec.contact.stiffness);
+}
+
+}  // namespace carillon::simulate

@@ -1,0 +1,124 @@
+// carillon-simulate: bodies that deform and move, on as many ranks as mpirun starts, to sound.
+#include <fmt/core.h>
+#include <mpi.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <string>
+#include <thread>
+
+#include "precompute/run/interrupt.hpp"
+#include "precompute/simulate/simulate.hpp"
+#include "runtime/base/error.hpp"
+#include "runtime/base/printable.hpp"
+#include "runtime/base/result.hpp"
+#include "runtime/version/version.hpp"
+
+namespace {
+
+using namespace carillon;
+
+/// MPI from its beginning to its end.
+class Session {
+ public:
+  Session(int argc, char** argv) { MPI_Init(&argc, &argv); }
+  ~Session() { MPI_Finalize(); }
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
+};
+
+struct CommandLine {
+  CLI::App app{
+      "Simulates bodies that deform and move, struck and touching, and writes their sound.\n"
+      "Start it on several ranks with: mpirun -np N carillon-simulate JOB.json",
+      "carillon-simulate"};
+  std::string job, result;
+  simulate::SimulateOptions options;
+
+  CommandLine() {
+    const CLI::Validator named([](const std::string& file) { return file.empty() ? "the name of the file is empty" : ""; }, "FILE");
+    app.failure_message(
+        [](const CLI::App* asked, const CLI::Error& error) { return base::printable_lines(CLI::FailureMessage::simple(asked, error)); });
+    app.add_option("JOB", job, "job file (JSON with // comments)")->required();
+    app.add_flag("-q,--quiet", options.quiet, "nothing on standard output; warnings and errors are on standard error");
+    app.add_option("--sound", options.sound, "write the sound to this WAV file, whatever the job says")->check(named);
+    app.add_option("--surface", options.surface, "record the surface to this file, for carillon-render")->check(named);
+    app.add_option("--motion", options.motion, "write the motion to this VTKHDF file")->check(named);
+    app.add_option("--record", options.record, "write figures and energies of the run to this file, JSON")->check(named);
+    app.add_option("--progress", options.progress, "append how far the run is to this file, a JSON object a line")->check(named);
+    app.add_option("--checkpoint", options.checkpoint,
+                   "resume from this file if it exists, and save to it; SIGUSR1 and SIGTERM then save and end with 85")
+        ->check(named);
+    app.add_option("--checkpoint-every", options.checkpoint_every_s, "seconds between two saves")
+        ->check(CLI::Range(0.0, 1e9))
+        ->capture_default_str();
+    app.add_option("--result", result, "write how the run ended to this file, a JSON object (docs/howto/when-jobs-die.md)")->check(named);
+    CLI::Option* validate =
+        app.add_flag("--validate", options.validate, "check the job and its meshes, predict step, time and memory, and simulate nothing");
+    app.add_flag("--json", options.json, "with --validate: print one JSON object")->needs(validate);
+    app.set_version_flag("--version", version::describe("carillon-simulate"));
+  }
+};
+
+/// The error of all ranks, printed once; should a rank get here alone, it ends the others after a while.
+int fail(int rank, const std::string& file, const base::Result& result) {
+  std::fflush(stdout);
+  MPI_Request request = MPI_REQUEST_NULL;
+  int all_here = 0;
+  MPI_Ibarrier(MPI_COMM_WORLD, &request);
+  for (int wait_ms = 0; wait_ms < 5000 && all_here == 0; wait_ms += 10) {
+    MPI_Test(&request, &all_here, MPI_STATUS_IGNORE);
+    if (all_here == 0) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  if (rank == 0 || all_here == 0) {
+    fmt::print(stderr, "carillon-simulate: error: {}\n", base::printable(result.message));
+    if (!file.empty()) base::write_result(file, result);
+  }
+  std::fflush(stderr);
+  const int code = base::get_exit_code(result.kind);
+  if (all_here == 0) MPI_Abort(MPI_COMM_WORLD, code);
+  return code;
+}
+
+int run_program(const CommandLine& words) {
+  const comm::Communicator comm(MPI_COMM_WORLD);
+  base::Result result;
+  try {
+    if (comm.is_root() && !words.options.quiet && !words.options.validate)
+      fmt::print("carillon-simulate {} on {} rank{}\n", version::get_number(), comm.size(), comm.size() == 1 ? "" : "s");
+    const simulate::SimulateSummary summary = simulate::simulate(comm, words.job, words.options);
+    if (summary.is_stopped) {
+      if (comm.is_root()) fmt::print(stderr, "carillon-simulate: {}\n", base::printable(summary.result));
+      result = {base::ResultKind::checkpointed, summary.result};
+    } else if (comm.is_root() && (words.options.validate || !words.options.quiet)) {
+      fmt::print("{}\n", words.options.json ? summary.result : base::printable_lines(summary.result));
+    }
+  } catch (...) {
+    result = base::describe_error(std::current_exception(), "out of memory; use a coarser mesh or a machine with more");
+    std::error_code error;
+    result.is_resumable = std::filesystem::exists(words.options.checkpoint, error);
+    return fail(comm.rank(), words.result, result);
+  }
+  std::error_code error;
+  result.is_resumable = result.kind != base::ResultKind::done && std::filesystem::exists(words.options.checkpoint, error);
+  if (comm.is_root() && !words.result.empty()) base::write_result(words.result, result);
+  return base::get_exit_code(result.kind);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CommandLine words;
+  run::end_on_signals(0);
+  try {
+    words.app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return words.app.exit(error) == 0 ? 0 : kExitInput;
+  }
+  if (!words.options.checkpoint.empty()) run::save_on_signals();
+  const Session session(argc, argv);
+  return run_program(words);
+}

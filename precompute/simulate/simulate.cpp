@@ -1,0 +1,501 @@
+// Method:     the steps of transient::Motion, whose displacements go to emission::Emission; books of the energy every hundredth of a
+// second. Source:     docs/equations.md E11 and E14; O'Brien, Cook and Essl 2001. Deviations: none beyond those of both.
+#include "precompute/simulate/simulate.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <ctime>
+#include <memory>
+#include <optional>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "precompute/emission/emission.hpp"
+#include "precompute/io/fingerprint.hpp"
+#include "precompute/io/progress_file.hpp"
+#include "precompute/job/simulation.hpp"
+#include "precompute/run/interrupt.hpp"
+#include "precompute/run/run_log.hpp"
+#include "precompute/simulate/bodies.hpp"
+#include "precompute/simulate/motion_file.hpp"
+#include "precompute/simulate/sound_file.hpp"
+#include "precompute/transient/contact.hpp"
+#include "precompute/transient/motion.hpp"
+#include "runtime/base/error.hpp"
+#include "runtime/base/file.hpp"
+#include "runtime/base/json.hpp"
+#include "runtime/base/sha256.hpp"
+
+namespace carillon::simulate {
+namespace {
+
+namespace fs = std::filesystem;
+using transient::EnergyBook;
+
+constexpr std::uint64_t kMaxJobBytes = 16 << 20;
+constexpr std::uint64_t kMaxCheckpointBytes = std::uint64_t{1} << 38;
+constexpr double kBookEveryS = 0.01;     // of simulated time
+constexpr std::int64_t kLookEvery = 16;  // samples between two looks at signals
+constexpr char kMagic[8] = {'C', 'A', 'R', 'S', 'I', 'M', '0', '1'};
+constexpr double kFullScalePa = 1.0;  // of a WAV file whose peak is below; louder ones are scaled to a peak of 1
+constexpr int kTrialSteps = 200;      // of --validate
+
+double find_cpu_s() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+
+/// One line on rank 0.
+struct Log {
+  const comm::Communicator& comm;
+  bool quiet;
+  void print(const std::string& text) const {
+    if (!comm.is_root() || quiet) return;
+    fmt::print("{}\n", text);
+    std::fflush(stdout);
+  }
+  void warn(const std::string& text) const {
+    if (comm.is_root()) fmt::print(stderr, "carillon-simulate: warning: {}\n", text);
+  }
+};
+
+job::SimulationSpec read_spec(const comm::Communicator& comm, const fs::path& file, const SimulateOptions& options, std::string& text) {
+  text = comm.broadcast([&] { return base::read_file(file, "job file", kMaxJobBytes); });
+  job::SimulationSpec spec = comm.agree([&] { return job::parse_simulation(text, fs::absolute(file)); });
+  const auto replace = [](fs::path& path, const fs::path& other) {
+    if (!other.empty()) path = fs::absolute(other).lexically_normal();
+  };
+  replace(spec.sound, options.sound);
+  replace(spec.surface, options.surface);
+  replace(spec.motion, options.motion);
+  replace(spec.record, options.record);
+  comm.agree([&] {
+    if (!comm.is_root() || options.validate) return;
+    if (spec.sound.empty() && spec.surface.empty() && spec.motion.empty() && spec.record.empty())
+      throw InputError(
+          fmt::format("{}: nothing is to be written; name a file with \"sound\", \"surface\", \"motion\" or \"record\"", file.string()));
+    if (!spec.sound.empty()) base::check_writable(spec.sound, "sound");
+    if (!spec.surface.empty()) base::check_writable(spec.surface, "recorded surface");
+    if (!spec.motion.empty()) base::check_writable(spec.motion, "motion");
+    if (!spec.record.empty()) base::check_writable(spec.record, "record");
+    if (!options.checkpoint.empty()) base::check_writable(options.checkpoint, "checkpoint");
+  });
+  return spec;
+}
+
+emission::Options make_emission_options(const job::SimulationSpec& spec, int steps_per_sample, bool is_resumed) {
+  emission::Options options;
+  options.sample_rate_hz = spec.sample_rate_hz;
+  options.steps_per_sample = steps_per_sample;
+  options.frames = static_cast<std::uint64_t>(std::llround(spec.duration_s * spec.sample_rate_hz));
+  options.radiation = spec.radiation == job::SurfaceSound::kirchhoff  ? emission::Radiation::kKirchhoff
+                      : spec.radiation == job::SurfaceSound::rayleigh ? emission::Radiation::kRayleigh
+                                                                      : emission::Radiation::kPaper2001;
+  if (spec.radiation != job::SurfaceSound::paper2001) options.high_pass_hz = spec.high_pass_hz;
+  options.has_visibility = spec.visibility;
+  if (spec.receivers.microphones_m.empty()) {
+    options.receivers =
+        emission::make_ears(spec.receivers.position_m, spec.receivers.position_m + spec.receivers.facing, spec.receivers.ear_distance_m);
+  } else {
+    for (const Vec3& place : spec.receivers.microphones_m) options.receivers.push_back({place, 0.0, {0, 1, 0}});
+  }
+  for (emission::Receiver& receiver : options.receivers) {
+    receiver.directivity = spec.receivers.cardioid;
+    receiver.axis = spec.receivers.facing;
+  }
+  options.surface_file = spec.surface;
+  options.is_resumed = is_resumed;
+  return options;
+}
+
+/// Each triangle on the rank that owns its lowest node.
+emission::SurfacePart make_surface_part(const transient::Domain& domain, const job::SimulationSpec& spec) {
+  emission::SurfacePart part;
+  const transient::Assembly& assembly = domain.get_assembly();
+  part.nodes_m = domain.get_rest_m();
+  for (std::int32_t place = 0; place < domain.node_count(); ++place) part.node_number.push_back(domain.find_number(place));
+  std::int64_t number = 0;
+  for (std::size_t b = 0; b < assembly.bodies.size(); ++b) {
+    if (!spec.bodies[b].sounds) continue;
+    for (const auto& triangle : list_skin_triangles(assembly, static_cast<std::int32_t>(b))) {
+      const std::int32_t owner = domain.find_place(*std::min_element(triangle.begin(), triangle.end()));
+      const std::int64_t own = number;
+      number += spec.bodies[b].sheet ? 2 : 1;
+      if (owner < 0 || owner >= domain.own_count()) continue;
+      const Triangle made{domain.find_place(triangle[0]), domain.find_place(triangle[1]), domain.find_place(triangle[2])};
+      part.triangles.push_back(made);
+      part.triangle_number.push_back(own);
+      part.body.push_back(static_cast<std::int32_t>(b));
+      if (!spec.bodies[b].sheet) continue;
+      part.triangles.push_back({made[0], made[2], made[1]});
+      part.triangle_number.push_back(own + 1);
+      part.body.push_back(static_cast<std::int32_t>(b));
+    }
+  }
+  return part;
+}
+
+transient::MotionOptions make_motion_options(const job::SimulationSpec& spec) {
+  transient::MotionOptions options;
+  options.sample_rate_hz = spec.sample_rate_hz;
+  if (spec.step_s) options.longest_step_s = *spec.step_s;
+  options.gravity_m_s2 = spec.gravity_m_s2;
+  options.settle_s = spec.settle_s;
+  options.round_steps = emission::find_steps;
+  return options;
+}
+
+std::vector<transient::BallStriker> make_strikers(const job::SimulationSpec& spec) {
+  std::vector<transient::BallStriker> strikers;
+  for (const job::Striker& striker : spec.strikers)
+    strikers.push_back({striker.radius_m, striker.mass_kg, striker.position_m, striker.velocity_m_s});
+  return strikers;
+}
+
+std::vector<transient::RigidObstacle> make_obstacles(const job::SimulationSpec& spec) {
+  std::vector<transient::RigidObstacle> obstacles;
+  for (const job::Obstacle& obstacle : spec.obstacles) {
+    if (const auto* plane = std::get_if<job::Plane>(&obstacle.form))
+      obstacles.emplace_back(transient::PlaneObstacle{plane->point_m, plane->normal});
+    if (const auto* ball = std::get_if<job::Ball>(&obstacle.form))
+      obstacles.emplace_back(transient::BallObstacle{ball->centre_m, ball->radius_m});
+    if (const auto* box = std::get_if<job::Block>(&obstacle.form)) obstacles.emplace_back(transient::BoxObstacle{box->min_m, box->max_m});
+  }
+  return obstacles;
+}
+
+/// The line of the job that tells of what overlaps at the start: the message of Contacts begins with it.
+std::string find_overlap_place(const job::SimulationSpec& spec, std::string_view message) {
+  for (std::size_t i = 0; i < spec.strikers.size(); ++i)
+    if (message.starts_with(fmt::format("striker {} ", i + 1))) return spec.strikers[i].place;
+  for (const job::SimulatedBody& body : spec.bodies)
+    if (message.starts_with(fmt::format("body \"{}\" ", body.name))) return body.place;
+  return spec.file.string();
+}
+
+/// All that moves, on this rank.
+struct Simulation {
+  job::SimulationSpec spec;
+  Bodies bodies;
+  std::unique_ptr<transient::Domain> domain;
+  std::unique_ptr<transient::Motion> motion;
+  std::unique_ptr<transient::Contacts> contacts;
+  std::unique_ptr<emission::Emission> sound;
+  std::unique_ptr<MotionFile> film;
+  std::vector<EnergyBook> books;
+  double sound_cpu_s = 0, steps_cpu_s = 0;
+
+  bool makes_sound() const { return !spec.sound.empty() || !spec.surface.empty(); }
+};
+
+void make_motion(const comm::Communicator& comm, Simulation& simulation) {
+  const job::SimulationSpec& spec = simulation.spec;
+  simulation.domain = std::make_unique<transient::Domain>(comm, simulation.bodies.assembly);
+  simulation.motion = std::make_unique<transient::Motion>(*simulation.domain, make_motion_options(spec), simulation.bodies.holds,
+                                                          simulation.bodies.impulses);
+  transient::TouchRules rules{spec.contact.restitution, spec.contact.friction, spec.gravity_m_s2};
+  try {
+    simulation.contacts = std::make_unique<transient::Contacts>(*simulation.domain, make_touch_surface(*simulation.bodies.assembly, spec),
+                                                                make_strikers(spec), make_obstacles(spec), rules);
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("{}: {}", find_overlap_place(spec, error.what()), error.what()));
+  }
+  if (simulation.contacts->is_needed()) simulation.motion->add(*simulation.contacts);
+  simulation.motion->set_start([&](std::int32_t node, const Vec3& rest_m) {
+    const auto body = static_cast<std::size_t>(simulation.bodies.assembly->find_body_of_node(node));
+    const job::SimulatedBody& described = spec.bodies[body];
+    return transient::Motion::Start{
+        {}, described.velocity_m_s + cross(described.angular_velocity_rad_s, rest_m - simulation.bodies.centre_m[body])};
+  });
+}
+
+// ---- checkpoint ----
+
+struct CheckpointHead {
+  char magic[8];
+  base::Sha256::Hash job;
+  std::int32_t ranks;
+  std::int32_t books;
+  std::int64_t motion, contacts;  // bytes
+};
+
+/// Of the job's text, what it computes, and the program.
+base::Sha256::Hash find_fingerprint(const std::string& text) {
+  base::Sha256 sum;
+  sum.add(text);
+  sum.add(io::find_program_version());
+  return sum.finish();
+}
+
+void save_checkpoint(const comm::Communicator& comm, const fs::path& file, const base::Sha256::Hash& job, Simulation& simulation) {
+  const std::vector<std::byte> motion = simulation.motion->save(), contacts = simulation.contacts->save();
+  std::vector<std::byte> own;
+  if (simulation.sound) own = comm.agree([&] { return simulation.sound->save(); });
+  const comm::Communicator::Gathering gathering = comm.plan_gathering(own.size());
+  const std::vector<std::byte> sounds = comm.all_gather(own);
+  comm.agree([&] {
+    if (!comm.is_root()) return;
+    CheckpointHead head{};
+    std::memcpy(head.magic, kMagic, sizeof kMagic);
+    head.job = job;
+    head.ranks = comm.size();
+    head.books = static_cast<std::int32_t>(simulation.books.size());
+    head.motion = static_cast<std::int64_t>(motion.size());
+    head.contacts = static_cast<std::int64_t>(contacts.size());
+    base::WholeFile whole(file);
+    const auto put = [&](const void* data, std::size_t bytes) { whole.append({static_cast<const char*>(data), bytes}); };
+    put(&head, sizeof head);
+    for (const int begin : gathering.begin) {
+      const std::int64_t at = begin;
+      put(&at, sizeof at);
+    }
+    put(simulation.books.data(), simulation.books.size() * sizeof(EnergyBook));
+    put(motion.data(), motion.size());
+    put(contacts.data(), contacts.size());
+    put(sounds.data(), sounds.size());
+    whole.commit();
+  });
+}
+
+/// False: there is none. What is of another job is refused in words.
+bool load_checkpoint(const comm::Communicator& comm, const fs::path& file, const base::Sha256::Hash& job, Simulation& simulation) {
+  const bool is_there = comm.broadcast(static_cast<std::int32_t>(comm.is_root() && !file.empty() && fs::exists(file))) != 0;
+  if (!is_there) return false;
+  std::string bytes;
+  CheckpointHead head{};
+  comm.agree([&] {
+    if (!comm.is_root()) return;
+    bytes = base::read_file(file, "checkpoint", kMaxCheckpointBytes);
+    const auto refuse = [&](const char* why) {
+      throw InputError(fmt::format("{}: the checkpoint {}; remove it, or give another file", file.string(), why));
+    };
+    if (bytes.size() < sizeof head) refuse("is cut off");
+    std::memcpy(&head, bytes.data(), sizeof head);
+    if (std::memcmp(head.magic, kMagic, sizeof kMagic) != 0) refuse("is none of a simulation");
+    if (head.job != job) refuse("is of another job or of another version of the program");
+    if (head.ranks != comm.size()) refuse(fmt::format("is of {} ranks, and there are {}", head.ranks, comm.size()).c_str());
+    if (head.books < 0 || head.motion < 0 || head.contacts < 0) refuse("is damaged");
+  });
+  head = comm.broadcast(head);
+  const auto all = comm.broadcast(std::vector<char>(bytes.begin(), bytes.end()));
+  comm.agree([&] {
+    const std::size_t table = sizeof head, books = table + static_cast<std::size_t>(head.ranks + 1) * sizeof(std::int64_t);
+    const std::size_t motion = books + static_cast<std::size_t>(head.books) * sizeof(EnergyBook),
+                      contacts = motion + static_cast<std::size_t>(head.motion);
+    const std::size_t sounds = contacts + static_cast<std::size_t>(head.contacts);
+    if (sounds > all.size()) throw InputError(fmt::format("{}: the checkpoint is cut off; remove it", file.string()));
+    std::vector<std::int64_t> begin(static_cast<std::size_t>(head.ranks + 1));
+    std::memcpy(begin.data(), all.data() + table, begin.size() * sizeof(std::int64_t));
+    if (begin.back() < 0 || sounds + static_cast<std::size_t>(begin.back()) != all.size())
+      throw InputError(fmt::format("{}: the checkpoint is cut off; remove it", file.string()));
+    simulation.books.resize(static_cast<std::size_t>(head.books));
+    if (head.books > 0) std::memcpy(simulation.books.data(), all.data() + books, simulation.books.size() * sizeof(EnergyBook));
+  });
+  const auto* data = reinterpret_cast<const std::byte*>(all.data());
+  const std::size_t books = sizeof head + static_cast<std::size_t>(head.ranks + 1) * sizeof(std::int64_t);
+  const std::size_t motion = books + static_cast<std::size_t>(head.books) * sizeof(EnergyBook),
+                    contacts = motion + static_cast<std::size_t>(head.motion);
+  const std::size_t sounds = contacts + static_cast<std::size_t>(head.contacts);
+  simulation.motion->load({data + motion, static_cast<std::size_t>(head.motion)});
+  simulation.contacts->load({data + contacts, static_cast<std::size_t>(head.contacts)});
+  if (simulation.sound)
+    comm.agree([&] {
+      std::vector<std::int64_t> begin(static_cast<std::size_t>(head.ranks + 1));
+      std::memcpy(begin.data(), all.data() + sizeof head, begin.size() * sizeof(std::int64_t));
+      const auto rank = static_cast<std::size_t>(comm.rank());
+      if (begin[rank] < 0 || begin[rank + 1] < begin[rank] || begin[rank + 1] > begin.back())
+        throw InputError(fmt::format("{}: the checkpoint is damaged; remove it", file.string()));
+      simulation.sound->load({data + sounds + begin[rank], static_cast<std::size_t>(begin[rank + 1] - begin[rank])});
+    });
+  return true;
+}
+
+// ---- outputs ----
+
+base::Json describe(const EnergyBook& book) {
+  base::Json json = base::Json::object();
+  json.set("time_s", base::significant(book.time_s, 9));
+  for (const auto& [name, value] : {std::pair{"kinetic_j", book.kinetic_j},
+                                    {"elastic_j", book.elastic_j},
+                                    {"dissipated_j", book.dissipated_j},
+                                    {"work_j", book.work_j},
+                                    {"error_j", book.error_j},
+                                    {"relative_error", book.relative_error}})
+    json.set(name, base::finite_or_null(value, base::significant, 9));
+  return json;
+}
+
+std::int64_t count_element_steps(const Simulation& simulation) {
+  return static_cast<std::int64_t>(simulation.bodies.assembly->element_count()) * simulation.motion->get_step_count();
+}
+
+std::string write_outputs(const comm::Communicator& comm, Simulation& simulation, double seconds) {
+  const job::SimulationSpec& spec = simulation.spec;
+  std::string result;
+  double peak = 0;
+  std::vector<std::vector<double>> channels;
+  if (simulation.sound) {
+    simulation.sound->finish();
+    const emission::Options options = make_emission_options(spec, simulation.motion->get_steps_per_sample(), false);
+    for (std::size_t r = 0; r < options.receivers.size(); ++r) channels.push_back(simulation.sound->calc_sound(r));
+    for (const auto& channel : channels)
+      for (const double p : channel) peak = std::max(peak, std::abs(p));
+  }
+  const transient::ExternalForces::Energy touch = simulation.contacts->calc_energy();
+  const double cpu[2] = {comm.sum(simulation.steps_cpu_s), comm.sum(simulation.sound_cpu_s)};
+  if (simulation.film) simulation.film->finish();
+  comm.agree([&] {
+    if (!comm.is_root()) return;
+    const EnergyBook& book = simulation.books.back();
+    const double gain = peak > kFullScalePa ? kFullScalePa / peak : 1.0;
+    if (!spec.sound.empty()) write_sound(spec.sound, channels, spec.sample_rate_hz, gain);
+    double worst = 0;
+    for (const EnergyBook& one : simulation.books) worst = std::max(worst, std::abs(one.relative_error));
+    const double rate = static_cast<double>(count_element_steps(simulation)) / std::max(1e-9, seconds);
+    base::Json record = base::Json::object();
+    record.set("job", spec.file.filename().string()).set("duration_s", spec.duration_s).set("sample_rate_hz", spec.sample_rate_hz);
+    record.set("step_s", base::significant(simulation.motion->get_step_s(), 9)).set("steps", simulation.motion->get_step_count());
+    record.set("elements", static_cast<std::int64_t>(simulation.bodies.assembly->element_count())).set("ranks", comm.size());
+    record.set("seconds", base::decimals(seconds, 3)).set("cpu_seconds", base::decimals(cpu[0] + cpu[1], 3));
+    record.set("sound_cpu_seconds", base::decimals(cpu[1], 3));
+    record.set("element_steps_per_second", base::significant(rate, 4));
+    record.set("peak_pa", base::finite_or_null(peak, base::significant, 6)).set("gain_per_pa", base::significant(gain, 9));
+    record.set("book_error", base::finite_or_null(worst, base::significant, 3));
+    record.set("contact_stored_j", base::significant(touch.stored_j, 9))
+        .set("contact_dissipated_j", base::significant(touch.dissipated_j, 9));
+    for (const EnergyBook& one : simulation.books) record.member("books").add(describe(one));
+    for (const std::string& warning : spec.warnings) record.member("warnings").add(warning);
+    if (!spec.record.empty()) base::write_file(spec.record, record.text());
+    result = fmt::format(
+        "{:.6g} s in {} steps of {:.4g} s, {:.3g} element-steps a second, sound {:.1f} % of the CPU time\n"
+        "energy: kinetic {:.4g} J, elastic {:.4g} J, dissipated {:.4g} J, put in {:.4g} J; the book closes to {:.1e}",
+        book.time_s, simulation.motion->get_step_count(), simulation.motion->get_step_s(), rate,
+        100.0 * cpu[1] / std::max(1e-9, cpu[0] + cpu[1]), book.kinetic_j, book.elastic_j, book.dissipated_j, book.work_j, worst);
+    if (simulation.sound)
+      result += fmt::format("\npeak {:.4g} Pa{}", peak, gain < 1.0 ? fmt::format(", the file has it as 1 (gain {:.4g})", gain) : "");
+    for (const fs::path& file : {spec.sound, spec.surface, spec.motion, spec.record})
+      if (!file.empty()) result += "\n" + file.string();
+  });
+  return result;
+}
+
+/// What a run would cost: a few steps are taken.
+std::string predict(const comm::Communicator& comm, Simulation& simulation, bool json) {
+  transient::Motion& motion = *simulation.motion;
+  const auto start = std::chrono::steady_clock::now();
+  for (int step = 0; step < kTrialSteps; ++step) motion.advance();
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() / kTrialSteps;
+  const double steps = std::ceil(simulation.spec.duration_s / motion.get_step_s());
+  const std::vector<std::int64_t> peaks = run::gather_peak_bytes(comm);
+  const std::int64_t peak = peaks.empty() ? 0 : *std::max_element(peaks.begin(), peaks.end());
+  base::Json record = base::Json::object();
+  record.set("step_s", base::significant(motion.get_step_s(), 6)).set("steps", base::significant(steps, 12));
+  record.set("longest_step_s", base::significant(motion.get_longest_step_s(), 6));
+  record.set("elements", static_cast<std::int64_t>(simulation.bodies.assembly->element_count()));
+  record.set("nodes", static_cast<std::int64_t>(simulation.bodies.assembly->node_count())).set("ranks", comm.size());
+  record.set("seconds", base::significant(steps * seconds, 3)).set("memory_bytes_a_rank", peak);
+  if (json) return record.text();
+  return fmt::format(
+      "{} elements, {} nodes\nstep {:.4g} s (the longest stable one is {:.4g} s), {:.0f} steps\nabout {:.3g} s on {} rank{}, {:.0f} MB a "
+      "rank",
+      simulation.bodies.assembly->element_count(), simulation.bodies.assembly->node_count(), motion.get_step_s(),
+      motion.get_longest_step_s(), steps, steps * seconds, comm.size(), comm.size() == 1 ? "" : "s", static_cast<double>(peak) / 1e6);
+}
+
+}  // namespace
+
+SimulateSummary simulate(const comm::Communicator& comm, const fs::path& job_file, const SimulateOptions& options) {
+  const Log log{comm, options.quiet || options.validate};
+  std::string text;
+  Simulation simulation;
+  simulation.spec = read_spec(comm, job_file, options, text);
+  const job::SimulationSpec& spec = simulation.spec;
+  for (const std::string& warning : spec.warnings) log.warn(warning);
+  simulation.bodies = make_bodies(comm, spec, [&](const std::string& line) { log.print(line); });
+  make_motion(comm, simulation);
+  transient::Motion& motion = *simulation.motion;
+  SimulateSummary summary;
+  if (options.validate) {
+    summary.result = predict(comm, simulation, options.json);
+    return summary;
+  }
+  const base::Sha256::Hash fingerprint = find_fingerprint(text);
+  const bool is_resumed =
+      comm.broadcast(static_cast<std::int32_t>(comm.is_root() && !options.checkpoint.empty() && fs::exists(options.checkpoint))) != 0;
+  const int steps_per_sample = motion.prepare();
+  if (simulation.makes_sound())
+    simulation.sound = std::make_unique<emission::Emission>(comm, make_surface_part(*simulation.domain, spec),
+                                                            make_emission_options(spec, steps_per_sample, is_resumed));
+  if (!spec.motion.empty()) simulation.film = std::make_unique<MotionFile>(*simulation.domain, spec, is_resumed);
+  if (load_checkpoint(comm, options.checkpoint, fingerprint, simulation))
+    log.print(fmt::format("resumed at {:.6g} s", motion.get_time_s()));
+  else if (simulation.sound)
+    simulation.sound->add_step(&motion.get_u()[0].x);
+  log.print(fmt::format("step {:.4g} s, {} a sample; {} rank{}", motion.get_step_s(), motion.get_steps_per_sample(), comm.size(),
+                        comm.size() == 1 ? "" : "s"));
+
+  std::optional<io::ProgressFile> progress;
+  comm.agree([&] {
+    if (comm.is_root() && !options.progress.empty()) progress.emplace(options.progress);
+  });
+  const std::int64_t frames = std::llround(spec.duration_s * spec.sample_rate_hz);
+  const std::int64_t book_every = std::max<std::int64_t>(1, std::llround(kBookEveryS * spec.sample_rate_hz));
+  const auto start = std::chrono::steady_clock::now();
+  auto last_save = start, last_line = start;
+  if (!options.checkpoint.empty()) run::set_news(true);
+  if (simulation.books.empty()) simulation.books.push_back(motion.calc_book());
+  int known_steps = motion.get_steps_per_sample();
+  double cpu = find_cpu_s();
+  while (motion.get_sample() < frames) {
+    if (simulation.film) simulation.film->add_sample(motion);
+    do {
+      motion.advance();
+      if (!simulation.sound) continue;
+      const double before = find_cpu_s();
+      if (motion.get_steps_per_sample() != known_steps) {
+        known_steps = motion.get_steps_per_sample();
+        simulation.sound->set_steps_per_sample(known_steps);
+      }
+      simulation.sound->add_step(&motion.get_u()[0].x);
+      simulation.sound_cpu_s += find_cpu_s() - before;
+    } while (!motion.is_at_sample());
+    if (motion.get_sample() % book_every == 0 || motion.get_sample() == frames) simulation.books.push_back(motion.calc_book());
+    if (motion.get_sample() % kLookEvery != 0) continue;
+    const auto now = std::chrono::steady_clock::now();
+    std::int32_t wants = run::is_stop_asked() ? 2 : 0;
+    if (comm.is_root() && std::chrono::duration<double>(now - last_save).count() > options.checkpoint_every_s) wants = std::max(wants, 1);
+    if (comm.max(wants) > 0 && !options.checkpoint.empty() && motion.get_sample() < frames) {
+      save_checkpoint(comm, options.checkpoint, fingerprint, simulation);
+      last_save = now;
+      if (comm.max(wants) > 1) {
+        summary.is_stopped = true;
+        summary.result = fmt::format("stopped by {} at {:.6g} s; the same command resumes from {}", run::find_stop_name(),
+                                     motion.get_time_s(), options.checkpoint.string());
+        return summary;
+      }
+    }
+    if (!comm.is_root() || std::chrono::duration<double>(now - last_line).count() < 1.0) continue;
+    last_line = now;
+    const double share = static_cast<double>(motion.get_sample()) / static_cast<double>(frames),
+                 taken = std::chrono::duration<double>(now - start).count();
+    if (progress) progress->append({"simulate", 100.0 * share, 0, {}, taken * (1.0 / share - 1.0), taken});
+    if (!options.quiet && static_cast<std::int64_t>(taken) % 10 == 0)
+      log.print(fmt::format("{:5.1f} %, {:.4g} s simulated, about {:.0f} s left", 100.0 * share, motion.get_time_s(),
+                            taken * (1.0 / share - 1.0)));
+  }
+  simulation.steps_cpu_s = find_cpu_s() - cpu - simulation.sound_cpu_s;
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (simulation.film) simulation.film->add_sample(motion);
+  summary.result = write_outputs(comm, simulation, seconds);
+  comm.agree([&] {
+    if (!comm.is_root()) return;
+    if (progress) progress->append({"done", 100.0, 0, {}, 0.0, seconds});
+    std::error_code ignored;
+    if (!options.checkpoint.empty()) fs::remove(options.checkpoint, ignored);
+  });
+  return summary;
+}
+
+}  // namespace carillon::simulate

@@ -1,0 +1,46 @@
+// The nonlinear energy of coupled modes and its gradient, sample by sample. Internal to carillon::nonlinear.
+#pragma once
+
+#include <vector>
+
+#include "runtime/bank/quartic_energy.hpp"
+#include "runtime/nonlinear/kernels.hpp"
+
+namespace carillon::nonlinear {
+
+/// The matrices of an energy as the kernels take them, padded by zeros and scaled so that motion of a thickness or so is of the size of 1:
+/// in single precision nothing overflows that a body survives. Matrices without anything off their diagonals (strings, mean stresses) are
+/// kept as their diagonals, and all of it goes in double precision. Memory is taken in the constructor only.
+class Evaluator {
+ public:
+  /// The sizes of the energy agree, and its numbers are finite.
+  Evaluator(const bank::QuarticEnergy& energy, const CoupledKernels& kernels);
+
+  /// Scaled q over q.
+  double get_scale() const noexcept { return scale_; }
+  /// Only the first `modes` are coupled from now on; of the others q is 0. [audio-thread]
+  void set_count(int modes) noexcept;
+  /// V [J]. q: scaled, in single precision, zeros behind the last; exact: the same in double precision. Fills `gradient` of the coupled
+  /// modes [N kg^-1/2], of the scaled q times get_scale(). [audio-thread]
+  double evaluate(const float* q, const double* im, const double* to_q, double* gradient) noexcept;
+  std::size_t calc_bytes() const noexcept;
+
+ private:
+  double evaluate_diagonals(const double* im, const double* to_q, double* gradient) noexcept;
+  void add_rows(const bank::QuarticEnergy& energy);
+  void add_diagonals(const bank::QuarticEnergy& energy);
+  void add_points(const bank::QuarticEnergy& energy);
+
+  enum class Form { kDiagonals, kRows, kPoints };
+  const CoupledKernels* kernels_;
+  Form form_ = Form::kRows;
+  double scale_ = 1.0;
+  int modes_ = 0, count_ = 0, padded_ = 0, rows_ = 0, parts_ = 0, strains_ = 0, points_ = 0;
+  bool is_curved_ = false;
+  std::ptrdiff_t stride_ = 0;
+  std::vector<double> diagonals_, exact_linear_;    // (R, N)
+  std::vector<float> matrices_, columns_, linear_;  // (R, stride), (N, parts, P), (R, padded N)
+  std::vector<float> eta_, of_linear_, pairs_, sum_, gradient_, back_, forces_, more_;
+};
+
+}  // namespace carillon::nonlinear

@@ -1,0 +1,31 @@
+// Method:     head::EarFilter on the grid of sub-blocks.
+// Source:     docs/equations.md.
+// Deviations: a source is as far away as heads are measured; one that is nearer is louder by 1 / r at both ears alike.
+#include "runtime/synth/head_ears.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "runtime/head/ear_filter.hpp"
+
+namespace carillon::synth {
+
+HeadEars::HeadEars(std::shared_ptr<const head::Head> head)
+    : filter_(std::make_unique<head::EarFilter>(std::move(head))), length_(filter_->get_length()) {}
+
+HeadEars::HeadEars(HeadEars&&) noexcept = default;
+HeadEars::~HeadEars() = default;
+
+void HeadEars::process(const Vec3& direction, std::span<const double> input, bool is_loud, std::span<double> left,
+                       std::span<double> right) noexcept {
+  if (is_loud) left_ = length_;
+  if (left_ == 0) return;
+  filter_->process(direction, input, left, right);
+  if (is_loud) return;
+  left_ = std::max(0, left_ - static_cast<int>(input.size()));
+  if (left_ == 0) filter_->reset();
+}
+
+std::size_t HeadEars::calc_bytes() const noexcept { return sizeof(HeadEars) + filter_->calc_bytes(); }
+
+}  // namespace carillon::synth

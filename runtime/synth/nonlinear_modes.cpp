@@ -1,0 +1,216 @@
+// Method:     what strikes and contacts do to each mode alone is found for the whole sub-block, as the kernels do it for the modes in
+//             groups, in double precision; then the modes are stepped. A contact's force over the last interval of a sub-block is heard
+//             with the first sample of the next.
+// Source:     docs/equations.md E5, E12.
+// Deviations: none.
+#include "runtime/synth/nonlinear_modes.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace carillon::synth {
+namespace {
+
+constexpr int kIntervals = kSubBlock + 1;
+
+/// phi . impulse of a mode [N s kg^-1/2], of rows of the model's shapes.
+double calc_amplitude(const std::int16_t* const* row, const float* weight, int mode, double scale) noexcept {
+  double amplitude = 0.0;
+  for (int r = 0; r < kStrikeRows; ++r) amplitude += static_cast<double>(weight[r]) * row[r][mode];
+  return amplitude * scale;
+}
+
+/// A mode's factor over a sample by one end of all contacts, as the contract of Kernels::drive has it: 1 minus this.
+double calc_damping(const ContactBlock& drive, std::size_t end, int mode, double scale, double angle) noexcept {
+  double x = 0.0;
+  for (std::size_t c = 0; c < static_cast<std::size_t>(drive.contacts); ++c) {
+    const ContactEnd& push = drive.push[c][end];
+    const double along = calc_amplitude(push.row, push.damping, mode, scale), taken = along * along;
+    const double spring = static_cast<double>(push.give) * taken;
+    x += taken + static_cast<double>(push.half_loss) * angle * spring / (angle * angle + spring + 1e-30);
+  }
+  x *= angle / (angle + x + 1e-30);
+  const double p = x + x * x * (0.5 + x / 6.0);
+  return p / (1.0 + p);
+}
+
+std::vector<int> find_places(const Model& model) {
+  std::vector<int> places(static_cast<std::size_t>(model.get_mode_count()), -1);
+  const std::vector<int>& coupled = model.get_nonlinear()->mode;
+  for (std::size_t i = 0; i < coupled.size(); ++i) places[static_cast<std::size_t>(coupled[i])] = static_cast<int>(i);
+  return places;
+}
+
+}  // namespace
+
+NonlinearModes::NonlinearModes(const Model& model)
+    : model_(&model),
+      nonlinear_(model.get_nonlinear()),
+      modes_(nonlinear_->energy, nonlinear_->constants, model.get_rate_hz()),
+      place_(find_places(model)) {
+  for (auto* values : {&push_re_, &push_im_, &keep_}) values->assign(kIntervals * nonlinear_->mode.size(), 0.0);
+}
+
+int NonlinearModes::get_group_count() const noexcept { return nonlinear_->groups; }
+
+void NonlinearModes::add_push(int interval, std::size_t i, double amplitude, const Moments& moments) noexcept {
+  const std::size_t at = static_cast<std::size_t>(interval) * nonlinear_->mode.size() + i;
+  for (int j = 0; j < kMoments; ++j) {
+    push_re_[at] += amplitude * moments[j] * nonlinear_->force_re[i][j];
+    push_im_[at] += amplitude * moments[j] * nonlinear_->force_im[i][j];
+  }
+}
+
+void NonlinearModes::add_pulses(std::int64_t sample, std::span<const QueuedPulse> pulses) noexcept {
+  for (const QueuedPulse& pulse : pulses) {
+    const double begin = pulse.begin - static_cast<double>(sample - 1);
+    for (int n = 0; n < kSubBlock; ++n) {
+      if (begin - n > 1.0 || begin - n + pulse.length <= 0.0) continue;
+      pushes_ = true;
+      const Moments moments = calc_pulse_moments(pulse.shape, begin - n, pulse.length);
+      for (std::size_t i = 0; i < nonlinear_->mode.size(); ++i) {
+        const int mode = nonlinear_->mode[i];
+        add_push(n, i, calc_amplitude(pulse.row, pulse.weight, mode, model_->get_scale(mode)), moments);
+      }
+    }
+  }
+}
+
+void NonlinearModes::add_forces(std::int64_t sample, std::span<const QueuedForce> forces) noexcept {
+  for (const QueuedForce& force : forces) {
+    const double begin = force.begin - static_cast<double>(sample - 1), end = force.calc_end() - static_cast<double>(sample - 1);
+    const std::int16_t* row[kStrikeRows];
+    float weight[3][kStrikeRows];
+    model_->find_rows(force.triangle, row);
+    for (int axis = 0; axis < force.axes; ++axis) force.find_weights(axis, weight[axis]);
+    for (int n = 0; n < kSubBlock; ++n) {
+      if (begin - n > 1.0 || end - n <= 0.0) continue;
+      pushes_ = true;
+      const ForceMoments moments = calc_force_moments(force, begin - n, force.step);
+      for (std::size_t i = 0; i < nonlinear_->mode.size(); ++i) {
+        const int mode = nonlinear_->mode[i];
+        for (int axis = 0; axis < force.axes; ++axis)
+          add_push(n, i, calc_amplitude(row, weight[axis], mode, model_->get_scale(mode)), moments[static_cast<std::size_t>(axis)]);
+      }
+    }
+  }
+}
+
+void NonlinearModes::add_contacts(const ContactBlock& drive) noexcept {
+  const std::size_t count = nonlinear_->mode.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    const int mode = nonlinear_->mode[i];
+    const double scale = model_->get_scale(mode);
+    if (drive.forces) {
+      double force[kIntervals] = {};
+      for (std::size_t c = 0; c < static_cast<std::size_t>(drive.contacts); ++c)
+        for (const ContactEnd& push : drive.push[c]) {
+          if (!push.forces) continue;
+          const double amplitude = calc_amplitude(push.row, push.force, mode, scale);
+          for (int n = 0; n < kIntervals; ++n) force[n] += amplitude * static_cast<double>(push.signal[n]);
+        }
+      double first[2] = {}, second[2] = {};  // answers to 1 - u and u
+      for (int j = 0; j < kTerms; ++j) {
+        first[0] += static_cast<double>(drive.ramp[0][j]) * nonlinear_->force_re[i][j];
+        first[1] += static_cast<double>(drive.ramp[0][j]) * nonlinear_->force_im[i][j];
+        second[0] += static_cast<double>(drive.ramp[1][j]) * nonlinear_->force_re[i][j];
+        second[1] += static_cast<double>(drive.ramp[1][j]) * nonlinear_->force_im[i][j];
+      }
+      for (int n = 1; n < kIntervals; ++n) {
+        push_re_[static_cast<std::size_t>(n) * count + i] += first[0] * force[n - 1] + second[0] * force[n];
+        push_im_[static_cast<std::size_t>(n) * count + i] += first[1] * force[n - 1] + second[1] * force[n];
+      }
+    }
+    if (!drive.damps) continue;
+    const double angle = std::sqrt(nonlinear_->constants[i].eigenvalue_rad2_s2) / model_->get_rate_hz();
+    const double begin = calc_damping(drive, 0, mode, scale, angle), end = calc_damping(drive, 1, mode, scale, angle);
+    for (int n = 1; n < kIntervals; ++n) {
+      const double share = (n - 0.5) / kSubBlock, lost = (1.0 - share) * begin + share * end;
+      keep_[static_cast<std::size_t>(n) * count + i] = 1.0 - lost;
+    }
+  }
+}
+
+void NonlinearModes::add(std::int64_t sample, const StrikeQueue& strikes, bool struck, const ContactBlock* drive, float* out,
+                         SampleStates* kept, int groups) noexcept {
+  const std::size_t count = nonlinear_->mode.size();
+  const auto row = [count](std::vector<double>& values, int n) {
+    return std::span(values).subspan(static_cast<std::size_t>(n) * count, count);
+  };
+  if (!is_live() && !struck && drive == nullptr) return;
+  const bool damps_first = carry_damps_, damps = drive != nullptr && drive->damps;
+  pushes_ = has_carry_;
+  if (damps && !damps_first) std::fill_n(keep_.begin(), count, 1.0);
+  if (struck) {
+    add_pulses(sample, strikes.get_pulses());
+    add_forces(sample, strikes.get_forces());
+  }
+  if (drive != nullptr) {
+    add_contacts(*drive);
+    pushes_ = pushes_ || drive->forces;
+  }
+  for (int n = 0; n < kSubBlock; ++n) {
+    if (n == 0 ? damps_first : damps)
+      modes_.step(row(push_re_, n), row(push_im_, n), row(keep_, n));
+    else if (pushes_)
+      modes_.step(row(push_re_, n), row(push_im_, n));
+    else
+      modes_.step();
+    double pressure = 0.0;
+    for (std::size_t i = 0; i < count; ++i) pressure += model_->get_gain(nonlinear_->mode[i]) * modes_.get_velocity(static_cast<int>(i));
+    out[n] += static_cast<float>(pressure);
+    if (kept == nullptr) continue;
+    for (std::size_t i = 0; i < count; ++i) {
+      const int group = nonlinear_->mode[i] / kGroup, lane = nonlinear_->mode[i] % kGroup;
+      if (group >= groups) continue;
+      kept[group].re[n][lane] += static_cast<float>(modes_.get_re(static_cast<int>(i)));
+      kept[group].im[n][lane] += static_cast<float>(modes_.get_im(static_cast<int>(i)));
+    }
+  }
+  // The last row is the first one of the next sub-block.
+  has_carry_ = drive != nullptr && drive->forces;
+  carry_damps_ = damps;
+  for (auto* values : {&push_re_, &push_im_}) {
+    if (has_carry_) std::copy_n(values->begin() + static_cast<std::ptrdiff_t>(kSubBlock * count), count, values->begin());
+    if (pushes_) std::fill(values->begin() + static_cast<std::ptrdiff_t>(has_carry_ ? count : 0), values->end(), 0.0);
+  }
+  if (damps) std::copy_n(keep_.begin() + static_cast<std::ptrdiff_t>(kSubBlock * count), count, keep_.begin());
+}
+
+/// Turned by one sample, as the lanes of the groups are.
+DampedState NonlinearModes::get_state(int i) const noexcept {
+  const nonlinear::ModeConstants& mode = nonlinear_->constants[static_cast<std::size_t>(i)];
+  const double omega = std::sqrt(mode.eigenvalue_rad2_s2), d = mode.decay_per_s, k = 1.0 / model_->get_rate_hz();
+  const double damped = std::sqrt((omega - d) * (omega + d)), size = std::exp(-d * k), c = std::cos(damped * k), s = std::sin(damped * k);
+  const double re = modes_.get_re(i), im = modes_.get_im(i), q = size * (im * c + re * s) / damped;
+  return {q, size * (re * c - im * s) - d * q};
+}
+
+void NonlinearModes::set_state(int i, const DampedState& state) noexcept {
+  const nonlinear::ModeConstants& mode = nonlinear_->constants[static_cast<std::size_t>(i)];
+  const double omega = std::sqrt(mode.eigenvalue_rad2_s2), d = mode.decay_per_s, k = 1.0 / model_->get_rate_hz();
+  const double damped = std::sqrt((omega - d) * (omega + d)), size = std::exp(d * k), c = std::cos(damped * k), s = std::sin(damped * k);
+  const double re = state.v + d * state.q, im = damped * state.q, q = size * (im * c - re * s) / damped;
+  modes_.set_state(i, q, size * (re * c + im * s) - d * q);
+}
+
+void NonlinearModes::drop_below(double pressure_pa) noexcept {
+  double bound = 0.0;
+  for (int i = 0; i < get_count(); ++i)
+    bound += std::abs(model_->get_gain(nonlinear_->mode[static_cast<std::size_t>(i)])) * std::hypot(modes_.get_re(i), modes_.get_im(i));
+  if (bound < pressure_pa && !has_carry_) reset();
+}
+
+void NonlinearModes::reset() noexcept {
+  modes_.reset();
+  has_carry_ = carry_damps_ = false;
+  std::fill(push_re_.begin(), push_re_.end(), 0.0);
+  std::fill(push_im_.begin(), push_im_.end(), 0.0);
+}
+
+std::size_t NonlinearModes::calc_bytes() const noexcept {
+  return sizeof(NonlinearModes) + modes_.calc_bytes() + place_.capacity() * sizeof(int) +
+         (push_re_.capacity() + push_im_.capacity() + keep_.capacity()) * sizeof(double);
+}
+
+}  // namespace carillon::synth

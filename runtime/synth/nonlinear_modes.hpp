@@ -1,0 +1,74 @@
+// The modes of a voice that large motion couples: sample by sample, in place of their lanes among the groups.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "runtime/nonlinear/coupled_modes.hpp"
+#include "runtime/synth/damped_modes.hpp"
+#include "runtime/synth/kernels.hpp"
+#include "runtime/synth/model.hpp"
+#include "runtime/synth/strike_queue.hpp"
+
+namespace carillon::synth {
+
+/// What a Model has for Effect::kNonlinear, where the bank has a nonlinear energy. N coupled modes, in the order of the energy: those of
+/// the bank that ring below the Nyquist frequency.
+struct ModelNonlinear {
+  bank::QuarticEnergy energy;
+  std::vector<int> mode;  // (N) of the model
+  std::vector<nonlinear::ModeConstants> constants;
+  std::vector<Moments> force_re, force_im;  // (N) of Chebyshev's moments of a force over a sample: what it makes of the state
+  std::vector<StrikeTable> strike;          // of the model, which no longer strike these
+  int groups = 0;                           // up to the last group with such a mode
+};
+
+/// The states are those at the last sample that was rendered. While is_live() is false nothing moves. Memory is taken in the constructor
+/// only.
+class NonlinearModes {
+ public:
+  /// The model must outlive the result and have a nonlinear energy.
+  explicit NonlinearModes(const Model& model);
+
+  bool is_live() const noexcept { return modes_.is_moving() || has_carry_; }
+  int get_count() const noexcept { return modes_.get_count(); }
+  int get_group_count() const noexcept;
+  /// Place of a mode of the model among them; -1: not there.
+  int find_place(int mode) const noexcept { return place_[static_cast<std::size_t>(mode)]; }
+
+  /// Adds the pressure [Pa at 1 m] of the kSubBlock samples from `sample` on. `struck`: some of `strikes` act; `drive`: contacts that last,
+  /// or nullptr. `kept`: where states are added of groups below `groups`, or nullptr.
+  void add(std::int64_t sample, const StrikeQueue& strikes, bool struck, const ContactBlock* drive, float* out, SampleStates* kept,
+           int groups) noexcept;
+
+  /// Of mode i, at the sample that comes next when nothing couples the modes on the way there.
+  DampedState get_state(int i) const noexcept;
+  void set_state(int i, const DampedState& state) noexcept;
+  /// Only so many are coupled from now on.
+  void set_limit(int modes) noexcept { modes_.set_limit(modes); }
+  int get_limit() const noexcept { return modes_.get_limit(); }
+  /// Silences them all when together they cannot sound more than this.
+  void drop_below(double pressure_pa) noexcept;
+  void reset() noexcept;
+  double calc_energy_j() const noexcept { return modes_.get_energy_j(); }
+  const nonlinear::CoupledCounters& get_counters() const noexcept { return modes_.get_counters(); }
+  std::size_t calc_bytes() const noexcept;
+
+ private:
+  void add_pulses(std::int64_t sample, std::span<const QueuedPulse> pulses) noexcept;
+  void add_forces(std::int64_t sample, std::span<const QueuedForce> forces) noexcept;
+  void add_contacts(const ContactBlock& drive) noexcept;
+  void add_push(int interval, std::size_t i, double amplitude, const Moments& moments) noexcept;
+
+  const Model* model_;
+  const ModelNonlinear* nonlinear_;  // of the model
+  nonlinear::CoupledModes modes_;
+  std::vector<int> place_;
+  std::vector<double> push_re_, push_im_, keep_;  // (kSubBlock + 1, N): at the samples of this sub-block, and the first one after it
+  bool pushes_ = false;                           // something does in this sub-block
+  bool has_carry_ = false, carry_damps_ = false;  // what of the last row is for the next one
+};
+
+}  // namespace carillon::synth

@@ -1,0 +1,62 @@
+#!/usr/bin/python3
+""" "radiation": "auto" takes boundary elements for flat bodies, and for compact ones whose modes lose more to the air than a third of what
+their material takes; it says which, why, and by which figures.
+
+usage: auto_air.py BIN_DIR
+"""
+import json
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+
+import h5py
+
+BIN = pathlib.Path(sys.argv[1]).resolve()
+CUBE = {"length_m": 0.15, "width_m": 0.15, "height_m": 0.15, "nodes": 800}
+HOLLOW = {"shape": "hollow-box", **CUBE, "wall_m": 0.006}
+LOSSY = {
+    "young_modulus_pa": 70e9,
+    "poisson_ratio": 0.33,
+    "density_kg_m3": 2700,
+    "damping": {"rayleigh": {"alpha1_s": 0, "alpha2_per_s": 500}},
+}
+LOSSLESS = LOSSY | {"damping": {"rayleigh": {"alpha1_s": 0, "alpha2_per_s": 0}}}
+CASES = {  # body, material, whether boundary elements are taken, what is said
+    "solid": ({"shape": "box", **CUBE}, "acrylic", False, "roundness 0.52, and from 0.4 on the gains of a sphere do"),
+    "hollow": (HOLLOW, "aluminium", True, "without it modes ring too long"),
+    "hollow-lossy": (HOLLOW, LOSSY, False, "the gains of a sphere do"),
+    "hollow-lossless": (HOLLOW, LOSSLESS, True, "up to inf times what the material takes"),
+    "plate": (
+        {"shape": "plate", "length_m": 0.3, "width_m": 0.2, "thickness_m": 0.01, "nodes": 800},
+        "acrylic",
+        True,
+        "roundness 0.02, below 0.4",
+    ),
+}
+
+
+def main():
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        for case, (body, material, is_solved, words) in CASES.items():
+            job = {"body": body, "material": material, "band_hz": [20, 12000], "max_modes": 6, "bank": f"{case}.hdf"}
+            job["radiation"] = {"method": "auto", "skin_nodes": 400}
+            (folder / f"{case}.json").write_text(json.dumps(job))
+            done = subprocess.run([BIN / "carillon-precompute", f"{case}.json"], cwd=folder, capture_output=True, text=True, timeout=120)
+            assert done.returncode == 0, f"{case}: {done.stderr}"
+            line = next(line for line in done.stdout.splitlines() if "boundary elements: " in line)
+            assert f"boundary elements: {'yes' if is_solved else 'no'}; " in line and words in line, f"{case}: {line}"
+            with h5py.File(folder / f"{case}.hdf") as bank:
+                assert ("radiation" in bank) == is_solved, case
+                if case != "hollow":
+                    continue
+                ratio = float(re.search(r"up to ([0-9.]+) times what", line)[1])
+                solved = (bank["radiation/decay"][:] / bank["modes/corrected_decay"][:]).max()
+                assert 0.5 < ratio / solved < 2 and solved > 1, (ratio, solved)  # the sphere's figure against the true one
+    print("auto_air: all cases hold")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,90 @@
+// What stands between a surface and a receiver.
+#include "precompute/emission/visibility.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "runtime/base/chance.hpp"
+#include "tests/unit/precompute/emission/motions.hpp"
+
+namespace carillon::emission {
+namespace {
+
+using namespace testing;
+
+/// Signed volumes: the way passes through the triangle when the three tetrahedra on it turn the same way.
+bool is_between(const Corners& t, const Vec3& from, const Vec3& to) {
+  const auto volume = [](const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) { return dot(cross(b - a, c - a), d - a); };
+  if (volume(t[0], t[1], t[2], from) * volume(t[0], t[1], t[2], to) > 0.0) return false;
+  const double a = volume(from, to, t[0], t[1]), b = volume(from, to, t[1], t[2]), c = volume(from, to, t[2], t[0]);
+  return (a > 0.0) == (b > 0.0) && (b > 0.0) == (c > 0.0);
+}
+
+TEST(Visibility, TheTreeFindsWhatASearchOfAllTrianglesFinds) {
+  std::uint64_t state = 7;
+  const auto draw = [&] { return base::to_unit(base::draw(state)); };
+  const auto place = [&] { return Vec3{draw(), draw(), draw()}; };
+  for (const std::size_t count : {0U, 1U, 5U, 300U}) {
+    std::vector<Corners> triangles;
+    for (std::size_t i = 0; i < count; ++i) {
+      const Vec3 a = place();
+      triangles.push_back({a, a + 0.2 * place(), a + 0.2 * place()});
+    }
+    const Visibility visibility(triangles);
+    int hidden = 0;
+    for (int i = 0; i < 500; ++i) {
+      const Vec3 from = place(), to = place();
+      bool is_free = true;
+      for (const Corners& one : triangles) is_free = is_free && !is_between(one, from, to);
+      EXPECT_EQ(visibility.is_free(from, to, -1), is_free);
+      hidden += is_free ? 0 : 1;
+    }
+    if (count == 300) {
+      EXPECT_GT(hidden, 50);
+      EXPECT_LT(hidden, 490);
+    }
+  }
+}
+
+std::vector<double> hear_behind(const std::vector<Corners>& walls, double speed, Radiation radiation) {
+  Options options = make_options(4000, {0.0, 0.0, 1.0}, 4);
+  options.radiation = radiation;
+  options.has_visibility = true;
+  options.walls_m = walls;
+  return hear(make_part(bem::testing::make_ball(2, 0.01)), options, [&](const Vec3& x, double t) {
+    return Vec3{speed * t, 0.0, 0.0} + 1e-6 * std::sin(kTwoPi * 1000.0 * t) * normalise(x);
+  });
+}
+
+double find_most(const std::vector<double>& sound, std::size_t begin, std::size_t end) {
+  double most = 0.0;
+  for (std::size_t n = begin; n < end; ++n) most = std::max(most, std::abs(sound[n]));
+  return most;
+}
+
+TEST(Visibility, ABodyBehindAWallIsSilentWhereTheFormulaHasDelta) {
+  const std::vector<Corners> wall{{Vec3{-3, -3, 0.5}, Vec3{3, -3, 0.5}, Vec3{0, 4, 0.5}}};
+  for (const Radiation radiation : {Radiation::kPaper2001, Radiation::kRayleigh}) {
+    EXPECT_EQ(find_most(hear_behind(wall, 0.0, radiation), 0, 4000), 0.0);
+    EXPECT_GT(find_most(hear_behind({}, 0.0, radiation), 1000, 4000), 1e-9);
+  }
+  EXPECT_GT(find_most(hear_behind(wall, 0.0, Radiation::kKirchhoff), 1000, 4000), 1e-9);
+}
+
+TEST(Visibility, ABodyThatGoesBehindAWallFadesWithoutAClick) {
+  // The edge is at x = 0.2, half way; the body passes it at 10 m/s.
+  const std::vector<Corners> wall{{Vec3{0.1, -5, 0.5}, Vec3{9, 0, 0.5}, Vec3{0.1, 5, 0.5}}};
+  const auto sound = hear_behind(wall, 10.0, Radiation::kRayleigh);
+  const double before = find_most(sound, 300, 700);
+  EXPECT_EQ(find_most(sound, 2000, 4000), 0.0);
+  EXPECT_GT(before, 1e-9);
+  // A tone of 1 kHz at 48 kHz has a second difference of (2 pi / 48)^2; a click has one of its own size.
+  double most = 0.0;
+  for (std::size_t n = 300; n < 2000; ++n) most = std::max(most, std::abs(sound[n + 1] - 2.0 * sound[n] + sound[n - 1]));
+  EXPECT_LT(most, 2.0 * before * std::pow(kTwoPi / 48.0, 2));
+}
+
+}  // namespace
+}  // namespace carillon::emission
