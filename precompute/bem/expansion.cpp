@@ -10,6 +10,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "runtime/base/hankel.hpp"
+
 namespace carillon::bem {
 namespace {
 
@@ -36,9 +38,8 @@ double calc_bessel_ratio(double x, int l) {
 
 /// Ratios h_l / h_{l-1}, l = 1 .. order, at [l].
 std::vector<Complex> calc_hankel_ratios(double x, int order) {
-  std::vector<Complex> ratio(static_cast<std::size_t>(order) + 1);
-  if (order > 0) ratio[1] = Complex(1.0 / x, -1.0);  // h_1 / h_0 = 1/x - i
-  for (int l = 2; l <= order; ++l) ratio[static_cast<std::size_t>(l)] = (2.0 * l - 1.0) / x - 1.0 / ratio[static_cast<std::size_t>(l - 1)];
+  std::vector<Complex> ratio = base::calc_hankel_quotients(x, order);
+  for (Complex& one : ratio) one = 1.0 / one;
   return ratio;
 }
 

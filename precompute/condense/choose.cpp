@@ -1,4 +1,5 @@
-// Method: A plate of thickness h that bends with the wave number k has rotation / strain = sqrt(24) / (h k); a wave of shear in the body has
+// Method: A plate of thickness h that bends with the wave number k has rotation / strain = sqrt(24) / (h k); a wave of shear in the body
+// has
 //   1, one of compression 0.
 // Source: docs/equations.md E13. Deviations: none.
 #include "precompute/condense/choose.hpp"
@@ -47,16 +48,15 @@ Choice choose_modes(std::span<const double> freq_hz, std::span<const double> sle
   Choice choice;
   std::vector<std::int32_t> bending;
   const auto find_freq = [&](std::int32_t mode) { return freq_hz[static_cast<std::size_t>(mode)]; };
-  for (const std::int32_t mode : eligible) {
-    if (slenderness[static_cast<std::size_t>(mode)] >= kSlender) {
-      if (find_freq(mode) <= below_hz) bending.push_back(mode);
-    } else if (choice.membrane_hz == 0) {
-      choice.membrane_hz = find_freq(mode);
-    }
-  }
+  for (const std::int32_t mode : eligible)
+    if (slenderness[static_cast<std::size_t>(mode)] >= kSlender && find_freq(mode) <= below_hz) bending.push_back(mode);
+  const auto membrane = std::find_if(slenderness.begin(), slenderness.end(), [](double value) { return value < kSlender; });
+  if (membrane != slenderness.end()) choice.membrane_hz = freq_hz[static_cast<std::size_t>(membrane - slenderness.begin())];
   choice.bending_count = static_cast<std::int64_t>(bending.size());
   auto kept = static_cast<std::size_t>(std::min<std::int64_t>(count, choice.bending_count));
-  const auto is_same = [&](std::size_t a, std::size_t b) { return find_freq(bending[b]) - find_freq(bending[a]) <= kSame * find_freq(bending[b]); };
+  const auto is_same = [&](std::size_t a, std::size_t b) {
+    return find_freq(bending[b]) - find_freq(bending[a]) <= kSame * find_freq(bending[b]);
+  };
   if (kept > 1 && kept < bending.size() && is_same(kept - 1, kept)) {
     std::size_t first = kept - 1;
     while (first > 0 && is_same(first - 1, first)) --first;

@@ -26,15 +26,16 @@ constexpr double kFieldsShare = 0.5;  // of the error that is asked for: for lea
 double count_rows_cost(double rows, double modes) { return rows * modes * (modes + 1); }
 double count_points_cost(double points, double rows, double modes) { return 2 * points * (9 * modes + 6 * rows); }
 
-void check(const SolvedModes& solved, const Options& options) {
+void check(const SolvedModes& solved, const CondenseOptions& options) {
   if (solved.components != 1)
     throw InputError(fmt::format("nonlinear motion couples the modes of one piece, and the body has {}: solve each as a body of its own",
                                  solved.components));
   const std::size_t eligible = options.eligible.empty() ? solved.lambda.size() : options.eligible.size();
   if (static_cast<std::size_t>(options.modes) > eligible)
-    throw InputError(fmt::format("\"nonlinear\" asks for {} coupled modes, and the body has {} in its band: ask for {} at most, or widen "
-                                 "\"band_hz\"",
-                                 options.modes, eligible, eligible));
+    throw InputError(
+        fmt::format("\"nonlinear\" asks for {} coupled modes, and the body has {} in its band: ask for {} at most, or widen "
+                    "\"band_hz\"",
+                    options.modes, eligible, eligible));
 }
 
 std::vector<double> calc_freq_hz(std::span<const double> lambda) {
@@ -76,9 +77,9 @@ double calc_peak(const comm::Communicator& comm, const double* shape, std::ptrdi
 
 }  // namespace
 
-Result condense_modes(const comm::Communicator& comm, const SolvedModes& solved, const Options& options) {
+Condensed condense_modes(const comm::Communicator& comm, const SolvedModes& solved, const CondenseOptions& options) {
   check(solved, options);
-  Result result;
+  Condensed result;
   const std::vector<double> freq_hz = calc_freq_hz(solved.lambda);
   const la::LocalColumns shapes(solved.shapes);
   const Strains strains = comm.agree([&] { return Strains(solved.local, solved.materials); });
@@ -87,8 +88,8 @@ Result condense_modes(const comm::Communicator& comm, const SolvedModes& solved,
     eligible.resize(solved.lambda.size());
     std::iota(eligible.begin(), eligible.end(), 0);
   }
-  Choice choice = choose_modes(freq_hz, calc_slenderness(comm, strains, solved.local, shapes.view()), eligible,
-                               options.modes, options.below_hz);
+  Choice choice =
+      choose_modes(freq_hz, calc_slenderness(comm, strains, solved.local, shapes.view()), eligible, options.modes, options.below_hz);
   result.bending_count = choice.bending_count;
   result.splits_pair = choice.splits_pair;
   result.top_hz = choice.top_hz;

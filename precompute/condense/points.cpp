@@ -1,4 +1,5 @@
-// Method:     Cubature of energy: weights x >= 0, few of them not 0, with sum over p of x_p c_p = c, c_p what a point adds to <s(q_l), E2(q_k)>
+// Method:     Cubature of energy: weights x >= 0, few of them not 0, with sum over p of x_p c_p = c, c_p what a point adds to <s(q_l),
+// E2(q_k)>
 //             of pairs of motions drawn at random, c the whole. With the points chosen, stress is fitted to all pairs of modes (ridge
 //             regression). Candidates are ordered by the numbers of the elements in the mesh: they do not depend on the ranks.
 // Source:     An, Kim, James, ACM Trans. Graph. 27, 165, 2008 (cubature); Farhat, Avery, Chapman, Cortial, Int. J. Numer. Meth. Eng. 98,
@@ -23,8 +24,8 @@ namespace {
 
 constexpr std::int64_t kCandidates = 4000;
 constexpr std::uint64_t kTrainingSeed = 1000;
-constexpr double kRidge = 1e-9;  // of the mean square of the strains
-constexpr double kGrowth = 1.25; // of the number of points from one attempt to the next
+constexpr double kRidge = 1e-9;   // of the mean square of the strains
+constexpr double kGrowth = 1.25;  // of the number of points from one attempt to the next
 
 /// Candidates of all ranks, in the order of the mesh. Rank 0.
 struct Candidates {
@@ -111,7 +112,8 @@ la::Matrix calc_pair_strains(const la::Matrix& gradient, const Pairs& pairs) {
           const auto [a, b] = kComponents[static_cast<std::size_t>(c)];
           double sum = 0;
           for (int k = 0; k < 3; ++k)
-            sum += gradient(9 * p + 3 * k + a, i) * gradient(9 * p + 3 * k + b, j) + gradient(9 * p + 3 * k + b, i) * gradient(9 * p + 3 * k + a, j);
+            sum += gradient(9 * p + 3 * k + a, i) * gradient(9 * p + 3 * k + b, j) +
+                   gradient(9 * p + 3 * k + b, i) * gradient(9 * p + 3 * k + a, j);
           strain(6 * p + c, pairs.find(i, j)) = (c < 3 ? 0.5 : 1.0) * (i == j ? 0.5 : 1.0) * sum;
         }
   return strain;
@@ -130,7 +132,8 @@ Equations make_equations(const CoupledBody& body, const StressFields& fields, co
   const la::Matrix eta = fields.form * samples.products;  // (R, motions)
   const la::Matrix strain = calc_strains(candidates.gradient, samples.q);
   const std::ptrdiff_t count = strain.rows() / 6, rows = eta.rows();
-  Equations equations{la::Matrix(static_cast<std::ptrdiff_t>(kPartners) * motions, count), la::Vector(static_cast<std::ptrdiff_t>(kPartners) * motions)};
+  Equations equations{la::Matrix(static_cast<std::ptrdiff_t>(kPartners) * motions, count),
+                      la::Vector(static_cast<std::ptrdiff_t>(kPartners) * motions)};
   std::uint64_t state = base::scramble(kTrainingSeed);
   for (int partner = 0; partner < kPartners; ++partner) {
     la::Matrix direction = eta;

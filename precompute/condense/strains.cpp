@@ -184,7 +184,8 @@ void Strains::calc_gradients(const ElementPoints& points, const RowMatrix& value
     for (int i = 0; i < points.nodes; ++i)
       for (int a = 0; a < 3; ++a)
         for (int k = 0; k < 3; ++k)
-          gradients.row(9 * p + 3 * a + k) += points.slope[static_cast<std::size_t>(p)][static_cast<std::size_t>(3 * i + k)] * values.row(3 * i + a);
+          gradients.row(9 * p + 3 * a + k) +=
+              points.slope[static_cast<std::size_t>(p)][static_cast<std::size_t>(3 * i + k)] * values.row(3 * i + a);
 }
 
 void Strains::calc_pair_strains(std::int32_t e, const ElementPoints& points, const RowMatrix& gradients, const Pairs& pairs,
@@ -218,8 +219,7 @@ void Strains::calc_square_strains(std::int32_t e, const ElementPoints& points, c
       const auto [k, l] = kComponents[static_cast<std::size_t>(c)];
       const double factor = c < 3 ? 0.5 : 0.5 * kShear;
       for (int a = 0; a < 3; ++a)
-        z.row(6 * p + c).array() +=
-            factor * gradients.row(9 * p + 3 * a + k).array() * gradients.row(9 * p + 3 * a + l).array();
+        z.row(6 * p + c).array() += factor * gradients.row(9 * p + 3 * a + k).array() * gradients.row(9 * p + 3 * a + l).array();
     }
   scale(e, points, z);
 }

@@ -23,10 +23,10 @@ inline constexpr std::array<std::array<int, 2>, 6> kComponents{{{0, 0}, {1, 1}, 
 /// One element at its points of integration, which are those that make its stiffness exact: one of a T4, four of a straight T10, fourteen
 /// of a curved one.
 struct ElementPoints {
-  int nodes = 0;                                           // 4 or 10
-  std::vector<double> volume_m3;                           // (points) weights
-  std::vector<std::array<double, 30>> slope;               // (points) d N_i / d x_k at 3 i + k
-  std::vector<std::array<double, 4>> at;                   // (points) barycentric coordinates
+  int nodes = 0;                              // 4 or 10
+  std::vector<double> volume_m3;              // (points) weights
+  std::vector<std::array<double, 30>> slope;  // (points) d N_i / d x_k at 3 i + k
+  std::vector<std::array<double, 4>> at;      // (points) barycentric coordinates
   int point_count() const { return static_cast<int>(volume_m3.size()); }
 };
 

@@ -1,4 +1,5 @@
-// Method:     Of all pairs: the Gram matrix of s_ij, in units of equal energy (q_i = g_i / omega_i), by its eigenvectors. Of many modes: the
+// Method:     Of all pairs: the Gram matrix of s_ij, in units of equal energy (q_i = g_i / omega_i), by its eigenvectors. Of many modes:
+// the
 //             fields of random motions, orthonormalised block by block, until the fields of other motions lie in what they span. There
 //             <s_r, s_ij> = <s_r, E_ij>, since s_r does no work on what was condensed: no pair needs a solve.
 // Source:     docs/equations.md E13; Halko, Martinsson, Tropp, SIAM Review 53, 2011 (randomised range finder).
@@ -21,7 +22,7 @@ constexpr double kLeastShare = 1e-12;      // of the trace: fields below are rou
 constexpr int kPairsAtOnce = 64;           // right-hand sides of a solve
 constexpr std::int64_t kRowsAtOnce = 768;  // of the elements whose stresses are multiplied together
 constexpr int kHeldOut = 48;
-constexpr std::uint64_t kTest = 1;           // seeds: of the motions held out; others follow
+constexpr std::uint64_t kTest = 1;  // seeds: of the motions held out; others follow
 
 std::ptrdiff_t to_index(std::size_t value) { return static_cast<std::ptrdiff_t>(value); }
 
@@ -55,7 +56,8 @@ void add_loads(const Strains& strains, std::int32_t e, const RowMatrix& forces, 
   const auto nodes = strains.nodes(e);
   const std::ptrdiff_t width = forces.cols();
   for (std::size_t i = 0; i < nodes.size(); ++i)
-    Eigen::Map<RowMatrix>(loads.data() + static_cast<std::ptrdiff_t>(nodes[i]) * 3 * width, 3, width) += forces.middleRows(3 * to_index(i), 3);
+    Eigen::Map<RowMatrix>(loads.data() + static_cast<std::ptrdiff_t>(nodes[i]) * 3 * width, 3, width) +=
+        forces.middleRows(3 * to_index(i), 3);
 }
 
 std::size_t count_nodal(const CoupledBody& body, std::ptrdiff_t width) {
@@ -234,7 +236,7 @@ Samples join(const Samples& a, const Samples& b) {
 }
 
 double calc_error(const la::Vector& energy, const la::Vector& cubic, const la::Vector& full, const la::Vector& full_cubic) {
-  constexpr double kLeastEnergy = 0.01;  // of the mean: what is softer is not heard beside the others
+  constexpr double kLeastEnergy = 0.01;  // of the mean: what is softer is not heard among the others
   const double least = kLeastEnergy * full.mean(), norm = full_cubic.norm();
   const double worst = ((energy - full).array().abs() / full.array().max(least)).maxCoeff();
   return norm > 0 ? std::max(worst, (cubic - full_cubic).norm() / norm) : worst;

@@ -15,8 +15,8 @@ struct CoupledBody {
   const comm::Communicator& comm;
   const Strains& strains;
   StaticAnswer& answer;
-  const Nodal& shapes;                // (local nodes, 3, N) of the kept modes
-  const std::vector<double>& omega;   // (N) [rad/s]
+  const Nodal& shapes;               // (local nodes, 3, N) of the kept modes
+  const std::vector<double>& omega;  // (N) [rad/s]
   Pairs pairs;
   /// Called before each block of solves, on every rank, with the share that is done; may throw on all ranks alike.
   std::function<void(double)> proceed;
@@ -35,10 +35,10 @@ Samples join(const Samples& a, const Samples& b);
 /// R fields of scaled stress (Strains), orthonormal over the body: eta_r(q) = <s_r, E2(q)> = sum over the pairs of form(r, ij) q_i q_j.
 /// The condensed energy is 1/2 sum of (linear q + eta)_r² less 1/2 sum of (linear q)_r².
 struct StressFields {
-  la::Matrix form;    // (R, pairs) [J^1/2 / (m² kg)], fields in the order of what they hold of the energy of equal modes
-  la::Matrix linear;  // (R, N) <s_r, eps(phi_i)>; zero of flat bodies
+  la::Matrix form;       // (R, pairs) [J^1/2 / (m² kg)], fields in the order of what they hold of the energy, with the same in all modes
+  la::Matrix linear;     // (R, N) <s_r, eps(phi_i)>; zero of flat bodies
   double curvature = 0;  // calc_curvature() of all fields
-  la::Matrix values;  // (rows of this rank, R); empty unless asked for
+  la::Matrix values;     // (rows of this rank, R); empty unless asked for
   std::int64_t solves = 0;
   double error = 0;  // of the energy, as find_rank() measures it
   Samples tests;     // motions of single modes and of all: what the energy is measured on, with its

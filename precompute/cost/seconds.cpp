@@ -79,9 +79,9 @@ PhaseSeconds predict_seconds(const ProblemSize& known) {
 
 PhaseSeconds calc_wall(const PhaseSeconds& cpu, const ProblemSize& size, int ranks) {
   PhaseSeconds wall = cpu;
-  for (double PhaseSeconds::*phase :
-       {&PhaseSeconds::partition, &PhaseSeconds::assemble, &PhaseSeconds::analyse, &PhaseSeconds::factor, &PhaseSeconds::solve,
-        &PhaseSeconds::orthogonalise, &PhaseSeconds::check, &PhaseSeconds::errors, &PhaseSeconds::coupling, &PhaseSeconds::collect, &PhaseSeconds::air})
+  for (double PhaseSeconds::*phase : {&PhaseSeconds::partition, &PhaseSeconds::assemble, &PhaseSeconds::analyse, &PhaseSeconds::factor,
+                                      &PhaseSeconds::solve, &PhaseSeconds::orthogonalise, &PhaseSeconds::check, &PhaseSeconds::errors,
+                                      &PhaseSeconds::coupling, &PhaseSeconds::collect, &PhaseSeconds::air})
     wall.*phase /= ranks;
   if (size.is_read_by_all) wall.read /= ranks;
   return wall;

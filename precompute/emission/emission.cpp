@@ -99,7 +99,7 @@ struct Emission::State {
   // ---- what does not change ----
   comm::Communicator comm;
   Options options;
-  const Loops* loops = &find_loops();
+  const RowLoops* loops = &find_loops();
   bool is_paper = false;
   double alpha = 0.0;
   std::vector<std::int32_t> node;   // (V) of the caller, each vertex of the triangles once

@@ -4,7 +4,7 @@
 
 namespace carillon::emission {
 
-const Loops& find_loops() {
+const RowLoops& find_loops() {
 #if defined(__x86_64__)
   if (base::has_instructions(base::Instructions::kAvx512)) return kLoopsAvx512;
   if (base::has_instructions(base::Instructions::kAvx2)) return kLoopsAvx2;

@@ -6,10 +6,10 @@
 
 namespace carillon::emission {
 
-inline constexpr int kSlots = 24;            // samples that one value of a low-pass adds to
-inline constexpr int kDerivativeHalf = 16;   // samples on either side that a derivative takes
-inline constexpr int kSpread = 32;           // samples over which an arrival is spread
-inline constexpr std::size_t kLane = 8;      // counts of rows are multiples of it
+inline constexpr int kSlots = 24;           // samples that one value of a low-pass adds to
+inline constexpr int kDerivativeHalf = 16;  // samples on either side that a derivative takes
+inline constexpr int kSpread = 32;          // samples over which an arrival is spread
+inline constexpr std::size_t kLane = 32;  // counts of rows are multiples of it: no loop has an end of its own, which could round otherwise
 inline constexpr std::size_t kTogether = 8;  // values that a low-pass takes in at once: its open samples do not fit into the first cache
 
 /// A double in units of 2^-46 Pa, by the bits of its sum with 1.5 * 2^52: 2^51 units to either side. Sums of whole numbers have no order.
@@ -17,7 +17,7 @@ inline constexpr double kUnitsPerPa = 70368744177664.0;
 inline constexpr double kLargestPa = 30.0;  // that scatter() may be given
 
 /// What a loop does to a row does not depend on its place among the rows, so neither do the bits of the result.
-struct Loops {
+struct RowLoops {
   /// sum (n, 4) += the four numbers of u at node[i].
   void (*add_places)(double* sum, const double* u, const std::int32_t* node, std::size_t n);
   /// open (rows, kSlots) += the sum over i of value (count, rows) x weight[i] (kSlots), one i after the other.
@@ -30,7 +30,7 @@ struct Loops {
   void (*scatter)(std::int64_t* to, double pa, const float* row, const float* share);
 };
 
-extern const Loops kLoopsPlain, kLoopsAvx2, kLoopsAvx512;
-const Loops& find_loops();
+extern const RowLoops kLoopsPlain, kLoopsAvx2, kLoopsAvx512;
+const RowLoops& find_loops();
 
 }  // namespace carillon::emission

@@ -29,53 +29,40 @@ void add_rows(double* __restrict open, const double* __restrict value, std::size
   }
 }
 
-/// Rows that are carried through all frames at once: long enough that the frames arrive from memory in runs.
-constexpr std::size_t kRun = 4 * kLane;
-
-template <std::size_t count>
-void calc_derivatives_of(const double* const* frame, std::size_t begin, const double* first, const double* second, double* v, double* a) {
-  double speed[count], acceleration[count];
-  for (std::size_t i = 0; i < count; ++i) {
-    speed[i] = 0.0;
-    acceleration[i] = second[0] * frame[kDerivativeHalf][begin + i];
-  }
-  for (int j = 1; j <= kDerivativeHalf; ++j) {
-    const double* after = frame[kDerivativeHalf + j] + begin;
-    const double* before = frame[kDerivativeHalf - j] + begin;
-    const double odd = first[j], even = second[j];
-    for (std::size_t i = 0; i < count; ++i) {
-      speed[i] += odd * (after[i] - before[i]);
-      acceleration[i] += even * (after[i] + before[i]);
+void calc_derivatives(const double* const* frame, std::size_t rows, const double* first, const double* second, double* v, double* a) {
+  for (std::size_t begin = 0; begin < rows; begin += kLane) {
+    double speed[kLane], acceleration[kLane];
+    for (std::size_t i = 0; i < kLane; ++i) {
+      speed[i] = 0.0;
+      acceleration[i] = second[0] * frame[kDerivativeHalf][begin + i];
+    }
+    for (int j = 1; j <= kDerivativeHalf; ++j) {
+      const double* after = frame[kDerivativeHalf + j] + begin;
+      const double* before = frame[kDerivativeHalf - j] + begin;
+      const double odd = first[j], even = second[j];
+      for (std::size_t i = 0; i < kLane; ++i) {
+        speed[i] += odd * (after[i] - before[i]);
+        acceleration[i] += even * (after[i] + before[i]);
+      }
+    }
+    for (std::size_t i = 0; i < kLane; ++i) {
+      v[begin + i] = speed[i];
+      a[begin + i] = acceleration[i];
     }
   }
-  for (std::size_t i = 0; i < count; ++i) {
-    v[begin + i] = speed[i];
-    a[begin + i] = acceleration[i];
-  }
-}
-
-void calc_derivatives(const double* const* frame, std::size_t rows, const double* first, const double* second, double* v, double* a) {
-  std::size_t begin = 0;
-  for (; begin + kRun <= rows; begin += kRun) calc_derivatives_of<kRun>(frame, begin, first, second, v, a);
-  for (; begin < rows; begin += kLane) calc_derivatives_of<kLane>(frame, begin, first, second, v, a);
-}
-
-template <std::size_t count>
-void sum_frames_of(const double* const* frame, std::size_t begin, const double* weight, double keep, double* out) {
-  double sum[count];
-  for (std::size_t i = 0; i < count; ++i) sum[i] = keep * out[begin + i];
-  for (int j = 0; j < kSpread; ++j) {
-    const double* x = frame[j] + begin;
-    const double w = weight[j];
-    for (std::size_t i = 0; i < count; ++i) sum[i] += w * x[i];
-  }
-  for (std::size_t i = 0; i < count; ++i) out[begin + i] = sum[i];
 }
 
 void sum_frames(const double* const* frame, std::size_t rows, const double* weight, double keep, double* out) {
-  std::size_t begin = 0;
-  for (; begin + kRun <= rows; begin += kRun) sum_frames_of<kRun>(frame, begin, weight, keep, out);
-  for (; begin < rows; begin += kLane) sum_frames_of<kLane>(frame, begin, weight, keep, out);
+  for (std::size_t begin = 0; begin < rows; begin += kLane) {
+    double sum[kLane];
+    for (std::size_t i = 0; i < kLane; ++i) sum[i] = keep * out[begin + i];
+    for (int j = 0; j < kSpread; ++j) {
+      const double* x = frame[j] + begin;
+      const double w = weight[j];
+      for (std::size_t i = 0; i < kLane; ++i) sum[i] += w * x[i];
+    }
+    for (std::size_t i = 0; i < kLane; ++i) out[begin + i] = sum[i];
+  }
 }
 
 void scatter(std::int64_t* __restrict to, double pa, const float* __restrict row, const float* __restrict share) {

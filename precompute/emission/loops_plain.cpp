@@ -5,6 +5,6 @@ namespace {
 #include "precompute/emission/loops.inl"
 }  // namespace
 
-const Loops kLoopsPlain{add_places, add_rows, calc_derivatives, sum_frames, scatter};
+const RowLoops kLoopsPlain{add_places, add_rows, calc_derivatives, sum_frames, scatter};
 
 }  // namespace carillon::emission

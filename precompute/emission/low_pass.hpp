@@ -41,7 +41,7 @@ class LowPass {
 
   std::size_t rows_;
   Kernel kernel_;
-  const Loops* loops_;
+  const RowLoops* loops_;
   int ring_ = 0;                                        // slot of the oldest open sample
   std::vector<std::array<double, 2 * kSlots>> weight_;  // (values), twice in a row, so that any beginning of the ring has a run
   std::vector<std::array<double, 2 * kSlots>> moment_;  // times the distance in time from the sample

@@ -36,7 +36,7 @@ class Arrivals {
   void load(std::span<const std::byte>& from);
 
  private:
-  const Loops* loops_;
+  const RowLoops* loops_;
   std::size_t frames_;
   std::vector<std::int64_t> units_;  // from sample -kSpread on
 };

@@ -151,14 +151,15 @@ void read_nonlinear(base::Object& job, JobSpec& spec) {
   if (auto modes = nonlinear.integer_if("modes", 1, kMaxCoupledModes)) found.modes = static_cast<int>(*modes);
   if (spec.max_modes && found.modes > *spec.max_modes) {
     if (nonlinear.has("modes"))
-      nonlinear.fail("modes", fmt::format("couples {} modes, and \"max_modes\" keeps {}; ask for fewer, or keep more", found.modes,
-                                          *spec.max_modes));
+      nonlinear.fail(
+          "modes", fmt::format("couples {} modes, and \"max_modes\" keeps {}; ask for fewer, or keep more", found.modes, *spec.max_modes));
     found.modes = *spec.max_modes;
   }
   found.below_hz = nonlinear.number_or("below_hz", found.below_hz, base::kPositive);
   if (found.below_hz <= spec.band_hz[0] || found.below_hz > kMaxHz)
-    nonlinear.fail("below_hz", fmt::format("is the highest frequency of a coupled mode, in Hz, above {:g} where \"band_hz\" begins, and is {:g}",
-                                           spec.band_hz[0], found.below_hz));
+    nonlinear.fail("below_hz",
+                   fmt::format("is the highest frequency of a coupled mode, in Hz, above {:g} where \"band_hz\" begins, and is {:g}",
+                               spec.band_hz[0], found.below_hz));
   found.energy_error = nonlinear.number_or("energy_error", found.energy_error, {kMinEnergyError, kMaxEnergyError});
   nonlinear.finish();
 }

@@ -207,7 +207,7 @@ Obstacle read_obstacle(base::Object& object) {
   for (const char* key : {"plane", "sphere", "box"}) forms += object.has(key) ? 1 : 0;
   if (forms != 1) object.fail("", "an obstacle is a \"plane\", a \"sphere\" or a \"box\"; give one");
   if (auto plane = object.object_if("plane")) {
-    Plane made{read_vector(*plane, "point_m", {}, kFarthestM), read_vector(*plane, "normal", {0, 0, 1}, 1e100)};
+    PlaneSpec made{read_vector(*plane, "point_m", {}, kFarthestM), read_vector(*plane, "normal", {0, 0, 1}, 1e100)};
     const double length = norm(made.normal);
     if (!(length > 1e-100)) plane->fail("normal", "is 0; give the direction to the free side");
     made.normal = (1.0 / length) * made.normal;
@@ -273,9 +273,9 @@ void check_names(base::Object& root, const std::vector<SimulatedBody>& bodies) {
   if (bodies.empty() || bodies.size() > kMaxBodies) root.fail("bodies", fmt::format("give 1 to {} bodies", kMaxBodies));
   std::set<std::string> names;
   for (const SimulatedBody& body : bodies) {
-    if (body.name.empty() || body.name.size() > 200) root.fail("bodies", fmt::format("{}: a name has 1 to 200 bytes", body.place));
+    if (body.name.empty() || body.name.size() > 200) throw InputError(fmt::format("{}: a name has 1 to 200 bytes", body.place));
     if (!names.insert(body.name).second)
-      root.fail("bodies", fmt::format("{}: two bodies are called \"{}\"; give each its own name", body.place, body.name));
+      throw InputError(fmt::format("{}: two bodies are called \"{}\"; give each its own name", body.place, body.name));
   }
 }
 

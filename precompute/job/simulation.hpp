@@ -38,10 +38,7 @@ struct Sheet {
   double thickness_m = 0;
 };
 
-/// How stress follows from strain. stvk: Saint Venant-Kirchhoff (OCE01).
-enum class Law { stvk };
-
-/// A body of the simulation. One of mesh, body and sheet is given.
+/// A body of the simulation, of Saint Venant and Kirchhoff's law (OCE01). One of mesh, body and sheet is given.
 struct SimulatedBody {
   std::string name;
   std::string place;  // "file:line" of the job, for messages
@@ -50,7 +47,6 @@ struct SimulatedBody {
   std::optional<Body> body = {};
   std::optional<Sheet> sheet = {};
   Element element = Element::T10;
-  Law law = Law::stvk;
   Material material;              // isotropic, Rayleigh damping
   std::vector<NodeGroup> fixed;   // do not move; of a sheet: clamped
   std::vector<NodeGroup> hinged;  // of a sheet: do not move, and turn freely
@@ -69,7 +65,7 @@ struct Striker {
 };
 
 /// A rigid thing in the way, at rest.
-struct Plane {
+struct PlaneSpec {
   Vec3 point_m{}, normal{0, 0, 1};  // unit, to the free side
 };
 struct Ball {
@@ -81,7 +77,7 @@ struct Block {
 };
 struct Obstacle {
   std::string place;
-  std::variant<Plane, Ball, Block> form;
+  std::variant<PlaneSpec, Ball, Block> form;
 };
 
 /// Of all contacts.

@@ -41,14 +41,13 @@ double calc_thickness(const Surface& surface, double volume_m3) {
   return area_m2 > 0 ? 2 * volume_m3 / area_m2 : 0.0;
 }
 
-condense::Options make_options(Run& run, const AccurateBody& found, std::vector<std::int32_t> kept) {
-  condense::Options options;
+condense::CondenseOptions make_options(Run& run, const AccurateBody& found, std::vector<std::int32_t> kept) {
+  condense::CondenseOptions options;
   options.modes = std::min(run.job.nonlinear->modes, static_cast<int>(kept.size()));
   options.below_hz = run.job.nonlinear->below_hz;
   options.energy_error = run.job.nonlinear->energy_error;
   options.eligible = std::move(kept);
-  options.thickness_m =
-      run.comm.broadcast([&] { return calc_thickness(found.body.surface, found.solved.properties.rigid.volume_m3); });
+  options.thickness_m = run.comm.broadcast([&] { return calc_thickness(found.body.surface, found.solved.properties.rigid.volume_m3); });
   options.report = [&run, tenths = 0](const std::string& text, double share) mutable {
     const int now = static_cast<int>(10.0 * share);
     if (std::exchange(tenths, now) != now) run.log.print(text);
@@ -56,7 +55,7 @@ condense::Options make_options(Run& run, const AccurateBody& found, std::vector<
   return options;
 }
 
-std::string describe(const condense::Result& result) {
+std::string describe(const condense::Condensed& result) {
   const bank::QuarticEnergy& energy = result.energy;
   return fmt::format("{} coupled modes up to {:.0f} Hz of {} that bend or twist, {} {}{}, error {:.1e}, {} solves; {}", energy.mode_count(),
                      result.top_hz, result.bending_count, energy.row_count(), energy.row_count() == 1 ? "field" : "fields",
@@ -64,7 +63,7 @@ std::string describe(const condense::Result& result) {
                      energy.linear.empty() ? "flat" : fmt::format("curved ({:.2g})", result.curvature));
 }
 
-void warn(Run& run, const condense::Result& result) {
+void warn(Run& run, const condense::Condensed& result) {
   const job::Nonlinear& asked = *run.job.nonlinear;
   if (result.energy.is_empty()) {
     run.log.warn(
@@ -81,8 +80,9 @@ void warn(Run& run, const condense::Result& result) {
         result.membrane_hz > 0
             ? fmt::format("stretching begins at {:.0f} Hz, and the highest coupled mode has {:.0f} Hz", result.membrane_hz, result.top_hz)
             : fmt::format("no mode of the band stretches the body, and the highest coupled mode has {:.0f} Hz", result.top_hz);
-    run.log.warn(fmt::format("{}: above half of it the inertia of stretching, which is left out, is heard; {}", cause,
-                             result.membrane_hz > 0 ? "lower \"nonlinear.below_hz\"" : "a wider \"band_hz\" would tell"));
+    run.log.warn(
+        fmt::format("{}: above half of it the inertia of stretching, which is left out, is heard; {}", cause,
+                    result.membrane_hz > 0 ? "lower \"nonlinear.below_hz\"" : "a wider \"band_hz\" or more \"max_modes\" would show it"));
   }
 }
 
@@ -94,8 +94,8 @@ CouplingReport couple_modes(Run& run, const AccurateBody& found) {
   run.log.begin("coupling", fmt::format("quartic energy of {} modes below {:g} Hz", run.job.nonlinear->modes, run.job.nonlinear->below_hz));
   const SolvedBody& solved = found.solved;
   const std::vector<std::int32_t> kept = find_kept_modes(run, solved);
-  const condense::Options options = make_options(run, found, kept);
-  const condense::Result result = name_errors(found.body.source, run, [&] {
+  const condense::CondenseOptions options = make_options(run, found, kept);
+  const condense::Condensed result = name_errors(found.body.source, run, [&] {
     if (solved.modes.lambda.empty()) throw InputError("\"nonlinear\" couples modes, and none lies in the band: widen \"band_hz\"");
     const fem::Materials& materials = solved.properties.materials;
     const fem::System system = fem::assemble(run.comm, found.body.pieces.local, materials, run.job.mass);

@@ -14,7 +14,8 @@
 namespace carillon::run {
 namespace {
 
-constexpr std::array<std::string_view, 9> kPhases{"read", "partition", "assemble", "modes", "errors", "coupling", "collect", "air", "write"};
+constexpr std::array<std::string_view, 9> kPhases{"read",     "partition", "assemble", "modes", "errors",
+                                                  "coupling", "collect",   "air",      "write"};
 constexpr int kModes = 3, kAfterTrials = 5;
 constexpr double kTrustSeconds = 0.5;  // weight of the predictions against what is measured
 constexpr double kNearEnd = 0.95;      // of a part whose time is up and which continues
@@ -22,7 +23,8 @@ constexpr double kMax = 99.9;          // per cent, before the end
 constexpr double kTrialShare = 0.5;    // of the rest: for a trial after which others may follow
 
 std::array<double, 9> list(const cost::PhaseSeconds& costs) {
-  return {costs.read, costs.partition, costs.assemble, costs.sum_modes(), costs.errors, costs.coupling, costs.collect, costs.air, costs.write};
+  return {costs.read,     costs.partition, costs.assemble, costs.sum_modes(), costs.errors,
+          costs.coupling, costs.collect,   costs.air,      costs.write};
 }
 
 double calc_factorisations(const eigen::Progress& progress) {

@@ -21,9 +21,10 @@ void check_method(const Run& run, std::int64_t unknowns) {
 /// Refuses before anything is solved.
 void check_pieces(const Run& run, const Body& body) {
   if (!run.job.nonlinear || body.pieces.components == 1) return;
-  throw InputError(fmt::format("{}: \"nonlinear\" couples the modes of one piece, and the body has {}: solve each as a body of its own, or "
-                               "leave \"nonlinear\" out",
-                               run.job.file.string(), body.pieces.components));
+  throw InputError(
+      fmt::format("{}: \"nonlinear\" couples the modes of one piece, and the body has {}: solve each as a body of its own, or "
+                  "leave \"nonlinear\" out",
+                  run.job.file.string(), body.pieces.components));
 }
 
 /// Elements that cannot bend without straining in the one way that the solid hardly allows are too stiff; docs/elements.md.

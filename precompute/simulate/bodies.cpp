@@ -149,8 +149,8 @@ Made make_solid(const job::SimulatedBody& body) {
   return made;
 }
 
-/// Holds what a clamp holds besides vertices: the angles of all edges between clamped vertices, and the ghosts behind those of the rim,
-/// which go where both ends of their edge go.
+/// Holds what a clamp holds in addition to vertices: the angles of all edges between clamped vertices, and the ghosts behind those of the
+/// rim, which go where both ends of their edge go.
 void hold_directions(const std::string& place, const transient::SheetElements& elements, const std::vector<std::int32_t>& group_of,
                      Made& made, std::vector<std::int32_t>& fixed_nodes) {
   const auto find_group_of = [&](std::int32_t vertex) { return group_of[static_cast<std::size_t>(vertex)]; };

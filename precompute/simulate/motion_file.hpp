@@ -12,7 +12,7 @@
 namespace carillon::simulate {
 
 /// Frames are appended to FILE.frames, from which FILE is made at the end: an UnstructuredGrid of triangles whose points move (VTKHDF 2.0,
-/// "Steps"), with the point data "speed" [m/s], the cell data "body", and strikers as balls. A run that resumes goes on where its
+/// "Steps"), with the point data "speed" [m/s] and the cell data "body"; strikers are not in it. A run that resumes continues where its
 /// checkpoint was. Collective, but for the constructor's checks.
 class MotionFile {
  public:

@@ -69,10 +69,11 @@ struct TouchRules {
 /// touch obstacles alone stay with their owner. The search is repeated when something may have moved by a part of its margin.
 class Contacts : public ExternalForces {
  public:
-  /// Collective. Throws InputError on every rank when bodies, strikers or obstacles overlap at the start by more than a tenth of an edge.
+  /// Collective.
   Contacts(const Domain& domain, TouchSurface surface, std::vector<BallStriker> strikers, std::vector<RigidObstacle> obstacles,
            const TouchRules& rules);
 
+  /// The first call throws InputError on every rank when bodies, strikers or obstacles overlap by more than a tenth of an edge.
   void add_forces(const StepTime& time, const Quad* u, const Quad* v, Quad* f) override;
   double calc_longest_step_s(const std::vector<double>& omega_rad_s) const override;
   Energy calc_energy() override;

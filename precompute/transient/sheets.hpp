@@ -35,7 +35,7 @@ struct SheetBlocks;
 class Sheets {
  public:
   /// rest_m: (n) by `read` numbers. read, write: (triangles, 9) as SheetElements::nodes; -1 where there is none.
-  /// which: the triangles of `elements` to take, ascending. spare: a place in the array of forces that nobody reads.
+  /// which: the triangles of `elements` to take, ascending. spare: an unread place in the array of forces.
   Sheets(const SheetElements& elements, std::span<const std::int32_t> which, const SheetLaw& law,
          std::span<const std::array<std::int32_t, 9>> read, std::span<const std::array<std::int32_t, 9>> write, std::int32_t spare);
 
@@ -51,7 +51,7 @@ class Sheets {
   /// [J] that damping has taken from triangle k since the last forget_spent().
   double get_spent(std::size_t k) const { return spent_[k]; }
   void forget_spent() { std::fill(spent_.begin(), spent_.end(), 0.0); }
-  /// What must be kept of triangle k to go on later: the work against damping and the viscous stresses of the step before.
+  /// What must be kept of triangle k to resume: the work against damping and the viscous stresses of the step before.
   static constexpr std::size_t kStateWidth = 1 + 6;
   void save_state(std::size_t k, double* state) const;
   void load_state(std::size_t k, const double* state);

@@ -68,7 +68,7 @@ struct CoefficientDecay {
 std::vector<CoefficientDecay> calc_coefficient_decays(const Multipoles& multipoles);
 
 /// Whether the air was that above a rigid plane. Then the field is that of the body and its mirror image, and the body makes half of the
-/// power that the coefficients carry: the decays of all modes together tell.
+/// power that the coefficients carry: the sum of all decays is half of what they say.
 bool is_half_space(const Multipoles& multipoles);
 
 /// Of every mode (M), the root mean square of the far field over the directions into which it goes, taken back to 1 m, per unit modal

@@ -15,11 +15,12 @@
 #include <string>
 #include <vector>
 
+#include "runtime/base/quaternion.hpp"
 #include "runtime/base/vector.hpp"
 
 namespace carillon::joints {
 
-using Quaternion = std::array<double, 4>;  // w x y z, unit
+using carillon::Quaternion;
 
 enum class Kind { kWeld, kHinge, kSlider, kUniversal, kBall };
 

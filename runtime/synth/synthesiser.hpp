@@ -47,8 +47,9 @@ struct SynthesiserOptions {
   double longest_m = 60.0;                                  // what is further away is not heard
   double budget = std::numeric_limits<double>::infinity();  // set_budget()
   /// Of Effect::kDirectivity: transfers that all bodies together look up in a second; in a block a quarter more at most. By default those
-  /// of 22 bodies with 228 modes and two ears that turn as fast as they like, at 48 kHz. Where bodies need n times as many, each is looked
-  /// up every n-th block on average: its modes are that old, or go so long from one weight to the next (Directivity, TransferBudget).
+  /// of 14 bodies with 228 modes and two ears that are all looked up in every block, at 48 kHz. Where bodies need n times as many, each is
+  /// looked up every n-th block on average: its modes are that old, or go so long from one weight to the next (Directivity,
+  /// TransferBudget).
   double transfers_per_s = 2.4e6;
   ContactSurface ground = kGroundSurface;     // what contacts touch whose other body is none
   std::optional<Floor> floor = std::nullopt;  // what bodies with Effect::kGroundReflection are reflected by

@@ -54,10 +54,7 @@ LAW = {
         ["runtime/base", "runtime/gltf", "runtime/material", "runtime/version", "runtime/bank", "runtime/radiation"],
         ["fmt", "cli", "eigen"],
     ),
-    "runtime/synth": (
-        ["runtime/base", "runtime/bank", "runtime/events", "runtime/radiation", "runtime/head", "runtime/nonlinear"],
-        [],
-    ),
+    "runtime/synth": (["runtime/base", "runtime/bank", "runtime/events", "runtime/radiation", "runtime/head", "runtime/nonlinear"], []),
     "runtime/effect_selection": (
         ["runtime/base", "runtime/bank", "runtime/events", "runtime/radiation", "runtime/head", "runtime/synth"],
         ["fmt"],
@@ -280,12 +277,27 @@ LAW = {
         ],
         ["fmt", "json", "mpi", "petsc", "hdf5"],
     ),
+    "precompute/simulate": (
+        [
+            "runtime/base",
+            "runtime/version",
+            "precompute/job",
+            "precompute/mesh",
+            "precompute/comm",
+            "precompute/io",
+            "precompute/run",
+            "precompute/transient",
+            "precompute/emission",
+        ],
+        ["fmt", "cli", "mpi", "hdf5"],
+    ),
     "precompute": (["runtime/base", "runtime/version", "precompute/petsc", "precompute/run"], ["fmt", "cli", "mpi"]),
 }
 # Finer than folders: the only files that may include these.
 ONLY_IN = {
     "hdf5": re.compile(
-        r"^(runtime/bank/[a-z0-9_]+\.cpp|precompute/emission/surface_file\.cpp|precompute/run/run_log\.cpp|precompute/vtkhdf/main\.cpp)$"
+        r"^(runtime/bank/[a-z0-9_]+|precompute/emission/surface_file|precompute/run/run_log|precompute/simulate/motion_file|"
+        r"precompute/vtkhdf/main)\.cpp$"
     ),
     "cgal": re.compile(r"^precompute/mesher/[a-z0-9_]+\.(cpp|hpp)$"),
 }

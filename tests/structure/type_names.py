@@ -13,15 +13,11 @@ import sys
 import include_law
 
 # Names that two namespaces may share, with the reason. The list only shrinks: one that is not needed any more is an error.
-SAME = "the same array of four numbers, w x y z"
 SOLVER = "an impact, the space of bodies and its sweeps each have their own view of it; files of the contact solver name the namespace"
 JOB = "as a job describes it, and as it is made or handed to the solver"
 BANK = "as it is computed, and as it stands in a bank"
 OWN = "each is private to its library; the one folder that includes both names the namespace"
 ALLOWED = {
-    ("Quaternion", "events", "joints"): SAME,
-    ("Quaternion", "events", "rigid"): SAME,
-    ("Quaternion", "joints", "rigid"): SAME,
     ("Body", "impact", "rigid::sweeps"): SOLVER,
     ("Books", "impact", "rigid"): SOLVER,
     ("Contact", "impact", "rigid"): SOLVER,

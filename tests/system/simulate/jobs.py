@@ -1,4 +1,5 @@
 """Jobs of carillon-simulate, and how the tests start it."""
+import copy
 import json
 import pathlib
 import struct
@@ -28,7 +29,7 @@ def make_bar(duration_s=0.1, element="T10"):
                     "name": "bar",
                     "shape": {"bar": {"length_m": 0.1, "width_m": 0.02, "thickness_m": 0.01, "nodes": 150}},
                     "element": element,
-                    "material": ALUMINIUM,
+                    "material": copy.deepcopy(ALUMINIUM),
                     "fixed": "x-min",
                 }
             ],
@@ -49,7 +50,7 @@ def make_plate(held, cells=16, duration_s=0.15):
                 {
                     "name": "plate",
                     "sheet": {"shape": "rectangle", "length_m": 0.3, "width_m": 0.3, "thickness_m": 0.001, "cells": cells},
-                    "material": STEEL,
+                    "material": copy.deepcopy(STEEL),
                     held: "rim",
                 }
             ],

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""A run that SIGUSR1 or SIGTERM stops ends with 85, and the same command goes on to the bytes of a run without a stop.
+"""A run that SIGUSR1 or SIGTERM stops ends with 85, and the same command continues to the bytes of a run without a stop.
 
 usage: resume.py BIN_DIR
 """
@@ -68,6 +68,8 @@ with tempfile.TemporaryDirectory(prefix="carillon-simulate-") as scratch:
         assert left == sorted([*FILES, "job.json", "bar.record.json"]), left
 
     # A checkpoint of another job, and one that is damaged.
+    for file in FILES:
+        (folder / file).unlink()
     stop(folder, signal.SIGUSR1, 1)
     write_job(folder / "job.json", job | {"sound": "other.wav"})
     done = run(folder, "job.json", "--checkpoint", "state")

@@ -51,7 +51,8 @@ class FullEnergy {
         Eigen::Matrix<double, 3, 10> x;
         for (int i = 0; i < 10; ++i) {
           point.node[static_cast<std::size_t>(i)] = local.tets[static_cast<std::size_t>(10 * e + i)];
-          for (int k = 0; k < 3; ++k) x(k, i) = local.nodes_m[static_cast<std::size_t>(point.node[static_cast<std::size_t>(i)])][static_cast<std::size_t>(k)];
+          for (int k = 0; k < 3; ++k)
+            x(k, i) = local.nodes_m[static_cast<std::size_t>(point.node[static_cast<std::size_t>(i)])][static_cast<std::size_t>(k)];
         }
         Eigen::Matrix<double, 10, 3> by_xi;
         for (int k = 0; k < 3; ++k) by_xi.col(k) = slope.col(k + 1) - slope.col(0);
@@ -189,7 +190,7 @@ std::vector<double> make_motion(const ModalBody& body, std::size_t modes, double
 TEST(CondensedEnergy, is_the_least_energy_of_a_flat_strip) {
   if (tests::get_rank() != 0) return;
   const Oracle oracle = make_oracle(0, 3);
-  const Result result = condense_modes(PETSC_COMM_SELF, oracle.body.solved(), {.modes = 3, .below_hz = 1e6, .energy_error = 1e-8});
+  const Condensed result = condense_modes(PETSC_COMM_SELF, oracle.body.solved(), {.modes = 3, .below_hz = 1e6, .energy_error = 1e-8});
   ASSERT_EQ(result.energy.modes, (std::vector<std::int32_t>{0, 1, 2}));
   const std::vector<double> q = make_motion(oracle.body, 3, 2e-5);  // a fiftieth of the thickness: beyond the quartic part there is 1e-4
   EXPECT_TRUE(result.energy.linear.empty()) << "the mesh makes a cubic part, which is left out";
@@ -200,12 +201,14 @@ TEST(CondensedEnergy, is_the_least_energy_of_a_flat_strip) {
 TEST(CondensedEnergy, has_the_cubic_part_of_an_arch) {
   if (tests::get_rank() != 0) return;
   const Oracle oracle = make_oracle(0.002, 3);
-  const Result result = condense_modes(PETSC_COMM_SELF, oracle.body.solved(), {.modes = 3, .below_hz = 1e6, .energy_error = 1e-8});
+  const Condensed result = condense_modes(PETSC_COMM_SELF, oracle.body.solved(), {.modes = 3, .below_hz = 1e6, .energy_error = 1e-8});
   ASSERT_FALSE(result.energy.linear.empty()) << "it is curved";
   const std::vector<double> q = make_motion(oracle.body, 3, 1e-5);
   const auto [plus, minus] = calc_full(oracle, q);
   const double odd = tests::calc_energy(PETSC_COMM_SELF, result.energy, q) - tests::calc_energy(PETSC_COMM_SELF, result.energy, negate(q));
-  EXPECT_NEAR((plus - minus) / odd, 1, 2e-3);
+  EXPECT_NEAR((plus - minus) / odd, 1, 1e-4);
+  const double even = tests::calc_energy(PETSC_COMM_SELF, result.energy, q) + tests::calc_energy(PETSC_COMM_SELF, result.energy, negate(q));
+  EXPECT_NEAR((plus + minus) / even, 1, 0.02) << "what a stress of the modes does on condensed rotations is left out";
 }
 
 /// A rectangular plate held at one edge: no two modes of one frequency.
@@ -218,8 +221,8 @@ TEST(CondensedEnergy, is_the_same_on_any_number_of_ranks) {
   for (const bool is_free : {false, true}) {
     const tests::IsFixed fixed = is_free ? tests::IsFixed() : tests::IsFixed(is_left);
     const ModalBody all = make_plate(PETSC_COMM_WORLD, 8, fixed), one = make_plate(PETSC_COMM_SELF, 8, fixed);
-    const Options options{.modes = 6, .below_hz = 1e6, .energy_error = 1e-7};
-    const Result of_all = condense_modes(all.comm, all.solved(), options), of_one = condense_modes(one.comm, one.solved(), options);
+    const CondenseOptions options{.modes = 6, .below_hz = 1e6, .energy_error = 1e-7};
+    const Condensed of_all = condense_modes(all.comm, all.solved(), options), of_one = condense_modes(one.comm, one.solved(), options);
     const std::vector<double> q = make_motion(one, 6, 1e-3);
     const double expected = tests::calc_energy(one.comm, of_one.energy, q);
     EXPECT_GT(expected, 0);
@@ -230,8 +233,8 @@ TEST(CondensedEnergy, is_the_same_on_any_number_of_ranks) {
 
 TEST(CondensedEnergy, does_not_change_when_modes_are_turned_among_themselves) {
   const ModalBody body = make_plate(PETSC_COMM_WORLD, 6, {});
-  const Options options{.modes = 6, .below_hz = 1e6, .energy_error = 1e-7};
-  const Result before = condense_modes(body.comm, body.solved(), options);
+  const CondenseOptions options{.modes = 6, .below_hz = 1e6, .energy_error = 1e-7};
+  const Condensed before = condense_modes(body.comm, body.solved(), options);
   const std::vector<double> q = make_motion(body, 6, 1e-3);
   const double c = std::cos(0.7), s = std::sin(0.7);
   {
@@ -246,7 +249,7 @@ TEST(CondensedEnergy, does_not_change_when_modes_are_turned_among_themselves) {
   std::vector<double> turned = q;
   turned[1] = c * q[1] + s * q[2];
   turned[2] = c * q[2] - s * q[1];
-  const Result after = condense_modes(body.comm, body.solved(), options);
+  const Condensed after = condense_modes(body.comm, body.solved(), options);
   EXPECT_NEAR(tests::calc_energy(body.comm, after.energy, turned) / tests::calc_energy(body.comm, before.energy, q), 1, 1e-5);
 }
 
@@ -256,11 +259,14 @@ struct Coupled {
       : modal(given),
         strains(given.pieces.local, given.materials),
         shapes(given.modes.shapes),
-        answer(given.comm, given.pieces.local, given.system.stiffness, given.system.mass, shapes.view().part(0, count), given.modes.lambda[0]),
+        answer(given.comm, given.pieces.local, given.system.stiffness, given.system.mass, shapes.view().part(0, count),
+               given.modes.lambda[0]),
         nodal(answer.spread(shapes.view().part(0, count))) {
     for (int i = 0; i < count; ++i) omega.push_back(std::sqrt(given.modes.lambda[static_cast<std::size_t>(i)]));
   }
-  CoupledBody body() { return {modal.comm, strains, answer, nodal, omega, Pairs{static_cast<std::ptrdiff_t>(omega.size())}, [](double) {}}; }
+  CoupledBody body() {
+    return {modal.comm, strains, answer, nodal, omega, Pairs{static_cast<std::ptrdiff_t>(omega.size())}, [](double) {}};
+  }
 
   const ModalBody& modal;
   Strains strains;
@@ -322,15 +328,19 @@ TEST(Points, give_the_energy_within_the_error_that_they_state) {
 
 TEST(CondenseModes, says_in_words_what_it_cannot_do) {
   const ModalBody body = make_plate(PETSC_COMM_WORLD, 4, {});
-  EXPECT_NE(tests::catch_message<InputError>([&] { condense_modes(body.comm, body.solved(), {.modes = 30}); }).find("asks for 30 coupled modes, and the body has 4"), std::string::npos);
+  EXPECT_NE(tests::catch_message<InputError>([&] {
+              condense_modes(body.comm, body.solved(), {.modes = 30});
+            }).find("asks for 30 coupled modes, and the body has 4"),
+            std::string::npos);
   SolvedModes two = body.solved();
   two.components = 2;
-  EXPECT_NE(tests::catch_message<InputError>([&] { condense_modes(body.comm, two, {.modes = 2}); }).find("the body has 2"), std::string::npos);
+  EXPECT_NE(tests::catch_message<InputError>([&] { condense_modes(body.comm, two, {.modes = 2}); }).find("the body has 2"),
+            std::string::npos);
 }
 
 TEST(CondenseModes, finds_nothing_to_couple_in_a_block) {
   const ModalBody body = solve_body(PETSC_COMM_WORLD, make_box({3, 3, 3}, {0.1, 0.11, 0.12}, 2), {}, kSteel, 6);
-  const Result result = condense_modes(body.comm, body.solved(), {.modes = 6, .below_hz = 1e6});
+  const Condensed result = condense_modes(body.comm, body.solved(), {.modes = 6, .below_hz = 1e6});
   EXPECT_TRUE(result.energy.is_empty());
   EXPECT_GT(result.membrane_hz, 0);
 }

@@ -22,7 +22,7 @@ using tests::solve_body;
 const material::Material kBar = make_solid(70e9, 0.0, 2700);
 const material::Material kSheet = make_solid(200e9, 0.3, 7800);
 
-Result condense(const ModalBody& body, int modes) { return condense_modes(body.comm, body.solved(), {.modes = modes, .below_hz = 1e6}); }
+Condensed condense(const ModalBody& body, int modes) { return condense_modes(body.comm, body.solved(), {.modes = modes, .below_hz = 1e6}); }
 
 /// Of a beam with both ends clamped; the amplitude counts in thicknesses.
 double calc_clamped_beam(std::array<int, 3> cells) {
@@ -114,7 +114,7 @@ TEST(Hardening, of_a_hinged_square_plate_is_von_Karmans) {
   const auto held = [&](const Vec3& x) { return (on_edge(x[0]) || on_edge(x[1])) && std::abs(x[2]) < 1e-9; };
   const ModalBody body = solve_body(PETSC_COMM_WORLD, shapes::make_box({side, side, thickness}, {16, 16, 1}, 2), held, kSheet, 4);
   EXPECT_NEAR(body.freq_hz(0) / (3 * 53.318), 1, 0.01);
-  const Result result = condense(body, 1);
+  const Condensed result = condense(body, 1);
   EXPECT_NEAR(tests::calc_gamma(body, result.energy, 0, thickness) / calc_held_plate(0.3), 1, 0.02);
   EXPECT_EQ(result.energy.linear.size(), 0u) << "it is flat";
 }
