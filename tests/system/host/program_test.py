@@ -266,7 +266,7 @@ class RenderProgram(unittest.TestCase):
                 on += effect["on_s"] > 0.0 and effect["units"] > 0
         self.assertGreaterEqual(on, 3)
         cube, far = (body["effects"] for body in report["per_body"])
-        self.assertEqual([far[name]["on_s"] for name in far], [0.0] * 11)
+        self.assertEqual([far[name]["on_s"] for name in far], [0.0] * len(far))
         self.assertEqual(cube["doppler"]["why"], "the scene says so")
         self.assertTrue(any(change["effect"] == "modal" and change["on"] for change in report["changes"]))
 
