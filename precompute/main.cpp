@@ -4,7 +4,6 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
@@ -12,10 +11,10 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <thread>
 
 #include "precompute/petsc/session.hpp"
 #include "precompute/run/air.hpp"
+#include "precompute/run/end_in_error.hpp"
 #include "precompute/run/enter_folder.hpp"
 #include "precompute/run/estimate.hpp"
 #include "precompute/run/interrupt.hpp"
@@ -31,27 +30,6 @@
 namespace {
 
 using namespace carillon;
-
-/// Prints the error once and writes the result file. Errors are agreed on before they are thrown, so all ranks get here; should one get
-/// here alone, it would leave the others waiting for ever, so after a while it prints the error itself and ends them all.
-int fail(MPI_Comm comm, int rank, const std::string& file, const base::Result& result) {
-  std::fflush(stdout);
-  MPI_Request request = MPI_REQUEST_NULL;
-  int all_here = 0;
-  MPI_Ibarrier(comm, &request);
-  for (int wait_ms = 0; wait_ms < 5000 && all_here == 0; wait_ms += 10) {
-    MPI_Test(&request, &all_here, MPI_STATUS_IGNORE);
-    if (all_here == 0) std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
-  if (rank == 0 || all_here == 0) {
-    fmt::print(stderr, "carillon-precompute: error: {}\n", base::printable(result.message));
-    if (!file.empty()) base::write_result(file, result);
-  }
-  std::fflush(stderr);
-  const int code = base::get_exit_code(result.kind);
-  if (all_here == 0) MPI_Abort(MPI_COMM_WORLD, code);
-  return code;
-}
 
 void print_start(const petsc::Session& session, bool quiet) {
   if (session.rank() != 0) return;
@@ -193,7 +171,7 @@ int run_program(const petsc::Session& session, const CommandLine& words) {
   const bool speaks = session.rank() == 0;
   if (has_failed) {
     if (words.options.json && speaks) fmt::print("{}\n", run::describe_failure(result.message, code));
-    fail(failures, session.rank(), words.result, result);
+    run::end_in_error(failures, "carillon-precompute", words.result, result);
   } else if (speaks && !words.result.empty()) {
     base::write_result(words.result, result);
   }

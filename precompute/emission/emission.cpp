@@ -17,7 +17,7 @@
 #include <numbers>
 #include <numeric>
 
-#include "precompute/emission/bytes.hpp"
+#include "runtime/base/bytes.hpp"
 #include "precompute/emission/derivative.hpp"
 #include "precompute/emission/high_pass.hpp"
 #include "precompute/emission/loops.hpp"
@@ -58,11 +58,11 @@ struct Saver {
   std::vector<std::byte>& to;
   template <typename T>
   void one(const T& value) {
-    put(to, value);
+    base::put(to, value);
   }
   template <typename T>
   void list(const std::vector<T>& values) {
-    put_list(to, values);
+    base::put_list(to, values);
   }
 };
 
@@ -70,11 +70,11 @@ struct Loader {
   std::span<const std::byte>& from;
   template <typename T>
   void one(T& value) {
-    value = take<T>(from);
+    value = base::take<T>(from);
   }
   template <typename T>
   void list(std::vector<T>& values) {
-    take_list(from, values);
+    base::take_list(from, values);
   }
 };
 

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "precompute/emission/bytes.hpp"
+#include "runtime/base/bytes.hpp"
 
 namespace carillon::emission {
 namespace {
@@ -99,22 +99,22 @@ void LowPass::close(double* out) {
 
 void LowPass::save(std::vector<std::byte>& to) {
   take_in();  // the order of the sum is the same
-  put(to, ring_);
-  put(to, weights_);
-  put(to, moments_);
-  put(to, has_last_);
-  put_list(to, open_);
-  put_list(to, last_);
+  base::put(to, ring_);
+  base::put(to, weights_);
+  base::put(to, moments_);
+  base::put(to, has_last_);
+  base::put_list(to, open_);
+  base::put_list(to, last_);
 }
 
 void LowPass::load(std::span<const std::byte>& from) {
   waiting_count_ = 0;
-  ring_ = take<int>(from);
-  weights_ = take<std::array<double, kSlots>>(from);
-  moments_ = take<std::array<double, kSlots>>(from);
-  has_last_ = take<bool>(from);
-  take_list(from, open_);
-  take_list(from, last_);
+  ring_ = base::take<int>(from);
+  weights_ = base::take<std::array<double, kSlots>>(from);
+  moments_ = base::take<std::array<double, kSlots>>(from);
+  has_last_ = base::take<bool>(from);
+  base::take_list(from, open_);
+  base::take_list(from, last_);
 }
 
 }  // namespace carillon::emission

@@ -9,7 +9,7 @@
 #include <array>
 #include <cmath>
 
-#include "precompute/emission/bytes.hpp"
+#include "runtime/base/bytes.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/sinc.hpp"
 
@@ -62,7 +62,7 @@ std::vector<double> Arrivals::sum(const comm::Communicator& comm) const {
   return pressure;
 }
 
-void Arrivals::save(std::vector<std::byte>& to) const { put_list(to, units_); }
-void Arrivals::load(std::span<const std::byte>& from) { take_list(from, units_); }
+void Arrivals::save(std::vector<std::byte>& to) const { base::put_list(to, units_); }
+void Arrivals::load(std::span<const std::byte>& from) { base::take_list(from, units_); }
 
 }  // namespace carillon::emission

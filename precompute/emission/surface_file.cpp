@@ -17,6 +17,7 @@
 #include <limits>
 #include <string_view>
 
+#include "runtime/bank/hdf5_id.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/sha256.hpp"
 
@@ -27,22 +28,6 @@ using recording::Array;
 using recording::kArrays;
 using recording::kHeaderBytes;
 using recording::kTextBytes;
-
-/// An HDF5 identifier that closes itself.
-class Id {
- public:
-  Id(hid_t id, herr_t (*close)(hid_t), const char* what) : id_(id), close_(close) {
-    if (id < 0) throw SystemError(fmt::format("HDF5 cannot make {}", what));
-  }
-  ~Id() { close_(id_); }
-  Id(const Id&) = delete;
-  Id& operator=(const Id&) = delete;
-  operator hid_t() const { return id_; }
-
- private:
-  hid_t id_;
-  herr_t (*close_)(hid_t);
-};
 
 hid_t find_type(const char* type) {
   const std::string_view name(type);
@@ -92,11 +77,11 @@ SurfaceFile::~SurfaceFile() {
 
 void SurfaceFile::make(const SurfaceTables& tables) {
   const auto properties = [](hid_t kind) { return H5Pcreate(kind); };
-  const Id creation(properties(H5P_FILE_CREATE), H5Pclose, "a property list");
+  const bank::Hdf5Id creation(properties(H5P_FILE_CREATE), H5Pclose, "a property list");
   H5Pset_userblock(creation, kHeaderBytes);
   H5Pset_obj_track_times(creation, false);
   {
-    const Id file(H5Fcreate(part_.c_str(), H5F_ACC_TRUNC, creation, H5P_DEFAULT), H5Fclose, part_.c_str());
+    const bank::Hdf5Id file(H5Fcreate(part_.c_str(), H5F_ACC_TRUNC, creation, H5P_DEFAULT), H5Fclose, part_.c_str());
     for (std::size_t i = 0; i < kArrays; ++i) {
       const recording::Header::Shape shape = header_.get_shape(static_cast<Array>(i));
       std::array<hsize_t, 3> extent{};
@@ -105,13 +90,14 @@ void SurfaceFile::make(const SurfaceTables& tables) {
         extent[static_cast<std::size_t>(ranks)] = shape.extent[static_cast<std::size_t>(ranks)];
         ++ranks;
       }
-      const Id space(H5Screate_simple(ranks, extent.data(), nullptr), H5Sclose, "a space");
-      const Id layout(properties(H5P_DATASET_CREATE), H5Pclose, "a property list");
+      const bank::Hdf5Id space(H5Screate_simple(ranks, extent.data(), nullptr), H5Sclose, "a space");
+      const bank::Hdf5Id layout(properties(H5P_DATASET_CREATE), H5Pclose, "a property list");
       H5Pset_layout(layout, H5D_CONTIGUOUS);
       H5Pset_alloc_time(layout, H5D_ALLOC_TIME_EARLY);
       H5Pset_fill_time(layout, H5D_FILL_TIME_NEVER);
       H5Pset_obj_track_times(layout, false);
-      const Id dataset(H5Dcreate2(file, shape.name, find_type(shape.type), space, H5P_DEFAULT, layout, H5P_DEFAULT), H5Dclose, shape.name);
+      const bank::Hdf5Id dataset(H5Dcreate2(file, shape.name, find_type(shape.type), space, H5P_DEFAULT, layout, H5P_DEFAULT), H5Dclose,
+                                 shape.name);
       const haddr_t offset = H5Dget_offset(dataset);
       if (offset == HADDR_UNDEF) throw SystemError(fmt::format("{}: HDF5 does not report where {} lies", part_.string(), shape.name));
       header_.offset[i] = offset;

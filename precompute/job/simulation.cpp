@@ -192,10 +192,10 @@ SimulatedBody read_simulated_body(base::Object& object, std::vector<std::string>
 Striker read_striker(base::Object& object) {
   Striker striker;
   striker.place = object.find_place("");
-  striker.radius_m = read_length(object, "sphere_m");
-  striker.mass_kg = read_within(object, "mass_kg", 1e-9, kMaxMassKg);
-  striker.position_m = read_vector(object, "position_m", {}, kFarthestM);
-  striker.velocity_m_s = read_vector(object, "velocity_m_s", {}, kMaxSpeedMs);
+  striker.ball.radius_m = read_length(object, "sphere_m");
+  striker.ball.mass_kg = read_within(object, "mass_kg", 1e-9, kMaxMassKg);
+  striker.ball.position_m = read_vector(object, "position_m", {}, kFarthestM);
+  striker.ball.velocity_m_s = read_vector(object, "velocity_m_s", {}, kMaxSpeedMs);
   object.finish();
   return striker;
 }
@@ -207,18 +207,18 @@ Obstacle read_obstacle(base::Object& object) {
   for (const char* key : {"plane", "sphere", "box"}) forms += object.has(key) ? 1 : 0;
   if (forms != 1) object.fail("", "an obstacle is a \"plane\", a \"sphere\" or a \"box\"; give one");
   if (auto plane = object.object_if("plane")) {
-    PlaneSpec made{read_vector(*plane, "point_m", {}, kFarthestM), read_vector(*plane, "normal", {0, 0, 1}, 1e100)};
+    PlaneObstacle made{read_vector(*plane, "point_m", {}, kFarthestM), read_vector(*plane, "normal", {0, 0, 1}, 1e100)};
     const double length = norm(made.normal);
     if (!(length > 1e-100)) plane->fail("normal", "is 0; give the direction to the free side");
     made.normal = (1.0 / length) * made.normal;
     plane->finish();
     obstacle.form = made;
   } else if (auto sphere = object.object_if("sphere")) {
-    obstacle.form = Ball{read_vector(*sphere, "centre_m", {}, kFarthestM), read_length(*sphere, "radius_m")};
+    obstacle.form = BallObstacle{read_vector(*sphere, "centre_m", {}, kFarthestM), read_length(*sphere, "radius_m")};
     sphere->finish();
   } else {
     const std::array<Vec3, 2> box = read_box(object.object("box"));
-    obstacle.form = Block{box[0], box[1]};
+    obstacle.form = BoxObstacle{box[0], box[1]};
   }
   object.finish();
   return obstacle;

@@ -6,10 +6,10 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <variant>
 #include <vector>
 
 #include "precompute/job/job_spec.hpp"
+#include "precompute/job/obstacles.hpp"
 #include "runtime/base/vector.hpp"
 
 namespace carillon::job {
@@ -57,27 +57,13 @@ struct SimulatedBody {
   bool sounds = true;
 };
 
-/// A rigid ball that strikes.
 struct Striker {
   std::string place;
-  double radius_m = 0, mass_kg = 0;
-  Vec3 position_m{}, velocity_m_s{};
-};
-
-/// A rigid thing in the way, at rest.
-struct PlaneSpec {
-  Vec3 point_m{}, normal{0, 0, 1};  // unit, to the free side
-};
-struct Ball {
-  Vec3 centre_m{};
-  double radius_m = 0;
-};
-struct Block {
-  Vec3 min_m{}, max_m{};
+  BallStriker ball;
 };
 struct Obstacle {
   std::string place;
-  std::variant<PlaneSpec, Ball, Block> form;
+  RigidObstacle form;
 };
 
 /// Of all contacts.

@@ -73,33 +73,33 @@ bool is_line(const std::vector<Vec3>& nodes_m, const std::vector<std::int32_t>& 
   });
 }
 
-/// What rank 0 knows of a body. Nodes of `held` are those of the mesh; of a sheet its vertices, then its edges and ghosts.
+/// What rank 0 knows of a body. Nodes of `constrained` are those of the mesh; of a sheet its vertices, then its edges and ghosts.
 struct Made {
   transient::AnyBody body;
-  struct Held {
+  struct Group {
     std::vector<std::int32_t> nodes;
     std::vector<std::array<double, 4>> rows;  // of the path
     bool is_hinge = false;
   };
-  std::vector<Held> held;
+  std::vector<Group> constrained;
   Vec3 centre_m{};
 };
 
-/// The groups of a body that are held, each node once: those that follow paths, one by one, then those that are fixed, then the hinged.
-struct HeldGroups {
-  std::vector<Made::Held> driven;
+/// The constrained groups of a body, each node once: those that follow paths, one by one, then those that are fixed, then the hinged.
+struct ConstrainedGroups {
+  std::vector<Made::Group> driven;
   std::vector<std::int32_t> fixed, hinged;
 };
 
-HeldGroups find_held(const job::SimulatedBody& body, const mesh::TetMesh& mesh) {
-  HeldGroups held;
+ConstrainedGroups find_constrained(const job::SimulatedBody& body, const mesh::TetMesh& mesh) {
+  ConstrainedGroups constrained;
   std::set<std::int32_t> driven, fixed, hinged;
   for (const job::Drive& drive : body.drives) {
-    Made::Held group{find_group(mesh, drive.nodes), drive.path, false};
+    Made::Group group{find_group(mesh, drive.nodes), drive.path, false};
     for (const std::int32_t node : group.nodes)
       if (!driven.insert(node).second)
         throw InputError(fmt::format("{}: a node of this drive follows another path already; drive each node once", drive.nodes.place));
-    held.driven.push_back(std::move(group));
+    constrained.driven.push_back(std::move(group));
   }
   for (const job::NodeGroup& group : body.fixed)
     for (const std::int32_t node : find_group(mesh, group)) {
@@ -114,9 +114,9 @@ HeldGroups find_held(const job::SimulatedBody& body, const mesh::TetMesh& mesh) 
             fmt::format("{}: a node that is hinged here is fixed or follows a path, too; take it out of one of the two", group.place));
       hinged.insert(node);
     }
-  held.fixed.assign(fixed.begin(), fixed.end());
-  held.hinged.assign(hinged.begin(), hinged.end());
-  return held;
+  constrained.fixed.assign(fixed.begin(), fixed.end());
+  constrained.hinged.assign(hinged.begin(), hinged.end());
+  return constrained;
 }
 
 Made make_solid(const job::SimulatedBody& body) {
@@ -127,11 +127,11 @@ Made make_solid(const job::SimulatedBody& body) {
   solid.law = make_law(body.material);
   solid.mass_damping_per_s = body.material.alpha2_per_s;
   mesh::TetMesh& mesh = solid.mesh;
-  HeldGroups held = find_held(body, mesh);
-  made.held = std::move(held.driven);
-  if (!held.fixed.empty()) {
-    const bool is_hinge = body.drives.empty() && is_line(mesh.nodes_m, held.fixed);
-    made.held.push_back({std::move(held.fixed), {}, is_hinge});
+  ConstrainedGroups constrained = find_constrained(body, mesh);
+  made.constrained = std::move(constrained.driven);
+  if (!constrained.fixed.empty()) {
+    const bool is_hinge = body.drives.empty() && is_line(mesh.nodes_m, constrained.fixed);
+    made.constrained.push_back({std::move(constrained.fixed), {}, is_hinge});
   }
   const Placement placement = find_placement(body);
   for (Vec3& x : mesh.nodes_m) x = placement.place(x);
@@ -149,10 +149,10 @@ Made make_solid(const job::SimulatedBody& body) {
   return made;
 }
 
-/// Holds what a clamp holds in addition to vertices: the angles of all edges between clamped vertices, and the ghosts behind those of the
+/// Fixes what a clamp fixes in addition to vertices: the angles of all edges between clamped vertices, and the ghosts behind those of the
 /// rim, which go where both ends of their edge go.
-void hold_directions(const std::string& place, const transient::SheetElements& elements, const std::vector<std::int32_t>& group_of,
-                     Made& made, std::vector<std::int32_t>& fixed_nodes) {
+void clamp_directions(const std::string& place, const transient::SheetElements& elements, const std::vector<std::int32_t>& group_of,
+                      Made& made, std::vector<std::int32_t>& fixed_nodes) {
   const auto find_group_of = [&](std::int32_t vertex) { return group_of[static_cast<std::size_t>(vertex)]; };
   for (std::size_t e = 0; e < elements.edge.size(); ++e)
     if (find_group_of(elements.edge[e][0]) >= 0 && find_group_of(elements.edge[e][1]) >= 0)
@@ -164,9 +164,9 @@ void hold_directions(const std::string& place, const transient::SheetElements& e
       const std::int32_t group = find_group_of(nodes[(i + 1) % 3]);
       if (group != find_group_of(nodes[(i + 2) % 3]))
         throw InputError(
-            fmt::format("{}: an edge of the rim joins two groups of nodes that are held apart; leave a free vertex between them", place));
-      if (static_cast<std::size_t>(group) < made.held.size())
-        made.held[static_cast<std::size_t>(group)].nodes.push_back(ghost);
+            fmt::format("{}: an edge of the rim joins two groups of constrained nodes; leave a free vertex between them", place));
+      if (static_cast<std::size_t>(group) < made.constrained.size())
+        made.constrained[static_cast<std::size_t>(group)].nodes.push_back(ghost);
       else
         fixed_nodes.push_back(ghost);
     }
@@ -188,7 +188,7 @@ Made make_sheet(const job::SimulatedBody& body) {
   mesh::TetMesh vertices;
   vertices.nodes_m = sheet.mesh.vertices_m;
   vertices.node_sets = sheet.mesh.node_sets;
-  HeldGroups held = find_held(body, vertices);
+  ConstrainedGroups constrained = find_constrained(body, vertices);
   std::vector<std::int32_t> group_of(vertices.nodes_m.size(), -1);  // clamped: the group
   sheet.clamped.resize(vertices.nodes_m.size());
   const auto clamp = [&](const std::vector<std::int32_t>& nodes, std::size_t group) {
@@ -197,14 +197,14 @@ Made make_sheet(const job::SimulatedBody& body) {
       sheet.clamped[static_cast<std::size_t>(node)] = true;
     }
   };
-  for (std::size_t g = 0; g < held.driven.size(); ++g) clamp(held.driven[g].nodes, g);
-  clamp(held.fixed, held.driven.size());
-  const bool is_hinge = held.driven.empty() && held.fixed.empty() && is_line(vertices.nodes_m, held.hinged);
-  made.held = std::move(held.driven);
+  for (std::size_t g = 0; g < constrained.driven.size(); ++g) clamp(constrained.driven[g].nodes, g);
+  clamp(constrained.fixed, constrained.driven.size());
+  const bool is_hinge = constrained.driven.empty() && constrained.fixed.empty() && is_line(vertices.nodes_m, constrained.hinged);
+  made.constrained = std::move(constrained.driven);
   // Angles are no places: they stay as they are where vertices follow a path.
-  hold_directions(body.place, transient::make_elements(sheet.mesh, sheet.clamped), group_of, made, held.fixed);
-  if (!held.fixed.empty()) made.held.push_back({std::move(held.fixed), {}, false});
-  if (!held.hinged.empty()) made.held.push_back({std::move(held.hinged), {}, is_hinge});
+  clamp_directions(body.place, transient::make_elements(sheet.mesh, sheet.clamped), group_of, made, constrained.fixed);
+  if (!constrained.fixed.empty()) made.constrained.push_back({std::move(constrained.fixed), {}, false});
+  if (!constrained.hinged.empty()) made.constrained.push_back({std::move(constrained.hinged), {}, is_hinge});
   const Placement placement = find_placement(body);
   for (Vec3& x : sheet.mesh.vertices_m) x = placement.place(x);
   double area = 0;
@@ -232,10 +232,10 @@ std::string describe(const transient::AnyBody& body) {
 /// Rank 0's lists on every rank.
 void share(const comm::Communicator& comm, const std::vector<Made>& made, const transient::Assembly& assembly, Bodies& bodies) {
   struct Entry {
-    std::int32_t hold, node;
+    std::int32_t constraint, node;
   };
   struct Row {
-    std::int32_t hold;
+    std::int32_t constraint;
     double at[4];
   };
   struct Kind {
@@ -246,24 +246,24 @@ void share(const comm::Communicator& comm, const std::vector<Made>& made, const 
   std::vector<Kind> kinds;
   if (comm.is_root())
     for (std::size_t b = 0; b < made.size(); ++b)
-      for (const Made::Held& held : made[b].held) {
-        const auto hold = static_cast<std::int32_t>(kinds.size());
+      for (const Made::Group& constrained : made[b].constrained) {
+        const auto constraint = static_cast<std::int32_t>(kinds.size());
         const transient::Assembly::Body& body = assembly.bodies[b];
-        for (const std::int32_t node : held.nodes)
-          entries.push_back({hold, body.is_sheet ? body.first_node + node : body.node_of_mesh[static_cast<std::size_t>(node)]});
-        for (const auto& row : held.rows) rows.push_back({hold, {row[0], row[1], row[2], row[3]}});
-        kinds.push_back({held.is_hinge ? 1 : 0});
+        for (const std::int32_t node : constrained.nodes)
+          entries.push_back({constraint, body.is_sheet ? body.first_node + node : body.node_of_mesh[static_cast<std::size_t>(node)]});
+        for (const auto& row : constrained.rows) rows.push_back({constraint, {row[0], row[1], row[2], row[3]}});
+        kinds.push_back({constrained.is_hinge ? 1 : 0});
       }
   entries = comm.broadcast(std::move(entries));
   rows = comm.broadcast(std::move(rows));
   kinds = comm.broadcast(std::move(kinds));
-  bodies.holds.resize(kinds.size());
+  bodies.constraints.resize(kinds.size());
   std::vector<std::vector<transient::PathRow>> paths(kinds.size());
-  for (const Entry& entry : entries) bodies.holds[static_cast<std::size_t>(entry.hold)].nodes.push_back(entry.node);
-  for (const Row& row : rows) paths[static_cast<std::size_t>(row.hold)].push_back({row.at[0], {row.at[1], row.at[2], row.at[3]}});
+  for (const Entry& entry : entries) bodies.constraints[static_cast<std::size_t>(entry.constraint)].nodes.push_back(entry.node);
+  for (const Row& row : rows) paths[static_cast<std::size_t>(row.constraint)].push_back({row.at[0], {row.at[1], row.at[2], row.at[3]}});
   for (std::size_t h = 0; h < kinds.size(); ++h) {
-    if (!paths[h].empty()) bodies.holds[h].path = transient::Path(std::move(paths[h]));
-    bodies.holds[h].is_hinge = kinds[h].is_hinge != 0;
+    if (!paths[h].empty()) bodies.constraints[h].path = transient::Path(std::move(paths[h]));
+    bodies.constraints[h].is_hinge = kinds[h].is_hinge != 0;
   }
 }
 

@@ -19,10 +19,10 @@ struct Placement {
 };
 Placement find_placement(const job::SimulatedBody& body);
 
-/// Everything that moves and what holds it, the same on every rank.
+/// Everything that moves and what constraints it, the same on every rank.
 struct Bodies {
   std::shared_ptr<const transient::Assembly> assembly;
-  std::vector<transient::Hold> holds;
+  std::vector<transient::Constraint> constraints;
   std::vector<transient::Impulse> impulses;
   std::vector<Vec3> centre_m;  // of mass, of each body
 };

@@ -3,13 +3,12 @@
 #include <mpi.h>
 
 #include <CLI/CLI.hpp>
-#include <chrono>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
 #include <string>
-#include <thread>
 
+#include "precompute/run/end_in_error.hpp"
 #include "precompute/run/interrupt.hpp"
 #include "precompute/simulate/simulate.hpp"
 #include "runtime/base/error.hpp"
@@ -63,26 +62,6 @@ struct CommandLine {
   }
 };
 
-/// The error of all ranks, printed once; should a rank get here alone, it ends the others after a while.
-int fail(int rank, const std::string& file, const base::Result& result) {
-  std::fflush(stdout);
-  MPI_Request request = MPI_REQUEST_NULL;
-  int all_here = 0;
-  MPI_Ibarrier(MPI_COMM_WORLD, &request);
-  for (int wait_ms = 0; wait_ms < 5000 && all_here == 0; wait_ms += 10) {
-    MPI_Test(&request, &all_here, MPI_STATUS_IGNORE);
-    if (all_here == 0) std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
-  if (rank == 0 || all_here == 0) {
-    fmt::print(stderr, "carillon-simulate: error: {}\n", base::printable(result.message));
-    if (!file.empty()) base::write_result(file, result);
-  }
-  std::fflush(stderr);
-  const int code = base::get_exit_code(result.kind);
-  if (all_here == 0) MPI_Abort(MPI_COMM_WORLD, code);
-  return code;
-}
-
 int run_program(const CommandLine& words) {
   const comm::Communicator comm(MPI_COMM_WORLD);
   base::Result result;
@@ -100,7 +79,7 @@ int run_program(const CommandLine& words) {
     result = base::describe_error(std::current_exception(), "out of memory; use a coarser mesh or a machine with more");
     std::error_code error;
     result.is_resumable = std::filesystem::exists(words.options.checkpoint, error);
-    return fail(comm.rank(), words.result, result);
+    return run::end_in_error(MPI_COMM_WORLD, "carillon-simulate", words.result, result);
   }
   std::error_code error;
   result.is_resumable = result.kind != base::ResultKind::done && std::filesystem::exists(words.options.checkpoint, error);

@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "precompute/simulate/bodies.hpp"
+#include "runtime/bank/hdf5_id.hpp"
 #include "runtime/base/descriptor.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/file.hpp"
@@ -23,51 +24,31 @@ namespace {
 
 constexpr std::size_t kRow = 4;  // floats of a point in a frame: place and speed
 
-/// An identifier of HDF5 with the function that closes it. Throws SystemError for one that is none.
-class Handle {
- public:
-  Handle(hid_t id, herr_t (*close)(hid_t)) : id_(id), close_(close) {
-    if (id < 0) throw SystemError("the motion cannot be written: HDF5 refuses; is the disk full?");
-  }
-  ~Handle() { close_(id_); }
-  Handle(const Handle&) = delete;
-  Handle& operator=(const Handle&) = delete;
-  operator hid_t() const { return id_; }
-
- private:
-  hid_t id_;
-  herr_t (*close_)(hid_t);
-};
-
-void check(herr_t result) {
-  if (result < 0) throw SystemError("the motion cannot be written: HDF5 refuses; is the disk full?");
-}
-
 void write_attribute(hid_t at, const char* name, hid_t type, std::vector<hsize_t> shape, const void* data) {
-  const Handle space(shape.empty() ? H5Screate(H5S_SCALAR) : H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr),
-                     H5Sclose);
-  const Handle attribute(H5Acreate2(at, name, type, space, H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
-  check(H5Awrite(attribute, type, data));
+  const bank::Hdf5Id space(shape.empty() ? H5Screate(H5S_SCALAR) : H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr),
+                           H5Sclose);
+  const bank::Hdf5Id attribute(H5Acreate2(at, name, type, space, H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+  bank::require(H5Awrite(attribute, type, data), "write the motion");
 }
 
 void write_text(hid_t at, const char* name, std::string_view text) {
-  const Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
-  check(H5Tset_size(type, text.size()));
+  const bank::Hdf5Id type(H5Tcopy(H5T_C_S1), H5Tclose);
+  bank::require(H5Tset_size(type, text.size()), "write the motion");
   write_attribute(at, name, type, {}, text.data());
 }
 
 /// A data set without the time of its making, so that equal runs write equal bytes.
 hid_t create_set(hid_t at, const char* name, hid_t type, hid_t space) {
-  const Handle plain(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
-  check(H5Pset_obj_track_times(plain, false));
+  const bank::Hdf5Id plain(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+  bank::require(H5Pset_obj_track_times(plain, false), "write the motion");
   return H5Dcreate2(at, name, type, space, H5P_DEFAULT, plain, H5P_DEFAULT);
 }
 
 void write_list(hid_t at, const char* name, const std::vector<std::int64_t>& values) {
   const hsize_t count = values.size();
-  const Handle space(H5Screate_simple(1, &count, nullptr), H5Sclose);
-  const Handle set(create_set(at, name, H5T_STD_I64LE, space), H5Dclose);
-  check(H5Dwrite(set, H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()));
+  const bank::Hdf5Id space(H5Screate_simple(1, &count, nullptr), H5Sclose);
+  const bank::Hdf5Id set(create_set(at, name, H5T_STD_I64LE, space), H5Dclose);
+  bank::require(H5Dwrite(set, H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()), "write the motion");
 }
 
 }  // namespace
@@ -148,8 +129,8 @@ void MotionFile::write() const {
   std::filesystem::path part = file_;
   part += ".part";
   try {
-    const Handle file(H5Fcreate(part.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT), H5Fclose);
-    const Handle root(H5Gcreate2(file, "VTKHDF", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
+    const bank::Hdf5Id file(H5Fcreate(part.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT), H5Fclose);
+    const bank::Hdf5Id root(H5Gcreate2(file, "VTKHDF", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
     const std::int64_t version[2] = {2, 0};
     write_attribute(root, "Version", H5T_NATIVE_INT64, {2}, version);
     write_text(root, "Type", "UnstructuredGrid");
@@ -167,14 +148,14 @@ void MotionFile::write() const {
     {
       const hsize_t count = triangles_.size();
       const std::vector<std::uint8_t> types(triangles_.size(), 5);  // VTK_TRIANGLE
-      const Handle space(H5Screate_simple(1, &count, nullptr), H5Sclose);
-      const Handle set(create_set(root, "Types", H5T_STD_U8LE, space), H5Dclose);
-      check(H5Dwrite(set, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, types.data()));
+      const bank::Hdf5Id space(H5Screate_simple(1, &count, nullptr), H5Sclose);
+      const bank::Hdf5Id set(create_set(root, "Types", H5T_STD_U8LE, space), H5Dclose);
+      bank::require(H5Dwrite(set, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, types.data()), "write the motion");
     }
-    const Handle cell_data(H5Gcreate2(root, "CellData", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
+    const bank::Hdf5Id cell_data(H5Gcreate2(root, "CellData", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
     write_list(cell_data, "body", {body_.begin(), body_.end()});
-    const Handle point_data(H5Gcreate2(root, "PointData", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
-    const Handle steps(H5Gcreate2(root, "Steps", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
+    const bank::Hdf5Id point_data(H5Gcreate2(root, "PointData", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
+    const bank::Hdf5Id steps(H5Gcreate2(root, "Steps", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
     write_attribute(steps, "NSteps", H5T_NATIVE_INT64, {}, &count_);
     std::vector<double> times;
     std::vector<std::int64_t> first_point, none(static_cast<std::size_t>(count_)), one(static_cast<std::size_t>(count_), 1), part_of;
@@ -185,25 +166,25 @@ void MotionFile::write() const {
     }
     {
       const hsize_t count = times.size();
-      const Handle space(H5Screate_simple(1, &count, nullptr), H5Sclose);
-      const Handle set(create_set(steps, "Values", H5T_IEEE_F64LE, space), H5Dclose);
-      check(H5Dwrite(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, times.data()));
+      const bank::Hdf5Id space(H5Screate_simple(1, &count, nullptr), H5Sclose);
+      const bank::Hdf5Id set(create_set(steps, "Values", H5T_IEEE_F64LE, space), H5Dclose);
+      bank::require(H5Dwrite(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, times.data()), "write the motion");
     }
     write_list(steps, "PartOffsets", part_of);
     write_list(steps, "NumberOfParts", one);
     write_list(steps, "PointOffsets", first_point);
     write_list(steps, "CellOffsets", none);
     write_list(steps, "ConnectivityIdOffsets", none);
-    const Handle point_offsets(H5Gcreate2(steps, "PointDataOffsets", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
+    const bank::Hdf5Id point_offsets(H5Gcreate2(steps, "PointDataOffsets", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
     write_list(point_offsets, "speed", first_point);
-    const Handle cell_offsets(H5Gcreate2(steps, "CellDataOffsets", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
+    const bank::Hdf5Id cell_offsets(H5Gcreate2(steps, "CellDataOffsets", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
     write_list(cell_offsets, "body", none);
 
     const hsize_t all_points[2] = {static_cast<hsize_t>(count_) * static_cast<hsize_t>(points_), 3};
-    const Handle points_space(H5Screate_simple(2, all_points, nullptr), H5Sclose),
+    const bank::Hdf5Id points_space(H5Screate_simple(2, all_points, nullptr), H5Sclose),
         speed_space(H5Screate_simple(1, all_points, nullptr), H5Sclose);
-    const Handle points(create_set(root, "Points", H5T_IEEE_F32LE, points_space), H5Dclose);
-    const Handle speed(create_set(point_data, "speed", H5T_IEEE_F32LE, speed_space), H5Dclose);
+    const bank::Hdf5Id points(create_set(root, "Points", H5T_IEEE_F32LE, points_space), H5Dclose);
+    const bank::Hdf5Id speed(create_set(point_data, "speed", H5T_IEEE_F32LE, speed_space), H5Dclose);
     const std::size_t row = static_cast<std::size_t>(points_) * kRow;
     std::int64_t frame = 0;
     std::string kept;
@@ -219,11 +200,12 @@ void MotionFile::write() const {
         }
         const hsize_t begin[2] = {static_cast<hsize_t>(frame) * static_cast<hsize_t>(points_), 0},
                       count[2] = {static_cast<hsize_t>(points_), 3};
-        const Handle part_space(H5Screate_simple(2, count, nullptr), H5Sclose), part_speed(H5Screate_simple(1, count, nullptr), H5Sclose);
-        check(H5Sselect_hyperslab(points_space, H5S_SELECT_SET, begin, nullptr, count, nullptr));
-        check(H5Sselect_hyperslab(speed_space, H5S_SELECT_SET, begin, nullptr, count, nullptr));
-        check(H5Dwrite(points, H5T_NATIVE_FLOAT, part_space, points_space, H5P_DEFAULT, place.data()));
-        check(H5Dwrite(speed, H5T_NATIVE_FLOAT, part_speed, speed_space, H5P_DEFAULT, size.data()));
+        const bank::Hdf5Id part_space(H5Screate_simple(2, count, nullptr), H5Sclose),
+            part_speed(H5Screate_simple(1, count, nullptr), H5Sclose);
+        bank::require(H5Sselect_hyperslab(points_space, H5S_SELECT_SET, begin, nullptr, count, nullptr), "write the motion");
+        bank::require(H5Sselect_hyperslab(speed_space, H5S_SELECT_SET, begin, nullptr, count, nullptr), "write the motion");
+        bank::require(H5Dwrite(points, H5T_NATIVE_FLOAT, part_space, points_space, H5P_DEFAULT, place.data()), "write the motion");
+        bank::require(H5Dwrite(speed, H5T_NATIVE_FLOAT, part_speed, speed_space, H5P_DEFAULT, size.data()), "write the motion");
         ++frame;
       }
     });

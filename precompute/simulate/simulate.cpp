@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstring>
 #include <ctime>
 #include <memory>
 #include <optional>
@@ -16,12 +15,12 @@
 #include <vector>
 
 #include "precompute/emission/emission.hpp"
-#include "precompute/io/fingerprint.hpp"
 #include "precompute/io/progress_file.hpp"
 #include "precompute/job/simulation.hpp"
 #include "precompute/run/interrupt.hpp"
 #include "precompute/run/run_log.hpp"
 #include "precompute/simulate/bodies.hpp"
+#include "precompute/simulate/checkpoint.hpp"
 #include "precompute/simulate/motion_file.hpp"
 #include "precompute/simulate/sound_file.hpp"
 #include "precompute/transient/contact.hpp"
@@ -29,7 +28,6 @@
 #include "runtime/base/error.hpp"
 #include "runtime/base/file.hpp"
 #include "runtime/base/json.hpp"
-#include "runtime/base/sha256.hpp"
 
 namespace carillon::simulate {
 namespace {
@@ -38,12 +36,10 @@ namespace fs = std::filesystem;
 using transient::EnergyBook;
 
 constexpr std::uint64_t kMaxJobBytes = 16 << 20;
-constexpr std::uint64_t kMaxCheckpointBytes = std::uint64_t{1} << 38;
 constexpr double kBookEveryS = 0.01;     // of simulated time
 constexpr std::int64_t kLookEvery = 16;  // samples between two looks at signals
-constexpr char kMagic[8] = {'C', 'A', 'R', 'S', 'I', 'M', '0', '1'};
-constexpr double kFullScalePa = 1.0;  // of a WAV file whose peak is below; louder ones are scaled to a peak of 1
-constexpr int kTrialSteps = 200;      // of --validate
+constexpr double kFullScalePa = 1.0;     // of a WAV file whose peak is below; louder ones are scaled to a peak of 1
+constexpr int kTrialSteps = 200;         // of --validate
 
 double find_cpu_s() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
@@ -149,25 +145,6 @@ transient::MotionOptions make_motion_options(const job::SimulationSpec& spec) {
   return options;
 }
 
-std::vector<transient::BallStriker> make_strikers(const job::SimulationSpec& spec) {
-  std::vector<transient::BallStriker> strikers;
-  for (const job::Striker& striker : spec.strikers)
-    strikers.push_back({striker.radius_m, striker.mass_kg, striker.position_m, striker.velocity_m_s});
-  return strikers;
-}
-
-std::vector<transient::RigidObstacle> make_obstacles(const job::SimulationSpec& spec) {
-  std::vector<transient::RigidObstacle> obstacles;
-  for (const job::Obstacle& obstacle : spec.obstacles) {
-    if (const auto* plane = std::get_if<job::PlaneSpec>(&obstacle.form))
-      obstacles.emplace_back(transient::PlaneObstacle{plane->point_m, plane->normal});
-    if (const auto* ball = std::get_if<job::Ball>(&obstacle.form))
-      obstacles.emplace_back(transient::BallObstacle{ball->centre_m, ball->radius_m});
-    if (const auto* box = std::get_if<job::Block>(&obstacle.form)) obstacles.emplace_back(transient::BoxObstacle{box->min_m, box->max_m});
-  }
-  return obstacles;
-}
-
 /// The line of the job of what overlaps at the start: the message of Contacts begins with it.
 std::string find_overlap_place(const job::SimulationSpec& spec, std::string_view message) {
   for (std::size_t i = 0; i < spec.strikers.size(); ++i)
@@ -187,6 +164,7 @@ struct Simulation {
   std::unique_ptr<emission::Emission> sound;
   std::unique_ptr<MotionFile> film;
   std::vector<EnergyBook> books;
+  int steps_per_sample = 0;  // that the sound has
   double sound_cpu_s = 0, steps_cpu_s = 0;
 
   bool makes_sound() const { return !spec.sound.empty() || !spec.surface.empty(); }
@@ -195,11 +173,15 @@ struct Simulation {
 void make_motion(const comm::Communicator& comm, Simulation& simulation) {
   const job::SimulationSpec& spec = simulation.spec;
   simulation.domain = std::make_unique<transient::Domain>(comm, simulation.bodies.assembly);
-  simulation.motion = std::make_unique<transient::Motion>(*simulation.domain, make_motion_options(spec), simulation.bodies.holds,
+  simulation.motion = std::make_unique<transient::Motion>(*simulation.domain, make_motion_options(spec), simulation.bodies.constraints,
                                                           simulation.bodies.impulses);
-  transient::TouchRules rules{spec.contact.restitution, spec.contact.friction, spec.gravity_m_s2};
+  std::vector<transient::BallStriker> strikers;
+  for (const job::Striker& striker : spec.strikers) strikers.push_back(striker.ball);
+  std::vector<transient::RigidObstacle> obstacles;
+  for (const job::Obstacle& obstacle : spec.obstacles) obstacles.push_back(obstacle.form);
+  const transient::TouchRules rules{spec.contact.restitution, spec.contact.friction, spec.gravity_m_s2};
   simulation.contacts = std::make_unique<transient::Contacts>(*simulation.domain, make_touch_surface(*simulation.bodies.assembly, spec),
-                                                              make_strikers(spec), make_obstacles(spec), rules);
+                                                              std::move(strikers), std::move(obstacles), rules);
   if (simulation.contacts->is_needed()) simulation.motion->add(*simulation.contacts);
   simulation.motion->set_start([&](std::int32_t node, const Vec3& rest_m) {
     const auto body = static_cast<std::size_t>(simulation.bodies.assembly->find_body_of_node(node));
@@ -215,105 +197,17 @@ void make_motion(const comm::Communicator& comm, Simulation& simulation) {
   }
 }
 
-// ---- checkpoint ----
-
-struct CheckpointHead {
-  char magic[8];
-  base::Sha256::Hash job;
-  std::int32_t ranks;
-  std::int32_t books;
-  std::int64_t motion, contacts;  // bytes
-};
-
-/// Of the job's text, what it computes, and the program.
-base::Sha256::Hash find_fingerprint(const std::string& text) {
-  base::Sha256 sum;
-  sum.add(text);
-  sum.add(io::find_program_version());
-  return sum.finish();
+SimulationState collect_state(const comm::Communicator& comm, Simulation& simulation) {
+  SimulationState state{simulation.books, simulation.motion->save(), simulation.contacts->save(), {}};
+  if (simulation.sound) state.sound = comm.agree([&] { return simulation.sound->save(); });
+  return state;
 }
 
-void save_checkpoint(const comm::Communicator& comm, const fs::path& file, const base::Sha256::Hash& job, Simulation& simulation) {
-  const std::vector<std::byte> motion = simulation.motion->save(), contacts = simulation.contacts->save();
-  std::vector<std::byte> own;
-  if (simulation.sound) own = comm.agree([&] { return simulation.sound->save(); });
-  const comm::Communicator::Gathering gathering = comm.plan_gathering(own.size());
-  const std::vector<std::byte> sounds = comm.all_gather(own);
-  comm.agree([&] {
-    if (!comm.is_root()) return;
-    CheckpointHead head{};
-    std::memcpy(head.magic, kMagic, sizeof kMagic);
-    head.job = job;
-    head.ranks = comm.size();
-    head.books = static_cast<std::int32_t>(simulation.books.size());
-    head.motion = static_cast<std::int64_t>(motion.size());
-    head.contacts = static_cast<std::int64_t>(contacts.size());
-    base::WholeFile whole(file);
-    const auto put = [&](const void* data, std::size_t bytes) { whole.append({static_cast<const char*>(data), bytes}); };
-    put(&head, sizeof head);
-    for (const int begin : gathering.begin) {
-      const std::int64_t at = begin;
-      put(&at, sizeof at);
-    }
-    put(simulation.books.data(), simulation.books.size() * sizeof(EnergyBook));
-    put(motion.data(), motion.size());
-    put(contacts.data(), contacts.size());
-    put(sounds.data(), sounds.size());
-    whole.commit();
-  });
-}
-
-/// False: there is none. What is of another job is refused in words.
-bool load_checkpoint(const comm::Communicator& comm, const fs::path& file, const base::Sha256::Hash& job, Simulation& simulation) {
-  const bool is_there = comm.broadcast(static_cast<std::int32_t>(comm.is_root() && !file.empty() && fs::exists(file))) != 0;
-  if (!is_there) return false;
-  std::string bytes;
-  CheckpointHead head{};
-  comm.agree([&] {
-    if (!comm.is_root()) return;
-    bytes = base::read_file(file, "checkpoint", kMaxCheckpointBytes);
-    const auto refuse = [&](const char* why) {
-      throw InputError(fmt::format("{}: the checkpoint {}; remove it, or give another file", file.string(), why));
-    };
-    if (bytes.size() < sizeof head) refuse("is cut off");
-    std::memcpy(&head, bytes.data(), sizeof head);
-    if (std::memcmp(head.magic, kMagic, sizeof kMagic) != 0) refuse("is none of a simulation");
-    if (head.job != job) refuse("is of another job or of another version of the program");
-    if (head.ranks != comm.size()) refuse(fmt::format("is of {} ranks, and there are {}", head.ranks, comm.size()).c_str());
-    if (head.books < 0 || head.motion < 0 || head.contacts < 0) refuse("is damaged");
-  });
-  head = comm.broadcast(head);
-  const auto all = comm.broadcast(std::vector<char>(bytes.begin(), bytes.end()));
-  comm.agree([&] {
-    const std::size_t table = sizeof head, books = table + static_cast<std::size_t>(head.ranks + 1) * sizeof(std::int64_t);
-    const std::size_t motion = books + static_cast<std::size_t>(head.books) * sizeof(EnergyBook),
-                      contacts = motion + static_cast<std::size_t>(head.motion);
-    const std::size_t sounds = contacts + static_cast<std::size_t>(head.contacts);
-    if (sounds > all.size()) throw InputError(fmt::format("{}: the checkpoint is cut off; remove it", file.string()));
-    std::vector<std::int64_t> begin(static_cast<std::size_t>(head.ranks + 1));
-    std::memcpy(begin.data(), all.data() + table, begin.size() * sizeof(std::int64_t));
-    if (begin.back() < 0 || sounds + static_cast<std::size_t>(begin.back()) != all.size())
-      throw InputError(fmt::format("{}: the checkpoint is cut off; remove it", file.string()));
-    simulation.books.resize(static_cast<std::size_t>(head.books));
-    if (head.books > 0) std::memcpy(simulation.books.data(), all.data() + books, simulation.books.size() * sizeof(EnergyBook));
-  });
-  const auto* data = reinterpret_cast<const std::byte*>(all.data());
-  const std::size_t books = sizeof head + static_cast<std::size_t>(head.ranks + 1) * sizeof(std::int64_t);
-  const std::size_t motion = books + static_cast<std::size_t>(head.books) * sizeof(EnergyBook),
-                    contacts = motion + static_cast<std::size_t>(head.motion);
-  const std::size_t sounds = contacts + static_cast<std::size_t>(head.contacts);
-  simulation.motion->load({data + motion, static_cast<std::size_t>(head.motion)});
-  simulation.contacts->load({data + contacts, static_cast<std::size_t>(head.contacts)});
-  if (simulation.sound)
-    comm.agree([&] {
-      std::vector<std::int64_t> begin(static_cast<std::size_t>(head.ranks + 1));
-      std::memcpy(begin.data(), all.data() + sizeof head, begin.size() * sizeof(std::int64_t));
-      const auto rank = static_cast<std::size_t>(comm.rank());
-      if (begin[rank] < 0 || begin[rank + 1] < begin[rank] || begin[rank + 1] > begin.back())
-        throw InputError(fmt::format("{}: the checkpoint is damaged; remove it", file.string()));
-      simulation.sound->load({data + sounds + begin[rank], static_cast<std::size_t>(begin[rank + 1] - begin[rank])});
-    });
-  return true;
+void resume(const comm::Communicator& comm, const SimulationState& state, Simulation& simulation) {
+  simulation.books = state.books;
+  simulation.motion->load(state.motion);
+  simulation.contacts->load(state.contacts);
+  if (simulation.sound) comm.agree([&] { simulation.sound->load(state.sound); });
 }
 
 // ---- outputs ----
@@ -414,6 +308,54 @@ std::string predict(const comm::Communicator& comm, Simulation& simulation, bool
       motion.get_longest_step_s(), steps, steps * seconds, comm.size(), comm.size() == 1 ? "" : "s", static_cast<double>(peak) / 1e6);
 }
 
+/// The steps of one sample, and what they make the surfaces sound.
+void advance_sample(Simulation& simulation) {
+  transient::Motion& motion = *simulation.motion;
+  if (simulation.film) simulation.film->add_sample(motion);
+  // The clock is dear next to a step of a small body: one sample in sixteen is measured.
+  const bool is_measured = motion.get_sample() % kLookEvery == 0;
+  do {
+    motion.advance();
+    if (!simulation.sound) continue;
+    const double before = is_measured ? find_cpu_s() : 0.0;
+    if (motion.get_steps_per_sample() != simulation.steps_per_sample) {
+      simulation.steps_per_sample = motion.get_steps_per_sample();
+      simulation.sound->set_steps_per_sample(simulation.steps_per_sample);
+    }
+    simulation.sound->add_step(&motion.get_u()[0].x);
+    if (is_measured) simulation.sound_cpu_s += static_cast<double>(kLookEvery) * (find_cpu_s() - before);
+  } while (!motion.is_at_sample());
+}
+
+/// Lines of progress, on rank 0.
+class Reporter {
+ public:
+  Reporter(const Log& log, const fs::path& file) : log_(log) {
+    if (!file.empty()) file_.emplace(file);
+  }
+
+  double find_seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+  void report(const transient::Motion& motion, std::int64_t frames) {
+    const double taken = find_seconds();
+    if (taken < last_ + 1.0) return;
+    last_ = taken;
+    const double share = static_cast<double>(motion.get_sample()) / static_cast<double>(frames), left = taken * (1.0 / share - 1.0);
+    if (file_) file_->append({"simulate", 100.0 * share, 0, {}, left, taken});
+    if (taken < last_printed_ + 10.0) return;
+    last_printed_ = taken;
+    log_.print(fmt::format("{:5.1f} %, {:.4g} s simulated, about {:.0f} s left", 100.0 * share, motion.get_time_s(), left));
+  }
+  void finish() {
+    if (file_) file_->append({"done", 100.0, 0, {}, 0.0, find_seconds()});
+  }
+
+ private:
+  const Log& log_;
+  std::optional<io::ProgressFile> file_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  double last_ = 0.0, last_printed_ = 0.0;
+};
+
 }  // namespace
 
 SimulateSummary simulate(const comm::Communicator& comm, const fs::path& job_file, const SimulateOptions& options) {
@@ -431,81 +373,57 @@ SimulateSummary simulate(const comm::Communicator& comm, const fs::path& job_fil
     summary.result = predict(comm, simulation, options.json);
     return summary;
   }
-  const base::Sha256::Hash fingerprint = find_fingerprint(text);
-  const bool is_resumed =
-      comm.broadcast(static_cast<std::int32_t>(comm.is_root() && !options.checkpoint.empty() && fs::exists(options.checkpoint))) != 0;
-  const int steps_per_sample = motion.prepare();
+  const std::optional<SimulationState> saved = load_checkpoint(comm, options.checkpoint, text);
   if (simulation.makes_sound())
     simulation.sound = std::make_unique<emission::Emission>(comm, make_surface_part(*simulation.domain, spec),
-                                                            make_emission_options(spec, steps_per_sample, is_resumed));
-  if (!spec.motion.empty()) simulation.film = std::make_unique<MotionFile>(*simulation.domain, spec, is_resumed);
-  if (load_checkpoint(comm, options.checkpoint, fingerprint, simulation))
+                                                            make_emission_options(spec, motion.get_steps_per_sample(), saved.has_value()));
+  if (!spec.motion.empty()) simulation.film = std::make_unique<MotionFile>(*simulation.domain, spec, saved.has_value());
+  if (saved) {
+    resume(comm, *saved, simulation);
     log.print(fmt::format("resumed at {:.6g} s", motion.get_time_s()));
-  else if (simulation.sound)
-    simulation.sound->add_step(&motion.get_u()[0].x);
-  log.print(fmt::format("step {:.4g} s, {} a sample; {} rank{}", motion.get_step_s(), motion.get_steps_per_sample(), comm.size(),
+  } else {
+    if (simulation.sound) simulation.sound->add_step(&motion.get_u()[0].x);
+    simulation.books.push_back(motion.calc_book());
+  }
+  simulation.steps_per_sample = motion.get_steps_per_sample();
+  log.print(fmt::format("step {:.4g} s, {} a sample; {} rank{}", motion.get_step_s(), simulation.steps_per_sample, comm.size(),
                         comm.size() == 1 ? "" : "s"));
 
-  std::optional<io::ProgressFile> progress;
-  comm.agree([&] {
-    if (comm.is_root() && !options.progress.empty()) progress.emplace(options.progress);
-  });
+  Reporter reporter = comm.agree([&] { return Reporter(log, comm.is_root() ? options.progress : fs::path()); });
   const std::int64_t frames = std::llround(spec.duration_s * spec.sample_rate_hz);
   const std::int64_t book_every = std::max<std::int64_t>(1, std::llround(kBookEveryS * spec.sample_rate_hz));
-  const auto start = std::chrono::steady_clock::now();
-  auto last_save = start, last_line = start;
-  if (!options.checkpoint.empty()) run::set_news(true);
-  if (simulation.books.empty()) simulation.books.push_back(motion.calc_book());
-  int known_steps = motion.get_steps_per_sample();
-  double cpu = find_cpu_s();
+  const bool is_kept = !options.checkpoint.empty();
+  if (is_kept) run::set_news(true);
+  double last_save_s = 0.0;
+  const double cpu_s = find_cpu_s();
   while (motion.get_sample() < frames) {
-    if (simulation.film) simulation.film->add_sample(motion);
-    do {
-      motion.advance();
-      if (!simulation.sound) continue;
-      // The clock is dear next to a step of a small body: one sample in sixteen is measured.
-      const bool is_measured = motion.get_sample() % kLookEvery == 0;
-      const double before = is_measured ? find_cpu_s() : 0.0;
-      if (motion.get_steps_per_sample() != known_steps) {
-        known_steps = motion.get_steps_per_sample();
-        simulation.sound->set_steps_per_sample(known_steps);
-      }
-      simulation.sound->add_step(&motion.get_u()[0].x);
-      if (is_measured) simulation.sound_cpu_s += static_cast<double>(kLookEvery) * (find_cpu_s() - before);
-    } while (!motion.is_at_sample());
+    advance_sample(simulation);
     if (motion.get_sample() % book_every == 0 || motion.get_sample() == frames) simulation.books.push_back(motion.calc_book());
-    if (motion.get_sample() % kLookEvery != 0) continue;
-    const auto now = std::chrono::steady_clock::now();
-    std::int32_t wants = run::is_stop_asked() ? 2 : 0;
-    if (comm.is_root() && std::chrono::duration<double>(now - last_save).count() > options.checkpoint_every_s) wants = std::max(wants, 1);
-    if (comm.max(wants) > 0 && !options.checkpoint.empty() && motion.get_sample() < frames) {
-      save_checkpoint(comm, options.checkpoint, fingerprint, simulation);
-      last_save = now;
-      if (comm.max(wants) > 1) {
-        summary.is_stopped = true;
-        summary.result = fmt::format("stopped by {} at {:.6g} s; the same command resumes from {}", run::find_stop_name(),
-                                     motion.get_time_s(), options.checkpoint.string());
-        return summary;
-      }
-    }
-    if (!comm.is_root() || std::chrono::duration<double>(now - last_line).count() < 1.0) continue;
-    last_line = now;
-    const double share = static_cast<double>(motion.get_sample()) / static_cast<double>(frames),
-                 taken = std::chrono::duration<double>(now - start).count();
-    if (progress) progress->append({"simulate", 100.0 * share, 0, {}, taken * (1.0 / share - 1.0), taken});
-    if (!options.quiet && static_cast<std::int64_t>(taken) % 10 == 0)
-      log.print(fmt::format("{:5.1f} %, {:.4g} s simulated, about {:.0f} s left", 100.0 * share, motion.get_time_s(),
-                            taken * (1.0 / share - 1.0)));
+    if (motion.get_sample() % kLookEvery != 0 || motion.get_sample() == frames) continue;
+    reporter.report(motion, frames);
+    if (!is_kept) continue;
+    enum : std::int32_t { kNothing, kSave, kStop };
+    const bool is_due = comm.is_root() && reporter.find_seconds() > last_save_s + options.checkpoint_every_s;
+    const std::int32_t wanted = comm.max(run::is_stop_asked() ? std::int32_t{kStop}
+                                         : is_due             ? std::int32_t{kSave}
+                                                              : std::int32_t{kNothing});
+    if (wanted == kNothing) continue;
+    save_checkpoint(comm, options.checkpoint, text, collect_state(comm, simulation));
+    last_save_s = reporter.find_seconds();
+    if (wanted == kSave) continue;
+    summary.is_stopped = true;
+    summary.result = fmt::format("stopped by {} at {:.6g} s; the same command resumes from {}", run::find_stop_name(), motion.get_time_s(),
+                                 options.checkpoint.string());
+    return summary;
   }
-  simulation.steps_cpu_s = find_cpu_s() - cpu - simulation.sound_cpu_s;
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  simulation.steps_cpu_s = find_cpu_s() - cpu_s - simulation.sound_cpu_s;
   if (simulation.film) simulation.film->add_sample(motion);
-  summary.result = write_outputs(comm, simulation, seconds);
+  summary.result = write_outputs(comm, simulation, reporter.find_seconds());
   comm.agree([&] {
     if (!comm.is_root()) return;
-    if (progress) progress->append({"done", 100.0, 0, {}, 0.0, seconds});
+    reporter.finish();
     std::error_code ignored;
-    if (!options.checkpoint.empty()) fs::remove(options.checkpoint, ignored);
+    if (is_kept) fs::remove(options.checkpoint, ignored);
   });
   return summary;
 }

@@ -138,24 +138,6 @@ void append_body(const SolidBody& solid, Assembly& assembly, std::vector<Numbers
                      straight, static_cast<std::int32_t>(width), static_cast<std::int32_t>(number.size())});
 }
 
-/// The nearest place to p on a triangle, by its weights (Ericson 2005, 5.1.5).
-Vec3 find_nearest(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
-  const Vec3 ab = b - a, ac = c - a, ap = p - a, bp = p - b, cp = p - c;
-  const double d1 = dot(ab, ap), d2 = dot(ac, ap), d3 = dot(ab, bp), d4 = dot(ac, bp), d5 = dot(ab, cp), d6 = dot(ac, cp);
-  if (d1 <= 0 && d2 <= 0) return {1, 0, 0};
-  if (d3 >= 0 && d4 <= d3) return {0, 1, 0};
-  if (d6 >= 0 && d5 <= d6) return {0, 0, 1};
-  const double vc = d1 * d4 - d3 * d2, vb = d5 * d2 - d1 * d6, va = d3 * d6 - d5 * d4;
-  if (vc <= 0 && d1 >= 0 && d3 <= 0) return {1 - d1 / (d1 - d3), d1 / (d1 - d3), 0};
-  if (vb <= 0 && d2 >= 0 && d6 <= 0) return {1 - d2 / (d2 - d6), 0, d2 / (d2 - d6)};
-  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
-    const double w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-    return {0, 1 - w, w};
-  }
-  const double sum = va + vb + vc;
-  return {va / sum, vb / sum, vc / sum};
-}
-
 }  // namespace
 
 std::int32_t Assembly::find_body_of_node(std::int32_t node) const {
@@ -354,7 +336,7 @@ std::vector<NodeShare> find_shares(const Assembly& assembly, std::int32_t body, 
   std::array<std::int32_t, 6> nearest{};
   Vec3 weight{};
   for (const auto& facet : list_skin(assembly, body)) {
-    const Vec3 a = at(facet[0]), b = at(facet[1]), c = at(facet[2]), w = find_nearest(point_m, a, b, c);
+    const Vec3 a = at(facet[0]), b = at(facet[1]), c = at(facet[2]), w = weigh_corners(point_m, a, b, c);
     const double distance = norm(w[0] * a + w[1] * b + w[2] * c - point_m);
     if (distance < least) {
       least = distance;

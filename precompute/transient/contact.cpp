@@ -12,6 +12,7 @@
 #include <cstring>
 #include <limits>
 #include <unordered_map>
+#include <variant>
 
 #include "runtime/base/error.hpp"
 
@@ -33,36 +34,6 @@ void add(Quad& f, const Vec3& force) {
   f.z += force[2];
 }
 
-/// The weights of the corners at the point of a triangle that is nearest to p (Ericson 2004, chapter 5).
-Vec3 find_nearest_weights(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
-  const Vec3 ab = b - a, ac = c - a, ap = p - a;
-  const double d1 = dot(ab, ap), d2 = dot(ac, ap);
-  if (d1 <= 0 && d2 <= 0) return {1, 0, 0};
-  const Vec3 bp = p - b;
-  const double d3 = dot(ab, bp), d4 = dot(ac, bp);
-  if (d3 >= 0 && d4 <= d3) return {0, 1, 0};
-  const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0 && d1 >= 0 && d3 <= 0) {
-    const double v = d1 / (d1 - d3);
-    return {1 - v, v, 0};
-  }
-  const Vec3 cp = p - c;
-  const double d5 = dot(ab, cp), d6 = dot(ac, cp);
-  if (d6 >= 0 && d5 <= d6) return {0, 0, 1};
-  const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0 && d2 >= 0 && d6 <= 0) {
-    const double w = d2 / (d2 - d6);
-    return {1 - w, 0, w};
-  }
-  const double va = d3 * d6 - d5 * d4;
-  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
-    const double w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-    return {0, 1 - w, w};
-  }
-  const double per = 1.0 / (va + vb + vc);
-  return {va * per, vb * per, vc * per};
-}
-
 /// Where a point is against an obstacle: signed distance [m], positive outside, and the unit normal to the free side.
 struct Clearance {
   double distance_m = 0;
@@ -70,13 +41,13 @@ struct Clearance {
 };
 
 Clearance find_clearance(const RigidObstacle& obstacle, const Vec3& p) {
-  if (const auto* plane = std::get_if<PlaneObstacle>(&obstacle)) return {dot(p - plane->point_m, plane->normal), plane->normal};
-  if (const auto* ball = std::get_if<BallObstacle>(&obstacle)) {
+  if (const auto* plane = std::get_if<job::PlaneObstacle>(&obstacle)) return {dot(p - plane->point_m, plane->normal), plane->normal};
+  if (const auto* ball = std::get_if<job::BallObstacle>(&obstacle)) {
     const Vec3 way = p - ball->centre_m;
     const double size = norm(way);
     return {size - ball->radius_m, size > 0 ? (1.0 / size) * way : Vec3{0, 0, 1}};
   }
-  const auto& box = std::get<BoxObstacle>(obstacle);
+  const auto& box = std::get<job::BoxObstacle>(obstacle);
   Vec3 outside{};
   double inside = -std::numeric_limits<double>::infinity();
   Vec3 nearest_face{};
@@ -196,7 +167,7 @@ Contacts::Nearest Contacts::find_nearest(const Vec3& p, const std::vector<std::i
   for (const std::int32_t t : triangles) {
     const auto& triangle = surface_.triangles[static_cast<std::size_t>(t)];
     const std::array<Vec3, 3> at{find_position(triangle[0]), find_position(triangle[1]), find_position(triangle[2])};
-    const Vec3 w = find_nearest_weights(p, at[0], at[1], at[2]);
+    const Vec3 w = weigh_corners(p, at[0], at[1], at[2]);
     const Vec3 there = p - (w[0] * at[0] + w[1] * at[1] + w[2] * at[2]), twice = cross(at[1] - at[0], at[2] - at[0]);
     const double distance = norm(there), above = dot(there, twice) / norm(twice);
     // Of several that share the nearest point, the one that sees p most from the front says on which side p is.
@@ -298,7 +269,7 @@ void Contacts::search(const Quad* u) {
             const auto a = static_cast<std::size_t>(triangle[0]), b = static_cast<std::size_t>(triangle[1]),
                        c = static_cast<std::size_t>(triangle[2]);
             if (surface_.nodes[a].body == body) continue;
-            const Vec3 w = find_nearest_weights(p, found_at_m_[a], found_at_m_[b], found_at_m_[c]);
+            const Vec3 w = weigh_corners(p, found_at_m_[a], found_at_m_[b], found_at_m_[c]);
             const Vec3 at = w[0] * found_at_m_[a] + w[1] * found_at_m_[b] + w[2] * found_at_m_[c];
             if (norm(p - at) < reach + surface_.nodes[a].reach_m) near[surface_.nodes[a].body].push_back(t);
           }

@@ -7,10 +7,10 @@
 #include <map>
 #include <span>
 #include <string>
-#include <variant>
 #include <vector>
 
 #include "precompute/comm/communicator.hpp"
+#include "precompute/job/obstacles.hpp"
 #include "precompute/transient/domain.hpp"
 #include "precompute/transient/motion.hpp"
 #include "precompute/transient/order_free_sum.hpp"
@@ -40,24 +40,8 @@ TouchSurface make_touch_surface(std::span<const Vec3> rest_m, std::span<const st
                                 std::span<const std::int32_t> body_of_triangle, std::span<const double> modulus_pa,
                                 std::span<const double> reach_m, double kappa);
 
-/// Half-space, ball and box, all of them rigid and at rest.
-struct PlaneObstacle {
-  Vec3 point_m{}, normal{0, 0, 1};  // unit, to the free side
-};
-struct BallObstacle {
-  Vec3 centre_m{};
-  double radius_m = 0;
-};
-struct BoxObstacle {
-  Vec3 min_m{}, max_m{};
-};
-using RigidObstacle = std::variant<PlaneObstacle, BallObstacle, BoxObstacle>;
-
-/// A rigid ball that flies freely and does not turn: friction changes its flight alone.
-struct BallStriker {
-  double radius_m = 0, mass_kg = 0;
-  Vec3 position_m{}, velocity_m_s{};
-};
+using job::BallStriker;
+using job::RigidObstacle;
 
 struct TouchRules {
   double restitution = 1.0;  // of a contact alone: the part of the closing speed with which rigid bodies would part

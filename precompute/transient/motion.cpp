@@ -48,27 +48,27 @@ constexpr std::size_t kNodeWidth = 10 * 3;
 
 }  // namespace
 
-Motion::Motion(Domain& domain, const MotionOptions& options, std::vector<Hold> holds, std::vector<Impulse> impulses)
+Motion::Motion(Domain& domain, const MotionOptions& options, std::vector<Constraint> constraints, std::vector<Impulse> impulses)
     : domain_(domain), options_(options), highest_(domain) {
   const comm::Communicator& comm = domain_.get_comm();
   comm.agree([&] {
-    check_input(holds, impulses);
-    holds_ = std::move(holds);
+    check_input(constraints, impulses);
+    constraints_ = std::move(constraints);
     impulses_ = std::move(impulses);
     const Assembly& assembly = domain_.get_assembly();
     const auto own = static_cast<std::size_t>(domain_.own_count()), nodes = static_cast<std::size_t>(domain_.node_count());
     for (auto* array : {&u_, &v_}) array->resize(nodes);
     f_.resize(static_cast<std::size_t>(domain_.force_count()));
     for (auto* array : {&external_, &work_, &brake_loss_, &carried_, &home_, &reaction_}) array->resize(own);
-    is_held_.resize(own, 0);
+    is_constrained_.resize(own, 0);
     is_carried_.assign(assembly.bodies.size(), 1);
-    for (std::size_t h = 0; h < holds_.size(); ++h)
-      for (const std::int32_t number : holds_[h].nodes) {
-        if (!holds_[h].is_hinge) is_carried_[static_cast<std::size_t>(assembly.find_body_of_node(number))] = 0;
+    for (std::size_t h = 0; h < constraints_.size(); ++h)
+      for (const std::int32_t number : constraints_[h].nodes) {
+        if (!constraints_[h].is_hinge) is_carried_[static_cast<std::size_t>(assembly.find_body_of_node(number))] = 0;
         const std::int32_t place = domain_.find_place(number);
         if (place < 0 || place >= domain_.own_count()) continue;
-        is_held_[static_cast<std::size_t>(place)] = 1;
-        held_nodes_.push_back({place, static_cast<std::int32_t>(h)});
+        is_constrained_[static_cast<std::size_t>(place)] = 1;
+        constrained_nodes_.push_back({place, static_cast<std::int32_t>(h)});
       }
     for (std::size_t i = 0; i < impulses_.size(); ++i)
       for (const NodeShare& one : impulses_[i].shares) {
@@ -79,29 +79,29 @@ Motion::Motion(Domain& domain, const MotionOptions& options, std::vector<Hold> h
       const double mass = domain_.get_masses_kg()[i];
       const double alpha2 = assembly.bodies[static_cast<std::size_t>(domain_.find_body(static_cast<std::int32_t>(i)))].mass_damping_per_s;
       inverse_kg_.push_back(1.0 / mass);
-      braked_kg_s_.push_back(is_held_[i] != 0 ? 0.0 : alpha2 * mass);
+      braked_kg_s_.push_back(is_constrained_[i] != 0 ? 0.0 : alpha2 * mass);
     }
     for (const Assembly::Body& body : assembly.bodies) is_braked_ = is_braked_ || body.mass_damping_per_s > 0.0;
-    has_external_ = is_braked_ || !holds_.empty() || !impulses_.empty() || norm(options_.gravity_m_s2) > 0.0;
+    has_external_ = is_braked_ || !constraints_.empty() || !impulses_.empty() || norm(options_.gravity_m_s2) > 0.0;
   });
 }
 
-void Motion::check_input(const std::vector<Hold>& holds, const std::vector<Impulse>& impulses) const {
+void Motion::check_input(const std::vector<Constraint>& constraints, const std::vector<Impulse>& impulses) const {
   const Assembly& assembly = domain_.get_assembly();
   if (!(options_.sample_rate_hz > 0.0) || !(options_.longest_step_s > 0.0) || !(options_.settle_s >= 0.0) ||
       !(options_.step_check_s > 0.0) || options_.inversion_check_steps < 1)
     throw InputError("the sample rate, the longest step and the times of checks must be positive, the time to settle not negative");
-  std::vector<char> is_held(static_cast<std::size_t>(assembly.node_count()), 0);
+  std::vector<char> is_constrained(static_cast<std::size_t>(assembly.node_count()), 0);
   const auto check_node = [&](std::int32_t node) {
     if (node < 0 || node >= assembly.node_count())
-      throw InputError(fmt::format("node {} is held or struck, and there are {} nodes", node, assembly.node_count()));
+      throw InputError(fmt::format("node {} is constrained or struck, and there are {} nodes", node, assembly.node_count()));
   };
-  for (const Hold& hold : holds)
-    for (const std::int32_t node : hold.nodes) {
+  for (const Constraint& constraint : constraints)
+    for (const std::int32_t node : constraint.nodes) {
       check_node(node);
-      if (std::exchange(is_held[static_cast<std::size_t>(node)], 1) != 0) {
+      if (std::exchange(is_constrained[static_cast<std::size_t>(node)], 1) != 0) {
         const Vec3& x = assembly.nodes_m[static_cast<std::size_t>(node)];
-        throw InputError(fmt::format("body '{}': the node at ({:.4g}, {:.4g}, {:.4g}) m is held twice; name it in one set only",
+        throw InputError(fmt::format("body '{}': the node at ({:.4g}, {:.4g}, {:.4g}) m is constrained twice; name it in one set only",
                                      assembly.bodies[static_cast<std::size_t>(assembly.find_body_of_node(node))].name, x[0], x[1], x[2]));
       }
     }
@@ -124,7 +124,7 @@ void Motion::set_start(const std::function<Start(std::int32_t, const Vec3&)>& fi
       const Start start = find_start(domain_.find_number(i), domain_.get_rest_m()[at]);
       u_[at] = to_quad(domain_.is_point(i) ? start.displacement_m : Vec3{});
       v_[at] = to_quad(domain_.is_point(i) ? start.velocity_m_s : Vec3{});
-      if (i >= domain_.own_count() || is_held_[at] == 0) continue;
+      if (i >= domain_.own_count() || is_constrained_[at] == 0) continue;
       home_[at] = u_[at];
       v_[at] = Quad{};
     }
@@ -136,8 +136,8 @@ void Motion::begin() {
   find_step(kStartIterations, true);
   // From v_0 to v_{-1/2}, so that the steps are symmetric in time from the start on.
   domain_.set_elastic_forces(u_.data(), f_.data());
-  for (std::size_t i = 0; i < is_held_.size(); ++i) {
-    if (is_held_[i] != 0) continue;
+  for (std::size_t i = 0; i < is_constrained_.size(); ++i) {
+    if (is_constrained_[i] != 0) continue;
     const double factor = 0.5 * step_s_ * inverse_kg_[i];
     v_[i] = {v_[i].x - factor * f_[i].x, v_[i].y - factor * f_[i].y, v_[i].z - factor * f_[i].z, 0.0};
   }
@@ -153,7 +153,7 @@ void Motion::begin() {
 
 void Motion::find_step(int iterations, bool is_start) {
   const Assembly& assembly = domain_.get_assembly();
-  const std::vector<double> omega = highest_.calc(domain_, u_.data(), is_held_, iterations);
+  const std::vector<double> omega = highest_.calc(domain_, u_.data(), is_constrained_, iterations);
   omega_ = omega;
   longest_s_ = std::numeric_limits<double>::infinity();
   for (std::size_t b = 0; b < omega.size(); ++b)
@@ -279,12 +279,12 @@ void Motion::set_external_forces() {
     }
   const StepTime time{step_, time_s, act_s_, act_before_s_, step_s_, step_before_s_};
   for (ExternalForces* forces : outside_) forces->add_forces(time, u_.data(), v_.data(), external_.data());
-  // What holds a node is what brings it where it has to be.
+  // The force of a support is what brings a node where it has to be.
   std::vector<Vec3> next;
-  for (const Hold& hold : holds_) next.push_back(hold.path.calc(find_next_time_s()));
-  for (const HeldNode& held : held_nodes_) {
-    const auto i = static_cast<std::size_t>(held.place);
-    const Vec3 to = to_vector(home_[i]) + next[static_cast<std::size_t>(held.hold)];
+  for (const Constraint& constraint : constraints_) next.push_back(constraint.path.calc(find_next_time_s()));
+  for (const ConstrainedNode& constrained : constrained_nodes_) {
+    const auto i = static_cast<std::size_t>(constrained.place);
+    const Vec3 to = to_vector(home_[i]) + next[static_cast<std::size_t>(constrained.constraint)];
     const double factor = mass[i] / act_s_;
     const Quad others = external_[i];
     external_[i] = {factor * ((to[0] - u_[i].x) / step_s_ - v_[i].x) - f_[i].x, factor * ((to[1] - u_[i].y) / step_s_ - v_[i].y) - f_[i].y,
@@ -293,12 +293,12 @@ void Motion::set_external_forces() {
   }
 }
 
-Vec3 Motion::calc_reaction(std::size_t hold) {
+Vec3 Motion::calc_reaction(std::size_t constraint) {
   begin_if_new();
   std::vector<OrderFreeSum> sums(3);
-  for (const HeldNode& held : held_nodes_) {
-    if (static_cast<std::size_t>(held.hold) != hold || !domain_.is_point(held.place)) continue;
-    const Quad& f = reaction_[static_cast<std::size_t>(held.place)];
+  for (const ConstrainedNode& constrained : constrained_nodes_) {
+    if (static_cast<std::size_t>(constrained.constraint) != constraint || !domain_.is_point(constrained.place)) continue;
+    const Quad& f = reaction_[static_cast<std::size_t>(constrained.place)];
     sums[0].add(f.x);
     sums[1].add(f.y);
     sums[2].add(f.z);

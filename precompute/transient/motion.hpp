@@ -1,6 +1,6 @@
 // Bodies that move: explicit steps of a Domain's nodes under elastic forces, damping, gravity, impulses, supports and what others add.
 //
-//   Motion motion(domain, options, holds, impulses);
+//   Motion motion(domain, options, constraints, impulses);
 //   motion.set_start([](std::int32_t node, const Vec3& rest_m) { return Motion::Start{}; });
 //   while (motion.get_time_s() < 1.0) {
 //     motion.advance();
@@ -32,8 +32,8 @@ struct MotionOptions {
   std::function<int(int)> round_steps;  // the number of steps in a sample that is taken for at least so many; none: the same
 };
 
-/// Nodes that are held where they are at the start (set_start()), or on a path from there.
-struct Hold {
+/// Nodes whose displacement is prescribed: fixed (Dirichlet) where they are at the start (set_start()), or driven along a path from there.
+struct Constraint {
   std::vector<std::int32_t> nodes;  // numbers of the assembly
   Path path;                        // none: fixed
   bool is_hinge = false;            // nodes of a line: the body swings about it, and mass damping does not brake the swing
@@ -108,14 +108,14 @@ class Motion {
   };
 
   /// Bodies are at rest in their rest shape. Domain lives as long as this; one Motion for a Domain. Throws on every rank: InputError for a
-  /// node that is held twice or not there, and for an impulse or option that makes no sense.
-  Motion(Domain& domain, const MotionOptions& options, std::vector<Hold> holds = {}, std::vector<Impulse> impulses = {});
+  /// node that is constrained twice or does not exist, and for an impulse or option that makes no sense.
+  Motion(Domain& domain, const MotionOptions& options, std::vector<Constraint> constraints = {}, std::vector<Impulse> impulses = {});
   Motion(const Motion&) = delete;
   Motion& operator=(const Motion&) = delete;
 
   /// Adds forces from outside, before the first step. They live as long as this.
   void add(ExternalForces& forces);
-  /// Displacement and velocity at time 0 of a node of the assembly with its rest position, the same on every rank that asks; held nodes do
+  /// Displacement and velocity at time 0 of a node of the assembly with its rest position, the same on every rank; constrained nodes do
   /// not move. Before the first step.
   void set_start(const std::function<Start(std::int32_t node, const Vec3& rest_m)>& find_start);
 
@@ -142,8 +142,8 @@ class Motion {
   const std::vector<Quad>& get_u() const { return u_; }  // (Domain::node_count) [m] at get_time_s()
   const std::vector<Quad>& get_v() const { return v_; }  // (Domain::node_count) [m/s] half a step before
   const std::vector<Quad>& get_f() const { return f_; }  // (at least own_count) [N] elastic and viscous, at get_time_s()
-  /// Force [N] that holds the nodes of a hold, on the body, summed over its nodes. Collective.
-  Vec3 calc_reaction(std::size_t hold);
+  /// Reaction [N] of the nodes of a constraint, on the body, summed over them. Collective.
+  Vec3 calc_reaction(std::size_t constraint);
 
   EnergyBook calc_book();
   /// Momentum [kg m/s] and angular momentum about the origin [kg m^2/s] at half a step before get_time_s(), over all ranks.
@@ -159,7 +159,7 @@ class Motion {
   void load(std::span<const std::byte> bytes);
 
  private:
-  void check_input(const std::vector<Hold>& holds, const std::vector<Impulse>& impulses) const;
+  void check_input(const std::vector<Constraint>& constraints, const std::vector<Impulse>& impulses) const;
   void find_step(int iterations, bool is_start);
   void check_inversion();
   void calc_forces(bool halo_is_there);
@@ -172,9 +172,9 @@ class Motion {
     if (!begun_) begin();
   }
 
-  struct HeldNode {
+  struct ConstrainedNode {
     std::int32_t place;
-    std::int32_t hold;
+    std::int32_t constraint;
   };
   struct OwnShare {
     std::int32_t place;
@@ -184,17 +184,17 @@ class Motion {
 
   Domain& domain_;
   MotionOptions options_;
-  std::vector<Hold> holds_;
+  std::vector<Constraint> constraints_;
   std::vector<Impulse> impulses_;
   std::vector<ExternalForces*> outside_;
-  std::vector<HeldNode> held_nodes_;
+  std::vector<ConstrainedNode> constrained_nodes_;
   std::vector<OwnShare> shares_;
-  std::vector<char> is_held_;                     // (own)
+  std::vector<char> is_constrained_;              // (own)
   std::vector<double> inverse_kg_, braked_kg_s_;  // (own)
   std::vector<char> is_carried_;                  // (bodies) mass damping leaves rigid motion alone
   bool is_braked_ = false, has_external_ = false, begun_ = false;
   std::vector<Quad> u_, v_, f_, external_, work_, brake_loss_, carried_;
-  std::vector<Quad> home_, reaction_;  // (own) of held nodes: where they were at the start; force of the support
+  std::vector<Quad> home_, reaction_;  // (own) of constrained nodes: displacement at the start, reaction force
   HighestFrequency highest_;
   std::vector<double> omega_;
   double longest_s_ = 0.0;

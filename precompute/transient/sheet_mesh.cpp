@@ -127,7 +127,7 @@ SheetElements make_elements(const SheetMesh& mesh, const std::vector<bool>& clam
                                    at[0].triangle, at[1].triangle));
     made.edge.push_back(ends);
     made.rest_m.push_back(0.5 * (a + b));
-    const bool holds = at.size() == 1 && clamped[static_cast<std::size_t>(ends[0])] && clamped[static_cast<std::size_t>(ends[1])];
+    const bool constraints = at.size() == 1 && clamped[static_cast<std::size_t>(ends[0])] && clamped[static_cast<std::size_t>(ends[1])];
     for (std::size_t k = 0; k < at.size(); ++k) {
       const auto t = static_cast<std::size_t>(at[k].triangle), i = static_cast<std::size_t>(at[k].corner);
       const Triangle& v = mesh.triangles[t];
@@ -138,7 +138,7 @@ SheetElements make_elements(const SheetMesh& mesh, const std::vector<bool>& clam
         const auto other = static_cast<std::size_t>(at[1 - k].triangle);
         made.nodes[t][3 + i] = mesh.triangles[other][static_cast<std::size_t>(at[1 - k].corner)];
         made.turn[t][i] = 0.5;
-      } else if (holds) {
+      } else if (constraints) {
         // The mirror image of the corner about the edge, in the plane of the triangle.
         const Vec3& c = mesh.vertices_m[static_cast<std::size_t>(v[i])];
         const Vec3 along = normalise(b - a), foot = a + dot(c - a, along) * along;

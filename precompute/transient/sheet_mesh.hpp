@@ -33,7 +33,7 @@ SheetMesh make_disc(double radius_m, int cells);
 enum class EdgeSupport { free, clamped };
 
 /// The mesh in the numbering of the simulation: nodes are the vertices, then the edges (their angle is the x of a node), then ghosts: the
-/// mirror images of the vertices opposite to clamped edges, which hold the direction there.
+/// mirror images of the vertices opposite to clamped edges, which fix the direction there.
 struct SheetElements {
   std::int32_t vertices = 0, edges = 0, ghosts = 0;
   std::vector<Vec3> rest_m;                        // (nodes); of an edge: its middle

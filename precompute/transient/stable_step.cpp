@@ -50,13 +50,13 @@ HighestFrequency::HighestFrequency(const Domain& domain)
   }
 }
 
-std::vector<double> HighestFrequency::calc(Domain& domain, const Quad* u, const std::vector<char>& held, int iterations) {
+std::vector<double> HighestFrequency::calc(Domain& domain, const Quad* u, const std::vector<char>& fixed, int iterations) {
   constexpr double kShareOfEdge = 1e-6;
   const comm::Communicator& comm = domain.get_comm();
   const auto bodies = shortest_edge_m_.size(), own = static_cast<std::size_t>(domain.own_count());
   std::vector<double> square(bodies, 0.0);
   for (std::size_t i = 0; i < own; ++i)
-    if (held[i] != 0) p_[i] = {};
+    if (fixed[i] != 0) p_[i] = {};
   domain.copy_to_halo(p_.data());
   for (int n = 0; n < iterations; ++n) {
     std::vector<double> most(bodies, 0.0);
@@ -76,7 +76,7 @@ std::vector<double> HighestFrequency::calc(Domain& domain, const Quad* u, const 
     for (std::size_t i = 0; i < own; ++i) {
       const std::size_t b = body_of(i);
       const double scale = scale_of(b), mass = domain.get_masses_kg()[i];
-      if (held[i] != 0 || scale == 0.0) continue;
+      if (fixed[i] != 0 || scale == 0.0) continue;
       const Quad force{(g_[i].x - f_[i].x) / (2.0 * scale), (g_[i].y - f_[i].y) / (2.0 * scale), (g_[i].z - f_[i].z) / (2.0 * scale), 0.0};
       sums[2 * b].add(p_[i].x * force.x + p_[i].y * force.y + p_[i].z * force.z);
       sums[2 * b + 1].add(mass * (p_[i].x * p_[i].x + p_[i].y * p_[i].y + p_[i].z * p_[i].z));

@@ -21,8 +21,9 @@ class HighestFrequency {
  public:
   explicit HighestFrequency(const Domain& domain);
 
-  /// [rad/s] (bodies), from below. u: (Domain::node_count) with its halo. held: (own_count) nodes that do not move. Collective.
-  std::vector<double> calc(Domain& domain, const Quad* u, const std::vector<char>& held, int iterations);
+  /// [rad/s] (bodies), from below. u: (Domain::node_count) with its halo. fixed: (own_count) nodes whose displacement is prescribed.
+  /// Collective.
+  std::vector<double> calc(Domain& domain, const Quad* u, const std::vector<char>& fixed, int iterations);
 
   std::vector<Quad>& get_vectors() { return p_; }  // (node_count), own ones count
 

@@ -14,28 +14,10 @@
 #include <cstring>
 #include <set>
 
+#include "runtime/bank/hdf5_id.hpp"
+
 namespace carillon::bank {
 namespace {
-
-/// An HDF5 identifier that closes itself.
-class Id {
- public:
-  Id(hid_t id, herr_t (*close)(hid_t), const char* what) : id_(id), close_(close) {
-    if (id < 0) throw SystemError(fmt::format("HDF5 cannot make {}", what));
-  }
-  ~Id() { close_(id_); }
-  Id(const Id&) = delete;
-  Id& operator=(const Id&) = delete;
-  operator hid_t() const { return id_; }
-
- private:
-  hid_t id_;
-  herr_t (*close_)(hid_t);
-};
-
-void require(herr_t status, const char* what) {
-  if (status < 0) throw SystemError(fmt::format("HDF5 cannot {}", what));
-}
 
 /// HDF5 prints every error to stderr by default; an object of this class disables that during its lifetime.
 class Silence {
@@ -53,21 +35,21 @@ class Silence {
   void* data_ = nullptr;
 };
 
-Id make_space(const std::vector<std::uint64_t>& shape) {
+Hdf5Id make_space(const std::vector<std::uint64_t>& shape) {
   const std::vector<hsize_t> extents(shape.begin(), shape.end());
   return {shape.empty() ? H5Screate(H5S_SCALAR) : H5Screate_simple(static_cast<int>(extents.size()), extents.data(), nullptr), H5Sclose,
           "a space"};
 }
 
-Id make_string_type(std::size_t bytes) {
-  Id type(H5Tcopy(H5T_C_S1), H5Tclose, "a type");
+Hdf5Id make_string_type(std::size_t bytes) {
+  Hdf5Id type(H5Tcopy(H5T_C_S1), H5Tclose, "a type");
   require(H5Tset_size(type, bytes), "size a text");
   if (bytes != H5T_VARIABLE) require(H5Tset_strpad(type, H5T_STR_NULLPAD), "pad a text");
   require(H5Tset_cset(type, H5T_CSET_UTF8), "set UTF-8");
   return {H5Tcopy(type), H5Tclose, "a type"};
 }
 
-Id make_type(const std::string& dtype) {
+Hdf5Id make_type(const std::string& dtype) {
   if (dtype == "<f8") return {H5Tcopy(H5T_IEEE_F64LE), H5Tclose, "a type"};
   if (dtype == "<f4") return {H5Tcopy(H5T_IEEE_F32LE), H5Tclose, "a type"};
   if (dtype == "<i8") return {H5Tcopy(H5T_STD_I64LE), H5Tclose, "a type"};
@@ -80,34 +62,34 @@ Id make_type(const std::string& dtype) {
 
 /// Of variable length, which h5py gives back as str.
 void write_text_attribute(hid_t object, const char* name, const std::string& text) {
-  const Id type = make_string_type(H5T_VARIABLE);
-  const Id space = make_space({});
-  const Id attribute(H5Acreate2(object, name, type, space, H5P_DEFAULT, H5P_DEFAULT), H5Aclose, name);
+  const Hdf5Id type = make_string_type(H5T_VARIABLE);
+  const Hdf5Id space = make_space({});
+  const Hdf5Id attribute(H5Acreate2(object, name, type, space, H5P_DEFAULT, H5P_DEFAULT), H5Aclose, name);
   const char* characters = text.c_str();
   require(H5Awrite(attribute, type, &characters), "write an attribute");
 }
 
 /// Creation properties without time stamps: the same bank gives the same bytes.
-Id make_properties(hid_t kind) {
+Hdf5Id make_properties(hid_t kind) {
   const hid_t properties = H5Pcreate(kind);
   H5Pset_obj_track_times(properties, false);
   return {properties, H5Pclose, "a property list"};
 }
 
-Id make_group(hid_t file, const char* path) {
-  const Id properties = make_properties(H5P_GROUP_CREATE);
+Hdf5Id make_group(hid_t file, const char* path) {
+  const Hdf5Id properties = make_properties(H5P_GROUP_CREATE);
   return {H5Gcreate2(file, path, H5P_DEFAULT, properties, H5P_DEFAULT), H5Gclose, path};
 }
 
 /// Writes one array of the seal and returns where it lies.
 Extent write_field(hid_t file, const Field& field) {
-  const Id space = make_space(field.shape);
-  const Id type = make_type(field.dtype);
-  const Id creation = make_properties(H5P_DATASET_CREATE);
+  const Hdf5Id space = make_space(field.shape);
+  const Hdf5Id type = make_type(field.dtype);
+  const Hdf5Id creation = make_properties(H5P_DATASET_CREATE);
   require(H5Pset_layout(creation, H5D_CONTIGUOUS), "choose a layout");
   require(H5Pset_alloc_time(creation, H5D_ALLOC_TIME_EARLY), "allocate early");
   require(H5Pset_fill_time(creation, H5D_FILL_TIME_NEVER), "choose not to fill");
-  const Id dataset(H5Dcreate2(file, field.name.c_str(), type, space, H5P_DEFAULT, creation, H5P_DEFAULT), H5Dclose, field.name.c_str());
+  const Hdf5Id dataset(H5Dcreate2(file, field.name.c_str(), type, space, H5P_DEFAULT, creation, H5P_DEFAULT), H5Dclose, field.name.c_str());
   Extent extent{field.dtype, 0, field.shape, calc_bytes(field)};
   if (extent.bytes > 0) {
     require(H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, field.data), "write an array");
@@ -122,43 +104,43 @@ Extent write_field(hid_t file, const Field& field) {
 
 /// A dataset of `shape` that shows the elements `source_space` has selected of the dataset `source` of this same file.
 void make_view(hid_t group, const char* name, hid_t type, const std::vector<std::uint64_t>& shape, const char* source, hid_t source_space) {
-  const Id space = make_space(shape);
-  const Id creation = make_properties(H5P_DATASET_CREATE);
+  const Hdf5Id space = make_space(shape);
+  const Hdf5Id creation = make_properties(H5P_DATASET_CREATE);
   require(H5Pset_virtual(creation, space, ".", source, source_space), "map a view");
-  const Id dataset(H5Dcreate2(group, name, type, space, H5P_DEFAULT, creation, H5P_DEFAULT), H5Dclose, name);
+  const Hdf5Id dataset(H5Dcreate2(group, name, type, space, H5P_DEFAULT, creation, H5P_DEFAULT), H5Dclose, name);
 }
 
 /// A small real dataset, compressed when it is long.
 void write_list(hid_t group, const char* name, hid_t file_type, hid_t memory_type, std::uint64_t size, const void* data) {
-  const Id space = make_space({size});
-  const Id creation = make_properties(H5P_DATASET_CREATE);
+  const Hdf5Id space = make_space({size});
+  const Hdf5Id creation = make_properties(H5P_DATASET_CREATE);
   if (size > 4096 && H5Zfilter_avail(H5Z_FILTER_DEFLATE) > 0) {
     const hsize_t chunk = std::min<hsize_t>(size, 1 << 16);
     require(H5Pset_chunk(creation, 1, &chunk), "cut into chunks");
     require(H5Pset_shuffle(creation), "shuffle");
     require(H5Pset_deflate(creation, 4), "compress");
   }
-  const Id dataset(H5Dcreate2(group, name, file_type, space, H5P_DEFAULT, creation, H5P_DEFAULT), H5Dclose, name);
+  const Hdf5Id dataset(H5Dcreate2(group, name, file_type, space, H5P_DEFAULT, creation, H5P_DEFAULT), H5Dclose, name);
   require(H5Dwrite(dataset, memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data), "write a list");
 }
 
 /// The views by which VTK and ParaView see a bank: an unstructured grid of triangles with one point array per mode, in steps of its scale.
 void write_vtk_views(hid_t file, const Bank& bank) {
   const std::uint64_t vertices = bank.vertex_count(), triangles = bank.triangles.size(), modes = bank.mode_count();
-  const Id group = make_group(file, "VTKHDF");
+  const Hdf5Id group = make_group(file, "VTKHDF");
   {
-    const Id space = make_space({2});
-    const Id attribute(H5Acreate2(group, "Version", H5T_STD_I64LE, space, H5P_DEFAULT, H5P_DEFAULT), H5Aclose, "Version");
+    const Hdf5Id space = make_space({2});
+    const Hdf5Id attribute(H5Acreate2(group, "Version", H5T_STD_I64LE, space, H5P_DEFAULT, H5P_DEFAULT), H5Aclose, "Version");
     const std::int64_t version[2] = {1, 0};
     require(H5Awrite(attribute, H5T_NATIVE_INT64, version), "write an attribute");
-    const Id type(H5Tcopy(H5T_C_S1), H5Tclose, "a type");
+    const Hdf5Id type(H5Tcopy(H5T_C_S1), H5Tclose, "a type");
     require(H5Tset_size(type, 16), "size a text");
-    const Id scalar = make_space({});
-    const Id kind(H5Acreate2(group, "Type", type, scalar, H5P_DEFAULT, H5P_DEFAULT), H5Aclose, "Type");
+    const Hdf5Id scalar = make_space({});
+    const Hdf5Id kind(H5Acreate2(group, "Type", type, scalar, H5P_DEFAULT, H5P_DEFAULT), H5Aclose, "Type");
     require(H5Awrite(kind, type, "UnstructuredGrid"), "write an attribute");
   }
   require(H5Lcreate_soft("/mesh/vertices", group, "Points", H5P_DEFAULT, H5P_DEFAULT), "link the points");
-  const Id corners = make_space({triangles, 3});
+  const Hdf5Id corners = make_space({triangles, 3});
   make_view(group, "Connectivity", H5T_STD_I64LE, {3 * triangles}, "/mesh/triangles", corners);
   std::vector<std::int64_t> offsets(triangles + 1);
   for (std::size_t t = 0; t <= triangles; ++t) offsets[t] = static_cast<std::int64_t>(3 * t);
@@ -174,10 +156,10 @@ void write_vtk_views(hid_t file, const Bank& bank) {
   count("NumberOfCells", triangles);
   count("NumberOfConnectivityIds", 3 * triangles);
 
-  const Id arrays = make_group(file, "VTKHDF/PointData");
+  const Hdf5Id arrays = make_group(file, "VTKHDF/PointData");
   const int digits = std::max<int>(3, static_cast<int>(std::to_string(modes).size()));
   for (std::uint64_t mode = 0; mode < modes; ++mode) {
-    const Id source = make_space({vertices, modes, 3});
+    const Hdf5Id source = make_space({vertices, modes, 3});
     const hsize_t start[3] = {0, mode, 0}, extent[3] = {vertices, 1, 3};
     require(H5Sselect_hyperslab(source, H5S_SELECT_SET, start, nullptr, extent, nullptr), "select a mode");
     const std::string name = fmt::format("mode_{:0{}}_{:.1f}Hz", mode + 1, digits, bank.freq_hz(mode));
@@ -232,9 +214,9 @@ Hdf5Image make_hdf5_image(const Bank& bank, const FileForm& form) {
   const std::vector<Field> fields = list_fields(bank, form);
   const bool is_packed = form.is_packed;
   const Silence silence;
-  const Id creation = make_properties(H5P_FILE_CREATE);
+  const Hdf5Id creation = make_properties(H5P_FILE_CREATE);
   require(H5Pset_userblock(creation, kSealBytes), "reserve the seal");
-  const Id access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, "a property list");
+  const Hdf5Id access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, "a property list");
   // In the newest format HDF5's own metadata carry checksums too.
   require(H5Pset_libver_bounds(access, H5F_LIBVER_LATEST, H5F_LIBVER_LATEST), "choose a format");
   require(H5Pset_alignment(access, 64 << 10, 4096), "align arrays to pages");
@@ -260,7 +242,7 @@ Hdf5Image make_hdf5_image(const Bank& bank, const FileForm& form) {
     }
     for (const Field& field : fields) image.extents.emplace(field.name, write_field(file, field));
     if (!is_packed) write_vtk_views(file, bank);
-    const Id root(H5Gopen2(file, "/", H5P_DEFAULT), H5Gclose, "the root");
+    const Hdf5Id root(H5Gopen2(file, "/", H5P_DEFAULT), H5Gclose, "the root");
     write_text_attribute(root, "format", "Carillon mode bank");
     write_text_attribute(root, "version", fmt::format("{}", fmt::join(find_version(bank, is_packed), ".")));
   } catch (...) {

@@ -10,7 +10,7 @@
 #include <limits>
 #include <numeric>
 
-#include "runtime/bank/triangle.hpp"
+#include "runtime/base/triangle.hpp"
 #include "runtime/base/vector.hpp"
 
 namespace carillon::bank {

@@ -10,7 +10,6 @@
 #include <utility>
 
 #include "runtime/bank/edges.hpp"
-#include "runtime/bank/triangle.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/triangle.hpp"
 
@@ -149,7 +148,7 @@ Nearest Mesh::find_nearest_on_face(const Vec3& x, int face) const {
   const Vec3 ab = b - a, ac = c - a, ax = x - a, bx = x - b, cx = x - c;
   Nearest found;
   found.face = face;
-  found.weights = bank::weigh_corners(dot(ab, ax), dot(ac, ax), dot(ab, bx), dot(ac, bx), dot(ab, cx), dot(ac, cx));
+  found.weights = weigh_corners(dot(ab, ax), dot(ac, ax), dot(ab, bx), dot(ac, bx), dot(ab, cx), dot(ac, cx));
   found.place = found.weights[0] * a + found.weights[1] * b + found.weights[2] * c;
   found.distance2 = norm2(x - found.place);
   return found;

@@ -234,9 +234,9 @@ LAW = {
         ],
         ["fmt", "petsc", "eigen"],
     ),
-    "precompute/emission": (["runtime/base", "runtime/recording", "precompute/comm"], ["fmt", "hdf5"]),
+    "precompute/emission": (["runtime/base", "runtime/bank", "runtime/recording", "precompute/comm"], ["fmt", "hdf5"]),
     "precompute/bem": (["runtime/base", "runtime/bank", "precompute/comm"], ["fmt", "eigen"]),
-    "precompute/transient": (["runtime/base", "partition", "precompute/mesh", "precompute/comm"], ["fmt", "mpi"]),
+    "precompute/transient": (["runtime/base", "precompute/job", "partition", "precompute/mesh", "precompute/comm"], ["fmt", "mpi"]),
     "precompute/io": (
         [
             "runtime/base",
@@ -281,6 +281,7 @@ LAW = {
         [
             "runtime/base",
             "runtime/version",
+            "runtime/bank",
             "precompute/job",
             "precompute/mesh",
             "precompute/comm",
@@ -296,8 +297,8 @@ LAW = {
 # Finer than folders: the only files that may include these.
 ONLY_IN = {
     "hdf5": re.compile(
-        r"^(runtime/bank/[a-z0-9_]+|precompute/emission/surface_file|precompute/run/run_log|precompute/simulate/motion_file|"
-        r"precompute/vtkhdf/main)\.cpp$"
+        r"^((runtime/bank/[a-z0-9_]+|precompute/emission/surface_file|precompute/run/run_log|precompute/simulate/motion_file|"
+        r"precompute/vtkhdf/main)\.cpp|runtime/bank/hdf5_id\.hpp)$"
     ),
     "cgal": re.compile(r"^precompute/mesher/[a-z0-9_]+\.(cpp|hpp)$"),
 }

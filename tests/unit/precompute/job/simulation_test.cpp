@@ -69,11 +69,11 @@ TEST(Simulation, all_keys_of_bodies_and_what_meets_them) {
   EXPECT_EQ(body.position_m, (Vec3{1, 2, 3}));
   EXPECT_FALSE(body.sounds);
   EXPECT_EQ(spec.step_s, 1e-6);
-  EXPECT_EQ(spec.strikers.at(0).velocity_m_s, (Vec3{0, 0, -2}));
+  EXPECT_EQ(spec.strikers.at(0).ball.velocity_m_s, (Vec3{0, 0, -2}));
   ASSERT_EQ(spec.obstacles.size(), 3U);
-  EXPECT_EQ(std::get<PlaneSpec>(spec.obstacles[0].form).normal, (Vec3{0, 0, 1}));
-  EXPECT_EQ(std::get<Ball>(spec.obstacles[1].form).radius_m, 0.5);
-  EXPECT_EQ(std::get<Block>(spec.obstacles[2].form).max_m, (Vec3{1, 1, 1}));
+  EXPECT_EQ(std::get<PlaneObstacle>(spec.obstacles[0].form).normal, (Vec3{0, 0, 1}));
+  EXPECT_EQ(std::get<BallObstacle>(spec.obstacles[1].form).radius_m, 0.5);
+  EXPECT_EQ(std::get<BoxObstacle>(spec.obstacles[2].form).max_m, (Vec3{1, 1, 1}));
   EXPECT_EQ(spec.blows.at(0).body, 1U);
   EXPECT_EQ(spec.contact.restitution, 0.5);
   EXPECT_EQ(spec.receivers.microphones_m.size(), 2U);

@@ -16,6 +16,7 @@
 namespace carillon::transient {
 namespace {
 
+using job::PlaneObstacle;
 using testing::make_box;
 using testing::make_law;
 using testing::World;
@@ -139,6 +140,29 @@ TEST(Contact, bodies_and_a_ball_keep_momentum_and_energy) {
   }
   EXPECT_TRUE(has_touched);
   EXPECT_LT(contacts.get_strikers()[0].velocity_m_s[0], 1.5);
+}
+
+// Without friction forces lie on the line between the two points: what hits off its centre turns, and the angular momentum of both is kept.
+TEST(Contact, keeps_angular_momentum_where_nothing_rubs) {
+  World world({{"left", make_block({0.02, 0.02, 0.02}, {2, 2, 2}, {-0.0105, 0, 0}), make_law(kYoung, 0.3, 1000, 1e-7), 0.0},
+               {"right", make_block({0.02, 0.01, 0.01}, {2, 1, 1}, {0.0105, 0.006, 0.004}), make_law(kYoung, 0.3, 1200, 1e-7), 0.0}});
+  MotionOptions options;
+  options.sample_rate_hz = 100000;
+  Motion motion(world.domain, options);
+  Contacts contacts(world.domain, make_surface(world, 0.01), {}, {}, {0.8, 0.0, {}});
+  motion.add(contacts);
+  motion.set_start([&](std::int32_t node, const Vec3&) {
+    return Motion::Start{{}, world.assembly->find_body_of_node(node) == 0 ? Vec3{1, 0, 0} : Vec3{-1, 0, 0}};
+  });
+  const Vec3 before = motion.calc_momentum().angular;
+  ASSERT_GT(norm(before), 0.0);
+  bool has_touched = false;
+  while (motion.get_time_s() < 0.006) {
+    motion.advance_sample();
+    has_touched = has_touched || contacts.count_touching() > 0;
+    EXPECT_LT(norm(motion.calc_momentum().angular - before), 1e-9 * norm(before));
+  }
+  EXPECT_TRUE(has_touched);
 }
 
 TEST(Contact, a_resumed_run_has_the_same_bits) {

@@ -112,7 +112,7 @@ struct Wave {
   std::array<int, 3> cells;
   double side_m;
   double stretch = 1.0;
-  bool is_held = false;  // both ends
+  bool is_constrained = false;  // both ends
   std::size_t axis = 0;
   double seconds = 0.02;
 };
@@ -121,12 +121,12 @@ struct Wave {
 double find_wave(const Wave& wave, double (*shape)(double)) {
   // E / rho = (1,000 m/s)^2, no lateral contraction.
   World world(make_body(wave.order, {0.5, wave.side_m, wave.side_m}, wave.cells, make_law(1e9, 0.0, 1000)));
-  std::vector<Hold> holds;
-  if (wave.is_held) holds = {{world.list_set("x-min"), {}, false}, {world.list_set("x-max"), {}, false}};
+  std::vector<Constraint> constraints;
+  if (wave.is_constrained) constraints = {{world.list_set("x-min"), {}, false}, {world.list_set("x-max"), {}, false}};
   MotionOptions options;
   options.sample_rate_hz = 100000;
   options.longest_step_s = wave.order == 1 ? 2e-6 : 1e-6;
-  Motion motion(world.domain, options, holds);
+  Motion motion(world.domain, options, constraints);
   motion.set_start([&](std::int32_t, const Vec3& x) {
     Motion::Start start{{(wave.stretch - 1.0) * x[0], 0.0, 0.0}, {}};
     start.velocity_m_s[wave.axis] = 1e-3 * shape(x[0] / 0.5 + 0.5);
@@ -176,7 +176,7 @@ TEST(Bar, that_is_stretched_is_faster) {
 
 // ---- supports ----
 
-TEST(Hold, driven_nodes_are_on_their_path_and_fixed_ones_stay) {
+TEST(Constraint, driven_nodes_are_on_their_path_and_fixed_ones_stay) {
   World world(make_body(1, {0.06, 0.02, 0.02}, {6, 2, 2}, make_law(1e8, 0.3, 1100, 1e-6)));
   const Path path({{0.0, {0, 0, 0}}, {5e-4, {2e-3, 1e-3, 0}}, {1e-3, {0, 0, -1e-3}}});
   // In large motion the book's error is that of the steps: it falls by four with half the step.
@@ -201,7 +201,7 @@ TEST(Hold, driven_nodes_are_on_their_path_and_fixed_ones_stay) {
 }
 
 // Weight that came on slowly: the support bears it, up to the bar's own swing, which braking has taken away.
-TEST(Hold, a_support_bears_the_weight) {
+TEST(Constraint, a_support_bears_the_weight) {
   World world(make_body(1, {0.02, 0.02, 0.06}, {2, 2, 6}, make_law(1e6, 0.3, 1100), 300.0));
   MotionOptions options;
   options.gravity_m_s2 = {0, 0, -9.81};
@@ -242,10 +242,10 @@ TEST(Motion, mass_damping_leaves_flight_alone) {
 }
 
 // A rod on a hinge at its end, from the horizontal: at the lowest point the energy of the fall is that of the swing, omega^2 = 3 g / L.
-TEST(Hold, a_hinged_rod_swings_and_mass_damping_does_not_brake_it) {
+TEST(Constraint, a_hinged_rod_swings_and_mass_damping_does_not_brake_it) {
   if (tests::get_ranks() > 1) GTEST_SKIP() << "tens of thousands of steps";
   World world(make_body(1, {0.1, 0.01, 0.01}, {8, 2, 2}, make_law(5e7, 0.3, 1000), 5.0));
-  Hold hinge;
+  Constraint hinge;
   hinge.is_hinge = true;
   for (const std::int32_t node : world.list_set("x-min"))
     if (std::abs(world.assembly->nodes_m[static_cast<std::size_t>(node)][2]) < 1e-9) hinge.nodes.push_back(node);
@@ -395,7 +395,7 @@ TEST(Motion, refuses_input_that_makes_no_sense) {
   EXPECT_EQ(tests::catch_message<InputError>([&] {
               Motion(world.domain, {}, {{{1000}, {}, false}});
             }),
-            "node 1000 is held or struck, and there are 16 nodes");
+            "node 1000 is constrained or struck, and there are 16 nodes");
   EXPECT_EQ(tests::catch_message<InputError>([&] {
               Motion(world.domain, {}, {}, {{0.1, 0.0, {}, {}}});
             }),

@@ -39,7 +39,7 @@ struct Scene {
     options.step_check_s = 2e-4;
     const Path path({{0.0, {0, 0, 0}}, {5e-4, {1e-3, 0, 2e-3}}, {1e-3, {0, 0, 0}}});
     motion = std::make_unique<Motion>(
-        world.domain, options, std::vector<Hold>{{world.list_set("x-min", 0), {}, false}, {world.list_set("x-max", 2), path, false}},
+        world.domain, options, std::vector<Constraint>{{world.list_set("x-min", 0), {}, false}, {world.list_set("x-max", 2), path, false}},
         std::vector<Impulse>{{1e-4, 2e-4, {0, 0.1, -1.0}, find_shares(*world.assembly, 0, {0.1, 0.0, 0.01})},
                              {0.0, 3e-4, {0.2, 0.1, -0.3}, find_shares(*world.assembly, 1, {0.0, 0.01, 0.2})}});
     motion->set_start([&](std::int32_t node, const Vec3& x) {

@@ -1,0 +1,29 @@
+// Rigid things that deformable bodies meet.
+#pragma once
+
+#include <variant>
+
+#include "runtime/base/vector.hpp"
+
+namespace carillon::job {
+
+/// Half-space, ball and box, at rest.
+struct PlaneObstacle {
+  Vec3 point_m{}, normal{0, 0, 1};  // unit, to the free side
+};
+struct BallObstacle {
+  Vec3 centre_m{};
+  double radius_m = 0;
+};
+struct BoxObstacle {
+  Vec3 min_m{}, max_m{};
+};
+using RigidObstacle = std::variant<PlaneObstacle, BallObstacle, BoxObstacle>;
+
+/// A ball that flies freely and does not turn: friction changes its flight alone.
+struct BallStriker {
+  double radius_m = 0, mass_kg = 0;
+  Vec3 position_m{}, velocity_m_s{};
+};
+
+}  // namespace carillon::job

@@ -1,0 +1,32 @@
+// The checkpoint of a simulation: one sealed file.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "precompute/comm/communicator.hpp"
+#include "precompute/transient/motion.hpp"
+
+namespace carillon::simulate {
+
+/// Everything that changes.
+struct SimulationState {
+  std::vector<transient::EnergyBook> books;  // the same on every rank
+  std::vector<std::byte> motion, contacts;   // rank 0
+  std::vector<std::byte> sound;              // of this rank; empty without sound
+};
+
+/// Writes the file whole or not at all, with the hash of the job's text, of the program and of all that it has. Collective. Throws
+/// SystemError on every rank when the disk refuses.
+void save_checkpoint(const comm::Communicator& comm, const std::filesystem::path& file, const std::string& job_text,
+                     const SimulationState& state);
+
+/// Nothing where there is no file. Collective. Throws InputError on every rank for a file that is cut off or changed, and for that of
+/// another job, program or number of ranks.
+std::optional<SimulationState> load_checkpoint(const comm::Communicator& comm, const std::filesystem::path& file,
+                                               const std::string& job_text);
+
+}  // namespace carillon::simulate
