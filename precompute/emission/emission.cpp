@@ -17,12 +17,12 @@
 #include <numbers>
 #include <numeric>
 
-#include "runtime/base/bytes.hpp"
 #include "precompute/emission/derivative.hpp"
 #include "precompute/emission/high_pass.hpp"
 #include "precompute/emission/loops.hpp"
 #include "precompute/emission/low_pass.hpp"
 #include "precompute/emission/surface_file.hpp"
+#include "runtime/base/bytes.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/sinc.hpp"
 #include "runtime/recording/pole.hpp"
@@ -115,7 +115,6 @@ struct Emission::State {
   std::vector<std::int64_t> gathered_places;  // of the triangles that ranks send, in the order of the ranks
   std::vector<std::int64_t> vertex_place;     // (V) among the vertices of all ranks
   std::vector<std::int64_t> gathered_vertices;
-  std::vector<Triangle> all_triangles;
   std::size_t vertex_total = 0, triangle_total = 0;
   std::uint64_t key_frames = 48, ray_frames = 48;
   Derivative derivative = make_derivative();
@@ -229,7 +228,6 @@ Emission::State::State(const comm::Communicator& communicator, SurfacePart part,
     }
     return own;
   });
-  const std::vector<Gathered> sent = all;
   std::sort(all.begin(), all.end(), [](const Gathered& a, const Gathered& b) { return a.number < b.number; });
   triangle_total = all.size();
   std::vector<std::int64_t> numbers;
@@ -260,11 +258,10 @@ Emission::State::State(const comm::Communicator& communicator, SurfacePart part,
       corner[c] = static_cast<std::int32_t>(find_place(vertices, one.nodes[c]));
       tables.vertex_body[static_cast<std::size_t>(corner[c])] = one.body;
     }
-    all_triangles.push_back(corner);
+    tables.triangles.push_back(corner);
     tables.triangle_body.push_back(one.body);
     tables.area_m2.push_back(one.area_m2);
   }
-  tables.triangles = all_triangles;
   for (const double whole : body_area) tables.radius_m.push_back(std::sqrt(std::max(whole, 1e-12) / (4.0 * std::numbers::pi)));
   for (const std::int32_t one : node) vertex_place.push_back(find_place(vertices, part.node_number[static_cast<std::size_t>(one)]));
   gathered_vertices = comm.all_gather(vertex_place);
@@ -553,7 +550,7 @@ void Emission::State::look(std::int64_t k) {
   std::vector<Vec3> vertices(vertex_total);
   for (std::size_t i = 0; i < all.size(); ++i) vertices[static_cast<std::size_t>(gathered_vertices[i])] = all[i];
   std::vector<Corners> triangles;
-  for (const Triangle& corner : all_triangles) {
+  for (const Triangle& corner : tables.triangles) {
     const auto at = [&](std::size_t c) { return vertices[static_cast<std::size_t>(corner[c])]; };
     triangles.push_back({at(0), at(1), at(2)});
   }
@@ -564,8 +561,12 @@ void Emission::State::look(std::int64_t k) {
     if (place[t] < 0) continue;
     const Corners& corner = triangles[static_cast<std::size_t>(place[t])];
     const Vec3 centre = (1.0 / 3.0) * (corner[0] + corner[1] + corner[2]);
-    for (std::size_t i = 0; i < arrivals.size(); ++i)
-      seen_now[i * corners.size() + t] = visibility.is_free(centre, options.receivers[i].place_m, place[t]) ? 1.0F : 0.0F;
+    const Vec3 out = cross(corner[1] - corner[0], corner[2] - corner[0]);
+    for (std::size_t i = 0; i < arrivals.size(); ++i) {
+      // A side that faces away is hidden by its own body; of a sheet, by its other side, which lies in the same plane.
+      const bool faces = dot(out, options.receivers[i].place_m - centre) > 0.0;
+      seen_now[i * corners.size() + t] = faces && visibility.is_free(centre, options.receivers[i].place_m, place[t]) ? 1.0F : 0.0F;
+    }
   }
   if (k == 0) seen_before = seen_now;
 }

@@ -323,9 +323,9 @@ SimulationSpec read_root(base::Object root, const fs::path& file) {
   spec.radiation = radiation == "kirchhoff"  ? SurfaceSound::kirchhoff
                    : radiation == "rayleigh" ? SurfaceSound::rayleigh
                                              : SurfaceSound::paper2001;
-  spec.visibility = job.boolean_or("visibility", spec.radiation == SurfaceSound::paper2001);
+  spec.visibility = job.boolean_or("visibility", spec.radiation != SurfaceSound::kirchhoff);
   spec.high_pass_hz = read_within_or(job, "high_pass_hz", 20.0, 0.0, 1000.0);
-  spec.motion_hz = read_within_or(job, "motion_hz", 60.0, 1.0, 1e5);
+  spec.motion_hz = read_within_or(job, "motion_hz", 60.0, 1.0, spec.sample_rate_hz);
   job.finish();
   read_outputs(root, spec);
   if (auto resources = root.object_if("resources")) {
@@ -352,8 +352,6 @@ SimulationSpec parse_simulation(std::string_view text, const fs::path& file) {
   return read_root(base::parse_document(text, file).root(), file);
 }
 
-SimulationSpec read_simulation(const fs::path& file) { return read_root(base::read_document(file).root(), file); }
-
 Material make_rayleigh(const Material& material, double low_hz, double high_hz) {
   // c(w) = alpha1 w^2 + alpha2 at both ends.
   const double low = std::pow(2.0 * std::numbers::pi * low_hz, 2), high = std::pow(2.0 * std::numbers::pi * high_hz, 2);
@@ -363,10 +361,6 @@ Material make_rayleigh(const Material& material, double low_hz, double high_hz) 
   result.alpha1_s = std::max(0.0, (c_high - c_low) / (high - low));
   result.alpha2_per_s = std::max(0.0, c_low - result.alpha1_s * low);
   return result;
-}
-
-std::string to_text(SurfaceSound radiation) {
-  return radiation == SurfaceSound::kirchhoff ? "kirchhoff" : radiation == SurfaceSound::rayleigh ? "rayleigh" : "paper2001";
 }
 
 }  // namespace carillon::job

@@ -121,11 +121,8 @@ bool is_simulation(std::string_view text);
 
 /// Reads and validates. Throws InputError. Not collective.
 SimulationSpec parse_simulation(std::string_view text, const std::filesystem::path& file);
-SimulationSpec read_simulation(const std::filesystem::path& file);
 
 /// A law of loss as Rayleigh's with the same loss at both frequencies. Material laws but Rayleigh's are played so by carillon-simulate.
 Material make_rayleigh(const Material& material, double low_hz, double high_hz);
-
-std::string to_text(SurfaceSound radiation);
 
 }  // namespace carillon::job

@@ -2,18 +2,18 @@
 
 #include <fmt/core.h>
 
-#include <algorithm>
 #include <cstdint>
 #include <cstring>
 #include <span>
+#include <string>
 #include <string_view>
 #include <utility>
 
+#include "precompute/comm/exchange.hpp"
 #include "precompute/io/fingerprint.hpp"
 #include "runtime/base/bytes.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/file.hpp"
-#include "runtime/base/sha256.hpp"
 
 namespace carillon::simulate {
 namespace {
@@ -24,17 +24,10 @@ constexpr std::uint64_t kMaxBytes = std::uint64_t{1} << 38;
 
 struct Head {
   char magic[8];
-  Hash job;
+  Hash identity;
   std::int32_t ranks;
 };
 constexpr char kMagic[8] = {'C', 'A', 'R', 'S', 'I', 'M', '0', '2'};
-
-Hash find_fingerprint(const std::string& job_text) {
-  base::Sha256 sum;
-  sum.add(job_text);
-  sum.add(io::find_program_version());
-  return sum.finish();
-}
 
 std::string_view view(std::span<const std::byte> bytes) { return {reinterpret_cast<const char*>(bytes.data()), bytes.size()}; }
 
@@ -47,11 +40,11 @@ Hash calc_seal(std::span<const std::byte> bytes) {
 /// What rank 0 has of a file.
 struct Content {
   SimulationState state;
-  std::vector<std::int32_t> sound_begin;  // (ranks + 1)
-  std::vector<std::byte> sounds;          // of all ranks
+  std::vector<std::int64_t> sizes;  // (ranks) bytes of their sounds
+  std::vector<std::byte> sounds;    // of all ranks
 };
 
-Content read(const std::filesystem::path& file, const Hash& job, int ranks) {
+Content read(const std::filesystem::path& file, const Hash& identity, int ranks) {
   const auto refuse = [&](const std::string& why) {
     throw InputError(fmt::format("{}: the checkpoint {}; remove it, or give another file", file.string(), why));
   };
@@ -64,55 +57,66 @@ Content read(const std::filesystem::path& file, const Hash& job, int ranks) {
   const auto head = base::take<Head>(from);
   if (std::memcmp(head.magic, kMagic, sizeof kMagic) != 0) refuse("is none of a simulation");
   if (base::take<Hash>(end) != calc_seal(content)) refuse("is cut off or changed");
-  if (head.job != job) refuse("is of another job or of another version of the program");
+  if (head.identity != identity) refuse("is of another job, of other meshes or of another version of the program");
   if (head.ranks != ranks) refuse(fmt::format("is of {} ranks, and there are {}", head.ranks, ranks));
   Content result;
   result.state.books = base::take_list<transient::EnergyBook>(from);
   result.state.motion = base::take_list<std::byte>(from);
   result.state.contacts = base::take_list<std::byte>(from);
-  result.sound_begin = base::take_list<std::int32_t>(from);
+  result.sizes = base::take_list<std::int64_t>(from);
   result.sounds = base::take_list<std::byte>(from);
   return result;
 }
 
 }  // namespace
 
-void save_checkpoint(const comm::Communicator& comm, const std::filesystem::path& file, const std::string& job_text,
+Hash find_identity(const std::string& job_text, const transient::Assembly& assembly) {
+  base::Sha256 sum;
+  sum.add(job_text);
+  sum.add(io::find_program_version());
+  sum.add(view(std::as_bytes(std::span(assembly.nodes_m))));
+  sum.add(view(std::as_bytes(std::span(assembly.tets))));
+  return sum.finish();
+}
+
+void save_checkpoint(const comm::Communicator& comm, const std::filesystem::path& file, const Hash& identity,
                      const SimulationState& state) {
-  const comm::Communicator::Gathering gathering = comm.plan_gathering(state.sound.size());
-  const std::vector<std::byte> sounds = comm.all_gather(state.sound);
+  const std::vector<std::int64_t> sizes = comm.all_gather(std::vector<std::int64_t>{static_cast<std::int64_t>(state.sound.size())});
+  const std::vector<std::byte> sounds = comm::gather(comm, state.sound);
   comm.agree([&] {
     if (!comm.is_root()) return;
     Head head{};
     std::memcpy(head.magic, kMagic, sizeof kMagic);
-    head.job = find_fingerprint(job_text);
+    head.identity = identity;
     head.ranks = comm.size();
     std::vector<std::byte> bytes;
     base::put(bytes, head);
     base::put_list(bytes, state.books);
     base::put_list(bytes, state.motion);
     base::put_list(bytes, state.contacts);
-    base::put_list(bytes, gathering.begin);
+    base::put_list(bytes, sizes);
     base::put_list(bytes, sounds);
     base::put(bytes, calc_seal(bytes));
     base::write_file(file, view(bytes));
   });
 }
 
-std::optional<SimulationState> load_checkpoint(const comm::Communicator& comm, const std::filesystem::path& file,
-                                               const std::string& job_text) {
+std::optional<SimulationState> load_checkpoint(const comm::Communicator& comm, const std::filesystem::path& file, const Hash& identity) {
   Content content;
   const bool is_there = comm.broadcast([&] {
     if (file.empty() || !std::filesystem::exists(file)) return std::int32_t{0};
-    content = read(file, find_fingerprint(job_text), comm.size());
+    content = read(file, identity, comm.size());
     return std::int32_t{1};
   }) != 0;
   if (!is_there) return std::nullopt;
   content.state.books = comm.broadcast(std::move(content.state.books));
-  content.sound_begin = comm.broadcast(std::move(content.sound_begin));
-  content.sounds = comm.broadcast(std::move(content.sounds));
-  const auto rank = static_cast<std::size_t>(comm.rank());
-  content.state.sound.assign(content.sounds.begin() + content.sound_begin[rank], content.sounds.begin() + content.sound_begin[rank + 1]);
+  // Each rank gets its part of rank 0.
+  comm::ByRank<std::byte> parts;
+  parts.items = std::move(content.sounds);
+  parts.begin.assign(1, 0);
+  for (int r = 0; r < comm.size(); ++r)
+    parts.begin.push_back(parts.begin.back() + (content.sizes.empty() ? 0 : content.sizes[static_cast<std::size_t>(r)]));
+  content.state.sound = comm::all_to_all(comm, parts).items;
   return std::move(content.state);
 }
 

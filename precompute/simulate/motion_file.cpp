@@ -13,6 +13,7 @@
 #include <string_view>
 #include <utility>
 
+#include "precompute/comm/exchange.hpp"
 #include "precompute/simulate/bodies.hpp"
 #include "runtime/bank/hdf5_id.hpp"
 #include "runtime/base/descriptor.hpp"
@@ -58,8 +59,7 @@ MotionFile::MotionFile(const transient::Domain& domain, const job::SimulationSpe
       file_(spec.motion),
       frames_(std::filesystem::path(spec.motion) += ".frames"),
       every_samples_(spec.sample_rate_hz / spec.motion_hz),
-      rate_hz_(spec.sample_rate_hz),
-      motion_hz_(spec.motion_hz) {
+      rate_hz_(spec.sample_rate_hz) {
   const transient::Assembly& assembly = domain.get_assembly();
   std::map<std::int32_t, std::int32_t> index;
   for (std::size_t b = 0; b < assembly.bodies.size(); ++b)
@@ -88,6 +88,7 @@ void MotionFile::add_sample(const transient::Motion& motion) {
   if (frame == frame_) return;
   // The one that is due, whatever came before: a run that resumes begins in the middle.
   frame_ = frame;
+  count_ = frame + 1;
   if (motion.get_sample() != static_cast<std::int64_t>(std::ceil(static_cast<double>(frame) * every_samples_ - 1e-9))) return;
   std::vector<Point> own;
   for (const auto& [number, place] : own_) {
@@ -96,8 +97,7 @@ void MotionFile::add_sample(const transient::Motion& motion) {
     own.push_back({number, static_cast<float>(rest[0] + u.x), static_cast<float>(rest[1] + u.y), static_cast<float>(rest[2] + u.z),
                    static_cast<float>(std::sqrt(v.x * v.x + v.y * v.y + v.z * v.z))});
   }
-  const std::vector<Point> all = domain_.get_comm().all_gather(own);
-  count_ = frame + 1;
+  const std::vector<Point> all = comm::gather(domain_.get_comm(), own);
   domain_.get_comm().agree([&] {
     if (!domain_.get_comm().is_root()) return;
     std::vector<float> row(static_cast<std::size_t>(points_) * kRow);

@@ -36,7 +36,7 @@ class MotionFile {
   double every_samples_ = 1;
   std::int64_t frame_ = -1;  // the last one
   std::int64_t count_ = 0;   // frames in the file
-  double rate_hz_ = 0, motion_hz_ = 0;
+  double rate_hz_ = 0;
   std::vector<std::array<std::int32_t, 2>> own_;        // index among the points, place on this rank
   std::vector<std::array<std::int32_t, 3>> triangles_;  // into the points
   std::vector<std::int32_t> body_;                      // of each

@@ -28,6 +28,7 @@
 #include "runtime/base/error.hpp"
 #include "runtime/base/file.hpp"
 #include "runtime/base/json.hpp"
+#include "runtime/base/printable.hpp"
 
 namespace carillon::simulate {
 namespace {
@@ -53,7 +54,7 @@ struct Log {
     std::fflush(stdout);
   }
   void warn(const std::string& text) const {
-    if (comm.is_root()) fmt::print(stderr, "carillon-simulate: warning: {}\n", text);
+    if (comm.is_root()) fmt::print(stderr, "carillon-simulate: warning: {}\n", base::printable(text));
   }
 };
 
@@ -373,7 +374,8 @@ SimulateSummary simulate(const comm::Communicator& comm, const fs::path& job_fil
     summary.result = predict(comm, simulation, options.json);
     return summary;
   }
-  const std::optional<SimulationState> saved = load_checkpoint(comm, options.checkpoint, text);
+  const base::Sha256::Hash identity = find_identity(text, *simulation.bodies.assembly);
+  const std::optional<SimulationState> saved = load_checkpoint(comm, options.checkpoint, identity);
   if (simulation.makes_sound())
     simulation.sound = std::make_unique<emission::Emission>(comm, make_surface_part(*simulation.domain, spec),
                                                             make_emission_options(spec, motion.get_steps_per_sample(), saved.has_value()));
@@ -408,7 +410,7 @@ SimulateSummary simulate(const comm::Communicator& comm, const fs::path& job_fil
                                          : is_due             ? std::int32_t{kSave}
                                                               : std::int32_t{kNothing});
     if (wanted == kNothing) continue;
-    save_checkpoint(comm, options.checkpoint, text, collect_state(comm, simulation));
+    save_checkpoint(comm, options.checkpoint, identity, collect_state(comm, simulation));
     last_save_s = reporter.find_seconds();
     if (wanted == kSave) continue;
     summary.is_stopped = true;

@@ -14,18 +14,25 @@
 #include <unordered_map>
 #include <variant>
 
+#include "precompute/comm/exchange.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::transient {
 namespace {
 
-constexpr double kMargin = 0.5;          // of the search, in mean edges
-constexpr double kStartOverlap = 0.1;    // in mean edges
-constexpr std::int64_t kMostSteps = 64;  // between two looks at how far things have moved
-constexpr double kSlowest = 1e-9;        // closing speed [m/s] of a contact that begins at rest
-constexpr double kStopShare = 0.5;       // of the tangential momentum that friction takes in a step at most
-constexpr double kStrikerPhase = 0.01;   // [rad] a step of a striker on an obstacle, which is stopped by a spring of its own
-constexpr double kSame = 1e-12;          // distances that are the same, in mean edges
+constexpr double kMargin = 0.5;                       // of the search, in mean edges
+constexpr double kStartOverlap = 0.1;                 // in mean edges
+constexpr std::int64_t kMostSteps = 64;               // between two looks at how far things have moved
+constexpr double kSlowest = 1e-9;                     // closing speed [m/s] of a contact that begins at rest
+constexpr double kStopShare = 0.5;                    // of the tangential momentum that friction takes in a step at most
+constexpr double kStrikerPhase = 0.01;                // [rad] a step of a striker on an obstacle, which is stopped by a spring of its own
+constexpr double kSame = 1e-12;                       // distances that are the same, in mean edges
+constexpr double kFarthestM = 1e6, kFastestMs = 1e9;  // beyond which a motion is not stable
+
+/// What is no number counts as larger.
+void take_larger(double value, double& largest) {
+  if (!(value <= largest)) largest = value;
+}
 
 Vec3 get_vector(const Quad& q) { return {q.x, q.y, q.z}; }
 void add(Quad& f, const Vec3& force) {
@@ -440,15 +447,21 @@ void Contacts::look_around(const StepTime& time, const Quad* u, const Quad* v) {
   double moved = 0, fastest = 0;
   for (const std::int32_t i : own_) {
     const auto s = static_cast<std::size_t>(i);
-    moved = std::max(moved, norm(surface_.nodes[s].rest_m + get_vector(u[place_[s]]) - found_at_m_[s]));
-    fastest = std::max(fastest, norm(get_vector(v[place_[s]])));
+    take_larger(norm(surface_.nodes[s].rest_m + get_vector(u[place_[s]]) - found_at_m_[s]), moved);
+    take_larger(norm(get_vector(v[place_[s]])), fastest);
   }
   for (std::size_t s = 0; s < strikers_.size(); ++s) {
-    if (s < strikers_at_m_.size()) moved = std::max(moved, norm(strikers_[s].position_m - strikers_at_m_[s]));
-    fastest = std::max(fastest, norm(strikers_[s].velocity_m_s));
+    if (s < strikers_at_m_.size()) take_larger(norm(strikers_[s].position_m - strikers_at_m_[s]), moved);
+    take_larger(norm(strikers_[s].velocity_m_s), fastest);
   }
   std::array<double, 2> most{moved, fastest};
+  // Forces grow with the cube of the displacement: what is lost is found here before its places are no numbers.
+  for (double& value : most)
+    if (!std::isfinite(value)) value = std::numeric_limits<double>::infinity();
   comm_.max(std::span<double>(most));
+  if (!(most[0] < kFarthestM && most[1] < kFastestMs))
+    throw SolveError(fmt::format("the bodies move without bounds at {:.6g} s, step {}: use a weaker blow, a shorter step or a finer mesh",
+                                 time.time_s, time.step));
   const bool is_first = active_index_.empty();
   if (is_first || most[0] > 0.25 * margin_m_) search(u);
   if (is_first && time.step == 0) comm_.agree([&] { check_start(); });
@@ -487,7 +500,13 @@ ExternalForces::Energy Contacts::calc_energy() {
   std::array<OrderFreeSum, 2> sums{stored_own_, lost_own_};
   const std::vector<double> own = calc_sums(comm_, sums);
   Energy energy{own[0] + stored_shared_, own[1] + lost_shared_, gravity_work_};
-  for (const BallStriker& striker : strikers_) energy.stored_j += 0.5 * striker.mass_kg * dot(striker.velocity_m_s, striker.velocity_m_s);
+  // As the book has it: in the middle of the step, kinetic energy by the velocities of both halves.
+  for (std::size_t s = 0; s < strikers_.size(); ++s) {
+    const BallStriker& striker = strikers_[s];
+    const Vec3& v = striker.velocity_m_s;
+    energy.stored_j += 0.5 * (striker.mass_kg * dot(v, v) + act_s_ * dot(v, on_striker_n_[s]));
+    energy.put_in_j += 0.5 * act_s_ * striker.mass_kg * dot(rules_.gravity_m_s2, v);
+  }
   return energy;
 }
 
@@ -514,7 +533,7 @@ std::vector<std::byte> Contacts::save() {
     const bool is_local = key[0] >= 0 && key[1] < 0;
     if (is_local || comm_.is_root()) own.push_back({key[0], key[1], touch.closing_m_s, touch.stiffness_n_m, touch.loss_n});
   }
-  std::vector<KeptTouch> all = comm_.all_gather(own);
+  const std::vector<KeptTouch> all = comm::gather(comm_, own);
   OrderFreeSum lost = lost_own_;
   const double lost_j = calc_sum(comm_, lost) + lost_shared_;
   return comm_.agree([&] {

@@ -8,7 +8,6 @@
 
 namespace carillon::transient {
 
-inline constexpr int kMostLanes = 8;
 inline constexpr int kStresses = 6;  // xx yy zz yz xz xy
 
 /// Of the rule of four points: node k's own barycentric coordinate at its point, and the others.

@@ -81,7 +81,11 @@ Motion::Motion(Domain& domain, const MotionOptions& options, std::vector<Constra
       inverse_kg_.push_back(1.0 / mass);
       braked_kg_s_.push_back(is_constrained_[i] != 0 ? 0.0 : alpha2 * mass);
     }
-    for (const Assembly::Body& body : assembly.bodies) is_braked_ = is_braked_ || body.mass_damping_per_s > 0.0;
+    for (std::size_t b = 0; b < assembly.bodies.size(); ++b) {
+      const bool is_braked = assembly.bodies[b].mass_damping_per_s > 0.0;
+      is_braked_ = is_braked_ || is_braked;
+      has_carried_ = has_carried_ || (is_braked && is_carried_[b] != 0);
+    }
     has_external_ = is_braked_ || !constraints_.empty() || !impulses_.empty() || norm(options_.gravity_m_s2) > 0.0;
   });
 }
@@ -219,7 +223,7 @@ void Motion::advance() {
   if (is_at_sample()) {
     const auto samples = std::max<std::int64_t>(1, std::llround(options_.step_check_s * options_.sample_rate_hz));
     const bool is_due = sample_ % samples == 0;
-    if (is_due || is_braked_) {
+    if (is_due || has_carried_) {
       domain_.end_halo(v_.data());
       halo_is_there = true;
       move_halo();
@@ -308,7 +312,7 @@ Vec3 Motion::calc_reaction(std::size_t constraint) {
 }
 
 void Motion::update_carried() {
-  if (!is_braked_) return;
+  if (!has_carried_) return;
   const Assembly& assembly = domain_.get_assembly();
   const auto bodies = assembly.bodies.size();
   constexpr std::size_t kSums = 16;  // m, m x, m v, m x (x) v as a vector, the six of m x x^T
@@ -380,7 +384,7 @@ void Motion::check_inversion() {
 
 EnergyBook Motion::calc_book() {
   begin_if_new();
-  std::vector<OrderFreeSum> sums(5);
+  std::vector<OrderFreeSum> sums(7);
   const std::vector<double>& mass = domain_.get_masses_kg();
   for (std::size_t i = 0; i < inverse_kg_.size(); ++i) {
     const Quad& v = v_[i];
@@ -395,25 +399,19 @@ EnergyBook Motion::calc_book() {
         const Quad relative{v.x - carried_[i].x, v.y - carried_[i].y, v.z - carried_[i].z, 0.0};
         sums[3].add(brake_loss_[i].x + brake_loss_[i].y + brake_loss_[i].z);
         brake_loss_[i] = {};
-        sums[4].add(0.5 * act_s_ * braked_kg_s_[i] * multiply(relative, v));
+        const double braked = 0.5 * act_s_ * braked_kg_s_[i] * multiply(relative, v);
+        sums[4].add(braked);
+        sums[6].add(braked);
       }
     }
     sums[0].add(0.5 * (mass[i] * multiply(v, v) + act_s_ * power));
   }
   const Domain::State state = domain_.calc_state(u_.data());
   for (const double energy : state.energy_j) sums[1].add(energy);
-  OrderFreeSum spent, brake_now;
-  for (const double value : domain_.list_spent()) spent.add(value);
+  for (const double value : domain_.list_spent()) sums[5].add(value);
   domain_.forget_spent();
-  if (is_braked_)
-    for (std::size_t i = 0; i < inverse_kg_.size(); ++i) {
-      const Quad relative{v_[i].x - carried_[i].x, v_[i].y - carried_[i].y, v_[i].z - carried_[i].z, 0.0};
-      brake_now.add(0.5 * act_s_ * braked_kg_s_[i] * multiply(relative, v_[i]));
-    }
-  sums.push_back(spent);
-  sums.push_back(brake_now);
   const std::vector<double> sum = calc_sums(domain_.get_comm(), sums);
-  // The second half of the last step's work against damping is not known yet, and the first half is among `spent`.
+  // The second half of the last step's work against damping is not known yet, and the first half is among those in sum[5].
   dissipated_j_ += sum[5];
   braked_j_ += sum[3];
   work_j_ += sum[2] + sum[3];

@@ -192,7 +192,7 @@ class Motion {
   std::vector<char> is_constrained_;              // (own)
   std::vector<double> inverse_kg_, braked_kg_s_;  // (own)
   std::vector<char> is_carried_;                  // (bodies) mass damping leaves rigid motion alone
-  bool is_braked_ = false, has_external_ = false, begun_ = false;
+  bool is_braked_ = false, has_carried_ = false, has_external_ = false, begun_ = false;
   std::vector<Quad> u_, v_, f_, external_, work_, brake_loss_, carried_;
   std::vector<Quad> home_, reaction_;  // (own) of constrained nodes: displacement at the start, reaction force
   HighestFrequency highest_;

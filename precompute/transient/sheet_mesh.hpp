@@ -29,9 +29,6 @@ SheetMesh make_rectangle(double length_m, double width_m, int cells, double bow_
 /// Throws InputError for a radius that is not positive or fewer than two cells.
 SheetMesh make_disc(double radius_m, int cells);
 
-/// What is behind an edge at the rim of a sheet, or where its vertices are fixed.
-enum class EdgeSupport { free, clamped };
-
 /// The mesh in the numbering of the simulation: nodes are the vertices, then the edges (their angle is the x of a node), then ghosts: the
 /// mirror images of the vertices opposite to clamped edges, which fix the direction there.
 struct SheetElements {

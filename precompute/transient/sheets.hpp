@@ -27,9 +27,6 @@ inline constexpr double kEdgeInertia = 0.02;
 /// The lumped masses of a sheet's nodes: [kg] of vertices, [kg m^2] of edges; a ghost gets that of its triangle's third, and is fixed.
 std::vector<double> calc_masses(const SheetElements& elements, const SheetLaw& law);
 
-/// The arrays of one block of kLanes triangles; a padded lane repeats the last triangle without stiffness.
-struct SheetBlocks;
-
 /// Triangles in blocks, structure of arrays. Nodes may be numbered in any way: `read` says where a node's state is, `write` where its force
 /// is added to. The force on a node is the sum over its triangles in ascending order; it does not depend on how they are cut into blocks.
 class Sheets {

@@ -76,7 +76,9 @@ with tempfile.TemporaryDirectory(prefix="carillon-simulate-") as scratch:
     assert done.returncode == 2 and "of another job" in done.stderr, done
     state = (folder / "state").read_bytes()
     write_job(folder / "job.json", job)
-    for damaged in (state[: len(state) // 2], state[:10], b"no checkpoint " * 100):
+    middle = len(state) // 2
+    flipped = state[:middle] + bytes([state[middle] ^ 1]) + state[middle + 1 :]
+    for damaged in (state[:middle], state[:10], flipped, b"no checkpoint " * 100):
         (folder / "state").write_bytes(damaged)
         done = run(folder, "job.json", "--checkpoint", "state")
         assert done.returncode == 2 and done.stderr.count("error:") == 1 and "checkpoint" in done.stderr, done

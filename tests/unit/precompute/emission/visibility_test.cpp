@@ -73,6 +73,28 @@ TEST(Visibility, ABodyBehindAWallIsSilentWhereTheFormulaHasDelta) {
   EXPECT_GT(find_most(hear_behind(wall, 0.0, Radiation::kKirchhoff), 1000, 4000), 1e-9);
 }
 
+// A sheet has each triangle from both sides: the side that faces the receiver is heard, and the other one is hidden behind it.
+TEST(Visibility, ASheetIsHeardFromItsNearSideAlone) {
+  const auto listen = [](bool has_both, Radiation radiation) {
+    SurfacePart part;
+    part.nodes_m = {{-0.01, -0.01, 0}, {0.01, -0.01, 0}, {0.01, 0.01, 0}, {-0.01, 0.01, 0}};
+    part.node_number = {0, 1, 2, 3};
+    part.triangles = {{0, 1, 2}, {0, 2, 3}};
+    if (has_both) part.triangles.insert(part.triangles.end(), {{0, 2, 1}, {0, 3, 2}});
+    for (std::size_t t = 0; t < part.triangles.size(); ++t) part.triangle_number.push_back(static_cast<std::int64_t>(t));
+    part.body.assign(part.triangles.size(), 0);
+    Options options = make_options(2000, {0.1, 0.2, 1.0}, 4);
+    options.radiation = radiation;
+    options.has_visibility = true;
+    return hear(part, options, [](const Vec3&, double t) { return Vec3{0, 0, 1e-6 * std::sin(kTwoPi * 1000.0 * t)}; });
+  };
+  for (const Radiation radiation : {Radiation::kRayleigh, Radiation::kPaper2001}) {
+    const std::vector<double> both = listen(true, radiation), near = listen(false, radiation);
+    EXPECT_GT(find_most(near, 0, near.size()), 0.0);
+    EXPECT_EQ(both, near);
+  }
+}
+
 TEST(Visibility, ABodyThatGoesBehindAWallFadesWithoutAClick) {
   // The edge is at x = 0.2, half way; the body passes it at 10 m/s.
   const std::vector<Corners> wall{{Vec3{0.1, -5, 0.5}, Vec3{9, 0, 0.5}, Vec3{0.1, 5, 0.5}}};

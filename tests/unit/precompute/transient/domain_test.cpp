@@ -4,6 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <memory>
+#include <numbers>
 #include <set>
 
 #include "runtime/base/error.hpp"
@@ -155,6 +158,20 @@ TEST(Domain, refuses_bodies_that_are_no_solids) {
   bodies[0].law = make_law(70e9, 0.33, 2700);
   std::swap(bodies[0].mesh.tets[0], bodies[0].mesh.tets[1]);
   EXPECT_NE(tests::catch_message<InputError>([&] { World world(bodies); }).find("body 'bar': element 1 of its mesh"), std::string::npos);
+}
+
+// rho t A, of the points alone: angles of edges have an inertia of their own.
+TEST(Domain, a_sheet_has_its_mass_on_any_number_of_ranks) {
+  const comm::Communicator comm(MPI_COMM_WORLD);
+  SheetBody sheet{"sheet", make_disc(0.1, 12), {}, {8e10, 6e10, 7000.0, 0.002, 0.0}, 0.0};
+  sheet.clamped.assign(sheet.mesh.vertices_m.size(), false);
+  const auto assembly = std::make_shared<const Assembly>(make_assembly(comm, std::vector<AnyBody>{sheet}));
+  const Domain domain(comm, assembly);
+  double mass = 0.0;
+  for (std::int32_t place = 0; place < domain.own_count(); ++place)
+    if (domain.is_point(place)) mass += domain.get_masses_kg()[static_cast<std::size_t>(place)];
+  const double area = 36 * 0.5 * 0.01 * std::sin(2 * std::numbers::pi / 36);  // of the polygon
+  EXPECT_NEAR(comm.sum(mass), 7000.0 * 0.002 * area, 1e-13);
 }
 
 }  // namespace
