@@ -64,6 +64,30 @@ std::string find_title(const PageOrder& order) {
   return first.filename() == "scene.json" ? first.parent_path().filename().string() : first.stem().string();
 }
 
+/// Takes effects by name out of a key "effects", in each of its forms: a list, {"on": [...], "off": [...]}, {"head": true}.
+void remove_effects(Json::Value& owner, const std::vector<std::string>& names) {
+  if (!owner.isObject() || !owner.isMember("effects")) return;
+  Json::Value& effects = owner["effects"];
+  const auto take_from = [&](Json::Value& list) {
+    if (!list.isArray()) return;
+    Json::Value kept(Json::arrayValue);
+    for (const Json::Value& one : list)
+      if (!one.isString() || std::find(names.begin(), names.end(), one.asString()) == names.end()) kept.append(one);
+    list = kept;
+  };
+  take_from(effects);
+  if (!effects.isObject()) return;
+  for (const char* key : {"on", "off"})
+    if (effects.isMember(key)) take_from(effects[key]);
+  for (const std::string& name : names) effects.removeMember(name);
+}
+
+/// The same of a scene and of each of its bodies.
+void remove_effects_of_all(Json::Value& scene, const std::vector<std::string>& names) {
+  remove_effects(scene, names);
+  for (Json::Value& body : scene["bodies"]) remove_effects(body, names);
+}
+
 /// Frees the ears of a listener with a head, which the sound engine has not. Whether there was one.
 bool take_head(Json::Value& scene) {
   if (!scene.isMember("listener")) return false;
@@ -71,6 +95,7 @@ bool take_head(Json::Value& scene) {
   const bool has_head = listener["ears"] == "hrtf";
   listener.removeMember("ears");
   listener.removeMember("sofa");
+  if (has_head) remove_effects_of_all(scene, {"head"});
   return has_head;
 }
 
@@ -208,6 +233,7 @@ class Work {
       if (done_.has_recording) body["effects"] = report_["per_body"][i]["effects"];
       about["bodies"].append(body);
     }
+    remove_effects_of_all(scene_, {"head", "nonlinear", "directivity", "ground_reflection"});  // not in the engine of pages
     base::write_file(path(kSceneFile), to_text(scene_));
     base::write_file(path(kAboutFile), to_text(about));
     put_folder(page_, folder_.path());

@@ -1,3 +1,4 @@
+// One chain from displacements to sound, whose stages share the rows of nodes and triangles; longer than most files.
 // Method:     displacements are summed over a box of steps; a low-pass takes the means to the audio rate; velocities and accelerations are
 //             band-limited derivatives there (33 samples). A box is a mean of places: the velocity that follows
 //             has passed it twice, as the difference and as the mean, which sets its images to -60 dB. Triangles are evaluated once a

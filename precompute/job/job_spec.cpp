@@ -16,8 +16,6 @@ namespace fs = std::filesystem;
 constexpr double kMaxHz = 1e12;
 constexpr std::size_t kMaxFixed = 1000, kMaxRegions = 10000;
 constexpr std::size_t kLongestName = 200;  // bytes
-constexpr long long kMaxRanks = 1'000'000;
-constexpr double kMaxGb = 1e9, kMaxSeconds = 1e9;
 constexpr double kMinScale = 1e-9, kMaxScale = 1e6;
 constexpr long long kMinSkin = 100, kMaxSkin = 200'000;
 constexpr double kMinAirDb = -80.0, kMaxAirDb = -20.0;
@@ -59,14 +57,7 @@ const Words<AirMethod> kAirMethods{{{"none", AirMethod::none}, {"auto", AirMetho
 Fixed read_fixed(base::Object fixed) {
   Fixed result;
   if (fixed.has("node_set")) result.node_set = fixed.string("node_set");
-  if (auto box = fixed.object_if("box_m")) {
-    result.box_m = {box->numbers<3>("min"), box->numbers<3>("max")};
-    for (int axis = 0; axis < 3; ++axis) {
-      if ((*result.box_m)[0][axis] > (*result.box_m)[1][axis])
-        box->fail("max", "every coordinate of \"max\" must be at least that of \"min\"");
-    }
-    box->finish();
-  }
+  if (auto box = fixed.object_if("box_m")) result.box_m = read_box(*box);
   if (fixed.has("name")) {
     result.name = fixed.string("name");
     if (result.name.size() > kLongestName ||
@@ -164,15 +155,6 @@ void read_nonlinear(base::Object& job, JobSpec& spec) {
   nonlinear.finish();
 }
 
-void read_resources(base::Object& job, JobSpec& spec) {
-  auto resources = job.object_if("resources");
-  if (!resources) return;
-  if (auto ranks = resources->integer_if("ranks", 1, kMaxRanks)) spec.resources.ranks = static_cast<int>(*ranks);
-  spec.resources.memory_gb = resources->number_if("memory_gb", {0.0, kMaxGb}).value_or(0.0);
-  spec.resources.time_limit_s = resources->number_if("time_limit_s", {0.0, kMaxSeconds}).value_or(0.0);
-  resources->finish();
-}
-
 void read_geometry(base::Object& job, JobSpec& spec) {
   if (job.has("shape")) {
     for (const char* key : {"body", "mesh", "mesh_scale"})
@@ -249,7 +231,7 @@ JobSpec read_root(base::Object job, const fs::path& file, BankKey bank) {
   read_solver(job, spec);
   read_air(job, spec);
   read_nonlinear(job, spec);
-  read_resources(job, spec);
+  spec.resources = read_resources(job);
   job.ignore("run");
   job.finish();
   check_outputs(job, spec);

@@ -13,6 +13,8 @@ namespace {
 constexpr double kMinLength = 1e-6, kMaxLength = 1e4;      // [m]
 constexpr double kMinOpening = 20.0, kMaxOpening = 340.0;  // [degrees]
 constexpr long long kMaxNodes = 20'000'000;
+constexpr long long kMaxRanks = 1'000'000;
+constexpr double kMaxGb = 1e9, kMaxSeconds = 1e9;
 
 double read_length(base::Object& body, const std::string& key) {
   const double value = body.number(key, base::kPositive);
@@ -77,6 +79,25 @@ void read_surface(base::Object& body, Body& result) {
 }
 
 }  // namespace
+
+std::array<std::array<double, 3>, 2> read_box(base::Object box) {
+  const std::array<std::array<double, 3>, 2> sides{box.numbers<3>("min"), box.numbers<3>("max")};
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    if (sides[0][axis] > sides[1][axis]) box.fail("max", "every coordinate of \"max\" must be at least that of \"min\"");
+  box.finish();
+  return sides;
+}
+
+Resources read_resources(base::Object& job) {
+  Resources read;
+  auto resources = job.object_if("resources");
+  if (!resources) return read;
+  if (auto ranks = resources->integer_if("ranks", 1, kMaxRanks)) read.ranks = static_cast<int>(*ranks);
+  read.memory_gb = resources->number_if("memory_gb", {0.0, kMaxGb}).value_or(0.0);
+  read.time_limit_s = resources->number_if("time_limit_s", {0.0, kMaxSeconds}).value_or(0.0);
+  resources->finish();
+  return read;
+}
 
 const std::vector<ShapeKeys>& get_shape_keys() {
   static const std::vector<ShapeKeys> keys{{"bar", {"length", "width", "thickness"}},

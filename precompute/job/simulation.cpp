@@ -23,8 +23,6 @@ constexpr double kMaxSeconds = 3600.0, kMinStepS = 1e-12, kMaxStepS = 1e-3;
 constexpr double kMinLengthM = 1e-6, kMaxMassKg = 1e9;
 constexpr int kMaxCells = 2000;
 constexpr std::size_t kMaxBodies = 100, kMaxBlows = 10000, kMaxRows = 100'000, kMaxGroups = 1000, kMaxMicrophones = 16;
-constexpr long long kMaxRanks = 1'000'000;
-constexpr double kMaxGb = 1e9, kMaxLimitS = 1e9;
 /// Where a law of loss that is not Rayleigh's has the same loss as the one that is simulated.
 constexpr double kFitLowHz = 200.0, kFitHighHz = 5000.0;
 
@@ -44,14 +42,6 @@ double read_within(base::Object& object, std::string_view key, double low, doubl
 
 double read_within_or(base::Object& object, std::string_view key, double fallback, double low, double high) {
   return object.has(key) ? read_within(object, key, low, high) : fallback;
-}
-
-std::array<Vec3, 2> read_box(base::Object box) {
-  const std::array<Vec3, 2> sides{box.numbers<3>("min"), box.numbers<3>("max")};
-  for (std::size_t axis = 0; axis < 3; ++axis)
-    if (sides[0][axis] > sides[1][axis]) box.fail("max", "every coordinate of \"max\" must be at least that of \"min\"");
-  box.finish();
-  return sides;
 }
 
 NodeGroup read_group(base::Object group) {
@@ -328,12 +318,7 @@ SimulationSpec read_root(base::Object root, const fs::path& file) {
   spec.motion_hz = read_within_or(job, "motion_hz", 60.0, 1.0, spec.sample_rate_hz);
   job.finish();
   read_outputs(root, spec);
-  if (auto resources = root.object_if("resources")) {
-    if (auto ranks = resources->integer_if("ranks", 1, kMaxRanks)) spec.resources.ranks = static_cast<int>(*ranks);
-    spec.resources.memory_gb = resources->number_if("memory_gb", {0.0, kMaxGb}).value_or(0.0);
-    spec.resources.time_limit_s = resources->number_if("time_limit_s", {0.0, kMaxLimitS}).value_or(0.0);
-    resources->finish();
-  }
+  spec.resources = read_resources(root);
   root.finish();
   return spec;
 }

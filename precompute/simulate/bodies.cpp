@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <set>
 #include <variant>
@@ -269,18 +270,28 @@ void share(const comm::Communicator& comm, const std::vector<Made>& made, const 
 
 void add_blows(const job::SimulationSpec& spec, Bodies& bodies) {
   const transient::Assembly& assembly = *bodies.assembly;
+  struct Struck {
+    std::vector<std::array<std::int32_t, 6>> skin;
+    double extent_m = 0;  // of the body about its centre of mass
+  };
+  std::map<std::size_t, Struck> struck;
   for (const job::Blow& blow : spec.blows) {
     const auto& body = assembly.bodies[blow.body];
+    const auto [found, is_new] = struck.try_emplace(blow.body);
+    Struck& target = found->second;
+    if (is_new) {
+      target.skin = transient::list_skin(assembly, static_cast<std::int32_t>(blow.body));
+      for (std::int32_t n = body.first_node; n < body.last_node; ++n)
+        target.extent_m = std::max(target.extent_m, norm(assembly.nodes_m[static_cast<std::size_t>(n)] - bodies.centre_m[blow.body]));
+    }
     const Placement placement = find_placement(spec.bodies[blow.body]);
-    double distance = 0, extent = 0;
+    double distance = 0;
     transient::Impulse impulse;
     impulse.time_s = blow.time_s - 0.5 * blow.duration_s;
     impulse.duration_s = blow.duration_s;
     impulse.impulse_n_s = placement.rotation * blow.impulse_n_s;
-    impulse.shares = find_shares(assembly, static_cast<std::int32_t>(blow.body), placement.place(blow.point_m), &distance);
-    for (std::int32_t n = body.first_node; n < body.last_node; ++n)
-      extent = std::max(extent, norm(assembly.nodes_m[static_cast<std::size_t>(n)] - bodies.centre_m[blow.body]));
-    if (distance > kMostStrikeDistance * extent)
+    impulse.shares = find_shares(assembly, target.skin, placement.place(blow.point_m), &distance);
+    if (distance > kMostStrikeDistance * target.extent_m)
       throw InputError(
           fmt::format("{}: \"point_m\" is {:.3g} m from the surface of body \"{}\"; give a point on it, in the axes of its mesh",
                       blow.place, distance, body.name));

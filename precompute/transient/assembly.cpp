@@ -331,11 +331,16 @@ std::vector<std::array<std::int32_t, 6>> list_skin(const Assembly& assembly, std
 }
 
 std::vector<NodeShare> find_shares(const Assembly& assembly, std::int32_t body, const Vec3& point_m, double* distance_m) {
+  return find_shares(assembly, list_skin(assembly, body), point_m, distance_m);
+}
+
+std::vector<NodeShare> find_shares(const Assembly& assembly, std::span<const std::array<std::int32_t, 6>> skin, const Vec3& point_m,
+                                   double* distance_m) {
   const auto at = [&](std::int32_t node) { return assembly.nodes_m[static_cast<std::size_t>(node)]; };
   double least = std::numeric_limits<double>::infinity();
   std::array<std::int32_t, 6> nearest{};
   Vec3 weight{};
-  for (const auto& facet : list_skin(assembly, body)) {
+  for (const auto& facet : skin) {
     const Vec3 a = at(facet[0]), b = at(facet[1]), c = at(facet[2]), w = weigh_corners(point_m, a, b, c);
     const double distance = norm(w[0] * a + w[1] * b + w[2] * c - point_m);
     if (distance < least) {

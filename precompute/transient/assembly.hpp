@@ -87,6 +87,9 @@ struct NodeShare {
 
 /// Shares of a force at `point_m` (rest position) among the nodes of the nearest facet of the body's skin: the values of the facet's shape
 /// functions at the nearest place on it, which sum up to 1. `distance_m`, if given: how far that is. Local.
+std::vector<NodeShare> find_shares(const Assembly& assembly, std::span<const std::array<std::int32_t, 6>> skin, const Vec3& point_m,
+                                   double* distance_m = nullptr);
+/// The same with the skin listed for it.
 std::vector<NodeShare> find_shares(const Assembly& assembly, std::int32_t body, const Vec3& point_m, double* distance_m = nullptr);
 
 }  // namespace carillon::transient

@@ -1,3 +1,4 @@
+// One contact from search to force, on one set of surfaces; longer than most files.
 // Method:     a point of one surface against the nearest point of another: penalty k d (1 + a d' / v), never pulling, with the closing
 // speed
 //             v at which the contact began; Coulomb friction that stops a node within one step at most.

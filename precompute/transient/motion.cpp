@@ -1,3 +1,4 @@
+// One step, whose forces, supports, damping and books follow each other; longer than most files.
 // Method: central differences as leapfrog; the work of every force is h f_n (v_{n-1/2} + v_{n+1/2}) / 2, which is exact, and the kinetic
 // energy
 //   m v_{n-1/2} v_{n+1/2} / 2, which with the elastic one is constant for a linear body at any stable step.

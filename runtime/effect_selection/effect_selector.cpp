@@ -299,7 +299,8 @@ void EffectSelector::State::look(Body& body, double time_s) {
          {.rule = apart > limit_m ? Rule::kOtherWay : Rule::kSameWay, .value = apart, .limit = limit_m});
   }
   // A head changes what each ear hears by decibels, wherever the body is.
-  if (facts.has_head) {
+  const BodyFacts& of = facts.bodies[static_cast<std::size_t>(&body - bodies.data())];
+  if (facts.has_head && !of.overrides.off.has(Effect::kHead)) {
     for (const Effect effect : {Effect::kTwoEars, Effect::kHead}) call(body, effect, 1e30, end_s, {.rule = Rule::kByHead});
   }
   call(body, Effect::kDoppler, wave * moved * wave * moved, time_s + travel_s,

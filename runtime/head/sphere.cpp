@@ -44,8 +44,8 @@ std::vector<double> calc_legendre(double x, std::size_t terms) {
 void check(double sample_rate_hz, const Sphere& sphere) {
   if (!(sample_rate_hz >= kMinRateHz && sample_rate_hz <= kMaxRateHz))
     throw InputError(fmt::format("head: a sample rate of {} Hz is outside {} to {} Hz", sample_rate_hz, kMinRateHz, kMaxRateHz));
-  if (!(sphere.radius_m >= 0.03 && sphere.radius_m <= 0.3))
-    throw InputError(fmt::format("head: a radius of {} m is outside 0.03 to 0.3 m", sphere.radius_m));
+  if (!(sphere.radius_m >= kMinRadiusM && sphere.radius_m <= kMaxRadiusM))
+    throw InputError(fmt::format("head: a radius of {} m is outside {} to {} m", sphere.radius_m, kMinRadiusM, kMaxRadiusM));
   if (!(sphere.ear_azimuth_deg >= 0.0 && sphere.ear_azimuth_deg <= 180.0))
     throw InputError(fmt::format("head: the azimuth of the left ear, {} degrees, is outside 0 to 180", sphere.ear_azimuth_deg));
   if (!(sphere.sound_speed_m_s >= 100.0 && sphere.sound_speed_m_s <= 2000.0))

@@ -9,6 +9,8 @@
 
 namespace carillon::head {
 
+inline constexpr double kMinRadiusM = 0.03, kMaxRadiusM = 0.3;
+
 /// Duda and Martens 1998: the radius is that of an average head, and ears lie behind its middle.
 struct Sphere {
   double radius_m = 0.0875;
@@ -18,8 +20,8 @@ struct Sphere {
 
 /// Responses to a plane wave: a source farther than 1 m. What is nearer is heard as if it were far: the louder near ear of a source at
 /// 0.25 m (by 6 dB at low frequencies) is left out. 361 angles, linear between them. Low frequencies have 0 dB everywhere; exact to 0.4 of
-/// the sample rate, then the band ends. Throws InputError for a sample rate outside kMinRateHz to kMaxRateHz, a radius outside 0.03 to
-/// 0.3 m and what else cannot be. Takes some milliseconds; not for an audio thread.
+/// the sample rate, then the band ends. Throws InputError for a sample rate outside kMinRateHz to kMaxRateHz, a radius outside
+/// kMinRadiusM to kMaxRadiusM and what else cannot be. Takes some milliseconds; not for an audio thread.
 std::shared_ptr<const Head> make_sphere(double sample_rate_hz, const Sphere& sphere = {});
 
 /// The coefficients c of the pressure on a rigid sphere in a plane wave, over that at its centre without it: p = sum over m of

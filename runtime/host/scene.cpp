@@ -15,6 +15,7 @@
 
 #include "runtime/base/quaternion.hpp"
 #include "runtime/base/vector.hpp"
+#include "runtime/head/sphere.hpp"
 #include "runtime/host/job_keys.hpp"
 #include "runtime/material/mallets.hpp"
 #include "runtime/material/solids.hpp"
@@ -32,8 +33,8 @@ constexpr std::size_t kLongestName = 200;  // bytes
 constexpr double kMaxSpeedMs = 300.0;      // below the speed of sound in air
 constexpr double kMaxSpinRadS = 1e4;
 constexpr double kMaxEarDistanceM = 10.0;
-constexpr double kHeadWidthM = 0.175;  // of the average head of Duda and Martens 1998
-constexpr double kNarrowestHeadM = 0.06, kWidestHeadM = 0.6;
+constexpr double kHeadWidthM = 2.0 * head::Sphere{}.radius_m;
+constexpr double kNarrowestHeadM = 2.0 * head::kMinRadiusM, kWidestHeadM = 2.0 * head::kMaxRadiusM;
 constexpr std::size_t kMaxWaypoints = 100000;
 constexpr std::size_t kMaxMicrophones = 16;
 constexpr std::size_t kMaxHolders = 1000;

@@ -101,7 +101,9 @@ Transfers::Transfers(const bank::Bank& bank, [[maybe_unused]] base::Instructions
       for (int l = 0; l <= orders_[mode]; ++l) {
         double sum = 0.0;
         for (int i = 0; i <= 2 * l; ++i, from += 2) {
-          lines_[group.first_line + static_cast<std::size_t>(l * l) + find_place(l, i)].steps[lane] = from[1] * 65536 + from[0];
+          // What a file may have below -32767, which no bank that is written has, would leave the range of the sum.
+          lines_[group.first_line + static_cast<std::size_t>(l * l) + find_place(l, i)].steps[lane] =
+              std::max<std::int32_t>(from[1], -32767) * 65536 + from[0];
           sum += static_cast<double>(from[0]) * from[0] + static_cast<double>(from[1]) * from[1];
         }
         radial[l].level[lane] = static_cast<float>(std::sqrt(sum / (4.0 * pi)));

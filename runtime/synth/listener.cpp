@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 
+#include "runtime/base/quaternion.hpp"
 #include "runtime/base/vector.hpp"
 
 namespace carillon::synth {
@@ -15,9 +16,7 @@ namespace {
 
 constexpr events::Quaternion kNotTurned{1.0, 0.0, 0.0, 0.0};
 
-Vec3 turn_back(const events::Quaternion& rotation, const Vec3& x) noexcept {
-  return turn({rotation[0], -rotation[1], -rotation[2], -rotation[3]}, x);
-}
+Vec3 turn_back(const events::Quaternion& rotation, const Vec3& x) noexcept { return turn(find_inverse(rotation), x); }
 
 }  // namespace
 

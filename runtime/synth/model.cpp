@@ -180,6 +180,7 @@ void Model::add_ringing_mode(const Mode& mode) {
 
 /// Modes that do not ring, or not below the Nyquist frequency, take no part.
 void Model::add_nonlinear(const bank::QuarticEnergy& energy) {
+  if (energy.is_empty()) return;
   std::vector<std::pair<std::size_t, int>> ringing;  // number in the bank, here
   for (int m = 0; m < ringing_; ++m) ringing.emplace_back(static_cast<std::size_t>(get_bank_mode(m)), m);
   std::sort(ringing.begin(), ringing.end());

@@ -137,10 +137,8 @@ void NonlinearModes::add(std::int64_t sample, const StrikeQueue& strikes, bool s
   const auto row = [count](std::vector<double>& values, int n) {
     return std::span(values).subspan(static_cast<std::size_t>(n) * count, count);
   };
-  if (!is_live() && !struck && drive == nullptr) return;
   const bool damps_first = carry_damps_, damps = drive != nullptr && drive->damps;
   pushes_ = has_carry_;
-  if (damps && !damps_first) std::fill_n(keep_.begin(), count, 1.0);
   if (struck) {
     add_pulses(sample, strikes.get_pulses());
     add_forces(sample, strikes.get_forces());

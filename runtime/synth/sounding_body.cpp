@@ -1,3 +1,4 @@
+// One body, whose effects, voices, delay lines and receivers change together; longer than most files.
 // Method:     modes and acceleration noise fill delay lines, which receivers read. A change of effects that touches the propagation makes
 //             a second one: both are fed until the new one holds all that its receivers read, then one fades into the other within a
 //             block, and the old one and the modules that are inaudible go back to the main thread.

@@ -174,7 +174,7 @@ void Voice::add_damped(std::int64_t sample, bool struck, const ContactForces* co
 
 /// Of the modes that large motion couples, where there are some: to the ears by the groups in which they would ring.
 void Voice::add_nonlinear(std::int64_t sample, bool struck, const ContactBlock* drive, float* out) noexcept {
-  if (!nonlinear_->is_live() && !struck && drive == nullptr) return;
+  if (!nonlinear_->is_live() && !struck && (drive == nullptr || !drive->forces)) return;
   if (is_directed()) wake(nonlinear_->get_group_count());
   nonlinear_->add(sample, strikes_, struck, drive, out, find_kept(), live_);
   counters_.coupled_samples += static_cast<std::int64_t>(nonlinear_->get_limit()) * kSubBlock;

@@ -134,6 +134,18 @@ class Explore(unittest.TestCase):
         report = json.loads((self.root / "report.json").read_text())
         self.assertAlmostEqual(self.read("fall", "explore.json")["gain_per_pa"], report["gain_per_pa"], delta=1e-6 * report["gain_per_pa"])
 
+    def test_a_page_has_no_effects_that_its_engine_lacks(self):
+        bar = {"name": "bar", "bank": "brass.hdf", "fixed": True, "effects": {"off": ["nonlinear", "doppler"]}}
+        scene = {"duration_s": 0.2, "bodies": [bar], "listener": {"ears": "hrtf"}, "effects": {"on": ["head", "two_ears"]}}
+        (self.root / "head.json").write_text(json.dumps(scene))
+        run = subprocess.run([BIN / "carillon", "explore", "head.json", "-o", "head"], cwd=self.root, capture_output=True, text=True)
+        self.assertEqual(run.returncode, 0, run.stderr)
+        self.assertIn("pages have no heads", run.stdout + run.stderr)
+        page = self.read("head", "scene.json")
+        self.assertEqual(page["effects"], {"on": ["two_ears"]})
+        self.assertEqual(page["bodies"][0]["effects"], {"off": ["doppler"]})
+        self.assertNotIn("ears", page["listener"])
+
     def test_a_body_that_is_described_is_computed_and_its_bank_comes_along(self):
         drum = {"name": "drum", "body": {"membrane": {"shape": "circle", "radius_m": 0.2, "lowest_hz": 100, "density_kg_m2": 0.3}}}
         drum |= {"material": "polyester film", "max_modes": 10, "fixed": True}
