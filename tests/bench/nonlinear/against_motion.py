@@ -49,7 +49,7 @@ SIDES = {1: "plus", -1: "minus"}
 SMALL = 1e-3  # of a gain, which may not be more than a surface could send
 PIECES = 64  # strikes of the scene that make one blow
 BLOWS = {"soft": 0.005, "medium": 0.05, "hard": 0.2}  # N s
-FULL = {"cells": 32, "nodes": 9000, "modes": 50, "duration_s": 0.51, "blows": BLOWS, "limits": (20.0, 10.0, 2.0)}
+FULL = {"cells": 32, "nodes": 16000, "modes": 50, "duration_s": 0.51, "blows": BLOWS, "limits": (20.0, 10.0, 2.0)}
 QUICK = {"cells": 16, "nodes": 2500, "modes": 12, "duration_s": 0.23, "blows": {"medium": 0.05}, "limits": (40.0, 20.0, 3.0)}
 
 
