@@ -106,6 +106,16 @@ bool has_described_body(const Json::Value& scene) {
          std::any_of(bodies.begin(), bodies.end(), [](const Json::Value& body) { return body.isObject() && !body.isMember("bank"); });
 }
 
+/// Pages play modes, and a recorded surface has none.
+void refuse_recordings(const Json::Value& scene, const fs::path& file) {
+  const Json::Value bodies = scene.isObject() ? scene["bodies"] : Json::Value();
+  if (!bodies.isArray()) return;
+  for (const Json::Value& body : bodies)
+    if (body.isObject() && body.isMember("recording"))
+      throw InputError(fmt::format(
+          "{}: a body is a recording, which pages cannot play; take it out, or play the scene with carillon-render", file.string()));
+}
+
 /// Gives described bodies the banks that carillon-render has played, as its trajectory names them.
 void name_banks(Json::Value& scene, const Json::Value& trajectory) {
   for (Json::ArrayIndex i = 0; i < scene["bodies"].size(); ++i) {
@@ -166,6 +176,7 @@ class Work {
   /// Simulates a scene file, which is checked by that, and keeps what happened. The scene that is returned names the bank of each body.
   Json::Value record(const fs::path& file) {
     Json::Value scene = report::parse_json(base::read_file(file, "scene", kMaxSceneBytes));
+    refuse_recordings(scene, file);
     const fs::path trajectory = path(".trajectory.json");
     std::vector<std::string> words{"--record", path(kContactsFile).string()};
     const bool lacks_bank = has_described_body(scene);

@@ -19,17 +19,20 @@
 #include <numeric>
 
 #include "precompute/emission/derivative.hpp"
-#include "precompute/emission/high_pass.hpp"
 #include "precompute/emission/loops.hpp"
 #include "precompute/emission/low_pass.hpp"
 #include "precompute/emission/surface_file.hpp"
 #include "runtime/base/bytes.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/sinc.hpp"
+#include "runtime/recording/high_pass.hpp"
 #include "runtime/recording/pole.hpp"
 
 namespace carillon::emission {
 namespace {
+
+using recording::calc_alpha;
+using recording::HighPass;
 
 constexpr int kLeast = 16;                                              // boxes in a sample: images at -60 dB
 constexpr int kPlaceRing = 64;                                          // samples of places that are kept
@@ -137,7 +140,7 @@ struct Emission::State {
   std::vector<double> sum;                    // (V, 4): displacements of the steps in the box
   std::vector<double> first_mean, last_mean;  // (3 V, padded)
   std::int32_t means = 0;                     // boxes that came, up to 2
-  std::vector<double> last_step;              // (3 V): displacements one step before (kPaper2001)
+  std::vector<double> last_step;              // (3 V): displacements one step before; of kPaper2001 alone
   std::unique_ptr<LowPass> places_filter, pressure_filter;
   std::vector<double> places;                // (kPlaceRing, 3 V padded) m
   std::vector<double> sources;               // (kSourceRing, slots): volume accelerations [m3/s2]; kPaper2001: pressure [Pa]
@@ -299,7 +302,8 @@ Emission::State::State(const comm::Communicator& communicator, SurfacePart part,
   comm.agree([&] {
     sum.assign(4 * node.size(), 0.0);
     first_mean.assign(rows, 0.0);
-    last_mean = mean = velocity = acceleration = last_step = first_mean;
+    last_mean = mean = velocity = acceleration = first_mean;
+    if (is_paper) last_step = first_mean;
     places_filter = std::make_unique<LowPass>(rows, is_paper ? Kernel::kHann2001 : Kernel::kFlat);
     if (is_paper) pressure_filter = std::make_unique<LowPass>(slots, Kernel::kHann2001);
     places.assign(rows * kPlaceRing, 0.0);
@@ -527,7 +531,7 @@ void Emission::State::emit(std::int64_t k) {
           break;
       }
       for (std::size_t i = 0; i < arrivals.size(); ++i) {
-        const Receiver& receiver = options.receivers[i];
+        const Microphone& receiver = options.receivers[i];
         const Vec3 way = receiver.place_m - centre;
         const double r = norm(way), cosine = dot(way, twice) / (r * area_now);
         double p = (plain + turned * cosine) / r;

@@ -37,6 +37,9 @@ struct SurfacePart {
 /// a wall. kPaper2001: OCE01 eq. 2 to 10 as printed, in arbitrary units: low notes of small bodies are up to 30 dB too loud or too soft.
 enum class Radiation : std::uint8_t { kKirchhoff, kRayleigh, kPaper2001 };
 
+/// Of the DC blocker of kPaper2001 as printed: a corner of 738 Hz at 44,100 Hz.
+inline constexpr double kAlpha2001 = 0.1;
+
 struct Options {
   double sample_rate_hz = 48000.0;  // kPaper2001: 44,100 Hz as printed; its fmax is half of it
   int steps_per_sample = 0;         // m: the step is 1 / (m fs). A multiple of 4 but with kPaper2001; find_steps() has cheap ones
@@ -44,7 +47,7 @@ struct Options {
   Radiation radiation = Radiation::kKirchhoff;
   std::optional<double> high_pass_hz;  // corner of the DC blocker, 0: none; unset: 20 Hz, or alpha = 0.1 with kPaper2001
   double air_density_kg_m3 = 1.21, sound_speed_m_s = 343.0;
-  std::vector<Receiver> receivers;
+  std::vector<Microphone> receivers;
   bool has_visibility = true;          // delta of kRayleigh and kPaper2001; 1 everywhere without it
   std::vector<Corners> walls_m;        // further triangles that hide what lies behind them; the same on every rank
   std::filesystem::path surface_file;  // recorded surface; empty: none. kKirchhoff and kRayleigh

@@ -17,12 +17,12 @@ namespace carillon::emission {
 
 static_assert(kSpread == base::kSincTaps);
 
-std::vector<Receiver> make_ears(const Vec3& position_m, const Vec3& look_at_m, double distance_m) {
+std::vector<Microphone> make_ears(const Vec3& position_m, const Vec3& look_at_m, double distance_m) {
   const Vec3 view = look_at_m - position_m, right{view[1], -view[0], 0.0};
   if (!(norm(right) > 1e-6 * norm(view)) || !(norm(view) > 0.0))
     throw InputError("the listener looks straight up or down, or nowhere, so its ears have no place; move look_at_m to its side");
   const Vec3 half = (0.5 * distance_m) * normalise(right);
-  Receiver left, other;
+  Microphone left, other;
   left.place_m = position_m - half;
   other.place_m = position_m + half;
   return {left, other};

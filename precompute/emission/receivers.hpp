@@ -13,11 +13,11 @@
 
 namespace carillon::emission {
 
-using recording::Receiver;
+using recording::Microphone;
 
 /// The left and the right one of two omnidirectional ears, distance_m apart on a horizontal line (z is up) at right angles to the view
 /// (OCE01 section 4). Throws InputError when the view has no direction or goes straight up or down.
-std::vector<Receiver> make_ears(const Vec3& position_m, const Vec3& look_at_m, double distance_m = 0.2);
+std::vector<Microphone> make_ears(const Vec3& position_m, const Vec3& look_at_m, double distance_m = 0.2);
 
 /// Pressure over time at one place. What it keeps true: samples are whole numbers of 2^-46 Pa, so that their sums have the same bits in any
 /// order and on any number of ranks.

@@ -41,8 +41,8 @@ hid_t find_type(const char* type) {
 SurfaceFile::SurfaceFile(std::filesystem::path file, recording::Header header, const SurfaceTables& tables, bool is_resumed)
     : file_(std::move(file)), part_(file_.string() + ".part"), header_(header), vertex_body_(tables.vertex_body) {
   if (!is_resumed) make(tables);
-  descriptor_ = ::open(part_.c_str(), O_RDWR | O_CLOEXEC);
-  if (descriptor_ < 0) {
+  descriptor_ = base::Descriptor(::open(part_.c_str(), O_RDWR | O_CLOEXEC));
+  if (descriptor_.get() < 0) {
     const int error = errno;
     if (is_resumed)
       throw InputError(fmt::format("{}: cannot be opened: {}; the run resumes and needs it: remove the checkpoint to begin again",
@@ -57,22 +57,13 @@ SurfaceFile::SurfaceFile(std::filesystem::path file, recording::Header header, c
   }
   std::string head(kHeaderBytes, '\0');
   struct stat status {};
-  const bool is_read =
-      ::pread(descriptor_, head.data(), head.size(), 0) == static_cast<ssize_t>(head.size()) && ::fstat(descriptor_, &status) == 0;
-  try {
-    const recording::Header found = recording::parse_header(head, is_read ? static_cast<std::uint64_t>(status.st_size) : 0, part_.string());
-    header_.offset = found.offset;
-    header_.length = found.length;
-    if (recording::format_header(header_) != head.substr(0, kTextBytes))
-      throw InputError(fmt::format("{}: is of another run; remove it and the checkpoint to begin again", part_.string()));
-  } catch (...) {
-    ::close(descriptor_);
-    throw;
-  }
-}
-
-SurfaceFile::~SurfaceFile() {
-  if (descriptor_ >= 0) ::close(descriptor_);
+  const bool is_read = ::pread(descriptor_.get(), head.data(), head.size(), 0) == static_cast<ssize_t>(head.size()) &&
+                       ::fstat(descriptor_.get(), &status) == 0;
+  const recording::Header found = recording::parse_header(head, is_read ? static_cast<std::uint64_t>(status.st_size) : 0, part_.string());
+  header_.offset = found.offset;
+  header_.length = found.length;
+  if (recording::format_header(header_) != head.substr(0, kTextBytes))
+    throw InputError(fmt::format("{}: is of another run; remove it and the checkpoint to begin again", part_.string()));
 }
 
 void SurfaceFile::make(const SurfaceTables& tables) {
@@ -124,7 +115,7 @@ void SurfaceFile::make(const SurfaceTables& tables) {
 
 void SurfaceFile::write(std::uint64_t offset, std::span<const std::byte> bytes) {
   while (!bytes.empty()) {
-    const ssize_t done = ::pwrite(descriptor_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
+    const ssize_t done = ::pwrite(descriptor_.get(), bytes.data(), bytes.size(), static_cast<off_t>(offset));
     if (done < 0 && errno == EINTR) continue;
     if (done <= 0) throw SystemError(fmt::format("{}: cannot be written: {}; make room and resume", part_.string(), std::strerror(errno)));
     offset += static_cast<std::uint64_t>(done);
@@ -177,7 +168,7 @@ void SurfaceFile::commit() {
   std::vector<std::byte> piece(1 << 20);
   for (std::uint64_t at = kHeaderBytes; at < header_.length;) {
     const auto wanted = std::min<std::uint64_t>(piece.size(), header_.length - at);
-    const ssize_t got = ::pread(descriptor_, piece.data(), wanted, static_cast<off_t>(at));
+    const ssize_t got = ::pread(descriptor_.get(), piece.data(), wanted, static_cast<off_t>(at));
     if (got < 0 && errno == EINTR) continue;
     if (got <= 0) throw SystemError(fmt::format("{}: cannot be read again: {}", part_.string(), std::strerror(errno)));
     sha.add(std::span<const std::byte>(piece).first(static_cast<std::size_t>(got)));
@@ -185,7 +176,7 @@ void SurfaceFile::commit() {
   }
   const std::string digest = base::to_hex(sha.finish());
   write(kTextBytes, std::as_bytes(std::span(digest)));
-  if (::fsync(descriptor_) != 0 || ::rename(part_.c_str(), file_.c_str()) != 0)
+  if (::fsync(descriptor_.get()) != 0 || ::rename(part_.c_str(), file_.c_str()) != 0)
     throw SystemError(fmt::format("{}: cannot be finished: {}", file_.string(), std::strerror(errno)));
 }
 

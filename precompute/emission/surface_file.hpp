@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "runtime/base/descriptor.hpp"
 #include "runtime/base/triangle.hpp"
 #include "runtime/base/vector.hpp"
 #include "runtime/recording/header.hpp"
@@ -27,9 +28,6 @@ class SurfaceFile {
   /// header: counts and constants. Makes FILE.part of its final length (holes take no room); is_resumed: takes the one that is there, and
   /// throws InputError when it is of another run.
   SurfaceFile(std::filesystem::path file, recording::Header header, const SurfaceTables& tables, bool is_resumed);
-  ~SurfaceFile();
-  SurfaceFile(const SurfaceFile&) = delete;
-  SurfaceFile& operator=(const SurfaceFile&) = delete;
 
   /// places (V) [m] at sample key * key_frames.
   void write_key(std::uint64_t key, std::span<const Vec3> places_m);
@@ -46,7 +44,7 @@ class SurfaceFile {
   std::filesystem::path file_, part_;
   recording::Header header_;
   std::vector<std::int32_t> vertex_body_;
-  int descriptor_ = -1;
+  base::Descriptor descriptor_;
 };
 
 }  // namespace carillon::emission

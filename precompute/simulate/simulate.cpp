@@ -98,7 +98,7 @@ emission::Options make_emission_options(const job::SimulationSpec& spec, int ste
   } else {
     for (const Vec3& place : spec.receivers.microphones_m) options.receivers.push_back({place, 0.0, {0, 1, 0}});
   }
-  for (emission::Receiver& receiver : options.receivers) {
+  for (emission::Microphone& receiver : options.receivers) {
     receiver.directivity = spec.receivers.cardioid;
     receiver.axis = spec.receivers.facing;
   }

@@ -27,6 +27,7 @@
 #include "runtime/host/scene.hpp"
 #include "runtime/host/sound_file.hpp"
 #include "runtime/host/spectrogram.hpp"
+#include "runtime/host/surface_playback.hpp"
 
 namespace carillon::host {
 namespace {
@@ -132,6 +133,7 @@ void check_outputs(const ProgramOptions& options, const Scene& scene) {
   if (options.contacts) taken.emplace_back(*options.contacts, "contacts file to play");
   for (const SceneBody& body : scene.bodies)
     if (!body.bank.empty()) taken.emplace_back(body.bank, fmt::format("bank of \"{}\"", body.name));
+  for (const SceneSurface& surface : scene.surfaces) taken.emplace_back(surface.file, fmt::format("recording of \"{}\"", surface.name));
   for (const auto& [file, what] : outputs) {
     for (const auto& [other, name] : taken) {
       if (is_same_file(file, other)) {
@@ -163,6 +165,8 @@ void print_summary(std::FILE* notes, const Scene& scene, const Sound& sound, con
       fmt::print(notes, "  {:<16} {}\n", "", base::printable(text));
     if (const std::string text = describe_limited(scene.bodies[i]); !text.empty()) fmt::print(notes, "  {:<16} {}\n", "", text);
   }
+  for (const SceneSurface& surface : scene.surfaces)
+    fmt::print(notes, "  {:<16} {}\n", base::printable(surface.name), describe_surface(scene, surface));
   print_bands(notes, scene, sound.rate_hz);
   fmt::print(notes, "modes sounding     {}\n", figures.modes);
   if (!scene.joints.empty() || !scene.cords.empty())
@@ -241,6 +245,8 @@ void print_plan(const Scene& scene, const Plan& plan) {
     if (!body.mounting.text.empty()) fmt::print("{}: {}\n", base::printable(body.name), base::printable(body.mounting.text));
     if (const std::string text = describe_limited(body); !text.empty()) fmt::print("{}: {}\n", base::printable(body.name), text);
   }
+  for (const SceneSurface& surface : scene.surfaces)
+    fmt::print("{}: {}\n", base::printable(surface.name), describe_surface(scene, surface));
 }
 
 /// A run of the program: a scene, what happens in it, and its sound, each made from the one before.
@@ -250,10 +256,11 @@ class Run {
     if (is_standard_output(options.wav)) base::check_standard_output("sound");
     check_outputs(options, scene_);
     if (!options.plan) check_room(scene_, options.wav);
+    read_surfaces(scene_);
     banks_ = read_banks(scene_, options.quiet);
     if (!scene_.listener.sofa.empty()) make_head(scene_, scene_.sample_rate_hz);  // before the physics, for its errors
     for (const SceneBody& body : scene_.bodies) body_banks_.push_back(body.spec.bank);
-    figures_.bodies = scene_.bodies.size();
+    figures_.bodies = scene_.bodies.size() + scene_.surfaces.size();
   }
 
   /// What happens, and which effects the bodies need for it.

@@ -209,7 +209,9 @@ class Rendering {
         summaries_(summarise(scene, banks, events, base_)),
         effects_(scene, summaries_, options.plan),
         playback_(events, list_scheduled_bodies(), path_),
-        synthesiser_(&open()) {}
+        synthesiser_(&open()) {
+    if (!scene.surfaces.empty()) surfaces_.emplace(scene, session_.get_microphones(), session_.get_head(), options.rate_hz);
+  }
 
   /// What is known before anything is rendered.
   void describe(Sound& sound) const {
@@ -237,6 +239,11 @@ class Rendering {
       synthesiser_->process(out.data(), static_cast<int>(out.size()), static_cast<int>(count));
       const std::size_t skipped = std::min(count, start < latency ? latency - start : 0);
       for (std::size_t c = 0; c < out.size(); ++c) heard[c] = blocks[c].data() + skipped;
+      if (surfaces_) {
+        std::vector<float*> to;
+        for (auto& block : blocks) to.push_back(block.data() + skipped);
+        surfaces_->add(to, count - skipped);
+      }
       outlet.add(heard, count - skipped);
       if (options_->progress) options_->progress(static_cast<double>(start + count) / static_cast<double>(samples));
     }
@@ -252,6 +259,7 @@ class Rendering {
     sound.refused = counters.refused;
     sound.faults = counters.faults + playback_.get_faults();
     sound.resets = counters.resets;
+    if (surfaces_) sound.surfaces = surfaces_->get_figures();
     for (std::size_t i = 0; i < scene_->bodies.size(); ++i) {
       const int body = static_cast<int>(i);
       sound.body_peak_pa.push_back(synthesiser_->get_peak_pa(body));
@@ -312,6 +320,7 @@ class Rendering {
   EffectTimeline effects_;
   EventPlayback playback_;
   synth::Synthesiser* synthesiser_;
+  std::optional<SurfacePlayback> surfaces_;  // none where the scene has no recorded surfaces
 };
 
 }  // namespace

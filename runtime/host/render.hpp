@@ -12,6 +12,7 @@
 #include "runtime/host/planning.hpp"
 #include "runtime/host/scene.hpp"
 #include "runtime/host/sound_store.hpp"
+#include "runtime/host/surface_playback.hpp"
 #include "runtime/synth/effects.hpp"
 #include "runtime/synth/synthesiser.hpp"
 
@@ -58,6 +59,7 @@ struct Sound {
   std::int64_t resets = 0;                             // bodies cleared because their state was no number
   std::vector<synth::EffectSet> body_effects;          // per body, what it had at any time
   std::vector<synth::EffectCounters> effect_counters;  // per body, at the end
+  std::vector<SurfaceFigures> surfaces;                // per recorded surface of the scene
   double seconds_per_tick = 0.0;                       // of the counters' ticks; 0 where they were not asked for
   double seconds_cpu = 0.0;
   double seconds_playing_cpu = 0.0;  // of them for what is done block by block
@@ -77,8 +79,9 @@ struct RenderOptions {
 inline constexpr double kFadeS = 0.01;
 inline constexpr double kFadeShare = 1.0 / 65536.0;
 
-/// Renders round(duration * rate) frames into `store`, which has the scene's channels and the rate. banks[i] belongs to scene.bodies[i];
-/// body i of the events (as EventPlayback takes them) is the same. A body to which nothing happens gets no effects.
+/// Renders round(duration * rate) frames of the scene, whose recordings are read (read_surfaces()), into `store`, which has the scene's
+/// channels and the rate. banks[i] belongs to scene.bodies[i]; body i of the events (as EventPlayback takes them) is the same. A body to
+/// which nothing happens gets no effects.
 Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks, const Events& events, const RenderOptions& options,
                  SoundStore& store);
 

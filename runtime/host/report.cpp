@@ -346,6 +346,8 @@ std::string make_report_json(const Scene& scene, const Sound& sound, const Plan&
   for (const std::string& warning : scene.warnings) warnings.add(base::printable(warning));
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) bodies.add(make_body_json(scene, sound, plan, f, i));
   json.set("warnings", warnings).set("per_body", bodies);
+  for (std::size_t i = 0; i < scene.surfaces.size(); ++i)
+    json.member("recordings").add(make_surface_json(scene, scene.surfaces[i], sound.surfaces[i]));
   json.set("changes", effect_selection::make_changes_json(plan.changes, plan.facts, kMaxReported));
   return json.text();
 }

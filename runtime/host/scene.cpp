@@ -45,6 +45,7 @@ constexpr double kSoftestGroundPa = 100.0;  // a jelly; the touch of a body last
 constexpr double kStiffestGroundPa = 1e13;  // ten times a diamond
 constexpr double kFeltRestitution = 0.7;    // our estimate; piano hammers lose about half of their energy
 constexpr double kDensestKgM3 = 22600.0;    // osmium
+constexpr double kLoudestGain = 1e6;        // 120 dB
 constexpr double kRoughestM = 1e-3;         // what is higher is no roughness but a shape
 
 /// Turns about the fixed axes of the world, x first, then y, then z.
@@ -150,6 +151,25 @@ effect_selection::EffectOverrides read_effects(base::Object& object) {
   return overrides;
 }
 
+/// A body's own "nonlinear", over what its effects say of that one: "auto", on or off.
+void read_nonlinear(base::Object& body, effect_selection::EffectOverrides& overrides) {
+  constexpr synth::Effect kEffect = synth::Effect::kNonlinear;
+  if (!body.has("nonlinear")) return;
+  if (body.has("effects") && (overrides.on.has(kEffect) || overrides.off.has(kEffect)))
+    body.fail("nonlinear", "says what \"effects\" of this body say already; keep one of them");
+  const bool is_automatic = body.has_string("nonlinear");
+  if (is_automatic) {
+    body.choice_or("nonlinear", {"auto"}, "auto");
+    if (!overrides.automatic)
+      body.fail("nonlinear", "is \"auto\", and its effects are a list, so that nothing is chosen; give true or false");
+  }
+  const bool is_on = !is_automatic && body.boolean_or("nonlinear", false);
+  if (is_on && !kPlayableEffects.has(kEffect))
+    body.fail("nonlinear", "asks for the effect \"nonlinear\", which is not in this build (CMake option CARILLON_EFFECTS)");
+  overrides.on = is_on ? overrides.on.with(kEffect) : overrides.on.without(kEffect);
+  overrides.off = is_automatic || is_on || !overrides.automatic ? overrides.off.without(kEffect) : overrides.off.with(kEffect);
+}
+
 /// Exactly the overrides, where effects are not selected.
 synth::EffectSet find_usual(const effect_selection::EffectOverrides& overrides) {
   return overrides.automatic ? kDefaultEffects.with(overrides.on).without(overrides.off) : overrides.on;
@@ -195,14 +215,18 @@ void read_bank_or_job(base::Object& object, SceneBody& body) {
   body.job = object.make_excerpt(kKeys);
 }
 
-SceneBody parse_body(base::Object& object, const effect_selection::EffectOverrides& overrides, double variation) {
-  SceneBody body;
-  body.name = object.string("name");
-  if (body.name.size() > kLongestName ||
-      std::any_of(body.name.begin(), body.name.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; })) {
+std::string read_body_name(base::Object& object) {
+  std::string name = object.string("name");
+  if (name.size() > kLongestName || std::any_of(name.begin(), name.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; })) {
     object.fail("name",
                 fmt::format("is no name: at most {} bytes, and none of them a line feed or another control character", kLongestName));
   }
+  return name;
+}
+
+SceneBody parse_body(base::Object& object, const effect_selection::EffectOverrides& overrides, double variation) {
+  SceneBody body;
+  body.name = read_body_name(object);
   body.place = object.find_place("");
   read_bank_or_job(object, body);
   body.variation = read_within(object, "variation", variation, 0.0, 1.0);
@@ -226,8 +250,27 @@ SceneBody parse_body(base::Object& object, const effect_selection::EffectOverrid
     if (body.support_place.empty() && object.has(key)) body.support_place = object.find_place(key);
   }
   body.overrides = object.has("effects") ? read_effects(object) : overrides;
+  read_nonlinear(object, body.overrides);
   object.finish();
   return body;
+}
+
+/// A body that is a recorded surface.
+SceneSurface parse_surface(base::Object& object) {
+  SceneSurface surface;
+  surface.name = read_body_name(object);
+  surface.place = object.find_place("recording");
+  surface.file = object.path("recording");
+  for (const char* key : {"bank", "shape", "body", "mesh"})
+    if (object.has(key)) object.fail(key, "describes a body that is struck, and \"recording\" one that was recorded; keep one of them");
+  surface.pose.position_m = read_vector(object, "position_m", {0.0, 0.0, 0.0}, kFarthestM);
+  surface.pose.rotation = read_rotation(object);
+  surface.start_s = read_within(object, "start_s", surface.start_s, 0.0, kLongestS);
+  surface.loop = object.boolean_or("loop", surface.loop);
+  surface.gain = read_within(object, "gain", surface.gain, 0.0, kLoudestGain);
+  surface.high_pass_hz = read_within(object, "high_pass_hz", surface.high_pass_hz, 0.0, 1000.0);
+  object.finish();
+  return surface;
 }
 
 /// A required number from `low` to `high`.
@@ -270,12 +313,16 @@ contact::GroundSpec parse_ground(base::Object& object, std::optional<double>& re
   return ground;
 }
 
-using Names = std::map<std::string, std::size_t>;  // of bodies, and their places in the list
+constexpr std::size_t kNotModal = std::numeric_limits<std::size_t>::max();
+using Names = std::map<std::string, std::size_t>;  // of bodies, and their places in the list; kNotModal: a recorded surface
 
 /// The body that a key names.
 std::size_t find_body(base::Object& object, const Names& bodies, std::string_view key = "body") {
   const std::string name = object.string(key);
-  if (const auto found = bodies.find(name); found != bodies.end()) return found->second;
+  if (const auto found = bodies.find(name); found != bodies.end()) {
+    if (found->second != kNotModal) return found->second;
+    object.fail(key, fmt::format("\"{}\" is a recording, which nothing strikes, joins or holds; name a body that has a bank", name));
+  }
   std::vector<std::string> names;
   for (const auto& [known, index] : bodies) names.push_back(known);
   const std::string nearest = base::find_nearest(name, names);
@@ -663,7 +710,7 @@ Scene parse_scene(const base::Document& document) {
          {"joints", "cords", "strikes", "listener", "microphones", "effects", "variation", "radiation", "frequencies", "output", "quality"})
       root.has(later);
     root.finish();  // a mistyped key is the likeliest reason
-    root.fail("bodies", "is missing or empty; list at least one body with a \"name\" and a \"bank\"");
+    root.fail("bodies", "is missing or empty; list at least one body with a \"name\" and a \"bank\", or a \"recording\"");
   }
   if (bodies.size() > kMaxBodies)
     root.fail("bodies",
@@ -673,9 +720,13 @@ Scene parse_scene(const base::Document& document) {
   const double variation = read_within(root, "variation", 0.0, 0.0, 1.0);
   Names names;
   for (base::Object& object : bodies) {
-    scene.bodies.push_back(parse_body(object, scene.overrides, variation));
-    const std::string& name = scene.bodies.back().name;
-    if (!names.emplace(name, names.size()).second)
+    const bool is_recorded = object.has("recording");
+    if (is_recorded)
+      scene.surfaces.push_back(parse_surface(object));
+    else
+      scene.bodies.push_back(parse_body(object, scene.overrides, variation));
+    const std::string& name = is_recorded ? scene.surfaces.back().name : scene.bodies.back().name;
+    if (!names.emplace(name, is_recorded ? kNotModal : scene.bodies.size() - 1).second)
       object.fail("name", fmt::format("there is a body called \"{}\" already; give this one another name", name));
   }
   for (base::Object& object : root.objects("joints")) scene.joints.push_back(parse_joint(object, names));
@@ -692,6 +743,10 @@ Scene parse_scene(const base::Document& document) {
       scene.microphones_m.push_back(read_place(root, "microphones", row));
     }
   }
+  for (const SceneSurface& surface : scene.surfaces)
+    if (!(surface.start_s < scene.duration_s))
+      throw InputError(fmt::format("{}: \"{}\" begins at {} s, and the scene ends at {} s; give a smaller \"start_s\"", surface.place,
+                                   surface.name, surface.start_s, scene.duration_s));
   check_head(root, scene);
   check_floor(root, scene);
   scene.frequencies = static_cast<bank::Frequencies>(read_name(root, "frequencies", kFrequenciesNames, "corrected"));

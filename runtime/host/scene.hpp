@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -21,6 +22,10 @@
 #include "runtime/synth/floor.hpp"
 #include "runtime/synth/kernels.hpp"
 #include "runtime/synth/trajectory.hpp"
+
+namespace carillon::recording {
+class RecordedSurface;
+}
 
 namespace carillon::host {
 
@@ -64,6 +69,20 @@ struct SceneBody {
   std::shared_ptr<const radiation::Transfers> transfers{};  // of its bank, when that is read and has multipoles
   radiation::Limited limited;                               // gains of its modes that its damping would not allow
   double variation = 0.0;                                   // its own key "variation", or the scene's: how much equal strikes differ, 0..1
+};
+
+/// A body of the scene that plays a recorded surface (docs/surface-format.md): it sounds and is not in the physics.
+struct SceneSurface {
+  std::string name;
+  std::string place;           // "file:line", for messages
+  std::filesystem::path file;  // absolute
+  contact::Pose pose{};        // of the recording's world in the scene's
+  double start_s = 0.0;        // when the recording begins
+  bool loop = false;           // it begins again where it ends
+  double gain = 1.0;           // of the pressure
+  double high_pass_hz = 20.0;  // as in a simulation; 0: none
+  /// The file, open, when that is read (read_surfaces()).
+  std::shared_ptr<const recording::RecordedSurface> recording{};
 };
 
 /// F = K y^p of a felt that is pressed in by y.
@@ -135,8 +154,9 @@ struct Scene {
   int sample_rate_hz = 48000;
   Vec3 gravity_m_s2{0.0, 0.0, -9.81};
   std::optional<contact::GroundSpec> ground;
-  std::optional<double> reflection;  // of the ground, 0..1, for ground_reflection; nothing: it is silent
-  std::vector<SceneBody> bodies;
+  std::optional<double> reflection;    // of the ground, 0..1, for ground_reflection; nothing: it is silent
+  std::vector<SceneBody> bodies;       // those that are modal
+  std::vector<SceneSurface> surfaces;  // the others
   std::vector<contact::JointSpec> joints;
   std::vector<contact::CordSpec> cords;
   std::vector<SceneStrike> strikes;  // in the order of the file

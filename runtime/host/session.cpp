@@ -33,8 +33,8 @@ Session::Session(const Scene& scene, const std::vector<const bank::Bank*>& banks
                        "with them, or leave the effect out");
     if (scene.bodies[i].overrides.on.has(synth::Effect::kNonlinear) && model->get_nonlinear() == nullptr)
       throw InputError(scene.bodies[i].place +
-                       ": \"effects\" names \"nonlinear\", which needs a bank with a nonlinear energy, and this body's has none; make its "
-                       "bank with it, or leave the effect out");
+                       ": the effect \"nonlinear\" is asked for, which needs a bank with a nonlinear energy, and this body's has none; "
+                       "make its bank with it, or leave the effect out");
   }
 }
 

@@ -24,6 +24,7 @@ class Session {
   Session(const Scene& scene, const std::vector<const bank::Bank*>& banks, double rate_hz, bool has_clicks);
 
   const Microphones& get_microphones() const { return microphones_; }
+  const std::optional<synth::ListeningHead>& get_head() const { return head_; }
   const synth::Model& get_model(std::size_t body) const { return *models_[body]; }
 
   /// Rate, microphones, head, listener, number of bodies, budget and ground of the scene.

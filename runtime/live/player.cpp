@@ -23,6 +23,7 @@
 #include "runtime/host/events.hpp"
 #include "runtime/host/planning.hpp"
 #include "runtime/host/scene.hpp"
+#include "runtime/host/surface_playback.hpp"
 #include "runtime/host/session.hpp"
 #include "runtime/host/strikes.hpp"
 #include "runtime/live/device.hpp"
@@ -235,6 +236,7 @@ void print_statistics(const DeviceStatistics& card, const synth::SynthesiserCoun
 
 void play(const PlayerOptions& options) {
   host::Scene scene = host::read_scene(options.scene);
+  host::refuse_surfaces(scene, "carillon-live");
   const host::Banks banks = host::read_banks(scene, options.quiet);
   std::vector<const bank::Bank*> body_banks;
   for (const host::SceneBody& body : scene.bodies) body_banks.push_back(body.spec.bank);

@@ -21,6 +21,7 @@
 #include "runtime/host/events.hpp"
 #include "runtime/host/planning.hpp"
 #include "runtime/host/scene.hpp"
+#include "runtime/host/surface_playback.hpp"
 #include "runtime/python/module.hpp"
 
 namespace carillon::python {
@@ -43,6 +44,7 @@ struct Rendered {
 };
 
 Rendered render(host::Scene scene) {
+  host::read_surfaces(scene);
   const host::Banks banks = host::read_banks(scene);
   std::vector<const bank::Bank*> body_banks;
   for (const host::SceneBody& body : scene.bodies) body_banks.push_back(body.spec.bank);

@@ -1,6 +1,8 @@
 // Method:     for each triangle and sample p = rho / (4 pi r) [ g + cos (g - (c/a) P) ], heard r / c later: the sample is spread over 32 at
 //             its arrival (runtime/base/sinc.hpp). Places between keys: cubic (Catmull and Rom); distances and cosines are linear over
-//             16 samples.
+//             16 samples. A receiver that moves is where it is at the arrival: found for the middle of the surface by iteration, for a
+//             triangle by its velocity. Samples that arrive denser because it comes nearer are no louder: they are divided by their
+//             density, 1 / (1 - n . v / c).
 // Source:     docs/equations.md E14.
 // Deviations: none.
 #include "runtime/recording/player.hpp"
@@ -13,8 +15,7 @@
 
 namespace carillon::recording {
 
-Player::Player(const Recording& recording, std::size_t receivers, const Vec3& offset_m)
-    : recording_(&recording), offset_m_(offset_m), arriving_(receivers) {
+Player::Player(const RecordedSurface& recording, std::size_t receivers) : recording_(&recording), arriving_(receivers) {
   const Header& header = recording.get_header();
   for (const double radius : recording.get_radii_m()) poles_.push_back(make_pole(radius, header.sample_rate_hz, header.sound_speed_m_s));
   state_.assign(header.triangles, 0.0);
@@ -51,7 +52,7 @@ void Player::find_places(std::uint64_t frame, std::vector<Vec3>& places_m) {
     at3 = 0.0;
   }
   for (std::size_t v = 0; v < places_m.size(); ++v)
-    places_m[v] = at0 * keys_m_[0][v] + b * keys_m_[1][v] + c * keys_m_[2][v] + at3 * keys_m_[3][v] + offset_m_;
+    places_m[v] = at0 * keys_m_[0][v] + b * keys_m_[1][v] + c * keys_m_[2][v] + at3 * keys_m_[3][v];
 }
 
 float Player::get_acceleration(std::int64_t frame, std::size_t triangle) {
@@ -60,24 +61,51 @@ float Player::get_acceleration(std::int64_t frame, std::size_t triangle) {
   return blocks_[block - first_block_][triangle * kBlockFrames + static_cast<std::size_t>(frame) % kBlockFrames];
 }
 
-void Player::look(const Receiver& receiver, std::size_t triangle, const std::vector<Vec3>& places_m, Spot& spot) const {
+/// The time of the last segment's arrival is a good first guess of this one's.
+void Player::find_ears(const Way& way, double time_s, const std::vector<Vec3>& places_m, std::vector<Ear>& ears) const {
+  constexpr int kRounds = 4;  // each leaves a share of v / c of the error
+  Vec3 middle{};
+  for (const Vec3& place : places_m) middle = middle + place;
+  middle = (1.0 / static_cast<double>(std::max<std::size_t>(1, places_m.size()))) * middle;
+  for (std::size_t i = 0; i < ears.size(); ++i) {
+    Ear& ear = ears[i];
+    for (int round = 0; round < kRounds; ++round) {
+      ear.at = way(i, time_s + ear.delay_s);
+      ear.delay_s = norm(ear.at.receiver.place_m - middle) / recording_->get_header().sound_speed_m_s;
+    }
+    ear.at = way(i, time_s + ear.delay_s);
+    ear.moves = ear.at.velocity_m_s != Vec3{};
+  }
+}
+
+void Player::look(const Ear& ear, std::size_t triangle, const std::vector<Vec3>& places_m, Spot& spot) const {
   const Header& header = recording_->get_header();
   const Triangle& corners = recording_->get_triangles()[triangle];
   const Vec3& a = places_m[static_cast<std::size_t>(corners[0])];
   const Vec3& b = places_m[static_cast<std::size_t>(corners[1])];
   const Vec3& c = places_m[static_cast<std::size_t>(corners[2])];
   const Vec3 centre = (1.0 / 3.0) * (a + b + c), twice = cross(b - a, c - a);
-  const Vec3 way = receiver.place_m - centre;
-  const double r = std::max(norm(way), 0.01);
+  const Microphone& receiver = ear.at.receiver;
+  Vec3 way = receiver.place_m - centre;
+  double r = std::max(norm(way), 0.01), delay_s = r / header.sound_speed_m_s, density = 1.0;
+  if (ear.moves) {
+    // c (delay + more) = r + more n . v
+    const double away = std::min(0.9, dot(way, ear.at.velocity_m_s) / (r * header.sound_speed_m_s));
+    const double more_s = (delay_s - ear.delay_s) / (1.0 - away);
+    way = way + more_s * ear.at.velocity_m_s;
+    r = std::max(norm(way), 0.01);
+    delay_s = ear.delay_s + more_s;
+    density = 1.0 - away;
+  }
   const double area = norm(twice);
   const double cosine = area > 0.0 ? dot(way, twice) / (r * area) : 0.0;
   const double heard = 1.0 - receiver.directivity - receiver.directivity * dot(receiver.axis, way) / r;
-  spot.delay = r / header.sound_speed_m_s * header.sample_rate_hz;
-  spot.gain = heard / (4.0 * std::numbers::pi * r);
+  spot.delay = delay_s * header.sample_rate_hz;
+  spot.gain = heard / (4.0 * std::numbers::pi * r * density);
   spot.turned = spot.gain * cosine;
 }
 
-void Player::emit_segment(std::span<const Receiver> from, std::span<const Receiver> to) {
+void Player::emit_segment(const Way& way) {
   const Header& header = recording_->get_header();
   const auto frame = static_cast<std::int64_t>(emitted_);
   // Samples from 15 before to 32 behind.
@@ -90,12 +118,20 @@ void Player::emit_segment(std::span<const Receiver> from, std::span<const Receiv
       if (block + i >= 0 && block + i < static_cast<std::int64_t>(header.count_blocks()))
         recording_->read_accelerations(static_cast<std::uint64_t>(block + i), blocks_[i]);
   }
-  if (emitted_ == 0) find_places(0, places_m_[1]);
+  const std::size_t receivers = arriving_.size();
+  const double begin_s = static_cast<double>(emitted_) / header.sample_rate_hz;
+  if (emitted_ == 0) {
+    find_places(0, places_m_[1]);
+    ears_[1].resize(receivers);
+    find_ears(way, 0.0, places_m_[1], ears_[1]);
+  }
   std::swap(places_m_[0], places_m_[1]);
   find_places(std::min(emitted_ + kSegment, header.frames - 1), places_m_[1]);
+  ears_[0] = ears_[1];
+  find_ears(way, begin_s + kSegment / header.sample_rate_hz, places_m_[1], ears_[1]);
 
   const base::Sinc& sinc = base::Sinc::get();
-  std::vector<Spot> begin(from.size()), end(from.size());
+  std::vector<Spot> begin(receivers), end(receivers);
   std::array<float, base::kSincTaps> taps{};
   std::array<double, kSegment + kPoleTaps> g{};
   for (std::size_t t = 0; t < state_.size(); ++t) {
@@ -103,9 +139,9 @@ void Player::emit_segment(std::span<const Receiver> from, std::span<const Receiv
     const double area = recording_->get_areas_m2()[t];
     for (std::size_t i = 0; i < g.size(); ++i)
       g[i] = area * get_acceleration(frame - base::kSincHalf + 1 + static_cast<std::int64_t>(i), t);
-    for (std::size_t i = 0; i < from.size(); ++i) {
-      look(from[i], t, places_m_[0], begin[i]);
-      look(to[i], t, places_m_[1], end[i]);
+    for (std::size_t i = 0; i < receivers; ++i) {
+      look(ears_[0][i], t, places_m_[0], begin[i]);
+      look(ears_[1][i], t, places_m_[1], end[i]);
     }
     for (std::size_t k = 0; k < kSegment; ++k) {
       const double now = g[k + base::kSincHalf - 1];
@@ -116,7 +152,7 @@ void Player::emit_segment(std::span<const Receiver> from, std::span<const Receiv
       state_[t] = next;
       if (emitted_ + k >= header.frames) continue;
       const double along = static_cast<double>(k) / kSegment;
-      for (std::size_t i = 0; i < from.size(); ++i) {
+      for (std::size_t i = 0; i < receivers; ++i) {
         const auto mix = [&](double Spot::*part) { return begin[i].*part + along * (end[i].*part - begin[i].*part); };
         const double pressure = mix(&Spot::gain) * source + mix(&Spot::turned) * turned;
         const double arrival = static_cast<double>(emitted_ + k - time_) + mix(&Spot::delay);
@@ -135,21 +171,25 @@ void Player::emit_segment(std::span<const Receiver> from, std::span<const Receiv
   emitted_ += kSegment;
 }
 
-void Player::play(std::span<const Receiver> receivers, std::size_t count, std::span<double> out) {
-  if (last_.empty()) last_.assign(receivers.begin(), receivers.end());
-  const std::uint64_t end = time_ + count + base::kSincHalf, begin = emitted_;
-  std::vector<Receiver> from = last_, to = last_;
-  while (emitted_ < end && emitted_ < recording_->get_header().frames) {
-    const double share =
-        std::min(1.0, static_cast<double>(emitted_ + kSegment - begin) / static_cast<double>(std::max<std::uint64_t>(1, end - begin)));
-    for (std::size_t i = 0; i < to.size(); ++i) {
-      to[i] = receivers[i];
-      to[i].place_m = last_[i].place_m + share * (receivers[i].place_m - last_[i].place_m);
-    }
-    emit_segment(from, to);
-    from = to;
+void Player::release() {
+  for (auto& places : places_m_) places = {};
+  for (auto& key : keys_m_) key = {};
+  for (auto& block : blocks_) block = {};
+  state_ = {};
+  poles_ = {};
+}
+
+bool Player::is_over() const {
+  const auto is_silent = [](const std::vector<double>& heard) { return heard.empty(); };
+  return emitted_ >= recording_->get_header().frames && std::all_of(arriving_.begin(), arriving_.end(), is_silent);
+}
+
+void Player::play(const Way& way, std::size_t count, std::span<double> out) {
+  const std::uint64_t end = time_ + count + base::kSincHalf, frames = recording_->get_header().frames;
+  if (emitted_ < frames) {
+    while (emitted_ < end && emitted_ < frames) emit_segment(way);
+    if (emitted_ >= frames) release();
   }
-  last_.assign(receivers.begin(), receivers.end());
   for (std::size_t i = 0; i < arriving_.size(); ++i) {
     auto& heard = arriving_[i];
     const std::size_t there = std::min(count, heard.size());
@@ -157,6 +197,10 @@ void Player::play(std::span<const Receiver> receivers, std::size_t count, std::s
     heard.erase(heard.begin(), heard.begin() + static_cast<std::ptrdiff_t>(there));
   }
   time_ += count;
+}
+
+void Player::play(std::span<const Microphone> receivers, std::size_t count, std::span<double> out) {
+  play([&](std::size_t i, double) { return MovingMicrophone{receivers[i], {}}; }, count, out);
 }
 
 }  // namespace carillon::recording

@@ -28,50 +28,30 @@ constexpr double kFarthest = 1e6;  // m, of a vertex
 
 }  // namespace
 
-Recording::Recording(const std::filesystem::path& file) : name_(file.string()) {
+RecordedSurface::RecordedSurface(const std::filesystem::path& file) : name_(file.string()) {
   // Non-blocking, so that a FIFO without a writer cannot hang the program.
-  descriptor_ = ::open(file.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC | O_NOCTTY);
-  if (descriptor_ < 0)
+  descriptor_ = base::Descriptor(::open(file.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC | O_NOCTTY));
+  if (descriptor_.get() < 0)
     throw InputError(fmt::format("{}: cannot be opened: {}; give the path of a recorded surface", name_, std::strerror(errno)));
-  try {
-    struct stat status {};
-    if (::fstat(descriptor_, &status) != 0 || !S_ISREG(status.st_mode))
-      throw InputError(fmt::format("{}: is not a regular file; give the path of a recorded surface", name_));
-    header_.length = static_cast<std::uint64_t>(status.st_size);
-    open();
-  } catch (...) {
-    ::close(descriptor_);
-    throw;
-  }
+  struct stat status {};
+  if (::fstat(descriptor_.get(), &status) != 0 || !S_ISREG(status.st_mode))
+    throw InputError(fmt::format("{}: is not a regular file; give the path of a recorded surface", name_));
+  header_.length = static_cast<std::uint64_t>(status.st_size);
+  open();
 }
 
-Recording::Recording(std::string_view bytes, std::string name) : name_(std::move(name)), bytes_(bytes) {
+RecordedSurface::RecordedSurface(std::string_view bytes, std::string name) : name_(std::move(name)), bytes_(bytes) {
   header_.length = bytes.size();
   open();
 }
 
-Recording::Recording(Recording&& other) noexcept
-    : name_(std::move(other.name_)),
-      bytes_(other.bytes_),
-      descriptor_(std::exchange(other.descriptor_, -1)),
-      header_(other.header_),
-      triangles_(std::move(other.triangles_)),
-      triangle_body_(std::move(other.triangle_body_)),
-      vertex_body_(std::move(other.vertex_body_)),
-      area_m2_(std::move(other.area_m2_)),
-      radius_m_(std::move(other.radius_m_)) {}
-
-Recording::~Recording() {
-  if (descriptor_ >= 0) ::close(descriptor_);
-}
-
-void Recording::read(std::uint64_t offset, std::span<std::byte> to) const {
-  if (descriptor_ < 0) {
+void RecordedSurface::read(std::uint64_t offset, std::span<std::byte> to) const {
+  if (descriptor_.get() < 0) {
     std::memcpy(to.data(), bytes_.data() + offset, to.size());
     return;
   }
   while (!to.empty()) {
-    const ssize_t got = ::pread(descriptor_, to.data(), to.size(), static_cast<off_t>(offset));
+    const ssize_t got = ::pread(descriptor_.get(), to.data(), to.size(), static_cast<off_t>(offset));
     if (got < 0 && errno == EINTR) continue;
     if (got < 0) throw SystemError(fmt::format("{}: cannot be read at byte {}: {}", name_, offset, std::strerror(errno)));
     if (got == 0)
@@ -82,18 +62,18 @@ void Recording::read(std::uint64_t offset, std::span<std::byte> to) const {
 }
 
 template <typename T>
-std::vector<T> Recording::read_array(Array array, std::uint64_t count) const {
+std::vector<T> RecordedSurface::read_array(Array array, std::uint64_t count) const {
   std::vector<T> values(count);
   read(header_.offset[static_cast<std::size_t>(array)], std::as_writable_bytes(std::span(values)));
   return values;
 }
 
-std::uint64_t Recording::find_offset(Array array, std::uint64_t row) const {
+std::uint64_t RecordedSurface::find_offset(Array array, std::uint64_t row) const {
   const Header::Shape shape = header_.get_shape(array);
   return header_.offset[static_cast<std::size_t>(array)] + row * (shape.bytes / shape.extent[0]);
 }
 
-void Recording::open() {
+void RecordedSurface::open() {
   const std::uint64_t length = header_.length;
   std::string head(std::min<std::uint64_t>(length, kHeaderBytes), '\0');
   read(0, std::as_writable_bytes(std::span(head)));
@@ -144,7 +124,15 @@ void Recording::open() {
   check_list(scale, "scale", "is no acceleration in m/s2", [](float value) { return value >= 0.0F && value <= 1e12F; });
 }
 
-void Recording::read_places(std::uint64_t key, std::span<Vec3> places_m) const {
+Vec3 RecordedSurface::read_centre(std::uint64_t key) const {
+  std::vector<std::array<double, 3>> centre(header_.bodies);
+  read(find_offset(Array::kCentre, key), std::as_writable_bytes(std::span(centre)));
+  Vec3 mean{};
+  for (const Vec3& one : centre) mean = mean + (1.0 / static_cast<double>(centre.size())) * one;
+  return mean;
+}
+
+void RecordedSurface::read_places(std::uint64_t key, std::span<Vec3> places_m) const {
   std::vector<std::array<double, 3>> centre(header_.bodies);
   std::vector<double> step(header_.bodies);
   std::vector<std::array<std::int16_t, 3>> place(header_.vertices);
@@ -157,7 +145,7 @@ void Recording::read_places(std::uint64_t key, std::span<Vec3> places_m) const {
   }
 }
 
-void Recording::read_accelerations(std::uint64_t block, std::span<float> acceleration_m_s2) const {
+void RecordedSurface::read_accelerations(std::uint64_t block, std::span<float> acceleration_m_s2) const {
   std::vector<float> scale(header_.triangles);
   std::vector<std::int16_t> values(header_.triangles * kBlockFrames);
   read(find_offset(Array::kScale, block), std::as_writable_bytes(std::span(scale)));

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "runtime/base/descriptor.hpp"
 #include "runtime/base/triangle.hpp"
 #include "runtime/base/vector.hpp"
 #include "runtime/recording/header.hpp"
@@ -17,15 +18,12 @@ namespace carillon::recording {
 /// The file, open; tables in memory, blocks read when they are asked for. What it keeps true: every byte was checked against the digest
 /// when it was opened; every number in its tables is in range and finite. A file that is changed afterwards gives wrong sound, never a
 /// crash.
-class Recording {
+class RecordedSurface {
  public:
   /// Throws InputError, one clear message, unless the file is whole and sane.
-  explicit Recording(const std::filesystem::path& file);
+  explicit RecordedSurface(const std::filesystem::path& file);
   /// Of bytes in memory, which must outlive it.
-  Recording(std::string_view bytes, std::string name);
-  ~Recording();
-  Recording(Recording&& other) noexcept;
-  Recording& operator=(Recording&&) = delete;
+  RecordedSurface(std::string_view bytes, std::string name);
 
   const Header& get_header() const { return header_; }
   double get_duration_s() const { return static_cast<double>(header_.frames) / header_.sample_rate_hz; }
@@ -34,6 +32,8 @@ class Recording {
   const std::vector<double>& get_areas_m2() const { return area_m2_; }
   const std::vector<double>& get_radii_m() const { return radius_m_; }
 
+  /// The mean of the middles of its bodies [m] at sample key * key_frames. key < count_keys().
+  Vec3 read_centre(std::uint64_t key) const;
   /// places (V): vertices [m] at sample key * key_frames. key < count_keys().
   void read_places(std::uint64_t key, std::span<Vec3> places_m) const;
   /// acceleration (T, kBlockFrames): of normals [m/s2], samples block * kBlockFrames on; zero behind the end. block < count_blocks().
@@ -48,7 +48,7 @@ class Recording {
 
   std::string name_;
   std::string_view bytes_;  // empty: from the file
-  int descriptor_ = -1;
+  base::Descriptor descriptor_;
   Header header_;
   std::vector<Triangle> triangles_;
   std::vector<std::int32_t> triangle_body_, vertex_body_;

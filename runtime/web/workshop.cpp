@@ -116,6 +116,9 @@ std::optional<bank::Edits> read_edits(const bank::Bank& bank, std::string_view t
 
 host::Scene read_scene(std::string_view text, std::size_t bodies) {
   host::Scene scene = host::parse_scene(base::parse_document(text, "scene"));
+  if (!scene.surfaces.empty())
+    throw InputError(fmt::format("{}: body \"{}\" is a recording, which pages cannot play; play it with carillon-render",
+                                 scene.surfaces[0].place, scene.surfaces[0].name));
   if (scene.bodies.size() != bodies)
     throw InputError(fmt::format("scene: describes {} bodies, but {} are expected", scene.bodies.size(), bodies));
   return scene;

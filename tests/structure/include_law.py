@@ -83,6 +83,7 @@ LAW = {
             "runtime/joints",
             "runtime/radiation",
             "runtime/head",
+            "runtime/recording",
             "runtime/synth",
             "runtime/effect_selection",
             "runtime/contact",

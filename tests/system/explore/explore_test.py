@@ -244,6 +244,9 @@ class Explore(unittest.TestCase):
         (self.root / "kept/mine.txt").write_text("mine")
         other = {**SCENE, "bodies": [{**SCENE["bodies"][0], "bank": "none.hdf"}]}
         (self.root / "other.json").write_text(json.dumps(other))
+        recorded = {**SCENE, "bodies": [*SCENE["bodies"], {"name": "recorded", "recording": "plate.surface"}]}
+        (self.root / "recorded.json").write_text(json.dumps(recorded))
+        self.refuse("recorded.json", contains=("recorded.json", "is a recording, which pages cannot play"))
         self.refuse("none.hdf", contains=("none.hdf", "no such file"))
         self.refuse("text.json", contains=("text.json:1",))
         self.refuse("other.json", contains=("none.hdf",))

@@ -6,14 +6,16 @@
 #include <vector>
 
 #include "precompute/emission/derivative.hpp"
-#include "precompute/emission/high_pass.hpp"
 #include "runtime/base/error.hpp"
+#include "runtime/recording/high_pass.hpp"
 #include "tests/unit/precompute/emission/motions.hpp"
 
 namespace carillon::emission {
 namespace {
 
 using namespace testing;
+using recording::calc_alpha;
+using recording::HighPass;
 
 /// What is heard of a tone of a small pulsating sphere, over rho Q' / (4 pi r) of the same velocity at the frequency of `reference_hz`.
 double find_gain(double freq_hz, double reference_hz, int steps, double r = 0.5) {

@@ -49,7 +49,7 @@ inline Options make_options(std::uint64_t frames, const Vec3& place_m, int steps
   options.frames = frames;
   options.steps_per_sample = steps;
   options.high_pass_hz = 0.0;
-  Receiver receiver;
+  Microphone receiver;
   receiver.place_m = place_m;
   options.receivers = {receiver};
   options.has_visibility = false;

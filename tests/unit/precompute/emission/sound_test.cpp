@@ -109,14 +109,14 @@ TEST(Sound, ATumblingRigidBodyMakesNoTone) {
 TEST(Sound, ReceiversHaveDirections) {
   const auto part = make_part(bem::testing::make_ball(2, 1e-3));
   Options options = make_options(800, {0.0, 0.0, 1.0}, 16);
-  Receiver eight;
+  Microphone eight;
   eight.place_m = {0.0, 0.0, 1.0};
   eight.directivity = 1.0;
   eight.axis = {1.0, 0.0, 0.0};
-  Receiver heart = eight;
+  Microphone heart = eight;
   heart.directivity = 0.5;
   heart.axis = {0.0, 0.0, -1.0};
-  Receiver away = heart;
+  Microphone away = heart;
   away.axis = {0.0, 0.0, 1.0};
   options.receivers.insert(options.receivers.end(), {eight, heart, away});
   Emission sound(MPI_COMM_SELF, part, options);

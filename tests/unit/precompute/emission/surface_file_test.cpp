@@ -48,7 +48,7 @@ Vec3 move(const Vec3& x, double t) {
 
 Options make_file_options(const std::filesystem::path& file) {
   Options options = make_options(kFrames, {0.5, 0.1, 0.2}, 16);
-  Receiver other;
+  Microphone other;
   other.place_m = {-0.3, 0.6, 0.1};
   other.directivity = 0.5;
   options.receivers.push_back(other);
@@ -78,7 +78,7 @@ class SurfaceFiles : public ::testing::Test {
 };
 
 TEST_F(SurfaceFiles, WhatIsPlayedIsWhatWasHeard) {
-  const recording::Recording recording(file);
+  const recording::RecordedSurface recording(file);
   EXPECT_EQ(recording.get_header().frames, kFrames);
   EXPECT_EQ(recording.get_header().bodies, 2U);
   EXPECT_FALSE(std::filesystem::exists(file.string() + ".part"));
@@ -107,7 +107,7 @@ TEST_F(SurfaceFiles, WhatIsPlayedIsWhatWasHeard) {
 }
 
 TEST_F(SurfaceFiles, PlacesAreThoseOfTheMotionToAStep) {
-  const recording::Recording recording(file);
+  const recording::RecordedSurface recording(file);
   const SurfacePart part = make_pair();
   std::vector<Vec3> places(part.nodes_m.size());
   for (const std::uint64_t key : {0U, 1U, 17U, 31U}) {
@@ -156,26 +156,26 @@ TEST_F(SurfaceFiles, EveryCutIsOneClearError) {
   cuts.push_back(bytes.size() - 1);
   for (const std::size_t cut : cuts) {
     const std::string part = bytes.substr(0, cut);
-    const auto message = tests::catch_message<InputError>([&] { recording::Recording(part, "cut.surface.hdf"); });
+    const auto message = tests::catch_message<InputError>([&] { recording::RecordedSurface(part, "cut.surface.hdf"); });
     ASSERT_EQ(message.find("cut.surface.hdf: "), 0U) << cut << ": " << message;
   }
   const auto path = folder->write("cut.surface.hdf", bytes.substr(0, 100000));
-  EXPECT_NE(tests::catch_message<InputError>([&] { recording::Recording{path}; }).find("truncated: 100000 bytes"), std::string::npos);
+  EXPECT_NE(tests::catch_message<InputError>([&] { recording::RecordedSurface{path}; }).find("truncated: 100000 bytes"), std::string::npos);
 }
 
 TEST_F(SurfaceFiles, EveryChangedByteIsFound) {
   std::string bytes = tests::read_all(file);
   for (std::size_t at = 0; at < bytes.size(); at += 97777) {
     bytes[at] = static_cast<char>(bytes[at] ^ 0x40);
-    EXPECT_THROW(recording::Recording(bytes, "changed"), InputError) << at;
+    EXPECT_THROW(recording::RecordedSurface(bytes, "changed"), InputError) << at;
     bytes[at] = static_cast<char>(bytes[at] ^ 0x40);
   }
-  EXPECT_NO_THROW(recording::Recording(bytes, "whole"));
+  EXPECT_NO_THROW(recording::RecordedSurface(bytes, "whole"));
 }
 
 TEST_F(SurfaceFiles, TablesThatCannotBeAreRefusedEvenWithTheRightDigest) {
   const std::string bytes = tests::read_all(file);
-  const recording::Recording recording(bytes, "whole");
+  const recording::RecordedSurface recording(bytes, "whole");
   const auto refuse = [&](recording::Array array, std::size_t at, auto value) {
     std::string bad = bytes;
     bad.replace(recording.get_header().offset[static_cast<std::size_t>(array)] + at, sizeof(value), reinterpret_cast<const char*>(&value),
@@ -184,7 +184,7 @@ TEST_F(SurfaceFiles, TablesThatCannotBeAreRefusedEvenWithTheRightDigest) {
     sha.add(std::string_view(bad).substr(0, recording::kTextBytes));
     sha.add(std::string_view(bad).substr(recording::kHeaderBytes));
     bad.replace(recording::kTextBytes, recording::kDigestBytes, base::to_hex(sha.finish()));
-    return tests::catch_message<InputError>([&] { recording::Recording(bad, "bad"); });
+    return tests::catch_message<InputError>([&] { recording::RecordedSurface(bad, "bad"); });
   };
   EXPECT_NE(refuse(recording::Array::kTriangle, 12, std::int32_t{1 << 20}).find("triangle[1] names a vertex that is not there"),
             std::string::npos);

@@ -10,6 +10,7 @@
 
 #include "runtime/host/microphones.hpp"
 #include "runtime/host/pose.hpp"
+#include "tests/support/catch_message.hpp"
 
 namespace carillon::host {
 namespace {
@@ -286,6 +287,42 @@ TEST(Scene, ABodyMayHaveEffectsOfItsOwn) {
   EXPECT_FALSE(scene.bodies[1].overrides.automatic);
   EXPECT_EQ(scene.bodies[2].overrides.off, synth::EffectSet{});
   EXPECT_TRUE(scene.bodies[2].overrides.automatic);
+}
+
+TEST(Scene, ABodyMayBeNonlinearByItself) {
+  using synth::Effect;
+  if (!kPlayableEffects.has(Effect::kNonlinear)) GTEST_SKIP() << "built without it";
+  const auto parse_all = [](const std::string& effects) {
+    return parse(R"({"duration_s": 2, "effects": )" + effects + R"(, "bodies": [
+      {"name": "a", "bank": "a.h5"}, {"name": "b", "bank": "a.h5", "nonlinear": true}, {"name": "c", "bank": "a.h5", "nonlinear": false}]})")
+        .bodies;
+  };
+  for (const char* effects : {R"("auto")", R"({"nonlinear": true})", R"({"off": ["nonlinear", "doppler"]})"}) {
+    const auto bodies = parse_all(effects);
+    for (const SceneBody& body : bodies) EXPECT_TRUE(body.overrides.automatic);
+    EXPECT_TRUE(bodies[1].overrides.on.has(Effect::kNonlinear) && !bodies[1].overrides.off.has(Effect::kNonlinear));
+    EXPECT_TRUE(!bodies[2].overrides.on.has(Effect::kNonlinear) && bodies[2].overrides.off.has(Effect::kNonlinear));
+    EXPECT_EQ(bodies[1].overrides.off.without(Effect::kNonlinear), bodies[0].overrides.off.without(Effect::kNonlinear));
+  }
+  const auto listed = parse_all(R"(["modal", "nonlinear"])");
+  EXPECT_EQ(listed[0].overrides.on, (synth::EffectSet{Effect::kModal, Effect::kNonlinear}));
+  EXPECT_EQ(listed[1].overrides.on, listed[0].overrides.on);
+  EXPECT_EQ(listed[2].overrides.on, synth::EffectSet{Effect::kModal});
+  EXPECT_TRUE(!listed[2].overrides.automatic && listed[2].overrides.off.is_empty());
+  // "auto" takes back what the scene says of this one effect.
+  const Scene chosen = parse(R"({"duration_s": 2, "effects": {"nonlinear": true, "off": ["doppler"]},
+    "bodies": [{"name": "a", "bank": "a.h5", "nonlinear": "auto"}]})");
+  EXPECT_TRUE(chosen.bodies[0].overrides.automatic);
+  EXPECT_TRUE(chosen.bodies[0].overrides.on.is_empty());
+  EXPECT_EQ(chosen.bodies[0].overrides.off, synth::EffectSet{Effect::kDoppler});
+  const auto refuse = [](const std::string& effects, const std::string& keys) {
+    return tests::catch_message<InputError>([&] {
+      (void)parse("{\"duration_s\": 2, \"effects\": " + effects + ", \"bodies\": [{\"name\": \"a\", \"bank\": \"a.h5\", " + keys + "}]}");
+    });
+  };
+  EXPECT_NE(refuse(R"(["modal"])", R"("nonlinear": "auto")").find("give true or false"), std::string::npos);
+  EXPECT_NE(refuse(R"("auto")", R"("nonlinear": "on")").find("nonlinear"), std::string::npos);
+  EXPECT_NE(refuse(R"("auto")", R"("nonlinear": true, "effects": {"nonlinear": false})").find("keep one of them"), std::string::npos);
 }
 
 TEST(Scene, SurfacesAreAsRoughAsTheySay) {

@@ -17,9 +17,9 @@ using namespace carillon;
 
 void play(std::string_view bytes) {
   try {
-    const recording::Recording recording(bytes, "input");
+    const recording::RecordedSurface recording(bytes, "input");
     recording::Player player(recording, 1);
-    std::vector<recording::Receiver> receivers(1);
+    std::vector<recording::Microphone> receivers(1);
     receivers[0].place_m = {1.0, 0.0, 0.0};
     std::vector<double> out(700, 0.0);
     player.play(receivers, out.size(), out);

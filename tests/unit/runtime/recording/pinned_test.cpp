@@ -22,7 +22,7 @@ std::string read_pinned() { return tests::read_all(CARILLON_SOURCE_DIR "/tests/u
 
 TEST(Pinned, FilesOfVersionOneStayReadable) {
   const std::string bytes = read_pinned();
-  const Recording recording(bytes, "octahedron");
+  const RecordedSurface recording(bytes, "octahedron");
   EXPECT_EQ(recording.get_header().frames, 600U);
   EXPECT_EQ(recording.get_triangles().size(), 8U);
   EXPECT_NEAR(recording.get_areas_m2()[0], 0.05 * 0.05 * std::sqrt(3.0) / 2.0, 1e-12);
@@ -35,9 +35,9 @@ TEST(Pinned, FilesOfVersionOneStayReadable) {
 TEST(Pinned, AnUnmovedSourceIsHeardByTheClosedForm) {
   // Volume acceleration: 1e-5 m of radial motion at the corners, mean over facets: area / sqrt(3).
   const std::string bytes = read_pinned();
-  const Recording recording(bytes, "octahedron");
+  const RecordedSurface recording(bytes, "octahedron");
   Player player(recording, 1);
-  std::vector<Receiver> receivers(1);
+  std::vector<Microphone> receivers(1);
   receivers[0].place_m = {0.0, 0.0, 2.0};
   std::vector<double> sound(900, 0.0);
   player.play(receivers, sound.size(), sound);
@@ -60,9 +60,9 @@ TEST(Pinned, EveryChangedByteBehindAGoodSealPlaysOrIsRefused) {
       changed[at] = static_cast<char>(changed[at] ^ flip);
       changed = testing::seal_again(changed);
       try {
-        const Recording recording(changed, "changed");
+        const RecordedSurface recording(changed, "changed");
         Player player(recording, 1);
-        std::vector<Receiver> receivers(1);
+        std::vector<Microphone> receivers(1);
         receivers[0].place_m = {0.3, 0.0, 0.0};
         std::vector<double> out(64, 0.0);
         player.play(receivers, out.size(), out);

@@ -1,9 +1,7 @@
 // The DC blocker of OCE01 eq. 9.
 #pragma once
 
-namespace carillon::emission {
-
-inline constexpr double kAlpha2001 = 0.1;  // as printed: a corner of 738 Hz at 44,100 Hz
+namespace carillon::recording {
 
 /// Of a corner (-3 dB) in Hz: alpha = 1 - exp(-2 pi f / fs); 0 Hz lets everything pass.
 double calc_alpha(double corner_hz, double sample_rate_hz);
@@ -22,4 +20,4 @@ struct HighPass {
   }
 };
 
-}  // namespace carillon::emission
+}  // namespace carillon::recording
