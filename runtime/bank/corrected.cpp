@@ -63,10 +63,12 @@ void scale_nonlinear(Bank& bank, const std::vector<double>& freq_hz) {
   scale_frequencies(bank.quartic, factor);
 }
 
-/// The nonlinear energy of the modes that mix_modes() will make; parts of modes that have none of it are left out.
+/// The nonlinear energy of the modes that mix_modes() will make, at their frequencies in air: sums of the modes of the body as they are at
+/// their corrected frequencies, if there are such. Parts of modes that have none of it are left out.
 void mix_nonlinear(Bank& bank) {
   const Mixing& mixing = bank.multipoles.mixing;
   if (bank.quartic.is_empty() || mixing.is_empty()) return;
+  if (!bank.corrected.is_empty()) scale_nonlinear(bank, bank.corrected.freq_hz);
   const std::size_t n = bank.quartic.mode_count();
   std::vector<std::size_t> place(bank.mode_count() + kRigidMotions, n);
   for (std::size_t i = 0; i < n; ++i) place[static_cast<std::size_t>(bank.quartic.modes[i])] = i;
@@ -101,9 +103,9 @@ Bank calc_corrected(Bank bank) {
   if (const std::vector<std::size_t> order = sort_played_modes(bank); !std::is_sorted(order.begin(), order.end()))
     select_modes(bank, order);
   if (bank.multipoles.mixing.is_empty()) scale_nonlinear(bank, has_air ? bank.multipoles.freq_hz : bank.corrected.freq_hz);
+  mix_nonlinear(bank);
   if (!bank.corrected.is_empty()) take_corrected(bank);
   if (has_air) {
-    mix_nonlinear(bank);
     mix_modes(bank);
     // Reactions are those of the elastic body, at the frequencies that it has alone.
     for (std::size_t m = 0; m < bank.mode_count(); ++m) {
@@ -119,7 +121,13 @@ Bank calc_corrected(Bank bank) {
 Bank choose_frequencies(Bank bank, Frequencies frequencies) {
   if (frequencies == Frequencies::kCorrected) return calc_corrected(std::move(bank));
   if (!bank.multipoles.is_empty()) {
-    mix_nonlinear(bank);
+    if (!bank.quartic.is_empty() && !bank.multipoles.mixing.is_empty()) {
+      mix_nonlinear(bank);
+      // From the frequencies in air to those of the mesh, as calc_corrected() takes it back.
+      std::vector<double> factor;
+      for (std::size_t m = 0; m < bank.mode_count(); ++m) factor.push_back(bank.freq_hz(m) / bank.multipoles.freq_hz[m]);
+      scale_frequencies(bank.quartic, factor);
+    }
     mix_modes(bank);  // what the multipoles are of
     add_radiation(bank);
   }

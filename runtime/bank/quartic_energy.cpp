@@ -146,10 +146,20 @@ double calc_energy_j(const QuarticEnergy& energy, std::span<const double> q, std
 }
 
 std::vector<double> calc_self_coupling(const QuarticEnergy& energy) {
+  const std::size_t n = energy.mode_count();
+  std::vector<double> squares;
+  if (!energy.is_of_points()) {
+    squares.resize(n);
+    for (std::size_t r = 0; r < energy.row_count(); ++r)
+      for (std::size_t i = 0; i < n; ++i) {
+        const auto diagonal = static_cast<double>(energy.rows[r * count_pairs(n) + find_pair(i, i)]);
+        squares[i] += diagonal * diagonal;
+      }
+    return squares;
+  }
   QuarticEnergy flat = energy;
   flat.linear.clear();
-  const std::size_t n = energy.mode_count();
-  std::vector<double> q(n), gradient(n), squares;
+  std::vector<double> q(n), gradient(n);
   for (std::size_t i = 0; i < n; ++i) {
     q[i] = 1.0;
     squares.push_back(2.0 * calc_energy_j(flat, q, gradient));

@@ -220,6 +220,30 @@ TEST(PlayedCoupled, MeshFirstIsAsGoodAsCorrectedAtOnce) {
   for (std::size_t m = 0; m < kModes; ++m) EXPECT_NEAR(once.decay_per_s[m] / twice.decay_per_s[m], 1.0, 1e-12);
 }
 
+TEST(PlayedCoupled, NonlinearEnergyIsThatOfTheCorrectedSums) {
+  constexpr double kFactor = 0.97;
+  Bank bank = make_coupled_bank();
+  select_modes(bank, sort_played_modes(bank));
+  for (std::size_t m = 0; m < kModes; ++m) bank.corrected.freq_hz[m] = kFactor * bank.freq_hz(m);
+  for (std::size_t m = 0; m < kModes; ++m) bank.quartic.modes.push_back(static_cast<std::int32_t>(m));
+  for (std::size_t i = 0; i < 2 * count_pairs(kModes); ++i)
+    bank.quartic.rows.push_back(static_cast<float>(1e6 * std::sin(0.7 * static_cast<double>(i * i))));
+  const Bank played = calc_corrected(bank);
+  // Modes that all are c times lower are softer by c^2, in large motion too; then the motion of the modes in air is that of the sums.
+  std::vector<double> q(kModes), sums(kModes), none(kModes);
+  for (std::size_t i = 0; i < kModes; ++i) q[i] = 1e-3 * std::cos(2.0 * static_cast<double>(i));
+  for (std::size_t i = 0; i < kModes; ++i)
+    for (std::size_t j = 0; j < kModes; ++j) sums[j] += find_part(bank.multipoles.mixing, i, j) * q[i];
+  const double wanted = kFactor * kFactor * calc_energy_j(bank.quartic, sums, none);
+  EXPECT_NEAR(calc_energy_j(played.quartic, q, none) / wanted, 1.0, 1e-5);
+  // At the frequencies of the mesh modes harden by as much, and on the way over them nothing is lost.
+  const Bank mesh = choose_frequencies(bank, Frequencies::kMesh), twice = calc_corrected(mesh);
+  const std::vector<double> in_air = calc_self_coupling(played.quartic), by_mesh = calc_self_coupling(mesh.quartic);
+  for (std::size_t m = 0; m < kModes; ++m)
+    EXPECT_NEAR(by_mesh[m] / in_air[m] * played.eigenvalue_rad2_s2[m] / mesh.eigenvalue_rad2_s2[m], 1.0, 1e-5) << m;
+  EXPECT_NEAR(calc_energy_j(twice.quartic, q, none) / wanted, 1.0, 1e-5);
+}
+
 TEST(MixingEdits, AnotherSizeScalesWhatIsPlayedAndAnotherStiffnessLeavesModesAlone) {
   const Bank bank = make_coupled_bank();
   const Bank large = calc_edited(bank, {.size_scale = 2.0});
