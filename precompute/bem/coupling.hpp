@@ -27,8 +27,8 @@ struct Mixture {
 /// mode are left out of its mixture. `mass`: (n, n), symmetric. Throws InputError where 1 + M is not positive definite.
 std::vector<Mixture> couple_modes(std::span<const double> wave_number_1_m, std::span<const double> mass, double kept);
 
-/// The mode nearest to `before`, for another mass (n, n) between its n motions, whose wave numbers are given (0: rigid). Modes of one wave
-/// number, to 1e-4, stay as they were turned in `before`. Throws InputError where 1 + M is not positive definite.
+/// The mode nearest to `before`, for another mass (n, n) between its n motions, whose wave numbers are given (0: rigid). Modes whose
+/// k^2 agree to 1e-4 stay as they were turned in `before`. Throws InputError where 1 + M is not positive definite.
 Mixture follow_mode(std::span<const double> wave_number_1_m, std::span<const double> mass, const Mixture& before);
 
 /// (sides, n) integrals over the surface of the pressure (N, sides) of each side times the velocity of each of the n motions.

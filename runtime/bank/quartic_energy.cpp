@@ -16,7 +16,7 @@
 namespace carillon::bank {
 namespace {
 
-/// What one row is at q: eta, l, and what they add to the gradient.
+/// What one row is at q [J^1/2]: eta and l.
 struct RowValue {
   double eta = 0.0, linear = 0.0;
 };

@@ -26,10 +26,10 @@ struct QuarticEnergy {
   std::vector<float> stress;        // (R, P, 3 or 6) J^1/2
   std::vector<double> weight;       // (P), none negative
   std::vector<double> linear;       // (R, N) J^1/2 m^-1 kg^-1/2, or empty: a flat body
-  double rest_energy_j = 0.0;       // V0 that keeps V + V0 above 0 for the softest blow worth playing; the runtime adds what others need
-  double error = 0.0;               // of the points: relative error of V on motions that they were not made from
-  double membrane_ratio = 0.0;      // highest coupled frequency over the lowest one of the condensed motion; above 1/2 its inertia counts
-  double thickness_m = 0.0;         // by which amplitudes are judged; 0: unknown
+  double rest_energy_j = 0.0;   // V0 of a curved body at first: linear energy of its lowest mode at 1/1000 of a thickness; blows raise it
+  double error = 0.0;           // of the points: relative error of V on motions that they were not made from
+  double membrane_ratio = 0.0;  // highest coupled frequency over the lowest one of the condensed motion; above 1/2 its inertia counts
+  double thickness_m = 0.0;     // by which amplitudes are judged; 0: unknown
 
   bool is_empty() const { return modes.empty(); }
   bool is_of_points() const { return !weight.empty(); }

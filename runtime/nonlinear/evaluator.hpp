@@ -20,8 +20,9 @@ class Evaluator {
   double get_scale() const noexcept { return scale_; }
   /// Only the first `modes` are coupled from now on; of the others q is 0. [audio-thread]
   void set_count(int modes) noexcept;
-  /// V [J]. q: scaled, in single precision, zeros behind the last; exact: the same in double precision. Fills `gradient` of the coupled
-  /// modes [N kg^-1/2], of the scaled q times get_scale(). [audio-thread]
+  /// V [J] at q, given twice: scaled, in single precision, zeros behind the last; and as im and to_q, whose products are q [m kg^1/2], for
+  /// diagonals in double precision. Fills `gradient`, with regard to q that is not scaled [N kg^-1/2]; 0 of modes that are not coupled.
+  /// [audio-thread]
   double evaluate(const float* q, const double* im, const double* to_q, double* gradient) noexcept;
   std::size_t calc_bytes() const noexcept;
 

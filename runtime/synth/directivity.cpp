@@ -2,7 +2,8 @@
 //             weight, then sounded by the table of a mode whose sound is the real part of its state. A weight W + u D + u (u - 1) / 2 C
 //             over a block gives A + u B + u (u - 1) / 2 E, A the sound by W, B that by D and E that by C, u from 0 to 1: what is heard
 //             has no steps. From block to block W grows by D and D by C, a parabola by forward differences. Next weights are looked up at
-//             a place that is predicted; C is the second divided difference of the last weight, this one and the next.
+//             a place that is predicted; C is twice the second divided difference, by blocks, of the weights
+//             at both ends of the last way and at the end of this one.
 // Source:     docs/equations.md E4, E10.
 // Deviations: T is that of a mode that rings for ever at its frequency: a strike's first cycles and a decay within few cycles are not.
 #include "runtime/synth/directivity.hpp"
