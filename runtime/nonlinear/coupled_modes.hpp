@@ -70,7 +70,6 @@ class CoupledModes {
   }
   /// q [m kg^1/2].
   double get_amplitude(int i) const noexcept { return im_[static_cast<std::size_t>(i)] / omega_[static_cast<std::size_t>(i)]; }
-  std::span<const double> get_middle() const noexcept { return std::span(middle_).first(static_cast<std::size_t>(count_)); }
 
   /// Sets a mode, by amplitude and velocity. What it has of energy counts as put in. Not between samples of a blow. [audio-thread]
   void set_state(int i, double q, double velocity) noexcept;
