@@ -1,6 +1,7 @@
 // Method:     rows: eta = A . (q q^T), one product of a matrix whose columns are the pairs of modes with the vector of the pairs; the
-//             gradient is the matrix sum of (l_r + eta_r) A_r times 2 q. Points: the gradients at the points, their strains, eta, and the
-//             same way back. Diagonals are half in a triangle, since it is applied with its transpose.
+//             gradient is the matrix sum of (l_r + eta_r) A_r times 2 q. Entries: the same, of rows that are 0 but for some; both products
+//             gather, by rows for eta and by pairs for the sum, so that nothing is scattered. Points: the gradients at the points, their
+//             strains, eta, and the same way back. Diagonals are half in a triangle, since it is applied with its transpose.
 // Source:     docs/equations.md E12.
 // Deviations: none.
 #include "runtime/nonlinear/evaluator.hpp"
@@ -17,6 +18,14 @@ double find_largest(const std::vector<float>& values) {
   double largest = 0.0;
   for (const float value : values) largest = std::max(largest, std::abs(static_cast<double>(value)));
   return largest;
+}
+
+/// From here on gathers cost more than passing over zeros: see tests/bench/nonlinear.
+constexpr double kMostEntries = 0.2;
+
+bool is_sparse(const bank::QuarticEnergy& energy) {
+  const auto entries = std::count_if(energy.rows.begin(), energy.rows.end(), [](float entry) { return entry != 0.0F; });
+  return static_cast<double>(entries) <= kMostEntries * static_cast<double>(energy.rows.size());
 }
 
 bool is_diagonal(const bank::QuarticEnergy& energy) {
@@ -40,6 +49,8 @@ Evaluator::Evaluator(const bank::QuarticEnergy& energy, const CoupledKernels& ke
     add_points(energy);
   else if (is_diagonal(energy))
     add_diagonals(energy);
+  else if (is_sparse(energy))
+    add_entries(energy);
   else
     add_rows(energy);
   const auto padded_rows = static_cast<std::size_t>(pad(rows_, kUnit));
@@ -47,12 +58,13 @@ Evaluator::Evaluator(const bank::QuarticEnergy& energy, const CoupledKernels& ke
   of_linear_.assign(padded_rows, 0.0F);
   forces_.assign(static_cast<std::size_t>(padded_), 0.0F);
   more_.assign(static_cast<std::size_t>(padded_), 0.0F);
+  if (form_ == Form::kEntries) weight_.assign(padded_rows, 0.0F);
   if (is_curved_ && form_ != Form::kDiagonals) {
     linear_.assign(padded_rows * static_cast<std::size_t>(padded_), 0.0F);
     for (std::size_t r = 0; r < static_cast<std::size_t>(rows_); ++r)
       for (std::size_t i = 0; i < static_cast<std::size_t>(modes_); ++i)
         linear_[r * static_cast<std::size_t>(padded_) + i] =
-            static_cast<float>(energy.linear[r * static_cast<std::size_t>(modes_) + i] / scale_);
+            static_cast<float>(energy.linear[(places_.empty() ? r : places_[r]) * static_cast<std::size_t>(modes_) + i] / scale_);
   }
   set_count(modes_);
 }
@@ -80,6 +92,52 @@ void Evaluator::add_rows(const bank::QuarticEnergy& energy) {
         matrices_[r * static_cast<std::size_t>(stride_) + static_cast<std::size_t>(find_column(static_cast<int>(j))) + i] =
             static_cast<float>(entry / (scale_ * scale_) * (i == j ? 0.5 : 1.0));
       }
+  pairs_.assign(static_cast<std::size_t>(stride_), 0.0F);
+  sum_.assign(static_cast<std::size_t>(stride_), 0.0F);
+}
+
+/// kUnit rows are as long as the longest of them: the others are filled up by zeros.
+void Evaluator::Entries::append(const std::vector<std::pair<std::int32_t, float>>* rows, int count) {
+  std::size_t longest = 0;
+  for (int r = 0; r < count; ++r) longest = std::max(longest, rows[r].size());
+  if (begin.empty()) begin.push_back(0);
+  begin.push_back(begin.back() + static_cast<std::int32_t>(longest));
+  for (std::size_t e = 0; e < longest; ++e)
+    for (int l = 0; l < kUnit; ++l) {
+      const bool is_there = l < count && e < rows[l].size();
+      index.push_back(is_there ? rows[l][e].first : 0);
+      values.push_back(is_there ? rows[l][e].second : 0.0F);
+    }
+}
+
+void Evaluator::add_entries(const bank::QuarticEnergy& energy) {
+  form_ = Form::kEntries;
+  const std::size_t n = energy.mode_count();
+  const double largest = find_largest(energy.rows);
+  scale_ = largest > 0.0 ? std::sqrt(largest) : 1.0;
+  stride_ = pad(static_cast<int>(find_column(modes_)), kUnit);
+  std::vector<std::vector<std::pair<std::int32_t, float>>> by_row(energy.row_count()), by_pair(static_cast<std::size_t>(stride_));
+  for (std::size_t r = 0; r < energy.row_count(); ++r)
+    for (std::size_t j = 0; j < n; ++j)
+      for (std::size_t i = 0; i <= j; ++i) {
+        const double entry = static_cast<double>(energy.rows[r * bank::count_pairs(n) + bank::find_pair(i, j)]);
+        if (entry == 0.0) continue;
+        const auto pair = static_cast<std::int32_t>(find_column(static_cast<int>(j)) + static_cast<std::ptrdiff_t>(i));
+        by_row[r].emplace_back(pair, static_cast<float>(entry / (scale_ * scale_) * (i == j ? 0.5 : 1.0)));
+      }
+  // Rows of one length lie together.
+  std::vector<std::size_t> order(by_row.size());
+  for (std::size_t r = 0; r < order.size(); ++r) order[r] = r;
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return by_row[a].size() > by_row[b].size(); });
+  std::vector<std::vector<std::pair<std::int32_t, float>>> sorted;
+  for (const std::size_t r : order) {
+    for (const auto& [pair, value] : by_row[r])
+      by_pair[static_cast<std::size_t>(pair)].emplace_back(static_cast<std::int32_t>(sorted.size()), value);
+    sorted.push_back(by_row[r]);
+  }
+  for (int first = 0; first < rows_; first += kUnit) of_rows_.append(sorted.data() + first, std::min(kUnit, rows_ - first));
+  for (std::ptrdiff_t first = 0; first < stride_; first += kUnit) of_pairs_.append(by_pair.data() + first, kUnit);
+  places_ = std::move(order);
   pairs_.assign(static_cast<std::size_t>(stride_), 0.0F);
   sum_.assign(static_cast<std::size_t>(stride_), 0.0F);
 }
@@ -156,7 +214,16 @@ double Evaluator::evaluate(const float* q, const double* im, const double* to_q,
     return kernels_->square(matrices_.data(), stride_, width, pad(rows_, kRowsAtOnce), pairs_.data(), weight, of_linear_.data(),
                             eta_.data(), sum_.data());
   };
-  if (form_ == Form::kRows) {
+  if (form_ == Form::kEntries) {
+    const int rows = pad(rows_, kUnit), groups = rows / kUnit;
+    kernels_->multiply(count_, q, pairs_.data());
+    kernels_->sum_up(of_rows_.begin.data(), groups, of_rows_.values.data(), of_rows_.index.data(), pairs_.data(), eta_.data());
+    energy = kernels_->weigh(rows, 2.0F, of_linear_.data(), eta_.data(), weight_.data());
+    kernels_->sum_up(of_pairs_.begin.data(), pad(static_cast<int>(find_column(count_)), kUnit) / kUnit, of_pairs_.values.data(),
+                     of_pairs_.index.data(), weight_.data(), sum_.data());
+    kernels_->apply(count_, sum_.data(), q, forces_.data());
+    factor *= 2.0;
+  } else if (form_ == Form::kRows) {
     kernels_->multiply(count_, q, pairs_.data());
     energy = square(pad(static_cast<int>(find_column(count_)), kUnit), 2.0F);
     kernels_->apply(count_, sum_.data(), q, forces_.data());
@@ -179,8 +246,12 @@ double Evaluator::evaluate(const float* q, const double* im, const double* to_q,
 
 std::size_t Evaluator::calc_bytes() const noexcept {
   std::size_t bytes = (diagonals_.capacity() + exact_linear_.capacity()) * sizeof(double);
-  for (const auto* values : {&matrices_, &columns_, &linear_, &eta_, &of_linear_, &pairs_, &sum_, &gradient_, &back_, &forces_, &more_})
+  for (const auto* values : {&matrices_, &columns_, &linear_, &eta_, &weight_, &of_linear_, &pairs_, &sum_, &gradient_, &back_, &forces_,
+                             &more_, &of_rows_.values, &of_pairs_.values})
     bytes += values->capacity() * sizeof(float);
+  for (const auto* numbers : {&of_rows_.begin, &of_rows_.index, &of_pairs_.begin, &of_pairs_.index})
+    bytes += numbers->capacity() * sizeof(std::int32_t);
+  bytes += places_.capacity() * sizeof(std::size_t);
   return bytes;
 }
 

@@ -1,6 +1,7 @@
 // The nonlinear energy of coupled modes and its gradient, sample by sample. Internal to carillon::nonlinear.
 #pragma once
 
+#include <utility>
 #include <vector>
 
 #include "runtime/bank/quartic_energy.hpp"
@@ -10,7 +11,8 @@ namespace carillon::nonlinear {
 
 /// The matrices of an energy as the kernels take them, padded by zeros and scaled so that motion of a thickness or so is of the size of 1:
 /// in single precision nothing overflows that a body survives. Matrices without anything off their diagonals (strings, mean stresses) are
-/// kept as their diagonals, and all of it goes in double precision. Memory is taken in the constructor only.
+/// kept as their diagonals, and all of it goes in double precision. Of such as are 0 almost everywhere (plates in closed form have four
+/// entries for a pair of modes, whatever the rows) the entries are kept. Memory is taken in the constructor only.
 class Evaluator {
  public:
   /// The sizes of the energy agree, and its numbers are finite.
@@ -29,10 +31,17 @@ class Evaluator {
  private:
   double evaluate_diagonals(const double* im, const double* to_q, double* gradient) noexcept;
   void add_rows(const bank::QuarticEnergy& energy);
+  void add_entries(const bank::QuarticEnergy& energy);
   void add_diagonals(const bank::QuarticEnergy& energy);
   void add_points(const bank::QuarticEnergy& energy);
 
-  enum class Form { kDiagonals, kRows, kPoints };
+  enum class Form { kDiagonals, kEntries, kRows, kPoints };
+  /// The entries of a sparse matrix, by its rows in groups of kUnit: see CoupledKernels::sum_up.
+  struct Entries {
+    std::vector<std::int32_t> begin, index;
+    std::vector<float> values;
+    void append(const std::vector<std::pair<std::int32_t, float>>* rows, int count);
+  };
   const CoupledKernels* kernels_;
   Form form_ = Form::kRows;
   double scale_ = 1.0;
@@ -40,8 +49,10 @@ class Evaluator {
   bool is_curved_ = false;
   std::ptrdiff_t stride_ = 0;
   std::vector<double> diagonals_, exact_linear_;    // (R, N)
+  std::vector<std::size_t> places_;                 // entries: the row of the energy that each row is
   std::vector<float> matrices_, columns_, linear_;  // (R, stride), (N, parts, P), (R, padded N)
-  std::vector<float> eta_, of_linear_, pairs_, sum_, gradient_, back_, forces_, more_;
+  Entries of_rows_, of_pairs_;                      // of A_r by rows, and of the same by pairs of modes
+  std::vector<float> eta_, weight_, of_linear_, pairs_, sum_, gradient_, back_, forces_, more_;
 };
 
 }  // namespace carillon::nonlinear

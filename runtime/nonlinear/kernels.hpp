@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 
 namespace carillon::nonlinear {
 
@@ -51,6 +52,12 @@ struct CoupledKernels {
   /// Returns the sum of linear_r eta_r + eta_r^2 / 2. `eta`: where they are put.
   double (*square)(const float* rows, std::ptrdiff_t stride, int length, int count, const float* x, float factor, const float* linear,
                    float* eta, float* sum) noexcept;
+  /// Of a matrix that is 0 almost everywhere, kUnit of its rows at once: out[kUnit g + l] = sum over e from begin[g] to begin[g + 1] of
+  /// values[kUnit e + l] x[index[kUnit e + l]].
+  void (*sum_up)(const std::int32_t* begin, int groups, const float* values, const std::int32_t* index, const float* x,
+                 float* out) noexcept;
+  /// eta is multiplied by `factor`, weight = linear + eta. Returns what square() does. count: a multiple of kUnit.
+  double (*weigh)(int count, float factor, const float* linear, float* eta, float* weight) noexcept;
   /// Strains of `length` points from their gradients, and what strains that are pulled by `pull` pull of the gradients; parts: 6 or 9.
   void (*strain)(int parts, int length, const float* gradient, float* strain) noexcept;
   void (*pull_back)(int parts, int length, const float* gradient, const float* pull, float* out) noexcept;

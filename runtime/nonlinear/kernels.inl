@@ -178,6 +178,44 @@ double square(const float* rows, std::ptrdiff_t stride, int length, int count, c
 }
 
 template <int kLanes>
+void sum_up(const std::int32_t* begin, int groups, const float* values, const std::int32_t* index, const float* x, float* out) noexcept {
+  using L = Lanes<kLanes>;
+  using F = typename L::Float;
+  constexpr int kVectors = kUnit / kLanes;
+  for (int g = 0; g < groups; ++g) {
+    F sum[kVectors] = {};
+    for (std::ptrdiff_t e = begin[g]; e < begin[g + 1]; ++e)
+#pragma GCC unroll 4
+      for (int v = 0; v < kVectors; ++v) {
+        const std::int32_t* at = index + kUnit * e + v * kLanes;
+        F found;
+#pragma GCC unroll 16
+        for (int l = 0; l < kLanes; ++l) found[l] = x[at[l]];
+        sum[v] += found * L::load(values + kUnit * e + v * kLanes);
+      }
+    for (int v = 0; v < kVectors; ++v) L::store(sum[v], out + kUnit * g + v * kLanes);
+  }
+}
+
+template <int kLanes>
+double weigh(int count, float factor, const float* linear, float* eta, float* weight) noexcept {
+  using L = Lanes<kLanes>;
+  using D = typename L::Double;
+  D energy{};
+  for (int at = 0; at < count; at += L::kDoubles) {
+    typename L::Narrow e, l;
+    __builtin_memcpy(&e, eta + at, sizeof e);
+    __builtin_memcpy(&l, linear + at, sizeof l);
+    e *= factor;
+    L::store(e, eta + at);
+    L::store(l + e, weight + at);
+    const D exact = __builtin_convertvector(e, D);
+    energy += exact * (__builtin_convertvector(l, D) + 0.5 * exact);
+  }
+  return L::add_up(energy);
+}
+
+template <int kLanes>
 void strain(int parts, int length, const float* gradient, float* out) noexcept {
   using L = Lanes<kLanes>;
   using F = typename L::Float;
@@ -257,7 +295,8 @@ template <int kLanes, int kVectors>
 constexpr CoupledKernels make_kernels() {
   constexpr int kNarrow = kLanes < kColumnUnit ? kLanes : kColumnUnit;
   return {turn<kLanes>,   compare<kLanes>, kick<kLanes>,      spread<kLanes, kVectors>, gather<kLanes>,
-          square<kLanes>, strain<kLanes>,  pull_back<kLanes>, multiply<kNarrow>,        apply<kNarrow>};
+          square<kLanes>, sum_up<kLanes>,  weigh<kLanes>,     strain<kLanes>,           pull_back<kLanes>,
+          multiply<kNarrow>, apply<kNarrow>};
 }
 
 }  // namespace

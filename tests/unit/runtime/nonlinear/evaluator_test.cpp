@@ -26,6 +26,17 @@ bank::QuarticEnergy make_rows(std::size_t n, std::size_t rows, bool is_diagonal,
   return energy;
 }
 
+/// Four entries for each pair, in rows drawn at random, and two rows that are diagonal.
+bank::QuarticEnergy make_entries(std::size_t n, std::size_t rows, bool is_curved) {
+  Chance chance;
+  bank::QuarticEnergy energy = make_rows(n, rows, true, is_curved, 1e6);
+  const std::size_t pairs = bank::count_pairs(n);
+  std::fill(energy.rows.begin() + static_cast<std::ptrdiff_t>(2 * pairs), energy.rows.end(), 0.0F);
+  for (std::size_t pair = 0; pair < pairs; ++pair)
+    for (int e = 0; e < 4; ++e) energy.rows[chance.engine() % rows * pairs + pair] = static_cast<float>(1e6 * chance.draw());
+  return energy;
+}
+
 bank::QuarticEnergy make_points(std::size_t n, std::size_t rows, std::size_t points, std::size_t parts, bool is_curved) {
   Chance chance;
   bank::QuarticEnergy energy;
@@ -72,6 +83,11 @@ TEST(Evaluator, IsTheSumsInDoublePrecisionInEveryFormAndInstructionSet) {
           expect_same(make_rows(n, rows, false, is_curved, 1e6), *kernels, 2e-5);
           expect_same(make_rows(n, rows, true, is_curved, 1e-3), *kernels, 1e-13);
         }
+      for (const std::size_t n : {2u, 9u, 30u, 51u}) {
+        const bank::QuarticEnergy energy = make_entries(n, n < 30 ? 33 : 150, is_curved);
+        expect_same(energy, *kernels, 2e-5);
+        if (n > 9) EXPECT_LT(Evaluator(energy, *kernels).calc_bytes(), energy.rows.size() * sizeof(float) / 2) << "kept by entries";
+      }
       for (const std::size_t parts : {6u, 9u})
         for (const std::size_t n : {2u, 5u, 30u}) expect_same(make_points(n, 9, 23, parts, is_curved), *kernels, 1e-5);
     }
