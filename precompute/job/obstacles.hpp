@@ -20,10 +20,12 @@ struct BoxObstacle {
 };
 using RigidObstacle = std::variant<PlaneObstacle, BallObstacle, BoxObstacle>;
 
-/// A ball that flies freely and does not turn: friction changes its flight alone.
+/// A homogeneous ball that flies freely; friction turns it, so that it can roll.
 struct BallStriker {
   double radius_m = 0, mass_kg = 0;
-  Vec3 position_m{}, velocity_m_s{};
+  Vec3 position_m{}, velocity_m_s{}, spin_rad_s{};
+
+  double find_inertia_kg_m2() const { return 0.4 * mass_kg * radius_m * radius_m; }
 };
 
 }  // namespace carillon::job

@@ -186,6 +186,7 @@ Striker read_striker(base::Object& object) {
   striker.ball.mass_kg = read_within(object, "mass_kg", 1e-9, kMaxMassKg);
   striker.ball.position_m = read_vector(object, "position_m", {}, kFarthestM);
   striker.ball.velocity_m_s = read_vector(object, "velocity_m_s", {}, kMaxSpeedMs);
+  striker.ball.spin_rad_s = read_vector(object, "angular_velocity_rad_s", {}, kMaxSpinRadS);
   object.finish();
   return striker;
 }

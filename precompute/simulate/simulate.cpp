@@ -268,6 +268,7 @@ std::string write_outputs(const comm::Communicator& comm, Simulation& simulation
       base::Json striker = base::Json::object();
       for (const double x : ball.position_m) striker.member("position_m").add(base::significant(x, 9));
       for (const double x : ball.velocity_m_s) striker.member("velocity_m_s").add(base::significant(x, 9));
+      for (const double x : ball.spin_rad_s) striker.member("angular_velocity_rad_s").add(base::significant(x, 9));
       record.member("strikers").add(std::move(striker));
     }
     for (const EnergyBook& one : simulation.books) record.member("books").add(describe(one));

@@ -27,6 +27,7 @@ constexpr std::int64_t kMostSteps = 64;               // between two looks at ho
 constexpr double kSlowest = 1e-9;                     // closing speed [m/s] of a contact that begins at rest
 constexpr double kStopShare = 0.5;                    // of the tangential momentum that friction takes in a step at most
 constexpr double kStrikerPhase = 0.01;                // [rad] a step of a striker on an obstacle, which is stopped by a spring of its own
+constexpr double kBallSlide = 3.5;                    // 1 + m r^2 / I: how much lighter a ball is to a force along its surface
 constexpr double kSame = 1e-12;                       // distances that are the same, in mean edges
 constexpr double kFarthestM = 1e6, kFastestMs = 1e9;  // beyond which a motion is not stable
 
@@ -140,6 +141,7 @@ Contacts::Contacts(const Domain& domain, TouchSurface surface, std::vector<BallS
       rules_(rules),
       damping_(calc_hunt_crossley(rules.restitution)) {
   on_striker_n_.resize(strikers_.size());
+  on_striker_n_m_.resize(strikers_.size());
   const std::size_t nodes = surface_.nodes.size();
   owner_.resize(nodes);
   mass_kg_.resize(nodes);
@@ -379,6 +381,7 @@ void Contacts::add_obstacles(const StepTime& time, const Quad* u, const Quad* v,
 
 void Contacts::add_pairs(const StepTime& time, Quad* f) {
   on_striker_n_.assign(strikers_.size(), Vec3{});
+  on_striker_n_m_.assign(strikers_.size(), Vec3{});
   Account account;
   const auto find_active = [&](std::int32_t node) { return static_cast<std::size_t>(active_index_[static_cast<std::size_t>(node)]); };
   const auto give = [&](std::int32_t node, const Vec3& force) {
@@ -396,8 +399,8 @@ void Contacts::add_pairs(const StepTime& time, Quad* f) {
     pair.normal = nearest.normal;
     pair.depth_m = (is_striker ? strikers_[striker].radius_m : surface_.nodes[vertex].reach_m) +
                    surface_.nodes[static_cast<std::size_t>(triangle[0])].reach_m - nearest.distance_m;
-    pair.relative_m_s = is_striker ? strikers_[striker].velocity_m_s : v_[find_active(candidate.vertex)];
-    double per_mass = 1.0 / (is_striker ? strikers_[striker].mass_kg : mass_kg_[vertex]);
+    pair.relative_m_s = is_striker ? calc_touching_velocity(strikers_[striker], pair.normal) : v_[find_active(candidate.vertex)];
+    double per_mass = is_striker ? kBallSlide / strikers_[striker].mass_kg : 1.0 / mass_kg_[vertex];
     for (std::size_t c = 0; c < 3; ++c) {
       const auto corner = static_cast<std::size_t>(triangle[c]);
       const double w = nearest.weights[c];
@@ -409,7 +412,7 @@ void Contacts::add_pairs(const StepTime& time, Quad* f) {
     pair.mass_kg = 1.0 / per_mass;
     const Vec3 force = calc_force(time, {candidate.vertex, candidate.body}, pair, account);
     if (is_striker)
-      on_striker_n_[striker] = on_striker_n_[striker] + force;
+      push_striker(striker, pair.normal, force);
     else
       give(candidate.vertex, force);
     for (std::size_t c = 0; c < 3; ++c) give(triangle[c], -nearest.weights[c] * force);
@@ -419,12 +422,22 @@ void Contacts::add_pairs(const StepTime& time, Quad* f) {
   lost_shared_ += account.lost_j;
 }
 
+Vec3 Contacts::calc_touching_velocity(const BallStriker& striker, const Vec3& normal) {
+  return striker.velocity_m_s - striker.radius_m * cross(striker.spin_rad_s, normal);
+}
+
+void Contacts::push_striker(std::size_t striker, const Vec3& normal, const Vec3& force) {
+  on_striker_n_[striker] = on_striker_n_[striker] + force;
+  on_striker_n_m_[striker] = on_striker_n_m_[striker] - strikers_[striker].radius_m * cross(normal, force);
+}
+
 void Contacts::move_strikers(const StepTime& time) {
   if (time.act_before_s == 0.0) return;  // no forces yet
   for (std::size_t s = 0; s < strikers_.size(); ++s) {
     BallStriker& striker = strikers_[s];
     const Vec3 before = striker.velocity_m_s;
     striker.velocity_m_s = before + (time.act_before_s / striker.mass_kg) * on_striker_n_[s];
+    striker.spin_rad_s = striker.spin_rad_s + (time.act_before_s / striker.find_inertia_kg_m2()) * on_striker_n_m_[s];
     striker.position_m = striker.position_m + time.step_before_s * striker.velocity_m_s;
     gravity_work_ += time.act_before_s * striker.mass_kg * dot(rules_.gravity_m_s2, 0.5 * (before + striker.velocity_m_s));
   }
@@ -437,9 +450,10 @@ void Contacts::add_striker_obstacles(const StepTime& time, Account& account) {
     for (std::size_t o = 0; o < obstacles_.size(); ++o) {
       const Clearance at = find_clearance(obstacles_[o], striker.position_m);
       const double soft = kStrikerPhase / time.step_s;
-      const Pair pair{striker.mass_kg * soft * soft, striker.radius_m - at.distance_m, striker.mass_kg, at.normal, striker.velocity_m_s};
-      on_striker_n_[s] =
-          on_striker_n_[s] + calc_force(time, {-1 - static_cast<std::int32_t>(s), -1 - static_cast<std::int32_t>(o)}, pair, account);
+      const Pair pair{striker.mass_kg * soft * soft, striker.radius_m - at.distance_m, striker.mass_kg / kBallSlide, at.normal,
+                      calc_touching_velocity(striker, at.normal)};
+      const Key key{-1 - static_cast<std::int32_t>(s), -1 - static_cast<std::int32_t>(o)};
+      push_striker(s, at.normal, calc_force(time, key, pair, account));
     }
   }
 }
@@ -506,6 +520,8 @@ ExternalForces::Energy Contacts::calc_energy() {
     const BallStriker& striker = strikers_[s];
     const Vec3& v = striker.velocity_m_s;
     energy.stored_j += 0.5 * (striker.mass_kg * dot(v, v) + act_s_ * dot(v, on_striker_n_[s]));
+    const Vec3& spin = striker.spin_rad_s;
+    energy.stored_j += 0.5 * (striker.find_inertia_kg_m2() * dot(spin, spin) + act_s_ * dot(spin, on_striker_n_m_[s]));
     energy.put_in_j += 0.5 * act_s_ * striker.mass_kg * dot(rules_.gravity_m_s2, v);
   }
   return energy;
@@ -548,6 +564,7 @@ std::vector<std::byte> Contacts::save() {
     put(&head, sizeof head);
     put(strikers_.data(), strikers_.size() * sizeof(BallStriker));
     put(on_striker_n_.data(), on_striker_n_.size() * sizeof(Vec3));
+    put(on_striker_n_m_.data(), on_striker_n_m_.size() * sizeof(Vec3));
     put(all.data(), all.size() * sizeof(KeptTouch));
     return bytes;
   });
@@ -557,19 +574,22 @@ void Contacts::load(std::span<const std::byte> bytes) {
   const std::vector<std::byte> all = comm_.broadcast(std::vector<std::byte>(bytes.begin(), bytes.end()));
   comm_.agree([&] {
     KeptHead head{};
+    constexpr std::size_t kStrikerBytes = sizeof(BallStriker) + 2 * sizeof(Vec3);
     const auto refuse = [] { throw InputError("the checkpoint's contacts are cut off or of other bodies; start again without it"); };
     if (all.size() < sizeof head) refuse();
     std::memcpy(&head, all.data(), sizeof head);
     const auto strikers = static_cast<std::size_t>(head.strikers), touches = static_cast<std::size_t>(head.touches);
     if (strikers != strikers_.size() || touches > all.size() ||
-        all.size() != sizeof head + strikers * (sizeof(BallStriker) + sizeof(Vec3)) + touches * sizeof(KeptTouch))
+        all.size() != sizeof head + strikers * kStrikerBytes + touches * sizeof(KeptTouch))
       refuse();
     std::memcpy(strikers_.data(), all.data() + sizeof head, strikers * sizeof(BallStriker));
     std::memcpy(on_striker_n_.data(), all.data() + sizeof head + strikers * sizeof(BallStriker), strikers * sizeof(Vec3));
+    std::memcpy(on_striker_n_m_.data(), all.data() + sizeof head + strikers * (sizeof(BallStriker) + sizeof(Vec3)),
+                strikers * sizeof(Vec3));
     touches_.clear();
     for (std::size_t t = 0; t < touches; ++t) {
       KeptTouch kept{};
-      std::memcpy(&kept, all.data() + sizeof head + strikers * (sizeof(BallStriker) + sizeof(Vec3)) + t * sizeof kept, sizeof kept);
+      std::memcpy(&kept, all.data() + sizeof head + strikers * kStrikerBytes + t * sizeof kept, sizeof kept);
       if (kept.first >= static_cast<std::int32_t>(surface_.nodes.size())) refuse();
       const bool is_local = kept.first >= 0 && kept.second < 0;
       if (!is_local || place_[static_cast<std::size_t>(kept.first)] >= 0)

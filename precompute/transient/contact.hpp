@@ -83,7 +83,7 @@ class Contacts : public ExternalForces {
   /// Two that may touch.
   struct Pair {
     double stiffness_n_m = 0, depth_m = 0;
-    double mass_kg = 0;   // that both have together where they touch
+    double mass_kg = 0;   // that both have together where they touch, along the surface
     Vec3 normal{};        // from the second to the first
     Vec3 relative_m_s{};  // of the first against the second
   };
@@ -107,6 +107,9 @@ class Contacts : public ExternalForces {
     double stored_j = 0, lost_j = 0;
   };
   Vec3 calc_force(const StepTime& time, const Key& key, const Pair& pair, Account& account);
+  /// The velocity of the point of a ball that touches a surface with this normal.
+  static Vec3 calc_touching_velocity(const BallStriker& striker, const Vec3& normal);
+  void push_striker(std::size_t striker, const Vec3& normal, const Vec3& force);
   /// By the forces of the step before.
   void move_strikers(const StepTime& time);
   void add_striker_obstacles(const StepTime& time, Account& account);
@@ -140,6 +143,7 @@ class Contacts : public ExternalForces {
   std::vector<double> sent_, received_;
   std::vector<std::int32_t> active_order_;  // (received) surface node
   std::vector<Vec3> on_striker_n_;          // forces of this step
+  std::vector<Vec3> on_striker_n_m_;        // their moments about the centre
   double act_s_ = 0;                        // for how long they act
   std::vector<Vec3> x_, v_;                 // (active)
   std::int64_t steps_to_look_ = 0;

@@ -106,6 +106,41 @@ TEST(Contact, friction_slows_a_sliding_block_by_coulombs_law) {
   EXPECT_LT(std::abs(motion.calc_book().relative_error), 1e-6);
 }
 
+// A ball on a slope of 20 degrees rolls with 5/7 of g sin a; where the friction is below 2/7 tan a it slips, with g (sin a - mu cos a), and
+// spins up by 5/2 mu g cos a / r. On the level, what slides without spin rolls with 5/7 of its speed, and the books have what friction
+// took.
+TEST(Contact, a_ball_rolls_and_slips) {
+  const double g = 9.81, radius = 0.01, mass = 0.03, slope = 20.0 * std::numbers::pi / 180.0, along = g * std::sin(slope),
+               across = g * std::cos(slope);
+  struct Case {
+    double mu, along, across, speed, time_s, wanted_m_s, wanted_rad_s, lost_j;
+  };
+  const double t = 0.1, mu = 0.05, speed = 0.5;
+  const Case cases[] = {
+      {0.5, along, across, 0.0, t, 5.0 / 7.0 * along * t, 5.0 / 7.0 * along * t / radius, 0.0},
+      {mu, along, across, 0.0, t, (along - mu * across) * t, 2.5 * mu * across * t / radius,
+       mass * mu * across * (along - 3.5 * mu * across) * t * t / 2},
+      {0.3, 0.0, g, speed, t, 5.0 / 7.0 * speed, 5.0 / 7.0 * speed / radius, mass * speed * speed / 7.0},
+  };
+  World world({{"far", make_block({0.02, 0.02, 0.01}, {2, 2, 1}, {0, 0, 1}), make_law(1e7, 0.3, 1000), 0.0}});
+  for (const Case& one : cases) {
+    MotionOptions options;
+    options.sample_rate_hz = 48000;
+    Motion motion(world.domain, options);
+    const TouchRules rules{0.5, one.mu, {one.along, 0, -one.across}};
+    Contacts contacts(world.domain, make_surface(world), {{radius, mass, {0, 0, radius}, {one.speed, 0, 0}}}, {PlaneObstacle{}}, rules);
+    motion.add(contacts);
+    while (motion.get_time_s() < one.time_s) motion.advance_sample();
+    const BallStriker& ball = contacts.get_strikers()[0];
+    EXPECT_NEAR(ball.velocity_m_s[0] / one.wanted_m_s, 1.0, 2e-3) << one.mu;
+    EXPECT_NEAR(ball.spin_rad_s[1] / one.wanted_rad_s, 1.0, 2e-3) << one.mu;
+    const ExternalForces::Energy energy = contacts.calc_energy();
+    const double start = 0.5 * mass * one.speed * one.speed, most = std::max(start, energy.put_in_j);
+    EXPECT_NEAR(energy.dissipated_j, one.lost_j, 2e-3 * most) << one.mu;
+    EXPECT_NEAR(energy.stored_j + energy.dissipated_j, start + energy.put_in_j, 1e-4 * most) << one.mu;
+  }
+}
+
 // Two blocks and a ball meet in the air: momentum is kept, and what is lost is booked.
 TEST(Contact, bodies_and_a_ball_keep_momentum_and_energy) {
   World world({{"left", make_block({0.02, 0.02, 0.02}, {2, 2, 2}, {-0.0105, 0, 0}), make_law(kYoung, 0.3, 1000, 1e-7), 0.0},
