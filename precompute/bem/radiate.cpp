@@ -180,13 +180,13 @@ double calc_mass_bound(const Radiator& radiator, const AirOptions& options) {
   return find_density(options) * radiator.sphere.radius_m * most;
 }
 
-Radiator make_radiator(const bank::Bank& bank, std::span<const double> freq_hz, const AirOptions& options, bool has_rigid) {
+Radiator make_radiator(const bank::Bank& bank, std::span<const double> freq_hz, const AirOptions& options) {
   Radiator radiator;
   const std::vector<Triangle> outer = bank::find_outer_triangles(bank.vertices_m, bank.triangles);
   if (outer.empty()) throw InputError("the surface of the body has no outside: no closed shell of it encloses a volume");
   std::vector<std::int32_t> number(bank.vertex_count(), -1);
   const std::size_t modes = bank.mode_count();
-  if (has_rigid) radiator.rigid = count_rigid(bank);
+  radiator.rigid = count_rigid(bank);
   const bank::RigidMotions rigid(bank.rigid);
   for (const Triangle& triangle : outer) {
     Triangle made{};
@@ -222,6 +222,18 @@ Radiator make_radiator(const bank::Bank& bank, std::span<const double> freq_hz, 
   return radiator;
 }
 
+Radiator leave_out_rigid(const Radiator& radiator) {
+  Radiator made = radiator;
+  made.rigid = 0;
+  made.velocity.clear();
+  const std::size_t motions = radiator.count_motions(), modes = radiator.count_modes();
+  for (std::size_t row = 0; row < 3 * radiator.triangles.size(); ++row) {
+    const auto begin = radiator.velocity.begin() + static_cast<std::ptrdiff_t>(row * motions);
+    made.velocity.insert(made.velocity.end(), begin, begin + static_cast<std::ptrdiff_t>(modes));
+  }
+  return made;
+}
+
 double calc_roundness(const bank::Bank& bank) {
   const std::vector<Triangle> outer = bank::find_outer_triangles(bank.vertices_m, bank.triangles);
   if (outer.empty()) return 0.0;
@@ -234,11 +246,10 @@ bank::Multipoles calc_multipoles(const comm::Communicator& comm, const bank::Ban
                                  const std::filesystem::path& answers) {
   const std::vector<double> played = find_played_freq_hz(bank);
   bool may_couple = false;  // on rank 0 first
-  Radiator radiator = comm.agree([&] {
-    if (!comm.is_root()) return Radiator{};
-    Radiator made = make_radiator(bank, played, options);
-    may_couple = calc_mass_bound(made, options) >= kCoupleMass;
-    return may_couple ? make_radiator(bank, played, options, true) : made;
+  const Radiator whole = comm.agree([&] { return comm.is_root() ? make_radiator(bank, played, options) : Radiator{}; });
+  const Radiator modes_alone = comm.agree([&] {
+    if (comm.is_root()) may_couple = calc_mass_bound(whole, options) >= kCoupleMass;
+    return may_couple ? Radiator{} : leave_out_rigid(whole);
   });
   may_couple = comm.broadcast(static_cast<std::int32_t>(may_couple)) != 0;
   AirSolveOptions solve = options.solve;
@@ -257,21 +268,21 @@ bank::Multipoles calc_multipoles(const comm::Communicator& comm, const bank::Ban
     return most >= kCoupleMass;
   };
   solve.coupling->has_rows = may_couple;
-  std::optional<AnswersFile> file;
-  if (comm.is_root() && !answers.empty()) {
-    file.emplace(answers, calc_fingerprint(radiator, solve));
-    keeper.read = [&] { return file->read(); };
-    keeper.save = [&](const WaveAnswer& answer) { file->save(answer); };
-  }
-  AirSolution solution = solve_air(comm, radiator, solve, keeper);
+  std::optional<AnswersFile> file, coupled_file;
+  const auto keep_in = [&](std::optional<AnswersFile>& kept, const std::filesystem::path& name, const Radiator& radiator) {
+    if (!comm.is_root() || answers.empty()) return;
+    kept.emplace(name, calc_fingerprint(radiator, solve));
+    keeper.read = [&kept] { return kept->read(); };
+    keeper.save = [&kept](const WaveAnswer& answer) { kept->save(answer); };
+  };
+  const Radiator& first = may_couple ? whole : modes_alone;
+  comm.agree([&] { keep_in(file, answers, first); });
+  AirSolution solution = solve_air(comm, first, solve, keeper);
   if (comm.broadcast(static_cast<std::int32_t>(solution.lacks_rows)) != 0) {  // a resonance of the air: once more, with all that it takes
     solve.coupling->has_rows = true;
-    comm.agree([&] {
-      if (!comm.is_root()) return;
-      radiator = make_radiator(bank, played, options, true);
-      if (file) file.emplace(answers, calc_fingerprint(radiator, solve));
-    });
-    solution = solve_air(comm, radiator, solve, keeper);
+    // A file of its own: a run that resumes comes past the first solve again.
+    comm.agree([&] { keep_in(coupled_file, std::filesystem::path(answers) += ".coupled", whole); });
+    solution = solve_air(comm, whole, solve, keeper);
   }
   return comm.agree([&] {
     bank::Multipoles multipoles;
@@ -288,8 +299,14 @@ bank::Multipoles calc_multipoles(const comm::Communicator& comm, const bank::Ban
     }
     const bool is_coupled = !multipoles.mixing.is_empty();
     if (is_coupled) warn_of_band(multipoles, played, options);
+    if (solution.unsettled > solve.coupling->settled && options.warn)
+      options.warn(
+          fmt::format("modes that the air couples were still moving by {:.1e} of their frequency when they were solved for the last "
+                      "time; their frequencies in air are right to that",
+                      solution.unsettled));
     add_decays(options, multipoles);
-    if (file) file->remove();
+    for (auto* kept : {&file, &coupled_file})
+      if (*kept) (*kept)->remove();
     multipoles.method = fmt::format("boundary elements (Burton-Miller, Galerkin), {} unknowns, {} wave numbers{}{}", solution.unknowns,
                                     solution.wave_numbers, options.half_space ? ", half space" : "",
                                     is_coupled ? fmt::format(", modes coupled (reciprocal to {:.1e})", solution.reciprocity) : "");

@@ -40,9 +40,12 @@ inline constexpr double kShiftMass = 0.01, kCoupleMass = 0.1, kMostMass = 1.0;
 inline constexpr double kFewestFacets = 1.0, kFewFacets = 2.0;
 
 /// The surface of the bank that faces the open air, with the normal velocities of all modes on it, at the wave numbers of the frequencies
-/// that are played. `freq_hz`: of the modes. With `has_rigid` the rigid motions of one free body are there too. Throws InputError
-/// where the surface has no outside, and where it is too coarse for the waves. Rank 0 alone.
-Radiator make_radiator(const bank::Bank& bank, std::span<const double> freq_hz, const AirOptions& options, bool has_rigid = false);
+/// that are played, and after them the rigid motions of one free body. `freq_hz`: of the modes. Throws InputError where the surface has no
+/// outside, and where it is too coarse for the waves. Rank 0 alone.
+Radiator make_radiator(const bank::Bank& bank, std::span<const double> freq_hz, const AirOptions& options);
+
+/// The same with the modes alone.
+Radiator leave_out_rigid(const Radiator& radiator);
 
 /// The largest added mass that a mode can have without a resonance of the air: a sphere around the body, all of whose surface moves in
 /// step, has it. Where it reaches kCoupleMass, modes may have to be coupled.

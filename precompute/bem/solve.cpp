@@ -421,6 +421,7 @@ AirSolution solve_air(const comm::Communicator& comm, const Radiator& radiator_o
     if (stage == Stage::kCoupled) {
       std::vector<double> moved = comm.broadcast([&] {
         std::vector<double> list = modes;
+        solution.unsettled = 0.0;
         for (std::size_t m = 0; m < modes.size(); ++m) {
           std::vector<double> wave_numbers;
           for (const std::int32_t i : mixtures[m].motions)
@@ -429,7 +430,9 @@ AirSolution solve_air(const comm::Communicator& comm, const Radiator& radiator_o
           mixtures[m] =
               follow_mode(wave_numbers, calc_masses_within(list_mine(m), stencils[m], options.coupling->density_kg_m3, mixtures[m].motions),
                           mixtures[m]);
-          if (std::abs(mixtures[m].wave_number_1_m / modes[m] - 1.0) > options.coupling->settled) list[m] = mixtures[m].wave_number_1_m;
+          const double distance = std::abs(mixtures[m].wave_number_1_m / modes[m] - 1.0);
+          solution.unsettled = std::max(solution.unsettled, distance);
+          if (distance > options.coupling->settled) list[m] = mixtures[m].wave_number_1_m;
         }
         return list;
       });

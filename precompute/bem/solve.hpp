@@ -99,6 +99,7 @@ struct AirSolution {
   std::vector<Sounding> modes;          // (n)
   std::vector<double> wave_number_1_m;  // (n) at which they were solved
   bool lacks_rows = false;              // modes are to be coupled, and that was not prepared: CouplingOptions::has_rows
+  double unsettled = 0.0;               // where coupled: the largest distance of a mode from where it was solved, over k
   double reciprocity = 0.0;             // where coupled: largest |m_ij - m_ji| of the air's masses over sqrt(m_ii m_jj)
   std::size_t unknowns = 0;
   std::size_t wave_numbers = 0;
