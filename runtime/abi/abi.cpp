@@ -432,11 +432,8 @@ carillon_status carillon_create(const carillon_options* options, carillon_synth*
       ours.microphones_m.clear();
       for (int32_t m = 0; m < given->microphone_count; ++m) ours.microphones_m.push_back(to_vector(given->microphones_m[m]));
     }
-    if (given->head_radius_m != 0.0) {
-      ours.head = synth::ListeningHead{.head = head::make_sphere(ours.rate_hz, {.radius_m = given->head_radius_m})};
-      if (ours.microphones_m.size() == 2)
-        ours.head->rotation = synth::calc_level_head_rotation(ours.microphones_m[0], ours.microphones_m[1]);
-    }
+    if (given->head_radius_m != 0.0)
+      ours.head = synth::make_level_head(head::make_sphere(ours.rate_hz, {.radius_m = given->head_radius_m}), ours.microphones_m);
     if (given->floor_reflection != 0.0)
       ours.floor = synth::Floor{.point_m = {0.0, 0.0, given->floor_height_m}, .reflection = given->floor_reflection};
     *synth = new carillon_synth(std::move(ours));

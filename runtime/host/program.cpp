@@ -258,7 +258,7 @@ class Run {
     if (!options.plan) check_room(scene_, options.wav);
     read_surfaces(scene_);
     banks_ = read_banks(scene_, options.quiet);
-    if (!scene_.listener.sofa.empty()) make_head(scene_, scene_.sample_rate_hz);  // before the physics, for its errors
+    head_ = make_head(scene_, scene_.sample_rate_hz);  // before the physics, for its errors
     for (const SceneBody& body : scene_.bodies) body_banks_.push_back(body.spec.bank);
     figures_.bodies = scene_.bodies.size() + scene_.surfaces.size();
   }
@@ -293,6 +293,7 @@ class Run {
                                     .measures = measures(),
                                     .audits = options_->audit,
                                     .fades_end = scene_.output.fade_end,
+                                    .head = &head_,
                                     .progress = Progress("sound", options_->quiet)},
                                    store);
     figures_.sound_s = get_seconds_since(started);
@@ -340,6 +341,7 @@ class Run {
   Scene scene_;
   Banks banks_;
   std::vector<const bank::Bank*> body_banks_;
+  std::optional<synth::ListeningHead> head_;  // of the listener
   SceneEvents happened_;
   Figures figures_;
 };

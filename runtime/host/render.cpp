@@ -203,7 +203,8 @@ class Rendering {
   Rendering(const Scene& scene, const std::vector<const bank::Bank*>& banks, const Events& events, const RenderOptions& options)
       : scene_(&scene),
         options_(&options),
-        session_(scene, banks, options.rate_hz, options.plan != nullptr || scene.effects.has(Effect::kAccelerationNoise)),
+        session_(scene, banks, options.rate_hz, options.plan != nullptr || scene.effects.has(Effect::kAccelerationNoise),
+                 options.head != nullptr ? *options.head : make_head(scene, options.rate_hz)),
         path_(list_listener_path(session_.get_microphones())),
         base_(session_.get_microphones().centre.find(0.0).position_m),
         summaries_(summarise(scene, banks, events, base_)),

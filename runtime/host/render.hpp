@@ -67,10 +67,12 @@ struct Sound {
 
 struct RenderOptions {
   int rate_hz = 48000;
-  const Plan* plan = nullptr;              // whose changes the bodies follow; without, all bodies have the scene's effects
-  bool measures = false;                   // what each effect of each body costs
-  bool audits = false;                     // the energy of the modes
-  bool fades_end = false;                  // what still sounds at the end goes to zero within kFadeS
+  const Plan* plan = nullptr;  // whose changes the bodies follow; without, all bodies have the scene's effects
+  bool measures = false;       // what each effect of each body costs
+  bool audits = false;         // the energy of the modes
+  bool fades_end = false;      // what still sounds at the end goes to zero within kFadeS
+  /// make_head() of the scene at that rate, where it was made before; nullptr: it is made here.
+  const std::optional<synth::ListeningHead>* head = nullptr;
   std::function<void(double)> progress{};  // may be empty; called with the finished fraction
 };
 

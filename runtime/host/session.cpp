@@ -20,8 +20,9 @@ std::shared_ptr<const synth::Model> make_model(const bank::Bank& bank, const Sce
 
 }  // namespace
 
-Session::Session(const Scene& scene, const std::vector<const bank::Bank*>& banks, double rate_hz, bool has_clicks)
-    : scene_(&scene), banks_(banks), rate_hz_(rate_hz), microphones_(make_microphones(scene)), head_(make_head(scene, rate_hz)) {
+Session::Session(const Scene& scene, const std::vector<const bank::Bank*>& banks, double rate_hz, bool has_clicks,
+                 std::optional<synth::ListeningHead> head)
+    : scene_(&scene), banks_(banks), rate_hz_(rate_hz), microphones_(make_microphones(scene)), head_(std::move(head)) {
   std::map<const bank::Bank*, std::shared_ptr<const synth::Model>> models;
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
     std::shared_ptr<const synth::Model>& model = models[banks[i]];

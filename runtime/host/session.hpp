@@ -20,8 +20,9 @@ namespace carillon::host {
 class Session {
  public:
   /// Makes the models. banks[i] belongs to scene.bodies[i]; scene and banks must outlive the result. `has_clicks`: models know the radius
-  /// that acceleration noise needs. Throws as make_head() does.
-  Session(const Scene& scene, const std::vector<const bank::Bank*>& banks, double rate_hz, bool has_clicks);
+  /// that acceleration noise needs. `head`: make_head() of the scene at that rate.
+  Session(const Scene& scene, const std::vector<const bank::Bank*>& banks, double rate_hz, bool has_clicks,
+          std::optional<synth::ListeningHead> head);
 
   const Microphones& get_microphones() const { return microphones_; }
   const std::optional<synth::ListeningHead>& get_head() const { return head_; }

@@ -157,7 +157,6 @@ class SurfacePlayback::Voice {
     const std::size_t receivers = blockers_.size();
     heard_.assign(receivers * kPiece, 0.0);
     play();
-    bool is_loud = false;
     for (std::size_t i = 0; i < receivers; ++i) {
       const double gain = surface_->gain * (i >= offsets_m_.size() ? floor_->reflection : 1.0);
       for (double& p : get_heard(i)) {
@@ -167,11 +166,10 @@ class SurfacePlayback::Voice {
                           "another place, or run carillon-simulate again",
                           surface_->place, surface_->file.string(), surface_->name, p, static_cast<double>(at_) / rate_hz_));
         p = gain * blockers_[i].next(p, alpha_);
-        is_loud = is_loud || p != 0.0;
       }
     }
     if (head_)
-      hear_by_head(is_loud, out);
+      hear_by_head(out);
     else
       for (std::size_t i = 0; i < receivers; ++i)
         for (std::size_t n = 0; n < kPiece; ++n) out[i % offsets_m_.size()][n] += heard_[i * kPiece + n];
@@ -240,7 +238,7 @@ class SurfacePlayback::Voice {
   }
 
   /// Straight, and then by way of the ground, each from its direction.
-  void hear_by_head(bool is_loud, std::vector<std::vector<double>>& out) {
+  void hear_by_head(std::vector<std::vector<double>>& out) {
     const recording::Header& header = recording_->get_header();
     for (std::size_t n = 0; n < kPiece; n += kTurn) {
       const double time_s = static_cast<double>(at_ + n + kTurn) / rate_hz_;
@@ -255,7 +253,7 @@ class SurfacePlayback::Voice {
           to = middle - listener;
           age_s = norm(to) / header.sound_speed_m_s;
         }
-        ears_[way].process(synth::turn(find_inverse(head_->rotation), to), get_heard(way).subspan(n, kTurn), is_loud,
+        ears_[way].process(synth::turn(find_inverse(head_->rotation), to), get_heard(way).subspan(n, kTurn),
                            std::span(out[0]).subspan(n, kTurn), std::span(out[1]).subspan(n, kTurn));
       }
     }

@@ -23,9 +23,9 @@
 #include "runtime/host/events.hpp"
 #include "runtime/host/planning.hpp"
 #include "runtime/host/scene.hpp"
-#include "runtime/host/surface_playback.hpp"
 #include "runtime/host/session.hpp"
 #include "runtime/host/strikes.hpp"
+#include "runtime/host/surface_playback.hpp"
 #include "runtime/live/device.hpp"
 #include "runtime/live/schedule.hpp"
 #include "runtime/synth/load_keeper.hpp"
@@ -122,7 +122,7 @@ class Player {
   Player(const host::Scene& scene, const std::vector<const bank::Bank*>& banks, const PlayerOptions& options)
       : scene_(&scene),
         lead_(options.look_ahead_s, scene.quality.thresholds.lead_s),
-        session_(scene, banks, scene.sample_rate_hz, true),
+        session_(scene, banks, scene.sample_rate_hz, true, host::make_head(scene, scene.sample_rate_hz)),
         selector_(host::make_facts(scene, session_.get_microphones(), host::has_physics(scene))),
         scheduler_(list_scheduled_bodies(), kMarginS),
         physics_(scene, selector_, scheduler_),

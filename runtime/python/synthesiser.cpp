@@ -63,11 +63,8 @@ class Instrument {
       : rate_hz_(rate_hz), has_head_(head_radius_m.has_value()), has_floor_(floor_reflection.has_value()) {
     synth::SynthesiserOptions options{
         .rate_hz = rate_hz, .microphones_m = std::move(microphones_m), .listener_m = listener_m, .max_bodies = max_bodies};
-    if (head_radius_m) {
-      options.head = synth::ListeningHead{.head = head::make_sphere(rate_hz, {.radius_m = *head_radius_m})};
-      if (options.microphones_m.size() == 2)
-        options.head->rotation = synth::calc_level_head_rotation(options.microphones_m[0], options.microphones_m[1]);
-    }
+    if (head_radius_m)
+      options.head = synth::make_level_head(head::make_sphere(rate_hz, {.radius_m = *head_radius_m}), options.microphones_m);
     if (floor_reflection) options.floor = synth::Floor{.point_m = {0.0, 0.0, floor_height_m}, .reflection = *floor_reflection};
     synthesiser_ = std::make_unique<synth::Synthesiser>(std::move(options));
   }

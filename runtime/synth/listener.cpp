@@ -56,6 +56,12 @@ events::Quaternion calc_level_head_rotation(const Vec3& left_m, const Vec3& righ
   return calc_head_rotation(cross(left, {0.0, 0.0, 1.0}), left);
 }
 
+ListeningHead make_level_head(std::shared_ptr<const head::Head> head, const std::vector<Vec3>& microphones_m) {
+  ListeningHead listening{.head = std::move(head)};
+  if (microphones_m.size() == 2) listening.rotation = calc_level_head_rotation(microphones_m[0], microphones_m[1]);
+  return listening;
+}
+
 Vec3 calc_middle(const std::vector<Vec3>& places) {
   Vec3 middle{};
   for (const Vec3& place : places)

@@ -29,6 +29,9 @@ events::Quaternion calc_head_rotation(const Vec3& forward, const Vec3& left) noe
 /// How the head of a listener is turned that has its left and its right ear at these places and looks straight on, z being up.
 events::Quaternion calc_level_head_rotation(const Vec3& left_m, const Vec3& right_m) noexcept;
 
+/// This head between microphones, level where those are two, left and right: how a listener is turned that says no more.
+ListeningHead make_level_head(std::shared_ptr<const head::Head> head, const std::vector<Vec3>& microphones_m);
+
 /// Where the listener is over time, and how it is turned. What it keeps true: microphone m, which is at offset o from a listener that is
 /// not turned, is at get_track(m) + o, so that receivers need not know of turns; as long as no events::Listener was turned all tracks are
 /// one. Between waypoints every microphone goes its own cubic way. With a floor there are the mirrored tracks too, to which the mirrored

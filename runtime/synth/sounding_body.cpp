@@ -561,7 +561,7 @@ void SoundingBody::hear(Propagation& propagation, std::int64_t sample, std::size
 /// else.
 void SoundingBody::hear_by_head(Propagation& propagation, std::int64_t sample, std::size_t count, const ListenerTracks& listener, Fade fade,
                                 BodyScratch& scratch, Mix& mix, TickFunction ticks) noexcept {
-  const bool is_loud = !propagation.has_silent_lines(), has_whole = propagation.monopole || propagation.dipole[0];
+  const bool has_whole = propagation.monopole || propagation.dipole[0];
   const Effect sends = propagation.monopole ? Effect::kModal : has_whole ? Effect::kAccelerationNoise : Effect::kDirectivity;
   for (std::size_t way = 0; way < propagation.head.size(); ++way) {
     const bool is_mirrored = way > 0;
@@ -604,7 +604,7 @@ void SoundingBody::hear_by_head(Propagation& propagation, std::int64_t sample, s
       Vec3 from = -1.0 * direction[n / kSubBlock];
       if (is_mirrored) from = listener.get_floor()->mirror_direction(from);
       const double end_s = static_cast<double>(sample + static_cast<std::int64_t>(n + size) - Receiver::kLatency) / frame_.rate_hz;
-      propagation.head[way].process(listener.find_in_head(from, end_s), arrived.subspan(n, size), is_loud, ears[0].subspan(n, size),
+      propagation.head[way].process(listener.find_in_head(from, end_s), arrived.subspan(n, size), ears[0].subspan(n, size),
                                     ears[1].subspan(n, size));
     }
     if (fade == Fade::kIn || fade == Fade::kOut) {

@@ -95,6 +95,7 @@ Synthesiser::Synthesiser(SynthesiserOptions options)
   owned_.resize(bodies);
   published_bodies_ = std::make_unique<Published[]>(bodies);
   playing_.resize(bodies);
+  directed_.reserve(bodies);
   awake_.resize((bodies + 63) / 64);
   mix_.resize(options_.microphones_m.size());
   if (options_.head) latency_ += options_.head->head->get_latency();
@@ -272,21 +273,20 @@ void Synthesiser::set_awake(int number) noexcept {
 }
 
 /// Whenever bodies come, change or go.
-void Synthesiser::count_directed() noexcept {
+void Synthesiser::list_directed() noexcept {
   if (!kCompiledEffects.has(Effect::kDirectivity)) return;
-  directed_ = static_cast<int>(
-      std::count_if(playing_.begin(), playing_.end(), [](const SoundingBody* body) { return body != nullptr && body->is_directed(); }));
+  directed_.clear();
+  for (SoundingBody* body : playing_)
+    if (body != nullptr && body->is_directed()) directed_.push_back(body);
 }
 
 /// At the start of a block: how many transfers each body may look up in it.
 void Synthesiser::share_transfers() noexcept {
-  if (!kCompiledEffects.has(Effect::kDirectivity) || directed_ == 0) return;
+  if (!kCompiledEffects.has(Effect::kDirectivity) || directed_.empty()) return;
   std::int64_t needs = 0;
-  for (SoundingBody* body : playing_)
-    if (body != nullptr) needs += body->find_transfer_need(sample_);
-  transfers_.begin(options_.transfers_per_s * kBlock / options_.rate_hz, directed_, needs);
-  for (SoundingBody* body : playing_)
-    if (body != nullptr) body->set_transfer_share(transfers_);
+  for (SoundingBody* body : directed_) needs += body->find_transfer_need(sample_);
+  transfers_.begin(options_.transfers_per_s * kBlock / options_.rate_hz, static_cast<int>(directed_.size()), needs);
+  for (SoundingBody* body : directed_) body->set_transfer_share(transfers_);
 }
 
 void Synthesiser::apply_commands() noexcept {
@@ -304,7 +304,7 @@ void Synthesiser::apply_commands() noexcept {
       set_awake(command.number);
     }
   }
-  if (changes) count_directed();
+  if (changes) list_directed();
 }
 
 /// Calls `work(number, body)` for every body that is awake, in the order of their numbers; those for which it returns false fall asleep.
@@ -406,7 +406,7 @@ void Synthesiser::finish_changes() noexcept {
     }
     return true;
   });
-  if (changes) count_directed();
+  if (changes) list_directed();
 }
 
 /// The floor for strikes in this block, whether the body is awake since its beginning or not; and no body wakes more modes than the whole

@@ -243,7 +243,7 @@ class Synthesiser {
   void for_awake(Work&& work) noexcept;
   void publish(int number) noexcept;
   void keep_budget() noexcept;
-  void count_directed() noexcept;
+  void list_directed() noexcept;
   void share_transfers() noexcept;
   void give_floor(SoundingBody& body) noexcept;
   void publish_counters() noexcept;
@@ -269,7 +269,7 @@ class Synthesiser {
   bool limited_ = false;           // voices have floors
   std::int64_t spent_before_ = 0;  // mode-samples up to the last block
   TransferBudget transfers_;
-  int directed_ = 0;  // bodies with directivity
+  std::vector<SoundingBody*> directed_;  // bodies with directivity, in the order of their numbers
   std::atomic<double> allowed_;
   SynthesiserCounters work_;  // the audio thread's
   std::atomic<float> gain_{1.0F};

@@ -16,6 +16,7 @@
 
 #include "runtime/base/error.hpp"
 #include "runtime/head/sofa.hpp"
+#include "runtime/host/microphones.hpp"
 #include "runtime/host/report.hpp"
 #include "runtime/host/sound_file.hpp"
 #include "tests/support/folder.hpp"
@@ -253,6 +254,16 @@ TEST(Render, AMeasuredHeadIsThatOfItsFile) {
   } catch (const InputError& error) {
     EXPECT_EQ(std::string(error.what()).rfind(c.scene.listener.sofa.string() + ": ", 0), 0u) << error.what();
   }
+}
+
+TEST(Render, AHeadThatWasMadeBeforeIsNotReadAgain) {
+  if (!head::has_sofa()) GTEST_SKIP() << "built without SOFA";
+  Case c = make_case_with_head();
+  const Heard wanted = c.render();
+  const std::optional<synth::ListeningHead> head = make_head(c.scene, 48000.0);
+  c.scene.listener.sofa = "/no/such/head.sofa";
+  EXPECT_THROW(c.render(), InputError);
+  EXPECT_EQ(calc_sound(c.scene, {&c.bank}, c.list_events(), {.rate_hz = 48000, .head = &head}).pressure_pa, wanted.pressure_pa);
 }
 
 TEST(Render, AccelerationNoiseIsADipoleAlongThePush) {

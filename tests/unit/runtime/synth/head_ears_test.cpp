@@ -331,6 +331,30 @@ TEST(HeadEars, SizesOfCallsChangeNoBit) {
   }
 }
 
+// A body that flies past and is struck again and again, just before and just after its filters are silent: when they begin and end must not
+// hang on how many sub-blocks a call has.
+TEST(HeadEars, SizesOfCallsChangeNoBitWhereSoundsBeginAndEnd) {
+  Scene scene = make_tone(900.0);
+  scene.bank = testing::make_cube_bank({{900.0, 3000.0}});
+  scene.position_m = {-3.0, 0.4, 0.0};
+  scene.frames = 24000;
+  scene.events = {events::BodyMotion{0.0, 0, {-3.0, 0.4, 0.0}, {12.0, 0.0, 0.0}},
+                  events::BodyMotion{0.5, 0, {3.0, 0.4, 0.0}, {12.0, 0.0, 0.0}}};
+  for (int n = 1200, step = 1; n < 22000; n += 700 + 37 * (step++ % 29))
+    scene.events.emplace_back(
+        events::Impulse{.time_s = n / kRate, .body = 0, .impulse_n_s = {0.0, 0.0, 1.0}, .duration_s = 1e-4 * (step % 5)});
+  for (const EffectSet effects : {kByHead, kByHead.without({Effect::kAirDelay, Effect::kDoppler}),
+                                  EffectSet{Effect::kModal, Effect::kTwoEars, Effect::kHead, Effect::kDoppler, Effect::kAirDelay}}) {
+    scene.effects = effects;
+    scene.block = 128;
+    const Sound whole = play(scene);
+    for (const int block : {32, 64, 96, 7, 160, 1000}) {
+      scene.block = block;
+      EXPECT_EQ(play(scene) == whole, true) << block;
+    }
+  }
+}
+
 // After a sound all that is left of it goes out of the filters, then the body sleeps; the next blow is as the first.
 TEST(HeadEars, EndWithTheSoundAndBeginAgain) {
   Scene scene = make_tone(800.0);
