@@ -49,6 +49,7 @@ class Stage:
         self.folder, self.bin, self.out, self.quick = folder, bin_dir, out, quick
         self.checks = []
         self.pictures = []
+        self.pictures_to = folder  # with --pictures
         self.out.mkdir(parents=True, exist_ok=True)
 
     def run(self, what, *command):
@@ -140,7 +141,7 @@ class Stage:
     def finish(self, keep_pictures):
         if keep_pictures:
             for picture in self.pictures:
-                shutil.copy(self.out / picture, self.folder)
+                shutil.copy(self.out / picture, self.pictures_to)
         print("\nChecks")
         for what, met in self.checks:
             print(f"  {'ok  ' if met else 'NOT '} {what}")
