@@ -145,6 +145,35 @@ void CoupledModes::set_state(int i, double q, double velocity) noexcept {
   work_j_ += work;
 }
 
+double CoupledModes::take_velocity(std::span<const double> share) noexcept {
+  double taken = 0.0;
+  for (std::size_t m = 0; m < share.size() && m < static_cast<std::size_t>(count_); ++m) {
+    const double v = re_[m] - tilt_[m] * im_[m], change = share[m] * v;
+    taken += change * (v - 0.5 * change);
+    re_[m] -= change;
+    middle_[m] -= change;
+  }
+  linear_j_ = std::max(0.0, linear_j_ - taken);
+  bound_j_ -= taken;
+  return taken;
+}
+
+double CoupledModes::calc_mode_energy_j(int i) const noexcept {
+  const auto m = static_cast<std::size_t>(i);
+  const double v = re_[m] - tilt_[m] * im_[m];
+  return 0.5 * (v * v + stiffness_[m] * im_[m] * im_[m]);
+}
+
+double CoupledModes::calc_tension_rad_s() const noexcept {
+  double virial = 0.0, squares = 0.0;
+  for (std::size_t m = 0; m < static_cast<std::size_t>(limit_); ++m) {
+    const double q = im_[m] / omega_[m];
+    virial += q * gradient_[m];
+    squares += q * im_[m];
+  }
+  return squares > 0.0 ? virial / squares : 0.0;
+}
+
 void CoupledModes::set_limit(int modes) noexcept {
   modes = std::clamp(modes, 0, count_);
   if (modes == limit_) return;

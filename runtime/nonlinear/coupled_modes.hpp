@@ -73,6 +73,15 @@ class CoupledModes {
 
   /// Sets a mode, by amplitude and velocity. What it has of energy counts as put in. Not between samples of a blow. [audio-thread]
   void set_state(int i, double q, double velocity) noexcept;
+  /// Takes a share of each velocity, 0 to 1, and with it energy [J], which is returned and is in the book no more. (N). Between two
+  /// samples. [audio-thread]
+  double take_velocity(std::span<const double> share) noexcept;
+  /// (lambda q^2 + q'^2) / 2 of mode i [J], half a sample after the sample.
+  double calc_mode_energy_j(int i) const noexcept;
+  /// tau [rad/s], by which the nonlinear force is at this moment that of a mean tension: a tension makes lambda_i greater by tau omega_i,
+  /// as it does in a plate that bends, where omega_i grows as the square of the wave number. q . grad V over the sum of omega_i q_i^2;
+  /// below 0 of a curved body that softens. [audio-thread]
+  double calc_tension_rad_s() const noexcept;
   /// Only the first `modes` are coupled from now on; the others continue as linear modes, from where they are. [audio-thread]
   void set_limit(int modes) noexcept;
   int get_limit() const noexcept { return limit_; }

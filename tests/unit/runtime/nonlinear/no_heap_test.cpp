@@ -1,6 +1,7 @@
 // Coupled modes in motion take no memory. A program of its own, as tests/support/heap_counter.hpp asks.
 #include <gtest/gtest.h>
 
+#include "runtime/nonlinear/cascade.hpp"
 #include "tests/support/heap_counter.hpp"
 #include "tests/unit/runtime/nonlinear/bodies.hpp"
 
@@ -21,12 +22,17 @@ TEST(CoupledModesWithoutHeap, TheCounterSeesAllocations) {
 TEST(CoupledModesWithoutHeap, StepsTakeNoMemory) {
   const bodies::Body body = bodies::Plate{}.make(20, decay);
   CoupledModes modes(body.energy, body.modes, 48000.0);
+  const std::vector<ModeConstants> above{{bodies::to_eigenvalue(6000.0), 1.0}, {bodies::to_eigenvalue(7000.0), 1.0}};
+  Cascade cascade(body.modes, above, {.mass_kg = 0.9, .thickness_m = 1e-3}, 48000.0);
   const std::vector<double> soft(20, 1e-3), hard(20, 1e3), none(20, 0.0);
   const long before = g_allocations;
   modes.step(soft, none);
   for (int n = 0; n < 500; ++n) modes.step();
   modes.step(hard, none);
-  for (int n = 0; n < 500; ++n) modes.step();
+  for (int n = 0; n < 500; ++n) {
+    modes.step();
+    cascade.step(modes, {}, {}, {});
+  }
   modes.set_limit(7);
   for (int n = 0; n < 500; ++n) modes.step();
   modes.set_state(3, 1e-3, 0.1);
@@ -34,6 +40,7 @@ TEST(CoupledModesWithoutHeap, StepsTakeNoMemory) {
   modes.step();
   EXPECT_EQ(g_allocations - before, 0);
   EXPECT_GT(modes.get_counters().guarded, 0);
+  EXPECT_GT(cascade.get_book().taken_j, 0.0);
 }
 
 }  // namespace
