@@ -4,7 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
+
+#include "precompute/analytic/polynomials.hpp"
+#include "precompute/analytic/stretch.hpp"
 
 namespace carillon::analytic {
 namespace {
@@ -61,6 +65,17 @@ void FlatBody::calc_shapes(const Vec3& point_m, std::span<const Mode> modes, std
   for (std::size_t m = 0; m < modes.size(); ++m) phi[m] = {0.0, 0.0, w[m]};
 }
 
+bank::QuarticEnergy FlatBody::calc_coupling(std::span<const Mode> modes, const material::Material& material, bool) const {
+  constexpr double kFirstZero = 2.404825557695773;  // of J_0
+  const double area = rigid.volume_m3 / thickness_m_, nu = material.poisson_ratio;
+  bank::QuarticEnergy energy;
+  append_row(std::sqrt(material.young_modulus_pa * thickness_m_ / (4.0 * area * (1.0 - nu * nu))) * calc_slope_products(modes), energy);
+  const double shear_m_s = std::sqrt(material.lame_mu_pa() * rigid.volume_m3 / rigid.mass_kg);
+  energy.membrane_ratio = shear_m_s * kFirstZero * std::sqrt(pi / area) / (2.0 * pi);
+  energy.thickness_m = thickness_m_;
+  return energy;
+}
+
 void FlatBody::set_rigid(double density_kg_m2) {
   const Net net = make_net(kMaxDefaultGrid);
   const double area = calc_slab_rigid(net, thickness_m_, 1.0).volume_m3 / thickness_m_;
@@ -114,6 +129,71 @@ void SineRectangle::calc_deflections(const Point2& point_m, std::span<const Mode
   }
   const double scale = 2.0 / std::sqrt(density_kg_m2_ * length_m_ * width_m_);
   for (std::size_t i = 0; i < modes.size(); ++i) w[i] = scale * sines[0][modes[i].index[0]] * sines[1][modes[i].index[1]];
+}
+
+la::Matrix SineRectangle::calc_slope_products(std::span<const Mode> modes) const {
+  la::Matrix products = la::Matrix::Zero(static_cast<Eigen::Index>(modes.size()), static_cast<Eigen::Index>(modes.size()));
+  for (std::size_t i = 0; i < modes.size(); ++i)
+    products(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(i)) =
+        square(pi) * (square(modes[i].index[0] / length_m_) + square(modes[i].index[1] / width_m_)) / density_kg_m2_;
+  return products;
+}
+
+/// del^4 F = E h (w_xy^2 - w_xx w_yy) with F a sum of cos(k pi x / a) cos(l pi y / b). For modes (m, n) and (m', n') the right side has the
+/// four products k = |m -+ m'|, l = |n -+ n'|; eta of one is its part of the right side over (k pi / a)^2 + (l pi / b)^2, in the norm.
+void SineRectangle::add_stress_functions(std::span<const Mode> modes, double rigidity_n_m, bank::QuarticEnergy& energy) const {
+  const double area = length_m_ * width_m_, factor = 1.0 / (density_kg_m2_ * area);  // a quarter of the square of the amplitude
+  std::map<std::array<int, 2>, std::size_t> places;
+  const std::size_t pairs = bank::count_pairs(modes.size());
+  for (const bool fills : {false, true}) {  // first the rows are counted
+    if (fills) {
+      std::size_t row = energy.rows.size() / pairs;
+      for (auto& [number, place] : places) place = row++;
+      energy.rows.resize(row * pairs, 0.0F);
+    }
+    for (std::size_t j = 0; j < modes.size(); ++j)
+      for (std::size_t i = 0; i <= j; ++i) {
+        const auto &one = modes[i].index, &other = modes[j].index;
+        const double ax = one[0] * pi / length_m_, ay = one[1] * pi / width_m_, bx = other[0] * pi / length_m_,
+                     by = other[1] * pi / width_m_;
+        for (const bool sums_x : {false, true})
+          for (const bool sums_y : {false, true}) {
+            const int k = sums_x ? one[0] + other[0] : std::abs(one[0] - other[0]);
+            const int l = sums_y ? one[1] + other[1] : std::abs(one[1] - other[1]);
+            const double part = sums_x == sums_y ? -square(ax * by - bx * ay) : square(ax * by + bx * ay);
+            if (part == 0.0) continue;  // and k = l = 0 among them
+            std::size_t& place = places[{k, l}];
+            if (!fills) continue;
+            const double norm = area * (k > 0 ? 0.5 : 1.0) * (l > 0 ? 0.5 : 1.0);
+            const double wave = square(k * pi / length_m_) + square(l * pi / width_m_);
+            energy.rows[place * pairs + bank::find_pair(i, j)] =
+                static_cast<float>(0.5 * factor * part * std::sqrt(rigidity_n_m * norm) / wave);
+          }
+      }
+  }
+}
+
+bank::QuarticEnergy SineRectangle::calc_coupling(std::span<const Mode> modes, const material::Material& material, bool is_stretch) const {
+  bank::QuarticEnergy energy = FlatBody::calc_coupling(modes, material, is_stretch);
+  if (!is_plate_) return energy;
+  const double nu = material.poisson_ratio, area = length_m_ * width_m_, rigidity = material.young_modulus_pa * thickness_m_;
+  // What a mode alone has of Airy's function is E h a b (e_x^2 + e_y^2) / 4.
+  const double airy = is_stretch ? 0.25 : 0.0;
+  std::vector<double> sum, difference;
+  for (const Mode& mode : modes) {
+    const double x = 0.5 * square(mode.index[0] * pi / length_m_) / (density_kg_m2_ * area),
+                 y = 0.5 * square(mode.index[1] * pi / width_m_) / (density_kg_m2_ * area);  // mean strains of q = 1
+    sum.push_back(std::sqrt(area * rigidity * (0.5 / (1.0 - nu) + airy)) * (x + y));
+    difference.push_back(std::sqrt(area * rigidity * (0.5 / (1.0 + nu) + airy)) * (x - y));
+  }
+  energy.rows.clear();
+  append_diagonal_row(sum, energy);
+  append_diagonal_row(difference, energy);
+  if (!is_stretch) add_stress_functions(modes, rigidity, energy);
+  const double longest = std::max(length_m_, width_m_);  // sides move along themselves: a wave of pressure from side to side is slower
+  const double pressure_m_s = std::sqrt(material.young_modulus_pa / ((1.0 - nu * nu) * material.density_kg_m3));
+  energy.membrane_ratio = std::min(energy.membrane_ratio, 0.5 * pressure_m_s / longest);
+  return energy;
 }
 
 Net SineRectangle::make_net(int grid) const {
@@ -256,6 +336,33 @@ void Circle::calc_deflections(const Point2& point_m, std::span<const Mode> modes
     const double turned = modes[i].index[0] * angle;
     w[i] = cached_[place] * (modes[i].index[2] == 0 ? std::cos(turned) : std::sin(turned));
   }
+}
+
+/// By parts, since w is 0 on the rim: the integral of -w_i times the Laplacian of w_j, of equal m and part.
+la::Matrix Circle::calc_slope_products(std::span<const Mode> modes) const {
+  const auto count = static_cast<Eigen::Index>(modes.size());
+  la::Matrix products = la::Matrix::Zero(count, count);
+  double largest = 1.0;
+  for (const Mode& mode : modes) largest = std::max(largest, radials_[static_cast<std::size_t>(mode.index[3])].root);
+  const GaussRule rule = make_gauss_rule(30 + static_cast<int>(largest));
+  la::Matrix w(static_cast<Eigen::Index>(rule.x.size()), count), bent = w;
+  for (Eigen::Index j = 0; j < count; ++j) {
+    const Radial& radial = radials_[static_cast<std::size_t>(modes[static_cast<std::size_t>(j)].index[3])];
+    for (std::size_t k = 0; k < rule.x.size(); ++k) {
+      const double j_part = radial.bessel * calc_j(radial.m, radial.root * rule.x[k]);
+      const double i_part =
+          radial.modified != 0.0 ? radial.modified * calc_i(radial.m, radial.root * rule.x[k]) / calc_i(radial.m, radial.root) : 0.0;
+      w(static_cast<Eigen::Index>(k), j) = j_part + i_part;
+      bent(static_cast<Eigen::Index>(k), j) = rule.weight[k] * rule.x[k] * square(radial.root) * (j_part - i_part);
+    }
+  }
+  for (Eigen::Index j = 0; j < count; ++j)
+    for (Eigen::Index i = 0; i <= j; ++i) {
+      const auto &one = modes[static_cast<std::size_t>(i)].index, &other = modes[static_cast<std::size_t>(j)].index;
+      if (one[0] != other[0] || one[2] != other[2]) continue;
+      products(i, j) = products(j, i) = (one[0] == 0 ? 2.0 : 1.0) * pi * w.col(i).dot(bent.col(j));
+    }
+  return products;
 }
 
 Net Circle::make_net(int grid) const { return make_disc_net(radius_m_, std::max(1, grid / 2)); }

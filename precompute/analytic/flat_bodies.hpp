@@ -15,8 +15,14 @@ class FlatBody : public KnownBody {
   /// grid intervals along the longest side.
   ClosedSurface make_surface(int grid) const override { return make_slab(make_net(grid), thickness_m_); }
   void calc_shapes(const Vec3& point_m, std::span<const Mode> modes, std::span<Vec3> phi) const override;
+  /// One row, of the mean of both strains: sqrt(E h / (4 A (1 - nu^2))) times the integrals of grad w_i . grad w_j over the area A (Berger
+  /// 1955). The rim is held. The lowest frequency of stretching is a lower bound: no body of this area that is held along its rim has a
+  /// lower one than a disc has (Faber 1923, Krahn 1925) where no wave is faster than shear.
+  bank::QuarticEnergy calc_coupling(std::span<const Mode> modes, const material::Material& material, bool is_stretch) const override;
 
  protected:
+  /// Integrals over the body of grad w_i . grad w_j [1/kg], (modes, modes).
+  virtual la::Matrix calc_slope_products(std::span<const Mode> modes) const = 0;
   virtual Net make_net(int grid) const = 0;
   /// w of each mode [kg^-1/2], (modes).
   virtual void calc_deflections(const Point2& point_m, std::span<const Mode> modes, std::span<double> w) const = 0;
@@ -35,10 +41,16 @@ class SineRectangle : public FlatBody {
   SineRectangle(const job::PlateBody& body, const material::Material& material);
   ModeList list_modes(double high_hz, std::int64_t max_modes) override;
   int choose_grid(std::span<const Mode> modes) const override;
+  /// Of a plate, whose sides stay straight and do not move: a row for each product of cosines of Airy's stress function, and two for the
+  /// mean strains (Chu and Herrmann 1956; Ducceschi and others 2014). The mean stretch alone: two rows, by which each mode alone hardens as
+  /// by all of them.
+  bank::QuarticEnergy calc_coupling(std::span<const Mode> modes, const material::Material& material, bool is_stretch) const override;
 
  private:
+  la::Matrix calc_slope_products(std::span<const Mode> modes) const override;
   Net make_net(int grid) const override;
   void calc_deflections(const Point2& point_m, std::span<const Mode> modes, std::span<double> w) const override;
+  void add_stress_functions(std::span<const Mode> modes, double rigidity_n_m, bank::QuarticEnergy& energy) const;
 
   double length_m_, width_m_, density_kg_m2_;
   bool is_plate_;
@@ -62,6 +74,7 @@ class Circle : public FlatBody {
     double root = 0.0;
     double bessel = 0.0, modified = 0.0;  // factors of J_m(root r / R) and I_m(root r / R) / I_m(root)
   };
+  la::Matrix calc_slope_products(std::span<const Mode> modes) const override;
   Net make_net(int grid) const override;
   void calc_deflections(const Point2& point_m, std::span<const Mode> modes, std::span<double> w) const override;
   std::array<double, 4> calc_conditions(int m, double root) const;
@@ -101,6 +114,7 @@ class RitzPlate : public FlatBody {
   };
   std::vector<Line> make_lines(int polynomials, job::Edge first, job::Edge last) const;
   Solved solve(int x_polynomials, int y_polynomials, double high_lambda);
+  la::Matrix calc_slope_products(std::span<const Mode> modes) const override;
   Net make_net(int grid) const override;
   void calc_deflections(const Point2& point_m, std::span<const Mode> modes, std::span<double> w) const override;
 

@@ -46,6 +46,12 @@ class KnownBody {
   /// phi [kg^-1/2] of each mode at a point of the body, (modes). Points outside count as the nearest one of the rim.
   virtual void calc_shapes(const Vec3& point_m, std::span<const Mode> modes, std::span<Vec3> phi) const = 0;
 
+  /// Whether large motion couples the mode: it bends or swings sideways.
+  virtual bool is_coupled(const Mode&) const { return true; }
+  /// What couples these modes, which list_modes() gave and is_coupled() takes: all but `modes` and membrane_ratio, in whose place is the
+  /// lowest frequency of stretching [Hz]. is_stretch: by the mean stretch alone, one or two rows. Without rows: nothing couples them.
+  virtual bank::QuarticEnergy calc_coupling(std::span<const Mode>, const material::Material&, bool /*is_stretch*/) const { return {}; }
+
   /// The surface with `grid` intervals along the longest side.
   virtual ClosedSurface make_surface(int grid) const = 0;
   /// Intervals that suit modes up to these; flat bodies at most kMaxDefaultGrid.

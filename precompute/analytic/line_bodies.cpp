@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "precompute/analytic/polynomials.hpp"
+#include "precompute/analytic/stretch.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::analytic {
@@ -83,6 +84,18 @@ void String::calc_shapes(const Vec3& point_m, std::span<const Mode> modes, std::
 }
 
 ClosedSurface String::make_surface(int grid) const { return make_prism(length_m_, make_disc_section(diameter_m_), grid); }
+
+bank::QuarticEnergy String::calc_coupling(std::span<const Mode> modes, const material::Material& material, bool) const {
+  bank::QuarticEnergy energy;
+  const double rigidity_n = material.young_modulus_pa * pi / 4.0 * square(diameter_m_);
+  std::vector<double> row;
+  for (const Mode& mode : modes)
+    row.push_back(std::sqrt(rigidity_n / (4.0 * length_m_)) * square(mode.index[0] * pi / length_m_) / mass_kg_m_);
+  append_diagonal_row(row, energy);
+  energy.membrane_ratio = std::sqrt(rigidity_n / mass_kg_m_) / (2.0 * length_m_);
+  energy.thickness_m = diameter_m_;
+  return energy;
+}
 
 int String::choose_grid(std::span<const Mode> modes) const {
   int half_waves = 1;
@@ -284,6 +297,41 @@ ClosedSurface Beam::make_surface(int grid) const {
   if (body_.diameter_m) return make_prism(body_.length_m, make_disc_section(*body_.diameter_m), grid);
   const double y = 0.5 * *body_.width_m, z = 0.5 * *body_.thickness_m;
   return make_prism(body_.length_m, {{0, -z}, {y, -z}, {y, 0}, {y, z}, {0, z}, {-y, z}, {-y, 0}, {-y, -z}}, grid);
+}
+
+bank::QuarticEnergy Beam::calc_coupling(std::span<const Mode> modes, const material::Material&, bool) const {
+  const double length = body_.length_m, mass = density_kg_m3_ * area_m2_ * length;
+  const auto n = static_cast<Eigen::Index>(modes.size());
+  la::Matrix slopes = la::Matrix::Zero(n, n);  // integrals of w_i' w_j' [1/(m kg)]
+  int half_waves = 1, polynomials = 1;
+  std::vector<const Shape*> shapes;
+  for (const Mode& mode : modes) {
+    shapes.push_back(&shapes_[static_cast<std::size_t>(mode.index[2])]);
+    half_waves = std::max(half_waves, mode.index[1] + 1);
+    polynomials = std::max(polynomials, static_cast<int>(shapes.back()->deflection.size()));
+  }
+  const GaussRule rule = make_gauss_rule(40 + 4 * half_waves);
+  const la::Matrix products = body_.is_timoshenko ? calc_products(polynomials, 1, 1) : la::Matrix();
+  for (Eigen::Index j = 0; j < n; ++j)
+    for (Eigen::Index i = 0; i <= j; ++i) {
+      if (modes[static_cast<std::size_t>(i)].index[0] != modes[static_cast<std::size_t>(j)].index[0]) continue;
+      const Shape &one = *shapes[static_cast<std::size_t>(i)], &other = *shapes[static_cast<std::size_t>(j)];
+      double sum = 0.0;
+      if (body_.is_timoshenko) {
+        const Eigen::Index count = std::min(one.deflection.size(), other.deflection.size());
+        sum = one.deflection.head(count).dot(products.topLeftCorner(count, count) * other.deflection.head(count)) / length;
+      } else {
+        for (std::size_t k = 0; k < rule.x.size(); ++k)
+          sum += rule.weight[k] * one.function.calc(rule.x[k], 1) * other.function.calc(rule.x[k], 1);
+        sum *= one.function.beta * other.function.beta / (mass * length);
+      }
+      slopes(i, j) = slopes(j, i) = sum;
+    }
+  bank::QuarticEnergy energy;
+  append_row(std::sqrt(young_pa_ * area_m2_ / (4.0 * length)) * slopes, energy);
+  energy.membrane_ratio = std::sqrt(young_pa_ / density_kg_m3_) / (2.0 * length);
+  energy.thickness_m = body_.diameter_m ? *body_.diameter_m : std::min(*body_.width_m, *body_.thickness_m);
+  return energy;
 }
 
 int Beam::choose_grid(std::span<const Mode> modes) const {

@@ -17,6 +17,8 @@ class String : public KnownBody {
   void calc_shapes(const Vec3& point_m, std::span<const Mode> modes, std::span<Vec3> phi) const override;
   ClosedSurface make_surface(int grid) const override;
   int choose_grid(std::span<const Mode> modes) const override;
+  /// The mean stretch by both planes (Kirchhoff 1876, Carrier 1945).
+  bank::QuarticEnergy calc_coupling(std::span<const Mode> modes, const material::Material& material, bool is_stretch) const override;
 
  private:
   double length_m_, mass_kg_m_, diameter_m_, tension_n_, stiffness_;  // stiffness: B
@@ -31,6 +33,9 @@ class Beam : public KnownBody {
   void calc_shapes(const Vec3& point_m, std::span<const Mode> modes, std::span<Vec3> phi) const override;
   ClosedSurface make_surface(int grid) const override;
   int choose_grid(std::span<const Mode> modes) const override;
+  bool is_coupled(const Mode& mode) const override { return mode.index[0] == kBendingY || mode.index[0] == kBendingZ; }
+  /// As String. Both ends are held, and do not move along the beam (Woinowsky-Krieger 1950).
+  bank::QuarticEnergy calc_coupling(std::span<const Mode> modes, const material::Material& material, bool is_stretch) const override;
 
  private:
   enum Motion { kBendingY = 1, kBendingZ = 2, kTorsion = 3, kAxial = 4 };

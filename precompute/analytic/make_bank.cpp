@@ -158,12 +158,50 @@ Found find(const job::JobSpec& job) {
   }
 }
 
+/// The lowest modes that large motion couples, as the job has them: numbers among those of the band. Modes of one frequency go together.
+std::vector<std::int32_t> choose_coupled(const KnownBody& body, const job::Nonlinear& asked, const std::vector<Mode>& modes) {
+  std::vector<std::int32_t> chosen;
+  for (std::size_t m = 0; m < modes.size(); ++m)
+    if (body.is_coupled(modes[m]) && to_hz(modes[m].lambda_rad2_s2) <= asked.below_hz) chosen.push_back(static_cast<std::int32_t>(m));
+  auto kept = std::min(chosen.size(), static_cast<std::size_t>(asked.modes));
+  const auto get_lambda = [&](std::size_t i) { return modes[static_cast<std::size_t>(chosen[i])].lambda_rad2_s2; };
+  if (kept < chosen.size()) {
+    while (kept > 0 && get_lambda(kept) - get_lambda(kept - 1) <= kDegenerate * get_lambda(kept)) --kept;
+    if (kept == 0) kept = static_cast<std::size_t>(asked.modes);
+  }
+  chosen.resize(kept);
+  return chosen;
+}
+
+void couple(const KnownBody& body, const job::JobSpec& job, const std::vector<Mode>& modes, Made& made) {
+  const std::vector<std::int32_t> chosen = choose_coupled(body, *job.nonlinear, modes);
+  if (chosen.empty()) {
+    made.warnings.push_back(
+        fmt::format("no mode that large motion couples lies below {:g} Hz: the bank stays linear", job.nonlinear->below_hz));
+    return;
+  }
+  std::vector<Mode> coupled;
+  for (const std::int32_t mode : chosen) coupled.push_back(modes[static_cast<std::size_t>(mode)]);
+  bank::QuarticEnergy& energy = made.bank.quartic;
+  energy = body.calc_coupling(coupled, job.material, job.nonlinear->is_stretch);
+  energy.modes = chosen;
+  const double membrane_hz = energy.membrane_ratio, top_hz = to_hz(coupled.back().lambda_rad2_s2);
+  energy.membrane_ratio = top_hz / membrane_hz;
+  if (energy.membrane_ratio > bank::kMaxMembraneRatio)
+    made.warnings.push_back(
+        fmt::format("stretching begins at {:.0f} Hz, and the highest coupled mode has {:.0f} Hz: above half of it the inertia of "
+                    "stretching, which is left out, is heard; lower \"nonlinear.below_hz\"",
+                    membrane_hz, top_hz));
+  made.coupling = fmt::format("{} coupled modes up to {:.0f} Hz, {} {}", energy.mode_count(), top_hz, energy.row_count(),
+                              energy.row_count() == 1 ? "row" : "rows");
+}
+
 }  // namespace
 
 Made make_bank(const job::JobSpec& job) {
   auto [body, band] = find(job);
   const std::size_t count = band.modes.size();
-  Made made{{}, body->theory, body->method, {}, body->warnings};
+  Made made{{}, body->theory, body->method, {}, body->warnings, {}};
   bank::Bank& bank = made.bank;
   ClosedSurface surface = body->make_surface(job.analytic->grid.value_or(body->choose_grid(band.modes)));
   if (static_cast<double>(surface.vertices_m.size()) * static_cast<double>(count) * 3.0 > kMaxNumbers)
@@ -198,6 +236,7 @@ Made make_bank(const job::JobSpec& job) {
   bank.complete = band.is_complete;
   bank.element = "analytic";
   bank.mass = "consistent";
+  if (job.nonlinear) couple(*body, job, band.modes, made);
   made.method = body->method;
   return made;
 }

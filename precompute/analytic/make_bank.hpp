@@ -11,6 +11,7 @@ struct Made {
   std::string theory, method;
   std::vector<std::string> names;     // (m) of the modes: "(1, 2)"
   std::vector<std::string> warnings;  // where the theory does not describe the body
+  std::string coupling;               // what large motion couples; empty: nothing
 };
 
 /// The bank of job.analytic: the modes of its band, their shapes on its surface, gains and decays. Throws InputError, SolveError.

@@ -193,6 +193,13 @@ void Polygon::calc_deflections(const Point2& point_m, std::span<const Mode> mode
   }
 }
 
+la::Matrix Polygon::calc_slope_products(std::span<const Mode> modes) const {
+  la::Matrix products = la::Matrix::Zero(static_cast<Eigen::Index>(modes.size()), static_cast<Eigen::Index>(modes.size()));
+  for (std::size_t i = 0; i < modes.size(); ++i)
+    products(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(i)) = modes[i].lambda_rad2_s2 / (rate_ * density_kg_m2_);
+  return products;
+}
+
 Net Polygon::make_net(int grid) const {
   if (side_m_ <= 0.0) return triangulate(corners_m_, 1.5 * longest_m_ / grid);
   // Three squares of a regular net.

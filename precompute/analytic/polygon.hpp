@@ -31,6 +31,7 @@ class Polygon : public FlatBody {
 
  private:
   Net make_elements(double k, double edge_m) const;
+  la::Matrix calc_slope_products(std::span<const Mode> modes) const override;
   Net make_net(int grid) const override;
   void calc_deflections(const Point2& point_m, std::span<const Mode> modes, std::span<double> w) const override;
   std::size_t find_element(const Point2& point_m, double& r, double& s) const;

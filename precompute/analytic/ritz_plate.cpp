@@ -159,6 +159,23 @@ void RitzPlate::calc_deflections(const Point2& point_m, std::span<const Mode> mo
   }
 }
 
+la::Matrix RitzPlate::calc_slope_products(std::span<const Mode> modes) const {
+  const double a = body_.length_m, b = body_.width_m;
+  const auto count = static_cast<Eigen::Index>(modes.size());
+  la::Matrix products = la::Matrix::Zero(count, count);
+  for (Eigen::Index j = 0; j < count; ++j) {
+    const Shape& shape = shapes_[static_cast<std::size_t>(modes[static_cast<std::size_t>(j)].index[0])];
+    const la::Matrix turned = x_lines_[static_cast<std::size_t>(shape.x_line)].slopes * shape.coefficients / square(a) +
+                              shape.coefficients * y_lines_[static_cast<std::size_t>(shape.y_line)].slopes / square(b);
+    for (Eigen::Index i = 0; i <= j; ++i) {
+      const Shape& other = shapes_[static_cast<std::size_t>(modes[static_cast<std::size_t>(i)].index[0])];
+      if (other.x_line != shape.x_line || other.y_line != shape.y_line) continue;
+      products(i, j) = products(j, i) = other.coefficients.cwiseProduct(turned).sum() / density_kg_m2_;
+    }
+  }
+  return products;
+}
+
 Net RitzPlate::make_net(int grid) const {
   const double longest = std::max(body_.length_m, body_.width_m);
   const auto cut = [&](double side) { return std::max(2, static_cast<int>(std::lround(grid * side / longest))); };

@@ -133,13 +133,58 @@ void read_air(base::Object& job, JobSpec& spec) {
   air.finish();
 }
 
+/// Which bodies have what "nonlinear" asks for.
+void check_stretch(base::Object& job, const JobSpec& spec) {
+  const bool is_stretch = spec.nonlinear->is_stretch;
+  if (!spec.analytic) {
+    if (is_stretch && spec.fixed.empty())
+      job.fail("nonlinear",
+               "the stretch is that of a body whose edges are held, and this one is held nowhere: give \"fixed\", or couple its modes "
+               "in full, {\"modes\": 30}");
+    return;
+  }
+  const auto is_held = [](const auto& edges) {
+    return std::all_of(edges.begin(), edges.end(), [](Edge edge) { return edge == Edge::hinged || edge == Edge::clamped; });
+  };
+  if (std::holds_alternative<MeasuredBody>(spec.analytic->kind))
+    job.fail("nonlinear", "needs the equations of a body, and this one is a table of measured modes; remove it");
+  const auto* beam = std::get_if<BeamBody>(&spec.analytic->kind);
+  const auto* plate = std::get_if<PlateBody>(&spec.analytic->kind);
+  const bool is_circle = plate != nullptr && plate->shape == "circle";
+  if ((beam != nullptr && !is_held(beam->ends)) || (is_circle && !is_held(std::array{plate->edges[0]})) ||
+      (plate != nullptr && !is_circle && !is_held(plate->edges)))
+    job.fail("nonlinear", fmt::format("a {} with {} that are free or slide has no mean stretch: hold them all (\"hinged\" or \"clamped\"), "
+                                      "or take finite elements (\"shape\") and {{\"modes\": 30}}",
+                                      get_key(*spec.analytic), beam != nullptr ? "ends" : "edges"));
+  const bool has_formula = plate != nullptr && !is_circle &&
+                           std::all_of(plate->edges.begin(), plate->edges.end(), [](Edge edge) { return edge == Edge::hinged; });
+  if (!is_stretch && !has_formula)
+    job.fail("nonlinear", fmt::format("all coupling of a {} is no formula here, but for a rectangular plate hinged on all sides: ask for "
+                                      "\"stretch\"{}",
+                                      get_key(*spec.analytic), plate != nullptr ? ", or take finite elements (\"shape\")" : ""));
+}
+
 void read_nonlinear(base::Object& job, JobSpec& spec) {
   if (!job.has("nonlinear")) return;
-  if (!job.has_object("nonlinear"))
-    job.fail("nonlinear", "is an object: {\"modes\": 30, \"below_hz\": 3000, \"energy_error\": 1e-3}, each of which may be left out");
-  base::Object nonlinear = job.object("nonlinear");
   Nonlinear& found = spec.nonlinear.emplace();
-  if (auto modes = nonlinear.integer_if("modes", 1, kMaxCoupledModes)) found.modes = static_cast<int>(*modes);
+  if (job.has_string("nonlinear")) {
+    found.is_stretch = true;
+    (void)job.choice("nonlinear", {"stretch"});
+    check_stretch(job, spec);
+    if (spec.max_modes) found.modes = std::min(found.modes, *spec.max_modes);
+    return;
+  }
+  if (!job.has_object("nonlinear"))
+    job.fail("nonlinear",
+             "is \"stretch\", or an object: {\"modes\": 30, \"below_hz\": 3000, \"energy_error\": 1e-3}, each of which may be left out");
+  base::Object nonlinear = job.object("nonlinear");
+  found.is_stretch = nonlinear.choice_or("form", {"full", "stretch"}, "full") == "stretch";
+  check_stretch(job, spec);
+  if (nonlinear.has("energy_error") && (spec.analytic || found.is_stretch))
+    nonlinear.fail("energy_error", found.is_stretch ? "is of all stress fields, and the stretch is a few of them; remove it"
+                                                    : "is of energies by elements, and this one is a formula; remove it");
+  const bool is_formula = spec.analytic && !found.is_stretch;
+  if (auto modes = nonlinear.integer_if("modes", 1, is_formula ? kMaxPlateModes : kMaxCoupledModes)) found.modes = static_cast<int>(*modes);
   if (spec.max_modes && found.modes > *spec.max_modes) {
     if (nonlinear.has("modes"))
       nonlinear.fail(
@@ -177,7 +222,7 @@ void read_geometry(base::Object& job, JobSpec& spec) {
                                          kMinScale, kMaxScale, spec.mesh_scale));
   }
   if (spec.analytic) {
-    for (const char* key : {"accuracy_cents", "element", "mass", "solver", "fixed", "materials", "radiation", "nonlinear"})
+    for (const char* key : {"accuracy_cents", "element", "mass", "solver", "fixed", "materials", "radiation"})
       if (job.has(key))
         job.fail(key, fmt::format("is for bodies of elements, but the modes of a \"{}\" are known; remove it", get_key(*spec.analytic)));
     return;

@@ -46,8 +46,11 @@ struct Air {
 
 inline constexpr int kMaxCoupledModes = 400;
 
+inline constexpr int kMaxPlateModes = 200;  // of them, of a plate in closed form: 900 rows, 72 MB
+
 /// Which modes large motion couples, and how exactly their energy is stored.
 struct Nonlinear {
+  bool is_stretch = false;     // "form": by the mean stretch alone, in a few rows
   int modes = 50;              // at most; the lowest that bend or twist
   double below_hz = 3000.0;    // of them
   double energy_error = 1e-2;  // relative, of the energy that is stored: 1e-3 takes twice as much to play

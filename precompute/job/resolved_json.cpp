@@ -127,11 +127,12 @@ Json::Value write_air(const Air& air) {
   return root;
 }
 
-Json::Value write_nonlinear(const Nonlinear& nonlinear) {
+Json::Value write_nonlinear(const Nonlinear& nonlinear, bool has_energy_error) {
   Json::Value root;
+  if (nonlinear.is_stretch) root["form"] = "stretch";
   root["modes"] = nonlinear.modes;
   root["below_hz"] = nonlinear.below_hz;
-  root["energy_error"] = nonlinear.energy_error;
+  if (has_energy_error) root["energy_error"] = nonlinear.energy_error;
   return root;
 }
 
@@ -148,7 +149,6 @@ void write_solve(const JobSpec& job, Json::Value& root) {
   root["solver"]["method"] = to_text(job.method);
   root["solver"]["factorisation"] = to_text(job.factorisation);
   if (job.air.method != AirMethod::none) root["radiation"] = write_air(job.air);
-  if (job.nonlinear) root["nonlinear"] = write_nonlinear(*job.nonlinear);
 }
 
 }  // namespace
@@ -170,6 +170,7 @@ std::string resolved_json(const JobSpec& job, const fs::path& folder, const std:
   root["band_hz"].append(job.band_hz[1]);
   if (job.max_modes) root["max_modes"] = *job.max_modes;
   if (!job.analytic) write_solve(job, root);
+  if (job.nonlinear) root["nonlinear"] = write_nonlinear(*job.nonlinear, !job.analytic && !job.nonlinear->is_stretch);
   if (!run_json.empty()) {
     std::istringstream stream(run_json);
     Json::CharReaderBuilder reader;

@@ -32,6 +32,7 @@ Json::Value describe(const Run& run, const analytic::Made& made) {
   Json::Value record = describe_program(run);
   record["theory"] = made.theory;
   record["method"] = made.method;
+  if (!made.coupling.empty()) record["coupling"] = made.coupling;
   for (const std::string& name : made.names) record["mode_names"].append(name);
   for (const std::string& warning : run.log.get_warnings()) record["warnings"].append(warning);
   return record;
@@ -60,6 +61,7 @@ RunSummary write_known_body(Run& run) {
     bank::write_bank(made.bank, written);
     base::write_file(job::find_resolved_path(written), record);
     summary.result = fmt::format("{}\n{}\n{}", made.theory, bank::describe_completeness(made.bank), bank::describe_accuracy(made.bank));
+    if (!made.coupling.empty()) summary.result += "\n" + made.coupling;
     if (const std::size_t count = made.bank.mode_count(); count > 0)
       summary.result += fmt::format("\n{:.2f} Hz to {:.2f} Hz", made.bank.freq_hz(0), made.bank.freq_hz(count - 1));
   });

@@ -58,12 +58,23 @@ TEST(JobSpec, nonlinear_is_read_strictly_and_is_part_of_the_resolved_job) {
   const std::string text = resolved_json(job, "/jobs", "");
   EXPECT_EQ(resolved_json(parse_job(text, "/jobs/b.bank.resolved.json"), "/jobs", ""), text);
   EXPECT_EQ(parse_job(job_with(R"(, "max_modes": 20, "nonlinear": {})"), "/jobs/job.json").nonlinear->modes, 20);
-  for (const char* bad : {"true", "\"stretch\"", "{\"modes\": 0}", "{\"modes\": 401}", "{\"below_hz\": 10}", "{\"below_hz\": -1}",
-                          "{\"energy_error\": 0.5}", "{\"energy_error\": 0}", "{\"mode\": 3}", "{\"modes\": 30}, \"max_modes\": 20"})
+  for (const char* bad :
+       {"true", "\"stretch\"", "\"full\"", "{\"modes\": 0}", "{\"modes\": 401}", "{\"below_hz\": 10}", "{\"below_hz\": -1}",
+        "{\"energy_error\": 0.5}", "{\"energy_error\": 0}", "{\"mode\": 3}", "{\"modes\": 30}, \"max_modes\": 20"})
     EXPECT_THROW(parse_job(job_with(std::string(", \"nonlinear\": ") + bad), "/jobs/job.json"), InputError) << bad;
   const char* known = R"({"body": {"membrane": {"shape": "circle", "radius_m": 0.2, "lowest_hz": 200, "density_kg_m2": 0.3}},
                           "bank": "b", "nonlinear": {}})";
   EXPECT_THROW(parse_job(known, "/jobs/job.json"), InputError);
+  // The short form and the long one; of a body that is held.
+  const JobSpec shortly = parse_job(job_with(R"(, "fixed": "rim", "nonlinear": "stretch")"), "/jobs/job.json");
+  ASSERT_TRUE(shortly.nonlinear);
+  EXPECT_TRUE(shortly.nonlinear->is_stretch);
+  EXPECT_FALSE(job.nonlinear->is_stretch);
+  const std::string long_form = R"(, "fixed": "rim", "nonlinear": {"form": "stretch", "modes": 50, "below_hz": 3000})";
+  EXPECT_EQ(resolved_json(shortly, "/jobs", ""), resolved_json(parse_job(job_with(long_form), "/jobs/job.json"), "/jobs", ""));
+  EXPECT_NE(resolved_json(shortly, "/jobs", "").find("\"stretch\""), std::string::npos);
+  EXPECT_THROW(parse_job(job_with(R"(, "fixed": "rim", "nonlinear": {"form": "stretch", "energy_error": 1e-3})"), "/jobs/job.json"),
+               InputError);
 }
 
 TEST(JobSpec, a_bank_may_be_left_out_only_where_a_store_keeps_it) {
