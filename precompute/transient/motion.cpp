@@ -71,6 +71,7 @@ Motion::Motion(Domain& domain, const MotionOptions& options, std::vector<Constra
         is_constrained_[static_cast<std::size_t>(place)] = 1;
         constrained_nodes_.push_back({place, static_cast<std::int32_t>(h)});
       }
+    find_hinges([&](std::int32_t node) { return assembly.nodes_m[static_cast<std::size_t>(node)]; });
     for (std::size_t i = 0; i < impulses_.size(); ++i)
       for (const NodeShare& one : impulses_[i].shares) {
         const std::int32_t place = domain_.find_place(one.node);
@@ -133,7 +134,26 @@ void Motion::set_start(const std::function<Start(std::int32_t, const Vec3&)>& fi
       home_[at] = u_[at];
       v_[at] = Quad{};
     }
+    find_hinges([&](std::int32_t node) {
+      const Vec3& rest_m = domain_.get_assembly().nodes_m[static_cast<std::size_t>(node)];
+      return rest_m + find_start(node, rest_m).displacement_m;
+    });
   });
+}
+
+void Motion::find_hinges(const std::function<Vec3(std::int32_t)>& find_place) {
+  hinges_.assign(domain_.get_assembly().bodies.size(), {});
+  for (const Constraint& constraint : constraints_) {
+    if (!constraint.is_hinge || constraint.nodes.empty()) continue;
+    Hinge& hinge = hinges_[static_cast<std::size_t>(domain_.get_assembly().find_body_of_node(constraint.nodes[0]))];
+    hinge = {true, find_place(constraint.nodes[0]), {}};
+    Vec3 way{};
+    for (const std::int32_t node : constraint.nodes) {
+      const Vec3 other = find_place(node) - hinge.point_m;
+      if (norm(other) > norm(way)) way = other;
+    }
+    if (norm(way) > 0.0) hinge.axis = (1.0 / norm(way)) * way;
+  }
 }
 
 void Motion::begin() {
@@ -344,16 +364,25 @@ void Motion::update_carried() {
   for (std::size_t b = 0; b < bodies; ++b) {
     const double* s = &sum[kSums * b];
     if (!moves(b) || !(s[0] > 0.0)) continue;
-    const Vec3 c{s[1] / s[0], s[2] / s[0], s[3] / s[0]}, v{s[4] / s[0], s[5] / s[0], s[6] / s[0]};
+    // A hinged body turns about its hinge: its centre of mass has no motion of its own.
+    const Hinge& hinge = hinges_[b];
+    const Vec3 middle{s[1] / s[0], s[2] / s[0], s[3] / s[0]}, v{s[4] / s[0], s[5] / s[0], s[6] / s[0]};
+    const Vec3 c = hinge.is_there ? hinge.point_m : middle;
     const Vec3 turn = Vec3{s[7], s[8], s[9]} - s[0] * cross(c, v);
     Vec3 square, product;
     for (std::size_t k = 0; k < 3; ++k) {
-      square[k] = s[10 + k] - s[0] * c[k] * c[k];
-      product[k] = s[13 + k] - s[0] * c[(k + 1) % 3] * c[(k + 2) % 3];
+      const std::size_t i = (k + 1) % 3, j = (k + 2) % 3;
+      square[k] = s[10 + k] - s[0] * c[k] * (2.0 * middle[k] - c[k]);
+      product[k] = s[13 + k] - s[0] * (c[i] * middle[j] + c[j] * middle[i] - c[i] * c[j]);
     }
     const Mat3 inertia{Vec3{square[1] + square[2], -product[2], -product[1]}, Vec3{-product[2], square[0] + square[2], -product[0]},
                        Vec3{-product[1], -product[0], square[0] + square[1]}};
-    rigid[b] = {c, v, calc_inverse(inertia) * turn};
+    if (!hinge.is_there)
+      rigid[b] = {c, v, calc_inverse(inertia) * turn};
+    else if (norm(hinge.axis) > 0.0)
+      rigid[b] = {c, {}, (dot(turn, hinge.axis) / dot(hinge.axis, inertia * hinge.axis)) * hinge.axis};
+    else
+      rigid[b] = {c, {}, calc_inverse(inertia) * turn};
   }
   for (std::size_t i = 0; i < own; ++i) {
     const Rigid& body = rigid[static_cast<std::size_t>(domain_.find_body(static_cast<std::int32_t>(i)))];

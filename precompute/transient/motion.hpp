@@ -165,6 +165,8 @@ class Motion {
   void calc_forces(bool halo_is_there);
   void move_halo();
   void set_external_forces();
+  /// Of all hinged bodies, whose nodes are at `find_place(number)`.
+  void find_hinges(const std::function<Vec3(std::int32_t)>& find_place);
   void update_carried();
   double find_next_time_s() const;
   void begin();
@@ -192,6 +194,11 @@ class Motion {
   std::vector<char> is_constrained_;              // (own)
   std::vector<double> inverse_kg_, braked_kg_s_;  // (own)
   std::vector<char> is_carried_;                  // (bodies) mass damping leaves rigid motion alone
+  struct Hinge {
+    bool is_there = false;
+    Vec3 point_m{}, axis{};  // unit; 0 where all nodes are one point
+  };
+  std::vector<Hinge> hinges_;  // (bodies)
   bool is_braked_ = false, has_carried_ = false, has_external_ = false, begun_ = false;
   std::vector<Quad> u_, v_, f_, external_, work_, brake_loss_, carried_;
   std::vector<Quad> home_, reaction_;  // (own) of constrained nodes: displacement at the start, reaction force

@@ -265,6 +265,40 @@ TEST(Constraint, a_hinged_rod_swings_and_mass_damping_does_not_brake_it) {
   EXPECT_LT(book.dissipated_j, 0.02 * 9.81 * 0.05 * world.calc_mass());
 }
 
+// A rod on a hinge that vibrates and does not swing: without angular momentum about the hinge mass damping takes alpha2 v of all of it, so
+// that the loss is alpha2 times the integral of twice the kinetic energy.
+TEST(Constraint, mass_damping_takes_from_a_hinged_rod_what_is_not_swing) {
+  const double alpha2 = 20.0;
+  World world(make_body(1, {0.1, 0.01, 0.01}, {8, 2, 2}, make_law(5e7, 0.3, 1000), alpha2));
+  Constraint hinge;
+  hinge.is_hinge = true;
+  for (const std::int32_t node : world.list_set("x-min"))
+    if (std::abs(world.assembly->nodes_m[static_cast<std::size_t>(node)][2]) < 1e-9) hinge.nodes.push_back(node);
+  MotionOptions options;
+  Motion motion(world.domain, options, {hinge});
+  // v_z = s^3 - c s of the distance s to the hinge, with c from the masses.
+  double second = 0.0, fourth = 0.0;
+  for (std::int32_t i = 0; i < world.domain.own_count(); ++i) {
+    const double mass = world.domain.get_masses_kg()[static_cast<std::size_t>(i)];
+    const double s = world.domain.get_rest_m()[static_cast<std::size_t>(i)][0] + 0.05;
+    second += mass * s * s;
+    fourth += mass * s * s * s * s;
+  }
+  const double c = world.comm.sum(fourth) / world.comm.sum(second);
+  motion.set_start([&](std::int32_t, const Vec3& x) {
+    const double s = x[0] + 0.05;
+    return Motion::Start{{}, {0, 0, 10.0 * (s * s * s - c * s)}};
+  });
+  double twice_kinetic = motion.calc_book().kinetic_j, lost = 0.0;
+  for (int i = 0; i < 200; ++i) {
+    motion.advance_sample();
+    const EnergyBook book = motion.calc_book();
+    twice_kinetic += (i + 1 < 200 ? 2.0 : 1.0) * book.kinetic_j;
+    lost = book.dissipated_j;
+  }
+  EXPECT_NEAR(lost / (alpha2 * twice_kinetic / options.sample_rate_hz), 1.0, 0.02);
+}
+
 // ---- forces from outside ----
 
 /// A spring to the place at rest of some nodes, and what it knows of itself.
