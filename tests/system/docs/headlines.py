@@ -16,6 +16,7 @@ GROUPS = {
     "materials": "extreme materials",
     "spectra": "dense, clustered and wide spectra",
     "air": "radiation by boundary elements",
+    "motion": "large motion: full order, coupled modes",
     "time": "long times, contacts, joints, sound",
     "formats": "formats of other programs",
     "cross": "answers of other solvers and engines",

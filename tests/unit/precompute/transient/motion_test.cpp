@@ -10,6 +10,7 @@
 #include "tests/support/catch_message.hpp"
 #include "tests/support/ranks.hpp"
 #include "tests/unit/precompute/transient/bodies.hpp"
+#include "tests/unit/precompute/transient/spin.hpp"
 
 namespace carillon::transient {
 namespace {
@@ -31,30 +32,14 @@ std::vector<SolidBody> make_body(int order, const std::array<double, 3>& edges, 
 class Spin : public ::testing::TestWithParam<int> {};
 INSTANTIATE_TEST_SUITE_P(Orders, Spin, ::testing::Values(1, 2));
 
-// Fifteen turns of a free box of soft plastic, fast enough that it stretches.
 TEST_P(Spin, keeps_momentum_angular_momentum_and_energy) {
   if (tests::get_ranks() > 1) GTEST_SKIP() << "tens of thousands of steps";
-  const double omega = 2000.0;
-  World world(make_body(GetParam(), {0.06, 0.02, 0.02}, {3, 1, 1}, make_law(1e9, 0.3, 1100)));
-  MotionOptions options;
-  options.sample_rate_hz = 50000;
-  options.longest_step_s = 5e-7;
-  Motion motion(world.domain, options);
-  motion.set_start([&](std::int32_t, const Vec3& x) { return Motion::Start{{}, Vec3{-omega * x[1], omega * x[0], 1.5}}; });
-  const Motion::Momentum before = motion.calc_momentum();
-  const EnergyBook start = motion.calc_book();
-  EXPECT_LE(motion.get_step_s(), options.longest_step_s);
-  double elastic = 0.0;
-  while (motion.get_time_s() < 15 * 2 * pi / omega) {
-    for (int i = 0; i < 100; ++i) motion.advance_sample();
-    const EnergyBook book = motion.calc_book();
-    EXPECT_LT(std::abs(book.relative_error), 1e-6) << book.time_s;
-    elastic = std::max(elastic, book.elastic_j);
-  }
-  EXPECT_GT(elastic, 1e-3 * start.kinetic_j);
-  const Motion::Momentum after = motion.calc_momentum();
-  EXPECT_LT(norm(after.angular - before.angular), 1e-13 * norm(before.angular));
-  EXPECT_LT(norm(after.linear - before.linear), 1e-13 * norm(before.linear));
+  const testing::Turned turned = testing::turn_fifteen_times(GetParam());
+  EXPECT_LE(turned.step_s, 5e-7);
+  EXPECT_LT(turned.book_error, 1e-6);
+  EXPECT_GT(turned.stretch, 1e-3);
+  EXPECT_LT(turned.angular_error, 1e-13);
+  EXPECT_LT(turned.linear_error, 1e-13);
 }
 
 TEST(Motion, falls_freely) {
