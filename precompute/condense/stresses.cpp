@@ -95,8 +95,8 @@ void fix_signs(StressFields& fields) {
 }
 
 /// Flat bodies have no cubic part: what the mesh has of it is set to nothing.
-void set_curvature(StressFields& fields, const std::vector<double>& omega) {
-  fields.curvature = calc_curvature(fields.linear, omega);
+void set_curvature(StressFields& fields, const std::vector<double>& omega, double error) {
+  fields.curvature = calc_curvature(fields.linear, multiply(fields.form, fields.tests.products), omega, error);
   if (fields.curvature >= kCurved) return;
   fields.linear.setZero();
   fields.cubic.setZero();
@@ -242,8 +242,16 @@ double calc_error(const la::Vector& energy, const la::Vector& cubic, const la::V
   return norm > 0 ? std::max(worst, (cubic - full_cubic).norm() / norm) : worst;
 }
 
-double calc_curvature(const la::Matrix& linear, const std::vector<double>& omega) {
-  la::Matrix scaled = linear;
+double calc_curvature(const la::Matrix& linear, const la::Matrix& eta, const std::vector<double>& omega, double error) {
+  // The principal directions of eta, by the eigenvectors of its products: U = eta W / S.
+  la::Matrix vectors = multiply_transposed(eta, eta);
+  la::Vector squares;
+  if (la::calc_eigenpairs(vectors, squares) != 0) throw SolveError("internal: the fields of motions have no principal directions");
+  std::ptrdiff_t first = squares.size();
+  for (double left = squares.sum(), least = error * left; first > 0 && left > least; left -= squares[--first]) {
+  }
+  la::Matrix scaled = multiply_transposed(la::Matrix(vectors.rightCols(squares.size() - first)), multiply_transposed(eta, linear));
+  for (std::ptrdiff_t r = 0; r < scaled.rows(); ++r) scaled.row(r) /= std::sqrt(squares[first + r]);
   for (std::size_t i = 0; i < omega.size(); ++i) scaled.col(to_index(i)) /= omega[i];
   la::Matrix square = scaled.transpose() * scaled;
   la::Vector values;
@@ -333,7 +341,7 @@ StressFields calc_fields_of_pairs(const CoupledBody& body, double error, bool wa
   const Samples& tests = fields.tests = join(make_single_samples(body.omega), make_samples(body.omega, kHeldOut, kTest));
   fields.full = 0.5 * tests.products.cwiseProduct(gram.values * tests.products).colwise().sum().transpose();
   fields.cubic = tests.q.cwiseProduct(gram.work * tests.products).colwise().sum().transpose();
-  set_curvature(fields, body.omega);
+  set_curvature(fields, body.omega, error);
   fields.error = error;
   const std::ptrdiff_t kept = find_rank(fields, fields.error);
   if (wants_values) {
@@ -380,7 +388,7 @@ StressFields calc_fields_of_samples(const CoupledBody& body, double error) {
     const la::Matrix eta = la::multiply_transposed(body.comm, to_columns(basis), to_columns(held_out));
     fields.linear = la::multiply_transposed(body.comm, to_columns(basis), to_columns(mode_strains));
     double left = ((2 * energy - eta.colwise().squaredNorm().transpose()).array() / (2 * energy).array()).maxCoeff();
-    if (calc_curvature(fields.linear, body.omega) >= kCurved) {
+    if (calc_curvature(fields.linear, eta, body.omega, error) >= kCurved) {
       const la::Vector found = (fields.linear * others.q).cwiseProduct(eta).colwise().sum().transpose();
       left = std::max(left, (found - cubic).norm() / cubic.norm());
     }
@@ -394,7 +402,7 @@ StressFields calc_fields_of_samples(const CoupledBody& body, double error) {
   }
   fields.form = calc_form(body, basis);
   fields.linear = la::multiply_transposed(body.comm, to_columns(basis), to_columns(mode_strains));
-  set_curvature(fields, body.omega);
+  set_curvature(fields, body.omega, error);
   // The fields in the order of their energy
   const la::Vector scale = calc_pair_scale(body.omega);
   const la::Matrix scaled = fields.form * scale.asDiagonal();

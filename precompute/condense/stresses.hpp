@@ -37,7 +37,7 @@ Samples join(const Samples& a, const Samples& b);
 struct StressFields {
   la::Matrix form;       // (R, pairs) [J^1/2 / (m² kg)], fields in the order of what they hold of the energy, with the same in all modes
   la::Matrix linear;     // (R, N) <s_r, eps(phi_i)>; zero of flat bodies
-  double curvature = 0;  // calc_curvature() of all fields
+  double curvature = 0;  // calc_curvature() on the tests
   la::Matrix values;     // (rows of this rank, R); empty unless asked for
   std::int64_t solves = 0;
   double error = 0;  // of the energy, as find_rank() measures it
@@ -46,9 +46,10 @@ struct StressFields {
   la::Vector cubic;  // (tests) <eps(q), s(q)> [J]
 };
 
-/// The root of the largest part of the linear energy of a motion that lies in the fields: 0 of a flat body, 1 where all of it does.
-/// linear: (R, N).
-double calc_curvature(const la::Matrix& linear, const std::vector<double>& omega);
+/// The root of the largest part of the linear energy of a motion that lies in the fields: 0 of a flat body, 1 where all of it does. Of the
+/// fields only the directions count that hold all but `error` of the energy of some motions: in others the mesh, which is never quite
+/// symmetric, is as large as the body. linear: (R, N); eta: (R, motions).
+double calc_curvature(const la::Matrix& linear, const la::Matrix& eta, const std::vector<double>& omega, double error);
 /// From here on a body is curved. A flat one has up to half of it by its mesh; what it does to the pitch goes with its square.
 inline constexpr double kCurved = 0.02;
 

@@ -187,6 +187,16 @@ std::vector<double> make_motion(const ModalBody& body, std::size_t modes, double
   return q;
 }
 
+TEST(CondensedEnergy, is_curved_only_by_fields_that_hold_energy) {
+  la::Matrix linear(2, 1), small(2, 3), large(2, 3);
+  linear << 0, 3;
+  small << 1, 2, 3, 1e-3, -1e-3, 1e-3;
+  large << 1, 2, 3, 2, -2, 2;
+  EXPECT_NEAR(calc_curvature(linear, small, {3.0}, 5e-3), 0, 2e-3) << "all of the mode's strain is in a field next to nothing";
+  EXPECT_NEAR(calc_curvature(linear, small, {3.0}, 0), 1, 1e-6);
+  EXPECT_NEAR(calc_curvature(linear, large, {3.0}, 5e-3), 1, 1e-6);
+}
+
 TEST(CondensedEnergy, is_the_least_energy_of_a_flat_strip) {
   if (tests::get_rank() != 0) return;
   const Oracle oracle = make_oracle(0, 3);
