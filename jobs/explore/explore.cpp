@@ -244,7 +244,7 @@ class Work {
       if (done_.has_recording) body["effects"] = report_["per_body"][i]["effects"];
       about["bodies"].append(body);
     }
-    remove_effects_of_all(scene_, {"head", "nonlinear", "directivity", "ground_reflection"});  // not in the engine of pages
+    remove_effects_of_all(scene_, {"head", "nonlinear", "cascade", "directivity", "ground_reflection"});  // not in the engine of pages
     base::write_file(path(kSceneFile), to_text(scene_));
     base::write_file(path(kAboutFile), to_text(about));
     put_folder(page_, folder_.path());

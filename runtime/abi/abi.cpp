@@ -225,7 +225,8 @@ carillon_motion make_default() {
   return motion;
 }
 
-static_assert(CARILLON_EFFECT_COUNT + CARILLON_LATER_EFFECT_COUNT + 2 == synth::kEffectCount &&
+static_assert(CARILLON_EFFECT_COUNT + CARILLON_LATER_EFFECT_COUNT + 3 == synth::kEffectCount &&
+              CARILLON_CASCADE == 1 << static_cast<int>(synth::Effect::kCascade) &&
               CARILLON_NONLINEAR == 1 << static_cast<int>(synth::Effect::kNonlinear) &&
               CARILLON_HEAD == 1 << static_cast<int>(synth::Effect::kHead) &&
               CARILLON_TWO_EARS == 1 << static_cast<int>(synth::Effect::kTwoEars) &&
@@ -670,6 +671,8 @@ carillon_status carillon_get_effect_counters(const carillon_synth* synth, int32_
   given.head_bytes = ours.bytes[synth::Effect::kHead];
   given.nonlinear_units = ours.units[synth::Effect::kNonlinear];
   given.nonlinear_bytes = ours.bytes[synth::Effect::kNonlinear];
+  given.cascade_units = ours.units[synth::Effect::kCascade];
+  given.cascade_bytes = ours.bytes[synth::Effect::kCascade];
   write(given, counters);
   return CARILLON_OK;
 }

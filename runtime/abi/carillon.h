@@ -179,7 +179,8 @@ typedef enum carillon_effect {
   CARILLON_DIRECTIVITY = 512,        /* of a bank with multipoles; CARILLON_BAD_INPUT for a model without */
   CARILLON_GROUND_REFLECTION = 1024, /* CARILLON_BAD_INPUT where floor_reflection is 0 */
   CARILLON_HEAD = 2048,              /* with CARILLON_TWO_EARS; CARILLON_BAD_INPUT where head_radius_m is 0 */
-  CARILLON_NONLINEAR = 4096          /* of a bank with a nonlinear energy; CARILLON_BAD_INPUT for a model without */
+  CARILLON_NONLINEAR = 4096,         /* of a bank with a nonlinear energy; CARILLON_BAD_INPUT for a model without */
+  CARILLON_CASCADE = 8192            /* with CARILLON_NONLINEAR; nothing for a model without modes above the coupled ones */
 } carillon_effect;
 #define CARILLON_EFFECT_COUNT 9       /* the first ones, to CARILLON_TWO_EARS */
 #define CARILLON_LATER_EFFECT_COUNT 2 /* those behind them, to CARILLON_GROUND_REFLECTION */
@@ -382,6 +383,8 @@ typedef struct carillon_effect_counters {
   int64_t head_bytes;
   int64_t nonlinear_units; /* coupled modes times samples */
   int64_t nonlinear_bytes;
+  int64_t cascade_units; /* modes above the coupled ones times samples */
+  int64_t cascade_bytes;
 } carillon_effect_counters;
 
 #define carillon_effect_counters_init(counters) carillon_effect_counters_init_sized((counters), sizeof(carillon_effect_counters))

@@ -46,6 +46,7 @@ double calc_norm(const Vec3& x) { return std::hypot(x[0], x[1], x[2]); }
 std::optional<Effect> find_base(Effect effect) {
   if (kContactEffects.has(effect)) return Effect::kModal;
   if (effect == Effect::kDirectivity || effect == Effect::kNonlinear) return Effect::kModal;
+  if (effect == Effect::kCascade) return Effect::kNonlinear;
   if (effect == Effect::kHead) return Effect::kTwoEars;
   if (effect == Effect::kDoppler) return Effect::kAirDelay;
   return std::nullopt;
@@ -85,6 +86,7 @@ struct EffectSelector::State {
     std::vector<double> swing;              // per coupled mode: amplitude of q [m kg^1/2] that strikes have left, at swing_s
     double swing_s = 0.0;
     double coupling_ns = 0.0;      // of a sample
+    double cascade_ns = 0.0;       // likewise; 0: no modes above the coupled ones
     std::vector<double> anchor_m;  // ways to the microphones by which kDoppler is judged
     synth::PerEffect<double> until_s{};
     synth::PerEffect<double> share{};          // the loudest call so far
@@ -202,6 +204,9 @@ EffectSelector::EffectSelector(SceneFacts facts, const Costs& costs) : state_(st
       body.swing.assign(energy.mode_count(), 0.0);
       body.coupling_ns =
           costs.coupled_mode_ns * static_cast<double>(energy.mode_count()) + costs.coupling_ns * count_multiplications(energy);
+      const auto above = std::count_if(levels->get_modes().begin(), levels->get_modes().end(),
+                                       [&](const BankLevels::Mode& mode) { return mode.index > energy.modes.back(); });
+      if (energy.thickness_m > 0.0 && of.bank->rigid.mass_kg > 0.0) body.cascade_ns = costs.cascade_mode_ns * static_cast<double>(above);
     }
     body.nearest_m = s.find_ways(body, 0.0);
     body.anchor_m = s.way_m;
@@ -220,6 +225,8 @@ void EffectSelector::State::find_possible(std::size_t number) {
   if (of.fixed) refuse(body, Effect::kAccelerationNoise, {.rule = Rule::kFixed});
   if (of.bank->multipoles.is_empty()) refuse(body, Effect::kDirectivity, {.rule = Rule::kNoMultipoles});
   if (of.bank->quartic.is_empty()) refuse(body, Effect::kNonlinear, {.rule = Rule::kNoEnergy});
+  if (!(body.cascade_ns > 0.0))
+    refuse(body, Effect::kCascade, {.rule = of.bank->quartic.is_empty() ? Rule::kNoEnergy : Rule::kNothingAbove});
   if (!facts.floor) refuse(body, Effect::kGroundReflection, {.rule = Rule::kNoFloor});
   if (!facts.has_head) refuse(body, Effect::kHead, {.rule = Rule::kNoHead});
   if (facts.microphones_m.size() < 2) refuse(body, Effect::kTwoEars, {.rule = Rule::kOneMicrophone});
@@ -457,6 +464,9 @@ void EffectSelector::State::call_nonlinear(Body& body, const events::Impulse& im
   }
   call(body, Effect::kNonlinear, cents, std::min(soft_s, until_s), {.rule = Rule::kHardens, .value = cents, .limit = kHardeningCents},
        kHardeningCents);
+  if (!body.possible.has(Effect::kCascade)) return;
+  // What has come up stays until it has died away.
+  call(body, Effect::kCascade, cents, until_s, {.rule = Rule::kHardens, .value = cents, .limit = kCascadeCents}, kCascadeCents);
 }
 
 /// Whether the acceleration noise of a body that is not fixed is heard. Returns until when the body sounds by it.
@@ -710,6 +720,7 @@ void EffectSelector::State::add_costs(Body& body) {
   add(Effect::kDirectivity,
       ears * reflected * modes * (moves ? 2.0 * costs.mode_sample_ns + costs.transfer_ns / synth::kBlock : costs.mode_sample_ns));
   add(Effect::kNonlinear, body.coupling_ns);
+  add(Effect::kCascade, body.cascade_ns);
   add(Effect::kAccelerationNoise, ears * costs.dipole_ear_sample_ns + costs.click_sample_ns);
   // What modes cost that a contact drives is in the first of its effects, as it is where it is measured.
   double driven_ns = kDrivenModeSampleNs * static_cast<double>(body.bank->get_modes().size());

@@ -47,6 +47,9 @@ inline constexpr double kDirectionDb = 1.0;
 inline constexpr double kDirectionClearDb = 10.0;
 /// Nonlinear motion is called for when a strike makes a coupled mode stiffer by so much, the least that is heard of a lone tone.
 inline constexpr double kHardeningCents = 3.0;
+/// The cascade above the coupled modes is called for when a strike makes a coupled mode stiffer by so much: some 0.6 of the thickness of a
+/// plate. Chosen, not measured: the flux grows as the third power of the energy (docs/decisions/cascade.md).
+inline constexpr double kCascadeCents = 300.0;
 /// Slower than this nothing slides or rolls: synth::ContactForces gives no force then.
 inline constexpr double kCreepMs = 2e-4;
 /// A ring that a lasting contact drives is random: its amplitude is this much above its root mean square at times.
@@ -129,7 +132,8 @@ struct SelectionReason {
     kNoHead,        // of the listener's
     kByHead,        // the body is heard, and by a head
     kNoEnergy,      // the bank does not say what large motion makes of its modes
-    kHardens        // value: how much higher the strike makes a coupled mode [cent], limit
+    kHardens,       // value: how much higher the strike makes a coupled mode [cent], limit
+    kNothingAbove   // the bank has no modes above the coupled ones, or does not say its mass or thickness
   };
   Rule rule = Rule::kNotStruck;
   double value = 0.0, limit = 0.0, distance_m = 0.0;

@@ -85,6 +85,8 @@ std::string describe(const SelectionReason& r) {
       return "the listener has a head";
     case Rule::kNoEnergy:
       return "the bank has no nonlinear energy";
+    case Rule::kNothingAbove:
+      return "the bank has no modes above the coupled ones, or no thickness";
     case Rule::kHardens:
       return fmt::format("a strike raises a mode by {:.3g} cents, {} than {:g}", r.value, r.value > r.limit ? "more" : "less", r.limit);
   }

@@ -32,6 +32,11 @@ Session::Session(const Scene& scene, const std::vector<const bank::Bank*>& banks
       throw InputError(scene.bodies[i].place +
                        ": \"effects\" names \"directivity\", which needs a bank with multipoles, and this body's has none; make its bank "
                        "with them, or leave the effect out");
+    if (scene.bodies[i].overrides.on.has(synth::Effect::kCascade) && !model->has_cascade())
+      throw InputError(
+          scene.bodies[i].place +
+          ": \"effects\" names \"cascade\", which needs a bank with a nonlinear energy, a thickness and modes above the coupled "
+          "ones, and this body's has not; make its bank so, or leave the effect out");
     if (scene.bodies[i].overrides.on.has(synth::Effect::kNonlinear) && model->get_nonlinear() == nullptr)
       throw InputError(scene.bodies[i].place +
                        ": the effect \"nonlinear\" is asked for, which needs a bank with a nonlinear energy, and this body's has none; "
@@ -71,7 +76,7 @@ synth::EffectSet find_effects(const Scene& scene, std::size_t body, synth::Effec
   effects = effects.common(synth::kCompiledEffects);
   const bank::Bank* bank = scene.bodies[body].spec.bank;
   if (bank == nullptr || bank->multipoles.is_empty()) effects = effects.without(synth::Effect::kDirectivity);
-  if (bank == nullptr || bank->quartic.is_empty()) effects = effects.without(synth::Effect::kNonlinear);
+  if (bank == nullptr || bank->quartic.is_empty()) effects = effects.without({synth::Effect::kNonlinear, synth::Effect::kCascade});
   if (!find_floor(scene)) effects = effects.without(synth::Effect::kGroundReflection);
   if (!has_head(scene)) effects = effects.without(synth::Effect::kHead);
   if (scene.bodies[body].spec.fixed) effects = effects.without(synth::Effect::kAccelerationNoise);

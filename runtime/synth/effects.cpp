@@ -12,8 +12,9 @@ namespace carillon::synth {
 namespace {
 
 constexpr std::array<const char*, kEffectCount> kNames{
-    "modal",    "hertz_pulse", "roughness",         "rolling", "contact_damping", "acceleration_noise", "air_delay", "doppler",
-    "two_ears", "directivity", "ground_reflection", "head",    "nonlinear"};
+    "modal",     "hertz_pulse", "roughness", "rolling",     "contact_damping",   "acceleration_noise",
+    "air_delay", "doppler",     "two_ears",  "directivity", "ground_reflection", "head",
+    "nonlinear", "cascade"};
 
 }  // namespace
 

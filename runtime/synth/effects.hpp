@@ -11,7 +11,7 @@
 
 // The effects of this build, bit i for effect i; the CMake option CARILLON_EFFECTS gives it.
 #ifndef CARILLON_EFFECTS_MASK
-#define CARILLON_EFFECTS_MASK 0x1fff
+#define CARILLON_EFFECTS_MASK 0x3fff
 #endif
 
 namespace carillon::synth {
@@ -29,12 +29,13 @@ enum class Effect : std::uint8_t {
   kDirectivity,
   kGroundReflection,
   kHead,
-  kNonlinear
+  kNonlinear,
+  kCascade
 };
-inline constexpr int kEffectCount = 13;
+inline constexpr int kEffectCount = 14;
 
 /// As scene files call it: "modal", "hertz_pulse", "roughness", "rolling", "contact_damping", "acceleration_noise", "air_delay", "doppler",
-/// "two_ears", "directivity", "ground_reflection", "head", "nonlinear".
+/// "two_ears", "directivity", "ground_reflection", "head", "nonlinear", "cascade".
 const char* get_name(Effect effect) noexcept;
 std::optional<Effect> find_effect(std::string_view name) noexcept;
 

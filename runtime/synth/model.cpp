@@ -178,6 +178,10 @@ void Model::add_ringing_mode(const Mode& mode) {
   }
 }
 
+bool Model::has_cascade() const {
+  return nonlinear_ != nullptr && nonlinear_->energy.thickness_m > 0.0 && mass_kg_ > 0.0 && !nonlinear_->above.empty();
+}
+
 /// Modes that do not ring, or not below the Nyquist frequency, take no part.
 void Model::add_nonlinear(const bank::QuarticEnergy& energy) {
   if (energy.is_empty()) return;
@@ -197,17 +201,16 @@ void Model::add_nonlinear(const bank::QuarticEnergy& energy) {
     made->constants.push_back({mode.lambda, mode.decay});
     made->groups = std::max(made->groups, m / kGroup + 1);
     made->strike[static_cast<std::size_t>(m / kGroup)].scale[m % kGroup] = 0.0F;
-    const double omega = std::sqrt(mode.lambda), omega_d = std::sqrt((omega - mode.decay) * (omega + mode.decay));
-    const auto points = get_chebyshev_points();
-    Moments re{}, im{};
-    for (int k = 0; k < kMoments; ++k) {
-      const double age = (1.0 - points[k]) / rate_hz_;
-      re[k] = std::exp(-mode.decay * age) * std::cos(omega_d * age);
-      im[k] = std::exp(-mode.decay * age) * std::sin(omega_d * age);
-    }
-    made->force_re.push_back(calc_chebyshev_coefficients(re));
-    made->force_im.push_back(calc_chebyshev_coefficients(im));
+    const ForceAnswer answer = calc_force_answer({mode.lambda, mode.decay}, rate_hz_);
+    made->force_re.push_back(answer.re);
+    made->force_im.push_back(answer.im);
   }
+  double highest = 0.0;
+  for (const nonlinear::ModeConstants& mode : made->constants) highest = std::max(highest, mode.eigenvalue_rad2_s2);
+  for (int m = 0; m < ringing_; ++m)
+    if (modes_[static_cast<std::size_t>(m)].lambda > highest) made->above.push_back(m);
+  std::sort(made->above.begin(), made->above.end(),
+            [this](int a, int b) { return modes_[static_cast<std::size_t>(a)].lambda < modes_[static_cast<std::size_t>(b)].lambda; });
   nonlinear_ = made;
 }
 

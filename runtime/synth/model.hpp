@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "runtime/bank/bank.hpp"
+#include "runtime/nonlinear/coupled_modes.hpp"
 #include "runtime/synth/kernels.hpp"
 #include "runtime/synth/pulse.hpp"
 
@@ -72,6 +73,10 @@ class Model {
   int get_mode_count() const { return static_cast<int>(modes_.size()); }
   double get_eigenvalue_rad2_s2(int mode) const { return modes_[static_cast<std::size_t>(mode)].lambda; }
   double get_decay_per_s(int mode) const { return modes_[static_cast<std::size_t>(mode)].decay; }
+  /// Of a ringing mode.
+  nonlinear::ModeConstants calc_constants(int mode) const {
+    return {modes_[static_cast<std::size_t>(mode)].lambda, modes_[static_cast<std::size_t>(mode)].decay};
+  }
   double get_gain(int mode) const { return modes_[static_cast<std::size_t>(mode)].gain; }
   /// kg^-1/2 per step of the rows of find_rows().
   double get_scale(int mode) const { return modes_[static_cast<std::size_t>(mode)].scale; }
@@ -90,6 +95,8 @@ class Model {
   const ModelDirectivity* get_directivity() const { return directivity_.get(); }
   /// nullptr where the bank has no nonlinear energy of modes that ring, or this build not the effect.
   const ModelNonlinear* get_nonlinear() const { return nonlinear_.get(); }
+  /// Whether Effect::kCascade has what it needs: a nonlinear energy with a thickness, a mass, and ringing modes above the coupled ones.
+  bool has_cascade() const;
   /// Centre of mass in the frame of the mesh.
   const Vec3& get_centre_m() const { return centre_m_; }
   /// Memory of the tables, which all voices share, with the transfers, which models of one bank may.

@@ -34,30 +34,56 @@ double calc_damping(const ContactBlock& drive, std::size_t end, int mode, double
   return p / (1.0 + p);
 }
 
-std::vector<int> find_places(const Model& model) {
-  std::vector<int> places(static_cast<std::size_t>(model.get_mode_count()), -1);
-  const std::vector<int>& coupled = model.get_nonlinear()->mode;
-  for (std::size_t i = 0; i < coupled.size(); ++i) places[static_cast<std::size_t>(coupled[i])] = static_cast<int>(i);
-  return places;
-}
-
 }  // namespace
 
-NonlinearModes::NonlinearModes(const Model& model)
+ForceAnswer calc_force_answer(const nonlinear::ModeConstants& mode, double rate_hz) {
+  const double omega = std::sqrt(mode.eigenvalue_rad2_s2), d = mode.decay_per_s, omega_d = std::sqrt((omega - d) * (omega + d));
+  const auto points = get_chebyshev_points();
+  Moments re{}, im{};
+  for (int k = 0; k < kMoments; ++k) {
+    const double age = (1.0 - points[k]) / rate_hz;
+    re[k] = std::exp(-d * age) * std::cos(omega_d * age);
+    im[k] = std::exp(-d * age) * std::sin(omega_d * age);
+  }
+  return {calc_chebyshev_coefficients(re), calc_chebyshev_coefficients(im)};
+}
+
+NonlinearModes::NonlinearModes(const Model& model, bool has_cascade)
     : model_(&model),
       nonlinear_(model.get_nonlinear()),
       modes_(nonlinear_->energy, nonlinear_->constants, model.get_rate_hz()),
-      place_(find_places(model)) {
-  for (auto* values : {&push_re_, &push_im_, &keep_}) values->assign(kIntervals * nonlinear_->mode.size(), 0.0);
+      mode_(nonlinear_->mode),
+      constants_(nonlinear_->constants),
+      place_(static_cast<std::size_t>(model.get_mode_count()), -1) {
+  if (has_cascade) {
+    strike_ = nonlinear_->strike;
+    for (const int m : nonlinear_->above) {
+      mode_.push_back(m);
+      constants_.push_back(model.calc_constants(m));
+      strike_[static_cast<std::size_t>(m / kGroup)].scale[m % kGroup] = 0.0F;
+    }
+    const std::span<const nonlinear::ModeConstants> all = constants_;
+    cascade_ = std::make_unique<nonlinear::Cascade>(
+        all.first(nonlinear_->mode.size()), all.subspan(nonlinear_->mode.size()),
+        nonlinear::CascadeBody{.mass_kg = model.get_mass_kg(), .thickness_m = nonlinear_->energy.thickness_m}, model.get_rate_hz());
+  }
+  for (std::size_t i = 0; i < mode_.size(); ++i) {
+    place_[static_cast<std::size_t>(mode_[i])] = static_cast<int>(i);
+    groups_ = std::max(groups_, mode_[i] / kGroup + 1);
+    gain_.push_back(model.get_gain(mode_[i]));
+    answer_.push_back(i < nonlinear_->mode.size() ? ForceAnswer{nonlinear_->force_re[i], nonlinear_->force_im[i]}
+                                                  : calc_force_answer(constants_[i], model.get_rate_hz()));
+  }
+  for (auto* values : {&push_re_, &push_im_, &keep_}) values->assign(kIntervals * mode_.size(), 0.0);
 }
 
-int NonlinearModes::get_group_count() const noexcept { return nonlinear_->groups; }
+int NonlinearModes::get_group_count() const noexcept { return groups_; }
 
 void NonlinearModes::add_push(int interval, std::size_t i, double amplitude, const Moments& moments) noexcept {
-  const std::size_t at = static_cast<std::size_t>(interval) * nonlinear_->mode.size() + i;
+  const std::size_t at = static_cast<std::size_t>(interval) * mode_.size() + i;
   for (int j = 0; j < kMoments; ++j) {
-    push_re_[at] += amplitude * moments[j] * nonlinear_->force_re[i][j];
-    push_im_[at] += amplitude * moments[j] * nonlinear_->force_im[i][j];
+    push_re_[at] += amplitude * moments[j] * answer_[i].re[j];
+    push_im_[at] += amplitude * moments[j] * answer_[i].im[j];
   }
 }
 
@@ -68,8 +94,8 @@ void NonlinearModes::add_pulses(std::int64_t sample, std::span<const QueuedPulse
       if (begin - n > 1.0 || begin - n + pulse.length <= 0.0) continue;
       pushes_ = true;
       const Moments moments = calc_pulse_moments(pulse.shape, begin - n, pulse.length);
-      for (std::size_t i = 0; i < nonlinear_->mode.size(); ++i) {
-        const int mode = nonlinear_->mode[i];
+      for (std::size_t i = 0; i < mode_.size(); ++i) {
+        const int mode = mode_[i];
         add_push(n, i, calc_amplitude(pulse.row, pulse.weight, mode, model_->get_scale(mode)), moments);
       }
     }
@@ -87,8 +113,8 @@ void NonlinearModes::add_forces(std::int64_t sample, std::span<const QueuedForce
       if (begin - n > 1.0 || end - n <= 0.0) continue;
       pushes_ = true;
       const ForceMoments moments = calc_force_moments(force, begin - n, force.step);
-      for (std::size_t i = 0; i < nonlinear_->mode.size(); ++i) {
-        const int mode = nonlinear_->mode[i];
+      for (std::size_t i = 0; i < mode_.size(); ++i) {
+        const int mode = mode_[i];
         for (int axis = 0; axis < force.axes; ++axis)
           add_push(n, i, calc_amplitude(row, weight[axis], mode, model_->get_scale(mode)), moments[static_cast<std::size_t>(axis)]);
       }
@@ -97,9 +123,9 @@ void NonlinearModes::add_forces(std::int64_t sample, std::span<const QueuedForce
 }
 
 void NonlinearModes::add_contacts(const ContactBlock& drive) noexcept {
-  const std::size_t count = nonlinear_->mode.size();
+  const std::size_t count = mode_.size();
   for (std::size_t i = 0; i < count; ++i) {
-    const int mode = nonlinear_->mode[i];
+    const int mode = mode_[i];
     const double scale = model_->get_scale(mode);
     if (drive.forces) {
       double force[kIntervals] = {};
@@ -111,10 +137,10 @@ void NonlinearModes::add_contacts(const ContactBlock& drive) noexcept {
         }
       double first[2] = {}, second[2] = {};  // answers to 1 - u and u
       for (int j = 0; j < kTerms; ++j) {
-        first[0] += static_cast<double>(drive.ramp[0][j]) * nonlinear_->force_re[i][j];
-        first[1] += static_cast<double>(drive.ramp[0][j]) * nonlinear_->force_im[i][j];
-        second[0] += static_cast<double>(drive.ramp[1][j]) * nonlinear_->force_re[i][j];
-        second[1] += static_cast<double>(drive.ramp[1][j]) * nonlinear_->force_im[i][j];
+        first[0] += static_cast<double>(drive.ramp[0][j]) * answer_[i].re[j];
+        first[1] += static_cast<double>(drive.ramp[0][j]) * answer_[i].im[j];
+        second[0] += static_cast<double>(drive.ramp[1][j]) * answer_[i].re[j];
+        second[1] += static_cast<double>(drive.ramp[1][j]) * answer_[i].im[j];
       }
       for (int n = 1; n < kIntervals; ++n) {
         push_re_[static_cast<std::size_t>(n) * count + i] += first[0] * force[n - 1] + second[0] * force[n];
@@ -122,7 +148,7 @@ void NonlinearModes::add_contacts(const ContactBlock& drive) noexcept {
       }
     }
     if (!drive.damps) continue;
-    const double angle = std::sqrt(nonlinear_->constants[i].eigenvalue_rad2_s2) / model_->get_rate_hz();
+    const double angle = std::sqrt(constants_[i].eigenvalue_rad2_s2) / model_->get_rate_hz();
     const double begin = calc_damping(drive, 0, mode, scale, angle), end = calc_damping(drive, 1, mode, scale, angle);
     for (int n = 1; n < kIntervals; ++n) {
       const double share = (n - 0.5) / kSubBlock, lost = (1.0 - share) * begin + share * end;
@@ -133,7 +159,7 @@ void NonlinearModes::add_contacts(const ContactBlock& drive) noexcept {
 
 void NonlinearModes::add(std::int64_t sample, const StrikeQueue& strikes, bool struck, const ContactBlock* drive, float* out,
                          SampleStates* kept, int groups) noexcept {
-  const std::size_t count = nonlinear_->mode.size();
+  const std::size_t count = mode_.size(), coupled = nonlinear_->mode.size();
   const auto row = [count](std::vector<double>& values, int n) {
     return std::span(values).subspan(static_cast<std::size_t>(n) * count, count);
   };
@@ -148,21 +174,28 @@ void NonlinearModes::add(std::int64_t sample, const StrikeQueue& strikes, bool s
     pushes_ = pushes_ || drive->forces;
   }
   for (int n = 0; n < kSubBlock; ++n) {
-    if (n == 0 ? damps_first : damps)
-      modes_.step(row(push_re_, n), row(push_im_, n), row(keep_, n));
+    const bool keeps = n == 0 ? damps_first : damps;
+    const std::span<const double> re = row(push_re_, n), im = row(push_im_, n), keep = row(keep_, n);
+    if (keeps)
+      modes_.step(re.first(coupled), im.first(coupled), keep.first(coupled));
     else if (pushes_)
-      modes_.step(row(push_re_, n), row(push_im_, n));
+      modes_.step(re.first(coupled), im.first(coupled));
     else
       modes_.step();
-    double pressure = 0.0;
-    for (std::size_t i = 0; i < count; ++i) pressure += model_->get_gain(nonlinear_->mode[i]) * modes_.get_velocity(static_cast<int>(i));
+    if (cascade_) {
+      constexpr std::span<const double> kNone;
+      const bool pushed = keeps || pushes_;
+      cascade_->step(modes_, pushed ? re.subspan(coupled) : kNone, pushed ? im.subspan(coupled) : kNone,
+                     keeps ? keep.subspan(coupled) : kNone);
+    }
+    const double pressure = calc_pressure();
     out[n] += static_cast<float>(pressure);
     if (kept == nullptr) continue;
     for (std::size_t i = 0; i < count; ++i) {
-      const int group = nonlinear_->mode[i] / kGroup, lane = nonlinear_->mode[i] % kGroup;
+      const int group = mode_[i] / kGroup, lane = mode_[i] % kGroup;
       if (group >= groups) continue;
-      kept[group].re[n][lane] += static_cast<float>(modes_.get_re(static_cast<int>(i)));
-      kept[group].im[n][lane] += static_cast<float>(modes_.get_im(static_cast<int>(i)));
+      kept[group].re[n][lane] += static_cast<float>(get_re(static_cast<int>(i)));
+      kept[group].im[n][lane] += static_cast<float>(get_im(static_cast<int>(i)));
     }
   }
   // The last row is the first one of the next sub-block.
@@ -177,38 +210,62 @@ void NonlinearModes::add(std::int64_t sample, const StrikeQueue& strikes, bool s
 
 /// Turned by one sample, as the lanes of the groups are.
 DampedState NonlinearModes::get_state(int i) const noexcept {
-  const nonlinear::ModeConstants& mode = nonlinear_->constants[static_cast<std::size_t>(i)];
+  const nonlinear::ModeConstants& mode = constants_[static_cast<std::size_t>(i)];
   const double omega = std::sqrt(mode.eigenvalue_rad2_s2), d = mode.decay_per_s, k = 1.0 / model_->get_rate_hz();
   const double damped = std::sqrt((omega - d) * (omega + d)), size = std::exp(-d * k), c = std::cos(damped * k), s = std::sin(damped * k);
-  const double re = modes_.get_re(i), im = modes_.get_im(i), q = size * (im * c + re * s) / damped;
+  const double re = get_re(i), im = get_im(i), q = size * (im * c + re * s) / damped;
   return {q, size * (re * c - im * s) - d * q};
 }
 
 void NonlinearModes::set_state(int i, const DampedState& state) noexcept {
-  const nonlinear::ModeConstants& mode = nonlinear_->constants[static_cast<std::size_t>(i)];
+  const nonlinear::ModeConstants& mode = constants_[static_cast<std::size_t>(i)];
   const double omega = std::sqrt(mode.eigenvalue_rad2_s2), d = mode.decay_per_s, k = 1.0 / model_->get_rate_hz();
   const double damped = std::sqrt((omega - d) * (omega + d)), size = std::exp(d * k), c = std::cos(damped * k), s = std::sin(damped * k);
   const double re = state.v + d * state.q, im = damped * state.q, q = size * (im * c - re * s) / damped;
-  modes_.set_state(i, q, size * (re * c + im * s) - d * q);
+  const double velocity = size * (re * c + im * s) - d * q;
+  if (i < get_coupled_count())
+    modes_.set_state(i, q, velocity);
+  else
+    cascade_->set_state(i - get_coupled_count(), q, velocity);
 }
 
 void NonlinearModes::drop_below(double pressure_pa) noexcept {
   double bound = 0.0;
-  for (int i = 0; i < get_count(); ++i)
-    bound += std::abs(model_->get_gain(nonlinear_->mode[static_cast<std::size_t>(i)])) * std::hypot(modes_.get_re(i), modes_.get_im(i));
+  for (int i = 0; i < get_count(); ++i) bound += std::abs(gain_[static_cast<std::size_t>(i)]) * std::hypot(get_re(i), get_im(i));
   if (bound < pressure_pa && !has_carry_) reset();
 }
 
 void NonlinearModes::reset() noexcept {
   modes_.reset();
+  if (cascade_) cascade_->reset();
   has_carry_ = carry_damps_ = false;
   std::fill(push_re_.begin(), push_re_.end(), 0.0);
   std::fill(push_im_.begin(), push_im_.end(), 0.0);
 }
 
 std::size_t NonlinearModes::calc_bytes() const noexcept {
-  return sizeof(NonlinearModes) + modes_.calc_bytes() + place_.capacity() * sizeof(int) +
-         (push_re_.capacity() + push_im_.capacity() + keep_.capacity()) * sizeof(double);
+  return sizeof(NonlinearModes) + modes_.calc_bytes() + (place_.capacity() + mode_.capacity()) * sizeof(int) +
+         constants_.capacity() * sizeof(nonlinear::ModeConstants) + answer_.capacity() * sizeof(ForceAnswer) +
+         (push_re_.capacity() + push_im_.capacity() + keep_.capacity() + gain_.capacity()) * sizeof(double) +
+         strike_.capacity() * sizeof(StrikeTable) + (cascade_ ? cascade_->calc_bytes() : 0);
+}
+
+std::size_t NonlinearModes::calc_cascade_bytes() const noexcept {
+  if (!cascade_) return 0;
+  const auto count = static_cast<std::size_t>(cascade_->get_count());
+  return cascade_->calc_bytes() + strike_.capacity() * sizeof(StrikeTable) +
+         count * (sizeof(int) + sizeof(nonlinear::ModeConstants) + sizeof(ForceAnswer) + (3 * kIntervals + 1) * sizeof(double));
+}
+
+/// At the sample.
+double NonlinearModes::calc_pressure() const noexcept {
+  double pressure = 0.0;
+  for (int i = 0; i < get_coupled_count(); ++i) pressure += gain_[static_cast<std::size_t>(i)] * modes_.get_velocity(i);
+  if (!cascade_) return pressure;
+  const std::span<const double> velocity = cascade_->get_velocities();
+  const double* gain = gain_.data() + get_coupled_count();
+  for (std::size_t m = 0; m < velocity.size(); ++m) pressure += gain[m] * velocity[m];
+  return pressure;
 }
 
 }  // namespace carillon::synth

@@ -3,9 +3,11 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
+#include "runtime/nonlinear/cascade.hpp"
 #include "runtime/nonlinear/coupled_modes.hpp"
 #include "runtime/synth/damped_modes.hpp"
 #include "runtime/synth/kernels.hpp"
@@ -23,17 +25,31 @@ struct ModelNonlinear {
   std::vector<Moments> force_re, force_im;  // (N) of Chebyshev's moments of a force over a sample: what it makes of the state
   std::vector<StrikeTable> strike;          // of the model, which no longer strike these
   int groups = 0;                           // up to the last group with such a mode
+  std::vector<int> above;                   // of the model: those that ring at higher frequencies than these, ascending
 };
+
+/// Chebyshev's moments of a force over a sample: what it makes of the state of a mode.
+struct ForceAnswer {
+  Moments re{}, im{};
+};
+ForceAnswer calc_force_answer(const nonlinear::ModeConstants& mode, double rate_hz);
 
 /// The states are those at the last sample that was rendered. While is_live() is false nothing moves. Memory is taken in the constructor
 /// only.
 class NonlinearModes {
  public:
   /// The model must outlive the result and have a nonlinear energy.
-  explicit NonlinearModes(const Model& model);
+  /// With a cascade the model must have what it needs, Model::has_cascade(); the modes above are then behind the coupled ones.
+  explicit NonlinearModes(const Model& model, bool has_cascade = false);
 
-  bool is_live() const noexcept { return modes_.is_moving() || has_carry_; }
-  int get_count() const noexcept { return modes_.get_count(); }
+  bool is_live() const noexcept { return modes_.is_moving() || has_carry_ || (cascade_ && cascade_->is_moving()); }
+  int get_count() const noexcept { return static_cast<int>(mode_.size()); }
+  int get_coupled_count() const noexcept { return modes_.get_count(); }
+  int get_cascade_count() const noexcept { return cascade_ ? cascade_->get_count() : 0; }
+  /// Numbers in the model.
+  std::span<const int> get_modes() const noexcept { return mode_; }
+  /// Of the model, without the modes that are here.
+  const StrikeTable* get_strike_tables() const noexcept { return cascade_ ? strike_.data() : nonlinear_->strike.data(); }
   int get_group_count() const noexcept;
   /// Place of a mode of the model among them; -1: not there.
   int find_place(int mode) const noexcept { return place_[static_cast<std::size_t>(mode)]; }
@@ -48,15 +64,20 @@ class NonlinearModes {
   void set_state(int i, const DampedState& state) noexcept;
   /// Only so many are coupled from now on.
   void set_limit(int modes) noexcept { modes_.set_limit(modes); }
-  int get_limit() const noexcept { return modes_.get_limit(); }
+  int get_limit() const noexcept { return modes_.get_limit(); }  // of the coupled ones
   /// Silences them all when together they cannot sound more than this.
   void drop_below(double pressure_pa) noexcept;
   void reset() noexcept;
-  double calc_energy_j() const noexcept { return modes_.get_energy_j(); }
+  double calc_energy_j() const noexcept { return modes_.get_energy_j() + (cascade_ ? cascade_->calc_energy_j() : 0.0); }
   const nonlinear::CoupledCounters& get_counters() const noexcept { return modes_.get_counters(); }
   std::size_t calc_bytes() const noexcept;
+  /// Of them, what the cascade adds.
+  std::size_t calc_cascade_bytes() const noexcept;
 
  private:
+  double get_re(int i) const noexcept { return i < get_coupled_count() ? modes_.get_re(i) : cascade_->get_re(i - get_coupled_count()); }
+  double get_im(int i) const noexcept { return i < get_coupled_count() ? modes_.get_im(i) : cascade_->get_im(i - get_coupled_count()); }
+  double calc_pressure() const noexcept;
   void add_pulses(std::int64_t sample, std::span<const QueuedPulse> pulses) noexcept;
   void add_forces(std::int64_t sample, std::span<const QueuedForce> forces) noexcept;
   void add_contacts(const ContactBlock& drive) noexcept;
@@ -65,7 +86,14 @@ class NonlinearModes {
   const Model* model_;
   const ModelNonlinear* nonlinear_;  // of the model
   nonlinear::CoupledModes modes_;
+  std::vector<int> mode_;  // of the model: the coupled ones, then those above them
+  std::vector<nonlinear::ModeConstants> constants_;
+  std::vector<ForceAnswer> answer_;
+  std::vector<double> gain_;  // [Pa at 1 m] of a velocity
+  std::unique_ptr<nonlinear::Cascade> cascade_;
+  std::vector<StrikeTable> strike_;  // with a cascade
   std::vector<int> place_;
+  int groups_ = 0;
   std::vector<double> push_re_, push_im_, keep_;  // (kSubBlock + 1, N): at the samples of this sub-block, and the first one after it
   bool pushes_ = false;                           // something does in this sub-block
   bool has_carry_ = false, carry_damps_ = false;  // what of the last row is for the next one

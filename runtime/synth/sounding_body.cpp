@@ -50,7 +50,9 @@ EffectBytes BodyChange::calc_bytes() const {
   if (voice) {
     const auto nonlinear = static_cast<std::int64_t>(voice->calc_nonlinear_bytes());
     bytes[Effect::kModal] += static_cast<std::int64_t>(voice->calc_bytes()) - nonlinear;
-    bytes[Effect::kNonlinear] += nonlinear;
+    const auto cascade = static_cast<std::int64_t>(voice->calc_cascade_bytes());
+    bytes[Effect::kNonlinear] += nonlinear - cascade;
+    bytes[Effect::kCascade] += cascade;
   }
   if (acceleration_noise) {
     bytes[Effect::kAccelerationNoise] +=
@@ -120,13 +122,17 @@ std::unique_ptr<BodyChange> SoundingBody::make_change(EffectSet from, EffectSet 
   change->inherits = model != model_;
   const auto lacks = [&](Effect effect) { return to.has(effect) && (change->inherits || !from.has(effect)); };
   // Modes that large motion couples are in a voice of another make.
-  const bool couples = has(to, Effect::kNonlinear) != has(from, Effect::kNonlinear);
+  const auto cascades = [](EffectSet effects, const Model& of) {
+    return has(effects, Effect::kNonlinear) && has(effects, Effect::kCascade) && of.has_cascade();
+  };
+  const bool couples = has(to, Effect::kNonlinear) != has(from, Effect::kNonlinear) || cascades(to, *model) != cascades(from, *model_);
   if (lacks(Effect::kModal) || (couples && to.has(Effect::kModal))) {
     change->voice = std::make_unique<Voice>(model, VoiceOptions{.max_strikes = frame_.max_strikes,
                                                                 .max_forces = frame_.max_forces,
                                                                 .silence_pa = frame_.silence_pa,
                                                                 .isa = frame_.isa,
                                                                 .is_nonlinear = has(to, Effect::kNonlinear),
+                                                                .has_cascade = cascades(to, *model),
                                                                 .audits_energy = frame_.audits_energy});
     if ((change->inherits || couples) && from.has(Effect::kModal)) change->handover = std::make_unique<VoiceHandover>(*model_, *model);
   }
@@ -383,6 +389,7 @@ Effect SoundingBody::make_modal_sound(std::span<float> mono) noexcept {
     work_.radiated_j += after.radiated_j - before.radiated_j;
     work_.units[Effect::kModal] += after.mode_samples - before.mode_samples;
     work_.units[Effect::kNonlinear] += after.coupled_samples - before.coupled_samples;
+    work_.units[Effect::kCascade] += after.cascade_samples - before.cascade_samples;
     if (touched) {
       const std::int64_t textured = contacts_->get_counters().samples - contact_samples;
       if (has(effects_, Effect::kRoughness)) work_.units[Effect::kRoughness] += textured;

@@ -51,7 +51,9 @@ Voice::Voice(std::shared_ptr<const Model> model, VoiceOptions options)
   if (options.is_nonlinear) {
     if (!kCompiledEffects.has(Effect::kNonlinear) || model_->get_nonlinear() == nullptr)
       throw InputError("nonlinear motion needs a bank with a nonlinear energy, which this body's has not");
-    nonlinear_ = std::make_unique<NonlinearModes>(*model_);
+    if (options.has_cascade && (!kCompiledEffects.has(Effect::kCascade) || !model_->has_cascade()))
+      throw InputError("a cascade needs a bank with a nonlinear energy, a mass, a thickness, and modes above the coupled ones");
+    nonlinear_ = std::make_unique<NonlinearModes>(*model_, options.has_cascade);
   }
   if (!audits_) return;
   radiation_.resize(static_cast<std::size_t>(model_->ringing_));
@@ -178,6 +180,7 @@ void Voice::add_nonlinear(std::int64_t sample, bool struck, const ContactBlock* 
   if (is_directed()) wake(nonlinear_->get_group_count());
   nonlinear_->add(sample, strikes_, struck, drive, out, find_kept(), live_);
   counters_.coupled_samples += static_cast<std::int64_t>(nonlinear_->get_limit()) * kSubBlock;
+  counters_.cascade_samples += static_cast<std::int64_t>(nonlinear_->get_cascade_count()) * kSubBlock;
 }
 
 /// What contacts and strikes add in one sub-block, with the damped modes and what fades out.
@@ -351,7 +354,7 @@ void Voice::set_limit(int modes) noexcept {
   if (!is_nonlinear()) return;
   // Coupling costs the most: what a limit leaves of the modes it leaves of the coupled ones, the lowest.
   const double share = std::clamp(modes / static_cast<double>(std::max(1, model_->ringing_)), 0.0, 1.0);
-  nonlinear_->set_limit(static_cast<int>(share * nonlinear_->get_count()));
+  nonlinear_->set_limit(static_cast<int>(share * nonlinear_->get_coupled_count()));
 }
 
 /// At the start of a block: holds the energy against that of the block before, when nothing acted in it.
@@ -416,7 +419,7 @@ void Voice::measure_amplitudes(std::span<float> by_bank_mode) const noexcept {
     put(m, std::hypot(state.re[m % kGroup], state.im[m % kGroup]) / std::sqrt((omega - mode.decay) * (omega + mode.decay)));
   }
   if (is_nonlinear() && nonlinear_->is_live())
-    for (const int m : model_->get_nonlinear()->mode) {
+    for (const int m : nonlinear_->get_modes()) {
       const DampedState state = get_mode_state(m);
       const auto& mode = model_->modes_[static_cast<std::size_t>(m)];
       const double omega = std::sqrt(mode.lambda), omega_d = std::sqrt((omega - mode.decay) * (omega + mode.decay));

@@ -30,6 +30,7 @@ struct VoiceOptions {
   double silence_pa = 1e-10;  // below this bound on its pressure at 1 m (-106 dB re 20 uPa) a body sleeps
   Isa isa = Isa::kBest;
   bool is_nonlinear = false;   // coupled modes of the model move as Effect::kNonlinear has it
+  bool has_cascade = false;    // and those above them as Effect::kCascade has it; only with is_nonlinear
   bool audits_energy = false;  // VoiceCounters::energy_rise and radiated_j
 };
 
@@ -37,6 +38,7 @@ struct VoiceCounters : StrikeCounters {
   std::int64_t resets = 0;           // times that the state was not finite and was cleared
   std::int64_t mode_samples = 0;     // work done: modes x samples, whole groups
   std::int64_t coupled_samples = 0;  // coupled modes x samples while they moved
+  std::int64_t cascade_samples = 0;  // modes above them x samples, likewise
   double energy_rise = 0.0;          // the largest share by which the energy rose over a block in which nothing acted; 0 unless asked for
   double radiated_j = 0.0;           // share of what damping took from what rang at the start of each block; 0 unless asked for
 };
@@ -66,7 +68,8 @@ class VoiceHandover {
 /// Memory is taken in the constructor only. One thread at a time.
 class Voice {
  public:
-  /// Throws InputError when the silence is not a positive number, and for nonlinear motion of a model without a nonlinear energy.
+  /// Throws InputError when the silence is not a positive number, and for nonlinear motion or a cascade that the model has
+  /// not got.
   explicit Voice(std::shared_ptr<const Model> model, VoiceOptions options = {});
 
   /// Registers a pulse. Times are since the first sample of this voice; `body` and `other` of the impulse are not looked at. False when it
@@ -140,7 +143,8 @@ class Voice {
   }
   /// Advances an idle voice by a multiple of kSubBlock samples without output. [audio-thread]
   void skip(std::int64_t samples) noexcept { horizon_ += samples; }
-  std::size_t calc_nonlinear_bytes() const noexcept { return nonlinear_ ? nonlinear_->calc_bytes() : 0; }  // of all that is below
+  std::size_t calc_nonlinear_bytes() const noexcept { return nonlinear_ ? nonlinear_->calc_bytes() : 0; }        // of all that is below
+  std::size_t calc_cascade_bytes() const noexcept { return nonlinear_ ? nonlinear_->calc_cascade_bytes() : 0; }  // of what is above
   /// Memory that this voice has taken, without that of the model.
   std::size_t calc_bytes() const;
   VoiceCounters get_counters() const noexcept;
@@ -188,7 +192,7 @@ class Voice {
   void add_damped(std::int64_t sample, bool struck, const ContactForces* contacts, int sub_block, float* out) noexcept;
   void add_nonlinear(std::int64_t sample, bool struck, const ContactBlock* drive, float* out) noexcept;
   const StrikeTable* get_strike_tables() const noexcept {
-    return is_nonlinear() ? model_->get_nonlinear()->strike.data() : model_->strike_.data();
+    return is_nonlinear() ? nonlinear_->get_strike_tables() : model_->strike_.data();
   }
   const std::vector<std::array<float, kGroup>>& get_weights() const noexcept {
     return is_directed() ? model_->directivity_->weight : model_->weight_;

@@ -109,9 +109,9 @@ void Voice::take_over(Voice& other, VoiceHandover& handover) noexcept {
   // Modes that are coupled ring out as those in groups do, in both voices: what one of them sounds beyond that is heard from the first
   // sample on. Their lanes are put back to rest.
   if (other.is_nonlinear())
-    for (const int m : other.model_->get_nonlinear()->mode) other.put_ringing_state(m, other.get_mode_state(m));
+    for (const int m : other.nonlinear_->get_modes()) other.put_ringing_state(m, other.get_mode_state(m));
   if (is_nonlinear())
-    for (const int m : model_->get_nonlinear()->mode) put_ringing_state(m, get_mode_state(m));
+    for (const int m : nonlinear_->get_modes()) put_ringing_state(m, get_mode_state(m));
   const auto count = static_cast<std::size_t>(live_);
   std::copy(other.damped_.get_states().begin(), other.damped_.get_states().end(), handover.old_damped_.begin());
   // Copies are rung out; the states themselves begin the block.
@@ -123,7 +123,7 @@ void Voice::take_over(Voice& other, VoiceHandover& handover) noexcept {
   std::copy_n(state_.begin(), count, handover.states_.begin());
   std::copy(damped_.get_states().begin(), damped_.get_states().end(), handover.damped_.begin());
   if (is_nonlinear())
-    for (const int m : model_->get_nonlinear()->mode)
+    for (const int m : nonlinear_->get_modes())
       state_[static_cast<std::size_t>(m / kGroup)].re[m % kGroup] = state_[static_cast<std::size_t>(m / kGroup)].im[m % kGroup] = 0.0;
   ring_out(std::span(handover.states_).first(count), handover.damped_, -1.0F, fade_, ears, ears);
   count_work(other.live_ + live_, kBlock);

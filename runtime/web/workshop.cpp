@@ -326,9 +326,9 @@ synth::EffectSet Workshop::find_possible(int body) const {
       if (!overrides.off.has(effect)) possible = possible.with(effect);
   }
   // Models that are read from tables have no transfers and no nonlinear energy, and a page has no floor that reflects and no heads.
-  return host::find_effects(
-      scene, 0,
-      possible.without({synth::Effect::kDirectivity, synth::Effect::kGroundReflection, synth::Effect::kHead, synth::Effect::kNonlinear}));
+  return host::find_effects(scene, 0,
+                            possible.without({synth::Effect::kDirectivity, synth::Effect::kGroundReflection, synth::Effect::kHead,
+                                              synth::Effect::kNonlinear, synth::Effect::kCascade}));
 }
 
 std::string Workshop::make_blow(int body, std::string_view scene, std::int32_t triangle, const Vec3& barycentric,

@@ -79,7 +79,8 @@ TEST(time, twenty_at_rest) {
   synth::EffectSet all;
   for (const synth::Effect effect : synth::EffectSet::all()) all = all.with(effect);
   // Those of banks with multipoles, of a floor that reflects, of a listener with a head, and of banks with coupled modes.
-  all = all.without({synth::Effect::kDirectivity, synth::Effect::kGroundReflection, synth::Effect::kHead, synth::Effect::kNonlinear});
+  all = all.without({synth::Effect::kDirectivity, synth::Effect::kGroundReflection, synth::Effect::kHead, synth::Effect::kNonlinear,
+                     synth::Effect::kCascade});
   for (int i = 0; i < 20; ++i)
     synthesiser.add_body(model, {.position_m = spec.bodies[static_cast<std::size_t>(i)].initial.position_m, .effects = all});
   std::vector<float> left(4800), right(4800);

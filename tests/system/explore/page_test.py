@@ -248,7 +248,7 @@ class PageTest(unittest.TestCase):
         page.evaluate("document.getElementById('reset').click()")
         page.wait_for(f"Math.abs(carillon.panel.body.sound.modes[0].freq_hz / {first[0]} - 1) < 1e-9")
         # Why each effect is on or off is shown.
-        page.wait_for("document.querySelectorAll('#plan dt').length === 13")
+        page.wait_for("document.querySelectorAll('#plan dt').length === 14")
         self.assertIn("modal", page.evaluate("document.querySelector('#plan dt.on').textContent"))
         self.assertEqual(page.errors, [])
 

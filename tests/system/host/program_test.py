@@ -259,7 +259,7 @@ class RenderProgram(unittest.TestCase):
         report = json.loads((self.root / "off-report.json").read_text())
         on = 0
         for body in report["per_body"]:
-            self.assertEqual(len(body["effects"]), 13)
+            self.assertEqual(len(body["effects"]), 14)
             for name, effect in body["effects"].items():
                 if effect["on_s"] == 0.0:
                     self.assertEqual((effect["units"], effect["measured_us_per_s"]), (0, 0), f"{body['name']} {name}")

@@ -23,7 +23,7 @@ WEB = BIN.parent / "share" / "carillon" / "web"
 HERE = pathlib.Path(__file__).parent
 EFFECTS = ["modal", "hertz_pulse", "air_delay", "doppler", "two_ears"]
 CONTACTS = ["roughness", "rolling", "contact_damping"]
-OTHERS = ["acceleration_noise", "directivity", "ground_reflection", "head", "nonlinear"]
+OTHERS = ["acceleration_noise", "directivity", "ground_reflection", "head", "nonlinear", "cascade"]
 LATENCY = 16  # frames by which the engine is behind a file
 LIMIT_DB = -90.0  # what is asked for is -60
 

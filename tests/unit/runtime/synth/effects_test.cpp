@@ -17,7 +17,7 @@ TEST(Effects, EveryEffectHasANameThatFindsIt) {
     names.insert(get_name(effect));
   }
   EXPECT_EQ(names, (std::set<std::string>{"modal", "hertz_pulse", "roughness", "rolling", "contact_damping", "acceleration_noise",
-                                          "air_delay", "doppler", "two_ears", "directivity", "ground_reflection", "head", "nonlinear"}));
+                                          "air_delay", "doppler", "two_ears", "directivity", "ground_reflection", "head", "nonlinear", "cascade"}));
   EXPECT_EQ(find_effect("two ears"), std::nullopt);
   EXPECT_EQ(find_effect(""), std::nullopt);
 }
@@ -50,7 +50,7 @@ TEST(Effects, AValueForEach) {
   PerEffect<int> values;
   values.fill(3);
   values[Effect::kTwoEars] = 5;
-  EXPECT_EQ(std::vector<int>(values.begin(), values.end()), (std::vector<int>{3, 3, 3, 3, 3, 3, 3, 3, 5, 3, 3, 3, 3}));
+  EXPECT_EQ(std::vector<int>(values.begin(), values.end()), (std::vector<int>{3, 3, 3, 3, 3, 3, 3, 3, 5, 3, 3, 3, 3, 3}));
 }
 
 }  // namespace

@@ -242,5 +242,68 @@ TEST(NonlinearBody, NeedsABankWithTheEnergy) {
   EXPECT_EQ(Model::read_tables(model->write_tables(), model->get_surface())->get_nonlinear(), nullptr);
 }
 
+/// With what a cascade needs.
+bank::Bank make_cascade_bank() {
+  bank::Bank bank = make_bank();
+  bank.quartic.thickness_m = 1e-3;
+  bank.rigid.mass_kg = 1.0;
+  return bank;
+}
+
+TEST(NonlinearVoice, ACascadeNeedsModesAboveAndAThickness) {
+  EXPECT_FALSE(make_model(make_bank())->has_cascade());
+  EXPECT_THROW(Voice(make_model(make_bank()), {.is_nonlinear = true, .has_cascade = true}), InputError);
+  EXPECT_TRUE(make_model(make_cascade_bank())->has_cascade());
+}
+
+TEST(NonlinearVoice, SoftlyACascadeIsTheLinearVoiceToMinus100Db) {
+  const auto model = make_model(make_cascade_bank());
+  Voice linear(model), cascade(model, {.is_nonlinear = true, .has_cascade = true});
+  for (Voice* voice : {&linear, &cascade}) strike_softly(*voice, 1e-6);
+  const std::vector<float> wanted = play(linear, 48000), found = play(cascade, 48000);
+  EXPECT_LE(calc_difference_db(found, wanted), -100.0);
+  Voice other(model, {.is_nonlinear = true, .has_cascade = true});
+  strike_softly(other, 1e-6);
+  EXPECT_EQ(play(other, 48000, 37), found);
+  EXPECT_GT(other.get_counters().cascade_samples, 0);
+  EXPECT_GT(other.calc_cascade_bytes(), 0);
+}
+
+TEST(NonlinearVoice, ACascadeThatIsOffIsNotThere) {
+  const auto model = make_model(make_cascade_bank()), without = make_model(make_bank());
+  std::vector<std::vector<float>> heard;
+  for (const auto& of : {model, without}) {
+    Voice voice(of, {.is_nonlinear = true});
+    voice.strike({.time_s = 1e-3, .impulse_n_s = {0.0, 0.0, 1.0}});
+    heard.push_back(play(voice, 9600));
+    EXPECT_EQ(voice.get_counters().cascade_samples, 0);
+    EXPECT_EQ(voice.calc_cascade_bytes(), 0);
+  }
+  EXPECT_EQ(heard[0], heard[1]);
+}
+
+TEST(NonlinearVoice, ACascadeComesAndGoesWithoutAClick) {
+  const auto model = make_model(make_cascade_bank());
+  Synthesiser synthesiser({.rate_hz = kRate, .microphones_m = {{0, 0, 0}}});
+  const EffectSet without = kDefaultEffects.with(Effect::kNonlinear), with = without.with(Effect::kCascade);
+  const int body = synthesiser.add_body(model, {.position_m = {0.0, 0.3, 1.0}, .effects = without});
+  synthesiser.push(events::Impulse{
+      .time_s = 0.001, .body = body, .triangle = 4, .barycentric = {0.2, 0.3, 0.5}, .impulse_n_s = {0.0, 0.0, 1e-2}, .duration_s = 2e-4});
+  std::vector<float> heard(12288);
+  for (std::size_t n = 0; n < heard.size(); n += 512) {
+    if (n == 4096) synthesiser.set_effects(body, with);
+    if (n == 8192) synthesiser.set_effects(body, without);
+    float* at = heard.data() + n;
+    synthesiser.process(&at, 1, 512);
+  }
+  float before = 0.0F, around = 0.0F;
+  for (std::size_t n = 2048; n < 12200; ++n) {
+    const float step = std::abs(heard[n + 1] - heard[n]);
+    (n < 4000 ? before : around) = std::max(n < 4000 ? before : around, step);
+  }
+  EXPECT_GT(before, 0.0F);
+  EXPECT_LE(around, 1.2F * before);
+}
+
 }  // namespace
 }  // namespace carillon::synth
