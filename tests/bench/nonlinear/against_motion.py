@@ -1,10 +1,11 @@
 #!/usr/bin/python3
-"""A nonlinear bank against full-order motion: one sheet under the same soft, medium and hard blow, by carillon-render and carillon-simulate.
+"""A nonlinear bank against full-order motion: one sheet under the same blows, soft to hard, by carillon-render and
+carillon-simulate.
 
 usage: tests/bench/nonlinear/against_motion.py [--bin BIN_DIR] [--out FOLDER] [--modes N] [--quick]
 
-The sheet is hinged along its border, which does not move. Its bank has T10 elements, one layer of them, and holds the nodes of the border in
-the middle of the thickness; the simulation has mid-edge (Morley) bending and constant-strain membranes: the two share no element and no
+The sheet is hinged along its border, which does not move. Its bank has T10 elements, one layer of them, and holds the nodes of the border
+in the middle of the thickness; the simulation has mid-edge (Morley) bending and constant-strain membranes: the two share no element and no
 integrator. Both have the same Rayleigh damping, and the same force: a raised cosine, which the scene makes of 64 short strikes. What is
 compared are velocities at three places of the surface, so that no radiation is between them: the simulation's vertices, and banks whose
 gains are the modes' shapes there.
