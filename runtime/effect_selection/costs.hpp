@@ -24,7 +24,7 @@ struct Costs {
   double moving_head_sample_ns = 26.0;  // in one that changes
   double coupled_mode_ns = 4.0;         // nonlinear: one coupled mode, one sample; not measured again where the program runs
   double coupling_ns = 0.047;           // and one number of its matrices that is multiplied; likewise
-  double cascade_mode_ns = 3.0;         // cascade: one mode above the coupled ones, one sample; likewise
+  double cascade_mode_ns = 2.0;         // cascade: one mode above the coupled ones, one sample; likewise
 };
 
 /// Runs a made-up body for some milliseconds. [main-thread]

@@ -622,6 +622,35 @@ TEST(EffectSelector, NonlinearMotionIsThatOfABlowThatRaisesAMode) {
   EXPECT_FALSE(play_strike(1.0).first.has(Effect::kNonlinear));
 }
 
+TEST(EffectSelector, ACascadeIsThatOfAHardBlowOnABankWithModesAbove) {
+  Stage stage;
+  const auto play_strike = [&](double impulse_n_s) {
+    EffectSelector selector(stage.facts);
+    selector.watch(make_strike(0.5, impulse_n_s));
+    const auto changes = selector.advance(10.0);
+    return std::pair(find_effects(changes, 0.5), selector.get_plan(0)[Effect::kCascade]);
+  };
+  EXPECT_EQ(describe(play_strike(1.0).second.reason), "the bank has no nonlinear energy");
+  bank::Bank bank = *stage.body().bank;
+  ASSERT_GT(bank.mode_count(), 1u);
+  bank.quartic.modes = {0};
+  bank.quartic.rows = {1e7F};
+  bank.rigid.mass_kg = 1.0;
+  stage.body().bank = &bank;
+  EXPECT_EQ(describe(play_strike(1.0).second.reason), "the bank has no modes above the coupled ones, or no thickness");
+  bank.quartic.thickness_m = 1e-3;
+  const double just = std::sqrt(kCascadeCents / play_strike(1.0).second.reason.value);
+  const auto [hard, high] = play_strike(1.01 * just);
+  EXPECT_TRUE(hard.has(Effect::kCascade) && hard.has(Effect::kNonlinear));
+  EXPECT_GT(high.cost_us, 0.0);
+  const auto [soft, low] = play_strike(0.99 * just);
+  EXPECT_FALSE(soft.has(Effect::kCascade));
+  EXPECT_TRUE(soft.has(Effect::kNonlinear));
+  EXPECT_EQ(low.cost_us, 0.0);
+  stage.body().overrides.off = {Effect::kNonlinear};
+  EXPECT_FALSE(play_strike(1.01 * just).first.has(Effect::kCascade));
+}
+
 TEST(EffectSelector, NothingIsStruckAndNothingMoves) {
   Stage stage;
   stage.body().struck = false;
