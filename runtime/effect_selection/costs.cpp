@@ -123,7 +123,7 @@ double time_head(bool moves) {
   return time_ns([&] {
            for (int b = 0; b < kBlocks * synth::kSubBlocks; ++b) {
              if (moves) angle += 1e-3;
-             ears.process({std::cos(angle), std::sin(angle), 0.1}, sound, true, left, right);
+             ears.process({std::cos(angle), std::sin(angle), 0.1}, sound, left, right);
            }
          }) /
          kBlocks;
