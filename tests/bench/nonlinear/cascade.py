@@ -5,10 +5,10 @@ usage: tests/bench/nonlinear/cascade.py [--bin BIN_DIR] [--out FOLDER] [--pictur
 
 A steel sheet, 0.3 x 0.2 x 0.0005 m, clamped at two edges, gets two blows. Spectral centroid of the velocity of the surface, 50 Hz to 8 kHz,
 in windows of 40 ms: by carillon-simulate from all triangles, and by bench_cascade from all modes of a bank: linear, 40 coupled ones, and
-those with the cascade above. No radiation is between them. Printed for each blow and model: the mean and the largest error, and the
-change of level from the first window to the last, over that of the full-order run. The exit code is 1 where the cascade is not nearer than the coupled modes alone, or its mean
-error is above 15 %. The constants of the cascade were fitted to these two runs. --quick: a coarser sheet, one blow, 25 %. Runs that --out
-already has are not made again.
+those with the cascade above. No radiation is between them. Printed for each blow and model: the mean and the largest error, and the change
+of level from the first window to the last, over that of the full-order run. The exit code is 1 where the cascade is not nearer than the
+coupled modes alone, or its mean error is above 15 %. The constants of the cascade were fitted to these two runs. --quick: a coarser sheet,
+one blow, 25 %. Runs that --out already has are not made again.
 """
 import argparse
 import json
