@@ -175,7 +175,7 @@ def play_all(lab, scenes, repeats=None, contacts=None):
 # --- banks
 
 
-TYPES = {"<f8": "<f8", "<i8": "<i8", "<i4": "<i4", "<i2": "<i2", "|i1": "|i1", "|u1": "|u1"}
+TYPES = {"<f8": "<f8", "<f4": "<f4", "<i8": "<i8", "<i4": "<i4", "<i2": "<i2", "|i1": "|i1", "|u1": "|u1"}
 
 
 def read_arrays(path, names):

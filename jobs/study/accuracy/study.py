@@ -9,7 +9,7 @@ from accuracy.lab import Lab
 from errors import InputError
 
 # One module a section, each with study(lab, bodies) -> Section and PROGRAMS, the programs it starts.
-SECTIONS = ("elements", "corrected", "walls", "solver", "banks", "air", "playing", "contact", "papers", "advice")
+SECTIONS = ("elements", "corrected", "walls", "solver", "banks", "air", "motion", "playing", "contact", "papers", "advice")
 
 
 def add_command(commands, read_count):

@@ -233,6 +233,23 @@ class Study(unittest.TestCase):
         self.assertEqual(len(report["findings"]), 3)
         xml.dom.minidom.parse(str(out / "air-price.svg"))
 
+    def test_pitches_of_motion_are_nearer_the_truth_with_better_elements(self):
+        result = call(self.folder, "--quick", "--only", "motion", "-o", "motion")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        out = self.folder / "motion"
+        cents = {row["element"]: abs(float(row["cents off"])) for row in read(out / "motion-elements.csv")}
+        self.assertLess(cents["T10"], 40)
+        self.assertGreater(cents["T4"], 200)
+        sheets = [abs(float(row["cents off"])) for row in read(out / "motion-plates.csv") if row["as"] == "sheet"]
+        self.assertEqual(sheets, sorted(sheets, reverse=True))
+        self.assertLess(sheets[-1], 40)
+        shares = [float(row["cents off"]) for row in read(out / "motion-steps.csv")]
+        self.assertLess(max(shares) - min(shares), 0.2)
+        (disc,) = read(out / "motion-coupling.csv")
+        self.assertAlmostEqual(float(disc["gamma"]), 0.5008, delta=0.1)
+        self.assertEqual(len(json.loads((out / "report.json").read_text())["sections"][0]["findings"]), 4)
+        xml.dom.minidom.parse(str(out / "motion-price.svg"))
+
     def test_without_numpy_only_the_sections_that_need_it_are_missing(self):
         for words, code, expected in ((("advise", "--help"), 0, "--cents"), (("accuracy", "--only", "playing"), 2, "python3-numpy")):
             result = subprocess.run(
