@@ -198,20 +198,6 @@ def study(lab, chosen):
         return f"{run.elements:,}", f"{1e6 * run.step_s:.3f}", f"{off(run, hz):+.1f}", f"{run.book_error:.1e}", f"{run.cpu_s:.2f}"
 
     heads = ("elements", "step, us", "cents off", "energy book", "CPU s")
-
-    heads = ("elements", "step, us", "cents off", "energy book", "CPU s")
-
-    def show(run, hz):
-        return f"{run.elements:,}", f"{1e6 * run.step_s:.3f}", f"{off(run, hz):+.1f}", f"{run.book_error:.1e}", f"{run.cpu_s:.2f}"
-
-    heads = ("elements", "step, us", "cents off", "energy book", "CPU s")
-    show = lambda run, hz: (
-        f"{run.elements:,}",
-        f"{1e6 * run.step_s:.3f}",
-        f"{off(run, hz):+.1f}",
-        f"{run.book_error:.1e}",
-        f"{run.cpu_s:.2f}",
-    )
     section.add_table(
         "elements",
         [("element", "nodes asked for", *heads)]
