@@ -1,0 +1,155 @@
+"""A gong and a thunder sheet under soft, medium and hard blows: pitch that moves, and high frequencies that grow after the blow."""
+import math
+
+import numpy
+
+import measure
+import stage as tools
+
+RADIUS_M, RISE_M, RINGS = 0.15, 0.003, 16  # of the gong: its middle is higher than its rim
+MALLET = {"from": "soft-felt"}
+BLOW_S = 0.05
+BLOWS = {  # mass [kg] and speeds [m/s] of the mallet, and where
+    "gong": (0.2, {"soft": 0.3, "medium": 1.0, "hard": 4.0}, [0.03, 0.01, 0.0006]),
+    "thunder": (0.1, {"soft": 0.05, "medium": 0.5, "hard": 5.0}, [0.2, 0.05, 0.0003]),
+}
+QUICK = {
+    "gong": {"body.nodes": 2500, "band_hz": [20, 4000], "nonlinear.modes": 16},
+    "thunder": {"body.nodes": 2500, "max_modes": 120, "nonlinear.modes": 16},
+}
+WINDOW_S = 0.1
+
+
+def write_gong(file):
+    """Its middle surface, a paraboloid: rings of vertices, six more in each."""
+    vertices, faces = [(0.0, 0.0, 0.0)], []
+    for ring in range(1, RINGS + 1):
+        share = ring / RINGS
+        for k in range(6 * ring):
+            angle = 2 * math.pi * k / (6 * ring)
+            vertices.append((RADIUS_M * share * math.cos(angle), RADIUS_M * share * math.sin(angle), -RISE_M * share**2))
+
+    def number(ring, k):
+        return 1 if ring == 0 else 2 + 3 * ring * (ring - 1) + k % (6 * ring)
+
+    for ring in range(1, RINGS + 1):
+        for sector in range(6):
+            for k in range(ring):
+                outer, inner = sector * ring + k, sector * (ring - 1) + k
+                faces.append((number(ring, outer), number(ring, outer + 1), number(ring - 1, inner)))
+                if k + 1 < ring:
+                    faces.append((number(ring - 1, inner), number(ring, outer + 1), number(ring - 1, inner + 1)))
+    lines = ["v %.7f %.7f %.7f" % vertex for vertex in vertices] + ["f %d %d %d" % face for face in faces]
+    file.write_text("\n".join(lines) + "\n")
+
+
+def cut(samples, rate, begin, length):
+    return samples[int(begin * rate) : int((begin + length) * rate)]
+
+
+def calc_centroid(samples, rate):
+    """Of the power [Hz]."""
+    freq, level = measure.calc_spectrum(samples, rate)
+    power = 10 ** (level / 10)
+    return (freq * power).sum() / power.sum()
+
+
+def find_pitch(samples, rate, near_hz):
+    """Of the strongest peak within a whole tone of near_hz."""
+    return measure.find_peak(samples, rate, near_hz, 0.122)
+
+
+def blow(stage, name, duration):
+    """Renders the three blows: {strength: (rate, sound in Pa, report)}"""
+    mass, speeds, place = BLOWS[name]
+    scene = tools.read_json(stage.folder / "scene.json")
+    scene["duration_s"] = duration
+    scene["bodies"][0]["bank"] = f"{name}.hdf"
+    sounds = {}
+    for strength, speed in speeds.items():
+        scene["strikes"][0].update({"point_m": place, "mallet": {**MALLET, "mass_kg": mass, "speed_m_s": speed}})
+        rate, samples, report = stage.render(f"{name}-{strength}", scene, picture=False)
+        sounds[strength] = (rate, samples / report["gain_per_pa"], report)
+        mallet, radiated = report["mallets"][0], report["energy"]["radiated_j"]
+        stage.expect(f"{name}, {strength}: every sample is a number", numpy.isfinite(samples).all())
+        stage.expect(
+            f"{name}, {strength}: {radiated:.2g} J are radiated, of {mallet['modes_j']:.2g} J that the blow left in modes",
+            0 < radiated < mallet["modes_j"],
+        )
+    return sounds
+
+
+def describe(sounds, duration, has_pitch):
+    """Prints what became of the blows. {strength: (centroids [Hz], cents from the soft blow's loudest mode, where has_pitch)}"""
+    rate, samples, _ = sounds["soft"]
+    times = [t for t in (0.01, 0.1, 0.3, 1.0, 2.0, 3.5) if BLOW_S + t + WINDOW_S < duration]
+    long_s = duration / 8
+    rows = [("blow", "modes [J]", "of a core", "peak [Pa]", *(f"{t:g} s" for t in times))]
+    if has_pitch:
+        soft_hz = measure.find_peaks(cut(samples, rate, duration / 2, duration / 2 - 0.02), rate, 20, 2000, 1)[0][0]
+        rows[0] += ("pitch, first and last [Hz]", "cents to soft")
+    found = {}
+    for strength, (rate, samples, report) in sounds.items():
+        centroids, cents = [calc_centroid(cut(samples, rate, BLOW_S + t, WINDOW_S), rate) for t in times], []
+        share = report["playing_cpu_s"] / report["duration_s"]
+        row = (strength, f"{report['mallets'][0]['modes_j']:.2g}", f"{100 * share:.0f} %", f"{abs(samples).max():.2g}")
+        row += tuple(f"{value:.0f}" for value in centroids)
+        if has_pitch:
+            starts = numpy.linspace(BLOW_S + 0.02, duration - long_s - 0.02, 8)
+            pitches = [find_pitch(cut(samples, rate, start, long_s), rate, soft_hz) for start in starts]
+            cents = [1200 * math.log2(pitch / soft_hz) for pitch in pitches]
+            row += (f"{pitches[0]:.1f}, {pitches[-1]:.1f}", f"{min(cents):+.0f} to {max(cents):+.0f}")
+        rows.append(row)
+        found[strength] = (centroids, cents)
+    print("  centroids of the power [Hz] by time after the blow")
+    tools.print_table(rows)
+    return found
+
+
+def draw(stage, sounds, picture):
+    """One spectrogram below the other: how the same body answers three blows."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    figure, axes = pyplot.subplots(len(sounds), 3, figsize=(12, 3.2 * len(sounds)), sharex=True, squeeze=False)
+    for row, (name, of_body) in zip(axes, sounds.items()):
+        for axis, (strength, (rate, samples, _)) in zip(row, of_body.items()):
+            top = 20 * math.log10(abs(samples).max() + 1e-30)
+            axis.specgram(samples[:, 0], NFFT=4096, Fs=rate, noverlap=3072, vmin=top - 140, vmax=top - 40, cmap="magma")
+            axis.set_ylim(0, 5000)
+            axis.set_title(f"{name}, {strength}")
+            axis.set_xlabel("Time (s)")
+        row[0].set_ylabel("Frequency (Hz)")
+    figure.tight_layout()
+    figure.savefig(stage.out / picture, dpi=60)
+    stage.pictures.append(picture)
+
+
+def play(stage):
+    write_gong(stage.out / "gong.obj")
+    duration = 2.0 if stage.quick else 4.0
+    sounds, found = {}, {}
+    for name in BLOWS:
+        stage.solve(f"{name}.json", name, quick=QUICK[name])
+        sounds[name] = blow(stage, name, duration)
+        found[name] = describe(sounds[name], duration, name == "gong")
+    for name in BLOWS:
+        soft, hard = (found[name][strength][0] for strength in ("soft", "hard"))
+        stage.expect(
+            f"{name}: a hard blow is brighter than a soft one after 0.3 s ({hard[2]:.0f} Hz against {soft[2]:.0f} Hz)",
+            hard[2] > 1.5 * soft[2],
+        )
+    soft = found["gong"]["soft"][1]
+    stage.expect(f"gong: a soft blow keeps its pitch (to {numpy.ptp(soft):.2f} cents)", numpy.ptp(soft) < 2)
+    medium = found["gong"]["medium"]
+    stage.expect(f"gong: the pitch of a medium blow moves by {numpy.ptp(medium[1]):.0f} cents", numpy.ptp(medium[1]) > 10)
+    stage.expect(
+        f"gong: high frequencies grow after a medium blow, from {medium[0][0]:.0f} Hz to {max(medium[0]):.0f} Hz",
+        max(medium[0]) > 1.2 * medium[0][0] and numpy.argmax(medium[0]) > 0,
+    )
+    soft = found["gong"]["soft"][0]
+    stage.expect(f"gong: a soft one becomes darker at once ({soft[0]:.0f} Hz to {soft[-1]:.0f} Hz)", soft[-1] < soft[0])
+    if not stage.quick:
+        draw(stage, sounds, "gongs.png")
