@@ -101,7 +101,7 @@ def compare_blows(stage, off, on, rate, unit, limit_db=-30):
     rows = [("line", "clamped plate [Hz]", "found [Hz]", "cents", "centre against off [dB]")]
     hz, below = [], []
     for factor in CLAMPED[:4]:
-        hz.append(measure.find_peak(off if factor < 120 else on, rate, 1.005 * factor * unit, 0.06))
+        hz.append(measure.find_peak(off if factor < 120 else on, rate, 0.98 * factor * unit, 0.06))
         below.append(find_level(on, rate, hz[-1]) - find_level(off, rate, hz[-1]))
         rows.append((len(hz), f"{factor * unit:.1f}", f"{hz[-1]:.1f}", f"{cents(hz[-1], factor * unit):+.0f}", f"{below[-1]:+.1f}"))
     tools.print_table(rows)
@@ -126,12 +126,13 @@ def play_plate(stage):
         quick = {"simulate.duration_s": 0.15}
         rate, off, _ = simulate(stage, "plate.json", f"plate-off-{cells}", changes, quick)
         lines[cells] = [
-            measure.find_peak(off[int(0.003 * rate) :], rate, 0.96 * f * unit, 0.07) for f in CLAMPED[: 2 if stage.quick else 3]
+            measure.find_peak(off[int(0.003 * rate) :], rate, (0.92 if stage.quick else 0.96) * f * unit, 0.08)
+            for f in CLAMPED[: 2 if stage.quick else 3]
         ]
     if not stage.quick:
         rate, on, _ = simulate(stage, "plate.json", "plate-on", {**changes, "simulate.impulses": [{**blow, "point_m": [0, 0, 0]}]})
         off, on = off[int(0.003 * rate) :], on[int(0.003 * rate) :]
-        compare_blows(stage, off, on, rate, 0.98 * unit)
+        compare_blows(stage, off, on, rate, unit)
         spectra = [("off the centre", *measure.calc_spectrum(off, rate)), ("on the centre", *measure.calc_spectrum(on, rate))]
     (coarse, low), (fine, high) = lines.items()
     rows = [("line", "clamped plate [Hz]", *(f"{cells} cells [cents]" for cells in lines), "extrapolated [Hz]", "cents")]
@@ -217,7 +218,7 @@ def play_ball(stage):
         wanted = math.sqrt(along**2 + 2 * 5 / 7 * GRAVITY * math.sin(tilt) * 0.09)
         stage.expect("the ball has rolled over the rim", ball["position_m"][0] > 0.15 * math.cos(tilt))
     print(f"  ball-rolls: turns with {spin:.4f} m/s at its rim, rigid bodies {wanted:.4f} m/s")
-    stage.compare("speed at which the ball rolls [m/s]", spin, wanted, 2)
+    stage.compare("speed at which the ball rolls [m/s]", spin, wanted, 5 if stage.quick else 2)
     stage.expect("the thick one takes nearly all of its energy as waves", abs(found["ball-stiff"][1]) < 0.3)
 
 
@@ -450,7 +451,7 @@ def play_pendulum(stage):
     times, places, _ = read_motion(stage, "pendulum-swings")
     tip = places[:, numpy.linalg.norm(places[0], axis=1) > length - 1e-3].mean(1)
     angle = numpy.arctan2(tip[:, 0], -tip[:, 2])
-    # theta'' = -w2 sin theta, from the angle and speed after the blow; its energy tells the speed at each angle.
+    # theta'' = -w2 sin theta, from the angle and speed after the blow; its energy says the speed at each angle.
     w2 = GRAVITY * (length / 2) / (length**2 / 3 + thickness**2 / 12)
     speed = numpy.gradient(angle, times)
     energy = (0.5 * speed**2 - w2 * numpy.cos(angle))[(times > 0.03)]
