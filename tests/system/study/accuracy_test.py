@@ -247,7 +247,8 @@ class Study(unittest.TestCase):
         self.assertLess(max(shares) - min(shares), 0.2)
         (disc,) = read(out / "motion-coupling.csv")
         self.assertAlmostEqual(float(disc["gamma"]), 0.5008, delta=0.1)
-        self.assertEqual(len(json.loads((out / "report.json").read_text())["sections"][0]["findings"]), 4)
+        self.assertEqual(len(json.loads((out / "report.json").read_text())["sections"][0]["findings"]), 5)
+        self.assertEqual([row["coupled modes"] for row in read(out / "motion-modes.csv")], ["1", "4", "12"])
         xml.dom.minidom.parse(str(out / "motion-price.svg"))
 
     def test_without_numpy_only_the_sections_that_need_it_are_missing(self):
