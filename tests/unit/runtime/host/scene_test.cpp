@@ -242,7 +242,8 @@ TEST(Scene, EffectsAreThoseOfTheList) {
       parse_effects(R"(["modal", "hertz_pulse", "acceleration_noise", "air_delay", "doppler", "two_ears", "roughness", "rolling",
     "contact_damping"])");
   EXPECT_FALSE(list.automatic);
-  EXPECT_EQ(list.on, kPlayableEffects.without({Effect::kDirectivity, Effect::kGroundReflection, Effect::kHead, Effect::kNonlinear}));
+  EXPECT_EQ(list.on, kPlayableEffects.without(
+                         {Effect::kDirectivity, Effect::kGroundReflection, Effect::kHead, Effect::kNonlinear, Effect::kCascade}));
   EXPECT_EQ(parse_effects(R"(["doppler"])").on, synth::EffectSet{Effect::kDoppler});
   EXPECT_FALSE(parse_effects("[]").automatic);
   const auto some = parse_effects(R"({"base": "auto", "on": ["acceleration_noise"], "off": ["doppler", "two_ears"]})");
