@@ -14,6 +14,7 @@
 #include "precompute/condense/points.hpp"
 #include "precompute/condense/static_answer.hpp"
 #include "precompute/condense/stresses.hpp"
+#include "precompute/condense/stretch.hpp"
 #include "precompute/la/local_columns.hpp"
 #include "runtime/base/error.hpp"
 
@@ -108,9 +109,17 @@ Condensed condense_modes(const comm::Communicator& comm, const SolvedModes& solv
     if (options.report) options.report(fmt::format("{:.0f} % of the pairs of {} modes", 100 * share, modes), share);
   };
   const CoupledBody body{comm, strains, answer, nodal, omega, Pairs{modes}, proceed};
-  const bool wants_points = modes > kModesOfAllPairs;
+  const bool wants_points = modes > kModesOfAllPairs && !options.is_stretch;
   const double fields_error = kFieldsShare * options.energy_error;
-  const StressFields fields = wants_points ? calc_fields_of_samples(body, fields_error) : calc_fields_of_pairs(body, fields_error, false);
+  StressFields fields =
+      modes > kModesOfAllPairs ? calc_fields_of_samples(body, fields_error) : calc_fields_of_pairs(body, fields_error, options.is_stretch);
+  if (options.is_stretch) {
+    keep_stretch(body, fields);
+    if (fields.form.rows() == 0)
+      throw InputError(
+          "\"nonlinear\": \"stretch\" is the mean stretch of a body that is held on opposite sides, and no stress of this one has a mean: "
+          "hold it so by \"fixed\", or couple its modes in full, {\"modes\": 30}");
+  }
   result.solves = fields.solves;
   result.curvature = fields.curvature;
   const double first_peak = calc_peak(comm, columns.column(0), columns.rows);
@@ -131,7 +140,6 @@ Condensed condense_modes(const comm::Communicator& comm, const SolvedModes& solv
     if (wants_points && points.error <= options.energy_error) {
       set_points(points, energy);
       energy.error = points.error;
-      result.points_m = points.at_m;
     } else {
       set_rows(fields, energy);
     }

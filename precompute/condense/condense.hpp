@@ -20,6 +20,7 @@ inline constexpr int kMaxModes = 400;        // that a job may couple: 80,200 pa
 inline constexpr int kModesOfAllPairs = 40;  // up to so many every pair has a solve of its own; beyond, motions are sampled
 
 struct CondenseOptions {
+  bool is_stretch = false;                  // the mean stretch alone, in three rows at most: a pitch that glides, at nearly no cost
   int modes = 50;                           // at most
   double below_hz = 3000;                   // of the coupled modes
   double energy_error = 1e-2;               // of the stored energy, relative, on motions that it was not made from
@@ -46,15 +47,15 @@ struct Condensed {
   std::int64_t bending_count = 0;  // modes up to below_hz that bend or twist
   bool splits_pair = false;        // one mode fewer than asked for, so as not to part two of one frequency
   double top_hz = 0;
-  double membrane_hz = 0;      // 0: no mode of the band stretches; membrane_ratio is then an upper bound, of the last mode
-  std::vector<Vec3> points_m;  // of the form "points"
-  double curvature = 0;        // see StressFields::curvature
+  double membrane_hz = 0;  // 0: no mode of the band stretches; membrane_ratio is then an upper bound, of the last mode
+  double curvature = 0;    // see StressFields::curvature
 };
 
 /// Condenses: docs/equations.md E13. V(q) is the least energy of quadratic strains of the coupled modes that all other displacements leave:
 /// 1/2 |E2(q) - eps(w)|² in the norm of C, with w orthogonal to the coupled modes. The same on any number of ranks to the rounding of the
 /// factorisation (1e-9 of V); signs and order of rows may differ where fields have the same energy. Collective. Throws on every rank:
-/// InputError when the body has several components, or fewer modes than are asked for; SolveError, SystemError.
+/// InputError when the body has several components, fewer modes than are asked for, or no mean stretch where that is wanted; SolveError,
+/// SystemError.
 Condensed condense_modes(const comm::Communicator& comm, const SolvedModes& solved, const CondenseOptions& options);
 
 /// gamma of a mode alone, q'' + omega² q (1 + gamma (q peak / s)²) = 0, for lengths s: 2 sum over r of A_r,ii² s² / (lambda peak²).

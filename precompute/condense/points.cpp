@@ -29,12 +29,11 @@ constexpr double kGrowth = 1.25;  // of the number of points from one attempt to
 
 /// Candidates of all ranks, in the order of the mesh. Rank 0.
 struct Candidates {
-  std::vector<Vec3> at_m;
   la::Matrix gradient;  // (9 C, N)
   la::Matrix stress;    // (6 C, R), times the volume of the point
 };
 
-/// Position, gradients and stresses of a candidate, one number after the other, behind its number.
+/// Gradients and stresses of a candidate, one number after the other, behind its number.
 std::vector<double> list_candidates(const CoupledBody& body, const partition::LocalMesh& local, const StressFields& fields,
                                     std::int64_t all_points) {
   const Strains& strains = body.strains;
@@ -51,13 +50,7 @@ std::vector<double> list_candidates(const CoupledBody& body, const partition::Lo
         strains.gather(e, body.shapes.data(), body.pairs.modes, shape);
         Strains::calc_gradients(points, shape, gradients);
       }
-      const auto nodes = strains.nodes(e);
-      Vec3 x{};
-      for (std::size_t i = 0; i < 4; ++i)
-        for (std::size_t k = 0; k < 3; ++k)
-          x[k] += points.at[static_cast<std::size_t>(p)][i] * local.nodes_m[static_cast<std::size_t>(nodes[i])][k];
       list.push_back(static_cast<double>(number));
-      list.insert(list.end(), x.begin(), x.end());
       for (int row = 0; row < 9; ++row) {
         const auto g = gradients.row(9 * p + row);
         list.insert(list.end(), g.data(), g.data() + g.size());
@@ -69,24 +62,27 @@ std::vector<double> list_candidates(const CoupledBody& body, const partition::Lo
   return list;
 }
 
-Candidates gather_candidates(const CoupledBody& body, const partition::LocalMesh& local, const StressFields& fields) {
-  const std::ptrdiff_t modes = body.pairs.modes, rows = fields.form.rows(), width = 4 + 9 * modes + 6 * rows;
-  const std::int64_t all_points = body.comm.sum(body.strains.first_row(body.strains.element_count()) / 6);
-  const std::vector<double> list = comm::gather(body.comm, [&] { return list_candidates(body, local, fields, all_points); });
-  const auto count = static_cast<std::ptrdiff_t>(list.size()) / width;
+Candidates sort_candidates(const std::vector<double>& list, std::ptrdiff_t modes, std::ptrdiff_t rows) {
+  const std::ptrdiff_t width = 1 + 9 * modes + 6 * rows, count = static_cast<std::ptrdiff_t>(list.size()) / width;
   std::vector<std::ptrdiff_t> order(static_cast<std::size_t>(count));
   std::iota(order.begin(), order.end(), std::ptrdiff_t{0});
   std::sort(order.begin(), order.end(), [&](std::ptrdiff_t a, std::ptrdiff_t b) {
     return list[static_cast<std::size_t>(a * width)] < list[static_cast<std::size_t>(b * width)];
   });
-  Candidates candidates{{}, la::Matrix(9 * count, modes), la::Matrix(6 * count, rows)};
+  Candidates candidates{la::Matrix(9 * count, modes), la::Matrix(6 * count, rows)};
   for (std::ptrdiff_t c = 0; c < count; ++c) {
     const double* from = list.data() + order[static_cast<std::size_t>(c)] * width;
-    candidates.at_m.push_back({from[1], from[2], from[3]});
-    candidates.gradient.middleRows(9 * c, 9) = Eigen::Map<const RowMatrix>(from + 4, 9, modes);
-    candidates.stress.middleRows(6 * c, 6) = Eigen::Map<const la::Matrix>(from + 4 + 9 * modes, 6, rows);
+    candidates.gradient.middleRows(9 * c, 9) = Eigen::Map<const RowMatrix>(from + 1, 9, modes);
+    candidates.stress.middleRows(6 * c, 6) = Eigen::Map<const la::Matrix>(from + 1 + 9 * modes, 6, rows);
   }
   return candidates;
+}
+
+Candidates gather_candidates(const CoupledBody& body, const partition::LocalMesh& local, const StressFields& fields) {
+  const std::ptrdiff_t modes = body.pairs.modes, rows = fields.form.rows();
+  const std::int64_t all_points = body.comm.sum(body.strains.first_row(body.strains.element_count()) / 6);
+  const std::vector<double> list = comm::gather(body.comm, [&] { return list_candidates(body, local, fields, all_points); });
+  return body.comm.agree([&] { return sort_candidates(list, modes, rows); });
 }
 
 /// (6 P, columns) engineering strains of motions: columns of q.
@@ -162,15 +158,11 @@ CouplingPoints fit(const CoupledBody& body, const StressFields& fields, const Ca
   la::Matrix prior(6 * count, fields.form.rows());
   for (std::ptrdiff_t c = 0, p = 0; c < x.size(); ++c) {
     if (!(x[c] > 0)) continue;
-    points.at_m.push_back(candidates.at_m[static_cast<std::size_t>(c)]);
     points.gradient.middleRows(9 * p, 9) = candidates.gradient.middleRows(9 * c, 9);
     prior.middleRows(6 * p, 6) = x[c] * candidates.stress.middleRows(6 * c, 6);
     points.weight[p++] = x[c];
   }
-  la::Vector scale(body.pairs.count());
-  for (std::ptrdiff_t j = 0; j < body.pairs.modes; ++j)
-    for (std::ptrdiff_t i = 0; i <= j; ++i)
-      scale[body.pairs.find(i, j)] = 1 / (body.omega[static_cast<std::size_t>(i)] * body.omega[static_cast<std::size_t>(j)]);
+  const la::Vector scale = calc_pair_scale(body.omega);
   const la::Matrix strain = calc_pair_strains(points.gradient, body.pairs) * scale.asDiagonal();
   la::Matrix left = fields.form * scale.asDiagonal();
   left -= multiply_transposed(prior, strain);

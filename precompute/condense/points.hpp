@@ -9,11 +9,10 @@ namespace carillon::condense {
 
 /// P points: eta_r = sum over p of weight_p stress_rp . strain_p, as bank::QuarticEnergy has it for solids. Rank 0.
 struct CouplingPoints {
-  std::vector<Vec3> at_m;  // (P)
-  la::Matrix gradient;     // (9 P, N), row 9 p + 3 k + a
-  la::Matrix stress;       // (6 P, R)
-  la::Vector weight;       // (P)
-  double error = 0;        // of the energy on the tests: see calc_error()
+  la::Matrix gradient;  // (9 P, N), row 9 p + 3 k + a
+  la::Matrix stress;    // (6 P, R)
+  la::Vector weight;    // (P)
+  double error = 0;     // of the energy on the tests: see calc_error()
 };
 
 /// Chooses points of integration by least squares with weights that are not negative, so that the sums are those of the fields on motions

@@ -36,21 +36,6 @@ const Points& get_rule_of_degree_2() {
   return rule;
 }
 
-/// As precompute/fem has it: a mid-side node further than 1e-6 of its edge from the middle.
-bool is_curved(std::span<const Vec3> x) {
-  for (std::size_t e = 0; e < mesh::kEdges.size(); ++e) {
-    const Vec3 &a = x[static_cast<std::size_t>(mesh::kEdges[e][0])], &b = x[static_cast<std::size_t>(mesh::kEdges[e][1])];
-    double off = 0, length = 0;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const double bow = x[4 + e][k] - (a[k] + b[k]) / 2, edge = b[k] - a[k];
-      off += bow * bow;
-      length += edge * edge;
-    }
-    if (off > 1e-12 * length) return true;
-  }
-  return false;
-}
-
 /// C in Mandel's form, less the mean dilatation's part.
 Matrix6 make_stiffness(const fem::Solid& solid) {
   Matrix6 c;
@@ -80,7 +65,7 @@ Strains::Strains(const partition::LocalMesh& local, const fem::Materials& materi
     if (local.order == 2) {
       std::array<Vec3, 10> x;
       for (std::size_t i = 0; i < 10; ++i) x[i] = local.nodes_m[static_cast<std::size_t>(nodes(e)[i])];
-      curved = is_curved(x);
+      curved = !fem::is_straight(x);
     }
     is_curved_.push_back(static_cast<char>(curved));
     const int points = local.order == 1 ? 1 : curved ? 14 : 4;

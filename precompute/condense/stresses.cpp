@@ -64,14 +64,26 @@ std::size_t count_nodal(const CoupledBody& body, std::ptrdiff_t width) {
   return body.shapes.size() / static_cast<std::size_t>(body.pairs.modes) * static_cast<std::size_t>(width);
 }
 
-/// Units in which all modes have the same energy: what a pair's products are multiplied by.
-la::Vector calc_pair_scale(const std::vector<double>& omega) {
-  const Pairs pairs{to_index(omega.size())};
-  la::Vector scale(pairs.count());
-  for (std::ptrdiff_t i = 0; i < pairs.modes; ++i)
-    for (std::ptrdiff_t j = i; j < pairs.modes; ++j)
-      scale[pairs.find(i, j)] = 1 / (omega[static_cast<std::size_t>(i)] * omega[static_cast<std::size_t>(j)]);
-  return scale;
+/// Eigenvalues, ascending, of a symmetric matrix that every rank has; its eigenvectors take its place. The first rank's are every rank's:
+/// all decide alike by them. Collective.
+la::Vector diagonalise(const comm::Communicator& comm, la::Matrix& matrix, const char* failure) {
+  la::Vector values = comm.agree([&] { return la::Vector(la::Vector::Zero(matrix.rows())); });
+  comm.agree([&] {
+    if (comm.is_root() && la::calc_eigenpairs_by_division(matrix, values) != 0) throw SolveError(failure);
+  });
+  comm.broadcast_into(la::entries(matrix));
+  comm.broadcast_into(la::entries(values));
+  return values;
+}
+
+/// find_rank() as the first rank has it. Collective.
+std::ptrdiff_t agree_on_rank(const comm::Communicator& comm, StressFields& fields) {
+  std::ptrdiff_t rank = 0;
+  comm.agree([&] {
+    if (comm.is_root()) rank = find_rank(fields, fields.error);
+  });
+  fields.error = comm.broadcast(fields.error);
+  return comm.broadcast(rank);
 }
 
 void fill_products(Samples& samples) {
@@ -95,8 +107,9 @@ void fix_signs(StressFields& fields) {
 }
 
 /// Flat bodies have no cubic part: what the mesh has of it is set to nothing.
-void set_curvature(StressFields& fields, const std::vector<double>& omega, double error) {
-  fields.curvature = calc_curvature(fields.linear, multiply(fields.form, fields.tests.products), omega, error);
+void set_curvature(const comm::Communicator& comm, StressFields& fields, const std::vector<double>& omega, double error) {
+  fields.curvature =
+      comm.broadcast([&] { return calc_curvature(fields.linear, multiply(fields.form, fields.tests.products), omega, error); });
   if (fields.curvature >= kCurved) return;
   fields.linear.setZero();
   fields.cubic.setZero();
@@ -116,54 +129,53 @@ la::Matrix calc_sample_fields(const CoupledBody& body, const la::Matrix& q, la::
   ElementPoints points;
   RowMatrix shape, motion, gradients, linear, z;
   const RowMatrix combine = q;
-  for (std::int32_t e = 0; e < strains.element_count(); ++e) {
-    strains.calc_points(e, points);
-    strains.gather(e, body.shapes.data(), body.pairs.modes, shape);
-    motion.noalias() = shape * combine;
-    Strains::calc_gradients(points, motion, gradients);
-    strains.calc_square_strains(e, points, gradients, z);
-    strains.calc_linear(e, points, linear);
-    fields.middleRows(strains.first_row(e), strains.row_count(e)) = z;
-    motion.noalias() = linear.transpose() * z;
-    add_loads(strains, e, motion, loads);
-  }
+  body.comm.agree([&] {
+    for (std::int32_t e = 0; e < strains.element_count(); ++e) {
+      strains.calc_points(e, points);
+      strains.gather(e, body.shapes.data(), body.pairs.modes, shape);
+      motion.noalias() = shape * combine;
+      Strains::calc_gradients(points, motion, gradients);
+      strains.calc_square_strains(e, points, gradients, z);
+      strains.calc_linear(e, points, linear);
+      fields.middleRows(strains.first_row(e), strains.row_count(e)) = z;
+      motion.noalias() = linear.transpose() * z;
+      add_loads(strains, e, motion, loads);
+    }
+  });
   const la::Matrix on_kept = body.answer.solve(loads, width);
   if (work != nullptr) *work = on_kept;
   solves += width;
-  for (std::int32_t e = 0; e < strains.element_count(); ++e) {
-    strains.calc_points(e, points);
-    strains.calc_linear(e, points, linear);
-    strains.gather(e, loads.data(), width, motion);
-    fields.middleRows(strains.first_row(e), strains.row_count(e)).noalias() -= linear * motion;
-  }
+  body.comm.agree([&] {
+    for (std::int32_t e = 0; e < strains.element_count(); ++e) {
+      strains.calc_points(e, points);
+      strains.calc_linear(e, points, linear);
+      strains.gather(e, loads.data(), width, motion);
+      fields.middleRows(strains.first_row(e), strains.row_count(e)).noalias() -= linear * motion;
+    }
+  });
   return fields;
 }
 
 la::Columns to_columns(la::Matrix& m) { return {m.data(), m.rows(), std::max<std::ptrdiff_t>(m.rows(), 1), static_cast<int>(m.cols())}; }
 
-/// What of `fields` is not yet in `basis` is added to it, orthonormal. Returns the squares of the norms of what was left of each field.
-la::Vector extend(const comm::Communicator& comm, la::Matrix fields, double least, la::Matrix& basis) {
-  la::Vector left;
-  for (int pass = 0; pass < 2; ++pass) {
-    if (basis.cols() > 0) {
-      const la::Matrix products = la::multiply_transposed(comm, to_columns(basis), to_columns(fields));
-      la::subtract_product(to_columns(basis), products.data(), static_cast<int>(products.rows()), to_columns(fields));
-    }
-    if (pass == 0) left = la::multiply_transposed(comm, to_columns(fields), to_columns(fields)).diagonal();
+/// What of `fields` is not yet in `basis` is added to it, orthonormal.
+void extend(const comm::Communicator& comm, la::Matrix fields, double least, la::Matrix& basis) {
+  for (int pass = 0; pass < 2 && basis.cols() > 0; ++pass) {
+    const la::Matrix products = la::multiply_transposed(comm, to_columns(basis), to_columns(fields));
+    la::subtract_product(to_columns(basis), products.data(), static_cast<int>(products.rows()), to_columns(fields));
   }
   for (int pass = 0; pass < 2; ++pass) {  // the first leaves what rounding of large fields did to small ones
     la::Matrix gram = la::multiply_transposed(comm, to_columns(fields), to_columns(fields));
-    la::Vector values;
-    if (la::calc_eigenpairs(gram, values) != 0) throw SolveError("internal: the fields of sampled motions have no orthonormal basis");
+    const la::Vector values = diagonalise(comm, gram, "internal: the fields of sampled motions have no orthonormal basis");
     const std::ptrdiff_t count = (values.array() > (pass == 0 ? least : 0.0)).count(), drop = values.size() - count;
     for (std::ptrdiff_t r = 0; r < count; ++r) gram.col(drop + r) /= std::sqrt(values[drop + r]);
-    fields = multiply(fields, gram.rightCols(count));
-    if (count == 0) return left;
+    if (count == 0) return;
+    comm.agree([&] { fields = multiply(fields, gram.rightCols(count)); });
   }
-  const std::ptrdiff_t before = basis.cols();
-  basis.conservativeResize(fields.rows(), before + fields.cols());
-  basis.rightCols(fields.cols()) = fields;
-  return left;
+  comm.agree([&] {
+    basis.conservativeResize(fields.rows(), basis.cols() + fields.cols());
+    basis.rightCols(fields.cols()) = fields;
+  });
 }
 
 /// The scaled linear strains of the modes, (rows of this rank, N).
@@ -172,12 +184,14 @@ la::Matrix calc_mode_strains(const CoupledBody& body) {
   la::Matrix values = body.comm.agree([&] { return la::Matrix(strains.first_row(strains.element_count()), body.pairs.modes); });
   ElementPoints points;
   RowMatrix shape, linear;
-  for (std::int32_t e = 0; e < strains.element_count(); ++e) {
-    strains.calc_points(e, points);
-    strains.gather(e, body.shapes.data(), body.pairs.modes, shape);
-    strains.calc_linear(e, points, linear);
-    values.middleRows(strains.first_row(e), strains.row_count(e)).noalias() = linear * shape;
-  }
+  body.comm.agree([&] {
+    for (std::int32_t e = 0; e < strains.element_count(); ++e) {
+      strains.calc_points(e, points);
+      strains.gather(e, body.shapes.data(), body.pairs.modes, shape);
+      strains.calc_linear(e, points, linear);
+      values.middleRows(strains.first_row(e), strains.row_count(e)).noalias() = linear * shape;
+    }
+  });
   return values;
 }
 
@@ -188,17 +202,19 @@ la::Matrix calc_form(const CoupledBody& body, const la::Matrix& basis) {
   la::Matrix sums = body.comm.agree([&] { return la::Matrix(la::Matrix::Zero(basis.cols(), pairs)); });
   ElementPoints points;
   RowMatrix shape, gradients, z;
-  for_chunks(strains, [&](std::int32_t begin, std::int32_t end, std::int64_t rows) {
-    la::Matrix chunk(rows, pairs);
-    for (std::int32_t e = begin; e < end; ++e) {
-      strains.calc_points(e, points);
-      strains.gather(e, body.shapes.data(), modes, shape);
-      Strains::calc_gradients(points, shape, gradients);
-      strains.calc_pair_strains(e, points, gradients, body.pairs, 0, pairs, z);
-      chunk.middleRows(strains.first_row(e) - strains.first_row(begin), strains.row_count(e)) = z;
-    }
-    la::gemm(la::Transpose::kYes, basis.cols(), static_cast<int>(pairs), rows, 1, basis.data() + strains.first_row(begin), basis.rows(),
-             chunk.data(), rows, 1, sums.data(), sums.rows());
+  body.comm.agree([&] {
+    for_chunks(strains, [&](std::int32_t begin, std::int32_t end, std::int64_t rows) {
+      la::Matrix chunk(rows, pairs);
+      for (std::int32_t e = begin; e < end; ++e) {
+        strains.calc_points(e, points);
+        strains.gather(e, body.shapes.data(), modes, shape);
+        Strains::calc_gradients(points, shape, gradients);
+        strains.calc_pair_strains(e, points, gradients, body.pairs, 0, pairs, z);
+        chunk.middleRows(strains.first_row(e) - strains.first_row(begin), strains.row_count(e)) = z;
+      }
+      la::gemm(la::Transpose::kYes, basis.cols(), static_cast<int>(pairs), rows, 1, basis.data() + strains.first_row(begin), basis.rows(),
+               chunk.data(), rows, 1, sums.data(), sums.rows());
+    });
   });
   body.comm.sum(la::entries(sums));
   return sums;
@@ -225,6 +241,15 @@ Samples make_single_samples(const std::vector<double>& omega) {
   for (std::size_t i = 0; i < omega.size(); ++i) samples.q(to_index(i), to_index(i)) = 1 / omega[i];
   fill_products(samples);
   return samples;
+}
+
+la::Vector calc_pair_scale(const std::vector<double>& omega) {
+  const Pairs pairs{to_index(omega.size())};
+  la::Vector scale(pairs.count());
+  for (std::ptrdiff_t i = 0; i < pairs.modes; ++i)
+    for (std::ptrdiff_t j = i; j < pairs.modes; ++j)
+      scale[pairs.find(i, j)] = 1 / (omega[static_cast<std::size_t>(i)] * omega[static_cast<std::size_t>(j)]);
+  return scale;
 }
 
 Samples join(const Samples& a, const Samples& b) {
@@ -284,33 +309,37 @@ Gram calc_gram(const CoupledBody& body) {
     const std::ptrdiff_t width = std::min<std::ptrdiff_t>(kPairsAtOnce, pairs - first);
     body.proceed(static_cast<double>(first) / static_cast<double>(pairs));
     Nodal loads = body.comm.agree([&] { return Nodal(count_nodal(body, width), 0.0); });
-    for (std::int32_t e = 0; e < strains.element_count(); ++e) {
-      strains.calc_points(e, points);
-      strains.gather(e, body.shapes.data(), modes, shape);
-      Strains::calc_gradients(points, shape, gradients);
-      strains.calc_pair_strains(e, points, gradients, body.pairs, first, width, z);
-      strains.calc_linear(e, points, linear);
-      forces.noalias() = linear.transpose() * z;
-      add_loads(strains, e, forces, loads);
-    }
+    body.comm.agree([&] {
+      for (std::int32_t e = 0; e < strains.element_count(); ++e) {
+        strains.calc_points(e, points);
+        strains.gather(e, body.shapes.data(), modes, shape);
+        Strains::calc_gradients(points, shape, gradients);
+        strains.calc_pair_strains(e, points, gradients, body.pairs, first, width, z);
+        strains.calc_linear(e, points, linear);
+        forces.noalias() = linear.transpose() * z;
+        add_loads(strains, e, forces, loads);
+      }
+    });
     gram.work.middleCols(first, width) = body.answer.solve(loads, static_cast<int>(width));
     const std::size_t rows = loads.size() / static_cast<std::size_t>(width);
     for (std::size_t row = 0; row < rows; ++row)
       std::copy_n(loads.begin() + to_index(row) * width, width, gram.theta.begin() + to_index(row) * pairs + first);
   }
-  for_chunks(strains, [&](std::int32_t begin, std::int32_t end, std::int64_t rows) {
-    la::Matrix chunk(rows, pairs);
-    for (std::int32_t e = begin; e < end; ++e) {
-      strains.calc_points(e, points);
-      strains.gather(e, body.shapes.data(), modes, shape);
-      Strains::calc_gradients(points, shape, gradients);
-      strains.calc_pair_strains(e, points, gradients, body.pairs, 0, pairs, z);
-      strains.calc_linear(e, points, linear);
-      strains.gather(e, gram.theta.data(), pairs, forces);
-      z.noalias() -= linear * forces;
-      chunk.middleRows(strains.first_row(e) - strains.first_row(begin), strains.row_count(e)) = z;
-    }
-    add_products(chunk, rows, gram.values);
+  body.comm.agree([&] {
+    for_chunks(strains, [&](std::int32_t begin, std::int32_t end, std::int64_t rows) {
+      la::Matrix chunk(rows, pairs);
+      for (std::int32_t e = begin; e < end; ++e) {
+        strains.calc_points(e, points);
+        strains.gather(e, body.shapes.data(), modes, shape);
+        Strains::calc_gradients(points, shape, gradients);
+        strains.calc_pair_strains(e, points, gradients, body.pairs, 0, pairs, z);
+        strains.calc_linear(e, points, linear);
+        strains.gather(e, gram.theta.data(), pairs, forces);
+        z.noalias() -= linear * forces;
+        chunk.middleRows(strains.first_row(e) - strains.first_row(begin), strains.row_count(e)) = z;
+      }
+      add_products(chunk, rows, gram.values);
+    });
   });
   body.comm.sum(la::entries(gram.values));
   mirror(gram.values);
@@ -323,8 +352,7 @@ StressFields calc_fields_of_pairs(const CoupledBody& body, double error, bool wa
   const la::Vector scale = calc_pair_scale(body.omega);
   la::Matrix vectors = scale.asDiagonal() * gram.values * scale.asDiagonal();
   const double trace = vectors.trace();
-  la::Vector values;
-  if (la::calc_eigenpairs_by_division(vectors, values) != 0) throw SolveError("internal: the Gram matrix has no eigenvectors");
+  const la::Vector values = diagonalise(body.comm, vectors, "internal: the Gram matrix has no eigenvectors");
   StressFields fields;
   fields.solves = pairs;
   const std::ptrdiff_t rank = (values.array() > kLeastShare * trace).count();
@@ -341,25 +369,27 @@ StressFields calc_fields_of_pairs(const CoupledBody& body, double error, bool wa
   const Samples& tests = fields.tests = join(make_single_samples(body.omega), make_samples(body.omega, kHeldOut, kTest));
   fields.full = 0.5 * tests.products.cwiseProduct(gram.values * tests.products).colwise().sum().transpose();
   fields.cubic = tests.q.cwiseProduct(gram.work * tests.products).colwise().sum().transpose();
-  set_curvature(fields, body.omega, error);
+  set_curvature(body.comm, fields, body.omega, error);
   fields.error = error;
-  const std::ptrdiff_t kept = find_rank(fields, fields.error);
+  const std::ptrdiff_t kept = agree_on_rank(body.comm, fields);
   if (wants_values) {
     const Strains& strains = body.strains;
     fields.values.resize(strains.first_row(strains.element_count()), kept);
     ElementPoints points;
     RowMatrix shape, gradients, linear, z, theta;
     const RowMatrix x = combine.leftCols(kept);
-    for (std::int32_t e = 0; e < strains.element_count(); ++e) {
-      strains.calc_points(e, points);
-      strains.gather(e, body.shapes.data(), body.pairs.modes, shape);
-      Strains::calc_gradients(points, shape, gradients);
-      strains.calc_pair_strains(e, points, gradients, body.pairs, 0, pairs, z);
-      strains.calc_linear(e, points, linear);
-      strains.gather(e, gram.theta.data(), pairs, theta);
-      z.noalias() -= linear * theta;
-      fields.values.middleRows(strains.first_row(e), strains.row_count(e)).noalias() = z * x;
-    }
+    body.comm.agree([&] {
+      for (std::int32_t e = 0; e < strains.element_count(); ++e) {
+        strains.calc_points(e, points);
+        strains.gather(e, body.shapes.data(), body.pairs.modes, shape);
+        Strains::calc_gradients(points, shape, gradients);
+        strains.calc_pair_strains(e, points, gradients, body.pairs, 0, pairs, z);
+        strains.calc_linear(e, points, linear);
+        strains.gather(e, gram.theta.data(), pairs, theta);
+        z.noalias() -= linear * theta;
+        fields.values.middleRows(strains.first_row(e), strains.row_count(e)).noalias() = z * x;
+      }
+    });
   }
   keep_first(fields, kept);
   fix_signs(fields);
@@ -388,10 +418,11 @@ StressFields calc_fields_of_samples(const CoupledBody& body, double error) {
     const la::Matrix eta = la::multiply_transposed(body.comm, to_columns(basis), to_columns(held_out));
     fields.linear = la::multiply_transposed(body.comm, to_columns(basis), to_columns(mode_strains));
     double left = ((2 * energy - eta.colwise().squaredNorm().transpose()).array() / (2 * energy).array()).maxCoeff();
-    if (calc_curvature(fields.linear, eta, body.omega, error) >= kCurved) {
+    if (body.comm.broadcast([&] { return calc_curvature(fields.linear, eta, body.omega, error); }) >= kCurved) {
       const la::Vector found = (fields.linear * others.q).cwiseProduct(eta).colwise().sum().transpose();
       left = std::max(left, (found - cubic).norm() / cubic.norm());
     }
+    left = body.comm.broadcast(left);
     if (start == 0) start = std::max(left, error);
     if (left <= 0.2 * error) break;
     body.proceed(std::clamp(std::log(start / left) / std::log(start / (0.2 * error)), 0.0, 1.0));
@@ -402,21 +433,20 @@ StressFields calc_fields_of_samples(const CoupledBody& body, double error) {
   }
   fields.form = calc_form(body, basis);
   fields.linear = la::multiply_transposed(body.comm, to_columns(basis), to_columns(mode_strains));
-  set_curvature(fields, body.omega, error);
+  set_curvature(body.comm, fields, body.omega, error);
   // The fields in the order of their energy
   const la::Vector scale = calc_pair_scale(body.omega);
   const la::Matrix scaled = fields.form * scale.asDiagonal();
   const la::Matrix columns = scaled.transpose();
   la::Matrix vectors = multiply_transposed(columns, columns);
-  la::Vector values;
-  if (la::calc_eigenpairs_by_division(vectors, values) != 0) throw SolveError("internal: the Gram matrix has no eigenvectors");
+  (void)diagonalise(body.comm, vectors, "internal: the Gram matrix has no eigenvectors");
   const la::Matrix turned = vectors.rowwise().reverse();
   fields.form = multiply_transposed(turned, fields.form);
   fields.linear = (turned.transpose() * fields.linear).eval();
   fields.error = error;
-  const std::ptrdiff_t kept = find_rank(fields, fields.error);
+  const std::ptrdiff_t kept = agree_on_rank(body.comm, fields);
   keep_first(fields, kept);
-  fields.values = multiply(basis, turned.leftCols(kept));
+  body.comm.agree([&] { fields.values = multiply(basis, turned.leftCols(kept)); });
   fix_signs(fields);
   return fields;
 }

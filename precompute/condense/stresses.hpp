@@ -31,6 +31,8 @@ Samples make_samples(const std::vector<double>& omega, int count, std::uint64_t 
 /// The motions of one mode each.
 Samples make_single_samples(const std::vector<double>& omega);
 Samples join(const Samples& a, const Samples& b);
+/// (pairs) units in which all modes have the same energy: what a pair's products are multiplied by.
+la::Vector calc_pair_scale(const std::vector<double>& omega);
 
 /// R fields of scaled stress (Strains), orthonormal over the body: eta_r(q) = <s_r, E2(q)> = sum over the pairs of form(r, ij) q_i q_j.
 /// The condensed energy is 1/2 sum of (linear q + eta)_r² less 1/2 sum of (linear q)_r².

@@ -17,7 +17,7 @@
 #include "precompute/estimate/algebraic.hpp"
 #include "precompute/estimate/order.hpp"
 #include "precompute/estimate/recovery.hpp"
-#include "precompute/mesh/tet_mesh.hpp"
+#include "precompute/fem/element.hpp"
 #include "precompute/petsc/session.hpp"
 
 namespace carillon::estimate {
@@ -151,17 +151,11 @@ std::vector<double> calc_sums(const comm::Communicator& comm, const partition::L
 bool is_curved(const comm::Communicator& comm, const partition::LocalMesh& local) {
   bool is_straight = true;
   if (local.order == 2)
-    for (std::size_t e = 0; e < local.tets.size() && is_straight; e += 10)
-      for (int m = 0; m < 6; ++m) {
-        const Vec3 &a = local.nodes_m[local.tets[e + mesh::kEdges[m][0]]], &b = local.nodes_m[local.tets[e + mesh::kEdges[m][1]]];
-        const Vec3& middle = local.nodes_m[local.tets[e + 4 + m]];
-        double off = 0, length = 0;
-        for (int k = 0; k < 3; ++k) {
-          off += std::pow(middle[k] - (a[k] + b[k]) / 2, 2);
-          length += std::pow(b[k] - a[k], 2);
-        }
-        if (off > 1e-12 * length) is_straight = false;
-      }
+    for (std::size_t e = 0; e < local.tets.size() && is_straight; e += 10) {
+      std::array<Vec3, 10> x;
+      for (std::size_t i = 0; i < x.size(); ++i) x[i] = local.nodes_m[static_cast<std::size_t>(local.tets[e + i])];
+      is_straight = fem::is_straight(x);
+    }
   return !comm.all(is_straight);
 }
 

@@ -81,21 +81,6 @@ double calc_linear(std::span<const Vec3> x, std::array<Vec3, 4>& b) {
   return determinant / 6.0;
 }
 
-/// True when every mid-side node lies in the middle of its edge, to 1e-6 of the edge's length, which is mesh::is_curved's measure.
-bool is_straight(std::span<const Vec3> x) {
-  for (int e = 0; e < 6; ++e) {
-    const Vec3 &a = x[mesh::kEdges[e][0]], &b = x[mesh::kEdges[e][1]];
-    double off = 0.0, length = 0.0;
-    for (int k = 0; k < 3; ++k) {
-      const double bow = x[4 + e][k] - (a[k] + b[k]) / 2, edge = b[k] - a[k];
-      off += bow * bow;
-      length += edge * edge;
-    }
-    if (off > 1e-12 * length) return false;
-  }
-  return true;
-}
-
 /// Integral of L_a L_b over the element, by its volume.
 constexpr double find_moment(int a, int b) { return a == b ? 0.1 : 0.05; }
 
@@ -338,6 +323,20 @@ bool calc_curved_t10(std::span<const Vec3> x, const Solid& solid, double& mass_k
 }
 
 }  // namespace
+
+bool is_straight(std::span<const Vec3> x) {
+  for (int e = 0; e < 6; ++e) {
+    const Vec3 &a = x[mesh::kEdges[e][0]], &b = x[mesh::kEdges[e][1]];
+    double off = 0.0, length = 0.0;
+    for (int k = 0; k < 3; ++k) {
+      const double bow = x[4 + e][k] - (a[k] + b[k]) / 2, edge = b[k] - a[k];
+      off += bow * bow;
+      length += edge * edge;
+    }
+    if (off > 1e-12 * length) return false;
+  }
+  return true;
+}
 
 double calc_mean_dilatation_modulus_pa(const material::Elasticity& c) {
   // C s = 1 for the normal strains s under a unit pressure, by elimination; C is positive definite.

@@ -48,6 +48,10 @@ struct Solid {
       tensor_pa{};  // C_rbcd at 27 r + 9 c + 3 b + d: stress_rb from strain_cd, less mean_dilatation_modulus_pa; of anisotropic ones
 };
 
+/// Whether every mid-side node of a T10, nodes x (10), lies in the middle of its edge, to 1e-6 of the edge's length, which is
+/// mesh::is_curved's measure. Not collective.
+bool is_straight(std::span<const Vec3> x);
+
 /// Calculates K and M of the element with node positions x, (4) or (10) in the order of mesh::TetMesh. Mid-side nodes are used where they
 /// are (isoparametric) unless all lie within 1e-6 of an edge's length from its middle. Straight-sided T10 are integrated exactly; the mass
 /// of curved ones too, their stiffness by a rule of degree 5.

@@ -43,6 +43,7 @@ double calc_thickness(const Surface& surface, double volume_m3) {
 
 condense::CondenseOptions make_options(Run& run, const AccurateBody& found, std::vector<std::int32_t> kept) {
   condense::CondenseOptions options;
+  options.is_stretch = run.job.nonlinear->is_stretch;
   options.modes = std::min(run.job.nonlinear->modes, static_cast<int>(kept.size()));
   options.below_hz = run.job.nonlinear->below_hz;
   options.energy_error = run.job.nonlinear->energy_error;
@@ -95,7 +96,7 @@ CouplingReport couple_modes(Run& run, const AccurateBody& found) {
   const SolvedBody& solved = found.solved;
   const std::vector<std::int32_t> kept = find_kept_modes(run, solved);
   const condense::CondenseOptions options = make_options(run, found, kept);
-  const condense::Condensed result = name_errors(found.body.source, run, [&] {
+  condense::Condensed result = name_errors(found.body.source, run, [&] {
     if (solved.modes.lambda.empty()) throw InputError("\"nonlinear\" couples modes, and none lies in the band: widen \"band_hz\"");
     const fem::Materials& materials = solved.properties.materials;
     const fem::System system = fem::assemble(run.comm, found.body.pieces.local, materials, run.job.mass);
@@ -106,8 +107,8 @@ CouplingReport couple_modes(Run& run, const AccurateBody& found) {
   });
   warn(run, result);
   if (run.comm.is_root() && !result.energy.is_empty()) {
-    report.energy = result.energy;
     report.result = describe(result);
+    report.energy = std::move(result.energy);
     run.log.print(report.result);
     for (std::int32_t& mode : report.energy.modes)
       mode = static_cast<std::int32_t>(std::lower_bound(kept.begin(), kept.end(), mode) - kept.begin());

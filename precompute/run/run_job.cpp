@@ -189,10 +189,10 @@ RunSummary carry_out(Run& run, const fs::path& job_file) {
   open_checkpoint(run);
   AccurateBody found = run.job.accuracy_cents ? solve_to_accuracy(run) : solve_once(run);
   check_options_used(run.comm);
-  if (run.checkpoint && run.job.air.method == job::AirMethod::none && !run.job.nonlinear) run.checkpoint->finish();
-  const CouplingReport coupling = couple_modes(run, found);
+  if (run.checkpoint && !is_more_to_come(run.job)) run.checkpoint->finish();
+  CouplingReport coupling = couple_modes(run, found);
   bank::Bank bank = collect_bank(run, found);
-  bank.quartic = coupling.energy;
+  bank.quartic = std::move(coupling.energy);
   const AirReport air = add_air(run, bank);
   if (run.checkpoint) run.checkpoint->finish();
   RunSummary summary = write_outputs(run, found, air, coupling, std::move(bank));

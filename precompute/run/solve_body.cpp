@@ -25,9 +25,6 @@ void begin_checkpoint(Run& run, const Setting& setting, const Body& body) {
   run.checkpoint->begin(setting, io::find_system_fingerprint(run.comm, job, setting, body.pieces.local), body.pieces.local);
 }
 
-/// After the modes and their errors.
-bool is_more_to_come(const job::JobSpec& job) { return job.air.method != job::AirMethod::none || job.nonlinear.has_value(); }
-
 /// Between two stages, with all modes; `must` saves them in any case. Throws eigen::Stopped when the run was asked to stop.
 void save_if_requested(Run& run, const eigen::Modes& modes, bool must = false) {
   if (!run.checkpoint) return;
@@ -37,6 +34,8 @@ void save_if_requested(Run& run, const eigen::Modes& modes, bool must = false) {
 }
 
 }  // namespace
+
+bool is_more_to_come(const job::JobSpec& job) { return job.air.method != job::AirMethod::none || job.nonlinear.has_value(); }
 
 SolvedBody solve_body(Run& run, const Setting& setting, Body& body) {
   AssembledSystem system = assemble_system(run, setting, body);

@@ -20,4 +20,7 @@ struct SolvedBody {
 /// the body and the job named; eigen::Stopped when a signal asked for a checkpoint.
 SolvedBody solve_body(Run& run, const Setting& setting, Body& body);
 
+/// Whether the job asks for more after the modes and their errors: the air, or coupled modes.
+bool is_more_to_come(const job::JobSpec& job);
+
 }  // namespace carillon::run
