@@ -87,7 +87,7 @@ void Directivity::end_way(Ear& ear, std::size_t m) noexcept {
   Mode& mode = ear.modes[m];
   mode.left = 0;
   set_weight(ear.step, m, {});
-  --ear.plans[static_cast<std::size_t>(mode.ahead)].modes;
+  --ear.plans[static_cast<std::uint8_t>(mode.ahead)].modes;
   --ear.ramping;
   if (!mode.bends) return;
   set_weight(ear.bend, m, {});
