@@ -23,6 +23,7 @@ struct Options {
   Launcher launcher = Launcher::automatic;
   std::vector<std::string> mpirun_options;  // words for mpirun or srun, before ours: which hosts, by which network
   bool has_pictures = false;       // draw the first modes for the report now, where memory_gb has room; carillon report does it later
+  bool is_simulation = false;      // of carillon-simulate, as the request in the folder says: found out here
   bool is_prediction = false;      // do not solve: find out what it needs (carillon-precompute --validate), into prediction.json
   double grace_s = 60.0;           // from "save and stop" to the kill
   double hang_s = 600.0;           // without progress, while a rank does not work

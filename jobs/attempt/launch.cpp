@@ -125,10 +125,10 @@ bool is_under_slurm() { return std::getenv("SLURM_JOB_ID") != nullptr; }
 Launch make_launch(const Options& options, const std::string& token, const Scratch* scratch) {
   Launch launch;
   launch.environment = make_environment(token, scratch);
-  const fs::path solver = base::require_program("carillon-precompute");
+  const fs::path solver = base::require_program(options.is_simulation ? "carillon-simulate" : "carillon-precompute");
   Launcher launcher = options.launcher;
   if (launcher == Launcher::automatic) launcher = options.ranks == 1 && !is_under_slurm() ? Launcher::alone : Launcher::mpirun;
-  if (launcher == Launcher::alone) launch.environment.push_back("OMPI_MCA_ess_singleton_isolated=1");  // no daemon for one rank
+  if (launcher == Launcher::alone) launch.environment.emplace_back("OMPI_MCA_ess_singleton_isolated=1");  // no daemon for one rank
   if (launcher == Launcher::mpirun) {
     launch.arguments = {base::require_program("mpirun"), "-np", std::to_string(options.ranks), "--bind-to", "none", "--oversubscribe"};
     launch.arguments.insert(launch.arguments.end(), options.mpirun_options.begin(), options.mpirun_options.end());
@@ -147,7 +147,11 @@ Launch make_launch(const Options& options, const std::string& token, const Scrat
   const std::string folder = fmt::format("work/{}/{}", options.id.substr(0, 2), options.id);
   if (launcher != Launcher::alone) add({"--folder", options.root.c_str(), folder.c_str()});
   add({"--result", store::kResultFile});
-  if (options.is_prediction) {
+  if (options.is_simulation && options.is_prediction) {
+    add({"--validate", "--json"});
+  } else if (options.is_simulation) {
+    add({"--checkpoint", store::kCheckpointFile, "--progress", store::kProgressFile});  // what it writes is in the job
+  } else if (options.is_prediction) {
     add({"--validate", "--json", "--patience", "1000000", "--count", "20"});  // what is reserved rests on the mesh, not on an estimate
   } else {
     add({"--bank", store::kBankFile, "--checkpoint", store::kCheckpointFile, "--progress", store::kProgressFile});

@@ -12,10 +12,12 @@
 #include <cerrno>
 #include <cstring>
 #include <system_error>
+#include <vector>
 
 #include "jobs/attempt/attempt.hpp"
 #include "jobs/store/identity.hpp"
 #include "jobs/store/open_folder.hpp"
+#include "jobs/store/order.hpp"
 #include "runtime/bank/bank.hpp"
 #include "runtime/base/descriptor.hpp"
 #include "runtime/base/failure.hpp"
@@ -70,11 +72,13 @@ void write_report(const fs::path& folder, report::Options& wanted) {
 }  // namespace
 
 std::optional<std::string> find_bank_fault(const fs::path& work, const store::Request& request, bool& has_bank) {
-  const fs::path file = work / store::kBankFile;
+  const bool is_simulation = request.input_kind == store::InputKind::simulation;
+  const fs::path file = work / (is_simulation ? store::kRecordFile : store::kBankFile);
   std::error_code error;
   const fs::file_status status = fs::symlink_status(file, error);
   has_bank = fs::exists(status);
-  if (!has_bank) return "there is no bank";
+  if (!has_bank) return is_simulation ? "there is no record" : "there is no bank";
+  if (is_simulation) return store::find_output_fault(work, request);
   if (!fs::is_regular_file(status)) return "what lies in place of the bank is no regular file";
   try {
     return store::find_origin_fault(bank::read_bank(file).provenance, request);
@@ -102,6 +106,7 @@ bool repair_records(const store::Store& store, const store::Request& request) {
   const store::Id id = store::calc_id(request);
   const store::OpenFolder folder = store.open_bank(id);
   const store::Temporary temporary = store.make_temporary();
+  if (request.input_kind == store::InputKind::simulation) return false;  // it is carried out again
   std::string record;
   try {
     record = bank::read_bank(folder.path() / store::kBankFile).provenance;
@@ -124,13 +129,17 @@ void publish(const store::Store& store, const store::Id& id, const fs::path& wor
   const store::Temporary temporary = store.make_temporary();
   const fs::path folder = temporary.content().shared_path();
   try {
-    link_or_copy(work / store::kBankFile, folder / store::kBankFile);
+    const std::optional<store::Request> request = store::read_request(work);
+    const bool is_simulation = request && request->input_kind == store::InputKind::simulation;
+    std::vector<std::string> results{store::kBankFile};
+    if (is_simulation) results = store::list_outputs(request->job);
+    for (const std::string& name : results) link_or_copy(work / name, folder / name);
     // The solver writes the job with every value that it used next to the bank; it runs again as a job.
     if (!take_copy(work / (std::string(store::kBankFile) + ".resolved.json"), folder / store::kJobFile))
       take_copy(work / store::kJobFile, folder / store::kJobFile);
     take_copy(work / store::kRequestFile, folder / store::kRequestFile);
     take_copy(work / store::kLogFile, folder / store::kLogFile);
-    write_report(folder, wanted);
+    if (!is_simulation) write_report(folder, wanted);
     outcome::write_outcome(folder, outcome);
     store.publish(id, temporary);
   } catch (const SystemError& error) {

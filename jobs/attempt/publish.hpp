@@ -12,8 +12,8 @@
 
 namespace carillon::attempt {
 
-/// What is wrong with the bank in the folder of work, in one sentence; none when it is whole and sane and was made of that request.
-/// `has_bank` says whether there is one.
+/// What is wrong with the bank in the folder of work, or with the files of a simulation, in one sentence; none when it is whole and sane
+/// and was made of that request. `has_bank` says whether there is one.
 std::optional<std::string> find_bank_fault(const std::filesystem::path& work, const store::Request& request, bool& has_bank);
 
 /// Why one of the records next to a bank in the store (job.json, request.json, outcome.json) is not what was published, or not that of this

@@ -24,6 +24,7 @@
 #include "jobs/store/files.hpp"
 #include "jobs/store/identity.hpp"
 #include "jobs/store/open_folder.hpp"
+#include "jobs/store/order.hpp"
 #include "jobs/store/store.hpp"
 #include "runtime/base/clock.hpp"
 #include "runtime/base/result.hpp"
@@ -147,6 +148,7 @@ class Attempt {
   /// What an attempt before this one left behind, processes and files; then it is we who work here.
   void clean() {
     const std::optional<outcome::Attempt> before = outcome::read_attempt(work_);
+    if (before) ranks_before_ = before->ranks;
     if (before && before->token != outcome_.token) {
       if (before->process.host == outcome_.host) process::end_with_environment("CARILLON_ATTEMPT=" + before->token);
       Scratch::remove_left(before->token);
@@ -173,20 +175,33 @@ class Attempt {
       throw InputError(*fault + "; submit the job again, or carillon verify --repair makes its folder again");
     const store::Request request = *store::read_request(work_);
     if (const auto fault = store::find_input_fault(store_, request))
-      throw InputError(fmt::format("{}; submit the job again, which copies its {} again", *fault, to_text(request.input_kind)));
+      throw InputError(fmt::format("{}; submit the job again, which copies its {} again", *fault,
+                                   request.inputs.empty() ? to_text(request.input_kind) : "meshes"));
     return request;
+  }
+
+  /// A checkpoint of a simulation belongs to a number of ranks.
+  void drop_other_ranks() {
+    std::error_code error;
+    if (ranks_before_ == 0 || ranks_before_ == options_.ranks || !fs::exists(work_ / store::kCheckpointFile, error)) return;
+    fs::remove(work_ / store::kCheckpointFile, error);
+    store::append_text(work_ / store::kLogFile,
+                       fmt::format("carillon attempt: the checkpoint is of {} ranks and these are {}; it starts from the beginning\n",
+                                   ranks_before_, options_.ranks));
   }
 
   void solve(double percent_before) {
     const store::Request request = check_inputs();
+    options_.is_simulation = request.input_kind == store::InputKind::simulation;
+    if (options_.is_simulation) drop_other_ranks();
     bool has_bank = false;
     if (!find_bank_fault(work_, request, has_bank)) {
       // What that attempt printed may be lost with it; a job that is done has a log, under Slurm too, where this error stream is not it.
       store::append_text(work_ / store::kLogFile,
-                         "carillon attempt: the bank was solved by an attempt that ended before it was published\n");
+                         "carillon attempt: the result was computed by an attempt that ended before it was published\n");
       return set(Cause::done, "");
     }
-    if (has_bank) store::OpenFolder::open(work_).remove(store::kBankFile);
+    if (has_bank) store::OpenFolder::open(work_).remove(options_.is_simulation ? store::kRecordFile : store::kBankFile);
     const fs::path log = work_ / store::kLogFile, checkpoint = work_ / store::kCheckpointFile;
     std::optional<Scratch> scratch;
     if (!is_under_slurm()) scratch.emplace(outcome_.token);
@@ -220,7 +235,7 @@ class Attempt {
       return set(Cause::predicted, "what it needs is predicted; waits for room");
     }
     if (const std::optional<std::string> fault = find_bank_fault(work_, request, has_bank))
-      return set(Cause::bad_bank, "the solver exited with 0, but its bank cannot be used: " + *fault);
+      return set(Cause::bad_bank, "the solver exited with 0, but its result cannot be used: " + *fault);
     if (const auto fault = store::find_input_fault(store_, request))
       set(Cause::bad_input, fmt::format("while it was solved {}; submit the job again", *fault));
   }
@@ -260,6 +275,7 @@ class Attempt {
   const fs::path work_;  // that folder, whatever its name leads to
   const store::Store& store_;
   const store::Id id_;
+  int ranks_before_ = 0;  // of the attempt before
   outcome::Outcome outcome_;
 };
 

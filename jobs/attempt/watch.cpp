@@ -26,7 +26,8 @@ namespace carillon::attempt {
 namespace {
 
 constexpr double kStepS = 0.5, kMaxStepS = 2.0, kLookS = 2.0, kAskAgainS = 10.0, kTermS = 5.0;
-constexpr const char* kRankName = "carillon-precom";  // as the kernel cuts it
+/// As the kernel cuts them.
+bool is_rank_name(const std::string& name) { return name == "carillon-precom" || name == "carillon-simula"; }
 
 sigset_t make_signals() {
   sigset_t set;
@@ -117,7 +118,7 @@ class Watcher {
     double idle_s = 0.0;
     std::map<pid_t, Idle> idle;
     for (const auto& [pid, usage] : all) {
-      if (usage.name != kRankName && !(pid == child_ && options_.launcher != Launcher::srun)) continue;
+      if (!is_rank_name(usage.name) && !(pid == child_ && options_.launcher != Launcher::srun)) continue;
       const std::uint64_t cpu_ns = calc_cpu_below(all, pid);
       const auto before = idle_.find(pid);
       const bool is_idle = !has_news && before != idle_.end() && before->second.cpu_ns == cpu_ns;

@@ -150,9 +150,11 @@ void add_run(CLI::App& app, Shared& shared, Run& run) {
 void add_get(CLI::App& app, Shared& shared, Run& run) {
   auto options = std::make_shared<GetOptions>();
   CLI::App* command = app.add_subcommand(
-      "get", "Prints the path of the finished bank, read-only in the store. Exit code 1: not there yet, with its state.");
+      "get",
+      "Prints the path of the finished bank, or of each file of a simulation, read-only in the store. Exit code 1: not there yet, with its "
+      "state.");
   command->add_option("JOB", options->word, "Job file (what it holds now), or an id or its beginning")->required();
-  command->add_option("--to", options->to, "Copy the bank to this file or into this folder");
+  command->add_option("--to", options->to, "Copy the bank to this file or into this folder; the files of a simulation into this folder");
   set_work(*command, shared, run, options, run_get);
 }
 

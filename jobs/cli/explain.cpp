@@ -1,6 +1,7 @@
 // carillon explain: would a job run, and why: what differs from what this job file asked for last.
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <map>
 #include <sstream>
 
@@ -40,10 +41,20 @@ std::map<std::string, std::string> read_leaves(const std::string& job) {
   return leaves;
 }
 
+/// The files of a simulation, in the order of its bodies.
+void add_input_changes(const std::vector<store::Input>& before, const std::vector<store::Input>& after, std::vector<Change>& changes) {
+  for (std::size_t i = 0; i < std::min(before.size(), after.size()); ++i)
+    if (before[i].sha256 != after[i].sha256)
+      changes.push_back(
+          {to_text(after[i].kind), after[i].file, "SHA-256 " + before[i].sha256.substr(0, 12), "SHA-256 " + after[i].sha256.substr(0, 12)});
+}
+
 std::vector<Change> find_changes(const store::Request& before, const store::Request& after) {
   std::vector<Change> changes;
   if (before.input_kind != after.input_kind)
     changes.push_back({"input", "", to_text(before.input_kind), to_text(after.input_kind)});
+  else if (after.input_kind == store::InputKind::simulation)
+    add_input_changes(before.inputs, after.inputs, changes);
   else if (before.input_sha256 != after.input_sha256)
     changes.push_back(
         {to_text(after.input_kind), "", "SHA-256 " + before.input_sha256.substr(0, 12), "SHA-256 " + after.input_sha256.substr(0, 12)});
@@ -70,7 +81,8 @@ std::string format_change(const Change& change, const store::Request& request) {
   if (change.part == "job") return fmt::format("{}: was {}, is {}", show(change.key), before, after);
   if (change.part == "solver") return fmt::format("solver: was {}, is {}", before, after);
   if (change.part == "input") return fmt::format("input: was a {}, is a {}", before, after);
-  return fmt::format("{} {}: its content was {}, is {}", change.part, show(request.input_file), before, after);
+  const std::string& file = change.key.empty() ? request.input_file : change.key;
+  return fmt::format("{} {}: its content was {}, is {}", change.part, show(file), before, after);
 }
 
 /// What would happen on submit, in one word for programs and one line for people.
@@ -80,11 +92,15 @@ struct Explanation {
   bool would_run = false;
 };
 
+/// Where the results are, in words.
+std::string describe_results(const store::Store& store, const store::Id& id) {
+  const auto results = list_results(store, id);
+  if (const auto bank = results.find("bank"); bank != results.end()) return "its bank is " + show(bank->second.string(), 4000);
+  return "its files are in " + show(store.bank_folder(id).string(), 4000);
+}
+
 Explanation explain(Shared& shared, const store::Id& id, const std::optional<registry::Job>& job) {
-  if (shared.store().has_bank(id))
-    return {"done",
-            fmt::format("nothing would run: its bank is {}", show((shared.store().bank_folder(id) / store::kBankFile).string(), 4000)),
-            false};
+  if (shared.store().has_bank(id)) return {"done", fmt::format("nothing would run: {}", describe_results(shared.store(), id)), false};
   const bool is_open = job && (job->state == registry::JobState::queued || job->state == registry::JobState::running ||
                                job->state == registry::JobState::waiting);
   if (shared.store().has_bank_folder(id) && !is_open)
@@ -131,7 +147,9 @@ int run_explain(Shared& shared, const ExplainOptions& options) {
       entry["after"] = change.after.empty() ? Json::Value() : to_json(change.after);
       root["changes"].append(entry);
     }
-    root["bank"] = explanation.word == "done" ? to_json((shared.store().bank_folder(id) / store::kBankFile).string()) : Json::Value();
+    root["bank"] = Json::Value();
+    if (const auto results = list_results(shared.store(), id); explanation.word == "done" && results.count("bank") > 0)
+      root["bank"] = to_json(results.at("bank").string());
     print_json(root);
     return 0;
   }

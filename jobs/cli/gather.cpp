@@ -30,7 +30,7 @@ Source keep_error(const std::string& job_file, const Read& read) {
   Source source;
   source.job_file = job_file;
   try {
-    source.job = read();
+    source.order = read();
   } catch (const InputError& error) {
     source.error = error.what();
   }
@@ -38,7 +38,7 @@ Source keep_error(const std::string& job_file, const Read& read) {
 }
 
 Source read_file_source(const fs::path& file) {
-  return keep_error(name_of(file), [&] { return job::read_job(file, job::BankKey::optional); });
+  return keep_error(name_of(file), [&] { return store::read_order(file); });
 }
 
 std::vector<Source> read_folder(const fs::path& folder) {
@@ -64,8 +64,7 @@ std::string strip(const std::string& line) {
 Source read_line(const std::string& line, const fs::path& manifest, int number) {
   const std::string place = fmt::format("{}:{}", manifest.string(), number);
   if (line.starts_with('{')) {
-    return keep_error(fmt::format("{}#{}", name_of(manifest), number),
-                      [&] { return job::parse_job(line, manifest, job::BankKey::optional, number); });
+    return keep_error(fmt::format("{}#{}", name_of(manifest), number), [&] { return store::parse_order(line, manifest, number); });
   }
   const fs::path file = fs::path(line).is_absolute() ? fs::path(line) : manifest.parent_path() / line;
   Source source = read_file_source(file);
@@ -103,11 +102,17 @@ std::vector<Source> read_word(const std::string& word) {
 void add_request(Source& source, store::RequestMaker& maker) {
   if (!source.error.empty()) return;
   try {
-    source.request = maker.make(source.job);
+    source.request = maker.make(source.order);
     source.request.job_file = source.job_file;
   } catch (const InputError& error) {
-    source.error = fmt::format("{}: {}", source.job.file.string(), error.what());
+    source.error = fmt::format("{}: {}", source.order.file().string(), error.what());
   }
+}
+
+/// The version of carillon-simulate, which is started only where it is needed.
+std::string find_simulator(const std::vector<Source>& sources) {
+  const bool is_needed = std::any_of(sources.begin(), sources.end(), [](const Source& source) { return source.order.is_simulation(); });
+  return is_needed ? read_program_version("carillon-simulate") : "";
 }
 
 }  // namespace
@@ -120,7 +125,7 @@ std::vector<Source> gather(const std::vector<std::string>& words, const std::str
       if (seen.insert(source.job_file).second) sources.push_back(std::move(source));
     }
   }
-  store::RequestMaker maker(solver);
+  store::RequestMaker maker(solver, find_simulator(sources));
   for (Source& source : sources) add_request(source, maker);
   return sources;
 }
@@ -128,8 +133,9 @@ std::vector<Source> gather(const std::vector<std::string>& words, const std::str
 Source gather_one(const std::string& word, const std::string& solver) {
   Source source;
   source.job_file = name_of(word);
-  source.job = job::read_job(word, job::BankKey::optional);
-  source.request = store::RequestMaker(solver).make(source.job);
+  source.order = store::read_order(word);
+  source.request =
+      store::RequestMaker(solver, source.order.is_simulation() ? read_program_version("carillon-simulate") : "").make(source.order);
   source.request.job_file = source.job_file;
   return source;
 }

@@ -15,7 +15,7 @@ namespace carillon::cli {
 /// One job as it was named, or why it cannot be used.
 struct Source {
   std::string job_file;  // store::to_text() of an absolute path, with "#7" for line 7 of a manifest
-  job::JobSpec job;
+  store::JobOrder order;
   store::Request request;
   std::string error;  // empty: it can be used
 };

@@ -18,6 +18,7 @@
 #include "jobs/cli/commands.hpp"
 #include "jobs/process/process.hpp"
 #include "jobs/store/files.hpp"
+#include "jobs/store/identity.hpp"
 #include "jobs/store/open_folder.hpp"
 #include "runtime/base/error.hpp"
 
@@ -134,9 +135,8 @@ bool add_jobs(Shared& shared, const References& references, std::vector<Item>& i
   const auto use_input = [&](const fs::path& folder) {
     try {
       const auto request = store::read_request(folder);
-      if (request && request->input_kind != store::InputKind::shape)
-        used_inputs.insert(
-            store.input_file(store::require_id(request->input_sha256, "request"), request->input_format).replace_extension());
+      for (const store::Input& input : request ? store::list_inputs(*request) : std::vector<store::Input>())
+        used_inputs.insert(store::find_input_file(store, input).replace_extension());
     } catch (const InputError&) {
       is_known = false;
     }

@@ -1,4 +1,4 @@
-// carillon get: the bank of a job.
+// carillon get: the bank of a job, or the files of a simulation.
 #include <fcntl.h>
 #include <fmt/core.h>
 #include <unistd.h>
@@ -21,8 +21,8 @@ namespace fs = std::filesystem;
 void copy_to(const fs::path& from, const fs::path& wanted) {
   std::error_code error;
   const fs::path to = fs::is_directory(wanted, error) ? wanted / from.filename() : wanted;
-  if (fs::equivalent(from, to, error)) throw InputError(fmt::format("{}: this is the bank in the store; name another file", to.string()));
-  base::check_writable(to, "copy of the bank");
+  if (fs::equivalent(from, to, error)) throw InputError(fmt::format("{}: this is the file in the store; name another", to.string()));
+  base::check_writable(to, "copy");
   const fs::path temporary = to.parent_path() / fmt::format(".{}.tmp.{}", to.filename().string().substr(0, 200), ::getpid());
   const auto refuse = [&](int code) {
     ::unlink(temporary.c_str());
@@ -48,12 +48,20 @@ int run_get(Shared& shared, const GetOptions& options) {
   shared.only_reads = true;
   shared.settle();
   const auto [id, job] = find_by_content(shared, options.word);
-  const fs::path bank = shared.store().bank_folder(id) / store::kBankFile;
   // A copy is for good: every byte is looked at before.
   const auto fault = shared.store().find_bank_fault(id, options.to.empty() ? store::Look::quick : store::Look::full);
   const bool is_done = !fault, is_damaged = fault && shared.store().has_bank_folder(id);
   const std::vector<std::string> warnings = is_done ? store::read_warnings(shared.store(), id) : std::vector<std::string>();
-  if (is_done && !options.to.empty()) copy_to(bank, options.to);
+  const auto results = is_done ? list_results(shared.store(), id) : std::map<std::string, fs::path>();
+  std::map<std::string, std::string> places;  // that are printed
+  const bool is_bank = results.count("bank") > 0;
+  std::error_code error;
+  if (is_done && !is_bank && !options.to.empty() && !fs::is_directory(options.to, error))
+    throw InputError(fmt::format("{}: is no folder, and a simulation has several files; name a folder that is there", options.to));
+  for (const auto& [key, file] : results) {
+    if (!options.to.empty()) copy_to(file, options.to);
+    places[key] = options.to.empty() ? file.string() : is_bank ? options.to : (fs::path(options.to) / file.filename()).string();
+  }
   const bool is_again = job && (job->state == registry::JobState::queued || job->state == registry::JobState::running ||
                                 job->state == registry::JobState::waiting);
   const std::string state = is_done ? "done" : is_damaged && !is_again ? "failed" : job ? to_text(job->state) : "new";
@@ -67,15 +75,17 @@ int run_get(Shared& shared, const GetOptions& options) {
     root["state"] = state;
     root["reason"] = to_json(why);
     root["warnings"] = to_json(warnings);
-    root["bank"] = is_done ? to_json(bank.string()) : Json::Value();
+    root["bank"] = is_bank ? to_json(results.at("bank").string()) : Json::Value();
+    root["results"] = Json::objectValue;
+    for (const auto& [key, file] : results) root["results"][key] = to_json(file.string());
     root["copy"] = is_done && !options.to.empty() ? to_json(options.to) : Json::Value();
     print_json(root);
   } else if (is_done) {
-    fmt::print("{}\n", options.to.empty() ? bank.string() : options.to);
+    for (const auto& [key, place] : places) fmt::print("{}\n", place);
     for (const std::string& warning : warnings) fmt::print(stderr, "carillon: warning: {}\n", show_message(warning));
   } else {
     const std::string reason = job || is_damaged ? show_message(why) : "carillon submit asks for it";
-    fmt::print(stderr, "carillon: no bank yet: {} is {}{}{}\n", id.short_text(), state, reason.empty() ? "" : "; ", reason);
+    fmt::print(stderr, "carillon: no result yet: {} is {}{}{}\n", id.short_text(), state, reason.empty() ? "" : "; ", reason);
   }
   if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
   return is_done ? 0 : kExitNotYet;

@@ -16,8 +16,10 @@ constexpr std::size_t kMaxVersionBytes = 4096;
 
 }  // namespace
 
-std::string read_solver_version() {
-  const fs::path program = base::require_program("carillon-precompute");
+std::string read_solver_version() { return read_program_version("carillon-precompute"); }
+
+std::string read_program_version(const std::string& name) {
+  const fs::path program = base::require_program(name);
   const base::Finished finished = base::run({.words = {program, "--version"}, .output = base::kCapture, .errors = base::kInherit},
                                             {.max_bytes = kMaxVersionBytes, .keeps_tail = true});
   const std::string line = finished.output.substr(0, finished.output.find('\n'));

@@ -93,6 +93,8 @@ int report_job(Shared& shared, const ReportOptions& options) {
   root["state"] = is_done ? "done" : job ? to_text(job->state) : "new";
   fs::path page;
   std::error_code error;
+  if (is_done && list_results(shared.store(), id).count("bank") == 0)
+    throw InputError(fmt::format("{}: is a simulation, and reports are of banks; carillon get prints its files", options.word));
   if (is_done) {
     const std::string title = find_title(folder);
     const bool has_pictures = fs::exists(folder / report::kPictureFile, error);

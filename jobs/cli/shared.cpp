@@ -154,10 +154,11 @@ std::string find_reason(Shared& shared, const registry::Job& job) {
   if (reason.find(inputs) == std::string::npos) return reason;
   try {
     const auto request = store::read_request(shared.store().find_folder(job.id));
-    if (!request || request->input_kind == store::InputKind::shape) return reason;
-    const std::string copy = shared.store().input_file(store::require_id(request->input_sha256, "request"), request->input_format).string();
-    for (std::size_t at = reason.find(copy); at != std::string::npos; at = reason.find(copy, at + request->input_file.size()))
-      reason.replace(at, copy.size(), request->input_file);
+    for (const store::Input& input : request ? store::list_inputs(*request) : std::vector<store::Input>()) {
+      const std::string copy = store::find_input_file(shared.store(), input).string();
+      for (std::size_t at = reason.find(copy); at != std::string::npos; at = reason.find(copy, at + input.file.size()))
+        reason.replace(at, copy.size(), input.file);
+    }
   } catch (const InputError&) {  // a damaged record costs the name, not the reason
   }
   return reason;
@@ -172,6 +173,16 @@ Json::Value to_json(const std::vector<std::string>& texts) {
   Json::Value list(Json::arrayValue);
   for (const std::string& text : texts) list.append(to_json(text));
   return list;
+}
+
+std::map<std::string, fs::path> list_results(const store::Store& store, const store::Id& id) {
+  const fs::path folder = store.bank_folder(id);
+  std::error_code error;
+  if (!fs::exists(folder / store::kRecordFile, error)) return {{"bank", folder / store::kBankFile}};
+  std::map<std::string, fs::path> results;
+  for (const store::Output& output : store::kOutputs)
+    if (fs::exists(folder / output.file, error)) results[output.key] = folder / output.file;
+  return results;
 }
 
 Json::Value describe(Shared& shared, const registry::Job& job) {
@@ -199,7 +210,10 @@ Json::Value describe(Shared& shared, const registry::Job& job) {
   root["seconds_left"] = progress && progress->seconds_left >= 0 && job.state == registry::JobState::running
                              ? Json::Value(progress->seconds_left)
                              : Json::Value();
-  root["bank"] = is_done ? to_json((shared.store().bank_folder(job.id) / store::kBankFile).string()) : Json::Value();
+  const auto results = is_done ? list_results(shared.store(), job.id) : std::map<std::string, fs::path>();
+  root["bank"] = results.count("bank") > 0 ? to_json(results.at("bank").string()) : Json::Value();
+  root["results"] = Json::objectValue;
+  for (const auto& [key, file] : results) root["results"][key] = to_json(file.string());
   root["warnings"] = to_json(find_warnings(shared, job));
   return root;
 }

@@ -4,6 +4,7 @@
 #include <json/json.h>
 
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -81,6 +82,8 @@ std::string format_bytes(double bytes);
 
 /// The line that carillon-precompute --version prints. SystemError when it cannot be started.
 std::string read_solver_version();
+/// The same of another program of this installation.
+std::string read_program_version(const std::string& name);
 /// Replaces this process by a program of this installation. Returns only by SystemError.
 [[noreturn]] void become(const std::string& program, std::vector<std::string> arguments);
 
@@ -94,6 +97,8 @@ bool is_submitted_again(const registry::Job& job, bool has_work);
 
 /// A row with its progress, its bank and its log, under the keys of docs/howto/jobs.md.
 Json::Value describe(Shared& shared, const registry::Job& job);
+/// The files of a job that is done, by the keys of jobs: "bank", or those of a simulation ("sound", "motion" ...).
+std::map<std::string, std::filesystem::path> list_results(const store::Store& store, const store::Id& id);
 /// What the solver warned of, of a job that is done; `name` stands for its job file.
 std::vector<std::string> find_warnings(Shared& shared, const registry::Job& job, const std::string& name = "the job");
 /// A list of texts as JSON.

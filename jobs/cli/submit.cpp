@@ -46,7 +46,7 @@ std::vector<SubmitResult> enter(Shared& shared, const SubmitOptions& options, co
   std::vector<store::Asked> asked;
   for (const Source& source : sources) {
     if (!source.error.empty()) continue;
-    asked.push_back({&source.job, &source.request});
+    asked.push_back({&source.order, &source.request});
     submissions.push_back({source.job_file, source.request});
   }
   const std::vector<bool> was_made = store::prepare_work(shared.store(), asked);
@@ -76,7 +76,7 @@ void print_errors(const std::vector<Source>& sources) {
 /// What the solver warned of: with the lines of the job file that was submitted, where its numbers are meant.
 std::vector<std::string> find_own_warnings(Shared& shared, const SubmitResult& result) {
   std::vector<std::string> warnings = find_warnings(shared, *result.job, result.source->job_file);
-  std::vector<std::string> own = result.source->job.warnings;
+  std::vector<std::string> own = result.source->order.warnings();
   for (std::string& warning : warnings) {
     if (!warning.starts_with(result.source->job_file + ": ")) continue;
     const std::string text = warning.substr(result.source->job_file.size());

@@ -61,12 +61,13 @@ void check_job(Shared& shared, const store::Id& id, std::map<std::string, std::o
     if (const auto fault = store::find_job_fault(store, id, store.work_folder(id))) findings.push_back({"work", id, *fault, "", false});
   }
   const auto request = queue::find_request(store, shared.registry(), id);
-  if (!request || request->input_kind == store::InputKind::shape) return;
-  const auto [entry, is_new] = inputs.try_emplace(request->input_sha256 + "." + request->input_format);
-  if (is_new) entry->second = store::find_input_fault(store, *request);
-  // Of a bank that is whole the input is not needed; one that gc took away is no damage.
-  const bool is_gone = entry->second && entry->second->ends_with("is missing");
-  if (entry->second && is_new && !(is_gone && store.has_bank(id))) findings.push_back({"input", id, *entry->second, "", false});
+  for (const store::Input& input : request ? store::list_inputs(*request) : std::vector<store::Input>()) {
+    const auto [entry, is_new] = inputs.try_emplace(input.sha256 + "." + input.format);
+    if (is_new) entry->second = store::find_input_fault(store, input);
+    // Of a bank that is whole the input is not needed; one that gc took away is no damage.
+    const bool is_gone = entry->second && entry->second->ends_with("is missing");
+    if (entry->second && is_new && !(is_gone && store.has_bank(id))) findings.push_back({"input", id, *entry->second, "", false});
+  }
 }
 
 /// Puts a job back into the queue, or says in its row what is damaged.

@@ -1,5 +1,5 @@
 // Method:     A job is predicted by precompute/cost from the nodes that it asks for or the size of its mesh file. Larger jobs, and those
-//             whose size is unknown, are predicted by carillon-precompute --validate instead.
+//             whose size is unknown, are predicted by carillon-precompute --validate instead, and simulations by carillon-simulate.
 // Source:     precompute/cost. Deviations: none.
 #include "jobs/queue/needs.hpp"
 
@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "jobs/attempt/attempt.hpp"
+#include "jobs/outcome/outcome.hpp"
 #include "precompute/cost/calibration.hpp"
 #include "precompute/cost/memory.hpp"
 #include "precompute/cost/seconds.hpp"
@@ -90,11 +91,16 @@ JobNeeds find_needs(const store::Store& store, const registry::Job& job) {
   } catch (const InputError&) {
   }
   const Size size = request ? find_size(store, *request) : Size{};
-  needs.need = guess_need(size.problem);
+  const bool is_simulation = request && request->input_kind == store::InputKind::simulation;
+  if (!is_simulation) needs.need = guess_need(size.problem);
   const bool has_prediction = read_prediction(folder, needs.need);
   needs.wants_prediction = !has_prediction && job.resources.memory_gb <= 0.0 &&
                            (!size.is_known || static_cast<double>(cost::complete(size.problem).nodes) > kLargeNodes);
   set_asked(needs, job);
+  // Its checkpoint is of so many ranks.
+  std::error_code error;
+  if (is_simulation && needs.need.ranks == 0 && fs::exists(folder / store::kCheckpointFile, error))
+    if (const auto before = outcome::read_attempt(folder)) needs.need.ranks = before->ranks;
   return needs;
 }
 

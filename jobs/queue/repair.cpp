@@ -31,8 +31,9 @@ std::optional<std::string> restore(const store::Store& store, const registry::Re
   if (!request) return "what it was to work on is gone from the store; submit it again";
   const std::optional<std::string> fault = store::find_input_fault(store, *request);
   if (fault && !store::restore_input(store, *request))
-    return fmt::format("{}, and {} has been removed or changed; submit the job with its {}", *fault, request->input_file,
-                       to_text(request->input_kind));
+    return fmt::format("{}, and {} has been removed or changed; submit the job with its {}", *fault,
+                       request->inputs.empty() ? request->input_file : "a file of it",
+                       request->inputs.empty() ? to_text(request->input_kind) : "meshes");
   if (store.has_bank_folder(id)) store.set_bank_aside(id);
   if (!is_whole) store::restore_work(store, *request);
   return std::nullopt;

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 
 #include "runtime/base/error.hpp"
 #include "runtime/base/file.hpp"
@@ -28,6 +29,12 @@ std::optional<Id> parse_id(std::string_view text) {
 Id require_id(std::string_view text, const std::string& where) {
   if (auto id = parse_id(text)) return *id;
   throw InputError(fmt::format("{}: an id is {} hex digits, and this is none", where, kIdDigits));
+}
+
+std::string make_input_name(const Id& sha256, const std::string& format) {
+  const bool is_plain =
+      format.size() <= 8 && std::all_of(format.begin(), format.end(), [](unsigned char c) { return std::isalnum(c) != 0; });
+  return sha256.text() + (format.empty() || !is_plain ? "" : "." + (format == "tetgen" ? std::string("node") : format));
 }
 
 Id hash_text(std::string_view text) { return *parse_id(base::to_hex(base::calc_sha256(text))); }

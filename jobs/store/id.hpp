@@ -38,4 +38,7 @@ Id hash_file(const std::filesystem::path& file, std::string_view what, const std
 /// 16 random bytes as 32 hex digits: the name of an attempt, of a temporary folder.
 std::string make_random_name();
 
+/// The name of an input in the store, of its SHA-256 and its format ("tetgen": that of the .node file).
+std::string make_input_name(const Id& sha256, const std::string& format);
+
 }  // namespace carillon::store

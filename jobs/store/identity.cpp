@@ -1,3 +1,4 @@
+// What a job is, from its file to its id, its copies of inputs and its folder of work: longer than most files.
 // Method:     The id is SHA-256 over the resolved job in one canonical line, the kind, format and SHA-256 of the input's bytes, and the
 //             solver's version. Jobs that ask for the same in other words resolve to the same line.
 // Source:     own; FIPS 180-4 for the hash.
@@ -54,6 +55,7 @@ void drop_signs_of_zero(Json::Value& value) {
 
 /// A resolved job without paths on one line.
 std::string make_canonical(Json::Value root) {
+  if (root.isMember("simulate")) return make_canonical_simulation(std::move(root));
   root.removeMember("mesh");
   if (root["body"].isObject())
     for (const char* path : {"surface", "modes_csv"}) root["body"].removeMember(path);
@@ -91,6 +93,7 @@ Json::Value& get_input_key(Json::Value& root, InputKind kind) {
 Origin compare_origin(Json::Value root, const Request& request) {
   if (!root.isObject()) return Origin::unknown;
   try {
+    if (request.input_kind == InputKind::simulation) return make_canonical(root) == request.job ? Origin::same : Origin::another_job;
     const Json::Value& named = get_input_key(root, request.input_kind);
     const std::string input = named.isString() ? fs::path(named.asString()).stem().string() : "";
     for (const char* key : {"run", "bank"}) root.removeMember(key);
@@ -159,17 +162,17 @@ Id copy_hashed(const fs::path& file, std::string_view what, const fs::path& targ
 }
 
 /// Puts the files of an input into inputs/ under the names that follow from their hash.
-void take_snapshot(const Store& store, const fs::path& input, const Request& request) {
-  const Id wanted = require_id(request.input_sha256, "the input's hash");
-  const fs::path target = store.input_file(wanted, request.input_format);
-  const bool is_pair = request.input_format == "tetgen";
+void take_snapshot(const Store& store, const fs::path& file, const Input& input) {
+  const Id wanted = require_id(input.sha256, "the input's hash");
+  const fs::path target = store.input_file(wanted, input.format);
+  const bool is_pair = input.format == "tetgen";
   const Temporary temporary = store.make_temporary();
-  const auto pair = find_tetgen_pair(input);
-  const std::string what = to_text(request.input_kind);
-  Id found = copy_hashed(is_pair ? pair[0] : input, what, temporary / "first");
+  const auto pair = find_tetgen_pair(file);
+  const std::string what = to_text(input.kind);
+  Id found = copy_hashed(is_pair ? pair[0] : file, what, temporary / "first");
   if (is_pair) found = hash_pair(found, copy_hashed(pair[1], what, temporary / "second"));
   if (found != wanted)
-    throw InputError(fmt::format("{}: this {} changes while it is read; submit the job when it is whole", input.string(), what));
+    throw InputError(fmt::format("{}: this {} changes while it is read; submit the job when it is whole", file.string(), what));
   const OpenFolder shard = store.open_inputs(wanted);
   const auto name = [&](const char* from, const fs::path& to) {
     const std::string last = to.filename().string();
@@ -187,14 +190,25 @@ void take_snapshot(const Store& store, const fs::path& input, const Request& req
 using Inputs = std::map<std::string, bool>;
 
 /// True when the input was not there, or damaged, and is whole now.
-bool ensure_input(const Store& store, const job::JobSpec& job, const Request& request, Inputs& known) {
-  if (request.input_kind == InputKind::shape) return false;
-  const auto [entry, is_new] = known.try_emplace(request.input_sha256 + "." + request.input_format, false);
-  if (is_new && find_input_fault(store, request)) {
-    take_snapshot(store, job::get_input(job), request);
-    entry->second = true;
+bool ensure_inputs(const Store& store, const JobOrder& order, const Request& request, Inputs& known) {
+  const std::vector<NamedInput> named = order.list_inputs();
+  const std::vector<Input> inputs = list_inputs(request);
+  bool is_copied = false;
+  for (std::size_t i = 0; i < inputs.size(); ++i) {
+    const auto [entry, is_new] = known.try_emplace(inputs[i].sha256 + "." + inputs[i].format, false);
+    if (is_new && find_input_fault(store, inputs[i])) {
+      take_snapshot(store, named.at(i).file, inputs[i]);
+      entry->second = true;
+    }
+    is_copied = is_copied || entry->second;
   }
-  return entry->second;
+  return is_copied;
+}
+
+std::vector<fs::path> find_input_files(const Store& store, const Request& request) {
+  std::vector<fs::path> files;
+  for (const Input& input : list_inputs(request)) files.push_back(find_input_file(store, input));
+  return files;
 }
 
 /// What is not synced yet: publish_work() does that.
@@ -207,32 +221,38 @@ void write_unsynced(const fs::path& file, const std::string& text) {
 }
 
 /// Writes the files of a job into its folder, which is to become work/ab/<id>.
-void fill_work(const Store& store, const job::JobSpec& job, const Request& request, const Id& id, const fs::path& folder) {
-  job::JobSpec inner = job;
-  const fs::path work = store.work_folder(id);
-  if (request.input_kind != InputKind::shape) {
-    const fs::path input = store.input_file(require_id(request.input_sha256, "the request"), request.input_format);
-    job::set_input(inner, input);
-  }
-  inner.bank = work / kBankFile;
-  write_unsynced(folder / kJobFile, job::resolved_json(inner, work, ""));
+void fill_work(const std::string& job, const Request& request, const fs::path& folder) {
+  write_unsynced(folder / kJobFile, job);
   write_unsynced(folder / kRequestFile, format_request(request));
   write_unsynced(folder / kStateFile, format_state({}));
 }
 
-/// The job of a request, with its input in the store and its bank where carillon-precompute is to write it.
-job::JobSpec make_job(const Store& store, const Request& request, const Id& id) {
+/// The job of a request, with its inputs in the store and its bank where carillon-precompute is to write it.
+std::string make_job(const Store& store, const Request& request, const Id& id) {
   Json::Value root = parse_json(request.job);
   const fs::path work = store.work_folder(id);
-  if (request.input_kind != InputKind::shape) {
-    const fs::path input = store.input_file(require_id(request.input_sha256, "the request"), request.input_format);
-    get_input_key(root, request.input_kind) = input.string();
-  }
+  const std::vector<fs::path> files = find_input_files(store, request);
+  if (request.input_kind == InputKind::simulation) return write_simulation(std::move(root), files);
+  if (!files.empty()) get_input_key(root, request.input_kind) = files[0].string();
   root["bank"] = (work / kBankFile).string();
   Json::StreamWriterBuilder writer;
   writer["precision"] = 17;
   writer["emitUTF8"] = true;
-  return job::parse_job(Json::writeString(writer, root), work / kJobFile);
+  return job::resolved_json(job::parse_job(Json::writeString(writer, root), work / kJobFile), work, "");
+}
+
+/// Why a job file in a folder of work is not that of its request.
+std::optional<std::string> find_text_fault(const Store& store, const Request& request, const Id& id, const std::string& text) {
+  constexpr const char* kAnother = "its job.json asks for something else than was submitted";
+  if (request.input_kind == InputKind::simulation)
+    return text == make_job(store, request, id) ? std::nullopt : std::optional(std::string(kAnother));
+  const job::JobSpec job = job::parse_job(text, store.work_folder(id) / kJobFile);
+  if (make_canonical_job(job) != request.job) return kAnother;
+  if (job.bank != store.work_folder(id) / kBankFile) return "its job.json names another bank than was submitted";
+  const std::vector<fs::path> files = find_input_files(store, request);
+  if (get_input(job) != (files.empty() ? fs::path() : files[0]))
+    return fmt::format("its job.json names another {} than was submitted", to_text(request.input_kind));
+  return std::nullopt;
 }
 
 /// A folder of work that is not what was submitted, and in which no attempt runs.
@@ -268,28 +288,47 @@ const RequestMaker::Known& RequestMaker::find_input(const fs::path& file, const 
   return known_.insert_or_assign(file, Known{id, head, stamp}).first->second;
 }
 
-Request RequestMaker::make(const job::JobSpec& job) {
+Input RequestMaker::find_hashed(const NamedInput& named) {
+  const std::string ending = lower_ending(named.file);
+  Input input{named.kind, "", "", to_text(named.file)};
+  if (named.kind == InputKind::mesh && (ending == "node" || ending == "ele")) {
+    const auto pair = find_tetgen_pair(named.file);
+    const Id node = find_input(pair[0], "mesh").sha256;
+    input.format = "tetgen";
+    input.sha256 = hash_pair(node, find_input(pair[1], "mesh").sha256).text();
+  } else {
+    const Known& known = find_input(named.file, to_text(named.kind));
+    input.format = named.kind != InputKind::mesh ? ending : find_mesh_format(known.head, ending);
+    input.sha256 = known.sha256.text();
+  }
+  return input;
+}
+
+Request RequestMaker::make(const JobOrder& order) {
   Request request;
-  request.job = make_canonical_job(job);
-  request.solver = solver_;
-  request.resources = job.resources;
+  std::vector<Input> inputs;
+  for (const NamedInput& named : order.list_inputs()) inputs.push_back(find_hashed(named));
+  if (order.is_simulation()) {
+    std::vector<fs::path> names;
+    for (const Input& input : inputs) names.push_back(make_input_name(require_id(input.sha256, "the input's hash"), input.format));
+    request.job = order.make_canonical(names);
+    request.solver = simulator_;
+    request.input_kind = InputKind::simulation;
+    request.inputs = std::move(inputs);
+  } else {
+    request.job = make_canonical_job(order.bank());
+    request.solver = solver_;
+    if (!inputs.empty()) {
+      request.input_kind = inputs[0].kind;
+      request.input_format = inputs[0].format;
+      request.input_sha256 = inputs[0].sha256;
+      request.input_file = inputs[0].file;
+    }
+  }
+  request.resources = order.resources();
   request.user = find_user();
   request.submitted_unix_s = std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-  const fs::path& input = job::get_input(job);
-  const std::string ending = lower_ending(input);
-  request.input_kind = input.empty() ? InputKind::shape : job.analytic ? InputKind::table : job.body ? InputKind::surface : InputKind::mesh;
-  if (!input.empty()) request.input_file = to_text(input);
-  if (request.input_kind == InputKind::mesh && (ending == "node" || ending == "ele")) {
-    const auto pair = find_tetgen_pair(input);
-    const Id node = find_input(pair[0], "mesh").sha256;
-    request.input_format = "tetgen";
-    request.input_sha256 = hash_pair(node, find_input(pair[1], "mesh").sha256).text();
-  } else if (!input.empty()) {
-    const Known& known = find_input(input, to_text(request.input_kind));
-    request.input_format = request.input_kind != InputKind::mesh ? ending : find_mesh_format(known.head, ending);
-    request.input_sha256 = known.sha256.text();
-  }
-  request.job_file = to_text(fs::absolute(job.file).lexically_normal());
+  request.job_file = to_text(fs::absolute(order.file()).lexically_normal());
   request.id = calc_id(request).text();
   return request;
 }
@@ -299,22 +338,31 @@ Id calc_id(const Request& request) {
                                to_text(request.input_format), request.input_sha256, request.solver));
 }
 
+fs::path find_input_file(const Store& store, const Input& input) {
+  return store.input_file(require_id(input.sha256, "the request"), input.format);
+}
+
 std::optional<std::string> find_input_fault(const Store& store, const Request& request) {
-  if (request.input_kind == InputKind::shape) return std::nullopt;
-  const Id wanted = require_id(request.input_sha256, "the request");
-  const fs::path file = store.input_file(wanted, request.input_format);
+  for (const Input& input : list_inputs(request))
+    if (auto fault = find_input_fault(store, input)) return fault;
+  return std::nullopt;
+}
+
+std::optional<std::string> find_input_fault(const Store& store, const Input& input) {
+  const Id wanted = require_id(input.sha256, "the request");
+  const fs::path file = find_input_file(store, input);
   const std::string what =
-      fmt::format("the copy of its {} in the store, {},", to_text(request.input_kind), file.lexically_relative(store.root()).string());
+      fmt::format("the copy of its {} in the store, {},", to_text(input.kind), file.lexically_relative(store.root()).string());
   try {
     const auto inputs = OpenFolder::open(store.root()).find("inputs");
     const auto shard = inputs ? inputs->find(wanted.text().substr(0, 2)) : std::nullopt;
     const auto hash = [&](const fs::path& name) -> std::optional<Id> {
       const auto info = shard ? shard->look_at(name.filename().string()) : std::nullopt;
       if (!info || !S_ISREG(info->st_mode)) return std::nullopt;
-      return hash_file(shard->path() / name.filename(), to_text(request.input_kind));
+      return hash_file(shard->path() / name.filename(), to_text(input.kind));
     };
     std::optional<Id> found = hash(file);
-    if (found && request.input_format == "tetgen") {
+    if (found && input.format == "tetgen") {
       const std::optional<Id> other = hash(fs::path(file).replace_extension("ele"));
       found = other ? std::optional(hash_pair(*found, *other)) : std::nullopt;
     }
@@ -333,16 +381,25 @@ std::optional<std::string> find_job_fault(const Store& store, const Id& id, cons
     const std::optional<Request> request = read_request(folder);
     if (!request) return "its request.json is missing";
     if (request->id != id.text() || calc_id(*request) != id) return "its request.json is not what was submitted";
-    const job::JobSpec job = job::parse_job(base::read_file(folder / kJobFile, "job file", kMaxJobBytes), store.work_folder(id) / kJobFile);
-    if (make_canonical_job(job) != request->job) return "its job.json asks for something else than was submitted";
-    if (job.bank != store.work_folder(id) / kBankFile) return "its job.json names another bank than was submitted";
-    const fs::path wanted = request->input_kind == InputKind::shape
-                                ? fs::path()
-                                : store.input_file(require_id(request->input_sha256, "the request"), request->input_format);
-    if (get_input(job) != wanted) return fmt::format("its job.json names another {} than was submitted", to_text(request->input_kind));
-    return std::nullopt;
+    return find_text_fault(store, *request, id, base::read_file(folder / kJobFile, "job file", kMaxJobBytes));
   } catch (const InputError& error) {
     return fmt::format("its files cannot be read: {}", error.what());
+  }
+}
+
+std::optional<std::string> find_output_fault(const fs::path& folder, const Request& request) {
+  try {
+    for (const std::string& name : list_outputs(request.job)) {
+      const fs::file_status status = fs::symlink_status(folder / name);
+      if (!fs::exists(status)) return fmt::format("its {} is missing", name);
+      if (!fs::is_regular_file(status)) return fmt::format("its {} is no regular file", name);
+    }
+    const std::string record = base::read_file(folder / kRecordFile, "record", kMaxJobBytes);
+    return find_record_fault(record, base::read_file(folder / kJobFile, "job file", kMaxJobBytes));
+  } catch (const InputError& error) {
+    return error.what();
+  } catch (const fs::filesystem_error& error) {
+    return error.what();
   }
 }
 
@@ -401,7 +458,9 @@ std::vector<std::string> read_warnings(const Store& store, const Id& id, const s
   const fs::path folder = store.bank_folder(id);
   try {
     const Json::Value root = parse_object(base::read_file(folder / kJobFile, "record", kMaxJobBytes));
-    const Json::Value& list = root["run"]["warnings"];
+    const Json::Value list = root.isMember("simulate")
+                                 ? parse_object(base::read_file(folder / kRecordFile, "record", kMaxJobBytes))["warnings"]
+                                 : root["run"]["warnings"];
     if (list.empty()) return texts;
     const std::optional<Request> request = read_request(folder);
     if (!request || request->id != id.text() || calc_id(*request) != id || compare_origin(root, *request) != Origin::same) return texts;
@@ -417,21 +476,23 @@ std::vector<std::string> read_warnings(const Store& store, const Id& id, const s
 }
 
 bool restore_input(const Store& store, const Request& request) {
-  if (!find_input_fault(store, request)) return true;
-  if (request.input_file.empty()) return false;
-  try {
-    take_snapshot(store, from_text(request.input_file), request);
-    return true;
-  } catch (const InputError&) {  // gone, or another by now
-    return false;
+  for (const Input& input : list_inputs(request)) {
+    if (!find_input_fault(store, input)) continue;
+    if (input.file.empty()) return false;
+    try {
+      take_snapshot(store, from_text(input.file), input);
+    } catch (const InputError&) {  // gone, or another by now
+      return false;
+    }
   }
+  return true;
 }
 
 bool restore_work(const Store& store, const Request& request) {
   const Id id = calc_id(request);
   const Temporary temporary = store.make_temporary();
   const OpenFolder folder = temporary.content().make(id.text());
-  fill_work(store, make_job(store, request, id), request, id, folder.path());
+  fill_work(make_job(store, request, id), request, folder.path());
   if (is_spoilt(store, id)) store.remove_work(id);
   return store.publish_work(temporary, {{id, id.text()}}).front();
 }
@@ -448,7 +509,7 @@ std::vector<bool> prepare_work(const Store& store, const std::vector<Asked>& ask
     if (!seen.insert(id).second) continue;
     if (!store.find_bank_fault(id, Look::full)) continue;
     if (store.has_bank_folder(id)) store.set_bank_aside(id);
-    const bool is_copied = ensure_input(store, *asked[i].job, *asked[i].request, inputs);
+    const bool is_copied = ensure_inputs(store, *asked[i].order, *asked[i].request, inputs);
     if (store.has_work(id)) {
       was_made[i] = is_copied;
       if (!is_spoilt(store, id)) continue;
@@ -458,7 +519,7 @@ std::vector<bool> prepare_work(const Store& store, const std::vector<Asked>& ask
     folders.push_back({id, id.text()});
     index.push_back(i);
     const OpenFolder folder = temporary->content().make(id.text());
-    fill_work(store, *asked[i].job, *asked[i].request, id, folder.path());
+    fill_work(asked[i].order->write(store.work_folder(id), find_input_files(store, *asked[i].request)), *asked[i].request, folder.path());
   }
   if (folders.empty()) return was_made;
   const std::vector<bool> was_published = store.publish_work(*temporary, folders);

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "jobs/store/id.hpp"
+#include "jobs/store/order.hpp"
 #include "jobs/store/records.hpp"
 #include "jobs/store/store.hpp"
 #include "precompute/job/job_spec.hpp"
@@ -20,10 +21,10 @@ std::string make_canonical_job(const job::JobSpec& job);
 /// Makes requests; a file that many jobs name is hashed once as long as it does not change.
 class RequestMaker {
  public:
-  /// `solver`: the line that carillon-precompute --version prints.
-  explicit RequestMaker(std::string solver) : solver_(std::move(solver)) {}
-  /// Hashes the input and fills the request but its engine. Throws InputError for a mesh or surface that cannot be read.
-  Request make(const job::JobSpec& job);
+  /// `solver`: the line that carillon-precompute --version prints; `simulator`: that of carillon-simulate, where there are simulations.
+  explicit RequestMaker(std::string solver, std::string simulator = "") : solver_(std::move(solver)), simulator_(std::move(simulator)) {}
+  /// Hashes the inputs and fills the request but its engine. Throws InputError for a mesh or surface that cannot be read.
+  Request make(const JobOrder& order);
 
  private:
   struct Known {
@@ -32,13 +33,14 @@ class RequestMaker {
     std::array<long long, 5> stamp{};  // device, file, size and times
   };
   const Known& find_input(const std::filesystem::path& file, const std::string& what);
-  std::string solver_;
+  Input find_hashed(const NamedInput& named);
+  std::string solver_, simulator_;
   std::map<std::filesystem::path, Known> known_;
 };
 
 /// A job and the request made of it.
 struct Asked {
-  const job::JobSpec* job = nullptr;
+  const JobOrder* order = nullptr;
   const Request* request = nullptr;
 };
 
@@ -51,12 +53,19 @@ std::vector<bool> prepare_work(const Store& store, const std::vector<Asked>& ask
 /// The id that follows from the parts in a request.
 Id calc_id(const Request& request);
 
-/// Why the input of a request in inputs/ is not what was submitted, in one sentence; none when it is. Reads all of it.
+/// Why an input of a request in inputs/ is not what was submitted, in one sentence; none when all are. Reads all of them.
 std::optional<std::string> find_input_fault(const Store& store, const Request& request);
+/// The same of one.
+std::optional<std::string> find_input_fault(const Store& store, const Input& input);
+/// Where it is in the store.
+std::filesystem::path find_input_file(const Store& store, const Input& input);
 
 /// Why work/ab/<id> is not what was submitted: its request gives another id, its job.json asks for something else. None when it is.
 /// `folder` is that folder (a link to its descriptor will do).
 std::optional<std::string> find_job_fault(const Store& store, const Id& id, const std::filesystem::path& folder);
+
+/// Why the files of a simulation in this folder are not whole, or not made of that request; none when they are.
+std::optional<std::string> find_output_fault(const std::filesystem::path& folder, const Request& request);
 
 /// Why a bank with this record of its making (JSON) was not made of that request; none when it was.
 std::optional<std::string> find_origin_fault(const std::string& provenance, const Request& request);
@@ -71,7 +80,7 @@ std::vector<std::string> read_warnings(const Store& store, const Id& id, const s
 /// A message that begins with the store's copy of a job file and a line of it, with `name` for both.
 std::string name_job(const std::string& message, const Id& id, const std::string& name);
 
-/// Copies a damaged or missing input again from where it was submitted from. False when that is gone or another by now.
+/// Copies damaged or missing inputs again from where they were submitted from. False when one is gone or another by now.
 bool restore_input(const Store& store, const Request& request);
 
 /// Makes work/ab/<id> again from a request alone, in place of one that is damaged; its input has to be in the store. False when there is

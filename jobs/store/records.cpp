@@ -35,8 +35,11 @@ constexpr std::array<Word<JobState>, 6> kStates{{{JobState::queued, "queued"},
                                                  {JobState::failed, "failed"},
                                                  {JobState::cancelled, "cancelled"}}};
 constexpr std::array<Word<JobEngine>, 2> kEngines{{{JobEngine::local, "local"}, {JobEngine::slurm, "slurm"}}};
-constexpr std::array<Word<InputKind>, 4> kInputKinds{
-    {{InputKind::mesh, "mesh"}, {InputKind::surface, "surface"}, {InputKind::shape, "shape"}, {InputKind::table, "table"}}};
+constexpr std::array<Word<InputKind>, 5> kInputKinds{{{InputKind::mesh, "mesh"},
+                                                      {InputKind::surface, "surface"},
+                                                      {InputKind::shape, "shape"},
+                                                      {InputKind::table, "table"},
+                                                      {InputKind::simulation, "simulation"}}};
 
 template <class Words>
 auto find_word(const Words& words, std::string_view word) {
@@ -62,10 +65,20 @@ Request read_request_root(base::Object root, const std::string& where) {
   Request request;
   request.id = require_id(root.string("id"), where).text();
   request.job = root.string("job");
-  request.input_kind = *find_word(kInputKinds, root.choice("input_kind", {"mesh", "surface", "shape", "table"}));
+  request.input_kind = *find_word(kInputKinds, root.choice("input_kind", {"mesh", "surface", "shape", "table", "simulation"}));
   request.input_format = read_empty_or(root, "input_format");
   request.input_sha256 = read_empty_or(root, "input_sha256");
-  if (request.input_kind != InputKind::shape) require_id(request.input_sha256, where);
+  if (request.input_kind == InputKind::simulation) {
+    for (base::Object& object : root.objects("inputs")) {
+      Input& input = request.inputs.emplace_back();
+      input.kind = *find_word(kInputKinds, object.choice("kind", {"mesh", "surface"}));
+      input.format = read_empty_or(object, "format");
+      input.sha256 = require_id(object.string("sha256"), where).text();
+      input.file = read_empty_or(object, "file");
+    }
+  } else if (request.input_kind != InputKind::shape) {
+    require_id(request.input_sha256, where);
+  }
   request.solver = root.string("solver");
   request.resources.ranks = static_cast<int>(root.integer("ranks", 0, kMaxCount));
   request.resources.memory_gb = root.number("memory_gb");
@@ -122,6 +135,12 @@ std::string to_text(InputKind kind) { return get_word(kInputKinds, kind); }
 std::optional<JobState> find_state(std::string_view word) { return find_word(kStates, word); }
 std::optional<JobEngine> find_engine(std::string_view word) { return find_word(kEngines, word); }
 
+std::vector<Input> list_inputs(const Request& request) {
+  if (request.input_kind == InputKind::simulation) return request.inputs;
+  if (request.input_kind == InputKind::shape) return {};
+  return {{request.input_kind, request.input_format, request.input_sha256, request.input_file}};
+}
+
 std::string format_request(const Request& request, bool one_line) {
   base::Json root = base::Json::object();
   const auto set_text = [&](const char* key, const std::string& text) {
@@ -130,6 +149,13 @@ std::string format_request(const Request& request, bool one_line) {
   root.set("id", request.id).set("job", request.job).set("input_kind", to_text(request.input_kind));
   set_text("input_format", request.input_format);
   set_text("input_sha256", request.input_sha256);
+  for (const Input& input : request.inputs) {
+    base::Json json = base::Json::object();
+    json.set("kind", to_text(input.kind)).set("sha256", input.sha256);
+    if (!input.format.empty()) json.set("format", input.format);
+    if (!input.file.empty()) json.set("file", input.file);
+    root.member("inputs").add(std::move(json));
+  }
   root.set("solver", request.solver).set("ranks", request.resources.ranks).set("memory_gb", request.resources.memory_gb);
   root.set("time_limit_s", request.resources.time_limit_s).set("engine", to_text(request.engine));
   set_text("job_file", request.job_file);

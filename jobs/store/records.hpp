@@ -19,8 +19,8 @@ using job::Resources;
 enum class JobState { queued, running, waiting, done, failed, cancelled };
 /// Where a job runs: the queue of this machine, or Slurm.
 enum class JobEngine { local, slurm };
-/// What a job is made of, in addition to its description.
-enum class InputKind { mesh, surface, shape, table };
+/// What a job is made of, in addition to its description; a simulation of any number of meshes and surfaces.
+enum class InputKind { mesh, surface, shape, table, simulation };
 /// The words of these in files and on the command line.
 std::string to_text(JobState state);
 std::string to_text(JobEngine engine);
@@ -29,14 +29,23 @@ std::string to_text(InputKind kind);
 std::optional<JobState> find_state(std::string_view word);
 std::optional<JobEngine> find_engine(std::string_view word);
 
+/// A file that a job is made of.
+struct Input {
+  InputKind kind = InputKind::mesh;
+  std::string format;  // "msh", "vtu", "mesh", "tetgen", "hdf", or the ending of a surface, "obj"
+  std::string sha256;  // 64 hex digits; of a TetGen pair, of both
+  std::string file;    // as it was named, to_text() of an absolute path
+};
+
 /// request.json: the parts of the id, and what is not part of it.
 struct Request {
   std::string id;   // 64 hex digits
   std::string job;  // canonical text of the resolved job, without paths
   InputKind input_kind = InputKind::shape;
-  std::string input_format;  // "msh", "vtu", "mesh", "tetgen", "hdf", or the ending of a surface, "obj"
-  std::string input_sha256;  // 64 hex digits; of a TetGen pair, of both
-  std::string solver;        // the line of carillon-precompute --version
+  std::string input_format;   // "msh", "vtu", "mesh", "tetgen", "hdf", or the ending of a surface, "obj"
+  std::string input_sha256;   // 64 hex digits; of a TetGen pair, of both
+  std::vector<Input> inputs;  // of a simulation, whose input_... are empty
+  std::string solver;         // the line of carillon-precompute --version, or that of carillon-simulate
   Resources resources;
   JobEngine engine = JobEngine::local;
   std::string job_file;    // where it was submitted from first: store::to_text() of an absolute path; "#7" follows for line 7 of a manifest
@@ -85,7 +94,10 @@ std::filesystem::path from_text(const std::string& text);
 /// JSON whose strings hold characters that move the cursor, colour, or turn the direction of writing only as "\uNNNN".
 std::string to_plain_json(const std::string& json);
 
-/// The file name of a request's mesh or surface as it was named; empty for a shape.
+/// The files that a job is made of, of either kind of request.
+std::vector<Input> list_inputs(const Request& request);
+
+/// The file name of a request's mesh or surface as it was named; empty for a shape and for a simulation.
 std::string find_input_name(const Request& request);
 
 }  // namespace carillon::store

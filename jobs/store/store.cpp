@@ -25,6 +25,7 @@
 #include "jobs/process/process.hpp"
 #include "jobs/store/files.hpp"
 #include "jobs/store/identity.hpp"
+#include "jobs/store/order.hpp"
 #include "runtime/bank/bank.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/file.hpp"
@@ -245,8 +246,19 @@ struct Sum {
   long long bytes = 0, written_ns = 0;
   std::map<std::string, std::string> records;
 };
+constexpr std::size_t kMaxSumBytes = 4000;
 constexpr const char* kSumWord = "carillon-bank-sum-1";
-constexpr std::array kRecords{kJobFile, kRequestFile, kOutcomeFile};
+/// What bank.sum has a line for: the records of every job, and the files of a simulation.
+std::vector<const char*> list_records() {
+  std::vector<const char*> names{kJobFile, kRequestFile, kOutcomeFile};
+  for (const Output& output : kOutputs) names.push_back(output.file);
+  return names;
+}
+
+/// The file that a folder of banks/ is there for: the bank, or the record of a simulation, which was written last.
+const char* find_main_file(const OpenFolder& folder) {
+  return !folder.look_at(kBankFile) && folder.look_at(kRecordFile) ? kRecordFile : kBankFile;
+}
 
 std::string read_head(int file, std::size_t max) {
   std::string head(max, '\0');
@@ -260,7 +272,7 @@ long long find_written_ns(const struct stat& info) { return info.st_mtim.tv_sec 
 std::optional<Sum> read_sum(const OpenFolder& folder) {
   const File file{open_regular(folder, kSumFile)};
   if (file.value < 0) return std::nullopt;
-  std::istringstream stream(read_head(file.value, 1000));
+  std::istringstream stream(read_head(file.value, kMaxSumBytes));
   std::string word;
   Sum sum;
   if (!(stream >> word >> sum.id >> sum.sha256 >> sum.head >> sum.bytes >> sum.written_ns) || word != kSumWord || !parse_id(sum.id))
@@ -278,29 +290,45 @@ std::string hash_record(const OpenFolder& folder, const char* name) {
 /// With the records as they are.
 void write_sum(const OpenFolder& folder, const Sum& sum) {
   std::string text = fmt::format("{} {} {} {} {} {}\n", kSumWord, sum.id, sum.sha256, sum.head, sum.bytes, sum.written_ns);
-  for (const char* name : kRecords) {
+  for (const char* name : list_records()) {
     if (const std::string sha256 = hash_record(folder, name); !sha256.empty()) text += fmt::format("{} {}\n", name, sha256);
   }
   base::write_file(folder.path() / kSumFile, text);
 }
 
 Sum calc_sum(const OpenFolder& folder, const Id& id) {
-  const File bank{open_regular(folder, kBankFile)};
+  const char* main = find_main_file(folder);
+  const File bank{open_regular(folder, main)};
   struct stat info {};
-  if (bank.value < 0 || ::fstat(bank.value, &info) != 0) throw_errno(folder.name() / kBankFile, "read", errno);
+  if (bank.value < 0 || ::fstat(bank.value, &info) != 0) throw_errno(folder.name() / main, "read", errno);
   return {id.text(),
-          hash_file(folder.path() / kBankFile, "bank").text(),
+          hash_file(folder.path() / main, "bank").text(),
           hash_text(read_head(bank.value, kHeadBytes)).text(),
           static_cast<long long>(info.st_size),
           find_written_ns(info),
           {}};
 }
 
+/// Which file of a simulation is not what was published: whether it is there, or, but for a quick look, all its bytes.
+std::optional<std::string> find_file_fault(const OpenFolder& folder, const Sum& sum, Look look) {
+  for (const Output& output : kOutputs) {
+    const auto known = sum.records.find(output.file);
+    if (known == sum.records.end()) continue;
+    const auto info = folder.look_at(output.file);
+    if (!info) return fmt::format("its {} is missing", output.file);
+    if (!S_ISREG(info->st_mode)) return fmt::format("its {} is no regular file", output.file);
+    if (look != Look::quick && hash_record(folder, output.file) != known->second)
+      return fmt::format("its {} is damaged: its bytes are no longer those that were computed", output.file);
+  }
+  return std::nullopt;
+}
+
 /// Why a bank is not sane, or was not made of the job of `id`, as all its bytes show. What its own records do not say is no fault where
 /// `has_sum` says that it is what was published.
 std::optional<std::string> find_content_fault(const OpenFolder& folder, const Id& id, bool has_sum) {
   try {
-    const bank::Bank bank = bank::read_bank(folder.path() / kBankFile);
+    const bool is_simulation = std::string_view(find_main_file(folder)) == kRecordFile;
+    const std::string provenance = is_simulation ? "" : bank::read_bank(folder.path() / kBankFile).provenance;
     std::optional<Request> request;
     try {
       request = read_request(folder.path());
@@ -308,7 +336,8 @@ std::optional<std::string> find_content_fault(const OpenFolder& folder, const Id
     }
     if (request && (request->id != id.text() || calc_id(*request) != id)) request.reset();
     if (!request) return has_sum ? std::nullopt : std::optional("its request.json is not what was submitted");
-    return bank.provenance.empty() ? std::nullopt : find_origin_fault(bank.provenance, *request);
+    if (is_simulation) return find_output_fault(folder.path(), *request);
+    return provenance.empty() ? std::nullopt : find_origin_fault(provenance, *request);
   } catch (const InputError& error) {
     return show_names(folder, error.what());
   }
@@ -379,7 +408,8 @@ std::optional<std::string> Store::find_bank_fault(const Id& id, Look look) const
     const auto shard = find_shard("banks", id);
     const auto folder = shard ? shard->find(id.text()) : std::nullopt;
     if (!folder) return "there is no bank";
-    const File file{open_regular(*folder, kBankFile)};
+    const char* main = find_main_file(*folder);
+    const File file{open_regular(*folder, main)};
     if (file.value < 0 && (errno == EACCES || errno == EPERM)) return std::nullopt;  // what may not be read is not damaged
     if (file.value < 0 && errno == ENOENT) return "its bank is missing";
     struct stat info {};
@@ -393,10 +423,12 @@ std::optional<std::string> Store::find_bank_fault(const Id& id, Look look) const
     if (info.st_size != sum->bytes) return fmt::format("its bank has {} bytes instead of {}", info.st_size, sum->bytes);
     if (hash_text(read_head(file.value, kHeadBytes)).text() != sum->head)
       return "its bank is another one than was computed, or its seal is damaged";
+    if (main == std::string_view(kRecordFile))
+      if (auto fault = find_file_fault(*folder, *sum, look)) return fault;
     if (look == Look::quick && find_written_ns(info) == sum->written_ns) return std::nullopt;
     if (hash_file(fmt::format("/proc/self/fd/{}", file.value), "bank").text() != sum->sha256) {
       // Every later look reads all of it, as its time is another.
-      const File own{::openat(folder->get(), kBankFile, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC)};
+      const File own{::openat(folder->get(), main, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC)};
       if (own.value >= 0) (void)!::futimens(own.value, nullptr);
       return "its bank is damaged: its bytes are no longer those that were computed";
     }
@@ -412,7 +444,8 @@ std::optional<std::string> Store::find_record_change(const Id& id) const {
   const OpenFolder folder = open_bank(id);
   const auto sum = read_sum(folder);
   for (const auto& [name, sha256] : sum ? sum->records : std::map<std::string, std::string>()) {
-    const bool is_ours = std::find(kRecords.begin(), kRecords.end(), name) != kRecords.end();
+    const std::vector<const char*> ours = list_records();
+    const bool is_ours = std::find(ours.begin(), ours.end(), name) != ours.end();
     if (!is_ours) continue;
     const auto info = folder.look_at(name);
     if (!info) return fmt::format("its {} is missing", name);
@@ -428,7 +461,8 @@ void Store::replace_records(const Id& id, const Temporary& folder) const {
   if (::fchmod(bank.get(), 0755) != 0) throw_errno(bank.name(), "write to this folder", errno);
   bool has_record = false;  // what else lies next to a bank must not make a damaged record look like one that was published
   for (const std::string& name : folder.content().list()) {
-    has_record = has_record || std::any_of(kRecords.begin(), kRecords.end(), [&](const char* record) { return name == record; });
+    const std::vector<const char*> records = list_records();
+    has_record = has_record || std::any_of(records.begin(), records.end(), [&](const char* record) { return name == record; });
     seal_file(folder.content(), name);
     if (bank.look_at(name)) bank.remove(name);
     if (::renameat(folder.content().get(), name.c_str(), bank.get(), name.c_str()) != 0) throw_errno(bank.name() / name, "write", errno);
@@ -476,13 +510,7 @@ fs::path Store::find_folder(const Id& id) const {
 std::vector<Id> Store::list_banks() const { return list_ids(root_, "banks"); }
 std::vector<Id> Store::list_work() const { return list_ids(root_, "work"); }
 
-fs::path Store::input_file(const Id& sha256, const std::string& format) const {
-  fs::path file = sharded(root_ / "inputs", sha256);
-  const bool is_plain =
-      format.size() <= 8 && std::all_of(format.begin(), format.end(), [](unsigned char c) { return std::isalnum(c) != 0; });
-  if (!format.empty() && is_plain) file += "." + (format == "tetgen" ? std::string("node") : format);
-  return file;
-}
+fs::path Store::input_folder(const Id& sha256) const { return root_ / "inputs" / sha256.text().substr(0, 2); }
 
 Temporary Store::make_temporary() const {
   const process::Identity self = process::find_self();

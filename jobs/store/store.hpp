@@ -2,9 +2,12 @@
 // done. Layout (ids are 64 hex digits, ab the first two):
 //
 //   VERSION                    "carillon store 1"
-//   banks/ab/<id>/             read-only: bank.hdf, job.json, request.json, outcome.json, log, report.html ...
+//   banks/ab/<id>/             read-only: bank.hdf, job.json, request.json, outcome.json, log, report.html ...; of a simulation
+//   record.json,
+//                              sound.wav, motion.vtkhdf ... (order.hpp) in place of bank and report
 //   inputs/ab/<sha256>.<end>   read-only snapshots of meshes and surfaces
-//   work/ab/<id>/              job.json (for carillon-precompute: mesh in inputs/, bank "bank.hdf"), request.json, attempt.json,
+//   work/ab/<id>/              job.json (for carillon-precompute or carillon-simulate: mesh in inputs/, bank "bank.hdf"), request.json,
+//   attempt.json,
 //                              outcome.json, result.json, log, progress.jsonl, checkpoint, bank.hdf
 //   tmp/                       what will get its name when it is whole; each entry belongs to one process and to its user alone (0700)
 //   damaged/                   banks that were set aside
@@ -98,7 +101,10 @@ class Store {
 
   std::filesystem::path bank_folder(const Id& id) const;
   std::filesystem::path work_folder(const Id& id) const;
-  std::filesystem::path input_file(const Id& sha256, const std::string& format) const;
+  std::filesystem::path input_file(const Id& sha256, const std::string& format) const {
+    return input_folder(sha256) / make_input_name(sha256, format);
+  }
+  std::filesystem::path input_folder(const Id& sha256) const;  // inputs/ab
   /// A bank that a quick look finds whole; a folder for it, whatever is in it; a folder of work. Links count for nothing.
   bool has_bank(const Id& id) const { return !find_bank_fault(id, Look::quick); }
   bool has_bank_folder(const Id& id) const;

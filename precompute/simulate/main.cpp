@@ -7,8 +7,10 @@
 #include <exception>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "precompute/run/end_in_error.hpp"
+#include "precompute/run/enter_folder.hpp"
 #include "precompute/run/interrupt.hpp"
 #include "precompute/simulate/simulate.hpp"
 #include "runtime/base/error.hpp"
@@ -35,6 +37,7 @@ struct CommandLine {
       "Start it on several ranks with: mpirun -np N carillon-simulate JOB.json",
       "carillon-simulate"};
   std::string job, result;
+  std::vector<std::string> folder;
   simulate::SimulateOptions options;
 
   CommandLine() {
@@ -55,6 +58,9 @@ struct CommandLine {
         ->check(CLI::Range(0.0, 1e9))
         ->capture_default_str();
     app.add_option("--result", result, "write how the run ended to this file, a JSON object (docs/howto/when-jobs-die.md)")->check(named);
+    app.add_option("--folder", folder, "work in folder NAME below ROOT, to which no link below ROOT leads")
+        ->expected(2)
+        ->type_name("ROOT NAME");
     CLI::Option* validate =
         app.add_flag("--validate", options.validate, "check the job and its meshes, predict step, time and memory, and simulate nothing");
     app.add_flag("--json", options.json, "with --validate: print one JSON object")->needs(validate);
@@ -96,6 +102,12 @@ int main(int argc, char** argv) {
     words.app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return words.app.exit(error) == 0 ? 0 : kExitInput;
+  }
+  try {
+    if (!words.folder.empty()) run::enter_folder(words.folder[0], words.folder[1]);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "carillon-simulate: error: {}\n", base::printable(error.what()));
+    return base::get_exit_code(base::describe_error(std::current_exception(), "").kind);
   }
   if (!words.options.checkpoint.empty()) run::save_on_signals();
   const Session session(argc, argv);

@@ -29,6 +29,8 @@
 #include "runtime/base/file.hpp"
 #include "runtime/base/json.hpp"
 #include "runtime/base/printable.hpp"
+#include "runtime/base/sha256.hpp"
+#include "runtime/version/version.hpp"
 
 namespace carillon::simulate {
 namespace {
@@ -41,6 +43,7 @@ constexpr double kBookEveryS = 0.01;     // of simulated time
 constexpr std::int64_t kLookEvery = 16;  // samples between two looks at signals
 constexpr double kFullScalePa = 1.0;     // of a WAV file whose peak is below; louder ones are scaled to a peak of 1
 constexpr int kTrialSteps = 200;         // of --validate
+constexpr std::int64_t kMaxPredictedRanks = 1024;
 
 double find_cpu_s() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
@@ -158,6 +161,7 @@ std::string find_overlap_place(const job::SimulationSpec& spec, std::string_view
 /// All that moves, on this rank.
 struct Simulation {
   job::SimulationSpec spec;
+  std::string job_sha256;  // of the bytes of the job
   Bodies bodies;
   std::unique_ptr<transient::Domain> domain;
   std::unique_ptr<transient::Motion> motion;
@@ -254,6 +258,7 @@ std::string write_outputs(const comm::Communicator& comm, Simulation& simulation
     for (const EnergyBook& one : simulation.books) worst = std::max(worst, std::abs(one.relative_error));
     const double rate = static_cast<double>(count_element_steps(simulation)) / std::max(1e-9, seconds);
     base::Json record = base::Json::object();
+    record.set("version", version::describe("carillon-simulate")).set("job_sha256", simulation.job_sha256);
     record.set("job", spec.file.filename().string()).set("duration_s", spec.duration_s).set("sample_rate_hz", spec.sample_rate_hz);
     record.set("step_s", base::significant(simulation.motion->get_step_s(), 9)).set("steps", simulation.motion->get_step_count());
     record.set("elements", static_cast<std::int64_t>(simulation.bodies.assembly->element_count())).set("ranks", comm.size());
@@ -302,6 +307,13 @@ std::string predict(const comm::Communicator& comm, Simulation& simulation, bool
   record.set("elements", static_cast<std::int64_t>(simulation.bodies.assembly->element_count()));
   record.set("nodes", static_cast<std::int64_t>(simulation.bodies.assembly->node_count())).set("ranks", comm.size());
   record.set("seconds", base::significant(steps * seconds, 3)).set("memory_bytes_a_rank", peak);
+  record.set("cpu_seconds", base::significant(steps * seconds * comm.size(), 3));
+  // As carillon-precompute --validate says it, for the queue: ranks share the bodies, and are counted as if they did not.
+  const emission::Options sound = make_emission_options(simulation.spec, motion.get_steps_per_sample(), false);
+  const auto samples = static_cast<std::int64_t>(simulation.makes_sound() ? sound.frames * sound.receivers.size() * sizeof(double) : 0);
+  base::Json memory = base::Json::object();
+  for (std::int64_t ranks = 1; ranks <= kMaxPredictedRanks; ranks *= 2) memory.set(std::to_string(ranks), ranks * (peak + samples));
+  record.set("memory_bytes", std::move(memory));
   if (json) return record.text();
   return fmt::format(
       "{} elements, {} nodes\nstep {:.4g} s (the longest stable one is {:.4g} s), {:.0f} steps\nabout {:.3g} s on {} rank{}, {:.0f} MB a "
@@ -365,6 +377,7 @@ SimulateSummary simulate(const comm::Communicator& comm, const fs::path& job_fil
   std::string text;
   Simulation simulation;
   simulation.spec = read_spec(comm, job_file, options, text);
+  simulation.job_sha256 = base::to_hex(base::calc_sha256(text));
   const job::SimulationSpec& spec = simulation.spec;
   for (const std::string& warning : spec.warnings) log.warn(warning);
   simulation.bodies = make_bodies(comm, spec, [&](const std::string& line) { log.print(line); });

@@ -139,7 +139,7 @@ LAW = {
     "partition": (["runtime/base", "precompute/mesh", "precompute/comm"], ["fmt", "mpi", "metis", "eigen"]),
     "jobs/process": (["runtime/base"], ["fmt"]),
     "jobs/outcome": (["runtime/base", "jobs/process"], ["fmt"]),
-    "jobs/store": (["runtime/base", "runtime/bank", "precompute/job", "jobs/process"], ["fmt", "json"]),
+    "jobs/store": (["runtime/base", "runtime/bank", "runtime/material", "precompute/job", "jobs/process"], ["fmt", "json"]),
     "jobs/registry": (["runtime/base", "jobs/process", "jobs/outcome", "jobs/store"], ["fmt", "sqlite"]),
     "jobs/attempt": (["runtime/base", "runtime/bank", "jobs/process", "jobs/outcome", "jobs/store", "jobs/report"], ["fmt"]),
     "jobs/queue": (

@@ -56,7 +56,8 @@ TEST_F(Settle, a_retry_and_what_is_asked_with_it_are_one_change) {
           "material": {"young_modulus_pa": 70e9, "poisson_ratio": 0.33, "density_kg_m3": 2700, "damping": {"internal_friction": {"tan_phi": 1e-3}}}})",
       "bar.json", job::BankKey::optional);
   const store::Request request = store::RequestMaker("solver").make(job);
-  store::prepare_work(store_, {{&job, &request}});
+  const store::JobOrder order(job);
+  store::prepare_work(store_, {{&order, &request}});
   registry_.submit({{"/jobs/bar.json", request}});
   const store::Id id = store::require_id(request.id, "test");
   registry_.update(id, [](Job& row) { return row.state = JobState::failed, row.attempts = 4, row.reason = "rank 1 was killed", true; });

@@ -143,8 +143,9 @@ TEST(Identity, work_is_a_job_that_runs_from_the_copies_in_the_store) {
   const store::Store store = store::Store::open(folder / "store");
   const job::JobSpec job = job::read_job(folder.write("a.json", job_with("m.msh", "")), job::BankKey::optional);
   const store::Request request = store::RequestMaker(kSolver).make(job);
-  EXPECT_EQ(store::prepare_work(store, {{&job, &request}}), std::vector<bool>{true});
-  EXPECT_EQ(store::prepare_work(store, {{&job, &request}}), std::vector<bool>{false});
+  const store::JobOrder order(job);
+  EXPECT_EQ(store::prepare_work(store, {{&order, &request}}), std::vector<bool>{true});
+  EXPECT_EQ(store::prepare_work(store, {{&order, &request}}), std::vector<bool>{false});
   folder.write("m.msh", "something else by now");
   const store::Id id = store::require_id(request.id, "test");
   const job::JobSpec inner = job::read_job(store.work_folder(id) / store::kJobFile);
@@ -165,7 +166,8 @@ TEST(Identity, an_input_that_is_no_longer_what_was_hashed_is_refused) {
   const job::JobSpec job = job::read_job(folder.write("a.json", job_with("m.msh", "")), job::BankKey::optional);
   const store::Request request = store::RequestMaker(kSolver).make(job);
   folder.write("m.msh", "after");
-  EXPECT_THROW(store::prepare_work(store, {{&job, &request}}), InputError);
+  const store::JobOrder order(job);
+  EXPECT_THROW(store::prepare_work(store, {{&order, &request}}), InputError);
   EXPECT_FALSE(store.has_work(store::require_id(request.id, "test")));
   EXPECT_TRUE(std::filesystem::is_empty(folder / "store/tmp"));
 }

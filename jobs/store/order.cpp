@@ -1,0 +1,183 @@
+// Method:     A simulation is kept as JSON, not as a struct: a key that is new in its schema counts for the identity without a line here.
+// Source:     own. Deviations: none.
+#include "jobs/store/order.hpp"
+
+#include <fmt/core.h>
+#include <json/json.h>
+
+#include <array>
+#include <cmath>
+#include <sstream>
+
+#include "jobs/store/store.hpp"
+#include "precompute/job/simulation.hpp"
+#include "runtime/base/document.hpp"
+#include "runtime/base/error.hpp"
+#include "runtime/base/file.hpp"
+#include "runtime/base/sha256.hpp"
+#include "runtime/material/read_material.hpp"
+
+namespace carillon::store {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::uint64_t kMaxJobBytes = 64 << 20;
+constexpr std::array<double, 2> kHearingHz{20.0, 20000.0};
+
+Json::Value parse_json(const std::string& text) {
+  Json::Value root;
+  std::istringstream stream(text);
+  std::string errors;
+  if (!Json::parseFromStream(Json::CharReaderBuilder(), stream, &root, &errors)) throw InputError("the job is not JSON: " + errors);
+  return root;
+}
+
+std::string write_json(const Json::Value& root, const char* indentation) {
+  Json::StreamWriterBuilder writer;
+  writer["indentation"] = indentation;
+  writer["precision"] = 17;
+  writer["emitUTF8"] = true;
+  writer["commentStyle"] = "None";
+  return Json::writeString(writer, root);
+}
+
+/// 1 and 1.0 are the same number, and so are 0 and -0.
+void unify_numbers(Json::Value& value) {
+  constexpr double kMaxWhole = 1e15;
+  if (value.isNumeric()) {
+    const double x = value.asDouble();
+    value = x == std::trunc(x) && std::abs(x) < kMaxWhole ? Json::Value(static_cast<Json::Int64>(x)) : Json::Value(x);
+  }
+  if (value.isArray() || value.isObject())
+    for (Json::Value& member : value) unify_numbers(member);
+}
+
+/// Where a job of a simulation names files of bodies, in their order.
+std::vector<Json::Value*> find_input_values(Json::Value& root) {
+  std::vector<Json::Value*> found;
+  Json::Value& bodies = root["simulate"]["bodies"];
+  if (!bodies.isArray()) return found;
+  for (Json::Value& body : bodies) {
+    if (!body.isObject()) continue;
+    if (body.isMember("mesh")) found.push_back(&body["mesh"]);
+    if (body.isMember("body") && body["body"].isObject() && body["body"].isMember("surface")) found.push_back(&body["body"]["surface"]);
+  }
+  return found;
+}
+
+/// A material with all its constants, as jobs have it: the table that it was taken from may change.
+Json::Value write_material(const material::Material& material) {
+  job::JobSpec spec;
+  spec.mesh = "/mesh";
+  spec.material = material;
+  return parse_json(job::resolved_json(spec, "/", ""))["material"];
+}
+
+SimulationOrder make_simulation(const job::SimulationSpec& spec, const std::string& text) {
+  SimulationOrder order;
+  order.file = spec.file;
+  order.resources = spec.resources;
+  order.warnings = spec.warnings;
+  Json::Value root = parse_json(text);
+  const base::Document document = base::parse_document(text, spec.file);
+  std::vector<base::Object> bodies = document.root().object("simulate").objects("bodies");
+  std::vector<std::string> known;
+  for (std::size_t i = 0; i < spec.bodies.size(); ++i) {
+    const job::SimulatedBody& body = spec.bodies[i];
+    Json::Value& json = root["simulate"]["bodies"][static_cast<Json::ArrayIndex>(i)];
+    json["material"] = write_material(material::read_material(bodies[i], "material", kHearingHz, known));
+    if (!body.mesh.empty()) order.inputs.push_back({InputKind::mesh, body.mesh});
+    if (body.body && !body.body->surface.empty()) order.inputs.push_back({InputKind::surface, body.body->surface});
+  }
+  root.removeMember("resources");
+  bool has_output = false;
+  for (const Output& output : kOutputs) {
+    has_output = has_output || root.isMember(output.key);
+    if (root.isMember(output.key)) root[output.key] = output.file;
+  }
+  if (!has_output)
+    throw InputError(
+        fmt::format("{}: nothing is to be written; name a file with \"sound\", \"surface\", \"motion\" or \"record\"", spec.file.string()));
+  root["record"] = kRecordFile;
+  std::vector<fs::path> files;
+  for (const NamedInput& input : order.inputs) files.push_back(input.file);
+  order.text = write_simulation(root, files);
+  return order;
+}
+
+}  // namespace
+
+std::vector<NamedInput> JobOrder::list_inputs() const {
+  if (simulation_) return simulation_->inputs;
+  const fs::path& input = job::get_input(bank_);
+  if (input.empty()) return {};
+  return {{bank_.analytic ? InputKind::table : bank_.body ? InputKind::surface : InputKind::mesh, input}};
+}
+
+std::string JobOrder::write(const fs::path& folder, const std::vector<fs::path>& inputs) const {
+  if (simulation_) return write_simulation(parse_json(make_canonical(inputs)), inputs);
+  job::JobSpec inner = bank_;
+  if (!inputs.empty()) job::set_input(inner, inputs[0]);
+  inner.bank = folder / kBankFile;
+  return job::resolved_json(inner, folder, "");
+}
+
+std::string JobOrder::make_canonical(const std::vector<fs::path>& inputs) const {
+  return make_canonical_simulation(parse_json(write_simulation(parse_json(simulation_->text), inputs)));
+}
+
+JobOrder read_order(const fs::path& file) {
+  std::string text;
+  try {
+    text = base::read_file(file, "job file", kMaxJobBytes);
+  } catch (const InputError&) {  // read_job() says why
+  }
+  if (!job::is_simulation(text)) return {job::read_job(file, job::BankKey::optional)};
+  return parse_order(text, fs::absolute(file).lexically_normal());
+}
+
+JobOrder parse_order(std::string_view text, const fs::path& file, int first_line) {
+  if (!job::is_simulation(text)) return {job::parse_job(text, file, job::BankKey::optional, first_line)};
+  // Empty lines bring every value to its line of the file.
+  const std::string moved = std::string(static_cast<std::size_t>(first_line - 1), '\n') + std::string(text);
+  return JobOrder(make_simulation(job::parse_simulation(moved, file), moved));
+}
+
+std::vector<std::string> list_outputs(const std::string& job) {
+  const Json::Value root = parse_json(job);
+  std::vector<std::string> files;
+  for (const Output& output : kOutputs)
+    if (root.isMember(output.key)) files.emplace_back(output.file);
+  return files;
+}
+
+std::string make_canonical_simulation(Json::Value root) {
+  for (Json::Value* value : find_input_values(root)) *value = fs::path(value->asString()).filename().string();
+  unify_numbers(root);
+  return write_json(root, "");
+}
+
+std::string write_simulation(Json::Value root, const std::vector<fs::path>& inputs) {
+  const std::vector<Json::Value*> values = find_input_values(root);
+  if (values.size() != inputs.size())
+    throw InputError(fmt::format("the job names {} files of bodies, and {} are known", values.size(), inputs.size()));
+  for (std::size_t i = 0; i < inputs.size(); ++i) *values[i] = inputs[i].string();
+  return write_json(root, "  ") + "\n";
+}
+
+std::optional<std::string> find_record_fault(const std::string& record, const std::string& job_text) {
+  Json::Value root;
+  std::istringstream stream(record);
+  std::string errors;
+  try {
+    if (!Json::parseFromStream(Json::CharReaderBuilder(), stream, &root, &errors) || !root.isObject()) return "its record is no JSON";
+    if (!root["job_sha256"].isString()) return "its record does not say of which job it is";
+  } catch (const Json::Exception&) {
+    return "its record is no JSON";
+  }
+  return root["job_sha256"].asString() == base::to_hex(base::calc_sha256(job_text)) ? std::nullopt
+                                                                                    : std::optional("its record is of another job");
+}
+
+}  // namespace carillon::store
