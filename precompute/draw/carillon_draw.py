@@ -1,11 +1,13 @@
 #!/usr/bin/python3
-"""carillon-draw: pictures of mode banks and of simulated scenes, drawn off-screen with VTK.
+"""carillon-draw: pictures of mode banks, of simulated scenes and of simulations, drawn off-screen with VTK.
 
-One file, so that it runs wherever it is copied to; three parts: pictures of modes, of their directivity, of scenes, and what all share.
+One file, so that it runs wherever it is copied to; four parts: pictures of modes, of their directivity, of scenes, of motions, and what all
+share.
 
     carillon-draw modes BANK -o OUT.png [--modes 1,2,3] [--up x|y|z]
     carillon-draw directivity BANK -o OUT.png [--modes 1,2,3] [--up x|y|z]
     carillon-draw scene TRAJECTORY.json -o OUT.png
+    carillon-draw motion MOTION.vtkhdf -o OUT.png [--moments 6] [--exaggerate 1] [--colour speed|displacement] [--up x|y|z] [--frames DIR]
 
 Exit codes: 0 done, 2 the input cannot be used, 4 the machine refused.
 """
@@ -293,6 +295,54 @@ class Trajectory:
             raise InputError(
                 f"{path}: this is no trajectory ({type(error).__name__}: {error}); carillon-render --trajectory writes one"
             ) from None
+
+
+class Motion:
+    """Surfaces in motion from a file of carillon-simulate: UnstructuredGrid of VTKHDF with steps, all of triangles.
+
+    times_s: (frames); triangles: (t, 3) into the points, the same in all frames; read_frame(): points (n, 3) [m] and speeds (n) [m/s].
+    InputError for a file that is none, or that is cut.
+    """
+
+    def __init__(self, path):
+        self.path = pathlib.Path(path)
+        try:
+            self.file = h5py.File(self.path, "r")
+        except OSError as error:
+            why = os.strerror(error.errno) if error.errno else "it is no HDF5 file, or cut"
+            raise InputError(f"{path}: this motion cannot be read ({why}); carillon-simulate --motion writes one") from None
+        try:
+            root = self.file["VTKHDF"] if "VTKHDF" in self.file else None
+            if root is None or "Steps" not in root or "speed" not in root.get("PointData", ()):
+                raise ValueError("it has no steps of VTKHDF with speeds")
+            if (root["Types"][:] != 5).any():  # VTK_TRIANGLE
+                raise ValueError("its cells are no triangles")
+            self.times_s = root["Steps/Values"][:].astype(float)
+            self.triangles = root["Connectivity"][:].reshape(-1, 3)
+            self.count = int(root["NumberOfPoints"][0])
+            if (root["NumberOfPoints"][:] != self.count).any():
+                raise ValueError("the number of points changes")
+            self.points, self.speed = root["Points"], root["PointData/speed"]
+            shape = (len(self.times_s) * self.count, 3)
+            if not (self.points.shape == shape and self.speed.shape == shape[:1]):
+                raise ValueError("points and steps do not fit")
+            if not (len(self.times_s) and len(self.triangles) and numpy.isfinite(self.times_s).all()):
+                raise ValueError("nothing moves in it")
+            if self.triangles.min() < 0 or self.triangles.max() >= self.count:
+                raise ValueError("a triangle has a corner that is no point")
+        except (KeyError, ValueError, TypeError, IndexError, AttributeError, OSError) as error:
+            why = str(error).strip("\"'")
+            raise InputError(f"{path}: this is no motion of carillon-simulate ({why}); carillon-simulate --motion writes one") from None
+
+    def read_frame(self, frame):
+        rows = slice(frame * self.count, (frame + 1) * self.count)
+        try:
+            place, speed = self.points[rows].astype(float), self.speed[rows].astype(float)
+        except OSError:
+            raise InputError(f"{self.path}: frame {frame + 1} cannot be read; the file is damaged, run carillon-simulate again") from None
+        if not (numpy.abs(place).max() <= 1e12 and numpy.isfinite(speed).all()):
+            raise InputError(f"{self.path}: frame {frame + 1} has a number that is not finite; run carillon-simulate again")
+        return place, speed
 
 
 def drop_cavities(vertices, triangles):
@@ -962,6 +1012,127 @@ def draw_scene(scene):
     return draw([renderer, overlay], width, height)
 
 
+# ------------------------------------------------------------------ motions
+
+
+LEGEND = 84  # pixels: height of the bar of colours below
+
+
+class MotionPainter:
+    """Frames of a motion by one view and one scale of colours, so that they can be compared, and make a film."""
+
+    def __init__(self, motion, frames, up, colour, exaggerate, panel_width):
+        self.motion, self.colour, self.exaggerate, self.panel_width = motion, colour, exaggerate, panel_width
+        self.rest = motion.read_frame(0)[0]
+        extent = self.rest.max(axis=0) - self.rest.min(axis=0)
+        if not extent.max() > 0:
+            raise InputError(f"{motion.path}: its points have no extent; run carillon-simulate again")
+        self.view = View(up, self.rest, 28, 34 if extent[up] < 0.25 * max(extent) else 14)
+        low, high, self.largest = numpy.full(3, math.inf), numpy.full(3, -math.inf), 0.0
+        first, last = low, high  # of the box in the axes of the world
+        for frame in frames:  # one at a time: a film may be longer than the memory
+            shape, value = self.calc_shape(frame)
+            seen = shape @ self.view.axes.T
+            low, high = numpy.minimum(low, seen.min(axis=0)), numpy.maximum(high, seen.max(axis=0))
+            first, last = numpy.minimum(first, shape.min(axis=0)), numpy.maximum(last, shape.max(axis=0))
+            self.largest = max(self.largest, value.max())
+        self.low, self.high, self.bounds = low, high, numpy.column_stack([first, last]).ravel()
+        aspect = (high[0] - low[0]) / max(high[1] - low[1], 0.05 * (high[0] - low[0]))
+        self.panel_height = 2 * round(0.5 * (min(max((panel_width - 90) / aspect, 150), 900) + 100))  # even: films are coded so
+        self.colours = make_colours()
+
+    def calc_shape(self, frame):
+        """Points with displacements as large as asked for, and what colours them, in m/s or m."""
+        place, speed = self.motion.read_frame(frame)
+        moved = place - self.rest
+        value = speed if self.colour == "speed" else numpy.linalg.norm(moved, axis=1)
+        return self.rest + self.exaggerate * moved, value
+
+    def paint(self, frame):
+        shape, value = self.calc_shape(frame)
+        renderer = make_renderer()
+        renderer.GradientBackgroundOff()
+        renderer.SetBackground(1.0, 1.0, 1.0)
+        width, height = self.panel_width, self.panel_height
+        self.view.aim(renderer, self.low, self.high, width, height, (45, 45, 70, 20))
+        value = value / self.largest if self.largest > 0 else value
+        renderer.AddActor(make_actor(make_surface(shape, self.motion.triangles, value), colours=self.colours))
+        renderer.ResetCameraClippingRange(*self.bounds)
+        renderer.AddActor2D(make_text(f"{1e3 * self.motion.times_s[frame] + 0.0:.3f} ms", 0.5, 36 / height, 26))
+        return draw([renderer], width, height)
+
+    def describe_ends(self):
+        unit, value = ("m/s", self.largest) if self.colour == "speed" else ("mm", 1e3 * self.largest)
+        return "0", f"{value:.3g} {unit}"
+
+    def describe(self):
+        larger = "" if self.exaggerate == 1 else f"   ·   displacements drawn {self.exaggerate:g} times as large"
+        return f"{self.motion.path.name}   ·   colour: {self.colour}{larger}"
+
+    def draw_legend(self, width):
+        return draw_legend(width, LEGEND, self.colours, self.describe_ends(), self.describe())
+
+
+def draw_moments(motion, moments, up, colour, exaggerate):
+    """A strip of moments that are evenly spread from the first frame to the last; a single one is the last."""
+    last = len(motion.times_s) - 1
+    frames = sorted({round(i * last / (moments - 1)) for i in range(moments)}) if moments > 1 else [last]
+    columns = min(len(frames), 6)
+    painter = MotionPainter(motion, frames, up, colour, exaggerate, 1860 // columns)
+    rows, width, height = math.ceil(len(frames) / columns), painter.panel_width, painter.panel_height
+    canvas = numpy.full((rows * height + LEGEND, columns * width, 3), 255.0)
+    for index, frame in enumerate(frames):
+        row, column = divmod(index, columns)
+        canvas[row * height : (row + 1) * height, column * width : (column + 1) * width] = painter.paint(frame)
+    canvas[rows * height :] = painter.draw_legend(canvas.shape[1])
+    return canvas
+
+
+def write_frames(motion, folder, up, colour, exaggerate):
+    """All frames as FOLDER/00001.png ...; their number, width and height. What cannot be read is found before the first one is written;
+    where the disk refuses, the folder keeps those before it."""
+    frames = range(len(motion.times_s))
+    painter = MotionPainter(motion, frames, up, colour, exaggerate, 960)
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise SystemError_(f"{folder}: cannot be made ({error.strerror}); choose another place") from None
+    legend = painter.draw_legend(painter.panel_width)
+    for frame in frames:
+        write_png(numpy.vstack([painter.paint(frame), legend]), folder / f"{frame + 1:05d}.png")
+    return len(frames), painter.panel_width, painter.panel_height + LEGEND
+
+
+def parse_factor(text):
+    try:
+        factor = float(text)
+    except ValueError:
+        factor = math.nan
+    if not 0 < factor <= 1e9:
+        raise InputError(f"--exaggerate {text}: is no factor; give a number above 0 and up to 1e9, 1 for motion as it is")
+    return factor
+
+
+def parse_moments(text):
+    if not (text.isdecimal() and 1 <= int(text) <= 24):
+        raise InputError(f"--moments {text}: is no number of pictures; give a whole number from 1 to 24")
+    return int(text)
+
+
+def check_motion_outputs(arguments):
+    if arguments.output is None and arguments.frames is None:
+        raise InputError("motion: nothing is to be drawn; give -o OUT.png, --frames DIR, or both")
+    folder = arguments.frames
+    if folder is None:
+        return
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"{folder}: this is a file; give the name of a folder")
+    if folder.is_dir() and any(folder.iterdir()):
+        raise InputError(f"{folder}: this folder is not empty; give an empty folder or a new one")
+    if not folder.absolute().parent.is_dir():
+        raise InputError(f"{folder.absolute().parent}: there is no such folder; make it first")
+
+
 # ------------------------------------------------------------------ the program
 
 
@@ -1003,9 +1174,9 @@ class Parser(argparse.ArgumentParser):
 
 
 def run():
-    parser = Parser(prog="carillon-draw", description="Draws mode banks and simulated scenes.")
+    parser = Parser(prog="carillon-draw", description="Draws mode banks, simulated scenes and simulations.")
     parser.add_argument("--version", action="version", version=f"carillon-draw {VERSION}")
-    commands = parser.add_subparsers(dest="command", required=True, metavar="modes|directivity|scene", parser_class=Parser)
+    commands = parser.add_subparsers(dest="command", required=True, metavar="modes|directivity|scene|motion", parser_class=Parser)
     modes = commands.add_parser("modes", help="modes of a bank as deformed bodies", allow_abbrev=False)
     directivity = commands.add_parser("directivity", help="how loud each mode is in every direction, far away", allow_abbrev=False)
     modes.add_argument("bank", metavar="BANK")
@@ -1017,12 +1188,25 @@ def run():
     scene = commands.add_parser("scene", help="the bodies of a simulated scene along their ways", allow_abbrev=False)
     scene.add_argument("trajectory", metavar="TRAJECTORY.json", help="written by carillon-render --trajectory")
     scene.add_argument("-o", "--output", required=True, type=pathlib.Path, metavar="OUT.png")
-    for command in (modes, directivity, scene):
+    motion_words = commands.add_parser("motion", help="bodies that deform, as carillon-simulate moved them", allow_abbrev=False)
+    motion_words.add_argument("motion", metavar="MOTION.vtkhdf", help="written by carillon-simulate --motion")
+    motion_words.add_argument("-o", "--output", type=pathlib.Path, metavar="OUT.png", help="pictures of some moments side by side")
+    motion_words.add_argument("--moments", default="6", metavar="N", help="how many, from the first frame to the last [6]")
+    motion_words.add_argument("--exaggerate", default="1", metavar="F", help="draw displacements from the first frame F times as large [1]")
+    motion_words.add_argument("--colour", choices=["speed", "displacement"], default="speed", help="what the colours show [speed]")
+    motion_words.add_argument("--up", choices="xyz", default="z", help="the axis that points up in the picture [z]")
+    motion_words.add_argument("--frames", type=pathlib.Path, metavar="DIR", help="write every frame to this folder, 00001.png and so on")
+    for command in (modes, directivity, scene, motion_words):
         command.add_argument("--result", type=pathlib.Path, metavar="FILE", help="write how the program ended to this file, a JSON object")
     arguments = parser.parse_args()
 
-    check_output(arguments.output)
-    if arguments.command == "scene":
+    if arguments.output is not None:
+        check_output(arguments.output)
+    if arguments.command == "motion":
+        check_motion_outputs(arguments)
+        moments, factor = parse_moments(arguments.moments), parse_factor(arguments.exaggerate)
+        motion = Motion(arguments.motion)
+    elif arguments.command == "scene":
         trajectory = Trajectory(arguments.trajectory)
     else:
         bank = Bank(arguments.bank)
@@ -1034,6 +1218,15 @@ def run():
         image = draw_modes(bank, numbers, "xyz".index(arguments.up))
     elif arguments.command == "directivity":
         image = draw_directivity(bank, air, numbers, "xyz".index(arguments.up))
+    elif arguments.command == "motion":
+        up = "xyz".index(arguments.up)
+        image = draw_moments(motion, moments, up, arguments.colour, factor) if arguments.output is not None else None
+        if arguments.frames is not None:
+            count, width, height = write_frames(motion, arguments.frames, up, arguments.colour, factor)
+            out = sys.stderr if arguments.output == STANDARD_OUTPUT else sys.stdout
+            print(f"{printable(arguments.frames)}: {count} frames of {width} x {height} pixels", file=out)
+        if image is None:
+            return
     else:
         image = draw_scene(trajectory)
     write_png(image, arguments.output)

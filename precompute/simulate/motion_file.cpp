@@ -160,7 +160,7 @@ void MotionFile::write() const {
     std::vector<double> times;
     std::vector<std::int64_t> first_point, none(static_cast<std::size_t>(count_)), one(static_cast<std::size_t>(count_), 1), part_of;
     for (std::int64_t f = 0; f < count_; ++f) {
-      times.push_back(std::ceil(static_cast<double>(f) * every_samples_ - 1e-9) / rate_hz_);
+      times.push_back((std::ceil(static_cast<double>(f) * every_samples_ - 1e-9) + 0.0) / rate_hz_);  // + 0: not -0 for the first
       first_point.push_back(f * points_);
       part_of.push_back(f);
     }
