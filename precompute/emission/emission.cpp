@@ -111,6 +111,8 @@ struct Emission::State {
   std::vector<Triangle> corners;    // (slots): vertices; triangles by body, each body padded to lanes
   std::vector<std::int64_t> place;  // (slots) among the triangles of all ranks by their numbers; -1: padding
   std::vector<double> area;         // (slots) at rest, m2
+  std::vector<std::int32_t> twin;   // (slots) the same triangle seen from its other side, with a lower slot; -1: none
+  std::vector<bool> is_whole;       // (slots) such a one follows: kKirchhoff emits both at once
   struct Run {
     std::size_t begin, end;  // slots
     recording::Pole pole;
@@ -293,6 +295,25 @@ Emission::State::State(const comm::Communicator& communicator, SurfacePart part,
     area.resize(run.end, 0.0);
     runs.push_back(run);
   }
+  // The two sides of a thin sheet.
+  twin.assign(corners.size(), -1);
+  is_whole.assign(corners.size(), false);
+  std::map<std::pair<std::int32_t, Triangle>, std::size_t> sides;  // body, and corners from the lowest on
+  for (const Run& run : runs)
+    for (std::size_t t = run.begin; t < run.end; ++t) {
+      if (place[t] < 0) continue;
+      Triangle turned = corners[t];
+      std::rotate(turned.begin(), std::min_element(turned.begin(), turned.end()), turned.end());
+      const auto body = static_cast<std::int32_t>(&run - runs.data());
+      const auto other = sides.find({body, {turned[0], turned[2], turned[1]}});
+      if (other == sides.end()) {
+        sides.emplace(std::pair(body, turned), t);
+      } else if (!is_whole[other->second]) {
+        twin[t] = static_cast<std::int32_t>(other->second);
+        is_whole[other->second] = true;
+      }
+    }
+
   std::vector<std::int64_t> own_places;
   for (const std::int64_t one : place)
     if (one >= 0) own_places.push_back(one);
@@ -481,6 +502,10 @@ void Emission::State::calc_sources(std::int64_t k) {
   // The mean of three, half of the cross product, and two derivatives by samples.
   const double scale = options.sample_rate_hz * options.sample_rate_hz / 6.0;
   for (std::size_t t = 0; t < corners.size(); ++t) {
+    if (twin[t] >= 0) {  // what one side sends away the other takes in
+      to[t] = -to[twin[t]];
+      continue;
+    }
     const Triangle& corner = corners[t];
     const Vec3 v0 = get_vertex(velocity.data(), corner[0]), v1 = get_vertex(velocity.data(), corner[1]),
                v2 = get_vertex(velocity.data(), corner[2]);
@@ -510,9 +535,10 @@ void Emission::State::emit(std::int64_t k) {
   const double* source = get_sources(k);
   const double fs = options.sample_rate_hz, rho = options.air_density_kg_m3, per_m = fs / options.sound_speed_m_s;
   const std::size_t slots = corners.size();
+  const bool is_kirchhoff = options.radiation == Radiation::kKirchhoff;
   for (const Run& run : runs) {
     for (std::size_t t = run.begin; t < run.end; ++t) {
-      if (place[t] < 0) continue;
+      if (place[t] < 0 || (is_kirchhoff && twin[t] >= 0)) continue;
       const Vec3 x0 = get_vertex(x, corners[t][0]), x1 = get_vertex(x, corners[t][1]), x2 = get_vertex(x, corners[t][2]);
       const Vec3 centre = (1.0 / 3.0) * (x0 + x1 + x2), twice = cross(x1 - x0, x2 - x0);
       const double area_now = norm(twice);
@@ -520,8 +546,9 @@ void Emission::State::emit(std::int64_t k) {
       double plain = 0.0, turned = 0.0;
       switch (options.radiation) {
         case Radiation::kKirchhoff:
-          plain = rho / (4.0 * std::numbers::pi) * source[t];
-          turned = rho / (4.0 * std::numbers::pi) * (source[t] - run.pole.rate_per_s * pole[t]);
+          // Of two sides what is alike to all sides cancels, and the rest is there twice.
+          plain = is_whole[t] ? 0.0 : rho / (4.0 * std::numbers::pi) * source[t];
+          turned = (is_whole[t] ? 2.0 : 1.0) * rho / (4.0 * std::numbers::pi) * (source[t] - run.pole.rate_per_s * pole[t]);
           break;
         case Radiation::kRayleigh:
           plain = rho / (2.0 * std::numbers::pi) * blockers[t].next(source[t], alpha);

@@ -106,6 +106,31 @@ TEST(Sound, ATumblingRigidBodyMakesNoTone) {
   EXPECT_LT(find_most(std::span(sound).subspan(200)), 2e-2 * scale);
 }
 
+// The two sides of a sheet go out as one; with nodes of their own they are two surfaces.
+TEST(Sound, TheSidesOfASheetAreHeardAsTheTwoSurfacesThatTheyAre) {
+  const auto listen = [](std::int32_t apart) {
+    SurfacePart part;
+    const std::vector<Vec3> corners{{-0.1, -0.1, 0}, {0.1, -0.1, 0}, {0.1, 0.1, 0}, {-0.1, 0.1, 0}};
+    part.nodes_m = corners;
+    if (apart > 0) part.nodes_m.insert(part.nodes_m.end(), corners.begin(), corners.end());
+    part.triangles = {{0, 1, 2}, {0, 2, 3}, {apart, apart + 2, apart + 1}, {apart, apart + 3, apart + 2}};
+    for (std::size_t i = 0; i < part.nodes_m.size(); ++i) part.node_number.push_back(static_cast<std::int64_t>(i));
+    part.triangle_number = {0, 1, 2, 3};
+    part.body = {0, 0, 0, 0};
+    return hear(part, make_options(1000, {0.3, 0.2, 0.5}), [](const Vec3& x, double t) {
+      return Vec3{0, 0, 1e-6 * (1.0 + 3.0 * x[0]) * std::sin(kTwoPi * 3000.0 * t)};
+    });
+  };
+  const std::vector<double> sheet = listen(0), surfaces = listen(4);
+  double most = 0.0, difference = 0.0;
+  for (std::size_t n = 0; n < sheet.size(); ++n) {
+    most = std::max(most, std::abs(surfaces[n]));
+    difference = std::max(difference, std::abs(sheet[n] - surfaces[n]));
+  }
+  EXPECT_GT(most, 1e-6);
+  EXPECT_LT(difference, 1e-9 * most);
+}
+
 TEST(Sound, ReceiversHaveDirections) {
   const auto part = make_part(bem::testing::make_ball(2, 1e-3));
   Options options = make_options(800, {0.0, 0.0, 1.0}, 16);
