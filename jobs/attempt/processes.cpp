@@ -9,7 +9,6 @@
 #include <charconv>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <sstream>
 #include <vector>
 
@@ -20,7 +19,9 @@ namespace fs = std::filesystem;
 
 std::string read_all(const std::string& file) {
   std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
+  std::ostringstream text;
+  text << stream.rdbuf();  // a process that ends between the two costs its text, not an exception, as with an iterator
+  return text.str();
 }
 
 template <typename Number>

@@ -18,7 +18,6 @@
 #include <charconv>
 #include <cstring>
 #include <fstream>
-#include <iterator>
 #include <sstream>
 
 namespace carillon::process {
@@ -28,7 +27,9 @@ namespace fs = std::filesystem;
 
 std::string read_all(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
+  std::ostringstream text;
+  text << stream.rdbuf();  // a process that ends between the two costs its text, not an exception, as with an iterator
+  return text.str();
 }
 
 /// JobState letter and start of a process; none when there is no such process.
