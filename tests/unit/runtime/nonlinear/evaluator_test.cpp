@@ -86,7 +86,9 @@ TEST(Evaluator, IsTheSumsInDoublePrecisionInEveryFormAndInstructionSet) {
       for (const std::size_t n : {2u, 9u, 30u, 51u}) {
         const bank::QuarticEnergy energy = make_entries(n, n < 30 ? 33 : 150, is_curved);
         expect_same(energy, *kernels, 2e-5);
-        if (n > 9) EXPECT_LT(Evaluator(energy, *kernels).calc_bytes(), energy.rows.size() * sizeof(float) / 2) << "kept by entries";
+        if (n > 9) {
+          EXPECT_LT(Evaluator(energy, *kernels).calc_bytes(), energy.rows.size() * sizeof(float) / 2) << "kept by entries";
+        }
       }
       for (const std::size_t parts : {6u, 9u})
         for (const std::size_t n : {2u, 5u, 30u}) expect_same(make_points(n, 9, 23, parts, is_curved), *kernels, 1e-5);
