@@ -37,6 +37,36 @@ void for_chunks(const Strains& strains, Visit&& visit) {
   }
 }
 
+/// Strains of pairs of modes, an element at a time, and the room that they take.
+struct PairStrains {
+  const CoupledBody& body;
+  ElementPoints points;
+  RowMatrix shape, gradients, values;  // values: (rows of the element, pairs)
+
+  void calc(std::int32_t e, std::ptrdiff_t first, std::ptrdiff_t count) {
+    body.strains.calc_points(e, points);
+    body.strains.gather(e, body.shapes.data(), body.pairs.modes, shape);
+    Strains::calc_gradients(points, shape, gradients);
+    body.strains.calc_pair_strains(e, points, gradients, body.pairs, first, count, values);
+  }
+};
+
+/// The strains of all pairs, for runs of elements: change(element, strains) may alter them, then use(chunk, first row, rows).
+template <typename Change, typename Use>
+void for_pair_strains(const CoupledBody& body, Change&& change, Use&& use) {
+  const Strains& strains = body.strains;
+  PairStrains pair_strains{body, {}, {}, {}, {}};
+  for_chunks(strains, [&](std::int32_t begin, std::int32_t end, std::int64_t rows) {
+    la::Matrix chunk(rows, body.pairs.count());
+    for (std::int32_t e = begin; e < end; ++e) {
+      pair_strains.calc(e, 0, body.pairs.count());
+      change(e, pair_strains);
+      chunk.middleRows(strains.first_row(e) - strains.first_row(begin), strains.row_count(e)) = pair_strains.values;
+    }
+    use(chunk, strains.first_row(begin), rows);
+  });
+}
+
 /// c += a^T b, c symmetric in the end: the upper part of its blocks.
 void add_products(const la::Matrix& a, std::ptrdiff_t rows, la::Matrix& c) {
   constexpr std::ptrdiff_t kBlock = 256;
@@ -197,24 +227,15 @@ la::Matrix calc_mode_strains(const CoupledBody& body) {
 
 /// <basis, E_ij> of all pairs and all ranks: (columns of basis, pairs).
 la::Matrix calc_form(const CoupledBody& body, const la::Matrix& basis) {
-  const Strains& strains = body.strains;
-  const std::ptrdiff_t pairs = body.pairs.count(), modes = body.pairs.modes;
+  const std::ptrdiff_t pairs = body.pairs.count();
   la::Matrix sums = body.comm.agree([&] { return la::Matrix(la::Matrix::Zero(basis.cols(), pairs)); });
-  ElementPoints points;
-  RowMatrix shape, gradients, z;
   body.comm.agree([&] {
-    for_chunks(strains, [&](std::int32_t begin, std::int32_t end, std::int64_t rows) {
-      la::Matrix chunk(rows, pairs);
-      for (std::int32_t e = begin; e < end; ++e) {
-        strains.calc_points(e, points);
-        strains.gather(e, body.shapes.data(), modes, shape);
-        Strains::calc_gradients(points, shape, gradients);
-        strains.calc_pair_strains(e, points, gradients, body.pairs, 0, pairs, z);
-        chunk.middleRows(strains.first_row(e) - strains.first_row(begin), strains.row_count(e)) = z;
-      }
-      la::gemm(la::Transpose::kYes, basis.cols(), static_cast<int>(pairs), rows, 1, basis.data() + strains.first_row(begin), basis.rows(),
-               chunk.data(), rows, 1, sums.data(), sums.rows());
-    });
+    for_pair_strains(
+        body, [](std::int32_t, PairStrains&) {},
+        [&](const la::Matrix& chunk, std::int64_t first, std::int64_t rows) {
+          la::gemm(la::Transpose::kYes, basis.cols(), static_cast<int>(pairs), rows, 1, basis.data() + first, basis.rows(), chunk.data(),
+                   rows, 1, sums.data(), sums.rows());
+        });
   });
   body.comm.sum(la::entries(sums));
   return sums;
@@ -303,20 +324,17 @@ Gram calc_gram(const CoupledBody& body) {
   Gram gram = body.comm.agree([&] {
     return Gram{la::Matrix::Zero(pairs, pairs), la::Matrix::Zero(modes, pairs), Nodal(count_nodal(body, pairs), 0.0)};
   });
-  ElementPoints points;
-  RowMatrix shape, gradients, linear, z, forces;
+  PairStrains one{body, {}, {}, {}, {}};
+  RowMatrix linear, forces;
   for (std::ptrdiff_t first = 0; first < pairs; first += kPairsAtOnce) {
     const std::ptrdiff_t width = std::min<std::ptrdiff_t>(kPairsAtOnce, pairs - first);
     body.proceed(static_cast<double>(first) / static_cast<double>(pairs));
     Nodal loads = body.comm.agree([&] { return Nodal(count_nodal(body, width), 0.0); });
     body.comm.agree([&] {
       for (std::int32_t e = 0; e < strains.element_count(); ++e) {
-        strains.calc_points(e, points);
-        strains.gather(e, body.shapes.data(), modes, shape);
-        Strains::calc_gradients(points, shape, gradients);
-        strains.calc_pair_strains(e, points, gradients, body.pairs, first, width, z);
-        strains.calc_linear(e, points, linear);
-        forces.noalias() = linear.transpose() * z;
+        one.calc(e, first, width);
+        strains.calc_linear(e, one.points, linear);
+        forces.noalias() = linear.transpose() * one.values;
         add_loads(strains, e, forces, loads);
       }
     });
@@ -326,20 +344,14 @@ Gram calc_gram(const CoupledBody& body) {
       std::copy_n(loads.begin() + to_index(row) * width, width, gram.theta.begin() + to_index(row) * pairs + first);
   }
   body.comm.agree([&] {
-    for_chunks(strains, [&](std::int32_t begin, std::int32_t end, std::int64_t rows) {
-      la::Matrix chunk(rows, pairs);
-      for (std::int32_t e = begin; e < end; ++e) {
-        strains.calc_points(e, points);
-        strains.gather(e, body.shapes.data(), modes, shape);
-        Strains::calc_gradients(points, shape, gradients);
-        strains.calc_pair_strains(e, points, gradients, body.pairs, 0, pairs, z);
-        strains.calc_linear(e, points, linear);
-        strains.gather(e, gram.theta.data(), pairs, forces);
-        z.noalias() -= linear * forces;
-        chunk.middleRows(strains.first_row(e) - strains.first_row(begin), strains.row_count(e)) = z;
-      }
-      add_products(chunk, rows, gram.values);
-    });
+    for_pair_strains(
+        body,
+        [&](std::int32_t e, PairStrains& of_element) {
+          strains.calc_linear(e, of_element.points, linear);
+          strains.gather(e, gram.theta.data(), pairs, forces);
+          of_element.values.noalias() -= linear * forces;
+        },
+        [&](const la::Matrix& chunk, std::int64_t, std::int64_t rows) { add_products(chunk, rows, gram.values); });
   });
   body.comm.sum(la::entries(gram.values));
   mirror(gram.values);

@@ -7,15 +7,14 @@
 #include <set>
 
 #include "tests/support/folder.hpp"
+#include "tests/unit/jobs/store/ids.hpp"
 
 namespace {
 
 using namespace carillon;
 using carillon::tests::Folder;
-
-constexpr const char* kSolver = "carillon-precompute 0.1.0 (abc)";
-constexpr const char* kMaterial =
-    R"("material": {"young_modulus_pa": 7e10, "poisson_ratio": 0.33, "density_kg_m3": 2700, "damping": {"rayleigh": {"alpha1_s": 1e-7, "alpha2_per_s": 0.5}}})";
+using store::testing::kMaterial;
+using store::testing::kSolver;
 
 std::string find_id(const std::filesystem::path& job, const std::string& solver = kSolver) {
   return store::RequestMaker(solver).make(job::read_job(job, job::BankKey::optional)).id;
@@ -43,10 +42,8 @@ TEST(Identity, is_the_same_for_the_same_request_in_other_words) {
        "\"poisson_ratio\": 0.33, "
        "\"young_modulus_pa\": 70e9}, \"mesh\": \"m.msh\"}"},
   };
-  for (const auto& [what, text] : same) {
-    const std::size_t bar = text.find('|');
-    EXPECT_EQ(find_id(folder.write(text.substr(0, bar), text.substr(bar + 1))), id) << what;
-  }
+  store::testing::expect_same(
+      folder, [](const auto& job) { return find_id(job); }, id, same);
 }
 
 TEST(Identity, is_another_for_every_input_that_changes_the_bank) {

@@ -9,16 +9,16 @@
 #include "precompute/job/simulation.hpp"
 #include "runtime/base/error.hpp"
 #include "tests/support/folder.hpp"
+#include "tests/unit/jobs/store/ids.hpp"
 
 namespace {
 
 using namespace carillon;
 using carillon::tests::Folder;
+using store::testing::kMaterial;
+using store::testing::kSolver;
 
-constexpr const char* kSolver = "carillon-precompute 0.1.0 (abc)";
 constexpr const char* kSimulator = "carillon-simulate 0.1.0 (abc)";
-constexpr const char* kMaterial =
-    R"("material": {"young_modulus_pa": 7e10, "poisson_ratio": 0.33, "density_kg_m3": 2700, "damping": {"rayleigh": {"alpha1_s": 1e-7, "alpha2_per_s": 0.5}}})";
 
 std::string simulation_of(const std::string& mesh, const std::string& simulate = "", const std::string& rest = ", \"sound\": \"a.wav\"") {
   return "{\"simulate\": {\"duration_s\": 0.25, \"bodies\": [{\"name\": \"a\", \"mesh\": \"" + mesh + "\", " + kMaterial + "}]" + simulate +
@@ -41,10 +41,8 @@ TEST(Order, is_the_same_simulation_in_other_words) {
       {"resources", "b.json|" + simulation_of("m.msh", "", ", \"sound\": \"a.wav\", \"resources\": {\"ranks\": 3}")},
       {"comments", "b.json|// a job\n" + simulation_of("m.msh", " // here\n")},
   };
-  for (const auto& [what, text] : same) {
-    const std::size_t bar = text.find('|');
-    EXPECT_EQ(find_id(folder.write(text.substr(0, bar), text.substr(bar + 1))), id) << what;
-  }
+  store::testing::expect_same(
+      folder, [](const auto& job) { return find_id(job); }, id, same);
 }
 
 TEST(Order, is_another_simulation_for_all_that_changes_its_files) {
@@ -63,8 +61,8 @@ TEST(Order, is_another_simulation_for_all_that_changes_its_files) {
       {"another file", simulation_of("m.msh", "", ", \"motion\": \"a.vtkhdf\"")},
       {"one more file", simulation_of("m.msh", "", ", \"sound\": \"a.wav\", \"motion\": \"a.vtkhdf\"")},
   };
-  std::set<std::string> ids;
-  for (const auto& [what, text] : others) EXPECT_TRUE(ids.insert(find_id(folder.write("a.json", text))).second) << what;
+  auto ids = store::testing::expect_different(
+      folder, [](const auto& job) { return find_id(job); }, others);
   EXPECT_TRUE(ids.insert(find_id(folder.write("a.json", simulation_of("m.msh")), "carillon-simulate 0.2.0 (abc)")).second);
 }
 

@@ -588,14 +588,17 @@ TEST(EffectSelector, AHeadHearsWhateverIsHeard) {
   EXPECT_EQ(deaf[Effect::kHead].reason.rule, SelectionReason::Rule::kNeedsOther);
 }
 
+/// The effects behind a blow at 0.5 s, and the plan of one of them.
+auto select_for_strike(const Stage& stage, double impulse_n_s, Effect effect) {
+  EffectSelector selector(stage.facts);
+  selector.watch(make_strike(0.5, impulse_n_s));
+  const auto changes = selector.advance(10.0);
+  return std::pair(find_effects(changes, 0.5), selector.get_plan(0)[effect]);
+}
+
 TEST(EffectSelector, NonlinearMotionIsThatOfABlowThatRaisesAMode) {
   Stage stage;
-  const auto play_strike = [&](double impulse_n_s) {
-    EffectSelector selector(stage.facts);
-    selector.watch(make_strike(0.5, impulse_n_s));
-    const auto changes = selector.advance(10.0);
-    return std::pair(find_effects(changes, 0.5), selector.get_plan(0)[Effect::kNonlinear]);
-  };
+  const auto play_strike = [&](double impulse_n_s) { return select_for_strike(stage, impulse_n_s, Effect::kNonlinear); };
   const auto [linear, none] = play_strike(1.0);
   EXPECT_FALSE(linear.has(Effect::kNonlinear));
   EXPECT_EQ(describe(none.reason), "the bank has no nonlinear energy");
@@ -624,12 +627,7 @@ TEST(EffectSelector, NonlinearMotionIsThatOfABlowThatRaisesAMode) {
 
 TEST(EffectSelector, ACascadeIsThatOfAHardBlowOnABankWithModesAbove) {
   Stage stage;
-  const auto play_strike = [&](double impulse_n_s) {
-    EffectSelector selector(stage.facts);
-    selector.watch(make_strike(0.5, impulse_n_s));
-    const auto changes = selector.advance(10.0);
-    return std::pair(find_effects(changes, 0.5), selector.get_plan(0)[Effect::kCascade]);
-  };
+  const auto play_strike = [&](double impulse_n_s) { return select_for_strike(stage, impulse_n_s, Effect::kCascade); };
   EXPECT_EQ(describe(play_strike(1.0).second.reason), "the bank has no nonlinear energy");
   bank::Bank bank = make_cube_bank({{1000.0, 20.0, 0.05}, {1700.0, 30.0, 0.05}});
   bank.quartic.modes = {0};
