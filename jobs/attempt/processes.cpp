@@ -8,21 +8,15 @@
 
 #include <charconv>
 #include <filesystem>
-#include <fstream>
 #include <sstream>
 #include <vector>
+
+#include "jobs/process/process.hpp"
 
 namespace carillon::attempt {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string read_all(const std::string& file) {
-  std::ifstream stream(file, std::ios::binary);
-  std::ostringstream text;
-  text << stream.rdbuf();  // a process that ends between the two costs its text, not an exception, as with an iterator
-  return text.str();
-}
 
 template <typename Number>
 Number parse(const std::string& text) {
@@ -33,7 +27,7 @@ Number parse(const std::string& text) {
 
 /// False for a zombie and for what is gone.
 bool read_usage(pid_t pid, Usage& usage) {
-  const std::string text = read_all(fmt::format("/proc/{}/stat", pid));
+  const std::string text = process::read_proc(fmt::format("/proc/{}/stat", pid));
   const std::size_t open = text.find('('), close = text.rfind(')');
   if (open == std::string::npos || close == std::string::npos || close < open) return false;
   std::istringstream fields(text.substr(close + 1));
@@ -69,7 +63,8 @@ std::map<pid_t, Usage> find_below(pid_t root) {
   }
   for (auto& [pid, usage] : below) {
     // Finer than ticks: a process that sleeps and looks now and then uses less than one.
-    if (const std::string text = read_all(fmt::format("/proc/{}/schedstat", pid)); !text.empty()) usage.cpu_ns = parse<std::uint64_t>(text);
+    if (const std::string text = process::read_proc(fmt::format("/proc/{}/schedstat", pid)); !text.empty())
+      usage.cpu_ns = parse<std::uint64_t>(text);
   }
   return below;
 }
@@ -84,7 +79,7 @@ std::uint64_t calc_cpu_below(const std::map<pid_t, Usage>& all, pid_t pid) {
 }
 
 std::uint64_t find_memory_kills() {
-  std::istringstream lines(read_all("/proc/vmstat"));
+  std::istringstream lines(process::read_proc("/proc/vmstat"));
   std::string name;
   std::uint64_t value = 0;
   while (lines >> name >> value) {

@@ -3,10 +3,10 @@
 
 #include <algorithm>
 #include <map>
-#include <sstream>
 
 #include "jobs/cli/commands.hpp"
 #include "jobs/cli/gather.hpp"
+#include "jobs/store/json.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::cli {
@@ -25,19 +25,12 @@ void flatten(const Json::Value& value, const std::string& name, std::map<std::st
     for (const std::string& key : value.getMemberNames()) flatten(value[key], name.empty() ? key : name + "." + key, leaves);
     return;
   }
-  Json::StreamWriterBuilder writer;
-  writer["indentation"] = "";
-  writer["precision"] = 17;
-  writer["emitUTF8"] = true;
-  leaves[name] = Json::writeString(writer, value);
+  leaves[name] = store::write_json(value, "");
 }
 
 std::map<std::string, std::string> read_leaves(const std::string& job) {
-  Json::Value root;
-  std::string errors;
-  std::istringstream stream(job);
   std::map<std::string, std::string> leaves;
-  if (Json::parseFromStream(Json::CharReaderBuilder(), stream, &root, &errors)) flatten(root, "", leaves);
+  if (const auto root = store::parse_json(job)) flatten(*root, "", leaves);
   return leaves;
 }
 

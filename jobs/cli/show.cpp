@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "jobs/cli/shared.hpp"
+#include "jobs/store/json.hpp"
 #include "jobs/store/records.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/printable.hpp"
@@ -51,10 +52,7 @@ Json::Value to_json_time(double unix_s) {
 }
 
 void print_json(const Json::Value& root) {
-  Json::StreamWriterBuilder writer;
-  writer["indentation"] = "  ";
-  writer["emitUTF8"] = true;
-  fmt::print("{}\n", store::to_plain_json(Json::writeString(writer, root)));
+  fmt::print("{}\n", store::to_plain_json(store::write_json(root, "  ")));
   if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
 }
 

@@ -1,19 +1,14 @@
 // carillon validate and carillon study: other programs, started in place of this one.
-#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
 
 #include "jobs/cli/commands.hpp"
+#include "jobs/store/order.hpp"
 #include "precompute/job/simulation.hpp"
 #include "runtime/base/file.hpp"
 
 namespace carillon::cli {
-namespace {
-
-constexpr std::uint64_t kMaxJobBytes = 64 << 20;
-
-}  // namespace
 
 int run_validate(Shared& shared, const ValidateOptions& options) {
   std::vector<std::string> arguments{"--validate"};
@@ -22,7 +17,7 @@ int run_validate(Shared& shared, const ValidateOptions& options) {
   arguments.push_back(options.word.starts_with('-') ? "./" + options.word : options.word);
   std::error_code error;
   const bool is_file = std::filesystem::is_regular_file(options.word, error);
-  const bool is_simulation = is_file && job::is_simulation(base::read_file(options.word, "job file", kMaxJobBytes));
+  const bool is_simulation = is_file && job::is_simulation(base::read_file(options.word, "job file", store::kMaxJobBytes));
   become(is_simulation ? "carillon-simulate" : "carillon-precompute", arguments);
 }
 

@@ -25,20 +25,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string read_all(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  std::ostringstream text;
-  text << stream.rdbuf();  // a process that ends between the two costs its text, not an exception, as with an iterator
-  return text.str();
-}
-
 /// JobState letter and start of a process; none when there is no such process.
 struct Stat {
   char state = 'X';
   std::uint64_t start_ticks = 0;
 };
 std::optional<Stat> find_stat(pid_t pid) {
-  const std::string text = read_all(fmt::format("/proc/{}/stat", pid));
+  const std::string text = read_proc(fmt::format("/proc/{}/stat", pid));
   const std::size_t end = text.rfind(')');  // the name before it may hold anything
   if (end == std::string::npos) return std::nullopt;
   std::istringstream fields(text.substr(end + 1));
@@ -53,7 +46,7 @@ std::optional<Stat> find_stat(pid_t pid) {
 bool is_dead(const std::optional<Stat>& stat) { return !stat || stat->state == 'Z' || stat->state == 'X'; }
 
 bool holds_entry(pid_t pid, std::string_view entry) {
-  const std::string environment = read_all(fmt::format("/proc/{}/environ", pid));
+  const std::string environment = read_proc(fmt::format("/proc/{}/environ", pid));
   std::size_t at = 0;
   while (at < environment.size()) {
     const std::size_t end = std::min(environment.find('\0', at), environment.size());
@@ -70,6 +63,13 @@ void wait_ms(long milliseconds) {
 
 }  // namespace
 
+std::string read_proc(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::ostringstream text;
+  text << stream.rdbuf();  // a process that ends between the two costs its text, not an exception, as with an iterator
+  return text.str();
+}
+
 std::string find_host() {
   std::array<char, 256> name{};
   ::gethostname(name.data(), name.size() - 1);
@@ -77,7 +77,7 @@ std::string find_host() {
 }
 
 std::string find_boot() {
-  std::string boot = read_all("/proc/sys/kernel/random/boot_id");
+  std::string boot = read_proc("/proc/sys/kernel/random/boot_id");
   boot.erase(std::remove(boot.begin(), boot.end(), '\n'), boot.end());
   std::error_code error;
   std::string space = fs::read_symlink("/proc/self/ns/pid", error).string();  // "pid:[4026531836]"

@@ -39,6 +39,9 @@ bool is_self(const Identity& identity);
 /// Of this machine and this boot: running or gone. Of an earlier boot of this machine: gone. Else: elsewhere.
 Life find_life(const Identity& identity);
 
+/// A file of /proc, whole; what there was of it when the process ends meanwhile, "" when it cannot be read.
+std::string read_proc(const std::filesystem::path& file);
+
 /// The processes with `entry` ("NAME=value") in the environment they were started with, zombies and this one left out.
 std::vector<pid_t> find_with_environment(std::string_view entry);
 

@@ -7,7 +7,6 @@
 
 #include <fcntl.h>
 #include <fmt/core.h>
-#include <json/json.h>
 #include <pwd.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -23,6 +22,7 @@
 
 #include "jobs/process/process.hpp"
 #include "jobs/store/files.hpp"
+#include "jobs/store/json.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/file.hpp"
 
@@ -32,17 +32,13 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kHeadBytes = 4096;
-constexpr std::uint64_t kMaxJobBytes = 64 << 20;
 constexpr std::size_t kMaxTexts = 50;
 constexpr const char* kScheme = "carillon identity 1";
 
-Json::Value parse_json(const std::string& text) {
-  Json::Value root;
-  std::istringstream stream(text);
-  std::string errors;
-  if (!Json::parseFromStream(Json::CharReaderBuilder(), stream, &root, &errors))
-    throw SystemError("internal: a resolved job is not JSON: " + errors);
-  return root;
+Json::Value parse_resolved(const std::string& text) {
+  auto root = parse_json(text);
+  if (!root) throw SystemError("internal: a resolved job is not JSON");
+  return std::move(*root);
 }
 
 /// -0 is 0.
@@ -61,11 +57,7 @@ std::string make_canonical(Json::Value root) {
     for (const char* path : {"surface", "modes_csv"}) root["body"].removeMember(path);
   if (root["body"].isNull()) root.removeMember("body");
   drop_signs_of_zero(root);
-  Json::StreamWriterBuilder writer;
-  writer["indentation"] = "";
-  writer["precision"] = 17;
-  writer["emitUTF8"] = true;
-  return Json::writeString(writer, root);
+  return write_json(root, "");
 }
 
 /// What a record of a run (JSON) has in common with a request.
@@ -73,14 +65,8 @@ enum class Origin { same, unknown, another_job, another_input };
 
 /// An object of JSON; null for anything else.
 Json::Value parse_object(const std::string& text) {
-  Json::Value root;
-  std::istringstream stream(text);
-  std::string errors;
-  try {
-    if (Json::parseFromStream(Json::CharReaderBuilder(), stream, &root, &errors) && root.isObject()) return root;
-  } catch (const Json::Exception&) {  // too deep
-  }
-  return {};
+  auto root = parse_json(text);
+  return root && root->isObject() ? std::move(*root) : Json::Value();
 }
 
 /// Where a job names its input.
@@ -229,16 +215,13 @@ void fill_work(const std::string& job, const Request& request, const fs::path& f
 
 /// The job of a request, with its inputs in the store and its bank where carillon-precompute is to write it.
 std::string make_job(const Store& store, const Request& request, const Id& id) {
-  Json::Value root = parse_json(request.job);
+  Json::Value root = parse_resolved(request.job);
   const fs::path work = store.work_folder(id);
   const std::vector<fs::path> files = find_input_files(store, request);
   if (request.input_kind == InputKind::simulation) return write_simulation(std::move(root), files);
   if (!files.empty()) get_input_key(root, request.input_kind) = files[0].string();
   root["bank"] = (work / kBankFile).string();
-  Json::StreamWriterBuilder writer;
-  writer["precision"] = 17;
-  writer["emitUTF8"] = true;
-  return job::resolved_json(job::parse_job(Json::writeString(writer, root), work / kJobFile), work, "");
+  return job::resolved_json(job::parse_job(write_json(root, "  "), work / kJobFile), work, "");
 }
 
 /// Why a job file in a folder of work is not that of its request.
@@ -270,7 +253,7 @@ bool is_spoilt(const Store& store, const Id& id) {
 std::string make_canonical_job(const job::JobSpec& job) {
   job::JobSpec bare = job;
   bare.bank.clear();
-  return make_canonical(parse_json(job::resolved_json(bare, "/", "")));
+  return make_canonical(parse_resolved(job::resolved_json(bare, "/", "")));
 }
 
 const RequestMaker::Known& RequestMaker::find_input(const fs::path& file, const std::string& what) {

@@ -3,12 +3,12 @@
 #include "jobs/store/order.hpp"
 
 #include <fmt/core.h>
-#include <json/json.h>
 
 #include <array>
 #include <cmath>
-#include <sstream>
+#include <utility>
 
+#include "jobs/store/json.hpp"
 #include "jobs/store/store.hpp"
 #include "precompute/job/simulation.hpp"
 #include "runtime/base/document.hpp"
@@ -22,24 +22,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::uint64_t kMaxJobBytes = 64 << 20;
 constexpr std::array<double, 2> kHearingHz{20.0, 20000.0};
 
-Json::Value parse_json(const std::string& text) {
-  Json::Value root;
-  std::istringstream stream(text);
-  std::string errors;
-  if (!Json::parseFromStream(Json::CharReaderBuilder(), stream, &root, &errors)) throw InputError("the job is not JSON: " + errors);
-  return root;
-}
-
-std::string write_json(const Json::Value& root, const char* indentation) {
-  Json::StreamWriterBuilder writer;
-  writer["indentation"] = indentation;
-  writer["precision"] = 17;
-  writer["emitUTF8"] = true;
-  writer["commentStyle"] = "None";
-  return Json::writeString(writer, root);
+Json::Value parse_job_json(const std::string& text) {
+  auto root = parse_json(text);
+  if (!root) throw InputError("the job is not JSON");
+  return std::move(*root);
 }
 
 /// 1 and 1.0 are the same number, and so are 0 and -0.
@@ -71,7 +59,7 @@ Json::Value write_material(const material::Material& material) {
   job::JobSpec spec;
   spec.mesh = "/mesh";
   spec.material = material;
-  return parse_json(job::resolved_json(spec, "/", ""))["material"];
+  return parse_job_json(job::resolved_json(spec, "/", ""))["material"];
 }
 
 SimulationOrder make_simulation(const job::SimulationSpec& spec, const std::string& text) {
@@ -79,7 +67,7 @@ SimulationOrder make_simulation(const job::SimulationSpec& spec, const std::stri
   order.file = spec.file;
   order.resources = spec.resources;
   order.warnings = spec.warnings;
-  Json::Value root = parse_json(text);
+  Json::Value root = parse_job_json(text);
   const base::Document document = base::parse_document(text, spec.file);
   std::vector<base::Object> bodies = document.root().object("simulate").objects("bodies");
   std::vector<std::string> known;
@@ -116,7 +104,7 @@ std::vector<NamedInput> JobOrder::list_inputs() const {
 }
 
 std::string JobOrder::write(const fs::path& folder, const std::vector<fs::path>& inputs) const {
-  if (simulation_) return write_simulation(parse_json(make_canonical(inputs)), inputs);
+  if (simulation_) return write_simulation(parse_job_json(make_canonical(inputs)), inputs);
   job::JobSpec inner = bank_;
   if (!inputs.empty()) job::set_input(inner, inputs[0]);
   inner.bank = folder / kBankFile;
@@ -124,7 +112,7 @@ std::string JobOrder::write(const fs::path& folder, const std::vector<fs::path>&
 }
 
 std::string JobOrder::make_canonical(const std::vector<fs::path>& inputs) const {
-  return make_canonical_simulation(parse_json(write_simulation(parse_json(simulation_->text), inputs)));
+  return make_canonical_simulation(parse_job_json(write_simulation(parse_job_json(simulation_->text), inputs)));
 }
 
 JobOrder read_order(const fs::path& file) {
@@ -145,7 +133,7 @@ JobOrder parse_order(std::string_view text, const fs::path& file, int first_line
 }
 
 std::vector<std::string> list_outputs(const std::string& job) {
-  const Json::Value root = parse_json(job);
+  const Json::Value root = parse_job_json(job);
   std::vector<std::string> files;
   for (const Output& output : kOutputs)
     if (root.isMember(output.key)) files.emplace_back(output.file);
@@ -167,17 +155,11 @@ std::string write_simulation(Json::Value root, const std::vector<fs::path>& inpu
 }
 
 std::optional<std::string> find_record_fault(const std::string& record, const std::string& job_text) {
-  Json::Value root;
-  std::istringstream stream(record);
-  std::string errors;
-  try {
-    if (!Json::parseFromStream(Json::CharReaderBuilder(), stream, &root, &errors) || !root.isObject()) return "its record is no JSON";
-    if (!root["job_sha256"].isString()) return "its record does not say of which job it is";
-  } catch (const Json::Exception&) {
-    return "its record is no JSON";
-  }
-  return root["job_sha256"].asString() == base::to_hex(base::calc_sha256(job_text)) ? std::nullopt
-                                                                                    : std::optional("its record is of another job");
+  const auto root = parse_json(record);
+  if (!root || !root->isObject()) return "its record is no JSON";
+  if (!(*root)["job_sha256"].isString()) return "its record does not say of which job it is";
+  return (*root)["job_sha256"].asString() == base::to_hex(base::calc_sha256(job_text)) ? std::nullopt
+                                                                                       : std::optional("its record is of another job");
 }
 
 }  // namespace carillon::store

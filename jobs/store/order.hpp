@@ -1,6 +1,7 @@
 // What a job file asks for: the modes of a body, which become a bank, or a simulation, whose files are kept as one.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -15,6 +16,9 @@ class Value;
 }
 
 namespace carillon::store {
+
+/// A job file that is larger is refused.
+inline constexpr std::uint64_t kMaxJobBytes = 64 << 20;
 
 /// A file that a job names.
 struct NamedInput {

@@ -1,7 +1,6 @@
 // Method:     Cubature of energy: weights x >= 0, few of them not 0, with sum over p of x_p c_p = c, c_p what a point adds to <s(q_l),
-// E2(q_k)>
-//             of pairs of motions drawn at random, c the whole. With the points chosen, stress is fitted to all pairs of modes (ridge
-//             regression). Candidates are ordered by the numbers of the elements in the mesh: they do not depend on the ranks.
+//             E2(q_k)> of pairs of motions drawn at random, c the whole. With the points chosen, stress is fitted to all pairs of modes
+//             (ridge regression). Candidates are ordered by the numbers of the elements in the mesh: they do not depend on the ranks.
 // Source:     An, Kim, James, ACM Trans. Graph. 27, 165, 2008 (cubature); Farhat, Avery, Chapman, Cortial, Int. J. Numer. Meth. Eng. 98,
 //             2014 (energy-conserving weights); docs/equations.md E13.
 // Deviations: The sum is of each field's coupling, not of the energy: squares of what is summed make the energy, so that it cannot be

@@ -1,6 +1,5 @@
 // Method:     Of all pairs: the Gram matrix of s_ij, in units of equal energy (q_i = g_i / omega_i), by its eigenvectors. Of many modes:
-// the
-//             fields of random motions, orthonormalised block by block, until the fields of other motions lie in what they span. There
+//             the fields of random motions, orthonormalised block by block, until the fields of other motions lie in what they span. There
 //             <s_r, s_ij> = <s_r, E_ij>, since s_r does no work on what was condensed: no pair needs a solve.
 // Source:     docs/equations.md E13; Halko, Martinsson, Tropp, SIAM Review 53, 2011 (randomised range finder).
 // Deviations: Of the work of stresses on displacements that are condensed, what the stresses of the modes themselves do on products of a

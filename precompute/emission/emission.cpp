@@ -1,12 +1,11 @@
 // One chain from displacements to sound, whose stages share the rows of nodes and triangles; longer than most files.
 // Method:     displacements are summed over a box of steps; a low-pass takes the means to the audio rate; velocities and accelerations are
-//             band-limited derivatives there (33 samples). A box is a mean of places: the velocity that follows
-//             has passed it twice, as the difference and as the mean, which sets its images to -60 dB. Triangles are evaluated once a
-//             sample.
+//             band-limited derivatives there (33 samples). A box is a mean of places: the velocity that follows has passed it twice, as
+//             the difference and as the mean, which sets its images to -60 dB. Triangles are evaluated once a sample.
 // Source:     OCE01 eq. 2 to 10; docs/equations.md E14.
 // Deviations: but for kPaper2001 the nodes are filtered instead of eq. 5: what a normal does within a step is far below what its motion
-// does
-//             within a sample. a_n is d(v.S)/dt over the area at rest, so that a closed surface radiates its change of volume exactly.
+//             does within a sample. a_n is d(v.S)/dt over the area at rest, so that a closed surface radiates its change of volume
+//             exactly.
 #include "precompute/emission/emission.hpp"
 
 #include <fmt/format.h>

@@ -1,6 +1,5 @@
 // Method:     a sample that arrives between two others is spread over 32 of them, with the weights by which runtime/base/sinc.hpp reads
-// between
-//             samples, in whole units of 2^-46 Pa.
+//             between samples, in whole units of 2^-46 Pa.
 // Source:     OCE01 section 3.3 and figure 4; docs/equations.md E14.
 // Deviations: OCE01 spreads by a Gaussian of two samples, 2 to 9 dB too soft at 10 kHz.
 #include "precompute/emission/receivers.hpp"

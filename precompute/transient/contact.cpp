@@ -1,7 +1,6 @@
 // One contact from search to force, on one set of surfaces; longer than most files.
 // Method:     a point of one surface against the nearest point of another: penalty k d (1 + a d' / v), never pulling, with the closing
-// speed
-//             v at which the contact began; Coulomb friction that stops a node within one step at most.
+//             speed v at which the contact began; Coulomb friction that stops a node within one step at most.
 // Source:     docs/equations.md E11; Hunt and Crossley 1975; Gonthier, McPhee, Lange and Piedboeuf 2004 (restitution).
 // Deviations: O'Brien and Hodgins 1999 have a force in proportion to the volume of the overlap; here it is the depth of nodes, times area.
 #include "precompute/transient/contact.hpp"

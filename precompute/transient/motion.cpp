@@ -1,11 +1,9 @@
 // One step, whose forces, supports, damping and books follow each other; longer than most files.
-// Method: central differences as leapfrog; the work of every force is h f_n (v_{n-1/2} + v_{n+1/2}) / 2, which is exact, and the kinetic
-// energy
-//   m v_{n-1/2} v_{n+1/2} / 2, which with the elastic one is constant for a linear body at any stable step.
-// Source: docs/equations.md E11; O'Brien, Cook and Essl 2001; Belytschko, Liu and Moran 2000, 6.2 (stable step with lagged damping).
+// Method:     central differences as leapfrog; the work of every force is h f_n (v_{n-1/2} + v_{n+1/2}) / 2, which is exact, and the
+//             kinetic energy m v_{n-1/2} v_{n+1/2} / 2, which with the elastic one is constant for a linear body at any stable step.
+// Source:     docs/equations.md E11; O'Brien, Cook and Essl 2001; Belytschko, Liu and Moran 2000, 6.2 (stable step with lagged damping).
 // Deviations: mass damping is of the velocity less that of the rigid body, for bodies that are free or hinged; the rigid velocity is
-// renewed
-//   at every output sample.
+//             renewed at every output sample.
 #include "precompute/transient/motion.hpp"
 
 #include <fmt/format.h>

@@ -1,7 +1,6 @@
 // Method:     a Player for each time that a recording is played, with the ears, microphones and their images under a ground that reflects
-// as
-//             receivers, all turned into the world of the recording. Behind it: the scene's sample rate, the DC blocker of simulations, the
-//             gain, and a head that hears it from the middle of its bodies.
+//             as receivers, all turned into the world of the recording. Behind it: the scene's sample rate, the DC blocker of simulations,
+//             the gain, and a head that hears it from the middle of its bodies.
 // Source:     docs/equations.md E14; docs/surface-format.md.
 // Deviations: bodies of the scene do not shade or reflect it; with a head all bodies of one recording come from one direction.
 #include "runtime/host/surface_playback.hpp"

@@ -1,12 +1,11 @@
 // Method:     wave turbulence in a plate passes energy to higher frequencies at the power eps = kappa f e^2 (-de/df) / (m^2 h^4 df^3), e
-// the
-//             energy of a mode, df the spacing of modes; integrated between two bands, kappa (e1^3 - e2^3) / (3 ln(f2 / f1)) over the same.
-//             Its steady state is e^3 ~ ln(f* / f), the spectrum of Kolmogorov and Zakharov. Modes above the coupled ones are in bands; the
-//             lowest band takes from the upper third of the coupled modes, as a viscosity on their velocity; the highest gives to none.
-//             What a band gains comes as kicks of random sign and size on its modes, and the band is then scaled to the energy of the book.
-//             Mean tension turns all modes by the same angle more: lambda + tau omega is omega + tau / 2, to first order.
-// Source:     Duering, Josserand and Rica, Phys. Rev. Lett. 97 (2006) 025503 (spectrum); Humbert, Josserand, Touze and Cadot, Physica D 316
-//             (2016) 34 (diffusion); Cirio, Qu, Drettakis, Grinspun and Zheng, ACM Trans. Graph. 37 (2018) 100 (diffusion in sound);
+//             the energy of a mode, df the spacing of modes; integrated between two bands, kappa (e1^3 - e2^3) / (3 ln(f2 / f1)) over the
+//             same. Its steady state is e^3 ~ ln(f* / f), the spectrum of Kolmogorov and Zakharov. Modes above the coupled ones are in
+//             bands; the lowest band takes from the upper third of the coupled modes, as a viscosity on their velocity; the highest gives
+//             to none. What a band gains comes as kicks of random sign and size on its modes, and the band is then scaled to the energy of
+//             the book. Mean tension turns all modes by the same angle more: lambda + tau omega is omega + tau / 2, to first order.
+// Source:     Duering, Josserand and Rica, Phys. Rev. Lett. 97 (2006) 025503 (spectrum); Humbert, Josserand, Touze and Cadot, Physica D
+//             316 (2016) 34 (diffusion); Cirio, Qu, Drettakis, Grinspun and Zheng, ACM Trans. Graph. 37 (2018) 100 (diffusion in sound);
 //             docs/equations.md E12.
 // Deviations: kappa is fitted to runs of full order (tests/bench/nonlinear/cascade). Tension is a scalar, the stress of the coupled modes
 //             being known in their own shapes only, and does no work on these modes. Nothing flows back to the coupled modes.
