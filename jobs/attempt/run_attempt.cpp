@@ -198,7 +198,8 @@ class Attempt {
     if (!find_bank_fault(work_, request, has_bank)) {
       // What that attempt printed may be lost with it; a job that is done has a log, under Slurm too, where this error stream is not it.
       store::append_text(work_ / store::kLogFile,
-                         "carillon attempt: the result was computed by an attempt that ended before it was published\n");
+                         fmt::format("carillon attempt: the {} was solved by an attempt that ended before it was published\n",
+                                     options_.is_simulation ? "simulation" : "bank"));
       return set(Cause::done, "");
     }
     if (has_bank) store::OpenFolder::open(work_).remove(options_.is_simulation ? store::kRecordFile : store::kBankFile);

@@ -294,9 +294,8 @@ void apply(int count, const float* triangle, const float* q, float* out) noexcep
 template <int kLanes, int kVectors>
 constexpr CoupledKernels make_kernels() {
   constexpr int kNarrow = kLanes < kColumnUnit ? kLanes : kColumnUnit;
-  return {turn<kLanes>,   compare<kLanes>, kick<kLanes>,      spread<kLanes, kVectors>, gather<kLanes>,
-          square<kLanes>, sum_up<kLanes>,  weigh<kLanes>,     strain<kLanes>,           pull_back<kLanes>,
-          multiply<kNarrow>, apply<kNarrow>};
+  return {turn<kLanes>,   compare<kLanes>, kick<kLanes>,   spread<kLanes, kVectors>, gather<kLanes>,    square<kLanes>,
+          sum_up<kLanes>, weigh<kLanes>,   strain<kLanes>, pull_back<kLanes>,        multiply<kNarrow>, apply<kNarrow>};
 }
 
 }  // namespace

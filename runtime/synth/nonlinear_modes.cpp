@@ -57,6 +57,8 @@ NonlinearModes::NonlinearModes(const Model& model, bool has_cascade)
       place_(static_cast<std::size_t>(model.get_mode_count()), -1) {
   if (has_cascade) {
     strike_ = nonlinear_->strike;
+    mode_.reserve(mode_.size() + nonlinear_->above.size());
+    constants_.reserve(mode_.size() + nonlinear_->above.size());
     for (const int m : nonlinear_->above) {
       mode_.push_back(m);
       constants_.push_back(model.calc_constants(m));
@@ -67,6 +69,8 @@ NonlinearModes::NonlinearModes(const Model& model, bool has_cascade)
         all.first(nonlinear_->mode.size()), all.subspan(nonlinear_->mode.size()),
         nonlinear::CascadeBody{.mass_kg = model.get_mass_kg(), .thickness_m = nonlinear_->energy.thickness_m}, model.get_rate_hz());
   }
+  gain_.reserve(mode_.size());
+  answer_.reserve(mode_.size());
   for (std::size_t i = 0; i < mode_.size(); ++i) {
     place_[static_cast<std::size_t>(mode_[i])] = static_cast<int>(i);
     groups_ = std::max(groups_, mode_[i] / kGroup + 1);

@@ -63,11 +63,11 @@ EffectBytes BodyChange::calc_bytes() const {
   if (contacts) bytes[Effect::kRoughness] += static_cast<std::int64_t>(contacts->calc_bytes());
   if (!propagation) return bytes;
   // What a delay line holds beyond one without travel time belongs to the travel time, or to the wait for what goes through a head.
-  const DelayLine still(0.0, 1.0, kBlock);
+  const std::size_t still = DelayLine::calc_least_bytes(kBlock);
   const Effect waits = propagation->effects.has(Effect::kAirDelay) ? Effect::kAirDelay : Effect::kModal;
   const auto add = [&](const DelayLine& delay_line, Effect effect) {
-    bytes[effect] += static_cast<std::int64_t>(sizeof(DelayLine) + still.get_bytes());
-    bytes[waits] += static_cast<std::int64_t>(delay_line.get_bytes() - still.get_bytes());
+    bytes[effect] += static_cast<std::int64_t>(sizeof(DelayLine) + still);
+    bytes[waits] += static_cast<std::int64_t>(delay_line.get_bytes() - still);
   };
   if (propagation->monopole) add(*propagation->monopole, Effect::kModal);
   for (const auto& delay_line : propagation->dipole)
@@ -80,8 +80,8 @@ EffectBytes BodyChange::calc_bytes() const {
   if (!propagation->directed) return bytes;
   bytes[Effect::kDirectivity] += static_cast<std::int64_t>(propagation->directed->calc_bytes());
   for (const DelayLine& line : propagation->directed->get_lines()) {
-    bytes[Effect::kDirectivity] += static_cast<std::int64_t>(still.get_bytes());
-    bytes[waits] += static_cast<std::int64_t>(line.get_bytes() - still.get_bytes());
+    bytes[Effect::kDirectivity] += static_cast<std::int64_t>(still);
+    bytes[waits] += static_cast<std::int64_t>(line.get_bytes() - still);
   }
   return bytes;
 }

@@ -16,8 +16,9 @@ TEST(Effects, EveryEffectHasANameThatFindsIt) {
     EXPECT_EQ(find_effect(get_name(effect)), effect);
     names.insert(get_name(effect));
   }
-  EXPECT_EQ(names, (std::set<std::string>{"modal", "hertz_pulse", "roughness", "rolling", "contact_damping", "acceleration_noise",
-                                          "air_delay", "doppler", "two_ears", "directivity", "ground_reflection", "head", "nonlinear", "cascade"}));
+  EXPECT_EQ(names,
+            (std::set<std::string>{"modal", "hertz_pulse", "roughness", "rolling", "contact_damping", "acceleration_noise", "air_delay",
+                                   "doppler", "two_ears", "directivity", "ground_reflection", "head", "nonlinear", "cascade"}));
   EXPECT_EQ(find_effect("two ears"), std::nullopt);
   EXPECT_EQ(find_effect(""), std::nullopt);
 }
