@@ -84,6 +84,14 @@ la::Matrix calc_products(int n, int a, int b) {
   return left * right.transpose();
 }
 
+la::Matrix calc_weighted(int n, int order) {
+  const GaussRule rule = make_gauss_rule(n + 1);
+  la::Matrix values(rule.x.size(), n);
+  for (std::size_t q = 0; q < rule.x.size(); ++q)
+    values.row(static_cast<Eigen::Index>(q)) = std::sqrt(rule.weight[q]) * calc_legendre(n, rule.x[q], order).transpose();
+  return values;
+}
+
 la::Matrix make_conditioned_basis(int n, const std::array<EndConditions, 2>& ends) {
   std::vector<la::Vector> rows;
   for (int end = 0; end < 2; ++end) {

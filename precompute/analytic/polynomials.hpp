@@ -29,6 +29,9 @@ struct EndConditions {
   bool has_value = false, has_slope = false;
 };
 
+/// Derivatives of that order at Gauss points times the roots of their weights, (n + 1, n): A^T A is calc_products(n, order, order).
+la::Matrix calc_weighted(int n, int order);
+
 /// Columns: an orthonormal basis of the polynomials of degree below n that meet the conditions at 0 and at 1.
 la::Matrix make_conditioned_basis(int n, const std::array<EndConditions, 2>& ends);
 

@@ -39,8 +39,8 @@ RitzPlate::RitzPlate(const job::PlateBody& body, const material::Material& mater
 /// The functions are the modes of a beam with these ends among the polynomials, of each parity where both ends are alike, so that a
 /// symmetric plate falls into four small problems.
 std::vector<RitzPlate::Line> RitzPlate::make_lines(int polynomials, Edge first, Edge last) const {
-  const la::Matrix slopes = calc_products(polynomials, 1, 1), bends = calc_products(polynomials, 2, 2),
-                   mixed = calc_products(polynomials, 0, 2);
+  const la::Matrix slopes = calc_products(polynomials, 1, 1), mixed = calc_products(polynomials, 0, 2);
+  const la::Matrix bending = calc_weighted(polynomials, 2);  // squared last: the products of low functions keep their digits
   std::vector<Line> lines;
   const bool is_symmetric = first == last;
   for (int parity = 0; parity < (is_symmetric ? 2 : 1); ++parity) {
@@ -55,13 +55,15 @@ std::vector<RitzPlate::Line> RitzPlate::make_lines(int polynomials, Edge first, 
       while (rank < std::min(even.rows(), even.cols()) && std::abs(qr.matrixR()(rank, rank)) > 1e-8) ++rank;
       basis = (qr.householderQ() * la::Matrix::Identity(polynomials, polynomials)).leftCols(rank);
     }
-    la::Matrix stiffness = basis.transpose() * bends * basis;
+    const la::Matrix bent = bending * basis;
+    la::Matrix stiffness = bent.transpose() * bent;
     la::Vector values(stiffness.rows());
     if (la::calc_eigenpairs_by_division(stiffness, values) != 0) throw SolveError("the dense eigensolver failed on a beam of the plate");
     Line line;
     line.functions = basis * stiffness;
     line.slopes = line.functions.transpose() * slopes * line.functions;
-    line.bends = line.functions.transpose() * bends * line.functions;
+    const la::Matrix curvatures = bending * line.functions;
+    line.bends = curvatures.transpose() * curvatures;
     line.mixed = line.functions.transpose() * mixed * line.functions;
     lines.push_back(std::move(line));
   }
@@ -94,10 +96,15 @@ RitzPlate::Solved RitzPlate::solve(int x_polynomials, int y_polynomials, double 
           block.diagonal().array() += y.bends(q, s) / square(b * b);
         }
       k *= rate_;
+      const la::Matrix energy = k;
       la::Vector values(k.rows());
       if (la::calc_eigenpairs_by_division(k, values) != 0) throw SolveError("the dense eigensolver failed on the plate");
-      for (Eigen::Index m = 0; m < values.size() && values(m) <= high_lambda; ++m)
-        found.push_back({values(m), {i, j, Eigen::Map<const la::Matrix>(k.col(m).data(), nx, ny)}});
+      for (Eigen::Index m = 0; m < values.size() && values(m) <= high_lambda; ++m) {
+        // The solver's error is of the size of the highest eigenvalue's rounding; the quotient's is of this one's.
+        const auto shape = k.col(m);
+        const double lambda = shape.dot(energy.selfadjointView<Eigen::Upper>() * shape) / shape.squaredNorm();
+        found.push_back({lambda, {i, j, Eigen::Map<const la::Matrix>(shape.data(), nx, ny)}});
+      }
     }
   std::stable_sort(found.begin(), found.end(), [](const Found& one, const Found& other) { return one.lambda < other.lambda; });
   Solved solved;
