@@ -79,14 +79,9 @@ SimulationOrder make_simulation(const job::SimulationSpec& spec, const std::stri
     if (body.body && !body.body->surface.empty()) order.inputs.push_back({InputKind::surface, body.body->surface});
   }
   root.removeMember("resources");
-  bool has_output = false;
-  for (const Output& output : kOutputs) {
-    has_output = has_output || root.isMember(output.key);
+  job::check_has_output(spec, spec.file.string());
+  for (const Output& output : kOutputs)
     if (root.isMember(output.key)) root[output.key] = output.file;
-  }
-  if (!has_output)
-    throw InputError(
-        fmt::format("{}: nothing is to be written; name a file with \"sound\", \"surface\", \"motion\" or \"record\"", spec.file.string()));
   root["record"] = kRecordFile;
   std::vector<fs::path> files;
   for (const NamedInput& input : order.inputs) files.push_back(input.file);

@@ -71,8 +71,11 @@ struct Output {
   const char* file;
 };
 inline constexpr const char* kRecordFile = "record.json";
-inline constexpr Output kOutputs[] = {
-    {"sound", "sound.wav"}, {"surface", "surface.hdf"}, {"motion", "motion.vtkhdf"}, {"record", kRecordFile}};
+inline constexpr Output kOutputs[] = {{"sound", "sound.wav"},
+                                      {"spectrogram", "spectrogram.png"},
+                                      {"surface", "surface.hdf"},
+                                      {"motion", "motion.vtkhdf"},
+                                      {"record", kRecordFile}};
 
 /// Of a resolved job of a simulation (JSON): the files that it makes.
 std::vector<std::string> list_outputs(const std::string& job);

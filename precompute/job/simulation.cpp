@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <numbers>
 #include <set>
@@ -271,20 +272,10 @@ void check_names(base::Object& root, const std::vector<SimulatedBody>& bodies) {
 }
 
 void read_outputs(base::Object& root, SimulationSpec& spec) {
-  std::set<fs::path> files{fs::absolute(spec.file).lexically_normal()};
-  for (const auto& body : spec.bodies) {
-    if (!body.mesh.empty()) files.insert(body.mesh);
-    if (body.body && !body.body->surface.empty()) files.insert(body.body->surface);
-  }
-  const auto read = [&](const char* key, fs::path& file) {
-    if (!root.has(key)) return;
-    file = root.path(key);
-    if (!files.insert(file.lexically_normal()).second) root.fail(key, "would overwrite another file of this job; choose another name");
-  };
-  read("sound", spec.sound);
-  read("surface", spec.surface);
-  read("motion", spec.motion);
-  read("record", spec.record);
+  for (const SimulationOutput& output : kSimulationOutputs)
+    if (root.has(output.key)) spec.*output.file = root.path(output.key);
+  if (const SimulationOutput* output = find_overwriting_output(spec))
+    root.fail(output->key, "would overwrite another file of this job; choose another name");
 }
 
 SimulationSpec read_root(base::Object root, const fs::path& file) {
@@ -336,6 +327,28 @@ bool is_simulation(std::string_view text) {
 
 SimulationSpec parse_simulation(std::string_view text, const fs::path& file) {
   return read_root(base::parse_document(text, file).root(), file);
+}
+
+void check_has_output(const SimulationSpec& spec, const std::string& place) {
+  std::string keys;
+  for (const SimulationOutput& output : kSimulationOutputs) {
+    if (!(spec.*output.file).empty()) return;
+    keys += fmt::format("{}\"{}\"", keys.empty() ? "" : &output == std::end(kSimulationOutputs) - 1 ? " or " : ", ", output.key);
+  }
+  throw InputError(fmt::format("{}: nothing is to be written; name a file with {}", place, keys));
+}
+
+const SimulationOutput* find_overwriting_output(const SimulationSpec& spec) {
+  std::set<fs::path> files{fs::absolute(spec.file).lexically_normal()};
+  for (const auto& body : spec.bodies) {
+    if (!body.mesh.empty()) files.insert(body.mesh);
+    if (body.body && !body.body->surface.empty()) files.insert(body.body->surface);
+  }
+  for (const SimulationOutput& output : kSimulationOutputs) {
+    const fs::path& file = spec.*output.file;
+    if (!file.empty() && !files.insert(file.lexically_normal()).second) return &output;
+  }
+  return nullptr;
 }
 
 Material make_rayleigh(const Material& material, double low_hz, double high_hz) {

@@ -110,11 +110,29 @@ struct SimulationSpec {
   SurfaceSound radiation = SurfaceSound::kirchhoff;
   bool visibility = false;
   double high_pass_hz = 20;
-  double motion_hz = 60;                                 // frames a second of `motion`
-  std::filesystem::path sound, surface, motion, record;  // absolute; empty: not wanted. record: energy book and figures of the run, JSON
+  double motion_hz = 60;  // frames a second of `motion`
+  // Absolute; empty: not wanted. record: energy book and figures of the run, JSON.
+  std::filesystem::path sound, spectrogram, surface, motion, record;
   Resources resources;
   std::vector<std::string> warnings;
 };
+
+/// What a simulation writes: key of the job, its place here, and its name in messages.
+struct SimulationOutput {
+  const char* key;
+  std::filesystem::path SimulationSpec::*file;
+  const char* name;
+};
+inline constexpr SimulationOutput kSimulationOutputs[] = {{"sound", &SimulationSpec::sound, "sound"},
+                                                          {"spectrogram", &SimulationSpec::spectrogram, "spectrogram"},
+                                                          {"surface", &SimulationSpec::surface, "recorded surface"},
+                                                          {"motion", &SimulationSpec::motion, "motion"},
+                                                          {"record", &SimulationSpec::record, "record"}};
+
+/// Throws InputError, which begins with `place`, when nothing is to be written.
+void check_has_output(const SimulationSpec& spec, const std::string& place);
+/// The first output that would overwrite another, an input or the job; nullptr: none.
+const SimulationOutput* find_overwriting_output(const SimulationSpec& spec);
 
 /// True when the text is a job of carillon-simulate: an object with the key "simulate".
 bool is_simulation(std::string_view text);

@@ -47,6 +47,7 @@ struct CommandLine {
     app.add_option("JOB", job, "job file (JSON with // comments)")->required();
     app.add_flag("-q,--quiet", options.quiet, "nothing on standard output; warnings and errors are on standard error");
     app.add_option("--sound", options.sound, "write the sound to this WAV file, whatever the job says")->check(named);
+    app.add_option("--spectrogram", options.spectrogram, "draw the spectrogram of the sound to this PNG file")->check(named);
     app.add_option("--surface", options.surface, "record the surface to this file, for carillon-render")->check(named);
     app.add_option("--motion", options.motion, "write the motion to this VTKHDF file")->check(named);
     app.add_option("--record", options.record, "write figures and energies of the run to this file, JSON")->check(named);

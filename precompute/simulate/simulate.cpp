@@ -2,7 +2,7 @@
 // second. Source:     docs/equations.md E11 and E14; O'Brien, Cook and Essl 2001. Deviations: none beyond those of both.
 #include "precompute/simulate/simulate.hpp"
 
-#include <fmt/core.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <chrono>
@@ -44,6 +44,7 @@ constexpr std::int64_t kLookEvery = 16;  // samples between two looks at signals
 constexpr double kFullScalePa = 1.0;     // of a WAV file whose peak is below; louder ones are scaled to a peak of 1
 constexpr int kTrialSteps = 200;         // of --validate
 constexpr std::int64_t kMaxPredictedRanks = 1024;
+constexpr std::int64_t kPictureBytes = 40 << 20;  // while the spectrogram is drawn: twice what was measured
 
 double find_cpu_s() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
@@ -68,18 +69,19 @@ job::SimulationSpec read_spec(const comm::Communicator& comm, const fs::path& fi
     if (!other.empty()) path = fs::absolute(other).lexically_normal();
   };
   replace(spec.sound, options.sound);
+  replace(spec.spectrogram, options.spectrogram);
   replace(spec.surface, options.surface);
   replace(spec.motion, options.motion);
   replace(spec.record, options.record);
   comm.agree([&] {
-    if (!comm.is_root() || options.validate) return;
-    if (spec.sound.empty() && spec.surface.empty() && spec.motion.empty() && spec.record.empty())
-      throw InputError(
-          fmt::format("{}: nothing is to be written; name a file with \"sound\", \"surface\", \"motion\" or \"record\"", file.string()));
-    if (!spec.sound.empty()) base::check_writable(spec.sound, "sound");
-    if (!spec.surface.empty()) base::check_writable(spec.surface, "recorded surface");
-    if (!spec.motion.empty()) base::check_writable(spec.motion, "motion");
-    if (!spec.record.empty()) base::check_writable(spec.record, "record");
+    if (!comm.is_root()) return;
+    if (const job::SimulationOutput* output = job::find_overwriting_output(spec))
+      throw InputError(fmt::format("{}: the {} would overwrite another file of this job; choose another name",
+                                   (spec.*output->file).string(), output->name));
+    if (options.validate) return;
+    job::check_has_output(spec, file.string());
+    for (const job::SimulationOutput& output : job::kSimulationOutputs)
+      if (!(spec.*output.file).empty()) base::check_writable(spec.*output.file, output.name);
     if (!options.checkpoint.empty()) base::check_writable(options.checkpoint, "checkpoint");
   });
   return spec;
@@ -172,7 +174,7 @@ struct Simulation {
   int steps_per_sample = 0;  // that the sound has
   double sound_cpu_s = 0, steps_cpu_s = 0;
 
-  bool makes_sound() const { return !spec.sound.empty() || !spec.surface.empty(); }
+  bool makes_sound() const { return !spec.sound.empty() || !spec.spectrogram.empty() || !spec.surface.empty(); }
 };
 
 void make_motion(const comm::Communicator& comm, Simulation& simulation) {
@@ -234,6 +236,13 @@ std::int64_t count_element_steps(const Simulation& simulation) {
   return static_cast<std::int64_t>(simulation.bodies.assembly->element_count()) * simulation.motion->get_step_count();
 }
 
+/// Of what the bytes of the job say, without names of files: the picture from the store is that of a run by hand.
+std::string make_title(const Simulation& simulation) {
+  std::vector<std::string> names;
+  for (const job::SimulatedBody& body : simulation.spec.bodies) names.push_back(base::printable(body.name));
+  return fmt::format("{}: {} elements", fmt::join(names, ", "), simulation.bodies.assembly->element_count());
+}
+
 std::string write_outputs(const comm::Communicator& comm, Simulation& simulation, double seconds) {
   const job::SimulationSpec& spec = simulation.spec;
   std::string result;
@@ -253,7 +262,11 @@ std::string write_outputs(const comm::Communicator& comm, Simulation& simulation
     if (!comm.is_root()) return;
     const EnergyBook& book = simulation.books.back();
     const double gain = peak > kFullScalePa ? kFullScalePa / peak : 1.0;
+    std::string picture;  // before anything is written
+    if (!spec.spectrogram.empty())
+      picture = draw_spectrogram(channels, spec.sample_rate_hz, make_title(simulation), spec.spectrogram.parent_path());
     if (!spec.sound.empty()) write_sound(spec.sound, channels, spec.sample_rate_hz, gain);
+    if (!spec.spectrogram.empty()) base::write_file(spec.spectrogram, picture);
     double worst = 0;
     for (const EnergyBook& one : simulation.books) worst = std::max(worst, std::abs(one.relative_error));
     const double rate = static_cast<double>(count_element_steps(simulation)) / std::max(1e-9, seconds);
@@ -286,8 +299,8 @@ std::string write_outputs(const comm::Communicator& comm, Simulation& simulation
         100.0 * cpu[1] / std::max(1e-9, cpu[0] + cpu[1]), book.kinetic_j, book.elastic_j, book.dissipated_j, book.work_j, worst);
     if (simulation.sound)
       result += fmt::format("\npeak {:.4g} Pa{}", peak, gain < 1.0 ? fmt::format(", the file has it as 1 (gain {:.4g})", gain) : "");
-    for (const fs::path& file : {spec.sound, spec.surface, spec.motion, spec.record})
-      if (!file.empty()) result += "\n" + file.string();
+    for (const job::SimulationOutput& output : job::kSimulationOutputs)
+      if (!(spec.*output.file).empty()) result += "\n" + (spec.*output.file).string();
   });
   return result;
 }
@@ -310,7 +323,9 @@ std::string predict(const comm::Communicator& comm, Simulation& simulation, bool
   record.set("cpu_seconds", base::significant(steps * seconds * comm.size(), 3));
   // As carillon-precompute --validate says it, for the queue: ranks share the bodies, and are counted as if they did not.
   const emission::Options sound = make_emission_options(simulation.spec, motion.get_steps_per_sample(), false);
-  const auto samples = static_cast<std::int64_t>(simulation.makes_sound() ? sound.frames * sound.receivers.size() * sizeof(double) : 0);
+  const std::int64_t picture = simulation.spec.spectrogram.empty() ? 0 : kPictureBytes;
+  const auto samples =
+      picture + static_cast<std::int64_t>(simulation.makes_sound() ? sound.frames * sound.receivers.size() * sizeof(double) : 0);
   base::Json memory = base::Json::object();
   for (std::int64_t ranks = 1; ranks <= kMaxPredictedRanks; ranks *= 2) memory.set(std::to_string(ranks), ranks * (peak + samples));
   record.set("memory_bytes", std::move(memory));

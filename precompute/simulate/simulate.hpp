@@ -1,4 +1,4 @@
-// One simulation, from its job to sound, surface, motion and record.
+// One simulation, from its job to sound, spectrogram, surface, motion and record.
 #pragma once
 
 #include <filesystem>
@@ -13,9 +13,9 @@ struct SimulateOptions {
   std::filesystem::path progress;    // progress as JSON lines is appended here; empty: nowhere
   std::filesystem::path checkpoint;  // resumed from if it exists, saved to on signals and from time to time; empty: none
   double checkpoint_every_s = 300;
-  std::filesystem::path sound, surface, motion, record;  // in place of the job's; empty: the job's
-  bool validate = false;                                 // predict, do not simulate
-  bool json = false;                                     // of what is predicted
+  std::filesystem::path sound, spectrogram, surface, motion, record;  // in place of the job's; empty: the job's
+  bool validate = false;                                              // predict, do not simulate
+  bool json = false;                                                  // of what is predicted
 };
 
 /// What main prints at the end; on rank 0.

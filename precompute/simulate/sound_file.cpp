@@ -10,6 +10,8 @@
 
 #include "runtime/base/error.hpp"
 #include "runtime/base/file.hpp"
+#include "runtime/sound/sound_store.hpp"
+#include "runtime/sound/spectrogram.hpp"
 
 namespace carillon::simulate {
 namespace {
@@ -57,6 +59,17 @@ void write_sound(const std::filesystem::path& file, const std::vector<std::vecto
   }
   whole.append(piece);
   whole.commit();
+}
+
+std::string draw_spectrogram(const std::vector<std::vector<double>>& channels, int rate_hz, const std::string& title,
+                             const std::filesystem::path& folder) {
+  sound::SoundStore store(rate_hz, channels.size(), base::Spool(folder, "sound"));
+  std::vector<float> frame(channels.size());
+  for (std::size_t i = 0; i < channels[0].size(); ++i) {
+    for (std::size_t c = 0; c < channels.size(); ++c) frame[c] = static_cast<float>(channels[c][i]);
+    store.append(frame);
+  }
+  return sound::make_spectrogram_png(store, title);
 }
 
 }  // namespace carillon::simulate

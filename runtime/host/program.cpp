@@ -26,8 +26,8 @@
 #include "runtime/host/report.hpp"
 #include "runtime/host/scene.hpp"
 #include "runtime/host/sound_file.hpp"
-#include "runtime/host/spectrogram.hpp"
 #include "runtime/host/surface_playback.hpp"
+#include "runtime/sound/spectrogram.hpp"
 
 namespace carillon::host {
 namespace {
@@ -286,7 +286,7 @@ class Run {
   /// Renders the sound and writes all outputs: everything is made before anything is seen.
   void render(const Plan& plan) {
     const auto started = Clock::now();
-    SoundStore store(scene_.sample_rate_hz, count_channels(scene_), make_spool("sound"));
+    sound::SoundStore store(scene_.sample_rate_hz, count_channels(scene_), make_spool("sound"));
     const Sound sound = calc_sound(scene_, body_banks_, happened_.events,
                                    {.rate_hz = scene_.sample_rate_hz,
                                     .plan = &plan,
@@ -310,7 +310,7 @@ class Run {
   bool measures() const { return options_->plan || options_->report.has_value(); }
   base::Spool make_spool(const char* what) const { return base::Spool(find_spool_folder(options_->wav), what); }
 
-  void write(const Plan& plan, const Sound& sound, const SoundStore& store) {
+  void write(const Plan& plan, const Sound& sound, const sound::SoundStore& store) {
     const bool to_standard_output = is_standard_output(options_->wav);
     std::FILE* notes = to_standard_output ? stderr : stdout;
     Outputs outputs;
@@ -318,7 +318,7 @@ class Run {
     if (options_->spectrogram) {
       const std::string title =
           fmt::format("{}: {} contacts, {} modes", scene_.file.stem().string(), figures_.tally.contacts, figures_.modes);
-      outputs.add(*options_->spectrogram, "spectrogram").append(make_spectrogram_png(store, title));
+      outputs.add(*options_->spectrogram, "spectrogram").append(sound::make_spectrogram_png(store, title));
     }
     if (options_->trajectory) {
       write_trajectory(scene_, body_banks_, happened_.events, make_spool("paths"),

@@ -121,7 +121,7 @@ class EffectTimeline {
 /// fade.
 class Outlet {
  public:
-  Outlet(SoundStore& store, std::uint64_t frames, bool fades)
+  Outlet(sound::SoundStore& store, std::uint64_t frames, bool fades)
       : store_(&store),
         meter_(store.get_rate_hz(), store.get_channels()),
         tail_begin_(fades ? frames - std::min<std::uint64_t>(frames, static_cast<std::uint64_t>(std::llround(kFadeS * store.get_rate_hz())))
@@ -172,7 +172,7 @@ class Outlet {
     store_->append(frames);
   }
 
-  SoundStore* store_;
+  sound::SoundStore* store_;
   Meter meter_;
   std::uint64_t tail_begin_ = 0, taken_ = 0;
   std::vector<float> frames_, tail_;
@@ -327,7 +327,7 @@ class Rendering {
 }  // namespace
 
 Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks, const Events& events, const RenderOptions& options,
-                 SoundStore& store) {
+                 sound::SoundStore& store) {
   const double started_s = base::get_process_cpu_s();
   Sound sound;
   Rendering rendering(scene, banks, events, options);

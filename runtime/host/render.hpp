@@ -11,8 +11,8 @@
 #include "runtime/host/events.hpp"
 #include "runtime/host/planning.hpp"
 #include "runtime/host/scene.hpp"
-#include "runtime/host/sound_store.hpp"
 #include "runtime/host/surface_playback.hpp"
+#include "runtime/sound/sound_store.hpp"
 #include "runtime/synth/effects.hpp"
 #include "runtime/synth/synthesiser.hpp"
 
@@ -85,7 +85,7 @@ inline constexpr double kFadeShare = 1.0 / 65536.0;
 /// channels and the rate. banks[i] belongs to scene.bodies[i]; body i of the events (as EventPlayback takes them) is the same. A body to
 /// which nothing happens gets no effects.
 Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks, const Events& events, const RenderOptions& options,
-                 SoundStore& store);
+                 sound::SoundStore& store);
 
 /// Of a sound of that length.
 std::uint64_t count_frames(double duration_s, int rate_hz);

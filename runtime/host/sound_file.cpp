@@ -115,7 +115,7 @@ std::uint64_t calc_wav_bytes(std::size_t channels, SampleFormat format, std::uin
   return make_wav_header(1, channels, format, frames).size() + data + data % 2;
 }
 
-void write_wav(const SoundStore& sound, double gain_per_pa, SampleFormat format, const std::function<void(std::string_view)>& sink) {
+void write_wav(const sound::SoundStore& sound, double gain_per_pa, SampleFormat format, const std::function<void(std::string_view)>& sink) {
   sink(make_wav_header(sound.get_rate_hz(), sound.get_channels(), format, sound.get_frames()));
   Passage passage{.sink = &sink};
   SF_VIRTUAL_IO io{get_length, seek, read, write, get_position};

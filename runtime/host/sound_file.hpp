@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "runtime/host/scene.hpp"
-#include "runtime/host/sound_store.hpp"
+#include "runtime/sound/sound_store.hpp"
 
 namespace carillon::host {
 
@@ -18,6 +18,6 @@ std::string make_wav_header(int rate_hz, std::size_t channels, SampleFormat form
 
 /// A WAV file in pieces, in order: a channel for each of the sound, pressure times `gain_per_pa`, full scale 1. Throws SystemError when
 /// libsndfile refuses, and what `sink` throws.
-void write_wav(const SoundStore& sound, double gain_per_pa, SampleFormat format, const std::function<void(std::string_view)>& sink);
+void write_wav(const sound::SoundStore& sound, double gain_per_pa, SampleFormat format, const std::function<void(std::string_view)>& sink);
 
 }  // namespace carillon::host

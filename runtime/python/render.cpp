@@ -39,7 +39,7 @@ void look_for_signals(double) {
 
 /// A scene's sound before it is an array.
 struct Rendered {
-  host::SoundStore store;
+  sound::SoundStore store;
   std::vector<std::string> warnings;
 };
 
@@ -52,7 +52,7 @@ Rendered render(host::Scene scene) {
   const bool has_contacts = effect_selection::EffectSelector(facts).needs_contacts();
   const host::SceneEvents happened = host::simulate(scene, has_contacts, false, look_for_signals);
   const host::Plan plan = host::make_plan(std::move(facts), happened.events, {});
-  Rendered rendered{host::SoundStore(scene.sample_rate_hz, host::count_channels(scene)), std::move(scene.warnings)};
+  Rendered rendered{sound::SoundStore(scene.sample_rate_hz, host::count_channels(scene)), std::move(scene.warnings)};
   const host::Sound sound = host::calc_sound(
       scene, body_banks, happened.events,
       {.rate_hz = scene.sample_rate_hz, .plan = &plan, .fades_end = scene.output.fade_end, .progress = look_for_signals}, rendered.store);
@@ -63,7 +63,7 @@ Rendered render(host::Scene scene) {
 }
 
 /// (frames, channels) [Pa].
-py::array_t<float> to_array(const host::SoundStore& store) {
+py::array_t<float> to_array(const sound::SoundStore& store) {
   const auto channels = static_cast<py::ssize_t>(store.get_channels());
   py::array_t<float> samples({static_cast<py::ssize_t>(store.get_frames()), channels});
   store.read(0, std::span(samples.mutable_data(), static_cast<std::size_t>(samples.size())));

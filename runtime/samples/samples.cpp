@@ -25,9 +25,9 @@
 #include "runtime/host/events.hpp"
 #include "runtime/host/render.hpp"
 #include "runtime/host/sound_file.hpp"
-#include "runtime/host/sound_store.hpp"
 #include "runtime/host/strikes.hpp"
 #include "runtime/material/mallets.hpp"
+#include "runtime/sound/sound_store.hpp"
 
 namespace carillon::samples {
 namespace {
@@ -260,7 +260,7 @@ class Maker {
 
   Sample render(const std::vector<events::Event>& events, Sample sample) {
     scene_.duration_s = options_->max_seconds;
-    host::SoundStore store(options_->rate_hz, 1);
+    sound::SoundStore store(options_->rate_hz, 1);
     host::calc_sound(scene_, {bank_}, host::make_events(events), {.rate_hz = options_->rate_hz, .fades_end = true}, store);
     sample.frames.resize(store.get_frames());
     store.read(0, sample.frames);
@@ -282,7 +282,7 @@ class Maker {
     if (!(loudest > 0.0)) throw InputError(fmt::format("{}: all strikes are silent; choose other points", options_->bank.string()));
     const double gain = std::pow(10.0, kPeakDbfs / 20.0) / loudest;
     for (const Sample& sample : samples_) {
-      host::SoundStore store(options_->rate_hz, 1);
+      sound::SoundStore store(options_->rate_hz, 1);
       store.append(sample.frames);
       base::WholeFile file(folder_ / sample.file);
       host::write_wav(store, gain / share(sample), options_->format, [&](std::string_view bytes) { file.append(bytes); });

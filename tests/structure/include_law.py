@@ -49,6 +49,7 @@ LAW = {
     "runtime/radiation": (["runtime/base", "runtime/bank"], []),
     "runtime/head": (["runtime/base"], ["fmt", "mysofa"]),
     "runtime/recording": (["runtime/base"], ["fmt"]),
+    "runtime/sound": (["runtime/base"], ["fmt", "eigen", "cairo"]),
     "runtime/nonlinear": (["runtime/base", "runtime/bank"], ["fmt"]),
     "runtime/exchange": (
         ["runtime/base", "runtime/gltf", "runtime/material", "runtime/version", "runtime/bank", "runtime/radiation"],
@@ -84,11 +85,12 @@ LAW = {
             "runtime/radiation",
             "runtime/head",
             "runtime/recording",
+            "runtime/sound",
             "runtime/synth",
             "runtime/effect_selection",
             "runtime/contact",
         ],
-        ["fmt", "cli", "eigen", "sndfile", "cairo"],
+        ["fmt", "cli", "sndfile"],
     ),
     "runtime/live": (
         [
@@ -115,11 +117,12 @@ LAW = {
             "runtime/synth",
             "runtime/effect_selection",
             "runtime/host",
+            "runtime/sound",
         ],
         ["fmt", "pybind11"],
     ),
     "runtime/samples": (
-        ["runtime/base", "runtime/material", "runtime/version", "runtime/bank", "runtime/events", "runtime/host"],
+        ["runtime/base", "runtime/material", "runtime/version", "runtime/bank", "runtime/events", "runtime/host", "runtime/sound"],
         ["fmt", "cli"],
     ),
     "runtime/web": (
@@ -283,6 +286,7 @@ LAW = {
             "runtime/base",
             "runtime/version",
             "runtime/bank",
+            "runtime/sound",
             "precompute/job",
             "precompute/mesh",
             "precompute/comm",

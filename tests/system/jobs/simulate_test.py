@@ -58,7 +58,7 @@ class Simulations(Bench):
         return {key: pathlib.Path(file) for key, file in self.ask("get", job)["results"].items()}
 
     def test_from_submit_to_gc(self):
-        job = make_simulation(motion="bar.vtkhdf", surface="bar.surface.hdf")
+        job = make_simulation(motion="bar.vtkhdf", surface="bar.surface.hdf", spectrogram="bar.png")
         file = self.write("a/bar.json", job)
         said = self.ask("submit", file)
         self.assertEqual([(entry["state"], entry["new"]) for entry in said["jobs"]], [("queued", True)])
@@ -76,10 +76,17 @@ class Simulations(Bench):
         files = self.results(file)
         self.assertEqual(
             {key: path.name for key, path in files.items()},
-            {"motion": "motion.vtkhdf", "record": "record.json", "sound": "sound.wav", "surface": "surface.hdf"},
+            {
+                "motion": "motion.vtkhdf",
+                "record": "record.json",
+                "sound": "sound.wav",
+                "spectrogram": "spectrogram.png",
+                "surface": "surface.hdf",
+            },
         )
         folder = files["sound"].parent
         self.assertEqual(files["sound"].read_bytes(), run_alone(self.folder, job))
+        self.assertEqual(files["spectrogram"].read_bytes(), (self.folder / "bar.png").read_bytes())  # of the run alone
         self.assertEqual(folder.stat().st_mode & 0o222, 0)
         self.assertFalse((folder / "report.html").exists())
         self.assertIn("steps of", self.run_it("log", id_).stdout)
@@ -97,8 +104,12 @@ class Simulations(Bench):
         self.refuse("get", file, "--to", "one.wav", says=["one.wav", "folder"])
         # Damage is found, and another run replaces it.
         self.assertEqual(self.ask("verify")["damaged"], [])
-        sound = files["sound"].read_bytes()
+        sound, picture = files["sound"].read_bytes(), files["spectrogram"].read_bytes()
         folder.chmod(0o755)
+        files["spectrogram"].chmod(0o644)
+        files["spectrogram"].write_bytes(picture[:-1] + b"x")
+        self.assertIn("spectrogram.png", self.ask("verify", code=3)["damaged"][0]["fault"])
+        files["spectrogram"].write_bytes(picture)
         files["sound"].chmod(0o644)
         files["sound"].write_bytes(sound[:-4] + b"\0\0\0\1")
         found = self.ask("verify", code=3)["damaged"]

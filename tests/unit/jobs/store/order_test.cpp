@@ -59,6 +59,7 @@ TEST(Order, is_another_simulation_for_all_that_changes_its_files) {
       {"density", denser},
       {"gravity", simulation_of("m.msh", ", \"gravity_m_s2\": [0, 0, -9.81]")},
       {"another file", simulation_of("m.msh", "", ", \"motion\": \"a.vtkhdf\"")},
+      {"a picture", simulation_of("m.msh", "", ", \"sound\": \"a.wav\", \"spectrogram\": \"a.png\"")},
       {"one more file", simulation_of("m.msh", "", ", \"sound\": \"a.wav\", \"motion\": \"a.vtkhdf\"")},
   };
   auto ids = store::testing::expect_different(

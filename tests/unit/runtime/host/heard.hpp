@@ -12,7 +12,7 @@ struct Heard : Sound {
   std::vector<std::vector<double>> pressure_pa;
 };
 
-inline Heard read_all(const Sound& sound, const SoundStore& store) {
+inline Heard read_all(const Sound& sound, const sound::SoundStore& store) {
   Heard heard{sound, {}};
   heard.pressure_pa.resize(store.get_channels());
   store.for_each_piece([&](std::uint64_t, std::span<const float> frames) {
@@ -23,7 +23,7 @@ inline Heard read_all(const Sound& sound, const SoundStore& store) {
 
 inline Heard calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks, const std::vector<events::Event>& events,
                         const RenderOptions& options) {
-  SoundStore store(options.rate_hz, count_channels(scene));
+  sound::SoundStore store(options.rate_hz, count_channels(scene));
   const Sound sound = host::calc_sound(scene, banks, make_events(events), options, store);
   return read_all(sound, store);
 }

@@ -31,8 +31,8 @@ namespace {
 using std::numbers::pi;
 
 /// Back into a store, all channels of the same length.
-SoundStore keep(const std::vector<std::vector<double>>& pressure_pa, int rate_hz) {
-  SoundStore store(rate_hz, pressure_pa.size());
+sound::SoundStore keep(const std::vector<std::vector<double>>& pressure_pa, int rate_hz) {
+  sound::SoundStore store(rate_hz, pressure_pa.size());
   for (std::size_t n = 0; n < pressure_pa[0].size(); ++n) {
     std::vector<float> frame;
     for (const auto& channel : pressure_pa) frame.push_back(static_cast<float>(channel[n]));
@@ -41,7 +41,7 @@ SoundStore keep(const std::vector<std::vector<double>>& pressure_pa, int rate_hz
   return store;
 }
 
-std::string make_wav(const SoundStore& store, double gain_per_pa, SampleFormat format) {
+std::string make_wav(const sound::SoundStore& store, double gain_per_pa, SampleFormat format) {
   std::string bytes;
   write_wav(store, gain_per_pa, format, [&](std::string_view piece) { bytes += piece; });
   EXPECT_EQ(bytes.size(), calc_wav_bytes(store.get_channels(), format, store.get_frames()));

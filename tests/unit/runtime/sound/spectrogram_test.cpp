@@ -1,4 +1,4 @@
-#include "runtime/host/spectrogram.hpp"
+#include "runtime/sound/spectrogram.hpp"
 
 #include <cairo.h>
 #include <gtest/gtest.h>
@@ -9,9 +9,9 @@
 #include <numbers>
 #include <string>
 
-#include "runtime/host/axis.hpp"
+#include "runtime/sound/axis.hpp"
 
-namespace carillon::host {
+namespace carillon::sound {
 namespace {
 
 SoundStore make_tone(double freq_hz, double amplitude_pa, int rate_hz, double seconds, int click_at = -1) {
@@ -153,4 +153,4 @@ TEST(Axis, TimesAreRoundAndNeverCrowded) {
 }
 
 }  // namespace
-}  // namespace carillon::host
+}  // namespace carillon::sound

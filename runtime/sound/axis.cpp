@@ -1,11 +1,11 @@
-#include "runtime/host/axis.hpp"
+#include "runtime/sound/axis.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
-namespace carillon::host {
+namespace carillon::sound {
 namespace {
 
 /// With so many decimals at most, and never an exponent: 0.047, 4.7, 470.
@@ -65,4 +65,4 @@ TimeAxis make_time_axis(double duration_s) {
   return axis;
 }
 
-}  // namespace carillon::host
+}  // namespace carillon::sound

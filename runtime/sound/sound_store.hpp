@@ -1,12 +1,15 @@
-// The sound of a whole scene, however long.
+// The sound of a whole scene or simulation, however long.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
+#include <utility>
+#include <vector>
 
 #include "runtime/base/spool.hpp"
 
-namespace carillon::host {
+namespace carillon::sound {
 
 /// Pressure [Pa], frame by frame: sample n of all channels, then sample n + 1. Memory does not grow with the number of frames.
 class SoundStore {
@@ -42,4 +45,4 @@ class SoundStore {
   base::Records<float> samples_;
 };
 
-}  // namespace carillon::host
+}  // namespace carillon::sound

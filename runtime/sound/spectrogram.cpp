@@ -2,7 +2,7 @@
 // Source:     Harris 1978 (windows); the colour map is "magma" of matplotlib (van der Walt & Smith 2015, CC0), perceptually uniform, by
 //             nine of its points.
 // Deviations: none.
-#include "runtime/host/spectrogram.hpp"
+#include "runtime/sound/spectrogram.hpp"
 
 #include <cairo.h>
 #include <fmt/format.h>
@@ -15,9 +15,9 @@
 #include <numbers>
 #include <unsupported/Eigen/FFT>
 
-#include "runtime/host/axis.hpp"
+#include "runtime/sound/axis.hpp"
 
-namespace carillon::host {
+namespace carillon::sound {
 namespace {
 
 constexpr double kReferencePa = 20e-6;
@@ -299,4 +299,4 @@ std::string make_spectrogram_png(const SoundStore& sound, const std::string& tit
   return png;
 }
 
-}  // namespace carillon::host
+}  // namespace carillon::sound

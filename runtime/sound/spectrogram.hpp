@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "runtime/host/sound_store.hpp"
+#include "runtime/sound/sound_store.hpp"
 
-namespace carillon::host {
+namespace carillon::sound {
 
 /// Short-time spectrum. level_db is (frames, bins) row-major: the level re 20 uPa of a steady tone in that bin, mean square of all
 /// channels.
@@ -37,4 +37,4 @@ struct SpectrogramLayout {
 /// file. Throws SystemError when there is no memory for it.
 std::string make_spectrogram_png(const SoundStore& sound, const std::string& title);
 
-}  // namespace carillon::host
+}  // namespace carillon::sound

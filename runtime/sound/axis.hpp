@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-namespace carillon::host {
+namespace carillon::sound {
 
 /// A number as it stands next to an axis: no exponent, at most six characters, in the unit named.
 struct Label {
@@ -27,4 +27,4 @@ struct TimeAxis {
 /// Marks from 0 to `duration_s` (> 0) in steps of 1, 2 or 5 times a power of ten, five to eleven of them; seconds from half a second on.
 TimeAxis make_time_axis(double duration_s);
 
-}  // namespace carillon::host
+}  // namespace carillon::sound
