@@ -141,6 +141,36 @@ def submit(store):
     check(not list((store.folder / "store/slurm").iterdir()), "the batch has left its folder")
 
 
+def simulate(store):
+    """A simulation on two ranks: `carillon get` has the files of a run of one rank without a store and without Slurm."""
+    bar = {
+        "name": "bar",
+        "shape": {"bar": {"length_m": 0.1, "width_m": 0.02, "thickness_m": 0.01, "nodes": 150}},
+        "material": {"young_modulus_pa": 7e10, "poisson_ratio": 0.33, "density_kg_m3": 2700, "damping": {"rayleigh": {}}},
+        "velocity_m_s": [0, 0, -1],
+    }
+    floor = {"plane": {"point_m": [0, 0, -0.0051], "normal": [0, 0, 1]}}
+    scene = {"duration_s": 0.002, "bodies": [bar], "obstacles": [floor], "microphones": [[0, 0, 0.1]]}
+    job = {"simulate": scene, "sound": "bar.wav", "surface": "bar.surface.hdf"}
+    file = store.folder / "bar.json"
+    file.write_text(json.dumps(job))
+    asked = store.submit(file, "--ranks", "2")[0]
+    check(asked["slurm_job"], f"not with Slurm: {asked}")
+    row = store.wait(asked, "done")
+    check((row["ranks"], row["attempts"]) == (2, 1), f"not one attempt on two ranks: {row}")
+    results = store.run("get", asked["id"])["results"]
+    check(sorted(results) == ["record", "sound", "surface"], f"not the files of the job: {results}")
+    check(json.loads(pathlib.Path(results["record"]).read_text())["ranks"] == 2, "its record is not of two ranks")
+    alone = subprocess.run([BIN / "carillon-simulate", "--quiet", file], capture_output=True, text=True, cwd=store.folder)
+    check(alone.returncode == 0, f"alone: {alone.stderr}")
+    check(any((store.folder / "bar.wav").read_bytes()[-300:]), "the sound is silence")
+    for key in ("sound", "surface"):
+        made = pathlib.Path(results[key]).read_bytes()
+        check(made == (store.folder / job[key]).read_bytes(), f"the {key} from Slurm has other bytes")
+    again = store.submit(file)[0]
+    check(again["state"] == "done" and not again["new"], f"simulated is not simulated: {again}")
+
+
 def array(store):
     """Ten jobs are one array; each has its bank. One of them cannot be solved, says why, and is not tried again."""
     for number in range(9):
@@ -287,6 +317,7 @@ def main():
     try:
         {
             "submit": submit,
+            "simulate": simulate,
             "array": array,
             "cancel": cancel,
             "time_limit": time_limit,
