@@ -56,7 +56,7 @@ with tempfile.TemporaryDirectory(prefix="carillon-simulate-") as scratch:
         done = run(folder, "-q", "job.json", *words, ranks=ranks)
         assert done.returncode == 0 and done.stderr == "", done
         pictures.append((folder / name).read_bytes())
-    assert pictures[0] == pictures[1] == pictures[2], "the picture depends on what is written beside it, or on ranks"
+    assert pictures[0] == pictures[1] == pictures[2], "the picture depends on what else is written, or on ranks"
 
     for words in ([], ["--validate"]):
         check_refused(folder, job | {"spectrogram": "bar.wav"}, *words, says=["job.json:", "spectrogram", "would overwrite"])
