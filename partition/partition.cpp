@@ -6,7 +6,6 @@
 #include "partition/partition.hpp"
 
 #include <fmt/core.h>
-#include <metis.h>
 
 #include <algorithm>
 #include <array>
@@ -15,21 +14,10 @@
 #include <numeric>
 #include <utility>
 
+#include "partition/metis_status.hpp"
+
 namespace carillon::partition {
 namespace {
-
-static_assert(sizeof(idx_t) == sizeof(std::int32_t), "METIS has to be built with 32-bit indices");
-
-constexpr idx_t kSeed = 1;
-
-void check_metis(int status, const char* what) {
-  if (status == METIS_OK) return;
-  // METIS has SIGTERM come to itself while it works, and gives it back as METIS_ERROR (which nothing else does): it is passed on to the
-  // handler that it was meant for. Blocking it instead would hand it to another thread of MPI, in which METIS's handler crashes.
-  if (status == METIS_ERROR) std::raise(SIGTERM);
-  if (status == METIS_ERROR_MEMORY) throw SystemError(fmt::format("METIS ran out of memory in {}; use a machine with more", what));
-  throw SystemError(fmt::format("METIS failed in {} (status {})", what, status));
-}
 
 void check_entries(std::size_t entries) {
   if (entries > static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max()))
@@ -87,6 +75,15 @@ void fill_empty_parts(std::vector<std::int32_t>& part, int parts) {
 }
 
 }  // namespace
+
+void check_metis(int status, const char* what) {
+  if (status == METIS_OK) return;
+  // METIS has SIGTERM come to itself while it works, and gives it back as METIS_ERROR (which nothing else does): it is passed on to the
+  // handler that it was meant for. Blocking it instead would hand it to another thread of MPI, in which METIS's handler crashes.
+  if (status == METIS_ERROR) std::raise(SIGTERM);
+  if (status == METIS_ERROR_MEMORY) throw SystemError(fmt::format("METIS ran out of memory in {}; use a machine with more", what));
+  throw SystemError(fmt::format("METIS failed in {} (status {})", what, status));
+}
 
 Graph make_dual_graph(std::span<const std::int32_t> corners) {
   constexpr std::array<std::array<int, 3>, 4> kFaceCorners{{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}};
@@ -233,6 +230,21 @@ std::vector<std::int32_t> order_nested_dissection(const Graph& graph) {
       METIS_NodeND(&vertices, copy.offsets.data(), copy.neighbours.data(), nullptr, options.data(), vertex_at.data(), position.data()),
       "METIS_NodeND");
   return position;
+}
+
+Graph renumber(const Graph& graph, const std::vector<std::int32_t>& position) {
+  std::vector<std::int32_t> at(position.size());
+  for (std::size_t v = 0; v < position.size(); ++v) at[position[v]] = static_cast<std::int32_t>(v);
+  Graph result;
+  result.offsets.push_back(0);
+  result.neighbours.reserve(graph.neighbours.size());
+  for (const std::int32_t v : at) {
+    const auto first = static_cast<std::ptrdiff_t>(result.neighbours.size());
+    for (std::int32_t k = graph.offsets[v]; k < graph.offsets[v + 1]; ++k) result.neighbours.push_back(position[graph.neighbours[k]]);
+    std::sort(result.neighbours.begin() + first, result.neighbours.end());
+    result.offsets.push_back(static_cast<std::int32_t>(result.neighbours.size()));
+  }
+  return result;
 }
 
 std::string metis_version() { return fmt::format("{}.{}.{}", METIS_VER_MAJOR, METIS_VER_MINOR, METIS_VER_SUBMINOR); }

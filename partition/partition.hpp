@@ -50,6 +50,9 @@ Partition partition_elements(std::span<const std::int32_t> corners, int parts);
 /// a permutation. This is MUMPS' PERM_IN less one. Throws SystemError when METIS runs out of memory.
 std::vector<std::int32_t> order_nested_dissection(const Graph& graph);
 
+/// The same graph with vertex v numbered position[v]; position: (vertices) a permutation.
+Graph renumber(const Graph& graph, const std::vector<std::int32_t>& position);
+
 /// "5.1.0": the METIS that this was built with.
 std::string metis_version();
 

@@ -5,10 +5,9 @@
 //             ordered by approximate minimum degree, weighted by their nodes, in a graph where those near a common rank are a clique. Wide
 //             supernodes of the separator are cut into chains, and each link goes to that of the ranks below it in the tree which keeps the
 //             fewest entries.
-// Source:     Koenig 1931 (cover from matching); Pothen, Simon, Liou 1990, Partitioning sparse matrices with eigenvectors of graphs (vertex
-//             from edge separators). Duff and Reid 1983, The multifrontal solution of indefinite sparse symmetric linear equations. Geist
-//             and Ng 1989, Task scheduling for parallel sparse Cholesky factorization (subtree to rank).
-//             Amestoy, Davis, Duff 1996, An approximate minimum degree ordering algorithm.
+// Source:     Koenig 1931 (cover from matching); Pothen, Simon, Liou 1990 (partition/vertex_cover.cpp). Duff and Reid 1983, The
+//             multifrontal solution of indefinite sparse symmetric linear equations. Geist and Ng 1989, Task scheduling for parallel sparse
+//             Cholesky factorization (subtree to rank). Amestoy, Davis, Duff 1996, An approximate minimum degree ordering algorithm.
 // Deviations: the separator is planned on every rank, in memory that grows with the whole separator (not with the whole graph).
 #include "precompute/ldlt/separator.hpp"
 
@@ -17,6 +16,7 @@
 #include <numeric>
 #include <set>
 
+#include "partition/vertex_cover.hpp"
 #include "precompute/petsc/session.hpp"
 
 namespace carillon::ldlt {
@@ -38,70 +38,6 @@ Ints gather_ints(MPI_Comm comm, const Ints& own, std::vector<int>& counts) {
   return all;
 }
 
-/// The edges between two ranks: links of the left nodes to the right ones.
-struct Bipartite {
-  Ints left;
-  Ints right;
-  std::vector<Ints> links;
-};
-
-Bipartite make_bipartite(const std::vector<std::pair<std::int32_t, std::int32_t>>& edges) {
-  Bipartite graph;
-  for (const auto& [a, b] : edges) {
-    graph.left.push_back(a);
-    graph.right.push_back(b);
-  }
-  for (Ints* side : {&graph.left, &graph.right}) {
-    std::sort(side->begin(), side->end());
-    side->erase(std::unique(side->begin(), side->end()), side->end());
-  }
-  const auto find = [](const Ints& side, std::int32_t node) {
-    return static_cast<std::int32_t>(std::lower_bound(side.begin(), side.end(), node) - side.begin());
-  };
-  graph.links.resize(graph.left.size());
-  for (const auto& [a, b] : edges) graph.links[find(graph.left, a)].push_back(find(graph.right, b));
-  return graph;
-}
-
-/// Walks from the left nodes `front` along free and matched edges in turn. reached_from: (right) the left node before, -1: not reached.
-/// Stops at a right node without a partner, and returns it; -1 if there is none.
-std::int32_t walk(const Bipartite& graph, const Ints& partner_of_right, Ints front, Ints& reached_from) {
-  for (std::size_t i = 0; i < front.size(); ++i)
-    for (const std::int32_t r : graph.links[front[i]]) {
-      if (reached_from[r] >= 0) continue;
-      reached_from[r] = front[i];
-      if (partner_of_right[r] < 0) return r;
-      front.push_back(partner_of_right[r]);
-    }
-  return -1;
-}
-
-/// A minimum vertex cover, added to `cover`.
-void cover_edges(const Bipartite& graph, std::set<std::int32_t>& cover) {
-  Ints partner_of_left(graph.left.size(), -1);
-  Ints partner_of_right(graph.right.size(), -1);
-  Ints reached_from;
-  for (std::int32_t l = 0; l < static_cast<std::int32_t>(graph.left.size()); ++l) {
-    reached_from.assign(graph.right.size(), -1);
-    for (std::int32_t r = walk(graph, partner_of_right, {l}, reached_from); r >= 0;) {
-      const std::int32_t from = reached_from[r];
-      partner_of_right[r] = from;
-      std::swap(partner_of_left[from], r);  // the node that loses its partner takes the one before it
-      if (from == l) break;
-    }
-  }
-  // Of the nodes that walks from unmatched left nodes reach, the right ones are in the cover; of the others, the left ones.
-  Ints unmatched;
-  for (std::int32_t l = 0; l < static_cast<std::int32_t>(graph.left.size()); ++l)
-    if (partner_of_left[l] < 0) unmatched.push_back(l);
-  reached_from.assign(graph.right.size(), -1);
-  (void)walk(graph, partner_of_right, unmatched, reached_from);
-  for (std::size_t r = 0; r < graph.right.size(); ++r) {
-    if (reached_from[r] >= 0) cover.insert(graph.right[r]);
-    if (reached_from[r] < 0 && partner_of_right[r] >= 0) cover.insert(graph.left[partner_of_right[r]]);
-  }
-}
-
 /// Fills the separator's nodes from the edges between ranks.
 void cover_all(const Ragged& all, const Ints& rank_starts, Separator& separator) {
   std::map<std::pair<int, int>, std::vector<std::pair<std::int32_t, std::int32_t>>> by_ranks;
@@ -111,7 +47,8 @@ void cover_all(const Ragged& all, const Ints& rank_starts, Separator& separator)
   std::set<std::int32_t> cover;
   for (auto& [ranks, pairs] : by_ranks) {
     std::erase_if(pairs, [&](const auto& edge) { return cover.contains(edge.first) || cover.contains(edge.second); });
-    cover_edges(make_bipartite(pairs), cover);
+    const Ints fewest = partition::cover_edges(pairs);
+    cover.insert(fewest.begin(), fewest.end());
   }
   separator.nodes.assign(cover.begin(), cover.end());
   separator.first_of_rank.clear();

@@ -1,0 +1,72 @@
+// Which ranks share which fronts, and what that costs before any number is computed.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "precompute/ldlt/symbolic.hpp"
+
+namespace carillon::ldlt {
+
+/// A rank and its fraction of a front's work.
+struct FrontShare {
+  int rank = 0;
+  double fraction = 1;
+};
+
+/// Proportional mapping: the subtree of a front has an interval of [0, ranks], as long as its share of the whole work, and the intervals of
+/// its children lie in it one after the other. A front belongs to the ranks that its interval meets, to each by the overlap. Neighbouring
+/// ranks share subtrees, so that they may stay on one machine.
+class Mapping {
+ public:
+  /// operations_weight: how much a subtree's operations count in its work, 0 to 1; the rest are its entries of L.
+  Mapping(const Forest& forest, int ranks, double operations_weight);
+
+  int ranks() const { return ranks_; }
+  double operations_weight() const { return operations_weight_; }
+  /// The rank that has a front whole, -1: it is shared.
+  int owner(std::int32_t front) const { return owner_[static_cast<std::size_t>(front)]; }
+  /// Its ranks, ascending; the fractions add up to one. A front that one rank has is one share of 1.
+  std::vector<FrontShare> list_shares(std::int32_t front) const;
+
+ private:
+  int ranks_ = 1;
+  double operations_weight_ = 1;
+  std::vector<double> begin_;  // (fronts) of the interval of the subtree
+  std::vector<double> end_;
+  std::vector<int> owner_;
+};
+
+/// What a mapping costs. Operations and entries are exact; messages and bytes are those of shared fronts in square tiles, dealt
+/// block-cyclic to a grid of the front's ranks.
+struct MappingCounts {
+  std::vector<double> operations;   // (ranks) of a factorisation
+  std::vector<double> entries;      // (ranks) of L and D
+  std::vector<double> messages;     // (ranks) received in a factorisation
+  std::vector<double> bytes;        // (ranks) received in a factorisation
+  std::vector<double> solve_bytes;  // (ranks) received in a solve of 16 columns, there and back
+  double total_operations = 0;
+  double total_entries = 0;
+  /// Operations on the longest chain of fronts and ranks, from the first pivot to the last, where a rank begins its share of a front as
+  /// soon as it is free and the children are complete ...
+  double path_operations = 0;
+  /// ... and where all ranks of a front begin together and wait for the slowest.
+  double gang_operations = 0;
+  double shared_operations = 0;  // in fronts of more than one rank
+  double shared_entries = 0;
+  std::int32_t shared_fronts = 0;
+  std::int32_t most_planned_fronts = 0;  // shared fronts that one rank has to know: those on its way to the root, and their children
+
+  /// path_operations over total_operations / ranks: 1 is perfect.
+  double path_ratio() const { return path_operations * static_cast<double>(operations.size()) / total_operations; }
+  /// Entries of the fullest rank over the mean.
+  double fullest_ratio() const;
+};
+
+MappingCounts count_mapping(const Forest& forest, const Mapping& mapping);
+
+/// The mapping of the shortest path among several weights whose fullest rank has at most 1.25 times the mean of the entries; where none
+/// has, that of the fewest entries.
+Mapping choose_mapping(const Forest& forest, int ranks);
+
+}  // namespace carillon::ldlt

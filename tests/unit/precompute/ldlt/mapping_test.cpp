@@ -1,0 +1,120 @@
+#include "precompute/ldlt/mapping.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numeric>
+
+#include "partition/dissect.hpp"
+
+namespace carillon::ldlt {
+namespace {
+
+using partition::Graph;
+
+double sum(const std::vector<double>& values) { return std::accumulate(values.begin(), values.end(), 0.0); }
+
+/// A block of n^3 nodes, each a neighbour of the 26 around it, in the order of elimination.
+Forest make_block(std::int32_t n, int parts) {
+  Graph graph;
+  graph.offsets.push_back(0);
+  for (std::int32_t v = 0; v < n * n * n; ++v) {
+    const std::int32_t x = v % n;
+    const std::int32_t y = v / n % n;
+    const std::int32_t z = v / n / n;
+    for (std::int32_t dz = -1; dz <= 1; ++dz)
+      for (std::int32_t dy = -1; dy <= 1; ++dy)
+        for (std::int32_t dx = -1; dx <= 1; ++dx) {
+          const bool is_inside = x + dx >= 0 && x + dx < n && y + dy >= 0 && y + dy < n && z + dz >= 0 && z + dz < n;
+          if (is_inside && (dx != 0 || dy != 0 || dz != 0)) graph.neighbours.push_back(v + dx + n * (dy + n * dz));
+        }
+    graph.offsets.push_back(static_cast<std::int32_t>(graph.neighbours.size()));
+  }
+  return find_supernodes(partition::renumber(graph, partition::dissect(graph, parts).position), 0, graph.vertex_count());
+}
+
+/// `leaves` equal fronts without a parent.
+Forest make_leaves(int leaves) {
+  Forest forest;
+  for (int s = 0; s < leaves; ++s) {
+    Supernode& node = forest.supernodes.emplace_back();
+    node.first = 10 * s;
+    node.width = 10;
+  }
+  return forest;
+}
+
+TEST(Mapping, equal_leaves_are_dealt_evenly) {
+  for (const int ranks : {1, 2, 4, 8, 32}) {
+    const MappingCounts counts = count_mapping(make_leaves(32), choose_mapping(make_leaves(32), ranks));
+    EXPECT_NEAR(counts.path_ratio(), 1, 1e-12) << ranks;
+    EXPECT_NEAR(counts.fullest_ratio(), 1, 1e-12) << ranks;
+    EXPECT_EQ(counts.shared_fronts, 0);
+    EXPECT_EQ(sum(counts.bytes), 0) << "nothing is shared, so nothing is sent";
+  }
+}
+
+TEST(Mapping, a_single_front_is_shared_by_all_ranks) {
+  Forest forest = make_leaves(1);
+  forest.supernodes[0].width = 1000;
+  const MappingCounts counts = count_mapping(forest, Mapping(forest, 5, 1));
+  EXPECT_EQ(counts.shared_fronts, 1);
+  EXPECT_NEAR(counts.path_ratio(), 1, 1e-12);
+  EXPECT_NEAR(counts.shared_operations, counts.total_operations, 1e-9 * counts.total_operations);
+}
+
+TEST(Mapping, a_chain_of_fronts_is_shared_by_two_ranks) {
+  Forest forest;
+  for (int s = 0; s < 6; ++s) {
+    Supernode& node = forest.supernodes.emplace_back();
+    node.first = 50 * s;
+    node.width = 50;
+    node.parent = s < 5 ? s + 1 : -1;
+    for (std::int32_t row = 50 * (s + 1); row < 300; ++row) node.rows.push_back(row);
+  }
+  // The lowest front, which has no children and less than a rank's work, is not shared.
+  const MappingCounts counts = count_mapping(forest, Mapping(forest, 2, 1));
+  EXPECT_NEAR(sum(counts.operations), counts.total_operations, 1e-9 * counts.total_operations);
+  EXPECT_GE(counts.path_operations, counts.total_operations / 2);
+  EXPECT_LE(counts.path_operations, counts.gang_operations * (1 + 1e-12));
+}
+
+TEST(Mapping, what_is_shared_out_is_what_there_is) {
+  const Forest forest = make_block(15, 16);
+  for (const int ranks : {1, 2, 3, 7, 16, 64, 200}) {
+    const Mapping mapping = choose_mapping(forest, ranks);
+    for (std::size_t s = 0; s < forest.supernodes.size(); ++s) {
+      double all = 0;
+      int before = -1;
+      for (const FrontShare& share : mapping.list_shares(static_cast<std::int32_t>(s))) {
+        EXPECT_GT(share.rank, before);
+        EXPECT_LT(share.rank, ranks);
+        EXPECT_GT(share.fraction, 0);
+        before = share.rank;
+        all += share.fraction;
+      }
+      EXPECT_NEAR(all, 1, 1e-9);
+    }
+    const MappingCounts counts = count_mapping(forest, mapping);
+    EXPECT_NEAR(sum(counts.operations), counts.total_operations, 1e-9 * counts.total_operations) << ranks;
+    EXPECT_NEAR(sum(counts.entries), counts.total_entries, 1e-9 * counts.total_entries) << ranks;
+    EXPECT_GE(counts.path_ratio(), 1 - 1e-9) << "no rank is faster than an equal share";
+    if (ranks == 1) {
+      EXPECT_EQ(counts.path_operations, counts.total_operations);
+      EXPECT_EQ(sum(counts.messages) + sum(counts.bytes) + sum(counts.solve_bytes), 0);
+    }
+  }
+}
+
+TEST(Mapping, path_and_memory_of_a_block_stay_near_an_equal_share) {
+  for (const int ranks : {2, 4, 8, 16, 32, 64}) {
+    const Forest forest = make_block(24, ranks);
+    const MappingCounts counts = count_mapping(forest, choose_mapping(forest, ranks));
+    EXPECT_LE(counts.path_ratio(), ranks <= 16 ? 1.5 : 2.5) << ranks;
+    EXPECT_LE(counts.fullest_ratio(), 1.3) << ranks;
+    EXPECT_LE(counts.most_planned_fronts, 40 * std::log2(ranks)) << "a rank plans its way to the root, not the whole tree";
+  }
+}
+
+}  // namespace
+}  // namespace carillon::ldlt
