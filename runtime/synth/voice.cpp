@@ -366,7 +366,9 @@ void Voice::audit() noexcept {
   if (before == 0.0 && energy_j_ == 0.0) return;
   for (std::size_t m = 0; m < radiation_.size(); ++m) {
     Radiation& mode = radiation_[m];
-    counters_.radiated_j += mode.part * std::exchange(mode.energy_j, calc_ringing_energy_j(static_cast<int>(m)));
+    const DampedState state = get_mode_state(static_cast<int>(m));  // among the coupled ones, too
+    const double energy_j = 0.5 * (state.v * state.v + model_->modes_[m].lambda * state.q * state.q);
+    counters_.radiated_j += mode.part * std::exchange(mode.energy_j, energy_j);
   }
 }
 

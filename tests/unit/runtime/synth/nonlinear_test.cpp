@@ -269,6 +269,20 @@ TEST(NonlinearVoice, SoftlyACascadeIsTheLinearVoiceToMinus100Db) {
   EXPECT_GT(other.calc_cascade_bytes(), 0);
 }
 
+TEST(NonlinearVoice, WhatIsRadiatedCountsTheModesOfAllKinds) {
+  const auto model = make_model(make_cascade_bank());
+  std::vector<double> radiated_j;
+  for (const auto& [is_nonlinear, has_cascade] : {std::pair{false, false}, {true, false}, {true, true}}) {
+    Voice voice(model, {.is_nonlinear = is_nonlinear, .has_cascade = has_cascade, .audits_energy = true});
+    strike_softly(voice, 1e-6);
+    (void)play(voice, 48000);
+    radiated_j.push_back(voice.get_counters().radiated_j);
+  }
+  EXPECT_GT(radiated_j[0], 0.0);
+  EXPECT_NEAR(radiated_j[1] / radiated_j[0], 1.0, 1e-3);
+  EXPECT_NEAR(radiated_j[2] / radiated_j[0], 1.0, 1e-3);
+}
+
 TEST(NonlinearVoice, ACascadeThatIsOffIsNotThere) {
   const auto model = make_model(make_cascade_bank()), without = make_model(make_bank());
   std::vector<std::vector<float>> heard;
