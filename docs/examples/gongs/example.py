@@ -1,4 +1,5 @@
-"""A gong and a thunder sheet under soft, medium and hard blows: pitch that moves, and high frequencies that grow after the blow."""
+"""A gong and a thunder sheet under soft, medium and hard blows: pitch that moves, and high frequencies that grow after the blow; the sheet
+also with the cascade above its coupled modes."""
 import math
 
 import numpy
@@ -18,6 +19,7 @@ QUICK = {
     "thunder": {"body.nodes": 2500, "max_modes": 120, "nonlinear.modes": 16},
 }
 WINDOW_S = 0.1
+TIMES_S = (0.01, 0.1, 0.3, 1.0, 2.0, 3.5)  # after the blow
 
 
 def write_gong(file):
@@ -59,21 +61,34 @@ def find_pitch(samples, rate, near_hz):
     return measure.find_peak(samples, rate, near_hz, 0.122)
 
 
-def blow(stage, name, duration):
+def calc_centroids(samples, rate, times):
+    """At so many seconds after the blow [Hz]."""
+    return [calc_centroid(cut(samples, rate, BLOW_S + t, WINDOW_S), rate) for t in times]
+
+
+def calc_level(samples):
+    """In dB re 20 uPa."""
+    return 20 * math.log10(math.sqrt((samples**2).mean()) / 20e-6)
+
+
+def blow(stage, name, duration, has_cascade=False):
     """Renders the three blows: {strength: (rate, sound in Pa, report)}"""
     mass, speeds, place = BLOWS[name]
     scene = tools.read_json(stage.folder / "scene.json")
     scene["duration_s"] = duration
+    if has_cascade:
+        scene["effects"]["off"].remove("cascade")
     scene["bodies"][0]["bank"] = f"{name}.hdf"
     sounds = {}
     for strength, speed in speeds.items():
         scene["strikes"][0].update({"point_m": place, "mallet": {**MALLET, "mass_kg": mass, "speed_m_s": speed}})
-        rate, samples, report = stage.render(f"{name}-{strength}", scene, picture=False)
+        file = f"{name}-{strength}-cascade" if has_cascade else f"{name}-{strength}"
+        rate, samples, report = stage.render(file, scene, picture=False)
         sounds[strength] = (rate, samples / report["gain_per_pa"], report)
         mallet, radiated = report["mallets"][0], report["energy"]["radiated_j"]
-        stage.expect(f"{name}, {strength}: every sample is a number", numpy.isfinite(samples).all())
+        stage.expect(f"{file}: every sample is a number", numpy.isfinite(samples).all())
         stage.expect(
-            f"{name}, {strength}: {radiated:.2g} J are radiated, of {mallet['modes_j']:.2g} J that the blow left in modes",
+            f"{file}: {radiated:.2g} J are radiated, of {mallet['modes_j']:.2g} J that the blow left in modes",
             0 < radiated < mallet["modes_j"],
         )
     return sounds
@@ -82,7 +97,7 @@ def blow(stage, name, duration):
 def describe(sounds, duration, has_pitch):
     """Prints what became of the blows. {strength: (centroids [Hz], cents from the soft blow's loudest mode, where has_pitch)}"""
     rate, samples, _ = sounds["soft"]
-    times = [t for t in (0.01, 0.1, 0.3, 1.0, 2.0, 3.5) if BLOW_S + t + WINDOW_S < duration]
+    times = [t for t in TIMES_S if BLOW_S + t + WINDOW_S < duration]
     long_s = duration / 8
     rows = [("blow", "modes [J]", "of a core", "peak [Pa]", *(f"{t:g} s" for t in times))]
     if has_pitch:
@@ -90,7 +105,7 @@ def describe(sounds, duration, has_pitch):
         rows[0] += ("pitch, first and last [Hz]", "cents to soft")
     found = {}
     for strength, (rate, samples, report) in sounds.items():
-        centroids, cents = [calc_centroid(cut(samples, rate, BLOW_S + t, WINDOW_S), rate) for t in times], []
+        centroids, cents = calc_centroids(samples, rate, times), []
         share = report["playing_cpu_s"] / report["duration_s"]
         row = (strength, f"{report['mallets'][0]['modes_j']:.2g}", f"{100 * share:.0f} %", f"{abs(samples).max():.2g}")
         row += tuple(f"{value:.0f}" for value in centroids)
@@ -127,6 +142,51 @@ def draw(stage, sounds, picture):
     stage.pictures.append(picture)
 
 
+def compare_cascade(stage, off, on, duration):
+    """Checks and prints what the cascade changes: centroids and levels over time after the blow."""
+    times = [t for t in TIMES_S if BLOW_S + t + WINDOW_S < duration]
+    rows = [("blow, cascade", "cascade on for [s]", *(f"{t:g} s" for t in times))]
+    centroids, levels = {}, {}
+    for strength in off:
+        for name, (rate, samples, report) in (("off", off[strength]), ("on", on[strength])):
+            centroids[strength, name] = calc_centroids(samples, rate, times)
+            levels[strength, name] = [calc_level(cut(samples, rate, BLOW_S + t, WINDOW_S)) for t in times]
+            cells = (f"{hz:.0f} Hz, {db:.1f} dB" for hz, db in zip(centroids[strength, name], levels[strength, name]))
+            rows.append((f"{strength}, {name}", f"{report['per_body'][0]['effects']['cascade']['on_s']:g}", *cells))
+    print("  centroids of the power and levels by time after the blow")
+    tools.print_table(rows)
+    soft, soft_on = off["soft"], on["soft"]
+    same = abs(soft_on[1] - soft[1]).max() <= 1e-5 * abs(soft[1]).max()
+    stage.expect("thunder: after a soft blow the cascade stays off", soft_on[2]["per_body"][0]["effects"]["cascade"]["on_s"] == 0 and same)
+    gain, wide = levels["hard", "on"][-1] - levels["hard", "off"][-1], centroids["hard", "on"][-1] / centroids["hard", "off"][-1]
+    stage.expect(
+        f"thunder: {times[-1]:g} s after a hard blow the cascade has added {gain:.1f} dB, and the centroid is {wide:.2f} times as high",
+        gain > 3 and wide > 0.9,
+    )
+
+
+def draw_cascade(stage, off, on, duration, picture):
+    """The hard blow without and with the cascade, and the centroids of all blows over time."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    figure, axes = pyplot.subplots(1, 3, figsize=(12, 3.6), layout="constrained")
+    top = 20 * math.log10(abs(on["hard"][1]).max())
+    for axis, (name, (rate, samples, _)) in zip(axes, (("off", off["hard"]), ("on", on["hard"]))):
+        axis.specgram(samples[:, 0], NFFT=4096, Fs=rate, noverlap=3072, vmin=top - 110, vmax=top - 40, cmap="magma")
+        axis.set(title=f"hard blow, cascade {name}", ylim=(0, 4000), xlabel="Time (s)", ylabel="Frequency (Hz)")
+    times = numpy.arange(0.01, duration - BLOW_S - WINDOW_S, 0.05)
+    for strength, colour in zip(off, ("C0", "C2", "C3")):
+        for (rate, samples, _), style, name in ((off[strength], "--", "off"), (on[strength], "-", "on")):
+            axes[2].plot(times, calc_centroids(samples, rate, times), colour + style, label=f"{strength}, {name}", linewidth=1)
+    axes[2].set(title="centroid", xlabel="Time after the blow (s)", ylabel="Frequency (Hz)", yscale="log", ylim=(60, 9000))
+    axes[2].legend(fontsize="small", ncols=3, loc="upper center")
+    figure.savefig(stage.out / picture, dpi=70)
+    stage.pictures.append(picture)
+
+
 def play(stage):
     write_gong(stage.out / "gong.obj")
     duration = 2.0 if stage.quick else 4.0
@@ -135,6 +195,8 @@ def play(stage):
         stage.solve(f"{name}.json", name, quick=QUICK[name])
         sounds[name] = blow(stage, name, duration)
         found[name] = describe(sounds[name], duration, name == "gong")
+    cascade = blow(stage, "thunder", duration, has_cascade=True)
+    compare_cascade(stage, sounds["thunder"], cascade, duration)
     for name in BLOWS:
         soft, hard = (found[name][strength][0] for strength in ("soft", "hard"))
         stage.expect(
@@ -153,3 +215,4 @@ def play(stage):
     stage.expect(f"gong: a soft one becomes darker at once ({soft[0]:.0f} Hz to {soft[-1]:.0f} Hz)", soft[-1] < soft[0])
     if not stage.quick:
         draw(stage, sounds, "gongs.png")
+        draw_cascade(stage, sounds["thunder"], cascade, duration, "cascade.png")
