@@ -106,8 +106,8 @@ def inversion():
 
 
 def same_bytes():
-    """Two bars and a ball bounce on each other and on the floor, for 100,000 steps on one and two ranks. On four, which share the cores of a
-    small machine, for 20,000: as many as one rank takes for the bytes to compare."""
+    """Two bars and a ball bounce on each other and on the floor, for 100,000 steps on one and two ranks. On four, which share the cores of
+    a small machine, for 20,000: as many as one rank takes for the bytes to compare."""
     block = {"bar": {"length_m": 0.02, "width_m": 0.01, "thickness_m": 0.01, "nodes": 20}}
     material = PLASTIC | {"young_modulus_pa": 1e9, "damping": {"rayleigh": {"alpha1_s": 1e-8, "alpha2_per_s": 1}}}
     bodies = [

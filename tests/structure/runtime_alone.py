@@ -114,7 +114,7 @@ def find_traces(build):
 
 def build_and_test(source, build, whole=None):
     """In `build`; `whole` is the whole build to take over from."""
-    # Ninja makes the objects of WebAssembly anew in a folder that was configured again, so pages are left to the build from nothing.
+    # Ninja makes the objects of WebAssembly again where it was configured again, so pages are left to the build from nothing.
     configure(source, build, [*read_settings(whole), "-DCARILLON_EMXX=OFF"] if whole else ["-DCMAKE_BUILD_TYPE=Release"])
     taken = take_over(whole, build) if whole else []
     subprocess.run(["cmake", "--build", build, "--", "--quiet"], check=True)
