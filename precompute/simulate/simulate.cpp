@@ -42,6 +42,8 @@ constexpr std::uint64_t kMaxJobBytes = 16 << 20;
 constexpr double kBookEveryS = 0.01;     // of simulated time
 constexpr std::int64_t kLookEvery = 16;  // samples between two looks at signals
 constexpr double kFullScalePa = 1.0;     // of a WAV file whose peak is below; louder ones are scaled to a peak of 1
+constexpr double kBookGoal = 1e-6;       // of the largest energy: what a book should close to
+constexpr double kBookScatter = 3.0;     // off the square law by 2.7 at most: 11 scenes with errors above the goal, steps down to a sixth
 constexpr int kTrialSteps = 200;         // of --validate
 constexpr std::int64_t kMaxPredictedRanks = 1024;
 constexpr std::int64_t kPictureBytes = 40 << 20;  // while the spectrogram is drawn: twice what was measured
@@ -232,6 +234,12 @@ base::Json describe(const EnergyBook& book) {
   return json;
 }
 
+/// The step with which the book is expected to close to kBookGoal, as its error falls with the square of the step; none where it does.
+std::optional<double> find_closing_step(double step_s, double book_error) {
+  if (!(book_error > kBookGoal) || !std::isfinite(book_error)) return std::nullopt;
+  return step_s * std::sqrt(kBookGoal / (kBookScatter * book_error));
+}
+
 std::int64_t count_element_steps(const Simulation& simulation) {
   return static_cast<std::int64_t>(simulation.bodies.assembly->element_count()) * simulation.motion->get_step_count();
 }
@@ -280,6 +288,8 @@ std::string write_outputs(const comm::Communicator& comm, Simulation& simulation
     record.set("element_steps_per_second", base::significant(rate, 4));
     record.set("peak_pa", base::finite_or_null(peak, base::significant, 6)).set("gain_per_pa", base::significant(gain, 9));
     record.set("book_error", base::finite_or_null(worst, base::significant, 3));
+    const std::optional<double> closing_step_s = find_closing_step(simulation.motion->get_step_s(), worst);
+    record.set("closing_step_s", base::finite_or_null(closing_step_s.value_or(NAN), base::significant, 3));
     record.set("contact_stored_j", base::significant(touch.stored_j, 9))
         .set("contact_dissipated_j", base::significant(touch.dissipated_j, 9));
     for (const transient::BallStriker& ball : simulation.contacts->get_strikers()) {
@@ -297,6 +307,9 @@ std::string write_outputs(const comm::Communicator& comm, Simulation& simulation
         "energy: kinetic {:.4g} J, elastic {:.4g} J, dissipated {:.4g} J, put in {:.4g} J; the book closes to {:.1e}",
         book.time_s, simulation.motion->get_step_count(), simulation.motion->get_step_s(), rate,
         100.0 * cpu[1] / std::max(1e-9, cpu[0] + cpu[1]), book.kinetic_j, book.elastic_j, book.dissipated_j, book.work_j, worst);
+    if (closing_step_s)
+      result += fmt::format("\nthe book is expected to close to {:g} with \"step_s\": {:.2e} (its error falls with the square of the step)",
+                            kBookGoal, *closing_step_s);
     if (simulation.sound)
       result += fmt::format("\npeak {:.4g} Pa{}", peak, gain < 1.0 ? fmt::format(", the file has it as 1 (gain {:.4g})", gain) : "");
     for (const job::SimulationOutput& output : job::kSimulationOutputs)
