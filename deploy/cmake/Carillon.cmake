@@ -136,7 +136,6 @@ function(carillon_test name)
   target_compile_definitions(${target} PRIVATE CARILLON_SOURCE_DIR="${PROJECT_SOURCE_DIR}" CARILLON_BIN_DIR="${CMAKE_BINARY_DIR}/bin")
   carillon_warnings(${target})
   carillon_precompile(${target} test)
-  target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)  # a fifth less to compile; what is tested keeps its own
   set(labels ${CARILLON_TEST_KIND} ${arg_LABELS})
   if(arg_RANKS)
     target_sources(${target} PRIVATE ${PROJECT_SOURCE_DIR}/tests/support/mpi_main.cpp)
