@@ -1,8 +1,8 @@
-// Method:     Clusters by METIS k-way; their quotient graph, weighted by vertices and edges, is bisected again and again by METIS (the best
-//             of eight cuts, sides up to a fifth apart: fewer cut edges are worth more than equal sides, for work is balanced later, when
-//             it is known). The edges cut are covered by the fewest vertices: the separator. Leaves and separators are ordered by METIS.
-// Source:     George 1973; Karypis and Kumar 1998; Koenig 1931 (vertex_cover.cpp). Against METIS's own order of the whole graph this costs
-//             12 to 19 % more operations at 64 parts of the bunny, PT-SCOTCH 7.0.3 up to five times as many (docs/scaling.md).
+// Method:     A part that one rank can hold is cut by METIS's vertex separator, the best of four. A larger one is cut into clusters by
+//             METIS k-way; their quotient graph, weighted by vertices and edges, is bisected by METIS (the best of eight cuts), and the
+//             edges cut are covered by the fewest vertices: the separator. Leaves and separators are ordered by METIS. Sides may be a fifth
+//             apart: a small separator is worth more, for work is balanced later, when it is known.
+// Source:     George 1973; Karypis and Kumar 1998; Koenig 1931 (vertex_cover.cpp).
 // Deviations: covers are not refined.
 #include "partition/dissect.hpp"
 
@@ -11,7 +11,7 @@
 #include <numeric>
 #include <utility>
 
-#include "partition/metis_status.hpp"
+#include "partition/metis.hpp"
 #include "partition/vertex_cover.hpp"
 
 namespace carillon::partition {
@@ -27,10 +27,7 @@ constexpr idx_t kImbalance = 200;  // thousandths
 Ints make_clusters(const Graph& graph, std::int32_t count) {
   Ints cluster(static_cast<std::size_t>(graph.vertex_count()), 0);
   if (count <= 1 || graph.neighbours.empty()) return cluster;
-  std::array<idx_t, METIS_NOPTIONS> options{};
-  METIS_SetDefaultOptions(options.data());
-  options[METIS_OPTION_NUMBERING] = 0;
-  options[METIS_OPTION_SEED] = kSeed;
+  MetisOptions options = make_metis_options();
   Graph copy = graph;
   idx_t vertices = graph.vertex_count();
   idx_t constraints = 1;
@@ -82,10 +79,7 @@ class Dissector {
   /// side_: 0, 1 or 2, the separator, for each of the vertices.
   void separate(const Ints& vertices) {
     Graph inner = take(vertices);
-    std::array<idx_t, METIS_NOPTIONS> options{};
-    METIS_SetDefaultOptions(options.data());
-    options[METIS_OPTION_NUMBERING] = 0;
-    options[METIS_OPTION_SEED] = kSeed;
+    MetisOptions options = make_metis_options();
     options[METIS_OPTION_NSEPS] = kSeparators;
     options[METIS_OPTION_UFACTOR] = kImbalance;
     idx_t count = inner.vertex_count();
@@ -140,10 +134,7 @@ class Dissector {
       }
       offsets.push_back(static_cast<std::int32_t>(neighbours.size()));
     }
-    std::array<idx_t, METIS_NOPTIONS> options{};
-    METIS_SetDefaultOptions(options.data());
-    options[METIS_OPTION_NUMBERING] = 0;
-    options[METIS_OPTION_SEED] = kSeed;
+    MetisOptions options = make_metis_options();
     options[METIS_OPTION_NCUTS] = kCuts;
     options[METIS_OPTION_UFACTOR] = kImbalance;
     auto clusters = static_cast<idx_t>(count);

@@ -14,7 +14,7 @@
 #include <numeric>
 #include <utility>
 
-#include "partition/metis_status.hpp"
+#include "partition/metis.hpp"
 
 namespace carillon::partition {
 namespace {
@@ -83,6 +83,14 @@ void check_metis(int status, const char* what) {
   if (status == METIS_ERROR) std::raise(SIGTERM);
   if (status == METIS_ERROR_MEMORY) throw SystemError(fmt::format("METIS ran out of memory in {}; use a machine with more", what));
   throw SystemError(fmt::format("METIS failed in {} (status {})", what, status));
+}
+
+MetisOptions make_metis_options() {
+  MetisOptions options{};
+  METIS_SetDefaultOptions(options.data());
+  options[METIS_OPTION_NUMBERING] = 0;
+  options[METIS_OPTION_SEED] = 1;
+  return options;
 }
 
 Graph make_dual_graph(std::span<const std::int32_t> corners) {
@@ -194,10 +202,7 @@ Partition partition_elements(std::span<const std::int32_t> corners, int parts) {
   {
     // METIS refuses contiguous parts of a graph that is itself in pieces, and prints where it should return: so ask first.
     const bool connected = count_pieces(dual, result.part, 1).front() == 1;
-    std::array<idx_t, METIS_NOPTIONS> options{};
-    METIS_SetDefaultOptions(options.data());
-    options[METIS_OPTION_NUMBERING] = 0;
-    options[METIS_OPTION_SEED] = kSeed;
+    MetisOptions options = make_metis_options();
     options[METIS_OPTION_CONTIG] = connected ? 1 : 0;
     // Few elements at the seams rather than few faces there: that leaves smaller separators to a factorisation, at the same price.
     options[METIS_OPTION_OBJTYPE] = METIS_OBJTYPE_VOL;
@@ -219,10 +224,7 @@ std::vector<std::int32_t> order_nested_dissection(const Graph& graph) {
   std::vector<std::int32_t> position(vertices);
   std::iota(position.begin(), position.end(), 0);
   if (graph.neighbours.empty()) return position;
-  std::array<idx_t, METIS_NOPTIONS> options{};
-  METIS_SetDefaultOptions(options.data());
-  options[METIS_OPTION_NUMBERING] = 0;
-  options[METIS_OPTION_SEED] = kSeed;
+  MetisOptions options = make_metis_options();
   std::vector<std::int32_t> vertex_at(vertices);
   // METIS takes the graph by pointers to mutable memory and leaves it unchanged in effect; a copy keeps the promise of const.
   Graph copy = graph;

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "jobs/store/json.hpp"
@@ -61,6 +62,8 @@ Json::Value write_material(const material::Material& material) {
   spec.material = material;
   return parse_job_json(job::resolved_json(spec, "/", ""))["material"];
 }
+
+static_assert(std::size(kOutputs) == std::size(job::kSimulationOutputs), "the store keeps every file that a simulation writes");
 
 SimulationOrder make_simulation(const job::SimulationSpec& spec, const std::string& text) {
   SimulationOrder order;

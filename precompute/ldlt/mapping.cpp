@@ -5,9 +5,8 @@
 // Source:     Pothen and Sun 1993, A mapping algorithm for parallel sparse Cholesky factorization (proportional mapping); Gupta, Karypis,
 //             Kumar 1997, Highly scalable parallel algorithms for sparse matrix factorization (subtree to subcube, fronts in two
 //             dimensions).
-// Deviations: shares are fractions of ranks, not whole ranks. In postorder instead of order of readiness a rank of two groups makes one
-// wait:
-//             at 64 ranks the path was four times as long.
+// Deviations: shares are fractions of ranks, not whole ranks; shared fronts go by readiness, not in postorder, in which a rank of two
+//             groups makes one wait (at 64 ranks the path was four times as long).
 #include "precompute/ldlt/mapping.hpp"
 
 #include <algorithm>

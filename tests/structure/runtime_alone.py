@@ -11,6 +11,7 @@ and what is loaded.
 
 usage: runtime_alone.py SOURCE_DIR BUILD_DIR WORK_DIR [--from-nothing]        WORK_DIR is removed at the end
 """
+import json
 import os
 import pathlib
 import re
@@ -25,7 +26,7 @@ HIDDEN = re.compile(
 )
 # An ordinary machine has these of some of the packages above as dependencies of light libraries; hiding them would not be fair.
 SHARED = re.compile(r"/lib(blas|lapack|openblas|hwloc|event|gomp)")
-LEFT_OUT = "structure|docs|bench|web|hard"
+LEFT_OUT = "structure|docs|bench"
 
 
 def installed():
@@ -90,11 +91,26 @@ def take_over(whole, build):
     return taken
 
 
-def run_tests(build, is_sample):
-    """A sample: of each GoogleTest program every twentieth case."""
-    sample = {"GTEST_TOTAL_SHARDS": "20", "GTEST_SHARD_INDEX": "0"} if is_sample else {}
+def find_sample(build):
+    """A regular expression of some tests of every program: one of each suite where each case is a test, and every script."""
+    listed = json.loads(
+        subprocess.run(
+            ["ctest", "--test-dir", build, "-LE", LEFT_OUT, "--show-only=json-v1"], capture_output=True, text=True, check=True
+        ).stdout
+    )
+    sample = {}
+    for test in listed["tests"]:
+        program = test["command"][0]
+        is_case = any(word.startswith("--gtest_filter") for word in test["command"])
+        sample.setdefault((program, test["name"].rsplit(".", 1)[0]) if is_case else test["name"], test["name"])
+    return "^(" + "|".join(map(re.escape, sample.values())) + ")$", len(sample)
+
+
+def run_tests(build, *choice, every=1):
+    """every: of the cases of a GoogleTest program that runs whole, one in so many."""
     return subprocess.run(
-        ["ctest", "--test-dir", build, "-j2", "--output-on-failure", "--no-tests=error", "-LE", LEFT_OUT], env={**os.environ, **sample}
+        ["ctest", "--test-dir", build, "-j2", "--output-on-failure", "--no-tests=error", "-LE", LEFT_OUT, *choice],
+        env={**os.environ, "GTEST_TOTAL_SHARDS": str(every), "GTEST_SHARD_INDEX": "0"},
     ).returncode
 
 
@@ -114,8 +130,7 @@ def find_traces(build):
 
 def build_and_test(source, build, whole=None):
     """In `build`; `whole` is the whole build to take over from."""
-    # Ninja makes the objects of WebAssembly again where it was configured again, so pages are left to the build from nothing.
-    configure(source, build, [*read_settings(whole), "-DCARILLON_EMXX=OFF"] if whole else ["-DCMAKE_BUILD_TYPE=Release"])
+    configure(source, build, read_settings(whole) if whole else ["-DCMAKE_BUILD_TYPE=Release"])
     taken = take_over(whole, build) if whole else []
     subprocess.run(["cmake", "--build", build, "--", "--quiet"], check=True)
     if whole:
@@ -130,7 +145,11 @@ def build_and_test(source, build, whole=None):
         ),
         flush=True,
     )
-    return run_tests(build, is_sample=whole is not None) or len(traces) > 0
+    if traces or not whole:
+        return run_tests(build) or len(traces) > 0
+    pattern, count = find_sample(build)
+    print(f"{count} tests, one of each suite or in twenty cases", flush=True)
+    return run_tests(build, "-R", pattern, every=20)
 
 
 def test_hidden(source, build, work, whole):

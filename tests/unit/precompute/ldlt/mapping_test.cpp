@@ -79,6 +79,20 @@ TEST(Mapping, a_chain_of_fronts_is_shared_by_two_ranks) {
   EXPECT_LE(counts.path_operations, counts.gang_operations * (1 + 1e-12));
 }
 
+TEST(Mapping, what_two_ranks_send_to_a_root_that_they_share_is_half_of_each_update_matrix) {
+  Forest forest = make_leaves(3);
+  forest.supernodes[2].width = 4;  // one panel, so nothing is sent inside the root
+  for (const int leaf : {0, 1}) {
+    forest.supernodes[leaf].parent = 2;
+    forest.supernodes[leaf].rows = {20, 21, 22, 23};
+  }
+  const Mapping mapping(forest, 2, 1);
+  ASSERT_NE(mapping.owner(0), mapping.owner(1));
+  ASSERT_EQ(mapping.list_shares(2).size(), 2U);
+  const MappingCounts counts = count_mapping(forest, mapping);
+  EXPECT_NEAR(sum(counts.bytes), 2 * 0.5 * 8 * (12 * 13 / 2), 1e-9);
+}
+
 TEST(Mapping, what_is_shared_out_is_what_there_is) {
   const Forest forest = make_block(15, 16);
   for (const int ranks : {1, 2, 3, 7, 16, 64, 200}) {
