@@ -88,6 +88,9 @@ def take_over(whole, build):
     for name in [*taken, ".ninja_log", ".ninja_deps"]:
         (build / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy2(whole / name, build / name, follow_symlinks=False)
+    # What commands of our own have read, such as those of WebAssembly, is in files of CMake that are no outputs.
+    if (whole / "CMakeFiles/d").is_dir():
+        shutil.copytree(whole / "CMakeFiles/d", build / "CMakeFiles/d", dirs_exist_ok=True)
     return taken
 
 
