@@ -10,7 +10,7 @@
 
 namespace carillon::attempt {
 
-enum class Launcher { automatic, alone, mpirun, srun };  // automatic: alone for one rank outside Slurm, else mpirun
+enum class Launcher { automatic, alone, mpirun, srun };  // automatic: alone for one rank, else mpirun
 
 struct Options {
   std::filesystem::path work;  // work/ab/<id> of a store

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "jobs/cli/commands.hpp"
+#include "jobs/slurm/task.hpp"
 #include "precompute/job/read_body.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/error.hpp"
@@ -323,6 +324,17 @@ void add_attempt(CLI::App& app, Run& run) {
   command->callback([&run, options] { run = [options] { return run_attempt(*options); }; });
 }
 
+void add_task(CLI::App& app, Run& run) {
+  auto options = std::make_shared<slurm::TaskOptions>();
+  CLI::App* command = app.add_subcommand("task", "One task of a packed array, for the scripts of Slurm")->group("");
+  command->add_option("STORE", options->root)->required();
+  command->add_option("BATCH", options->batch)->required();
+  command->add_option("TASK", options->task)->required();
+  command->add_option("--mpirun-option", options->mpirun_options, "A word for mpirun; can be given many times")->allow_extra_args(false);
+  command->add_flag("--pictures", options->has_pictures);
+  command->callback([&run, options] { run = [options] { return slurm::run_task(*options); }; });
+}
+
 /// Throws InputError for a word that is no command, with the nearest one.
 void check_command(CLI::App& app, int argc, char** argv) {
   const int at = find_command(argc, argv);
@@ -365,6 +377,7 @@ Run parse_command_line(int argc, char** argv, Shared& shared) {
                          add_validate, add_study, add_report, add_hear, add_explore, add_materials, add_bank_for})
     add(app, shared, run);
   add_attempt(app, run);
+  add_task(app, run);
   check_command(app, argc, argv);
   const bool json = shared.json;
   try {

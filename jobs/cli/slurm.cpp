@@ -44,9 +44,8 @@ std::vector<Job> list_open(Shared& shared) {
 }
 
 std::vector<Job> hand_over(Shared& shared) {
-  return find_engine(shared).hand_over(shared.registry(), [&](const Job& job) {
-    return slurm::find_resources(shared.store(), job, find_settings(shared), base::find_self());
-  });
+  return find_engine(shared).hand_over(
+      shared.registry(), [&](const Job& job) { return slurm::find_needs(shared.store(), job, find_settings(shared), base::find_self()); });
 }
 
 }  // namespace

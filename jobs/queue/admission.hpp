@@ -28,6 +28,7 @@ struct Need {
   double seconds = 0.0;                   // on one rank, predicted; 0: not known, and small
   std::vector<double> predicted_gb = {};  // on 1, 2, 4, 8 ... ranks; empty: not known
   double min_gb = 0.0;                    // whatever is predicted, so much is given: for what follows the solve
+  double serial_seconds = 0.0;            // of `seconds`, what does not fall with ranks
 };
 
 /// Memory of a job on so many ranks [GB].

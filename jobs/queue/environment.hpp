@@ -52,13 +52,14 @@ struct EndedChild {
 struct StartOptions {
   double time_limit_s = 0.0;   // 0: none
   bool is_prediction = false;  // find out what the job needs, and solve nothing
+  int signal_at_end = 0;       // sent to it when the thread that started it ends; 0: it outlives this process
 };
 
 /// The processes of this machine.
 class Launcher {
  public:
   virtual ~Launcher() = default;
-  /// Starts an attempt, which outlives this process, with the token, ranks and memory of the row. SystemError when it cannot be started.
+  /// Starts an attempt with the token, ranks and memory of the row. SystemError when it cannot be started.
   virtual pid_t start(const registry::Job& job, const StartOptions& options) = 0;
   /// A child that has ended and was not reported yet.
   virtual std::optional<EndedChild> reap_child() = 0;

@@ -67,6 +67,7 @@ pid_t LocalLauncher::start(const registry::Job& job, const StartOptions& options
                       .output = output.get(),
                       .errors = output.get(),
                       .group = base::Command::Group::session,
+                      .signal_at_end = options.signal_at_end,
                       .blocked = {SIGUSR1, SIGTERM, SIGINT, SIGHUP},
                       .default_signals = true});
 }

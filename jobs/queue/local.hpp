@@ -41,7 +41,7 @@ struct AttemptCommand {
   std::vector<std::string> mpirun_options;  // words for mpirun: which hosts, by which network
 };
 
-/// Attempts are children of this process until reap_child() returns them; each has a session of its own and outlives this process.
+/// Attempts are children of this process until reap_child() returns them; each has a session of its own.
 class LocalLauncher final : public Launcher {
  public:
   LocalLauncher(const store::Store& store, AttemptCommand command) : store_(store), command_(std::move(command)) {}

@@ -3,6 +3,7 @@
 // Source:     precompute/cost. Deviations: none.
 #include "jobs/queue/needs.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
@@ -34,8 +35,12 @@ Size find_size(const store::Store& store, const store::Request& request) {
   try {
     base::Object job = base::parse_document(request.job, "request.json").root();
     const bool is_quadratic = job.string_or("element", "T10") != "T4";
-    if (std::optional<base::Object> body = job.object_if("body"); body && body->has_number("nodes"))
-      size = {cost::estimate_meshed_size(std::llround(body->number("nodes")), is_quadratic), true};
+    if (std::optional<base::Object> body = job.object_if("body")) {
+      if (body->has_number("nodes"))
+        size = {cost::estimate_meshed_size(std::llround(body->number("nodes")), is_quadratic), true};
+      else if (request.input_kind == store::InputKind::surface && !body->has_number("edge_m"))
+        size = {cost::estimate_meshed_size(cost::kDefaultNodes, is_quadratic), true};
+    }
     std::error_code error;
     if (request.input_kind == store::InputKind::mesh) {
       const auto bytes = static_cast<std::int64_t>(
@@ -47,11 +52,16 @@ Size find_size(const store::Store& store, const store::Request& request) {
       size.problem.air_nodes = air && air->has_number("skin_nodes") ? std::llround(air->number("skin_nodes")) : cost::kAirNodes;
       if (job.has_string("radiation") && job.string("radiation") == "none") size.problem.air_nodes = 0;
     }
+    if (job.has_number("max_modes"))
+      size.problem.modes = std::min<std::int64_t>(cost::kDefaultModes, std::llround(job.number("max_modes")));
     if (job.has_number("accuracy_cents")) size = {cost::refine(size.problem, cost::kRefinementGrowth), false};
   } catch (const InputError&) {
   }
   return size;
 }
+
+/// What does not fall with ranks, of so many seconds on one that become so many on two.
+double find_serial(double one_s, double two_s) { return std::clamp(2.0 * two_s - one_s, 0.0, one_s); }
 
 /// False when there is none that can be used.
 bool read_prediction(const fs::path& folder, Need& need) {
@@ -66,6 +76,9 @@ bool read_prediction(const fs::path& folder, Need& need) {
     if (memory_gb.empty()) return false;
     need.predicted_gb = memory_gb;
     need.seconds = root.number_or("cpu_seconds", 0.0);
+    need.serial_seconds = 0.0;
+    if (root.has("wall_seconds"))
+      need.serial_seconds = find_serial(need.seconds, root.object("wall_seconds").number_or("2", 0.5 * need.seconds));
     return true;
   } catch (const InputError&) {
     return false;
@@ -78,7 +91,9 @@ Need guess_need(const cost::ProblemSize& size) {
   Need need;
   for (int ranks = 1; ranks <= kMaxGuessedRanks; ranks *= 2)
     need.predicted_gb.push_back(1e-9 * cost::kAdmissionMargin * cost::predict_bytes(size, ranks));
-  need.seconds = cost::predict_seconds(size).sum();
+  const cost::PhaseSeconds seconds = cost::predict_seconds(size);
+  need.seconds = seconds.sum();
+  need.serial_seconds = find_serial(need.seconds, cost::calc_wall(seconds, size, 2).sum());
   return need;
 }
 
@@ -91,7 +106,7 @@ JobNeeds find_needs(const store::Store& store, const registry::Job& job) {
   } catch (const InputError&) {
   }
   const Size size = request ? find_size(store, *request) : Size{};
-  const bool is_simulation = request && request->input_kind == store::InputKind::simulation;
+  const bool is_simulation = needs.is_simulation = request && request->input_kind == store::InputKind::simulation;
   if (!is_simulation) needs.need = guess_need(size.problem);
   const bool has_prediction = read_prediction(folder, needs.need);
   needs.wants_prediction = !has_prediction && job.resources.memory_gb <= 0.0 &&

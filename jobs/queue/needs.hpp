@@ -12,6 +12,7 @@ struct JobNeeds {
   Need need;
   double time_limit_s = 0.0;
   bool wants_prediction = false;  // too large to guess, and nothing was asked for
+  bool is_simulation = false;
 };
 
 /// Reads request.json and prediction.json of the job's folder. A damaged one is as none.

@@ -32,7 +32,7 @@ struct Job {
   std::string reason = {};          // one sentence: why it failed, waits, or was cancelled
   std::string token = {};           // of the attempt, 32 hex digits; empty before the first
   process::Identity worker = {};    // of the attempt; of the one who claimed, before that is known
-  std::string slurm_job = {};       // "123" or "123_4"
+  std::string slurm_job = {};       // "123", "123_4", or "123_4.7": one of several jobs of that task
   bool cancel_wanted = false;       // a running job is to end
   int attempts = 0;
   int failures = 0;  // attempts that count against the retries

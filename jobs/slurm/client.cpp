@@ -55,7 +55,10 @@ bool is_unreachable(const Finished& finished) {
          });
 }
 
-bool is_unknown_job(const Finished& finished) { return finished.errors.find("nvalid job id") != std::string::npos; }
+bool is_unknown_job(const Finished& finished) {
+  // The second, on standard output, of a task of an array that was cancelled while all of it waited.
+  return finished.errors.find("nvalid job id") != std::string::npos || finished.output.ends_with(" not found\n");
+}
 
 /// Runs one of Slurm's commands. Unreachable when it is not there or gets no answer.
 Finished ask(const std::vector<std::string>& words, std::string_view input = {}) {
@@ -118,6 +121,8 @@ std::optional<SlurmStatus> find_in_accounting(const std::string& job) {
 }  // namespace
 
 std::string find_array(const std::string& job) { return job.substr(0, job.find('_')); }
+std::string find_task(const std::string& job) { return job.substr(0, job.find('.')); }
+bool is_packed(const std::string& job) { return job.find('.') != std::string::npos; }
 
 SlurmPhase find_phase(std::string_view state) {
   for (const std::string_view known :
@@ -142,6 +147,28 @@ std::map<std::string, SlurmStatus> parse_list(std::string_view text) {
     jobs[std::string(fields[0])] = seen;
   }
   return jobs;
+}
+
+std::optional<Machine> parse_nodes(std::string_view text, std::string_view partition) {
+  constexpr double kMemoryShare = 0.95;                             // of a node: the rest is the system's
+  std::map<std::pair<int, int>, std::set<std::string_view>> alike;  // by cores and MiB
+  for (const std::string_view line : split(text, '\n')) {
+    const std::vector<std::string_view> fields = split(line, '|');
+    if (fields.size() < 6) continue;
+    const bool is_default = fields[1].ends_with('*');
+    const std::string_view name = is_default ? fields[1].substr(0, fields[1].size() - 1) : fields[1];
+    const bool is_wanted = partition.empty() ? is_default : name == partition;
+    const bool is_up =
+        fields[5].starts_with("idle") || fields[5].starts_with("alloc") || fields[5].starts_with("mix") || fields[5].starts_with("comp");
+    const int cores = parse_int(fields[2]) * parse_int(fields[3]);
+    if (is_wanted && is_up && cores > 0) alike[{cores, parse_int(fields[4])}].insert(fields[0]);
+  }
+  std::optional<Machine> most;
+  for (const auto& [kind, names] : alike) {
+    const auto nodes = static_cast<int>(names.size());
+    if (!most || nodes * kind.first > most->nodes * most->cores) most = Machine{nodes, kind.first, kMemoryShare * kind.second * 1048576e-9};
+  }
+  return most;
 }
 
 std::optional<SlurmStatus> parse_show(std::string_view line) {
@@ -219,6 +246,17 @@ void SlurmClient::requeue(const std::string& job, double delay_s) const {
   if (finished.exit_code != 0) refuse(words, finished);
   if (delay_s > 0.0)
     ask({"scontrol", "update", "JobId=" + job, fmt::format("StartTime=now+{}", static_cast<long long>(std::ceil(delay_s)))});
+}
+
+std::optional<Machine> SlurmClient::find_machine() const {
+  const Finished finished = ask({"sinfo", "--noheader", "--Node", "--format=%N|%P|%X|%Y|%m|%T"});
+  std::optional<Machine> machine = parse_nodes(finished.output, settings_.partition);
+  if (settings_.pack_cores > 0 && !machine) machine.emplace();
+  if (!machine) return machine;
+  if (settings_.pack_cores > 0) machine->cores = settings_.pack_cores;
+  if (settings_.pack_nodes > 0) machine->nodes = settings_.pack_nodes;
+  if (settings_.max_running > 0) machine->nodes = std::min(machine->nodes, settings_.max_running);
+  return machine;
 }
 
 int SlurmClient::find_max_tasks() const {

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "jobs/slurm/packing.hpp"
 #include "jobs/slurm/script.hpp"
 #include "jobs/slurm/settings.hpp"
 #include "runtime/base/error.hpp"
@@ -57,6 +58,9 @@ class SlurmClient {
   bool is_running(const std::string& job) const;
   void requeue(const std::string& job, double delay_s) const;
 
+  /// The nodes that are alike and have the most cores together, of the partition, as far as they are up; none when sinfo names none.
+  std::optional<Machine> find_machine() const;
+
   /// How many tasks an array may have.
   int find_max_tasks() const;
 
@@ -64,13 +68,18 @@ class SlurmClient {
   Settings settings_;
 };
 
-/// "123_4" -> "123".
+/// "123_4" and "123_4.7" -> "123".
 std::string find_array(const std::string& job);
+/// "123_4.7" -> "123_4": the task that job 7 of it shares with others.
+std::string find_task(const std::string& job);
+bool is_packed(const std::string& job);
 
 // The parsers, for tests.
 SlurmPhase find_phase(std::string_view state);
 /// Lines of squeue --format=%i|%T|%r.
 std::map<std::string, SlurmStatus> parse_list(std::string_view text);
+/// Lines of sinfo --Node --format=%N|%P|%X|%Y|%m|%T; empty partition: Slurm's default.
+std::optional<Machine> parse_nodes(std::string_view text, std::string_view partition);
 /// One line of scontrol --oneliner show job.
 std::optional<SlurmStatus> parse_show(std::string_view line);
 

@@ -13,6 +13,7 @@
 #include "jobs/outcome/outcome.hpp"
 #include "jobs/registry/registry.hpp"
 #include "jobs/slurm/client.hpp"
+#include "jobs/slurm/needs.hpp"
 #include "jobs/slurm/records.hpp"
 #include "jobs/slurm/settings.hpp"
 #include "jobs/store/store.hpp"
@@ -23,14 +24,15 @@ namespace carillon::slurm {
 /// twice, whenever this process ends.
 class Engine {
  public:
-  /// Ranks, memory and time limit of a job. Asked outside of transactions.
-  using FindNeeds = std::function<store::Resources(const registry::Job&)>;
+  /// What is asked of Slurm for a job. Asked outside of transactions.
+  using FindNeeds = std::function<Needs(const registry::Job&)>;
 
   /// `program`: carillon, unless the settings name it. `say`: lines about Slurm itself, e.g. that it does not answer.
   Engine(const store::Store& store, Settings settings, std::filesystem::path program, std::function<void(const std::string&)> say);
 
-  /// Hands over all that is ready: jobs that ask for the same go in one array. What Slurm refuses has failed, and why is in its row; when
-  /// Slurm does not answer they stay queued. Returns the rows that Slurm took or refused. Call follow() first.
+  /// Hands over all that is ready: short jobs packed into the tasks of one array (packing.hpp), of the others those that ask for the same
+  /// in one array. What Slurm refuses has failed, and why is in its row; when Slurm does not answer they stay queued. Returns the rows that
+  /// Slurm took or refused. Call follow() first.
   std::vector<registry::Job> hand_over(registry::Registry& registry, const FindNeeds& find_needs);
 
   /// Brings the rows up to date: waits, runs, ended and why, to be handed over again. Ends those that are to be cancelled. Rows stay as
@@ -42,10 +44,23 @@ class Engine {
 
  private:
   using Rows = std::vector<registry::Job>;
-  void submit(registry::Registry& registry, const Batch& batch, const Rows& jobs, Rows& changed);
+  /// How the jobs of a batch lie in its tasks; none: a task each.
+  struct Packed {
+    std::vector<std::vector<Placed>> tasks;  // by indices into the jobs
+    double memory_gb = 0.0;
+  };
+  Batch make_batch(std::size_t jobs) const;
+  void submit(registry::Registry& registry, const Batch& batch, const Rows& jobs, const Packed* packed, Rows& changed);
+  void submit_packed(registry::Registry& registry, const Machine& machine, int max_tasks, Rows jobs, const std::vector<Needs>& needs,
+                     Rows& changed);
   void adopt(registry::Registry& registry, Rows& jobs);
   void look_at(registry::Registry& registry, const registry::Job& job, const SlurmStatus& seen, Rows& changed);
+  void show_phase(registry::Registry& registry, const registry::Job& job, const SlurmStatus& seen, Rows& changed);
+  void look_at_packed(registry::Registry& registry, const registry::Job& job, const SlurmStatus& seen, Rows& changed);
   void settle(registry::Registry& registry, const registry::Job& job, const std::optional<SlurmStatus>& seen, Rows& changed);
+  void settle_ended(registry::Registry& registry, const registry::Job& job, const SubmittedJob& submitted,
+                    const std::optional<SlurmStatus>& seen, Rows& changed);
+  void end_unwanted(const Rows& jobs);
   void cancel_left(registry::Registry& registry);
   void clean();
   void show_unreachable(const Unreachable& error);

@@ -1,5 +1,7 @@
 #include "jobs/slurm/records.hpp"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <fstream>
 #include <system_error>
@@ -24,11 +26,21 @@ constexpr std::streamoff kMaxOutputBytes = 4096;
 
 bool is_name(const std::string& text) { return text.size() == 32 && text.find_first_not_of("0123456789abcdef") == std::string::npos; }
 
+/// Cores and memory, then one job a line: id, ranks, GB, predicted seconds, time limit.
+std::string format_task(const TaskList& list) {
+  std::string text = fmt::format("{} {}\n", list.cores, list.memory_gb);
+  for (const TaskJob& job : list.jobs)
+    text += fmt::format("{} {} {} {} {}\n", job.id.text(), job.placed.ranks, job.placed.memory_gb, job.placed.seconds, job.time_limit_s);
+  return text;
+}
+
 }  // namespace
 
 void write_submitted_job(const fs::path& work, const SubmittedJob& submitted) {
   base::Json root = base::Json::object();
   root.set("batch", submitted.batch).set("title", submitted.title).set("task", submitted.task);
+  if (submitted.place >= 0) root.set("place", submitted.place);
+  if (submitted.is_unwanted) root.set("unwanted", true);
   root.set("before", submitted.before.empty() ? kNoJob : submitted.before);
   base::write_file(work / kSubmittedFile, root.text());
 }
@@ -42,6 +54,8 @@ std::optional<SubmittedJob> read_submitted_job(const fs::path& work) {
     submitted.batch = root.string("batch");
     submitted.title = root.string("title");
     submitted.task = static_cast<int>(root.integer("task", -1, 1 << 30));
+    submitted.place = static_cast<int>(root.integer_if("place", -1, 1 << 30).value_or(-1));
+    submitted.is_unwanted = root.boolean_or("unwanted", false);
     submitted.before = root.string("before");
     if (submitted.before == kNoJob) submitted.before.clear();
     if (is_name(submitted.batch)) return submitted;
@@ -69,12 +83,42 @@ int read_failures(const fs::path& work) {
   }
 }
 
-void make_batch_folder(const store::Store& store, const std::string& batch, const std::string& script, const std::vector<store::Id>& jobs) {
+std::optional<TaskList> read_task(const fs::path& root, const std::string& batch, int task) {
+  if (!is_name(batch)) return std::nullopt;
+  std::ifstream stream(root / "slurm" / batch / fmt::format("{}.jobs", task));
+  TaskList list;
+  if (!(stream >> list.cores >> list.memory_gb) || list.cores < 1) return std::nullopt;
+  std::string text;
+  double time_limit_s = 0.0;
+  for (Placed placed; stream >> text >> placed.ranks >> placed.memory_gb >> placed.seconds >> time_limit_s;) {
+    const std::optional<store::Id> id = store::parse_id(text);
+    if (!id || placed.ranks < 1) return std::nullopt;
+    placed.job = list.jobs.size();
+    list.jobs.push_back({*id, placed, time_limit_s});
+  }
+  return list;
+}
+
+void write_begun(const fs::path& root, const std::string& batch, int task) {
+  const auto all = store::OpenFolder::open(root).find("slurm");
+  const auto folder = all && is_name(batch) ? all->find(batch) : std::nullopt;
+  if (folder) base::write_file(folder->path() / fmt::format("{}.begun", task), "");
+}
+
+bool has_begun(const fs::path& root, const SubmittedJob& submitted) {
+  std::error_code error;
+  return fs::exists(root / "slurm" / submitted.batch / fmt::format("{}.begun", submitted.task), error);
+}
+
+void make_batch_folder(const store::Store& store, const std::string& batch, const std::string& script, const std::vector<store::Id>& jobs,
+                       const std::vector<TaskList>& tasks) {
   const store::Temporary temporary = store.make_temporary();
   std::string ids;
   for (const store::Id& id : jobs) ids += id.text() + "\n";
   base::write_file(temporary / kJobsFile, ids);
   base::write_file(temporary / "job.sh", script);
+  for (std::size_t task = 0; task < tasks.size(); ++task)
+    base::write_file(temporary / fmt::format("{}.jobs", task), format_task(tasks[task]));
   store.publish_batch(batch, temporary);
 }
 

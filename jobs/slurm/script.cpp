@@ -77,14 +77,16 @@ std::string make_script(const Batch& batch, const Settings& settings) {
   for (const std::string& word : settings.mpirun_options) options += " --mpirun-option=" + quote_word(word);
   if (settings.has_pictures) options += " --pictures";
   for (const std::string& folder : batch.folders) folders += (folders.empty() ? "" : " ") + quote_word(folder);
-  return fill(kJobScript, {{"@PROLOGUE@\n", prologue},
-                           {"@FOLDERS@", folders},
-                           {"@PROGRAM@", quote_word(batch.program.string())},
-                           {"@WORK@", quote_word((batch.root / "work").string())},
-                           {"@RANKS@", std::to_string(batch.ranks)},
-                           {"@MEMORY_GB@", fmt::format("{}", batch.memory_gb)},
-                           {"@LAUNCHER@", settings.launcher},
-                           {"@OPTIONS@", options}});
+  return fill(batch.tasks > 0 ? kTaskScript : kJobScript, {{"@PROLOGUE@\n", prologue},
+                                                           {"@FOLDERS@", folders},
+                                                           {"@PROGRAM@", quote_word(batch.program.string())},
+                                                           {"@STORE@", quote_word(batch.root.string())},
+                                                           {"@BATCH@", quote_word(batch.name)},
+                                                           {"@WORK@", quote_word((batch.root / "work").string())},
+                                                           {"@RANKS@", std::to_string(batch.ranks)},
+                                                           {"@MEMORY_GB@", fmt::format("{}", batch.memory_gb)},
+                                                           {"@LAUNCHER@", settings.launcher},
+                                                           {"@OPTIONS@", options}});
 }
 
 std::vector<std::string> make_sbatch(const Batch& batch, const Settings& settings) {
@@ -101,12 +103,13 @@ std::vector<std::string> make_sbatch(const Batch& batch, const Settings& setting
   add("--job-name=" + batch.title);
   add("--comment=" + batch.comment + " " + batch.name);
   add("--chdir=" + batch.root.string());
-  const bool is_array = batch.folders.size() > 1;
+  const bool is_packed = batch.tasks > 0, is_array = is_packed || batch.folders.size() > 1;
   add("--output=" + escape_pattern((batch.root / "slurm" / batch.name).string()) + (is_array ? "/%a.out" : "/0.out"));
   if (is_array) {
     const std::string limit = settings.max_running > 0 ? fmt::format("%{}", settings.max_running) : "";
-    add(fmt::format("--array=0-{}{}", batch.folders.size() - 1, limit));
+    add(fmt::format("--array=0-{}{}", (is_packed ? batch.tasks : batch.folders.size()) - 1, limit));
   }
+  if (is_packed) add("--nodes=1");
   add(fmt::format("--ntasks={}", batch.ranks));
   add("--cpus-per-task=1");
   // By core, as the ranks may be on several nodes.

@@ -10,20 +10,22 @@
 
 namespace carillon::slurm {
 
-/// deploy/slurm/job.sh.
+/// deploy/slurm/job.sh and deploy/slurm/task.sh.
 extern const char* const kJobScript;
+extern const char* const kTaskScript;
 
-/// Jobs that ask for the same. One of them is a job of Slurm, more are an array.
+/// Jobs that ask for the same: one of them is a job of Slurm, more are an array. Or tasks of a packed array, each for many jobs.
 struct Batch {
   std::string name;                  // 32 hex digits
   std::string title;                 // for squeue: "carillon-<12 digits>", of the id of the only job, else of `name`
   std::string comment;               // the id of the only job, else how many there are; `name` follows in Slurm
   std::filesystem::path root;        // of the store, absolute
-  std::vector<std::string> folders;  // below root/work: "ab/abcdef..."
+  std::vector<std::string> folders;  // below root/work: "ab/abcdef..."; none: a packed array
+  std::size_t tasks = 0;             // of a packed array
   std::filesystem::path program;     // carillon
-  int ranks = 1;
-  double memory_gb = 0.0;     // of all ranks together; 0: what the site gives
-  double time_limit_s = 0.0;  // 0: what the site gives
+  int ranks = 1;                     // of a packed array, the cores of a task
+  double memory_gb = 0.0;            // of all ranks together; 0: what the site gives
+  double time_limit_s = 0.0;         // 0: what the site gives
 };
 
 /// A word that a shell reads as just these bytes. Throws InputError for line ends and zero bytes, which belong to no path of ours.

@@ -30,6 +30,10 @@ Settings read_settings(std::optional<base::Object> object) {
   settings.max_ranks = static_cast<int>(object->integer_if("max_ranks", 1, 1 << 20).value_or(settings.max_ranks));
   settings.max_running = static_cast<int>(object->integer_if("max_running", 0, 1 << 20).value_or(settings.max_running));
   settings.max_in_array = static_cast<int>(object->integer_if("max_in_array", 1, 1 << 20).value_or(settings.max_in_array));
+  settings.packs = object->boolean_or("pack", settings.packs);
+  settings.pack_nodes = static_cast<int>(object->integer_if("pack_nodes", 0, 1 << 20).value_or(settings.pack_nodes));
+  settings.pack_cores = static_cast<int>(object->integer_if("pack_cores", 0, 1 << 20).value_or(settings.pack_cores));
+  settings.pack_minutes = object->number_or("pack_minutes", settings.pack_minutes, {0.0, 1e6});
   settings.has_pictures = object->boolean_or("pictures", settings.has_pictures);
   settings.options = read_texts(*object, "options");
   settings.prologue = read_texts(*object, "prologue");

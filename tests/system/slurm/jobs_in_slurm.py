@@ -13,6 +13,8 @@ import sys
 import tempfile
 import time
 
+import h5py
+
 BIN, CLUSTER, CASE = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]).resolve(), sys.argv[3]
 SCRIPT = pathlib.Path(__file__).resolve().parents[3] / "deploy/slurm/cluster"
 os.environ["SLURM_CONF"] = str(CLUSTER / "slurm.conf")
@@ -36,7 +38,13 @@ class Store:
         self.folder = pathlib.Path(self.scratch.name) / 'it\'s a $HOME "store"'
         self.folder.mkdir()
         (self.folder / "profile.json").write_text(
-            json.dumps({"store": "store", "on": "slurm", "slurm": {"poll_s": 0.5, "signal_before_s": 60, "pictures": CASE == "submit"}})
+            json.dumps(
+                {
+                    "store": "store",
+                    "on": "slurm",
+                    "slurm": {"poll_s": 0.5, "signal_before_s": 60, "pictures": CASE == "submit", "pack": CASE != "array"},
+                }
+            )
         )
 
     def run(self, *words, code=0):
@@ -71,6 +79,13 @@ class Store:
             check(row["state"] not in ("done", "failed", "cancelled"), lambda: f"ended as {row} instead of {state}\n{self.log(job)}")
             time.sleep(0.5)
         return row
+
+    def wait_until(self, holds, seconds=100):
+        deadline = time.monotonic() + seconds
+        while not holds(counts := self.run("status")["counts"]):
+            check(time.monotonic() < deadline, lambda: f"not in {seconds} s: {counts}")
+            time.sleep(0.5)
+        return counts
 
     def log(self, job):
         files = [*self.folder.glob(f"store/*/*/{job['id']}/log"), *self.folder.glob("store/slurm/*/*")]
@@ -190,6 +205,55 @@ def array(store):
     row = [job for job in jobs if job["job_file"].endswith(bad.name)][0]
     row = store.wait(row, "failed")
     check("no such set" in row["reason"] and row["attempts"] == 1, f"not the true reason: {row}")
+
+
+def read_modes(bank):
+    """Frequencies, decay and shapes as bytes."""
+    found = {}
+    with h5py.File(bank) as file:
+        file.visititems(
+            lambda name, item: found.update({name: item[()].tobytes()})
+            if isinstance(item, h5py.Dataset) and item.dtype.kind in "fiu"
+            else None
+        )
+    return found
+
+
+def library(store):
+    """Forty bodies are one array of one task that packs them: each has one bank, with the modes of a direct run; a broken mesh fails alone,
+    a cancelled job touches no other, and a task that is asked to save and stop continues with what is left."""
+    for number in range(38):
+        store.write(f"body{number:02}.json", 100 + 5 * number, number)
+    mesh = store.folder / "broken.msh"
+    mesh.write_text("$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\nnonsense\n")
+    (store.folder / "body38.json").write_text(json.dumps({"mesh": "broken.msh", "material": "steel"}))
+    store.write("body39.json", 4000, 39)  # starts first
+    jobs = store.submit(*sorted(store.folder.glob("body*.json")))
+    check({job["slurm_job"].split(".")[0] for job in jobs} == {jobs[0]["slurm_job"].split(".")[0]}, f"not one task: {jobs}")
+    check({int(job["slurm_job"].split(".")[1]) for job in jobs} == set(range(40)), f"not forty places: {jobs}")
+    task = jobs[0]["slurm_job"].split(".")[0]
+    by_name = {pathlib.Path(job["job_file"]).name: job for job in jobs}
+    last = by_name["body01.json"]
+    store.run("cancel", last["id"])
+    check(store.status(last)["state"] == "cancelled", lambda: f"not cancelled: {store.status(last)}")
+    store.wait_until(lambda counts: counts["done"] > 3)
+    subprocess.run(["scancel", "--batch", "--signal=USR1", task], check=True)
+    counts = store.wait_until(lambda counts: counts["queued"] + counts["running"] + counts["waiting"] == 0)
+    check((counts["done"], counts["failed"], counts["cancelled"]) == (38, 1, 1), f"not 38 done, one failed, one cancelled: {counts}")
+    shown = subprocess.run(["scontrol", "--oneliner", "show", "job", task], capture_output=True, text=True).stdout
+    check("Restarts=1" in shown and "JobState=COMPLETED" in shown, f"the task was not queued again, or failed: {shown}")
+    broken = store.status(by_name["body38.json"])
+    check("broken.msh:5" in broken["reason"] and broken["attempts"] == 1, f"not the true reason: {broken}")
+    banks = [row["bank"] for row in store.run("status")["jobs"] if row["state"] == "done"]
+    check(len(set(banks)) == 38, "a bank is not there, or there twice")
+    for name in ("body00.json", "body20.json", "body37.json"):
+        alone = store.folder / "alone.hdf"
+        done = subprocess.run(
+            [BIN / "carillon-precompute", "-q", store.folder / name, "--bank", alone], capture_output=True, text=True, cwd=store.folder
+        )
+        check(done.returncode == 0, f"alone: {done.stderr}")
+        mine, its = read_modes(alone), read_modes(store.status(by_name[name])["bank"])
+        check(mine and mine == its, f"{name}: the bank of the array has other modes")
 
 
 def cancel(store):
@@ -319,6 +383,7 @@ def main():
             "submit": submit,
             "simulate": simulate,
             "array": array,
+            "library": library,
             "cancel": cancel,
             "time_limit": time_limit,
             "killed_rank": killed_rank,

@@ -45,6 +45,30 @@ TEST(slurm_site, a_state_that_is_not_known_has_ended) {
   EXPECT_EQ(find_array("12"), "12");
 }
 
+TEST(slurm_site, the_nodes_that_have_most_cores_together_are_planned_for) {
+  const std::string nodes =
+      "n1|main*|2|32|256000|idle\nn2|main*|2|32|256000|mixed\nn3|main*|2|32|256000|down*\nn4|main*|1|8|64000|allocated\n"
+      "n1|long|2|32|256000|idle\nn5|gpu|1|96|512000|idle\nrubbish\n";
+  const auto machine = parse_nodes(nodes, "");
+  ASSERT_TRUE(machine);
+  EXPECT_EQ(machine->nodes, 2);
+  EXPECT_EQ(machine->cores, 64);
+  EXPECT_NEAR(machine->memory_gb, 0.95 * 268.4, 0.1);
+  EXPECT_EQ(parse_nodes(nodes, "gpu")->cores, 96);
+  EXPECT_EQ(parse_nodes(nodes, "long")->nodes, 1);
+  EXPECT_EQ(parse_nodes(nodes, "main")->nodes, 2);
+  EXPECT_FALSE(parse_nodes(nodes, "other"));
+  EXPECT_FALSE(parse_nodes("", ""));
+}
+
+TEST(slurm_site, a_packed_job_is_known_by_its_task_and_its_place) {
+  EXPECT_EQ(find_array("12_3.7"), "12");
+  EXPECT_EQ(find_task("12_3.7"), "12_3");
+  EXPECT_EQ(find_task("12_3"), "12_3");
+  EXPECT_TRUE(is_packed("12_3.7"));
+  EXPECT_FALSE(is_packed("12_3"));
+}
+
 TEST(slurm_command, input_output_and_exit_code_pass) {
   const std::string input(300000, 'x');
   const Finished finished = run_command({"/bin/sh", "-c", "cat; echo error >&2; exit 7"}, input);

@@ -6,6 +6,7 @@
 
 #include "jobs/slurm/engine.hpp"
 #include "jobs/slurm/inside.hpp"
+#include "jobs/slurm/task.hpp"
 #include "tests/support/folder.hpp"
 
 namespace carillon::slurm {
@@ -105,6 +106,46 @@ TEST_F(slurm_judge, what_was_handed_over_is_known_again) {
   EXPECT_EQ(read_failures(work), 0);
   write_failures(work, 3);
   EXPECT_EQ(read_failures(work), 3);
+}
+
+TEST_F(slurm_judge, a_packed_job_and_the_list_of_its_task_are_known_again) {
+  const fs::path work = store_->work_folder(id_);
+  SubmittedJob packed{std::string(32, 'c'), "carillon-2", 3, "", 41, true};
+  write_submitted_job(work, packed);
+  EXPECT_EQ(read_submitted_job(work)->place, 41);
+  EXPECT_TRUE(read_submitted_job(work)->is_unwanted);
+  const store::Id other = store::hash_text("another job");
+  make_batch_folder(*store_, packed.batch, "", {id_, other},
+                    {{}, {64, 120.5, {{other, {0, 4, 2.5, 31.25}, 90.0}, {id_, {1, 1, 0.25, 0.125}, 0.0}}}});
+  const std::optional<TaskList> list = read_task(folder_, packed.batch, 1);
+  ASSERT_TRUE(list);
+  EXPECT_EQ(list->cores, 64);
+  EXPECT_DOUBLE_EQ(list->memory_gb, 120.5);
+  ASSERT_EQ(list->jobs.size(), 2u);
+  EXPECT_EQ(list->jobs[0].id, other);
+  EXPECT_EQ(list->jobs[0].placed.ranks, 4);
+  EXPECT_DOUBLE_EQ(list->jobs[0].placed.memory_gb, 2.5);
+  EXPECT_DOUBLE_EQ(list->jobs[0].time_limit_s, 90.0);
+  EXPECT_EQ(list->jobs[1].placed.job, 1u);
+  EXPECT_DOUBLE_EQ(list->jobs[1].placed.seconds, 0.125);
+  EXPECT_FALSE(read_task(folder_, packed.batch, 2));
+  EXPECT_FALSE(read_task(folder_, "../" + packed.batch, 1));
+  packed.task = 1;
+  EXPECT_FALSE(has_begun(folder_, packed));
+  write_begun(folder_, packed.batch, 1);
+  EXPECT_TRUE(has_begun(folder_, packed));
+}
+
+TEST_F(slurm_judge, where_a_packed_job_stands_is_in_its_folder) {
+  EXPECT_EQ(find_packed_state(*store_, id_, handed_), PackedState::waits);
+  leave("token before", "token before", Cause::killed);
+  EXPECT_EQ(find_packed_state(*store_, id_, handed_), PackedState::waits);
+  leave("new", "token before", Cause::killed);
+  EXPECT_EQ(find_packed_state(*store_, id_, handed_), PackedState::runs);
+  leave("new", "new", Cause::stopped);
+  EXPECT_EQ(find_packed_state(*store_, id_, handed_), PackedState::stopped);
+  leave("new", "new", Cause::no_solution);
+  EXPECT_EQ(find_packed_state(*store_, id_, handed_), PackedState::ended);
 }
 
 TEST_F(slurm_judge, a_script_that_cannot_start_carillon_says_so) {

@@ -86,6 +86,28 @@ TEST(slurm_script, options_say_what_the_job_needs) {
   EXPECT_TRUE(std::none_of(words.begin(), words.end(), [](const std::string& word) { return word.starts_with("--array"); }));
 }
 
+TEST(slurm_script, a_packed_array_has_tasks_of_one_node_that_run_their_own_lists) {
+  const tests::Folder folder;
+  const fs::path root = folder.path() / kNasty;
+  fs::create_directories(root);
+  std::ofstream(root / "carillon") << "#!/bin/sh\nprintf '%s\\n' \"$@\"\n";
+  fs::permissions(root / "carillon", fs::perms::owner_all);
+  Batch batch = make_batch(root, {});
+  batch.tasks = 3;
+  batch.ranks = 64;
+  batch.memory_gb = 128.0;
+  Settings settings;
+  settings.has_pictures = true;
+  const Finished finished = run_command({"/usr/bin/env", "SLURM_ARRAY_TASK_ID=2", "/bin/sh"}, make_script(batch, settings));
+  EXPECT_EQ(finished.errors, "");
+  EXPECT_EQ(finished.output, "task\n" + root.string() + "\n" + batch.name + "\n2\n--pictures\n");
+  batch.root = "/store";
+  const std::vector<std::string> words = make_sbatch(batch, settings);
+  for (const char* word : {"--array=0-2", "--nodes=1", "--ntasks=64", "--mem-per-cpu=1908M"}) EXPECT_TRUE(has(words, word)) << word;
+  batch.tasks = 1;
+  EXPECT_TRUE(has(make_sbatch(batch, settings), "--array=0-0"));
+}
+
 TEST(slurm_script, more_jobs_are_an_array) {
   Settings settings;
   settings.max_running = 5;
