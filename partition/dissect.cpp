@@ -24,20 +24,6 @@ constexpr idx_t kSeparators = 4;
 constexpr idx_t kCuts = 8;
 constexpr idx_t kImbalance = 200;  // thousandths
 
-Ints make_clusters(const Graph& graph, std::int32_t count) {
-  Ints cluster(static_cast<std::size_t>(graph.vertex_count()), 0);
-  if (count <= 1 || graph.neighbours.empty()) return cluster;
-  MetisOptions options = make_metis_options();
-  Graph copy = graph;
-  idx_t vertices = graph.vertex_count();
-  idx_t constraints = 1;
-  idx_t cut = 0;
-  check_metis(METIS_PartGraphKway(&vertices, &constraints, copy.offsets.data(), copy.neighbours.data(), nullptr, nullptr, nullptr, &count,
-                                  nullptr, nullptr, options.data(), &cut, cluster.data()),
-              "METIS_PartGraphKway");
-  return cluster;
-}
-
 class Dissector {
  public:
   Dissector(const Graph& graph, std::int32_t largest_gathered)
@@ -62,9 +48,10 @@ class Dissector {
     }
     const int left_parts = parts / 2;
     if (static_cast<std::int32_t>(vertices.size()) <= largest_gathered_) {
-      separate(vertices);
+      const Ints side = separate(take(vertices));
+      for (std::size_t i = 0; i < vertices.size(); ++i) side_[vertices[i]] = side[i];
     } else {
-      halve(vertices, static_cast<float>(left_parts) / static_cast<float>(parts));
+      halve_clusters(vertices, static_cast<double>(left_parts) / parts);
       for (const std::int32_t v : cover_edges(list_cut_edges(vertices))) side_[v] = 2;
     }
     std::array<Ints, 3> sides;
@@ -76,44 +63,26 @@ class Dissector {
     result_.separator.push_back(static_cast<std::int32_t>(sides[2].size()));
   }
 
-  /// side_: 0, 1 or 2, the separator, for each of the vertices.
-  void separate(const Ints& vertices) {
-    Graph inner = take(vertices);
-    MetisOptions options = make_metis_options();
-    options[METIS_OPTION_NSEPS] = kSeparators;
-    options[METIS_OPTION_UFACTOR] = kImbalance;
-    idx_t count = inner.vertex_count();
-    idx_t size = 0;
-    Ints side(vertices.size(), 0);
-    if (!inner.neighbours.empty())
-      check_metis(
-          METIS_ComputeVertexSeparator(&count, inner.offsets.data(), inner.neighbours.data(), nullptr, options.data(), &size, side.data()),
-          "METIS_ComputeVertexSeparator");
-    else
-      for (std::size_t i = 0; i < side.size(); ++i) side[i] = 2 * i < side.size() ? 0 : 1;
-    for (std::size_t i = 0; i < vertices.size(); ++i) side_[vertices[i]] = side[i];
-  }
-
   /// side_: 0 or 1 for each of the vertices.
-  void halve(const Ints& vertices, float left) {
+  void halve_clusters(const Ints& vertices, double left) {
     Ints clusters;
     for (const std::int32_t v : vertices)
       if (place_of_cluster_[cluster_[v]] < 0) {
         place_of_cluster_[cluster_[v]] = static_cast<std::int32_t>(clusters.size());
         clusters.push_back(cluster_[v]);
       }
-    Ints side(clusters.size(), 0);
-    if (clusters.size() > 1) bisect_clusters(vertices, clusters.size(), left, side);
+    const Ints side = halve(make_quotient(vertices, clusters.size()), left);
     for (const std::int32_t v : vertices) side_[v] = side[place_of_cluster_[cluster_[v]]];
     for (const std::int32_t c : clusters) place_of_cluster_[c] = -1;
   }
 
-  void bisect_clusters(const Ints& vertices, std::size_t count, float left, Ints& side) {
-    Ints weight(count, 0);
+  WeightedGraph make_quotient(const Ints& vertices, std::size_t count) {
+    WeightedGraph quotient;
+    quotient.weights.assign(count, 0);
     std::vector<std::pair<std::int32_t, std::int32_t>> links;
     for (const std::int32_t v : vertices) number_[v] = place_of_cluster_[cluster_[v]];
     for (const std::int32_t v : vertices) {
-      ++weight[number_[v]];
+      ++quotient.weights[number_[v]];
       for (std::int32_t k = graph_.offsets[v]; k < graph_.offsets[v + 1]; ++k) {
         const std::int32_t to = number_[graph_.neighbours[k]];
         if (to >= 0 && to != number_[v]) links.emplace_back(number_[v], to);
@@ -121,30 +90,17 @@ class Dissector {
     }
     for (const std::int32_t v : vertices) number_[v] = -1;
     std::sort(links.begin(), links.end());
-    Ints offsets(1, 0);
-    Ints neighbours;
-    Ints edges;
     std::size_t at = 0;
     for (std::int32_t c = 0; c < static_cast<std::int32_t>(count); ++c) {
       while (at < links.size() && links[at].first == c) {
         const std::size_t first = at;
         while (at < links.size() && links[at] == links[first]) ++at;
-        neighbours.push_back(links[first].second);
-        edges.push_back(static_cast<std::int32_t>(at - first));
+        quotient.graph.neighbours.push_back(links[first].second);
+        quotient.links.push_back(static_cast<std::int32_t>(at - first));
       }
-      offsets.push_back(static_cast<std::int32_t>(neighbours.size()));
+      quotient.graph.offsets.push_back(static_cast<std::int32_t>(quotient.graph.neighbours.size()));
     }
-    MetisOptions options = make_metis_options();
-    options[METIS_OPTION_NCUTS] = kCuts;
-    options[METIS_OPTION_UFACTOR] = kImbalance;
-    auto clusters = static_cast<idx_t>(count);
-    idx_t constraints = 1;
-    idx_t halves = 2;
-    idx_t cut = 0;
-    std::array<real_t, 2> shares{left, 1 - left};
-    check_metis(METIS_PartGraphRecursive(&clusters, &constraints, offsets.data(), neighbours.data(), weight.data(), nullptr, edges.data(),
-                                         &halves, shares.data(), nullptr, options.data(), &cut, side.data()),
-                "METIS_PartGraphRecursive");
+    return quotient;
   }
 
   std::vector<std::pair<std::int32_t, std::int32_t>> list_cut_edges(const Ints& vertices) const {
@@ -187,6 +143,56 @@ class Dissector {
 };
 
 }  // namespace
+
+std::vector<std::int32_t> separate(const Graph& graph) {
+  Ints side(static_cast<std::size_t>(graph.vertex_count()), 0);
+  if (graph.neighbours.empty()) {
+    for (std::size_t v = 0; v < side.size(); ++v) side[v] = 2 * v < side.size() ? 0 : 1;
+    return side;
+  }
+  MetisOptions options = make_metis_options();
+  options[METIS_OPTION_NSEPS] = kSeparators;
+  options[METIS_OPTION_UFACTOR] = kImbalance;
+  Graph copy = graph;
+  idx_t count = graph.vertex_count();
+  idx_t size = 0;
+  check_metis(
+      METIS_ComputeVertexSeparator(&count, copy.offsets.data(), copy.neighbours.data(), nullptr, options.data(), &size, side.data()),
+      "METIS_ComputeVertexSeparator");
+  return side;
+}
+
+std::vector<std::int32_t> make_clusters(const Graph& graph, std::int32_t count) {
+  Ints cluster(static_cast<std::size_t>(graph.vertex_count()), 0);
+  if (count <= 1 || graph.neighbours.empty()) return cluster;
+  MetisOptions options = make_metis_options();
+  Graph copy = graph;
+  idx_t vertices = graph.vertex_count();
+  idx_t constraints = 1;
+  idx_t cut = 0;
+  check_metis(METIS_PartGraphKway(&vertices, &constraints, copy.offsets.data(), copy.neighbours.data(), nullptr, nullptr, nullptr, &count,
+                                  nullptr, nullptr, options.data(), &cut, cluster.data()),
+              "METIS_PartGraphKway");
+  return cluster;
+}
+
+std::vector<std::int32_t> halve(const WeightedGraph& graph, double left) {
+  WeightedGraph copy = graph;
+  Ints side(graph.weights.size(), 0);
+  if (side.size() < 2) return side;
+  MetisOptions options = make_metis_options();
+  options[METIS_OPTION_NCUTS] = kCuts;
+  options[METIS_OPTION_UFACTOR] = kImbalance;
+  auto count = static_cast<idx_t>(side.size());
+  idx_t constraints = 1;
+  idx_t halves = 2;
+  idx_t cut = 0;
+  std::array<real_t, 2> shares{static_cast<real_t>(left), static_cast<real_t>(1 - left)};
+  check_metis(METIS_PartGraphRecursive(&count, &constraints, copy.graph.offsets.data(), copy.graph.neighbours.data(), copy.weights.data(),
+                                       nullptr, copy.links.data(), &halves, shares.data(), nullptr, options.data(), &cut, side.data()),
+              "METIS_PartGraphRecursive");
+  return side;
+}
 
 Dissection dissect(const Graph& graph, int parts, std::int32_t largest_gathered) { return Dissector(graph, largest_gathered).run(parts); }
 

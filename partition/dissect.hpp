@@ -8,6 +8,23 @@
 
 namespace carillon::partition {
 
+/// A graph whose vertices and links count more or less.
+struct WeightedGraph {
+  Graph graph{{0}, {}};
+  std::vector<std::int32_t> weights;  // (vertices)
+  std::vector<std::int32_t> links;    // (2 edges) as the neighbours
+};
+
+/// 0 and 1, the sides, or 2, the separator between them, for each vertex: the smallest of four found. Sides may be a fifth apart. Throws
+/// SystemError when METIS runs out of memory, as all below.
+std::vector<std::int32_t> separate(const Graph& graph);
+
+/// Vertices in `count` clusters of nearly equal size with few edges between them: the cluster of each.
+std::vector<std::int32_t> make_clusters(const Graph& graph, std::int32_t count);
+
+/// 0 or 1 for each vertex; side 0 has `left` of the weight, and the edges cut weigh little.
+std::vector<std::int32_t> halve(const WeightedGraph& graph, double left);
+
 /// A binary tree of separators over `parts` leaves.
 struct Dissection {
   std::vector<std::int32_t> position;   // (vertices) place in the order of elimination: left, right, then their separator

@@ -159,7 +159,7 @@ bool Factor::factorise(double sigma) {
     petsc::add_flops(s.plan.analysis.ranks[static_cast<std::size_t>(s.plan.rank)].flops);
   });
   s.backward_error = std::numeric_limits<double>::infinity();
-  if (!s.numbers.is_complete || s.numbers.smallest <= kVanishedPivot * s.norm) return false;
+  if (!s.numbers.outcome.is_complete || s.numbers.outcome.smallest <= kVanishedPivot * s.norm) return false;
   s.backward_error = s.measure_backward_error(false);
   s.needs_refinement = s.backward_error > kRefinedBackwardError;
   if (s.backward_error > kWorstBackwardError) return false;
@@ -167,9 +167,9 @@ bool Factor::factorise(double sigma) {
   return true;
 }
 
-std::int64_t Factor::get_negative_pivots() const { return state_->numbers.negative; }
+std::int64_t Factor::get_negative_pivots() const { return state_->numbers.outcome.negative; }
 double Factor::get_backward_error() const { return state_->backward_error; }
-double Factor::get_growth() const { return state_->numbers.growth; }
+double Factor::get_growth() const { return state_->numbers.outcome.growth; }
 
 void Factor::State::solve(const double* b, double* x, int stride, int columns) {
   petsc::add_flops(4.0 * static_cast<double>(plan.analysis.ranks[static_cast<std::size_t>(plan.rank)].entries) * columns);

@@ -22,7 +22,8 @@ struct Analysis {
   std::int64_t peak_bytes = 0;
   std::int64_t largest_peak_bytes = 0;  // of one rank
   std::int64_t supernodes = 0;
-  std::int64_t separator_nodes = 0;  // of the separator between the ranks
+  std::int64_t shared_fronts = 0;  // of several ranks
+  std::int64_t shared_nodes = 0;   // their pivots
 };
 
 /// L D L^T of K - sigma M with a fixed pattern and changing sigma, by the multifrontal method (docs/decisions/factorisation.md).

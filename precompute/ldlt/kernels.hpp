@@ -67,12 +67,15 @@ struct Kernels {
   /// W = A P^T L^-T for the rows begin to end of a front, to strips of kWideRows rows. columns: (n) where row 0 of each column of A would
   /// be, in the order of the pivots; triangle: L^-1.
   void (*trsm)(const double* const* columns, int begin, int end, int n, const double* triangle, double* wide);
-  /// L = W D^-1 (m, n), strips to tiles. Raises growth to the largest magnitude in L.
-  void (*scale_by_d_inverse)(const double* wide, int m, int n, const BlockPivots& pivots, double* tiles, double& growth);
+  /// L = W D^-1 (m, n), strips to tiles, from row `begin` of W on, a multiple of 4. Raises growth to the largest magnitude in L.
+  void (*scale_by_d_inverse)(const double* wide, int begin, int m, int n, const BlockPivots& pivots, double* tiles, double& growth);
   /// C -= L W^T (or = -L W^T where the update matrix is to be made), the columns panel.begin to end of a front with `end` rows, of which
   /// the first `pivots`, a multiple of kTileRows behind panel.begin, stand whole and the others in strips. columns: (end) where row 0 of
   /// each column would be. What is stored above the diagonal is left undefined.
   void (*update)(const Panel& panel, int pivots, int end, bool is_made, double* const* columns);
+  /// C -= W L^T: the rows begin to end of W (strips of kWideRows rows) and `width` rows of L (tiles), both of n columns. columns: (width)
+  /// where row 0 of each column of C would be.
+  void (*update_columns)(const double* tiles, int width, const double* wide, int begin, int end, int n, double* const* columns);
   /// target[c][run.to + i] += source[c][run.from + i] for every run and three columns; in column c rows before the c-th of the first run
   /// are left out.
   void (*extend_add)(const double* const* source, const Run* runs, int count, double* const* target);

@@ -477,14 +477,14 @@ void trsm(const double* const* columns, int begin, int end, int n, const double*
   }
 }
 
-void scale_by_d_inverse(const double* wide, int m, int n, const BlockPivots& pivots, double* tiles, double& growth) {
+void scale_by_d_inverse(const double* wide, int begin, int m, int n, const BlockPivots& pivots, double* tiles, double& growth) {
   constexpr int kParts = kTileRows / 4;
   Quad largest{};
   for (int row = 0; row < m; row += kTileRows) {
     const int height = m - row < kTileRows ? m - row : kTileRows;
     const double* part[kParts];
     for (int q = 0; q < kParts; ++q) {
-      const int at = 4 * q < height ? row + 4 * q : row;  // there is no strip behind the last row
+      const int at = begin + (4 * q < height ? row + 4 * q : row);  // there is no strip behind the last row
       part[q] = wide + static_cast<long>(at / kWideRows) * kWideRows * n + at % kWideRows;
     }
     for (int k = 0; k < n; ++k) {
@@ -561,6 +561,38 @@ void update(const Panel& panel, int pivots, int end, bool is_made, double* const
   }
 }
 
+/// Some of the rows of update_columns, which begin with a strip.
+template <int kHeight>
+inline void update_rows(const double* tile, const double* wide, int first, int behind, int begin, int end, int n, double* const* columns) {
+  for (int row = first; row < behind; row += kWideRows) {
+    const auto* strip = reinterpret_cast<const Vector*>(wide + static_cast<long>(row) * n);
+    if (row >= begin && row + kWideRows <= end)
+      update_block<kHeight>(tile, strip, n, false, columns, row);
+    else
+      update_edge<kHeight>(tile, strip, n, false, columns, row, row > begin ? row : begin, row + kWideRows < end ? row + kWideRows : end);
+  }
+}
+
+void update_columns(const double* tiles, int width, const double* wide, int begin, int end, int n, double* const* columns) {
+  constexpr int kStripNumbers = 1 << 16;  // as in update
+  const int rows = kStripNumbers / (kWideRows * n) * kWideRows;
+  for (int first = begin / kWideRows * kWideRows; first < end; first += rows) {
+    const int behind = first + rows < end ? first + rows : end;
+    for (int column = 0; column < width; column += kTileRows) {
+      const double* tile = tiles + static_cast<long>(column) * n;
+      const int height = width - column;
+      if (height >= kTileRows)
+        update_rows<kTileRows>(tile, wide, first, behind, begin, end, n, columns + column);
+      else if (height == 9)
+        update_rows<9>(tile, wide, first, behind, begin, end, n, columns + column);
+      else if (height == 6)
+        update_rows<6>(tile, wide, first, behind, begin, end, n, columns + column);
+      else
+        update_rows<3>(tile, wide, first, behind, begin, end, n, columns + column);
+    }
+  }
+}
+
 inline void add_run(const double* __restrict__ from, double* __restrict__ to, int length) {
   int i = 0;
   for (; i + 4 <= length; i += 4) store(to + i, load(to + i) + load(from + i));
@@ -596,8 +628,18 @@ void transpose(const double* from, long from_stride, int n, int m, double* to, l
 }  // namespace
 
 extern const Kernels kTable;
-const Kernels kTable{
-    subtract_product, subtract_transposed, trmm,      add_trmm_transposed, multiply_by_d_inverse, factorise_block, trsm, scale_by_d_inverse,
-    update,           extend_add,          transpose, CARILLON_ISA_NAME};
+const Kernels kTable{subtract_product,
+                     subtract_transposed,
+                     trmm,
+                     add_trmm_transposed,
+                     multiply_by_d_inverse,
+                     factorise_block,
+                     trsm,
+                     scale_by_d_inverse,
+                     update,
+                     update_columns,
+                     extend_add,
+                     transpose,
+                     CARILLON_ISA_NAME};
 
 }  // namespace carillon::ldlt::CARILLON_ISA

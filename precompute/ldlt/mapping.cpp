@@ -1,7 +1,7 @@
-// Method:     From the roots down each front hands its interval of ranks on to its children in proportion to their subtrees' work, the
-//             largest first. Ends near a whole number move there, so that a rank is not in two groups for nothing; what is shorter than a
-//             small part of a rank goes to one rank whole. The path is found by playing the elimination through: each rank does the
-//             subtrees that it has alone, then its shares of the shared fronts in the order in which these become ready.
+// Method:     From the roots down each front hands its interval of ranks on to its children in proportion to their subtrees' work. Ends
+//             near a whole number move there, so that a rank is not in two groups for nothing; what is shorter than a small part of a rank
+//             goes to one rank whole. The path is found by playing the elimination through: each rank does the subtrees that it has alone,
+//             then its shares of the shared fronts in the order in which these become ready.
 // Source:     Pothen and Sun 1993, A mapping algorithm for parallel sparse Cholesky factorization (proportional mapping); Gupta, Karypis,
 //             Kumar 1997, Highly scalable parallel algorithms for sparse matrix factorization (subtree to subcube, fronts in two
 //             dimensions).
@@ -11,22 +11,26 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
-#include <numeric>
+#include <queue>
+#include <utility>
+
+#include "precompute/ldlt/kernels.hpp"
+#include "precompute/ldlt/tile_map.hpp"
 
 namespace carillon::ldlt {
 namespace {
 
 constexpr double kSnap = 0.08;   // of a rank
 constexpr double kSmall = 0.06;  // of a rank: a subtree that straddles two ranks goes to one of them
-constexpr double kTile = 72;     // rows and columns of a tile of a shared front
 constexpr double kColumns = 16;  // of a solve
 constexpr double kEntriesBound = 1.25;
 
-std::vector<std::vector<std::int32_t>> list_children(const Forest& forest, std::vector<std::int32_t>& roots) {
-  std::vector<std::vector<std::int32_t>> children(forest.supernodes.size());
-  for (std::size_t s = 0; s < forest.supernodes.size(); ++s) {
-    const std::int32_t parent = forest.supernodes[s].parent;
+std::vector<std::vector<std::int32_t>> list_children(const std::vector<FrontCost>& fronts, std::vector<std::int32_t>& roots) {
+  std::vector<std::vector<std::int32_t>> children(fronts.size());
+  for (std::size_t s = 0; s < fronts.size(); ++s) {
+    const std::int32_t parent = fronts[s].parent;
     (parent < 0 ? roots : children[static_cast<std::size_t>(parent)]).push_back(static_cast<std::int32_t>(s));
   }
   return children;
@@ -35,42 +39,62 @@ std::vector<std::vector<std::int32_t>> list_children(const Forest& forest, std::
 /// Of the trailing rows and columns of a front, the numbers of the lower triangle.
 double count_triangle_of(double rows) { return rows * (rows + 1) / 2; }
 
+/// Operations of each rank of each shared front, as its tiles are dealt; empty: one rank has the front.
+using SharedOperations = std::vector<std::vector<double>>;
+
+SharedOperations list_operations(const std::vector<FrontCost>& fronts, const Mapping& mapping) {
+  SharedOperations all(fronts.size());
+  for (std::size_t s = 0; s < fronts.size(); ++s)
+    if (mapping.owner(static_cast<std::int32_t>(s)) < 0)
+      all[s] = TileMap(fronts[s].width, fronts[s].rows, mapping.list_shares(static_cast<std::int32_t>(s))).count_operations();
+  return all;
+}
+
 /// The order of events of an elimination: when each rank is free, and when each front is complete [operations].
 class Replay {
  public:
-  Replay(const Forest& forest, const Mapping& mapping, bool is_gang)
-      : forest_(forest),
+  Replay(const std::vector<FrontCost>& fronts, const Mapping& mapping, const SharedOperations& shared, bool is_gang)
+      : fronts_(fronts),
         mapping_(mapping),
+        shared_(shared),
         is_gang_(is_gang),
         free_(static_cast<std::size_t>(mapping.ranks()), 0.0),
-        ready_(forest.supernodes.size(), 0.0),
-        waiting_(forest.supernodes.size(), 0) {}
+        ready_(fronts.size(), 0.0),
+        waiting_(fronts.size(), 0) {}
 
   double run() {
     std::vector<std::int32_t> shared;
-    for (std::size_t s = 0; s < forest_.supernodes.size(); ++s) {
+    for (std::size_t s = 0; s < fronts_.size(); ++s) {
       const auto front = static_cast<std::int32_t>(s);
       if (mapping_.owner(front) >= 0) {
         eliminate(front, {{mapping_.owner(front), 1.0}});
       } else {
         shared.push_back(front);
-        const std::int32_t parent = forest_.supernodes[s].parent;
+        const std::int32_t parent = fronts_[s].parent;
         if (parent >= 0) ++waiting_[static_cast<std::size_t>(parent)];
       }
     }
-    std::vector<std::int32_t> open;
     for (const std::int32_t s : shared)
-      if (waiting_[static_cast<std::size_t>(s)] == 0) open.push_back(s);
-    while (!open.empty()) {
-      const auto next = std::min_element(open.begin(), open.end(), [this](std::int32_t a, std::int32_t b) { return start(a) < start(b); });
-      const std::int32_t s = *next;
-      open.erase(next);
+      if (waiting_[static_cast<std::size_t>(s)] == 0) open_.emplace(start(s), s);
+    while (!open_.empty()) {
+      // Starts only grow later, so the first whose start still holds is the earliest of all.
+      const auto [known, s] = open_.top();
+      open_.pop();
+      const double now = start(s);
+      if (now > known) {
+        open_.emplace(now, s);
+        continue;
+      }
       eliminate(s, mapping_.list_shares(s));
-      const std::int32_t parent = forest_.supernodes[static_cast<std::size_t>(s)].parent;
-      if (parent >= 0 && --waiting_[static_cast<std::size_t>(parent)] == 0) open.push_back(parent);
+      order_.push_back(s);
+      const std::int32_t parent = fronts_[static_cast<std::size_t>(s)].parent;
+      if (parent >= 0 && --waiting_[static_cast<std::size_t>(parent)] == 0) open_.emplace(start(parent), parent);
     }
     return *std::max_element(free_.begin(), free_.end());
   }
+
+  /// The shared fronts as they were begun.
+  std::vector<std::int32_t> take_order() { return std::move(order_); }
 
  private:
   /// When all ranks of a front are free and its children complete.
@@ -81,63 +105,74 @@ class Replay {
   }
 
   void eliminate(std::int32_t front, const std::vector<FrontShare>& shares) {
-    const Supernode& node = forest_.supernodes[static_cast<std::size_t>(front)];
-    const double operations = count_flops(node.width, node.size());
+    const FrontCost& cost = fronts_[static_cast<std::size_t>(front)];
+    const std::vector<double>& parts = shared_[static_cast<std::size_t>(front)];
+    const auto find_operations = [&](std::size_t place) { return parts.empty() ? cost.operations : parts[place]; };
     const double together = is_gang_ ? start(front) : 0;
     double largest = 0;
-    for (const FrontShare& share : shares) largest = std::max(largest, share.fraction);
+    for (std::size_t place = 0; place < shares.size(); ++place) largest = std::max(largest, find_operations(place));
     double complete = 0;
-    for (const FrontShare& share : shares) {
-      double& free = free_[static_cast<std::size_t>(share.rank)];
-      free = is_gang_ ? together + operations * largest
-                      : std::max(ready_[static_cast<std::size_t>(front)], free) + operations * share.fraction;
+    for (std::size_t place = 0; place < shares.size(); ++place) {
+      double& free = free_[static_cast<std::size_t>(shares[place].rank)];
+      free = is_gang_ ? together + largest : std::max(ready_[static_cast<std::size_t>(front)], free) + find_operations(place);
       complete = std::max(complete, free);
     }
-    if (node.parent >= 0) {
-      double& ready = ready_[static_cast<std::size_t>(node.parent)];
+    if (cost.parent >= 0) {
+      double& ready = ready_[static_cast<std::size_t>(cost.parent)];
       ready = std::max(ready, complete);
     }
   }
 
-  const Forest& forest_;
+  using Start = std::pair<double, std::int32_t>;  // when, and the front
+
+  const std::vector<FrontCost>& fronts_;
   const Mapping& mapping_;
+  const SharedOperations& shared_;
   bool is_gang_ = false;
   std::vector<double> free_;           // (ranks)
   std::vector<double> ready_;          // (fronts)
   std::vector<std::int32_t> waiting_;  // (fronts) shared children that are not complete
+  std::priority_queue<Start, std::vector<Start>, std::greater<>> open_;
+  std::vector<std::int32_t> order_;
 };
 
 }  // namespace
 
-Mapping::Mapping(const Forest& forest, int ranks, double operations_weight)
+std::vector<FrontCost> list_costs(const Forest& forest) {
+  std::vector<FrontCost> fronts;
+  for (const Supernode& node : forest.supernodes)
+    fronts.push_back({node.parent, node.width, static_cast<std::int32_t>(node.rows.size()), count_flops(node.width, node.size()),
+                      static_cast<double>(count_entries(node.width, node.size()))});
+  return fronts;
+}
+
+Mapping::Mapping(const std::vector<FrontCost>& fronts, int ranks, double operations_weight)
     : ranks_(ranks),
       operations_weight_(operations_weight),
-      begin_(forest.supernodes.size(), 0.0),
-      end_(forest.supernodes.size(), 0.0),
-      owner_(forest.supernodes.size(), -1) {
-  const std::size_t count = forest.supernodes.size();
+      begin_(fronts.size(), 0.0),
+      end_(fronts.size(), 0.0),
+      owner_(fronts.size(), -1) {
+  const std::size_t count = fronts.size();
   double operations = 0;
   double entries = 0;
-  for (const Supernode& node : forest.supernodes) {
-    operations += count_flops(node.width, node.size());
-    entries += static_cast<double>(count_entries(node.width, node.size()));
+  for (const FrontCost& front : fronts) {
+    operations += front.operations;
+    entries += front.entries;
   }
   std::vector<double> work(count, 0.0);  // of the subtree
   for (std::size_t s = 0; s < count; ++s) {
-    const Supernode& node = forest.supernodes[s];
-    work[s] += operations_weight * count_flops(node.width, node.size()) / operations +
-               (1 - operations_weight) * static_cast<double>(count_entries(node.width, node.size())) / entries;
-    if (node.parent >= 0) work[static_cast<std::size_t>(node.parent)] += work[s];
+    const FrontCost& front = fronts[s];
+    work[s] += operations_weight * front.operations / operations + (1 - operations_weight) * front.entries / entries;
+    if (front.parent >= 0) work[static_cast<std::size_t>(front.parent)] += work[s];
   }
   std::vector<std::int32_t> roots;
-  const std::vector<std::vector<std::int32_t>> children = list_children(forest, roots);
-  const auto divide = [&](std::vector<std::int32_t> fronts, double begin, double end) {
+  const std::vector<std::vector<std::int32_t>> children = list_children(fronts, roots);
+  // In the order of the forest, which is that of the ranks whose rows they are.
+  const auto divide = [&](const std::vector<std::int32_t>& siblings, double begin, double end) {
     double all = 0;
-    for (const std::int32_t s : fronts) all += work[static_cast<std::size_t>(s)];
-    std::stable_sort(fronts.begin(), fronts.end(),
-                     [&](std::int32_t a, std::int32_t b) { return work[static_cast<std::size_t>(a)] > work[static_cast<std::size_t>(b)]; });
+    for (const std::int32_t s : siblings) all += work[static_cast<std::size_t>(s)];
     double at = begin;
-    for (const std::int32_t s : fronts) {
+    for (const std::int32_t s : siblings) {
       begin_[static_cast<std::size_t>(s)] = at;
       at += all > 0 ? (end - begin) * work[static_cast<std::size_t>(s)] / all : 0;
       end_[static_cast<std::size_t>(s)] = std::min(at, end);
@@ -152,6 +187,10 @@ Mapping::Mapping(const Forest& forest, int ranks, double operations_weight)
       if (length > 0.5 && end > begin) {
         begin_[s] = begin;
         end_[s] = end;
+      }
+      if (fronts[s].parent >= 0) {  // the ranks of a front are among those of the front above
+        begin_[s] = std::max(begin_[s], begin_[static_cast<std::size_t>(fronts[s].parent)]);
+        end_[s] = std::min(end_[s], end_[static_cast<std::size_t>(fronts[s].parent)]);
       }
       const int first = std::clamp(static_cast<int>(std::floor(begin_[s] + 1e-9)), 0, ranks - 1);
       const int last = std::clamp(static_cast<int>(std::ceil(end_[s] - 1e-9)) - 1, first, ranks - 1);
@@ -186,75 +225,146 @@ double MappingCounts::fullest_ratio() const {
   return *std::max_element(entries.begin(), entries.end()) * static_cast<double>(entries.size()) / total_entries;
 }
 
-MappingCounts count_mapping(const Forest& forest, const Mapping& mapping) {
-  const auto ranks = static_cast<std::size_t>(mapping.ranks());
-  MappingCounts counts;
-  for (std::vector<double>* list : {&counts.operations, &counts.entries, &counts.messages, &counts.bytes, &counts.solve_bytes})
-    list->assign(ranks, 0.0);
-  std::vector<std::int32_t> planned(ranks, 0);
-  std::vector<std::int32_t> roots;
-  const std::vector<std::vector<std::int32_t>> children = list_children(forest, roots);
-  for (std::size_t s = 0; s < forest.supernodes.size(); ++s) {
-    const Supernode& node = forest.supernodes[s];
-    const auto front = static_cast<std::int32_t>(s);
-    const double operations = count_flops(node.width, node.size());
-    const auto entries = static_cast<double>(count_entries(node.width, node.size()));
-    counts.total_operations += operations;
-    counts.total_entries += entries;
-    const std::vector<FrontShare> shares = mapping.list_shares(front);
-    for (const FrontShare& share : shares) {
-      counts.operations[static_cast<std::size_t>(share.rank)] += operations * share.fraction;
-      counts.entries[static_cast<std::size_t>(share.rank)] += entries * share.fraction;
-    }
-    const auto add_update = [&](std::int32_t child) {  // an update matrix, from its ranks to those of the front
-      const double numbers = count_triangle_of(3.0 * static_cast<double>(forest.supernodes[static_cast<std::size_t>(child)].rows.size()));
-      const std::vector<FrontShare> from = mapping.list_shares(child);
-      for (const FrontShare& share : shares) {
-        double elsewhere = 0;
-        for (const FrontShare& sender : from)
-          if (sender.rank != share.rank) {
-            elsewhere += sender.fraction;
-            counts.messages[static_cast<std::size_t>(share.rank)] += 1;
-          }
-        counts.bytes[static_cast<std::size_t>(share.rank)] += 8 * numbers * share.fraction * elsewhere;
+namespace {
+
+/// Counts what the ranks of a shared front send each other.
+class FrontMessages {
+ public:
+  FrontMessages(const TileMap& map, MappingCounts& counts) : map_(map), counts_(counts) {}
+
+  void count() {
+    for (int k = 0; k < map_.pivot_tiles(); ++k) {
+      const double n = 3.0 * map_.nodes(k);
+      const int home = map_.owner(k, k);
+      std::vector<double> rows(static_cast<std::size_t>(map_.places()), 0.0);  // of column k below the diagonal, by place
+      for (int i = k + 1; i < map_.tiles(); ++i) rows[static_cast<std::size_t>(map_.owner(i, k))] += 3.0 * map_.nodes(i);
+      for (int place = 0; place < map_.places(); ++place) {
+        if (rows[static_cast<std::size_t>(place)] == 0) continue;
+        if (place != home) {
+          receive(place, 3 * n + static_cast<double>(count_triangle(static_cast<std::int64_t>(n))));
+          solve(place, n);  // forward: the solution at the panel
+          solve(home, n);   // backward: a sum
+        }
+        send_rows(k, place, rows[static_cast<std::size_t>(place)]);
       }
-    };
-    for (const std::int32_t child : children[s]) add_update(child);
-    if (shares.size() < 2) continue;
-    ++counts.shared_fronts;
-    counts.shared_operations += operations;
-    counts.shared_entries += entries;
-    const double group = static_cast<double>(shares.size());
-    const double grid_rows = std::floor(std::sqrt(group));
-    const double grid_columns = group / grid_rows;
-    const double size = 3.0 * node.size();
-    const double width = 3.0 * node.width;
-    for (const FrontShare& share : shares) {
-      const auto rank = static_cast<std::size_t>(share.rank);
-      planned[rank] += 1 + static_cast<std::int32_t>(children[s].size());
-      for (double begin = 0; begin < width; begin += kTile) {
-        // A panel's tiles along the rank's row of the grid, and transposed along its column, where it has not made them itself.
-        const double panel = std::min(kTile, width - begin);
-        const double below = size - begin - panel;
-        counts.messages[rank] += (grid_columns > 1 ? 1 - 1 / grid_columns : 0) + (grid_rows > 1 ? 1 - 1 / grid_rows : 0);
-        counts.bytes[rank] += 8 * panel * below * ((1 - 1 / grid_columns) / grid_rows + (1 - 1 / grid_rows) / grid_columns);
-        counts.solve_bytes[rank] += 2 * 8 * kColumns * panel * (1 - 1 / group);
+      std::vector<bool> is_in_row(static_cast<std::size_t>(map_.places()), false);
+      for (int j = 0; j < k; ++j) is_in_row[static_cast<std::size_t>(map_.owner(k, j))] = true;
+      for (int place = 0; place < map_.places(); ++place) {
+        if (!is_in_row[static_cast<std::size_t>(place)] || place == home) continue;
+        solve(home, n);
+        solve(place, n);
       }
     }
   }
-  for (const std::int32_t fronts : planned) counts.most_planned_fronts = std::max(counts.most_planned_fronts, fronts);
-  counts.path_operations = Replay(forest, mapping, false).run();
-  counts.gang_operations = Replay(forest, mapping, true).run();
+
+ private:
+  /// To each place with tiles behind the panel, what it needs for its rows or its columns.
+  void send_rows(int k, int from, double all) {
+    const double n = 3.0 * map_.nodes(k);
+    for (int to = 0; to < map_.places(); ++to) {
+      if (to == from || map_.find_last_column(to) <= k) continue;
+      double rows = map_.has_whole_columns() ? all : 0;
+      for (int i = k + 1; !map_.has_whole_columns() && i < map_.tiles(); ++i)
+        if (map_.owner(i, k) == from && (map_.has_row(to, i) || map_.has_column(to, i))) rows += 3.0 * map_.nodes(i);
+      if (rows > 0) receive(to, n * (rows + 2));
+    }
+  }
+  void receive(int place, double numbers) {
+    counts_.messages[static_cast<std::size_t>(map_.rank(place))] += 1;
+    counts_.bytes[static_cast<std::size_t>(map_.rank(place))] += 8 * numbers;
+  }
+  void solve(int place, double rows) {
+    counts_.solve_messages[static_cast<std::size_t>(map_.rank(place))] += 1;
+    counts_.solve_bytes[static_cast<std::size_t>(map_.rank(place))] += 8 * kColumns * rows;
+  }
+
+  const TileMap& map_;
+  MappingCounts& counts_;
+};
+
+/// Sums up operations, entries and paths, which are what a mapping is chosen by.
+MappingCounts count_work(const std::vector<FrontCost>& fronts, const Mapping& mapping) {
+  const auto ranks = static_cast<std::size_t>(mapping.ranks());
+  MappingCounts counts;
+  counts.operations.assign(ranks, 0.0);
+  counts.entries.assign(ranks, 0.0);
+  const SharedOperations shared = list_operations(fronts, mapping);
+  for (std::size_t s = 0; s < fronts.size(); ++s) {
+    const FrontCost& cost = fronts[s];
+    const auto front = static_cast<std::int32_t>(s);
+    counts.total_operations += cost.operations;
+    counts.total_entries += cost.entries;
+    if (mapping.owner(front) >= 0) {
+      counts.operations[static_cast<std::size_t>(mapping.owner(front))] += cost.operations;
+      counts.entries[static_cast<std::size_t>(mapping.owner(front))] += cost.entries;
+      continue;
+    }
+    ++counts.shared_fronts;
+    counts.shared_operations += cost.operations;
+    counts.shared_entries += cost.entries;
+    const TileMap map(cost.width, cost.rows, mapping.list_shares(front));
+    const std::vector<std::int64_t> entries = map.count_entries();
+    for (int place = 0; place < map.places(); ++place) {
+      counts.operations[static_cast<std::size_t>(map.rank(place))] += shared[s][static_cast<std::size_t>(place)];
+      counts.entries[static_cast<std::size_t>(map.rank(place))] += static_cast<double>(entries[static_cast<std::size_t>(place)]);
+    }
+  }
+  counts.path_operations = Replay(fronts, mapping, shared, false).run();
+  counts.gang_operations = Replay(fronts, mapping, shared, true).run();
   return counts;
 }
 
-Mapping choose_mapping(const Forest& forest, int ranks) {
-  Mapping best(forest, ranks, 1.0);
+}  // namespace
+
+MappingCounts count_mapping(const std::vector<FrontCost>& fronts, const Mapping& mapping) {
+  MappingCounts counts = count_work(fronts, mapping);
+  const auto ranks = static_cast<std::size_t>(mapping.ranks());
+  for (std::vector<double>* list : {&counts.messages, &counts.bytes, &counts.solve_messages, &counts.solve_bytes}) list->assign(ranks, 0.0);
+  std::vector<std::int32_t> planned(ranks, 0);
+  std::vector<double> path(fronts.size(), 0.0);  // messages of a solve from the leaves to the front and back
+  std::vector<std::int32_t> roots;
+  const std::vector<std::vector<std::int32_t>> children = list_children(fronts, roots);
+  for (std::size_t s = 0; s < fronts.size(); ++s) {
+    const auto front = static_cast<std::int32_t>(s);
+    if (mapping.owner(front) >= 0) continue;
+    const std::vector<FrontShare> shares = mapping.list_shares(front);
+    const TileMap map(fronts[s].width, fronts[s].rows, shares);
+    FrontMessages(map, counts).count();
+    for (const FrontShare& share : shares)
+      planned[static_cast<std::size_t>(share.rank)] += 1 + static_cast<std::int32_t>(children[s].size());
+    for (const std::int32_t child : children[s]) {
+      const auto rows = 3.0 * static_cast<double>(fronts[static_cast<std::size_t>(child)].rows);
+      const std::vector<FrontShare> from = mapping.list_shares(child);
+      const double copies = std::ceil(std::sqrt(static_cast<double>(from.size())));  // ranks that have a part of the sum of a row
+      path[s] = std::max(path[s], path[static_cast<std::size_t>(child)]);
+      for (const FrontShare& share : shares) {
+        const auto rank = static_cast<std::size_t>(share.rank);
+        for (const FrontShare& sender : from) {
+          if (sender.rank == share.rank) continue;
+          const double part = share.fraction * sender.fraction;
+          counts.messages[rank] += 1;
+          counts.bytes[rank] += 8 * count_triangle_of(rows) * part;
+          counts.solve_messages[rank] += 1;
+          counts.solve_bytes[rank] += 8 * kColumns * rows * copies * part;
+          counts.solve_messages[static_cast<std::size_t>(sender.rank)] += 1;
+          counts.solve_bytes[static_cast<std::size_t>(sender.rank)] += 8 * kColumns * rows * copies * part;
+        }
+      }
+    }
+    path[s] += 2 + 4.0 * map.pivot_tiles();  // from the children and back, and at each panel along its row and its column
+    counts.solve_path_messages = std::max(counts.solve_path_messages, path[s]);
+  }
+  for (const std::int32_t known : planned) counts.most_planned_fronts = std::max(counts.most_planned_fronts, known);
+  return counts;
+}
+
+Mapping choose_mapping(const std::vector<FrontCost>& fronts, int ranks) {
+  Mapping best(fronts, ranks, 1.0);
   double best_path = std::numeric_limits<double>::infinity();
   double best_entries = std::numeric_limits<double>::infinity();
   for (const double weight : {1.0, 0.7, 0.4}) {
-    Mapping candidate(forest, ranks, weight);
-    const MappingCounts counts = count_mapping(forest, candidate);
+    Mapping candidate(fronts, ranks, weight);
+    const MappingCounts counts = count_work(fronts, candidate);
     const double entries = std::max(counts.fullest_ratio(), kEntriesBound);
     if (entries > best_entries || (entries == best_entries && counts.path_operations >= best_path)) continue;
     best = std::move(candidate);
@@ -262,6 +372,13 @@ Mapping choose_mapping(const Forest& forest, int ranks) {
     best_entries = entries;
   }
   return best;
+}
+
+std::vector<std::int32_t> order_shared(const std::vector<FrontCost>& fronts, const Mapping& mapping) {
+  const SharedOperations shared = list_operations(fronts, mapping);
+  Replay replay(fronts, mapping, shared, false);
+  replay.run();
+  return replay.take_order();
 }
 
 }  // namespace carillon::ldlt

@@ -8,6 +8,18 @@
 
 namespace carillon::ldlt {
 
+/// A front, or a subtree that one rank eliminates whole, as the mapping sees it. Children stand before their parents.
+struct FrontCost {
+  std::int32_t parent = -1;
+  std::int32_t width = 0;  // pivot nodes; of a subtree: of its root
+  std::int32_t rows = 0;   // nodes behind the pivots
+  double operations = 0;
+  double entries = 0;  // of L and D
+};
+
+/// Every front of a forest.
+std::vector<FrontCost> list_costs(const Forest& forest);
+
 /// A rank and its fraction of a front's work.
 struct FrontShare {
   int rank = 0;
@@ -20,7 +32,7 @@ struct FrontShare {
 class Mapping {
  public:
   /// operations_weight: how much a subtree's operations count in its work, 0 to 1; the rest are its entries of L.
-  Mapping(const Forest& forest, int ranks, double operations_weight);
+  Mapping(const std::vector<FrontCost>& fronts, int ranks, double operations_weight);
 
   int ranks() const { return ranks_; }
   double operations_weight() const { return operations_weight_; }
@@ -37,14 +49,16 @@ class Mapping {
   std::vector<int> owner_;
 };
 
-/// What a mapping costs. Operations and entries are exact; messages and bytes are those of shared fronts in square tiles, dealt
-/// block-cyclic to a grid of the front's ranks.
+/// What a mapping costs, counted tile by tile as the factorisation deals them (tile_map.hpp). Of update matrices and of sums that go from a
+/// child to its parent the messages are bounds, one for each pair of ranks, and the bytes those of even shares.
 struct MappingCounts {
-  std::vector<double> operations;   // (ranks) of a factorisation
-  std::vector<double> entries;      // (ranks) of L and D
-  std::vector<double> messages;     // (ranks) received in a factorisation
-  std::vector<double> bytes;        // (ranks) received in a factorisation
-  std::vector<double> solve_bytes;  // (ranks) received in a solve of 16 columns, there and back
+  std::vector<double> operations;      // (ranks) of a factorisation
+  std::vector<double> entries;         // (ranks) of L and D
+  std::vector<double> messages;        // (ranks) received in a factorisation
+  std::vector<double> bytes;           // (ranks) received in a factorisation
+  std::vector<double> solve_messages;  // (ranks) received in a solve of up to 32 columns, there and back
+  std::vector<double> solve_bytes;     // (ranks) the same for 16 columns
+  double solve_path_messages = 0;      // one after the other on the longest way from a leaf to the root and back
   double total_operations = 0;
   double total_entries = 0;
   /// Operations on the longest chain of fronts and ranks, from the first pivot to the last, where a rank begins its share of a front as
@@ -63,10 +77,14 @@ struct MappingCounts {
   double fullest_ratio() const;
 };
 
-MappingCounts count_mapping(const Forest& forest, const Mapping& mapping);
+MappingCounts count_mapping(const std::vector<FrontCost>& fronts, const Mapping& mapping);
 
 /// The mapping of the shortest path among several weights whose fullest rank has at most 1.25 times the mean of the entries; where none
 /// has, that of the fewest entries.
-Mapping choose_mapping(const Forest& forest, int ranks);
+Mapping choose_mapping(const std::vector<FrontCost>& fronts, int ranks);
+
+/// The shared fronts in the order in which their ranks are free and their children complete: children before parents. Where all ranks go
+/// through it in this order, none waits for another that waits for it.
+std::vector<std::int32_t> order_shared(const std::vector<FrontCost>& fronts, const Mapping& mapping);
 
 }  // namespace carillon::ldlt

@@ -2,47 +2,45 @@
 #pragma once
 
 #include <cstdint>
-#include <cstdlib>
-#include <memory>
+#include <limits>
 #include <vector>
 
+#include "precompute/ldlt/buffer.hpp"
+#include "precompute/ldlt/kernels.hpp"
 #include "precompute/ldlt/plan.hpp"
 
 namespace carillon::ldlt {
 
-struct FreeNumbers {
-  std::size_t mapped_bytes = 0;  // 0: from the heap
-  void operator()(double* p) const;
+/// What the pivots of a factorisation were like.
+struct Outcome {
+  std::int64_t negative = 0;                                  // eigenvalues of D below zero
+  double smallest = std::numeric_limits<double>::infinity();  // least magnitude of a pivot
+  double growth = 0;                                          // largest magnitude in L21
+  bool is_complete = true;                                    // no pivot vanished exactly
+
+  /// triangle <- L^-1 of a diagonal block (columns kMaxBlock apart, both triangles); zero with zero pivots when one vanishes, so that what
+  /// follows stays finite.
+  void eliminate(const Kernels& kernels, double* block, int n, BlockPivots& pivots, double* triangle);
 };
 
-/// When a large buffer gets its memory: all of it at once takes two thirds of the time, and is for what will be used from end to end.
-enum class Pages { kWhenTouched, kAtOnce };
-
-/// Uninitialised numbers, aligned for vectors. Large ones are pages of their own, which go back to the system at once: update matrices come
-/// and go, and what the heap keeps of them would count as memory of the rank. Throws std::bad_alloc.
-class Buffer {
- public:
-  Buffer() = default;
-  explicit Buffer(std::int64_t count, Pages pages_come = Pages::kWhenTouched);
-  double* data() const { return data_.get(); }
-  std::int64_t size() const { return size_; }
-
- private:
-  std::unique_ptr<double, FreeNumbers> data_;
-  std::int64_t size_ = 0;
+/// Where a panel of a shared front is among this rank's numbers; -1: it has none.
+struct SharedPanel {
+  std::int64_t triangle = -1;  // L11^-1, with the diagonal tile
+  std::int64_t tiles = -1;     // L21 of its rows below
+  std::int32_t pivots = -1;    // D and order, with the diagonal tile
 };
 
 /// L D L^T of this rank's fronts. Each front is a row of panels; each panel is L11^-1 and then L21, both in tiles (kernels.hpp).
 struct Numbers {
   Buffer panels;
-  std::vector<std::int64_t> front_offsets;  // where each front's panels begin
-  std::vector<double> d_diagonal;           // (3 local_nodes) the inverse of D at this rank's pivots: diagonal ...
-  std::vector<double> d_off;                // ... and between a row and the next
-  std::vector<std::uint8_t> order;          // (3 local_nodes) of the pivots in their panels: BlockPivots::order
-  std::int64_t negative = 0;                // the rest over all ranks: negative eigenvalues of D
-  double smallest = 0;                      // least magnitude of a pivot
-  double growth = 0;                        // largest magnitude in L21
-  bool is_complete = false;                 // no pivot vanished exactly
+  std::vector<std::int64_t> front_offsets;       // where each front's panels begin
+  std::vector<std::vector<SharedPanel>> shared;  // (shared fronts) of (pivot tiles)
+  // At this rank's pivots, first those of its own fronts:
+  std::vector<double> d_diagonal;   // the inverse of D: diagonal ...
+  std::vector<double> d_off;        // ... and between a row and the next
+  std::vector<std::uint8_t> order;  // of the pivots in their panels: BlockPivots::order
+  Outcome outcome;                  // of all ranks
+  int generation = 0;               // how often it was factorised
 };
 
 /// Room for the panels. Throws std::bad_alloc.
@@ -53,7 +51,7 @@ void factorise_fronts(const Plan& plan, const la::Pencil& pencil, double sigma, 
 
 /// Right-hand sides in order of elimination: blocks of 8 or 16 columns, in each a row of them per row of the matrix.
 struct Workspace {
-  std::vector<Buffer> blocks;  // one per 16 columns
+  std::vector<Buffer> blocks;  // one per 16 columns: rows of all slots
 };
 
 inline constexpr int kSolveColumns = 32;  // at a time

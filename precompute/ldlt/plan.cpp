@@ -1,268 +1,581 @@
-// Method:     Each rank orders its subdomain by METIS and eliminates it on paper; what the roots of its forest leave on the separator is
-//             gathered, and every rank plans the separator alike (separator.cpp). Whatever two ranks have to agree upon follows from that
-//             common knowledge, so no message is spent on the messages to come.
-// Source:     Duff and Reid 1983; Liu 1992, The multifrontal method for sparse matrix solution: theory and practice (stack of update
-//             matrices).
-// Deviations: two stacks, for fronts of even and odd depth: a front and its children never share one, so an update matrix can be made while
-//             those of the children are read, and nothing has to be moved.
+// Method:     The holders of the tree's parts report to all ranks what their fronts cost, subtrees of less than a few hundredths of a
+// rank's work
+//             as one; from that every rank makes the same mapping. Then each front goes to the rank that has it, or to those that share it,
+//             with its rows; what is a child of a shared front goes to all ranks of that front. So a rank knows its own subtrees and the
+//             shared fronts between them and the root. It asks the owners of the matrix rows for the pattern of the columns in which it has
+//             pivots or tiles. Update matrices lie on two stacks, by the parity of their depth: those of a front's children are on the
+//             other stack than its own, so an update matrix can be made while those of the children are read, and nothing is moved.
+// Source:     Liu 1992, The multifrontal method for sparse matrix solution (stacks); Pothen and Sun 1993 (mapping).
+// Deviations: two stacks in place of one.
 #include "precompute/ldlt/plan.hpp"
 
 #include <algorithm>
 #include <numeric>
+#include <unordered_map>
 
+#include "precompute/comm/exchange.hpp"
+#include "precompute/comm/index_partition.hpp"
 #include "precompute/la/node_rows.hpp"
 #include "precompute/ldlt/kernels.hpp"
-#include "precompute/ldlt/separator.hpp"
-#include "precompute/ldlt/subdomain.hpp"
+#include "precompute/ldlt/lists.hpp"
+#include "precompute/ldlt/mapping.hpp"
+#include "precompute/ldlt/order.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::ldlt {
 namespace {
 
+using comm::Communicator;
+using comm::IndexPartition;
 using petsc::check;
 
-bool leaves_rows(const Supernode& node) { return node.parent < 0 && !node.rows.empty(); }
+constexpr double kWhole = 0.03;  // of a rank's work: a subtree of less is mapped as one
 
-/// Sends the rows of the subdomain's roots to everybody and plans the separator. Collective.
-void plan_common(MPI_Comm comm, const Subdomain& subdomain, Separator& separator) {
-  const auto count = static_cast<std::int32_t>(subdomain.own_node.size());
-  Ragged roots;
-  double entries = 0;
-  for (const Supernode& node : subdomain.forest.supernodes) {
-    entries += static_cast<double>(count_entries(node.width, node.size()));
-    if (!leaves_rows(node)) continue;
-    for (const std::int32_t row : node.rows) roots.items.push_back(subdomain.boundary[row - count]);
-    roots.close();
+/// A front, or a subtree as one, for the mapping.
+struct FrontRecord {
+  std::int32_t id, parent;
+  FrontCost cost;
+};
+
+/// The mapping of all fronts, as every rank makes it.
+struct SharedMapping {
+  Ints ids;  // of the fronts mapped, ascending
+  std::vector<FrontCost> costs;
+  Mapping mapping{{}, 1, 1};
+  Ints order;  // (ids) place among the shared fronts, -1: one rank has it
+
+  std::int32_t find(std::int32_t id) const {
+    const auto at = std::lower_bound(ids.begin(), ids.end(), id);
+    return at != ids.end() && *at == id ? static_cast<std::int32_t>(at - ids.begin()) : -1;
   }
-  Ints first_of_rank;
-  separator.elements = gather_ragged(comm, roots, first_of_rank);
-  for (std::size_t rank = 0; rank + 1 < first_of_rank.size(); ++rank)
-    separator.element_rank.insert(separator.element_rank.end(), static_cast<std::size_t>(first_of_rank[rank + 1] - first_of_rank[rank]),
-                                  static_cast<std::int32_t>(rank));
-  std::vector<double> kept(first_of_rank.size() - 1);
-  MPI_Allgather(&entries, 1, MPI_DOUBLE, kept.data(), 1, MPI_DOUBLE, comm);
-  comm::Communicator(comm).agree([&] { plan_separator(separator, std::move(kept)); });
+};
+
+/// Which of a part's fronts are mapped: itself, or as the root of a whole subtree.
+struct Pruning {
+  std::vector<double> operations, entries;  // (supernodes) of the subtrees
+  std::vector<bool> is_whole;               // (supernodes)
+};
+
+Pruning prune(const HeldPart& held, bool is_leaf, double most_operations, double most_entries) {
+  const std::vector<Supernode>& nodes = held.forest.supernodes;
+  Pruning pruning{std::vector<double>(nodes.size(), 0.0), std::vector<double>(nodes.size(), 0.0), std::vector<bool>(nodes.size(), false)};
+  for (std::size_t s = 0; s < nodes.size(); ++s) {
+    pruning.operations[s] += count_flops(nodes[s].width, nodes[s].size());
+    pruning.entries[s] += static_cast<double>(count_entries(nodes[s].width, nodes[s].size()));
+    pruning.is_whole[s] = is_leaf && pruning.operations[s] < most_operations && pruning.entries[s] < most_entries;
+    if (nodes[s].parent < 0) continue;
+    pruning.operations[static_cast<std::size_t>(nodes[s].parent)] += pruning.operations[s];
+    pruning.entries[static_cast<std::size_t>(nodes[s].parent)] += pruning.entries[s];
+  }
+  return pruning;
 }
 
-/// Makes a rank's own plan of the common one.
+/// Maps the fronts. owners: for each held part, who has each supernode; -1: it is shared. Collective.
+SharedMapping map_fronts(const Communicator& comm, const Elimination& all, std::vector<Ints>& owners) {
+  double total[2] = {0, 0};
+  for (const HeldPart& held : all.parts)
+    for (const Supernode& node : held.forest.supernodes) {
+      total[0] += count_flops(node.width, node.size());
+      total[1] += static_cast<double>(count_entries(node.width, node.size()));
+    }
+  comm.sum(std::span<double>(total));
+  std::vector<Pruning> prunings;
+  std::vector<FrontRecord> records = comm.all_gather([&] {
+    std::vector<FrontRecord> own;
+    for (const HeldPart& held : all.parts) {
+      const TreePart& part = all.tree.parts[static_cast<std::size_t>(held.part)];
+      const std::vector<Supernode>& nodes = held.forest.supernodes;
+      prunings.push_back(prune(held, part.is_leaf(), kWhole * total[0] / comm.size(), kWhole * total[1] / comm.size()));
+      const Pruning& pruning = prunings.back();
+      for (std::size_t s = 0; s < nodes.size(); ++s) {
+        if (nodes[s].parent >= 0 && pruning.is_whole[static_cast<std::size_t>(nodes[s].parent)]) continue;
+        FrontRecord& record = own.emplace_back();
+        record.id = part.first_front + static_cast<std::int32_t>(s);
+        record.parent = held.parents[s];
+        record.cost = {-1, nodes[s].width, static_cast<std::int32_t>(nodes[s].rows.size()),
+                       pruning.is_whole[s] ? pruning.operations[s] : count_flops(nodes[s].width, nodes[s].size()),
+                       pruning.is_whole[s] ? pruning.entries[s] : static_cast<double>(count_entries(nodes[s].width, nodes[s].size()))};
+      }
+    }
+    return own;
+  });
+  return comm.agree([&] {
+    SharedMapping shared;
+    std::sort(records.begin(), records.end(), [](const FrontRecord& a, const FrontRecord& b) { return a.id < b.id; });
+    for (const FrontRecord& record : records) shared.ids.push_back(record.id);
+    for (const FrontRecord& record : records) {
+      shared.costs.push_back(record.cost);
+      shared.costs.back().parent = record.parent < 0 ? -1 : shared.find(record.parent);
+    }
+    shared.mapping = choose_mapping(shared.costs, comm.size());
+    shared.order.assign(shared.ids.size(), -1);
+    const std::vector<std::int32_t> order = order_shared(shared.costs, shared.mapping);
+    for (std::size_t k = 0; k < order.size(); ++k) shared.order[static_cast<std::size_t>(order[k])] = static_cast<std::int32_t>(k);
+    for (std::size_t h = 0; h < all.parts.size(); ++h) {
+      const std::vector<Supernode>& nodes = all.parts[h].forest.supernodes;
+      Ints& owner = owners.emplace_back(nodes.size(), -1);
+      for (std::size_t s = nodes.size(); s-- > 0;) {
+        const std::int32_t at =
+            shared.find(all.tree.parts[static_cast<std::size_t>(all.parts[h].part)].first_front + static_cast<std::int32_t>(s));
+        owner[s] = at >= 0 ? shared.mapping.owner(at) : owner[static_cast<std::size_t>(nodes[s].parent)];
+      }
+    }
+    return shared;
+  });
+}
+
+/// A front on its way from the holder to those that have it or share it or its parent. Positions of the whole order.
+struct DealtFront {
+  std::int32_t id = 0;
+  std::int32_t parent = -1;
+  std::int32_t owner = -1;  // -1: shared
+  std::int32_t first = 0;
+  Ints nodes;  // (width) global numbers of the pivots
+  Ints rows;
+
+  std::int32_t width() const { return static_cast<std::int32_t>(nodes.size()); }
+};
+
+/// Sends each front to the ranks that have to know it. Result: ascending ids. Collective.
+std::vector<DealtFront> deal_fronts(const Communicator& comm, const Elimination& all, const SharedMapping& shared,
+                                    const std::vector<Ints>& owners) {
+  const auto received = comm::all_to_all(comm, [&] {
+    std::vector<Ints> lists(static_cast<std::size_t>(comm.size()));
+    for (std::size_t h = 0; h < all.parts.size(); ++h) {
+      const HeldPart& held = all.parts[h];
+      const TreePart& part = all.tree.parts[static_cast<std::size_t>(held.part)];
+      for (std::size_t s = 0; s < held.forest.supernodes.size(); ++s) {
+        const Supernode& node = held.forest.supernodes[s];
+        const std::int32_t above = held.parents[s] < 0 ? -1 : shared.find(held.parents[s]);
+        Ints ranks;
+        if (above >= 0 && shared.mapping.owner(above) < 0) {
+          for (const FrontShare& share : shared.mapping.list_shares(above)) ranks.push_back(share.rank);
+        } else if (owners[h][s] < 0) {
+          for (const FrontShare& share : shared.mapping.list_shares(shared.find(part.first_front + static_cast<std::int32_t>(s))))
+            ranks.push_back(share.rank);
+        }
+        if (owners[h][s] >= 0 && std::find(ranks.begin(), ranks.end(), owners[h][s]) == ranks.end()) ranks.push_back(owners[h][s]);
+        for (const std::int32_t rank : ranks) {
+          Ints& list = lists[static_cast<std::size_t>(rank)];
+          list.insert(list.end(), {part.first_front + static_cast<std::int32_t>(s), held.parents[s], owners[h][s], node.first, node.width,
+                                   static_cast<std::int32_t>(node.rows.size())});
+          const auto nodes = held.nodes.begin() + (node.first - part.first);
+          list.insert(list.end(), nodes, nodes + node.width);
+          list.insert(list.end(), node.rows.begin(), node.rows.end());
+        }
+      }
+    }
+    return join(lists);
+  });
+  return comm.agree([&] {
+    std::vector<DealtFront> fronts;
+    for (ListReader reader(received.items); !reader.is_at_end();) {
+      DealtFront& front = fronts.emplace_back();
+      front.id = reader.next();
+      front.parent = reader.next();
+      front.owner = reader.next();
+      front.first = reader.next();
+      const std::int32_t width = reader.next();
+      const std::int32_t rows = reader.next();
+      front.nodes = reader.take(width);
+      front.rows = reader.take(rows);
+    }
+    std::sort(fronts.begin(), fronts.end(), [](const DealtFront& a, const DealtFront& b) { return a.id < b.id; });
+    return fronts;
+  });
+}
+
+/// A column of A in which this rank has pivots: of its own fronts (front -1) or of a shared one.
+struct WantedColumn {
+  std::int32_t node = 0;    // global
+  std::int32_t front = -1;  // among the shared fronts
+  std::int32_t column = 0;  // local node, or node of the shared front
+};
+
+/// Makes a rank's plan of the fronts that it was dealt.
 class PlanMaker {
  public:
-  PlanMaker(Plan& plan, const NodeLinks& nodes, const Separator& separator) : plan_(plan), nodes_(nodes), separator_(separator) {}
+  PlanMaker(Plan& plan, const NodeLinks& nodes, const IndexPartition& owners, std::vector<DealtFront> dealt, const SharedMapping& mapping)
+      : plan_(plan), nodes_(nodes), owners_(owners), dealt_(std::move(dealt)), mapping_(mapping) {}
 
-  void number_nodes(const Subdomain& subdomain) {
+  void add_fronts() {
     plan_.own_nodes = nodes_.own_nodes;
-    plan_.subdomain_nodes = static_cast<std::int32_t>(subdomain.own_node.size());
-    plan_.subdomain_fronts = static_cast<std::int32_t>(subdomain.forest.supernodes.size());
-    front_of_.assign(separator_.owner.size(), -1);
-    std::int32_t next = plan_.subdomain_fronts;
-    for (std::size_t s = 0; s < front_of_.size(); ++s)
-      if (separator_.owner[s] == plan_.rank) front_of_[s] = next++;
-    touched_ = find_touched_positions(separator_, plan_.rank);
-    local_of_position_.assign(separator_.nodes.size(), -1);
-    for (std::size_t k = 0; k < touched_.size(); ++k)
-      local_of_position_[touched_[k]] = plan_.subdomain_nodes + static_cast<std::int32_t>(k);
-    plan_.local_nodes = plan_.subdomain_nodes + static_cast<std::int32_t>(touched_.size());
-    plan_.node_of_own.assign(nodes_.own_nodes, -1);
-    for (std::int32_t i = 0; i < plan_.subdomain_nodes; ++i) plan_.node_of_own[subdomain.own_node[i]] = i;
-    for (std::int32_t i = separator_.first_of_rank[plan_.rank]; i < separator_.first_of_rank[plan_.rank + 1]; ++i)
-      plan_.node_of_own[separator_.nodes[i] - nodes_.first_node] = find_local(i);
-  }
-
-  Ints find_ghosts(const NodeRows& rows) const {
-    Ints local;
-    for (PetscInt g = 0; g < rows.ghost_count(); ++g) {
-      const std::int32_t index = separator_.find(rows.ghosts()[g] / 3);
-      local.push_back(index < 0 ? -1 : find_local(index));
-    }
-    return local;
-  }
-
-  void add_subdomain_fronts(Subdomain& subdomain, const Ints& boundary_positions) {
-    const Ints& element_rank = separator_.element_rank;
-    auto element = static_cast<std::int32_t>(std::lower_bound(element_rank.begin(), element_rank.end(), plan_.rank) - element_rank.begin());
-    for (Supernode& node : subdomain.forest.supernodes) {
-      Front front;
-      const bool leaves = leaves_rows(node);
-      static_cast<Supernode&>(front) = std::move(node);
-      for (std::int32_t& row : front.rows)
-        if (row >= plan_.subdomain_nodes) row = local_of_position_[boundary_positions[row - plan_.subdomain_nodes]];
-      if (leaves) {
-        set_parent(front, separator_.forest.element_parents[element], element);
-        ++element;
-      }
-      plan_.fronts.push_back(std::move(front));
-    }
-    for (std::int32_t s = plan_.subdomain_fronts; s-- > 0;) {
+    plan_.links = nodes_.count();
+    add_own_fronts();
+    add_shared_fronts();
+    for (std::size_t s = plan_.fronts.size(); s-- > 0;) {
       Front& front = plan_.fronts[s];
-      if (front.parent >= 0 && front.parent < plan_.subdomain_fronts) front.depth = plan_.fronts[front.parent].depth + 1;
+      if (front.parent >= 0) front.depth = plan_.fronts[static_cast<std::size_t>(front.parent)].depth + 1;
     }
-  }
-
-  void add_separator_fronts() {
-    const std::vector<Supernode>& supernodes = separator_.forest.supernodes;
-    for (std::size_t s = 0; s < supernodes.size(); ++s) {
-      if (separator_.owner[s] != plan_.rank) continue;
-      Front front;
-      front.is_separator = true;
-      front.first = local_of_position_[supernodes[s].first];
-      front.width = supernodes[s].width;
-      for (const std::int32_t row : supernodes[s].rows) front.rows.push_back(local_of_position_[row]);
-      if (supernodes[s].parent >= 0) set_parent(front, supernodes[s].parent, separator_.elements.count() + static_cast<std::int32_t>(s));
-      plan_.fronts.push_back(std::move(front));
-    }
-    for (std::int32_t h = 0; h < separator_.elements.count(); ++h)
-      if (separator_.forest.element_parents[h] >= 0)
-        add_remote_child(separator_.forest.element_parents[h], separator_.element_rank[h], h, separator_.elements.begin(h),
-                         separator_.elements.end(h));
-    for (std::size_t s = 0; s < supernodes.size(); ++s)
-      if (supernodes[s].parent >= 0)
-        add_remote_child(supernodes[s].parent, separator_.owner[s], separator_.elements.count() + static_cast<std::int32_t>(s),
-                         supernodes[s].rows.data(), supernodes[s].rows.data() + supernodes[s].rows.size());
     for (std::size_t s = 0; s < plan_.fronts.size(); ++s)
-      if (plan_.fronts[s].parent >= 0) plan_.fronts[plan_.fronts[s].parent].children.push_back(static_cast<std::int32_t>(s));
+      if (plan_.fronts[s].parent >= 0)
+        plan_.fronts[static_cast<std::size_t>(plan_.fronts[s].parent)].children.push_back(static_cast<std::int32_t>(s));
   }
 
-  void add_exchanges(int ranks) {
-    const std::vector<Supernode>& supernodes = separator_.forest.supernodes;
-    std::vector<SolveExchange> exchanges(supernodes.size());
-    for (int rank = 0; rank < ranks; ++rank) {
-      const Ints touched = rank == plan_.rank ? touched_ : find_touched_positions(separator_, rank);
-      auto at = touched.begin();
-      for (std::size_t s = 0; s < supernodes.size(); ++s) {
-        const auto begin = at;
-        at = std::lower_bound(at, touched.end(), supernodes[s].first + supernodes[s].width);
-        const bool is_mine = separator_.owner[s] == plan_.rank;
-        if (begin == at || rank == separator_.owner[s] || !(is_mine || rank == plan_.rank)) continue;
-        Ints nodes;
-        for (auto p = begin; p != at; ++p) nodes.push_back(local_of_position_[*p]);
-        if (is_mine)
-          exchanges[s].participants.push_back({rank, std::move(nodes)});
-        else
-          exchanges[s].nodes = std::move(nodes);
-      }
+  /// What has to come from the owners of matrix rows: columns of own fronts that they own themselves do not.
+  std::vector<WantedColumn> list_wanted() const {
+    std::vector<WantedColumn> wanted;
+    for (std::int32_t p = 0; p < plan_.pivot_nodes; ++p)
+      if (owners_.find_owner(node_of_pivot_[static_cast<std::size_t>(p)]) != plan_.rank)
+        wanted.push_back({node_of_pivot_[static_cast<std::size_t>(p)], -1, p});
+    for (std::size_t f = 0; f < plan_.shared.size(); ++f) {
+      const SharedFront& front = plan_.shared[f];
+      for (std::int32_t c = 0; c < front.width; ++c)
+        if (front.map.has_column(front.place, front.map.find_tile(c)))
+          wanted.push_back({shared_nodes_[f][static_cast<std::size_t>(c)], static_cast<std::int32_t>(f), c});
     }
-    for (std::size_t s = 0; s < supernodes.size(); ++s) {
-      exchanges[s].owner = separator_.owner[s];
-      exchanges[s].tag = static_cast<int>(s);
-      exchanges[s].front = front_of_[s];
-      if (exchanges[s].front >= 0 || !exchanges[s].nodes.empty()) plan_.exchanges.push_back(std::move(exchanges[s]));
-    }
+    return wanted;
   }
 
-  void add_blocks(int ranks) {
-    std::vector<BlockList> sent(ranks);
-    std::vector<BlockList> received(ranks);
-    std::size_t s = 0;
-    for (std::int32_t p = 0; p < separator_.count(); ++p) {
-      while (p >= separator_.forest.supernodes[s].first + separator_.forest.supernodes[s].width) ++s;
-      const std::int32_t i = separator_.index[p];
-      const int from = find_rank(separator_.first_of_rank, i);
-      const int to = separator_.owner[s];
-      if (from != plan_.rank && to != plan_.rank) continue;
-      Ints rows{p};
-      for (const std::int32_t* j = separator_.links.begin(i); j != separator_.links.end(i); ++j)
-        if (separator_.position[*j] > p) rows.push_back(separator_.position[*j]);
-      std::sort(rows.begin(), rows.end());
-      for (const std::int32_t row : rows) {
-        if (from == plan_.rank) add_block(sent[to], p, row);
-        if (to == plan_.rank) add_block(received[from], p, row);
-      }
+  /// Slots of the pivots that this rank solves for, and their nodes.
+  std::vector<std::pair<std::int32_t, std::int32_t>> list_homes() const {
+    std::vector<std::pair<std::int32_t, std::int32_t>> homes;
+    for (std::int32_t p = 0; p < plan_.pivot_nodes; ++p) homes.emplace_back(node_of_pivot_[static_cast<std::size_t>(p)], p);
+    for (std::size_t f = 0; f < plan_.shared.size(); ++f) {
+      const SharedFront& front = plan_.shared[f];
+      for (int k = 0; k < front.map.pivot_tiles(); ++k)
+        for (std::int32_t c = front.map.start(k); front.map.owner(k, k) == front.place && c < front.map.start(k + 1); ++c)
+          homes.emplace_back(shared_nodes_[f][static_cast<std::size_t>(c)],
+                             front.first_slot + front.row_begin[static_cast<std::size_t>(k)] + c - front.map.start(k));
     }
-    for (int rank = 0; rank < ranks; ++rank) {
-      sent[rank].rank = received[rank].rank = rank;
-      if (!sent[rank].columns.empty()) plan_.sent.push_back(std::move(sent[rank]));
-      if (!received[rank].columns.empty()) plan_.received.push_back(std::move(received[rank]));
-    }
+    return homes;
+  }
+
+  std::int32_t find_local(std::int32_t position) const {
+    const auto at = local_of_.find(position);
+    return at == local_of_.end() ? -1 : at->second;
+  }
+
+  /// The node of a shared front at a position, -1: none.
+  std::int32_t find_node(std::int32_t front, std::int32_t position) const {
+    const DealtFront& dealt = dealt_[static_cast<std::size_t>(shared_dealt_[static_cast<std::size_t>(front)])];
+    return find_node(dealt, position);
   }
 
  private:
-  std::int32_t find_local(std::int32_t index) const { return local_of_position_[separator_.position[index]]; }
+  static std::int32_t find_node(const DealtFront& front, std::int32_t position) {
+    if (position >= front.first && position < front.first + front.width()) return position - front.first;
+    const auto at = std::lower_bound(front.rows.begin(), front.rows.end(), position);
+    return at != front.rows.end() && *at == position ? front.width() + static_cast<std::int32_t>(at - front.rows.begin()) : -1;
+  }
 
-  /// The parent is separator supernode `above`: a front of this rank or another's.
-  void set_parent(Front& front, std::int32_t above, int tag) const {
-    if (separator_.owner[above] == plan_.rank) {
-      front.parent = front_of_[above];
-    } else {
-      front.parent = -1;
-      front.to_parent = {separator_.owner[above], tag, {}};
+  /// Own fronts in postorder, though parts of the tree mix them.
+  void add_own_fronts() {
+    std::unordered_map<std::int32_t, std::int32_t> own_of;  // by id: place in dealt_
+    for (std::size_t d = 0; d < dealt_.size(); ++d)
+      if (dealt_[d].owner == plan_.rank) own_of.emplace(dealt_[d].id, static_cast<std::int32_t>(d));
+    std::vector<Ints> children(dealt_.size());
+    Ints roots;
+    for (std::size_t d = 0; d < dealt_.size(); ++d) {
+      if (dealt_[d].owner != plan_.rank) continue;
+      const auto parent = own_of.find(dealt_[d].parent);
+      (parent == own_of.end() ? roots : children[static_cast<std::size_t>(parent->second)]).push_back(static_cast<std::int32_t>(d));
+    }
+    Ints order;
+    Ints stack(roots.begin(), roots.end());
+    while (!stack.empty()) {  // written from behind: parents before children
+      const std::int32_t d = stack.back();
+      stack.pop_back();
+      order.push_back(d);
+      stack.insert(stack.end(), children[static_cast<std::size_t>(d)].begin(), children[static_cast<std::size_t>(d)].end());
+    }
+    std::reverse(order.begin(), order.end());
+    std::unordered_map<std::int32_t, std::int32_t> front_of;
+    std::int32_t pivots = 0;
+    for (const std::int32_t d : order) {
+      const DealtFront& dealt = dealt_[static_cast<std::size_t>(d)];
+      for (std::int32_t k = 0; k < dealt.width(); ++k) {
+        local_of_.emplace(dealt.first + k, pivots++);
+        node_of_pivot_.push_back(dealt.nodes[static_cast<std::size_t>(k)]);
+      }
+      front_of.emplace(dealt.id, static_cast<std::int32_t>(front_of.size()));
+    }
+    plan_.pivot_nodes = pivots;
+    Ints behind;
+    for (const std::int32_t d : order)
+      for (const std::int32_t row : dealt_[static_cast<std::size_t>(d)].rows)
+        if (!local_of_.contains(row)) behind.push_back(row);
+    std::sort(behind.begin(), behind.end());
+    behind.erase(std::unique(behind.begin(), behind.end()), behind.end());
+    for (const std::int32_t row : behind) local_of_.emplace(row, static_cast<std::int32_t>(local_of_.size()));
+    plan_.local_nodes = static_cast<std::int32_t>(local_of_.size());
+    for (const std::int32_t d : order) {
+      const DealtFront& dealt = dealt_[static_cast<std::size_t>(d)];
+      Front& front = plan_.fronts.emplace_back();
+      front.first = local_of_.at(dealt.first);
+      front.width = dealt.width();
+      for (const std::int32_t row : dealt.rows) front.rows.push_back(local_of_.at(row));
+      std::sort(front.rows.begin(), front.rows.end());
+      const auto parent = front_of.find(dealt.parent);
+      front.parent = parent == front_of.end() ? -1 : parent->second;
+    }
+    own_front_of_ = std::move(front_of);
+  }
+
+  std::vector<FrontShare> list_shares(const DealtFront& front) const {
+    return front.owner >= 0 ? std::vector<FrontShare>{{front.owner, 1.0}} : mapping_.mapping.list_shares(mapping_.find(front.id));
+  }
+
+  void add_shared_fronts() {
+    std::vector<std::pair<std::int32_t, std::int32_t>> order;  // place among all shared fronts, dealt front
+    for (std::size_t d = 0; d < dealt_.size(); ++d) {
+      if (dealt_[d].owner >= 0) continue;
+      bool is_shared_here = false;
+      for (const FrontShare& share : list_shares(dealt_[d])) is_shared_here = is_shared_here || share.rank == plan_.rank;
+      if (is_shared_here)
+        order.emplace_back(mapping_.order[static_cast<std::size_t>(mapping_.find(dealt_[d].id))], static_cast<std::int32_t>(d));
+    }
+    std::sort(order.begin(), order.end());
+    std::unordered_map<std::int32_t, std::int32_t> shared_of;
+    std::int32_t slot = plan_.local_nodes;
+    for (const auto& [place, d] : order) {
+      const DealtFront& dealt = dealt_[static_cast<std::size_t>(d)];
+      shared_of.emplace(dealt.id, static_cast<std::int32_t>(plan_.shared.size()));
+      shared_dealt_.push_back(d);
+      shared_nodes_.push_back(dealt.nodes);
+      const auto rows = static_cast<std::int32_t>(dealt.rows.size());
+      plan_.shared.push_back(
+          {dealt.id, dealt.width(), rows, TileMap(dealt.width(), rows, list_shares(dealt)), 0, -1, -1, {}, {}, {}, {}, slot, {}, {}, {}});
+      SharedFront& front = plan_.shared.back();
+      front.place = front.map.find_place(plan_.rank);
+      front.row_begin.push_back(0);
+      for (int i = 0; i < front.map.tiles(); ++i) {
+        const bool has_row = front.map.has_row(front.place, i);
+        if (has_row) front.row_tiles.push_back(i);
+        if (front.map.has_column(front.place, i)) front.column_tiles.push_back(i);
+        front.row_begin.push_back(front.row_begin.back() + (has_row ? front.map.nodes(i) : 0));
+      }
+      for (int place_of = 0; place_of < front.map.places(); ++place_of) front.last_columns.push_back(front.map.find_last_column(place_of));
+      slot += front.own_nodes();
+    }
+    plan_.given_slots = slot;
+    for (std::size_t d = 0; d < dealt_.size(); ++d) {
+      const auto above = shared_of.find(dealt_[d].parent);
+      if (above == shared_of.end()) continue;
+      SharedFront& parent = plan_.shared[static_cast<std::size_t>(above->second)];
+      const auto rows = static_cast<std::int32_t>(dealt_[d].rows.size());
+      SharedChild child{TileMap(dealt_[d].width(), rows, list_shares(dealt_[d])), dealt_[d].width(), {}, {}, -1, -1};
+      for (const std::int32_t row : dealt_[d].rows) child.node_of_row.push_back(find_node(above->second, row));
+      const auto place = static_cast<std::int32_t>(parent.children.size());
+      if (dealt_[d].owner == plan_.rank) {
+        child.front = own_front_of_.at(dealt_[d].id);
+        Front& front = plan_.fronts[static_cast<std::size_t>(child.front)];
+        front.shared_parent = above->second;
+        front.place_in_parent = place;
+      } else if (const auto at = shared_of.find(dealt_[d].id); at != shared_of.end()) {
+        child.shared = at->second;
+        plan_.shared[static_cast<std::size_t>(at->second)].parent = above->second;
+        plan_.shared[static_cast<std::size_t>(at->second)].place_in_parent = place;
+      }
+      add_messages(dealt_[d].id, parent, child);
+      parent.children.push_back(std::move(child));
     }
   }
 
-  void add_remote_child(std::int32_t above, int rank, int tag, const std::int32_t* begin, const std::int32_t* end) {
-    if (separator_.owner[above] != plan_.rank || rank == plan_.rank) return;
-    Edge edge{rank, tag, {}};
-    for (; begin != end; ++begin) edge.rows.push_back(local_of_position_[*begin]);
-    plan_.fronts[front_of_[above]].remote_children.push_back(std::move(edge));
-  }
-
-  void add_block(BlockList& list, std::int32_t column, std::int32_t row) const {
-    list.columns.push_back(local_of_position_[column]);
-    list.rows.push_back(local_of_position_[row]);
+  /// What the ranks of a child send to those of its parent: tiles in a factorisation, sums of rows in a solve.
+  void add_messages(std::int32_t id, SharedFront& parent, SharedChild& child) {
+    const auto slot_in = [](const SharedFront& front, std::int32_t node) {
+      const int i = front.map.find_tile(node);
+      return front.first_slot + front.row_begin[static_cast<std::size_t>(i)] + node - front.map.start(i);
+    };
+    for (int from = 0; from < child.map.places(); ++from) {
+      std::int64_t numbers = 0;
+      for_pieces(child, from, parent.map, parent.place, [&](const Piece& piece) { numbers += piece.count(); });
+      child.arriving.push_back(numbers);
+      SumMessage sums{child.map.rank(from), id, {}};
+      for_sums(child, from, parent.map, parent.place,
+               [&](std::int32_t a) { sums.slots.push_back(slot_in(parent, child.node_of_row[static_cast<std::size_t>(a)])); });
+      if (!sums.slots.empty()) parent.from_children.push_back(std::move(sums));
+    }
+    const int place = child.map.find_place(plan_.rank);
+    if (place < 0) return;
+    for (int to = 0; to < parent.map.places(); ++to) {
+      SumMessage sums{parent.map.rank(to), id, {}};
+      for_sums(child, place, parent.map, to, [&](std::int32_t a) {
+        sums.slots.push_back(child.front >= 0 ? plan_.fronts[static_cast<std::size_t>(child.front)].rows[static_cast<std::size_t>(a)]
+                                              : slot_in(plan_.shared[static_cast<std::size_t>(child.shared)], child.width + a));
+      });
+      if (sums.slots.empty()) continue;
+      (child.front >= 0 ? plan_.fronts[static_cast<std::size_t>(child.front)].to_parent
+                        : plan_.shared[static_cast<std::size_t>(child.shared)].to_parent)
+          .push_back(std::move(sums));
+    }
   }
 
   Plan& plan_;
   const NodeLinks& nodes_;
-  const Separator& separator_;
-  Ints touched_;
-  Ints local_of_position_;
-  Ints front_of_;
+  const IndexPartition& owners_;
+  std::vector<DealtFront> dealt_;
+  const SharedMapping& mapping_;
+  std::unordered_map<std::int32_t, std::int32_t> local_of_;      // by position
+  std::unordered_map<std::int32_t, std::int32_t> own_front_of_;  // by id
+  Ints node_of_pivot_;                                           // (pivot_nodes) global
+  Ints shared_dealt_;                                            // (shared fronts) place in dealt_
+  std::vector<Ints> shared_nodes_;                               // (shared fronts) global numbers of the pivots
 };
+
+/// Asks for the pattern of the columns that come from other ranks, or go into shared fronts. Collective.
+void plan_blocks(const Communicator& comm, Plan& plan, const PlanMaker& maker, const NodeLinks& nodes, const IndexPartition& owners,
+                 const Ints& position) {
+  const auto wanted = comm.agree([&] {
+    return comm::sort_by_receiver(comm.size(), maker.list_wanted(), [&](const WantedColumn& one) { return owners.find_owner(one.node); });
+  });
+  const auto asked = comm::all_to_all(comm, wanted);
+  const auto answers = comm::all_to_all(comm, [&] {
+    std::vector<Ints> lists(static_cast<std::size_t>(comm.size()));
+    for (int rank = 0; rank < comm.size(); ++rank) {
+      SentBlocks sent;
+      sent.rank = rank;
+      Ints& list = lists[static_cast<std::size_t>(rank)];
+      for (const WantedColumn& column : asked.of(rank)) {
+        const auto own = static_cast<std::int32_t>(owners.to_local(column.node));
+        const std::int32_t at = position[static_cast<std::size_t>(own)];
+        const std::size_t count = list.size();
+        list.push_back(0);
+        const auto add = [&](std::int32_t link) {
+          if (position[static_cast<std::size_t>(link)] < at) return;
+          sent.columns.push_back(own);
+          sent.rows.push_back(link);
+          list.push_back(position[static_cast<std::size_t>(link)]);
+        };
+        add(own);
+        for (const std::int32_t* u = nodes.links.begin(own); u != nodes.links.end(own); ++u) add(*u);
+        list[count] = static_cast<std::int32_t>(list.size() - count) - 1;
+      }
+      if (!sent.columns.empty()) plan.sent.push_back(std::move(sent));
+    }
+    return join(lists);
+  });
+  comm.agree([&] {
+    for (int rank = 0; rank < comm.size(); ++rank) {
+      ReceivedBlocks received;
+      received.rank = rank;
+      ListReader reader(answers.of(rank));
+      for (const WantedColumn& column : wanted.of(rank))
+        for (std::int32_t left = reader.next(); left > 0; --left) {
+          const std::int32_t at = reader.next();
+          if (column.front < 0) {
+            received.columns.push_back(column.column);
+            received.rows.push_back(maker.find_local(at));
+            continue;
+          }
+          const SharedFront& front = plan.shared[static_cast<std::size_t>(column.front)];
+          const std::int32_t row = maker.find_node(column.front, at);
+          const bool is_here = front.map.has_row(front.place, front.map.find_tile(row));
+          received.shared.push_back({column.front, column.column, is_here ? row : -1});
+        }
+      if (received.count() > 0) plan.received.push_back(std::move(received));
+    }
+  });
+}
+
+/// Reports to the owners of matrix rows where these are solved for. Collective.
+void plan_rows(const Communicator& comm, Plan& plan, const PlanMaker& maker, const IndexPartition& owners) {
+  struct Home {
+    std::int32_t node, slot;
+  };
+  const auto homes = comm.agree([&] {
+    std::vector<Home> list;
+    for (const auto& [node, slot] : maker.list_homes()) list.push_back({node, slot});
+    return comm::sort_by_receiver(comm.size(), list, [&](const Home& one) { return owners.find_owner(one.node); });
+  });
+  const auto reported = comm::all_to_all(comm, homes);
+  comm.agree([&] {
+    plan.slots = plan.given_slots;
+    plan.slot_of_own.assign(static_cast<std::size_t>(plan.own_nodes), -1);
+    for (int rank = 0; rank < comm.size(); ++rank) {
+      const auto given = reported.of(rank);
+      if (rank != comm.rank() && !given.empty()) {
+        plan.given.push_back({rank, plan.slots, static_cast<std::int32_t>(given.size())});
+        for (const Home& one : given) plan.slot_of_own[owners.to_local(one.node)] = plan.slots++;
+      }
+      if (rank == comm.rank())
+        for (const Home& one : given) plan.slot_of_own[owners.to_local(one.node)] = one.slot;
+      if (rank == comm.rank() || homes.of(rank).empty()) continue;
+      TakenRows& taken = plan.taken.emplace_back();
+      taken.rank = rank;
+      for (const Home& one : homes.of(rank)) taken.slots.push_back(one.slot);
+    }
+  });
+}
+
+std::int64_t count_update_of(const Ints& rows) { return count_update(3 * static_cast<std::int64_t>(rows.size())); }
 
 /// Plays the factorisation through: stacks, peak of memory, entries and flops of this rank.
 Analysis::Rank measure(Plan& plan) {
   Analysis::Rank own;
   std::int64_t factor = 0;
-  std::int64_t loose = 0;  // update matrices outside the stacks; those on their way to others may stay to the end
-  std::int64_t subdomain_loose = 0;
-  std::int64_t loose_peak = 0;
+  std::int64_t waiting = 0;  // update matrices for shared fronts: sent, and perhaps not yet received
   std::int64_t scratch = 0;
   std::int64_t columns = 0;
   std::int64_t used[2] = {0, 0};
-  const auto count = [](const Ints& rows) { return count_update(3 * static_cast<std::int64_t>(rows.size())); };
   for (const Front& front : plan.fronts) {
     own.entries += count_entries(front.width, front.size());
     own.flops += count_flops(front.width, front.size());
     factor += count_stored(front.width, front.size());
-    scratch = std::max(scratch, count_wide(front));
+    scratch = std::max(scratch, count_wide(front.width, front.size()));
     columns = std::max(columns, std::int64_t{9} * front.size() * front.width);
-    const bool is_stacked = front.parent >= 0 && front.parent < plan.subdomain_fronts;
-    std::int64_t& room = is_stacked ? used[front.depth % 2] : loose;
-    room += count(front.rows);
-    std::int64_t remote = 0;  // they come one after the other
-    for (const Edge& edge : front.remote_children) remote = std::max(remote, count(edge.rows));
-    loose_peak = std::max(loose_peak, loose + remote);
-    if (!front.is_separator) subdomain_loose = std::max(subdomain_loose, loose);
+    if (front.parent >= 0)
+      used[front.depth % 2] += count_update_of(front.rows);
+    else
+      waiting += count_update_of(front.rows);
     for (int parity = 0; parity < 2; ++parity) plan.stack_entries[parity] = std::max(plan.stack_entries[parity], used[parity]);
     for (const std::int32_t child : front.children)
-      (front.is_separator ? loose : used[plan.fronts[child].depth % 2]) -= count(plan.fronts[child].rows);
+      used[plan.fronts[static_cast<std::size_t>(child)].depth % 2] -= count_update_of(plan.fronts[static_cast<std::size_t>(child)].rows);
   }
-  const std::int64_t blocks = [&] {
-    std::int64_t entries = 0;
-    for (const auto* lists : {&plan.sent, &plan.received})
-      for (const BlockList& list : *lists) entries += 9 * static_cast<std::int64_t>(list.columns.size());
-    return entries;
-  }();
+  std::int64_t peak = plan.stack_entries[0] + plan.stack_entries[1] + columns + scratch + waiting;
+  for (const SharedFront& front : plan.shared) {
+    own.entries += front.map.count_entries()[static_cast<std::size_t>(front.place)];
+    own.flops += front.map.count_operations()[static_cast<std::size_t>(front.place)];
+    std::int64_t update = 0;  // tiles behind the pivots: they go to the parent
+    for (const int j : front.column_tiles)
+      for (const int i : front.row_tiles) {
+        if (i < j) continue;
+        const std::int64_t tile = 9 * std::int64_t{front.map.nodes(i)} * front.map.nodes(j);
+        (j < front.map.pivot_tiles() ? factor : update) += tile;
+      }
+    const std::int64_t numbers = front.map.count_numbers(front.place);
+    const std::int64_t panels = std::int64_t{4} * 3 * kPanelNodes * 3 * (front.own_nodes() + std::int64_t{kWideRows});
+    peak = std::max(peak, waiting + 2 * numbers + panels);  // its tiles, and what its children send for them
+    waiting += update;
+    for (const SharedChild& child : front.children)
+      if (child.shared >= 0)
+        for (const int j : plan.shared[static_cast<std::size_t>(child.shared)].column_tiles)
+          for (const int i : plan.shared[static_cast<std::size_t>(child.shared)].row_tiles)
+            if (i >= j && j >= plan.shared[static_cast<std::size_t>(child.shared)].map.pivot_tiles())
+              waiting -= 9 * std::int64_t{plan.shared[static_cast<std::size_t>(child.shared)].map.nodes(i)} *
+                         plan.shared[static_cast<std::size_t>(child.shared)].map.nodes(j);
+  }
+  std::int64_t blocks = 0;
+  for (const SentBlocks& list : plan.sent) blocks += 9 * static_cast<std::int64_t>(list.columns.size());
+  for (const ReceivedBlocks& list : plan.received) blocks += 9 * static_cast<std::int64_t>(list.count());
   constexpr std::int64_t kSolveColumns = 32;
-  // The stacks are given back before the first front of the separator.
-  const std::int64_t updates = std::max(plan.stack_entries[0] + plan.stack_entries[1] + subdomain_loose, loose_peak);
-  own.peak_bytes = 8 * (factor + updates + columns + scratch + blocks + 3 * kSolveColumns * plan.local_nodes);
+  own.peak_bytes = 8 * (factor + peak + blocks + 3 * kSolveColumns * plan.slots);
   return own;
 }
 
-void gather_analysis(Plan& plan, const Analysis::Rank& own, int ranks, const Separator& separator) {
+void gather_analysis(Plan& plan, const Analysis::Rank& own, const Communicator& comm) {
   Analysis& all = plan.analysis;
-  all.ranks.resize(ranks);
-  MPI_Allgather(&own, sizeof own, MPI_BYTE, all.ranks.data(), sizeof own, MPI_BYTE, plan.comm);
+  all.ranks = comm.all_gather(std::vector<Analysis::Rank>{own});
   for (const Analysis::Rank& rank : all.ranks) {
     all.entries += rank.entries;
     all.flops += rank.flops;
     all.peak_bytes += rank.peak_bytes;
     all.largest_peak_bytes = std::max(all.largest_peak_bytes, rank.peak_bytes);
   }
-  const auto fronts = static_cast<std::int64_t>(plan.fronts.size());
-  MPI_Allreduce(&fronts, &all.supernodes, 1, MPI_INT64_T, MPI_SUM, plan.comm);
-  all.separator_nodes = separator.count();
+  // A shared front is counted by the first of its ranks.
+  std::int64_t counts[3] = {static_cast<std::int64_t>(plan.fronts.size()), 0, 0};
+  for (const SharedFront& front : plan.shared) {
+    if (front.place != 0) continue;
+    ++counts[1];
+    counts[2] += front.width;
+  }
+  counts[0] += counts[1];
+  comm.sum(std::span<std::int64_t>(counts));
+  all.supernodes = counts[0];
+  all.shared_fronts = counts[1];
+  all.shared_nodes = counts[2];
 }
 
 }  // namespace
@@ -277,18 +590,16 @@ std::int64_t count_stored(std::int32_t width, std::int32_t size) {
   return stored;
 }
 
-std::int64_t count_wide(const Front& front) {
-  const std::int64_t panel = std::min(front.width, kPanelNodes);
-  return 3 * panel * (3 * static_cast<std::int64_t>(front.size()) + kWideRows);
+std::int64_t count_wide(std::int32_t width, std::int32_t size) {
+  const std::int64_t panel = std::min(width, kPanelNodes);
+  return 3 * panel * (3 * static_cast<std::int64_t>(size) + kWideRows);
 }
 
 Plan make_plan(Mat stiffness, Mat mass) {
   Plan plan;
-  const comm::Communicator comm = petsc::get_communicator(stiffness);
+  const Communicator comm = petsc::get_communicator(stiffness);
   plan.comm = comm;
   plan.rank = comm.rank();
-  const int ranks = comm.size();
-  Ints rank_starts;
   NodeLinks nodes;
   comm.agree([&] {
     const NodeRows k(stiffness);
@@ -296,31 +607,37 @@ Plan make_plan(Mat stiffness, Mat mass) {
     if (k.rows() % 3 != 0 || k.first_row() % 3 != 0)
       throw InputError("K of a factorisation must have whole nodes of three rows on each rank.");
     nodes = find_links(k, m);
-    const PetscInt* starts = nullptr;
-    check(MatGetOwnershipRanges(stiffness, &starts));
-    for (int rank = 0; rank <= ranks; ++rank) rank_starts.push_back(starts[rank] / 3);
   });
-  std::vector<bool> is_separator;
-  Separator separator = gather_separator(plan.comm, nodes, rank_starts, is_separator);
-  Subdomain subdomain;
-  comm::Communicator(plan.comm).agree([&] { subdomain = plan_subdomain(nodes, separator, is_separator); });
-  const Ints first_positions = subdomain.boundary;
-  plan_common(plan.comm, subdomain, separator);
-  Analysis::Rank own;
-  comm::Communicator(plan.comm).agree([&] {
-    Ints boundary = first_positions;
-    for (std::int32_t& position : boundary) position = separator.forest.position[position];
-    PlanMaker maker(plan, nodes, separator);
-    maker.number_nodes(subdomain);
-    maker.add_subdomain_fronts(subdomain, boundary);
-    maker.add_separator_fronts();
-    maker.add_exchanges(ranks);
-    maker.add_blocks(ranks);
-    plan.node_of_ghost_k = maker.find_ghosts(NodeRows(stiffness));
-    plan.node_of_ghost_m = maker.find_ghosts(NodeRows(mass));
-    own = measure(plan);
+  const IndexPartition owners(comm, nodes.own_nodes);
+  Ints position;
+  std::vector<Ints> front_owners;
+  SharedMapping mapping;
+  std::vector<DealtFront> dealt;
+  {
+    Elimination all = eliminate_on_paper(comm, nodes, owners);
+    mapping = map_fronts(comm, all, front_owners);
+    dealt = deal_fronts(comm, all, mapping, front_owners);
+    position = std::move(all.position);
+  }
+  PlanMaker maker(plan, nodes, owners, std::move(dealt), mapping);
+  comm.agree([&] { maker.add_fronts(); });
+  plan_blocks(comm, plan, maker, nodes, owners, position);
+  plan_rows(comm, plan, maker, owners);
+  const Analysis::Rank own = comm.agree([&] {
+    const NodeRows k(stiffness);
+    const NodeRows m(mass);
+    for (std::int32_t v = 0; v < nodes.own_nodes; ++v) plan.node_of_own.push_back(maker.find_local(position[static_cast<std::size_t>(v)]));
+    const auto find_ghosts = [&](const NodeRows& rows, Ints& links, Ints& locals) {
+      for (PetscInt g = 0; g < rows.ghost_count(); ++g) {
+        links.push_back(nodes.find_ghost(rows.ghosts()[g] / 3));
+        locals.push_back(maker.find_local(position[static_cast<std::size_t>(links.back())]));
+      }
+    };
+    find_ghosts(k, plan.link_of_ghost_k, plan.node_of_ghost_k);
+    find_ghosts(m, plan.link_of_ghost_m, plan.node_of_ghost_m);
+    return measure(plan);
   });
-  gather_analysis(plan, own, ranks, separator);
+  gather_analysis(plan, own, comm);
   return plan;
 }
 

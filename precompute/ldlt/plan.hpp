@@ -3,71 +3,171 @@
 
 #include <petscmat.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
 #include "precompute/ldlt/factor.hpp"
 #include "precompute/ldlt/kernels.hpp"
+#include "precompute/ldlt/node_links.hpp"
 #include "precompute/ldlt/symbolic.hpp"
+#include "precompute/ldlt/tile_map.hpp"
 
 namespace carillon::ldlt {
 
-using Ints = std::vector<std::int32_t>;
-
-/// An update matrix that comes from or goes to another rank.
-struct Edge {
+/// Rows of right-hand sides that go from a child of a shared front to its parent, and solutions that come back.
+struct SumMessage {
   int rank = -1;
-  int tag = 0;
-  Ints rows;  // local nodes, ascending (of a child); empty for what goes to a parent
+  std::int32_t child = 0;  // id of the child
+  Ints slots;
 };
 
-/// A front on this rank. Pivots and rows are local nodes.
+/// A front that this rank has whole. Pivots and rows are local nodes.
 struct Front : Supernode {
-  Ints children;                      // fronts of this rank, in order of assembly
-  std::vector<Edge> remote_children;  // after them
-  Edge to_parent;                     // rank >= 0: the parent lives there
-  std::int32_t depth = 0;             // below its root among the subdomain fronts; the parity picks the stack of its update matrix
-  bool is_separator = false;
+  Ints children;                    // fronts of this rank, in order of assembly
+  std::int32_t shared_parent = -1;  // the shared front above, and this front's place among its children; `parent` is -1 then
+  std::int32_t place_in_parent = -1;
+  std::vector<SumMessage> to_parent;  // where the shared parent collects its rows
+  std::int32_t depth = 0;             // below its root; the parity picks the stack of its update matrix
 };
 
-/// What happens at one supernode of the separator during the solves: its owner collects what other ranks have added to its pivots, and
-/// gives them the solution there.
-struct SolveExchange {
-  std::int32_t front = -1;  // on the owner
-  int owner = -1;           // elsewhere: the rank to send to
-  int tag = 0;
-  struct Participant {
-    int rank = -1;
-    Ints nodes;  // local nodes
+/// A child of a shared front, as all ranks of the parent know it: the ranks that have it, and where its rows are in the parent.
+struct SharedChild {
+  TileMap map;
+  std::int32_t width = 0;
+  Ints node_of_row;                    // (rows) node of the parent, ascending
+  std::vector<std::int64_t> arriving;  // (its places) numbers of its update matrix that come from there to this rank
+  std::int32_t front = -1;             // which of this rank's own fronts it is
+  std::int32_t shared = -1;            // which of its shared fronts
+};
+
+/// Rows a_begin to a_end and columns b_begin to b_end of an update matrix, in nodes, that lie in one tile of the child and in one of the
+/// parent. On the diagonal a_begin is b_begin, and the lower triangle is meant.
+struct Piece {
+  std::int32_t a_begin, a_end, b_begin, b_end;
+
+  /// The first row meant of column c, as rows and columns of the matrix are numbered.
+  std::int64_t find_first_row(std::int64_t c) const { return a_begin == b_begin ? c : std::int64_t{3} * a_begin; }
+  std::int64_t count() const {
+    const std::int64_t rows = 3 * std::int64_t{a_end - a_begin};
+    return a_begin == b_begin ? rows * (rows + 1) / 2 : rows * 3 * (b_end - b_begin);
+  }
+};
+
+/// A front in tiles that several ranks share.
+struct SharedFront {
+  std::int32_t id = 0;  // among all fronts
+  std::int32_t width = 0;
+  std::int32_t rows = 0;
+  TileMap map;
+  int place = 0;             // of this rank in the map
+  std::int32_t parent = -1;  // among the shared fronts; the root has none
+  std::int32_t place_in_parent = -1;
+  std::vector<SharedChild> children;
+  std::vector<int> row_tiles;             // those where this rank has its rows
+  std::vector<int> column_tiles;          // those where it has its columns
+  Ints row_begin;                         // (tiles + 1) nodes of its rows before each tile
+  std::int32_t first_slot = 0;            // of its rows in a workspace of the solves
+  std::vector<int> last_columns;          // (places) the last column of tiles in which each has one, -1: none
+  std::vector<SumMessage> from_children;  // what its ranks have summed up for rows that are collected here, in the order of arrival
+  std::vector<SumMessage> to_parent;      // what this rank has summed up for rows behind the pivots, by where it is collected
+
+  std::int32_t own_nodes() const { return row_begin.back(); }
+  /// Place of tile j among the column tiles; pre: it is one.
+  std::size_t find_column_tile(int j) const {
+    return static_cast<std::size_t>(std::lower_bound(column_tiles.begin(), column_tiles.end(), j) - column_tiles.begin());
+  }
+  /// Whether a place has tiles behind panel k.
+  bool is_updated(int by_place, int k) const { return last_columns[static_cast<std::size_t>(by_place)] > k; }
+};
+
+/// Calls visit(piece) for what place `from` of a child sends to place `to` of its parent, in the order of both.
+template <typename Visit>
+void for_pieces(const SharedChild& child, int from, const TileMap& parent, int to, Visit&& visit) {
+  const TileMap& map = child.map;
+  const auto rows = static_cast<std::int32_t>(child.node_of_row.size());
+  // Runs of rows in one tile of the child and of the parent.
+  struct Group {
+    std::int32_t begin;
+    int tile, parent_tile;
   };
-  std::vector<Participant> participants;  // on the owner
-  Ints nodes;                             // elsewhere: local nodes among the pivots
-};
+  std::vector<Group> groups;
+  for (std::int32_t a = 0; a < rows; ++a) {
+    const int tile = map.find_tile(child.width + a);
+    const int parent_tile = parent.find_tile(child.node_of_row[static_cast<std::size_t>(a)]);
+    if (groups.empty() || groups.back().tile != tile || groups.back().parent_tile != parent_tile) groups.push_back({a, tile, parent_tile});
+  }
+  for (std::size_t b = 0; b < groups.size(); ++b) {
+    if (!map.has_column(from, groups[b].tile) || !parent.has_column(to, groups[b].parent_tile)) continue;
+    const std::int32_t b_end = b + 1 < groups.size() ? groups[b + 1].begin : rows;
+    for (std::size_t a = b; a < groups.size(); ++a)
+      if (map.has_row(from, groups[a].tile) && parent.has_row(to, groups[a].parent_tile))
+        visit(Piece{groups[a].begin, a + 1 < groups.size() ? groups[a + 1].begin : rows, groups[b].begin, b_end});
+  }
+}
 
-/// 3x3 blocks of A between separator nodes on their way from the rank of the column to the owner of its front. Local nodes of this rank,
-/// columns ascending, rows ascending in a column.
-struct BlockList {
-  int rank = -1;  // to or from
-  Ints columns;
+/// Calls visit(row) for each row, of a child, of which place `from` has a part of the sum and place `to` of the parent collects it.
+template <typename Visit>
+void for_sums(const SharedChild& child, int from, const TileMap& parent, int to, Visit&& visit) {
+  for (std::size_t a = 0; a < child.node_of_row.size(); ++a)
+    if (child.map.has_row(from, child.map.find_tile(child.width + static_cast<std::int32_t>(a))) &&
+        parent.home(parent.find_tile(child.node_of_row[a])) == to)
+      visit(static_cast<std::int32_t>(a));
+}
+
+/// 3x3 blocks of A from the rank of their row to one that eliminates it, in the order of both.
+struct SentBlocks {
+  int rank = -1;
+  Ints columns;  // own nodes
+  Ints rows;     // own nodes and ghosts
+};
+struct ReceivedBlocks {
+  /// Of a shared front, in its nodes; row -1: the tile is another rank's.
+  struct Shared {
+    std::int32_t front, column, row;
+  };
+  int rank = -1;
+  Ints columns;  // local nodes, ascending
   Ints rows;
+  std::vector<Shared> shared;  // after them, fronts ascending
+  std::size_t count() const { return columns.size() + shared.size(); }
 };
 
-/// Local nodes are numbered in order of elimination: first this rank's subdomain nodes, then those separator nodes with which it has to do.
+/// Rows of right-hand sides that are eliminated on another rank than that of the matrix row.
+struct GivenRows {
+  int rank = -1;
+  std::int32_t first_slot = 0;
+  std::int32_t count = 0;
+};
+struct TakenRows {
+  int rank = -1;
+  Ints slots;
+};
+
+/// Local nodes are numbered in the order of elimination: first the pivots of this rank's own fronts, then the nodes behind them. Slots are
+/// rows of right-hand sides, three for a node: those of the local nodes, of the rows of shared fronts, of nodes that other ranks eliminate.
 struct Plan {
   MPI_Comm comm = MPI_COMM_NULL;
   int rank = 0;
-  std::int32_t own_nodes = 0;
-  std::int32_t subdomain_nodes = 0;
+  std::int32_t own_nodes = 0;  // rows of the matrix
+  std::int32_t pivot_nodes = 0;
   std::int32_t local_nodes = 0;
-  Ints node_of_own;           // (own_nodes) local node of each node of this rank
-  Ints node_of_ghost_k;       // (ghost columns of K) local node, -1: none
-  Ints node_of_ghost_m;       // the same for M
-  std::vector<Front> fronts;  // subdomain ones in postorder, then own ones of the separator
-  std::int32_t subdomain_fronts = 0;
-  std::vector<SolveExchange> exchanges;  // in order of the separator: of own fronts and of those where this rank is a participant
-  std::vector<BlockList> sent;
-  std::vector<BlockList> received;
-  std::int64_t stack_entries[2] = {0, 0};  // the most that update matrices of subdomain fronts of even and odd depth take
+  std::int32_t given_slots = 0;  // the first of those that go to other ranks
+  std::int32_t slots = 0;
+  Ints slot_of_own;                 // (own_nodes)
+  Ints node_of_own;                 // (own_nodes) local node, -1: none
+  Ints node_of_ghost_k;             // (ghost columns of K) local node, -1: none
+  Ints node_of_ghost_m;             // the same for M
+  Ints link_of_ghost_k;             // (ghost columns of K) number among own nodes and ghosts
+  Ints link_of_ghost_m;             // the same for M
+  std::int32_t links = 0;           // own nodes and ghosts
+  std::vector<Front> fronts;        // in postorder
+  std::vector<SharedFront> shared;  // in the order in which all ranks go through theirs, children before parents
+  std::vector<SentBlocks> sent;
+  std::vector<ReceivedBlocks> received;
+  std::vector<GivenRows> given;
+  std::vector<TakenRows> taken;
+  std::int64_t stack_entries[2] = {0, 0};  // the most that update matrices of own fronts of even and odd depth take
   Analysis analysis;
 };
 
@@ -87,7 +187,7 @@ inline std::int32_t find_panel_start(std::int32_t width, std::int32_t p) {
 /// Numbers stored of a front: of each panel a triangle and the rows below.
 std::int64_t count_stored(std::int32_t width, std::int32_t size);
 /// Room for the W of one of its panels.
-std::int64_t count_wide(const Front& front);
+std::int64_t count_wide(std::int32_t width, std::int32_t size);
 
 /// Where strip b of an update matrix of r rows begins.
 inline std::int64_t find_strip(std::int64_t r, std::int64_t b) { return kStripColumns * (b * r - kStripColumns * (b * (b - 1) / 2)); }

@@ -1,12 +1,15 @@
 // Method:     L D L^T X = B by fronts: forward in order of elimination, backward against it, on the rows of the right-hand sides where they
 //             lie. Panels are applied as products (L11^-1 is at hand, so there is no triangular solve), and read once in each direction for
-//             up to 32 columns. At a front of the separator the owner adds up what other ranks have gathered at its pivots, and on the way
-//             back sends them the solution there.
+//             up to 32 columns. Of a shared front each rank multiplies its tiles; the owner of a diagonal tile adds up what the ranks of
+//             its row have gathered, and sends its part of the solution down its column, on the way back along its row. The row of the next
+//             panel is always multiplied first, so that the next owner can begin.
 // Source:     Liu 1992, section 6; Ashcraft, Eisenstat, Liu 1990, A fan-in algorithm for distributed sparse numerical factorization (sums
 //             travel to the owner once).
 // Deviations: none.
 #include <algorithm>
 #include <cstring>
+#include <list>
+#include <map>
 #include <numeric>
 
 #include "precompute/ldlt/kernels.hpp"
@@ -17,7 +20,7 @@ namespace {
 
 /// One block of 8 or 16 columns.
 struct Block {
-  double* rows = nullptr;  // (3 local_nodes) rows of `width` numbers
+  double* rows = nullptr;  // (3 slots) rows of `width` numbers
   int width = 0;
   int columns = 0;  // of them in use
   int first_column = 0;
@@ -34,13 +37,23 @@ class Solver {
     }
   }
 
-  void load(const double* b, std::ptrdiff_t stride) const {
+  void load(const double* b, std::ptrdiff_t stride) {
     for (const Block& block : blocks_) {
       std::memset(
-          find_row(block, plan_.subdomain_nodes), 0,
-          sizeof(double) * 3 * static_cast<std::size_t>(plan_.local_nodes - plan_.subdomain_nodes) * static_cast<std::size_t>(block.width));
+          find_row(block, plan_.pivot_nodes), 0,
+          sizeof(double) * 3 * static_cast<std::size_t>(plan_.given_slots - plan_.pivot_nodes) * static_cast<std::size_t>(block.width));
       load_own(block, b + block.first_column * stride, stride);
     }
+    for (const GivenRows& given : plan_.given) send(given.rank, kGivenTag, list_given(given));
+    for (const TakenRows& taken : plan_.taken) receive(taken.rank, kGivenTag, taken.slots, Arrival::kIsSet);
+    finish_sends();
+  }
+
+  /// Solutions for rows of other ranks go back to them.
+  void give_back() {
+    for (const TakenRows& taken : plan_.taken) send(taken.rank, kGivenTag, taken.slots);
+    for (const GivenRows& given : plan_.given) receive(given.rank, kGivenTag, list_given(given), Arrival::kIsSet);
+    finish_sends();
   }
 
   /// By strips of nodes that stay in the first-level cache. Columns are written in whole runs: one number of each at a time would wait for
@@ -64,30 +77,24 @@ class Solver {
   }
 
   void forward() {
-    for (std::int32_t s = 0; s < plan_.subdomain_fronts; ++s) forward(s);
-    for (const SolveExchange& exchange : plan_.exchanges) {
-      if (exchange.front >= 0) {
-        for (const SolveExchange::Participant& participant : exchange.participants)
-          receive(participant.rank, exchange.tag, participant.nodes, true);
-        forward(exchange.front);
-      } else {
-        send(exchange.owner, exchange.tag, exchange.nodes);
-      }
+    for (std::int32_t s = 0; s < static_cast<std::int32_t>(plan_.fronts.size()); ++s) {
+      forward(s);
+      const Front& front = plan_.fronts[static_cast<std::size_t>(s)];
+      if (front.shared_parent < 0) continue;
+      for (const SumMessage& sums : front.to_parent) send_sums(sums, kSums);
+      for (const Block& block : blocks_)
+        for (const std::int32_t row : front.rows)
+          std::memset(find_row(block, row), 0, sizeof(double) * 3 * static_cast<std::size_t>(block.width));
     }
+    for (std::size_t f = 0; f < plan_.shared.size(); ++f) forward_shared(f);
     finish_sends();
   }
 
   void backward() {
-    for (auto exchange = plan_.exchanges.rbegin(); exchange != plan_.exchanges.rend(); ++exchange) {
-      if (exchange->front >= 0) {
-        backward(exchange->front);
-        for (const SolveExchange::Participant& participant : exchange->participants)
-          send(participant.rank, exchange->tag, participant.nodes);
-      } else {
-        receive(exchange->owner, exchange->tag, exchange->nodes, false);
-      }
-    }
-    for (std::int32_t s = plan_.subdomain_fronts; s-- > 0;) backward(s);
+    for (std::size_t f = plan_.shared.size(); f-- > 0;) backward_shared(f);
+    for (const Front& front : plan_.fronts)
+      for (const SumMessage& sums : front.to_parent) receive_sums(sums, kSolutions, Arrival::kIsSet);
+    for (std::int32_t s = static_cast<std::int32_t>(plan_.fronts.size()); s-- > 0;) backward(s);
     finish_sends();
   }
 
@@ -117,7 +124,7 @@ class Solver {
     return block.rows + 3 * static_cast<std::ptrdiff_t>(node) * block.width;
   }
 
-  double* find_own(const Block& block, std::ptrdiff_t v) const { return find_row(block, plan_.node_of_own[static_cast<std::size_t>(v)]); }
+  double* find_own(const Block& block, std::ptrdiff_t v) const { return find_row(block, plan_.slot_of_own[static_cast<std::size_t>(v)]); }
 
   /// Prefetches the strip that begins at an own node: runs as short as it has in a column are over before the processor sees them.
   template <bool kIsWritten = false>
@@ -217,24 +224,231 @@ class Solver {
     return static_cast<std::ptrdiff_t>(end - 3 * find_panel_start(front.width, p - 1)) * (3 * front.size() - end);
   }
 
-  void send(int rank, int tag, const Ints& nodes) {
-    std::vector<double>& message = messages_.emplace_back();
-    message.reserve(3 * nodes.size() * static_cast<std::size_t>(row_width_));
+  // ---- shared fronts ----
+
+  enum class Arrival { kIsSet, kIsAdded };
+  enum Tag { kSums, kAlongRow, kAlongColumn, kSolutions, kTags };
+  static constexpr int kGivenTag = 8;
+  static constexpr int kFirstTag = 128;
+  static int find_tag(std::int32_t front, Tag tag) { return kFirstTag + kTags * front + tag; }
+
+  static Ints list_slots(const SharedFront& front, int i) {
+    Ints slots(static_cast<std::size_t>(front.map.nodes(i)));
+    std::iota(slots.begin(), slots.end(), front.first_slot + front.row_begin[static_cast<std::size_t>(i)]);
+    return slots;
+  }
+  static Ints list_given(const GivenRows& given) {
+    Ints slots(static_cast<std::size_t>(given.count));
+    std::iota(slots.begin(), slots.end(), given.first_slot);
+    return slots;
+  }
+
+  /// The places other than the owner of the diagonal tile that have tiles in row k before it, or in column k behind it.
+  static Ints list_row(const SharedFront& front, int k) {
+    return list_places(front, k, 0, k, [&](int j) { return front.map.owner(k, j); });
+  }
+  static Ints list_column(const SharedFront& front, int k) {
+    return list_places(front, k, k + 1, front.map.tiles(), [&](int i) { return front.map.owner(i, k); });
+  }
+  template <typename FindOwner>
+  static Ints list_places(const SharedFront& front, int k, int begin, int end, FindOwner&& find_owner) {
+    Ints places;
+    for (int i = begin; i < end; ++i) places.push_back(find_owner(i));
+    std::sort(places.begin(), places.end());
+    places.erase(std::unique(places.begin(), places.end()), places.end());
+    std::erase(places, front.map.owner(k, k));
+    return places;
+  }
+  static bool contains(const Ints& places, int place) { return std::binary_search(places.begin(), places.end(), place); }
+
+  /// Multiplies rows of column k by the solution there and subtracts that: the tiles from `begin` on, of this rank's nodes.
+  void subtract_column(const SharedFront& front, const double* tiles, int k, std::int32_t begin, std::int32_t end,
+                       const std::vector<const double*>& in) {
+    const int n = 3 * front.map.nodes(k);
+    const std::int32_t first = front.row_begin[static_cast<std::size_t>(k) + 1];
+    if (begin == end) return;
+    for (std::size_t b = 0; b < blocks_.size(); ++b)
+      kernels_.subtract_product(tiles + std::int64_t{3} * (begin - first) * n, 3 * (end - begin), n, blocks_[b].width / 8, in[b],
+                                nodes_.data() + begin, blocks_[b].rows);
+  }
+
+  void forward_shared(std::size_t f) {
+    const SharedFront& front = plan_.shared[f];
+    for (const SumMessage& sums : front.from_children) receive_sums(sums, kSums, Arrival::kIsAdded);
+    nodes_.resize(static_cast<std::size_t>(front.own_nodes()));
+    std::iota(nodes_.begin(), nodes_.end(), front.first_slot);
+    alignas(64) double pivots[kMaxBlock * 16];
+    for (int k = 0; k < front.map.pivot_tiles(); ++k) {
+      const SharedPanel& panel = numbers_.shared[f][static_cast<std::size_t>(k)];
+      const int home = front.map.owner(k, k);
+      const int n = 3 * front.map.nodes(k);
+      const Ints column = list_column(front, k);
+      std::vector<const double*> in;
+      if (home == front.place) {
+        const Ints slots = list_slots(front, k);
+        for (const std::int32_t place : list_row(front, k))
+          receive(front.map.rank(place), find_tag(front.id, kAlongRow), slots, Arrival::kIsAdded);
+        for (const Block& block : blocks_) {
+          double* own = find_row(block, slots.front());
+          const std::uint8_t* order = numbers_.order.data() + panel.pivots;
+          for (int c = 0; c < n; ++c) copy_row(own + order[c] * block.width, block.width, pivots + c * block.width);
+          kernels_.trmm(numbers_.panels.data() + panel.triangle, n, block.width / 8, pivots, own);
+          in.push_back(own);
+        }
+        for (const std::int32_t place : column) send(front.map.rank(place), find_tag(front.id, kAlongColumn), slots);
+      } else if (contains(column, front.place)) {
+        in = receive_block(front.map.rank(home), find_tag(front.id, kAlongColumn), n);
+      }
+      const std::int32_t begin = front.row_begin[static_cast<std::size_t>(k) + 1];
+      const std::int32_t next = k + 1 < front.map.pivot_tiles() ? front.row_begin[static_cast<std::size_t>(k) + 2] : begin;
+      const double* tiles = numbers_.panels.data() + panel.tiles;
+      if (!in.empty()) subtract_column(front, tiles, k, begin, next, in);
+      if (k + 1 < front.map.pivot_tiles() && contains(list_row(front, k + 1), front.place))
+        send(front.map.rank(front.map.owner(k + 1, k + 1)), find_tag(front.id, kAlongRow), list_slots(front, k + 1));
+      if (!in.empty()) subtract_column(front, tiles, k, next, front.own_nodes(), in);
+    }
+    for (const SumMessage& sums : front.to_parent) send_sums(sums, kSums);
+  }
+
+  void backward_shared(std::size_t f) {
+    const SharedFront& front = plan_.shared[f];
+    for (const SumMessage& sums : front.to_parent) receive_sums(sums, kSolutions, Arrival::kIsSet);
+    nodes_.resize(static_cast<std::size_t>(front.own_nodes()));
+    std::iota(nodes_.begin(), nodes_.end(), front.first_slot);
+    for (int k = front.map.pivot_tiles(); k-- > 0;) {
+      const SharedPanel& panel = numbers_.shared[f][static_cast<std::size_t>(k)];
+      const bool is_home = front.map.owner(k, k) == front.place;
+      const int n = 3 * front.map.nodes(k);
+      const Ints column = list_column(front, k);
+      const bool has_column = is_home || contains(column, front.place);
+      std::vector<double*> sums = has_column ? clear_sums(n) : std::vector<double*>();
+      if (is_home)
+        for (std::size_t b = 0; b < blocks_.size(); ++b)
+          kernels_.multiply_by_d_inverse(numbers_.d_diagonal.data() + panel.pivots, numbers_.d_off.data() + panel.pivots, n,
+                                         blocks_[b].width / 8, find_row(blocks_[b], list_slots(front, k).front()), sums[b]);
+      const std::int32_t begin = front.row_begin[static_cast<std::size_t>(k) + 1];
+      const std::int32_t next = k + 1 < front.map.pivot_tiles() ? front.row_begin[static_cast<std::size_t>(k) + 2] : begin;
+      const double* tiles = numbers_.panels.data() + panel.tiles;
+      if (has_column) subtract_rows(front, tiles, k, next, front.own_nodes(), sums);
+      if (k + 1 < front.map.pivot_tiles() && contains(list_row(front, k + 1), front.place))
+        receive(front.map.rank(front.map.owner(k + 1, k + 1)), find_tag(front.id, kAlongRow), list_slots(front, k + 1), Arrival::kIsSet);
+      if (has_column) subtract_rows(front, tiles, k, begin, next, sums);
+      if (!is_home) {
+        if (has_column) send_block(front.map.rank(front.map.owner(k, k)), find_tag(front.id, kAlongColumn), n, sums);
+        continue;
+      }
+      for (const std::int32_t place : column) add_block(front.map.rank(place), find_tag(front.id, kAlongColumn), n, sums);
+      alignas(64) double solution[kMaxBlock * 16];
+      const Ints slots = list_slots(front, k);
+      const double* triangle = numbers_.panels.data() + panel.triangle;
+      for (std::size_t b = 0; b < blocks_.size(); ++b) {
+        const int width = blocks_[b].width;
+        std::memset(solution, 0, sizeof(double) * static_cast<std::size_t>(n * width));
+        kernels_.add_trmm_transposed(triangle, n, width / 8, sums[b], solution, triangle);
+        double* own = find_row(blocks_[b], slots.front());
+        for (int c = 0; c < n; ++c)
+          copy_row(solution + c * width, width, own + numbers_.order[static_cast<std::size_t>(panel.pivots + c)] * width);
+      }
+      for (const std::int32_t place : list_row(front, k)) send(front.map.rank(place), find_tag(front.id, kAlongRow), slots);
+    }
+    for (const SumMessage& sums : front.from_children) send_sums(sums, kSolutions);
+  }
+
+  /// sums -= L^T X for the tiles of column k from node `begin` of this rank's on.
+  void subtract_rows(const SharedFront& front, const double* tiles, int k, std::int32_t begin, std::int32_t end,
+                     const std::vector<double*>& sums) {
+    if (begin == end) return;
+    const int n = 3 * front.map.nodes(k);
+    const double* from = tiles + std::int64_t{3} * (begin - front.row_begin[static_cast<std::size_t>(k) + 1]) * n;
+    for (std::size_t b = 0; b < blocks_.size(); ++b)
+      kernels_.subtract_transposed(from, 3 * (end - begin), n, blocks_[b].width / 8, nodes_.data() + begin, blocks_[b].rows, sums[b], from);
+  }
+
+  /// Room for n rows of each block, zero.
+  std::vector<double*> clear_sums(int n) {
+    std::vector<double*> sums;
+    for (std::size_t b = 0; b < blocks_.size(); ++b) {
+      sums.push_back(sums_ + b * kMaxBlock * 16);
+      std::memset(sums.back(), 0, sizeof(double) * static_cast<std::size_t>(n * blocks_[b].width));
+    }
+    return sums;
+  }
+
+  // ---- messages ----
+
+  /// To or from this rank itself there is no message: what was sent is kept by its child.
+  void send_sums(const SumMessage& sums, Tag tag) {
+    if (sums.rank != plan_.rank) {
+      send(sums.rank, find_tag(sums.child, tag), sums.slots);
+      return;
+    }
+    std::vector<double>& kept = kept_[sums.child];
+    kept.clear();
+    pack(sums.slots, kept);
+  }
+
+  void receive_sums(const SumMessage& sums, Tag tag, Arrival arrival) {
+    if (sums.rank == plan_.rank)
+      unpack(kept_[sums.child].data(), sums.slots, arrival);
+    else
+      receive(sums.rank, find_tag(sums.child, tag), sums.slots, arrival);
+  }
+
+  void pack(const Ints& slots, std::vector<double>& message) const {
+    message.reserve(3 * slots.size() * static_cast<std::size_t>(row_width_));
     for (const Block& block : blocks_)
-      for (const std::int32_t node : nodes) message.insert(message.end(), find_row(block, node), find_row(block, node) + 3 * block.width);
+      for (const std::int32_t slot : slots) message.insert(message.end(), find_row(block, slot), find_row(block, slot) + 3 * block.width);
+  }
+
+  void unpack(const double* from, const Ints& slots, Arrival arrival) const {
+    for (const Block& block : blocks_)
+      for (const std::int32_t slot : slots) {
+        double* row = find_row(block, slot);
+        for (int i = 0; i < 3 * block.width; ++i) row[i] = arrival == Arrival::kIsAdded ? row[i] + from[i] : from[i];
+        from += 3 * block.width;
+      }
+  }
+
+  void send(int rank, int tag, const Ints& slots) {
+    std::vector<double>& message = messages_.emplace_back();
+    pack(slots, message);
     MPI_Isend(message.data(), static_cast<int>(message.size()), MPI_DOUBLE, rank, tag, plan_.comm, &requests_.emplace_back());
   }
 
-  void receive(int rank, int tag, const Ints& nodes, bool add) {
-    received_.resize(3 * nodes.size() * static_cast<std::size_t>(row_width_));
-    MPI_Recv(received_.data(), static_cast<int>(received_.size()), MPI_DOUBLE, rank, tag, plan_.comm, MPI_STATUS_IGNORE);
+  void receive(int rank, int tag, const Ints& slots, Arrival arrival) {
+    receive_numbers(rank, tag, 3 * slots.size() * static_cast<std::size_t>(row_width_));
+    unpack(received_.data(), slots, arrival);
+  }
+
+  void receive_numbers(int rank, int tag, std::size_t count) {
+    received_.resize(count);
+    MPI_Recv(received_.data(), static_cast<int>(count), MPI_DOUBLE, rank, tag, plan_.comm, MPI_STATUS_IGNORE);
+  }
+
+  /// n rows of each block, which stay until the next call.
+  std::vector<const double*> receive_block(int rank, int tag, int n) {
+    receive_numbers(rank, tag, static_cast<std::size_t>(n) * static_cast<std::size_t>(row_width_));
+    std::vector<const double*> in;
     const double* from = received_.data();
-    for (const Block& block : blocks_)
-      for (const std::int32_t node : nodes) {
-        double* row = find_row(block, node);
-        for (int i = 0; i < 3 * block.width; ++i) row[i] = add ? row[i] + from[i] : from[i];
-        from += 3 * block.width;
-      }
+    for (std::size_t b = 0; b < blocks_.size(); ++b) {
+      const int count = n * blocks_[b].width;
+      in.push_back(std::copy_n(from, count, sums_ + b * kMaxBlock * 16) - count);
+      from += count;
+    }
+    return in;
+  }
+
+  void send_block(int rank, int tag, int n, const std::vector<double*>& sums) {
+    std::vector<double>& message = messages_.emplace_back();
+    for (std::size_t b = 0; b < blocks_.size(); ++b) message.insert(message.end(), sums[b], sums[b] + n * blocks_[b].width);
+    MPI_Isend(message.data(), static_cast<int>(message.size()), MPI_DOUBLE, rank, tag, plan_.comm, &requests_.emplace_back());
+  }
+
+  void add_block(int rank, int tag, int n, const std::vector<double*>& sums) {
+    receive_numbers(rank, tag, static_cast<std::size_t>(n) * static_cast<std::size_t>(row_width_));
+    const double* from = received_.data();
+    for (std::size_t b = 0; b < blocks_.size(); ++b)
+      for (int i = 0; i < n * blocks_[b].width; ++i) sums[b][i] += *from++;
   }
 
   void finish_sends() {
@@ -249,7 +463,9 @@ class Solver {
   std::vector<Block> blocks_;
   Ints nodes_;  // of the front in work
   int row_width_ = 0;
-  std::vector<std::vector<double>> messages_;
+  alignas(64) double sums_[kSolveColumns / 16 * kMaxBlock * 16];
+  std::map<std::int32_t, std::vector<double>> kept_;  // by child
+  std::list<std::vector<double>> messages_;
   std::vector<double> received_;
   std::vector<MPI_Request> requests_;
 };
@@ -258,7 +474,7 @@ class Solver {
 
 Workspace make_workspace(const Plan& plan) {
   Workspace workspace;
-  for (int first = 0; first < kSolveColumns; first += 16) workspace.blocks.emplace_back(std::int64_t{3 * 16} * plan.local_nodes);
+  for (int first = 0; first < kSolveColumns; first += 16) workspace.blocks.emplace_back(std::int64_t{3 * 16} * plan.slots);
   return workspace;
 }
 
@@ -267,6 +483,7 @@ void solve_columns(const Plan& plan, const Numbers& numbers, Workspace& workspac
   solver.load(b, stride);
   solver.forward();
   solver.backward();
+  solver.give_back();
   solver.store(x, stride);
 }
 

@@ -18,7 +18,7 @@ import sys
 
 HERE = pathlib.Path(__file__).resolve().parent
 PAGE = HERE.parents[1] / "docs/reports/stability.md"
-GROUPS = ["meshes", "materials", "spectra", "air", "motion", "time", "formats", "cross"]
+GROUPS = ["meshes", "materials", "spectra", "ranks", "air", "motion", "time", "formats", "cross"]
 KEYS = {"id", "title", "risk", "method", "figure"}
 HEAD = "| case | what could go wrong | what we do | figure | measured | bound |\n|---|---|---|---|---|---|\n"
 

@@ -215,7 +215,7 @@ LAW = {
     "precompute/vtkhdf": (["runtime/base"], ["fmt", "hdf5"]),
     "precompute/parallel_mesh": (["runtime/base", "partition", "precompute/mesh", "precompute/comm"], ["fmt"]),
     "precompute/la": (["runtime/base", "precompute/comm", "precompute/petsc"], ["mpi", "petsc", "eigen"]),
-    "precompute/ldlt": (["runtime/base", "partition", "precompute/petsc", "precompute/la"], ["fmt", "mpi", "petsc"]),
+    "precompute/ldlt": (["runtime/base", "partition", "precompute/comm", "precompute/petsc", "precompute/la"], ["fmt", "mpi", "petsc"]),
     "precompute/eigen": (
         ["runtime/base", "precompute/cost", "precompute/comm", "precompute/petsc", "precompute/la", "precompute/ldlt"],
         ["fmt", "mpi", "petsc", "mumps", "eigen"],

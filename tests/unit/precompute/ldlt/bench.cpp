@@ -46,8 +46,9 @@ void run_own(const fem::System& system, double sigma, int rank) {
                     factor = std::make_unique<ldlt::Factor>(la::Pencil{system.stiffness, system.mass});
                   })));
   const ldlt::Analysis& analysis = factor->get_analysis();
-  say(fmt::format("entries {:.4g}, flops {:.4g}, {} supernodes, {} separator nodes, peak {:.3f} GB", static_cast<double>(analysis.entries),
-                  analysis.flops, analysis.supernodes, analysis.separator_nodes, 1e-9 * static_cast<double>(analysis.peak_bytes)));
+  say(fmt::format("entries {:.4g}, flops {:.4g}, {} fronts, {} shared with {} pivot nodes, peak {:.3f} GB",
+                  static_cast<double>(analysis.entries), analysis.flops, analysis.supernodes, analysis.shared_fronts, analysis.shared_nodes,
+                  1e-9 * static_cast<double>(analysis.peak_bytes)));
   for (const ldlt::Analysis::Rank& part : analysis.ranks)
     say(fmt::format("  a rank: entries {:.4g}, flops {:.4g}, peak {:.3f} GB", static_cast<double>(part.entries), part.flops,
                     1e-9 * static_cast<double>(part.peak_bytes)));

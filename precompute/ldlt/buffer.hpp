@@ -1,0 +1,42 @@
+// Memory for numbers.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+
+namespace carillon::ldlt {
+
+struct FreeNumbers {
+  std::size_t mapped_bytes = 0;  // 0: from the heap
+  void operator()(double* p) const;
+};
+
+/// When a large buffer gets its memory: all of it at once takes two thirds of the time, and is for what will be used from end to end.
+enum class Pages { kWhenTouched, kAtOnce };
+
+/// Uninitialised numbers, aligned for vectors. Large ones are pages of their own, which go back to the system at once: update matrices come
+/// and go, and what the heap keeps of them would count as memory of the rank. Throws std::bad_alloc.
+class Buffer {
+ public:
+  Buffer() = default;
+  explicit Buffer(std::int64_t count, Pages pages_come = Pages::kWhenTouched);
+  double* data() const { return data_.get(); }
+  std::int64_t size() const { return size_; }
+
+ private:
+  std::unique_ptr<double, FreeNumbers> data_;
+  std::int64_t size_ = 0;
+};
+
+/// While one lives, large buffers that are given back are kept for others of nearly their size, up to 256 MB: fresh pages cost more than
+/// what is done with them. One at a time.
+class BufferReuse {
+ public:
+  BufferReuse();
+  ~BufferReuse();
+  BufferReuse(const BufferReuse&) = delete;
+  BufferReuse& operator=(const BufferReuse&) = delete;
+};
+
+}  // namespace carillon::ldlt

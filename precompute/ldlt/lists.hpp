@@ -1,0 +1,42 @@
+// Lists of integers of many lengths in one message. Inner header of carillon::ldlt.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "precompute/comm/exchange.hpp"
+
+namespace carillon::ldlt {
+
+/// One list for each rank, as an all-to-all takes them.
+inline comm::ByRank<std::int32_t> join(const std::vector<std::vector<std::int32_t>>& lists) {
+  comm::ByRank<std::int32_t> joined;
+  joined.begin.push_back(0);
+  for (const std::vector<std::int32_t>& list : lists) {
+    joined.items.insert(joined.items.end(), list.begin(), list.end());
+    joined.begin.push_back(static_cast<std::int64_t>(joined.items.size()));
+  }
+  return joined;
+}
+
+/// Reads a list from front to end, as it was written.
+class ListReader {
+ public:
+  explicit ListReader(std::span<const std::int32_t> items) : items_(items) {}
+
+  bool is_at_end() const { return at_ == items_.size(); }
+  std::size_t place() const { return at_; }
+  std::int32_t next() { return items_[at_++]; }
+  void skip(std::int32_t count) { at_ += static_cast<std::size_t>(count); }
+  std::vector<std::int32_t> take(std::int32_t count) {
+    const std::span<const std::int32_t> taken = items_.subspan(at_, static_cast<std::size_t>(count));
+    skip(count);
+    return {taken.begin(), taken.end()};
+  }
+
+ private:
+  std::span<const std::int32_t> items_;
+  std::size_t at_ = 0;
+};
+
+}  // namespace carillon::ldlt

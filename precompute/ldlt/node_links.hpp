@@ -1,0 +1,42 @@
+// Who the neighbours of a rank's nodes are.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "precompute/la/node_rows.hpp"
+
+namespace carillon::ldlt {
+
+using Ints = std::vector<std::int32_t>;
+using la::NodeRows;
+
+/// Lists of integers, one after the other.
+struct Ragged {
+  Ints offsets{0};
+  Ints items;
+  std::int32_t count() const { return static_cast<std::int32_t>(offsets.size()) - 1; }
+  const std::int32_t* begin(std::int32_t i) const { return items.data() + offsets[static_cast<std::size_t>(i)]; }
+  const std::int32_t* end(std::int32_t i) const { return items.data() + offsets[static_cast<std::size_t>(i) + 1]; }
+  void close() { offsets.push_back(static_cast<std::int32_t>(items.size())); }
+};
+
+/// Neighbours of this rank's nodes: numbers below own_nodes are this rank's, own_nodes + g is the node ghosts[g] of another.
+struct NodeLinks {
+  std::int32_t first_node = 0;
+  std::int32_t own_nodes = 0;
+  Ints ghosts;   // global, ascending
+  Ragged links;  // (own_nodes) ascending, without the node itself
+
+  std::int32_t count() const { return own_nodes + static_cast<std::int32_t>(ghosts.size()); }
+  std::int32_t find_global(std::int32_t v) const {
+    return v < own_nodes ? first_node + v : ghosts[static_cast<std::size_t>(v - own_nodes)];
+  }
+  /// Pre: `node` is a ghost.
+  std::int32_t find_ghost(std::int32_t node) const;
+};
+
+/// The union of the patterns of K and M, in nodes. Throws InputError when their rows differ. Local.
+NodeLinks find_links(const NodeRows& k, const NodeRows& m);
+
+}  // namespace carillon::ldlt

@@ -1,0 +1,68 @@
+// Which rank has which tile of a shared front.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "precompute/ldlt/mapping.hpp"
+
+namespace carillon::ldlt {
+
+/// The lower triangle of a front in square tiles of at most 24 nodes, in two dimensions: each column of tiles belongs to a class of ranks,
+/// and within a class each row of tiles to one rank. So a column of g ranks is spread over about sqrt(g) of them, and a row too. Both sides
+/// of a message make the map for themselves. Ranks stand by their place in the list of shares.
+class TileMap {
+ public:
+  /// width, rows: nodes, pivots and behind them. The shares decide how much of the work a rank gets, as nearly as tiles allow.
+  TileMap(std::int32_t width, std::int32_t rows, const std::vector<FrontShare>& shares);
+
+  int tiles() const { return static_cast<int>(starts_.size()) - 1; }
+  int pivot_tiles() const { return pivot_tiles_; }
+  /// First node of tile i; of tile tiles(): the number of nodes.
+  std::int32_t start(int i) const { return starts_[static_cast<std::size_t>(i)]; }
+  std::int32_t nodes(int i) const { return start(i + 1) - start(i); }
+  /// The tile of a node.
+  int find_tile(std::int32_t node) const;
+
+  int places() const { return static_cast<int>(ranks_.size()); }
+  int rank(int place) const { return ranks_[static_cast<std::size_t>(place)]; }
+  /// -1: the rank has no share.
+  int find_place(int rank) const;
+  /// The place that has tile (i, j), i >= j.
+  int owner(int i, int j) const {
+    return row_owner_[static_cast<std::size_t>(class_of_column_[static_cast<std::size_t>(j)])][static_cast<std::size_t>(i)];
+  }
+  /// Whether column j can hold tiles of a place: a place has tiles in the columns of one class only.
+  bool has_column(int place, int j) const {
+    return class_of_place_[static_cast<std::size_t>(place)] == class_of_column_[static_cast<std::size_t>(j)];
+  }
+  /// Whether the place has row i in its columns.
+  bool has_row(int place, int i) const {
+    return row_owner_[static_cast<std::size_t>(class_of_place_[static_cast<std::size_t>(place)])][static_cast<std::size_t>(i)] == place;
+  }
+  /// Whether each column lies on one place whole.
+  bool has_whole_columns() const { return row_owner_.size() == ranks_.size(); }
+  /// The last column in which a place has a tile, -1: none.
+  int find_last_column(int place) const;
+  /// Where what is to be subtracted from row i of a right-hand side is collected: the place of the diagonal tile, or behind the pivots that
+  /// of the last pivot column.
+  int home(int i) const { return i < pivot_tiles_ ? owner(i, i) : owner(i, pivot_tiles_ - 1); }
+
+  /// Operations of a factorisation and entries of L and D, of each place.
+  std::vector<double> count_operations() const;
+  std::vector<std::int64_t> count_entries() const;
+  /// Numbers of all its tiles.
+  std::int64_t count_numbers(int place) const;
+
+ private:
+  double cost(int i, int j) const;
+
+  std::vector<std::int32_t> starts_;  // (tiles + 1)
+  int pivot_tiles_ = 0;
+  std::vector<int> ranks_;                   // (places)
+  std::vector<int> class_of_place_;          // (places)
+  std::vector<int> class_of_column_;         // (tiles)
+  std::vector<std::vector<int>> row_owner_;  // (classes) of (tiles): a place
+};
+
+}  // namespace carillon::ldlt

@@ -1,0 +1,196 @@
+// The order of elimination and its fronts against elimination by sets, on any number of ranks.
+#include "precompute/ldlt/order.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <set>
+#include <vector>
+
+#include "precompute/comm/exchange.hpp"
+#include "precompute/petsc/session.hpp"
+
+namespace carillon::ldlt {
+namespace {
+
+using comm::Communicator;
+using comm::IndexPartition;
+
+/// A block of nx x ny x nz nodes, `copies` of them apart, each node a neighbour of the 26 around it.
+std::vector<Ints> make_block(std::int32_t nx, std::int32_t ny, std::int32_t nz, std::int32_t copies) {
+  std::vector<Ints> links;
+  for (std::int32_t copy = 0; copy < copies; ++copy)
+    for (std::int32_t v = 0; v < nx * ny * nz; ++v) {
+      Ints& near = links.emplace_back();
+      for (std::int32_t z = v / nx / ny - 1; z <= v / nx / ny + 1; ++z)
+        for (std::int32_t y = v / nx % ny - 1; y <= v / nx % ny + 1; ++y)
+          for (std::int32_t x = v % nx - 1; x <= v % nx + 1; ++x) {
+            const std::int32_t u = x + nx * (y + ny * z);
+            if (x >= 0 && x < nx && y >= 0 && y < ny && z >= 0 && z < nz && u != v) near.push_back(copy * nx * ny * nz + u);
+          }
+    }
+  return links;
+}
+
+/// A front with everything about it, on every rank.
+struct Known {
+  std::int32_t first = 0;
+  std::int32_t width = 0;
+  std::int32_t parent = -1;
+  Ints rows;
+};
+
+class Case {
+ public:
+  /// Rows lie on the ranks in runs; the first rank has none if `is_first_empty`.
+  Case(const std::vector<Ints>& graph, std::int32_t largest_gathered, bool is_first_empty = false)
+      : graph_(graph), comm_(PETSC_COMM_WORLD) {
+    const auto total = static_cast<std::int64_t>(graph.size());
+    const int ranks = comm_.size() - (is_first_empty && comm_.size() > 1 ? 1 : 0);
+    const int place = comm_.rank() - (comm_.size() - ranks);
+    NodeLinks nodes;
+    nodes.first_node = place < 0 ? 0 : static_cast<std::int32_t>(total * place / ranks);
+    nodes.own_nodes = place < 0 ? 0 : static_cast<std::int32_t>(total * (place + 1) / ranks) - nodes.first_node;
+    std::set<std::int32_t> ghosts;
+    const auto is_own = [&](std::int32_t u) { return u >= nodes.first_node && u < nodes.first_node + nodes.own_nodes; };
+    for (std::int32_t v = 0; v < nodes.own_nodes; ++v)
+      for (const std::int32_t u : graph[static_cast<std::size_t>(nodes.first_node + v)])
+        if (!is_own(u)) ghosts.insert(u);
+    nodes.ghosts.assign(ghosts.begin(), ghosts.end());
+    for (std::int32_t v = 0; v < nodes.own_nodes; ++v) {
+      Ints near;
+      for (const std::int32_t u : graph[static_cast<std::size_t>(nodes.first_node + v)])
+        near.push_back(is_own(u) ? u - nodes.first_node : nodes.find_ghost(u));
+      std::sort(near.begin(), near.end());
+      nodes.links.items.insert(nodes.links.items.end(), near.begin(), near.end());
+      nodes.links.close();
+    }
+    const Elimination all = eliminate_on_paper(comm_, nodes, IndexPartition(comm_, nodes.own_nodes), largest_gathered);
+    position_ = comm_.all_gather(Ints(all.position.begin(), all.position.begin() + nodes.own_nodes));
+    Ints packed;
+    for (const HeldPart& held : all.parts)
+      for (std::size_t s = 0; s < held.forest.supernodes.size(); ++s) {
+        const Supernode& node = held.forest.supernodes[s];
+        packed.insert(packed.end(), {all.tree.parts[static_cast<std::size_t>(held.part)].first_front + static_cast<std::int32_t>(s),
+                                     node.first, node.width, held.parents[s], static_cast<std::int32_t>(node.rows.size())});
+        packed.insert(packed.end(), node.rows.begin(), node.rows.end());
+        for (std::int32_t k = 0; k < node.width; ++k) {
+          const TreePart& part = all.tree.parts[static_cast<std::size_t>(held.part)];
+          nodes_of_fronts_.push_back(held.nodes[static_cast<std::size_t>(node.first - part.first + k)]);
+          places_of_nodes_.push_back(node.first + k);
+        }
+      }
+    nodes_of_fronts_ = comm_.all_gather(nodes_of_fronts_);
+    places_of_nodes_ = comm_.all_gather(places_of_nodes_);
+    packed = comm_.all_gather(packed);
+    fronts_.resize(static_cast<std::size_t>(all.tree.fronts));
+    for (std::size_t at = 0; at < packed.size();) {
+      Known& front = fronts_[static_cast<std::size_t>(packed[at])];
+      front.first = packed[at + 1];
+      front.width = packed[at + 2];
+      front.parent = packed[at + 3];
+      const auto rows = packed.begin() + static_cast<std::ptrdiff_t>(at) + 5;
+      front.rows.assign(rows, rows + packed[at + 4]);
+      at += 5 + static_cast<std::size_t>(packed[at + 4]);
+    }
+  }
+
+  void expect_every_node_once() const {
+    Ints sorted = position_;
+    std::sort(sorted.begin(), sorted.end());
+    for (std::size_t v = 0; v < sorted.size(); ++v) ASSERT_EQ(sorted[v], static_cast<std::int32_t>(v)) << "positions are no permutation";
+    ASSERT_EQ(nodes_of_fronts_.size(), graph_.size()) << "each node is a pivot of one front";
+    for (std::size_t k = 0; k < nodes_of_fronts_.size(); ++k)
+      EXPECT_EQ(position_[static_cast<std::size_t>(nodes_of_fronts_[k])], places_of_nodes_[k]) << "holder and owner disagree";
+  }
+
+  /// Eliminates node by node, with sets.
+  void expect_fronts_hold_the_fill() const {
+    std::vector<std::set<std::int32_t>> behind(graph_.size());
+    for (std::size_t v = 0; v < graph_.size(); ++v)
+      for (const std::int32_t u : graph_[v])
+        if (position_[static_cast<std::size_t>(u)] > position_[v])
+          behind[static_cast<std::size_t>(position_[v])].insert(position_[static_cast<std::size_t>(u)]);
+    for (std::set<std::int32_t>& column : behind) {
+      if (column.empty()) continue;
+      std::set<std::int32_t>& next = behind[static_cast<std::size_t>(*column.begin())];
+      next.insert(std::next(column.begin()), column.end());
+    }
+    for (std::size_t f = 0; f < fronts_.size(); ++f) {
+      const Known& front = fronts_[f];
+      ASSERT_TRUE(std::is_sorted(front.rows.begin(), front.rows.end()));
+      for (std::int32_t p = front.first; p < front.first + front.width; ++p)
+        for (const std::int32_t row : behind[static_cast<std::size_t>(p)])
+          ASSERT_TRUE(row < front.first + front.width || std::binary_search(front.rows.begin(), front.rows.end(), row))
+              << "row " << row << " of pivot " << p << " is missing";
+      if (front.rows.empty()) {
+        EXPECT_EQ(front.parent, -1);
+        continue;
+      }
+      ASSERT_GT(front.parent, static_cast<std::int32_t>(f)) << "children stand before their parents";
+      const Known& parent = fronts_[static_cast<std::size_t>(front.parent)];
+      EXPECT_GE(front.rows.front(), parent.first);
+      EXPECT_LT(front.rows.front(), parent.first + parent.width);
+      for (const std::int32_t row : front.rows)
+        EXPECT_TRUE(row < parent.first + parent.width || std::binary_search(parent.rows.begin(), parent.rows.end(), row));
+    }
+  }
+
+  double count_operations() const {
+    double operations = 0;
+    for (const Known& front : fronts_) operations += count_flops(front.width, front.width + static_cast<std::int64_t>(front.rows.size()));
+    return operations;
+  }
+
+ private:
+  const std::vector<Ints>& graph_;
+  Communicator comm_;
+  Ints position_;  // (nodes)
+  Ints nodes_of_fronts_, places_of_nodes_;
+  std::vector<Known> fronts_;
+};
+
+constexpr std::int32_t kAll = 300'000;
+
+TEST(order, holds_every_node_once_and_the_fill_of_its_elimination) {
+  const std::vector<Ints> graph = make_block(9, 8, 7, 1);
+  const Case whole(graph, kAll);
+  whole.expect_every_node_once();
+  whole.expect_fronts_hold_the_fill();
+}
+
+// Where a piece is too large to be gathered it is cut by its quotient graph, as a mesh of many millions of nodes is.
+TEST(order, the_same_where_no_rank_may_gather_the_graph) {
+  const std::vector<Ints> graph = make_block(16, 12, 10, 1);
+  const Case whole(graph, kAll);
+  for (const std::int32_t largest : {0, 300, 1000}) {
+    const Case cut(graph, largest);
+    cut.expect_every_node_once();
+    cut.expect_fronts_hold_the_fill();
+    EXPECT_LE(cut.count_operations(), 2.5 * whole.count_operations()) << largest;
+  }
+}
+
+TEST(order, the_same_for_a_body_in_pieces_and_ranks_without_rows) {
+  for (const std::int32_t copies : {1, 7, 50}) {
+    const std::vector<Ints> graph = make_block(3, 2, 2, copies);
+    for (const std::int32_t largest : {0, 40, kAll})
+      for (const bool is_first_empty : {false, true}) {
+        const Case body(graph, largest, is_first_empty);
+        body.expect_every_node_once();
+        body.expect_fronts_hold_the_fill();
+      }
+  }
+}
+
+TEST(order, the_same_for_fewer_nodes_than_ranks) {
+  for (const std::int32_t nodes : {1, 2, 5}) {
+    const std::vector<Ints> graph = make_block(nodes, 1, 1, 1);
+    const Case few(graph, kAll);
+    few.expect_every_node_once();
+    few.expect_fronts_hold_the_fill();
+  }
+}
+
+}  // namespace
+}  // namespace carillon::ldlt
