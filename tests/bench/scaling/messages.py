@@ -45,6 +45,8 @@ def find_phase(names):
     """names: from the innermost function outwards."""
     if any("ldlt::Factor::factorise" in name for name in names):
         return "factor"  # the solve that measures its error, too
+    if any("ldlt::make_plan" in name for name in names):
+        return "plan"  # order, fronts, mapping
     for name in names:
         for text, phase in RULES:
             if text in name:

@@ -2,11 +2,14 @@
 
 Every line of the model is a function here and a row of the table of assumptions in docs/reports/scaling.md. Pure; measure reads, runs and
 draws.
-Symbols: N unknowns, n = N / 3 nodes, p ranks, m modes, b columns per block, k basis size, s order (unknowns) of a separator.
+Symbols: N unknowns, n = N / 3 nodes, p ranks, m modes, b columns per block, k basis size. The tree of fronts is in fronts.py.
 """
 import dataclasses
 import math
 
+import fronts
+
+CASES = ("good", "expected", "poor")
 PHASES = ("read", "partition", "assemble", "factor", "solve", "orthogonalise", "write")
 
 
@@ -41,29 +44,26 @@ class Body:
     right_sides: float  # all solves
     block: float  # columns per solve
     basis: float  # columns that a new block is made orthogonal to, at the end of a slice
-    separator: float  # unknowns of the separator that halves the body
+    tree: fronts.Tree  # the fronts above the ranks' own subtrees
     surface_nodes: float
     file_bytes: float
     columns: float = 1000  # of all unknowns that are in memory at the peak: the basis, its copies, the modes
-    shrink: float = 2 ** (-2 / 3)  # separators of a level over those of the level above
+    halo: float = 4.0  # unknowns that a rank gets for a product with K or M, over its own to the power of 2/3
     neighbours: float = 14  # ranks that a rank has to do with
-    groups: float = 12  # of separator nodes that a rank is near to
-    more_flops: float = 0.0  # of a factorisation, per level of ranks: the separator last is no nested dissection
-    more_entries: float = 0.0  # of L
+    more_flops: float = 0.0  # of a factorisation on many ranks: the tree of all ranks is not METIS's own order
     mass_entries_per_row: float = 1.0  # 1: lumped
 
-    def grow(self, unknowns, entries_power, flops_power):
-        """The body with that many unknowns: modes, band and so the Krylov space stay (they belong to the body); its faces, separators and
-        surface grow as the area, N^(2/3)."""
+    def grow(self, unknowns, entries, factor_flops, tree):
+        """The body with that many unknowns, whose factor was counted: modes, band and so the Krylov space stay (they belong to the body);
+        its surface grows as the area, N^(2/3)."""
         ratio = unknowns / self.unknowns
-        area = ratio ** (2 / 3)
         return dataclasses.replace(
             self,
             unknowns=unknowns,
-            entries=self.entries * ratio**entries_power,
-            factor_flops=self.factor_flops * ratio**flops_power,
-            separator=self.separator * area,
-            surface_nodes=self.surface_nodes * area,
+            entries=entries,
+            factor_flops=factor_flops,
+            tree=tree,
+            surface_nodes=self.surface_nodes * ratio ** (2 / 3),
             file_bytes=self.file_bytes * ratio,
         )
 
@@ -77,13 +77,12 @@ class Rates:
     read_s_per_unknown: float
     partition_s_per_unknown: float
     assemble_s_per_unknown: float
+    order_s_per_node: float  # elimination order, fronts and plan, on one rank
+    cut_s_per_node: float  # one level of vertex separators
     factor_gflops: float
-    front_gflops: float  # one large front on one rank
     solve_gflops: float
     orthogonalise_gflops: float
     write_s_per_value: float  # surface node x mode
-    plan_s: float  # order of the separator, on every rank alike: plan_s ranks^plan_power
-    plan_power: float
 
 
 def find_levels(ranks):
@@ -91,32 +90,17 @@ def find_levels(ranks):
     return max(0, math.ceil(math.log2(ranks)))
 
 
-def find_fronts(body, ranks):
-    """[(pivots, order)] of the largest front of each level above the subtrees, root first. A front other than the root has the separators
-    around it for a border: in all about 2.5 times its pivots."""
-    return [
-        (body.separator * body.shrink**level, body.separator * body.shrink**level * (1.0 if level == 0 else 2.5))
-        for level in range(find_levels(ranks))
-    ]
-
-
-def find_separator_unknowns(body, ranks):
-    """Unknowns between the ranks: level l has 2^l separators."""
-    return min(sum(body.separator * (2 * body.shrink) ** level for level in range(find_levels(ranks))), body.unknowns)
-
-
 def find_halo_unknowns(body, ranks):
-    """Unknowns that one rank gets from its neighbours for a product with K or M: every separator has two sides."""
-    return 0.0 if ranks == 1 else 2 * find_separator_unknowns(body, ranks) / ranks
+    """Unknowns that one rank gets from its neighbours for a product with K or M."""
+    return 0.0 if ranks == 1 else min(body.halo * (body.unknowns / ranks) ** (2 / 3), body.unknowns)
 
 
-def count_meetings(body, ranks):
-    """Fronts of the separator at which one rank meets others: one for two ranks, in the end those of all groups near it."""
-    return 0 if ranks == 1 else min(ranks - 1, body.groups)
-
-
+LARGEST_GATHERED = 3e5  # nodes of a part that one rank cuts: precompute/ldlt/order.hpp
+CLUSTERS = 64  # of a rank, at least 1,024 in all: the vertices of the quotient graph
+CLUSTER_TRIES = 8  # bisections of the quotient graph, of which the best is taken
+MAPPING_S_PER_RANK = 3e-4  # every rank maps all shared fronts: count_mapping, 0.3 s at 1,024 ranks of 5.7 million unknowns
 PROGRAM_BYTES = 9e7  # what a rank holds before it has a matrix
-ORDERING_S_PER_NODE = 3e-6  # nested dissection by METIS, as the ranks order their interiors
+FACTOR_CALLS = 60  # collective calls of an order and its plan, once
 PROJECTED_SHARE = 0.4  # of DGEMM's rate: what a dense symmetric eigensolver reaches
 PROJECTED_TRIES = 1.7  # convergence tests of a slice, in units of the last: at 60, 80 and 100 % of the final basis
 
@@ -124,10 +108,6 @@ PROJECTED_TRIES = 1.7  # convergence tests of a slice, in units of the last: at 
 def count_projected_flops(body):
     """Dense eigenproblems of the basis' size with vectors, about 9 k^3 each; rank 0 solves them for all."""
     return PROJECTED_TRIES * 9 * body.basis**3
-
-
-def count_front_flops(pivots, order):
-    return pivots * order**2 - pivots**2 * order + pivots**3 / 3
 
 
 class Model:
@@ -146,11 +126,24 @@ class Model:
         """A step is bound by arithmetic or by memory, whichever takes longer."""
         return max(flops / (1e9 * gflops * self.speed), size / (1e9 * self.machine.memory_gb_s))
 
-    def calc(self, ranks, parallel_reading=True, spread_fronts=False):
+    def calc_ordering_s(self, ranks):
+        """Cutting, ordering, planning: the quotient graph on rank 0, a part of at most 300,000 nodes on one rank, its halves on two, and so
+        on, so all levels take what two do; leaves side by side; the mapping on every rank."""
+        rates, nodes = self.rates, self.body.unknowns / 3
+        if ranks == 1:
+            return rates.order_s_per_node * nodes / self.speed
+        quotient = 0.0
+        if nodes > LARGEST_GATHERED:
+            halvings = math.ceil(math.log2(nodes / LARGEST_GATHERED))
+            quotient = CLUSTER_TRIES * halvings * max(1024, CLUSTERS * ranks) * rates.cut_s_per_node
+        cuts = 2 * min(nodes, LARGEST_GATHERED) * rates.cut_s_per_node
+        return (quotient + cuts + rates.order_s_per_node * nodes / ranks + MAPPING_S_PER_RANK * ranks) / self.speed
+
+    def calc(self, ranks, parallel_reading=True, case="expected"):
         """{phase: (computing shared by all ranks, computing that does not shrink, messages)}, seconds on the critical path.
 
-        spread_fronts: what is not built: a front of level l belongs to the p / 2^l ranks below it, which reach half of their rate together,
-        in panels of 64 columns; and the separator is ordered by nested dissection, in time that grows with its size alone."""
+        case, of the factorisation and the solves: good: ranks of a front do not wait for one another, and half of what is sent arrives
+        while they compute. expected: they wait, and nothing is hidden. poor: in addition, shared fronts run at half the rate."""
         body, rates, machine, p = self.body, self.rates, self.machine, ranks
         n = body.unknowns
         levels = find_levels(p)
@@ -182,36 +175,26 @@ class Model:
             0.0 if p == 1 else self.send_s(body.neighbours, 8 * 9 * 15 * halo / 3),
         )
 
-        # Factor: the subtrees run side by side; above them one rank after the other, each front where it stands.
-        fronts = find_fronts(body, p)
-        top = sum(2**level * count_front_flops(*front) for level, front in enumerate(fronts))
-        flops = body.factor_flops * (1 + body.more_flops * levels)
-        shared = body.factorisations * max(flops - top, 0.0) / p / (1e9 * rates.factor_gflops * self.speed)
-        path = sum(count_front_flops(*front) for front in fronts) / (1e9 * rates.front_gflops * self.speed)
-        updates = sum(self.send_s(2, 8 * (order - pivots) ** 2 / 2) for pivots, order in fronts)
-        plan = 0.0 if p == 1 else rates.plan_s * p**rates.plan_power * slow
-        if spread_fronts:
-            shares = [max(1.0, 0.5 * p / 2**level) for level in range(levels)]
-            path = sum(count_front_flops(*front) / share for front, share in zip(fronts, shares)) / (1e9 * rates.front_gflops * self.speed)
-            updates = sum(
-                self.send_s(order / 64 * 2 * math.log2(2 * share), 8 * pivots * order / math.sqrt(share))
-                for (pivots, order), share in zip(fronts, shares)
-            )
-            plan = ORDERING_S_PER_NODE * find_separator_unknowns(body, p) / 3 * slow
-        out["factor"] = (shared, body.factorisations * path + plan, body.factorisations * updates)
+        # Factor: operations on the path, what the fullest rank receives, the order once.
+        tree, hidden = body.tree, 0.5 if case == "good" else 1.0
+        flops = self.count_flops(p)
+        even = body.factorisations * flops / p / (1e9 * rates.factor_gflops * self.speed)
+        path = 1.0 if p == 1 else fronts.PATH if case == "good" else fronts.find_gang(p)
+        if case == "poor":
+            path *= 1 + min(fronts.count_shared(tree, p)[0] / flops, 1.0)
+        received = hidden * self.send_s(*fronts.count_factor_messages(tree, p)) if p > 1 else 0.0
+        out["factor"] = (even, (path - 1) * even + self.calc_ordering_s(p), body.factorisations * received)
 
-        # Solve: L is read twice per block of columns; fronts on the path wait for one another twice, down and up.
-        top_entries = sum(2**level * (pivots * order - pivots**2 / 2) for level, (pivots, order) in enumerate(fronts))
-        own = max(body.entries * (1 + body.more_entries * levels) - top_entries, 0.0) / p
-        shared = blocks * self.compute_s(4 * own * body.block, rates.solve_gflops, 16 * own)
-        path_entries = sum(
-            (pivots * order - pivots**2 / 2) / (shares[level] if spread_fronts else 1.0) for level, (pivots, order) in enumerate(fronts)
-        )
-        path = blocks * self.compute_s(4 * path_entries * body.block, rates.solve_gflops, 16 * path_entries)
-        exchange = blocks * (
-            2 * count_meetings(body, p) * machine.latency_s + sum(2 * self.send_s(1, small * order) for _, order in fronts)
-        )
-        out["solve"] = (shared, path, exchange)
+        # Solve: L is read twice per block of columns. Where panels of a front wait for one another, one column of tiles is busy.
+        solve_s = lambda entries: blocks * self.compute_s(4 * entries * body.block, rates.solve_gflops, 16 * entries)
+        own = body.entries / p
+        slowest = (fronts.FULLEST - 1) * own if p > 1 else 0.0
+        if case != "good":
+            for one in tree.list_levels(p):
+                slowest += fronts.count_entries(one.pivots, one.order) * max(1 / math.sqrt(one.group) - 1 / one.group, 0.0)
+        messages, size = fronts.count_solve_messages(tree, p)
+        exchange = fronts.count_solve_path(tree, p) * machine.latency_s + hidden * self.send_s(messages, size * body.block / fronts.COLUMNS)
+        out["solve"] = (solve_s(own), solve_s(slowest), blocks * exchange if p > 1 else 0.0)
 
         # Orthogonalise: per block one recurrence and one pass against the whole basis (half of its final size on average), Ritz vectors at
         # the end; nine sums over the ranks a block; M z needs the halo when M is not diagonal. The projected problem is rank 0's.
@@ -232,15 +215,13 @@ class Model:
     def calc_seconds(self, ranks, **options):
         return {phase: sum(parts) for phase, parts in self.calc(ranks, **options).items()}
 
-    def calc_memory_bytes(self, ranks, spread_fronts=False):
-        """Of the largest rank: MPI, PETSc and the program, its share of L and of the columns, the largest front above the subtrees and its
-        child's."""
+    def count_flops(self, ranks):
+        return self.body.factor_flops * (1 + self.body.more_flops if ranks > 1 else 1.0)
+
+    def calc_memory_bytes(self, ranks):
+        """Of the largest rank: MPI, PETSc and the program, its columns, its share of L and of the fronts."""
         body = self.body
-        fronts = find_fronts(body, ranks)
-        shares = [ranks / 2**level if spread_fronts else 1.0 for level in range(len(fronts))]
-        largest = max((8 * order**2 / 2 / share for (_, order), share in zip(fronts, shares)), default=0.0)
-        entries = body.entries * (1 + body.more_entries * find_levels(ranks))
-        return PROGRAM_BYTES + 8 * entries / ranks + 8 * body.unknowns * body.columns / ranks + 2 * largest
+        return PROGRAM_BYTES + 8 * body.unknowns * body.columns / ranks + fronts.count_peak_bytes(body.tree, ranks, body.entries)
 
     def count_messages(self, ranks):
         """{phase: (collective calls, point-to-point messages)} of a rank, for the check against counted ones."""
@@ -248,22 +229,43 @@ class Model:
         if p == 1:
             return {}
         blocks = body.right_sides / body.block
-        meetings = count_meetings(body, p)
+        factor, solve = fronts.count_factor_messages(body.tree, p)[0], fronts.count_solve_messages(body.tree, p)[0]
         return {
             "orthogonalise": (9 * blocks, 0),
-            "solve": (0, blocks * meetings),
-            "factor": (50 + 3 * body.factorisations, body.factorisations * (3 + 2 * meetings)),
+            "solve": (0, blocks * solve),
+            "factor": (FACTOR_CALLS, body.factorisations * (factor + solve)),
         }
 
     def calc_work_s(self, ranks):
         """{phase: seconds of computing summed over the ranks}."""
         body, rates = self.body, self.rates
         work = {phase: ranks * shared + serial for phase, (shared, serial, _) in self.calc(ranks).items()}
-        # The fronts off the path are work of other ranks; together the factor and a solve cost what they cost one rank.
-        levels = find_levels(ranks)
-        work["factor"] = body.factorisations * body.factor_flops * (1 + body.more_flops * levels) / (1e9 * rates.factor_gflops * self.speed)
-        work["solve"] = 4 * body.entries * (1 + body.more_entries * levels) * body.right_sides / (1e9 * rates.solve_gflops * self.speed)
+        work["factor"] = body.factorisations * self.count_flops(ranks) / (1e9 * rates.factor_gflops * self.speed)
+        work["factor"] += rates.order_s_per_node * body.unknowns / 3 / self.speed
+        work["solve"] = 4 * body.entries * body.right_sides / (1e9 * rates.solve_gflops * self.speed)
         return work
+
+
+COUNTED = ("path", "gang", "entries", "messages", "bytes", "solve messages", "solve bytes", "solve path", "memory")
+
+
+def compare(tree, row):
+    """{what: model over count} of a row of count_mapping's table."""
+    ranks = round(row["ranks"])
+    messages, size = fronts.count_factor_messages(tree, ranks)
+    solve_messages, solve_size = fronts.count_solve_messages(tree, ranks)
+    pairs = (
+        (fronts.PATH, row["path"]),
+        (fronts.find_gang(ranks), row["gang"]),
+        (fronts.FULLEST, row["fullest"]),
+        (messages, row["messages"]),
+        (size, 1e6 * row["megabytes"]),
+        (solve_messages, row["solve_messages"]),
+        (solve_size, 1e3 * row["solve_kilobytes"]),
+        (fronts.count_solve_path(tree, ranks), row["solve_path_messages"]),
+        (fronts.count_peak_bytes(tree, ranks, row["entries"]), 1e6 * row["peak_megabytes"]),
+    )
+    return {what: predicted / counted for what, (predicted, counted) in zip(COUNTED, pairs)}
 
 
 def find_limit(model, phase, ranks, **options):
