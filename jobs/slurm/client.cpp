@@ -253,7 +253,12 @@ std::optional<Machine> SlurmClient::find_machine() const {
   std::optional<Machine> machine = parse_nodes(finished.output, settings_.partition);
   if (settings_.pack_cores > 0 && !machine) machine.emplace();
   if (!machine) return machine;
-  if (settings_.pack_cores > 0) machine->cores = settings_.pack_cores;
+  if (settings_.pack_cores > 0) {
+    // Several tasks on a node.
+    machine->nodes *= std::max(1, machine->cores / settings_.pack_cores);
+    machine->memory_gb *= std::min(1.0, static_cast<double>(settings_.pack_cores) / machine->cores);
+    machine->cores = settings_.pack_cores;
+  }
   if (settings_.pack_nodes > 0) machine->nodes = settings_.pack_nodes;
   if (settings_.max_running > 0) machine->nodes = std::min(machine->nodes, settings_.max_running);
   return machine;

@@ -17,7 +17,7 @@ struct Settings {
   int max_running = 0;                  // tasks of one array at a time; 0: no limit
   int max_in_array = 1000;              // longer batches become several arrays; never more than the site allows
   bool packs = true;                    // short jobs share tasks (packing.hpp)
-  int pack_nodes = 0, pack_cores = 0;   // nodes and cores of a node to plan for; 0: as sinfo says
+  int pack_nodes = 0, pack_cores = 0;   // tasks at a time and cores of each to plan for; 0: nodes, as sinfo says
   double pack_minutes = 30.0;           // of a task, about
   std::vector<std::string> options;     // words for sbatch, before ours: {"--constraint=zen3"}
   std::vector<std::string> prologue;    // lines of shell at the start of every job: "module load openmpi". The profile is the user's own.

@@ -50,17 +50,13 @@ class TaskRunner {
         list_(list),
         launcher_(store, {base::find_self(), options.has_pictures, options.mpirun_options}),
         room_{list.cores, list.memory_gb > 0.0 ? list.memory_gb : std::numeric_limits<double>::infinity()} {
-    for (const TaskJob& job : list.jobs) {
-      if (is_wanted(job)) waiting_.push_back(job.placed);
-    }
+    for (const TaskJob& job : list.jobs) waiting_.push_back(job.placed);
   }
 
   int run() {
     const sigset_t signals = make_signals();
     ::sigprocmask(SIG_BLOCK, &signals, nullptr);
     ::signal(SIGPIPE, SIG_IGN);
-    fmt::print("carillon task: {} of {} jobs to do, {} cores\n", waiting_.size(), list_.jobs.size(), list_.cores);
-    std::fflush(stdout);
     double looked_s = base::get_steady_s();
     for (;;) {
       reap();
@@ -121,11 +117,11 @@ class TaskRunner {
     start.time_limit_s = job.time_limit_s;
     start.signal_at_end = SIGTERM;
     try {
-      if (!has_begun_) write_begun(options_.root, options_.batch, options_.task);
-      has_begun_ = true;
       running_.emplace(launcher_.start(row, start), placed);
       room_.cores -= placed.ranks;
       room_.memory_gb -= placed.memory_gb;
+      if (!has_begun_) write_begun(options_.root, options_.batch, options_.task);
+      has_begun_ = true;
     } catch (const SystemError& error) {
       fmt::print(stderr, "carillon task: {}: {}\n", job.id.short_text(), error.what());
       exit_code_ = kExitSystem;

@@ -58,6 +58,12 @@ class Store:
         check(code is None or done.returncode == code, f"carillon {words}: exit code {done.returncode}\n{done.stdout}\n{done.stderr}")
         return json.loads(done.stdout)
 
+    def run_lines(self, *words):
+        """As run(), of a command that prints an object per line."""
+        words = [BIN / "carillon", "--profile", self.folder / "profile.json", "--json", *words]
+        done = subprocess.run(words, capture_output=True, text=True, timeout=120, cwd=self.folder)
+        check(done.returncode == 0, f"carillon {words}: exit code {done.returncode}\n{done.stdout}\n{done.stderr}")
+
     def write(self, name, nodes, number=0, **more):
         """Each number is a job of its own."""
         body = {"shape": "bar", "length_m": 0.2, "width_m": 0.02, "thickness_m": 0.004, "nodes": nodes}
@@ -256,6 +262,31 @@ def library(store):
         check(mine and mine == its, f"{name}: the bank of the array has other modes")
 
 
+def killed_task(store):
+    """kill -9 of a packed task: its attempts save and end, jobs that had not begun are not charged, and the next run finishes all; one of
+    them takes two ranks in the task."""
+    store.write("wide.json", 8000, 0, band_hz=[20, 200000], resources={"ranks": 2})
+    for number in range(1, 6):
+        store.write(f"small{number}.json", 100, number)
+    jobs = store.submit(*sorted(store.folder.glob("[sw]*.json")))
+    wide = next(job for job in jobs if job["job_file"].endswith("wide.json"))
+    check(wide["slurm_job"].endswith("_0.0"), f"the widest does not start first: {wide}")
+    store.wait_for_solver(wide, 2)
+    runner = subprocess.run(["pgrep", "-f", "carillon task .*store"], capture_output=True, text=True).stdout.split()
+    mine = [int(pid) for pid in runner if str(store.folder) in pathlib.Path(f"/proc/{pid}/cmdline").read_text()]
+    check(len(mine) == 1, f"no runner: {runner}")
+    os.kill(mine[0], signal.SIGKILL)
+    deadline = time.monotonic() + 60
+    while not (store.work(wide) / "outcome.json").exists():
+        check(time.monotonic() < deadline, "its attempt does not end with it")
+        time.sleep(0.2)
+    store.run_lines("run", "--on", "slurm")
+    rows = store.run("status")["jobs"]
+    check(all(row["state"] == "done" and row["failures"] == 0 for row in rows), f"not all done: {rows}")
+    check(all(row["attempts"] == 1 for row in rows if row["id"] != wide["id"]), f"a job that had not begun was charged: {rows}")
+    store.check_bank(wide)
+
+
 def cancel(store):
     """A job that runs and one that waits are cancelled; Slurm has neither any more. scancel is noticed too. retry asks again."""
     one, two = (
@@ -384,6 +415,7 @@ def main():
             "simulate": simulate,
             "array": array,
             "library": library,
+            "killed_task": killed_task,
             "cancel": cancel,
             "time_limit": time_limit,
             "killed_rank": killed_rank,

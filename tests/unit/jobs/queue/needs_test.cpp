@@ -1,0 +1,64 @@
+// What a job will need, by its request alone.
+#include "jobs/queue/needs.hpp"
+
+#include <gtest/gtest.h>
+
+#include "precompute/cost/calibration.hpp"
+#include "precompute/cost/seconds.hpp"
+#include "tests/unit/jobs/registry/jobs.hpp"
+
+namespace carillon::tests {
+namespace {
+
+class Needs : public testing::Test {
+ protected:
+  queue::JobNeeds find(const std::string& text, store::InputKind kind) {
+    registry::Submission submission = make_submission(++number_);
+    submission.request.job = text;
+    submission.request.input_kind = kind;
+    if (kind == store::InputKind::surface) {
+      submission.request.input_sha256 = make_id(1000).text();
+      submission.request.input_format = "obj";
+      submission.request.input_file = "/jobs/a.obj";
+    }
+    make_work(store_, submission);
+    return queue::find_needs(store_, registry::Job{.id = make_id(number_)});
+  }
+  static double predict(std::int64_t nodes, std::int64_t modes = cost::kDefaultModes) {
+    cost::ProblemSize size = cost::estimate_meshed_size(nodes, true);
+    size.modes = modes;
+    return cost::predict_seconds(size).sum();
+  }
+
+  int number_ = 0;
+  const Folder folder_;
+  const store::Store store_ = store::Store::open(folder_ / "store");
+};
+
+TEST_F(Needs, a_surface_without_a_size_is_meshed_with_the_default_and_needs_no_prediction) {
+  const queue::JobNeeds needs = find(R"({"body": {"surface": "a.obj"}})", store::InputKind::surface);
+  EXPECT_FALSE(needs.wants_prediction);
+  EXPECT_DOUBLE_EQ(needs.need.seconds, predict(cost::kDefaultNodes));
+  EXPECT_TRUE(find(R"({"body": {"surface": "a.obj", "edge_m": 0.001}})", store::InputKind::surface).wants_prediction);
+  EXPECT_DOUBLE_EQ(find(R"({"body": {"surface": "a.obj", "nodes": 700}})", store::InputKind::surface).need.seconds, predict(700));
+}
+
+TEST_F(Needs, fewer_modes_take_less_time) {
+  const queue::JobNeeds needs = find(R"({"body": {"shape": "bar", "nodes": 5000}, "max_modes": 10})", store::InputKind::shape);
+  EXPECT_DOUBLE_EQ(needs.need.seconds, predict(5000, 10));
+  EXPECT_LT(needs.need.seconds, predict(5000));
+}
+
+TEST_F(Needs, what_does_not_fall_with_ranks_is_a_part_of_the_time) {
+  const queue::Need need = find(R"({"body": {"shape": "bar", "nodes": 5000}})", store::InputKind::shape).need;
+  EXPECT_GT(need.serial_seconds, cost::kStart);
+  EXPECT_LT(need.serial_seconds, 0.5 * need.seconds);
+}
+
+TEST_F(Needs, a_simulation_is_known_as_one) {
+  EXPECT_TRUE(find("{}", store::InputKind::simulation).is_simulation);
+  EXPECT_FALSE(find("{}", store::InputKind::shape).is_simulation);
+}
+
+}  // namespace
+}  // namespace carillon::tests
