@@ -20,7 +20,6 @@ namespace {
 using Ints = std::vector<std::int32_t>;
 
 constexpr std::int32_t kClusters = 1024;  // with 4,096 one cut of the bunny in 64 parts was so bad that it doubled the operations
-constexpr idx_t kSeparators = 4;
 constexpr idx_t kCuts = 8;
 constexpr idx_t kImbalance = 200;  // thousandths
 
@@ -144,14 +143,15 @@ class Dissector {
 
 }  // namespace
 
-std::vector<std::int32_t> separate(const Graph& graph) {
+std::vector<std::int32_t> separate(const Graph& graph, int tries, int seed) {
   Ints side(static_cast<std::size_t>(graph.vertex_count()), 0);
   if (graph.neighbours.empty()) {
     for (std::size_t v = 0; v < side.size(); ++v) side[v] = 2 * v < side.size() ? 0 : 1;
     return side;
   }
   MetisOptions options = make_metis_options();
-  options[METIS_OPTION_NSEPS] = kSeparators;
+  options[METIS_OPTION_NSEPS] = tries;
+  options[METIS_OPTION_SEED] += seed;
   options[METIS_OPTION_UFACTOR] = kImbalance;
   Graph copy = graph;
   idx_t count = graph.vertex_count();

@@ -15,9 +15,9 @@ struct WeightedGraph {
   std::vector<std::int32_t> links;    // (2 edges) as the neighbours
 };
 
-/// 0 and 1, the sides, or 2, the separator between them, for each vertex: the smallest of four found. Sides may be a fifth apart. Throws
-/// SystemError when METIS runs out of memory, as all below.
-std::vector<std::int32_t> separate(const Graph& graph);
+/// 0 and 1, the sides, or 2, the separator between them, for each vertex: the smallest of `tries` found. Sides may be a fifth apart.
+/// Another seed finds others. Throws SystemError when METIS runs out of memory, as all below.
+std::vector<std::int32_t> separate(const Graph& graph, int tries = 4, int seed = 0);
 
 /// Vertices in `count` clusters of nearly equal size with few edges between them: the cluster of each.
 std::vector<std::int32_t> make_clusters(const Graph& graph, std::int32_t count);

@@ -35,7 +35,8 @@ class Factoriser {
         k_factor_(pencil.stiffness_factor),
         m_factor_(-sigma * pencil.mass_factor),
         numbers_(numbers),
-        kernels_(get_kernels()) {
+        kernels_(get_kernels()),
+        shared_(plan, numbers, received_) {
     std::int64_t largest = 0;
     std::int64_t scratch = 0;
     for (const Front& front : plan.fronts) {
@@ -47,6 +48,8 @@ class Factoriser {
     block_ = Buffer(kMaxBlock * kMaxBlock);
     for (int parity = 0; parity < 2; ++parity) stack_[parity] = Buffer(plan.stack_entries[parity], Pages::kAtOnce);
     where_.assign(static_cast<std::size_t>(plan.local_nodes), -1);
+    slot_.assign(static_cast<std::size_t>(plan.links), -1);
+    requests_.reserve(plan.received.size() + plan.sent.size());
     for (const SentBlocks& list : plan.sent) sent_.emplace_back(9 * list.columns.size());
     for (const ReceivedBlocks& list : plan.received) received_.emplace_back(9 * list.count());
     block_at_.assign(plan.received.size(), 0);
@@ -60,11 +63,9 @@ class Factoriser {
   /// Collective.
   void run() {
     exchange_blocks();
-    ++numbers_.generation;
     const BufferReuse reuse;
-    SharedFactoriser shared(plan_, numbers_, received_);
-    shared.run([&] {
-      for (std::int32_t s = 0; s < static_cast<std::int32_t>(plan_.fronts.size()); ++s) process(s, shared);
+    shared_.run([&] {
+      for (std::int32_t s = 0; s < static_cast<std::int32_t>(plan_.fronts.size()); ++s) process(s);
       for (Buffer& stack : stack_) stack = Buffer();
       columns_ = Buffer();
       wide_ = Buffer();
@@ -73,7 +74,7 @@ class Factoriser {
   }
 
  private:
-  void process(std::int32_t s, SharedFactoriser& shared) {
+  void process(std::int32_t s) {
     const Front& front = plan_.fronts[static_cast<std::size_t>(s)];
     w_ = 3 * front.width;
     r_ = 3 * static_cast<int>(front.rows.size());
@@ -101,7 +102,7 @@ class Factoriser {
     eliminate(front, panels);
     for (std::size_t c = front.children.size(); c-- > 0;) add_child(front.children[c], Part::kRest);
     if (front.shared_parent >= 0)
-      shared.send_update(
+      shared_.send_update(
           front.shared_parent, front.place_in_parent, 0, std::move(loose),
           [update = update_, r = r_](std::int32_t a, std::int64_t c) { return update + find_update_column(r, c) + std::int64_t{3} * a; });
   }
@@ -151,43 +152,40 @@ class Factoriser {
 
   /// Sends the 3x3 blocks that other ranks eliminate, and those of shared fronts.
   void exchange_blocks() {
-    Ints slot(static_cast<std::size_t>(plan_.links), -1);
     for (std::size_t l = 0; l < plan_.sent.size(); ++l) {
       const SentBlocks& list = plan_.sent[l];
       std::fill(sent_[l].begin(), sent_[l].end(), 0.0);
       for (std::size_t begin = 0; begin < list.columns.size();) {
         std::size_t end = begin;
         for (; end < list.columns.size() && list.columns[end] == list.columns[begin]; ++end)
-          slot[static_cast<std::size_t>(list.rows[end])] = static_cast<std::int32_t>(end);
-        collect_blocks(list.columns[begin], slot, sent_[l]);
-        for (std::size_t i = begin; i < end; ++i) slot[static_cast<std::size_t>(list.rows[i])] = -1;
+          slot_[static_cast<std::size_t>(list.rows[end])] = static_cast<std::int32_t>(end);
+        collect_blocks(list.columns[begin], sent_[l]);
+        for (std::size_t i = begin; i < end; ++i) slot_[static_cast<std::size_t>(list.rows[i])] = -1;
         begin = end;
       }
     }
-    std::vector<MPI_Request> requests;
-    requests.reserve(plan_.received.size() + plan_.sent.size());
     for (std::size_t l = 0; l < plan_.received.size(); ++l)
       if (plan_.received[l].rank != plan_.rank)
         MPI_Irecv(received_[l].data(), static_cast<int>(received_[l].size()), MPI_DOUBLE, plan_.received[l].rank, kBlockTag, plan_.comm,
-                  &requests.emplace_back());
+                  &requests_.emplace_back());
     for (std::size_t l = 0; l < plan_.sent.size(); ++l) {
       if (plan_.sent[l].rank != plan_.rank) {
         MPI_Isend(sent_[l].data(), static_cast<int>(sent_[l].size()), MPI_DOUBLE, plan_.sent[l].rank, kBlockTag, plan_.comm,
-                  &requests.emplace_back());
+                  &requests_.emplace_back());
         continue;
       }
       for (std::size_t k = 0; k < plan_.received.size(); ++k)
         if (plan_.received[k].rank == plan_.rank) received_[k].swap(sent_[l]);
     }
-    MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE);
+    MPI_Waitall(static_cast<int>(requests_.size()), requests_.data(), MPI_STATUSES_IGNORE);
     sent_.clear();
   }
 
-  void collect_blocks(std::int32_t own, const Ints& slot, std::vector<double>& blocks) const {
+  void collect_blocks(std::int32_t own, std::vector<double>& blocks) const {
     for (int d = 0; d < 3; ++d) {
       const auto collect = [&](const NodeRows& rows, const Ints& ghosts, double factor) {
         const auto add = [&](std::int32_t link, PetscInt column, double value) {
-          const std::int32_t at = slot[static_cast<std::size_t>(link)];
+          const std::int32_t at = slot_[static_cast<std::size_t>(link)];
           if (at >= 0) blocks[9 * static_cast<std::size_t>(at) + static_cast<std::size_t>(3 * d + column % 3)] += factor * value;
         };
         rows.visit(
@@ -313,11 +311,14 @@ class Factoriser {
 
   Buffer stack_[2];
   std::int64_t used_[2] = {0, 0};
+  Ints slot_;  // (own nodes and ghosts) of the column that is sent, -1
+  std::vector<MPI_Request> requests_;
   std::vector<std::vector<double>> sent_;
   std::vector<std::vector<double>> received_;
   std::vector<std::size_t> block_at_;
   Ints own_of_pivot_;  // (pivot_nodes) node of this rank's rows, -1: another's
   Outcome outcome_;
+  SharedFactoriser shared_;
 };
 
 }  // namespace
@@ -367,6 +368,7 @@ Numbers make_numbers(const Plan& plan) {
 }
 
 void factorise_fronts(const Plan& plan, const la::Pencil& pencil, double sigma, Numbers& numbers) {
+  ++numbers.generation;
   std::unique_ptr<Factoriser> factoriser;
   comm::Communicator(plan.comm).agree([&] { factoriser = std::make_unique<Factoriser>(plan, pencil, sigma, numbers); });
   factoriser->run();

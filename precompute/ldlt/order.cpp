@@ -1,9 +1,10 @@
 // Method:     Every node begins in one piece. While it is larger than one rank can gather, it is cut by its quotient graph: each rank makes
 //             clusters of its own nodes, rank 0 bisects their graph down the tree, and part by part the edges between two sides are covered
 //             by the fewest nodes. Then each piece is gathered and cut by vertex separators, the right half going to another rank, until
-//             each rank has a leaf; leaves and separators are ordered by METIS. Of two halves that one goes left whose rows lie more on the
-//             ranks there. Fronts are found from the leaves up: a leaf or a subtree hands on the rows of its roots as elements of the
-//             quotient graph, so no rank sees more than the parts that it holds.
+//             each rank has a leaf; up to four of the ranks below seek a separator each, and the smallest is taken; leaves and separators
+//             are ordered by METIS. Of two halves that one goes left whose rows lie more on the ranks there. Fronts are found from the
+//             leaves up: a leaf or a subtree hands on the rows of its roots as elements of the quotient graph, so no rank sees more than
+//             the parts that it holds.
 // Source:     George 1973, Nested dissection of a regular finite element mesh; Karypis and Kumar 1998 (METIS). Koenig 1931 (vertex cover).
 //             Duff and Reid 1983 (elements of the quotient graph).
 // Deviations: the quotient graph is bisected on one rank.
@@ -29,6 +30,7 @@ using partition::Graph;
 constexpr std::int32_t kClusters = 1024;      // of all ranks together
 constexpr std::int32_t kFewestClusters = 64;  // of a rank
 constexpr std::size_t kSmallestCut = 8;       // nodes: fewer stay together
+constexpr int kTries = 4;                     // ranks that seek a separator of the same piece
 
 int add_part(SeparatorTree& tree, int begin, int end, int depth) {
   int children[2] = {-1, -1};
@@ -251,10 +253,8 @@ Piece take(const Piece& piece, const Ints& vertices, Label label, Ints& number) 
 }
 
 /// Into what is left of the separator, right of it, and the separator.
-std::array<Piece, 3> cut(const Piece& piece, const Branches& branches, const IndexPartition& owners) {
+std::array<Piece, 3> cut(const Piece& piece, const Ints& side, const Branches& branches, const IndexPartition& owners) {
   const int part = piece.label.part;
-  Ints side(piece.nodes.size(), 0);
-  if (piece.nodes.size() >= kSmallestCut) side = partition::separate(piece.graph);
   const int middle = branches[branches.right(part)].begin;
   std::int64_t kept = 0;  // nodes whose rows are where their side would go, less those whose are not
   for (std::size_t v = 0; v < side.size(); ++v)
@@ -339,6 +339,46 @@ void place(const Piece& piece, std::vector<Ints>& placed) {
   for (std::size_t v = 0; v < order.size(); ++v) list[before + static_cast<std::size_t>(order[v])] = piece.nodes[v];
 }
 
+/// Whether a piece is cut at this depth of the tree.
+bool is_cut(const Piece& piece, const Branches& branches, int depth) {
+  return piece.label.is_separator == 0 && branches[piece.label.part].depth == depth && !branches[piece.label.part].is_leaf();
+}
+
+/// The sides of the piece that this rank cuts at this depth, empty: it cuts none. Collective: its group seeks separators with it.
+Ints seek_separator(const Communicator& comm, const std::vector<Piece>& pieces, const Branches& branches, int depth) {
+  const Piece* own = nullptr;
+  for (const Piece& piece : pieces)
+    if (is_cut(piece, branches, depth)) own = &piece;
+  const auto copies = comm::all_to_all(comm, [&] {
+    std::vector<Ints> lists(static_cast<std::size_t>(comm.size()));
+    if (own != nullptr && own->nodes.size() >= kSmallestCut) {
+      const TreePart& part = branches[own->label.part];
+      for (int rank = part.begin + 1; rank < std::min(part.end, part.begin + kTries); ++rank)
+        pack(*own, lists[static_cast<std::size_t>(rank)]);
+    }
+    return join(lists);
+  });
+  Ints best;
+  const auto found = comm::all_to_all(comm, [&] {
+    std::vector<Ints> lists(static_cast<std::size_t>(comm.size()));
+    if (own != nullptr) best = own->nodes.size() < kSmallestCut ? Ints(own->nodes.size(), 0) : partition::separate(own->graph, 1);
+    for (ListReader reader(copies.items); !reader.is_at_end();) {
+      const Piece piece = unpack(reader);
+      const int holder = branches[piece.label.part].begin;
+      lists[static_cast<std::size_t>(holder)] = partition::separate(piece.graph, 1, comm.rank() - holder);
+    }
+    return join(lists);
+  });
+  const auto count = [](const Ints& side) { return std::count(side.begin(), side.end(), 2); };
+  comm.agree([&] {
+    for (int rank = 0; rank < comm.size(); ++rank) {
+      const Ints side(found.of(rank).begin(), found.of(rank).end());
+      if (!side.empty() && count(side) < count(best)) best = side;
+    }
+  });
+  return best;
+}
+
 /// The nodes of each part that this rank holds, in the order of elimination. Fills first and count of the parts. Collective.
 std::vector<Ints> order_parts(const Communicator& comm, const NodeLinks& nodes, const IndexPartition& owners, SeparatorTree& tree,
                               std::int32_t largest) {
@@ -346,11 +386,12 @@ std::vector<Ints> order_parts(const Communicator& comm, const NodeLinks& nodes, 
   std::vector<Piece> pieces = gather_pieces(comm, nodes, branches, label_nodes(comm, nodes, owners, branches, largest));
   std::vector<Ints> placed(tree.parts.size());
   for (int depth = 0; depth < branches.depth(); ++depth) {
+    const Ints side = seek_separator(comm, pieces, branches, depth);
     const auto received = comm::all_to_all(comm, [&] {
       std::vector<Ints> lists(static_cast<std::size_t>(comm.size()));
       for (Piece& piece : pieces) {
-        if (piece.label.is_separator != 0 || branches[piece.label.part].depth != depth || branches[piece.label.part].is_leaf()) continue;
-        std::array<Piece, 3> sides = cut(piece, branches, owners);
+        if (!is_cut(piece, branches, depth)) continue;
+        std::array<Piece, 3> sides = cut(piece, side, branches, owners);
         place(sides[2], placed);
         pack(sides[1], lists[static_cast<std::size_t>(branches[sides[1].label.part].begin)]);
         piece = std::move(sides[0]);
