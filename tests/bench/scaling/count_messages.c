@@ -117,6 +117,12 @@ COUNT("wait", 0, MPI_Wait, (MPI_Request * q, MPI_Status* s), (q, s))
 COUNT("wait", 0, MPI_Waitall, (int n, MPI_Request q[], MPI_Status s[]), (n, q, s))
 COUNT("wait", 0, MPI_Waitany, (int n, MPI_Request q[], int* i, MPI_Status* s), (n, q, i, s))
 COUNT("wait", 0, MPI_Waitsome, (int n, MPI_Request q[], int* o, int i[], MPI_Status s[]), (n, q, o, i, s))
+// Who asks whether something has come waits, too.
+COUNT("wait", 0, MPI_Test, (MPI_Request * q, int* f, MPI_Status* s), (q, f, s))
+COUNT("wait", 0, MPI_Testall, (int n, MPI_Request q[], int* f, MPI_Status s[]), (n, q, f, s))
+COUNT("wait", 0, MPI_Iprobe, (int r, int g, MPI_Comm c, int* f, MPI_Status* s), (r, g, c, f, s))
+COUNT("wait", 0, MPI_Improbe, (int r, int g, MPI_Comm c, int* f, MPI_Message* m, MPI_Status* s), (r, g, c, f, m, s))
+COUNT("wait", 0, MPI_Mrecv, (void* b, int n, MPI_Datatype t, MPI_Message* m, MPI_Status* s), (b, n, t, m, s))
 COUNT("allreduce", find_bytes(n, t), MPI_Allreduce, (const void* b, void* d, int n, MPI_Datatype t, MPI_Op o, MPI_Comm c),
       (b, d, n, t, o, c))
 COUNT("allreduce", find_bytes(n, t), MPI_Iallreduce, (const void* b, void* d, int n, MPI_Datatype t, MPI_Op o, MPI_Comm c, MPI_Request* q),

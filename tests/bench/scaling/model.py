@@ -97,10 +97,11 @@ def find_halo_unknowns(body, ranks):
 
 LARGEST_GATHERED = 3e5  # nodes of a part that one rank cuts: precompute/ldlt/order.hpp
 CLUSTERS = 64  # of a rank, at least 1,024 in all: the vertices of the quotient graph
-CLUSTER_TRIES = 8  # bisections of the quotient graph, of which the best is taken
+CLUSTER_TRIES = 2  # of the quotient graph the best of eight bisections is taken, of a part the best of four separators
 MAPPING_S_PER_RANK = 3e-4  # every rank maps all shared fronts: count_mapping, 0.3 s at 1,024 ranks of 5.7 million unknowns
 PROGRAM_BYTES = 9e7  # what a rank holds before it has a matrix
-FACTOR_CALLS = 60  # collective calls of an order and its plan, once
+FACTOR_CALLS = 14  # collective calls of a factorisation, before and after its fronts
+PLAN_CALLS = 100  # of an order and its plan, once
 PROJECTED_SHARE = 0.4  # of DGEMM's rate: what a dense symmetric eigensolver reaches
 PROJECTED_TRIES = 1.7  # convergence tests of a slice, in units of the last: at 60, 80 and 100 % of the final basis
 
@@ -233,7 +234,7 @@ class Model:
         return {
             "orthogonalise": (9 * blocks, 0),
             "solve": (0, blocks * solve),
-            "factor": (FACTOR_CALLS, body.factorisations * (factor + solve)),
+            "factor": (PLAN_CALLS + FACTOR_CALLS * body.factorisations, body.factorisations * (factor + solve)),
         }
 
     def calc_work_s(self, ranks):

@@ -93,17 +93,30 @@ def make_cases(source):
 
 def make_prediction(source):
     page = (source / "docs/reports/scaling.md").read_text()
-    now, spread = ({row[0]: row for row in read_rows(read_between(page, name), 11)} for name in ("prediction", "spread"))
-    pairs = [(now[ranks], spread[ranks]) for ranks in ("64", "512", "4,096")]
-    rows = [[one[0], one[4], one[8], one[10], two[8], two[10]] for one, two in pairs]
-    prediction = write_table(["ranks", "factor, s", "whole run, s", "GB on the fullest rank", "2-D fronts: run, s", "2-D fronts: GB"], rows)
-    return f"{prediction}\n{make_check(page)}"
+    rows = [[row[0], row[9], row[8], row[10], row[12]] for row in read_rows(read_between(page, "prediction"), 13)]
+    prediction = write_table(["ranks", "good, s", "expected, s", "poor, s", "GB on the fullest rank"], rows)
+    return f"{make_counts(page)}\n{prediction}\n{make_check(page)}"
+
+
+def make_counts(page):
+    """The goals by counts, on two bodies."""
+    t10, million = ({row[0]: row for row in read_rows(read_between(page, f"counts-{name}"), 14)} for name in ("t10", "million"))
+    head = [
+        "ranks",
+        "bunny of 102,730 nodes, T10: path",
+        "fullest rank",
+        "a million unknowns, T4: path",
+        "fullest rank",
+        "messages on a solve's path",
+    ]
+    rows = [[ranks, one[2], one[4], million[ranks][2], million[ranks][4], million[ranks][11]] for ranks, one in t10.items()]
+    return write_table(head, rows)
 
 
 def make_check(page):
     """How far the model of scaling is from what was measured on several ranks, at most."""
     check = [row for row in read_rows(read_between(page, "check"), 9) if row[0] != "1"]
-    large = ("factor", "solve", "orthogonalise")
+    large = ("factor", "solve and orthogonalise")
     percent = {row: abs(int(check[row][4].rstrip(" %"))) for row in range(len(check))}
     memory = [row for row in read_rows(read_between(page, "memory"), 5) if row[0] != "1"]
     rows = [
