@@ -28,24 +28,24 @@ int collectives = 0;  // calls over all ranks of a communicator
 
 // MPI's profiling interface: the library's calls come here first.
 extern "C" {
-int (MPI_Allreduce)(const void* from, void* to, int count, MPI_Datatype type, MPI_Op op, MPI_Comm comm) {
+int(MPI_Allreduce)(const void* from, void* to, int count, MPI_Datatype type, MPI_Op op, MPI_Comm comm) {
   ++collectives;
   return PMPI_Allreduce(from, to, count, type, op, comm);
 }
-int (MPI_Iallreduce)(const void* from, void* to, int count, MPI_Datatype type, MPI_Op op, MPI_Comm comm, MPI_Request* request) {
+int(MPI_Iallreduce)(const void* from, void* to, int count, MPI_Datatype type, MPI_Op op, MPI_Comm comm, MPI_Request* request) {
   ++collectives;
   return PMPI_Iallreduce(from, to, count, type, op, comm, request);
 }
-int (MPI_Bcast)(void* data, int count, MPI_Datatype type, int root, MPI_Comm comm) {
+int(MPI_Bcast)(void* data, int count, MPI_Datatype type, int root, MPI_Comm comm) {
   ++collectives;
   return PMPI_Bcast(data, count, type, root, comm);
 }
-int (MPI_Barrier)(MPI_Comm comm) {
+int(MPI_Barrier)(MPI_Comm comm) {
   ++collectives;
   return PMPI_Barrier(comm);
 }
-int (MPI_Allgatherv)(const void* from, int count, MPI_Datatype type, void* to, const int* counts, const int* begin, MPI_Datatype to_type,
-                   MPI_Comm comm) {
+int(MPI_Allgatherv)(const void* from, int count, MPI_Datatype type, void* to, const int* counts, const int* begin, MPI_Datatype to_type,
+                    MPI_Comm comm) {
   ++collectives;
   return PMPI_Allgatherv(from, count, type, to, counts, begin, to_type, comm);
 }
