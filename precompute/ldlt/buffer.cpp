@@ -2,6 +2,7 @@
 
 #include <sys/mman.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <map>
 #include <new>
@@ -71,6 +72,13 @@ Buffer::Buffer(std::int64_t count, Pages pages_come) : size_(count) {
   }
   if (pages == MAP_FAILED) throw std::bad_alloc();
   data_ = {static_cast<double*>(pages), FreeNumbers{bytes}};
+  is_fresh_ = true;
+}
+
+Buffer Buffer::make_zero(std::int64_t count) {
+  Buffer zero(count, Pages::kAtOnce);
+  if (!zero.is_fresh_) std::fill_n(zero.data(), count, 0.0);
+  return zero;
 }
 
 void FreeNumbers::operator()(double* p) const {

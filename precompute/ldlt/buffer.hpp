@@ -21,12 +21,15 @@ class Buffer {
  public:
   Buffer() = default;
   explicit Buffer(std::int64_t count, Pages pages_come = Pages::kWhenTouched);
+  /// The same, all zero.
+  static Buffer make_zero(std::int64_t count);
   double* data() const { return data_.get(); }
   std::int64_t size() const { return size_; }
 
  private:
   std::unique_ptr<double, FreeNumbers> data_;
   std::int64_t size_ = 0;
+  bool is_fresh_ = false;  // pages of the system, which are zero
 };
 
 /// While one lives, large buffers that are given back are kept for others of nearly their size, up to 256 MB: fresh pages cost more than

@@ -423,25 +423,37 @@ double* SharedFactoriser::find_column(const SharedFront& front, const Work& work
 
 template <typename FindPieceRows>
 void SharedFactoriser::add_update(const SharedFront& front, Work& work, const SharedChild& child, int from, FindPieceRows&& find_rows) {
+  // Rows that follow each other in the front too.
+  struct Run {
+    std::int64_t begin, end;  // rows of the child
+    std::int64_t to;          // row of the tile
+  };
+  std::vector<Run> runs;
   for_pieces(child, from, front.map, front.place, [&](const Piece& piece) {
     const std::int32_t* nodes = child.node_of_row.data();
     const int j = front.map.find_tile(nodes[piece.b_begin]);
     const int i = front.map.find_tile(nodes[piece.a_begin]);
     const std::size_t at = front.find_column_tile(j);
-    for (std::int32_t b = piece.b_begin; b < piece.b_end; ++b)
-      for (int d = 0; d < 3; ++d) {
-        double* column = find_column(front, work, at, 3 * (nodes[b] - front.map.start(j)) + d) + find_first_row(front, i);
-        const std::int64_t end = 3 * std::int64_t{piece.a_end};
-        const double* numbers = find_rows(piece, 3 * std::int64_t{b} + d);
-        for (std::int64_t row = piece.find_first_row(3 * std::int64_t{b} + d); row < end;) {
-          // As many rows as follow each other in the parent too.
-          auto a = static_cast<std::int32_t>(row / 3);
-          double* to = column + 3 * std::int64_t{nodes[a] - front.map.start(i)} + row % 3;
-          while (a + 1 < piece.a_end && nodes[a + 1] == nodes[a] + 1) ++a;
-          const std::int64_t behind = 3 * (std::int64_t{a} + 1);
-          for (; row < behind; ++row) *to++ += *numbers++;
-        }
+    runs.clear();
+    for (std::int32_t a = piece.a_begin; a < piece.a_end; ++a) {
+      if (runs.empty() || nodes[a] != nodes[a - 1] + 1)
+        runs.push_back({3 * std::int64_t{a}, 0, 3 * std::int64_t{nodes[a] - front.map.start(i)}});
+      runs.back().end = 3 * (std::int64_t{a} + 1);
+    }
+    for (std::int64_t c = 3 * std::int64_t{piece.b_begin}; c < 3 * std::int64_t{piece.b_end}; ++c) {
+      const std::int32_t within = 3 * (nodes[c / 3] - front.map.start(j)) + static_cast<std::int32_t>(c % 3);
+      double* column = find_column(front, work, at, within) + find_first_row(front, i);
+      const std::int64_t first = piece.find_first_row(c);
+      const double* numbers = find_rows(piece, c);
+      for (const Run& run : runs) {
+        const std::int64_t begin = std::max(run.begin, first);
+        const std::int64_t count = run.end - begin;
+        if (count <= 0) continue;
+        double* __restrict__ to = column + run.to + (begin - run.begin);
+        const double* __restrict__ rows = numbers + (begin - first);
+        for (std::int64_t r = 0; r < count; ++r) to[r] += rows[r];
       }
+    }
   });
 }
 
@@ -451,8 +463,7 @@ void SharedFactoriser::assemble(const SharedFront& front, Work& work, std::int32
     work.column_begin.push_back(numbers);
     numbers += (3 * std::int64_t{front.own_nodes()} - find_first_row(front, j)) * 3 * front.map.nodes(j);
   }
-  work.tiles = Buffer(numbers);
-  std::fill_n(work.tiles.data(), numbers, 0.0);
+  work.tiles = Buffer::make_zero(numbers);
   const auto find = [&](std::int32_t column, std::int32_t row) {
     const int j = front.map.find_tile(column);
     const int i = front.map.find_tile(row);
