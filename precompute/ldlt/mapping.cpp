@@ -39,21 +39,26 @@ std::vector<std::vector<std::int32_t>> list_children(const std::vector<FrontCost
 /// Of the trailing rows and columns of a front, the numbers of the lower triangle.
 double count_triangle_of(double rows) { return rows * (rows + 1) / 2; }
 
-/// Operations of each rank of each shared front, as its tiles are dealt; empty: one rank has the front.
-using SharedOperations = std::vector<std::vector<double>>;
+/// What each rank of a shared front has of it, as its tiles are dealt; empty: one rank has the front.
+struct FrontParts {
+  std::vector<double> operations;
+  std::vector<std::int64_t> entries;
+};
 
-SharedOperations list_operations(const std::vector<FrontCost>& fronts, const Mapping& mapping) {
-  SharedOperations all(fronts.size());
-  for (std::size_t s = 0; s < fronts.size(); ++s)
-    if (mapping.owner(static_cast<std::int32_t>(s)) < 0)
-      all[s] = TileMap(fronts[s].width, fronts[s].rows, mapping.list_shares(static_cast<std::int32_t>(s))).count_operations();
+std::vector<FrontParts> list_parts(const std::vector<FrontCost>& fronts, const Mapping& mapping) {
+  std::vector<FrontParts> all(fronts.size());
+  for (std::size_t s = 0; s < fronts.size(); ++s) {
+    if (mapping.owner(static_cast<std::int32_t>(s)) >= 0) continue;
+    const TileMap map(fronts[s].width, fronts[s].rows, mapping.list_shares(static_cast<std::int32_t>(s)));
+    all[s] = {map.count_operations(), map.count_entries()};
+  }
   return all;
 }
 
 /// The order of events of an elimination: when each rank is free, and when each front is complete [operations].
 class Replay {
  public:
-  Replay(const std::vector<FrontCost>& fronts, const Mapping& mapping, const SharedOperations& shared, bool is_gang)
+  Replay(const std::vector<FrontCost>& fronts, const Mapping& mapping, const std::vector<FrontParts>& shared, bool is_gang)
       : fronts_(fronts),
         mapping_(mapping),
         shared_(shared),
@@ -106,7 +111,7 @@ class Replay {
 
   void eliminate(std::int32_t front, const std::vector<FrontShare>& shares) {
     const FrontCost& cost = fronts_[static_cast<std::size_t>(front)];
-    const std::vector<double>& parts = shared_[static_cast<std::size_t>(front)];
+    const std::vector<double>& parts = shared_[static_cast<std::size_t>(front)].operations;
     const auto find_operations = [&](std::size_t place) { return parts.empty() ? cost.operations : parts[place]; };
     const double together = is_gang_ ? start(front) : 0;
     double largest = 0;
@@ -127,7 +132,7 @@ class Replay {
 
   const std::vector<FrontCost>& fronts_;
   const Mapping& mapping_;
-  const SharedOperations& shared_;
+  const std::vector<FrontParts>& shared_;
   bool is_gang_ = false;
   std::vector<double> free_;           // (ranks)
   std::vector<double> ready_;          // (fronts)
@@ -236,21 +241,14 @@ class FrontMessages {
     for (int k = 0; k < map_.pivot_tiles(); ++k) {
       const double n = 3.0 * map_.nodes(k);
       const int home = map_.owner(k, k);
-      std::vector<double> rows(static_cast<std::size_t>(map_.places()), 0.0);  // of column k below the diagonal, by place
-      for (int i = k + 1; i < map_.tiles(); ++i) rows[static_cast<std::size_t>(map_.owner(i, k))] += 3.0 * map_.nodes(i);
-      for (int place = 0; place < map_.places(); ++place) {
-        if (rows[static_cast<std::size_t>(place)] == 0) continue;
-        if (place != home) {
-          receive(place, 3 * n + static_cast<double>(count_triangle(static_cast<std::int64_t>(n))));
-          solve(place, n);  // forward: the solution at the panel
-          solve(home, n);   // backward: a sum
-        }
-        send_rows(k, place, rows[static_cast<std::size_t>(place)]);
+      for (const int place : map_.list_column(k)) {
+        receive(place, 3 * n + static_cast<double>(count_triangle(static_cast<std::int64_t>(n))));
+        solve(place, n);  // forward: the solution at the panel
+        solve(home, n);   // backward: a sum
+        send_rows(k, place);
       }
-      std::vector<bool> is_in_row(static_cast<std::size_t>(map_.places()), false);
-      for (int j = 0; j < k; ++j) is_in_row[static_cast<std::size_t>(map_.owner(k, j))] = true;
-      for (int place = 0; place < map_.places(); ++place) {
-        if (!is_in_row[static_cast<std::size_t>(place)] || place == home) continue;
+      send_rows(k, home);
+      for (const int place : map_.list_row(k)) {
         solve(home, n);
         solve(place, n);
       }
@@ -259,13 +257,12 @@ class FrontMessages {
 
  private:
   /// To each place with tiles behind the panel, what it needs for its rows or its columns.
-  void send_rows(int k, int from, double all) {
+  void send_rows(int k, int from) {
     const double n = 3.0 * map_.nodes(k);
     for (int to = 0; to < map_.places(); ++to) {
       if (to == from || map_.find_last_column(to) <= k) continue;
-      double rows = map_.has_whole_columns() ? all : 0;
-      for (int i = k + 1; !map_.has_whole_columns() && i < map_.tiles(); ++i)
-        if (map_.owner(i, k) == from && (map_.has_row(to, i) || map_.has_column(to, i))) rows += 3.0 * map_.nodes(i);
+      double rows = 0;
+      map_.for_needed(k, from, to, [&](int i) { rows += 3.0 * map_.nodes(i); });
       if (rows > 0) receive(to, n * (rows + 2));
     }
   }
@@ -288,7 +285,7 @@ MappingCounts count_work(const std::vector<FrontCost>& fronts, const Mapping& ma
   MappingCounts counts;
   counts.operations.assign(ranks, 0.0);
   counts.entries.assign(ranks, 0.0);
-  const SharedOperations shared = list_operations(fronts, mapping);
+  const std::vector<FrontParts> shared = list_parts(fronts, mapping);
   for (std::size_t s = 0; s < fronts.size(); ++s) {
     const FrontCost& cost = fronts[s];
     const auto front = static_cast<std::int32_t>(s);
@@ -302,15 +299,13 @@ MappingCounts count_work(const std::vector<FrontCost>& fronts, const Mapping& ma
     ++counts.shared_fronts;
     counts.shared_operations += cost.operations;
     counts.shared_entries += cost.entries;
-    const TileMap map(cost.width, cost.rows, mapping.list_shares(front));
-    const std::vector<std::int64_t> entries = map.count_entries();
-    for (int place = 0; place < map.places(); ++place) {
-      counts.operations[static_cast<std::size_t>(map.rank(place))] += shared[s][static_cast<std::size_t>(place)];
-      counts.entries[static_cast<std::size_t>(map.rank(place))] += static_cast<double>(entries[static_cast<std::size_t>(place)]);
+    const std::vector<FrontShare> shares = mapping.list_shares(front);
+    for (std::size_t place = 0; place < shares.size(); ++place) {
+      counts.operations[static_cast<std::size_t>(shares[place].rank)] += shared[s].operations[place];
+      counts.entries[static_cast<std::size_t>(shares[place].rank)] += static_cast<double>(shared[s].entries[place]);
     }
   }
   counts.path_operations = Replay(fronts, mapping, shared, false).run();
-  counts.gang_operations = Replay(fronts, mapping, shared, true).run();
   return counts;
 }
 
@@ -318,6 +313,7 @@ MappingCounts count_work(const std::vector<FrontCost>& fronts, const Mapping& ma
 
 MappingCounts count_mapping(const std::vector<FrontCost>& fronts, const Mapping& mapping) {
   MappingCounts counts = count_work(fronts, mapping);
+  counts.gang_operations = Replay(fronts, mapping, list_parts(fronts, mapping), true).run();
   const auto ranks = static_cast<std::size_t>(mapping.ranks());
   for (std::vector<double>* list : {&counts.messages, &counts.bytes, &counts.solve_messages, &counts.solve_bytes}) list->assign(ranks, 0.0);
   std::vector<std::int32_t> planned(ranks, 0);
@@ -375,7 +371,7 @@ Mapping choose_mapping(const std::vector<FrontCost>& fronts, int ranks) {
 }
 
 std::vector<std::int32_t> order_shared(const std::vector<FrontCost>& fronts, const Mapping& mapping) {
-  const SharedOperations shared = list_operations(fronts, mapping);
+  const std::vector<FrontParts> shared = list_parts(fronts, mapping);
   Replay replay(fronts, mapping, shared, false);
   replay.run();
   return replay.take_order();

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "precompute/comm/exchange.hpp"
+#include "precompute/comm/index_partition.hpp"
 #include "precompute/la/node_rows.hpp"
 
 namespace carillon::ldlt {
@@ -38,5 +40,14 @@ struct NodeLinks {
 
 /// The union of the patterns of K and M, in nodes. Throws InputError when their rows differ. Local.
 NodeLinks find_links(const NodeRows& k, const NodeRows& m);
+
+/// Values of ghosts, from their owners; own: (own_nodes). Collective.
+template <comm::Plain T>
+std::vector<T> fetch_ghosts(const comm::Communicator& comm, const NodeLinks& nodes, const comm::IndexPartition& owners,
+                            const std::vector<T>& own) {
+  return comm::query_owners<T>(
+      comm, nodes.ghosts, [&](std::int32_t node) { return owners.find_owner(node); },
+      [&](std::int32_t node) { return own[owners.to_local(node)]; });
+}
 
 }  // namespace carillon::ldlt

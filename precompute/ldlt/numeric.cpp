@@ -16,6 +16,7 @@
 #include "precompute/la/node_rows.hpp"
 #include "precompute/ldlt/kernels.hpp"
 #include "precompute/ldlt/shared.hpp"
+#include "precompute/ldlt/storage.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/base/error.hpp"
 
@@ -48,14 +49,14 @@ class Factoriser {
     block_ = Buffer(kMaxBlock * kMaxBlock);
     for (int parity = 0; parity < 2; ++parity) stack_[parity] = Buffer(plan.stack_entries[parity], Pages::kAtOnce);
     where_.assign(static_cast<std::size_t>(plan.local_nodes), -1);
-    slot_.assign(static_cast<std::size_t>(plan.links), -1);
+    slot_.assign(plan.node_of_link.size(), -1);
     requests_.reserve(plan.received.size() + plan.sent.size());
     for (const SentBlocks& list : plan.sent) sent_.emplace_back(9 * list.columns.size());
     for (const ReceivedBlocks& list : plan.received) received_.emplace_back(9 * list.count());
     block_at_.assign(plan.received.size(), 0);
     own_of_pivot_.assign(static_cast<std::size_t>(plan.pivot_nodes), -1);
     for (std::int32_t v = 0; v < plan.own_nodes; ++v) {
-      const std::int32_t node = plan.node_of_own[static_cast<std::size_t>(v)];
+      const std::int32_t node = plan.node_of_link[static_cast<std::size_t>(v)];
       if (node >= 0 && node < plan.pivot_nodes) own_of_pivot_[static_cast<std::size_t>(node)] = v;
     }
   }
@@ -69,7 +70,6 @@ class Factoriser {
       for (Buffer& stack : stack_) stack = Buffer();
       columns_ = Buffer();
       wide_ = Buffer();
-      return outcome_;
     });
   }
 
@@ -120,8 +120,8 @@ class Factoriser {
       if (node >= first) target[3 * where_[node] + column % 3] += factor * value;
     };
     rows.visit(
-        row, [&](PetscInt column, double value) { add(plan_.node_of_own[column / 3], column, value); },
-        [&](PetscInt ghost, double value) { add(ghosts[ghost], rows.ghosts()[ghost], value); });
+        row, [&](PetscInt column, double value) { add(plan_.node_of_link[column / 3], column, value); },
+        [&](PetscInt ghost, double value) { add(plan_.node_of_link[ghosts[ghost]], rows.ghosts()[ghost], value); });
   }
 
   void add_entries(const Front& front) {
@@ -132,8 +132,8 @@ class Factoriser {
       if (k_.has_blocks())
         add_node_rows(own, front.first, target);
       else
-        for (int d = 0; d < 3; ++d) add_row(k_, plan_.node_of_ghost_k, 3 * own + d, front.first, k_factor_, target + d * f_);
-      for (int d = 0; d < 3; ++d) add_row(m_, plan_.node_of_ghost_m, 3 * own + d, front.first, m_factor_, target + d * f_);
+        for (int d = 0; d < 3; ++d) add_row(k_, plan_.link_of_ghost_k, 3 * own + d, front.first, k_factor_, target + d * f_);
+      for (int d = 0; d < 3; ++d) add_row(m_, plan_.link_of_ghost_m, 3 * own + d, front.first, m_factor_, target + d * f_);
     }
   }
 
@@ -146,8 +146,8 @@ class Factoriser {
         for (int e = 0; e < 3; ++e) to[d * f_ + e] += k_factor_ * values[d][e];
     };
     k_.visit_blocks(
-        own, [&](PetscInt column, const double* const(&values)[3]) { add(plan_.node_of_own[column / 3], values); },
-        [&](PetscInt ghost, const double* const(&values)[3]) { add(plan_.node_of_ghost_k[ghost], values); });
+        own, [&](PetscInt column, const double* const(&values)[3]) { add(plan_.node_of_link[column / 3], values); },
+        [&](PetscInt ghost, const double* const(&values)[3]) { add(plan_.node_of_link[plan_.link_of_ghost_k[ghost]], values); });
   }
 
   /// Sends the 3x3 blocks that other ranks eliminate, and those of shared fronts.
@@ -274,7 +274,7 @@ class Factoriser {
     const double* columns[kMaxBlock];
     for (int k = 0; k < n; ++k) columns[k] = starts_[begin + pivots.order[k]];
     kernels_.trsm(columns, end, f_, n, triangle, wide_.data());
-    kernels_.scale_by_d_inverse(wide_.data(), 0, f_ - end, n, pivots, tiles, outcome_.growth);
+    kernels_.scale_by_d_inverse(wide_.data(), 0, f_ - end, n, pivots, tiles, numbers_.outcome.growth);
     kernels_.update({tiles, wide_.data(), n, end}, w_, f_, is_made, starts_.data());
     return tiles + static_cast<std::ptrdiff_t>(f_ - end) * n;
   }
@@ -283,7 +283,7 @@ class Factoriser {
     double* block = block_.data();
     for (int j = 0; j < n; ++j)
       for (int i = j; i < n; ++i) block[j * kMaxBlock + i] = block[i * kMaxBlock + j] = starts_[begin + j][begin + i];
-    outcome_.eliminate(kernels_, block, n, pivots, triangle);
+    numbers_.outcome.eliminate(kernels_, block, n, pivots, triangle);
   }
 
   static constexpr int kBlockTag = 1;
@@ -317,7 +317,6 @@ class Factoriser {
   std::vector<std::vector<double>> received_;
   std::vector<std::size_t> block_at_;
   Ints own_of_pivot_;  // (pivot_nodes) node of this rank's rows, -1: another's
-  Outcome outcome_;
   SharedFactoriser shared_;
 };
 
@@ -369,6 +368,7 @@ Numbers make_numbers(const Plan& plan) {
 
 void factorise_fronts(const Plan& plan, const la::Pencil& pencil, double sigma, Numbers& numbers) {
   ++numbers.generation;
+  numbers.outcome = {};
   std::unique_ptr<Factoriser> factoriser;
   comm::Communicator(plan.comm).agree([&] { factoriser = std::make_unique<Factoriser>(plan, pencil, sigma, numbers); });
   factoriser->run();

@@ -39,7 +39,7 @@ struct Numbers {
   std::vector<double> d_diagonal;   // the inverse of D: diagonal ...
   std::vector<double> d_off;        // ... and between a row and the next
   std::vector<std::uint8_t> order;  // of the pivots in their panels: BlockPivots::order
-  Outcome outcome;                  // of all ranks
+  Outcome outcome;                  // of this rank until a factorisation ends, then of all
   int generation = 0;               // how often it was factorised
 };
 

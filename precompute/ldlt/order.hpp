@@ -1,4 +1,4 @@
-// In which order the nodes are eliminated: a tree of separators over the ranks, and the fronts of each part of it.
+// In which order the nodes are eliminated: a tree of separators over the ranks.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +7,6 @@
 #include "precompute/comm/communicator.hpp"
 #include "precompute/comm/index_partition.hpp"
 #include "precompute/ldlt/node_links.hpp"
-#include "precompute/ldlt/symbolic.hpp"
 
 namespace carillon::ldlt {
 
@@ -17,6 +16,8 @@ struct TreePart {
   int begin = 0;
   int end = 1;
   int parent = -1;
+  int left = -1;  // parts below a separator
+  int right = -1;
   int depth = 0;
   std::int32_t first = 0;  // of its nodes, in the order of elimination
   std::int32_t count = 0;
@@ -25,33 +26,35 @@ struct TreePart {
 };
 
 /// All parts, children before parents; the same on every rank.
-struct SeparatorTree {
+class SeparatorTree {
+ public:
+  /// One leaf to a rank, no nodes.
+  explicit SeparatorTree(int ranks);
+
   std::vector<TreePart> parts;
   std::int32_t fronts = 0;
 
+  const TreePart& operator[](int part) const { return parts[static_cast<std::size_t>(part)]; }
+  int root() const { return static_cast<int>(parts.size()) - 1; }
+  /// Of the lowest leaf.
+  int depth() const { return depth_; }
+  /// Whether a part is in the left subtree below a separator, of which it is in one.
+  bool is_left_of(int part, int above) const { return (*this)[part].end <= (*this)[(*this)[above].right].begin; }
+  /// The lowest part above both, or one of them.
+  int find_common(int a, int b) const;
   /// The part of a position in the order of elimination.
   int find_part(std::int32_t position) const;
-  int find_holder(std::int32_t position) const { return parts[static_cast<std::size_t>(find_part(position))].begin; }
+  int find_holder(std::int32_t position) const { return (*this)[find_part(position)].begin; }
+
+ private:
+  int add(int begin, int end, int depth);
+  int depth_ = 0;
 };
 
-/// A part on the rank that holds it, eliminated on paper.
-struct HeldPart {
-  int part = 0;
-  Ints nodes;     // (count) global number of the node at each position
-  Forest forest;  // pivots and rows are positions of the whole order; `parent` is of this part, -1: see parents
-  Ints parents;   // (supernodes) parent front among all, -1: a root
-};
-
-/// Where all nodes stand, and the fronts that this rank holds.
-struct Elimination {
-  SeparatorTree tree;
-  Ints position;                // (own and ghost nodes) in the order of elimination
-  std::vector<HeldPart> parts;  // children before parents
-};
-
-/// Orders the nodes and finds the fronts. Parts of up to `largest_gathered` nodes are gathered on one rank and cut there; larger ones are
-/// cut by their quotient graph, and stay where they are. Collective. Throws SystemError on all ranks when memory runs out.
-Elimination eliminate_on_paper(const comm::Communicator& comm, const NodeLinks& nodes, const comm::IndexPartition& owners,
-                               std::int32_t largest_gathered = 300'000);
+/// The nodes (global numbers) of each part that this rank holds, in the order of elimination. Fills first and count of the parts. Parts of
+/// up to `largest_gathered` nodes are gathered on one rank and cut there; larger ones are cut by their quotient graph, and stay where they
+/// are. Collective. Throws SystemError on all ranks when memory runs out.
+std::vector<Ints> order_parts(const comm::Communicator& comm, const NodeLinks& nodes, const comm::IndexPartition& owners,
+                              SeparatorTree& tree, std::int32_t largest_gathered);
 
 }  // namespace carillon::ldlt

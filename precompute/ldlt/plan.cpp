@@ -1,11 +1,8 @@
-// Method:     The holders of the tree's parts report to all ranks what their fronts cost, subtrees of less than a few hundredths of a
-// rank's work
-//             as one; from that every rank makes the same mapping. Then each front goes to the rank that has it, or to those that share it,
-//             with its rows; what is a child of a shared front goes to all ranks of that front. So a rank knows its own subtrees and the
-//             shared fronts between them and the root. It asks the owners of the matrix rows for the pattern of the columns in which it has
-//             pivots or tiles. Update matrices lie on two stacks, by the parity of their depth: those of a front's children are on the
-//             other stack than its own, so an update matrix can be made while those of the children are read, and nothing is moved.
-// Source:     Liu 1992, The multifrontal method for sparse matrix solution (stacks); Pothen and Sun 1993 (mapping).
+// Method:     A rank knows its own subtrees and the shared fronts between them and the root (deal.cpp). It asks the owners of the matrix
+//             rows for the pattern of the columns in which it has pivots or tiles. Update matrices lie on two stacks, by the parity of
+//             their depth: those of a front's children are on the other stack than its own, so an update matrix can be made while those of
+//             the children are read, and nothing is moved.
+// Source:     Liu 1992, The multifrontal method for sparse matrix solution (stacks).
 // Deviations: two stacks in place of one.
 #include "precompute/ldlt/plan.hpp"
 
@@ -16,10 +13,9 @@
 #include "precompute/comm/exchange.hpp"
 #include "precompute/comm/index_partition.hpp"
 #include "precompute/la/node_rows.hpp"
-#include "precompute/ldlt/kernels.hpp"
+#include "precompute/ldlt/deal.hpp"
 #include "precompute/ldlt/lists.hpp"
-#include "precompute/ldlt/mapping.hpp"
-#include "precompute/ldlt/order.hpp"
+#include "precompute/ldlt/storage.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/base/error.hpp"
 
@@ -29,162 +25,6 @@ namespace {
 using comm::Communicator;
 using comm::IndexPartition;
 using petsc::check;
-
-constexpr double kWhole = 0.03;  // of a rank's work: a subtree of less is mapped as one
-
-/// A front, or a subtree as one, for the mapping.
-struct FrontRecord {
-  std::int32_t id, parent;
-  FrontCost cost;
-};
-
-/// The mapping of all fronts, as every rank makes it.
-struct SharedMapping {
-  Ints ids;  // of the fronts mapped, ascending
-  std::vector<FrontCost> costs;
-  Mapping mapping{{}, 1, 1};
-  Ints order;  // (ids) place among the shared fronts, -1: one rank has it
-
-  std::int32_t find(std::int32_t id) const {
-    const auto at = std::lower_bound(ids.begin(), ids.end(), id);
-    return at != ids.end() && *at == id ? static_cast<std::int32_t>(at - ids.begin()) : -1;
-  }
-};
-
-/// Which of a part's fronts are mapped: itself, or as the root of a whole subtree.
-struct Pruning {
-  std::vector<double> operations, entries;  // (supernodes) of the subtrees
-  std::vector<bool> is_whole;               // (supernodes)
-};
-
-Pruning prune(const HeldPart& held, bool is_leaf, double most_operations, double most_entries) {
-  const std::vector<Supernode>& nodes = held.forest.supernodes;
-  Pruning pruning{std::vector<double>(nodes.size(), 0.0), std::vector<double>(nodes.size(), 0.0), std::vector<bool>(nodes.size(), false)};
-  for (std::size_t s = 0; s < nodes.size(); ++s) {
-    pruning.operations[s] += count_flops(nodes[s].width, nodes[s].size());
-    pruning.entries[s] += static_cast<double>(count_entries(nodes[s].width, nodes[s].size()));
-    pruning.is_whole[s] = is_leaf && pruning.operations[s] < most_operations && pruning.entries[s] < most_entries;
-    if (nodes[s].parent < 0) continue;
-    pruning.operations[static_cast<std::size_t>(nodes[s].parent)] += pruning.operations[s];
-    pruning.entries[static_cast<std::size_t>(nodes[s].parent)] += pruning.entries[s];
-  }
-  return pruning;
-}
-
-/// Maps the fronts. owners: for each held part, who has each supernode; -1: it is shared. Collective.
-SharedMapping map_fronts(const Communicator& comm, const Elimination& all, std::vector<Ints>& owners) {
-  double total[2] = {0, 0};
-  for (const HeldPart& held : all.parts)
-    for (const Supernode& node : held.forest.supernodes) {
-      total[0] += count_flops(node.width, node.size());
-      total[1] += static_cast<double>(count_entries(node.width, node.size()));
-    }
-  comm.sum(std::span<double>(total));
-  std::vector<Pruning> prunings;
-  std::vector<FrontRecord> records = comm.all_gather([&] {
-    std::vector<FrontRecord> own;
-    for (const HeldPart& held : all.parts) {
-      const TreePart& part = all.tree.parts[static_cast<std::size_t>(held.part)];
-      const std::vector<Supernode>& nodes = held.forest.supernodes;
-      prunings.push_back(prune(held, part.is_leaf(), kWhole * total[0] / comm.size(), kWhole * total[1] / comm.size()));
-      const Pruning& pruning = prunings.back();
-      for (std::size_t s = 0; s < nodes.size(); ++s) {
-        if (nodes[s].parent >= 0 && pruning.is_whole[static_cast<std::size_t>(nodes[s].parent)]) continue;
-        FrontRecord& record = own.emplace_back();
-        record.id = part.first_front + static_cast<std::int32_t>(s);
-        record.parent = held.parents[s];
-        record.cost = {-1, nodes[s].width, static_cast<std::int32_t>(nodes[s].rows.size()),
-                       pruning.is_whole[s] ? pruning.operations[s] : count_flops(nodes[s].width, nodes[s].size()),
-                       pruning.is_whole[s] ? pruning.entries[s] : static_cast<double>(count_entries(nodes[s].width, nodes[s].size()))};
-      }
-    }
-    return own;
-  });
-  return comm.agree([&] {
-    SharedMapping shared;
-    std::sort(records.begin(), records.end(), [](const FrontRecord& a, const FrontRecord& b) { return a.id < b.id; });
-    for (const FrontRecord& record : records) shared.ids.push_back(record.id);
-    for (const FrontRecord& record : records) {
-      shared.costs.push_back(record.cost);
-      shared.costs.back().parent = record.parent < 0 ? -1 : shared.find(record.parent);
-    }
-    shared.mapping = choose_mapping(shared.costs, comm.size());
-    shared.order.assign(shared.ids.size(), -1);
-    const std::vector<std::int32_t> order = order_shared(shared.costs, shared.mapping);
-    for (std::size_t k = 0; k < order.size(); ++k) shared.order[static_cast<std::size_t>(order[k])] = static_cast<std::int32_t>(k);
-    for (std::size_t h = 0; h < all.parts.size(); ++h) {
-      const std::vector<Supernode>& nodes = all.parts[h].forest.supernodes;
-      Ints& owner = owners.emplace_back(nodes.size(), -1);
-      for (std::size_t s = nodes.size(); s-- > 0;) {
-        const std::int32_t at =
-            shared.find(all.tree.parts[static_cast<std::size_t>(all.parts[h].part)].first_front + static_cast<std::int32_t>(s));
-        owner[s] = at >= 0 ? shared.mapping.owner(at) : owner[static_cast<std::size_t>(nodes[s].parent)];
-      }
-    }
-    return shared;
-  });
-}
-
-/// A front on its way from the holder to those that have it or share it or its parent. Positions of the whole order.
-struct DealtFront {
-  std::int32_t id = 0;
-  std::int32_t parent = -1;
-  std::int32_t owner = -1;  // -1: shared
-  std::int32_t first = 0;
-  Ints nodes;  // (width) global numbers of the pivots
-  Ints rows;
-
-  std::int32_t width() const { return static_cast<std::int32_t>(nodes.size()); }
-};
-
-/// Sends each front to the ranks that have to know it. Result: ascending ids. Collective.
-std::vector<DealtFront> deal_fronts(const Communicator& comm, const Elimination& all, const SharedMapping& shared,
-                                    const std::vector<Ints>& owners) {
-  const auto received = comm::all_to_all(comm, [&] {
-    std::vector<Ints> lists(static_cast<std::size_t>(comm.size()));
-    for (std::size_t h = 0; h < all.parts.size(); ++h) {
-      const HeldPart& held = all.parts[h];
-      const TreePart& part = all.tree.parts[static_cast<std::size_t>(held.part)];
-      for (std::size_t s = 0; s < held.forest.supernodes.size(); ++s) {
-        const Supernode& node = held.forest.supernodes[s];
-        const std::int32_t above = held.parents[s] < 0 ? -1 : shared.find(held.parents[s]);
-        Ints ranks;
-        if (above >= 0 && shared.mapping.owner(above) < 0) {
-          for (const FrontShare& share : shared.mapping.list_shares(above)) ranks.push_back(share.rank);
-        } else if (owners[h][s] < 0) {
-          for (const FrontShare& share : shared.mapping.list_shares(shared.find(part.first_front + static_cast<std::int32_t>(s))))
-            ranks.push_back(share.rank);
-        }
-        if (owners[h][s] >= 0 && std::find(ranks.begin(), ranks.end(), owners[h][s]) == ranks.end()) ranks.push_back(owners[h][s]);
-        for (const std::int32_t rank : ranks) {
-          Ints& list = lists[static_cast<std::size_t>(rank)];
-          list.insert(list.end(), {part.first_front + static_cast<std::int32_t>(s), held.parents[s], owners[h][s], node.first, node.width,
-                                   static_cast<std::int32_t>(node.rows.size())});
-          const auto nodes = held.nodes.begin() + (node.first - part.first);
-          list.insert(list.end(), nodes, nodes + node.width);
-          list.insert(list.end(), node.rows.begin(), node.rows.end());
-        }
-      }
-    }
-    return join(lists);
-  });
-  return comm.agree([&] {
-    std::vector<DealtFront> fronts;
-    for (ListReader reader(received.items); !reader.is_at_end();) {
-      DealtFront& front = fronts.emplace_back();
-      front.id = reader.next();
-      front.parent = reader.next();
-      front.owner = reader.next();
-      front.first = reader.next();
-      const std::int32_t width = reader.next();
-      const std::int32_t rows = reader.next();
-      front.nodes = reader.take(width);
-      front.rows = reader.take(rows);
-    }
-    std::sort(fronts.begin(), fronts.end(), [](const DealtFront& a, const DealtFront& b) { return a.id < b.id; });
-    return fronts;
-  });
-}
 
 /// A column of A in which this rank has pivots: of its own fronts (front -1) or of a shared one.
 struct WantedColumn {
@@ -201,7 +41,6 @@ class PlanMaker {
 
   void add_fronts() {
     plan_.own_nodes = nodes_.own_nodes;
-    plan_.links = nodes_.count();
     add_own_fronts();
     add_shared_fronts();
     for (std::size_t s = plan_.fronts.size(); s-- > 0;) {
@@ -335,18 +174,8 @@ class PlanMaker {
       shared_dealt_.push_back(d);
       shared_nodes_.push_back(dealt.nodes);
       const auto rows = static_cast<std::int32_t>(dealt.rows.size());
-      plan_.shared.push_back(
-          {dealt.id, dealt.width(), rows, TileMap(dealt.width(), rows, list_shares(dealt)), 0, -1, -1, {}, {}, {}, {}, slot, {}, {}, {}});
-      SharedFront& front = plan_.shared.back();
-      front.place = front.map.find_place(plan_.rank);
-      front.row_begin.push_back(0);
-      for (int i = 0; i < front.map.tiles(); ++i) {
-        const bool has_row = front.map.has_row(front.place, i);
-        if (has_row) front.row_tiles.push_back(i);
-        if (front.map.has_column(front.place, i)) front.column_tiles.push_back(i);
-        front.row_begin.push_back(front.row_begin.back() + (has_row ? front.map.nodes(i) : 0));
-      }
-      for (int place_of = 0; place_of < front.map.places(); ++place_of) front.last_columns.push_back(front.map.find_last_column(place_of));
+      const SharedFront& front =
+          plan_.shared.emplace_back(dealt.id, dealt.width(), TileMap(dealt.width(), rows, list_shares(dealt)), plan_.rank, slot);
       slot += front.own_nodes();
     }
     plan_.given_slots = slot;
@@ -528,24 +357,14 @@ Analysis::Rank measure(Plan& plan) {
   for (const SharedFront& front : plan.shared) {
     own.entries += front.map.count_entries()[static_cast<std::size_t>(front.place)];
     own.flops += front.map.count_operations()[static_cast<std::size_t>(front.place)];
-    std::int64_t update = 0;  // tiles behind the pivots: they go to the parent
-    for (const int j : front.column_tiles)
-      for (const int i : front.row_tiles) {
-        if (i < j) continue;
-        const std::int64_t tile = 9 * std::int64_t{front.map.nodes(i)} * front.map.nodes(j);
-        (j < front.map.pivot_tiles() ? factor : update) += tile;
-      }
     const std::int64_t numbers = front.map.count_numbers(front.place);
+    const std::int64_t update = front.map.count_numbers(front.place, front.map.pivot_tiles());  // goes to the parent
+    factor += numbers - update;
     const std::int64_t panels = std::int64_t{4} * 3 * kPanelNodes * 3 * (front.own_nodes() + std::int64_t{kWideRows});
     peak = std::max(peak, waiting + 2 * numbers + panels);  // its tiles, and what its children send for them
     waiting += update;
     for (const SharedChild& child : front.children)
-      if (child.shared >= 0)
-        for (const int j : plan.shared[static_cast<std::size_t>(child.shared)].column_tiles)
-          for (const int i : plan.shared[static_cast<std::size_t>(child.shared)].row_tiles)
-            if (i >= j && j >= plan.shared[static_cast<std::size_t>(child.shared)].map.pivot_tiles())
-              waiting -= 9 * std::int64_t{plan.shared[static_cast<std::size_t>(child.shared)].map.nodes(i)} *
-                         plan.shared[static_cast<std::size_t>(child.shared)].map.nodes(j);
+      if (child.shared >= 0) waiting -= child.map.count_numbers(child.map.find_place(plan.rank), child.map.pivot_tiles());
   }
   std::int64_t blocks = 0;
   for (const SentBlocks& list : plan.sent) blocks += 9 * static_cast<std::int64_t>(list.columns.size());
@@ -580,19 +399,18 @@ void gather_analysis(Plan& plan, const Analysis::Rank& own, const Communicator& 
 
 }  // namespace
 
-std::int64_t count_stored(std::int32_t width, std::int32_t size) {
-  std::int64_t stored = 0;
-  for (std::int32_t p = 0; p < count_panels(width); ++p) {
-    const std::int64_t end = find_panel_start(width, p + 1);
-    const std::int64_t nodes = end - find_panel_start(width, p);
-    stored += count_triangle(3 * nodes) + 9 * nodes * (size - end);
+SharedFront::SharedFront(std::int32_t id_, std::int32_t width_, TileMap map_, int rank, std::int32_t first_slot_)
+    : id(id_), width(width_), map(std::move(map_)), place(map.find_place(rank)), first_slot(first_slot_) {
+  row_begin.push_back(0);
+  for (int i = 0; i < map.tiles(); ++i) {
+    if (map.has_column(place, i)) column_tiles.push_back(i);
+    row_begin.push_back(row_begin.back() + (map.has_row(place, i) ? map.nodes(i) : 0));
   }
-  return stored;
-}
-
-std::int64_t count_wide(std::int32_t width, std::int32_t size) {
-  const std::int64_t panel = std::min(width, kPanelNodes);
-  return 3 * panel * (3 * static_cast<std::int64_t>(size) + kWideRows);
+  for (int other = 0; other < map.places(); ++other) last_columns.push_back(map.find_last_column(other));
+  for (int k = 0; k < map.pivot_tiles(); ++k) {
+    row_places.push_back(map.list_row(k));
+    column_places.push_back(map.list_column(k));
+  }
 }
 
 Plan make_plan(Mat stiffness, Mat mass) {
@@ -626,15 +444,12 @@ Plan make_plan(Mat stiffness, Mat mass) {
   const Analysis::Rank own = comm.agree([&] {
     const NodeRows k(stiffness);
     const NodeRows m(mass);
-    for (std::int32_t v = 0; v < nodes.own_nodes; ++v) plan.node_of_own.push_back(maker.find_local(position[static_cast<std::size_t>(v)]));
-    const auto find_ghosts = [&](const NodeRows& rows, Ints& links, Ints& locals) {
-      for (PetscInt g = 0; g < rows.ghost_count(); ++g) {
-        links.push_back(nodes.find_ghost(rows.ghosts()[g] / 3));
-        locals.push_back(maker.find_local(position[static_cast<std::size_t>(links.back())]));
-      }
+    for (const std::int32_t at : position) plan.node_of_link.push_back(maker.find_local(at));
+    const auto find_ghosts = [&](const NodeRows& rows, Ints& links) {
+      for (PetscInt g = 0; g < rows.ghost_count(); ++g) links.push_back(nodes.find_ghost(rows.ghosts()[g] / 3));
     };
-    find_ghosts(k, plan.link_of_ghost_k, plan.node_of_ghost_k);
-    find_ghosts(m, plan.link_of_ghost_m, plan.node_of_ghost_m);
+    find_ghosts(k, plan.link_of_ghost_k);
+    find_ghosts(m, plan.link_of_ghost_m);
     return measure(plan);
   });
   gather_analysis(plan, own, comm);

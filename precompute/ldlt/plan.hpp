@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "precompute/ldlt/factor.hpp"
-#include "precompute/ldlt/kernels.hpp"
 #include "precompute/ldlt/node_links.hpp"
 #include "precompute/ldlt/symbolic.hpp"
 #include "precompute/ldlt/tile_map.hpp"
@@ -56,21 +55,23 @@ struct Piece {
 
 /// A front in tiles that several ranks share.
 struct SharedFront {
+  SharedFront(std::int32_t id, std::int32_t width, TileMap map, int rank, std::int32_t first_slot);
+
   std::int32_t id = 0;  // among all fronts
   std::int32_t width = 0;
-  std::int32_t rows = 0;
   TileMap map;
   int place = 0;             // of this rank in the map
   std::int32_t parent = -1;  // among the shared fronts; the root has none
   std::int32_t place_in_parent = -1;
   std::vector<SharedChild> children;
-  std::vector<int> row_tiles;             // those where this rank has its rows
-  std::vector<int> column_tiles;          // those where it has its columns
-  Ints row_begin;                         // (tiles + 1) nodes of its rows before each tile
-  std::int32_t first_slot = 0;            // of its rows in a workspace of the solves
-  std::vector<int> last_columns;          // (places) the last column of tiles in which each has one, -1: none
-  std::vector<SumMessage> from_children;  // what its ranks have summed up for rows that are collected here, in the order of arrival
-  std::vector<SumMessage> to_parent;      // what this rank has summed up for rows behind the pivots, by where it is collected
+  std::vector<int> column_tiles;                // those where it has its columns
+  Ints row_begin;                               // (tiles + 1) nodes of its rows before each tile
+  std::int32_t first_slot = 0;                  // of its rows in a workspace of the solves
+  std::vector<int> last_columns;                // (places) the last column of tiles in which each has one, -1: none
+  std::vector<std::vector<int>> row_places;     // (pivot tiles) TileMap::list_row
+  std::vector<std::vector<int>> column_places;  // (pivot tiles) TileMap::list_column
+  std::vector<SumMessage> from_children;        // what its ranks have summed up for rows that are collected here, in the order of arrival
+  std::vector<SumMessage> to_parent;            // what this rank has summed up for rows behind the pivots, by where it is collected
 
   std::int32_t own_nodes() const { return row_begin.back(); }
   /// Place of tile j among the column tiles; pre: it is one.
@@ -155,12 +156,9 @@ struct Plan {
   std::int32_t given_slots = 0;  // the first of those that go to other ranks
   std::int32_t slots = 0;
   Ints slot_of_own;                 // (own_nodes)
-  Ints node_of_own;                 // (own_nodes) local node, -1: none
-  Ints node_of_ghost_k;             // (ghost columns of K) local node, -1: none
-  Ints node_of_ghost_m;             // the same for M
+  Ints node_of_link;                // (own nodes and ghosts) local node, -1: none
   Ints link_of_ghost_k;             // (ghost columns of K) number among own nodes and ghosts
   Ints link_of_ghost_m;             // the same for M
-  std::int32_t links = 0;           // own nodes and ghosts
   std::vector<Front> fronts;        // in postorder
   std::vector<SharedFront> shared;  // in the order in which all ranks go through theirs, children before parents
   std::vector<SentBlocks> sent;
@@ -173,34 +171,5 @@ struct Plan {
 
 /// Plans everything. Collective; throws as Factor's constructor.
 Plan make_plan(Mat stiffness, Mat mass);
-
-/// Pivot nodes eliminated at a time, and how `width` pivot nodes are cut into such panels.
-inline constexpr std::int32_t kPanelNodes = 24;
-inline std::int32_t count_panels(std::int32_t width) { return (width + kPanelNodes - 1) / kPanelNodes; }
-/// First pivot node of panel p. Panels are nearly equal; all but the first have a multiple of 4 nodes, so that tiles of 12 rows behind a
-/// panel also begin where the update matrix does.
-inline std::int32_t find_panel_start(std::int32_t width, std::int32_t p) {
-  const std::int64_t quads = (static_cast<std::int64_t>(width) + 3) / 4;
-  const std::int32_t panels = count_panels(width);
-  return p == 0 ? 0 : width - 4 * static_cast<std::int32_t>(quads * (panels - p) / panels);
-}
-/// Numbers stored of a front: of each panel a triangle and the rows below.
-std::int64_t count_stored(std::int32_t width, std::int32_t size);
-/// Room for the W of one of its panels.
-std::int64_t count_wide(std::int32_t width, std::int32_t size);
-
-/// Where strip b of an update matrix of r rows begins.
-inline std::int64_t find_strip(std::int64_t r, std::int64_t b) { return kStripColumns * (b * r - kStripColumns * (b * (b - 1) / 2)); }
-/// Numbers stored of it.
-inline std::int64_t count_update(std::int64_t r) {
-  const std::int64_t whole = r / kStripColumns;
-  const std::int64_t rest = r - whole * kStripColumns;
-  return find_strip(r, whole) + rest * rest;
-}
-/// Where row 0 of column j would be.
-inline std::int64_t find_update_column(std::int64_t r, std::int64_t j) {
-  const std::int64_t first = j / kStripColumns * kStripColumns;
-  return find_strip(r, j / kStripColumns) + (j - first) * (r - first) - first;
-}
 
 }  // namespace carillon::ldlt

@@ -1,3 +1,4 @@
+// One state machine, whose fronts, panels and letters every step changes together; longer than most files.
 // Method:     Right-looking L D L^T of a front in tiles. The owner of a diagonal tile factorises it with pivoting inside it and sends
 //             L11^-1 and D down its column; the owners of the column make W = A21 P^T L11^-T and L21 = W D^-1 and send W to those who
 //             have tiles in the same rows, or in the columns of that number; each updates its own tiles, the next column first, so that
@@ -9,10 +10,10 @@
 #include "precompute/ldlt/shared.hpp"
 
 #include <algorithm>
-#include <cstring>
 #include <new>
 
 #include "precompute/comm/communicator.hpp"
+#include "precompute/ldlt/storage.hpp"
 
 namespace carillon::ldlt {
 namespace {
@@ -27,33 +28,22 @@ constexpr std::int64_t kPivotNumbers = 2 * kMaxBlock;
 
 std::int64_t count_strips(std::int64_t rows) { return (rows + kWideRows - 1) / kWideRows * kWideRows; }
 
-/// Rows of strips of n columns to a block in columns, and back.
-void copy_from_strips(const double* wide, int n, std::int64_t first, std::int64_t rows, double* block) {
+/// Calls copy(in the strip, in the block, numbers) for the runs of some rows of strips of n columns, and of a block in columns.
+template <typename Strips, typename Block, typename Copy>
+void for_strip_runs(Strips* wide, int n, std::int64_t first, std::int64_t rows, Block* block, Copy&& copy) {
   for (int k = 0; k < n; ++k, block += rows)
     for (std::int64_t r = 0; r < rows;) {
       const std::int64_t at = first + r;
       const std::int64_t run = std::min<std::int64_t>(kWideRows - at % kWideRows, rows - r);
-      std::memcpy(block + r, wide + at / kWideRows * kWideRows * n + std::int64_t{k} * kWideRows + at % kWideRows,
-                  sizeof(double) * static_cast<std::size_t>(run));
+      copy(wide + at / kWideRows * kWideRows * n + std::int64_t{k} * kWideRows + at % kWideRows, block + r, run);
       r += run;
     }
+}
+void copy_from_strips(const double* wide, int n, std::int64_t first, std::int64_t rows, double* block) {
+  for_strip_runs(wide, n, first, rows, block, [](const double* from, double* to, std::int64_t count) { std::copy_n(from, count, to); });
 }
 void copy_to_strips(const double* block, int n, std::int64_t first, std::int64_t rows, double* wide) {
-  for (int k = 0; k < n; ++k, block += rows)
-    for (std::int64_t r = 0; r < rows;) {
-      const std::int64_t at = first + r;
-      const std::int64_t run = std::min<std::int64_t>(kWideRows - at % kWideRows, rows - r);
-      std::memcpy(wide + at / kWideRows * kWideRows * n + std::int64_t{k} * kWideRows + at % kWideRows, block + r,
-                  sizeof(double) * static_cast<std::size_t>(run));
-      r += run;
-    }
-}
-
-/// Calls visit(i) for the tiles of column k below the diagonal that place `from` has and place `to` needs: as its rows or as its columns.
-template <typename Visit>
-void for_rows(const SharedFront& front, int k, int from, int to, Visit&& visit) {
-  for (int i = k + 1; i < front.map.tiles(); ++i)
-    if (front.map.owner(i, k) == from && (front.map.has_row(to, i) || front.map.has_column(to, i))) visit(i);
+  for_strip_runs(wide, n, first, rows, block, [](double* to, const double* from, std::int64_t count) { std::copy_n(from, count, to); });
 }
 
 }  // namespace
@@ -76,14 +66,10 @@ SharedFactoriser::SharedFactoriser(const Plan& plan, Numbers& numbers, const std
   }
 }
 
-void SharedFactoriser::run(const std::function<Outcome()>& factorise_own) {
+void SharedFactoriser::run(const std::function<void()>& factorise_own) {
   const comm::Communicator comm(plan_.comm);
   try {
-    const Outcome own = factorise_own();
-    outcome_.negative += own.negative;
-    outcome_.smallest = std::min(outcome_.smallest, own.smallest);
-    outcome_.growth = std::max(outcome_.growth, own.growth);
-    outcome_.is_complete = outcome_.is_complete && own.is_complete;
+    factorise_own();
     work_off();
   } catch (const std::bad_alloc&) {
     has_failed_ = true;
@@ -110,7 +96,7 @@ void SharedFactoriser::work_off() {
 }
 
 void SharedFactoriser::drain() {
-  double extremes[3] = {-outcome_.smallest, outcome_.growth, outcome_.is_complete ? 0.0 : 1.0};
+  double extremes[3] = {-numbers_.outcome.smallest, numbers_.outcome.growth, numbers_.outcome.is_complete ? 0.0 : 1.0};
   double all_extremes[3] = {};
   std::int64_t negative = 0;
   MPI_Request requests[2] = {MPI_REQUEST_NULL, MPI_REQUEST_NULL};
@@ -127,7 +113,7 @@ void SharedFactoriser::drain() {
     if (!mailbox_.release()) continue;
     if (!is_reducing) {
       MPI_Iallreduce(extremes, all_extremes, 3, MPI_DOUBLE, MPI_MAX, plan_.comm, &requests[0]);
-      MPI_Iallreduce(&outcome_.negative, &negative, 1, MPI_INT64_T, MPI_SUM, plan_.comm, &requests[1]);
+      MPI_Iallreduce(&numbers_.outcome.negative, &negative, 1, MPI_INT64_T, MPI_SUM, plan_.comm, &requests[1]);
       is_reducing = true;
     }
     MPI_Testall(2, requests, &is_over, MPI_STATUSES_IGNORE);
@@ -194,9 +180,8 @@ bool SharedFactoriser::eliminate_lead(const SharedFront& front, Work& work, std:
     ++work.lead;
     return true;
   }
-  const bool is_updated = work.panel >= k ||
-                          (work.panel == k - 1 && work.next < front.column_tiles.size() && front.column_tiles[work.next] > k) ||
-                          (work.panel == k - 1 && work.next >= front.column_tiles.size());
+  const bool is_updated =
+      work.panel >= k || (work.panel == k - 1 && (work.next >= front.column_tiles.size() || front.column_tiles[work.next] > k));
   if (!is_updated) return false;
   if (front.map.owner(k, k) == front.place) {
     eliminate_diagonal(front, work, f, k);
@@ -228,14 +213,11 @@ void SharedFactoriser::eliminate_diagonal(const SharedFront& front, Work& work, 
   }
   BlockPivots pivots;
   double* triangle = numbers_.panels.data() + panel.triangle;
-  outcome_.eliminate(kernels_, block, n, pivots, triangle);
+  numbers_.outcome.eliminate(kernels_, block, n, pivots, triangle);
   std::copy_n(pivots.diagonal, n, numbers_.d_diagonal.begin() + panel.pivots);
   std::copy_n(pivots.off, n, numbers_.d_off.begin() + panel.pivots);
   std::copy_n(pivots.order, n, numbers_.order.begin() + panel.pivots);
-  std::vector<bool> is_below(static_cast<std::size_t>(front.map.places()), false);
-  for (int i = k + 1; i < front.map.tiles(); ++i) is_below[static_cast<std::size_t>(front.map.owner(i, k))] = true;
-  for (int place = 0; place < front.map.places(); ++place) {
-    if (!is_below[static_cast<std::size_t>(place)] || place == front.place) continue;
+  for (const int place : front.column_places[static_cast<std::size_t>(k)]) {
     Letter letter({kDiagonal, front.id, front.place, k}, 3 * std::int64_t{n} + count_triangle(n));
     double* to = std::copy_n(pivots.diagonal, n, letter.numbers());
     to = std::copy_n(pivots.off, n, to);
@@ -276,7 +258,7 @@ void SharedFactoriser::eliminate_column(const SharedFront& front, Work& work, st
   }
   send_rows(front, k, pivots, letter, wide);
   double* tiles = numbers_.panels.data() + numbers_.shared[static_cast<std::size_t>(f)][static_cast<std::size_t>(k)].tiles;
-  kernels_.scale_by_d_inverse(wide, 0, end - begin, n, pivots, tiles, outcome_.growth);
+  kernels_.scale_by_d_inverse(wide, 0, end - begin, n, pivots, tiles, numbers_.outcome.growth);
   if (update == nullptr) return;
   update->pivots = pivots;
   update->wide = wide;
@@ -297,13 +279,13 @@ void SharedFactoriser::send_rows(const SharedFront& front, int k, const BlockPiv
       continue;
     }
     std::int64_t rows = 0;
-    for_rows(front, k, front.place, place, [&](int i) { rows += 3 * front.map.nodes(i); });
+    front.map.for_needed(k, front.place, place, [&](int i) { rows += 3 * front.map.nodes(i); });
     if (rows == 0) continue;
     Letter part({kPanel, front.id, front.place, k}, kPivotNumbers + rows * n);
     std::copy_n(pivots.diagonal, n, part.numbers());
     std::copy_n(pivots.off, n, part.numbers() + kMaxBlock);
     double* to = part.numbers() + kPivotNumbers;
-    for_rows(front, k, front.place, place, [&](int i) {
+    front.map.for_needed(k, front.place, place, [&](int i) {
       const std::int64_t height = 3 * std::int64_t{front.map.nodes(i)};
       copy_from_strips(wide, n, find_first_row(front, i) - begin, height, to);
       to += height * n;
@@ -328,9 +310,7 @@ SharedFactoriser::Update& SharedFactoriser::find_update(const SharedFront& front
   for (int place = 0; place < front.map.places(); ++place) {
     if (!front.map.has_column(place, k)) continue;
     bool has_rows = false;
-    for (int i = k + 1; i < front.map.tiles() && !has_rows; ++i)
-      has_rows = front.map.owner(i, k) == place &&
-                 (place == front.place || front.map.has_row(front.place, i) || front.map.has_column(front.place, i));
+    front.map.for_needed(k, place, front.place, [&](int) { has_rows = true; });
     update.missing += has_rows ? 1 : 0;
   }
   return update;
@@ -339,7 +319,7 @@ SharedFactoriser::Update& SharedFactoriser::find_update(const SharedFront& front
 /// Puts rows that came from another rank where this rank's rows and columns need them.
 void SharedFactoriser::add_rows(const SharedFront& front, Update& update, int k, int from, const double* rows) {
   const int n = 3 * front.map.nodes(k);
-  for_rows(front, k, from, front.place, [&](int i) {
+  front.map.for_needed(k, from, front.place, [&](int i) {
     const std::int64_t height = 3 * std::int64_t{front.map.nodes(i)};
     if (front.map.has_row(front.place, i))
       copy_to_strips(rows, n, find_first_row(front, i) - find_first_row(front, k + 1), height, update.rows.data());

@@ -20,9 +20,9 @@ class SharedFactoriser {
   /// blocks: what came of A, as plan.received lists it. Both must outlive it.
   SharedFactoriser(const Plan& plan, Numbers& numbers, const std::vector<std::vector<double>>& blocks);
 
-  /// Does the own fronts, then the shared ones, and sets the outcome of all. Collective. Throws SystemError on all ranks when memory runs
-  /// out on one, after all messages have been taken.
-  void run(const std::function<Outcome()>& factorise_own);
+  /// Does the own fronts, then the shared ones, and makes the outcome that of all ranks. Collective. Throws SystemError on all ranks when
+  /// memory runs out on one, after all messages have been taken.
+  void run(const std::function<void()>& factorise_own);
 
   /// Where the first row of node a is in column c of an update matrix; the rows of nodes in the same tile follow.
   using FindRows = std::function<const double*(std::int32_t a, std::int64_t c)>;
@@ -96,7 +96,6 @@ class SharedFactoriser {
   std::vector<Work> works_;
   std::map<std::int32_t, std::int32_t> shared_of_id_;
   Buffer block_;
-  Outcome outcome_;
   int left_ = 0;  // fronts that are not done
   bool has_failed_ = false;
 };

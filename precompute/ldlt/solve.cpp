@@ -14,6 +14,7 @@
 
 #include "precompute/ldlt/kernels.hpp"
 #include "precompute/ldlt/numeric.hpp"
+#include "precompute/ldlt/storage.hpp"
 
 namespace carillon::ldlt {
 namespace {
@@ -243,23 +244,7 @@ class Solver {
     return slots;
   }
 
-  /// The places other than the owner of the diagonal tile that have tiles in row k before it, or in column k behind it.
-  static Ints list_row(const SharedFront& front, int k) {
-    return list_places(front, k, 0, k, [&](int j) { return front.map.owner(k, j); });
-  }
-  static Ints list_column(const SharedFront& front, int k) {
-    return list_places(front, k, k + 1, front.map.tiles(), [&](int i) { return front.map.owner(i, k); });
-  }
-  template <typename FindOwner>
-  static Ints list_places(const SharedFront& front, int k, int begin, int end, FindOwner&& find_owner) {
-    Ints places;
-    for (int i = begin; i < end; ++i) places.push_back(find_owner(i));
-    std::sort(places.begin(), places.end());
-    places.erase(std::unique(places.begin(), places.end()), places.end());
-    std::erase(places, front.map.owner(k, k));
-    return places;
-  }
-  static bool contains(const Ints& places, int place) { return std::binary_search(places.begin(), places.end(), place); }
+  static bool contains(const std::vector<int>& places, int place) { return std::binary_search(places.begin(), places.end(), place); }
 
   /// Multiplies rows of column k by the solution there and subtracts that: the tiles from `begin` on, of this rank's nodes.
   void subtract_column(const SharedFront& front, const double* tiles, int k, std::int32_t begin, std::int32_t end,
@@ -282,11 +267,11 @@ class Solver {
       const SharedPanel& panel = numbers_.shared[f][static_cast<std::size_t>(k)];
       const int home = front.map.owner(k, k);
       const int n = 3 * front.map.nodes(k);
-      const Ints column = list_column(front, k);
+      const std::vector<int>& column = front.column_places[static_cast<std::size_t>(k)];
       std::vector<const double*> in;
       if (home == front.place) {
         const Ints slots = list_slots(front, k);
-        for (const std::int32_t place : list_row(front, k))
+        for (const std::int32_t place : front.row_places[static_cast<std::size_t>(k)])
           receive(front.map.rank(place), find_tag(front.id, kAlongRow), slots, Arrival::kIsAdded);
         for (const Block& block : blocks_) {
           double* own = find_row(block, slots.front());
@@ -303,7 +288,7 @@ class Solver {
       const std::int32_t next = k + 1 < front.map.pivot_tiles() ? front.row_begin[static_cast<std::size_t>(k) + 2] : begin;
       const double* tiles = numbers_.panels.data() + panel.tiles;
       if (!in.empty()) subtract_column(front, tiles, k, begin, next, in);
-      if (k + 1 < front.map.pivot_tiles() && contains(list_row(front, k + 1), front.place))
+      if (k + 1 < front.map.pivot_tiles() && contains(front.row_places[static_cast<std::size_t>(k) + 1], front.place))
         send(front.map.rank(front.map.owner(k + 1, k + 1)), find_tag(front.id, kAlongRow), list_slots(front, k + 1));
       if (!in.empty()) subtract_column(front, tiles, k, next, front.own_nodes(), in);
     }
@@ -319,7 +304,7 @@ class Solver {
       const SharedPanel& panel = numbers_.shared[f][static_cast<std::size_t>(k)];
       const bool is_home = front.map.owner(k, k) == front.place;
       const int n = 3 * front.map.nodes(k);
-      const Ints column = list_column(front, k);
+      const std::vector<int>& column = front.column_places[static_cast<std::size_t>(k)];
       const bool has_column = is_home || contains(column, front.place);
       std::vector<double*> sums = has_column ? clear_sums(n) : std::vector<double*>();
       if (is_home)
@@ -330,7 +315,7 @@ class Solver {
       const std::int32_t next = k + 1 < front.map.pivot_tiles() ? front.row_begin[static_cast<std::size_t>(k) + 2] : begin;
       const double* tiles = numbers_.panels.data() + panel.tiles;
       if (has_column) subtract_rows(front, tiles, k, next, front.own_nodes(), sums);
-      if (k + 1 < front.map.pivot_tiles() && contains(list_row(front, k + 1), front.place))
+      if (k + 1 < front.map.pivot_tiles() && contains(front.row_places[static_cast<std::size_t>(k) + 1], front.place))
         receive(front.map.rank(front.map.owner(k + 1, k + 1)), find_tag(front.id, kAlongRow), list_slots(front, k + 1), Arrival::kIsSet);
       if (has_column) subtract_rows(front, tiles, k, begin, next, sums);
       if (!is_home) {
@@ -349,7 +334,8 @@ class Solver {
         for (int c = 0; c < n; ++c)
           copy_row(solution + c * width, width, own + numbers_.order[static_cast<std::size_t>(panel.pivots + c)] * width);
       }
-      for (const std::int32_t place : list_row(front, k)) send(front.map.rank(place), find_tag(front.id, kAlongRow), slots);
+      for (const std::int32_t place : front.row_places[static_cast<std::size_t>(k)])
+        send(front.map.rank(place), find_tag(front.id, kAlongRow), slots);
     }
     for (const SumMessage& sums : front.from_children) send_sums(sums, kSolutions);
   }

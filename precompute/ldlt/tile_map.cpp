@@ -7,8 +7,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
-#include "precompute/ldlt/plan.hpp"
+#include "precompute/ldlt/storage.hpp"
 
 namespace carillon::ldlt {
 namespace {
@@ -91,6 +92,25 @@ int TileMap::find_last_column(int place) const {
   return column;
 }
 
+std::vector<int> TileMap::list_others(std::vector<int> places, int k) const {
+  std::sort(places.begin(), places.end());
+  places.erase(std::unique(places.begin(), places.end()), places.end());
+  std::erase(places, owner(k, k));
+  return places;
+}
+
+std::vector<int> TileMap::list_row(int k) const {
+  std::vector<int> places;
+  for (int j = 0; j < k; ++j) places.push_back(owner(k, j));
+  return list_others(std::move(places), k);
+}
+
+std::vector<int> TileMap::list_column(int k) const {
+  std::vector<int> places;
+  for (int i = k + 1; i < tiles(); ++i) places.push_back(owner(i, k));
+  return list_others(std::move(places), k);
+}
+
 std::vector<double> TileMap::count_operations() const {
   std::vector<double> operations(ranks_.size(), 0.0);
   for (int j = 0; j < tiles(); ++j) {
@@ -112,9 +132,9 @@ std::vector<std::int64_t> TileMap::count_entries() const {
   return entries;
 }
 
-std::int64_t TileMap::count_numbers(int place) const {
+std::int64_t TileMap::count_numbers(int place, int first) const {
   std::int64_t numbers = 0;
-  for (int j = 0; j < tiles(); ++j)
+  for (int j = first; j < tiles(); ++j)
     for (int i = j; has_column(place, j) && i < tiles(); ++i)
       if (has_row(place, i)) numbers += 9 * std::int64_t{nodes(i)} * nodes(j);
   return numbers;

@@ -44,6 +44,16 @@ class TileMap {
   bool has_whole_columns() const { return row_owner_.size() == ranks_.size(); }
   /// The last column in which a place has a tile, -1: none.
   int find_last_column(int place) const;
+  /// The places other than that of the diagonal tile with tiles in row k before it, and in column k behind it; ascending.
+  std::vector<int> list_row(int k) const;
+  std::vector<int> list_column(int k) const;
+  /// Calls visit(i) for the tiles of column k below the diagonal that place `from` has and place `to` needs for its updates: in its rows,
+  /// or as its columns.
+  template <typename Visit>
+  void for_needed(int k, int from, int to, Visit&& visit) const {
+    for (int i = k + 1; i < tiles(); ++i)
+      if (owner(i, k) == from && (has_row(to, i) || has_column(to, i))) visit(i);
+  }
   /// Where what is to be subtracted from row i of a right-hand side is collected: the place of the diagonal tile, or behind the pivots that
   /// of the last pivot column.
   int home(int i) const { return i < pivot_tiles_ ? owner(i, i) : owner(i, pivot_tiles_ - 1); }
@@ -51,11 +61,12 @@ class TileMap {
   /// Operations of a factorisation and entries of L and D, of each place.
   std::vector<double> count_operations() const;
   std::vector<std::int64_t> count_entries() const;
-  /// Numbers of all its tiles.
-  std::int64_t count_numbers(int place) const;
+  /// Numbers of a place's tiles in the columns from `first` on.
+  std::int64_t count_numbers(int place, int first = 0) const;
 
  private:
   double cost(int i, int j) const;
+  std::vector<int> list_others(std::vector<int> places, int k) const;
 
   std::vector<std::int32_t> starts_;  // (tiles + 1)
   int pivot_tiles_ = 0;

@@ -300,10 +300,13 @@ TEST(factor, says_before_the_work_what_it_will_take) {
   const Analysis& analysis = factor.get_analysis();
   ASSERT_EQ(static_cast<int>(analysis.ranks.size()), find_ranks());
   std::int64_t entries = 0;
+  double flops = 0;
   for (const Analysis::Rank& rank : analysis.ranks) {
     entries += rank.entries;
     EXPECT_GE(rank.peak_bytes, 8 * rank.entries);
+    flops += rank.flops;
   }
+  EXPECT_NEAR(flops, analysis.flops, 1e-12 * flops);
   EXPECT_EQ(entries, analysis.entries);
   const auto n = static_cast<std::int64_t>(pencil.dense_k.rows());
   EXPECT_LE(analysis.entries, n * (n + 1) / 2);

@@ -1,6 +1,4 @@
 // The order of elimination and its fronts against elimination by sets, on any number of ranks.
-#include "precompute/ldlt/order.hpp"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,6 +6,7 @@
 #include <vector>
 
 #include "precompute/comm/exchange.hpp"
+#include "precompute/ldlt/elimination.hpp"
 #include "precompute/petsc/session.hpp"
 
 namespace carillon::ldlt {

@@ -3,10 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
 #include <numeric>
 #include <set>
+#include <utility>
 
 #include "precompute/ldlt/kernels.hpp"
+#include "precompute/ldlt/plan.hpp"
 #include "precompute/ldlt/symbolic.hpp"
 
 namespace carillon::ldlt {
@@ -86,6 +89,51 @@ TEST(TileMap, knows_the_last_column_where_a_rank_has_a_tile) {
           if (map.owner(i, j) == place) last = j;
       EXPECT_EQ(map.find_last_column(place), last);
     }
+  }
+}
+
+/// A child of 40 pivots whose 130 rows lie here and there in a parent of 90 pivots and 150 rows.
+SharedChild make_child(const std::vector<FrontShare>& shares) {
+  SharedChild child{TileMap(40, 130, shares), 40, {}, {}, -1, -1};
+  for (std::int32_t a = 0; a < 130; ++a) child.node_of_row.push_back(a < 60 ? a : 60 + (a - 60) * 5 / 2);
+  return child;
+}
+
+TEST(TileMap, an_update_matrix_goes_to_the_parent_whole_and_each_number_once) {
+  for (const int below : {1, 2, 4, 9})
+    for (const int above : {2, 5, 16}) {
+      const SharedChild child = make_child(make_equal(below));
+      const TileMap parent(90, 150, make_equal(above));
+      std::int64_t numbers = 0;
+      std::set<std::pair<std::int32_t, std::int32_t>> seen;
+      for (int from = 0; from < below; ++from)
+        for (int to = 0; to < above; ++to)
+          for_pieces(child, from, parent, to, [&](const Piece& piece) {
+            numbers += piece.count();
+            for (std::int32_t b = piece.b_begin; b < piece.b_end; ++b)
+              for (std::int32_t a = std::max(piece.a_begin, piece.a_begin == piece.b_begin ? b : piece.a_begin); a < piece.a_end; ++a) {
+                EXPECT_TRUE(seen.emplace(a, b).second);
+                const auto row = child.node_of_row[static_cast<std::size_t>(a)], column = child.node_of_row[static_cast<std::size_t>(b)];
+                EXPECT_EQ(parent.owner(parent.find_tile(row), parent.find_tile(column)), to);
+                EXPECT_EQ(child.map.owner(child.map.find_tile(40 + a), child.map.find_tile(40 + b)), from);
+              }
+          });
+      EXPECT_EQ(numbers, 390 * 391 / 2);
+      EXPECT_EQ(seen.size(), 130U * 131 / 2);
+    }
+}
+
+TEST(TileMap, every_part_of_a_sum_goes_to_one_place_of_the_parent) {
+  const SharedChild child = make_child(make_equal(9));
+  const TileMap parent(90, 150, make_equal(16));
+  for (int from = 0; from < 9; ++from) {
+    std::map<std::int32_t, int> sent;
+    for (int to = 0; to < 16; ++to)
+      for_sums(child, from, parent, to, [&](std::int32_t a) {
+        ++sent[a];
+        EXPECT_TRUE(parent.has_row(to, parent.find_tile(child.node_of_row[static_cast<std::size_t>(a)])));
+      });
+    for (std::int32_t a = 0; a < 130; ++a) EXPECT_EQ(sent[a], child.map.has_row(from, child.map.find_tile(40 + a)) ? 1 : 0);
   }
 }
 

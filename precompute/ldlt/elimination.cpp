@@ -1,0 +1,291 @@
+// Method:     From the leaves up: a leaf or a subtree hands on the rows of its roots as elements of the quotient graph, and the holder of
+// the
+//             separator above eliminates it behind them; so no rank sees more than the parts that it holds. Positions are those of
+//             order_parts at first; as each part is put in postorder they move, and all who use them ask for the last ones.
+// Source:     Duff and Reid 1983 (elements of the quotient graph).
+// Deviations: fronts of different parts are not merged.
+#include "precompute/ldlt/elimination.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "precompute/comm/exchange.hpp"
+#include "precompute/ldlt/lists.hpp"
+
+namespace carillon::ldlt {
+namespace {
+
+using comm::Communicator;
+using comm::IndexPartition;
+using partition::Graph;
+
+/// Where a node stands in the order of elimination.
+struct Position {
+  std::int32_t node, position;
+};
+
+/// What a subtree leaves behind: the rows of one of its roots, and which front that is.
+struct Element {
+  std::int32_t part = 0;
+  std::int32_t supernode = 0;
+  Ints rows;  // positions, ascending
+};
+
+/// Eliminates a part on paper. links: of each of its positions those behind, and of a leaf all. Elements that have no row in the part go
+/// to `left` as they are, the roots of the part too; `parents` gets the front above each element.
+class PartEliminator {
+ public:
+  PartEliminator(const TreePart& part, HeldPart& held, const Ragged& links, std::vector<Element>& elements)
+      : part_(part), held_(held), links_(links), elements_(elements) {}
+
+  /// above: (elements) the supernode above each, -1: none here.
+  std::vector<Element> run(Ints& above) {
+    find_boundary();
+    const auto hubs = static_cast<std::int32_t>(elements_.size());
+    held_.forest = find_supernodes(make_graph(), hubs, part_.count);
+    above = held_.forest.element_parents;
+    std::vector<Element> left;
+    for (std::size_t h = 0; h < elements_.size(); ++h)
+      if (above[h] < 0 && !elements_[h].rows.empty()) left.push_back(std::move(elements_[h]));
+    Ints ordered(held_.nodes.size());
+    for (std::size_t k = 0; k < ordered.size(); ++k) ordered[static_cast<std::size_t>(held_.forest.position[k])] = held_.nodes[k];
+    held_.nodes = std::move(ordered);
+    for (std::size_t s = 0; s < held_.forest.supernodes.size(); ++s) {
+      Supernode& node = held_.forest.supernodes[s];
+      node.first += part_.first;
+      for (std::int32_t& row : node.rows)
+        row = row < part_.count ? part_.first + row : boundary_[static_cast<std::size_t>(row - part_.count)];
+      if (node.parent < 0 && !node.rows.empty()) left.push_back({held_.part, static_cast<std::int32_t>(s), node.rows});
+    }
+    return left;
+  }
+
+ private:
+  void find_boundary() {
+    const std::int32_t behind = part_.first + part_.count;
+    for (const std::int32_t to : links_.items)
+      if (to >= behind) boundary_.push_back(to);
+    for (const Element& element : elements_)
+      for (const std::int32_t row : element.rows)
+        if (row >= behind) boundary_.push_back(row);
+    std::sort(boundary_.begin(), boundary_.end());
+    boundary_.erase(std::unique(boundary_.begin(), boundary_.end()), boundary_.end());
+  }
+
+  /// Elements, pivots, boundary.
+  Graph make_graph() const {
+    const auto hubs = static_cast<std::int32_t>(elements_.size());
+    const std::int32_t behind = part_.first + part_.count;
+    const auto find = [&](std::int32_t position) {
+      if (position < behind) return hubs + position - part_.first;
+      const auto at = std::lower_bound(boundary_.begin(), boundary_.end(), position) - boundary_.begin();
+      return hubs + part_.count + static_cast<std::int32_t>(at);
+    };
+    std::vector<Ints> inward(static_cast<std::size_t>(part_.count) + boundary_.size());  // of pivots: elements; of the boundary: pivots too
+    Graph graph;
+    graph.offsets.push_back(0);
+    const auto close = [&] { graph.offsets.push_back(static_cast<std::int32_t>(graph.neighbours.size())); };
+    for (std::int32_t h = 0; h < hubs; ++h) {
+      for (const std::int32_t row : elements_[static_cast<std::size_t>(h)].rows) {
+        graph.neighbours.push_back(find(row));
+        inward[static_cast<std::size_t>(find(row) - hubs)].push_back(h);
+      }
+      close();
+    }
+    for (std::int32_t p = 0; p < part_.count; ++p) {
+      const Ints& near = inward[static_cast<std::size_t>(p)];
+      graph.neighbours.insert(graph.neighbours.end(), near.begin(), near.end());
+      for (const std::int32_t* to = links_.begin(p); to != links_.end(p); ++to) {
+        if (*to < part_.first) continue;  // in a subtree below: an element stands for it
+        graph.neighbours.push_back(find(*to));
+        if (*to >= behind) inward[static_cast<std::size_t>(find(*to) - hubs)].push_back(hubs + p);
+      }
+      close();
+    }
+    for (std::size_t b = static_cast<std::size_t>(part_.count); b < inward.size(); ++b) {
+      graph.neighbours.insert(graph.neighbours.end(), inward[b].begin(), inward[b].end());
+      close();
+    }
+    return graph;
+  }
+
+  const TreePart& part_;
+  HeldPart& held_;
+  const Ragged& links_;
+  std::vector<Element>& elements_;
+  Ints boundary_;
+};
+
+/// Links of the nodes of each held part, by position. Collective.
+std::vector<Ragged> send_links(const Communicator& comm, const NodeLinks& nodes, const Elimination& all) {
+  const auto received = comm::all_to_all(comm, [&] {
+    std::vector<Ints> lists(static_cast<std::size_t>(comm.size()));
+    for (std::int32_t v = 0; v < nodes.own_nodes; ++v) {
+      const std::int32_t position = all.position[static_cast<std::size_t>(v)];
+      Ints& list = lists[static_cast<std::size_t>(all.tree.find_holder(position))];
+      list.insert(list.end(),
+                  {position, nodes.links.offsets[static_cast<std::size_t>(v) + 1] - nodes.links.offsets[static_cast<std::size_t>(v)]});
+      for (const std::int32_t* u = nodes.links.begin(v); u != nodes.links.end(v); ++u)
+        list.push_back(all.position[static_cast<std::size_t>(*u)]);
+    }
+    return join(lists);
+  });
+  return comm.agree([&] {
+    std::vector<Ragged> links(all.parts.size());
+    std::vector<std::vector<std::size_t>> at(all.parts.size());
+    std::vector<std::size_t> held_of(all.tree.parts.size(), 0);
+    for (std::size_t h = 0; h < all.parts.size(); ++h) {
+      at[h].assign(static_cast<std::size_t>(all.tree.parts[static_cast<std::size_t>(all.parts[h].part)].count), 0);
+      held_of[static_cast<std::size_t>(all.parts[h].part)] = h;
+    }
+    for (ListReader reader(received.items); !reader.is_at_end();) {
+      const std::int32_t position = reader.next();
+      const auto part = static_cast<std::size_t>(all.tree.find_part(position));
+      at[held_of[part]][static_cast<std::size_t>(position - all.tree.parts[part].first)] = reader.place();
+      reader.skip(reader.next());
+    }
+    for (std::size_t h = 0; h < links.size(); ++h)
+      for (const std::size_t place : at[h]) {
+        const std::int32_t* list = received.items.data() + place;
+        links[h].items.insert(links[h].items.end(), list + 1, list + 1 + *list);
+        links[h].close();
+      }
+    return links;
+  });
+}
+
+/// The front above each root, as (part, supernode) of both.
+struct Above {
+  std::int32_t part, supernode, above_part, above_supernode;
+};
+
+std::vector<Above> eliminate_parts(const Communicator& comm, Elimination& all, const std::vector<Ragged>& links) {
+  std::vector<Above> found;
+  std::vector<Element> elements;  // for the part that comes next
+  for (int depth = all.tree.depth(); depth >= 0; --depth) {
+    const auto received = comm::all_to_all(comm, [&] {
+      std::vector<Ints> lists(static_cast<std::size_t>(comm.size()));
+      for (std::size_t h = 0; h < all.parts.size(); ++h) {
+        HeldPart& held = all.parts[h];
+        const TreePart& part = all.tree[held.part];
+        if (part.depth != depth) continue;
+        Ints above;
+        std::vector<Element> arrived = std::exchange(elements, {});
+        std::vector<Element> named;
+        for (const Element& element : arrived) named.push_back({element.part, element.supernode, {}});
+        const std::vector<Element> left = PartEliminator(part, held, links[h], arrived).run(above);
+        for (std::size_t k = 0; k < named.size(); ++k)
+          if (above[k] >= 0) found.push_back({named[k].part, named[k].supernode, held.part, above[k]});
+        for (const Element& element : left) {
+          Ints& list = lists[static_cast<std::size_t>(all.tree[part.parent].begin)];
+          list.insert(list.end(), {element.part, element.supernode, static_cast<std::int32_t>(element.rows.size())});
+          list.insert(list.end(), element.rows.begin(), element.rows.end());
+        }
+      }
+      return join(lists);
+    });
+    comm.agree([&] {
+      for (ListReader reader(received.items); !reader.is_at_end();) {
+        Element& element = elements.emplace_back();
+        element.part = reader.next();
+        element.supernode = reader.next();
+        element.rows = reader.take(reader.next());
+      }
+    });
+  }
+  return found;
+}
+
+/// Numbers the fronts, and reports to the holder of each root which front is above it. Collective.
+void link_parts(const Communicator& comm, Elimination& all, const std::vector<Above>& found) {
+  Ints counts(all.tree.parts.size(), 0);
+  for (const HeldPart& held : all.parts)
+    counts[static_cast<std::size_t>(held.part)] = static_cast<std::int32_t>(held.forest.supernodes.size());
+  comm.sum(std::span<std::int32_t>(counts));
+  all.tree.fronts = 0;
+  for (std::size_t t = 0; t < counts.size(); ++t) {
+    all.tree.parts[t].first_front = all.tree.fronts;
+    all.tree.fronts += counts[t];
+  }
+  const auto first_front = [&](std::int32_t part) { return all.tree.parts[static_cast<std::size_t>(part)].first_front; };
+  const auto reported =
+      comm::all_to_all(comm, found, [&](const Above& one) { return all.tree.parts[static_cast<std::size_t>(one.part)].begin; });
+  comm.agree([&] {
+    for (HeldPart& held : all.parts) {
+      held.parents.clear();
+      for (const Supernode& node : held.forest.supernodes)
+        held.parents.push_back(node.parent < 0 ? -1 : first_front(held.part) + node.parent);
+      for (const Above& one : reported.items)
+        if (one.part == held.part)
+          held.parents[static_cast<std::size_t>(one.supernode)] = first_front(one.above_part) + one.above_supernode;
+    }
+  });
+}
+
+/// The last places of positions that the holders of their parts have moved. Collective.
+Ints find_moved(const Communicator& comm, const Elimination& all, const Ints& positions) {
+  std::vector<const HeldPart*> held_of(all.tree.parts.size(), nullptr);
+  for (const HeldPart& held : all.parts) held_of[static_cast<std::size_t>(held.part)] = &held;
+  return comm::query_owners<std::int32_t>(
+      comm, positions, [&](std::int32_t position) { return all.tree.find_holder(position); },
+      [&](std::int32_t position) {
+        const auto part = static_cast<std::size_t>(all.tree.find_part(position));
+        const std::int32_t first = all.tree.parts[part].first;
+        return first + held_of[part]->forest.position[static_cast<std::size_t>(position - first)];
+      });
+}
+
+}  // namespace
+
+Elimination eliminate_on_paper(const Communicator& comm, const NodeLinks& nodes, const IndexPartition& owners,
+                               std::int32_t largest_gathered) {
+  Elimination all = comm.agree([&] { return Elimination(comm.size()); });
+  std::vector<Ints> placed = order_parts(comm, nodes, owners, all.tree, largest_gathered);
+  const auto reported = comm::all_to_all(
+      comm,
+      [&] {
+        std::vector<Position> list;
+        for (std::size_t t = 0; t < placed.size(); ++t) {
+          std::int32_t position = all.tree.parts[t].first;
+          for (const std::int32_t node : placed[t]) list.push_back({node, position++});
+          if (all.tree.parts[t].begin != comm.rank()) continue;
+          HeldPart& held = all.parts.emplace_back();
+          held.part = static_cast<int>(t);
+          held.nodes = std::move(placed[t]);
+        }
+        return list;
+      },
+      [&](const Position& one) { return owners.find_owner(one.node); });
+  comm.agree([&] {
+    all.position.assign(static_cast<std::size_t>(nodes.own_nodes), -1);
+    for (const Position& one : reported.items) all.position[owners.to_local(one.node)] = one.position;
+  });
+  const Ints ghosts = fetch_ghosts(comm, nodes, owners, all.position);
+  all.position.insert(all.position.end(), ghosts.begin(), ghosts.end());
+  link_parts(comm, all, eliminate_parts(comm, all, send_links(comm, nodes, all)));
+
+  // Positions as they are after the fronts have been found.
+  Ints asked = all.position;
+  for (const HeldPart& held : all.parts) {
+    const TreePart& part = all.tree.parts[static_cast<std::size_t>(held.part)];
+    for (const Supernode& node : held.forest.supernodes)
+      for (const std::int32_t row : node.rows)
+        if (row >= part.first + part.count) asked.push_back(row);
+  }
+  const Ints known = find_moved(comm, all, asked);
+  comm.agree([&] {
+    std::copy_n(known.begin(), all.position.size(), all.position.begin());
+    auto next = known.begin() + static_cast<std::ptrdiff_t>(all.position.size());
+    for (HeldPart& held : all.parts) {
+      const TreePart& part = all.tree.parts[static_cast<std::size_t>(held.part)];
+      for (Supernode& node : held.forest.supernodes) {
+        for (std::int32_t& row : node.rows)
+          if (row >= part.first + part.count) row = *next++;
+        std::sort(node.rows.begin(), node.rows.end());
+      }
+    }
+  });
+  return all;
+}
+
+}  // namespace carillon::ldlt
