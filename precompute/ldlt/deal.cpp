@@ -1,6 +1,5 @@
-// Method:     The holders of the tree's parts report to all ranks what their fronts cost, subtrees of less than a few hundredths of a
-// rank's
-//             work as one; from that every rank makes the same mapping. Then each front goes to those who have to know it, with its rows.
+// Method:     The holders of the tree's parts report to all ranks what their fronts cost, small subtrees as one; from that every rank
+//             makes the same mapping. Then each front goes to those who have to know it, with its rows.
 // Source:     Pothen and Sun 1993 (mapping.cpp).
 // Deviations: none.
 #include "precompute/ldlt/deal.hpp"

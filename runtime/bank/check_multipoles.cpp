@@ -16,12 +16,11 @@
 namespace carillon::bank {
 namespace {
 
-constexpr double kOutside = 1e-4;        // of the radius
-constexpr double kMaxDetuning = 0.4;     // of the frequency that is played, for the mass of the air
-constexpr double kMassTolerance = 1e-6;  // of the modal mass of a mode in air
-constexpr double kRootTolerance = 1e-9;  // of the root of a decay, for arithmetic
-constexpr double kMaxAir = 1e5;          // kg/m^3, m/s: beyond any gas
-constexpr double kMaxLengthM = 1e7, kMaxHz = 1e12, kMaxDecayPerS = 1e32;
+constexpr double kOutside = 1e-4;             // of the radius
+constexpr double kMaxDetuning = 0.4;          // of the frequency that is played, for the mass of the air
+constexpr double kModalMassTolerance = 1e-6;  // of the modal mass of a mode in air
+constexpr double kRootTolerance = 1e-9;       // of the root of a decay, for arithmetic
+constexpr double kMaxAir = 1e5;               // kg/m^3, m/s: beyond any gas
 
 void check_sphere(const Bank& bank, Faults& faults) {
   const Multipoles& air = bank.multipoles;
@@ -64,7 +63,7 @@ std::int32_t check_mixing(const Multipoles& air, Faults& faults) {
     for (std::int32_t k = 0; k < air.mixing.count[i]; ++k, ++at) squares += air.mixing.part[at] * air.mixing.part[at];
     most = std::max(most, air.mixing.count[i]);
     const double mass = squares * (1.0 + air.added_mass[i]);
-    if (!(std::abs(mass - 1.0) <= kMassTolerance))
+    if (!(std::abs(mass - 1.0) <= kModalMassTolerance))
       faults.add("the parts of mode {} (radiation/mixing_part) have a modal mass of {:.9g} in air, and it is 1", i, mass);
   }
   return most;

@@ -30,10 +30,7 @@ constexpr double kResidualLimit = 1e-4;
 constexpr double kLawTolerance = 1e-9;   // of quantities that were computed by the same formula
 constexpr double kMassTolerance = 0.01;  // mass against density times volume
 constexpr double kShareTolerance = 1e-6;
-// Bounds that no body reaches. Lengths: from a nanometre to a small planet. Frequency and damping: what a job may ask for at most.
-constexpr double kMinLengthM = 1e-9, kMaxLengthM = 1e7, kFarthestM = 1e12;  // sizes; how far from the origin
-constexpr double kMaxHz = 1e12;
-constexpr double kMaxDecayPerS = 1e32;  // alpha1 of 1e6 s at that frequency
+constexpr double kMinLengthM = 1e-9, kFarthestM = 1e12;  // sizes; how far from the origin
 constexpr double kMaxAlpha1S = 1e6, kMaxAlpha2PerS = 1e12;
 // A mode of unit modal mass that moves only the share s of the body's mass has |phi| = 1 / sqrt(s m) there.
 constexpr double kMinShare = 1e-12;

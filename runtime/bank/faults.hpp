@@ -11,6 +11,9 @@
 
 namespace carillon::bank {
 
+// Bounds that no body reaches: a small planet; what a job may ask for at most; alpha1 of 1e6 s at that frequency.
+inline constexpr double kMaxLengthM = 1e7, kMaxHz = 1e12, kMaxDecayPerS = 1e32;
+
 /// The first three faults in full, the others counted.
 class Faults {
  public:

@@ -16,10 +16,10 @@
 namespace carillon::bank {
 namespace {
 
-constexpr std::int32_t kLeaf = 6;       // triangles
-constexpr int kDeepest = 64;            // halving 2^31 triangles takes 31 levels
-constexpr double kMinArea = 1e-14;      // of a triangle: its height over its length, squared
-constexpr double kSlack = 1.0 - 1e-12;  // of a squared distance: more than its rounding
+constexpr std::int32_t kLeaf = 6;          // triangles
+constexpr int kDeepest = 64;               // halving 2^31 triangles takes 31 levels
+constexpr double kMinArea = 1e-14;         // of a triangle: its height over its length, squared
+constexpr double kRounding = 1.0 - 1e-12;  // of a squared distance: more than its rounding
 
 /// How far along (a, b), 0 to 1, the point nearest to p lies.
 double find_along(const Vec3& p, const Vec3& a, const Vec3& b) {
@@ -158,7 +158,7 @@ NearestPlace SurfaceTree::find(const Vec3& point_m) const noexcept {
   stack[static_cast<std::size_t>(depth++)] = weigh(0);
   while (depth > 0) {
     const Waiting next = stack[static_cast<std::size_t>(--depth)];
-    if (next.square * kSlack > min) continue;
+    if (next.square * kRounding > min) continue;
     const Box& box = boxes_[static_cast<std::size_t>(next.box)];
     if (box.count > 0) {
       for (std::int32_t i = box.first; i < box.first + box.count; ++i)

@@ -13,7 +13,7 @@ namespace carillon::base {
 namespace {
 
 /// A file in `folder` that is gone with its descriptor; -1 and errno when there is none.
-int open_nameless(const std::filesystem::path& folder) {
+int open_unlinked(const std::filesystem::path& folder) {
   const int descriptor = ::open(folder.c_str(), O_RDWR | O_TMPFILE | O_CLOEXEC, 0600);
   if (descriptor >= 0) return descriptor;
   // Where the file system has no files without a name (NFS), the name lives for a moment.
@@ -67,7 +67,7 @@ void Spool::write_tail() {
       folder_ = std::filesystem::temp_directory_path(error);
       if (error) folder_ = ".";
     }
-    descriptor_ = open_nameless(folder_);
+    descriptor_ = open_unlinked(folder_);
     if (descriptor_ < 0) refuse(errno);
     memory_ = std::clamp<std::size_t>(memory_, 1, kTail);  // from now on memory is only there to write in large pieces
   }

@@ -21,9 +21,9 @@
 namespace carillon::host {
 namespace {
 
-constexpr double kLongestS = 1.0;    // of one blow, and of what overlaps with it
-constexpr double kMinCosine = 0.05;  // of the way to the surface: flatter is past it
-constexpr double kDeepM = 0.05;      // that a felt goes in
+constexpr double kLongestBlowS = 1.0;  // of one blow, and of what overlaps with it
+constexpr double kMinCosine = 0.05;    // of the way to the surface: flatter is past it
+constexpr double kDeepM = 0.05;        // that a felt goes in
 
 double calc_energy(double mass_kg, const Vec3& v) { return 0.5 * mass_kg * dot(v, v); }
 
@@ -108,14 +108,14 @@ std::span<const double> find_shape(const Head& head, const impact::Modes* modes)
 }
 
 /// Lets the impact run to its end. A blow that comes meanwhile joins it: its head is so far away as it flies until its time. `next`: of the
-/// strikes, sorted by time. False when a head still presses after kLongestS.
+/// strikes, sorted by time. False when a head still presses after kLongestBlowS.
 bool run_to_end(impact::Impact& impact, std::vector<Head>& heads, const std::vector<Mallets::Strike>& strikes, std::size_t& next,
                 const bank::Bank& bank, const impact::Modes* modes) {
   const double begin_s = heads[0].strike->from->time_s;
   while (true) {
-    const double until_s = next < strikes.size() ? strikes[next].from->time_s - begin_s : kLongestS;
-    const bool ended = impact.advance(std::min(until_s - impact.get_step_length(), kLongestS));
-    if (ended || next == strikes.size() || until_s > kLongestS) return ended;
+    const double until_s = next < strikes.size() ? strikes[next].from->time_s - begin_s : kLongestBlowS;
+    const bool ended = impact.advance(std::min(until_s - impact.get_step_length(), kLongestBlowS));
+    if (ended || next == strikes.size() || until_s > kLongestBlowS) return ended;
     Head head = make_head(strikes[next++], bank, static_cast<int>(heads.size()) + 1);
     head.contact.gap_m = std::max(0.0, until_s - impact.get_time()) * -dot(head.spot.normal, head.body.velocity_m_s);
     head.contact.shape_b = find_shape(head, modes);
@@ -189,7 +189,7 @@ void Mallets::play(const SceneBody& body, const bank::Bank& bank, std::vector<St
     impact::Impact impact({struck, heads[0].body}, {heads[0].contact});
     if (!run_to_end(impact, heads, strikes, next, bank, modes)) {
       warnings.push_back(fmt::format("{}: the mallet still presses on \"{}\" after {:g} s; the rest is left out",
-                                     heads[0].strike->from->place, body.name, kLongestS));
+                                     heads[0].strike->from->place, body.name, kLongestBlowS));
     }
     const std::vector<impact::Body> after = impact.get_bodies();
     const impact::Books books = impact.get_books();

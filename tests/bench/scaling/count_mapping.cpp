@@ -92,13 +92,11 @@ std::vector<double> count_peaks(const std::vector<ldlt::FrontCost>& fronts, cons
     const auto s = static_cast<std::size_t>(front);
     const ldlt::TileMap map(fronts[s].width, fronts[s].rows, mapping.list_shares(front));
     std::vector<double>& update = updates[s];
-    update.assign(static_cast<std::size_t>(map.places()), 0.0);
-    for (int j = map.pivot_tiles(); j < map.tiles(); ++j)
-      for (int i = j; i < map.tiles(); ++i) update[static_cast<std::size_t>(map.owner(i, j))] += 9.0 * map.nodes(i) * map.nodes(j);
     for (int place = 0; place < map.places(); ++place) {
       Alive& rank = ranks[static_cast<std::size_t>(map.rank(place))];
       rank.peak = std::max(rank.peak, rank.sent + 2 * static_cast<double>(map.count_numbers(place)));
-      rank.sent += update[static_cast<std::size_t>(place)];
+      update.push_back(static_cast<double>(map.count_numbers(place, map.pivot_tiles())));
+      rank.sent += update.back();
     }
     for (const std::int32_t child : children[s]) {
       const std::vector<double>& done = updates[static_cast<std::size_t>(child)];

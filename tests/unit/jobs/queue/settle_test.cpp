@@ -74,7 +74,6 @@ TEST_F(Settle, a_job_whose_folder_is_of_another_is_not_retried) {
   EXPECT_EQ(registry_.find(make_id(1))->state, JobState::failed);
 }
 
-}  // namespace
 TEST_F(Settle, a_process_that_was_not_started_for_the_row_gets_no_signal) {
   queue::LocalLauncher launcher(store_, {});
   Job job{make_id(1)};
@@ -103,4 +102,5 @@ TEST_F(Settle, a_process_that_was_not_started_for_the_row_gets_no_signal) {
   EXPECT_FALSE(launcher.is_attempt_of(job, found));
 }
 
+}  // namespace
 }  // namespace carillon::tests

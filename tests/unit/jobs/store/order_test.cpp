@@ -25,7 +25,7 @@ std::string simulation_of(const std::string& mesh, const std::string& simulate =
          "}" + rest + "}";
 }
 
-std::string find_id(const std::filesystem::path& job, const std::string& simulator = kSimulator) {
+std::string find_order_id(const std::filesystem::path& job, const std::string& simulator = kSimulator) {
   return store::RequestMaker(kSolver, simulator).make(store::read_order(job)).id;
 }
 
@@ -33,7 +33,7 @@ TEST(Order, is_the_same_simulation_in_other_words) {
   const Folder folder;
   folder.write("m.msh", "$MeshFormat\n");
   folder.write("elsewhere/deep/other name.msh", "$MeshFormat\n");
-  const std::string id = find_id(folder.write("a.json", simulation_of("m.msh")));
+  const std::string id = find_order_id(folder.write("a.json", simulation_of("m.msh")));
   const std::pair<const char*, std::string> same[] = {
       {"another folder", "elsewhere/deep/a.json|" + simulation_of("other name.msh")},
       {"other names of files", "b.json|" + simulation_of("m.msh", "", ", \"sound\": \"x/y.wav\"")},
@@ -42,7 +42,7 @@ TEST(Order, is_the_same_simulation_in_other_words) {
       {"comments", "b.json|// a job\n" + simulation_of("m.msh", " // here\n")},
   };
   store::testing::expect_same(
-      folder, [](const auto& job) { return find_id(job); }, id, same);
+      folder, [](const auto& job) { return find_order_id(job); }, id, same);
 }
 
 TEST(Order, is_another_simulation_for_all_that_changes_its_files) {
@@ -63,8 +63,8 @@ TEST(Order, is_another_simulation_for_all_that_changes_its_files) {
       {"one more file", simulation_of("m.msh", "", ", \"sound\": \"a.wav\", \"motion\": \"a.vtkhdf\"")},
   };
   auto ids = store::testing::expect_different(
-      folder, [](const auto& job) { return find_id(job); }, others);
-  EXPECT_TRUE(ids.insert(find_id(folder.write("a.json", simulation_of("m.msh")), "carillon-simulate 0.2.0 (abc)")).second);
+      folder, [](const auto& job) { return find_order_id(job); }, others);
+  EXPECT_TRUE(ids.insert(find_order_id(folder.write("a.json", simulation_of("m.msh")), "carillon-simulate 0.2.0 (abc)")).second);
 }
 
 TEST(Order, work_is_a_simulation_of_the_copies_in_the_store) {

@@ -52,7 +52,7 @@ TetMesh make_cube(int n) {
   return mesh;
 }
 
-std::string refusal(TetMesh mesh) {
+std::string find_refusal(TetMesh mesh) {
   try {
     check_mesh(mesh, "body.msh");
   } catch (const InputError& error) {
@@ -62,7 +62,7 @@ std::string refusal(TetMesh mesh) {
 }
 
 void expect_refusal(const TetMesh& mesh, std::initializer_list<const char*> words) {
-  const std::string message = refusal(mesh);
+  const std::string message = find_refusal(mesh);
   EXPECT_TRUE(message.starts_with("body.msh: ")) << message;
   for (const char* word : words) EXPECT_NE(message.find(word), std::string::npos) << word << " is not in: " << message;
 }

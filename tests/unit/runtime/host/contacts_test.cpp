@@ -69,54 +69,54 @@ Difference compare(const Heard& a, const Heard& b) {
 }
 
 /// Contacts of a body without a single strike.
-struct Case {
+struct Contacts {
   const char* name;
   std::function<std::vector<events::Event>()> list_events;
 };
 
-const std::vector<Case> kCases{{"a slide that stops and lies",
-                                [] {
-                                  std::vector<events::Event> events;
-                                  for (int i = 0; i <= 400; ++i) {
-                                    const double t = 0.1 + 2e-3 * i;
-                                    events.emplace_back(make_contact(t, 1, std::max(0.0, 0.8 * (1.0 - (t - 0.1) / 0.7)), 2.0));
-                                  }
-                                  return events;
-                                }},
-                               {"a scrape that is lifted",
-                                [] {
-                                  std::vector<events::Event> events;
-                                  for (int i = 0; i <= 200; ++i)
-                                    events.emplace_back(make_contact(0.1 + 2e-3 * i, 1, 0.3 + 0.2 * std::sin(0.1 * i), 10.0));
-                                  events::LastingContact end = make_contact(0.502, 1, 0.3, 0.0);
-                                  end.state = events::ContactState::kEnd;
-                                  events.emplace_back(end);
-                                  return events;
-                                }},
-                               {"a roll of two contacts, of which one ends early",
-                                [] {
-                                  std::vector<events::Event> events;
-                                  for (int i = 0; i <= 300; ++i) {
-                                    for (const std::uint64_t id : {1, 2}) {
-                                      if (id == 2 && i > 100) continue;
-                                      events::LastingContact c = make_contact(0.1 + 2e-3 * i, id, 0.0, 3.0);
-                                      c.sweep_m_s = c.other_sweep_m_s = 0.5;
-                                      c.patch_radius_m = 10e-6;
-                                      if (i == 300 || (id == 2 && i == 100)) c.state = events::ContactState::kEnd;
-                                      events.emplace_back(c);
-                                    }
-                                  }
-                                  return events;
-                                }},
-                               {"rare records of a slow scrape", [] {
-                                  std::vector<events::Event> events;
-                                  for (int i = 0; i <= 4; ++i) events.emplace_back(make_contact(0.1 + 0.3 * i, 1, 0.05, 5.0));
-                                  for (const double t : {1.34, 1.6}) events.emplace_back(make_contact(t, 1, 0.0, 5.0));
-                                  return events;
-                                }}};
+const std::vector<Contacts> kCases{{"a slide that stops and lies",
+                                    [] {
+                                      std::vector<events::Event> events;
+                                      for (int i = 0; i <= 400; ++i) {
+                                        const double t = 0.1 + 2e-3 * i;
+                                        events.emplace_back(make_contact(t, 1, std::max(0.0, 0.8 * (1.0 - (t - 0.1) / 0.7)), 2.0));
+                                      }
+                                      return events;
+                                    }},
+                                   {"a scrape that is lifted",
+                                    [] {
+                                      std::vector<events::Event> events;
+                                      for (int i = 0; i <= 200; ++i)
+                                        events.emplace_back(make_contact(0.1 + 2e-3 * i, 1, 0.3 + 0.2 * std::sin(0.1 * i), 10.0));
+                                      events::LastingContact end = make_contact(0.502, 1, 0.3, 0.0);
+                                      end.state = events::ContactState::kEnd;
+                                      events.emplace_back(end);
+                                      return events;
+                                    }},
+                                   {"a roll of two contacts, of which one ends early",
+                                    [] {
+                                      std::vector<events::Event> events;
+                                      for (int i = 0; i <= 300; ++i) {
+                                        for (const std::uint64_t id : {1, 2}) {
+                                          if (id == 2 && i > 100) continue;
+                                          events::LastingContact c = make_contact(0.1 + 2e-3 * i, id, 0.0, 3.0);
+                                          c.sweep_m_s = c.other_sweep_m_s = 0.5;
+                                          c.patch_radius_m = 10e-6;
+                                          if (i == 300 || (id == 2 && i == 100)) c.state = events::ContactState::kEnd;
+                                          events.emplace_back(c);
+                                        }
+                                      }
+                                      return events;
+                                    }},
+                                   {"rare records of a slow scrape", [] {
+                                      std::vector<events::Event> events;
+                                      for (int i = 0; i <= 4; ++i) events.emplace_back(make_contact(0.1 + 0.3 * i, 1, 0.05, 5.0));
+                                      for (const double t : {1.34, 1.6}) events.emplace_back(make_contact(t, 1, 0.0, 5.0));
+                                      return events;
+                                    }}};
 
 TEST(PlannedContacts, KeepTheRingUntilItIsNotHeard) {
-  for (const Case& of : kCases) {
+  for (const Contacts& of : kCases) {
     const Stage stage;
     const std::vector<events::Event> events = of.list_events();
     const Plan plan = make_plan(make_facts(stage.scene, make_microphones(stage.scene), true), make_events(events), {});

@@ -15,7 +15,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// A folder with a bank of one support, "end", which the bank itself says is rigid, and a bank of a free body.
-class Mounting : public testing::Test {
+class Mounting : public ::testing::Test {
  protected:
   Mounting() {
     fs::create_directories(folder_);

@@ -11,7 +11,7 @@ namespace {
 
 using testing::HasSubstr;
 
-std::optional<Fixing> read(const std::string& members) {
+std::optional<Fixing> read_supports(const std::string& members) {
   base::Object object = base::parse_document("{" + members + "}", "test.json").root();
   const auto fixing = read_fixing(object);
   object.finish();
@@ -20,14 +20,14 @@ std::optional<Fixing> read(const std::string& members) {
 
 std::string fail(const std::string& members) {
   try {
-    read(members);
+    read_supports(members);
   } catch (const InputError& error) {
     return error.what();
   }
   return "no error";
 }
 
-/// As read() takes them.
+/// As read_supports() takes them.
 std::string write_members(const Fixing& fixing) {
   const std::string object = write_fixing(fixing).line();
   return object.substr(1, object.size() - 2);
@@ -36,9 +36,9 @@ std::string write_members(const Fixing& fixing) {
 TEST(Words, of_every_name_come_back_as_they_were_written) {
   for (const std::string& wall : list_base_names()) {
     for (const std::string& joint : list_joint_names()) {
-      const auto fixing = read("\"on\": " + base::quote(wall) + ", \"joint\": " + base::quote(joint));
+      const auto fixing = read_supports("\"on\": " + base::quote(wall) + ", \"joint\": " + base::quote(joint));
       ASSERT_TRUE(fixing);
-      EXPECT_EQ(write_fixing(*read(write_members(*fixing))).line(), write_fixing(*fixing).line());
+      EXPECT_EQ(write_fixing(*read_supports(write_members(*fixing))).line(), write_fixing(*fixing).line());
       EXPECT_EQ(fixing->joint, joint);
       EXPECT_GT(fixing->joint_loss, 0.0);
       EXPECT_THAT(describe(*fixing), HasSubstr(wall));
@@ -48,21 +48,21 @@ TEST(Words, of_every_name_come_back_as_they_were_written) {
 
 TEST(Words, of_numbers_come_back_to_the_last_bit) {
   const auto wall =
-      read(R"("on": {"young_modulus_pa": 1.23456789012345e10, "density_kg_m3": 1801, "thickness_m": 0.2401}, "loss": 0.0123)");
+      read_supports(R"("on": {"young_modulus_pa": 1.23456789012345e10, "density_kg_m3": 1801, "thickness_m": 0.2401}, "loss": 0.0123)");
   ASSERT_TRUE(wall);
   EXPECT_EQ(wall->base.kind, BaseKind::kPlate);
-  const auto again = read(write_members(*wall));
+  const auto again = read_supports(write_members(*wall));
   EXPECT_EQ(again->base.young_modulus_pa, 1.23456789012345e10);
   EXPECT_EQ(again->base.thickness_m, 0.2401);
   EXPECT_EQ(again->joint_loss, 0.0123);
-  const auto lumped = read(R"("on": {"mass_kg": 0.3, "damping_n_s_m": 7, "stiffness_n_m": 1e6, "loss_factor": 0.1})");
-  EXPECT_EQ(read(write_members(*lumped))->base.stiffness_n_m, 1e6);
+  const auto lumped = read_supports(R"("on": {"mass_kg": 0.3, "damping_n_s_m": 7, "stiffness_n_m": 1e6, "loss_factor": 0.1})");
+  EXPECT_EQ(read_supports(write_members(*lumped))->base.stiffness_n_m, 1e6);
 }
 
 TEST(Words, that_are_not_there_ask_for_nothing) {
-  EXPECT_FALSE(read(""));
+  EXPECT_FALSE(read_supports(""));
   EXPECT_EQ(write_fixing(Fixing{}).line(), "{}");
-  EXPECT_EQ(write_fixing(*read(R"("on": "rigid")")).line(), "{}");
+  EXPECT_EQ(write_fixing(*read_supports(R"("on": "rigid")")).line(), "{}");
 }
 
 TEST(Words, that_cannot_be_meant_are_refused_with_the_correction) {

@@ -5,18 +5,18 @@
 #include <random>
 
 #include "runtime/base/error.hpp"
-#include "tests/unit/runtime/nonlinear/bodies.hpp"
+#include "tests/unit/runtime/nonlinear/blows.hpp"
 
 namespace carillon::nonlinear {
 namespace {
 
 using bodies::Body;
+using bodies::decay_as_steel;
 using bodies::Plate;
 
 constexpr double kRateHz = 48000.0;
 
 double have_no_decay(double) { return 0.0; }
-double decay_as_steel(double omega) { return 6.0 * (1.0 + 2e-8 * omega * omega); }
 
 /// The energy of the states themselves, by the sums in double precision; between the samples psi stands for V.
 double calc_linear_j(const CoupledModes& modes, const Body& body) {

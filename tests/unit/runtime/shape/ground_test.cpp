@@ -6,14 +6,14 @@
 namespace carillon::shape::tests {
 namespace {
 
-std::vector<Touch> find(const Shape& a, const Frame& frame, double margin, PairMemory& memory) {
+std::vector<Touch> find_touches(const Shape& a, const Frame& frame, double margin, PairMemory& memory) {
   std::vector<Touch> out;
   find_ground_touches(a, frame, 0.0, margin, memory, out);
   return out;
 }
-std::vector<Touch> find(const Shape& a, const Frame& frame, double margin) {
+std::vector<Touch> find_touches(const Shape& a, const Frame& frame, double margin) {
   PairMemory memory;
-  return find(a, frame, margin, memory);
+  return find_touches(a, frame, margin, memory);
 }
 
 TEST(ground, box_stands_on_four_corners_whatever_its_mesh) {
@@ -21,7 +21,7 @@ TEST(ground, box_stands_on_four_corners_whatever_its_mesh) {
     const auto box = make_box({0.06, 0.05, 0.04}, n).make();
     Frame frame;
     frame.position_m = {0.3, 0.1, 0.02 - 1e-6};
-    const auto touches = find(*box, frame, 1e-4);
+    const auto touches = find_touches(*box, frame, 1e-4);
     ASSERT_EQ(touches.size(), 4U);
     for (const Touch& t : touches) {
       EXPECT_NEAR(t.gap_m, -1e-6, 1e-12);
@@ -29,7 +29,7 @@ TEST(ground, box_stands_on_four_corners_whatever_its_mesh) {
       EXPECT_FALSE(t.smooth);
     }
     frame.position_m[2] = 0.0202;
-    EXPECT_TRUE(find(*box, frame, 1e-4).empty());
+    EXPECT_TRUE(find_touches(*box, frame, 1e-4).empty());
   }
 }
 
@@ -44,7 +44,7 @@ TEST(ground, corner_keeps_its_name_while_a_box_turns) {
     for (int c = 0; c < 8; ++c)
       low = std::min(low, dot(frame.rotation[2], Vec3{c & 1 ? 0.03 : -0.03, c & 2 ? 0.025 : -0.025, c & 4 ? 0.02 : -0.02}));
     frame.position_m[2] = -low + 1e-5;
-    const auto touches = find(*box, frame, 1e-4, memory);
+    const auto touches = find_touches(*box, frame, 1e-4, memory);
     ASSERT_EQ(touches.size(), 1U);
     EXPECT_NEAR(touches[0].gap_m, 1e-5, 1e-12);
     if (i > 0) {
@@ -63,7 +63,7 @@ double calc_ripple(int n) {
     Frame frame;
     frame.rotation = dice.roll_turn();
     frame.position_m[2] = 1.0;
-    const auto touches = find(*ball, frame, 0.01);
+    const auto touches = find_touches(*ball, frame, 0.01);
     EXPECT_EQ(touches.size(), 1U);
     if (touches.empty()) continue;
     EXPECT_NEAR(touches[0].curvature_a_per_m, 1.0, 0.03);
@@ -92,7 +92,7 @@ TEST(ground, rolling_ball_has_one_touch_with_one_name_and_refresh_agrees_with_se
     Frame frame;
     frame.rotation = multiply(make_turn({0.3, 1, 0}, angle), make_turn({1, 2, 3}, 1.0));
     frame.position_m = {r * angle, 0, r};
-    const auto touches = find(*ball, frame, 1e-3, memory);
+    const auto touches = find_touches(*ball, frame, 1e-3, memory);
     ASSERT_EQ(touches.size(), 1U);
     const Touch& t = touches[0];
     EXPECT_TRUE(t.smooth);
@@ -115,7 +115,7 @@ TEST(ground, cylinder_lies_on_a_line_and_stands_on_a_ring) {
   Frame frame;
   frame.rotation = make_turn({1, 0, 0}, std::numbers::pi / 2);
   frame.position_m[2] = 0.02;
-  auto touches = find(*cylinder, frame, 1e-4);
+  auto touches = find_touches(*cylinder, frame, 1e-4);
   ASSERT_GE(touches.size(), 2U);
   EXPECT_LE(touches.size(), 4U);
   double low = 1.0, high = -1.0;
@@ -127,7 +127,7 @@ TEST(ground, cylinder_lies_on_a_line_and_stands_on_a_ring) {
   EXPECT_NEAR(high - low, 0.1, 0.002);
   // Slightly tilted, its far end is still within the margin.
   frame.rotation = make_turn({1, 0, 0}, std::numbers::pi / 2 + 5e-4);
-  touches = find(*cylinder, frame, 1e-4);
+  touches = find_touches(*cylinder, frame, 1e-4);
   low = 1.0, high = -1.0;
   for (const Touch& t : touches) {
     low = std::min(low, t.where_m[1]);
@@ -136,7 +136,7 @@ TEST(ground, cylinder_lies_on_a_line_and_stands_on_a_ring) {
   EXPECT_NEAR(high - low, 0.1, 0.003);
   frame.rotation = make_turn({1, 0, 0}, 0.0);
   frame.position_m[2] = 0.05;
-  touches = find(*cylinder, frame, 1e-4);
+  touches = find_touches(*cylinder, frame, 1e-4);
   EXPECT_EQ(touches.size(), 4U);
   for (const Touch& t : touches) {
     EXPECT_NEAR(t.gap_m, 0.0, 1e-12);
@@ -152,7 +152,7 @@ TEST(ground, tilted_coin_rolls_on_a_round_rim) {
     Frame frame;
     frame.rotation = multiply(make_turn({1, 0, 0}, tilt), make_turn({0, 0, 1}, 0.0137 * i));
     frame.position_m[2] = r * std::sin(tilt) + 0.001 * std::cos(tilt);
-    const auto touches = find(*coin, frame, 1e-5);
+    const auto touches = find_touches(*coin, frame, 1e-5);
     ASSERT_EQ(touches.size(), 1U);
     low = std::min(low, touches[0].gap_m);
     high = std::max(high, touches[0].gap_m);
@@ -169,7 +169,7 @@ TEST(ground, leaning_cone_stands_on_its_tip) {
     for (const double lean : {0.0, 0.2, 0.7, 1.2, 1.27, 1.3, 1.35}) {
       Frame frame;
       frame.rotation = make_turn({0, 1, 0}, lean);
-      const auto touches = find(*cone, frame, 1e-4);
+      const auto touches = find_touches(*cone, frame, 1e-4);
       ASSERT_FALSE(touches.empty()) << lean;
       double lowest = 1.0;
       for (const Touch& t : touches) lowest = std::min(lowest, t.gap_m);
@@ -184,11 +184,11 @@ TEST(ground, needle_and_sheet_on_edge) {
   Frame frame;
   frame.rotation = make_turn({1, 0.2, 0}, 1.2);
   frame.position_m[2] = 0.05 * std::cos(1.2);
-  EXPECT_GE(find(*needle, frame, 1e-3).size(), 1U);
+  EXPECT_GE(find_touches(*needle, frame, 1e-3).size(), 1U);
   const auto sheet = make_box({0.3, 1e-4, 0.2}, 5).make();
   frame.rotation = make_turn({1, 0, 0}, 0.0);
   frame.position_m[2] = 0.1;
-  EXPECT_EQ(find(*sheet, frame, 1e-5).size(), 4U);
+  EXPECT_EQ(find_touches(*sheet, frame, 1e-5).size(), 4U);
 }
 
 }  // namespace
