@@ -116,6 +116,14 @@ function(carillon_limit_time out seconds)
   set(${out} ${limit} PARENT_SCOPE)
 endfunction()
 
+# Slots of CTest, PROCESSORS, are half cores: deploy/test runs two tests a core, since many wait for much of their time. A rank that waits
+# polls, and keeps from its core the rank that it waits for: four pairs of ranks on two cores take ten times as long as one after the
+# other. So a rank takes a whole core.
+function(carillon_take_cores test cores)
+  math(EXPR slots "2 * ${cores}")
+  set_tests_properties(${test} PROPERTIES PROCESSORS ${slots})
+endfunction()
+
 function(carillon_warnings target)
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wno-unknown-pragmas)
 endfunction()
@@ -147,13 +155,17 @@ function(carillon_test name)
     foreach(ranks ${arg_RANKS})
       carillon_mpi_command(command ${ranks})
       add_test(NAME ${name}.np${ranks} COMMAND ${command} $<TARGET_FILE:${target}>)
-      set_tests_properties(${name}.np${ranks} PROPERTIES PROCESSORS ${ranks} TIMEOUT ${limit} COST ${arg_TIMEOUT} LABELS "mpi;${labels}"
+      set_tests_properties(${name}.np${ranks} PROPERTIES TIMEOUT ${limit} COST ${arg_TIMEOUT} LABELS "mpi;${labels}"
         ENVIRONMENT "${CARILLON_MPI_ENVIRONMENT}")
+      carillon_take_cores(${name}.np${ranks} ${ranks})
     endforeach()
   else()
     target_link_libraries(${target} PRIVATE ${arg_LINK} GTest::gtest_main)
     add_test(NAME ${name} COMMAND ${target} --gtest_brief=1)
     set_tests_properties(${name} PROPERTIES TIMEOUT ${limit} COST ${arg_TIMEOUT} LABELS "${labels}")
+    if("mpi" IN_LIST labels)  # it starts programs
+      carillon_take_cores(${name} 1)
+    endif()
   endif()
 endfunction()
 
@@ -167,7 +179,8 @@ function(carillon_mpi_command out ranks)
   set(${out} ${MPIEXEC_EXECUTABLE} ${MPIEXEC_NUMPROC_FLAG} ${ranks} ${MPIEXEC_PREFLAGS} PARENT_SCOPE)
 endfunction()
 
-# carillon_script_test(NAME COMMAND ... [LABELS ...] [TIMEOUT s]): a test that is a script or a program run with arguments.
+# carillon_script_test(NAME COMMAND ... [LABELS ...] [TIMEOUT s]): a test that is a script or a program run with arguments. With a label mpi,
+# jobs or examples it takes a core: most of what it starts has one rank.
 function(carillon_script_test name)
   cmake_parse_arguments(arg "" "TIMEOUT" "COMMAND;LABELS" ${ARGN})
   if(NOT arg_TIMEOUT)
@@ -178,6 +191,9 @@ function(carillon_script_test name)
   add_test(NAME ${name} COMMAND ${arg_COMMAND})
   set_tests_properties(${name} PROPERTIES TIMEOUT ${limit} COST ${arg_TIMEOUT} LABELS "${labels}"
     ENVIRONMENT "${CARILLON_MPI_ENVIRONMENT};CARILLON_BIN_DIR=${CMAKE_BINARY_DIR}/bin;CARILLON_SOURCE_DIR=${PROJECT_SOURCE_DIR}")
+  if(labels MATCHES "(^|;)(mpi|jobs|examples)(;|$)")
+    carillon_take_cores(${name} 1)
+  endif()
 endfunction()
 
 # carillon_fuzz(NAME SOURCES ... LINK libs... CORPUS dirs... [DICTIONARY file]): a libFuzzer target (clang only, CARILLON_FUZZ=ON) and a short CTest

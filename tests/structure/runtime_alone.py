@@ -26,7 +26,7 @@ HIDDEN = re.compile(
 )
 # An ordinary machine has these of some of the packages above as dependencies of light libraries; hiding them would not be fair.
 SHARED = re.compile(r"/lib(blas|lapack|openblas|hwloc|event|gomp)")
-LEFT_OUT = "structure|docs|bench"
+LEFT_OUT = "structure|docs|bench|web"  # pages run in a browser, which loads none of these packages
 
 
 def installed():
@@ -81,7 +81,14 @@ def configure(source, build, settings):
 
 
 def take_over(whole, build):
-    """Copies what ninja would make here and finds there, with its moments and the log of how it was made. Returns the copies."""
+    """Copies what ninja would make here and finds there, with its moments and the log of how it was made. Returns the copies.
+
+    Sources that CMake writes, such as those that include others, get the moment of their equals there.
+    """
+    for path in (path for path in build.rglob("*") if path.suffix in (".cpp", ".cxx", ".hxx", ".objects")):
+        equal = whole / path.relative_to(build)
+        if equal.is_file() and equal.read_bytes() == path.read_bytes():
+            shutil.copystat(equal, path)
     lines = subprocess.run(["ninja", "-C", build, "-t", "targets", "all"], capture_output=True, text=True, check=True).stdout.splitlines()
     outputs = [name for name, _, rule in (line.rpartition(": ") for line in lines) if rule not in ("phony", "RERUN_CMAKE")]
     taken = [name for name in outputs if not name.startswith("/") and (whole / name).is_file()]

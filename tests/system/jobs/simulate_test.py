@@ -126,7 +126,7 @@ class Simulations(Bench):
         self.assertFalse(folder.exists())
 
     def test_killed_and_resumed_on_two_ranks(self):
-        job = make_simulation(0.05)
+        job = make_simulation(0.3)
         file = self.write("bar.json", {**job, "resources": {"ranks": 2}})
         id_ = self.ask("submit", file)["jobs"][0]["id"]
         work = self.store / "work" / id_[:2] / id_
