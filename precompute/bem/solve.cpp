@@ -1,3 +1,4 @@
+// One march over the wave numbers, whose matrix, solutions and moments every step shares; longer than most files.
 // Method:     a wave number at a time: matrix in single precision, GMRES for the modes that read it, multipoles; LU where GMRES fails.
 //             Modes are interpolated over the wave number; where three and four wave numbers disagree by more than is asked, one more is
 //             put between. Modes that the air couples are sums of solutions at the wave number of the sum: what moves with a mode is

@@ -1,3 +1,4 @@
+// One set of loops for narrow blocks, with the same packing and tiles in each; longer than most files.
 // Method:     The narrow block is packed, a panel of rows at a time that stays in the second-level cache; the wide block streams past it, a
 //             few columns at a time, in strips that stay in the first level and are fetched one strip ahead. Sums and
 //             coefficients live in registers (6 x 4 tiles).

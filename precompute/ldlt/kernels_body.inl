@@ -1,3 +1,4 @@
+// One body of loops, compiled for each set of instructions; longer than most files.
 // Method:     Products of tiles with up to 16 right-hand sides keep a tile's sums in registers; every number of L is read once, in order,
 //             and multiplied into whole vectors. Diagonal blocks: right-looking L D L^T with rook pivoting on the full square in the
 //             first-level cache, then the inverse of L by rows.

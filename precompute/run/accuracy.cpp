@@ -1,3 +1,4 @@
+// One loop from trial to trial, whose error bars and costs decide the next; longer than most files.
 // Method:     A coarse solve gives every mode's error bar in parts whose rates of convergence are known. They say how much finer the mesh
 //             must be; its cost follows from the last trial's by the cost model, or by the exponent between two trials. What is predicted
 //             is then solved, its corrected frequencies are compared with those of the coarser mesh, and their error bars decide; where

@@ -1,4 +1,4 @@
-// What makes a bank sane.
+// What makes a bank sane: one check after another, on the same bank; longer than most files.
 // Method: every property that a solve must have delivered is looked at from the numbers of the bank alone.
 //   Surface: a closed oriented surface passes every edge once in each direction; its signed volume (divergence theorem, sum of
 //   a . (b x c) / 6 over the triangles) is positive when it is outward.

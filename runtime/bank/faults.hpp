@@ -1,4 +1,4 @@
-// What checks share: a list of faults that stays short. Internal to carillon::bank.
+// What checks share: bounds that no body reaches, and a list of faults that stays short. Internal to carillon::bank.
 #pragma once
 
 #include <fmt/format.h>
@@ -11,7 +11,8 @@
 
 namespace carillon::bank {
 
-// Bounds that no body reaches: a small planet; what a job may ask for at most; alpha1 of 1e6 s at that frequency.
+// Bounds that no body reaches. Length: a small planet. Frequency and damping: what a job may ask for at most, alpha1 of 1e6 s at that
+// frequency.
 inline constexpr double kMaxLengthM = 1e7, kMaxHz = 1e12, kMaxDecayPerS = 1e32;
 
 /// The first three faults in full, the others counted.

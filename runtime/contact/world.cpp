@@ -1,4 +1,5 @@
 // Checks a world, lets its bodies move and strike (runtime/rigid), and writes down what the sound needs of it.
+// One world, whose bodies, shapes and records every step changes together; longer than most files.
 #include "runtime/contact/world.hpp"
 
 #include <fmt/format.h>

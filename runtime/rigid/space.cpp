@@ -1,3 +1,4 @@
+// One space, whose windows, pairs and groups every step changes together; longer than most files.
 // Method: windows, in which bodies that can meet nothing fly; pairs that are near and their touches; groups of bodies, each of which goes
 //   through the small steps by itself (step.cpp).
 // Source: B. Mirtich, "Impulse-based dynamic simulation of rigid body systems" (1996): bounds on what can meet, flight in closed form.

@@ -1,3 +1,4 @@
+// One class, whose contacts, rows and forces every sub-block changes together; longer than most files.
 // Method:     every border of two sub-blocks, each contact's values are found on the line between its records; from them its
 //             direction, gains and damping. In between, the force is computed sample by sample and handed to the modes through the
 //             contact's rows at both borders, blended, so that nothing steps when the place or the direction changes.

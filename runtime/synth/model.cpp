@@ -1,3 +1,4 @@
+// One set of tables, made in one order from a bank; longer than most files.
 // Method:     an under-damped mode is z = (q' + d q) + i omega_d q, so that z(t + h) = e^{(-d + i omega_d) h} z(t), and its pressure
 //             g q' = Re(w z) with w = g (1 + i d / omega_d). Every table is made of exponentials in double precision, never of repeated
 //             products. Modes are sorted by the time after which the reference strike has left them silent, so that those still heard

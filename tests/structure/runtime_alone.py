@@ -26,7 +26,7 @@ HIDDEN = re.compile(
 )
 # An ordinary machine has these of some of the packages above as dependencies of light libraries; hiding them would not be fair.
 SHARED = re.compile(r"/lib(blas|lapack|openblas|hwloc|event|gomp)")
-LEFT_OUT = "structure|docs|bench|web"  # pages run in a browser, which loads none of these packages
+LEFT_OUT = "structure|docs|bench"
 
 
 def installed():
@@ -83,11 +83,11 @@ def configure(source, build, settings):
 def take_over(whole, build):
     """Copies what ninja would make here and finds there, with its moments and the log of how it was made. Returns the copies.
 
-    Sources that CMake writes, such as those that include others, get the moment of their equals there.
+    Files that CMake has written, such as sources that include others, get the moment of their equals there.
     """
-    for path in (path for path in build.rglob("*") if path.suffix in (".cpp", ".cxx", ".hxx", ".objects")):
+    for path in build.rglob("*"):
         equal = whole / path.relative_to(build)
-        if equal.is_file() and equal.read_bytes() == path.read_bytes():
+        if path.is_file() and equal.is_file() and equal.read_bytes() == path.read_bytes():
             shutil.copystat(equal, path)
     lines = subprocess.run(["ninja", "-C", build, "-t", "targets", "all"], capture_output=True, text=True, check=True).stdout.splitlines()
     outputs = [name for name, _, rule in (line.rpartition(": ") for line in lines) if rule not in ("phony", "RERUN_CMAKE")]
@@ -102,10 +102,11 @@ def take_over(whole, build):
 
 
 def find_sample(build):
-    """A regular expression of some tests of every program: one of each suite where each case is a test, and every script."""
+    """A regular expression of some tests of every program: one of each suite where each case is a test, and every script but those of
+    pages, which run in a browser."""
     listed = json.loads(
         subprocess.run(
-            ["ctest", "--test-dir", build, "-LE", LEFT_OUT, "--show-only=json-v1"], capture_output=True, text=True, check=True
+            ["ctest", "--test-dir", build, "-LE", LEFT_OUT + "|web", "--show-only=json-v1"], capture_output=True, text=True, check=True
         ).stdout
     )
     sample = {}

@@ -2,6 +2,8 @@
 
 Bodies of the study are predicted from what the study measured on them; others from coarse solves of their own (forecast.Probe). Seconds
 of another machine are scaled by one small solve that both made.
+
+One path from a body to advice and back to what came of it; longer than most files.
 """
 import argparse
 import contextlib

@@ -1,5 +1,7 @@
 """Banks in the eyes of others: h5py by the words of docs/bank-format.md, VTK, and files that h5py made bad and sealed again.
 
+One script of five parts that share the same small banks; longer than most files.
+
 bank_scripts.py doc|vtk|bad|packed|program. Finds the programs in $CARILLON_BIN_DIR and the page in $CARILLON_SOURCE_DIR.
 """
 import json

@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
-"""carillon-render from outside: a cube with known modes falls, the WAV is read by Python's wave module and looked at with numpy."""
+"""carillon-render from outside: a cube with known modes falls, the WAV is read by Python's wave module and looked at with numpy.
+
+One program on the same scene and bank; longer than most files."""
 import json
 import math
 import os

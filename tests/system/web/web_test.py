@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""The sound engine of pages in headless Chromium, held against carillon-render.
+"""The sound engine of pages in headless Chromium, held against carillon-render. One script, whose
+pages and browser every test shares; longer than most files.
 
 usage: web_test.py NAME    NAME is one of the functions test_NAME below
 """

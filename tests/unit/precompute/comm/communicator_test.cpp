@@ -10,6 +10,7 @@
 #include "precompute/comm/index_partition.hpp"
 #include "runtime/base/failure.hpp"
 #include "tests/support/catch_message.hpp"
+#include "tests/unit/precompute/comm/world.hpp"
 
 namespace carillon::comm {
 namespace {
@@ -17,12 +18,6 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 using tests::catch_message;
-
-const Communicator& world() {
-  static const Communicator comm(MPI_COMM_WORLD);
-  return comm;
-}
-bool is_last() { return world().rank() == world().size() - 1; }
 
 TEST(Communicator, is_the_communicator_of_mpi_with_rank_and_size) {
   int rank = -1, size = -1;

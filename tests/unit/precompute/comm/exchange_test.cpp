@@ -10,6 +10,7 @@
 #include "precompute/comm/index_partition.hpp"
 #include "runtime/base/error.hpp"
 #include "tests/support/catch_message.hpp"
+#include "tests/unit/precompute/comm/world.hpp"
 
 namespace carillon::comm {
 namespace {
@@ -21,12 +22,6 @@ struct Item {
   std::int32_t from = 0, to = 0, place = 0;
   bool operator==(const Item&) const = default;
 };
-
-const Communicator& world() {
-  static const Communicator comm(MPI_COMM_WORLD);
-  return comm;
-}
-bool is_last() { return world().rank() == world().size() - 1; }
 
 int find_length(int from, int to) { return 3 * from + 5 * to; }  // none from rank 0 to itself
 

@@ -6,17 +6,13 @@
 
 #include "runtime/base/error.hpp"
 #include "tests/support/catch_message.hpp"
+#include "tests/unit/precompute/comm/world.hpp"
 
 namespace carillon::comm {
 namespace {
 
 constexpr std::int32_t kOwned = 9;
 constexpr std::size_t kWidth = 3;
-
-const Communicator& world() {
-  static const Communicator comm(MPI_COMM_WORLD);
-  return comm;
-}
 
 /// All numbers of all ranks, own ones first; `place` in reverse order.
 struct AllShared {

@@ -1,4 +1,4 @@
-// L D L^T against Eigen's dense solvers, on any number of ranks.
+// L D L^T against Eigen's dense solvers, on any number of ranks. One class on the same few pencils; longer than most files.
 #include "precompute/ldlt/factor.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-/* Every function of carillon.h, with good and with bad arguments. */
+/* Every function of carillon.h, with good and with bad arguments: one list, as the header is; longer than most files. */
 #include <carillon.h>
 #include <math.h>
 #include <stdio.h>

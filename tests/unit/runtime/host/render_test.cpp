@@ -1,3 +1,4 @@
+// One function from a scene to a sound, each case a short scene; longer than most files.
 #include "runtime/host/render.hpp"
 
 #include <gtest/gtest.h>

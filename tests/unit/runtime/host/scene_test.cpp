@@ -1,3 +1,4 @@
+// One format, each key with good and with bad values; longer than most files.
 #include "runtime/host/scene.hpp"
 
 #include <gtest/gtest.h>
