@@ -1,4 +1,5 @@
-// Method: METIS k-way on the dual graph gives elements to ranks; a node goes to the highest rank among those of its elements. Rank 0 makes
+// Method: METIS k-way on the dual graph gives elements to ranks, or the caller; a node goes to the highest rank among those of its
+// elements. Rank 0 makes
 //   and sends one rank's part at a time.
 // Source: Karypis and Kumar 1998 (METIS).
 // Deviations: none.
@@ -68,12 +69,15 @@ std::vector<bool> mark_fixed(const mesh::TetMesh& mesh, const std::vector<std::i
   return is_fixed;
 }
 
-Partition cut_mesh(const mesh::TetMesh& mesh, int ranks) {
-  if (mesh.order == 1) return partition_elements(mesh.tets, ranks);
+Partition cut_mesh(const mesh::TetMesh& mesh, int ranks, const std::vector<std::int32_t>& part) {
+  const auto cut = [&](const std::vector<std::int32_t>& corners) {
+    return part.empty() ? partition_elements(corners, ranks) : measure_parts(corners, part, ranks);
+  };
+  if (mesh.order == 1) return cut(mesh.tets);
   std::vector<std::int32_t> corners;
   corners.reserve(4 * mesh.tet_count());
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e) corners.insert(corners.end(), mesh.tet(e).begin(), mesh.tet(e).begin() + 4);
-  return partition_elements(corners, ranks);
+  return cut(corners);
 }
 
 /// Numbers the free nodes by owner, then by node.
@@ -110,7 +114,7 @@ Plan make_plan(const mesh::TetMesh& mesh, const std::vector<std::int32_t>& fixed
                DistributedMesh& out) {
   Plan plan;
   plan.is_fixed = mark_fixed(mesh, fixed_nodes);
-  const Partition cut = cut_mesh(mesh, ranks);
+  const Partition cut = cut_mesh(mesh, ranks, options.part);
   out.tets = mesh.tet_count();
   out.report.edge_cut = cut.quality.edge_cut;
   out.report.contiguous = cut.quality.contiguous;

@@ -10,10 +10,11 @@
 namespace carillon::partition {
 
 struct DistributeOptions {
+  std::vector<std::int32_t> part = {};  // rank 0: (E) the rank of each element; empty: METIS cuts
   bool elimination_order = false;  // order the whole graph on rank 0, for factorisations that cannot order a distributed matrix themselves
 };
 
-/// Cuts the mesh with METIS, numbers the free nodes so that each rank's are contiguous, and sends each rank its part. The mesh and the
+/// Cuts the mesh, numbers the free nodes so that each rank's are contiguous, and sends each rank its part. The mesh and the
 /// fixed nodes are read on rank 0 only; afterwards the mesh is not needed any more.
 /// Collective. Throws on every rank: InputError when there are fewer tetrahedra than ranks, a fixed node is not in the mesh, or every node
 /// is fixed; SystemError when memory runs out.

@@ -219,6 +219,13 @@ Partition partition_elements(std::span<const std::int32_t> corners, int parts) {
   return result;
 }
 
+Partition measure_parts(std::span<const std::int32_t> corners, std::vector<std::int32_t> part, int parts) {
+  Partition result;
+  result.quality = find_quality(make_dual_graph(corners), part, parts);
+  result.part = std::move(part);
+  return result;
+}
+
 std::vector<std::int32_t> order_nested_dissection(const Graph& graph) {
   idx_t vertices = graph.vertex_count();
   std::vector<std::int32_t> position(vertices);

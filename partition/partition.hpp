@@ -46,6 +46,9 @@ Graph make_node_graph(std::span<const std::int32_t> elements, int width, std::in
 /// Throws InputError when there are fewer elements than parts, SystemError when METIS runs out of memory.
 Partition partition_elements(std::span<const std::int32_t> corners, int parts);
 
+/// The quality of parts that others have made. part: (E) in [0, parts). Throws InputError as make_dual_graph().
+Partition measure_parts(std::span<const std::int32_t> corners, std::vector<std::int32_t> part, int parts);
+
 /// Fill-reducing order of a graph by METIS nested dissection: result[v] is the position of vertex v in the elimination order (zero-based),
 /// a permutation. This is MUMPS' PERM_IN less one. Throws SystemError when METIS runs out of memory.
 std::vector<std::int32_t> order_nested_dissection(const Graph& graph);

@@ -99,6 +99,7 @@ def make_environment():
         "OMPI_MCA_hwloc_base_binding_policy": "none",
         "OMPI_MCA_mpi_yield_when_idle": "1",
         "HWLOC_COMPONENTS": "-gl",
+        "GLIBC_TUNABLES": "glibc.malloc.hugetlb=1",  # as carillon-precompute sets it: rivals have the same pages
     }
 
 

@@ -53,7 +53,8 @@ InertiaCounter::InertiaCounter(const la::Pencil& pencil, const Problem& problem,
 const ShiftedFactor& InertiaCounter::analyse() {
   const petsc::WorkScope scope(petsc::WorkPhase::kFactor);
   const Timer timer(seconds_.analyse);
-  factor_ = uses_mumps_ ? make_mumps_factor(pencil_, problem_.nodes.elimination_position) : make_ldlt_factor(pencil_);
+  factor_ =
+      uses_mumps_ ? make_mumps_factor(pencil_, problem_.nodes.elimination_position) : make_ldlt_factor(pencil_, problem_.nodes.order.get());
   statistics_.solver = factor_->get_solver();
   statistics_.ordering = factor_->get_ordering();
   return *factor_;

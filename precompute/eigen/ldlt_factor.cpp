@@ -9,7 +9,8 @@ namespace {
 
 class LdltFactor final : public ShiftedFactor {
  public:
-  explicit LdltFactor(const la::Pencil& pencil) : factor_(pencil), rank_(petsc::get_communicator(pencil.stiffness).rank()) {}
+  LdltFactor(const la::Pencil& pencil, const ldlt::MeshOrder* order)
+      : factor_(pencil, order), rank_(petsc::get_communicator(pencil.stiffness).rank()) {}
 
   bool factorise(double sigma) override { return factor_.factorise(sigma); }
   void solve(const double* b, double* x, std::ptrdiff_t stride, int columns) override {
@@ -30,6 +31,8 @@ class LdltFactor final : public ShiftedFactor {
 
 }  // namespace
 
-std::unique_ptr<ShiftedFactor> make_ldlt_factor(const la::Pencil& pencil) { return std::make_unique<LdltFactor>(pencil); }
+std::unique_ptr<ShiftedFactor> make_ldlt_factor(const la::Pencil& pencil, const ldlt::MeshOrder* order) {
+  return std::make_unique<LdltFactor>(pencil, order);
+}
 
 }  // namespace carillon::eigen

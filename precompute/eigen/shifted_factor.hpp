@@ -9,6 +9,10 @@
 
 #include "precompute/la/pencil.hpp"
 
+namespace carillon::ldlt {
+class MeshOrder;
+}  // namespace carillon::ldlt
+
 namespace carillon::eigen {
 
 /// A direct solver for K - sigma M with a fixed pattern and changing sigma. All members but the get_ ones are collective and fail on all
@@ -36,8 +40,8 @@ class ShiftedFactor {
 };
 
 /// carillon::ldlt: supernodal L D L^T over the ranks, made for many right-hand sides. factorise is also false when its measured backward
-/// error is too large.
-std::unique_ptr<ShiftedFactor> make_ldlt_factor(const la::Pencil& pencil);
+/// error is too large. order: of the mesh, as ldlt::Factor takes it.
+std::unique_ptr<ShiftedFactor> make_ldlt_factor(const la::Pencil& pencil, const ldlt::MeshOrder* order = nullptr);
 
 /// MUMPS: L D L^T with pivoting across fronts. elimination_position: on rank 0, per node the place in the elimination order; empty: MUMPS
 /// orders.

@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -15,6 +16,10 @@
 #include "precompute/la/pencil.hpp"
 #include "precompute/petsc/handle.hpp"
 #include "runtime/base/vector.hpp"
+
+namespace carillon::ldlt {
+class MeshOrder;
+}  // namespace carillon::ldlt
 
 namespace carillon::eigen {
 
@@ -26,8 +31,10 @@ struct NodeLayout {
   /// Per component the positions of its fixed (Dirichlet) nodes [m], the same on every rank. Empty: no node is fixed anywhere. Components
   /// whose every node is fixed have no row in K and may stand in the list.
   std::vector<std::vector<Vec3>> fixed;
-  /// Fill-reducing order, used on rank 0 only: elimination position of every free node in the global numbering of K's row blocks
-  /// (partition::order_nested_dissection). Empty: the factorisation orders by itself, with more fill.
+  /// The order by which the mesh was cut, for our L D L^T; null: that orders by itself.
+  std::shared_ptr<const ldlt::MeshOrder> order;
+  /// Fill-reducing order of MUMPS and CHOLMOD, used on rank 0 only: elimination position of every free node in the global numbering of K's
+  /// row blocks (partition::order_nested_dissection). Empty: the factorisation orders by itself, with more fill.
   std::vector<std::int32_t> elimination_position;
 };
 

@@ -1,6 +1,6 @@
 // Method: OpenBLAS picks its kernels while it is loaded, so the library that a program would get is loaded here and asked.
 // Source: OpenBLAS 0.3.21, README, "Run-time environment variables"; Open MPI 4.1, ompi_info --param; hwloc 2.9, HWLOC_COMPONENTS;
-//         ld.so(8), LD_PRELOAD.
+//         ld.so(8), LD_PRELOAD; GNU C Library 2.36 manual, 38.1 (glibc.malloc.hugetlb).
 #include "precompute/launch/environment.hpp"
 
 #include <dlfcn.h>
@@ -56,6 +56,7 @@ void prepare_environment() {
   ::unsetenv("PETSC_OPTIONS_YAML");
   if (is_on_one_host()) ::setenv("OMPI_MCA_pml", "ob1", 0);
   ::setenv("HWLOC_COMPONENTS", "-gl", 0);
+  ::setenv("GLIBC_TUNABLES", "glibc.malloc.hugetlb=1", 0);
   choose_kernels();
 }
 

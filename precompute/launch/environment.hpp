@@ -11,6 +11,8 @@ namespace carillon::launch {
 ///   every later one is a Pentium 4 to them;
 /// - Open MPI's transport ob1, where all ranks are on this host: asking each network library takes 0.2 s;
 /// - HWLOC_COMPONENTS without displays: hwloc opens :0 to :9 to list graphics cards, and Xlib ends the process when such a server ends;
+/// - GLIBC_TUNABLES: large allocations ask for pages of 2 MB; K, M and the basis are touched from end to end, and on a virtual machine a
+///   fresh page of 4 kB cost as much as all that is done with it (docs/decisions/launcher.md);
 /// - no PETSC_OPTIONS (always): what a run does is in its job file and its command line.
 /// For this process and those it starts or becomes.
 void prepare_environment();

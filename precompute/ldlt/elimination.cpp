@@ -1,7 +1,6 @@
-// Method:     From the leaves up: a leaf or a subtree hands on the rows of its roots as elements of the quotient graph, and the holder of
-// the
-//             separator above eliminates it behind them; so no rank sees more than the parts that it holds. Positions are those of
-//             order_parts at first; as each part is put in postorder they move, and all who use them ask for the last ones.
+// Method:     From the leaves up: a leaf or a subtree hands on the rows of its roots as elements of the quotient graph, and the holder
+//             of the separator above eliminates it behind them; so no rank sees more than its parts. Positions are those of order_parts
+//             at first; as each part is put in postorder they move, and all who use them ask for the last ones.
 // Source:     Duff and Reid 1983 (elements of the quotient graph).
 // Deviations: fronts of different parts are not merged.
 #include "precompute/ldlt/elimination.hpp"
@@ -237,54 +236,65 @@ Ints find_moved(const Communicator& comm, const Elimination& all, const Ints& po
 
 }  // namespace
 
-Elimination eliminate_on_paper(const Communicator& comm, const NodeLinks& nodes, const IndexPartition& owners,
-                               std::int32_t largest_gathered) {
-  Elimination all = comm.agree([&] { return Elimination(comm.size()); });
-  std::vector<Ints> placed = order_parts(comm, nodes, owners, all.tree, largest_gathered);
+Ints report_positions(const Communicator& comm, const Elimination& all, const NodeLinks& nodes, const IndexPartition& owners) {
   const auto reported = comm::all_to_all(
       comm,
       [&] {
         std::vector<Position> list;
-        for (std::size_t t = 0; t < placed.size(); ++t) {
-          std::int32_t position = all.tree.parts[t].first;
-          for (const std::int32_t node : placed[t]) list.push_back({node, position++});
-          if (all.tree.parts[t].begin != comm.rank()) continue;
-          HeldPart& held = all.parts.emplace_back();
-          held.part = static_cast<int>(t);
-          held.nodes = std::move(placed[t]);
+        for (const HeldPart& held : all.parts) {
+          std::int32_t position = all.tree[held.part].first;
+          for (const std::int32_t node : held.nodes) list.push_back({node, position++});
         }
         return list;
       },
       [&](const Position& one) { return owners.find_owner(one.node); });
-  comm.agree([&] {
-    all.position.assign(static_cast<std::size_t>(nodes.own_nodes), -1);
-    for (const Position& one : reported.items) all.position[owners.to_local(one.node)] = one.position;
+  Ints position = comm.agree([&] {
+    Ints own(static_cast<std::size_t>(nodes.own_nodes), -1);
+    for (const Position& one : reported.items) own[owners.to_local(one.node)] = one.position;
+    return own;
   });
-  const Ints ghosts = fetch_ghosts(comm, nodes, owners, all.position);
-  all.position.insert(all.position.end(), ghosts.begin(), ghosts.end());
-  link_parts(comm, all, eliminate_parts(comm, all, send_links(comm, nodes, all)));
+  const Ints ghosts = fetch_ghosts(comm, nodes, owners, position);
+  position.insert(position.end(), ghosts.begin(), ghosts.end());
+  return position;
+}
 
-  // Positions as they are after the fronts have been found.
-  Ints asked = all.position;
-  for (const HeldPart& held : all.parts) {
-    const TreePart& part = all.tree.parts[static_cast<std::size_t>(held.part)];
-    for (const Supernode& node : held.forest.supernodes)
-      for (const std::int32_t row : node.rows)
-        if (row >= part.first + part.count) asked.push_back(row);
-  }
-  const Ints known = find_moved(comm, all, asked);
+Elimination eliminate_on_paper(const Communicator& comm, const NodeLinks& nodes, const IndexPartition& owners,
+                               std::int32_t largest_gathered) {
+  Elimination all = comm.agree([&] { return Elimination(comm.size()); });
+  std::vector<Ints> placed = order_parts(comm, nodes, owners, all.tree, largest_gathered);
   comm.agree([&] {
-    std::copy_n(known.begin(), all.position.size(), all.position.begin());
-    auto next = known.begin() + static_cast<std::ptrdiff_t>(all.position.size());
-    for (HeldPart& held : all.parts) {
-      const TreePart& part = all.tree.parts[static_cast<std::size_t>(held.part)];
-      for (Supernode& node : held.forest.supernodes) {
-        for (std::int32_t& row : node.rows)
-          if (row >= part.first + part.count) row = *next++;
-        std::sort(node.rows.begin(), node.rows.end());
-      }
+    for (std::size_t t = 0; t < placed.size(); ++t) {
+      if (all.tree.parts[t].begin != comm.rank()) continue;
+      HeldPart& held = all.parts.emplace_back();
+      held.part = static_cast<int>(t);
+      held.nodes = std::move(placed[t]);
     }
   });
+  all.position = report_positions(comm, all, nodes, owners);
+  link_parts(comm, all, eliminate_parts(comm, all, send_links(comm, nodes, all)));
+
+  // Fronts have moved the positions inside their parts.
+  const Ints asked = comm.agree([&] {
+    Ints rows;
+    for (const HeldPart& held : all.parts) {
+      const TreePart& part = all.tree[held.part];
+      for (const Supernode& node : held.forest.supernodes)
+        for (const std::int32_t row : node.rows)
+          if (row >= part.first + part.count) rows.push_back(row);
+    }
+    return rows;
+  });
+  const Ints known = find_moved(comm, all, asked);
+  auto next = known.begin();
+  for (HeldPart& held : all.parts) {
+    const TreePart& part = all.tree[held.part];
+    for (Supernode& node : held.forest.supernodes) {
+      for (std::int32_t& row : node.rows)
+        if (row >= part.first + part.count) row = *next++;
+      std::sort(node.rows.begin(), node.rows.end());
+    }
+  }
+  all.position = report_positions(comm, all, nodes, owners);
   return all;
 }
 

@@ -25,6 +25,9 @@ struct Elimination {
   std::vector<HeldPart> parts;  // children before parents
 };
 
+/// Positions of own nodes and ghosts, from the ranks that hold them. Collective.
+Ints report_positions(const comm::Communicator& comm, const Elimination& all, const NodeLinks& nodes, const comm::IndexPartition& owners);
+
 /// Orders the nodes and finds the fronts. largest_gathered: of order_parts. Collective. Throws SystemError on all ranks when memory runs
 /// out.
 Elimination eliminate_on_paper(const comm::Communicator& comm, const NodeLinks& nodes, const comm::IndexPartition& owners,

@@ -35,7 +35,8 @@ constexpr double kVanishedPivot = 64 * std::numeric_limits<double>::epsilon();  
 }  // namespace
 
 struct Factor::State {
-  explicit State(const la::Pencil& given_pencil) : given(given_pencil), plan(make_plan(given.stiffness, given.mass)) {}
+  State(const la::Pencil& given_pencil, const MeshOrder* order)
+      : given(given_pencil), plan(make_plan(given.stiffness, given.mass, order)) {}
 
   const la::Pencil given;
   Plan plan;
@@ -141,7 +142,7 @@ double Factor::State::measure_backward_error(bool is_refined) {
   return std::isfinite(error) ? error : std::numeric_limits<double>::infinity();
 }
 
-Factor::Factor(const la::Pencil& pencil) : state_(std::make_unique<State>(pencil)) {}
+Factor::Factor(const la::Pencil& pencil, const MeshOrder* order) : state_(std::make_unique<State>(pencil, order)) {}
 
 Factor::~Factor() = default;
 Factor::Factor(Factor&&) noexcept = default;

@@ -9,6 +9,8 @@
 
 namespace carillon::ldlt {
 
+class MeshOrder;
+
 /// What a factorisation will cost, known before any number is computed; the same on every rank.
 struct Analysis {
   struct Rank {
@@ -33,9 +35,10 @@ struct Analysis {
 /// on they must stay, and outlive the factor. Every member but the get_ ones is collective and fails on all ranks alike.
 class Factor {
  public:
-  /// Orders the nodes and plans fronts, memory and messages; computes no number. Symmetry is assumed and not checked. Throws InputError
-  /// when the rows are not whole nodes or the matrices not AIJ, SystemError when memory runs out.
-  explicit Factor(const la::Pencil& pencil);
+  /// Orders the nodes and plans fronts, memory and messages; computes no number. Symmetry is assumed and not checked. order: of the mesh
+  /// that K and M are of, with the rows' numbers; null: they are ordered here. Throws InputError when the rows are not whole nodes, the
+  /// matrices not AIJ or the order not theirs, SystemError when memory runs out.
+  explicit Factor(const la::Pencil& pencil, const MeshOrder* order = nullptr);
   ~Factor();
   Factor(Factor&&) noexcept;
   Factor& operator=(Factor&&) noexcept;

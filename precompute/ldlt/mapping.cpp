@@ -26,6 +26,7 @@ constexpr double kSnap = 0.08;   // of a rank
 constexpr double kSmall = 0.06;  // of a rank: a subtree that straddles two ranks goes to one of them
 constexpr double kColumns = 16;  // of a solve
 constexpr double kEntriesBound = 1.25;
+constexpr double kLeastShare = 0.2;  // of an even one
 
 std::vector<std::vector<std::int32_t>> list_children(const std::vector<FrontCost>& fronts, std::vector<std::int32_t>& roots) {
   std::vector<std::vector<std::int32_t>> children(fronts.size());
@@ -45,23 +46,45 @@ struct FrontParts {
   std::vector<std::int64_t> entries;
 };
 
+FrontParts find_parts(const FrontCost& front, const std::vector<FrontShare>& shares) {
+  const TileMap map(front.width, front.rows, shares);
+  return {map.count_operations(), map.count_entries()};
+}
+
 std::vector<FrontParts> list_parts(const std::vector<FrontCost>& fronts, const Mapping& mapping) {
   std::vector<FrontParts> all(fronts.size());
-  for (std::size_t s = 0; s < fronts.size(); ++s) {
-    if (mapping.owner(static_cast<std::int32_t>(s)) >= 0) continue;
-    const TileMap map(fronts[s].width, fronts[s].rows, mapping.list_shares(static_cast<std::int32_t>(s)));
-    all[s] = {map.count_operations(), map.count_entries()};
-  }
+  for (std::size_t s = 0; s < fronts.size(); ++s)
+    if (mapping.owner(static_cast<std::int32_t>(s)) < 0) all[s] = find_parts(fronts[s], mapping.list_shares(static_cast<std::int32_t>(s)));
   return all;
+}
+
+/// Fractions with which ranks that are free at these times [operations] end a front of so many operations together; a rank that is free
+/// too late has `least`.
+void level(std::vector<FrontShare>& shares, const std::vector<double>& times, double operations, double least) {
+  std::vector<double> sorted = times;
+  std::sort(sorted.begin(), sorted.end());
+  double end = 0;
+  double sum = 0;
+  for (std::size_t k = 0; k < sorted.size(); ++k) {
+    sum += sorted[k];
+    end = (sum + operations) / static_cast<double>(k + 1);
+    if (k + 1 < sorted.size() && end <= sorted[k + 1]) break;
+  }
+  double all = 0;
+  for (std::size_t place = 0; place < shares.size(); ++place) {
+    shares[place].fraction = std::max((end - times[place]) / operations, least);
+    all += shares[place].fraction;
+  }
+  for (FrontShare& share : shares) share.fraction /= all;
 }
 
 /// The order of events of an elimination: when each rank is free, and when each front is complete [operations].
 class Replay {
  public:
-  Replay(const std::vector<FrontCost>& fronts, const Mapping& mapping, const std::vector<FrontParts>& shared, bool is_gang)
+  Replay(const std::vector<FrontCost>& fronts, const Mapping& mapping, std::vector<FrontParts> shared, bool is_gang)
       : fronts_(fronts),
         mapping_(mapping),
-        shared_(shared),
+        shared_(std::move(shared)),
         is_gang_(is_gang),
         free_(static_cast<std::size_t>(mapping.ranks()), 0.0),
         ready_(fronts.size(), 0.0),
@@ -90,12 +113,20 @@ class Replay {
         open_.emplace(now, s);
         continue;
       }
-      eliminate(s, mapping_.list_shares(s));
+      if (levelled_ != nullptr) level_front(s);
+      eliminate(s, (levelled_ != nullptr ? *levelled_ : mapping_).list_shares(s));
       order_.push_back(s);
       const std::int32_t parent = fronts_[static_cast<std::size_t>(s)].parent;
       if (parent >= 0 && --waiting_[static_cast<std::size_t>(parent)] == 0) open_.emplace(start(parent), parent);
     }
     return *std::max_element(free_.begin(), free_.end());
+  }
+
+  /// The same, and the ranks of each shared front get as much of it as lets them end it together, into `levelled`, which begins as the
+  /// mapping.
+  double run(Mapping& levelled) {
+    levelled_ = &levelled;
+    return run();
   }
 
   /// The shared fronts as they were begun.
@@ -107,6 +138,16 @@ class Replay {
     double time = ready_[static_cast<std::size_t>(front)];
     for (const FrontShare& share : mapping_.list_shares(front)) time = std::max(time, free_[static_cast<std::size_t>(share.rank)]);
     return time;
+  }
+
+  void level_front(std::int32_t front) {
+    std::vector<FrontShare> shares = mapping_.list_shares(front);
+    std::vector<double> times;
+    for (const FrontShare& share : shares)
+      times.push_back(std::max(free_[static_cast<std::size_t>(share.rank)], ready_[static_cast<std::size_t>(front)]));
+    level(shares, times, fronts_[static_cast<std::size_t>(front)].operations, kLeastShare / static_cast<double>(shares.size()));
+    shared_[static_cast<std::size_t>(front)] = find_parts(fronts_[static_cast<std::size_t>(front)], shares);
+    levelled_->set_shares(front, std::move(shares));
   }
 
   void eliminate(std::int32_t front, const std::vector<FrontShare>& shares) {
@@ -132,8 +173,9 @@ class Replay {
 
   const std::vector<FrontCost>& fronts_;
   const Mapping& mapping_;
-  const std::vector<FrontParts>& shared_;
+  std::vector<FrontParts> shared_;
   bool is_gang_ = false;
+  Mapping* levelled_ = nullptr;
   std::vector<double> free_;           // (ranks)
   std::vector<double> ready_;          // (fronts)
   std::vector<std::int32_t> waiting_;  // (fronts) shared children that are not complete
@@ -219,11 +261,17 @@ Mapping::Mapping(const std::vector<FrontCost>& fronts, int ranks, double operati
 std::vector<FrontShare> Mapping::list_shares(std::int32_t front) const {
   const auto s = static_cast<std::size_t>(front);
   if (owner_[s] >= 0) return {{owner_[s], 1.0}};
+  if (!levelled_.empty() && !levelled_[s].empty()) return levelled_[s];
   std::vector<FrontShare> shares;
   const double length = end_[s] - begin_[s];
   for (int rank = static_cast<int>(std::floor(begin_[s] + 1e-9)); rank < ranks_ && rank < end_[s] - 1e-9; ++rank)
     shares.push_back({rank, (std::min(end_[s], rank + 1.0) - std::max(begin_[s], static_cast<double>(rank))) / length});
   return shares;
+}
+
+void Mapping::set_shares(std::int32_t front, std::vector<FrontShare> shares) {
+  levelled_.resize(owner_.size());
+  levelled_[static_cast<std::size_t>(front)] = std::move(shares);
 }
 
 double MappingCounts::fullest_ratio() const {
@@ -358,14 +406,20 @@ Mapping choose_mapping(const std::vector<FrontCost>& fronts, int ranks) {
   Mapping best(fronts, ranks, 1.0);
   double best_path = std::numeric_limits<double>::infinity();
   double best_entries = std::numeric_limits<double>::infinity();
-  for (const double weight : {1.0, 0.7, 0.4}) {
-    Mapping candidate(fronts, ranks, weight);
+  const auto consider = [&](const Mapping& candidate) {
     const MappingCounts counts = count_work(fronts, candidate);
     const double entries = std::max(counts.fullest_ratio(), kEntriesBound);
-    if (entries > best_entries || (entries == best_entries && counts.path_operations >= best_path)) continue;
-    best = std::move(candidate);
+    if (entries > best_entries || (entries == best_entries && counts.path_operations >= best_path)) return;
+    best = candidate;
     best_path = counts.path_operations;
     best_entries = entries;
+  };
+  for (const double weight : {1.0, 0.7, 0.4}) {
+    const Mapping candidate(fronts, ranks, weight);
+    consider(candidate);
+    Mapping levelled = candidate;
+    Replay(fronts, candidate, list_parts(fronts, candidate), false).run(levelled);
+    consider(levelled);
   }
   return best;
 }

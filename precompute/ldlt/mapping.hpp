@@ -40,6 +40,8 @@ class Mapping {
   int owner(std::int32_t front) const { return owner_[static_cast<std::size_t>(front)]; }
   /// Its ranks, ascending; the fractions add up to one. A front that one rank has is one share of 1.
   std::vector<FrontShare> list_shares(std::int32_t front) const;
+  /// Gives the same ranks of a shared front other fractions, which add up to one.
+  void set_shares(std::int32_t front, std::vector<FrontShare> shares);
 
  private:
   int ranks_ = 1;
@@ -47,6 +49,7 @@ class Mapping {
   std::vector<double> begin_;  // (fronts) of the interval of the subtree
   std::vector<double> end_;
   std::vector<int> owner_;
+  std::vector<std::vector<FrontShare>> levelled_;  // (fronts) by set_shares, or empty
 };
 
 /// What a mapping costs, counted tile by tile as the factorisation deals them (tile_map.hpp). Of update matrices and of sums that go from a

@@ -15,6 +15,7 @@
 #include "precompute/la/node_rows.hpp"
 #include "precompute/ldlt/deal.hpp"
 #include "precompute/ldlt/lists.hpp"
+#include "precompute/ldlt/mesh_order.hpp"
 #include "precompute/ldlt/storage.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/base/error.hpp"
@@ -244,6 +245,34 @@ class PlanMaker {
   std::vector<Ints> shared_nodes_;                               // (shared fronts) global numbers of the pivots
 };
 
+/// A row of a front where it was looked for; -1 where an order of another pattern has none.
+std::int32_t check_row(std::int32_t row) {
+  if (row < 0) throw InputError("The order of a factorisation lacks links that K or M has.");
+  return row;
+}
+
+/// Whether the fronts of this rank have all rows that K and M have in their columns.
+void check_fronts(const Plan& plan, const NodeLinks& nodes) {
+  Ints own_of_pivot(static_cast<std::size_t>(plan.pivot_nodes), -1);
+  for (std::int32_t v = 0; v < nodes.own_nodes; ++v) {
+    const std::int32_t pivot = plan.node_of_link[static_cast<std::size_t>(v)];
+    if (pivot >= 0 && pivot < plan.pivot_nodes) own_of_pivot[static_cast<std::size_t>(pivot)] = v;
+  }
+  Ints front_of(static_cast<std::size_t>(plan.local_nodes), -1);  // the last front that has the row
+  for (std::size_t s = 0; s < plan.fronts.size(); ++s) {
+    const Front& front = plan.fronts[s];
+    const auto id = static_cast<std::int32_t>(s);
+    for (const std::int32_t row : front.rows) front_of[static_cast<std::size_t>(row)] = id;
+    for (std::int32_t pivot = front.first; pivot < front.first + front.width; ++pivot) {
+      const std::int32_t v = own_of_pivot[static_cast<std::size_t>(pivot)];
+      for (const std::int32_t* u = v < 0 ? nullptr : nodes.links.begin(v); v >= 0 && u != nodes.links.end(v); ++u) {
+        const std::int32_t row = check_row(plan.node_of_link[static_cast<std::size_t>(*u)]);
+        if (row >= front.first + front.width && front_of[static_cast<std::size_t>(row)] != id) check_row(-1);
+      }
+    }
+  }
+}
+
 /// Asks for the pattern of the columns that come from other ranks, or go into shared fronts. Collective.
 void plan_blocks(const Communicator& comm, Plan& plan, const PlanMaker& maker, const NodeLinks& nodes, const IndexPartition& owners,
                  const Ints& position) {
@@ -286,11 +315,11 @@ void plan_blocks(const Communicator& comm, Plan& plan, const PlanMaker& maker, c
           const std::int32_t at = reader.next();
           if (column.front < 0) {
             received.columns.push_back(column.column);
-            received.rows.push_back(maker.find_local(at));
+            received.rows.push_back(check_row(maker.find_local(at)));
             continue;
           }
           const SharedFront& front = plan.shared[static_cast<std::size_t>(column.front)];
-          const std::int32_t row = maker.find_node(column.front, at);
+          const std::int32_t row = check_row(maker.find_node(column.front, at));
           const bool is_here = front.map.has_row(front.place, front.map.find_tile(row));
           received.shared.push_back({column.front, column.column, is_here ? row : -1});
         }
@@ -413,7 +442,7 @@ SharedFront::SharedFront(std::int32_t id_, std::int32_t width_, TileMap map_, in
   }
 }
 
-Plan make_plan(Mat stiffness, Mat mass) {
+Plan make_plan(Mat stiffness, Mat mass, const MeshOrder* order) {
   Plan plan;
   const Communicator comm = petsc::get_communicator(stiffness);
   plan.comm = comm;
@@ -428,11 +457,16 @@ Plan make_plan(Mat stiffness, Mat mass) {
   });
   const IndexPartition owners(comm, nodes.own_nodes);
   Ints position;
-  std::vector<Ints> front_owners;
   SharedMapping mapping;
   std::vector<DealtFront> dealt;
-  {
+  if (order != nullptr) {
+    if (order->node_count() != owners.total()) throw InputError("The order of a factorisation has another number of nodes than K.");
+    mapping = order->get_mapping();
+    dealt = deal_fronts(comm, order->get_elimination(), mapping, order->get_front_owners());
+    position = report_positions(comm, order->get_elimination(), nodes, owners);
+  } else {
     Elimination all = eliminate_on_paper(comm, nodes, owners);
+    std::vector<Ints> front_owners;
     mapping = map_fronts(comm, all, front_owners);
     dealt = deal_fronts(comm, all, mapping, front_owners);
     position = std::move(all.position);
@@ -450,6 +484,7 @@ Plan make_plan(Mat stiffness, Mat mass) {
     };
     find_ghosts(k, plan.link_of_ghost_k);
     find_ghosts(m, plan.link_of_ghost_m);
+    if (order != nullptr) check_fronts(plan, nodes);
     return measure(plan);
   });
   gather_analysis(plan, own, comm);

@@ -169,7 +169,7 @@ struct Plan {
   Analysis analysis;
 };
 
-/// Plans everything. Collective; throws as Factor's constructor.
-Plan make_plan(Mat stiffness, Mat mass);
+/// Plans everything. order: as for Factor. Collective; throws as Factor's constructor.
+Plan make_plan(Mat stiffness, Mat mass, const MeshOrder* order);
 
 }  // namespace carillon::ldlt

@@ -1,5 +1,5 @@
 // Method: find the arrays (layout), read blocks (read_block), cut (partition::bisect), move elements and number nodes
-//   (partition::redistribute), bring faces together (boundary).
+//   (partition::redistribute), once more if the caller has a better cut, bring faces together (boundary).
 // Source: the steps name theirs.
 // Deviations: none.
 #include "precompute/parallel_mesh/read_parallel.hpp"
@@ -10,9 +10,11 @@
 #include <array>
 #include <fstream>
 #include <system_error>
+#include <utility>
 
 #include "partition/bisect.hpp"
 #include "partition/redistribute.hpp"
+#include "precompute/comm/exchange.hpp"
 #include "precompute/mesh/check_parts.hpp"
 #include "precompute/parallel_mesh/boundary.hpp"
 #include "precompute/parallel_mesh/layout.hpp"
@@ -81,6 +83,73 @@ void calc_quality(const comm::Communicator& comm, const partition::LocalMesh& lo
   report.slivers = static_cast<std::int64_t>(sum[2]);
 }
 
+/// The rank of each element of the block, where each rank knows those of its elements. Collective.
+std::vector<std::int32_t> send_back(const comm::Communicator& comm, const comm::IndexPartition& elements, const partition::LocalMesh& local,
+                                    const std::vector<std::int32_t>& rank) {
+  struct Moved {
+    std::int32_t element, rank;
+  };
+  const auto moved = comm::all_to_all(
+      comm,
+      [&] {
+        std::vector<Moved> list;
+        for (std::size_t e = 0; e < rank.size(); ++e) list.push_back({local.tet_in_mesh[e], rank[e]});
+        return list;
+      },
+      [&](const Moved& one) { return elements.find_owner(one.element); });
+  return comm.agree([&] {
+    std::vector<std::int32_t> part(static_cast<std::size_t>(elements.own_count()));
+    for (const Moved& one : moved.items) part[elements.to_local(one.element)] = one.rank;
+    return part;
+  });
+}
+
+/// The rows of the own free nodes of `first` in the mesh as it is cut now. Collective.
+std::vector<std::int32_t> find_rows(const comm::Communicator& comm, const partition::MeshBlock& block, const partition::LocalMesh& first,
+                                    const partition::LocalMesh& now) {
+  struct Row {
+    std::int32_t node, row;
+  };
+  const auto reported = comm::all_to_all(
+      comm,
+      [&] {
+        std::vector<Row> list;
+        for (std::size_t i = 0; i < static_cast<std::size_t>(now.free_nodes); ++i) list.push_back({now.node_in_mesh[i], now.row[i]});
+        return list;
+      },
+      [&](const Row& one) { return block.find_owner(one.node); });
+  const auto row_at = comm.agree([&] {
+    std::vector<std::int32_t> rows(static_cast<std::size_t>(block.corners.own_count() + block.mids.own_count()), -1);
+    for (const Row& one : reported.items) rows[block.to_local(one.node)] = one.row;
+    return rows;
+  });
+  return comm::query_owners<std::int32_t>(
+      comm, std::vector(first.node_in_mesh.begin(), first.node_in_mesh.begin() + first.free_nodes),
+      [&](std::int32_t node) { return block.find_owner(node); }, [&](std::int32_t node) { return row_at[block.to_local(node)]; });
+}
+
+/// Cuts the mesh by `part`, and once more where the options say so. Collective.
+partition::DistributedMesh cut(const comm::Communicator& comm, const std::string& name, partition::MeshBlock& block,
+                               const std::vector<std::int32_t>& part, const ReadOptions& options, std::vector<char>& on_seam) {
+  const bool has_fixed = !options.fixed.empty();
+  if (!options.recut || comm.size() == 1) return partition::redistribute(comm, name, block, part, has_fixed, on_seam);
+  partition::MeshBlock copy = comm.agree([&] { return block; });
+  partition::DistributedMesh first = partition::redistribute(comm, name, copy, part, has_fixed, on_seam);
+  const std::vector<std::int32_t> rank = options.recut(first.local, first.free_nodes);
+  const bool is_recut = comm.max(rank.empty() ? 0.0 : 1.0) > 0;
+  if (is_recut) {
+    const std::vector<std::int32_t> last = send_back(comm, block.elements, first.local, rank);
+    on_seam.clear();
+    const partition::LocalMesh before = std::exchange(first.local, {});
+    first = partition::redistribute(comm, name, block, last, has_fixed, on_seam);
+    options.renumber(find_rows(comm, block, before, first.local));
+  } else {
+    block = std::move(copy);
+    options.renumber(comm.agree([&] { return std::vector(first.local.row.begin(), first.local.row.begin() + first.local.free_nodes); }));
+  }
+  return first;
+}
+
 void collect_warnings(mesh::CheckReport& report) {
   mesh::warn_of_elements(report);
   if (report.touching_nodes > 0)
@@ -109,7 +178,7 @@ ParallelMesh read_parallel(const comm::Communicator& comm, const std::filesystem
   result.fixed_nodes = comm.sum(std::int64_t{std::ranges::count_if(block.fixed, [](std::int32_t fixed) { return fixed != 0; })});
   const auto part = partition::bisect(comm, block.centres_m, block.elements.own_begin());
   std::vector<char> on_seam;
-  result.mesh = partition::redistribute(comm, name, block, part, !options.fixed.empty(), on_seam);
+  result.mesh = cut(comm, name, block, part, options, on_seam);
   result.check.components = result.mesh.components;
   result.boundary = find_boundary(comm, name, block.corners, on_seam, result.mesh, result.check);
   calc_quality(comm, result.mesh.local, result.check);

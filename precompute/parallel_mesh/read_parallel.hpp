@@ -9,6 +9,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -29,6 +30,11 @@ struct ReadOptions {
   int order = 2;       // of the elements to compute with, whatever the file has
   double scale = 1.0;  // metres per unit of the file; boxes are in metres
   std::vector<FixedNodes> fixed = {};
+  /// Gives each element of a first cut, of so many free nodes in all, its rank; empty on all ranks: the first cut stays. Collective. May be
+  /// empty.
+  std::function<std::vector<std::int32_t>(const partition::LocalMesh& first, std::int64_t free_nodes)> recut = {};
+  /// Is told the row of each own free node of the first cut, where there is a recut. Collective.
+  std::function<void(const std::vector<std::int32_t>& rows)> renumber = {};
 };
 
 /// The boundary of the whole mesh; filled on rank 0 only. The same for every number of ranks, and the same as mesh::extract_boundary's.

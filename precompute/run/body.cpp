@@ -14,6 +14,7 @@
 #include "precompute/mesh/read.hpp"
 #include "precompute/parallel_mesh/read_parallel.hpp"
 #include "precompute/petsc/session.hpp"
+#include "precompute/run/cut_mesh.hpp"
 #include "precompute/run/meshing.hpp"
 #include "precompute/run/refine_mesh.hpp"
 
@@ -106,6 +107,9 @@ bool wants_elimination_order(const job::JobSpec& job) {
   return job.factorisation == job::Factorisation::mumps || job.factorisation == job::Factorisation::cholmod;
 }
 
+/// A factorisation of this project solves the job, so the mesh is best cut where it will have its separators.
+bool wants_cut_by_order(const job::JobSpec& job) { return !wants_elimination_order(job) && job.method != job::Method::dense; }
+
 /// Every rank reads its part of the file.
 Body read_in_parallel(Run& run, const Setting& setting) {
   Body body;
@@ -116,6 +120,7 @@ Body read_in_parallel(Run& run, const Setting& setting) {
   options.order = setting.element == job::Element::T10 ? 2 : 1;
   for (const job::Fixed& fixed : run.job.fixed)
     options.fixed.push_back({fixed.node_set, fixed.box_m, (fixed.place.empty() ? run.job.file.string() : fixed.place) + ": key 'fixed'"});
+  if (wants_cut_by_order(run.job)) cut_by_order(run.comm, options, body.order);
   parallel_mesh::ParallelMesh mesh = parallel_mesh::read_parallel(run.comm, run.job.mesh, options);
   body.pieces = std::move(mesh.mesh);
   body.check = std::move(mesh.check);
@@ -156,9 +161,15 @@ Body make_pieces(Run& run, const Setting& setting, Patience* patience) {
     return body;
   }
 
-  run.log.begin("partition", "METIS k-way on the dual graph");
-  body.pieces = name_errors(body.source, run, [&] {
-    return partition::distribute(run.comm, mesh, fixed_nodes, {.elimination_order = wants_elimination_order(run.job)});
+  run.log.begin("partition", "the separator tree of the nodes, or METIS k-way on the dual graph");
+  name_errors(body.source, run, [&] {
+    if (wants_cut_by_order(run.job)) {
+      CutMesh cut = cut_by_order(run.comm, mesh, fixed_nodes);
+      body.pieces = std::move(cut.pieces);
+      body.order = std::move(cut.order);
+    } else {
+      body.pieces = partition::distribute(run.comm, mesh, fixed_nodes, {.elimination_order = wants_elimination_order(run.job)});
+    }
   });
   broadcast_fixed_nodes(run.comm, std::move(fixed), body.pieces.local);
   mesh = {};

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -14,6 +15,10 @@
 #include "precompute/run/meshing.hpp"
 #include "precompute/run/run.hpp"
 
+namespace carillon::ldlt {
+class MeshOrder;
+}  // namespace carillon::ldlt
+
 namespace carillon::run {
 
 using io::Surface;
@@ -21,6 +26,7 @@ using job::Setting;
 
 struct Body {
   partition::DistributedMesh pieces;
+  std::shared_ptr<const ldlt::MeshOrder> order;      // by which the mesh was cut; null: METIS cut it
   mesh::CheckReport check;                           // rank 0
   std::int64_t fixed_nodes = 0;                      // rank 0
   Surface surface;                                   // rank 0

@@ -118,8 +118,10 @@ eigen::Options make_options(const Run& run, const Setting& setting) {
   return options;
 }
 
-eigen::NodeLayout make_layout(partition::DistributedMesh& pieces) {
+eigen::NodeLayout make_layout(Body& body) {
+  partition::DistributedMesh& pieces = body.pieces;
   eigen::NodeLayout layout;
+  layout.order = body.order;
   const auto free_nodes = pieces.local.free_nodes;
   layout.nodes_m.assign(pieces.local.nodes_m.begin(), pieces.local.nodes_m.begin() + free_nodes);
   layout.component.assign(pieces.local.component.begin(), pieces.local.component.begin() + free_nodes);
@@ -130,7 +132,7 @@ eigen::NodeLayout make_layout(partition::DistributedMesh& pieces) {
 }
 
 eigen::Modes find_modes(Run& run, const Setting& setting, Body& body, const AssembledSystem& system) {
-  eigen::Modes modes = solve_named(run, setting, body, system, make_layout(body.pieces));
+  eigen::Modes modes = solve_named(run, setting, body, system, make_layout(body));
   warn_of_band(run, body, modes);
   return modes;
 }

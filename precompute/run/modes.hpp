@@ -15,7 +15,7 @@ eigen::Options make_options(const Run& run, const Setting& setting);
 double find_low_hz(const job::JobSpec& job, const eigen::Modes& modes);
 
 /// Positions and components of the free nodes; moves the elimination order out of the pieces.
-eigen::NodeLayout make_layout(partition::DistributedMesh& pieces);
+eigen::NodeLayout make_layout(Body& body);
 
 /// All modes of the job's band, with the proof that they are all. Warns of modes outside the band and of mechanisms. The elimination order
 /// of the body is gone afterwards. Phase "modes". Collective. Throws on every rank: InputError, SolveError, SystemError, with the body and

@@ -311,8 +311,8 @@ void Validation::analyse_mesh(const Setting& setting) {
     assembled_s_ = base::get_process_cpu_s();
     heartbeat_.begin("analysing the factorisation");
     solve_estimate_ = name_errors(body_.source, run_, [&] {
-      return eigen::estimate_solve({system.matrices.stiffness, system.matrices.mass, make_layout(body_.pieces)},
-                                   make_options(run_, setting), [&](const eigen::SolveEstimate& estimate) { return may_count(estimate); });
+      return eigen::estimate_solve({system.matrices.stiffness, system.matrices.mass, make_layout(body_)}, make_options(run_, setting),
+                                   [&](const eigen::SolveEstimate& estimate) { return may_count(estimate); });
     });
     properties_ = std::move(system.properties);
     memory_.copies_peak = static_cast<double>(solve_estimate_.copies_bytes);

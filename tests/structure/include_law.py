@@ -272,6 +272,7 @@ LAW = {
             "precompute/fem",
             "precompute/parallel_mesh",
             "precompute/estimate",
+            "precompute/ldlt",
             "precompute/eigen",
             "precompute/analytic",
             "precompute/bem",

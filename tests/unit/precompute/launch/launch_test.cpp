@@ -45,11 +45,12 @@ TEST(Kernels, that_fit_are_never_older_than_the_processor) {
 }
 
 TEST(Environment, has_one_thread_and_what_the_user_chose) {
-  const std::array<Environment, 5> all{{{"OMP_NUM_THREADS", "7"},
+  const std::array<Environment, 6> all{{{"OMP_NUM_THREADS", "7"},
                                         {"OPENBLAS_CORETYPE", "Nehalem"},
                                         {"CARILLON_DEFAULT_KERNELS", "Prescott"},
                                         {"OMPI_MCA_pml", "cm"},
-                                        {"HWLOC_COMPONENTS", nullptr}}};
+                                        {"HWLOC_COMPONENTS", nullptr},
+                                        {"GLIBC_TUNABLES", nullptr}}};
   prepare_environment();
   EXPECT_THAT(std::getenv("OMP_NUM_THREADS"), StrEq("1"));
   EXPECT_THAT(std::getenv("OPENBLAS_NUM_THREADS"), StrEq("1"));
@@ -57,6 +58,7 @@ TEST(Environment, has_one_thread_and_what_the_user_chose) {
   EXPECT_EQ(std::getenv("CARILLON_DEFAULT_KERNELS"), nullptr);  // the choice is the user's
   EXPECT_THAT(std::getenv("OMPI_MCA_pml"), StrEq("cm"));
   EXPECT_THAT(std::getenv("HWLOC_COMPONENTS"), StrEq("-gl"));
+  EXPECT_THAT(std::getenv("GLIBC_TUNABLES"), StrEq("glibc.malloc.hugetlb=1"));
 }
 
 TEST(Environment, has_the_transport_of_one_host_only_on_one_host) {

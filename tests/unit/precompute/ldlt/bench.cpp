@@ -13,12 +13,12 @@
 #include <string>
 #include <vector>
 
-#include "partition/distribute.hpp"
 #include "precompute/fem/assemble.hpp"
 #include "precompute/ldlt/factor.hpp"
 #include "precompute/mesh/check.hpp"
 #include "precompute/mesh/read.hpp"
 #include "precompute/petsc/session.hpp"
+#include "precompute/run/cut_mesh.hpp"
 
 namespace {
 
@@ -37,13 +37,13 @@ double measure_s(Work&& work) {
   return own;
 }
 
-void run_own(const fem::System& system, double sigma, int rank) {
+void run_own(const fem::System& system, const ldlt::MeshOrder* order, double sigma, int rank) {
   const auto say = [rank](const std::string& line) {
     if (rank == 0) fmt::print("{}\n", line);
   };
   std::unique_ptr<ldlt::Factor> factor;
   say(fmt::format("analysis      {:7.3f} s", measure_s([&] {
-                    factor = std::make_unique<ldlt::Factor>(la::Pencil{system.stiffness, system.mass});
+                    factor = std::make_unique<ldlt::Factor>(la::Pencil{system.stiffness, system.mass}, order);
                   })));
   const ldlt::Analysis& analysis = factor->get_analysis();
   say(fmt::format("entries {:.4g}, flops {:.4g}, {} fronts, {} shared with {} pivot nodes, peak {:.3f} GB",
@@ -98,19 +98,21 @@ void run_mumps(const fem::System& system, double sigma, int rank) {
                analysis, numeric, entries < 0 ? -1e6 * entries : 1.0 * entries, flops, negative);
 }
 
-void run(const std::string& file, bool with_mumps, int rank) {
+void measure_body(const std::string& file, bool with_mumps, int rank) {
   mesh::TetMesh body;
   comm::Communicator(PETSC_COMM_WORLD).agree([&] {
     if (rank == 0) body = mesh::read_mesh(file);
   });
-  const partition::DistributedMesh pieces = partition::distribute(PETSC_COMM_WORLD, body, {});
+  run::CutMesh cut;
+  const double order_s = measure_s([&] { cut = run::cut_by_order(PETSC_COMM_WORLD, body, {}); });
+  if (rank == 0) fmt::print("order and cut {:7.3f} s\n", order_s);
   material::Material ceramic;
   ceramic.young_modulus_pa = 5.4543e9;
   ceramic.poisson_ratio = 0.3303;
   ceramic.density_kg_m3 = 2700;
-  const fem::System system = fem::assemble(PETSC_COMM_WORLD, pieces.local, ceramic, job::Mass::consistent);
+  const fem::System system = fem::assemble(PETSC_COMM_WORLD, cut.pieces.local, ceramic, job::Mass::consistent);
   const double omega = 2 * std::numbers::pi * 12'000.0;
-  run_own(system, omega * omega, rank);
+  run_own(system, cut.order.get(), omega * omega, rank);
   if (with_mumps) run_mumps(system, omega * omega, rank);
 }
 
@@ -124,7 +126,7 @@ int main(int argc, char** argv) {
     return 1;
   }
   try {
-    run(argv[1], with_mumps, session.rank());
+    measure_body(argv[1], with_mumps, session.rank());
   } catch (const std::exception& error) {
     if (session.rank() == 0) fmt::print(stderr, "bench_ldlt: {}\n", error.what());
     return 1;

@@ -1,0 +1,149 @@
+// Method:     The graph of the nodes is gathered from the elements by the ranks that answer for the nodes; order, fronts and mapping are
+//             those of a factorisation. The nodes of an element are a clique, so their fronts lie on one way to the root, and the rank of
+//             the first of them has, or shares, all.
+// Source:     Pothen and Sun 1993 (subtrees to ranks); the order: order.cpp.
+// Deviations: none.
+#include "precompute/ldlt/mesh_order.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "precompute/comm/exchange.hpp"
+#include "precompute/ldlt/lists.hpp"
+#include "precompute/ldlt/tile_map.hpp"
+
+namespace carillon::ldlt {
+namespace {
+
+using comm::Communicator;
+using comm::IndexPartition;
+
+/// Links of the own nodes, from elements of any ranks. Collective.
+NodeLinks gather_links(const Communicator& comm, std::span<const std::int32_t> elements, int width, const IndexPartition& owners) {
+  const auto received = comm::all_to_all(comm, [&] {
+    std::vector<Ints> lists(static_cast<std::size_t>(comm.size()));
+    std::vector<int> ranks;
+    for (std::size_t at = 0; at < elements.size(); at += static_cast<std::size_t>(width)) {
+      const auto nodes = elements.subspan(at, static_cast<std::size_t>(width));
+      ranks.clear();
+      for (const std::int32_t node : nodes)
+        if (node >= 0) ranks.push_back(owners.find_owner(node));
+      std::sort(ranks.begin(), ranks.end());
+      ranks.erase(std::unique(ranks.begin(), ranks.end()), ranks.end());
+      for (const int rank : ranks)
+        lists[static_cast<std::size_t>(rank)].insert(lists[static_cast<std::size_t>(rank)].end(), nodes.begin(), nodes.end());
+    }
+    return join(lists);
+  });
+  return comm.agree([&] {
+    NodeLinks links;
+    links.first_node = static_cast<std::int32_t>(owners.own_begin());
+    links.own_nodes = static_cast<std::int32_t>(owners.own_count());
+    const auto is_own = [&](std::int32_t node) { return node >= links.first_node && node < links.first_node + links.own_nodes; };
+    for (const std::int32_t node : received.items)
+      if (node >= 0 && !is_own(node)) links.ghosts.push_back(node);
+    std::sort(links.ghosts.begin(), links.ghosts.end());
+    links.ghosts.erase(std::unique(links.ghosts.begin(), links.ghosts.end()), links.ghosts.end());
+    Ints local = received.items;
+    for (std::int32_t& node : local)
+      if (node >= 0) node = is_own(node) ? node - links.first_node : links.find_ghost(node);
+    partition::Graph graph = partition::make_node_graph(local, width, links.count());
+    graph.offsets.resize(static_cast<std::size_t>(links.own_nodes) + 1);
+    graph.neighbours.resize(static_cast<std::size_t>(graph.offsets.back()));
+    links.links = {std::move(graph.offsets), std::move(graph.neighbours)};
+    return links;
+  });
+}
+
+/// The rank that eliminates a node.
+struct NodeRank {
+  std::int32_t node, rank;
+};
+
+/// Those of the nodes that this rank holds.
+std::vector<NodeRank> list_ranks(const Elimination& all, const std::vector<Ints>& owners, const SharedMapping& mapping) {
+  std::vector<NodeRank> list;
+  for (std::size_t h = 0; h < all.parts.size(); ++h) {
+    const HeldPart& held = all.parts[h];
+    const TreePart& part = all.tree[held.part];
+    for (std::size_t s = 0; s < held.forest.supernodes.size(); ++s) {
+      const Supernode& front = held.forest.supernodes[s];
+      const Ints::const_iterator nodes = held.nodes.begin() + (front.first - part.first);
+      if (owners[h][s] >= 0) {
+        for (std::int32_t k = 0; k < front.width; ++k) list.push_back({nodes[k], owners[h][s]});
+        continue;
+      }
+      const std::int32_t at = mapping.find(part.first_front + static_cast<std::int32_t>(s));
+      const TileMap map(front.width, static_cast<std::int32_t>(front.rows.size()), mapping.mapping.list_shares(at));
+      for (std::int32_t k = 0; k < front.width; ++k) {
+        const int tile = map.find_tile(k);
+        list.push_back({nodes[k], map.rank(map.owner(tile, tile))});
+      }
+    }
+  }
+  return list;
+}
+
+}  // namespace
+
+MeshOrder::MeshOrder(const Communicator& comm, std::span<const std::int32_t> elements, int width, const IndexPartition& owners)
+    : owners_(owners), elimination_(eliminate_on_paper(comm, gather_links(comm, elements, width, owners), owners)) {
+  mapping_ = map_fronts(comm, elimination_, front_owners_);
+  const auto reported = comm::all_to_all(
+      comm, [&] { return list_ranks(elimination_, front_owners_, mapping_); },
+      [&](const NodeRank& one) { return owners_.find_owner(one.node); });
+  comm.agree([&] {
+    rank_.assign(static_cast<std::size_t>(owners_.own_count()), -1);
+    for (const NodeRank& one : reported.items) rank_[owners_.to_local(one.node)] = one.rank;
+  });
+}
+
+Ints MeshOrder::find_ranks(const Communicator& comm, std::span<const std::int32_t> elements, int width) const {
+  struct Place {
+    std::int32_t position, rank;
+  };
+  const Ints nodes = comm.agree([&] {
+    Ints list(elements.begin(), elements.end());
+    std::sort(list.begin(), list.end());
+    list.erase(std::unique(list.begin(), list.end()), list.end());
+    if (!list.empty() && list.front() < 0) list.erase(list.begin());
+    return list;
+  });
+  const std::vector<Place> places = comm::query_owners<Place>(
+      comm, nodes, [&](std::int32_t node) { return owners_.find_owner(node); },
+      [&](std::int32_t node) {
+        const std::size_t own = owners_.to_local(node);
+        return Place{elimination_.position[own], rank_[own]};
+      });
+  return comm.agree([&] {
+    Ints ranks;
+    for (std::size_t at = 0; at < elements.size(); at += static_cast<std::size_t>(width)) {
+      Place first{0, -1};
+      for (const std::int32_t node : elements.subspan(at, static_cast<std::size_t>(width))) {
+        if (node < 0) continue;
+        const Place& place = places[static_cast<std::size_t>(std::lower_bound(nodes.begin(), nodes.end(), node) - nodes.begin())];
+        if (first.rank < 0 || place.position < first.position) first = place;
+      }
+      ranks.push_back(first.rank);
+    }
+    return ranks;
+  });
+}
+
+void MeshOrder::renumber(const Communicator& comm, const Ints& row) {
+  const Ints asked = comm.agree([&] {
+    Ints nodes;
+    for (const HeldPart& held : elimination_.parts) nodes.insert(nodes.end(), held.nodes.begin(), held.nodes.end());
+    return nodes;
+  });
+  const Ints rows = comm::query_owners<std::int32_t>(
+      comm, asked, [&](std::int32_t node) { return owners_.find_owner(node); },
+      [&](std::int32_t node) { return row[owners_.to_local(node)]; });
+  auto next = rows.begin();
+  for (HeldPart& held : elimination_.parts)
+    for (std::int32_t& node : held.nodes) node = *next++;
+  elimination_.position = {};  // of the old numbers
+  rank_ = {};
+}
+
+}  // namespace carillon::ldlt

@@ -1,0 +1,48 @@
+// The order of elimination of a mesh whose rows are not dealt yet.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "precompute/comm/communicator.hpp"
+#include "precompute/comm/index_partition.hpp"
+#include "precompute/ldlt/deal.hpp"
+#include "precompute/ldlt/elimination.hpp"
+
+namespace carillon::ldlt {
+
+/// The separator tree of a mesh and the ranks that eliminate its nodes, found before the mesh is cut: elements can then go to the ranks
+/// that eliminate their nodes, and right-hand sides need not travel in a solve.
+///
+///   MeshOrder order(comm, elements, 10, owners);
+///   const Ints part = order.find_ranks(comm, elements, 10);  // cut the mesh so, and number its rows
+///   order.renumber(comm, rows);                              // for Factor(pencil, &order)
+class MeshOrder {
+ public:
+  /// elements: (e, width) nodes of this rank's elements, each element on one rank; negative: fixed. owners: who answers for which node
+  /// until the rows are numbered; anyone may. Collective. Throws SystemError on all ranks when memory runs out.
+  MeshOrder(const comm::Communicator& comm, std::span<const std::int32_t> elements, int width, const comm::IndexPartition& owners);
+
+  /// (e) for each of this rank's elements the rank that eliminates the first of its nodes, of a shared front the one with the diagonal
+  /// tile; -1: all are fixed. Nodes that one rank eliminates alone have all their elements there. Collective.
+  Ints find_ranks(const comm::Communicator& comm, std::span<const std::int32_t> elements, int width) const;
+
+  /// row: for each of the nodes that this rank answers for its row among those of K, in nodes. Once. Collective.
+  void renumber(const comm::Communicator& comm, const Ints& row);
+
+  std::int32_t node_count() const { return static_cast<std::int32_t>(owners_.total()); }
+  const Elimination& get_elimination() const { return elimination_; }
+  const SharedMapping& get_mapping() const { return mapping_; }
+  /// For each held part of the elimination, who has each supernode; -1: it is shared.
+  const std::vector<Ints>& get_front_owners() const { return front_owners_; }
+
+ private:
+  comm::IndexPartition owners_;
+  Elimination elimination_;
+  std::vector<Ints> front_owners_;
+  SharedMapping mapping_;
+  Ints rank_;  // (own nodes) who eliminates each
+};
+
+}  // namespace carillon::ldlt
