@@ -18,9 +18,10 @@ inline constexpr double kLinearNodesPerTet = 0.25;
 inline constexpr double kSurfaceMeshSeconds = 5;  // of carillon-mesh, where its surface is not known
 inline constexpr double kSurfaceMeshSecondsPerNode = 1e-4;
 
-// Fill of the factor, of 100,000 unknowns, and its powers: 4/3 and 2 for infinite solids (George 1973), less at these sizes.
-inline constexpr double kEntries = 2.7e7, kEntryPower = 1.33;
-inline constexpr double kFlops = 2.0e10, kFlopPower = 1.7;
+// Fill of the factor, of 100,000 unknowns, and its powers: 4/3 and 2 for infinite solids (George 1973). Fitted to the hollow bunny of
+// 38,000 to 1,470,000 unknowns (docs/reports/scaling.md), whose walls have more elements across the finer the mesh is.
+inline constexpr double kEntries = 3.0e7, kEntryPower = 1.45;
+inline constexpr double kFlops = 2.5e10, kFlopPower = 2.0;
 inline constexpr double kRowNeighbours = 15, kQuadraticRowNeighbours = 28;  // nodes that share an element with a node, itself included
 
 // The eigensolver.

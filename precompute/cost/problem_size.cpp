@@ -1,5 +1,5 @@
 // Method:     Powers of the unknowns, as nested dissection of solids fills; counts of slices as precompute/eigen cuts them.
-// Source:     George, Nested dissection of a regular finite element mesh, 1973 (4/3 and 2). Deviations: smaller powers, measured.
+// Source:     George, Nested dissection of a regular finite element mesh, 1973 (4/3 and 2). Deviations: measured powers.
 #include "precompute/cost/problem_size.hpp"
 
 #include <algorithm>

@@ -76,7 +76,7 @@ void load_displacement(const partition::LocalMesh& local, const std::vector<std:
 constexpr int kSums = 9;
 using Sums = std::array<DoubleLanes, kSums>;
 
-Sums calc_block(const Kernels& kernels, Recovery& recovery, Room& room, job::Mass mass_kind, const DoubleLanes& lambda) {
+Sums calc_block(const ElementKernels& kernels, Recovery& recovery, Room& room, job::Mass mass_kind, const DoubleLanes& lambda) {
   const Elements& elements = recovery.elements;
   Sums sums{};
   const void* displacement = room.displacement.data();
@@ -126,7 +126,7 @@ std::vector<double> calc_sums(const comm::Communicator& comm, const partition::L
     recovery.nodes.reserve(3 * kLanes * sizeof(double));
     recovery.vertices.reserve(static_cast<std::size_t>(elements.terms) * materials * 6 * kLanes * sizeof(float));
   });
-  const Kernels& kernels = *list_kernels(elements.nodes).front();
+  const ElementKernels& kernels = *list_kernels(elements.nodes).front();
   PetscInt stride = 0;
   const PetscScalar* shapes = nullptr;
   petsc::check(MatDenseGetLDA(solution.shapes, &stride));

@@ -70,7 +70,7 @@ struct Traction {
 
 /// The loops for one kind of element and one instruction set. displacement: (nodes, 3), of T4 FloatLanes, of T10 DoubleLanes (their error
 /// energies are smaller than what the differences of single precision leave).
-struct Kernels {
+struct ElementKernels {
   /// q of every sample, added into the patches' terms; if `lumped`, adds phi^T (M_lumped - M_consistent) phi to `difference`.
   /// strains: (e, s), of T10 only; patches: (patches, t).
   void (*add_strains)(const Elements& elements, bool lumped, const void* displacement, Strain* strains, Strain* patches,
@@ -90,6 +90,6 @@ struct Kernels {
 };
 
 /// The tables that this processor can run, the fastest first. nodes: 4 or 10.
-std::vector<const Kernels*> list_kernels(int nodes);
+std::vector<const ElementKernels*> list_kernels(int nodes);
 
 }  // namespace carillon::estimate

@@ -271,11 +271,11 @@ void add_tractions(const std::vector<Traction>& tractions, const Strain* values,
 
 }  // namespace
 
-extern const Kernels kT4;
-extern const Kernels kT10;
-const Kernels kT4{add_strains<4, 1, 1, FloatLanes>, find_middles,  add_energies_t4,
-                  add_shifts<FloatLanes>,           add_tractions, CARILLON_ISA_NAME};
-const Kernels kT10{
+extern const ElementKernels kT4;
+extern const ElementKernels kT10;
+const ElementKernels kT4{add_strains<4, 1, 1, FloatLanes>, find_middles,  add_energies_t4,
+                         add_shifts<FloatLanes>,           add_tractions, CARILLON_ISA_NAME};
+const ElementKernels kT10{
     add_strains<10, 4, 10, DoubleLanes>, find_middles, add_energies_t10, add_shifts<DoubleLanes>, add_tractions, CARILLON_ISA_NAME};
 
 }  // namespace carillon::estimate::CARILLON_ISA

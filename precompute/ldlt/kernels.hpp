@@ -35,7 +35,7 @@ struct BlockPivots {
 };
 
 /// Consecutive rows of a child that stay consecutive in its parent.
-struct Run {
+struct RowRun {
   int from = 0;
   int to = 0;
   int length = 0;
@@ -78,7 +78,7 @@ struct Kernels {
   void (*update_columns)(const double* tiles, int width, const double* wide, int begin, int end, int n, double* const* columns);
   /// target[c][run.to + i] += source[c][run.from + i] for every run and three columns; in column c rows before the c-th of the first run
   /// are left out.
-  void (*extend_add)(const double* const* source, const Run* runs, int count, double* const* target);
+  void (*extend_add)(const double* const* source, const RowRun* runs, int count, double* const* target);
   /// to (m rows of n numbers, to_stride apart) = the transpose of from (n rows of m numbers, from_stride apart). They do not overlap.
   void (*transpose)(const double* from, long from_stride, int n, int m, double* to, long to_stride);
   const char* name;

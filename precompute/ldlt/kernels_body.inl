@@ -600,7 +600,7 @@ inline void add_run(const double* __restrict__ from, double* __restrict__ to, in
   for (; i < length; ++i) to[i] += from[i];
 }
 
-void extend_add(const double* const* source, const Run* runs, int count, double* const* target) {
+void extend_add(const double* const* source, const RowRun* runs, int count, double* const* target) {
   for (int c = 0; c < 3; ++c) add_run(source[c] + runs[0].from + c, target[c] + runs[0].to + c, runs[0].length - c);
   for (int k = 1; k < count; ++k)
     for (int c = 0; c < 3; ++c) add_run(source[c] + runs[k].from, target[c] + runs[k].to, runs[k].length);

@@ -229,7 +229,7 @@ class Factoriser {
   /// Adds the columns of node j of a child's update matrix of r rows, from their diagonals on.
   void add_node(const double* update, std::int64_t r, std::size_t j) {
     const int k = node_runs_[j];
-    const Run whole = runs_[k];
+    const RowRun whole = runs_[k];
     const int from = 3 * static_cast<int>(j);
     const int column = whole.to + from - whole.from;
     const double* source[3];
@@ -305,9 +305,9 @@ class Factoriser {
   Buffer block_;
   double* update_ = nullptr;
   std::vector<double*> starts_;
-  Ints where_;             // (local_nodes) node of the front in work
-  std::vector<Run> runs_;  // of the child that is being added
-  Ints node_runs_;         // the run of each of its nodes
+  Ints where_;                // (local_nodes) node of the front in work
+  std::vector<RowRun> runs_;  // of the child that is being added
+  Ints node_runs_;            // the run of each of its nodes
 
   Buffer stack_[2];
   std::int64_t used_[2] = {0, 0};

@@ -404,11 +404,11 @@ double* SharedFactoriser::find_column(const SharedFront& front, const Work& work
 template <typename FindPieceRows>
 void SharedFactoriser::add_update(const SharedFront& front, Work& work, const SharedChild& child, int from, FindPieceRows&& find_rows) {
   // Rows that follow each other in the front too.
-  struct Run {
+  struct TileRun {
     std::int64_t begin, end;  // rows of the child
     std::int64_t to;          // row of the tile
   };
-  std::vector<Run> runs;
+  std::vector<TileRun> runs;
   for_pieces(child, from, front.map, front.place, [&](const Piece& piece) {
     const std::int32_t* nodes = child.node_of_row.data();
     const int j = front.map.find_tile(nodes[piece.b_begin]);
@@ -425,7 +425,7 @@ void SharedFactoriser::add_update(const SharedFront& front, Work& work, const Sh
       double* column = find_column(front, work, at, within) + find_first_row(front, i);
       const std::int64_t first = piece.find_first_row(c);
       const double* numbers = find_rows(piece, c);
-      for (const Run& run : runs) {
+      for (const TileRun& run : runs) {
         const std::int64_t begin = std::max(run.begin, first);
         const std::int64_t count = run.end - begin;
         if (count <= 0) continue;

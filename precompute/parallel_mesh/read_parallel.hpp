@@ -33,7 +33,7 @@ struct ReadOptions {
   /// Gives each element of a first cut, of so many free nodes in all, its rank; empty on all ranks: the first cut stays. Collective. May be
   /// empty.
   std::function<std::vector<std::int32_t>(const partition::LocalMesh& first, std::int64_t free_nodes)> recut = {};
-  /// Is told the row of each own free node of the first cut, where there is a recut. Collective.
+  /// Gets the row of each own free node of the first cut, where there is a recut. Collective.
   std::function<void(const std::vector<std::int32_t>& rows)> renumber = {};
 };
 

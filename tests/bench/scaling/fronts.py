@@ -11,9 +11,10 @@ TILE = 72  # unknowns of a tile: 24 nodes
 COLUMNS = 16  # of a solve
 SMALL = 0.06  # of a rank: subtrees that lie on two ranks and are smaller go to one of them whole
 FULLEST = 1.25  # entries of the fullest rank over the mean: the mapping's bound
-PATH = 1.2  # operations on the path over total / ranks: counted 1.05 to 1.25 from 2 to 64 ranks, no trend
-GANG = 2.1  # the same where the ranks of a front wait for one another, on very many ranks ...
-GANG_STEP = 0.35  # ... of which 1 - 2^(-0.35 levels) is reached: fitted to the counts
+PATH = 1.25  # operations on the path over total / ranks, on very many ranks ...
+PATH_STEP = 0.5  # ... of whose excess 1 - 2^(-0.5 levels) is reached: fitted to the counts
+GANG = 2.4  # the same where the ranks of a front wait for one another, on very many ranks ...
+GANG_STEP = 0.35  # ... of whose excess (1 - 2^(-0.35 levels))^2 is reached: fitted to the counts
 UNEVEN = 1.4  # messages and bytes of the fullest rank of a front over the mean
 LONGEST = 1.8  # panels on the longest way to the root over those of mean fronts
 SPREAD = 1.3  # tiles of the fullest rank of a front over the mean
@@ -177,5 +178,9 @@ def count_peak_bytes(tree, ranks, entries):
     return 8 * ((FULLEST if ranks > 1 else 1.0) * entries / ranks + 2 * SPREAD * tiles + left)
 
 
+def find_path(ranks):
+    return 1 + (PATH - 1) * (1 - 2 ** (-PATH_STEP * math.log2(ranks)))
+
+
 def find_gang(ranks):
-    return 1 + (GANG - 1) * (1 - 2 ** (-GANG_STEP * math.log2(ranks)))
+    return max(find_path(ranks), 1 + (GANG - 1) * (1 - 2 ** (-GANG_STEP * math.log2(ranks))) ** 2)

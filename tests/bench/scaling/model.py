@@ -180,7 +180,7 @@ class Model:
         tree, hidden = body.tree, 0.5 if case == "good" else 1.0
         flops = self.count_flops(p)
         even = body.factorisations * flops / p / (1e9 * rates.factor_gflops * self.speed)
-        path = 1.0 if p == 1 else fronts.PATH if case == "good" else fronts.find_gang(p)
+        path = 1.0 if p == 1 else fronts.find_path(p) if case == "good" else fronts.find_gang(p)
         if case == "poor":
             path *= 1 + min(fronts.count_shared(tree, p)[0] / flops, 1.0)
         received = hidden * self.send_s(*fronts.count_factor_messages(tree, p)) if p > 1 else 0.0
@@ -256,7 +256,7 @@ def compare(tree, row):
     messages, size = fronts.count_factor_messages(tree, ranks)
     solve_messages, solve_size = fronts.count_solve_messages(tree, ranks)
     pairs = (
-        (fronts.PATH, row["path"]),
+        (fronts.find_path(ranks), row["path"]),
         (fronts.find_gang(ranks), row["gang"]),
         (fronts.FULLEST, row["fullest"]),
         (messages, row["messages"]),

@@ -79,8 +79,8 @@ TEST_P(Loops, give_the_same_with_every_instruction_set) {
   DoubleLanes lambda;
   for (int l = 0; l < kLanes; ++l) lambda.lane[l] = 0.1 * (l + 1);
   std::array<DoubleLanes, 8> first{};
-  const std::vector<const Kernels*> tables = list_kernels(GetParam());
-  for (const Kernels* kernels : tables) {
+  const std::vector<const ElementKernels*> tables = list_kernels(GetParam());
+  for (const ElementKernels* kernels : tables) {
     std::vector<Strain> patches(40 * work.elements.terms, Strain{}), strains(work.elements.count * work.elements.samples);
     std::array<DoubleLanes, 8> sums{};
     kernels->add_strains(work.elements, true, displacement, strains.data(), patches.data(), sums[2]);
@@ -147,7 +147,7 @@ TEST(Energies, of_T10_are_the_exact_integrals_of_the_squared_field) {
         field[l][both] += 4 * u;
       }
     }
-  for (const Kernels* kernels : list_kernels(10)) {
+  for (const ElementKernels* kernels : list_kernels(10)) {
     DoubleLanes error{}, singular{}, bent{}, energy{};
     kernels->add_energies(elements, value_of.data(), values.data(), nullptr, strains.data(), error, singular, bent, energy);
     for (int l = 0; l < kLanes; ++l) {
@@ -159,7 +159,7 @@ TEST(Energies, of_T10_are_the_exact_integrals_of_the_squared_field) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Kernels, Loops, testing::Values(4, 10));
+INSTANTIATE_TEST_SUITE_P(ElementKernels, Loops, testing::Values(4, 10));
 
 }  // namespace
 }  // namespace carillon::estimate

@@ -131,5 +131,16 @@ TEST(Mapping, path_and_memory_of_a_block_stay_near_an_equal_share) {
   }
 }
 
+TEST(Mapping, ranks_end_the_fronts_that_they_share_together) {
+  for (const int ranks : {2, 3, 4, 8}) {
+    const std::vector<FrontCost> forest = make_block(24, ranks);
+    const MappingCounts chosen = count_mapping(forest, choose_mapping(forest, ranks));
+    const MappingCounts proportional = count_mapping(forest, Mapping(forest, ranks, 1));
+    EXPECT_LE(chosen.path_operations, proportional.path_operations);
+    EXPECT_LE(chosen.path_ratio(), ranks == 2 ? 1.08 : 1.25) << ranks << " ranks";
+    EXPECT_LE(chosen.gang_operations, proportional.gang_operations) << ranks << " ranks: who is free early waits less too";
+  }
+}
+
 }  // namespace
 }  // namespace carillon::ldlt

@@ -88,7 +88,7 @@ TEST(MeshOrder, only_rows_of_shared_fronts_travel) {
   EXPECT_LE(lattice.comm().sum(travel), plan.analysis.shared_nodes);
   std::int64_t blocks = 0;
   for (const ReceivedBlocks& received : plan.received) blocks += static_cast<std::int64_t>(received.columns.size());
-  EXPECT_EQ(lattice.comm().sum(blocks), 0) << "columns of own fronts come from nobody";
+  EXPECT_EQ(lattice.comm().sum(blocks), 0) << "columns of own fronts come from no other rank";
 }
 
 TEST(MeshOrder, solves_and_counts_as_dense_matrices_do) {
