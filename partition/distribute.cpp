@@ -1,6 +1,5 @@
-// Method: METIS k-way on the dual graph gives elements to ranks, or the caller; a node goes to the highest rank among those of its
-// elements. Rank 0 makes
-//   and sends one rank's part at a time.
+// Method: Elements go to ranks as the caller says, or by METIS k-way on the dual graph; a node goes to the highest rank among those of its
+//   elements. Rank 0 makes and sends one rank's part at a time.
 // Source: Karypis and Kumar 1998 (METIS).
 // Deviations: none.
 #include "partition/distribute.hpp"

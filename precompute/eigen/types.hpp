@@ -31,7 +31,7 @@ struct NodeLayout {
   /// Per component the positions of its fixed (Dirichlet) nodes [m], the same on every rank. Empty: no node is fixed anywhere. Components
   /// whose every node is fixed have no row in K and may stand in the list.
   std::vector<std::vector<Vec3>> fixed;
-  /// The order by which the mesh was cut, for our L D L^T; null: that orders by itself.
+  /// The order for our L D L^T, by which the mesh is cut where that is even enough; null: L D L^T orders by itself.
   std::shared_ptr<const ldlt::MeshOrder> order;
   /// Fill-reducing order of MUMPS and CHOLMOD, used on rank 0 only: elimination position of every free node in the global numbering of K's
   /// row blocks (partition::order_nested_dissection). Empty: the factorisation orders by itself, with more fill.

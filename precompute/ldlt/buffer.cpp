@@ -8,10 +8,12 @@
 #include <cstdlib>
 #include <map>
 #include <new>
+#include <utility>
 
 namespace carillon::ldlt {
 namespace {
 
+constexpr std::size_t kMapped = 1 << 20;  // from here on buffers have pages of their own
 constexpr std::size_t kMostKept = std::size_t{256} << 20;
 constexpr std::size_t kPage = 4096;
 constexpr std::size_t kLargePage = std::size_t{2} << 20;
@@ -26,19 +28,28 @@ struct Kept {
   std::size_t bytes = 0;
   std::multimap<std::size_t, double*> pages;
 
-  /// The first pages of the smallest run that has enough; what is behind them stays. Null: no run has.
+  /// The first pages of the smallest run that has enough; what is behind them stays, if a buffer can use it. Null: no run has enough.
   double* take(std::size_t wanted) {
     const auto at = pages.lower_bound(wanted);
     if (at == pages.end()) return nullptr;
-    const auto [size, taken] = *at;
-    pages.erase(at);
-    bytes -= wanted;
-    if (size > wanted) pages.emplace(size - wanted, advance(taken, wanted));
+    auto run = pages.extract(at);
+    double* taken = run.mapped();
+    const std::size_t rest = run.key() - wanted;
+    bytes -= run.key();
+    if (rest >= kMapped) {
+      run.key() = rest;
+      run.mapped() = advance(taken, wanted);
+      pages.insert(std::move(run));
+      bytes += rest;
+    } else if (rest > 0) {
+      munmap(advance(taken, wanted), rest);
+    }
     return taken;
   }
   /// As much as there is room for; the rest goes back.
   void put(double* freed, std::size_t size) {
-    const std::size_t kept = is_active ? std::min(size, kMostKept - bytes) : 0;
+    std::size_t kept = is_active ? std::min(size, kMostKept - bytes) : 0;
+    if (kept < kMapped) kept = 0;
     if (kept > 0) pages.emplace(kept, freed);
     bytes += kept;
     if (size > kept) munmap(advance(freed, kept), size - kept);
@@ -80,7 +91,6 @@ BufferReuse::~BufferReuse() {
 Buffer::Buffer(std::int64_t count, Pages pages_come) : size_(count) {
   if (count == 0) return;
   constexpr std::size_t kAlignment = 64;
-  constexpr std::size_t kMapped = 1 << 20;
   const std::size_t bytes = sizeof(double) * static_cast<std::size_t>(count);
   if (bytes < kMapped) {
     data_.reset(static_cast<double*>(std::aligned_alloc(kAlignment, round_up(bytes, kAlignment))));

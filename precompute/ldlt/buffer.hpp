@@ -15,8 +15,8 @@ struct FreeNumbers {
 /// When a large buffer gets its memory: all of it at once takes two thirds of the time, and is for what will be used from end to end.
 enum class Pages { kWhenTouched, kAtOnce };
 
-/// Uninitialised numbers, aligned for vectors. Large ones are pages of their own, which go back to the system at once: update matrices come
-/// and go, and what the heap keeps of them would count as memory of the rank. Throws std::bad_alloc.
+/// Uninitialised numbers, aligned for vectors. Large ones are pages of their own, of 2 MB where the system has such, which go back to it at
+/// once: update matrices come and go, and what the heap keeps of them would count as memory of the rank. Throws std::bad_alloc.
 class Buffer {
  public:
   Buffer() = default;
@@ -32,8 +32,8 @@ class Buffer {
   bool is_fresh_ = false;  // pages of the system, which are zero
 };
 
-/// While one lives, large buffers that are given back are kept for others of nearly their size, up to 256 MB: fresh pages cost more than
-/// what is done with them. One at a time.
+/// While one lives, up to 256 MB of large buffers that are given back serve others of their size or less: fresh pages cost more than what
+/// is done with them. One at a time.
 class BufferReuse {
  public:
   BufferReuse();

@@ -46,7 +46,7 @@ struct FrontParts {
   std::vector<std::int64_t> entries;
 };
 
-FrontParts find_parts(const FrontCost& front, const std::vector<FrontShare>& shares) {
+FrontParts deal_tiles(const FrontCost& front, const std::vector<FrontShare>& shares) {
   const TileMap map(front.width, front.rows, shares);
   return {map.count_operations(), map.count_entries()};
 }
@@ -54,7 +54,7 @@ FrontParts find_parts(const FrontCost& front, const std::vector<FrontShare>& sha
 std::vector<FrontParts> list_parts(const std::vector<FrontCost>& fronts, const Mapping& mapping) {
   std::vector<FrontParts> all(fronts.size());
   for (std::size_t s = 0; s < fronts.size(); ++s)
-    if (mapping.owner(static_cast<std::int32_t>(s)) < 0) all[s] = find_parts(fronts[s], mapping.list_shares(static_cast<std::int32_t>(s)));
+    if (mapping.owner(static_cast<std::int32_t>(s)) < 0) all[s] = deal_tiles(fronts[s], mapping.list_shares(static_cast<std::int32_t>(s)));
   return all;
 }
 
@@ -146,7 +146,7 @@ class Replay {
     for (const FrontShare& share : shares)
       times.push_back(std::max(free_[static_cast<std::size_t>(share.rank)], ready_[static_cast<std::size_t>(front)]));
     level(shares, times, fronts_[static_cast<std::size_t>(front)].operations, kLeastShare / static_cast<double>(shares.size()));
-    shared_[static_cast<std::size_t>(front)] = find_parts(fronts_[static_cast<std::size_t>(front)], shares);
+    shared_[static_cast<std::size_t>(front)] = deal_tiles(fronts_[static_cast<std::size_t>(front)], shares);
     levelled_->set_shares(front, std::move(shares));
   }
 
@@ -261,7 +261,7 @@ Mapping::Mapping(const std::vector<FrontCost>& fronts, int ranks, double operati
 std::vector<FrontShare> Mapping::list_shares(std::int32_t front) const {
   const auto s = static_cast<std::size_t>(front);
   if (owner_[s] >= 0) return {{owner_[s], 1.0}};
-  if (!levelled_.empty() && !levelled_[s].empty()) return levelled_[s];
+  if (!given_shares_.empty() && !given_shares_[s].empty()) return given_shares_[s];
   std::vector<FrontShare> shares;
   const double length = end_[s] - begin_[s];
   for (int rank = static_cast<int>(std::floor(begin_[s] + 1e-9)); rank < ranks_ && rank < end_[s] - 1e-9; ++rank)
@@ -270,8 +270,8 @@ std::vector<FrontShare> Mapping::list_shares(std::int32_t front) const {
 }
 
 void Mapping::set_shares(std::int32_t front, std::vector<FrontShare> shares) {
-  levelled_.resize(owner_.size());
-  levelled_[static_cast<std::size_t>(front)] = std::move(shares);
+  given_shares_.resize(owner_.size());
+  given_shares_[static_cast<std::size_t>(front)] = std::move(shares);
 }
 
 double MappingCounts::fullest_ratio() const {

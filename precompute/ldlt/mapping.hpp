@@ -49,7 +49,7 @@ class Mapping {
   std::vector<double> begin_;  // (fronts) of the interval of the subtree
   std::vector<double> end_;
   std::vector<int> owner_;
-  std::vector<std::vector<FrontShare>> levelled_;  // (fronts) by set_shares, or empty
+  std::vector<std::vector<FrontShare>> given_shares_;  // (fronts) by set_shares, or empty
 };
 
 /// What a mapping costs, counted tile by tile as the factorisation deals them (tile_map.hpp). Of update matrices and of sums that go from a

@@ -6,6 +6,7 @@
 #include "precompute/ldlt/mesh_order.hpp"
 
 #include <algorithm>
+#include <stdexcept>
 #include <utility>
 
 #include "precompute/comm/exchange.hpp"
@@ -98,7 +99,12 @@ MeshOrder::MeshOrder(const Communicator& comm, std::span<const std::int32_t> ele
   });
 }
 
+void MeshOrder::check_is_numbered() const {
+  if (!is_numbered_) throw std::logic_error("an order of a mesh without the numbers of its rows");
+}
+
 Ints MeshOrder::find_ranks(const Communicator& comm, std::span<const std::int32_t> elements, int width) const {
+  if (is_numbered_) throw std::logic_error("ranks of elements are asked for before the rows are numbered");
   struct Place {
     std::int32_t position, rank;
   };
@@ -131,6 +137,7 @@ Ints MeshOrder::find_ranks(const Communicator& comm, std::span<const std::int32_
 }
 
 void MeshOrder::renumber(const Communicator& comm, const Ints& row) {
+  if (is_numbered_) throw std::logic_error("the rows of a mesh are numbered once");
   const Ints asked = comm.agree([&] {
     Ints nodes;
     for (const HeldPart& held : elimination_.parts) nodes.insert(nodes.end(), held.nodes.begin(), held.nodes.end());
@@ -144,6 +151,7 @@ void MeshOrder::renumber(const Communicator& comm, const Ints& row) {
     for (std::int32_t& node : held.nodes) node = *next++;
   elimination_.position = {};  // of the old numbers
   rank_ = {};
+  is_numbered_ = true;
 }
 
 }  // namespace carillon::ldlt

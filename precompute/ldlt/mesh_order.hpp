@@ -25,12 +25,14 @@ class MeshOrder {
   MeshOrder(const comm::Communicator& comm, std::span<const std::int32_t> elements, int width, const comm::IndexPartition& owners);
 
   /// (e) for each of this rank's elements the rank that eliminates the first of its nodes, of a shared front the one with the diagonal
-  /// tile; -1: all are fixed. Nodes that one rank eliminates alone have all their elements there. Collective.
+  /// tile; -1: all are fixed. Nodes that one rank eliminates alone have all their elements there. Pre: not renumbered. Collective.
   Ints find_ranks(const comm::Communicator& comm, std::span<const std::int32_t> elements, int width) const;
 
   /// row: for each of the nodes that this rank answers for its row among those of K, in nodes. Once. Collective.
   void renumber(const comm::Communicator& comm, const Ints& row);
 
+  /// Throws std::logic_error before renumber().
+  void check_is_numbered() const;
   std::int32_t node_count() const { return static_cast<std::int32_t>(owners_.total()); }
   const Elimination& get_elimination() const { return elimination_; }
   const SharedMapping& get_mapping() const { return mapping_; }
@@ -42,7 +44,8 @@ class MeshOrder {
   Elimination elimination_;
   std::vector<Ints> front_owners_;
   SharedMapping mapping_;
-  Ints rank_;  // (own nodes) who eliminates each
+  Ints rank_;  // (own nodes) who eliminates each; until the rows are numbered
+  bool is_numbered_ = false;
 };
 
 }  // namespace carillon::ldlt

@@ -194,15 +194,9 @@ Piece take(const Piece& piece, const Ints& vertices, Label label, Ints& number) 
 std::array<Piece, 3> cut(const Piece& piece, const Ints& side, const SeparatorTree& tree, const IndexPartition& owners) {
   const int part = piece.label.part;
   const int middle = tree[tree[part].right].begin;
-  std::int64_t kept = 0;             // nodes whose rows are where their side would go, less those whose are not
-  std::int64_t on_side[2] = {0, 0};  // rows on the ranks left and right
-  for (std::size_t v = 0; v < side.size(); ++v) {
-    if (side[v] == 2) continue;
-    const bool is_right = owners.find_owner(piece.nodes[v]) >= middle;
-    ++on_side[is_right ? 1 : 0];
-    kept += is_right == (side[v] == 1) ? 1 : -1;
-  }
-  if (on_side[0] == 0 || on_side[1] == 0) kept = 0;  // not dealt yet
+  std::int64_t kept = 0;  // nodes whose rows are where their side would go, less those whose are not
+  for (std::size_t v = 0; v < side.size(); ++v)
+    if (side[v] < 2) kept += (owners.find_owner(piece.nodes[v]) >= middle) == (side[v] == 1) ? 1 : -1;
   std::array<Ints, 3> sides;
   for (std::size_t v = 0; v < side.size(); ++v)
     sides[static_cast<std::size_t>(side[v] < 2 && kept < 0 ? 1 - side[v] : side[v])].push_back(static_cast<std::int32_t>(v));

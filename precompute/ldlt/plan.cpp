@@ -259,6 +259,7 @@ void check_fronts(const Plan& plan, const NodeLinks& nodes) {
     if (pivot >= 0 && pivot < plan.pivot_nodes) own_of_pivot[static_cast<std::size_t>(pivot)] = v;
   }
   Ints front_of(static_cast<std::size_t>(plan.local_nodes), -1);  // the last front that has the row
+  std::vector<std::size_t> next(plan.received.size(), 0);
   for (std::size_t s = 0; s < plan.fronts.size(); ++s) {
     const Front& front = plan.fronts[s];
     const auto id = static_cast<std::int32_t>(s);
@@ -269,6 +270,11 @@ void check_fronts(const Plan& plan, const NodeLinks& nodes) {
         const std::int32_t row = check_row(plan.node_of_link[static_cast<std::size_t>(*u)]);
         if (row >= front.first + front.width && front_of[static_cast<std::size_t>(row)] != id) check_row(-1);
       }
+    }
+    for (std::size_t l = 0; l < plan.received.size(); ++l) {  // columns ascend, as fronts do
+      const ReceivedBlocks& list = plan.received[l];
+      for (std::size_t& k = next[l]; k < list.columns.size() && list.columns[k] < front.first + front.width; ++k)
+        if (list.rows[k] >= front.first + front.width && front_of[static_cast<std::size_t>(list.rows[k])] != id) check_row(-1);
     }
   }
 }
@@ -460,6 +466,7 @@ Plan make_plan(Mat stiffness, Mat mass, const MeshOrder* order) {
   SharedMapping mapping;
   std::vector<DealtFront> dealt;
   if (order != nullptr) {
+    order->check_is_numbered();
     if (order->node_count() != owners.total()) throw InputError("The order of a factorisation has another number of nodes than K.");
     mapping = order->get_mapping();
     dealt = deal_fronts(comm, order->get_elimination(), mapping, order->get_front_owners());

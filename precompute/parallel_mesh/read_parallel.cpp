@@ -104,9 +104,9 @@ std::vector<std::int32_t> send_back(const comm::Communicator& comm, const comm::
   });
 }
 
-/// The rows of the own free nodes of `first` in the mesh as it is cut now. Collective.
-std::vector<std::int32_t> find_rows(const comm::Communicator& comm, const partition::MeshBlock& block, const partition::LocalMesh& first,
-                                    const partition::LocalMesh& now) {
+/// The rows of free nodes in the mesh as it is cut now. Collective.
+std::vector<std::int32_t> find_rows(const comm::Communicator& comm, const partition::MeshBlock& block,
+                                    const std::vector<std::int32_t>& nodes, const partition::LocalMesh& now) {
   struct Row {
     std::int32_t node, row;
   };
@@ -124,30 +124,31 @@ std::vector<std::int32_t> find_rows(const comm::Communicator& comm, const partit
     return rows;
   });
   return comm::query_owners<std::int32_t>(
-      comm, std::vector(first.node_in_mesh.begin(), first.node_in_mesh.begin() + first.free_nodes),
-      [&](std::int32_t node) { return block.find_owner(node); }, [&](std::int32_t node) { return row_at[block.to_local(node)]; });
+      comm, nodes, [&](std::int32_t node) { return block.find_owner(node); },
+      [&](std::int32_t node) { return row_at[block.to_local(node)]; });
 }
 
 /// Cuts the mesh by `part`, and once more where the options say so. Collective.
 partition::DistributedMesh cut(const comm::Communicator& comm, const std::string& name, partition::MeshBlock& block,
                                const std::vector<std::int32_t>& part, const ReadOptions& options, std::vector<char>& on_seam) {
   const bool has_fixed = !options.fixed.empty();
-  if (!options.recut || comm.size() == 1) return partition::redistribute(comm, name, block, part, has_fixed, on_seam);
+  if (!options.recut || !options.recut->is_wanted(block.node_count()))
+    return partition::redistribute(comm, name, block, part, has_fixed, on_seam);
+  block.centres_m = {};
   partition::MeshBlock copy = comm.agree([&] { return block; });
-  partition::DistributedMesh first = partition::redistribute(comm, name, copy, part, has_fixed, on_seam);
-  const std::vector<std::int32_t> rank = options.recut(first.local, first.free_nodes);
-  const bool is_recut = comm.max(rank.empty() ? 0.0 : 1.0) > 0;
-  if (is_recut) {
-    const std::vector<std::int32_t> last = send_back(comm, block.elements, first.local, rank);
+  partition::DistributedMesh mesh = partition::redistribute(comm, name, copy, part, has_fixed, on_seam);
+  const std::vector<std::int32_t> ranks = options.recut->find_ranks(mesh.local);
+  const std::vector<std::int32_t> nodes(mesh.local.node_in_mesh.begin(), mesh.local.node_in_mesh.begin() + mesh.local.free_nodes);
+  if (comm.sum(static_cast<std::int64_t>(ranks.size())) > 0) {
+    const std::vector<std::int32_t> second = send_back(comm, block.elements, mesh.local, ranks);
+    mesh = {};
     on_seam.clear();
-    const partition::LocalMesh before = std::exchange(first.local, {});
-    first = partition::redistribute(comm, name, block, last, has_fixed, on_seam);
-    options.renumber(find_rows(comm, block, before, first.local));
+    mesh = partition::redistribute(comm, name, block, second, has_fixed, on_seam);
   } else {
     block = std::move(copy);
-    options.renumber(comm.agree([&] { return std::vector(first.local.row.begin(), first.local.row.begin() + first.local.free_nodes); }));
   }
-  return first;
+  options.recut->renumber(find_rows(comm, block, nodes, mesh.local));
+  return mesh;
 }
 
 void collect_warnings(mesh::CheckReport& report) {

@@ -26,15 +26,20 @@ struct FixedNodes {
   std::string place = "";  // begins messages about it: "job.json:7: key 'fixed'"
 };
 
+/// A second cut, which sees the pieces of the first. All members are set, and collective.
+struct Recut {
+  std::function<bool(std::int64_t nodes)> is_wanted;  // for a mesh of so many nodes
+  /// The rank of each element of the first cut; empty on all ranks: the first cut stays.
+  std::function<std::vector<std::int32_t>(const partition::LocalMesh& first)> find_ranks;
+  /// Gets the row of each own free node of the first cut as the mesh is cut in the end, wherever the second was wanted.
+  std::function<void(const std::vector<std::int32_t>& rows)> renumber;
+};
+
 struct ReadOptions {
   int order = 2;       // of the elements to compute with, whatever the file has
   double scale = 1.0;  // metres per unit of the file; boxes are in metres
   std::vector<FixedNodes> fixed = {};
-  /// Gives each element of a first cut, of so many free nodes in all, its rank; empty on all ranks: the first cut stays. Collective. May be
-  /// empty.
-  std::function<std::vector<std::int32_t>(const partition::LocalMesh& first, std::int64_t free_nodes)> recut = {};
-  /// Gets the row of each own free node of the first cut, where there is a recut. Collective.
-  std::function<void(const std::vector<std::int32_t>& rows)> renumber = {};
+  std::optional<Recut> recut = {};
 };
 
 /// The boundary of the whole mesh; filled on rank 0 only. The same for every number of ranks, and the same as mesh::extract_boundary's.
@@ -56,10 +61,11 @@ struct ParallelMesh {
 bool is_parallel_format(const std::filesystem::path& file);
 
 /// Reads, checks, cuts and numbers the mesh without any rank ever holding the whole. Elements are turned where they are inside out. The cut
-/// is by recursive inertial bisection; nodes and elements keep the numbers that mesh::check_mesh and mesh::to_quadratic would give them.
-/// Collective. Throws on every rank: InputError naming the file and the element for whatever mesh::check_mesh refuses (cracks and folded
-/// curved elements, which it would repair, become a warning and are refused by the assembly), for a damaged file, for options that cannot
-/// be met, and when there are fewer tetrahedra than ranks; SystemError when the disk or the memory fails.
+/// is by recursive inertial bisection, and then by options.recut; nodes and elements keep the numbers that mesh::check_mesh and
+/// mesh::to_quadratic would give them. Collective. Throws on every rank: InputError naming the file and the element for whatever
+/// mesh::check_mesh refuses (cracks and folded curved elements, which it would repair, become a warning and are refused by the assembly),
+/// for a damaged file, for options that cannot be met, and when there are fewer tetrahedra than ranks; SystemError when the disk or the
+/// memory fails.
 ParallelMesh read_parallel(const comm::Communicator& comm, const std::filesystem::path& file, const ReadOptions& options);
 
 }  // namespace carillon::parallel_mesh

@@ -21,6 +21,8 @@
 namespace carillon::run {
 namespace {
 
+constexpr const char* kByOrder = "cut a second time, by the separator tree of the nodes";
+
 /// A fixed node, and the first entry of the job's "fixed" that names it.
 struct FixedNode {
   std::int32_t node, entry;
@@ -120,13 +122,16 @@ Body read_in_parallel(Run& run, const Setting& setting) {
   options.order = setting.element == job::Element::T10 ? 2 : 1;
   for (const job::Fixed& fixed : run.job.fixed)
     options.fixed.push_back({fixed.node_set, fixed.box_m, (fixed.place.empty() ? run.job.file.string() : fixed.place) + ": key 'fixed'"});
-  if (wants_cut_by_order(run.job)) cut_by_order(run.comm, options, body.order);
+  RecutByOrder recut(run.comm);
+  if (wants_cut_by_order(run.job)) options.recut = recut.make_recut();
   parallel_mesh::ParallelMesh mesh = parallel_mesh::read_parallel(run.comm, run.job.mesh, options);
   body.pieces = std::move(mesh.mesh);
+  body.order = recut.get_order();
   body.check = std::move(mesh.check);
   body.fixed_nodes = mesh.fixed_nodes;
   body.surface = {std::move(mesh.boundary.vertices_m), std::move(mesh.boundary.triangles), std::move(mesh.boundary.row)};
   warn_of_mesh(run, body);
+  if (recut.is_used()) run.log.print(kByOrder);
   log_size(run, body.pieces.nodes, body.pieces.tets, body.pieces.components, body.fixed_nodes);
   run.log.print(partition::describe(body.pieces.report));
   run.log.end();
@@ -161,12 +166,13 @@ Body make_pieces(Run& run, const Setting& setting, Patience* patience) {
     return body;
   }
 
-  run.log.begin("partition", "the separator tree of the nodes, or METIS k-way on the dual graph");
+  run.log.begin("partition", "METIS k-way on the dual graph");
   name_errors(body.source, run, [&] {
     if (wants_cut_by_order(run.job)) {
       CutMesh cut = cut_by_order(run.comm, mesh, fixed_nodes);
       body.pieces = std::move(cut.pieces);
       body.order = std::move(cut.order);
+      if (cut.is_by_order) run.log.print(kByOrder);
     } else {
       body.pieces = partition::distribute(run.comm, mesh, fixed_nodes, {.elimination_order = wants_elimination_order(run.job)});
     }

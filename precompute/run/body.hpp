@@ -26,7 +26,7 @@ using job::Setting;
 
 struct Body {
   partition::DistributedMesh pieces;
-  std::shared_ptr<const ldlt::MeshOrder> order;      // by which the mesh was cut; null: METIS cut it
+  std::shared_ptr<const ldlt::MeshOrder> order;      // of the factorisation (CutMesh); until the modes are sought
   mesh::CheckReport check;                           // rank 0
   std::int64_t fixed_nodes = 0;                      // rank 0
   Surface surface;                                   // rank 0

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "partition/distribute.hpp"
@@ -18,17 +19,29 @@ namespace carillon::run {
 
 struct CutMesh {
   partition::DistributedMesh pieces;
-  std::shared_ptr<const ldlt::MeshOrder> order;  // for the factorisation; null: it orders by itself
+  std::shared_ptr<const ldlt::MeshOrder> order;  // of the factorisation; null: it orders by itself
+  bool is_by_order = false;                      // whether the mesh is cut by it
 };
 
-/// Whether a mesh of so many free nodes is cut by its separator tree: on several ranks, with enough nodes on each.
-bool is_cut_by_order(const comm::Communicator& comm, std::int64_t free_nodes);
-
-/// Orders the nodes of the mesh on rank 0, and sends each element to the rank that eliminates the first of its nodes. Where that would
-/// leave a rank with too little, METIS cuts the mesh. Collective. Throws as partition::distribute().
+/// Cuts the mesh by METIS and, on several ranks with at least 300 nodes each on average, a second time: each element goes to the rank that
+/// eliminates the first of its nodes. The first cut stays where the second would leave a rank without an element, or one with more than 1.5
+/// times the mean. Collective. Throws as partition::distribute().
 CutMesh cut_by_order(const comm::Communicator& comm, const mesh::TetMesh& mesh, const std::vector<std::int32_t>& fixed_nodes);
 
-/// Has read_parallel cut the mesh by its separator tree too, which `order` gets. `order` must outlive the reading.
-void cut_by_order(const comm::Communicator& comm, parallel_mesh::ReadOptions& options, std::shared_ptr<const ldlt::MeshOrder>& order);
+/// The same second cut for read_parallel, by its own first cut.
+class RecutByOrder {
+ public:
+  explicit RecutByOrder(const comm::Communicator& comm);
+  /// For ReadOptions; this must outlive the reading.
+  parallel_mesh::Recut make_recut();
+  /// What the reading has made; null: the mesh was too small.
+  std::shared_ptr<const ldlt::MeshOrder> get_order() const { return order_; }
+  bool is_used() const { return is_used_; }
+
+ private:
+  const comm::Communicator comm_;
+  std::shared_ptr<ldlt::MeshOrder> order_;
+  bool is_used_ = false;
+};
 
 }  // namespace carillon::run

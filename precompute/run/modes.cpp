@@ -121,7 +121,7 @@ eigen::Options make_options(const Run& run, const Setting& setting) {
 eigen::NodeLayout make_layout(Body& body) {
   partition::DistributedMesh& pieces = body.pieces;
   eigen::NodeLayout layout;
-  layout.order = body.order;
+  layout.order = std::move(body.order);
   const auto free_nodes = pieces.local.free_nodes;
   layout.nodes_m.assign(pieces.local.nodes_m.begin(), pieces.local.nodes_m.begin() + free_nodes);
   layout.component.assign(pieces.local.component.begin(), pieces.local.component.begin() + free_nodes);

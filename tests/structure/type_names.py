@@ -101,7 +101,7 @@ def find_faults(duplicates, allowed):
 def self_test():
     a = ("runtime/bank/x.hpp", "namespace carillon::bank {\nstruct Body {\n  struct Inner {\n")
     b = ("runtime/synth/x.hpp", "namespace carillon::synth {\nclass Body final : public X {\nusing Vec3 = base::Vec3;\n")
-    c = ("precompute/ldlt/x.hpp", "namespace carillon::ldlt {\nenum class Body {\nusing Vec3 = std::array<double, 3>;\n")
+    c = ("precompute/mesher/x.hpp", "namespace carillon::mesher {\nenum class Body {\nusing Vec3 = std::array<double, 3>;\n")
     duplicate = ("Body", "bank", "synth")
     assert find_duplicates([a, b, c]) == {duplicate}, find_duplicates([a, b, c])
     assert len(find_faults({duplicate}, {})) == 1
