@@ -42,7 +42,12 @@ std::optional<Letter> Mailbox::receive() {
     MPI_Mrecv(data.data(), count, MPI_DOUBLE, &message, MPI_STATUS_IGNORE);
     return Letter(std::move(data));
   } catch (const std::bad_alloc&) {
-    // The sender must not wait for ever: what has room for one number takes the message, and the rest is cut off.
+    // The sender must not wait for ever. Open MPI ends the process where it reads a long message into less room.
+    if (count <= refuge_.size()) {
+      MPI_Mrecv(refuge_.data(), count, MPI_DOUBLE, &message, MPI_STATUS_IGNORE);
+      throw;
+    }
+    // What has room for one number takes the message, and the rest is cut off.
     double nothing = 0;
     MPI_Errhandler handler = MPI_ERRHANDLER_NULL;
     MPI_Comm_get_errhandler(comm_, &handler);

@@ -42,7 +42,8 @@ class Letter {
 /// the same tag, and no one else does.
 class Mailbox {
  public:
-  Mailbox(MPI_Comm comm, int tag) : comm_(comm), tag_(tag) {}
+  /// refuge: takes the numbers of a letter for which there is no memory; what was in it is lost then. It must outlive this.
+  Mailbox(MPI_Comm comm, int tag, const Buffer& refuge) : comm_(comm), tag_(tag), refuge_(refuge) {}
 
   void send(int rank, Letter letter);
   /// The letter stays the caller's, who may read it, and gives it up after the last send.
@@ -61,6 +62,7 @@ class Mailbox {
   };
   MPI_Comm comm_;
   int tag_ = 0;
+  const Buffer& refuge_;
   std::list<Sent> sent_;
   int fruitless_ = 0;
 };

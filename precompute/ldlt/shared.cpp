@@ -53,7 +53,7 @@ SharedFactoriser::SharedFactoriser(const Plan& plan, Numbers& numbers, const std
       numbers_(numbers),
       blocks_(blocks),
       kernels_(get_kernels()),
-      mailbox_(plan.comm, kTag + numbers.generation % 2),
+      mailbox_(plan.comm, kTag + numbers.generation % 2, numbers.panels),
       works_(plan.shared.size()),
       block_(plan.shared.empty() ? 0 : kMaxBlock * kMaxBlock),
       left_(static_cast<int>(plan.shared.size())) {
