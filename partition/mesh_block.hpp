@@ -24,6 +24,7 @@ struct MeshBlock {
 
   std::size_t width() const { return order == 1 ? 4 : 10; }
   std::int64_t node_count() const { return corners.total() + mids.total(); }
+  std::int64_t own_node_count() const { return corners.own_count() + mids.own_count(); }
   int find_owner(std::int64_t node) const {
     return node < corners.total() ? corners.find_owner(node) : mids.find_owner(node - corners.total());
   }

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "precompute/comm/communicator.hpp"
+#include "precompute/comm/index_partition.hpp"
 #include "precompute/comm/messages.hpp"
 
 namespace carillon::comm {
@@ -154,6 +155,33 @@ std::vector<Answer> query_owners(const Communicator& comm, const std::vector<Que
   exchange.backward(replies.data(), returned.data());
   for (std::size_t i = 0; i < source.size(); ++i) answers[source[i]] = returned[i];
   return answers;
+}
+
+/// A value of a number that some rank owns.
+template <Plain T>
+struct Reported {
+  std::int32_t number;
+  T value;
+};
+
+/// Sends each Reported of the list that `make` returns to the rank that find_owner(number) names. Returns `count` values there, at
+/// to_local(number); those that nothing is reported for are `missing`.
+template <Plain T, std::invocable Make, typename FindOwner, typename FindLocal>
+std::vector<T> report_to_owners(const Communicator& comm, Make&& make, FindOwner&& find_owner, std::int64_t count, FindLocal&& to_local,
+                                T missing = {}) {
+  const auto arrived = all_to_all(comm, std::forward<Make>(make), [&](const Reported<T>& one) { return find_owner(one.number); });
+  return comm.agree([&] {
+    std::vector<T> values(static_cast<std::size_t>(count), missing);
+    for (const Reported<T>& one : arrived.items) values[to_local(one.number)] = one.value;
+    return values;
+  });
+}
+/// The same for the numbers of a partition.
+template <Plain T, std::invocable Make>
+std::vector<T> report_to_owners(const Communicator& comm, Make&& make, const IndexPartition& owners, T missing = {}) {
+  return report_to_owners<T>(
+      comm, std::forward<Make>(make), [&](std::int32_t number) { return owners.find_owner(number); }, owners.own_count(),
+      [&](std::int32_t number) { return owners.to_local(number); }, missing);
 }
 
 /// Which rank owns each of the wanted numbers, of which every rank names those that it owns; numbers are not negative. Every wanted number

@@ -1,6 +1,7 @@
 #include "precompute/ldlt/buffer.hpp"
 
 #include <sys/mman.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -15,7 +16,7 @@ namespace {
 
 constexpr std::size_t kMapped = 1 << 20;  // from here on buffers have pages of their own
 constexpr std::size_t kMostKept = std::size_t{256} << 20;
-constexpr std::size_t kPage = 4096;
+const std::size_t kPage = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
 constexpr std::size_t kLargePage = std::size_t{2} << 20;
 
 std::size_t round_up(std::size_t bytes, std::size_t to) { return (bytes + to - 1) / to * to; }

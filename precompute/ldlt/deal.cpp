@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <span>
+#include <utility>
 
 #include "precompute/comm/exchange.hpp"
 #include "precompute/ldlt/lists.hpp"
@@ -45,7 +46,9 @@ Pruning prune(const HeldPart& held, bool is_leaf, double most_operations, double
 
 }  // namespace
 
-SharedMapping map_fronts(const Communicator& comm, const Elimination& all, std::vector<Ints>& owners) {
+MappedFronts map_fronts(const Communicator& comm, Elimination elimination) {
+  MappedFronts fronts{std::move(elimination), {}, {}};
+  const Elimination& all = fronts.elimination;
   double total[2] = {0, 0};
   for (const HeldPart& held : all.parts)
     for (const Supernode& node : held.forest.supernodes) {
@@ -70,8 +73,8 @@ SharedMapping map_fronts(const Communicator& comm, const Elimination& all, std::
     }
     return own;
   });
-  return comm.agree([&] {
-    SharedMapping shared;
+  comm.agree([&] {
+    SharedMapping& shared = fronts.shared;
     std::sort(records.begin(), records.end(), [](const FrontRecord& a, const FrontRecord& b) { return a.id < b.id; });
     for (const FrontRecord& record : records) shared.ids.push_back(record.id);
     for (const FrontRecord& record : records) {
@@ -84,19 +87,21 @@ SharedMapping map_fronts(const Communicator& comm, const Elimination& all, std::
     for (std::size_t k = 0; k < order.size(); ++k) shared.order[static_cast<std::size_t>(order[k])] = static_cast<std::int32_t>(k);
     for (std::size_t h = 0; h < all.parts.size(); ++h) {
       const std::vector<Supernode>& nodes = all.parts[h].forest.supernodes;
-      Ints& owner = owners.emplace_back(nodes.size(), -1);
+      Ints& owner = fronts.owners.emplace_back(nodes.size(), -1);
       for (std::size_t s = nodes.size(); s-- > 0;) {
         const std::int32_t at =
             shared.find(all.tree.parts[static_cast<std::size_t>(all.parts[h].part)].first_front + static_cast<std::int32_t>(s));
         owner[s] = at >= 0 ? shared.mapping.owner(at) : owner[static_cast<std::size_t>(nodes[s].parent)];
       }
     }
-    return shared;
   });
+  return fronts;
 }
 
-std::vector<DealtFront> deal_fronts(const Communicator& comm, const Elimination& all, const SharedMapping& shared,
-                                    const std::vector<Ints>& owners) {
+std::vector<DealtFront> deal_fronts(const Communicator& comm, const MappedFronts& fronts) {
+  const Elimination& all = fronts.elimination;
+  const SharedMapping& shared = fronts.shared;
+  const std::vector<Ints>& owners = fronts.owners;
   const auto received = comm::all_to_all(comm, [&] {
     std::vector<Ints> lists(static_cast<std::size_t>(comm.size()));
     for (std::size_t h = 0; h < all.parts.size(); ++h) {

@@ -22,8 +22,15 @@ struct SharedMapping {
   }
 };
 
-/// Maps the fronts. owners: for each held part, who has each supernode; -1: it is shared. Collective.
-SharedMapping map_fronts(const comm::Communicator& comm, const Elimination& all, std::vector<Ints>& owners);
+/// All fronts as the ranks that hold them know them, and who has which.
+struct MappedFronts {
+  Elimination elimination;
+  SharedMapping shared;
+  std::vector<Ints> owners;  // (parts) of (supernodes): who has each, -1: it is shared
+};
+
+/// Maps the fronts. Collective.
+MappedFronts map_fronts(const comm::Communicator& comm, Elimination elimination);
 
 /// A front on its way from the holder to those that have it or share it or its parent. Positions of the whole order.
 struct DealtFront {
@@ -39,7 +46,6 @@ struct DealtFront {
 
 /// Sends each front to the rank that has it, or to those that share it, and the children of shared fronts to all ranks of those. Result:
 /// ascending ids. Collective.
-std::vector<DealtFront> deal_fronts(const comm::Communicator& comm, const Elimination& all, const SharedMapping& shared,
-                                    const std::vector<Ints>& owners);
+std::vector<DealtFront> deal_fronts(const comm::Communicator& comm, const MappedFronts& fronts);
 
 }  // namespace carillon::ldlt

@@ -18,11 +18,6 @@ using comm::Communicator;
 using comm::IndexPartition;
 using partition::Graph;
 
-/// Where a node stands in the order of elimination.
-struct Position {
-  std::int32_t node, position;
-};
-
 /// What a subtree leaves behind: the rows of one of its roots, and which front that is.
 struct Element {
   std::int32_t part = 0;
@@ -237,22 +232,17 @@ Ints find_moved(const Communicator& comm, const Elimination& all, const Ints& po
 }  // namespace
 
 Ints report_positions(const Communicator& comm, const Elimination& all, const NodeLinks& nodes, const IndexPartition& owners) {
-  const auto reported = comm::all_to_all(
+  Ints position = comm::report_to_owners<std::int32_t>(
       comm,
       [&] {
-        std::vector<Position> list;
+        std::vector<comm::Reported<std::int32_t>> list;
         for (const HeldPart& held : all.parts) {
-          std::int32_t position = all.tree[held.part].first;
-          for (const std::int32_t node : held.nodes) list.push_back({node, position++});
+          std::int32_t at = all.tree[held.part].first;
+          for (const std::int32_t node : held.nodes) list.push_back({node, at++});
         }
         return list;
       },
-      [&](const Position& one) { return owners.find_owner(one.node); });
-  Ints position = comm.agree([&] {
-    Ints own(static_cast<std::size_t>(nodes.own_nodes), -1);
-    for (const Position& one : reported.items) own[owners.to_local(one.node)] = one.position;
-    return own;
-  });
+      owners, -1);
   const Ints ghosts = fetch_ghosts(comm, nodes, owners, position);
   position.insert(position.end(), ghosts.begin(), ghosts.end());
   return position;

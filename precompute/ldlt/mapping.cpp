@@ -122,8 +122,8 @@ class Replay {
     return *std::max_element(free_.begin(), free_.end());
   }
 
-  /// The same, and the ranks of each shared front get as much of it as lets them end it together, into `levelled`, which begins as the
-  /// mapping.
+  /// The same, where the ranks of each shared front get as much of it as lets them end it together. Their shares go into `levelled`, which
+  /// begins as the mapping; what parts of shared fronts were given does not count.
   double run(Mapping& levelled) {
     levelled_ = &levelled;
     return run();
@@ -418,7 +418,7 @@ Mapping choose_mapping(const std::vector<FrontCost>& fronts, int ranks) {
     const Mapping candidate(fronts, ranks, weight);
     consider(candidate);
     Mapping levelled = candidate;
-    Replay(fronts, candidate, list_parts(fronts, candidate), false).run(levelled);
+    Replay(fronts, candidate, std::vector<FrontParts>(fronts.size()), false).run(levelled);
     consider(levelled);
   }
   return best;

@@ -56,26 +56,22 @@ NodeLinks gather_links(const Communicator& comm, std::span<const std::int32_t> e
   });
 }
 
-/// The rank that eliminates a node.
-struct NodeRank {
-  std::int32_t node, rank;
-};
-
-/// Those of the nodes that this rank holds.
-std::vector<NodeRank> list_ranks(const Elimination& all, const std::vector<Ints>& owners, const SharedMapping& mapping) {
-  std::vector<NodeRank> list;
+/// The ranks that eliminate the nodes which this rank holds.
+std::vector<comm::Reported<std::int32_t>> list_ranks(const MappedFronts& fronts) {
+  std::vector<comm::Reported<std::int32_t>> list;
+  const Elimination& all = fronts.elimination;
   for (std::size_t h = 0; h < all.parts.size(); ++h) {
     const HeldPart& held = all.parts[h];
     const TreePart& part = all.tree[held.part];
     for (std::size_t s = 0; s < held.forest.supernodes.size(); ++s) {
       const Supernode& front = held.forest.supernodes[s];
       const Ints::const_iterator nodes = held.nodes.begin() + (front.first - part.first);
-      if (owners[h][s] >= 0) {
-        for (std::int32_t k = 0; k < front.width; ++k) list.push_back({nodes[k], owners[h][s]});
+      if (fronts.owners[h][s] >= 0) {
+        for (std::int32_t k = 0; k < front.width; ++k) list.push_back({nodes[k], fronts.owners[h][s]});
         continue;
       }
-      const std::int32_t at = mapping.find(part.first_front + static_cast<std::int32_t>(s));
-      const TileMap map(front.width, static_cast<std::int32_t>(front.rows.size()), mapping.mapping.list_shares(at));
+      const std::int32_t at = fronts.shared.find(part.first_front + static_cast<std::int32_t>(s));
+      const TileMap map(front.width, static_cast<std::int32_t>(front.rows.size()), fronts.shared.mapping.list_shares(at));
       for (std::int32_t k = 0; k < front.width; ++k) {
         const int tile = map.find_tile(k);
         list.push_back({nodes[k], map.rank(map.owner(tile, tile))});
@@ -88,19 +84,14 @@ std::vector<NodeRank> list_ranks(const Elimination& all, const std::vector<Ints>
 }  // namespace
 
 MeshOrder::MeshOrder(const Communicator& comm, std::span<const std::int32_t> elements, int width, const IndexPartition& owners)
-    : owners_(owners), elimination_(eliminate_on_paper(comm, gather_links(comm, elements, width, owners), owners)) {
-  mapping_ = map_fronts(comm, elimination_, front_owners_);
-  const auto reported = comm::all_to_all(
-      comm, [&] { return list_ranks(elimination_, front_owners_, mapping_); },
-      [&](const NodeRank& one) { return owners_.find_owner(one.node); });
-  comm.agree([&] {
-    rank_.assign(static_cast<std::size_t>(owners_.own_count()), -1);
-    for (const NodeRank& one : reported.items) rank_[owners_.to_local(one.node)] = one.rank;
-  });
+    : owners_(owners), fronts_(map_fronts(comm, eliminate_on_paper(comm, gather_links(comm, elements, width, owners), owners))) {
+  rank_ = comm::report_to_owners<std::int32_t>(
+      comm, [&] { return list_ranks(fronts_); }, owners_, -1);
 }
 
-void MeshOrder::check_is_numbered() const {
+const MappedFronts& MeshOrder::get_fronts() const {
   if (!is_numbered_) throw std::logic_error("an order of a mesh without the numbers of its rows");
+  return fronts_;
 }
 
 Ints MeshOrder::find_ranks(const Communicator& comm, std::span<const std::int32_t> elements, int width) const {
@@ -119,7 +110,7 @@ Ints MeshOrder::find_ranks(const Communicator& comm, std::span<const std::int32_
       comm, nodes, [&](std::int32_t node) { return owners_.find_owner(node); },
       [&](std::int32_t node) {
         const std::size_t own = owners_.to_local(node);
-        return Place{elimination_.position[own], rank_[own]};
+        return Place{fronts_.elimination.position[own], rank_[own]};
       });
   return comm.agree([&] {
     Ints ranks;
@@ -140,16 +131,16 @@ void MeshOrder::renumber(const Communicator& comm, const Ints& row) {
   if (is_numbered_) throw std::logic_error("the rows of a mesh are numbered once");
   const Ints asked = comm.agree([&] {
     Ints nodes;
-    for (const HeldPart& held : elimination_.parts) nodes.insert(nodes.end(), held.nodes.begin(), held.nodes.end());
+    for (const HeldPart& held : fronts_.elimination.parts) nodes.insert(nodes.end(), held.nodes.begin(), held.nodes.end());
     return nodes;
   });
   const Ints rows = comm::query_owners<std::int32_t>(
       comm, asked, [&](std::int32_t node) { return owners_.find_owner(node); },
       [&](std::int32_t node) { return row[owners_.to_local(node)]; });
   auto next = rows.begin();
-  for (HeldPart& held : elimination_.parts)
+  for (HeldPart& held : fronts_.elimination.parts)
     for (std::int32_t& node : held.nodes) node = *next++;
-  elimination_.position = {};  // of the old numbers
+  fronts_.elimination.position = {};  // of the old numbers
   rank_ = {};
   is_numbered_ = true;
 }

@@ -8,7 +8,6 @@
 #include "precompute/comm/communicator.hpp"
 #include "precompute/comm/index_partition.hpp"
 #include "precompute/ldlt/deal.hpp"
-#include "precompute/ldlt/elimination.hpp"
 
 namespace carillon::ldlt {
 
@@ -31,19 +30,13 @@ class MeshOrder {
   /// row: for each of the nodes that this rank answers for its row among those of K, in nodes. Once. Collective.
   void renumber(const comm::Communicator& comm, const Ints& row);
 
-  /// Throws std::logic_error before renumber().
-  void check_is_numbered() const;
-  std::int32_t node_count() const { return static_cast<std::int32_t>(owners_.total()); }
-  const Elimination& get_elimination() const { return elimination_; }
-  const SharedMapping& get_mapping() const { return mapping_; }
-  /// For each held part of the elimination, who has each supernode; -1: it is shared.
-  const std::vector<Ints>& get_front_owners() const { return front_owners_; }
+  std::int64_t node_count() const { return owners_.total(); }
+  /// By the numbers of the rows. Throws std::logic_error before renumber().
+  const MappedFronts& get_fronts() const;
 
  private:
   comm::IndexPartition owners_;
-  Elimination elimination_;
-  std::vector<Ints> front_owners_;
-  SharedMapping mapping_;
+  MappedFronts fronts_;
   Ints rank_;  // (own nodes) who eliminates each; until the rows are numbered
   bool is_numbered_ = false;
 };

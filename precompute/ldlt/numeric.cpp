@@ -54,11 +54,6 @@ class Factoriser {
     for (const SentBlocks& list : plan.sent) sent_.emplace_back(9 * list.columns.size());
     for (const ReceivedBlocks& list : plan.received) received_.emplace_back(9 * list.count());
     block_at_.assign(plan.received.size(), 0);
-    own_of_pivot_.assign(static_cast<std::size_t>(plan.pivot_nodes), -1);
-    for (std::int32_t v = 0; v < plan.own_nodes; ++v) {
-      const std::int32_t node = plan.node_of_link[static_cast<std::size_t>(v)];
-      if (node >= 0 && node < plan.pivot_nodes) own_of_pivot_[static_cast<std::size_t>(node)] = v;
-    }
   }
 
   /// Collective.
@@ -127,7 +122,7 @@ class Factoriser {
   void add_entries(const Front& front) {
     for (std::int32_t i = 0; i < front.width; ++i) {
       double* target = columns_.data() + static_cast<std::ptrdiff_t>(3 * i) * f_;
-      const std::int32_t own = own_of_pivot_[static_cast<std::size_t>(front.first + i)];
+      const std::int32_t own = plan_.own_of_pivot[static_cast<std::size_t>(front.first + i)];
       if (own < 0) continue;  // add_blocks has it
       if (k_.has_blocks())
         add_node_rows(own, front.first, target);
@@ -316,7 +311,6 @@ class Factoriser {
   std::vector<std::vector<double>> sent_;
   std::vector<std::vector<double>> received_;
   std::vector<std::size_t> block_at_;
-  Ints own_of_pivot_;  // (pivot_nodes) node of this rank's rows, -1: another's
   SharedFactoriser shared_;
 };
 

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <optional>
 #include <unordered_map>
 
 #include "precompute/comm/exchange.hpp"
@@ -245,36 +246,28 @@ class PlanMaker {
   std::vector<Ints> shared_nodes_;                               // (shared fronts) global numbers of the pivots
 };
 
-/// A row of a front where it was looked for; -1 where an order of another pattern has none.
-std::int32_t check_row(std::int32_t row) {
-  if (row < 0) throw InputError("The order of a factorisation lacks links that K or M has.");
-  return row;
-}
+[[noreturn]] void refuse_order() { throw InputError("The order of a factorisation lacks links that K or M has."); }
 
 /// Whether the fronts of this rank have all rows that K and M have in their columns.
 void check_fronts(const Plan& plan, const NodeLinks& nodes) {
-  Ints own_of_pivot(static_cast<std::size_t>(plan.pivot_nodes), -1);
-  for (std::int32_t v = 0; v < nodes.own_nodes; ++v) {
-    const std::int32_t pivot = plan.node_of_link[static_cast<std::size_t>(v)];
-    if (pivot >= 0 && pivot < plan.pivot_nodes) own_of_pivot[static_cast<std::size_t>(pivot)] = v;
-  }
   Ints front_of(static_cast<std::size_t>(plan.local_nodes), -1);  // the last front that has the row
   std::vector<std::size_t> next(plan.received.size(), 0);
   for (std::size_t s = 0; s < plan.fronts.size(); ++s) {
     const Front& front = plan.fronts[s];
-    const auto id = static_cast<std::int32_t>(s);
-    for (const std::int32_t row : front.rows) front_of[static_cast<std::size_t>(row)] = id;
-    for (std::int32_t pivot = front.first; pivot < front.first + front.width; ++pivot) {
-      const std::int32_t v = own_of_pivot[static_cast<std::size_t>(pivot)];
-      for (const std::int32_t* u = v < 0 ? nullptr : nodes.links.begin(v); v >= 0 && u != nodes.links.end(v); ++u) {
-        const std::int32_t row = check_row(plan.node_of_link[static_cast<std::size_t>(*u)]);
-        if (row >= front.first + front.width && front_of[static_cast<std::size_t>(row)] != id) check_row(-1);
-      }
+    const std::int32_t behind = front.first + front.width;
+    for (const std::int32_t row : front.rows) front_of[static_cast<std::size_t>(row)] = static_cast<std::int32_t>(s);
+    const auto check_row = [&](std::int32_t row) {
+      if (row < 0 || (row >= behind && front_of[static_cast<std::size_t>(row)] != static_cast<std::int32_t>(s))) refuse_order();
+    };
+    for (std::int32_t pivot = front.first; pivot < behind; ++pivot) {
+      const std::int32_t v = plan.own_of_pivot[static_cast<std::size_t>(pivot)];
+      if (v < 0) continue;  // received
+      for (const std::int32_t* u = nodes.links.begin(v); u != nodes.links.end(v); ++u)
+        check_row(plan.node_of_link[static_cast<std::size_t>(*u)]);
     }
     for (std::size_t l = 0; l < plan.received.size(); ++l) {  // columns ascend, as fronts do
       const ReceivedBlocks& list = plan.received[l];
-      for (std::size_t& k = next[l]; k < list.columns.size() && list.columns[k] < front.first + front.width; ++k)
-        if (list.rows[k] >= front.first + front.width && front_of[static_cast<std::size_t>(list.rows[k])] != id) check_row(-1);
+      for (std::size_t& k = next[l]; k < list.columns.size() && list.columns[k] < behind; ++k) check_row(list.rows[k]);
     }
   }
 }
@@ -321,11 +314,12 @@ void plan_blocks(const Communicator& comm, Plan& plan, const PlanMaker& maker, c
           const std::int32_t at = reader.next();
           if (column.front < 0) {
             received.columns.push_back(column.column);
-            received.rows.push_back(check_row(maker.find_local(at)));
+            received.rows.push_back(maker.find_local(at));
             continue;
           }
           const SharedFront& front = plan.shared[static_cast<std::size_t>(column.front)];
-          const std::int32_t row = check_row(maker.find_node(column.front, at));
+          const std::int32_t row = maker.find_node(column.front, at);
+          if (row < 0) refuse_order();
           const bool is_here = front.map.has_row(front.place, front.map.find_tile(row));
           received.shared.push_back({column.front, column.column, is_here ? row : -1});
         }
@@ -462,22 +456,15 @@ Plan make_plan(Mat stiffness, Mat mass, const MeshOrder* order) {
     nodes = find_links(k, m);
   });
   const IndexPartition owners(comm, nodes.own_nodes);
-  Ints position;
-  SharedMapping mapping;
-  std::vector<DealtFront> dealt;
-  if (order != nullptr) {
-    order->check_is_numbered();
-    if (order->node_count() != owners.total()) throw InputError("The order of a factorisation has another number of nodes than K.");
-    mapping = order->get_mapping();
-    dealt = deal_fronts(comm, order->get_elimination(), mapping, order->get_front_owners());
-    position = report_positions(comm, order->get_elimination(), nodes, owners);
-  } else {
-    Elimination all = eliminate_on_paper(comm, nodes, owners);
-    std::vector<Ints> front_owners;
-    mapping = map_fronts(comm, all, front_owners);
-    dealt = deal_fronts(comm, all, mapping, front_owners);
-    position = std::move(all.position);
-  }
+  if (order != nullptr && order->node_count() != owners.total())
+    throw InputError("The order of a factorisation has another number of nodes than K.");
+  std::optional<MappedFronts> made;
+  if (order == nullptr) made = map_fronts(comm, eliminate_on_paper(comm, nodes, owners));
+  const MappedFronts& fronts = order != nullptr ? order->get_fronts() : *made;
+  const Ints position = made ? made->elimination.position : report_positions(comm, fronts.elimination, nodes, owners);
+  std::vector<DealtFront> dealt = deal_fronts(comm, fronts);
+  const SharedMapping mapping = fronts.shared;
+  made.reset();  // the fronts of others are of no more use
   PlanMaker maker(plan, nodes, owners, std::move(dealt), mapping);
   comm.agree([&] { maker.add_fronts(); });
   plan_blocks(comm, plan, maker, nodes, owners, position);
@@ -486,6 +473,11 @@ Plan make_plan(Mat stiffness, Mat mass, const MeshOrder* order) {
     const NodeRows k(stiffness);
     const NodeRows m(mass);
     for (const std::int32_t at : position) plan.node_of_link.push_back(maker.find_local(at));
+    plan.own_of_pivot.assign(static_cast<std::size_t>(plan.pivot_nodes), -1);
+    for (std::int32_t v = 0; v < plan.own_nodes; ++v) {
+      const std::int32_t node = plan.node_of_link[static_cast<std::size_t>(v)];
+      if (node >= 0 && node < plan.pivot_nodes) plan.own_of_pivot[static_cast<std::size_t>(node)] = v;
+    }
     const auto find_ghosts = [&](const NodeRows& rows, Ints& links) {
       for (PetscInt g = 0; g < rows.ghost_count(); ++g) links.push_back(nodes.find_ghost(rows.ghosts()[g] / 3));
     };

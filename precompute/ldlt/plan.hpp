@@ -157,6 +157,7 @@ struct Plan {
   std::int32_t slots = 0;
   Ints slot_of_own;                 // (own_nodes)
   Ints node_of_link;                // (own nodes and ghosts) local node, -1: none
+  Ints own_of_pivot;                // (pivot_nodes) own node that is the pivot, -1: the row is another rank's
   Ints link_of_ghost_k;             // (ghost columns of K) number among own nodes and ghosts
   Ints link_of_ghost_m;             // the same for M
   std::vector<Front> fronts;        // in postorder

@@ -86,46 +86,29 @@ void calc_quality(const comm::Communicator& comm, const partition::LocalMesh& lo
 /// The rank of each element of the block, where each rank knows those of its elements. Collective.
 std::vector<std::int32_t> send_back(const comm::Communicator& comm, const comm::IndexPartition& elements, const partition::LocalMesh& local,
                                     const std::vector<std::int32_t>& rank) {
-  struct Moved {
-    std::int32_t element, rank;
-  };
-  const auto moved = comm::all_to_all(
+  return comm::report_to_owners<std::int32_t>(
       comm,
       [&] {
-        std::vector<Moved> list;
+        std::vector<comm::Reported<std::int32_t>> list;
         for (std::size_t e = 0; e < rank.size(); ++e) list.push_back({local.tet_in_mesh[e], rank[e]});
         return list;
       },
-      [&](const Moved& one) { return elements.find_owner(one.element); });
-  return comm.agree([&] {
-    std::vector<std::int32_t> part(static_cast<std::size_t>(elements.own_count()));
-    for (const Moved& one : moved.items) part[elements.to_local(one.element)] = one.rank;
-    return part;
-  });
+      elements);
 }
 
 /// The rows of free nodes in the mesh as it is cut now. Collective.
 std::vector<std::int32_t> find_rows(const comm::Communicator& comm, const partition::MeshBlock& block,
                                     const std::vector<std::int32_t>& nodes, const partition::LocalMesh& now) {
-  struct Row {
-    std::int32_t node, row;
-  };
-  const auto reported = comm::all_to_all(
+  const auto find_owner = [&](std::int32_t node) { return block.find_owner(node); };
+  const auto row_at = comm::report_to_owners<std::int32_t>(
       comm,
       [&] {
-        std::vector<Row> list;
-        for (std::size_t i = 0; i < static_cast<std::size_t>(now.free_nodes); ++i) list.push_back({now.node_in_mesh[i], now.row[i]});
-        return list;
+        std::vector<comm::Reported<std::int32_t>> rows;
+        for (std::size_t i = 0; i < static_cast<std::size_t>(now.free_nodes); ++i) rows.push_back({now.node_in_mesh[i], now.row[i]});
+        return rows;
       },
-      [&](const Row& one) { return block.find_owner(one.node); });
-  const auto row_at = comm.agree([&] {
-    std::vector<std::int32_t> rows(static_cast<std::size_t>(block.corners.own_count() + block.mids.own_count()), -1);
-    for (const Row& one : reported.items) rows[block.to_local(one.node)] = one.row;
-    return rows;
-  });
-  return comm::query_owners<std::int32_t>(
-      comm, nodes, [&](std::int32_t node) { return block.find_owner(node); },
-      [&](std::int32_t node) { return row_at[block.to_local(node)]; });
+      find_owner, block.own_node_count(), [&](std::int32_t node) { return block.to_local(node); }, -1);
+  return comm::query_owners<std::int32_t>(comm, nodes, find_owner, [&](std::int32_t node) { return row_at[block.to_local(node)]; });
 }
 
 /// Cuts the mesh by `part`, and once more where the options say so. Collective.
@@ -137,10 +120,10 @@ partition::DistributedMesh cut(const comm::Communicator& comm, const std::string
   block.centres_m = {};
   partition::MeshBlock copy = comm.agree([&] { return block; });
   partition::DistributedMesh mesh = partition::redistribute(comm, name, copy, part, has_fixed, on_seam);
-  const std::vector<std::int32_t> ranks = options.recut->find_ranks(mesh.local);
+  const std::optional<std::vector<std::int32_t>> ranks = options.recut->find_ranks(mesh.local);
   const std::vector<std::int32_t> nodes(mesh.local.node_in_mesh.begin(), mesh.local.node_in_mesh.begin() + mesh.local.free_nodes);
-  if (comm.sum(static_cast<std::int64_t>(ranks.size())) > 0) {
-    const std::vector<std::int32_t> second = send_back(comm, block.elements, mesh.local, ranks);
+  if (ranks) {
+    const std::vector<std::int32_t> second = send_back(comm, block.elements, mesh.local, *ranks);
     mesh = {};
     on_seam.clear();
     mesh = partition::redistribute(comm, name, block, second, has_fixed, on_seam);

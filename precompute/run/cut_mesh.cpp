@@ -1,6 +1,7 @@
 #include "precompute/run/cut_mesh.hpp"
 
 #include <algorithm>
+#include <numeric>
 #include <span>
 #include <utility>
 
@@ -18,9 +19,13 @@ constexpr double kFullest = 1.5;             // elements of a rank over the mean
 
 bool is_worth_it(const comm::Communicator& comm, std::int64_t nodes) { return comm.size() > 1 && nodes >= kNodesOfARank * comm.size(); }
 
-/// The order of a mesh that is cut already, by the rows of that cut; and the rank of each element in the second cut, empty on all ranks
-/// where that would be uneven. Collective.
-std::shared_ptr<ldlt::MeshOrder> order_pieces(const comm::Communicator& comm, const partition::LocalMesh& first, Ints& ranks) {
+struct OrderedPieces {
+  std::shared_ptr<ldlt::MeshOrder> order;  // by the rows of the cut that there is
+  std::optional<Ints> ranks;               // of each element in the second cut; none on any rank: that would be uneven
+};
+
+/// Collective.
+OrderedPieces order_pieces(const comm::Communicator& comm, const partition::LocalMesh& first) {
   const Ints elements = comm.agree([&] {
     Ints rows;
     rows.reserve(first.tets.size());
@@ -28,33 +33,28 @@ std::shared_ptr<ldlt::MeshOrder> order_pieces(const comm::Communicator& comm, co
     return rows;
   });
   const int width = first.nodes_per_tet();
-  auto order = std::make_shared<ldlt::MeshOrder>(comm, elements, width, comm::IndexPartition(comm, first.free_nodes));
-  ranks = order->find_ranks(comm, elements, width);
+  OrderedPieces pieces;
+  pieces.order = std::make_shared<ldlt::MeshOrder>(comm, elements, width, comm::IndexPartition(comm, first.free_nodes));
+  Ints ranks = pieces.order->find_ranks(comm, elements, width);
   std::vector<std::int64_t> counts(static_cast<std::size_t>(comm.size()), 0);
   for (std::int32_t& rank : ranks) ++counts[static_cast<std::size_t>(rank = std::max(rank, 0))];  // all fixed: anywhere
   comm.sum(std::span<std::int64_t>(counts));
-  std::int64_t all = 0;
-  for (const std::int64_t count : counts) all += count;
+  const auto all = static_cast<double>(std::accumulate(counts.begin(), counts.end(), std::int64_t{0}));
   const auto [least, most] = std::minmax_element(counts.begin(), counts.end());
-  if (*least == 0 || static_cast<double>(*most) * comm.size() > kFullest * static_cast<double>(all)) ranks = {};
-  return order;
+  if (*least > 0 && static_cast<double>(*most) * comm.size() <= kFullest * all) pieces.ranks = std::move(ranks);
+  return pieces;
 }
 
 /// Rank 0: the rank of each element of the mesh. Collective.
-Ints gather_ranks(const comm::Communicator& comm, const partition::LocalMesh& first, const Ints& ranks) {
-  struct Moved {
-    std::int32_t element, rank;
-  };
-  const std::vector<Moved> moved = comm::gather(comm, [&] {
-    std::vector<Moved> list;
-    for (std::size_t e = 0; e < ranks.size(); ++e) list.push_back({first.tet_in_mesh[e], ranks[e]});
-    return list;
-  });
-  return comm.agree([&] {
-    Ints part(moved.size());
-    for (const Moved& one : moved) part[static_cast<std::size_t>(one.element)] = one.rank;
-    return part;
-  });
+Ints gather_ranks(const comm::Communicator& comm, const partition::DistributedMesh& first, const Ints& ranks) {
+  return comm::report_to_owners<std::int32_t>(
+      comm,
+      [&] {
+        std::vector<comm::Reported<std::int32_t>> list;
+        for (std::size_t e = 0; e < ranks.size(); ++e) list.push_back({first.local.tet_in_mesh[e], ranks[e]});
+        return list;
+      },
+      comm::IndexPartition(comm, comm.is_root() ? first.tets : 0));
 }
 
 }  // namespace
@@ -63,22 +63,21 @@ CutMesh cut_by_order(const comm::Communicator& comm, const mesh::TetMesh& mesh, 
   CutMesh cut;
   cut.pieces = partition::distribute(comm, mesh, fixed_nodes);
   if (!is_worth_it(comm, cut.pieces.free_nodes)) return cut;
-  Ints ranks;
-  const std::shared_ptr<ldlt::MeshOrder> order = order_pieces(comm, cut.pieces.local, ranks);
-  cut.order = order;
+  const OrderedPieces ordered = order_pieces(comm, cut.pieces.local);
+  cut.order = ordered.order;
+  cut.is_by_order = ordered.ranks.has_value();
   const partition::LocalMesh& first = cut.pieces.local;
-  cut.is_by_order = comm.sum(static_cast<std::int64_t>(ranks.size())) > 0;
   if (!cut.is_by_order) {
-    order->renumber(comm, Ints(first.row.begin(), first.row.begin() + first.free_nodes));
+    ordered.order->renumber(comm, Ints(first.row.begin(), first.row.begin() + first.free_nodes));
     return cut;
   }
-  Ints part = gather_ranks(comm, first, ranks);
   const Ints nodes(first.node_in_mesh.begin(), first.node_in_mesh.begin() + first.free_nodes);
+  Ints part = gather_ranks(comm, cut.pieces, *ordered.ranks);
   cut.pieces = {};
   cut.pieces = partition::distribute(comm, mesh, fixed_nodes, {.part = std::move(part)});
-  order->renumber(comm, comm::query_owners<std::int32_t>(
-                            comm, nodes, [](std::int32_t) { return 0; },
-                            [&](std::int32_t node) { return cut.pieces.row_of_node[static_cast<std::size_t>(node)]; }));
+  ordered.order->renumber(comm, comm::query_owners<std::int32_t>(
+                                    comm, nodes, [](std::int32_t) { return 0; },
+                                    [&](std::int32_t node) { return cut.pieces.row_of_node[static_cast<std::size_t>(node)]; }));
   return cut;
 }
 
@@ -87,10 +86,10 @@ RecutByOrder::RecutByOrder(const comm::Communicator& comm) : comm_(comm) {}
 parallel_mesh::Recut RecutByOrder::make_recut() {
   return {[this](std::int64_t nodes) { return is_worth_it(comm_, nodes); },
           [this](const partition::LocalMesh& first) {
-            Ints ranks;
-            order_ = order_pieces(comm_, first, ranks);
-            is_used_ = comm_.sum(static_cast<std::int64_t>(ranks.size())) > 0;
-            return ranks;
+            OrderedPieces ordered = order_pieces(comm_, first);
+            order_ = std::move(ordered.order);
+            is_used_ = ordered.ranks.has_value();
+            return std::move(ordered.ranks);
           },
           [this](const Ints& rows) { order_->renumber(comm_, rows); }};
 }

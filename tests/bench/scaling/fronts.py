@@ -16,6 +16,7 @@ PATH_STEP = 0.5  # ... of whose excess 1 - 2^(-0.5 levels) is reached: fitted to
 GANG = 2.4  # the same where the ranks of a front wait for one another, on very many ranks ...
 GANG_STEP = 0.35  # ... of whose excess (1 - 2^(-0.35 levels))^2 is reached: fitted to the counts
 UNEVEN = 1.4  # messages and bytes of the fullest rank of a front over the mean
+MORE_SUMS = 1.1  # messages of a solve that the fullest rank of a front receives over the mean
 LONGEST = 1.8  # panels on the longest way to the root over those of mean fronts
 SPREAD = 1.3  # tiles of the fullest rank of a front over the mean
 
@@ -159,7 +160,7 @@ def count_solve_messages(tree, ranks):
         child_rows = one.pivots * tree.shrink * (tree.border - 1)
         between = met * (2 * one.child_group + one.group)
         sums = 4 * child_rows * math.sqrt(one.child_group) / one.group * (1 - 1 / one.group)
-        messages += inside + between
+        messages += MORE_SUMS * (inside + between)
         size += 8 * COLUMNS * (inside * TILE + met * sums)
     return messages, size
 

@@ -130,7 +130,7 @@ class Counts(unittest.TestCase):
         "entries": (0.95, 1.3),
         "messages": (0.65, 1.15),
         "bytes": (0.85, 1.8),
-        "solve messages": (0.65, 1.3),
+        "solve messages": (0.75, 1.3),
         "solve bytes": (0.7, 1.3),
         "solve path": (0.75, 1.1),
         "memory": (0.7, 1.4),

@@ -150,6 +150,24 @@ TEST(QueryOwners, throws_on_every_rank_what_the_answering_rank_throws) {
             "element 7 is given twice");
 }
 
+TEST(ReportToOwners, brings_each_value_to_the_owner_of_its_number) {
+  const IndexPartition owners(world(), world().rank() == 0 ? 0 : 3);  // the first owns none
+  const auto values = report_to_owners<double>(
+      world(),
+      [&] {
+        std::vector<Reported<double>> list;  // even numbers, dealt to the ranks in turn, the last first
+        for (std::int32_t number = static_cast<std::int32_t>(owners.total()) - 1; number >= 0; --number)
+          if (number % 2 == 0 && number / 2 % world().size() == world().rank()) list.push_back({number, 0.5 * number});
+        return list;
+      },
+      owners, -1);
+  ASSERT_EQ(static_cast<std::int64_t>(values.size()), owners.own_count());
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const std::int64_t number = owners.own_begin() + static_cast<std::int64_t>(i);
+    EXPECT_EQ(values[i], number % 2 == 0 ? 0.5 * static_cast<double>(number) : -1) << number;
+  }
+}
+
 TEST(FindOwners, finds_numbers_that_are_owned_in_no_order) {
   std::vector<std::int32_t> owned, wanted, expected;
   const auto owner_of = [](std::int32_t number) { return (number * 5 + number / 7) % world().size(); };

@@ -2,10 +2,11 @@
 #include "precompute/ldlt/buffer.hpp"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstdint>
-#include <utility>
+#include <fstream>
 
 namespace carillon::ldlt {
 namespace {
@@ -35,17 +36,33 @@ TEST(Buffer, serves_smaller_ones_piece_by_piece_while_reuse_lives) {
   EXPECT_TRUE(third.data() + third.size() <= begin || third.data() >= begin + 4 * kMillion);
 }
 
-TEST(Buffer, keeps_no_more_than_256_MB_and_all_of_it_is_usable) {
-  const BufferReuse reuse;
-  for (int round = 0; round < 2; ++round) {
-    Buffer a(24 * kMillion);
-    Buffer b(24 * kMillion);
-    a = Buffer();
-    b = Buffer();
-    Buffer c = Buffer::make_zero(20 * kMillion);
-    EXPECT_EQ(std::count(c.data(), c.data() + c.size(), 0.0), c.size());
-    std::fill_n(c.data(), c.size(), 3.0);
+/// Bytes of memory that the process has mapped.
+std::int64_t find_mapped() {
+  std::int64_t pages = 0;
+  std::ifstream("/proc/self/statm") >> pages;
+  return pages * sysconf(_SC_PAGESIZE);
+}
+
+TEST(Buffer, keeps_no_more_than_256_MB_and_gives_all_of_it_back) {
+  constexpr std::int64_t kSlack = std::int64_t{8} << 20;  // of the heap
+  const std::int64_t before = find_mapped();
+  {
+    const BufferReuse reuse;
+    for (int round = 0; round < 20; ++round) {
+      Buffer a(24 * kMillion + 1000 * round);
+      Buffer b(24 * kMillion);
+      Buffer small(kMillion / 4 + 100 * round);
+      EXPECT_NEAR(static_cast<double>(find_mapped() - before), 8.0 * static_cast<double>(a.size() + b.size() + small.size()),
+                  (256 << 20) + kSlack);
+      a = Buffer();
+      b = Buffer();
+      EXPECT_LE(find_mapped() - before, (std::int64_t{256} << 20) + 8 * small.size() + kSlack) << round;
+      const Buffer c = Buffer::make_zero(20 * kMillion);
+      EXPECT_EQ(std::count(c.data(), c.data() + c.size(), 0.0), c.size());
+      std::fill_n(c.data(), c.size(), 3.0);
+    }
   }
+  EXPECT_NEAR(static_cast<double>(find_mapped() - before), 0, kSlack);
 }
 
 TEST(Buffer, is_fresh_and_zero_where_nothing_is_kept) {
