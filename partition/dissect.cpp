@@ -156,6 +156,7 @@ std::vector<std::int32_t> separate(const Graph& graph, int tries, int seed) {
   Graph copy = graph;
   idx_t count = graph.vertex_count();
   idx_t size = 0;
+  // It leaves signals alone.
   check_metis(
       METIS_ComputeVertexSeparator(&count, copy.offsets.data(), copy.neighbours.data(), nullptr, options.data(), &size, side.data()),
       "METIS_ComputeVertexSeparator");
@@ -170,9 +171,10 @@ std::vector<std::int32_t> make_clusters(const Graph& graph, std::int32_t count) 
   idx_t vertices = graph.vertex_count();
   idx_t constraints = 1;
   idx_t cut = 0;
-  check_metis(METIS_PartGraphKway(&vertices, &constraints, copy.offsets.data(), copy.neighbours.data(), nullptr, nullptr, nullptr, &count,
-                                  nullptr, nullptr, options.data(), &cut, cluster.data()),
-              "METIS_PartGraphKway");
+  call_metis("METIS_PartGraphKway", [&] {
+    return METIS_PartGraphKway(&vertices, &constraints, copy.offsets.data(), copy.neighbours.data(), nullptr, nullptr, nullptr, &count,
+                               nullptr, nullptr, options.data(), &cut, cluster.data());
+  });
   return cluster;
 }
 
@@ -188,9 +190,10 @@ std::vector<std::int32_t> halve(const WeightedGraph& graph, double left) {
   idx_t halves = 2;
   idx_t cut = 0;
   std::array<real_t, 2> shares{static_cast<real_t>(left), static_cast<real_t>(1 - left)};
-  check_metis(METIS_PartGraphRecursive(&count, &constraints, copy.graph.offsets.data(), copy.graph.neighbours.data(), copy.weights.data(),
-                                       nullptr, copy.links.data(), &halves, shares.data(), nullptr, options.data(), &cut, side.data()),
-              "METIS_PartGraphRecursive");
+  call_metis("METIS_PartGraphRecursive", [&] {
+    return METIS_PartGraphRecursive(&count, &constraints, copy.graph.offsets.data(), copy.graph.neighbours.data(), copy.weights.data(),
+                                    nullptr, copy.links.data(), &halves, shares.data(), nullptr, options.data(), &cut, side.data());
+  });
   return side;
 }
 

@@ -9,7 +9,6 @@
 
 #include <algorithm>
 #include <array>
-#include <csignal>
 #include <limits>
 #include <numeric>
 #include <utility>
@@ -75,23 +74,6 @@ void fill_empty_parts(std::vector<std::int32_t>& part, int parts) {
 }
 
 }  // namespace
-
-void check_metis(int status, const char* what) {
-  if (status == METIS_OK) return;
-  // METIS has SIGTERM come to itself while it works, and gives it back as METIS_ERROR (which nothing else does): it is passed on to the
-  // handler that it was meant for. Blocking it instead would hand it to another thread of MPI, in which METIS's handler crashes.
-  if (status == METIS_ERROR) std::raise(SIGTERM);
-  if (status == METIS_ERROR_MEMORY) throw SystemError(fmt::format("METIS ran out of memory in {}; use a machine with more", what));
-  throw SystemError(fmt::format("METIS failed in {} (status {})", what, status));
-}
-
-MetisOptions make_metis_options() {
-  MetisOptions options{};
-  METIS_SetDefaultOptions(options.data());
-  options[METIS_OPTION_NUMBERING] = 0;
-  options[METIS_OPTION_SEED] = 1;
-  return options;
-}
 
 Graph make_dual_graph(std::span<const std::int32_t> corners) {
   constexpr std::array<std::array<int, 3>, 4> kFaceCorners{{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}};
@@ -210,9 +192,10 @@ Partition partition_elements(std::span<const std::int32_t> corners, int parts) {
     idx_t constraints = 1;
     idx_t part_count = parts;
     idx_t cut = 0;
-    check_metis(METIS_PartGraphKway(&vertices, &constraints, dual.offsets.data(), dual.neighbours.data(), nullptr, nullptr, nullptr,
-                                    &part_count, nullptr, nullptr, options.data(), &cut, result.part.data()),
-                "METIS_PartGraphKway");
+    call_metis("METIS_PartGraphKway", [&] {
+      return METIS_PartGraphKway(&vertices, &constraints, dual.offsets.data(), dual.neighbours.data(), nullptr, nullptr, nullptr,
+                                 &part_count, nullptr, nullptr, options.data(), &cut, result.part.data());
+    });
     fill_empty_parts(result.part, parts);
   }
   result.quality = find_quality(dual, result.part, parts);
@@ -235,9 +218,9 @@ std::vector<std::int32_t> order_nested_dissection(const Graph& graph) {
   std::vector<std::int32_t> vertex_at(vertices);
   // METIS takes the graph by pointers to mutable memory and leaves it unchanged in effect; a copy keeps the promise of const.
   Graph copy = graph;
-  check_metis(
-      METIS_NodeND(&vertices, copy.offsets.data(), copy.neighbours.data(), nullptr, options.data(), vertex_at.data(), position.data()),
-      "METIS_NodeND");
+  call_metis("METIS_NodeND", [&] {
+    return METIS_NodeND(&vertices, copy.offsets.data(), copy.neighbours.data(), nullptr, options.data(), vertex_at.data(), position.data());
+  });
   return position;
 }
 

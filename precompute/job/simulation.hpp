@@ -111,7 +111,7 @@ struct SimulationSpec {
   bool visibility = false;
   double high_pass_hz = 20;
   double motion_hz = 60;  // frames a second of `motion`
-  // Absolute; empty: not wanted. record: energy book and figures of the run, JSON.
+  // Absolute, or a name in the folder of this process; empty: not wanted. record: energy book and figures of the run, JSON.
   std::filesystem::path sound, spectrogram, surface, motion, record;
   Resources resources;
   std::vector<std::string> warnings;

@@ -64,6 +64,16 @@ struct Log {
   }
 };
 
+/// What lies in the folder of the job stays a name without a folder, where the job is one: it means the folder that this process is in,
+/// even if that is renamed meanwhile.
+void name_in_folder(job::SimulationSpec& spec, const fs::path& file) {
+  if (file.has_parent_path()) return;
+  for (const job::SimulationOutput& output : job::kSimulationOutputs) {
+    fs::path& path = spec.*output.file;
+    if (!path.empty() && path.parent_path() == spec.file.parent_path()) path = path.filename();
+  }
+}
+
 job::SimulationSpec read_spec(const comm::Communicator& comm, const fs::path& file, const SimulateOptions& options, std::string& text) {
   text = comm.broadcast([&] { return base::read_file(file, "job file", kMaxJobBytes); });
   job::SimulationSpec spec = comm.agree([&] { return job::parse_simulation(text, fs::absolute(file)); });
@@ -80,7 +90,10 @@ job::SimulationSpec read_spec(const comm::Communicator& comm, const fs::path& fi
     if (const job::SimulationOutput* output = job::find_overwriting_output(spec))
       throw InputError(fmt::format("{}: the {} would overwrite another file of this job; choose another name",
                                    (spec.*output->file).string(), output->name));
-    if (options.validate) return;
+  });
+  name_in_folder(spec, file);
+  comm.agree([&] {
+    if (!comm.is_root() || options.validate) return;
     job::check_has_output(spec, file.string());
     for (const job::SimulationOutput& output : job::kSimulationOutputs)
       if (!(spec.*output.file).empty()) base::check_writable(spec.*output.file, output.name);
@@ -271,8 +284,10 @@ std::string write_outputs(const comm::Communicator& comm, Simulation& simulation
     const EnergyBook& book = simulation.books.back();
     const double gain = peak > kFullScalePa ? kFullScalePa / peak : 1.0;
     std::string picture;  // before anything is written
-    if (!spec.spectrogram.empty())
-      picture = draw_spectrogram(channels, spec.sample_rate_hz, make_title(simulation), spec.spectrogram.parent_path());
+    if (!spec.spectrogram.empty()) {
+      const fs::path folder = spec.spectrogram.has_parent_path() ? spec.spectrogram.parent_path() : fs::path(".");
+      picture = draw_spectrogram(channels, spec.sample_rate_hz, make_title(simulation), folder);
+    }
     if (!spec.sound.empty()) write_sound(spec.sound, channels, spec.sample_rate_hz, gain);
     if (!spec.spectrogram.empty()) base::write_file(spec.spectrogram, picture);
     double worst = 0;
@@ -313,7 +328,7 @@ std::string write_outputs(const comm::Communicator& comm, Simulation& simulation
     if (simulation.sound)
       result += fmt::format("\npeak {:.4g} Pa{}", peak, gain < 1.0 ? fmt::format(", the file has it as 1 (gain {:.4g})", gain) : "");
     for (const job::SimulationOutput& output : job::kSimulationOutputs)
-      if (!(spec.*output.file).empty()) result += "\n" + (spec.*output.file).string();
+      if (!(spec.*output.file).empty()) result += "\n" + fs::absolute(spec.*output.file).string();
   });
   return result;
 }

@@ -10,6 +10,12 @@ import unittest
 
 BIN = pathlib.Path(sys.argv.pop(1)).resolve()
 MATERIAL = {"young_modulus_pa": 2e11, "poisson_ratio": 0.3, "density_kg_m3": 7800, "damping": {"rayleigh": {"alpha1_s": 1e-7}}}
+ALUMINIUM = {
+    "young_modulus_pa": 7e10,
+    "poisson_ratio": 0.33,
+    "density_kg_m3": 2700,
+    "damping": {"rayleigh": {"alpha1_s": 1e-8, "alpha2_per_s": 2}},
+}
 
 
 def make_job(**changes):
@@ -17,6 +23,27 @@ def make_job(**changes):
         "body": {"shape": "bar", "length_m": 0.2, "width_m": 0.02, "thickness_m": 0.005, "nodes": 300},
         "material": dict(MATERIAL),
         "band_hz": [20, 6000],
+    }
+    job.update(changes)
+    return job
+
+
+def make_simulation(duration_s=0.002, **changes):
+    """A short bar that is clamped at one end and struck at the other."""
+    job = {
+        "simulate": {
+            "duration_s": duration_s,
+            "bodies": [
+                {
+                    "name": "bar",
+                    "shape": {"bar": {"length_m": 0.1, "width_m": 0.02, "thickness_m": 0.01, "nodes": 150}},
+                    "material": dict(ALUMINIUM),
+                    "fixed": "x-min",
+                }
+            ],
+            "impulses": [{"time_s": 0.0002, "body": "bar", "point_m": [0.05, 0, 0.005], "impulse_n_s": [0, 0, -0.001]}],
+        },
+        "sound": "bar.wav",
     }
     job.update(changes)
     return job

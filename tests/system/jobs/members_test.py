@@ -6,6 +6,7 @@ usage: members_test.py BIN_DIR        does nothing but by root
 """
 import contextlib
 import errno
+import json
 import os
 import pathlib
 import shutil
@@ -18,9 +19,10 @@ import unittest
 
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
-from bench import Bench, make_job
+from bench import BIN, Bench, make_job, make_simulation
 
 MEMBER = 65534  # user and group without privileges
+AS_MEMBER = {"user": MEMBER, "group": MEMBER, "extra_groups": []}
 SWAPS = 1000  # of each folder that is swapped while root works
 PAUSE_S = 0.0005  # with the link in place, and with the folder
 RETRIES_S = 300  # a job is tried again after 10, 40 and 160 s
@@ -251,6 +253,39 @@ class Members(Bench):
                     self.assertEqual(look(self.victim), before)
                 put_back()
                 self.run_it("get", self.done)
+
+    def test_a_folder_that_no_path_leads_to(self):
+        """What root starts in a folder of the store writes there by names alone: a path to it may lead elsewhere by then. Here no path
+        leads there for who may not search the folder above."""
+        closed = self.folder / "closed"
+        place = closed / "work"
+        place.mkdir(parents=True)
+        (place / "job.json").write_text(json.dumps(make_job(bank="bank.hdf")))
+        outputs = {"sound": "sound.wav", "spectrogram": "sound.png", "surface": "sound.surface.hdf", "motion": "motion.vtkhdf"}
+        (place / "simulation.json").write_text(json.dumps(make_simulation(**outputs, record="record.json")))
+        os.chown(place, MEMBER, MEMBER)
+        closed.chmod(0o700)
+        aside = ["--checkpoint", "checkpoint", "--progress", "progress.jsonl", "--result", "result.json"]
+        for words, made in (
+            (["carillon-precompute", "job.json", "--validate", "--json", "--bank", "bank.hdf", "--result", "result.json"], ["result.json"]),
+            (["carillon-precompute", "job.json", "--bank", "bank.hdf", *aside], ["bank.hdf", "bank.hdf.resolved.json"]),
+            (["carillon-simulate", "simulation.json", *aside], [*outputs.values(), "record.json"]),
+        ):
+            with self.subTest(" ".join(words)):
+                try:
+                    done = subprocess.run(
+                        [BIN / words[0], *words[1:]],
+                        cwd=place,
+                        env={**self.environment, "HOME": "/nonexistent"},
+                        capture_output=True,
+                        text=True,
+                        **AS_MEMBER,
+                    )
+                except PermissionError:
+                    self.skipTest("the member may not start the program")
+                self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+                for name in made:
+                    self.assertTrue((place / name).exists(), name)
 
     def test_folders_that_are_swapped_again_and_again(self):
         (self.victim / "thesis.tex").write_text("important")

@@ -15,35 +15,7 @@ import unittest
 
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
-from bench import BIN, Bench
-
-ALUMINIUM = {
-    "young_modulus_pa": 7e10,
-    "poisson_ratio": 0.33,
-    "density_kg_m3": 2700,
-    "damping": {"rayleigh": {"alpha1_s": 1e-8, "alpha2_per_s": 2}},
-}
-
-
-def make_simulation(duration_s=0.002, **changes):
-    """A short bar that is clamped at one end and struck at the other."""
-    job = {
-        "simulate": {
-            "duration_s": duration_s,
-            "bodies": [
-                {
-                    "name": "bar",
-                    "shape": {"bar": {"length_m": 0.1, "width_m": 0.02, "thickness_m": 0.01, "nodes": 150}},
-                    "material": dict(ALUMINIUM),
-                    "fixed": "x-min",
-                }
-            ],
-            "impulses": [{"time_s": 0.0002, "body": "bar", "point_m": [0.05, 0, 0.005], "impulse_n_s": [0, 0, -0.001]}],
-        },
-        "sound": "bar.wav",
-    }
-    job.update(changes)
-    return job
+from bench import BIN, Bench, make_simulation
 
 
 def run_alone(folder, job):

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <chrono>
 #include <csignal>
 #include <numeric>
@@ -160,6 +161,39 @@ TEST(NestedDissection, that_is_stopped_from_outside_ends_as_the_program_wants_it
         for (int repeat = 0; repeat < 100; ++repeat) (void)order_nested_dissection(graph);
       },
       testing::ExitedWithCode(42), "");
+}
+
+/// METIS would answer the signal by longjmp, out of malloc too, which then never opens its lock again.
+TEST(NestedDissection, gives_the_same_order_while_signals_come) {
+  static std::atomic<int> caught;
+  caught = 0;
+  const auto box = tests::make_box({16, 16, 16}, {1, 1, 1});
+  const Graph graph = make_node_graph(box.tets, 4, static_cast<std::int32_t>(box.nodes_m.size()));
+  const auto expected = order_nested_dissection(graph);
+  struct sigaction action {
+  }, before{}, after{};
+  action.sa_handler = [](int) { ++caught; };
+  action.sa_flags = SA_RESTART;
+  sigaddset(&action.sa_mask, SIGUSR2);
+  sigaction(SIGTERM, &action, &before);
+  int wrong = 0;
+  {
+    const std::jthread sender([](const std::stop_token& stop) {
+      sigset_t all;
+      sigfillset(&all);
+      pthread_sigmask(SIG_BLOCK, &all, nullptr);
+      while (!stop.stop_requested()) {
+        kill(getpid(), SIGTERM);
+        std::this_thread::sleep_for(std::chrono::microseconds(100));
+      }
+    });
+    for (int repeat = 0; repeat < 50; ++repeat) wrong += order_nested_dissection(graph) != expected;
+  }
+  sigaction(SIGTERM, &before, &after);
+  EXPECT_EQ(wrong, 0);
+  EXPECT_GE(caught, 50);
+  EXPECT_EQ(after.sa_handler, action.sa_handler);
+  EXPECT_TRUE(sigismember(&after.sa_mask, SIGUSR2)) << "METIS put it back with other flags";
 }
 
 TEST(NestedDissection, of_a_graph_without_edges_is_the_identity) {
