@@ -7,6 +7,8 @@
 #include <cerrno>
 #include <cstdint>
 #include <cstdlib>
+#include <iterator>
+#include <limits>
 #include <map>
 #include <new>
 #include <utility>
@@ -15,7 +17,6 @@ namespace carillon::ldlt {
 namespace {
 
 constexpr std::size_t kMapped = 1 << 20;  // from here on buffers have pages of their own
-constexpr std::size_t kMostKept = std::size_t{256} << 20;
 const std::size_t kPage = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
 constexpr std::size_t kLargePage = std::size_t{2} << 20;
 
@@ -23,43 +24,54 @@ std::size_t round_up(std::size_t bytes, std::size_t to) { return (bytes + to - 1
 
 double* advance(double* pages, std::size_t bytes) { return pages + bytes / sizeof(double); }
 
-/// Pages that wait for their next use, by size.
+/// Pages that wait for their next use.
 struct Kept {
   bool is_active = false;
-  std::size_t bytes = 0;
-  std::multimap<std::size_t, double*> pages;
+  std::map<double*, std::size_t> runs;  // bytes of each; those that follow each other are one
 
-  /// The first pages of the smallest run that has enough; what is behind them stays, if a buffer can use it. Null: no run has enough.
+  /// The first pages of the smallest run that has enough; null: none has.
   double* take(std::size_t wanted) {
-    const auto at = pages.lower_bound(wanted);
-    if (at == pages.end()) return nullptr;
-    auto run = pages.extract(at);
-    double* taken = run.mapped();
-    const std::size_t rest = run.key() - wanted;
-    bytes -= run.key();
-    if (rest >= kMapped) {
-      run.key() = rest;
-      run.mapped() = advance(taken, wanted);
-      pages.insert(std::move(run));
-      bytes += rest;
-    } else if (rest > 0) {
-      munmap(advance(taken, wanted), rest);
-    }
+    auto best = runs.end();
+    for (auto at = runs.begin(); at != runs.end(); ++at)
+      if (at->second >= wanted && (best == runs.end() || at->second < best->second)) best = at;
+    if (best == runs.end()) return nullptr;
+    const auto [taken, bytes] = *best;
+    runs.erase(best);
+    if (bytes > wanted) runs.emplace(advance(taken, wanted), bytes - wanted);
     return taken;
   }
-  /// As much as there is room for; the rest goes back.
-  void put(double* freed, std::size_t size) {
-    std::size_t kept = is_active ? std::min(size, kMostKept - bytes) : 0;
-    if (kept < kMapped) kept = 0;
-    if (kept > 0) pages.emplace(kept, freed);
-    bytes += kept;
-    if (size > kept) munmap(advance(freed, kept), size - kept);
+  void put(double* freed, std::size_t bytes) {
+    if (!is_active) {
+      munmap(freed, bytes);
+      return;
+    }
+    const auto after = runs.lower_bound(freed);
+    if (after != runs.begin()) {
+      const auto before = std::prev(after);
+      if (advance(before->first, before->second) == freed) {
+        freed = before->first;
+        bytes += before->second;
+        runs.erase(before);
+      }
+    }
+    if (after != runs.end() && advance(freed, bytes) == after->first) {
+      bytes += after->second;
+      runs.erase(after);
+    }
+    runs.emplace(freed, bytes);
   }
-  void clear() {
-    for (const auto& [size, page] : pages) munmap(page, size);
-    pages.clear();
-    bytes = 0;
+  /// Gives so many bytes back to the system, or all that there are.
+  void release(std::size_t bytes) {
+    while (bytes > 0 && !runs.empty()) {
+      const auto [pages, size] = *runs.begin();
+      const std::size_t part = std::min(bytes, size);
+      munmap(pages, part);
+      runs.erase(runs.begin());
+      if (part < size) runs.emplace(advance(pages, part), size - part);
+      bytes -= part;
+    }
   }
+  void clear() { release(std::numeric_limits<std::size_t>::max()); }
 };
 
 Kept& get_kept() {
@@ -102,8 +114,11 @@ Buffer::Buffer(std::int64_t count, Pages pages_come) : size_(count) {
   const std::size_t mapped = round_up(bytes, kPage);
   double* pages = kept.take(mapped);
   is_fresh_ = pages == nullptr;
-  if (pages == nullptr) pages = map_pages(mapped);
-  if (pages == nullptr && !kept.pages.empty()) {
+  if (is_fresh_) {
+    kept.release(mapped);  // with what waits, no more is mapped than was in use at most
+    pages = map_pages(mapped);
+  }
+  if (pages == nullptr && !kept.runs.empty()) {
     kept.clear();
     pages = map_pages(mapped);
   }

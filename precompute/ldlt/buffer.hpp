@@ -32,8 +32,8 @@ class Buffer {
   bool is_fresh_ = false;  // pages of the system, which are zero
 };
 
-/// While one lives, up to 256 MB of large buffers that are given back serve others of their size or less: fresh pages cost more than what
-/// is done with them. One at a time.
+/// While one lives, the pages of large buffers that are given back serve others: fresh pages cost more than what is done with them. What
+/// is mapped, with what waits, never exceeds what was in use at most. One at a time.
 class BufferReuse {
  public:
   BufferReuse();
