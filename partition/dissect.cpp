@@ -156,10 +156,9 @@ std::vector<std::int32_t> separate(const Graph& graph, int tries, int seed) {
   Graph copy = graph;
   idx_t count = graph.vertex_count();
   idx_t size = 0;
-  // It leaves signals alone.
-  check_metis(
-      METIS_ComputeVertexSeparator(&count, copy.offsets.data(), copy.neighbours.data(), nullptr, options.data(), &size, side.data()),
-      "METIS_ComputeVertexSeparator");
+  call_metis("METIS_ComputeVertexSeparator", [&] {
+    return METIS_ComputeVertexSeparator(&count, copy.offsets.data(), copy.neighbours.data(), nullptr, options.data(), &size, side.data());
+  });
   return side;
 }
 

@@ -15,11 +15,8 @@ using MetisOptions = std::array<idx_t, METIS_NOPTIONS>;
 /// METIS's own, counted from zero, with a seed: the same graph gives the same answer.
 MetisOptions make_metis_options();
 
-/// Throws SystemError where METIS did not succeed. what: the call.
-void check_metis(int status, const char* what);
-
-/// check_metis(call(), what) for calls that take SIGTERM for themselves, which are all but METIS_ComputeVertexSeparator: it comes to the
-/// handler that the program set, at once, in some thread. Two threads must not be in it at a time.
+/// Calls METIS, and throws SystemError where it did not succeed. what: the name of the call. Signals are left to the program: a SIGTERM
+/// runs its handler at once, and METIS continues when that returns.
 void call_metis(const char* what, const std::function<int()>& call);
 
 }  // namespace carillon::partition

@@ -35,43 +35,57 @@ struct Kept {
     for (auto at = runs.begin(); at != runs.end(); ++at)
       if (at->second >= wanted && (best == runs.end() || at->second < best->second)) best = at;
     if (best == runs.end()) return nullptr;
-    const auto [taken, bytes] = *best;
-    runs.erase(best);
-    if (bytes > wanted) runs.emplace(advance(taken, wanted), bytes - wanted);
+    double* const taken = best->first;
+    cut(best, wanted);
     return taken;
   }
-  void put(double* freed, std::size_t bytes) {
-    if (!is_active) {
-      munmap(freed, bytes);
-      return;
-    }
+  void put(double* freed, std::size_t bytes) noexcept {
     const auto after = runs.lower_bound(freed);
-    if (after != runs.begin()) {
-      const auto before = std::prev(after);
-      if (advance(before->first, before->second) == freed) {
-        freed = before->first;
-        bytes += before->second;
-        runs.erase(before);
-      }
-    }
-    if (after != runs.end() && advance(freed, bytes) == after->first) {
-      bytes += after->second;
+    const auto before = after == runs.begin() ? runs.end() : std::prev(after);
+    const bool follows = before != runs.end() && advance(before->first, before->second) == freed;
+    const bool is_followed = after != runs.end() && advance(freed, bytes) == after->first;
+    if (follows) {
+      before->second += bytes;
+      if (!is_followed) return;
+      before->second += after->second;
       runs.erase(after);
+    } else if (is_followed) {
+      auto run = runs.extract(after);
+      run.key() = freed;
+      run.mapped() += bytes;
+      runs.insert(std::move(run));
+    } else if (!is_active || !add(freed, bytes)) {
+      munmap(freed, bytes);
     }
-    runs.emplace(freed, bytes);
   }
   /// Gives so many bytes back to the system, or all that there are.
   void release(std::size_t bytes) {
     while (bytes > 0 && !runs.empty()) {
-      const auto [pages, size] = *runs.begin();
-      const std::size_t part = std::min(bytes, size);
-      munmap(pages, part);
-      runs.erase(runs.begin());
-      if (part < size) runs.emplace(advance(pages, part), size - part);
+      const std::size_t part = std::min(bytes, runs.begin()->second);
+      munmap(runs.begin()->first, part);
+      cut(runs.begin(), part);
       bytes -= part;
     }
   }
   void clear() { release(std::numeric_limits<std::size_t>::max()); }
+
+ private:
+  /// Takes so many bytes from the beginning of a run.
+  void cut(std::map<double*, std::size_t>::iterator at, std::size_t bytes) {
+    auto run = runs.extract(at);
+    run.key() = advance(run.key(), bytes);
+    run.mapped() -= bytes;
+    if (run.mapped() > 0) runs.insert(std::move(run));
+  }
+  /// False: the heap has no memory for it.
+  bool add(double* pages, std::size_t bytes) noexcept {
+    try {
+      runs.emplace(pages, bytes);
+      return true;
+    } catch (const std::bad_alloc&) {
+      return false;
+    }
+  }
 };
 
 Kept& get_kept() {

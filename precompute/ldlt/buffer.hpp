@@ -33,7 +33,7 @@ class Buffer {
 };
 
 /// While one lives, the pages of large buffers that are given back serve others: fresh pages cost more than what is done with them. What
-/// is mapped, with what waits, never exceeds what was in use at most. One at a time.
+/// large buffers have mapped, with what waits, never exceeds what they had in use at most. One at a time.
 class BufferReuse {
  public:
   BufferReuse();

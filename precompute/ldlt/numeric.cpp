@@ -49,7 +49,7 @@ class Factoriser {
     wide_ = Buffer(scratch);
     block_ = Buffer(kMaxBlock * kMaxBlock);
     for (int parity = 0; parity < 2; ++parity) stack_[parity] = Buffer(plan.stack_entries[parity], Pages::kAtOnce);
-    // Pages that were freed a while ago cost ten times as much in a virtual machine that gives such back to its host: so these come first.
+    // In a virtual machine that returns free memory to its host, pages that were freed a while ago cost far more: so these come first.
     for (const Front& front : plan.fronts)
       if (front.parent < 0) leaving_.emplace_back(count_update(3 * static_cast<std::int64_t>(front.rows.size())), Pages::kAtOnce);
     where_.assign(static_cast<std::size_t>(plan.local_nodes), -1);

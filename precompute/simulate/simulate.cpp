@@ -328,7 +328,11 @@ std::string write_outputs(const comm::Communicator& comm, Simulation& simulation
     if (simulation.sound)
       result += fmt::format("\npeak {:.4g} Pa{}", peak, gain < 1.0 ? fmt::format(", the file has it as 1 (gain {:.4g})", gain) : "");
     for (const job::SimulationOutput& output : job::kSimulationOutputs)
-      if (!(spec.*output.file).empty()) result += "\n" + fs::absolute(spec.*output.file).string();
+      if (!(spec.*output.file).empty()) {
+        std::error_code error;  // the folder may be gone
+        const fs::path whole = fs::absolute(spec.*output.file, error);
+        result += "\n" + (error ? spec.*output.file : whole).string();
+      }
   });
   return result;
 }

@@ -268,8 +268,9 @@ class Members(Bench):
         aside = ["--checkpoint", "checkpoint", "--progress", "progress.jsonl", "--result", "result.json"]
         for words, made in (
             (["carillon-precompute", "job.json", "--validate", "--json", "--bank", "bank.hdf", "--result", "result.json"], ["result.json"]),
-            (["carillon-precompute", "job.json", "--bank", "bank.hdf", *aside], ["bank.hdf", "bank.hdf.resolved.json"]),
-            (["carillon-simulate", "simulation.json", *aside], [*outputs.values(), "record.json"]),
+            (["carillon-precompute", "job.json", "--bank", "bank.hdf", *aside], ["result.json", "bank.hdf", "bank.hdf.resolved.json"]),
+            (["carillon-simulate", "simulation.json", "--validate", "--json", "--result", "result.json"], ["result.json"]),
+            (["carillon-simulate", "simulation.json", *aside], ["result.json", *outputs.values(), "record.json"]),
         ):
             with self.subTest(" ".join(words)):
                 try:
@@ -286,6 +287,7 @@ class Members(Bench):
                 self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
                 for name in made:
                     self.assertTrue((place / name).exists(), name)
+                (place / "result.json").unlink()
 
     def test_folders_that_are_swapped_again_and_again(self):
         (self.victim / "thesis.tex").write_text("important")
