@@ -154,7 +154,6 @@ Launch make_launch(const Options& options, const std::string& token, const Scrat
     add({"--checkpoint", store::kCheckpointFile, "--progress", store::kProgressFile});  // what it writes is in the job
   } else if (options.is_prediction) {
     add({"--validate", "--json", "--patience", "1000000", "--count", "20"});  // what is reserved rests on the mesh, not on an estimate
-    add({"--bank", store::kBankFile});  // not by the path in the job: another user of the store may rename a folder along it
   } else {
     add({"--bank", store::kBankFile, "--checkpoint", store::kCheckpointFile, "--progress", store::kProgressFile});
   }

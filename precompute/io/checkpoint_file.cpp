@@ -426,7 +426,7 @@ void CheckpointFile::write(const std::string& numbers, const std::vector<eigen::
     file.flush();
     if (::rename(temporary_.c_str(), file_.c_str()) != 0) throw SystemError(std::strerror(errno));
     if (!file.has_name(file_)) throw SystemError(SharedFile::kReplaced);
-    const fs::path folder = file_.has_parent_path() ? file_.parent_path() : fs::path(".");
+    const fs::path folder = base::find_folder(file_);
     try {
       with_descriptor(folder, O_RDONLY | O_DIRECTORY, [](int descriptor) { return ::fsync(descriptor) == 0; });
     } catch (const SystemError&) {  // Some file systems cannot; the name is there.

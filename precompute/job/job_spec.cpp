@@ -300,6 +300,10 @@ const fs::path& get_input(const JobSpec& job) { return find_input(job); }
 
 void set_input(JobSpec& job, const fs::path& file) { find_input(job) = file; }
 
+fs::path find_opened(const fs::path& output, const fs::path& file, const fs::path& given) {
+  return !given.has_parent_path() && output.parent_path() == file.parent_path() ? output.filename() : output;
+}
+
 fs::path find_resolved_path(const fs::path& bank) { return fs::path(bank) += ".resolved.json"; }
 
 JobSpec parse_job(std::string_view text, const fs::path& file, BankKey bank, int first_line) {

@@ -128,6 +128,11 @@ const std::filesystem::path& get_input(const JobSpec& job);
 /// Puts another file in its place, where there is one.
 void set_input(JobSpec& job, const std::filesystem::path& file);
 
+/// An output (absolute, or empty) of the job `file` (absolute) as it is to be opened. Where the job was given as a name without a folder,
+/// what lies in its folder is one too: it means the folder that this process is in, even if that is renamed meanwhile.
+std::filesystem::path find_opened(const std::filesystem::path& output, const std::filesystem::path& file,
+                                  const std::filesystem::path& given);
+
 /// Where the resolved job goes: next to the bank, "<bank>.resolved.json".
 std::filesystem::path find_resolved_path(const std::filesystem::path& bank);
 

@@ -52,14 +52,13 @@ RunSummary write_known_body(Run& run) {
   });
   run.log.end();
   run.log.begin("write", summary.bank.string());
-  const fs::path written = run.options.bank.empty() ? run.job.bank : run.options.bank;
   comm::Communicator(run.comm).agree([&] {
     if (!run.comm.is_root()) return;
     for (const std::string& warning : made.warnings) run.log.warn(warning);
     const std::string record = job::resolved_json(run.job, fs::absolute(summary.bank).parent_path(), write_json(describe(run, made)));
     made.bank.provenance = record;
-    bank::write_bank(made.bank, written);
-    base::write_file(job::find_resolved_path(written), record);
+    bank::write_bank(made.bank, run.bank);
+    base::write_file(job::find_resolved_path(run.bank), record);
     summary.result = fmt::format("{}\n{}\n{}", made.theory, bank::describe_completeness(made.bank), bank::describe_accuracy(made.bank));
     if (!made.coupling.empty()) summary.result += "\n" + made.coupling;
     if (const std::size_t count = made.bank.mode_count(); count > 0)

@@ -30,10 +30,9 @@ void check_job(const Run& run) {
           fmt::format("{}: \"solver.factorisation\": cholmod works on one rank, and there are {}; take \"mumps\" or \"automatic\"",
                       run.job.file.string(), run.comm.size()));
     }
-    if (!run.comm.is_root() || run.job.bank.empty()) return;
-    const fs::path bank = run.options.bank.empty() ? run.job.bank : run.options.bank;  // as it is opened
-    base::check_writable(bank, "bank");
-    base::check_writable(job::find_resolved_path(bank), "resolved job");
+    if (!run.comm.is_root() || run.bank.empty()) return;
+    base::check_writable(run.bank, "bank");
+    base::check_writable(job::find_resolved_path(run.bank), "resolved job");
   });
 }
 
@@ -41,7 +40,11 @@ void check_job(const Run& run) {
 
 void open_job(Run& run, const fs::path& file, job::BankKey bank) {
   run.job = read_shared_job(run, file, run.options.bank.empty() ? bank : job::BankKey::optional);
-  if (!run.options.bank.empty()) run.job.bank = fs::absolute(run.options.bank).lexically_normal();
+  run.bank = job::find_opened(run.job.bank, run.job.file, file);
+  if (!run.options.bank.empty()) {
+    run.bank = run.options.bank;
+    run.job.bank = fs::absolute(run.options.bank).lexically_normal();
+  }
   check_job(run);
   for (const std::string& warning : run.job.warnings) run.log.warn(warning);
 }

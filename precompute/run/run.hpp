@@ -3,6 +3,7 @@
 
 #include <mpi.h>
 
+#include <filesystem>
 #include <memory>
 #include <string>
 
@@ -24,7 +25,8 @@ struct Run {
       : comm(communicator), options(run_options), log(communicator, run_options.quiet) {}
 
   comm::Communicator comm;
-  job::JobSpec job;  // the same on every rank
+  job::JobSpec job;            // the same on every rank
+  std::filesystem::path bank;  // job.bank as it is opened
   RunOptions options;
   RunLog log;
   std::unique_ptr<ProgressReporter> progress;      // on rank 0, if it is asked for

@@ -124,21 +124,19 @@ RunSummary write_outputs(Run& run, const AccurateBody& found, const AirReport& a
     if (!summary.warning.empty()) record["warnings"].append(summary.warning);
     return job::resolved_json(run.job, folder, write_json(record));
   };
-  // A name without a folder stays one: it means the folder that this process is in, even if that folder was renamed.
-  const fs::path written = run.options.bank.empty() ? run.job.bank : run.options.bank;
   run.log.begin("write", summary.bank.string());
   Measured measured = measure(run.comm);
   comm::Communicator(run.comm).agree([&] {
     if (!run.comm.is_root()) return;
     bank.provenance = make_record(measured);
-    bank::write_bank(bank, written);
-    run.log.print(fmt::format("{} bytes", fs::file_size(written)));
+    bank::write_bank(bank, run.bank);
+    run.log.print(fmt::format("{} bytes", fs::file_size(run.bank)));
     summary.result = describe_result(bank);
   });
   run.log.end();
   measured = measure(run.comm);
   comm::Communicator(run.comm).agree([&] {
-    if (run.comm.is_root()) base::write_file(job::find_resolved_path(written), make_record(measured));
+    if (run.comm.is_root()) base::write_file(job::find_resolved_path(run.bank), make_record(measured));
   });
   return summary;
 }

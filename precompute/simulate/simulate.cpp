@@ -64,16 +64,6 @@ struct Log {
   }
 };
 
-/// What lies in the folder of the job stays a name without a folder, where the job is one: it means the folder that this process is in,
-/// even if that is renamed meanwhile.
-void name_in_folder(job::SimulationSpec& spec, const fs::path& file) {
-  if (file.has_parent_path()) return;
-  for (const job::SimulationOutput& output : job::kSimulationOutputs) {
-    fs::path& path = spec.*output.file;
-    if (!path.empty() && path.parent_path() == spec.file.parent_path()) path = path.filename();
-  }
-}
-
 job::SimulationSpec read_spec(const comm::Communicator& comm, const fs::path& file, const SimulateOptions& options, std::string& text) {
   text = comm.broadcast([&] { return base::read_file(file, "job file", kMaxJobBytes); });
   job::SimulationSpec spec = comm.agree([&] { return job::parse_simulation(text, fs::absolute(file)); });
@@ -91,7 +81,8 @@ job::SimulationSpec read_spec(const comm::Communicator& comm, const fs::path& fi
       throw InputError(fmt::format("{}: the {} would overwrite another file of this job; choose another name",
                                    (spec.*output->file).string(), output->name));
   });
-  name_in_folder(spec, file);
+  for (const job::SimulationOutput& output : job::kSimulationOutputs)
+    spec.*output.file = job::find_opened(spec.*output.file, spec.file, file);
   comm.agree([&] {
     if (!comm.is_root() || options.validate) return;
     job::check_has_output(spec, file.string());
@@ -284,10 +275,8 @@ std::string write_outputs(const comm::Communicator& comm, Simulation& simulation
     const EnergyBook& book = simulation.books.back();
     const double gain = peak > kFullScalePa ? kFullScalePa / peak : 1.0;
     std::string picture;  // before anything is written
-    if (!spec.spectrogram.empty()) {
-      const fs::path folder = spec.spectrogram.has_parent_path() ? spec.spectrogram.parent_path() : fs::path(".");
-      picture = draw_spectrogram(channels, spec.sample_rate_hz, make_title(simulation), folder);
-    }
+    if (!spec.spectrogram.empty())
+      picture = draw_spectrogram(channels, spec.sample_rate_hz, make_title(simulation), base::find_folder(spec.spectrogram));
     if (!spec.sound.empty()) write_sound(spec.sound, channels, spec.sample_rate_hz, gain);
     if (!spec.spectrogram.empty()) base::write_file(spec.spectrogram, picture);
     double worst = 0;

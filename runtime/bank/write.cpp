@@ -28,7 +28,7 @@ fs::path resolve_target(const fs::path& file) {
   if (fs::exists(status) && !fs::is_regular_file(status)) {
     throw InputError(fmt::format("{}: is not a regular file; give the bank another name", file.string()));
   }
-  const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
+  const fs::path folder = base::find_folder(target);
   if (!fs::is_directory(folder, error)) {
     throw InputError(fmt::format("{}: there is no folder {}; make it or choose another", file.string(), folder.string()));
   }

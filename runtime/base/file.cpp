@@ -19,17 +19,18 @@
 #include "runtime/base/failure.hpp"
 
 namespace carillon::base {
-namespace {
 
 namespace fs = std::filesystem;
 
-fs::path folder_of(const fs::path& file) { return file.has_parent_path() ? file.parent_path() : fs::path("."); }
+fs::path find_folder(const fs::path& file) { return file.has_parent_path() ? file.parent_path() : fs::path("."); }
+
+namespace {
 
 /// Next to `file`, hidden, of this process and call alone: two threads that write one name must not share a temporary file. Never longer
 /// than the name of `file` and some forty bytes, cut where a file system's 255 would end.
 fs::path make_temporary_name(const fs::path& file) {
   static std::atomic<unsigned> count{0};
-  return folder_of(file) / fmt::format(".{}.tmp.{}.{}", file.filename().string().substr(0, 200), ::getpid(), count++);
+  return find_folder(file) / fmt::format(".{}.tmp.{}.{}", file.filename().string().substr(0, 200), ::getpid(), count++);
 }
 
 void sync_folder(const fs::path& folder) {
@@ -143,7 +144,7 @@ int write_all(int descriptor, std::string_view bytes) noexcept {
 
 WholeFile::WholeFile(fs::path file) : file_(std::move(file)), temporary_(make_temporary_name(file_)) {
   ::unlink(temporary_.c_str());  // of a process with our number that was killed; O_EXCL then follows no planted link
-  descriptor_ = open_nameless(folder_of(file_));
+  descriptor_ = open_nameless(find_folder(file_));
   is_nameless_ = descriptor_ >= 0;
   if (!is_nameless_) descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
   if (descriptor_ < 0) refuse(errno);
@@ -180,7 +181,7 @@ void WholeFile::commit() {
     if (::close(std::exchange(descriptor_, -1)) != 0) refuse(errno);
     if (::rename(temporary_.c_str(), file_.c_str()) != 0) refuse(errno);
   }
-  sync_folder(folder_of(file_));
+  sync_folder(find_folder(file_));
 }
 
 void write_file(const fs::path& file, std::string_view bytes) {
@@ -247,7 +248,7 @@ void check_writable(const fs::path& file, std::string_view what) {
                                  fs::is_directory(status) ? "a folder" : "a pipe or a device"));
   }
   struct stat info {};
-  const fs::path folder = folder_of(file);
+  const fs::path folder = find_folder(file);
   fs::create_directories(folder, error);
   if (error || !fs::is_directory(folder)) {
     throw InputError(fmt::format("{}: cannot make the folder of the {} ({}); choose another place", folder.string(), what,

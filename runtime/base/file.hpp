@@ -15,6 +15,9 @@ namespace carillon::base {
 /// Whether this value of errno is that of a disk, or of a user's share of it, that takes no more.
 bool is_full_error(int error);
 
+/// The folder that a file is in: "." where its name has none.
+std::filesystem::path find_folder(const std::filesystem::path& file);
+
 /// The bytes of a regular file. Throws InputError when there is none, when it is a folder, a pipe or a device (never waits on one), when it
 /// cannot be read, or when it holds more than `max_bytes`. `what` says in messages what was expected ("job file").
 std::string read_file(const std::filesystem::path& file, std::string_view what, std::uint64_t max_bytes,

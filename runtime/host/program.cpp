@@ -65,7 +65,7 @@ using base::is_standard_output;
 /// Where what the sound is made of waits until it is written.
 fs::path find_spool_folder(const fs::path& wav) {
   if (wav.empty() || is_standard_output(wav)) return {};
-  return wav.has_parent_path() ? wav.parent_path() : fs::path(".");
+  return base::find_folder(wav);
 }
 
 /// Throws SystemError when the sound cannot fit on the disk: better now than after hours.

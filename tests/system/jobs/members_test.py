@@ -265,12 +265,12 @@ class Members(Bench):
         (place / "simulation.json").write_text(json.dumps(make_simulation(**outputs, record="record.json")))
         os.chown(place, MEMBER, MEMBER)
         closed.chmod(0o700)
-        aside = ["--checkpoint", "checkpoint", "--progress", "progress.jsonl", "--result", "result.json"]
+        records = ["--checkpoint", "checkpoint", "--progress", "progress.jsonl", "--result", "result.json"]
         for words, made in (
-            (["carillon-precompute", "job.json", "--validate", "--json", "--bank", "bank.hdf", "--result", "result.json"], ["result.json"]),
-            (["carillon-precompute", "job.json", "--bank", "bank.hdf", *aside], ["result.json", "bank.hdf", "bank.hdf.resolved.json"]),
+            (["carillon-precompute", "job.json", "--validate", "--json", "--result", "result.json"], ["result.json"]),
+            (["carillon-precompute", "job.json", "--bank", "bank.hdf", *records], ["result.json", "bank.hdf", "bank.hdf.resolved.json"]),
             (["carillon-simulate", "simulation.json", "--validate", "--json", "--result", "result.json"], ["result.json"]),
-            (["carillon-simulate", "simulation.json", *aside], ["result.json", *outputs.values(), "record.json"]),
+            (["carillon-simulate", "simulation.json", *records], ["result.json", *outputs.values(), "record.json"]),
         ):
             with self.subTest(" ".join(words)):
                 try:

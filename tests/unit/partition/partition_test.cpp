@@ -176,8 +176,9 @@ TEST(Metis, gives_the_same_while_signals_come_to_any_thread) {
   const Graph graph = make_node_graph(box.tets, 4, static_cast<std::int32_t>(box.nodes_m.size()));
   const auto expected_order = order_nested_dissection(graph);
   const auto expected_part = partition_elements(box.tets, 8).part;
-  struct sigaction action {
-  }, before{}, after{};
+  struct sigaction action {};
+  struct sigaction before {};
+  struct sigaction after {};
   action.sa_handler = [](int) { ++caught; };
   action.sa_flags = SA_RESTART;
   sigaddset(&action.sa_mask, SIGUSR2);
@@ -208,8 +209,8 @@ TEST(Metis, gives_the_same_while_signals_come_to_any_thread) {
 /// METIS raises SIGTERM for its own errors, by the functions that it is given here, and leaves its work by longjmp.
 TEST(Metis, that_raises_its_own_error_fails_and_leaves_the_handler_alone) {
   static std::jmp_buf place;
-  struct sigaction before {
-  }, after{};
+  struct sigaction before {};
+  struct sigaction after {};
   sigaction(SIGTERM, nullptr, &before);
   const auto fail = [] {
     const auto outer = __sysv_signal(SIGTERM, [](int signal) { std::longjmp(place, signal); });
