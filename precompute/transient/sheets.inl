@@ -1,13 +1,12 @@
 // Method:     four triangles in the lanes. Membrane: constant Green's strain in plane stress. Bending: s = turn * 2 tan(theta / 2) +- psi
-// of each
-//             edge, M = B (s - s0 + alpha1 s'); each triangle takes its own side of a hinge, so that an edge needs no pass of its own.
+//             of each edge, M = B (s - s0 + alpha1 s'); each triangle takes its own side of a hinge, so that an edge needs no pass of
+//             its own.
 // Source:     docs/equations.md E11; Grinspun, Gingold, Reisman and Zorin 2006 (mid-edge normals), with 2 tan(theta / 2) for theta.
 // Deviations: none.
 //
 // Included by sheets_*.cpp inside an unnamed namespace; nothing of std is used.
 
 typedef double Lanes __attribute__((vector_size(32)));
-typedef std::int64_t LaneMask __attribute__((vector_size(32)));
 
 struct Lanes3 {
   Lanes x, y, z;
@@ -35,12 +34,12 @@ inline Lanes calc_root(Lanes x) {
 
 /// Four rows to four columns.
 inline void transpose(Lanes& a, Lanes& b, Lanes& c, Lanes& d) {
-  const Lanes ab0 = __builtin_shuffle(a, b, LaneMask{0, 4, 2, 6}), ab1 = __builtin_shuffle(a, b, LaneMask{1, 5, 3, 7});
-  const Lanes cd0 = __builtin_shuffle(c, d, LaneMask{0, 4, 2, 6}), cd1 = __builtin_shuffle(c, d, LaneMask{1, 5, 3, 7});
-  a = __builtin_shuffle(ab0, cd0, LaneMask{0, 1, 4, 5});
-  b = __builtin_shuffle(ab1, cd1, LaneMask{0, 1, 4, 5});
-  c = __builtin_shuffle(ab0, cd0, LaneMask{2, 3, 6, 7});
-  d = __builtin_shuffle(ab1, cd1, LaneMask{2, 3, 6, 7});
+  const Lanes ab0 = __builtin_shufflevector(a, b, 0, 4, 2, 6), ab1 = __builtin_shufflevector(a, b, 1, 5, 3, 7);
+  const Lanes cd0 = __builtin_shufflevector(c, d, 0, 4, 2, 6), cd1 = __builtin_shufflevector(c, d, 1, 5, 3, 7);
+  a = __builtin_shufflevector(ab0, cd0, 0, 1, 4, 5);
+  b = __builtin_shufflevector(ab1, cd1, 0, 1, 4, 5);
+  c = __builtin_shufflevector(ab0, cd0, 2, 3, 6, 7);
+  d = __builtin_shufflevector(ab1, cd1, 2, 3, 6, 7);
 }
 
 inline Lanes3 gather(const Quad* q, const std::int32_t* at) {
