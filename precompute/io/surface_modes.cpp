@@ -143,10 +143,10 @@ void SurfaceWork::load(std::size_t mode, std::size_t count) {
   const double* array = nullptr;
   petsc::check(MatDenseGetLDA(shapes_, &leading));
   petsc::check(MatDenseGetArrayRead(shapes_, &array));
-  const double* columns = array + mode * static_cast<std::size_t>(leading) - 3 * static_cast<std::ptrdiff_t>(owners_.own_begin());
+  const std::ptrdiff_t first = static_cast<std::ptrdiff_t>(mode) * leading - 3 * static_cast<std::ptrdiff_t>(owners_.own_begin());
   for (std::size_t i = 0; i < own_; ++i)
     for (int d = 0; d < 3; ++d) {
-      const double* from = columns + 3 * static_cast<std::size_t>(rows_[i]) + d;
+      const double* from = array + first + 3 * static_cast<std::ptrdiff_t>(rows_[i]) + d;
       double* to = &values_[(3 * i + d) * kBlock];
       for (std::size_t k = 0; k < count; ++k) to[k] = from[k * static_cast<std::size_t>(leading)];
     }

@@ -23,11 +23,17 @@ constexpr std::size_t kLargePage = std::size_t{2} << 20;
 std::size_t round_up(std::size_t bytes, std::size_t to) { return (bytes + to - 1) / to * to; }
 
 double* advance(double* pages, std::size_t bytes) { return pages + bytes / sizeof(double); }
+std::size_t count_bytes(const double* begin, const double* end) { return sizeof(double) * static_cast<std::size_t>(end - begin); }
+
+/// False: there is no memory for them.
+bool populate_pages(double* pages, std::size_t bytes) { return madvise(pages, bytes, MADV_POPULATE_WRITE) == 0 || errno != ENOMEM; }
 
 /// Pages that wait for their next use.
 struct Kept {
   bool is_active = false;
   std::map<double*, std::size_t> runs;  // bytes of each; those that follow each other are one
+  double* lent_begin = nullptr;         // pages of a buffer that lives: they stay mapped
+  double* lent_end = nullptr;
 
   /// The first pages of the smallest run that has enough; null: none has.
   double* take(std::size_t wanted) {
@@ -55,14 +61,14 @@ struct Kept {
       run.mapped() += bytes;
       runs.insert(std::move(run));
     } else if (!is_active || !add(freed, bytes)) {
-      munmap(freed, bytes);
+      give_back(freed, bytes);
     }
   }
   /// Gives so many bytes back to the system, or all that there are.
   void release(std::size_t bytes) {
     while (bytes > 0 && !runs.empty()) {
       const std::size_t part = std::min(bytes, runs.begin()->second);
-      munmap(runs.begin()->first, part);
+      give_back(runs.begin()->first, part);
       cut(runs.begin(), part);
       bytes -= part;
     }
@@ -70,6 +76,15 @@ struct Kept {
   void clear() { release(std::numeric_limits<std::size_t>::max()); }
 
  private:
+  /// To the system; of lent pages their memory, and while nothing waits for its next use not even that.
+  void give_back(double* pages, std::size_t bytes) const {
+    double* const end = advance(pages, bytes);
+    double* const lent = std::clamp(lent_begin, pages, end);
+    double* const behind = std::clamp(lent_end, pages, end);
+    if (pages < lent) munmap(pages, count_bytes(pages, lent));
+    if (lent < behind && is_active) madvise(lent, count_bytes(lent, behind), MADV_DONTNEED);
+    if (behind < end) munmap(behind, count_bytes(behind, end));
+  }
   /// Takes so many bytes from the beginning of a run.
   void cut(std::map<double*, std::size_t>::iterator at, std::size_t bytes) {
     auto run = runs.extract(at);
@@ -112,7 +127,7 @@ double* map_pages(std::size_t bytes) {
 BufferReuse::BufferReuse() { get_kept().is_active = true; }
 BufferReuse::~BufferReuse() {
   get_kept().is_active = false;
-  get_kept().clear();
+  get_kept().clear();  // what is lent stays
 }
 
 Buffer::Buffer(std::int64_t count, Pages pages_come) : size_(count) {
@@ -138,8 +153,22 @@ Buffer::Buffer(std::int64_t count, Pages pages_come) : size_(count) {
   }
   if (pages == nullptr) throw std::bad_alloc();
   data_ = {pages, FreeNumbers{mapped}};
-  if (is_fresh_ && pages_come == Pages::kAtOnce && madvise(pages, mapped, MADV_POPULATE_WRITE) != 0 && errno == ENOMEM)
+  if (is_fresh_ && pages_come == Pages::kAtOnce) populate();
+}
+
+void Buffer::populate() const {
+  if (const std::size_t mapped = data_.get_deleter().mapped_bytes; mapped > 0 && !populate_pages(data_.get(), mapped))
     throw std::bad_alloc();
+}
+
+void Buffer::lend_behind(std::int64_t count) const {
+  const std::size_t kept_bytes = round_up(sizeof(double) * static_cast<std::size_t>(count), kPage);
+  const std::size_t mapped = data_.get_deleter().mapped_bytes;
+  if (kept_bytes >= mapped) return;
+  Kept& kept = get_kept();
+  kept.lent_begin = advance(data_.get(), kept_bytes);
+  kept.lent_end = advance(data_.get(), mapped);
+  kept.put(kept.lent_begin, mapped - kept_bytes);
 }
 
 Buffer Buffer::make_zero(std::int64_t count) {
@@ -149,10 +178,13 @@ Buffer Buffer::make_zero(std::int64_t count) {
 }
 
 void FreeNumbers::operator()(double* p) const {
-  if (mapped_bytes == 0)
+  if (mapped_bytes == 0) {
     std::free(p);
-  else
-    get_kept().put(p, mapped_bytes);
+    return;
+  }
+  Kept& kept = get_kept();
+  if (p <= kept.lent_begin && kept.lent_end == advance(p, mapped_bytes)) kept.lent_begin = kept.lent_end = nullptr;
+  kept.put(p, mapped_bytes);
 }
 
 }  // namespace carillon::ldlt

@@ -92,7 +92,7 @@ void Factor::State::prepare() {
   if (is_allocated) return;
   comm::Communicator(plan.comm).agree([&] {
     numbers = make_numbers(plan);
-    workspace = make_workspace(plan);
+    workspace = make_workspace(plan, numbers);
   });
   is_allocated = true;
 }

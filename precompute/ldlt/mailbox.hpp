@@ -7,6 +7,7 @@
 #include <list>
 #include <memory>
 #include <optional>
+#include <span>
 
 #include "precompute/ldlt/buffer.hpp"
 
@@ -43,7 +44,7 @@ class Letter {
 class Mailbox {
  public:
   /// refuge: takes the numbers of a letter for which there is no memory; what was in it is lost then. It must outlive this.
-  Mailbox(MPI_Comm comm, int tag, const Buffer& refuge) : comm_(comm), tag_(tag), refuge_(refuge) {}
+  Mailbox(MPI_Comm comm, int tag, std::span<double> refuge) : comm_(comm), tag_(tag), refuge_(refuge) {}
 
   void send(int rank, Letter letter);
   /// The letter stays the caller's, who may read it, and gives it up after the last send.
@@ -62,7 +63,7 @@ class Mailbox {
   };
   MPI_Comm comm_;
   int tag_ = 0;
-  const Buffer& refuge_;
+  std::span<double> refuge_;
   std::list<Sent> sent_;
   int fruitless_ = 0;
 };

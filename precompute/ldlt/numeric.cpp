@@ -39,16 +39,12 @@ class Factoriser {
         numbers_(numbers),
         kernels_(get_kernels()),
         shared_(plan, numbers, received_) {
-    std::int64_t largest = 0;
     std::int64_t scratch = 0;
-    for (const Front& front : plan.fronts) {
-      largest = std::max(largest, std::int64_t{9} * front.size() * front.width);
-      scratch = std::max(scratch, count_wide(front.width, front.size()));
-    }
-    columns_ = Buffer(largest);
+    for (const Front& front : plan.fronts) scratch = std::max(scratch, count_wide(front.width, front.size()));
+    numbers.panels.populate();
     wide_ = Buffer(scratch);
     block_ = Buffer(kMaxBlock * kMaxBlock);
-    for (int parity = 0; parity < 2; ++parity) stack_[parity] = Buffer(plan.stack_entries[parity], Pages::kAtOnce);
+    for (int parity = 0; parity < 2; ++parity) top_[parity] = numbers.panels.data() + plan.room.stack_begin[parity];
     // In a virtual machine that returns free memory to its host, pages that were freed a while ago cost far more: so these come first.
     for (const Front& front : plan.fronts)
       if (front.parent < 0) leaving_.emplace_back(count_update(3 * static_cast<std::int64_t>(front.rows.size())), Pages::kAtOnce);
@@ -66,9 +62,8 @@ class Factoriser {
     const BufferReuse reuse;
     shared_.run([&] {
       for (std::int32_t s = 0; s < static_cast<std::int32_t>(plan_.fronts.size()); ++s) process(s);
-      for (Buffer& stack : stack_) stack = Buffer();
-      columns_ = Buffer();
       wide_ = Buffer();
+      if (!plan_.shared.empty()) numbers_.panels.lend_behind(plan_.room.panels);
     });
   }
 
@@ -80,25 +75,25 @@ class Factoriser {
     f_ = w_ + r_;
     Buffer leaving;
     if (front.parent >= 0) {
-      update_ = stack_[front.depth % 2].data() + used_[front.depth % 2];
-      used_[front.depth % 2] += count_update(r_);
+      update_ = top_[front.depth % 2] -= count_update(r_);
     } else {
       leaving = std::move(leaving_.front());
       leaving_.pop_front();
       update_ = leaving.data();
     }
+    double* panels = numbers_.panels.data() + numbers_.front_offsets[static_cast<std::size_t>(s)];
+    columns_ = panels + kColumnsBegin;
     point_at_columns();
     for (std::int32_t i = 0; i < front.width; ++i) where_[static_cast<std::size_t>(front.first + i)] = i;
     for (std::size_t i = 0; i < front.rows.size(); ++i)
       where_[static_cast<std::size_t>(front.rows[i])] = front.width + static_cast<std::int32_t>(i);
-    std::fill_n(columns_.data(), static_cast<std::size_t>(f_) * static_cast<std::size_t>(w_), 0.0);
-    double* panels = numbers_.panels.data() + numbers_.front_offsets[static_cast<std::size_t>(s)];
+    std::fill_n(columns_, static_cast<std::size_t>(f_) * static_cast<std::size_t>(w_), 0.0);
     // The first panel makes the update matrix, so it need not be cleared, and the children's shares in it come behind.
     add_entries(front);
     add_blocks(front);
-    const std::int64_t used[2] = {used_[0], used_[1]};
+    double* const top[2] = {top_[0], top_[1]};
     for (std::size_t c = front.children.size(); c-- > 0;) add_child(front.children[c], Part::kPivots);  // the last one lies on top
-    std::copy(used, used + 2, used_);
+    std::copy(top, top + 2, top_);
     eliminate(front, panels);
     for (std::size_t c = front.children.size(); c-- > 0;) add_child(front.children[c], Part::kRest);
     if (front.shared_parent >= 0)
@@ -110,7 +105,7 @@ class Factoriser {
   /// starts_: where row 0 of each column of the front would be.
   void point_at_columns() {
     starts_.resize(static_cast<std::size_t>(f_));
-    for (int c = 0; c < w_; ++c) starts_[c] = columns_.data() + static_cast<std::ptrdiff_t>(c) * f_;
+    for (int c = 0; c < w_; ++c) starts_[c] = columns_ + static_cast<std::ptrdiff_t>(c) * f_;
     for (int c = w_; c < f_; ++c) starts_[c] = update_ + find_update_column(r_, c - w_) - w_;
   }
 
@@ -126,7 +121,7 @@ class Factoriser {
 
   void add_entries(const Front& front) {
     for (std::int32_t i = 0; i < front.width; ++i) {
-      double* target = columns_.data() + static_cast<std::ptrdiff_t>(3 * i) * f_;
+      double* target = columns_ + static_cast<std::ptrdiff_t>(3 * i) * f_;
       const std::int32_t own = plan_.own_of_pivot[static_cast<std::size_t>(front.first + i)];
       if (own < 0) continue;  // add_blocks has it
       if (k_.has_blocks())
@@ -205,9 +200,8 @@ class Factoriser {
       for (; at < list.columns.size() && list.columns[at] < front.first + front.width; ++at)
         for (int d = 0; d < 3; ++d)
           for (int e = 0; e < 3; ++e)
-            columns_.data()[static_cast<std::ptrdiff_t>(3 * where_[static_cast<std::size_t>(list.columns[at])] + d) * f_ +
-                            3 * where_[static_cast<std::size_t>(list.rows[at])] + e] +=
-                received_[l][9 * at + static_cast<std::size_t>(3 * d + e)];
+            columns_[static_cast<std::ptrdiff_t>(3 * where_[static_cast<std::size_t>(list.columns[at])] + d) * f_ +
+                     3 * where_[static_cast<std::size_t>(list.rows[at])] + e] += received_[l][9 * at + static_cast<std::size_t>(3 * d + e)];
     }
   }
 
@@ -242,13 +236,13 @@ class Factoriser {
   enum class Part { kPivots, kRest };
 
   /// Adds what of a child's update matrix falls into the columns of pivots, or the rest of it, and gives it back with that. Children lie on
-  /// their stack in order, and are taken from behind: so where they begin follows from what is used below them.
+  /// their stack in order, and are taken from its top: the last one first.
   void add_child(std::int32_t s, Part part) {
     const Front& child = plan_.fronts[static_cast<std::size_t>(s)];
     const std::size_t pivots = locate(child.rows, w_ / 3);
     const std::int64_t r = 3 * static_cast<std::int64_t>(child.rows.size());
-    used_[child.depth % 2] -= count_update(r);
-    const double* source = stack_[child.depth % 2].data() + used_[child.depth % 2];
+    const double* source = top_[child.depth % 2];
+    top_[child.depth % 2] += count_update(r);
     for (std::size_t j = part == Part::kRest ? pivots : 0; j < (part == Part::kPivots ? pivots : child.rows.size()); ++j)
       add_node(source, r, j);
   }
@@ -300,7 +294,7 @@ class Factoriser {
   int w_ = 0;
   int r_ = 0;
   int f_ = 0;
-  Buffer columns_;
+  double* columns_ = nullptr;
   Buffer wide_;
   Buffer block_;
   double* update_ = nullptr;
@@ -309,10 +303,9 @@ class Factoriser {
   std::vector<RowRun> runs_;  // of the child that is being added
   Ints node_runs_;            // the run of each of its nodes
 
-  Buffer stack_[2];
-  std::deque<Buffer> leaving_;  // update matrices that shared fronts get, of the fronts that are to come
-  std::int64_t used_[2] = {0, 0};
-  Ints slot_;  // (own nodes and ghosts) of the column that is sent, -1
+  double* top_[2] = {nullptr, nullptr};  // of the stacks of update matrices, which grow downwards
+  std::deque<Buffer> leaving_;           // update matrices that shared fronts get, of the fronts that are to come
+  Ints slot_;                            // (own nodes and ghosts) of the column that is sent, -1
   std::vector<MPI_Request> requests_;
   std::vector<std::vector<double>> sent_;
   std::vector<std::vector<double>> received_;
@@ -359,7 +352,7 @@ Numbers make_numbers(const Plan& plan) {
       stored += 3 * n * (front.own_nodes() - front.row_begin[static_cast<std::size_t>(k) + 1]);
     }
   }
-  numbers.panels = Buffer(stored, Pages::kAtOnce);
+  numbers.panels = Buffer(plan.room.numbers, Pages::kAtOnce);
   numbers.d_diagonal.assign(3 * static_cast<std::size_t>(pivots), 0.0);
   numbers.d_off.assign(3 * static_cast<std::size_t>(pivots), 0.0);
   numbers.order.assign(3 * static_cast<std::size_t>(pivots), 0);

@@ -41,6 +41,9 @@ struct Numbers {
   std::vector<std::uint8_t> order;  // of the pivots in their panels: BlockPivots::order
   Outcome outcome;                  // of this rank until a factorisation ends, then of all
   int generation = 0;               // how often it was factorised
+
+  /// Null: this rank has none of it.
+  const double* find_tiles(const SharedPanel& panel) const { return panel.tiles < 0 ? nullptr : panels.data() + panel.tiles; }
 };
 
 /// Room for the panels. Throws std::bad_alloc.
@@ -51,13 +54,13 @@ void factorise_fronts(const Plan& plan, const la::Pencil& pencil, double sigma, 
 
 /// Right-hand sides in order of elimination: blocks of 8 or 16 columns, in each a row of them per row of the matrix.
 struct Workspace {
-  std::vector<Buffer> blocks;  // one per 16 columns: rows of all slots
+  std::vector<double*> blocks;  // one per kBlockColumns columns: rows of all slots
+  std::vector<Buffer> buffers;  // of those that have no room behind the panels
 };
-
-inline constexpr int kSolveColumns = 32;  // at a time
 
 /// x <- A^-1 b for at most kSolveColumns columns, `stride` apart; b may be x. Collective.
 void solve_columns(const Plan& plan, const Numbers& numbers, Workspace& workspace, const double* b, double* x, int stride, int columns);
-Workspace make_workspace(const Plan& plan);
+/// Lies behind the panels where there is room, so numbers must outlive it. Throws std::bad_alloc.
+Workspace make_workspace(const Plan& plan, const Numbers& numbers);
 
 }  // namespace carillon::ldlt

@@ -145,6 +145,20 @@ struct TakenRows {
   Ints slots;
 };
 
+/// Where own fronts are made, in numbers from the first panel on: panels fill it from below, and what they have not filled yet holds the
+/// columns of the front in work and, from above, two stacks of update matrices.
+struct Room {
+  std::int64_t panels = 0;               // of own and shared fronts
+  std::int64_t numbers = 0;              // the panels and what own fronts take besides
+  std::int64_t stack_begin[2] = {0, 0};  // of update matrices of even and odd depth; stacks grow downwards
+  int solve_blocks = 0;                  // of right-hand sides that lie behind the panels in the solves, from solve_begin() on
+
+  std::int64_t solve_begin() const { return (panels + 7) / 8 * 8; }  // aligned for vectors
+};
+
+inline constexpr int kSolveColumns = 32;  // right-hand sides at a time
+inline constexpr int kBlockColumns = 16;  // of a block of them
+
 /// Local nodes are numbered in the order of elimination: first the pivots of this rank's own fronts, then the nodes behind them. Slots are
 /// rows of right-hand sides, three for a node: those of the local nodes, of the rows of shared fronts, of nodes that other ranks eliminate.
 struct Plan {
@@ -166,8 +180,11 @@ struct Plan {
   std::vector<ReceivedBlocks> received;
   std::vector<GivenRows> given;
   std::vector<TakenRows> taken;
-  std::int64_t stack_entries[2] = {0, 0};  // the most that update matrices of own fronts of even and odd depth take
+  Room room;
   Analysis analysis;
+
+  /// Of a block of right-hand sides.
+  std::int64_t count_block() const { return std::int64_t{3 * kBlockColumns} * slots; }
 };
 
 /// Plans everything. order: as for Factor. Collective; throws as Factor's constructor.

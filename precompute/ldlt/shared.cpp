@@ -53,7 +53,7 @@ SharedFactoriser::SharedFactoriser(const Plan& plan, Numbers& numbers, const std
       numbers_(numbers),
       blocks_(blocks),
       kernels_(get_kernels()),
-      mailbox_(plan.comm, kTag + numbers.generation % 2, numbers.panels),
+      mailbox_(plan.comm, kTag + numbers.generation % 2, {numbers.panels.data(), static_cast<std::size_t>(plan.room.panels)}),
       works_(plan.shared.size()),
       block_(plan.shared.empty() ? 0 : kMaxBlock * kMaxBlock),
       left_(static_cast<int>(plan.shared.size())) {
@@ -338,7 +338,7 @@ void SharedFactoriser::complete(const SharedFront& front, std::int32_t f, Update
   if (update.missing > 0) return;
   const int n = 3 * front.map.nodes(k);
   const int first = find_first_row(front, k + 1);
-  const double* own = numbers_.panels.data() + numbers_.shared[static_cast<std::size_t>(f)][static_cast<std::size_t>(k)].tiles;
+  const double* own = numbers_.find_tiles(numbers_.shared[static_cast<std::size_t>(f)][static_cast<std::size_t>(k)]);
   std::int64_t made = 0;
   for (const int j : front.column_tiles)
     if (j > k && front.map.owner(j, k) != front.place) made += 3 * front.map.nodes(j);

@@ -31,9 +31,9 @@ class Solver {
  public:
   Solver(const Plan& plan, const Numbers& numbers, Workspace& workspace, int columns)
       : plan_(plan), numbers_(numbers), kernels_(get_kernels()) {
-    for (int first = 0; first < columns; first += 16) {
-      const int count = std::min(16, columns - first);
-      blocks_.push_back({workspace.blocks[static_cast<std::size_t>(first / 16)].data(), count > 8 ? 16 : 8, count, first});
+    for (int first = 0; first < columns; first += kBlockColumns) {
+      const int count = std::min(kBlockColumns, columns - first);
+      blocks_.push_back({workspace.blocks[static_cast<std::size_t>(first / kBlockColumns)], count > 8 ? 16 : 8, count, first});
       row_width_ += blocks_.back().width;
     }
   }
@@ -286,7 +286,7 @@ class Solver {
       }
       const std::int32_t begin = front.row_begin[static_cast<std::size_t>(k) + 1];
       const std::int32_t next = k + 1 < front.map.pivot_tiles() ? front.row_begin[static_cast<std::size_t>(k) + 2] : begin;
-      const double* tiles = numbers_.panels.data() + panel.tiles;
+      const double* tiles = numbers_.find_tiles(panel);
       if (!in.empty()) subtract_column(front, tiles, k, begin, next, in);
       if (k + 1 < front.map.pivot_tiles() && contains(front.row_places[static_cast<std::size_t>(k) + 1], front.place))
         send(front.map.rank(front.map.owner(k + 1, k + 1)), find_tag(front.id, kAlongRow), list_slots(front, k + 1));
@@ -313,7 +313,7 @@ class Solver {
                                          blocks_[b].width / 8, find_row(blocks_[b], list_slots(front, k).front()), sums[b]);
       const std::int32_t begin = front.row_begin[static_cast<std::size_t>(k) + 1];
       const std::int32_t next = k + 1 < front.map.pivot_tiles() ? front.row_begin[static_cast<std::size_t>(k) + 2] : begin;
-      const double* tiles = numbers_.panels.data() + panel.tiles;
+      const double* tiles = numbers_.find_tiles(panel);
       if (has_column) subtract_rows(front, tiles, k, next, front.own_nodes(), sums);
       if (k + 1 < front.map.pivot_tiles() && contains(front.row_places[static_cast<std::size_t>(k) + 1], front.place))
         receive(front.map.rank(front.map.owner(k + 1, k + 1)), find_tag(front.id, kAlongRow), list_slots(front, k + 1), Arrival::kIsSet);
@@ -458,9 +458,14 @@ class Solver {
 
 }  // namespace
 
-Workspace make_workspace(const Plan& plan) {
+Workspace make_workspace(const Plan& plan, const Numbers& numbers) {
   Workspace workspace;
-  for (int first = 0; first < kSolveColumns; first += 16) workspace.blocks.emplace_back(std::int64_t{3 * 16} * plan.slots);
+  for (int block = 0; block < kSolveColumns / kBlockColumns; ++block) {
+    if (block < plan.room.solve_blocks)
+      workspace.blocks.push_back(numbers.panels.data() + plan.room.solve_begin() + block * plan.count_block());
+    else
+      workspace.blocks.push_back(workspace.buffers.emplace_back(plan.count_block()).data());
+  }
   return workspace;
 }
 

@@ -164,6 +164,6 @@ inline void add_blocks(const Sheets::Block* blocks, std::size_t count, bool is_d
     if (is_damped)
       add_block<true>(blocks[b], weights, x, v, f, lag + 24 * b, spent + 4 * b);
     else
-      add_block<false>(blocks[b], weights, x, v, f, lag + 24 * b, spent + 4 * b);
+      add_block<false>(blocks[b], weights, x, v, f, nullptr, nullptr);
   }
 }
