@@ -185,6 +185,17 @@ void broadcast_totals(const comm::Communicator& comm, DistributedMesh& out) {
 
 }  // namespace
 
+std::vector<std::int32_t> list_free_nodes(const mesh::TetMesh& mesh, const std::vector<std::int32_t>& fixed_nodes) {
+  const std::vector<bool> is_fixed = mark_fixed(mesh, fixed_nodes);
+  std::vector<bool> is_free(mesh.nodes_m.size(), false);
+  for (const std::int32_t node : mesh.tets) is_free[node] = !is_fixed[node];
+  std::vector<std::int32_t> nodes;
+  for (std::size_t v = 0; v < is_free.size(); ++v)
+    if (is_free[v]) nodes.push_back(static_cast<std::int32_t>(v));
+  check_free_nodes(static_cast<std::int64_t>(nodes.size()), "");
+  return nodes;
+}
+
 DistributedMesh distribute(const comm::Communicator& comm, const mesh::TetMesh& mesh, const std::vector<std::int32_t>& fixed_nodes,
                            const DistributeOptions& options) {
   DistributedMesh out;

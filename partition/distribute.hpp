@@ -14,6 +14,10 @@ struct DistributeOptions {
   bool elimination_order = false;  // order the whole graph on rank 0, for factorisations that cannot order a distributed matrix themselves
 };
 
+/// The nodes that elements use and that are not fixed, ascending. Throws InputError when a fixed node is not in the mesh, or every node is
+/// fixed.
+std::vector<std::int32_t> list_free_nodes(const mesh::TetMesh& mesh, const std::vector<std::int32_t>& fixed_nodes);
+
 /// Cuts the mesh, numbers the free nodes so that each rank's are contiguous, and sends each rank its part. The mesh and the
 /// fixed nodes are read on rank 0 only; afterwards the mesh is not needed any more.
 /// Collective. Throws on every rank: InputError when there are fewer tetrahedra than ranks, a fixed node is not in the mesh, or every node

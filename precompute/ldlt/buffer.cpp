@@ -76,13 +76,13 @@ struct Kept {
   void clear() { release(std::numeric_limits<std::size_t>::max()); }
 
  private:
-  /// To the system; of lent pages their memory, and while nothing waits for its next use not even that.
+  /// To the system; of lent pages their memory alone.
   void give_back(double* pages, std::size_t bytes) const {
     double* const end = advance(pages, bytes);
     double* const lent = std::clamp(lent_begin, pages, end);
     double* const behind = std::clamp(lent_end, pages, end);
     if (pages < lent) munmap(pages, count_bytes(pages, lent));
-    if (lent < behind && is_active) madvise(lent, count_bytes(lent, behind), MADV_DONTNEED);
+    if (lent < behind) madvise(lent, count_bytes(lent, behind), MADV_DONTNEED);
     if (behind < end) munmap(behind, count_bytes(behind, end));
   }
   /// Takes so many bytes from the beginning of a run.
@@ -127,7 +127,7 @@ double* map_pages(std::size_t bytes) {
 BufferReuse::BufferReuse() { get_kept().is_active = true; }
 BufferReuse::~BufferReuse() {
   get_kept().is_active = false;
-  get_kept().clear();  // what is lent stays
+  get_kept().clear();
 }
 
 Buffer::Buffer(std::int64_t count, Pages pages_come) : size_(count) {

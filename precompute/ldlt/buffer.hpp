@@ -26,10 +26,10 @@ class Buffer {
   double* data() const { return data_.get(); }
   std::int64_t size() const { return size_; }
 
-  /// The pages behind so many numbers serve other buffers until the BufferReuse that lives now ends; what is in them is lost. One buffer
-  /// at a time lends.
+  /// The pages behind so many numbers serve other buffers until the BufferReuse that lives now ends. Then their memory goes back to the
+  /// system; they get other when they are touched. One buffer at a time lends.
   void lend_behind(std::int64_t count) const;
-  /// Gets memory for those pages that have none: lent ones may have lost theirs. Throws std::bad_alloc.
+  /// Gets memory for all pages that have none. Throws std::bad_alloc.
   void populate() const;
 
  private:

@@ -63,7 +63,7 @@ class Factoriser {
     shared_.run([&] {
       for (std::int32_t s = 0; s < static_cast<std::int32_t>(plan_.fronts.size()); ++s) process(s);
       wide_ = Buffer();
-      if (!plan_.shared.empty()) numbers_.panels.lend_behind(plan_.room.panels);
+      numbers_.panels.lend_behind(plan_.room.panels);
     });
   }
 

@@ -259,8 +259,11 @@ std::vector<Piece> gather_pieces(const Communicator& comm, const NodeLinks& node
           piece.graph.offsets.push_back(static_cast<std::int32_t>(piece.graph.neighbours.size()));
         }
         if (piece.nodes.empty()) continue;
-        for (std::int32_t& to : piece.graph.neighbours)  // nodes came in ascending order
-          to = static_cast<std::int32_t>(std::lower_bound(piece.nodes.begin(), piece.nodes.end(), to) - piece.nodes.begin());
+        // Nodes came in ascending order, often without a gap.
+        const bool has_gaps = piece.nodes.back() - piece.nodes.front() >= static_cast<std::int32_t>(piece.nodes.size());
+        for (std::int32_t& to : piece.graph.neighbours)
+          to = has_gaps ? static_cast<std::int32_t>(std::lower_bound(piece.nodes.begin(), piece.nodes.end(), to) - piece.nodes.begin())
+                        : to - piece.nodes.front();
         pieces.push_back(std::move(piece));
       }
     }

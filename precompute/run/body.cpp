@@ -21,7 +21,8 @@
 namespace carillon::run {
 namespace {
 
-constexpr const char* kByOrder = "cut a second time, by the separator tree of the nodes";
+constexpr const char* kByMetis = "by METIS, k-way on the dual graph";
+constexpr const char* kByOrder = "by the separator tree of the nodes";
 
 /// A fixed node, and the first entry of the job's "fixed" that names it.
 struct FixedNode {
@@ -166,13 +167,13 @@ Body make_pieces(Run& run, const Setting& setting, Patience* patience) {
     return body;
   }
 
-  run.log.begin("partition", "METIS k-way on the dual graph");
+  run.log.begin("partition", "elements to ranks");
   name_errors(body.source, run, [&] {
     if (wants_cut_by_order(run.job)) {
       CutMesh cut = cut_by_order(run.comm, mesh, fixed_nodes);
       body.pieces = std::move(cut.pieces);
       body.order = std::move(cut.order);
-      if (cut.is_by_order) run.log.print(kByOrder);
+      run.log.print(cut.is_by_order ? kByOrder : kByMetis);
     } else {
       body.pieces = partition::distribute(run.comm, mesh, fixed_nodes, {.elimination_order = wants_elimination_order(run.job)});
     }

@@ -20,21 +20,20 @@ constexpr double kFullest = 1.5;             // elements of a rank over the mean
 bool is_worth_it(const comm::Communicator& comm, std::int64_t nodes) { return comm.size() > 1 && nodes >= kNodesOfARank * comm.size(); }
 
 struct OrderedPieces {
-  std::shared_ptr<ldlt::MeshOrder> order;  // by the rows of the cut that there is
-  std::optional<Ints> ranks;               // of each element in the second cut; none on any rank: that would be uneven
+  std::shared_ptr<ldlt::MeshOrder> order;  // by the numbers that nodes have before the cut
+  std::optional<Ints> ranks;               // of each of this rank's elements in the cut; none on any rank: that would be uneven
 };
 
-/// Collective.
-OrderedPieces order_pieces(const comm::Communicator& comm, const partition::LocalMesh& first) {
+/// tets: nodes of this rank's elements; numbers: of these nodes, -1: fixed; own_nodes: how many this rank answers for. Collective.
+OrderedPieces order_pieces(const comm::Communicator& comm, const Ints& tets, int width, const Ints& numbers, std::int64_t own_nodes) {
   const Ints elements = comm.agree([&] {
-    Ints rows;
-    rows.reserve(first.tets.size());
-    for (const std::int32_t node : first.tets) rows.push_back(first.row[static_cast<std::size_t>(node)]);
-    return rows;
+    Ints list;
+    list.reserve(tets.size());
+    for (const std::int32_t node : tets) list.push_back(numbers[static_cast<std::size_t>(node)]);
+    return list;
   });
-  const int width = first.nodes_per_tet();
   OrderedPieces pieces;
-  pieces.order = std::make_shared<ldlt::MeshOrder>(comm, elements, width, comm::IndexPartition(comm, first.free_nodes));
+  pieces.order = std::make_shared<ldlt::MeshOrder>(comm, elements, width, comm::IndexPartition(comm, own_nodes));
   Ints ranks = pieces.order->find_ranks(comm, elements, width);
   std::vector<std::int64_t> counts(static_cast<std::size_t>(comm.size()), 0);
   for (std::int32_t& rank : ranks) ++counts[static_cast<std::size_t>(rank = std::max(rank, 0))];  // all fixed: anywhere
@@ -43,6 +42,10 @@ OrderedPieces order_pieces(const comm::Communicator& comm, const partition::Loca
   const auto [least, most] = std::minmax_element(counts.begin(), counts.end());
   if (*least > 0 && static_cast<double>(*most) * comm.size() <= kFullest * all) pieces.ranks = std::move(ranks);
   return pieces;
+}
+
+OrderedPieces order_pieces(const comm::Communicator& comm, const partition::LocalMesh& first) {
+  return order_pieces(comm, first.tets, first.nodes_per_tet(), first.row, first.free_nodes);
 }
 
 /// Rank 0: the rank of each element of the mesh. Collective.
@@ -57,12 +60,32 @@ Ints gather_ranks(const comm::Communicator& comm, const partition::DistributedMe
       comm::IndexPartition(comm, comm.is_root() ? first.tets : 0));
 }
 
-}  // namespace
+/// A mesh that rank 0 orders as it is. free_nodes: on rank 0. Collective.
+CutMesh cut_once(const comm::Communicator& comm, const mesh::TetMesh& mesh, const Ints& fixed_nodes, const Ints& free_nodes) {
+  const Ints numbers = comm.agree([&] {
+    Ints list(comm.is_root() ? mesh.nodes_m.size() : 0, -1);
+    for (std::size_t i = 0; i < free_nodes.size(); ++i) list[static_cast<std::size_t>(free_nodes[i])] = static_cast<std::int32_t>(i);
+    return list;
+  });
+  const int width = comm.broadcast(mesh.nodes_per_tet());
+  OrderedPieces ordered = order_pieces(comm, mesh.tets, width, numbers, static_cast<std::int64_t>(free_nodes.size()));
+  CutMesh cut;
+  cut.order = ordered.order;
+  cut.is_by_order = ordered.ranks.has_value();
+  cut.pieces = partition::distribute(comm, mesh, fixed_nodes, {.part = std::move(ordered.ranks).value_or(Ints())});
+  const Ints rows = comm.agree([&] {
+    Ints list;
+    for (const std::int32_t node : free_nodes) list.push_back(cut.pieces.row_of_node[static_cast<std::size_t>(node)]);
+    return list;
+  });
+  ordered.order->renumber(comm, rows);
+  return cut;
+}
 
-CutMesh cut_by_order(const comm::Communicator& comm, const mesh::TetMesh& mesh, const Ints& fixed_nodes) {
+/// A mesh that no rank can order alone: METIS cuts it first. Collective.
+CutMesh cut_twice(const comm::Communicator& comm, const mesh::TetMesh& mesh, const Ints& fixed_nodes) {
   CutMesh cut;
   cut.pieces = partition::distribute(comm, mesh, fixed_nodes);
-  if (!is_worth_it(comm, cut.pieces.free_nodes)) return cut;
   const OrderedPieces ordered = order_pieces(comm, cut.pieces.local);
   cut.order = ordered.order;
   cut.is_by_order = ordered.ranks.has_value();
@@ -79,6 +102,20 @@ CutMesh cut_by_order(const comm::Communicator& comm, const mesh::TetMesh& mesh, 
                                     comm, nodes, [](std::int32_t) { return 0; },
                                     [&](std::int32_t node) { return cut.pieces.row_of_node[static_cast<std::size_t>(node)]; }));
   return cut;
+}
+
+}  // namespace
+
+CutMesh cut_by_order(const comm::Communicator& comm, const mesh::TetMesh& mesh, const Ints& fixed_nodes, std::int32_t largest_ordered) {
+  const Ints free_nodes =
+      comm.agree([&] { return comm.is_root() && comm.size() > 1 ? partition::list_free_nodes(mesh, fixed_nodes) : Ints(); });
+  const auto count = comm.broadcast(static_cast<std::int64_t>(free_nodes.size()));
+  if (!is_worth_it(comm, count)) {
+    CutMesh cut;
+    cut.pieces = partition::distribute(comm, mesh, fixed_nodes);
+    return cut;
+  }
+  return count <= largest_ordered ? cut_once(comm, mesh, fixed_nodes, free_nodes) : cut_twice(comm, mesh, fixed_nodes);
 }
 
 RecutByOrder::RecutByOrder(const comm::Communicator& comm) : comm_(comm) {}

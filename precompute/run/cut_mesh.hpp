@@ -8,12 +8,9 @@
 
 #include "partition/distribute.hpp"
 #include "precompute/comm/communicator.hpp"
+#include "precompute/ldlt/mesh_order.hpp"
 #include "precompute/mesh/tet_mesh.hpp"
 #include "precompute/parallel_mesh/read_parallel.hpp"
-
-namespace carillon::ldlt {
-class MeshOrder;
-}  // namespace carillon::ldlt
 
 namespace carillon::run {
 
@@ -23,12 +20,14 @@ struct CutMesh {
   bool is_by_order = false;                      // whether the mesh is cut by it
 };
 
-/// Cuts the mesh by METIS and, on several ranks with at least 300 nodes each on average, a second time: each element goes to the rank that
-/// eliminates the first of its nodes. The first cut stays where the second would leave a rank without an element, or one with more than 1.5
-/// times the mean. Collective. Throws as partition::distribute().
-CutMesh cut_by_order(const comm::Communicator& comm, const mesh::TetMesh& mesh, const std::vector<std::int32_t>& fixed_nodes);
+/// Cuts the mesh by METIS or, on several ranks with at least 300 nodes each on average, by the order of elimination: each element goes to
+/// the rank that eliminates the first of its nodes. METIS cuts where that would leave a rank without an element, or one with more than 1.5
+/// times the mean; and above `largest_ordered` nodes it cuts first, so that all ranks can order. Collective. Throws as
+/// partition::distribute().
+CutMesh cut_by_order(const comm::Communicator& comm, const mesh::TetMesh& mesh, const std::vector<std::int32_t>& fixed_nodes,
+                     std::int32_t largest_ordered = ldlt::kLargestGathered);
 
-/// The same second cut for read_parallel, by its own first cut.
+/// A cut by the order for read_parallel, after its own cut.
 class RecutByOrder {
  public:
   explicit RecutByOrder(const comm::Communicator& comm);

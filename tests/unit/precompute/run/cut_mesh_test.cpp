@@ -74,8 +74,8 @@ TEST(CutByOrder, has_every_element_once_and_the_spectrum_of_the_other_cut) {
   const comm::Communicator comm(PETSC_COMM_WORLD);
   const mesh::TetMesh plate = get_rank() == 0 ? make_plate() : mesh::TetMesh();
   const Ints end = get_rank() == 0 ? find_end(plate) : Ints();
-  for (const Ints& fixed : {Ints(), end}) {
-    const CutMesh cut = cut_by_order(comm, plate, fixed);
+  for (const auto& [fixed, largest_ordered] : {std::pair(Ints(), 100'000), {end, 100'000}, {Ints(), 100}, {end, 100}}) {
+    const CutMesh cut = cut_by_order(comm, plate, fixed, largest_ordered);
     const partition::DistributedMesh metis = partition::distribute(comm, plate, fixed);
     EXPECT_EQ(cut.order != nullptr, get_ranks() > 1);
     EXPECT_EQ(cut.is_by_order, get_ranks() > 1);
