@@ -60,12 +60,14 @@ inline constexpr double kAirMatrixBytes = 1.1e9;                                
 inline constexpr double kRankBytes = 35e6;                                        // what MPI and its messages take of each
 inline constexpr double kMeshBytesPerTet = 200, kQuadraticMeshBytesPerTet = 600;  // mesh, partition and surface
 inline constexpr double kCopiesShare = 0.42;  // of K and M as PETSc stores them: the same by blocks of nodes
-inline constexpr double kFactorPeak = 1.25;   // what own fronts take besides their panels included, over the factor
+inline constexpr double kFactorPeak = 1.25;   // update matrices and what solves take included, over the factor
 inline constexpr double kDenseCopies = 3;     // on every rank: K, which the vectors overwrite, M, and a message of one of them
 inline constexpr double kDenseWork = 3;       // on all ranks together: two matrices of LAPACK's own, the vectors as distributed
-// All ranks together over what is held: halos, and what is on its way into shared fronts. By log2 of the ranks; then by the step.
+// All ranks together over one: halos, by log2 of the ranks, then by the step; and a factorisation, whose shared fronts and what is on its
+// way to them lie in memory together, in addition.
 inline constexpr std::array<double, 3> kRankGrowth{1.1, 1.15, 1.2};
 inline constexpr double kRankGrowthStep = 0.1;  // of each further doubling
+inline constexpr std::array<double, 3> kFactorGrowth{1, 1.1, 1.2};
 
 // Modes: real counts lie within these factors of Weyl's law. Curved walls are stiffer than flat ones and have fewer modes.
 inline constexpr double kSolidFactor = 1.4, kThinFactor = 1.5, kCurvedFactor = 3;

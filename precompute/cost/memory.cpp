@@ -4,6 +4,7 @@
 #include "precompute/cost/memory.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 
@@ -37,13 +38,14 @@ double calc_coupling_bytes(const ProblemSize& size) {
   return kNumber * rows * kCouplingColumns * n;
 }
 
-double find_growth(int ranks) {
+/// By log2 of the ranks; further doublings by the step.
+double find_growth(const std::array<double, 3>& growth, double step, int ranks) {
   const double doublings = std::log2(static_cast<double>(ranks));
   const auto index = static_cast<std::size_t>(doublings);
-  if (index + 1 >= kRankGrowth.size())
-    return kRankGrowth.back() + kRankGrowthStep * (doublings + 1 - static_cast<double>(kRankGrowth.size()));
-  return kRankGrowth[index] + (doublings - std::floor(doublings)) * (kRankGrowth[index + 1] - kRankGrowth[index]);
+  if (index + 1 >= growth.size()) return growth.back() + step * (doublings + 1 - static_cast<double>(growth.size()));
+  return growth[index] + (doublings - std::floor(doublings)) * (growth[index + 1] - growth[index]);
 }
+double find_growth(int ranks) { return find_growth(kRankGrowth, kRankGrowthStep, ranks); }
 
 }  // namespace
 
@@ -71,8 +73,9 @@ double calc_peak_bytes(const MemoryParts& parts, const ProblemSize& known, int r
   // Update matrices and basis never meet; modes that were found stay while the next slice is factorised.
   const auto unknowns = static_cast<double>(size.unknowns);
   const double found = *size.modes > kSliceModes ? kNumber * unknowns * static_cast<double>(*size.modes) : 0;
-  const double sparse =
-      std::max(parts.copies_peak, parts.copies + std::max(parts.factor_peak + found, parts.factor + calc_search_bytes(size)));
+  const double sparse = std::max(
+      parts.copies_peak,
+      parts.copies + std::max(find_growth(kFactorGrowth, 0, ranks) * parts.factor_peak + found, parts.factor + calc_search_bytes(size)));
   const bool is_dense = size.is_dense || size.unknowns <= kDenseRows;
   const double dense = is_dense ? (kDenseCopies * ranks + kDenseWork) * kNumber * unknowns * unknowns : 0;
   const double own = std::max(parts.assembled + (is_dense ? 0 : sparse), parts.read_peak) - parts.program;

@@ -160,7 +160,7 @@ class PlanMaker {
   }
 
   /// Children, and the roots of subtrees, in the order in which panels and update matrices take least room together: those first that need
-  /// most room besides what they leave.
+  /// most room above what they leave.
   void sort_by_room(Ints& roots, std::vector<Ints>& children) const {
     std::vector<std::int64_t> most(dealt_.size(), 0);  // while its subtree is eliminated
     std::vector<std::int64_t> left(dealt_.size(), 0);  // behind that: its panels and one update matrix

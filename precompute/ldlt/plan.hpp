@@ -149,7 +149,7 @@ struct TakenRows {
 /// columns of the front in work and, from above, two stacks of update matrices.
 struct Room {
   std::int64_t panels = 0;               // of own and shared fronts
-  std::int64_t numbers = 0;              // the panels and what own fronts take besides
+  std::int64_t numbers = 0;              // panels, columns and stacks
   std::int64_t stack_begin[2] = {0, 0};  // of update matrices of even and odd depth; stacks grow downwards
   int solve_blocks = 0;                  // of right-hand sides that lie behind the panels in the solves, from solve_begin() on
 
