@@ -63,8 +63,8 @@ inline constexpr double kCopiesShare = 0.42;  // of K and M as PETSc stores them
 inline constexpr double kFactorPeak = 1.25;   // update matrices and what solves take included, over the factor
 inline constexpr double kDenseCopies = 3;     // on every rank: K, which the vectors overwrite, M, and a message of one of them
 inline constexpr double kDenseWork = 3;       // on all ranks together: two matrices of LAPACK's own, the vectors as distributed
-// All ranks together over one: halos, by log2 of the ranks, then by the step; and a factorisation, whose shared fronts and what is on its
-// way to them lie in memory together, in addition.
+// Total over all ranks, relative to one: of everything, for halos, by log2 of the ranks, then by the step; and of a factorisation, in
+// addition, whose shared fronts lie in memory together with what is on its way to them.
 inline constexpr std::array<double, 3> kRankGrowth{1.1, 1.15, 1.2};
 inline constexpr double kRankGrowthStep = 0.1;  // of each further doubling
 inline constexpr std::array<double, 3> kFactorGrowth{1, 1.1, 1.2};

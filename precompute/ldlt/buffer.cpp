@@ -32,7 +32,7 @@ bool populate_pages(double* pages, std::size_t bytes) { return madvise(pages, by
 struct Kept {
   bool is_active = false;
   std::map<double*, std::size_t> runs;  // bytes of each; those that follow each other are one
-  double* lent_begin = nullptr;         // pages of a buffer that lives: they stay mapped
+  double* lent_begin = nullptr;         // pages of a buffer that outlives the reuse: they stay mapped
   double* lent_end = nullptr;
 
   /// The first pages of the smallest run that has enough; null: none has.
@@ -126,8 +126,10 @@ double* map_pages(std::size_t bytes) {
 
 BufferReuse::BufferReuse() { get_kept().is_active = true; }
 BufferReuse::~BufferReuse() {
-  get_kept().is_active = false;
-  get_kept().clear();
+  Kept& kept = get_kept();
+  kept.is_active = false;
+  kept.clear();
+  kept.lent_begin = kept.lent_end = nullptr;
 }
 
 Buffer::Buffer(std::int64_t count, Pages pages_come) : size_(count) {
@@ -144,7 +146,7 @@ Buffer::Buffer(std::int64_t count, Pages pages_come) : size_(count) {
   double* pages = kept.take(mapped);
   is_fresh_ = pages == nullptr;
   if (is_fresh_) {
-    kept.release(mapped);  // with what waits, no more is mapped than was in use at most
+    kept.release(mapped);  // with what waits, no more is in memory than was in use at most
     pages = map_pages(mapped);
   }
   if (pages == nullptr && !kept.runs.empty()) {
@@ -161,11 +163,11 @@ void Buffer::populate() const {
     throw std::bad_alloc();
 }
 
-void Buffer::lend_behind(std::int64_t count) const {
+void Buffer::lend_tail(std::int64_t count) const {
   const std::size_t kept_bytes = round_up(sizeof(double) * static_cast<std::size_t>(count), kPage);
   const std::size_t mapped = data_.get_deleter().mapped_bytes;
-  if (kept_bytes >= mapped) return;
   Kept& kept = get_kept();
+  if (kept_bytes >= mapped || !kept.is_active || kept.lent_begin != nullptr) return;
   kept.lent_begin = advance(data_.get(), kept_bytes);
   kept.lent_end = advance(data_.get(), mapped);
   kept.put(kept.lent_begin, mapped - kept_bytes);
@@ -182,9 +184,7 @@ void FreeNumbers::operator()(double* p) const {
     std::free(p);
     return;
   }
-  Kept& kept = get_kept();
-  if (p <= kept.lent_begin && kept.lent_end == advance(p, mapped_bytes)) kept.lent_begin = kept.lent_end = nullptr;
-  kept.put(p, mapped_bytes);
+  get_kept().put(p, mapped_bytes);
 }
 
 }  // namespace carillon::ldlt

@@ -26,9 +26,9 @@ class Buffer {
   double* data() const { return data_.get(); }
   std::int64_t size() const { return size_; }
 
-  /// The pages behind so many numbers serve other buffers until the BufferReuse that lives now ends. Then their memory goes back to the
-  /// system; they get other when they are touched. One buffer at a time lends.
-  void lend_behind(std::int64_t count) const;
+  /// The pages after the first `count` numbers serve other buffers until the BufferReuse that lives now ends, which this buffer must
+  /// outlive. Then their memory goes back to the system, and the next touch brings fresh pages. Once in a BufferReuse.
+  void lend_tail(std::int64_t count) const;
   /// Gets memory for all pages that have none. Throws std::bad_alloc.
   void populate() const;
 
@@ -39,7 +39,7 @@ class Buffer {
 };
 
 /// While one lives, the pages of large buffers that are given back serve others: fresh pages cost more than what is done with them. What
-/// large buffers have mapped, with what waits, never exceeds what they had in use at most. One at a time.
+/// large buffers have in memory, with what waits, never exceeds what they had in use at most. One at a time.
 class BufferReuse {
  public:
   BufferReuse();

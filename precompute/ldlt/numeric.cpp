@@ -28,6 +28,14 @@ using la::NodeRows;
 
 static_assert(3 * kPanelNodes <= kMaxBlock);
 
+/// Panels fit the columns that they are made of (kColumnsBegin): a triangle takes no more than the square that it comes from.
+constexpr bool fit_triangles() {
+  for (std::int64_t n = 3; n <= 3 * kPanelNodes; n += 3)
+    if (count_triangle(n) > std::min(n * n, kColumnsBegin)) return false;
+  return true;
+}
+static_assert(fit_triangles());
+
 class Factoriser {
  public:
   Factoriser(const Plan& plan, const la::Pencil& pencil, double sigma, Numbers& numbers)
@@ -63,7 +71,7 @@ class Factoriser {
     shared_.run([&] {
       for (std::int32_t s = 0; s < static_cast<std::int32_t>(plan_.fronts.size()); ++s) process(s);
       wide_ = Buffer();
-      numbers_.panels.lend_behind(plan_.room.panels);
+      numbers_.panels.lend_tail(plan_.room.panels);
     });
   }
 

@@ -55,12 +55,12 @@ void factorise_fronts(const Plan& plan, const la::Pencil& pencil, double sigma, 
 /// Right-hand sides in order of elimination: blocks of 8 or 16 columns, in each a row of them per row of the matrix.
 struct Workspace {
   std::vector<double*> blocks;  // one per kBlockColumns columns: rows of all slots
-  std::vector<Buffer> buffers;  // of those that have no room behind the panels
+  std::vector<Buffer> buffers;  // of those that have no room after the panels
 };
 
 /// x <- A^-1 b for at most kSolveColumns columns, `stride` apart; b may be x. Collective.
 void solve_columns(const Plan& plan, const Numbers& numbers, Workspace& workspace, const double* b, double* x, int stride, int columns);
-/// Lies behind the panels where there is room, so numbers must outlive it. Throws std::bad_alloc.
+/// Lies after the panels where there is room, so numbers must outlive it. Throws std::bad_alloc.
 Workspace make_workspace(const Plan& plan, const Numbers& numbers);
 
 }  // namespace carillon::ldlt

@@ -194,7 +194,7 @@ Piece take(const Piece& piece, const Ints& vertices, Label label, Ints& number) 
 std::array<Piece, 3> cut(const Piece& piece, const Ints& side, const SeparatorTree& tree, const IndexPartition& owners) {
   const int part = piece.label.part;
   const int middle = tree[tree[part].right].begin;
-  std::int64_t kept = 0;  // nodes whose rows are where their side would go, less those whose are not
+  std::int64_t kept = 0;  // nodes whose rows are where their side would go, less those whose are not; all on one rank: any side will do
   for (std::size_t v = 0; v < side.size(); ++v)
     if (side[v] < 2) kept += (owners.find_owner(piece.nodes[v]) >= middle) == (side[v] == 1) ? 1 : -1;
   std::array<Ints, 3> sides;

@@ -163,7 +163,7 @@ class PlanMaker {
   /// most room above what they leave.
   void sort_by_room(Ints& roots, std::vector<Ints>& children) const {
     std::vector<std::int64_t> most(dealt_.size(), 0);  // while its subtree is eliminated
-    std::vector<std::int64_t> left(dealt_.size(), 0);  // behind that: its panels and one update matrix
+    std::vector<std::int64_t> left(dealt_.size(), 0);  // afterwards: its panels and one update matrix
     const auto sort = [&](Ints& list) {
       std::stable_sort(list.begin(), list.end(), [&](std::int32_t a, std::int32_t b) {
         return most[static_cast<std::size_t>(a)] - left[static_cast<std::size_t>(a)] >
@@ -190,8 +190,10 @@ class PlanMaker {
       }
       const std::int32_t width = dealt_[d].width();
       const auto size = static_cast<std::int32_t>(width + dealt_[d].rows.size());
-      most[d] = std::max(most[d], before + count_front_room(width, size) + count_update_of(dealt_[d].rows));
-      left[d] = before - updates + count_stored(width, size) + count_update_of(dealt_[d].rows);
+      const bool is_root = std::find(roots.begin(), roots.end(), *at) != roots.end();  // its update matrix lies elsewhere
+      const std::int64_t update = is_root ? 0 : count_update_of(dealt_[d].rows);
+      most[d] = std::max(most[d], before + count_front_room(width, size) + update);
+      left[d] = before - updates + count_stored(width, size) + update;
     }
     sort(roots);
   }
@@ -425,7 +427,7 @@ Analysis::Rank measure(Plan& plan) {
     for (const std::int32_t child : front.children)
       used[plan.fronts[static_cast<std::size_t>(child)].depth % 2] -= count_update_of(plan.fronts[static_cast<std::size_t>(child)].rows);
   }
-  // One stack has a place of its own behind the other, which grows towards the panels.
+  // One stack has a place of its own at the end; the other, before it, grows towards the panels.
   const int apart = most_used[0] + most_below[1] <= most_used[1] + most_below[0] ? 0 : 1;
   room.numbers = most_used[apart] + most_below[1 - apart];
   std::int64_t kept = leaving;

@@ -145,13 +145,13 @@ struct TakenRows {
   Ints slots;
 };
 
-/// Where own fronts are made, in numbers from the first panel on: panels fill it from below, and what they have not filled yet holds the
-/// columns of the front in work and, from above, two stacks of update matrices.
+/// The memory in which own fronts are made, as offsets in doubles from the first panel: panels fill it from below, and what they have not
+/// filled yet holds the columns of the front in work and, from above, two stacks of update matrices.
 struct Room {
   std::int64_t panels = 0;               // of own and shared fronts
   std::int64_t numbers = 0;              // panels, columns and stacks
   std::int64_t stack_begin[2] = {0, 0};  // of update matrices of even and odd depth; stacks grow downwards
-  int solve_blocks = 0;                  // of right-hand sides that lie behind the panels in the solves, from solve_begin() on
+  int solve_blocks = 0;                  // of right-hand sides that lie after the panels in the solves, from solve_begin() on
 
   std::int64_t solve_begin() const { return (panels + 7) / 8 * 8; }  // aligned for vectors
 };

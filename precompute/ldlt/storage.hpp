@@ -29,8 +29,8 @@ inline std::int64_t count_stored(std::int32_t width, std::int32_t size) {
   return stored;
 }
 
-/// Where the pivot columns of a front in work begin, from where its panels will: a panel is written when its columns have been read, all
-/// but its triangle, and never reaches the next.
+/// Where the pivot columns of a front in work begin, counted from where its panels will. Except for its triangle, a panel is written only
+/// after its columns have been read, and it never overlaps the columns of the next panel.
 inline constexpr std::int64_t kColumnsBegin = count_triangle(3 * kPanelNodes);
 /// What the columns and panels of a front take together.
 inline std::int64_t count_front_room(std::int32_t width, std::int32_t size) { return kColumnsBegin + std::int64_t{9} * width * size; }

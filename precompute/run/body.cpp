@@ -21,8 +21,8 @@
 namespace carillon::run {
 namespace {
 
-constexpr const char* kByMetis = "by METIS, k-way on the dual graph";
-constexpr const char* kByOrder = "by the separator tree of the nodes";
+constexpr const char* kByMetis = "elements go to ranks by METIS, k-way on the dual graph";
+constexpr const char* kByOrder = "elements go to ranks by the separator tree of the nodes";
 
 /// A fixed node, and the first entry of the job's "fixed" that names it.
 struct FixedNode {
@@ -167,14 +167,15 @@ Body make_pieces(Run& run, const Setting& setting, Patience* patience) {
     return body;
   }
 
-  run.log.begin("partition", "elements to ranks");
+  run.log.begin("partition", "the mesh over the ranks");
   name_errors(body.source, run, [&] {
     if (wants_cut_by_order(run.job)) {
       CutMesh cut = cut_by_order(run.comm, mesh, fixed_nodes);
       body.pieces = std::move(cut.pieces);
       body.order = std::move(cut.order);
-      run.log.print(cut.is_by_order ? kByOrder : kByMetis);
+      if (run.comm.size() > 1) run.log.print(cut.is_by_order ? kByOrder : kByMetis);
     } else {
+      if (run.comm.size() > 1) run.log.print(kByMetis);
       body.pieces = partition::distribute(run.comm, mesh, fixed_nodes, {.elimination_order = wants_elimination_order(run.job)});
     }
   });

@@ -68,7 +68,9 @@ CutMesh cut_once(const comm::Communicator& comm, const mesh::TetMesh& mesh, cons
     return list;
   });
   const int width = comm.broadcast(mesh.nodes_per_tet());
-  OrderedPieces ordered = order_pieces(comm, mesh.tets, width, numbers, static_cast<std::int64_t>(free_nodes.size()));
+  const Ints none;
+  OrderedPieces ordered =
+      order_pieces(comm, comm.is_root() ? mesh.tets : none, width, numbers, static_cast<std::int64_t>(free_nodes.size()));
   CutMesh cut;
   cut.order = ordered.order;
   cut.is_by_order = ordered.ranks.has_value();

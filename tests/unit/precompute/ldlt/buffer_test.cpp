@@ -107,7 +107,7 @@ TEST(Buffer, lends_what_is_behind_and_gets_it_back) {
     for (int round = 0; round < 3; ++round) {
       room.populate();
       const BufferReuse reuse;
-      room.lend_behind(8 * kMillion);
+      room.lend_tail(8 * kMillion);
       const Buffer first(6 * kMillion);
       EXPECT_EQ(first.data(), room.data() + 8 * kMillion);
       std::fill_n(first.data(), first.size(), 3.0);
@@ -125,10 +125,24 @@ TEST(Buffer, lends_what_is_behind_and_gets_it_back) {
   EXPECT_NEAR(static_cast<double>(find_mapped() - before), 0, kSlack) << "all of it goes with the buffer";
 }
 
+TEST(Buffer, stays_whole_when_one_other_takes_all_that_is_lent) {
+  constexpr std::int64_t kKept = 8 * kMillion;
+  const Buffer room(24 * kMillion, Pages::kAtOnce);
+  {
+    const BufferReuse reuse;
+    room.lend_tail(kKept);
+    const Buffer other(16 * kMillion);  // to the page what is lent
+    ASSERT_EQ(other.data(), room.data() + kKept);
+  }
+  room.populate();
+  std::fill_n(room.data(), room.size(), 5.0);
+  EXPECT_EQ(std::count(room.data(), room.data() + room.size(), 5.0), room.size());
+}
+
 TEST(Buffer, lends_nothing_of_a_small_one) {
   const BufferReuse reuse;
   const Buffer room(1000);
-  room.lend_behind(10);
+  room.lend_tail(10);
   room.populate();
   const Buffer other(kMillion, Pages::kAtOnce);
   EXPECT_TRUE(other.data() + other.size() <= room.data() || other.data() >= room.data() + room.size());
