@@ -25,9 +25,6 @@ std::size_t round_up(std::size_t bytes, std::size_t to) { return (bytes + to - 1
 double* advance(double* pages, std::size_t bytes) { return pages + bytes / sizeof(double); }
 std::size_t count_bytes(const double* begin, const double* end) { return sizeof(double) * static_cast<std::size_t>(end - begin); }
 
-/// False: there is no memory for them.
-bool populate_pages(double* pages, std::size_t bytes) { return madvise(pages, bytes, MADV_POPULATE_WRITE) == 0 || errno != ENOMEM; }
-
 /// Pages that wait for their next use.
 struct Kept {
   bool is_active = false;
@@ -80,10 +77,10 @@ struct Kept {
   void give_back(double* pages, std::size_t bytes) const {
     double* const end = advance(pages, bytes);
     double* const lent = std::clamp(lent_begin, pages, end);
-    double* const behind = std::clamp(lent_end, pages, end);
+    double* const after = std::clamp(lent_end, pages, end);
     if (pages < lent) munmap(pages, count_bytes(pages, lent));
-    if (lent < behind) madvise(lent, count_bytes(lent, behind), MADV_DONTNEED);
-    if (behind < end) munmap(behind, count_bytes(behind, end));
+    if (lent < after) madvise(lent, count_bytes(lent, after), MADV_DONTNEED);
+    if (after < end) munmap(after, count_bytes(after, end));
   }
   /// Takes so many bytes from the beginning of a run.
   void cut(std::map<double*, std::size_t>::iterator at, std::size_t bytes) {
@@ -159,8 +156,8 @@ Buffer::Buffer(std::int64_t count, Pages pages_come) : size_(count) {
 }
 
 void Buffer::populate() const {
-  if (const std::size_t mapped = data_.get_deleter().mapped_bytes; mapped > 0 && !populate_pages(data_.get(), mapped))
-    throw std::bad_alloc();
+  const std::size_t mapped = data_.get_deleter().mapped_bytes;
+  if (mapped > 0 && madvise(data_.get(), mapped, MADV_POPULATE_WRITE) != 0 && errno == ENOMEM) throw std::bad_alloc();
 }
 
 void Buffer::lend_tail(std::int64_t count) const {
@@ -180,11 +177,10 @@ Buffer Buffer::make_zero(std::int64_t count) {
 }
 
 void FreeNumbers::operator()(double* p) const {
-  if (mapped_bytes == 0) {
+  if (mapped_bytes == 0)
     std::free(p);
-    return;
-  }
-  get_kept().put(p, mapped_bytes);
+  else
+    get_kept().put(p, mapped_bytes);
 }
 
 }  // namespace carillon::ldlt

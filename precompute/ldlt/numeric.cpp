@@ -55,7 +55,7 @@ class Factoriser {
     for (int parity = 0; parity < 2; ++parity) top_[parity] = numbers.panels.data() + plan.room.stack_begin[parity];
     // In a virtual machine that returns free memory to its host, pages that were freed a while ago cost far more: so these come first.
     for (const Front& front : plan.fronts)
-      if (front.parent < 0) leaving_.emplace_back(count_update(3 * static_cast<std::int64_t>(front.rows.size())), Pages::kAtOnce);
+      if (front.parent < 0) leaving_.emplace_back(count_update_of(front.rows), Pages::kAtOnce);
     where_.assign(static_cast<std::size_t>(plan.local_nodes), -1);
     slot_.assign(plan.node_of_link.size(), -1);
     requests_.reserve(plan.received.size() + plan.sent.size());

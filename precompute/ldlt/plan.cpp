@@ -1,11 +1,7 @@
 // Method:     A rank knows its own subtrees and the shared fronts between them and the root (deal.cpp). It asks the owners of the matrix
-//             rows for the pattern of the columns in which it has pivots or tiles. Update matrices lie on two stacks, by the parity of
-//             their depth: those of a front's children are on the other stack than its own, so an update matrix can be made while those of
-//             the children are read, and nothing is moved. Stacks and the columns of the front in work lie where the panels of later
-//             fronts will be. Children are eliminated in the order that takes least room.
-// Source:     Liu 1986, On the storage requirement in the out-of-core multifrontal method for sparse factorization (order of children);
-//             Liu 1992, The multifrontal method for sparse matrix solution (stacks).
-// Deviations: two stacks in place of one.
+//             rows for the pattern of the columns in which it has pivots or tiles. Where own fronts are made: room.cpp.
+// Source:     Pothen and Sun 1993 (mapping.cpp).
+// Deviations: none.
 #include "precompute/ldlt/plan.hpp"
 
 #include <algorithm>
@@ -36,8 +32,6 @@ struct WantedColumn {
   std::int32_t front = -1;  // among the shared fronts
   std::int32_t column = 0;  // local node, or node of the shared front
 };
-
-std::int64_t count_update_of(const Ints& rows) { return count_update(3 * static_cast<std::int64_t>(rows.size())); }
 
 /// Makes a rank's plan of the fronts that it was dealt.
 class PlanMaker {
@@ -117,7 +111,7 @@ class PlanMaker {
       const auto parent = own_of.find(dealt_[d].parent);
       (parent == own_of.end() ? roots : children[static_cast<std::size_t>(parent->second)]).push_back(static_cast<std::int32_t>(d));
     }
-    sort_by_room(roots, children);
+    sort_by_room(dealt_, children, roots);
     Ints order;
     Ints stack(roots.begin(), roots.end());
     while (!stack.empty()) {  // written from behind: parents before children
@@ -157,45 +151,6 @@ class PlanMaker {
       front.parent = parent == front_of.end() ? -1 : parent->second;
     }
     own_front_of_ = std::move(front_of);
-  }
-
-  /// Children, and the roots of subtrees, in the order in which panels and update matrices take least room together: those first that need
-  /// most room above what they leave.
-  void sort_by_room(Ints& roots, std::vector<Ints>& children) const {
-    std::vector<std::int64_t> most(dealt_.size(), 0);  // while its subtree is eliminated
-    std::vector<std::int64_t> left(dealt_.size(), 0);  // afterwards: its panels and one update matrix
-    const auto sort = [&](Ints& list) {
-      std::stable_sort(list.begin(), list.end(), [&](std::int32_t a, std::int32_t b) {
-        return most[static_cast<std::size_t>(a)] - left[static_cast<std::size_t>(a)] >
-               most[static_cast<std::size_t>(b)] - left[static_cast<std::size_t>(b)];
-      });
-    };
-    Ints order;  // parents before children
-    Ints stack = roots;
-    while (!stack.empty()) {
-      const std::int32_t d = stack.back();
-      stack.pop_back();
-      order.push_back(d);
-      stack.insert(stack.end(), children[static_cast<std::size_t>(d)].begin(), children[static_cast<std::size_t>(d)].end());
-    }
-    for (auto at = order.rbegin(); at != order.rend(); ++at) {
-      const auto d = static_cast<std::size_t>(*at);
-      sort(children[d]);
-      std::int64_t before = 0;  // panels and update matrices of the children
-      std::int64_t updates = 0;
-      for (const std::int32_t child : children[d]) {
-        most[d] = std::max(most[d], before + most[static_cast<std::size_t>(child)]);
-        before += left[static_cast<std::size_t>(child)];
-        updates += count_update_of(dealt_[static_cast<std::size_t>(child)].rows);
-      }
-      const std::int32_t width = dealt_[d].width();
-      const auto size = static_cast<std::int32_t>(width + dealt_[d].rows.size());
-      const bool is_root = std::find(roots.begin(), roots.end(), *at) != roots.end();  // its update matrix lies elsewhere
-      const std::int64_t update = is_root ? 0 : count_update_of(dealt_[d].rows);
-      most[d] = std::max(most[d], before + count_front_room(width, size) + update);
-      left[d] = before - updates + count_stored(width, size) + update;
-    }
-    sort(roots);
   }
 
   std::vector<FrontShare> list_shares(const DealtFront& front) const {
@@ -402,59 +357,38 @@ void plan_rows(const Communicator& comm, Plan& plan, const PlanMaker& maker, con
   });
 }
 
-/// Plays the factorisation through: room, peak of memory, entries and flops of this rank.
+/// Room, peak of memory, entries and flops of this rank.
 Analysis::Rank measure(Plan& plan) {
   Analysis::Rank own;
-  Room& room = plan.room;
   std::int64_t leaving = 0;  // update matrices for shared fronts: sent, and perhaps not yet received
   std::int64_t scratch = 0;
-  std::int64_t used[2] = {0, 0};
-  std::int64_t most_used[2] = {0, 0};
-  std::int64_t most_below[2] = {0, 0};  // a stack with the panels and columns below it
   for (const Front& front : plan.fronts) {
     own.entries += count_entries(front.width, front.size());
     own.flops += count_flops(front.width, front.size());
     scratch = std::max(scratch, count_wide(front.width, front.size()));
-    if (front.parent >= 0)
-      used[front.depth % 2] += count_update_of(front.rows);
-    else
-      leaving += front.shared_parent >= 0 ? count_update_of(front.rows) : 0;
-    for (int parity = 0; parity < 2; ++parity) {
-      most_used[parity] = std::max(most_used[parity], used[parity]);
-      most_below[parity] = std::max(most_below[parity], room.panels + count_front_room(front.width, front.size()) + used[parity]);
-    }
-    room.panels += count_stored(front.width, front.size());
-    for (const std::int32_t child : front.children)
-      used[plan.fronts[static_cast<std::size_t>(child)].depth % 2] -= count_update_of(plan.fronts[static_cast<std::size_t>(child)].rows);
+    if (front.shared_parent >= 0) leaving += count_update_of(front.rows);
   }
-  // One stack has a place of its own at the end; the other, before it, grows towards the panels.
-  const int apart = most_used[0] + most_below[1] <= most_used[1] + most_below[0] ? 0 : 1;
-  room.numbers = most_used[apart] + most_below[1 - apart];
   std::int64_t kept = leaving;
+  std::int64_t shared_panels = 0;
   std::int64_t shared_peak = 0;
   for (const SharedFront& front : plan.shared) {
     own.entries += front.map.count_entries()[static_cast<std::size_t>(front.place)];
     own.flops += front.map.count_operations()[static_cast<std::size_t>(front.place)];
     const std::int64_t numbers = front.map.count_numbers(front.place);
     const std::int64_t update = front.map.count_numbers(front.place, front.map.pivot_tiles());  // goes to the parent
-    room.panels += numbers - update;
+    shared_panels += numbers - update;
     const std::int64_t panels = std::int64_t{4} * 3 * kPanelNodes * 3 * (front.own_nodes() + std::int64_t{kWideRows});
     shared_peak = std::max(shared_peak, kept + 2 * numbers + panels);  // its tiles, and what its children send for them
     kept += update;
     for (const SharedChild& child : front.children)
       if (child.shared >= 0) kept -= child.map.count_numbers(child.map.find_place(plan.rank), child.map.pivot_tiles());
   }
-  room.numbers = std::max(room.numbers, room.panels);
-  room.stack_begin[apart] = room.numbers;
-  room.stack_begin[1 - apart] = room.numbers - most_used[apart];
-  const std::int64_t peak = std::max(room.numbers + leaving + scratch, room.panels + shared_peak);
-  std::int64_t blocks = 0;
-  for (const SentBlocks& list : plan.sent) blocks += 9 * static_cast<std::int64_t>(list.columns.size());
-  for (const ReceivedBlocks& list : plan.received) blocks += 9 * static_cast<std::int64_t>(list.count());
   constexpr int kBlocks = kSolveColumns / kBlockColumns;
-  while (room.solve_blocks < kBlocks && room.solve_begin() + (room.solve_blocks + 1) * plan.count_block() <= room.numbers)
-    ++room.solve_blocks;
-  own.peak_bytes = 8 * (peak + blocks + (kBlocks - room.solve_blocks) * plan.count_block());
+  const Room& room = plan.room = plan_room(plan.fronts, shared_panels, kBlocks, plan.count_block());
+  std::int64_t numbers = std::max(room.numbers + leaving + scratch, room.panels + shared_peak);
+  for (const SentBlocks& list : plan.sent) numbers += 9 * static_cast<std::int64_t>(list.columns.size());
+  for (const ReceivedBlocks& list : plan.received) numbers += 9 * static_cast<std::int64_t>(list.count());
+  own.peak_bytes = 8 * (numbers + (kBlocks - room.solve_blocks) * plan.count_block());
   return own;
 }
 

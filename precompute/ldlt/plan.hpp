@@ -9,6 +9,7 @@
 
 #include "precompute/ldlt/factor.hpp"
 #include "precompute/ldlt/node_links.hpp"
+#include "precompute/ldlt/room.hpp"
 #include "precompute/ldlt/symbolic.hpp"
 #include "precompute/ldlt/tile_map.hpp"
 
@@ -143,17 +144,6 @@ struct GivenRows {
 struct TakenRows {
   int rank = -1;
   Ints slots;
-};
-
-/// The memory in which own fronts are made, as offsets in doubles from the first panel: panels fill it from below, and what they have not
-/// filled yet holds the columns of the front in work and, from above, two stacks of update matrices.
-struct Room {
-  std::int64_t panels = 0;               // of own and shared fronts
-  std::int64_t numbers = 0;              // panels, columns and stacks
-  std::int64_t stack_begin[2] = {0, 0};  // of update matrices of even and odd depth; stacks grow downwards
-  int solve_blocks = 0;                  // of right-hand sides that lie after the panels in the solves, from solve_begin() on
-
-  std::int64_t solve_begin() const { return (panels + 7) / 8 * 8; }  // aligned for vectors
 };
 
 inline constexpr int kSolveColumns = 32;  // right-hand sides at a time

@@ -449,7 +449,7 @@ class Solver {
   std::vector<Block> blocks_;
   Ints nodes_;  // of the front in work
   int row_width_ = 0;
-  alignas(64) double sums_[kSolveColumns / 16 * kMaxBlock * 16];
+  alignas(64) double sums_[kMaxBlock * kSolveColumns];
   std::map<std::int32_t, std::vector<double>> kept_;  // by child
   std::list<std::vector<double>> messages_;
   std::vector<double> received_;

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "precompute/ldlt/kernels.hpp"
+#include "precompute/ldlt/node_links.hpp"
 
 namespace carillon::ldlt {
 
@@ -49,6 +50,8 @@ inline std::int64_t count_update(std::int64_t r) {
   const std::int64_t rest = r - whole * kStripColumns;
   return find_strip(r, whole) + rest * rest;
 }
+/// The same for the nodes of its rows.
+inline std::int64_t count_update_of(const Ints& nodes) { return count_update(3 * static_cast<std::int64_t>(nodes.size())); }
 /// Where row 0 of column j would be.
 inline std::int64_t find_update_column(std::int64_t r, std::int64_t j) {
   const std::int64_t first = j / kStripColumns * kStripColumns;

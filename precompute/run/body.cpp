@@ -168,17 +168,18 @@ Body make_pieces(Run& run, const Setting& setting, Patience* patience) {
   }
 
   run.log.begin("partition", "the mesh over the ranks");
+  bool is_by_order = false;
   name_errors(body.source, run, [&] {
     if (wants_cut_by_order(run.job)) {
       CutMesh cut = cut_by_order(run.comm, mesh, fixed_nodes);
       body.pieces = std::move(cut.pieces);
       body.order = std::move(cut.order);
-      if (run.comm.size() > 1) run.log.print(cut.is_by_order ? kByOrder : kByMetis);
+      is_by_order = cut.is_by_order;
     } else {
-      if (run.comm.size() > 1) run.log.print(kByMetis);
       body.pieces = partition::distribute(run.comm, mesh, fixed_nodes, {.elimination_order = wants_elimination_order(run.job)});
     }
   });
+  if (run.comm.size() > 1) run.log.print(is_by_order ? kByOrder : kByMetis);
   broadcast_fixed_nodes(run.comm, std::move(fixed), body.pieces.local);
   mesh = {};
   for (std::int32_t& row : body.surface.row) row = body.pieces.row_of_node[row];

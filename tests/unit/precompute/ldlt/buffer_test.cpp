@@ -9,6 +9,8 @@
 #include <cstdint>
 #include <fstream>
 
+#include "runtime/base/host.hpp"
+
 namespace carillon::ldlt {
 namespace {
 
@@ -89,21 +91,13 @@ TEST(Buffer, maps_no_more_than_was_in_use_at_most_and_gives_all_of_it_back) {
   EXPECT_NEAR(static_cast<double>(find_mapped() - before), 0, kSlack);
 }
 
-/// Bytes of memory that the process has.
-std::int64_t find_resident() {
-  std::int64_t mapped = 0;
-  std::int64_t resident = 0;
-  std::ifstream("/proc/self/statm") >> mapped >> resident;
-  return resident * sysconf(_SC_PAGESIZE);
-}
-
-TEST(Buffer, lends_what_is_behind_and_gets_it_back) {
+TEST(Buffer, lends_its_tail_and_gets_it_back) {
   constexpr std::int64_t kSlack = std::int64_t{8} << 20;
   const std::int64_t before = find_mapped();
   {
     const Buffer room(24 * kMillion, Pages::kAtOnce);
     std::fill_n(room.data(), room.size(), 7.0);
-    const std::int64_t resident = find_resident();
+    const std::int64_t resident = base::find_memory().resident;
     for (int round = 0; round < 3; ++round) {
       room.populate();
       const BufferReuse reuse;
@@ -113,11 +107,11 @@ TEST(Buffer, lends_what_is_behind_and_gets_it_back) {
       std::fill_n(first.data(), first.size(), 3.0);
       const Buffer second(12 * kMillion, Pages::kAtOnce);  // more than waits: what does loses its memory
       EXPECT_TRUE(second.data() + second.size() <= room.data() || second.data() >= room.data() + room.size());
-      EXPECT_LE(find_resident(), resident + 8 * 2 * kMillion + kSlack) << "6 + 12 are in use where 16 were lent";
+      EXPECT_LE(base::find_memory().resident, resident + 8 * 2 * kMillion + kSlack) << "6 + 12 are in use where 16 were lent";
     }
-    EXPECT_LE(find_resident(), resident - 8 * 16 * kMillion + kSlack) << "lent pages keep no memory";
+    EXPECT_LE(base::find_memory().resident, resident - 8 * 16 * kMillion + kSlack) << "lent pages keep no memory";
     room.populate();
-    EXPECT_GE(find_resident(), resident - kSlack);
+    EXPECT_GE(base::find_memory().resident, resident - kSlack);
     std::fill_n(room.data() + 8 * kMillion, 16 * kMillion, 5.0);
     EXPECT_EQ(std::count(room.data(), room.data() + 8 * kMillion, 7.0), 8 * kMillion) << "what is not lent stays";
     EXPECT_EQ(std::count(room.data() + 8 * kMillion, room.data() + room.size(), 5.0), 16 * kMillion);

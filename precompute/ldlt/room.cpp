@@ -1,0 +1,71 @@
+// Method:     Update matrices lie on two stacks, by the parity of their depth: those of a front's children are on the other stack than its
+//             own, so an update matrix can be made while those of the children are read, and nothing is moved. Stacks and the columns of
+//             the front in work lie where the panels of later fronts will be. The factorisation is played through: one stack has a place
+//             of its own at the end; the other, before it, grows towards the panels. Which is which is chosen for the least room.
+// Source:     Liu 1986, On the storage requirement in the out-of-core multifrontal method for sparse factorization (order of children);
+//             Liu 1992, The multifrontal method for sparse matrix solution (stacks).
+// Deviations: two stacks in place of one, which the order of children does not know; panels count as memory, too.
+#include "precompute/ldlt/room.hpp"
+
+#include <algorithm>
+
+#include "precompute/ldlt/deal.hpp"
+#include "precompute/ldlt/plan.hpp"
+#include "precompute/ldlt/storage.hpp"
+
+namespace carillon::ldlt {
+
+Room plan_room(const std::vector<Front>& fronts, std::int64_t shared_panels, int blocks, std::int64_t block) {
+  Room room;
+  std::int64_t used[2] = {0, 0};
+  std::int64_t most_used[2] = {0, 0};
+  std::int64_t most_below[2] = {0, 0};  // a stack with the panels and columns below it
+  for (const Front& front : fronts) {
+    if (front.parent >= 0) used[front.depth % 2] += count_update_of(front.rows);
+    for (int parity = 0; parity < 2; ++parity) {
+      most_used[parity] = std::max(most_used[parity], used[parity]);
+      most_below[parity] = std::max(most_below[parity], room.panels + count_front_room(front.width, front.size()) + used[parity]);
+    }
+    room.panels += count_stored(front.width, front.size());
+    for (const std::int32_t child : front.children)
+      used[fronts[static_cast<std::size_t>(child)].depth % 2] -= count_update_of(fronts[static_cast<std::size_t>(child)].rows);
+  }
+  const int apart = most_used[0] + most_below[1] <= most_used[1] + most_below[0] ? 0 : 1;
+  room.panels += shared_panels;
+  room.numbers = std::max(most_used[apart] + most_below[1 - apart], room.panels);
+  room.stack_begin[apart] = room.numbers;
+  room.stack_begin[1 - apart] = room.numbers - most_used[apart];
+  while (room.solve_blocks < blocks && room.solve_begin() + (room.solve_blocks + 1) * block <= room.numbers) ++room.solve_blocks;
+  return room;
+}
+
+void sort_by_room(const std::vector<DealtFront>& dealt, std::vector<Ints>& children, Ints& roots) {
+  std::vector<std::int64_t> most(dealt.size(), 0);  // while a subtree is eliminated
+  std::vector<std::int64_t> left(dealt.size(), 0);  // afterwards: its panels and one update matrix
+  const auto sort = [&](Ints& list) {
+    std::stable_sort(list.begin(), list.end(), [&](std::int32_t a, std::int32_t b) {
+      return most[static_cast<std::size_t>(a)] - left[static_cast<std::size_t>(a)] >
+             most[static_cast<std::size_t>(b)] - left[static_cast<std::size_t>(b)];
+    });
+  };
+  std::vector<bool> is_root(dealt.size(), false);  // its update matrix lies elsewhere
+  for (const std::int32_t root : roots) is_root[static_cast<std::size_t>(root)] = true;
+  for (std::size_t d = 0; d < dealt.size(); ++d) {
+    sort(children[d]);
+    std::int64_t before = 0;  // panels and update matrices of the children
+    std::int64_t updates = 0;
+    for (const std::int32_t child : children[d]) {
+      most[d] = std::max(most[d], before + most[static_cast<std::size_t>(child)]);
+      before += left[static_cast<std::size_t>(child)];
+      updates += count_update_of(dealt[static_cast<std::size_t>(child)].rows);
+    }
+    const std::int32_t width = dealt[d].width();
+    const auto size = static_cast<std::int32_t>(dealt[d].nodes.size() + dealt[d].rows.size());
+    const std::int64_t update = is_root[d] ? 0 : count_update_of(dealt[d].rows);
+    most[d] = std::max(most[d], before + count_front_room(width, size) + update);
+    left[d] = before - updates + count_stored(width, size) + update;
+  }
+  sort(roots);
+}
+
+}  // namespace carillon::ldlt
