@@ -126,18 +126,18 @@ std::vector<pid_t> find_with_environment(std::string_view entry) {
   return found;
 }
 
-int end_with_environment(std::string_view entry, double patience_s) {
+int end_with_environment(std::string_view entry, double patience_s, double grace_s) {
   std::vector<pid_t> seen;
   int empty_looks = 0;  // two in a row: a process in the middle of its exec shows no environment
   for (double waited_s = 0.0;; waited_s += 0.02) {
     const std::vector<pid_t> left = find_with_environment(entry);
     empty_looks = left.empty() ? empty_looks + 1 : 0;
     if (empty_looks == 2) return static_cast<int>(seen.size());
-    if (waited_s > patience_s && !left.empty())
+    if (waited_s > grace_s + patience_s && !left.empty())
       throw SystemError(fmt::format("process {} does not end, not even by SIGKILL; look at it with ps", left[0]));
     for (const pid_t pid : left) {
       if (std::find(seen.begin(), seen.end(), pid) == seen.end()) seen.push_back(pid);
-      ::kill(pid, SIGKILL);
+      if (waited_s >= grace_s) ::kill(pid, SIGKILL);
     }
     wait_ms(20);
   }

@@ -45,9 +45,9 @@ std::string read_proc(const std::filesystem::path& file);
 /// The processes with `entry` ("NAME=value") in the environment they were started with, zombies and this one left out.
 std::vector<pid_t> find_with_environment(std::string_view entry);
 
-/// Kills them (SIGKILL), and those that they start meanwhile, and waits until all are gone. Returns how many there were. SystemError when
-/// one is still there after `patience_s`.
-int end_with_environment(std::string_view entry, double patience_s = 20.0);
+/// Waits up to `grace_s` for them to end by themselves; then kills them (SIGKILL), and those that they start meanwhile, and waits until all
+/// are gone. Returns how many there were. SystemError when one is still there `patience_s` later.
+int end_with_environment(std::string_view entry, double patience_s = 20.0, double grace_s = 0.0);
 
 /// An exclusive lock on a file, for its lifetime; the kernel releases it when the process ends, in whatever way.
 class Lock {

@@ -11,6 +11,7 @@
 #include <cstring>
 #include <optional>
 
+#include "jobs/process/process.hpp"
 #include "runtime/base/command.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/result.hpp"
@@ -32,6 +33,9 @@ std::string find_message(const std::string& errors, const std::string& program) 
   message = message.substr(0, message.find('\n'));
   return message.starts_with("error: ") ? message.substr(7) : message;
 }
+
+constexpr double kDaemonGraceS = 2.0;
+constexpr double kEndPatienceS = 5.0;
 
 /// What an exit code says without a result.
 base::ResultKind find_kind(int exit_code) {
@@ -87,10 +91,18 @@ std::string Programs::run(const std::string& program, std::vector<std::string> w
   command.words.insert(command.words.end(), words.begin(), words.end());
   if (has_result) command.words.insert(command.words.end(), {"--result", result_file.string()});
   command.folder = folder_;
+  const std::string mark = "CARILLON_PROGRAMS=" + folder_.string();
+  command.environment.emplace({mark});
+  for (char** entry = environ; *entry != nullptr; ++entry)
+    if (!std::string_view(*entry).starts_with("CARILLON_PROGRAMS=")) command.environment->emplace_back(*entry);
   command.output = shows && !is_quiet_ ? STDERR_FILENO : base::kCapture;
   command.errors = base::kCapture;
   const base::Finished finished = base::run(command, {.may_stop = [](const base::Finished&) { return SignalWatch::get_signal() != 0; }});
-  if (SignalWatch::get_signal() != 0) throw SystemError(fmt::format("ended by signal {}", SignalWatch::get_signal()));
+  if (SignalWatch::get_signal() != 0) {
+    // Open MPI's daemon outlives a program of one rank that was killed until it has removed its session folder.
+    process::end_with_environment(mark, kEndPatienceS, kDaemonGraceS);
+    throw SystemError(fmt::format("ended by signal {}", SignalWatch::get_signal()));
+  }
   if (finished.exit_code == 0) return finished.output;
   const std::optional<base::Result> said = has_result ? base::read_result(result_file) : std::nullopt;
   base::Result result = said.value_or(base::Result{.kind = find_kind(finished.exit_code)});

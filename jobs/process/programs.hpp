@@ -30,7 +30,8 @@ class Programs {
   Programs& operator=(const Programs&) = delete;
 
   /// The standard output of a program of this installation. Files among the words are absolute. `has_result`: it takes --result. `shows`:
-  /// its progress goes to standard error. It is killed once SignalWatch has a signal. Throws InputError, SolveError, SystemError.
+  /// its progress goes to standard error. It is killed once SignalWatch has a signal, and gone with all that it started when this returns.
+  /// Throws InputError, SolveError, SystemError.
   std::string run(const std::string& program, std::vector<std::string> words, bool has_result, bool shows = false) const;
 
  private:
