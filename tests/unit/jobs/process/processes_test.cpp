@@ -66,6 +66,19 @@ TEST(Processes, what_carries_an_entry_is_ended_with_its_daemons_and_no_other) {
   ::waitpid(other, nullptr, 0);
 }
 
+TEST(Processes, what_ends_by_itself_in_time_is_not_killed) {
+  const std::string entry = "CARILLON_TEST_MARK=" + std::to_string(::getpid());
+  const pid_t quick = start_shell("sleep 0.3; exit 7", entry.c_str());
+  const pid_t slow = start_shell("exec sleep 1000", entry.c_str());
+  wait_until([&] { return process::find_with_environment(entry).size() >= 2; });
+  EXPECT_GE(process::end_with_environment(entry, 20.0, 1.5), 2);
+  int status = 0;
+  ::waitpid(quick, &status, 0);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 7);
+  ::waitpid(slow, &status, 0);
+  EXPECT_TRUE(WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL);
+}
+
 TEST(Processes, a_lock_is_held_until_its_holder_dies) {
   const tests::Folder folder;
   const fs::path file = folder / "lock";
