@@ -11,6 +11,7 @@
 #include <numeric>
 #include <utility>
 
+#include "partition/condense.hpp"
 #include "partition/metis.hpp"
 #include "partition/vertex_cover.hpp"
 
@@ -144,22 +145,23 @@ class Dissector {
 }  // namespace
 
 std::vector<std::int32_t> separate(const Graph& graph, int tries, int seed) {
-  Ints side(static_cast<std::size_t>(graph.vertex_count()), 0);
-  if (graph.neighbours.empty()) {
+  const Condensation condensed(graph);
+  Graph core = condensed.core();
+  Ints side(static_cast<std::size_t>(core.vertex_count()), 0);
+  if (core.neighbours.empty()) {
     for (std::size_t v = 0; v < side.size(); ++v) side[v] = 2 * v < side.size() ? 0 : 1;
-    return side;
+    return condensed.expand_sides(side);
   }
   MetisOptions options = make_metis_options();
-  options[METIS_OPTION_NSEPS] = tries;
+  options[METIS_OPTION_NSEPS] = tries * condensed.find_tries();
   options[METIS_OPTION_SEED] += seed;
   options[METIS_OPTION_UFACTOR] = kImbalance;
-  Graph copy = graph;
-  idx_t count = graph.vertex_count();
+  idx_t count = core.vertex_count();
   idx_t size = 0;
   call_metis("METIS_ComputeVertexSeparator", [&] {
-    return METIS_ComputeVertexSeparator(&count, copy.offsets.data(), copy.neighbours.data(), nullptr, options.data(), &size, side.data());
+    return METIS_ComputeVertexSeparator(&count, core.offsets.data(), core.neighbours.data(), nullptr, options.data(), &size, side.data());
   });
-  return side;
+  return condensed.expand_sides(side);
 }
 
 std::vector<std::int32_t> make_clusters(const Graph& graph, std::int32_t count) {

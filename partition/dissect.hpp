@@ -8,6 +8,9 @@
 
 namespace carillon::partition {
 
+/// Vertices of a graph, or of a part of it, that one process cuts: larger parts are cut with up to a quarter more operations.
+inline constexpr std::int32_t kLargestGathered = 1'000'000;
+
 /// A graph whose vertices and links count more or less.
 struct WeightedGraph {
   Graph graph{{0}, {}};
@@ -35,6 +38,6 @@ struct Dissection {
 /// larger one by a quotient graph of clusters and the smallest vertex cover of the edges cut, so that where the graph is distributed, only
 /// clusters and cut edges have to be gathered. Leaves and separators are ordered by nested dissection. The same input gives the same
 /// answer. Throws SystemError when METIS runs out of memory.
-Dissection dissect(const Graph& graph, int parts, std::int32_t largest_gathered = 300'000);
+Dissection dissect(const Graph& graph, int parts, std::int32_t largest_gathered = kLargestGathered);
 
 }  // namespace carillon::partition

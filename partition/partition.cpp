@@ -13,6 +13,7 @@
 #include <numeric>
 #include <utility>
 
+#include "partition/condense.hpp"
 #include "partition/metis.hpp"
 
 namespace carillon::partition {
@@ -210,18 +211,21 @@ Partition measure_parts(std::span<const std::int32_t> corners, std::vector<std::
 }
 
 std::vector<std::int32_t> order_nested_dissection(const Graph& graph) {
-  idx_t vertices = graph.vertex_count();
-  std::vector<std::int32_t> position(vertices);
+  std::vector<std::int32_t> position(graph.vertex_count());
   std::iota(position.begin(), position.end(), 0);
   if (graph.neighbours.empty()) return position;
+  const Condensation condensed(graph);
   MetisOptions options = make_metis_options();
-  std::vector<std::int32_t> vertex_at(vertices);
+  options[METIS_OPTION_NSEPS] = condensed.find_tries();
   // METIS takes the graph by pointers to mutable memory and leaves it unchanged in effect; a copy keeps the promise of const.
-  Graph copy = graph;
+  Graph core = condensed.core();
+  idx_t vertices = core.vertex_count();
+  std::vector<std::int32_t> vertex_at(vertices);
+  position.resize(vertices);
   call_metis("METIS_NodeND", [&] {
-    return METIS_NodeND(&vertices, copy.offsets.data(), copy.neighbours.data(), nullptr, options.data(), vertex_at.data(), position.data());
+    return METIS_NodeND(&vertices, core.offsets.data(), core.neighbours.data(), nullptr, options.data(), vertex_at.data(), position.data());
   });
-  return position;
+  return condensed.expand_order(position);
 }
 
 Graph renumber(const Graph& graph, const std::vector<std::int32_t>& position) {

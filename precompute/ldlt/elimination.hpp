@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "partition/dissect.hpp"
 #include "precompute/ldlt/order.hpp"
 #include "precompute/ldlt/symbolic.hpp"
 
@@ -28,12 +29,9 @@ struct Elimination {
 /// Positions of own nodes and ghosts, from the ranks that hold them. Collective.
 Ints report_positions(const comm::Communicator& comm, const Elimination& all, const NodeLinks& nodes, const comm::IndexPartition& owners);
 
-/// Nodes of a mesh, or of a part of it, that one rank cuts.
-inline constexpr std::int32_t kLargestGathered = 300'000;
-
 /// Orders the nodes and finds the fronts. largest_gathered: of order_parts. Collective. Throws SystemError on all ranks when memory runs
 /// out.
 Elimination eliminate_on_paper(const comm::Communicator& comm, const NodeLinks& nodes, const comm::IndexPartition& owners,
-                               std::int32_t largest_gathered = kLargestGathered);
+                               std::int32_t largest_gathered = partition::kLargestGathered);
 
 }  // namespace carillon::ldlt

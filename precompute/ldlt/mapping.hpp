@@ -31,8 +31,9 @@ struct FrontShare {
 /// ranks share subtrees, so that they may stay on one machine.
 class Mapping {
  public:
-  /// operations_weight: how much a subtree's operations count in its work, 0 to 1; the rest are its entries of L.
-  Mapping(const std::vector<FrontCost>& fronts, int ranks, double operations_weight);
+  /// operations_weight: how much a subtree's operations count in its work, 0 to 1; the rest are its entries of L. grain: how large the part
+  /// of a rank is that goes to one rank whole, 1: 0.06; less shares more fronts.
+  Mapping(const std::vector<FrontCost>& fronts, int ranks, double operations_weight, double grain = 1);
 
   int ranks() const { return ranks_; }
   double operations_weight() const { return operations_weight_; }
@@ -40,6 +41,13 @@ class Mapping {
   int owner(std::int32_t front) const { return owner_[static_cast<std::size_t>(front)]; }
   /// Its ranks, ascending; the fractions add up to one. A front that one rank has is one share of 1.
   std::vector<FrontShare> list_shares(std::int32_t front) const;
+  /// Levels what ranks do alone: gives subtrees below shared fronts to other ranks that share the same front, exchanges two, and shares the
+  /// root of a subtree that is too large for that. fronts: those that the mapping was made of.
+  void level_subtrees(const std::vector<FrontCost>& fronts);
+  /// Gives a front to one rank.
+  void set_owner(std::int32_t front, int rank) { owner_[static_cast<std::size_t>(front)] = rank; }
+  /// Gives a front to the ranks of another one.
+  void share(std::int32_t front, std::int32_t as);
   /// Gives the same ranks of a shared front other fractions, which add up to one.
   void set_shares(std::int32_t front, std::vector<FrontShare> shares);
 
@@ -82,8 +90,8 @@ struct MappingCounts {
 
 MappingCounts count_mapping(const std::vector<FrontCost>& fronts, const Mapping& mapping);
 
-/// The mapping of the shortest path among several weights whose fullest rank has at most 1.25 times the mean of the entries; where none
-/// has, that of the fewest entries.
+/// The mapping of the shortest path among several weights and grains whose fullest rank has at most 1.25 times the mean of the entries;
+/// where none has, that of the fewest entries.
 Mapping choose_mapping(const std::vector<FrontCost>& fronts, int ranks);
 
 /// The shared fronts in the order in which their ranks are free and their children complete: children before parents. Where all ranks go

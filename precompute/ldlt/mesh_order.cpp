@@ -99,26 +99,31 @@ Ints MeshOrder::find_ranks(const Communicator& comm, std::span<const std::int32_
   struct Place {
     std::int32_t position, rank;
   };
-  const Ints nodes = comm.agree([&] {
-    Ints list(elements.begin(), elements.end());
+  const auto find_own = [&](std::int32_t node) {
+    const std::size_t own = owners_.to_local(node);
+    return Place{fronts_.elimination.position[own], rank_[own]};
+  };
+  const Ints foreign = comm.agree([&] {
+    Ints list;
+    for (const std::int32_t node : elements)
+      if (node >= 0 && !owners_.is_own(node)) list.push_back(node);
     std::sort(list.begin(), list.end());
     list.erase(std::unique(list.begin(), list.end()), list.end());
-    if (!list.empty() && list.front() < 0) list.erase(list.begin());
     return list;
   });
   const std::vector<Place> places = comm::query_owners<Place>(
-      comm, nodes, [&](std::int32_t node) { return owners_.find_owner(node); },
-      [&](std::int32_t node) {
-        const std::size_t own = owners_.to_local(node);
-        return Place{fronts_.elimination.position[own], rank_[own]};
-      });
+      comm, foreign, [&](std::int32_t node) { return owners_.find_owner(node); }, find_own);
+  const auto find_place = [&](std::int32_t node) {
+    if (owners_.is_own(node)) return find_own(node);
+    return places[static_cast<std::size_t>(std::lower_bound(foreign.begin(), foreign.end(), node) - foreign.begin())];
+  };
   return comm.agree([&] {
     Ints ranks;
     for (std::size_t at = 0; at < elements.size(); at += static_cast<std::size_t>(width)) {
       Place first{0, -1};
       for (const std::int32_t node : elements.subspan(at, static_cast<std::size_t>(width))) {
         if (node < 0) continue;
-        const Place& place = places[static_cast<std::size_t>(std::lower_bound(nodes.begin(), nodes.end(), node) - nodes.begin())];
+        const Place place = find_place(node);
         if (first.rank < 0 || place.position < first.position) first = place;
       }
       ranks.push_back(first.rank);

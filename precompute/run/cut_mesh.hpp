@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "partition/dissect.hpp"
 #include "partition/distribute.hpp"
 #include "precompute/comm/communicator.hpp"
 #include "precompute/ldlt/mesh_order.hpp"
@@ -25,7 +26,7 @@ struct CutMesh {
 /// times the mean; and above `largest_ordered` nodes it cuts first, so that all ranks can order. Collective. Throws as
 /// partition::distribute().
 CutMesh cut_by_order(const comm::Communicator& comm, const mesh::TetMesh& mesh, const std::vector<std::int32_t>& fixed_nodes,
-                     std::int32_t largest_ordered = ldlt::kLargestGathered);
+                     std::int32_t largest_ordered = partition::kLargestGathered);
 
 /// A cut by the order for read_parallel, after its own cut.
 class RecutByOrder {

@@ -121,11 +121,11 @@ void run(const std::string& file, int refinements, const std::vector<int>& rank_
   };
   const std::vector<ldlt::FrontCost> whole = find_costs(partition::order_nested_dissection(graph));
   const ldlt::MappingCounts alone = ldlt::count_mapping(whole, ldlt::Mapping(whole, 1, 1));
-  fmt::print("# {} unknowns; METIS on the whole graph: {:.4g} operations, {:.4g} entries, {:.2f} s\n", 3 * std::int64_t{nodes},
+  fmt::print("# {} unknowns; one rank: {:.4g} operations, {:.4g} entries, {:.2f} s\n", 3 * std::int64_t{nodes},
              alone.total_operations, alone.total_entries, find_seconds() - before);
   std::fflush(stdout);
   fmt::print(
-      "ranks,operations,entries,over_metis,path,path_over_metis,gang,fullest,weight,shared_operations,shared_entries,shared_fronts,planned_"
+      "ranks,operations,entries,over_one,path,path_over_one,gang,fullest,weight,shared_operations,shared_entries,shared_fronts,planned_"
       "fronts,"
       "messages,megabytes,solve_messages,solve_kilobytes,solve_path_messages,peak_megabytes,root,dissect_s,map_s\n");
   const auto largest = [](const std::vector<double>& values) { return *std::max_element(values.begin(), values.end()); };

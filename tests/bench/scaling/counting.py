@@ -16,7 +16,7 @@ SERIES = {
 
 
 def read_table(text):
-    """{"unknowns", "operations", "entries": of METIS's own order, "rows": [{column: number}]} of count_mapping's output."""
+    """{"unknowns", "operations", "entries": of the order that one rank makes, "rows": [{column: number}]} of count_mapping's output."""
     head, names, *lines = text.splitlines()
     words = head.replace(",", "").split()
     names = names.split(",")

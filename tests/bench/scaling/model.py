@@ -50,7 +50,7 @@ class Body:
     columns: float = 1000  # of all unknowns that are in memory at the peak: the basis, its copies, the modes
     halo: float = 4.0  # unknowns that a rank gets for a product with K or M, over its own to the power of 2/3
     neighbours: float = 14  # ranks that a rank has to do with
-    more_flops: float = 0.0  # of a factorisation on many ranks: the tree of all ranks is not METIS's own order
+    more_flops: float = 0.0  # of a factorisation on many ranks: the tree of all ranks is not the order of one rank
     mass_entries_per_row: float = 1.0  # 1: lumped
 
     def grow(self, unknowns, entries, factor_flops, tree):

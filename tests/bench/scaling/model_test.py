@@ -162,7 +162,7 @@ class Counts(unittest.TestCase):
     def test_the_goals_hold_by_counts(self):
         for name in ("t10", "million"):
             for row in self.counted[name]["rows"]:
-                self.assertLessEqual(row["path_over_metis"], 1.5 if row["ranks"] <= 16 else 2.5)
+                self.assertLessEqual(row["path_over_one"], 1.5 if row["ranks"] <= 16 else 2.5)
                 self.assertLessEqual(row["fullest"], 1.3)
 
 

@@ -17,6 +17,7 @@
 #include "partition/metis.hpp"
 #include "runtime/base/error.hpp"
 #include "tests/support/box_mesh.hpp"
+#include "tests/unit/partition/fill.hpp"
 
 namespace carillon::partition {
 namespace {
@@ -35,23 +36,6 @@ std::set<std::pair<int, int>> slow_dual(const std::vector<std::int32_t>& corners
       if (common == 3) pairs.emplace(a, b);
     }
   return pairs;
-}
-
-/// Fill-in of the Cholesky factor under an order, by symbolic elimination: the slow and sure way.
-std::size_t count_factor_entries(const Graph& graph, const std::vector<std::int32_t>& position) {
-  const int n = graph.vertex_count();
-  std::vector<std::set<std::int32_t>> later(n);  // by position
-  for (int v = 0; v < n; ++v)
-    for (int k = graph.offsets[v]; k < graph.offsets[v + 1]; ++k)
-      if (position[graph.neighbours[k]] > position[v]) later[position[v]].insert(position[graph.neighbours[k]]);
-  std::size_t entries = n;
-  for (int p = 0; p < n; ++p) {
-    entries += later[p].size();
-    if (later[p].empty()) continue;
-    const int parent = *later[p].begin();
-    later[parent].insert(std::next(later[p].begin()), later[p].end());
-  }
-  return entries;
 }
 
 TEST(DualGraph, joins_exactly_the_tetrahedra_that_share_three_corners) {

@@ -1,0 +1,179 @@
+#include "partition/condense.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <numeric>
+#include <random>
+#include <set>
+
+#include "partition/dissect.hpp"
+#include "partition/metis.hpp"
+#include "tests/support/box_mesh.hpp"
+#include "tests/unit/partition/fill.hpp"
+
+namespace carillon::partition {
+namespace {
+
+using Vertices = std::vector<std::int32_t>;
+
+Graph make_graph(std::int32_t count, const std::set<std::pair<std::int32_t, std::int32_t>>& edges) {
+  std::vector<std::set<std::int32_t>> near(static_cast<std::size_t>(count));
+  for (const auto& [a, b] : edges) {
+    near[a].insert(b);
+    near[b].insert(a);
+  }
+  Graph graph{{0}, {}};
+  for (const auto& list : near) {
+    graph.neighbours.insert(graph.neighbours.end(), list.begin(), list.end());
+    graph.offsets.push_back(static_cast<std::int32_t>(graph.neighbours.size()));
+  }
+  return graph;
+}
+
+Graph make_t10_graph(std::array<int, 3> cells) {
+  const auto box = tests::make_box(cells, {1, 1, 1}, 2);
+  return make_node_graph(box.tets, 10, static_cast<std::int32_t>(box.nodes_m.size()));
+}
+
+/// A vertex and its neighbours.
+std::set<std::int32_t> list_closed(const Graph& graph, std::int32_t v) {
+  std::set<std::int32_t> closed(graph.neighbours.begin() + graph.offsets[v], graph.neighbours.begin() + graph.offsets[v + 1]);
+  closed.insert(v);
+  return closed;
+}
+
+bool dominates(const Graph& graph, std::int32_t u, std::int32_t v) {
+  const auto of_u = list_closed(graph, u);
+  const auto of_v = list_closed(graph, v);
+  return u != v && of_u.contains(v) && std::includes(of_u.begin(), of_u.end(), of_v.begin(), of_v.end()) && (of_u != of_v || u < v);
+}
+
+/// The core by the definition; and every dominated vertex in a separator that its core asks for, and in no other.
+void expect_core_of_definition(const Graph& graph) {
+  const Condensation condensed(graph, 1);
+  const std::int32_t n = graph.vertex_count();
+  Vertices kept;
+  std::vector<Vertices> hosts(static_cast<std::size_t>(n));
+  for (std::int32_t v = 0; v < n; ++v) {
+    for (std::int32_t u = 0; u < n; ++u)
+      if (dominates(graph, u, v)) hosts[v].push_back(u);
+    if (hosts[v].empty()) kept.push_back(v);
+  }
+  ASSERT_EQ(condensed.core().vertex_count(), static_cast<std::int32_t>(kept.size()));
+  Vertices number(static_cast<std::size_t>(n), -1);
+  for (std::size_t c = 0; c < kept.size(); ++c) number[kept[c]] = static_cast<std::int32_t>(c);
+  for (std::size_t c = 0; c < kept.size(); ++c) {
+    std::set<std::int32_t> expected;
+    for (const std::int32_t u : list_closed(graph, kept[c]))
+      if (u != kept[c] && number[u] >= 0) expected.insert(number[u]);
+    const Graph& core = condensed.core();
+    EXPECT_EQ(Vertices(core.neighbours.begin() + core.offsets[c], core.neighbours.begin() + core.offsets[c + 1]),
+              Vertices(expected.begin(), expected.end()));
+  }
+  Vertices position(kept.size());
+  std::iota(position.begin(), position.end(), 0);
+  std::shuffle(position.begin(), position.end(), std::mt19937(5));
+  const Vertices order = condensed.expand_order(position);
+  Vertices sorted = order;
+  std::sort(sorted.begin(), sorted.end());
+  for (std::int32_t v = 0; v < n; ++v) {
+    EXPECT_EQ(sorted[v], v);
+    for (const std::int32_t u : hosts[v]) {
+      if (number[u] >= 0) {
+        EXPECT_LT(order[v], order[u]);
+      }
+    }
+  }
+  for (std::size_t c = 0; c + 1 < kept.size(); ++c)
+    for (std::size_t d = c + 1; d < kept.size(); ++d) EXPECT_EQ(order[kept[c]] < order[kept[d]], position[c] < position[d]);
+}
+
+TEST(Condensation, has_the_core_of_the_definition) {
+  expect_core_of_definition(make_t10_graph({2, 2, 2}));
+  expect_core_of_definition(make_t10_graph({4, 1, 1}));
+  const auto t4 = tests::make_box({3, 3, 1}, {1, 1, 1});
+  expect_core_of_definition(make_node_graph(t4.tets, 4, static_cast<std::int32_t>(t4.nodes_m.size())));
+  std::mt19937 random(11);
+  for (int round = 0; round < 40; ++round) {
+    const std::int32_t n = 2 + static_cast<std::int32_t>(random() % 14);
+    std::set<std::pair<std::int32_t, std::int32_t>> edges;
+    for (unsigned k = random() % (3 * n); k > 0; --k) {
+      const auto a = static_cast<std::int32_t>(random() % n);
+      const auto b = static_cast<std::int32_t>(random() % n);
+      if (a != b) edges.emplace(std::min(a, b), std::max(a, b));
+    }
+    expect_core_of_definition(make_graph(n, edges));
+  }
+}
+
+TEST(Condensation, of_hard_graphs_is_what_it_has_to_be) {
+  std::set<std::pair<std::int32_t, std::int32_t>> clique, star, path;
+  for (std::int32_t a = 0; a < 12; ++a)
+    for (std::int32_t b = a + 1; b < 12; ++b) {
+      clique.emplace(a, b);
+      if (a == 0) star.emplace(a, b);
+      if (b == a + 1) path.emplace(a, b);
+    }
+  for (const auto& edges : {clique, star, path, {}}) expect_core_of_definition(make_graph(12, edges));
+  EXPECT_EQ(Condensation(make_graph(12, clique), 1).core().vertex_count(), 1);
+  EXPECT_EQ(Condensation(make_graph(12, star), 1).core().vertex_count(), 1);
+  EXPECT_EQ(Condensation(make_graph(12, path), 1).core().vertex_count(), 10);
+  EXPECT_EQ(Condensation(make_graph(12, {}), 1).core().vertex_count(), 12);
+  const Graph few = make_graph(12, clique);
+  EXPECT_EQ(Condensation(few).core().neighbours, few.neighbours) << "too few to be cut";
+  const Graph none;
+  EXPECT_EQ(Condensation(none).core().vertex_count(), 0);
+  EXPECT_TRUE(Condensation(none).expand_order({}).empty());
+  for (const auto& edges : {clique, star, path, {}}) {
+    const Vertices order = order_nested_dissection(make_graph(12, edges));
+    EXPECT_EQ(std::set<std::int32_t>(order.begin(), order.end()).size(), 12U);
+  }
+}
+
+TEST(Condensation, of_second_order_is_the_corners_and_its_separators_separate) {
+  const std::array<int, 3> cells{8, 7, 6};
+  const Graph graph = make_t10_graph(cells);
+  const Condensation condensed(graph);
+  // Without the eight corners of the box: what lies in one cell only is dominated by an end of the cell's diagonal.
+  EXPECT_EQ(condensed.core().vertex_count(), (cells[0] + 1) * (cells[1] + 1) * (cells[2] + 1) - 8);
+  EXPECT_EQ(condensed.find_tries(), 4);
+  const Vertices side = separate(graph);
+  std::array<int, 3> counts{};
+  for (std::int32_t v = 0; v < graph.vertex_count(); ++v) {
+    ++counts[side[v]];
+    for (std::int32_t k = graph.offsets[v]; k < graph.offsets[v + 1]; ++k) {
+      const std::int32_t to = side[graph.neighbours[k]];
+      EXPECT_TRUE(side[v] == 2 || to != 1 - side[v]);
+    }
+  }
+  EXPECT_GT(counts[0], graph.vertex_count() / 4);
+  EXPECT_GT(counts[1], graph.vertex_count() / 4);
+  EXPECT_LE(counts[2], 1.3 * (2 * cells[1] + 1) * (2 * cells[2] + 1)) << "a plane of nodes across the shorter sides";
+}
+
+/// What METIS makes of all vertices.
+Vertices order_all(const Graph& graph) {
+  Graph copy = graph;
+  idx_t count = graph.vertex_count();
+  Vertices at(static_cast<std::size_t>(count));
+  Vertices position(at);
+  MetisOptions options = make_metis_options();
+  call_metis("METIS_NodeND", [&] {
+    return METIS_NodeND(&count, copy.offsets.data(), copy.neighbours.data(), nullptr, options.data(), at.data(), position.data());
+  });
+  return position;
+}
+
+TEST(Condensation, gives_an_order_with_hardly_more_entries_than_one_of_all_vertices) {
+  for (const auto& cells : {std::array{8, 8, 8}, std::array{40, 6, 1}, std::array{3, 3, 30}}) {
+    const Graph graph = make_t10_graph(cells);
+    const double ratio = static_cast<double>(count_factor_entries(graph, order_nested_dissection(graph))) /
+                         static_cast<double>(count_factor_entries(graph, order_all(graph)));
+    RecordProperty("entries_over_metis", std::to_string(ratio));
+    EXPECT_LT(ratio, 1.15) << cells[0] << " x " << cells[1] << " x " << cells[2];
+  }
+}
+
+}  // namespace
+}  // namespace carillon::partition
