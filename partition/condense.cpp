@@ -1,9 +1,9 @@
-// Method:     Who dominates a vertex is among the neighbours of its neighbour with the fewest; each candidate is compared row by row. A
-// vertex
-//             that is dominated at all is dominated by one of the core, as domination is transitive; the vertices of the core that dominate
-//             it are neighbours of each other, so no separator has them on two sides.
+// Method:     Who dominates a vertex is among the neighbours of each of its neighbours, so of two with few that are not neighbours
+//             themselves; each candidate is compared row by row. A vertex that is dominated at all is dominated by one of the core, as
+//             domination is transitive; the vertices of the core that dominate it are neighbours of each other, so no separator has them
+//             on two sides.
 // Source:     George and Liu 1989, "The evolution of the minimum degree ordering algorithm" (who may wait when neighbourhoods contain each
-//             other); Barmak and Minian 2012 (dominated vertices).
+//             other); Barmak and Minian 2012 (dominated vertices); Liu 1990, "The role of elimination trees in sparse factorization".
 // Deviations: none.
 #include "partition/condense.hpp"
 
@@ -25,7 +25,7 @@ std::span<const std::int32_t> list_neighbours(const Graph& graph, std::int32_t v
 /// All that dominate each vertex, in compressed rows.
 class Dominators {
  public:
-  explicit Dominators(const Graph& graph) : graph_(graph), is_near_(static_cast<std::size_t>(graph.vertex_count()), 0) {
+  explicit Dominators(const Graph& graph) : graph_(graph), mark_(static_cast<std::size_t>(graph.vertex_count()), 0) {
     for (std::int32_t v = 0; v < graph.vertex_count(); ++v) {
       add(v);
       offsets.push_back(static_cast<std::int32_t>(list.size()));
@@ -39,32 +39,54 @@ class Dominators {
   void add(std::int32_t v) {
     const auto near = list_neighbours(graph_, v);
     if (near.empty()) return;
-    const std::int32_t least = *std::min_element(near.begin(), near.end(), [&](std::int32_t a, std::int32_t b) {
-      return list_neighbours(graph_, a).size() < list_neighbours(graph_, b).size();
-    });
-    mark(v, 1);
-    if (may_dominate(least, v)) list.push_back(least);
-    for (const std::int32_t u : list_neighbours(graph_, least))
-      if (u != v && is_near_[static_cast<std::size_t>(u)] != 0 && may_dominate(u, v)) list.push_back(u);
-    mark(v, 0);
+    for (const std::int32_t u : near) mark(u) = 1;
+    const std::int32_t first = find_least(near, 1);
+    mark(first) = 2;
+    for (const std::int32_t u : list_neighbours(graph_, first)) mark(u) *= 2;
+    // Who dominates v is a neighbour of the first, and of a second which is not: few are that.
+    const std::int32_t second = find_least(near, 1);
+    if (second < 0) {
+      for (const std::int32_t u : near)
+        if (may_dominate(u, v)) list.push_back(u);
+    } else {
+      for (const std::int32_t u : list_neighbours(graph_, second))
+        if (mark(u) == 2 && may_dominate(u, v)) list.push_back(u);
+    }
+    for (const std::int32_t u : near) mark(u) = 0;
   }
 
-  void mark(std::int32_t v, char value) {
-    for (const std::int32_t u : list_neighbours(graph_, v)) is_near_[static_cast<std::size_t>(u)] = value;
+  char& mark(std::int32_t vertex) { return mark_[static_cast<std::size_t>(vertex)]; }
+  std::size_t count_neighbours(std::int32_t vertex) const {
+    const auto v = static_cast<std::size_t>(vertex);
+    return static_cast<std::size_t>(graph_.offsets[v + 1] - graph_.offsets[v]);
   }
 
-  /// The neighbours of v are marked.
+  /// Of the vertices with this mark the one with the fewest neighbours; -1: none.
+  std::int32_t find_least(std::span<const std::int32_t> vertices, char wanted) {
+    std::int32_t least = -1;
+    std::size_t fewest = 0;
+    for (const std::int32_t u : vertices) {
+      if (mark(u) != wanted) continue;
+      const std::size_t count = count_neighbours(u);
+      if (least >= 0 && count >= fewest) continue;
+      least = u;
+      fewest = count;
+    }
+    return least;
+  }
+
+  /// The neighbours of v are marked, and no other vertex is.
   bool may_dominate(std::int32_t u, std::int32_t v) const {
     const auto near = list_neighbours(graph_, u);
-    const std::size_t count = list_neighbours(graph_, v).size();
+    const std::size_t count = count_neighbours(v);
     if (near.size() < count || (near.size() == count && u > v)) return false;
     std::size_t common = 1;  // v
-    for (const std::int32_t w : near) common += static_cast<std::size_t>(is_near_[static_cast<std::size_t>(w)]);
+    for (const std::int32_t w : near) common += mark_[static_cast<std::size_t>(w)] != 0 ? 1 : 0;
     return common == count;
   }
 
   const Graph& graph_;
-  std::vector<char> is_near_;
+  std::vector<char> mark_;  // (vertices) 1: a neighbour of v; 2: the first, or a neighbour of it too
 };
 
 }  // namespace
@@ -75,7 +97,7 @@ Condensation::Condensation(const Graph& graph, std::int32_t smallest_core)
   std::int32_t count = 0;
   for (std::size_t v = 0; v < number_.size(); ++v)
     if (all.offsets[v] == all.offsets[v + 1]) number_[v] = count++;
-  if (count < smallest_core || count == graph.vertex_count()) {
+  if (count < smallest_core || 2 * count > graph.vertex_count()) {
     std::iota(number_.begin(), number_.end(), 0);
     offsets_.assign(number_.size() + 1, 0);
     core_ = graph;
@@ -107,6 +129,42 @@ Ints Condensation::expand_sides(const Ints& side) const {
   return result;
 }
 
+/// The place of the first vertex of the core that dominates this one.
+std::int32_t Condensation::find_first_host(std::int32_t vertex, const Ints& position) const {
+  auto first = static_cast<std::int32_t>(position.size());
+  for (std::int32_t k = offsets_[static_cast<std::size_t>(vertex)]; k < offsets_[static_cast<std::size_t>(vertex) + 1]; ++k)
+    first = std::min(first, position[static_cast<std::size_t>(hosts_[static_cast<std::size_t>(k)])]);
+  return first;
+}
+
+double Condensation::estimate_operations(const Ints& position) const {
+  const auto count = position.size();
+  std::vector<double> width(count, 1.0);  // (places) what is eliminated there
+  for (std::int32_t v = 0; v < graph_.vertex_count(); ++v)
+    if (number_[static_cast<std::size_t>(v)] < 0) ++width[static_cast<std::size_t>(find_first_host(v, position))];
+  Ints at(count);
+  for (std::size_t v = 0; v < count; ++v) at[static_cast<std::size_t>(position[v])] = static_cast<std::int32_t>(v);
+  // Row by row of the factor: the places on the ways up the elimination tree from the neighbours before (Liu 1990).
+  std::vector<double> below(count, 0.0);
+  Ints parent(count, -1);
+  Ints seen_from(count, -1);
+  for (std::int32_t row = 0; row < static_cast<std::int32_t>(count); ++row) {
+    seen_from[static_cast<std::size_t>(row)] = row;
+    for (const std::int32_t u : list_neighbours(core_, at[static_cast<std::size_t>(row)])) {
+      if (position[static_cast<std::size_t>(u)] > row) continue;
+      for (auto place = static_cast<std::size_t>(position[static_cast<std::size_t>(u)]); seen_from[place] != row;
+           place = static_cast<std::size_t>(parent[place])) {
+        seen_from[place] = row;
+        below[place] += width[static_cast<std::size_t>(row)];
+        if (parent[place] < 0) parent[place] = row;
+      }
+    }
+  }
+  double operations = 0;
+  for (std::size_t k = 0; k < count; ++k) operations += width[k] * (below[k] + width[k] / 2) * (below[k] + width[k] / 2);
+  return operations;
+}
+
 Ints Condensation::expand_order(const Ints& position) const {
   // By the place of the first host, those that it dominates before it.
   std::vector<Ints> dominated(position.size());
@@ -116,10 +174,7 @@ Ints Condensation::expand_order(const Ints& position) const {
       last[static_cast<std::size_t>(position[static_cast<std::size_t>(number_[v])])] = static_cast<std::int32_t>(v);
       continue;
     }
-    auto first = static_cast<std::int32_t>(position.size());
-    for (std::int32_t k = offsets_[v]; k < offsets_[v + 1]; ++k)
-      first = std::min(first, position[static_cast<std::size_t>(hosts_[static_cast<std::size_t>(k)])]);
-    dominated[static_cast<std::size_t>(first)].push_back(static_cast<std::int32_t>(v));
+    dominated[static_cast<std::size_t>(find_first_host(static_cast<std::int32_t>(v), position))].push_back(static_cast<std::int32_t>(v));
   }
   Ints result(number_.size());
   std::int32_t next = 0;

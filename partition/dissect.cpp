@@ -153,7 +153,7 @@ std::vector<std::int32_t> separate(const Graph& graph, int tries, int seed) {
     return condensed.expand_sides(side);
   }
   MetisOptions options = make_metis_options();
-  options[METIS_OPTION_NSEPS] = tries * condensed.find_tries();
+  options[METIS_OPTION_NSEPS] = condensed.is_small() ? 4 * tries : tries;
   options[METIS_OPTION_SEED] += seed;
   options[METIS_OPTION_UFACTOR] = kImbalance;
   idx_t count = core.vertex_count();

@@ -43,6 +43,7 @@ struct Kept {
     return taken;
   }
   void put(double* freed, std::size_t bytes) noexcept {
+    if (!is_active) return give_back(freed, bytes);
     const auto after = runs.lower_bound(freed);
     const auto before = after == runs.begin() ? runs.end() : std::prev(after);
     const bool follows = before != runs.end() && advance(before->first, before->second) == freed;
@@ -57,7 +58,7 @@ struct Kept {
       run.key() = freed;
       run.mapped() += bytes;
       runs.insert(std::move(run));
-    } else if (!is_active || !add(freed, bytes)) {
+    } else if (!add(freed, bytes)) {
       give_back(freed, bytes);
     }
   }
@@ -71,6 +72,19 @@ struct Kept {
     }
   }
   void clear() { release(std::numeric_limits<std::size_t>::max()); }
+  /// Lent pages are their buffer's again.
+  void end_loan() noexcept {
+    const auto is_lent = [&](const auto& run) { return run.first < lent_end && lent_begin < advance(run.first, run.second); };
+    for (auto at = std::find_if(runs.begin(), runs.end(), is_lent); at != runs.end();
+         at = std::find_if(runs.begin(), runs.end(), is_lent)) {
+      double* const begin = at->first;
+      double* const end = advance(begin, at->second);
+      runs.erase(at);
+      keep(begin, std::min(end, lent_begin));
+      keep(std::max(begin, lent_end), end);
+    }
+    lent_begin = lent_end = nullptr;
+  }
 
  private:
   /// To the system; of lent pages their memory alone.
@@ -88,6 +102,10 @@ struct Kept {
     run.key() = advance(run.key(), bytes);
     run.mapped() -= bytes;
     if (run.mapped() > 0) runs.insert(std::move(run));
+  }
+  /// Pages that are not lent.
+  void keep(double* begin, double* end) noexcept {
+    if (begin < end && !add(begin, count_bytes(begin, end))) munmap(begin, count_bytes(begin, end));
   }
   /// False: the heap has no memory for it.
   bool add(double* pages, std::size_t bytes) noexcept {
@@ -125,9 +143,9 @@ BufferReuse::BufferReuse() { get_kept().is_active = true; }
 BufferReuse::~BufferReuse() {
   Kept& kept = get_kept();
   kept.is_active = false;
-  kept.clear();
-  kept.lent_begin = kept.lent_end = nullptr;
+  kept.end_loan();
 }
+void BufferReuse::give_back_waiting() { get_kept().clear(); }
 
 Buffer::Buffer(std::int64_t count, Pages pages_come) : size_(count) {
   if (count == 0) return;
@@ -158,6 +176,12 @@ Buffer::Buffer(std::int64_t count, Pages pages_come) : size_(count) {
 void Buffer::populate() const {
   const std::size_t mapped = data_.get_deleter().mapped_bytes;
   if (mapped > 0 && madvise(data_.get(), mapped, MADV_POPULATE_WRITE) != 0 && errno == ENOMEM) throw std::bad_alloc();
+}
+
+void Buffer::give_back_tail(std::int64_t count) const {
+  const std::size_t kept_bytes = round_up(sizeof(double) * static_cast<std::size_t>(count), kPage);
+  const std::size_t mapped = data_.get_deleter().mapped_bytes;
+  if (kept_bytes < mapped) madvise(advance(data_.get(), kept_bytes), mapped - kept_bytes, MADV_DONTNEED);
 }
 
 void Buffer::lend_tail(std::int64_t count) const {

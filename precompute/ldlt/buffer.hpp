@@ -27,8 +27,10 @@ class Buffer {
   std::int64_t size() const { return size_; }
 
   /// The pages after the first `count` numbers serve other buffers until the BufferReuse that lives now ends, which this buffer must
-  /// outlive. Then their memory goes back to the system, and the next touch brings fresh pages. Once in a BufferReuse.
+  /// outlive. What is in them is lost. Once in a BufferReuse.
   void lend_tail(std::int64_t count) const;
+  /// The memory of the pages after the first `count` numbers goes back to the system, and the next touch brings fresh pages.
+  void give_back_tail(std::int64_t count) const;
   /// Gets memory for all pages that have none. Throws std::bad_alloc.
   void populate() const;
 
@@ -39,13 +41,17 @@ class Buffer {
 };
 
 /// While one lives, the pages of large buffers that are given back serve others: fresh pages cost more than what is done with them. What
-/// large buffers have in memory, with what waits, never exceeds what they had in use at most. One at a time.
+/// large buffers have in memory, with what waits, never exceeds what they had in use at most. Afterwards they wait for the next one, until
+/// give_back_waiting(). One at a time.
 class BufferReuse {
  public:
   BufferReuse();
   ~BufferReuse();
   BufferReuse(const BufferReuse&) = delete;
   BufferReuse& operator=(const BufferReuse&) = delete;
+
+  /// Pages that wait go back to the system. Pre: none lives.
+  static void give_back_waiting();
 };
 
 }  // namespace carillon::ldlt

@@ -38,6 +38,10 @@ struct Factor::State {
   State(const la::Pencil& given_pencil, const MeshOrder* order)
       : given(given_pencil), plan(make_plan(given.stiffness, given.mass, order)) {}
 
+  State(const State&) = delete;
+  State& operator=(const State&) = delete;
+  ~State() { BufferReuse::give_back_waiting(); }
+
   const la::Pencil given;
   Plan plan;
   std::optional<EquilibratedPencil> equilibrated;  // what is factorised, measured and refined with; from the first factorisation on
@@ -50,7 +54,11 @@ struct Factor::State {
   bool needs_refinement = false;
   double backward_error = 0;  // of the solves as they are made
   bool is_allocated = false;
+  bool has_scratch = false;  // memory of the last factorisation, for the next
 
+  /// Gives back what a factorisation needs and solves do not. A factorisation that counts eigenvalues is often followed by another at once,
+  /// which would wait for fresh pages; solves are not.
+  void drop_scratch();
   /// Runs work, and says how much is needed where memory runs out. Collective.
   template <typename Work>
   void name_need(Work&& work) const;
@@ -77,6 +85,12 @@ void Factor::State::name_need(Work&& work) const {
                     plan.analysis.ranks.size()),
         static_cast<double>(plan.analysis.peak_bytes));
   }
+}
+
+void Factor::State::drop_scratch() {
+  if (!std::exchange(has_scratch, false)) return;
+  numbers.panels.give_back_tail(plan.room.panels);
+  BufferReuse::give_back_waiting();
 }
 
 void Factor::State::prepare() {
@@ -156,7 +170,13 @@ bool Factor::factorise(double sigma) {
   s.name_need([&] {
     s.prepare();
     s.norm = s.stiffness_norm + std::abs(sigma) * s.mass_norm;
-    factorise_fronts(s.plan, s.equilibrated->get(), sigma, s.numbers);
+    s.has_scratch = true;
+    try {
+      factorise_fronts(s.plan, s.equilibrated->get(), sigma, s.numbers);
+    } catch (...) {
+      s.drop_scratch();
+      throw;
+    }
     petsc::add_flops(s.plan.analysis.ranks[static_cast<std::size_t>(s.plan.rank)].flops);
   });
   s.backward_error = std::numeric_limits<double>::infinity();
@@ -208,6 +228,7 @@ void Factor::State::solve_refined(double* x, int stride, int columns) {
 
 void Factor::solve(const double* b, double* x, int stride, int columns) {
   State& s = *state_;
+  s.drop_scratch();
   if (s.equilibrated->is_scaled() || s.needs_refinement) {
     for (int j = 0; j < columns && b != x; ++j) {
       const std::ptrdiff_t at = std::ptrdiff_t{j} * stride;

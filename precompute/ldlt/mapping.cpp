@@ -26,8 +26,9 @@ constexpr double kSnap = 0.08;   // of a rank
 constexpr double kSmall = 0.06;  // of a rank: a subtree that straddles two ranks goes to one of them
 constexpr double kColumns = 16;  // of a solve
 constexpr double kEntriesBound = 1.25;
-constexpr double kLeastShare = 0.2;  // of an even one
-constexpr int kMostSought = 64;      // ranks: with more, fewer mappings are tried
+constexpr double kLeastShare = 0.2;   // of an even one
+constexpr double kSharedFront = 5e6;  // operations that its messages take the time of, in a factorisation and its solves: 0.1 ms
+constexpr int kMostSought = 64;       // ranks: with more, fewer mappings are tried
 
 std::vector<std::vector<std::int32_t>> list_children(const std::vector<FrontCost>& fronts, std::vector<std::int32_t>& roots) {
   std::vector<std::vector<std::int32_t>> children(fronts.size());
@@ -464,6 +465,7 @@ MappingCounts count_work(const std::vector<FrontCost>& fronts, const Mapping& ma
   counts.operations.assign(ranks, 0.0);
   counts.entries.assign(ranks, 0.0);
   const std::vector<FrontParts> shared = list_parts(fronts, mapping);
+  std::vector<std::int32_t> shared_of_rank(ranks, 0);
   for (std::size_t s = 0; s < fronts.size(); ++s) {
     const FrontCost& cost = fronts[s];
     const auto front = static_cast<std::int32_t>(s);
@@ -479,10 +481,12 @@ MappingCounts count_work(const std::vector<FrontCost>& fronts, const Mapping& ma
     counts.shared_entries += cost.entries;
     const std::vector<FrontShare> shares = mapping.list_shares(front);
     for (std::size_t place = 0; place < shares.size(); ++place) {
+      ++shared_of_rank[static_cast<std::size_t>(shares[place].rank)];
       counts.operations[static_cast<std::size_t>(shares[place].rank)] += shared[s].operations[place];
       counts.entries[static_cast<std::size_t>(shares[place].rank)] += static_cast<double>(shared[s].entries[place]);
     }
   }
+  for (const std::int32_t count : shared_of_rank) counts.most_shared_fronts = std::max(counts.most_shared_fronts, count);
   counts.path_operations = Replay(fronts, mapping, shared, false).run();
   return counts;
 }
@@ -534,14 +538,15 @@ MappingCounts count_mapping(const std::vector<FrontCost>& fronts, const Mapping&
 
 Mapping choose_mapping(const std::vector<FrontCost>& fronts, int ranks) {
   Mapping best(fronts, ranks, 1.0);
-  double best_path = std::numeric_limits<double>::infinity();
+  double best_cost = std::numeric_limits<double>::infinity();
   double best_entries = std::numeric_limits<double>::infinity();
   const auto consider = [&](const Mapping& candidate) {
     const MappingCounts counts = count_work(fronts, candidate);
     const double entries = std::max(counts.fullest_ratio(), kEntriesBound);
-    if (entries > best_entries || (entries == best_entries && counts.path_operations >= best_path)) return;
+    const double cost = counts.path_operations + kSharedFront * counts.most_shared_fronts;
+    if (entries > best_entries || (entries == best_entries && cost >= best_cost)) return;
     best = candidate;
-    best_path = counts.path_operations;
+    best_cost = cost;
     best_entries = entries;
   };
   const auto consider_levelled = [&](const Mapping& candidate) {

@@ -80,6 +80,7 @@ struct MappingCounts {
   double shared_operations = 0;  // in fronts of more than one rank
   double shared_entries = 0;
   std::int32_t shared_fronts = 0;
+  std::int32_t most_shared_fronts = 0;   // that one rank shares
   std::int32_t most_planned_fronts = 0;  // shared fronts that one rank has to know: those on its way to the root, and their children
 
   /// path_operations over total_operations / ranks: 1 is perfect.
@@ -90,8 +91,8 @@ struct MappingCounts {
 
 MappingCounts count_mapping(const std::vector<FrontCost>& fronts, const Mapping& mapping);
 
-/// The mapping of the shortest path among several weights and grains whose fullest rank has at most 1.25 times the mean of the entries;
-/// where none has, that of the fewest entries.
+/// The mapping of the shortest path, with some operations for each shared front on it, among several weights and grains whose fullest rank
+/// has at most 1.25 times the mean of the entries; where none has, that of the fewest entries.
 Mapping choose_mapping(const std::vector<FrontCost>& fronts, int ranks);
 
 /// The shared fronts in the order in which their ranks are free and their children complete: children before parents. Where all ranks go

@@ -222,7 +222,7 @@ Piece unpack(ListReader& reader) {
   return piece;
 }
 
-/// The pieces that this rank begins with.
+/// The pieces of one label that this rank begins with. Collective.
 std::vector<Piece> gather_pieces(const Communicator& comm, const NodeLinks& nodes, const SeparatorTree& tree,
                                  const std::vector<Label>& label) {
   const auto received = comm::all_to_all(comm, [&] {
@@ -267,6 +267,29 @@ std::vector<Piece> gather_pieces(const Communicator& comm, const NodeLinks& node
         pieces.push_back(std::move(piece));
       }
     }
+    return pieces;
+  });
+}
+
+/// The piece of all nodes, which are all this rank's.
+Piece make_whole(const NodeLinks& nodes, const SeparatorTree& tree) {
+  Piece whole;
+  whole.label = {tree.root(), 0};
+  whole.nodes.resize(static_cast<std::size_t>(nodes.own_nodes));
+  std::iota(whole.nodes.begin(), whole.nodes.end(), 0);
+  whole.graph = {nodes.links.offsets, nodes.links.items};
+  return whole;
+}
+
+/// The pieces that this rank begins with. Collective.
+std::vector<Piece> find_pieces(const Communicator& comm, const NodeLinks& nodes, const IndexPartition& owners, const SeparatorTree& tree,
+                               std::int32_t largest) {
+  const bool is_one_piece = owners.total() <= largest || comm.size() == 1;
+  if (!is_one_piece || owners.begin(1) < owners.total())
+    return gather_pieces(comm, nodes, tree, label_nodes(comm, nodes, owners, tree, largest));
+  return comm.agree([&] {
+    std::vector<Piece> pieces;
+    if (nodes.own_nodes > 0) pieces.push_back(make_whole(nodes, tree));
     return pieces;
   });
 }
@@ -353,7 +376,7 @@ int SeparatorTree::find_part(std::int32_t position) const {
 
 std::vector<Ints> order_parts(const Communicator& comm, const NodeLinks& nodes, const IndexPartition& owners, SeparatorTree& tree,
                               std::int32_t largest) {
-  std::vector<Piece> pieces = gather_pieces(comm, nodes, tree, label_nodes(comm, nodes, owners, tree, largest));
+  std::vector<Piece> pieces = find_pieces(comm, nodes, owners, tree, largest);
   std::vector<Ints> placed(tree.parts.size());
   for (int depth = 0; depth < tree.depth(); ++depth) {
     const Ints side = seek_separator(comm, pieces, tree, depth);

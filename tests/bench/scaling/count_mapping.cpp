@@ -121,8 +121,8 @@ void run(const std::string& file, int refinements, const std::vector<int>& rank_
   };
   const std::vector<ldlt::FrontCost> whole = find_costs(partition::order_nested_dissection(graph));
   const ldlt::MappingCounts alone = ldlt::count_mapping(whole, ldlt::Mapping(whole, 1, 1));
-  fmt::print("# {} unknowns; one rank: {:.4g} operations, {:.4g} entries, {:.2f} s\n", 3 * std::int64_t{nodes},
-             alone.total_operations, alone.total_entries, find_seconds() - before);
+  fmt::print("# {} unknowns; one rank: {:.4g} operations, {:.4g} entries, {:.2f} s\n", 3 * std::int64_t{nodes}, alone.total_operations,
+             alone.total_entries, find_seconds() - before);
   std::fflush(stdout);
   fmt::print(
       "ranks,operations,entries,over_one,path,path_over_one,gang,fullest,weight,shared_operations,shared_entries,shared_fronts,planned_"

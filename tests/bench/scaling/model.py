@@ -95,7 +95,7 @@ def find_halo_unknowns(body, ranks):
     return 0.0 if ranks == 1 else min(body.halo * (body.unknowns / ranks) ** (2 / 3), body.unknowns)
 
 
-LARGEST_GATHERED = 3e5  # nodes of a part that one rank cuts: precompute/ldlt/order.hpp
+LARGEST_GATHERED = 1e6  # nodes of a part that one rank cuts: partition/dissect.hpp
 CLUSTERS = 64  # of a rank, at least 1,024 in all: the vertices of the quotient graph
 CLUSTER_TRIES = 2  # of the quotient graph the best of eight bisections is taken, of a part the best of four separators
 MAPPING_S_PER_RANK = 3e-4  # every rank maps all shared fronts: count_mapping, 0.3 s at 1,024 ranks of 5.7 million unknowns
@@ -128,7 +128,7 @@ class Model:
         return max(flops / (1e9 * gflops * self.speed), size / (1e9 * self.machine.memory_gb_s))
 
     def calc_ordering_s(self, ranks):
-        """Cutting, ordering, planning: the quotient graph on rank 0, a part of at most 300,000 nodes on one rank, its halves on two, and so
+        """Cutting, ordering, planning: the quotient graph on rank 0, a part of at most a million nodes on one rank, its halves on two, and so
         on, so all levels take what two do; leaves side by side; the mapping on every rank."""
         rates, nodes = self.rates, self.body.unknowns / 3
         if ranks == 1:

@@ -16,13 +16,19 @@ namespace {
 
 constexpr std::int64_t kMillion = 1 << 20;  // numbers: 8 MB
 
-TEST(Buffer, begins_where_vectors_and_large_pages_do) {
+/// Begins with no pages that wait.
+class Buffers : public testing::Test {
+ protected:
+  void SetUp() override { BufferReuse::give_back_waiting(); }
+};
+
+TEST_F(Buffers, begins_where_vectors_and_large_pages_do) {
   EXPECT_EQ(reinterpret_cast<std::uintptr_t>(Buffer(3).data()) % 64, 0U);
   EXPECT_EQ(reinterpret_cast<std::uintptr_t>(Buffer(kMillion).data()) % (2U << 20), 0U);
   EXPECT_EQ(Buffer(0).data(), nullptr);
 }
 
-TEST(Buffer, serves_smaller_ones_piece_by_piece_while_reuse_lives) {
+TEST_F(Buffers, serves_smaller_ones_piece_by_piece_while_reuse_lives) {
   const BufferReuse reuse;
   Buffer large(4 * kMillion, Pages::kAtOnce);
   double* const begin = large.data();
@@ -45,7 +51,7 @@ std::int64_t find_mapped() {
   return pages * sysconf(_SC_PAGESIZE);
 }
 
-TEST(Buffer, joins_pieces_that_are_given_back_in_any_order) {
+TEST_F(Buffers, joins_pieces_that_are_given_back_in_any_order) {
   const BufferReuse reuse;
   double* begin = nullptr;
   {
@@ -66,7 +72,7 @@ TEST(Buffer, joins_pieces_that_are_given_back_in_any_order) {
   }
 }
 
-TEST(Buffer, maps_no_more_than_was_in_use_at_most_and_gives_all_of_it_back) {
+TEST_F(Buffers, maps_no_more_than_was_in_use_at_most_and_gives_all_of_it_back) {
   constexpr std::int64_t kSlack = std::int64_t{8} << 20;  // of the heap
   const std::int64_t before = find_mapped();
   {
@@ -88,10 +94,30 @@ TEST(Buffer, maps_no_more_than_was_in_use_at_most_and_gives_all_of_it_back) {
       EXPECT_LE(find_mapped() - before, most + kSlack) << round;
     }
   }
+  BufferReuse::give_back_waiting();
   EXPECT_NEAR(static_cast<double>(find_mapped() - before), 0, kSlack);
 }
 
-TEST(Buffer, lends_its_tail_and_gets_it_back) {
+TEST_F(Buffers, keeps_pages_for_the_next_reuse_until_they_are_given_back) {
+  double* begin = nullptr;
+  {
+    const BufferReuse reuse;
+    Buffer first(4 * kMillion, Pages::kAtOnce);
+    begin = first.data();
+    begin[5] = 7.0;
+  }
+  const std::int64_t waiting = find_mapped();
+  {
+    const Buffer early(kMillion);
+    EXPECT_EQ(early.data(), begin) << "before the next reuse begins";
+    EXPECT_EQ(early.data()[5], 7.0) << "fresh pages";
+  }
+  EXPECT_LE(find_mapped(), waiting - 8 * kMillion) << "what is freed outside of a reuse does not wait";
+  BufferReuse::give_back_waiting();
+  EXPECT_LE(find_mapped(), waiting - 8 * 4 * kMillion);
+}
+
+TEST_F(Buffers, lends_its_tail_and_gets_it_back) {
   constexpr std::int64_t kSlack = std::int64_t{8} << 20;
   const std::int64_t before = find_mapped();
   {
@@ -99,6 +125,7 @@ TEST(Buffer, lends_its_tail_and_gets_it_back) {
     std::fill_n(room.data(), room.size(), 7.0);
     const std::int64_t resident = base::find_memory().resident;
     for (int round = 0; round < 3; ++round) {
+      BufferReuse::give_back_waiting();
       room.populate();
       const BufferReuse reuse;
       room.lend_tail(8 * kMillion);
@@ -109,7 +136,12 @@ TEST(Buffer, lends_its_tail_and_gets_it_back) {
       EXPECT_TRUE(second.data() + second.size() <= room.data() || second.data() >= room.data() + room.size());
       EXPECT_LE(base::find_memory().resident, resident + 8 * 2 * kMillion + kSlack) << "6 + 12 are in use where 16 were lent";
     }
-    EXPECT_LE(base::find_memory().resident, resident - 8 * 16 * kMillion + kSlack) << "lent pages keep no memory";
+    BufferReuse::give_back_waiting();
+    EXPECT_LE(base::find_memory().resident, resident + kSlack) << "more than the buffer's own";
+    room.populate();
+    EXPECT_GE(base::find_memory().resident, resident - kSlack) << "the tail is its own again";
+    room.give_back_tail(8 * kMillion);
+    EXPECT_LE(base::find_memory().resident, resident - 8 * 16 * kMillion + kSlack);
     room.populate();
     EXPECT_GE(base::find_memory().resident, resident - kSlack);
     std::fill_n(room.data() + 8 * kMillion, 16 * kMillion, 5.0);
@@ -119,7 +151,7 @@ TEST(Buffer, lends_its_tail_and_gets_it_back) {
   EXPECT_NEAR(static_cast<double>(find_mapped() - before), 0, kSlack) << "all of it goes with the buffer";
 }
 
-TEST(Buffer, stays_whole_when_one_other_takes_all_that_is_lent) {
+TEST_F(Buffers, stays_whole_when_one_other_takes_all_that_is_lent) {
   constexpr std::int64_t kKept = 8 * kMillion;
   const Buffer room(24 * kMillion, Pages::kAtOnce);
   {
@@ -133,7 +165,7 @@ TEST(Buffer, stays_whole_when_one_other_takes_all_that_is_lent) {
   EXPECT_EQ(std::count(room.data(), room.data() + room.size(), 5.0), room.size());
 }
 
-TEST(Buffer, lends_nothing_of_a_small_one) {
+TEST_F(Buffers, lends_nothing_of_a_small_one) {
   const BufferReuse reuse;
   const Buffer room(1000);
   room.lend_tail(10);
@@ -142,7 +174,7 @@ TEST(Buffer, lends_nothing_of_a_small_one) {
   EXPECT_TRUE(other.data() + other.size() <= room.data() || other.data() >= room.data() + room.size());
 }
 
-TEST(Buffer, is_fresh_and_zero_where_nothing_is_kept) {
+TEST_F(Buffers, is_fresh_and_zero_where_nothing_is_kept) {
   {
     Buffer used(kMillion, Pages::kAtOnce);
     std::fill_n(used.data(), used.size(), 7.0);

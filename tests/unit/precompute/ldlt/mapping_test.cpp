@@ -94,6 +94,71 @@ TEST(Mapping, what_two_ranks_send_to_a_root_that_they_share_is_half_of_each_upda
   EXPECT_NEAR(sum(counts.bytes), 2 * 0.5 * 8 * (12 * 13 / 2), 1e-9);
 }
 
+/// Operations of the fronts that each rank has alone.
+std::vector<double> list_own(const std::vector<FrontCost>& fronts, const Mapping& mapping) {
+  std::vector<double> own(static_cast<std::size_t>(mapping.ranks()), 0.0);
+  for (std::size_t s = 0; s < fronts.size(); ++s)
+    if (mapping.owner(static_cast<std::int32_t>(s)) >= 0)
+      own[static_cast<std::size_t>(mapping.owner(static_cast<std::int32_t>(s)))] += fronts[s].operations;
+  return own;
+}
+
+TEST(Mapping, subtrees_are_exchanged_until_two_ranks_have_the_same_to_do_alone) {
+  // Below a root that both share: 6 + 5 and 4 + 3 + 2, which an exchange of 5 for 4 levels to 10 and 10.
+  std::vector<FrontCost> fronts;
+  for (const double operations : {6.0, 5.0, 4.0, 3.0, 2.0}) fronts.push_back({5, 10, 10, operations, operations});
+  fronts.push_back({-1, 100, 0, 20, 20});
+  Mapping mapping(fronts, 2, 1);
+  ASSERT_EQ(mapping.owner(5), -1);
+  for (const int s : {0, 1}) mapping.set_owner(s, 0);
+  for (const int s : {2, 3, 4}) mapping.set_owner(s, 1);
+  mapping.level_subtrees(fronts);
+  EXPECT_EQ(list_own(fronts, mapping), (std::vector<double>{10, 10}));
+  EXPECT_EQ(mapping.owner(5), -1);
+}
+
+TEST(Mapping, a_subtree_that_is_too_large_to_be_given_away_is_shared_at_its_root) {
+  // 7 of the 12 below the root of all are one subtree of three fronts: 3 + 3 and 1 above them.
+  std::vector<FrontCost> fronts{{2, 10, 10, 3, 3}, {2, 10, 10, 3, 3}, {4, 30, 10, 1, 1}, {4, 10, 10, 5, 5}, {-1, 100, 0, 20, 20}};
+  Mapping mapping(fronts, 2, 1);
+  for (const int s : {0, 1, 2}) mapping.set_owner(s, 0);
+  mapping.set_owner(3, 1);
+  ASSERT_EQ(mapping.owner(4), -1);
+  mapping.level_subtrees(fronts);
+  EXPECT_EQ(mapping.owner(2), -1);
+  EXPECT_EQ(mapping.list_shares(2).size(), 2U);
+  EXPECT_EQ(list_own(fronts, mapping), (std::vector<double>{6, 5})) << "no exchange brings 6 and 5 closer";
+}
+
+TEST(Mapping, what_cannot_be_levelled_stays) {
+  for (const int ranks : {1, 2, 3}) {
+    std::vector<FrontCost> fronts{{-1, 10, 0, 5, 5}};  // one front
+    Mapping one(fronts, ranks, 1);
+    one.level_subtrees(fronts);
+    EXPECT_EQ(count_mapping(fronts, one).path_operations, count_mapping(fronts, Mapping(fronts, ranks, 1)).path_operations);
+    const std::vector<FrontCost> leaves = list_costs(make_leaves(7));  // none has a front above it
+    Mapping many(leaves, ranks, 1);
+    many.level_subtrees(leaves);
+    EXPECT_EQ(list_own(leaves, many), list_own(leaves, Mapping(leaves, ranks, 1)));
+    Mapping none({}, ranks, 1);
+    none.level_subtrees({});
+  }
+}
+
+TEST(Mapping, ranks_of_a_front_are_among_those_of_the_front_above) {
+  for (const int ranks : {2, 3, 5, 16, 64}) {
+    const std::vector<FrontCost> forest = make_block(15, ranks);
+    const Mapping mapping = choose_mapping(forest, ranks);
+    for (std::size_t s = 0; s < forest.size(); ++s) {
+      if (forest[s].parent < 0) continue;
+      std::vector<bool> is_above(static_cast<std::size_t>(ranks), false);
+      for (const FrontShare& share : mapping.list_shares(forest[s].parent)) is_above[static_cast<std::size_t>(share.rank)] = true;
+      for (const FrontShare& share : mapping.list_shares(static_cast<std::int32_t>(s)))
+        EXPECT_TRUE(is_above[static_cast<std::size_t>(share.rank)]) << "front " << s << " on " << ranks << " ranks";
+    }
+  }
+}
+
 TEST(Mapping, what_is_shared_out_is_what_there_is) {
   const std::vector<FrontCost> forest = make_block(15, 16);
   for (const int ranks : {1, 2, 3, 7, 16, 64, 200}) {
@@ -137,7 +202,7 @@ TEST(Mapping, ranks_end_the_fronts_that_they_share_together) {
     const MappingCounts chosen = count_mapping(forest, choose_mapping(forest, ranks));
     const MappingCounts proportional = count_mapping(forest, Mapping(forest, ranks, 1));
     EXPECT_LE(chosen.path_operations, proportional.path_operations);
-    EXPECT_LE(chosen.path_ratio(), ranks == 2 ? 1.06 : 1.25) << ranks << " ranks";
+    EXPECT_LE(chosen.path_ratio(), ranks == 2 ? 1.02 : 1.25) << ranks << " ranks";
     EXPECT_LE(chosen.gang_operations, proportional.gang_operations) << ranks << " ranks: who is free early waits less too";
   }
 }
