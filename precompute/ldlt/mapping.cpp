@@ -17,6 +17,7 @@
 #include <utility>
 
 #include "precompute/ldlt/kernels.hpp"
+#include "precompute/ldlt/level_subtrees.hpp"
 #include "precompute/ldlt/tile_map.hpp"
 
 namespace carillon::ldlt {
@@ -28,16 +29,9 @@ constexpr double kColumns = 16;  // of a solve
 constexpr double kEntriesBound = 1.25;
 constexpr double kLeastShare = 0.2;   // of an even one
 constexpr double kSharedFront = 5e6;  // operations that its messages take the time of, in a factorisation and its solves: 0.1 ms
-constexpr int kMostSought = 64;       // ranks: with more, fewer mappings are tried
-
-std::vector<std::vector<std::int32_t>> list_children(const std::vector<FrontCost>& fronts, std::vector<std::int32_t>& roots) {
-  std::vector<std::vector<std::int32_t>> children(fronts.size());
-  for (std::size_t s = 0; s < fronts.size(); ++s) {
-    const std::int32_t parent = fronts[s].parent;
-    (parent < 0 ? roots : children[static_cast<std::size_t>(parent)]).push_back(static_cast<std::int32_t>(s));
-  }
-  return children;
-}
+// Ranks up to which subtrees are levelled, and other grains are tried: the mapping takes longer than it saves where there are more.
+constexpr int kMostLevelled = 64;
+constexpr int kMostGrains = 16;
 
 /// Of the trailing rows and columns of a front, the numbers of the lower triangle.
 double count_triangle_of(double rows) { return rows * (rows + 1) / 2; }
@@ -187,6 +181,15 @@ class Replay {
 
 }  // namespace
 
+std::vector<std::vector<std::int32_t>> list_children(const std::vector<FrontCost>& fronts, std::vector<std::int32_t>& roots) {
+  std::vector<std::vector<std::int32_t>> children(fronts.size());
+  for (std::size_t s = 0; s < fronts.size(); ++s) {
+    const std::int32_t parent = fronts[s].parent;
+    (parent < 0 ? roots : children[static_cast<std::size_t>(parent)]).push_back(static_cast<std::int32_t>(s));
+  }
+  return children;
+}
+
 std::vector<FrontCost> list_costs(const Forest& forest) {
   std::vector<FrontCost> fronts;
   for (const Supernode& node : forest.supernodes)
@@ -258,128 +261,6 @@ Mapping::Mapping(const std::vector<FrontCost>& fronts, int ranks, double operati
       owner_[static_cast<std::size_t>(child)] = owner_[s];
     }
   }
-}
-
-namespace {
-
-/// The subtrees that one rank each has below shared fronts, and what all their ranks have to do.
-class Levelling {
- public:
-  Levelling(const std::vector<FrontCost>& fronts, Mapping& mapping)
-      : fronts_(fronts), mapping_(mapping), work_(fronts.size(), 0.0), load_(static_cast<std::size_t>(mapping.ranks()), 0.0) {
-    std::vector<std::int32_t> roots;
-    children_ = list_children(fronts, roots);
-    for (std::size_t s = 0; s < fronts.size(); ++s) {
-      const auto front = static_cast<std::int32_t>(s);
-      work_[s] += fronts[s].operations;
-      if (fronts[s].parent >= 0) work_[static_cast<std::size_t>(fronts[s].parent)] += work_[s];
-      add_front(front, 1);
-      if (mapping.owner(front) >= 0 && fronts[s].parent >= 0 && mapping.owner(fronts[s].parent) < 0) subtrees_.push_back(front);
-    }
-  }
-
-  /// Gives a subtree of the rank with most to another, or exchanges two, whichever levels the two ranks best. False: none would.
-  bool exchange() {
-    const int most = find_most();
-    double best = kUneven * load(most);
-    std::int32_t given = -1;
-    std::int32_t taken = -1;
-    int to = -1;
-    const auto consider = [&](std::int32_t subtree, std::int32_t back, int rank) {
-      const double moved = work(subtree) - (back < 0 ? 0 : work(back));
-      const double gain = std::min(moved, load(most) - load(rank) - moved);
-      if (gain <= best) return;
-      best = gain;
-      given = subtree;
-      taken = back;
-      to = rank;
-    };
-    for (const std::int32_t subtree : subtrees_) {
-      if (mapping_.owner(subtree) != most) continue;
-      for (const FrontShare& share : list_takers(subtree))
-        if (share.rank != most) consider(subtree, -1, share.rank);
-      for (const std::int32_t back : subtrees_)
-        if (mapping_.owner(back) != most && can_take(subtree, mapping_.owner(back)) && can_take(back, most))
-          consider(subtree, back, mapping_.owner(back));
-    }
-    if (given < 0) return false;
-    give(given, to);
-    if (taken >= 0) give(taken, most);
-    return true;
-  }
-
-  /// Shares the root of the smallest subtree of the rank with most that is too large to be given away. False: the ranks are level, or there
-  /// is none.
-  bool split() {
-    const int most = find_most();
-    std::int32_t best = -1;
-    for (const std::int32_t subtree : subtrees_) {
-      if (mapping_.owner(subtree) != most || children_[static_cast<std::size_t>(subtree)].empty()) continue;
-      double least = load(most);
-      for (const FrontShare& share : list_takers(subtree)) least = std::min(least, load(share.rank));
-      const double gap = load(most) - least;
-      if (gap < 4 * kUneven * load(most) || work(subtree) < gap / 2 || (best >= 0 && work(subtree) >= work(best))) continue;
-      best = subtree;
-    }
-    if (best < 0) return false;
-    add_front(best, -1);
-    mapping_.share(best, fronts_[static_cast<std::size_t>(best)].parent);
-    add_front(best, 1);
-    std::erase(subtrees_, best);
-    const std::vector<std::int32_t>& below = children_[static_cast<std::size_t>(best)];
-    subtrees_.insert(subtrees_.end(), below.begin(), below.end());
-    return true;
-  }
-
- private:
-  static constexpr double kUneven = 1e-3;
-
-  double work(std::int32_t subtree) const { return work_[static_cast<std::size_t>(subtree)]; }
-  double load(int rank) const { return load_[static_cast<std::size_t>(rank)]; }
-  int find_most() const { return static_cast<int>(std::max_element(load_.begin(), load_.end()) - load_.begin()); }
-  std::vector<FrontShare> list_takers(std::int32_t subtree) const {
-    return mapping_.list_shares(fronts_[static_cast<std::size_t>(subtree)].parent);
-  }
-  bool can_take(std::int32_t subtree, int rank) const {
-    const std::vector<FrontShare> takers = list_takers(subtree);
-    return std::any_of(takers.begin(), takers.end(), [&](const FrontShare& share) { return share.rank == rank; });
-  }
-  /// A front that all ranks share does not count: it can be shared evenly whatever lies below.
-  void add_front(std::int32_t front, int sign) {
-    const std::vector<FrontShare> shares = mapping_.list_shares(front);
-    if (shares.size() == load_.size()) return;
-    for (const FrontShare& share : shares)
-      load_[static_cast<std::size_t>(share.rank)] +=
-          sign * fronts_[static_cast<std::size_t>(front)].operations / static_cast<double>(shares.size());
-  }
-  void give(std::int32_t subtree, int to) {
-    load_[static_cast<std::size_t>(mapping_.owner(subtree))] -= work(subtree);
-    load_[static_cast<std::size_t>(to)] += work(subtree);
-    std::vector<std::int32_t> open{subtree};
-    while (!open.empty()) {
-      const std::int32_t front = open.back();
-      open.pop_back();
-      mapping_.set_owner(front, to);
-      const std::vector<std::int32_t>& below = children_[static_cast<std::size_t>(front)];
-      open.insert(open.end(), below.begin(), below.end());
-    }
-  }
-
-  const std::vector<FrontCost>& fronts_;
-  Mapping& mapping_;
-  std::vector<std::vector<std::int32_t>> children_;
-  std::vector<double> work_;            // (fronts) of the subtree
-  std::vector<double> load_;            // (ranks)
-  std::vector<std::int32_t> subtrees_;  // their roots
-};
-
-}  // namespace
-
-void Mapping::level_subtrees(const std::vector<FrontCost>& fronts) {
-  Levelling levelling(fronts, *this);
-  const int most = 8 * ranks_;
-  for (int changes = 0; changes < most; ++changes)
-    if (!levelling.exchange() && !levelling.split()) return;
 }
 
 void Mapping::share(std::int32_t front, std::int32_t as) {
@@ -559,10 +440,12 @@ Mapping choose_mapping(const std::vector<FrontCost>& fronts, int ranks) {
     for (const double grain : {1.0, 0.5, 0.25, 0.12}) {
       const Mapping candidate(fronts, ranks, weight, grain);
       consider_levelled(candidate);
-      if (ranks > kMostSought) break;
-      Mapping moved = candidate;
-      moved.level_subtrees(fronts);
-      consider_levelled(moved);
+      if (ranks <= kMostLevelled) {
+        Mapping moved = candidate;
+        level_subtrees(fronts, moved);
+        consider_levelled(moved);
+      }
+      if (ranks > kMostGrains) break;
     }
   return best;
 }

@@ -20,6 +20,9 @@ struct FrontCost {
 /// Every front of a forest.
 std::vector<FrontCost> list_costs(const Forest& forest);
 
+/// The children of each front, in their order. roots: appended to, those without a parent.
+std::vector<std::vector<std::int32_t>> list_children(const std::vector<FrontCost>& fronts, std::vector<std::int32_t>& roots);
+
 /// A rank and its fraction of a front's work.
 struct FrontShare {
   int rank = 0;
@@ -41,9 +44,6 @@ class Mapping {
   int owner(std::int32_t front) const { return owner_[static_cast<std::size_t>(front)]; }
   /// Its ranks, ascending; the fractions add up to one. A front that one rank has is one share of 1.
   std::vector<FrontShare> list_shares(std::int32_t front) const;
-  /// Levels what ranks do alone: gives subtrees below shared fronts to other ranks that share the same front, exchanges two, and shares the
-  /// root of a subtree that is too large for that. fronts: those that the mapping was made of.
-  void level_subtrees(const std::vector<FrontCost>& fronts);
   /// Gives a front to one rank.
   void set_owner(std::int32_t front, int rank) { owner_[static_cast<std::size_t>(front)] = rank; }
   /// Gives a front to the ranks of another one.

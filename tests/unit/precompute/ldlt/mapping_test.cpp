@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "partition/dissect.hpp"
+#include "precompute/ldlt/level_subtrees.hpp"
 
 namespace carillon::ldlt {
 namespace {
@@ -112,7 +113,7 @@ TEST(Mapping, subtrees_are_exchanged_until_two_ranks_have_the_same_to_do_alone) 
   ASSERT_EQ(mapping.owner(5), -1);
   for (const int s : {0, 1}) mapping.set_owner(s, 0);
   for (const int s : {2, 3, 4}) mapping.set_owner(s, 1);
-  mapping.level_subtrees(fronts);
+  level_subtrees(fronts, mapping);
   EXPECT_EQ(list_own(fronts, mapping), (std::vector<double>{10, 10}));
   EXPECT_EQ(mapping.owner(5), -1);
 }
@@ -124,7 +125,7 @@ TEST(Mapping, a_subtree_that_is_too_large_to_be_given_away_is_shared_at_its_root
   for (const int s : {0, 1, 2}) mapping.set_owner(s, 0);
   mapping.set_owner(3, 1);
   ASSERT_EQ(mapping.owner(4), -1);
-  mapping.level_subtrees(fronts);
+  level_subtrees(fronts, mapping);
   EXPECT_EQ(mapping.owner(2), -1);
   EXPECT_EQ(mapping.list_shares(2).size(), 2U);
   EXPECT_EQ(list_own(fronts, mapping), (std::vector<double>{6, 5})) << "no exchange brings 6 and 5 closer";
@@ -134,14 +135,14 @@ TEST(Mapping, what_cannot_be_levelled_stays) {
   for (const int ranks : {1, 2, 3}) {
     std::vector<FrontCost> fronts{{-1, 10, 0, 5, 5}};  // one front
     Mapping one(fronts, ranks, 1);
-    one.level_subtrees(fronts);
+    level_subtrees(fronts, one);
     EXPECT_EQ(count_mapping(fronts, one).path_operations, count_mapping(fronts, Mapping(fronts, ranks, 1)).path_operations);
     const std::vector<FrontCost> leaves = list_costs(make_leaves(7));  // none has a front above it
     Mapping many(leaves, ranks, 1);
-    many.level_subtrees(leaves);
+    level_subtrees(leaves, many);
     EXPECT_EQ(list_own(leaves, many), list_own(leaves, Mapping(leaves, ranks, 1)));
     Mapping none({}, ranks, 1);
-    none.level_subtrees({});
+    level_subtrees({}, none);
   }
 }
 
