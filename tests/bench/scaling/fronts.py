@@ -15,9 +15,10 @@ PATH = 1.25  # operations on the path over total / ranks, on very many ranks ...
 PATH_STEP = 0.5  # ... of whose excess 1 - 2^(-0.5 levels) is reached: fitted to the counts
 GANG = 2.4  # the same where the ranks of a front wait for one another, on very many ranks ...
 GANG_STEP = 0.35  # ... of whose excess (1 - 2^(-0.35 levels))^2 is reached: fitted to the counts
-UNEVEN = 1.4  # messages and bytes of the fullest rank of a front over the mean
-MORE_SUMS = 1.1  # messages of a solve that the fullest rank of a front receives over the mean
-LONGEST = 1.8  # panels on the longest way to the root over those of mean fronts
+UNEVEN = 1.25  # messages and bytes of the fullest rank of a front over the mean: fitted to the counts, as those below
+MORE_SUMS = 1.27  # messages and bytes of a solve that the fullest rank of a front receives over the mean
+LONGEST = 1.62  # panels on the longest way to the root over those of mean fronts
+MEETINGS = 1.5  # fronts of a level that the fullest rank shares where each has at most one rank's work: subtrees are levelled
 SPREAD = 1.3  # tiles of the fullest rank of a front over the mean
 
 
@@ -129,7 +130,7 @@ def fit_tree(rows):
 
 def find_meetings(level, ranks):
     """Fronts of a level in which the fullest rank has a share: an end of an interval lies inside most ranks."""
-    return min(2.0 if level.ranks <= 1 else 1 + 1 / level.ranks, ranks - 1.0)
+    return min(MEETINGS if level.ranks <= 1 else 1 + 1 / level.ranks, ranks - 1.0)
 
 
 def count_factor_messages(tree, ranks):
@@ -161,7 +162,7 @@ def count_solve_messages(tree, ranks):
         between = met * (2 * one.child_group + one.group)
         sums = 4 * child_rows * math.sqrt(one.child_group) / one.group * (1 - 1 / one.group)
         messages += MORE_SUMS * (inside + between)
-        size += 8 * COLUMNS * (inside * TILE + met * sums)
+        size += MORE_SUMS * 8 * COLUMNS * (inside * TILE + met * sums)
     return messages, size
 
 

@@ -128,8 +128,8 @@ class Model:
         return max(flops / (1e9 * gflops * self.speed), size / (1e9 * self.machine.memory_gb_s))
 
     def calc_ordering_s(self, ranks):
-        """Cutting, ordering, planning: the quotient graph on rank 0, a part of at most a million nodes on one rank, its halves on two, and so
-        on, so all levels take what two do; leaves side by side; the mapping on every rank."""
+        """Cutting, ordering, planning: the quotient graph on rank 0, a part of at most a million nodes on one rank, its halves on two, and
+        so on, so all levels take what two do; leaves side by side; the mapping on every rank."""
         rates, nodes = self.rates, self.body.unknowns / 3
         if ranks == 1:
             return rates.order_s_per_node * nodes / self.speed
