@@ -1,12 +1,12 @@
 // Method:     A few bad modes go through the operator at hand once more, (K - sigma M)^-1 M phi, and are made orthogonal to the others:
-//             that corrects what rounding in the recurrence left. The rest are taken in groups of neighbours. One step of inverse iteration
-//             with sigma just below the group damps everything farther from sigma than the group is. It is written as a correction, phi -
-//             (K - sigma M)^-1 (K phi - lambda M phi), so that it ends at the modes of K and M and not at those of the factors' rounding,
-//             which differ for thin bodies. Rayleigh-Ritz within the group parts its members; Gram-Schmidt from the lowest mode up makes
-//             the whole set M-orthonormal again. What is still bad is tried again in narrower groups, whose shifts are nearer; the
-//             narrowest hold a single mode. The stiffness against fast motions multiplies the rounding of a slow mode's entries: its
-//             residual is large though the mode is right. The inverse takes that out again: with d = (K - sigma M)^-1 r there is an
-//             eigenvalue within |lambda - sigma| ||d||_M, relative to itself, of lambda - sigma, as for any residual of the inverse.
+//             that corrects what rounding in the recurrence and the solves left. The rest are taken in groups of neighbours. One step of
+//             inverse iteration with sigma just below the group damps everything farther from sigma than the group is. It is written as a
+//             correction, phi - (K - sigma M)^-1 (K phi - lambda M phi), so that it ends at the modes of K and M and not at those of the
+//             factors' rounding, which differ for thin bodies. Rayleigh-Ritz within the group parts its members; Gram-Schmidt from the
+//             lowest mode up makes the whole set M-orthonormal again. What is still bad is tried again in narrower groups, whose shifts are
+//             nearer; the narrowest hold a single mode. The stiffness against fast motions multiplies the rounding of a slow mode's
+//             entries: its residual is large though the mode is right. The inverse takes that out again: with d = (K - sigma M)^-1 r there
+//             is an eigenvalue within |lambda - sigma| ||d||_M, relative to itself, of lambda - sigma, as for any residual of the inverse.
 // Source:     Parlett, The symmetric eigenvalue problem, 1998, sections 4.2 (inverse iteration), 11.3 (Rayleigh-Ritz).
 // Deviations: none.
 #include "precompute/eigen/refine.hpp"
@@ -176,10 +176,20 @@ void polish(const RefineRequest& request, const Group& bad, std::vector<double>&
     const Columns x = own.view();
     std::vector<double> space(static_cast<std::size_t>(x.rows) * bad.size());
     const Columns work{space.data(), x.rows, x.rows, x.count};
-    for (std::size_t j = 0; j < bad.size(); ++j)
-      operators.mass.multiply(all.part(static_cast<int>(bad[j]), 1), x.part(static_cast<int>(j), 1));
+    // (lambda - sigma) (K - sigma M)^-1 M phi, as a correction: so the rounding of the solve is that of the correction, not of phi.
+    for (std::size_t j = 0; j < bad.size(); ++j) {
+      const Columns phi = all.part(static_cast<int>(bad[j]), 1);
+      operators.stiffness.multiply(phi, x.part(static_cast<int>(j), 1));
+      operators.mass.multiply(phi, work.part(static_cast<int>(j), 1));
+      for (std::ptrdiff_t i = 0; i < x.rows; ++i) x.column(static_cast<int>(j))[i] -= lambda[bad[j]] * work.column(static_cast<int>(j))[i];
+    }
     request.at_hand->solve(x.values, x.values, x.stride, x.count);
     cost.solves += x.count;
+    for (std::size_t j = 0; j < bad.size(); ++j) {
+      const double* phi = all.column(static_cast<int>(bad[j]));
+      double* corrected = x.column(static_cast<int>(j));
+      for (std::ptrdiff_t i = 0; i < x.rows; ++i) corrected[i] = phi[i] - corrected[i];
+    }
     for (int pass = 0; pass < 3; ++pass) {
       normalise(operators, x, work);
       operators.mass.multiply(x, work);
