@@ -16,12 +16,6 @@ namespace {
 
 using Ints = std::vector<std::int32_t>;
 
-std::span<const std::int32_t> list_neighbours(const Graph& graph, std::int32_t vertex) {
-  const auto v = static_cast<std::size_t>(vertex);
-  const std::int32_t first = graph.offsets[v];
-  return {graph.neighbours.data() + first, static_cast<std::size_t>(graph.offsets[v + 1] - first)};
-}
-
 /// All that dominate each vertex, in compressed rows.
 class Dominators {
  public:
@@ -37,37 +31,32 @@ class Dominators {
 
  private:
   void add(std::int32_t v) {
-    const auto near = list_neighbours(graph_, v);
+    const auto near = graph_.list_neighbours(v);
     if (near.empty()) return;
     for (const std::int32_t u : near) mark(u) = 1;
     const std::int32_t first = find_least(near, 1);
     mark(first) = 2;
-    for (const std::int32_t u : list_neighbours(graph_, first)) mark(u) *= 2;
+    for (const std::int32_t u : graph_.list_neighbours(first)) mark(u) *= 2;
     // Who dominates v is a neighbour of the first, and of a second which is not: few are that.
     const std::int32_t second = find_least(near, 1);
     if (second < 0) {
       for (const std::int32_t u : near)
         if (may_dominate(u, v)) list.push_back(u);
     } else {
-      for (const std::int32_t u : list_neighbours(graph_, second))
+      for (const std::int32_t u : graph_.list_neighbours(second))
         if (mark(u) == 2 && may_dominate(u, v)) list.push_back(u);
     }
     for (const std::int32_t u : near) mark(u) = 0;
   }
 
   char& mark(std::int32_t vertex) { return mark_[static_cast<std::size_t>(vertex)]; }
-  std::size_t count_neighbours(std::int32_t vertex) const {
-    const auto v = static_cast<std::size_t>(vertex);
-    return static_cast<std::size_t>(graph_.offsets[v + 1] - graph_.offsets[v]);
-  }
-
   /// Of the vertices with this mark the one with the fewest neighbours; -1: none.
   std::int32_t find_least(std::span<const std::int32_t> vertices, char wanted) {
     std::int32_t least = -1;
     std::size_t fewest = 0;
     for (const std::int32_t u : vertices) {
       if (mark(u) != wanted) continue;
-      const std::size_t count = count_neighbours(u);
+      const std::size_t count = graph_.list_neighbours(u).size();
       if (least >= 0 && count >= fewest) continue;
       least = u;
       fewest = count;
@@ -77,8 +66,8 @@ class Dominators {
 
   /// The neighbours of v are marked, and no other vertex is.
   bool may_dominate(std::int32_t u, std::int32_t v) const {
-    const auto near = list_neighbours(graph_, u);
-    const std::size_t count = count_neighbours(v);
+    const auto near = graph_.list_neighbours(u);
+    const std::size_t count = graph_.list_neighbours(v).size();
     if (near.size() < count || (near.size() == count && u > v)) return false;
     std::size_t common = 1;  // v
     for (const std::int32_t w : near) common += mark_[static_cast<std::size_t>(w)] != 0 ? 1 : 0;
@@ -93,10 +82,15 @@ class Dominators {
 
 Condensation::Condensation(const Graph& graph, std::int32_t smallest_core)
     : graph_(graph), number_(static_cast<std::size_t>(graph.vertex_count()), -1) {
-  Dominators all(graph);
-  std::int32_t count = 0;
-  for (std::size_t v = 0; v < number_.size(); ++v)
-    if (all.offsets[v] == all.offsets[v + 1]) number_[v] = count++;
+  const Dominators all(graph);
+  Ints scratch = number_;
+  Ints kept;
+  for (std::size_t v = 0; v < number_.size(); ++v) {
+    if (all.offsets[v] < all.offsets[v + 1]) continue;
+    number_[v] = static_cast<std::int32_t>(kept.size());
+    kept.push_back(static_cast<std::int32_t>(v));
+  }
+  const auto count = static_cast<std::int32_t>(kept.size());
   if (count < smallest_core || 2 * count > graph.vertex_count()) {
     std::iota(number_.begin(), number_.end(), 0);
     offsets_.assign(number_.size() + 1, 0);
@@ -110,13 +104,7 @@ Condensation::Condensation(const Graph& graph, std::int32_t smallest_core)
     }
     offsets_.push_back(static_cast<std::int32_t>(hosts_.size()));
   }
-  core_.offsets = {0};
-  for (std::int32_t v = 0; v < graph.vertex_count(); ++v) {
-    if (number_[static_cast<std::size_t>(v)] < 0) continue;
-    for (const std::int32_t u : list_neighbours(graph, v))
-      if (number_[static_cast<std::size_t>(u)] >= 0) core_.neighbours.push_back(number_[static_cast<std::size_t>(u)]);
-    core_.offsets.push_back(static_cast<std::int32_t>(core_.neighbours.size()));
-  }
+  core_ = take_part(graph, kept, scratch);
 }
 
 Ints Condensation::expand_sides(const Ints& side) const {
@@ -150,7 +138,7 @@ double Condensation::estimate_operations(const Ints& position) const {
   Ints seen_from(count, -1);
   for (std::int32_t row = 0; row < static_cast<std::int32_t>(count); ++row) {
     seen_from[static_cast<std::size_t>(row)] = row;
-    for (const std::int32_t u : list_neighbours(core_, at[static_cast<std::size_t>(row)])) {
+    for (const std::int32_t u : core_.list_neighbours(at[static_cast<std::size_t>(row)])) {
       if (position[static_cast<std::size_t>(u)] > row) continue;
       for (auto place = static_cast<std::size_t>(position[static_cast<std::size_t>(u)]); seen_from[place] != row;
            place = static_cast<std::size_t>(parent[place])) {
@@ -181,7 +169,7 @@ Ints Condensation::expand_order(const Ints& position) const {
   for (std::size_t place = 0; place < position.size(); ++place) {
     Ints& before = dominated[place];
     std::stable_sort(before.begin(), before.end(),
-                     [&](std::int32_t a, std::int32_t b) { return list_neighbours(graph_, a).size() < list_neighbours(graph_, b).size(); });
+                     [&](std::int32_t a, std::int32_t b) { return graph_.list_neighbours(a).size() < graph_.list_neighbours(b).size(); });
     for (const std::int32_t v : before) result[static_cast<std::size_t>(v)] = next++;
     result[static_cast<std::size_t>(last[place])] = next++;
   }

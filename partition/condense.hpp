@@ -20,9 +20,9 @@ class Condensation {
   /// The graph of the vertices that no other dominates, in their order.
   const Graph& core() const { return core_; }
 
-  /// Whether METIS orders the core in so little time that it may try several times: its time goes with the core, that of the factorisation
-  /// with the graph.
-  bool is_small() const { return 4 * core_.vertex_count() <= graph_.vertex_count(); }
+  /// How many separators or orders of the core to seek where one would be sought of the graph: METIS's time goes with the core, that of the
+  /// factorisation with the graph.
+  int find_tries() const { return 4 * core_.vertex_count() <= graph_.vertex_count() ? 4 : 1; }
 
   /// A separator of the whole graph from one of the core. side: (core vertices) 0, 1 or 2, the separator; the same for every vertex of
   /// the graph. A dominated vertex is in the separator only if all are that dominate it.

@@ -1,4 +1,5 @@
-// Method:     A part that one rank can hold is cut by METIS's vertex separator, the best of four. A larger one is cut into clusters by
+// Method:     A part that one rank can hold is condensed (condense.cpp) and cut by METIS's vertex separator, the best of four. A larger one
+// is cut into clusters by
 //             METIS k-way; their quotient graph, weighted by vertices and edges, is bisected by METIS (the best of eight cuts), and the
 //             edges cut are covered by the fewest vertices: the separator. Leaves and separators are ordered by METIS. Sides may be a fifth
 //             apart: a small separator is worth more, for work is balanced later, when it is known.
@@ -48,7 +49,7 @@ class Dissector {
     }
     const int left_parts = parts / 2;
     if (static_cast<std::int32_t>(vertices.size()) <= largest_gathered_) {
-      const Ints side = separate(take(vertices));
+      const Ints side = separate(take_part(graph_, vertices, number_));
       for (std::size_t i = 0; i < vertices.size(); ++i) side_[vertices[i]] = side[i];
     } else {
       halve_clusters(vertices, static_cast<double>(left_parts) / parts);
@@ -111,23 +112,9 @@ class Dissector {
     return edges;
   }
 
-  /// The graph of these vertices alone, in their order.
-  Graph take(const Ints& vertices) {
-    Graph inner;
-    inner.offsets.push_back(0);
-    for (std::size_t i = 0; i < vertices.size(); ++i) number_[vertices[i]] = static_cast<std::int32_t>(i);
-    for (const std::int32_t v : vertices) {
-      for (std::int32_t k = graph_.offsets[v]; k < graph_.offsets[v + 1]; ++k)
-        if (number_[graph_.neighbours[k]] >= 0) inner.neighbours.push_back(number_[graph_.neighbours[k]]);
-      inner.offsets.push_back(static_cast<std::int32_t>(inner.neighbours.size()));
-    }
-    for (const std::int32_t v : vertices) number_[v] = -1;
-    return inner;
-  }
-
   /// The next places of the order, by nested dissection among these vertices.
   void place(const Ints& vertices) {
-    const Ints order = order_nested_dissection(take(vertices));
+    const Ints order = order_nested_dissection(take_part(graph_, vertices, number_));
     for (std::size_t i = 0; i < vertices.size(); ++i) result_.position[vertices[i]] = placed_ + order[i];
     placed_ += static_cast<std::int32_t>(vertices.size());
   }
@@ -153,7 +140,7 @@ std::vector<std::int32_t> separate(const Graph& graph, int tries, int seed) {
     return condensed.expand_sides(side);
   }
   MetisOptions options = make_metis_options();
-  options[METIS_OPTION_NSEPS] = condensed.is_small() ? 4 * tries : tries;
+  options[METIS_OPTION_NSEPS] = tries * condensed.find_tries();
   options[METIS_OPTION_SEED] += seed;
   options[METIS_OPTION_UFACTOR] = kImbalance;
   idx_t count = core.vertex_count();

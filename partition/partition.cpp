@@ -1,4 +1,6 @@
-// Method: k-way partition of the dual graph by communication volume and nested dissection of the node graph by METIS 5.
+// Method: k-way partition of the dual graph by communication volume and nested dissection of the condensed node graph (condense.cpp) by
+//   METIS 5: with four separators a level where that graph is small against the whole; below 5,000 vertices, where METIS seeks one whatever
+//   it is asked for, the order of fewest operations of four.
 // Source: Karypis and Kumar 1998, "A fast and high quality multilevel scheme for partitioning irregular graphs"; "Multilevel k-way
 //   partitioning scheme for irregular graphs" (the METIS manual 5.1 names the options).
 // Deviations: the graphs are built here, by sorting, so that they are the same on every machine; a part that METIS leaves empty, which it
@@ -19,7 +21,6 @@
 namespace carillon::partition {
 namespace {
 
-constexpr int kTries = 4;                       // separators, or orders, of a condensed graph
 constexpr std::int32_t kManySeparators = 5000;  // vertices: from here on METIS seeks as many separators a level as it is asked for
 
 void check_entries(std::size_t entries) {
@@ -235,14 +236,14 @@ std::vector<std::int32_t> order_nested_dissection(const Graph& graph) {
                           position.data());
     });
   };
-  if (!condensed.is_small() || vertices >= kManySeparators) {
-    options[METIS_OPTION_NSEPS] = condensed.is_small() ? kTries : 1;
+  if (condensed.find_tries() == 1 || vertices >= kManySeparators) {
+    options[METIS_OPTION_NSEPS] = condensed.find_tries();
     order();
     return condensed.expand_order(position);
   }
   std::vector<std::int32_t> best;
   double fewest = std::numeric_limits<double>::infinity();
-  for (int attempt = 0; attempt < kTries; ++attempt, ++options[METIS_OPTION_SEED]) {
+  for (int attempt = 0; attempt < condensed.find_tries(); ++attempt, ++options[METIS_OPTION_SEED]) {
     order();
     const double operations = condensed.estimate_operations(position);
     if (operations >= fewest) continue;
@@ -250,6 +251,18 @@ std::vector<std::int32_t> order_nested_dissection(const Graph& graph) {
     best = position;
   }
   return condensed.expand_order(best);
+}
+
+Graph take_part(const Graph& graph, const std::vector<std::int32_t>& vertices, std::vector<std::int32_t>& number) {
+  Graph part{{0}, {}};
+  for (std::size_t i = 0; i < vertices.size(); ++i) number[vertices[i]] = static_cast<std::int32_t>(i);
+  for (const std::int32_t v : vertices) {
+    for (const std::int32_t to : graph.list_neighbours(v))
+      if (number[to] >= 0) part.neighbours.push_back(number[to]);
+    part.offsets.push_back(static_cast<std::int32_t>(part.neighbours.size()));
+  }
+  for (const std::int32_t v : vertices) number[v] = -1;
+  return part;
 }
 
 Graph renumber(const Graph& graph, const std::vector<std::int32_t>& position) {

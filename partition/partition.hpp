@@ -18,6 +18,10 @@ struct Graph {
   std::vector<std::int32_t> neighbours;  // (2 edges)
 
   std::int32_t vertex_count() const { return offsets.empty() ? 0 : static_cast<std::int32_t>(offsets.size()) - 1; }
+  std::span<const std::int32_t> list_neighbours(std::int32_t vertex) const {
+    const std::int32_t* first = neighbours.data() + offsets[static_cast<std::size_t>(vertex)];
+    return {first, neighbours.data() + offsets[static_cast<std::size_t>(vertex) + 1]};
+  }
 };
 
 /// How good a partition is.
@@ -49,9 +53,14 @@ Partition partition_elements(std::span<const std::int32_t> corners, int parts);
 /// The quality of parts that others have made. part: (E) in [0, parts). Throws InputError as make_dual_graph().
 Partition measure_parts(std::span<const std::int32_t> corners, std::vector<std::int32_t> part, int parts);
 
-/// Fill-reducing order of a graph by METIS nested dissection: result[v] is the position of vertex v in the elimination order (zero-based),
-/// a permutation. This is MUMPS' PERM_IN less one. Throws SystemError when METIS runs out of memory.
+/// Fill-reducing order of a graph by nested dissection, METIS's of the condensed graph (condense.hpp): result[v] is the position of vertex
+/// v in the elimination order (zero-based), a permutation. This is MUMPS' PERM_IN less one. Throws SystemError when METIS runs out of
+/// memory.
 std::vector<std::int32_t> order_nested_dissection(const Graph& graph);
+
+/// The graph of some vertices alone, which are numbered as they stand in the list, ascending. number: (vertices of the graph) -1, and so
+/// afterwards: scratch that serves many parts of one graph.
+Graph take_part(const Graph& graph, const std::vector<std::int32_t>& vertices, std::vector<std::int32_t>& number);
 
 /// The same graph with vertex v numbered position[v]; position: (vertices) a permutation.
 Graph renumber(const Graph& graph, const std::vector<std::int32_t>& position);

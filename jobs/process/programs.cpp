@@ -10,6 +10,7 @@
 #include <csignal>
 #include <cstring>
 #include <optional>
+#include <string_view>
 
 #include "jobs/process/process.hpp"
 #include "runtime/base/command.hpp"
@@ -34,8 +35,10 @@ std::string find_message(const std::string& errors, const std::string& program) 
   return message.starts_with("error: ") ? message.substr(7) : message;
 }
 
-constexpr double kDaemonGraceS = 2.0;
+constexpr double kDaemonGraceS = 2.0;  // Open MPI's daemon removes its session folder in some 0.05 s
 constexpr double kEndPatienceS = 5.0;
+/// In the environment of what programs are started with, and so of all that these start.
+constexpr std::string_view kMark = "CARILLON_PROGRAMS=";
 
 /// What an exit code says without a result.
 base::ResultKind find_kind(int exit_code) {
@@ -91,16 +94,16 @@ std::string Programs::run(const std::string& program, std::vector<std::string> w
   command.words.insert(command.words.end(), words.begin(), words.end());
   if (has_result) command.words.insert(command.words.end(), {"--result", result_file.string()});
   command.folder = folder_;
-  const std::string mark = "CARILLON_PROGRAMS=" + folder_.string();
+  const std::string mark = std::string(kMark) + folder_.string();
   command.environment.emplace({mark});
   for (char** entry = environ; *entry != nullptr; ++entry)
-    if (!std::string_view(*entry).starts_with("CARILLON_PROGRAMS=")) command.environment->emplace_back(*entry);
+    if (!std::string_view(*entry).starts_with(kMark)) command.environment->emplace_back(*entry);
   command.output = shows && !is_quiet_ ? STDERR_FILENO : base::kCapture;
   command.errors = base::kCapture;
   const base::Finished finished = base::run(command, {.may_stop = [](const base::Finished&) { return SignalWatch::get_signal() != 0; }});
   if (SignalWatch::get_signal() != 0) {
     // Open MPI's daemon outlives a program of one rank that was killed until it has removed its session folder.
-    process::end_with_environment(mark, kEndPatienceS, kDaemonGraceS);
+    end_with_environment(mark, kEndPatienceS, kDaemonGraceS);
     throw SystemError(fmt::format("ended by signal {}", SignalWatch::get_signal()));
   }
   if (finished.exit_code == 0) return finished.output;

@@ -83,6 +83,17 @@ void normalise(const Operators& operators, const Columns& x, const Columns& work
   scale_all(norm);
 }
 
+// K phi - lambda M phi of a group's modes. work: as many columns.
+void calc_residuals(const Operators& operators, const Group& group, const std::vector<double>& lambda, const Columns& phi,
+                    const Columns& residual, const Columns& work) {
+  operators.stiffness.multiply(phi, residual);
+  operators.mass.multiply(phi, work);
+  for (int c = 0; c < phi.count; ++c) {
+    const double value = lambda[group[static_cast<std::size_t>(c)]];
+    for (std::ptrdiff_t i = 0; i < phi.rows; ++i) residual.column(c)[i] -= value * work.column(c)[i];
+  }
+}
+
 // The factor at a shift below the group, `nearness` away relative to lambda. Returns the shift.
 double factorise_below(const RefineRequest& request, const Group& group, double nearness, const std::vector<double>& lambda,
                        RefineCost& cost) {
@@ -109,13 +120,7 @@ struct Corrections {
         work{space.data() + 2 * rows * group.size(), all.rows, all.rows, phi.count} {
     for (std::size_t j = 0; j < group.size(); ++j)
       std::copy_n(all.column(static_cast<int>(group[j])), rows, phi.column(static_cast<int>(j)));
-    request.operators->stiffness.multiply(phi, d);
-    request.operators->mass.multiply(phi, work);
-    for (std::size_t j = 0; j < group.size(); ++j) {
-      const double* m_phi = work.column(static_cast<int>(j));
-      double* residual = d.column(static_cast<int>(j));
-      for (std::size_t i = 0; i < rows; ++i) residual[i] -= lambda[group[j]] * m_phi[i];
-    }
+    calc_residuals(*request.operators, group, lambda, phi, d, work);
     request.get_factor().solve(d.values, d.values, d.stride, d.count);
     cost.solves += d.count;
   }
@@ -174,22 +179,17 @@ void polish(const RefineRequest& request, const Group& bad, std::vector<double>&
   {
     const LocalColumns own(polished);
     const Columns x = own.view();
-    std::vector<double> space(static_cast<std::size_t>(x.rows) * bad.size());
-    const Columns work{space.data(), x.rows, x.rows, x.count};
+    const std::size_t size = static_cast<std::size_t>(x.rows) * bad.size();
+    std::vector<double> space(2 * size);
+    const Columns phi{space.data(), x.rows, x.rows, x.count};
+    const Columns work{space.data() + size, x.rows, x.rows, x.count};
+    for (std::size_t j = 0; j < bad.size(); ++j) std::copy_n(all.column(static_cast<int>(bad[j])), x.rows, phi.column(static_cast<int>(j)));
     // (lambda - sigma) (K - sigma M)^-1 M phi, as a correction: so the rounding of the solve is that of the correction, not of phi.
-    for (std::size_t j = 0; j < bad.size(); ++j) {
-      const Columns phi = all.part(static_cast<int>(bad[j]), 1);
-      operators.stiffness.multiply(phi, x.part(static_cast<int>(j), 1));
-      operators.mass.multiply(phi, work.part(static_cast<int>(j), 1));
-      for (std::ptrdiff_t i = 0; i < x.rows; ++i) x.column(static_cast<int>(j))[i] -= lambda[bad[j]] * work.column(static_cast<int>(j))[i];
-    }
+    calc_residuals(operators, bad, lambda, phi, x, work);
     request.at_hand->solve(x.values, x.values, x.stride, x.count);
     cost.solves += x.count;
-    for (std::size_t j = 0; j < bad.size(); ++j) {
-      const double* phi = all.column(static_cast<int>(bad[j]));
-      double* corrected = x.column(static_cast<int>(j));
-      for (std::ptrdiff_t i = 0; i < x.rows; ++i) corrected[i] = phi[i] - corrected[i];
-    }
+    for (int j = 0; j < x.count; ++j)
+      for (std::ptrdiff_t i = 0; i < x.rows; ++i) x.column(j)[i] = phi.column(j)[i] - x.column(j)[i];
     for (int pass = 0; pass < 3; ++pass) {
       normalise(operators, x, work);
       operators.mass.multiply(x, work);

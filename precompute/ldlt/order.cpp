@@ -103,8 +103,6 @@ Ints bisect_clusters(const SeparatorTree& tree, const Ints& weights, std::vector
 /// Where each own node and ghost is before anything is gathered.
 std::vector<Label> label_nodes(const Communicator& comm, const NodeLinks& nodes, const IndexPartition& owners, const SeparatorTree& tree,
                                std::int32_t largest) {
-  if (owners.total() <= largest || comm.size() == 1)
-    return comm.agree([&] { return std::vector<Label>(static_cast<std::size_t>(nodes.count()), Label{tree.root(), 0}); });
   Ints cluster = comm.agree([&] {
     const auto share = static_cast<std::int32_t>(std::int64_t{kClusters} * nodes.own_nodes / owners.total());
     return partition::make_clusters(make_own_graph(nodes), std::min(std::max(share, kFewestClusters), std::max(nodes.own_nodes / 4, 1)));
@@ -172,21 +170,12 @@ struct Piece {
   Graph graph;
 };
 
-/// The graph of some of a piece's vertices alone. number: (vertices) scratch, -1.
+/// Some of a piece's vertices alone. number: scratch of partition::take_part.
 Piece take(const Piece& piece, const Ints& vertices, Label label, Ints& number) {
   Piece taken;
   taken.label = label;
-  taken.graph.offsets.push_back(0);
-  for (std::size_t i = 0; i < vertices.size(); ++i) number[static_cast<std::size_t>(vertices[i])] = static_cast<std::int32_t>(i);
-  for (const std::int32_t v : vertices) {
-    taken.nodes.push_back(piece.nodes[static_cast<std::size_t>(v)]);
-    for (std::int32_t k = piece.graph.offsets[static_cast<std::size_t>(v)]; k < piece.graph.offsets[static_cast<std::size_t>(v) + 1]; ++k) {
-      const std::int32_t to = number[static_cast<std::size_t>(piece.graph.neighbours[static_cast<std::size_t>(k)])];
-      if (to >= 0) taken.graph.neighbours.push_back(to);
-    }
-    taken.graph.offsets.push_back(static_cast<std::int32_t>(taken.graph.neighbours.size()));
-  }
-  for (const std::int32_t v : vertices) number[static_cast<std::size_t>(v)] = -1;
+  for (const std::int32_t v : vertices) taken.nodes.push_back(piece.nodes[static_cast<std::size_t>(v)]);
+  taken.graph = partition::take_part(piece.graph, vertices, number);
   return taken;
 }
 
@@ -285,13 +274,13 @@ Piece make_whole(const NodeLinks& nodes, const SeparatorTree& tree) {
 std::vector<Piece> find_pieces(const Communicator& comm, const NodeLinks& nodes, const IndexPartition& owners, const SeparatorTree& tree,
                                std::int32_t largest) {
   const bool is_one_piece = owners.total() <= largest || comm.size() == 1;
-  if (!is_one_piece || owners.begin(1) < owners.total())
-    return gather_pieces(comm, nodes, tree, label_nodes(comm, nodes, owners, tree, largest));
-  return comm.agree([&] {
-    std::vector<Piece> pieces;
-    if (nodes.own_nodes > 0) pieces.push_back(make_whole(nodes, tree));
-    return pieces;
-  });
+  if (is_one_piece && owners.begin(1) == owners.total()) {
+    return comm.agree([&] { return nodes.own_nodes > 0 ? std::vector<Piece>{make_whole(nodes, tree)} : std::vector<Piece>(); });
+  }
+  if (!is_one_piece) return gather_pieces(comm, nodes, tree, label_nodes(comm, nodes, owners, tree, largest));
+  return gather_pieces(comm, nodes, tree, comm.agree([&] {
+    return std::vector<Label>(static_cast<std::size_t>(nodes.count()), Label{tree.root(), 0});
+  }));
 }
 
 /// Appends the piece's nodes to their part, in the order of METIS.

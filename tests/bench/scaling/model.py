@@ -98,7 +98,7 @@ def find_halo_unknowns(body, ranks):
 LARGEST_GATHERED = 1e6  # nodes of a part that one rank cuts: partition/dissect.hpp
 CLUSTERS = 64  # of a rank, at least 1,024 in all: the vertices of the quotient graph
 CLUSTER_TRIES = 2  # of the quotient graph the best of eight bisections is taken, of a part the best of four separators
-MAPPING_S_PER_RANK = 3e-4  # every rank maps all shared fronts: count_mapping, 0.3 s at 1,024 ranks of 5.7 million unknowns
+MAPPING_S_PER_RANK = 4.5e-4  # every rank maps all shared fronts: count_mapping, 0.45 s at 1,024 ranks of 5.7 million unknowns
 PROGRAM_BYTES = 9e7  # what a rank holds before it has a matrix
 FACTOR_CALLS = 14  # collective calls of a factorisation, before and after its fronts
 PLAN_CALLS = 100  # of an order and its plan, once

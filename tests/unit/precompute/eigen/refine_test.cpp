@@ -68,6 +68,59 @@ TEST(RefineModes, brings_spoiled_modes_back_within_the_tolerance) {
   }
 }
 
+// Solves whose entries are wrong by one part in ten million, as those of a bad factorisation are.
+class RoundingFactor : public ShiftedFactor {
+ public:
+  explicit RoundingFactor(ShiftedFactor& exact) : exact_(exact) {}
+  bool factorise(double sigma) override { return exact_.factorise(sigma); }
+  void solve(const double* b, double* x, std::ptrdiff_t stride, int columns) override {
+    exact_.solve(b, x, stride, columns);
+    for (std::ptrdiff_t i = 0; i < stride * columns; ++i) x[i] *= 1 + 1e-7 * std::sin(12.9898 * static_cast<double>(i + 1));
+  }
+  std::int64_t get_negative_pivots() const override { return exact_.get_negative_pivots(); }
+  double get_backward_error() const override { return exact_.get_backward_error(); }
+  std::int64_t get_peak_bytes() const override { return exact_.get_peak_bytes(); }
+  std::string get_solver() const override { return exact_.get_solver(); }
+  std::string get_ordering() const override { return exact_.get_ordering(); }
+  std::int64_t get_entries() const override { return exact_.get_entries(); }
+  double get_flops() const override { return exact_.get_flops(); }
+
+ private:
+  ShiftedFactor& exact_;
+};
+
+TEST(RefineModes, needs_no_factorisation_where_solves_at_hand_are_rounded_more_than_the_tolerance) {
+  const test::Network block = test::make_block(4, 4, 8);
+  const std::vector<double> all = test::calc_all_eigenvalues(block);
+  const test::System system = test::make_system(block);
+  Options options;
+  options.low_hz = 1;
+  options.high_hz = to_hz(0.5 * (all[20] + all[21]));
+  Modes modes = solve_modes(system.problem, options);
+  ASSERT_EQ(modes.lambda.size(), 15u);
+  const la::Pencil pencil{system.stiffness, system.mass};
+  const Operators operators(pencil);
+  const auto factor = make_mumps_factor(pencil, {});
+  RoundingFactor at_hand(*factor);
+  ASSERT_TRUE(at_hand.factorise(0.5 * (all[10] + all[11])));
+  RefineRequest request;
+  request.operators = &operators;
+  request.tolerance = 1e-9;
+  request.at_hand = &at_hand;
+  request.get_factor = [&]() -> ShiftedFactor& { return *factor; };
+  spoil(modes.shapes, 1e-10);  // what fast motions make of it is above the tolerance, and nothing else is
+  ModeErrors errors = normalise_and_measure(operators, modes.lambda, modes.shapes);
+  ASSERT_GT(*std::max_element(errors.residual.begin(), errors.residual.end()), 2 * request.tolerance);
+  const RefineCost cost = refine_modes(request, modes.lambda, modes.shapes, errors);
+  EXPECT_EQ(cost.factorisations, 0);
+  EXPECT_GT(cost.solves, 0);
+  EXPECT_LT(errors.orthonormality, 1e-10);
+  for (std::size_t j = 0; j < modes.lambda.size(); ++j) {
+    EXPECT_LE(errors.residual[j], request.tolerance) << j;
+    EXPECT_NEAR(modes.lambda[j] / all[j + 6], 1.0, 1e-9) << j;
+  }
+}
+
 // Goes through a band of these eigenvalues as a solver would that finds all of every slice; returns the modes per slice.
 std::vector<std::int64_t> sweep_through(const std::vector<double>& lambda, const Slice& band, std::int64_t max, int& counts) {
   const CountBelow count = [&](double x) { return std::lower_bound(lambda.begin(), lambda.end(), x) - lambda.begin(); };

@@ -18,6 +18,7 @@
 #include "precompute/ldlt/kernels.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/base/error.hpp"
+#include "runtime/base/host.hpp"
 #include "tests/unit/precompute/ldlt/pencil.hpp"
 
 namespace {
@@ -496,6 +497,35 @@ TEST(factor, refuses_rows_that_are_not_whole_nodes) {
   petsc::check(MatAssemblyBegin(k, MAT_FINAL_ASSEMBLY));
   petsc::check(MatAssemblyEnd(k, MAT_FINAL_ASSEMBLY));
   EXPECT_THROW(Factor({k, k}), InputError);
+}
+
+TEST(Factor, keeps_the_memory_of_a_factorisation_for_the_next_and_gives_it_back_at_the_first_solve) {
+  if (find_ranks() > 1) GTEST_SKIP() << "MPI's own memory changes as much";
+  const Pencil lattice = make_lattice(11, 11, 11, 1, MassKind::kDiagonal, 5);
+  const la::Pencil pencil{lattice.k, lattice.m};
+  const auto find_resident = [] { return static_cast<double>(base::find_memory().resident); };
+  constexpr double kSlack = 1 << 20;
+  const double before = find_resident();
+  double kept = 0;
+  {
+    Factor factor(pencil);
+    std::vector<double> x(static_cast<std::size_t>(lattice.rows) + 1, 1.0);
+    const auto solve = [&] { factor.solve(x.data(), x.data(), std::max<int>(lattice.rows, 1), 1); };
+    ASSERT_TRUE(factor.factorise(-1.0));
+    solve();
+    const double solved = find_resident();
+    for (int round = 0; round < 5; ++round) {
+      ASSERT_TRUE(factor.factorise(-1.0 - round));
+      kept = find_resident();
+      ASSERT_TRUE(factor.factorise(-1.5 - round));
+      EXPECT_NEAR(find_resident(), kept, kSlack) << "another factorisation takes the same pages";
+      solve();
+      EXPECT_NEAR(find_resident(), solved, kSlack) << "round " << round;
+    }
+    EXPECT_GT(kept - solved, kSlack) << "nothing was kept that could be given back";
+    ASSERT_TRUE(factor.factorise(-1.0));
+  }
+  EXPECT_LT(find_resident() - before, kept - before) << "what waits goes with the factor";
 }
 
 }  // namespace
