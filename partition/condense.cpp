@@ -1,7 +1,7 @@
 // Method:     Who dominates a vertex is among the neighbours of each of its neighbours, so of two with few that are not neighbours
-//             themselves; each candidate is compared row by row. A vertex that is dominated at all is dominated by one of the core, as
-//             domination is transitive; the vertices of the core that dominate it are neighbours of each other, so no separator has them
-//             on two sides.
+//             themselves; each candidate is compared row by row. In a mesh it is a node of all elements of the vertex. A vertex that is
+//             dominated at all is dominated by one of the core, as domination is transitive; the vertices of the core that dominate it are
+//             neighbours of each other, so no separator has them on two sides.
 // Source:     George and Liu 1989, "The evolution of the minimum degree ordering algorithm" (who may wait when neighbourhoods contain each
 //             other); Barmak and Minian 2012 (dominated vertices); Liu 1990, "The role of elimination trees in sparse factorization".
 // Deviations: none.
@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <numeric>
 #include <span>
+#include <utility>
 
 namespace carillon::partition {
 namespace {
@@ -78,33 +79,119 @@ class Dominators {
   std::vector<char> mark_;  // (vertices) 1: a neighbour of v; 2: the first, or a neighbour of it too
 };
 
+/// All nodes that are in every element of a node, in compressed rows: of two in the same elements the second does not count for the first.
+struct ElementDominators {
+  ElementDominators(std::span<const std::int32_t> elements, int width, const ElementLists& lists, std::int32_t nodes) {
+    std::vector<std::int32_t> shared(static_cast<std::size_t>(nodes), 0);  // elements of v, up to this one, which all have the node
+    for (std::int32_t v = 0; v < nodes; ++v) {
+      const auto of_v = lists.of(v);
+      for (std::size_t k = 0; k < of_v.size(); ++k)
+        for (const std::int32_t u : get(elements, of_v[k], width))
+          if (u >= 0) shared[static_cast<std::size_t>(u)] += shared[static_cast<std::size_t>(u)] == static_cast<std::int32_t>(k) ? 1 : 0;
+      for (const std::int32_t e : of_v.first(std::min<std::size_t>(of_v.size(), 1)))
+        for (const std::int32_t u : get(elements, e, width)) {
+          if (u < 0) continue;
+          const auto common = static_cast<std::size_t>(std::exchange(shared[static_cast<std::size_t>(u)], 0));
+          const std::size_t count = lists.of(u).size();
+          if (common == of_v.size() && u != v && (count > common || u < v)) list.push_back(u);
+        }
+      offsets.push_back(static_cast<std::int32_t>(list.size()));
+    }
+  }
+
+  Ints offsets{0};
+  Ints list;
+
+ private:
+  static std::span<const std::int32_t> get(std::span<const std::int32_t> elements, std::int32_t e, int width) {
+    return elements.subspan(static_cast<std::size_t>(e) * static_cast<std::size_t>(width), static_cast<std::size_t>(width));
+  }
+};
+
+int count_tries(std::int64_t core, std::int64_t all) { return 4 * core <= all ? 4 : 1; }
+
+/// width: (places) vertices that are eliminated together.
+double sum_operations(const Graph& core, const Ints& position, const std::vector<double>& width) {
+  const std::size_t count = position.size();
+  Ints at(count);
+  for (std::size_t v = 0; v < count; ++v) at[static_cast<std::size_t>(position[v])] = static_cast<std::int32_t>(v);
+  // Row by row of the factor: the places on the ways up the elimination tree from the neighbours before (Liu 1990).
+  std::vector<double> below(count, 0.0);
+  Ints parent(count, -1);
+  Ints seen_from(count, -1);
+  for (std::int32_t row = 0; row < static_cast<std::int32_t>(count); ++row) {
+    seen_from[static_cast<std::size_t>(row)] = row;
+    for (const std::int32_t u : core.list_neighbours(at[static_cast<std::size_t>(row)])) {
+      if (position[static_cast<std::size_t>(u)] > row) continue;
+      for (auto place = static_cast<std::size_t>(position[static_cast<std::size_t>(u)]); seen_from[place] != row;
+           place = static_cast<std::size_t>(parent[place])) {
+        seen_from[place] = row;
+        below[place] += width[static_cast<std::size_t>(row)];
+        if (parent[place] < 0) parent[place] = row;
+      }
+    }
+  }
+  double operations = 0;
+  for (std::size_t k = 0; k < count; ++k) operations += width[k] * (below[k] + width[k] / 2) * (below[k] + width[k] / 2);
+  return operations;
+}
+
 }  // namespace
 
-Condensation::Condensation(const Graph& graph, std::int32_t smallest_core)
-    : graph_(graph), number_(static_cast<std::size_t>(graph.vertex_count()), -1) {
+Condensation::Condensation(const Graph& graph, std::int32_t smallest_core) : number_(static_cast<std::size_t>(graph.vertex_count()), -1) {
+  for (std::int32_t v = 0; v < graph.vertex_count(); ++v) degree_.push_back(static_cast<std::int32_t>(graph.list_neighbours(v).size()));
   const Dominators all(graph);
-  Ints scratch = number_;
+  const Ints kept = choose_core(all.offsets, all.list, smallest_core);
+  Ints scratch(number_.size(), -1);
+  core_ = kept.empty() ? graph : take_part(graph, kept, scratch);
+}
+
+Condensation::Condensation(std::span<const std::int32_t> elements, int width, std::int32_t nodes, std::int32_t smallest_core)
+    : number_(static_cast<std::size_t>(nodes), -1) {
+  const ElementLists lists = list_elements(elements, width, nodes);
+  for (std::int32_t v = 0; v < nodes; ++v) degree_.push_back(static_cast<std::int32_t>(lists.of(v).size()));
+  const ElementDominators all(elements, width, lists, nodes);
+  const Ints kept = choose_core(all.offsets, all.list, smallest_core);
+  if (kept.empty()) {
+    core_ = make_node_graph(elements, width, nodes);
+    return;
+  }
+  Ints of_core(elements.begin(), elements.end());
+  for (std::int32_t& node : of_core)
+    if (node >= 0) node = number_[static_cast<std::size_t>(node)];
+  core_ = make_node_graph(of_core, width, static_cast<std::int32_t>(kept.size()));
+}
+
+Ints Condensation::choose_core(const Ints& offsets, const Ints& dominators, std::int32_t smallest_core) {
   Ints kept;
   for (std::size_t v = 0; v < number_.size(); ++v) {
-    if (all.offsets[v] < all.offsets[v + 1]) continue;
+    if (offsets[v] < offsets[v + 1]) continue;
     number_[v] = static_cast<std::int32_t>(kept.size());
     kept.push_back(static_cast<std::int32_t>(v));
   }
-  const auto count = static_cast<std::int32_t>(kept.size());
-  if (count < smallest_core || 2 * count > graph.vertex_count()) {
+  if (static_cast<std::int32_t>(kept.size()) < smallest_core || 2 * kept.size() > number_.size()) {
     std::iota(number_.begin(), number_.end(), 0);
     offsets_.assign(number_.size() + 1, 0);
-    core_ = graph;
-    return;
+    return {};
   }
   for (std::size_t v = 0; v < number_.size(); ++v) {
-    for (std::int32_t k = all.offsets[v]; k < all.offsets[v + 1]; ++k) {
-      const std::int32_t host = number_[static_cast<std::size_t>(all.list[static_cast<std::size_t>(k)])];
+    for (std::int32_t k = offsets[v]; k < offsets[v + 1]; ++k) {
+      const std::int32_t host = number_[static_cast<std::size_t>(dominators[static_cast<std::size_t>(k)])];
       if (host >= 0) hosts_.push_back(host);
     }
     offsets_.push_back(static_cast<std::int32_t>(hosts_.size()));
   }
-  core_ = take_part(graph, kept, scratch);
+  return kept;
+}
+
+int Condensation::find_tries() const { return count_tries(core_.vertex_count(), static_cast<std::int64_t>(number_.size())); }
+
+Ints Condensation::count_weights() const {
+  Ints weights(static_cast<std::size_t>(core_.vertex_count()), 1);
+  for (std::size_t v = 0; v < number_.size(); ++v)
+    if (number_[v] < 0)
+      ++weights[static_cast<std::size_t>(*std::min_element(hosts_.begin() + offsets_[v], hosts_.begin() + offsets_[v + 1]))];
+  return weights;
 }
 
 Ints Condensation::expand_sides(const Ints& side) const {
@@ -126,31 +213,10 @@ std::int32_t Condensation::find_first_host(std::int32_t vertex, const Ints& posi
 }
 
 double Condensation::estimate_operations(const Ints& position) const {
-  const auto count = position.size();
-  std::vector<double> width(count, 1.0);  // (places) what is eliminated there
-  for (std::int32_t v = 0; v < graph_.vertex_count(); ++v)
-    if (number_[static_cast<std::size_t>(v)] < 0) ++width[static_cast<std::size_t>(find_first_host(v, position))];
-  Ints at(count);
-  for (std::size_t v = 0; v < count; ++v) at[static_cast<std::size_t>(position[v])] = static_cast<std::int32_t>(v);
-  // Row by row of the factor: the places on the ways up the elimination tree from the neighbours before (Liu 1990).
-  std::vector<double> below(count, 0.0);
-  Ints parent(count, -1);
-  Ints seen_from(count, -1);
-  for (std::int32_t row = 0; row < static_cast<std::int32_t>(count); ++row) {
-    seen_from[static_cast<std::size_t>(row)] = row;
-    for (const std::int32_t u : core_.list_neighbours(at[static_cast<std::size_t>(row)])) {
-      if (position[static_cast<std::size_t>(u)] > row) continue;
-      for (auto place = static_cast<std::size_t>(position[static_cast<std::size_t>(u)]); seen_from[place] != row;
-           place = static_cast<std::size_t>(parent[place])) {
-        seen_from[place] = row;
-        below[place] += width[static_cast<std::size_t>(row)];
-        if (parent[place] < 0) parent[place] = row;
-      }
-    }
-  }
-  double operations = 0;
-  for (std::size_t k = 0; k < count; ++k) operations += width[k] * (below[k] + width[k] / 2) * (below[k] + width[k] / 2);
-  return operations;
+  std::vector<double> width(position.size(), 1.0);  // what is eliminated there
+  for (std::size_t v = 0; v < number_.size(); ++v)
+    if (number_[v] < 0) ++width[static_cast<std::size_t>(find_first_host(static_cast<std::int32_t>(v), position))];
+  return sum_operations(core_, position, width);
 }
 
 Ints Condensation::expand_order(const Ints& position) const {
@@ -168,12 +234,23 @@ Ints Condensation::expand_order(const Ints& position) const {
   std::int32_t next = 0;
   for (std::size_t place = 0; place < position.size(); ++place) {
     Ints& before = dominated[place];
-    std::stable_sort(before.begin(), before.end(),
-                     [&](std::int32_t a, std::int32_t b) { return graph_.list_neighbours(a).size() < graph_.list_neighbours(b).size(); });
+    std::stable_sort(before.begin(), before.end(), [&](std::int32_t a, std::int32_t b) {
+      return degree_[static_cast<std::size_t>(a)] < degree_[static_cast<std::size_t>(b)];
+    });
     for (const std::int32_t v : before) result[static_cast<std::size_t>(v)] = next++;
     result[static_cast<std::size_t>(last[place])] = next++;
   }
   return result;
+}
+
+double estimate_operations(const Graph& core, const Ints& weights, const Ints& position) {
+  std::vector<double> width(position.size());
+  for (std::size_t v = 0; v < position.size(); ++v) width[static_cast<std::size_t>(position[v])] = weights[v];
+  return sum_operations(core, position, width);
+}
+
+int find_tries(const Graph& core, const Ints& weights) {
+  return count_tries(core.vertex_count(), std::accumulate(weights.begin(), weights.end(), std::int64_t{0}));
 }
 
 }  // namespace carillon::partition

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "partition/partition.hpp"
@@ -13,16 +14,24 @@ namespace carillon::partition {
 /// T10 the middle of an edge is dominated by both ends. Vertices with the same neighbours dominate each other; the first of them stays.
 class Condensation {
  public:
-  /// graph: has to outlive this. One whose core would have less than `smallest_core` vertices, or more than
-  /// half of them, is its own core.
-  explicit Condensation(const Graph& graph, std::int32_t smallest_core = 64);
+  /// One whose core would have less than `smallest_core` vertices, or more than half of them, is its own core.
+  explicit Condensation(const Graph& graph, std::int32_t smallest_core = kSmallestCore);
+  /// Of the node graph of a mesh, which is not made: u dominates v if it is in all elements of v. So a vertex whose neighbours another has
+  /// by chance stays in the core. elements: as make_node_graph(), each with
+  /// different nodes.
+  Condensation(std::span<const std::int32_t> elements, int width, std::int32_t nodes, std::int32_t smallest_core = kSmallestCore);
 
   /// The graph of the vertices that no other dominates, in their order.
   const Graph& core() const { return core_; }
+  /// (vertices) the number of each in the core, -1: dominated.
+  const std::vector<std::int32_t>& numbers() const { return number_; }
 
   /// How many separators or orders of the core to seek where one would be sought of the graph: METIS's time goes with the core, that of the
   /// factorisation with the graph.
-  int find_tries() const { return 4 * core_.vertex_count() <= graph_.vertex_count() ? 4 : 1; }
+  int find_tries() const;
+
+  /// (core vertices) how many vertices each stands for: itself, and those dominated of which it is the first host by number.
+  std::vector<std::int32_t> count_weights() const;
 
   /// A separator of the whole graph from one of the core. side: (core vertices) 0, 1 or 2, the separator; the same for every vertex of
   /// the graph. A dominated vertex is in the separator only if all are that dominate it.
@@ -31,18 +40,30 @@ class Condensation {
   /// An order of elimination of the whole graph from one of the core: a dominated vertex comes before the first that dominates it, those
   /// with few neighbours first. position: (core vertices) a permutation; result: (vertices) a permutation.
   std::vector<std::int32_t> expand_order(const std::vector<std::int32_t>& position) const;
-  /// Squares of the lengths of the columns of L, summed, in the order that expand_order makes of this one: operations, to compare orders
-  /// by. What comes before a vertex of the core counts as if it had all the rows of that vertex, which is up to twice too much.
+  /// Operations of a factorisation in the order that expand_order makes of this one, to compare orders by: partition::estimate_operations
+  /// with the vertices that come before each one.
   double estimate_operations(const std::vector<std::int32_t>& position) const;
 
  private:
+  static constexpr std::int32_t kSmallestCore = 64;
+
+  /// dominators, offsets: all that dominate each vertex, in compressed rows. The vertices of the core; empty: it is not worth it.
+  std::vector<std::int32_t> choose_core(const std::vector<std::int32_t>& offsets, const std::vector<std::int32_t>& dominators,
+                                        std::int32_t smallest_core);
   std::int32_t find_first_host(std::int32_t vertex, const std::vector<std::int32_t>& position) const;
 
-  const Graph& graph_;
   std::vector<std::int32_t> offsets_{0};  // (vertices + 1) of hosts_
   std::vector<std::int32_t> hosts_;       // per dominated vertex the vertices of the core that dominate it
   std::vector<std::int32_t> number_;      // (vertices) in the core, -1: dominated
+  std::vector<std::int32_t> degree_;      // (vertices) neighbours, or elements: who dominates another has no fewer
   Graph core_;
 };
+
+/// Squares of the lengths of the columns of L, summed, where each vertex of a core is eliminated together with those that it stands for,
+/// as if these had all its rows, which is up to twice too much. weights: (vertices) how many that is; position: (vertices) the order.
+double estimate_operations(const Graph& core, const std::vector<std::int32_t>& weights, const std::vector<std::int32_t>& position);
+
+/// Condensation::find_tries() of a core, or a part of one, whose vertices stand for so many.
+int find_tries(const Graph& core, const std::vector<std::int32_t>& weights);
 
 }  // namespace carillon::partition

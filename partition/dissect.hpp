@@ -19,8 +19,8 @@ struct WeightedGraph {
 };
 
 /// 0 and 1, the sides, or 2, the separator between them, for each vertex: the smallest of `tries` found. Sides may be a fifth apart.
-/// Another seed finds others. Throws SystemError when METIS runs out of memory, as all below.
-std::vector<std::int32_t> separate(const Graph& graph, int tries = 4, int seed = 0);
+/// Another seed finds others. weights: as order_nested_dissection. Throws SystemError when METIS runs out of memory, as all below.
+std::vector<std::int32_t> separate(const Graph& graph, int tries = 4, int seed = 0, const std::vector<std::int32_t>& weights = {});
 
 /// Vertices in `count` clusters of nearly equal size with few edges between them: the cluster of each.
 std::vector<std::int32_t> make_clusters(const Graph& graph, std::int32_t count);

@@ -78,6 +78,40 @@ void fill_empty_parts(std::vector<std::int32_t>& part, int parts) {
   }
 }
 
+/// METIS's order of a graph that is not condensed further; estimate(position): the operations by which orders are compared.
+template <typename Estimate>
+std::vector<std::int32_t> order_core(const Graph& graph, int tries, Estimate&& estimate) {
+  std::vector<std::int32_t> position(graph.vertex_count());
+  std::iota(position.begin(), position.end(), 0);
+  if (graph.neighbours.empty()) return position;
+  // METIS takes the graph by pointers to mutable memory and leaves it unchanged in effect; a copy keeps the promise of const.
+  Graph copy = graph;
+  idx_t vertices = copy.vertex_count();
+  std::vector<std::int32_t> vertex_at(vertices);
+  MetisOptions options = make_metis_options();
+  const auto order = [&] {
+    call_metis("METIS_NodeND", [&] {
+      return METIS_NodeND(&vertices, copy.offsets.data(), copy.neighbours.data(), nullptr, options.data(), vertex_at.data(),
+                          position.data());
+    });
+  };
+  if (tries == 1 || vertices >= kManySeparators) {
+    options[METIS_OPTION_NSEPS] = tries;
+    order();
+    return position;
+  }
+  std::vector<std::int32_t> best;
+  double fewest = std::numeric_limits<double>::infinity();
+  for (int attempt = 0; attempt < tries; ++attempt, ++options[METIS_OPTION_SEED]) {
+    order();
+    const double operations = estimate(position);
+    if (operations >= fewest) continue;
+    fewest = operations;
+    best = position;
+  }
+  return best;
+}
+
 }  // namespace
 
 Graph make_dual_graph(std::span<const std::int32_t> corners) {
@@ -139,19 +173,23 @@ Graph make_dual_graph(std::span<const std::int32_t> corners) {
   return graph;
 }
 
+ElementLists list_elements(std::span<const std::int32_t> elements, int width, std::int32_t nodes) {
+  const std::size_t entries = elements.size() / width * width;
+  ElementLists lists;
+  lists.begin.assign(static_cast<std::size_t>(nodes) + 1, 0);
+  for (std::size_t i = 0; i < entries; ++i)
+    if (elements[i] >= 0) ++lists.begin[elements[i] + 1];
+  std::partial_sum(lists.begin.begin(), lists.begin.end(), lists.begin.begin());
+  lists.items.resize(lists.begin.back());
+  std::vector<std::int64_t> next(lists.begin.begin(), lists.begin.end() - 1);
+  for (std::size_t i = 0; i < entries; ++i)
+    if (elements[i] >= 0) lists.items[next[elements[i]]++] = static_cast<std::int32_t>(i / width);
+  return lists;
+}
+
 Graph make_node_graph(std::span<const std::int32_t> elements, int width, std::int32_t nodes) {
-  const std::size_t count = elements.size() / width;
-  // The elements of every node, then for every node the other nodes of its elements, each once.
-  std::vector<std::int64_t> begin(static_cast<std::size_t>(nodes) + 1, 0);
-  for (std::size_t i = 0; i < count * width; ++i)
-    if (elements[i] >= 0) ++begin[elements[i] + 1];
-  std::partial_sum(begin.begin(), begin.end(), begin.begin());
-  std::vector<std::int32_t> element_of(begin.back());
-  {
-    std::vector<std::int64_t> next(begin.begin(), begin.end() - 1);
-    for (std::size_t i = 0; i < count * width; ++i)
-      if (elements[i] >= 0) element_of[next[elements[i]]++] = static_cast<std::int32_t>(i / width);
-  }
+  // For every node the other nodes of its elements, each once.
+  const ElementLists lists = list_elements(elements, width, nodes);
   Graph graph;
   graph.offsets.reserve(static_cast<std::size_t>(nodes) + 1);
   graph.offsets.push_back(0);
@@ -159,11 +197,11 @@ Graph make_node_graph(std::span<const std::int32_t> elements, int width, std::in
   std::vector<std::int32_t> near;
   for (std::int32_t v = 0; v < nodes; ++v) {
     seen_from[v] = v;
-    near.resize(static_cast<std::size_t>(begin[v + 1] - begin[v]) * width + 1);
+    near.resize(lists.of(v).size() * width + 1);
     // Each is written, and kept where it is new: a branch would be predicted wrongly half of the time.
     std::size_t count_near = 0;
-    for (std::int64_t k = begin[v]; k < begin[v + 1]; ++k)
-      for (const std::int32_t w : elements.subspan(static_cast<std::size_t>(element_of[k]) * width, width)) {
+    for (const std::int32_t e : lists.of(v))
+      for (const std::int32_t w : elements.subspan(static_cast<std::size_t>(e) * width, width)) {
         if (w < 0) continue;
         near[count_near] = w;
         count_near += seen_from[w] != v ? 1 : 0;
@@ -219,38 +257,14 @@ Partition measure_parts(std::span<const std::int32_t> corners, std::vector<std::
   return result;
 }
 
-std::vector<std::int32_t> order_nested_dissection(const Graph& graph) {
-  std::vector<std::int32_t> position(graph.vertex_count());
-  std::iota(position.begin(), position.end(), 0);
-  if (graph.neighbours.empty()) return position;
+std::vector<std::int32_t> order_nested_dissection(const Graph& graph, const std::vector<std::int32_t>& weights) {
+  if (!weights.empty())
+    return order_core(graph, find_tries(graph, weights),
+                      [&](const std::vector<std::int32_t>& position) { return estimate_operations(graph, weights, position); });
   const Condensation condensed(graph);
-  // METIS takes the graph by pointers to mutable memory and leaves it unchanged in effect; a copy keeps the promise of const.
-  Graph core = condensed.core();
-  idx_t vertices = core.vertex_count();
-  std::vector<std::int32_t> vertex_at(vertices);
-  position.resize(vertices);
-  MetisOptions options = make_metis_options();
-  const auto order = [&] {
-    call_metis("METIS_NodeND", [&] {
-      return METIS_NodeND(&vertices, core.offsets.data(), core.neighbours.data(), nullptr, options.data(), vertex_at.data(),
-                          position.data());
-    });
-  };
-  if (condensed.find_tries() == 1 || vertices >= kManySeparators) {
-    options[METIS_OPTION_NSEPS] = condensed.find_tries();
-    order();
-    return condensed.expand_order(position);
-  }
-  std::vector<std::int32_t> best;
-  double fewest = std::numeric_limits<double>::infinity();
-  for (int attempt = 0; attempt < condensed.find_tries(); ++attempt, ++options[METIS_OPTION_SEED]) {
-    order();
-    const double operations = condensed.estimate_operations(position);
-    if (operations >= fewest) continue;
-    fewest = operations;
-    best = position;
-  }
-  return condensed.expand_order(best);
+  return condensed.expand_order(order_core(condensed.core(), condensed.find_tries(), [&](const std::vector<std::int32_t>& position) {
+    return condensed.estimate_operations(position);
+  }));
 }
 
 Graph take_part(const Graph& graph, const std::vector<std::int32_t>& vertices, std::vector<std::int32_t>& number) {

@@ -41,6 +41,19 @@ struct Partition {
 /// Throws InputError when more than two tetrahedra share a face.
 Graph make_dual_graph(std::span<const std::int32_t> corners);
 
+/// The elements of each node of a mesh.
+struct ElementLists {
+  std::vector<std::int64_t> begin;  // (nodes + 1) of each node's in items
+  std::vector<std::int32_t> items;  // ascending for each node
+
+  std::span<const std::int32_t> of(std::int32_t node) const {
+    const std::int32_t* first = items.data() + begin[static_cast<std::size_t>(node)];
+    return {first, items.data() + begin[static_cast<std::size_t>(node) + 1]};
+  }
+};
+/// elements: (E, width) node indices in [0, nodes); negative entries are skipped.
+ElementLists list_elements(std::span<const std::int32_t> elements, int width, std::int32_t nodes);
+
 /// The node graph of a mesh: two nodes are neighbours when an element holds both. elements: (E, width) node indices in [0, nodes);
 /// negative entries are skipped (nodes that take no part). Throws InputError when the graph exceeds 32-bit indices.
 Graph make_node_graph(std::span<const std::int32_t> elements, int width, std::int32_t nodes);
@@ -54,9 +67,9 @@ Partition partition_elements(std::span<const std::int32_t> corners, int parts);
 Partition measure_parts(std::span<const std::int32_t> corners, std::vector<std::int32_t> part, int parts);
 
 /// Fill-reducing order of a graph by nested dissection, METIS's of the condensed graph (condense.hpp): result[v] is the position of vertex
-/// v in the elimination order (zero-based), a permutation. This is MUMPS' PERM_IN less one. Throws SystemError when METIS runs out of
-/// memory.
-std::vector<std::int32_t> order_nested_dissection(const Graph& graph);
+/// v in the elimination order (zero-based), a permutation. This is MUMPS' PERM_IN less one. weights: of a graph that is the core of a
+/// Condensation already, Condensation::count_weights() of its vertices; empty: of none. Throws SystemError when METIS runs out of memory.
+std::vector<std::int32_t> order_nested_dissection(const Graph& graph, const std::vector<std::int32_t>& weights = {});
 
 /// The graph of some vertices alone, which are numbered as they stand in the list, ascending. number: (vertices of the graph) -1, and so
 /// afterwards: scratch that serves many parts of one graph.

@@ -11,6 +11,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "precompute/petsc/session.hpp"
 #include "precompute/petsc/work.hpp"
@@ -109,6 +110,12 @@ void to_rows(const Columns& x, Row* out) {
   }
 }
 
+/// The packed columns of a product. One for all matrices of the rank: fresh memory at each product costs as much as the product.
+std::vector<Row>& get_strip() {
+  static thread_local std::vector<Row> strip;
+  return strip;
+}
+
 struct Block {
   PetscInt node = 0;
   std::array<double, 9> values{};
@@ -155,28 +162,38 @@ void NodeMatrix::read(Mat matrix, double factor) {
   check(MatGetOwnershipRange(matrix, &first, &last));
   nodes_ = static_cast<std::size_t>((last - first) / 3);
   bool only_diagonal = true;
-  bool only_scalars = true;
+  bool only_scalars = true;  // then one value per block is kept
   std::vector<PetscInt> global;
+  start_.reserve(nodes_ + 1);
   start_.push_back(0);
   std::vector<Block> blocks;
   MatInfo info;
   check(MatGetInfo(matrix, MAT_LOCAL, &info));
-  values_.reserve(static_cast<std::size_t>(info.nz_used));
-  global.reserve(static_cast<std::size_t>(info.nz_used) / 9);
+  const auto entries = static_cast<std::size_t>(info.nz_used);  // three of a scalar, nine of a block
+  global.reserve(entries / 3);
+  values_.reserve(entries);
+  const auto keep_blocks = [&] {
+    if (!std::exchange(only_scalars, false)) return;
+    std::vector<double> scalars;
+    scalars.swap(values_);
+    values_.reserve(entries);
+    for (const double value : scalars) values_.insert(values_.end(), {value, 0, 0, 0, value, 0, 0, 0, value});
+  };
   for (PetscInt row = first; row < last; row += 3) {
     read_node_row(matrix, factor, row, blocks);
     for (const auto& [node, block] : blocks) {
       if (std::all_of(block.begin(), block.end(), [](double v) { return v == 0; })) continue;
       only_diagonal = only_diagonal && 3 * node == row && is_diagonal_block(block);
-      only_scalars = only_scalars && is_scalar(block);
+      if (!is_scalar(block)) keep_blocks();
       global.push_back(node);
-      values_.insert(values_.end(), block.begin(), block.end());
+      values_.insert(values_.end(), block.begin(), only_scalars ? block.begin() + 1 : block.end());
     }
     start_.push_back(static_cast<std::int64_t>(global.size()));
   }
   kind_ = comm::Communicator(comm).all(only_diagonal)  ? Kind::kDiagonal
           : comm::Communicator(comm).all(only_scalars) ? Kind::kScalars
                                                        : Kind::kBlocks;
+  if (kind_ != Kind::kScalars) keep_blocks();
   if (kind_ == Kind::kDiagonal) {
     diagonal_.assign(3 * nodes_, 0.0);
     for (std::size_t node = 0; node < nodes_; ++node) {
@@ -187,11 +204,6 @@ void NodeMatrix::read(Mat matrix, double factor) {
     values_ = {};
     return;
   }
-  if (kind_ == Kind::kScalars) {
-    for (std::size_t k = 0; k < global.size(); ++k) values_[k] = values_[9 * k];
-    values_.resize(global.size());
-    values_.shrink_to_fit();
-  }
   if (kind_ == Kind::kBlocks) sum_rows();
   const PetscInt first_node = first / 3;
   std::vector<PetscInt> ghosts;
@@ -201,6 +213,7 @@ void NodeMatrix::read(Mat matrix, double factor) {
   std::sort(ghosts.begin(), ghosts.end());
   ghosts.erase(std::unique(ghosts.begin(), ghosts.end()), ghosts.end());
   ghosts_ = ghosts.size();
+  neighbour_.reserve(global.size() + kAhead);
   for (const PetscInt node : global) {
     if (node >= first_node && node < last / 3) {
       neighbour_.push_back(static_cast<std::int32_t>(node - first_node));
@@ -291,7 +304,7 @@ void NodeMatrix::multiply(const Columns& x, const Columns& y) const {
     }
     return;
   }
-  std::vector<Row> packed;
+  std::vector<Row>& packed = get_strip();
   Row rows[3 * kNodes];
   for (int first = 0; first < x.count; first += kStrip) {
     pack(x, first, packed);

@@ -1,6 +1,7 @@
 // Method:     From the leaves up: a leaf or a subtree hands on the rows of its roots as elements of the quotient graph, and the holder
 //             of the separator above eliminates it behind them; so no rank sees more than its parts. Positions are those of order_parts
-//             at first; as each part is put in postorder they move, and all who use them ask for the last ones.
+//             at first; as each part is put in postorder they move, and all who use them ask for the last ones. Where rank 0 has all
+//             elements, it condenses them, lets the core be ordered and puts the other nodes back.
 // Source:     Duff and Reid 1983 (elements of the quotient graph).
 // Deviations: fronts of different parts are not merged.
 #include "precompute/ldlt/elimination.hpp"
@@ -8,6 +9,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "partition/condense.hpp"
 #include "precompute/comm/exchange.hpp"
 #include "precompute/ldlt/lists.hpp"
 
@@ -110,6 +112,32 @@ class PartEliminator {
   Ints boundary_;
 };
 
+/// Lists of (position, count, links), each of the holder of its position, as rows of the held parts. Collective.
+std::vector<Ragged> sort_links(const Communicator& comm, const Ints& items, const Elimination& all) {
+  return comm.agree([&] {
+    std::vector<Ragged> links(all.parts.size());
+    std::vector<std::vector<std::size_t>> at(all.parts.size());
+    std::vector<std::size_t> held_of(all.tree.parts.size(), 0);
+    for (std::size_t h = 0; h < all.parts.size(); ++h) {
+      at[h].assign(static_cast<std::size_t>(all.tree.parts[static_cast<std::size_t>(all.parts[h].part)].count), 0);
+      held_of[static_cast<std::size_t>(all.parts[h].part)] = h;
+    }
+    for (ListReader reader(items); !reader.is_at_end();) {
+      const std::int32_t position = reader.next();
+      const auto part = static_cast<std::size_t>(all.tree.find_part(position));
+      at[held_of[part]][static_cast<std::size_t>(position - all.tree.parts[part].first)] = reader.place();
+      reader.skip(reader.next());
+    }
+    for (std::size_t h = 0; h < links.size(); ++h)
+      for (const std::size_t place : at[h]) {
+        const std::int32_t* list = items.data() + place;
+        links[h].items.insert(links[h].items.end(), list + 1, list + 1 + *list);
+        links[h].close();
+      }
+    return links;
+  });
+}
+
 /// Links of the nodes of each held part, by position. Collective.
 std::vector<Ragged> send_links(const Communicator& comm, const NodeLinks& nodes, const Elimination& all) {
   const auto received = comm::all_to_all(comm, [&] {
@@ -124,28 +152,7 @@ std::vector<Ragged> send_links(const Communicator& comm, const NodeLinks& nodes,
     }
     return join(lists);
   });
-  return comm.agree([&] {
-    std::vector<Ragged> links(all.parts.size());
-    std::vector<std::vector<std::size_t>> at(all.parts.size());
-    std::vector<std::size_t> held_of(all.tree.parts.size(), 0);
-    for (std::size_t h = 0; h < all.parts.size(); ++h) {
-      at[h].assign(static_cast<std::size_t>(all.tree.parts[static_cast<std::size_t>(all.parts[h].part)].count), 0);
-      held_of[static_cast<std::size_t>(all.parts[h].part)] = h;
-    }
-    for (ListReader reader(received.items); !reader.is_at_end();) {
-      const std::int32_t position = reader.next();
-      const auto part = static_cast<std::size_t>(all.tree.find_part(position));
-      at[held_of[part]][static_cast<std::size_t>(position - all.tree.parts[part].first)] = reader.place();
-      reader.skip(reader.next());
-    }
-    for (std::size_t h = 0; h < links.size(); ++h)
-      for (const std::size_t place : at[h]) {
-        const std::int32_t* list = received.items.data() + place;
-        links[h].items.insert(links[h].items.end(), list + 1, list + 1 + *list);
-        links[h].close();
-      }
-    return links;
-  });
+  return sort_links(comm, received.items, all);
 }
 
 /// The front above each root, as (part, supernode) of both.
@@ -229,10 +236,19 @@ Ints find_moved(const Communicator& comm, const Elimination& all, const Ints& po
       });
 }
 
-}  // namespace
+/// Own parts of the tree and their nodes. Local.
+void hold_parts(const Communicator& comm, Elimination& all, std::vector<Ints> placed) {
+  for (std::size_t t = 0; t < placed.size(); ++t) {
+    if (all.tree.parts[t].begin != comm.rank()) continue;
+    HeldPart& held = all.parts.emplace_back();
+    held.part = static_cast<int>(t);
+    held.nodes = std::move(placed[t]);
+  }
+}
 
-Ints report_positions(const Communicator& comm, const Elimination& all, const NodeLinks& nodes, const IndexPartition& owners) {
-  Ints position = comm::report_to_owners<std::int32_t>(
+/// Positions of own nodes. Collective.
+Ints report_own_positions(const Communicator& comm, const Elimination& all, const IndexPartition& owners) {
+  return comm::report_to_owners<std::int32_t>(
       comm,
       [&] {
         std::vector<comm::Reported<std::int32_t>> list;
@@ -243,27 +259,11 @@ Ints report_positions(const Communicator& comm, const Elimination& all, const No
         return list;
       },
       owners, -1);
-  const Ints ghosts = fetch_ghosts(comm, nodes, owners, position);
-  position.insert(position.end(), ghosts.begin(), ghosts.end());
-  return position;
 }
 
-Elimination eliminate_on_paper(const Communicator& comm, const NodeLinks& nodes, const IndexPartition& owners,
-                               std::int32_t largest_gathered) {
-  Elimination all = comm.agree([&] { return Elimination(comm.size()); });
-  std::vector<Ints> placed = order_parts(comm, nodes, owners, all.tree, largest_gathered);
-  comm.agree([&] {
-    for (std::size_t t = 0; t < placed.size(); ++t) {
-      if (all.tree.parts[t].begin != comm.rank()) continue;
-      HeldPart& held = all.parts.emplace_back();
-      held.part = static_cast<int>(t);
-      held.nodes = std::move(placed[t]);
-    }
-  });
-  all.position = report_positions(comm, all, nodes, owners);
-  link_parts(comm, all, eliminate_parts(comm, all, send_links(comm, nodes, all)));
-
-  // Fronts have moved the positions inside their parts.
+/// Finds the fronts, and moves the positions inside their parts. links: of the held parts, as PartEliminator has them. Collective.
+void find_fronts(const Communicator& comm, Elimination& all, const std::vector<Ragged>& links) {
+  link_parts(comm, all, eliminate_parts(comm, all, links));
   const Ints asked = comm.agree([&] {
     Ints rows;
     for (const HeldPart& held : all.parts) {
@@ -284,7 +284,138 @@ Elimination eliminate_on_paper(const Communicator& comm, const NodeLinks& nodes,
       std::sort(node.rows.begin(), node.rows.end());
     }
   }
+}
+
+/// Nodes in their order, for the holder of each part. position: (nodes) on rank 0, elsewhere empty. Local.
+std::vector<Ints> list_nodes(const Communicator& comm, const SeparatorTree& tree, const Ints& position) {
+  std::vector<Ints> lists(static_cast<std::size_t>(comm.size()));
+  if (position.empty()) return lists;
+  Ints node_at(position.size());
+  for (std::size_t v = 0; v < position.size(); ++v) node_at[static_cast<std::size_t>(position[v])] = static_cast<std::int32_t>(v);
+  for (const TreePart& part : tree.parts)
+    lists[static_cast<std::size_t>(part.begin)].insert(lists[static_cast<std::size_t>(part.begin)].end(), node_at.begin() + part.first,
+                                                       node_at.begin() + part.first + part.count);
+  return lists;
+}
+
+/// Links that lead to the same fronts as those between all nodes of an element: from the first node of each element that is eliminated to
+/// its others. When that node goes, the others become a clique, so no row is lost, and none is gained. Lists as sort_links() takes them.
+/// Local.
+std::vector<Ints> list_star_links(const Communicator& comm, const SeparatorTree& tree, std::span<const std::int32_t> elements, int width,
+                                  const Ints& position) {
+  std::vector<Ints> lists(static_cast<std::size_t>(comm.size()));
+  const std::size_t count = position.size();
+  if (count == 0) return lists;
+  // The elements by their first node, as chains.
+  Ints head(count, -1);
+  Ints next;
+  Ints places(elements.begin(), elements.end());
+  for (std::size_t at = 0; at < places.size(); at += static_cast<std::size_t>(width)) {
+    auto first = static_cast<std::int32_t>(count);
+    for (std::int32_t& place : std::span(places).subspan(at, static_cast<std::size_t>(width))) {
+      if (place < 0) continue;
+      place = position[static_cast<std::size_t>(place)];
+      first = std::min(first, place);
+    }
+    const auto e = static_cast<std::int32_t>(next.size());
+    next.push_back(first < static_cast<std::int32_t>(count) ? std::exchange(head[static_cast<std::size_t>(first)], e) : -1);
+  }
+  Ragged behind;
+  Ints seen_from(count, -1);
+  for (std::int32_t p = 0; p < static_cast<std::int32_t>(count); ++p) {
+    seen_from[static_cast<std::size_t>(p)] = p;
+    for (std::int32_t e = head[static_cast<std::size_t>(p)]; e >= 0; e = next[static_cast<std::size_t>(e)])
+      for (const std::int32_t q :
+           std::span(places).subspan(static_cast<std::size_t>(e) * static_cast<std::size_t>(width), static_cast<std::size_t>(width)))
+        if (q >= 0 && std::exchange(seen_from[static_cast<std::size_t>(q)], p) != p) behind.items.push_back(q);
+    behind.close();
+  }
+  for (const TreePart& part : tree.parts) {
+    Ints& list = lists[static_cast<std::size_t>(part.begin)];
+    const std::int32_t end = part.first + part.count;
+    std::vector<Ints> before(static_cast<std::size_t>(part.count));
+    for (std::int32_t p = part.first; p < end; ++p) {
+      for (const std::int32_t* q = behind.begin(p); q != behind.end(p); ++q)
+        if (*q < end) before[static_cast<std::size_t>(*q - part.first)].push_back(p);
+    }
+    for (std::int32_t p = part.first; p < end; ++p) {
+      const Ints& near = before[static_cast<std::size_t>(p - part.first)];
+      list.insert(list.end(), {p, static_cast<std::int32_t>(near.size() + static_cast<std::size_t>(behind.end(p) - behind.begin(p)))});
+      list.insert(list.end(), near.begin(), near.end());
+      list.insert(list.end(), behind.begin(p), behind.end(p));
+    }
+  }
+  return lists;
+}
+
+}  // namespace
+
+Ints report_positions(const Communicator& comm, const Elimination& all, const NodeLinks& nodes, const IndexPartition& owners) {
+  Ints position = report_own_positions(comm, all, owners);
+  const Ints ghosts = fetch_ghosts(comm, nodes, owners, position);
+  position.insert(position.end(), ghosts.begin(), ghosts.end());
+  return position;
+}
+
+Elimination eliminate_on_paper(const Communicator& comm, const NodeLinks& nodes, const IndexPartition& owners,
+                               std::int32_t largest_gathered) {
+  Elimination all = comm.agree([&] { return Elimination(comm.size()); });
+  std::vector<Ints> placed = order_parts(comm, nodes, owners, all.tree, largest_gathered);
+  comm.agree([&] { hold_parts(comm, all, std::move(placed)); });
   all.position = report_positions(comm, all, nodes, owners);
+  find_fronts(comm, all, send_links(comm, nodes, all));
+  all.position = report_positions(comm, all, nodes, owners);
+  return all;
+}
+
+Elimination eliminate_elements(const Communicator& comm, std::span<const std::int32_t> elements, int width, std::int32_t nodes,
+                               std::int32_t largest_gathered) {
+  Elimination all = comm.agree([&] { return Elimination(comm.size()); });
+  const auto condensed = comm.agree([&] { return partition::Condensation(elements, width, nodes); });
+  NodeLinks core = comm.agree([&] {
+    NodeLinks links;
+    links.own_nodes = condensed.core().vertex_count();
+    links.links = {condensed.core().offsets, condensed.core().neighbours};
+    return links;
+  });
+  const IndexPartition core_owners(comm, core.own_nodes);
+  core.first_node = static_cast<std::int32_t>(core_owners.own_begin());
+  std::vector<Ints> placed =
+      order_parts(comm, core, core_owners, all.tree, largest_gathered, comm.agree([&] { return condensed.count_weights(); }));
+  comm.agree([&] { hold_parts(comm, all, std::move(placed)); });
+  const Ints core_position = report_own_positions(comm, all, core_owners);
+
+  // Rank 0 puts back what was condensed; the parts grow by it.
+  const Ints position = comm.agree([&] { return condensed.expand_order(core_position); });
+  const Ints ends = comm.broadcast([&] {
+    Ints end(all.tree.parts.size(), 0);
+    for (std::size_t v = 0; v < position.size(); ++v) {
+      const std::int32_t number = condensed.numbers()[v];
+      if (number < 0) continue;
+      const int part = all.tree.find_part(core_position[static_cast<std::size_t>(number)]);
+      end[static_cast<std::size_t>(part)] = std::max(end[static_cast<std::size_t>(part)], position[v] + 1);
+    }
+    return end;
+  });
+  std::int32_t first = 0;
+  for (std::size_t t = 0; t < ends.size(); ++t) {
+    TreePart& part = all.tree.parts[t];
+    part.first = first;
+    first = std::max(first, ends[t]);
+    part.count = first - part.first;
+  }
+  const auto held_nodes = comm::all_to_all(comm, [&] { return join(list_nodes(comm, all.tree, position)); });
+  auto next = held_nodes.items.begin();
+  comm.agree([&] {
+    for (HeldPart& held : all.parts) {
+      const std::int32_t count = all.tree[held.part].count;
+      held.nodes.assign(next, next + count);
+      next += count;
+    }
+  });
+  const auto links = comm::all_to_all(comm, [&] { return join(list_star_links(comm, all.tree, elements, width, position)); });
+  find_fronts(comm, all, sort_links(comm, links.items, all));
+  all.position = report_own_positions(comm, all, IndexPartition(comm, nodes));
   return all;
 }
 

@@ -89,7 +89,7 @@ void Factor::State::name_need(Work&& work) const {
 
 void Factor::State::drop_scratch() {
   if (!std::exchange(has_scratch, false)) return;
-  numbers.panels.give_back_tail(plan.room.panels);
+  numbers.panels.give_back_tail(plan.room.solve_begin() + plan.room.solve_blocks * plan.count_block());
   BufferReuse::give_back_waiting();
 }
 
@@ -104,10 +104,7 @@ void Factor::State::prepare() {
     equilibrated = std::move(candidate);
   }
   if (is_allocated) return;
-  comm::Communicator(plan.comm).agree([&] {
-    numbers = make_numbers(plan);
-    workspace = make_workspace(plan, numbers);
-  });
+  comm::Communicator(plan.comm).agree([&] { numbers = make_numbers(plan); });
   is_allocated = true;
 }
 
@@ -172,7 +169,7 @@ bool Factor::factorise(double sigma) {
     s.norm = s.stiffness_norm + std::abs(sigma) * s.mass_norm;
     s.has_scratch = true;
     try {
-      factorise_fronts(s.plan, s.equilibrated->get(), sigma, s.numbers);
+      factorise_fronts(s.plan, s.equilibrated->get(), sigma, s.numbers, s.workspace);
     } catch (...) {
       s.drop_scratch();
       throw;

@@ -12,6 +12,9 @@ namespace carillon::ldlt {
 inline comm::ByRank<std::int32_t> join(const std::vector<std::vector<std::int32_t>>& lists) {
   comm::ByRank<std::int32_t> joined;
   joined.begin.push_back(0);
+  std::size_t count = 0;
+  for (const std::vector<std::int32_t>& list : lists) count += list.size();
+  joined.items.reserve(count);
   for (const std::vector<std::int32_t>& list : lists) {
     joined.items.insert(joined.items.end(), list.begin(), list.end());
     joined.begin.push_back(static_cast<std::int64_t>(joined.items.size()));

@@ -1,6 +1,6 @@
-// Method:     The graph of the nodes is gathered from the elements by the ranks that answer for the nodes; order, fronts and mapping are
-//             those of a factorisation. The nodes of an element are a clique, so their fronts lie on one way to the root, and the rank of
-//             the first of them has, or shares, all.
+// Method:     The graph of the nodes is gathered from the elements by the ranks that answer for the nodes, unless rank 0 has all of both;
+//             order, fronts and mapping are those of a factorisation. The nodes of an element are a clique, so their fronts lie on one way
+//             to the root, and the rank of the first of them has, or shares, all.
 // Source:     Pothen and Sun 1993 (subtrees to ranks); the order: order.cpp.
 // Deviations: none.
 #include "precompute/ldlt/mesh_order.hpp"
@@ -56,6 +56,13 @@ NodeLinks gather_links(const Communicator& comm, std::span<const std::int32_t> e
   });
 }
 
+Elimination eliminate(const Communicator& comm, std::span<const std::int32_t> elements, int width, const IndexPartition& owners) {
+  const std::int64_t elsewhere = comm.sum(comm.is_root() ? std::int64_t{0} : static_cast<std::int64_t>(elements.size()));
+  if (elsewhere == 0 && owners.begin(1) == owners.total() && owners.total() <= partition::kLargestGathered)
+    return eliminate_elements(comm, elements, width, static_cast<std::int32_t>(owners.own_count()));
+  return eliminate_on_paper(comm, gather_links(comm, elements, width, owners), owners);
+}
+
 /// The ranks that eliminate the nodes which this rank holds.
 std::vector<comm::Reported<std::int32_t>> list_ranks(const MappedFronts& fronts) {
   std::vector<comm::Reported<std::int32_t>> list;
@@ -84,7 +91,7 @@ std::vector<comm::Reported<std::int32_t>> list_ranks(const MappedFronts& fronts)
 }  // namespace
 
 MeshOrder::MeshOrder(const Communicator& comm, std::span<const std::int32_t> elements, int width, const IndexPartition& owners)
-    : owners_(owners), fronts_(map_fronts(comm, eliminate_on_paper(comm, gather_links(comm, elements, width, owners), owners))) {
+    : owners_(owners), fronts_(map_fronts(comm, eliminate(comm, elements, width, owners))) {
   rank_ = comm::report_to_owners<std::int32_t>(
       comm, [&] { return list_ranks(fronts_); }, owners_, -1);
 }
@@ -94,7 +101,7 @@ const MappedFronts& MeshOrder::get_fronts() const {
   return fronts_;
 }
 
-Ints MeshOrder::find_ranks(const Communicator& comm, std::span<const std::int32_t> elements, int width) const {
+ElementRanks MeshOrder::find_ranks(const Communicator& comm, std::span<const std::int32_t> elements, int width) const {
   if (is_numbered_) throw std::logic_error("ranks of elements are asked for before the rows are numbered");
   struct Place {
     std::int32_t position, rank;
@@ -118,7 +125,7 @@ Ints MeshOrder::find_ranks(const Communicator& comm, std::span<const std::int32_
     return places[static_cast<std::size_t>(std::lower_bound(foreign.begin(), foreign.end(), node) - foreign.begin())];
   };
   return comm.agree([&] {
-    Ints ranks;
+    ElementRanks ranks;
     for (std::size_t at = 0; at < elements.size(); at += static_cast<std::size_t>(width)) {
       Place first{0, -1};
       for (const std::int32_t node : elements.subspan(at, static_cast<std::size_t>(width))) {
@@ -126,7 +133,8 @@ Ints MeshOrder::find_ranks(const Communicator& comm, std::span<const std::int32_
         const Place place = find_place(node);
         if (first.rank < 0 || place.position < first.position) first = place;
       }
-      ranks.push_back(first.rank);
+      ranks.rank.push_back(first.rank);
+      ranks.position.push_back(first.position);
     }
     return ranks;
   });

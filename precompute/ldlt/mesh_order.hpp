@@ -11,11 +11,17 @@
 
 namespace carillon::ldlt {
 
+/// Where elements go, and where they stand in the order of elimination.
+struct ElementRanks {
+  Ints rank;  // (e) that eliminates the first of the element's nodes, of a shared front the one with the diagonal tile; -1: all are fixed
+  Ints position;  // (e) of that node
+};
+
 /// The separator tree of a mesh and the ranks that eliminate its nodes, found before the mesh is cut: elements can then go to the ranks
 /// that eliminate their nodes, and right-hand sides need not travel in a solve.
 ///
 ///   MeshOrder order(comm, elements, 10, owners);
-///   const Ints part = order.find_ranks(comm, elements, 10);  // cut the mesh so, and number its rows
+///   const Ints part = order.find_ranks(comm, elements, 10).rank;  // cut the mesh so, and number its rows
 ///   order.renumber(comm, rows);                              // for Factor(pencil, &order)
 class MeshOrder {
  public:
@@ -23,9 +29,8 @@ class MeshOrder {
   /// until the rows are numbered; anyone may. Collective. Throws SystemError on all ranks when memory runs out.
   MeshOrder(const comm::Communicator& comm, std::span<const std::int32_t> elements, int width, const comm::IndexPartition& owners);
 
-  /// (e) for each of this rank's elements the rank that eliminates the first of its nodes, of a shared front the one with the diagonal
-  /// tile; -1: all are fixed. Nodes that one rank eliminates alone have all their elements there. Pre: not renumbered. Collective.
-  Ints find_ranks(const comm::Communicator& comm, std::span<const std::int32_t> elements, int width) const;
+  /// Of this rank's elements. Nodes that one rank eliminates alone have all their elements there. Pre: not renumbered. Collective.
+  ElementRanks find_ranks(const comm::Communicator& comm, std::span<const std::int32_t> elements, int width) const;
 
   /// row: for each of the nodes that this rank answers for its row among those of K, in nodes. Once. Collective.
   void renumber(const comm::Communicator& comm, const Ints& row);

@@ -67,7 +67,6 @@ class Factoriser {
   /// Collective.
   void run() {
     exchange_blocks();
-    const BufferReuse reuse;
     shared_.run([&] {
       for (std::int32_t s = 0; s < static_cast<std::int32_t>(plan_.fronts.size()); ++s) process(s);
       wide_ = Buffer();
@@ -367,12 +366,18 @@ Numbers make_numbers(const Plan& plan) {
   return numbers;
 }
 
-void factorise_fronts(const Plan& plan, const la::Pencil& pencil, double sigma, Numbers& numbers) {
+void factorise_fronts(const Plan& plan, const la::Pencil& pencil, double sigma, Numbers& numbers, Workspace& workspace) {
   ++numbers.generation;
   numbers.outcome = {};
-  std::unique_ptr<Factoriser> factoriser;
-  comm::Communicator(plan.comm).agree([&] { factoriser = std::make_unique<Factoriser>(plan, pencil, sigma, numbers); });
-  factoriser->run();
+  const comm::Communicator comm(plan.comm);
+  {
+    const BufferReuse reuse;
+    workspace = {};
+    std::unique_ptr<Factoriser> factoriser;
+    comm.agree([&] { factoriser = std::make_unique<Factoriser>(plan, pencil, sigma, numbers); });
+    factoriser->run();
+  }
+  comm.agree([&] { workspace = make_workspace(plan, numbers); });
 }
 
 }  // namespace carillon::ldlt

@@ -49,9 +49,6 @@ struct Numbers {
 /// Room for the panels. Throws std::bad_alloc.
 Numbers make_numbers(const Plan& plan);
 
-/// Computes L D L^T of K - sigma M. Collective. Throws SystemError on all ranks when memory runs out.
-void factorise_fronts(const Plan& plan, const la::Pencil& pencil, double sigma, Numbers& numbers);
-
 /// Right-hand sides in order of elimination: blocks of 8 or 16 columns, in each a row of them per row of the matrix.
 struct Workspace {
   std::vector<double*> blocks;  // one per kBlockColumns columns: rows of all slots
@@ -62,5 +59,9 @@ struct Workspace {
 void solve_columns(const Plan& plan, const Numbers& numbers, Workspace& workspace, const double* b, double* x, int stride, int columns);
 /// Lies after the panels where there is room, so numbers must outlive it. Throws std::bad_alloc.
 Workspace make_workspace(const Plan& plan, const Numbers& numbers);
+
+/// Computes L D L^T of K - sigma M, in the memory of the workspace too, which is made again afterwards. Collective. Throws SystemError on
+/// all ranks when memory runs out.
+void factorise_fronts(const Plan& plan, const la::Pencil& pencil, double sigma, Numbers& numbers, Workspace& workspace);
 
 }  // namespace carillon::ldlt

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <array>
 #include <numeric>
+#include <stdexcept>
 #include <utility>
 
 #include "partition/dissect.hpp"
@@ -168,6 +169,7 @@ struct Piece {
   Label label;
   Ints nodes;  // global
   Graph graph;
+  Ints weights;  // of a core of a Condensation, how many nodes each stands for; empty: of no core
 };
 
 /// Some of a piece's vertices alone. number: scratch of partition::take_part.
@@ -176,6 +178,8 @@ Piece take(const Piece& piece, const Ints& vertices, Label label, Ints& number) 
   taken.label = label;
   for (const std::int32_t v : vertices) taken.nodes.push_back(piece.nodes[static_cast<std::size_t>(v)]);
   taken.graph = partition::take_part(piece.graph, vertices, number);
+  for (const std::int32_t v : vertices)
+    if (!piece.weights.empty()) taken.weights.push_back(piece.weights[static_cast<std::size_t>(v)]);
   return taken;
 }
 
@@ -195,7 +199,9 @@ std::array<Piece, 3> cut(const Piece& piece, const Ints& side, const SeparatorTr
 }
 
 void pack(const Piece& piece, Ints& list) {
-  list.insert(list.end(), {piece.label.part, static_cast<std::int32_t>(piece.nodes.size())});
+  list.insert(list.end(), {piece.label.part, static_cast<std::int32_t>(piece.weights.size())});
+  list.insert(list.end(), piece.weights.begin(), piece.weights.end());
+  list.push_back(static_cast<std::int32_t>(piece.nodes.size()));
   list.insert(list.end(), piece.nodes.begin(), piece.nodes.end());
   for (std::size_t v = 0; v < piece.nodes.size(); ++v) list.push_back(piece.graph.offsets[v + 1] - piece.graph.offsets[v]);
   list.insert(list.end(), piece.graph.neighbours.begin(), piece.graph.neighbours.end());
@@ -204,6 +210,7 @@ void pack(const Piece& piece, Ints& list) {
 Piece unpack(ListReader& reader) {
   Piece piece;
   piece.label.part = reader.next();
+  piece.weights = reader.take(reader.next());
   piece.nodes = reader.take(reader.next());
   piece.graph.offsets.push_back(0);
   for (std::size_t v = 0; v < piece.nodes.size(); ++v) piece.graph.offsets.push_back(piece.graph.offsets.back() + reader.next());
@@ -261,22 +268,24 @@ std::vector<Piece> gather_pieces(const Communicator& comm, const NodeLinks& node
 }
 
 /// The piece of all nodes, which are all this rank's.
-Piece make_whole(const NodeLinks& nodes, const SeparatorTree& tree) {
+Piece make_whole(const NodeLinks& nodes, const SeparatorTree& tree, const Ints& weights) {
   Piece whole;
   whole.label = {tree.root(), 0};
   whole.nodes.resize(static_cast<std::size_t>(nodes.own_nodes));
   std::iota(whole.nodes.begin(), whole.nodes.end(), 0);
   whole.graph = {nodes.links.offsets, nodes.links.items};
+  whole.weights = weights;
   return whole;
 }
 
 /// The pieces that this rank begins with. Collective.
 std::vector<Piece> find_pieces(const Communicator& comm, const NodeLinks& nodes, const IndexPartition& owners, const SeparatorTree& tree,
-                               std::int32_t largest) {
+                               std::int32_t largest, const Ints& weights) {
   const bool is_one_piece = owners.total() <= largest || comm.size() == 1;
   if (is_one_piece && owners.begin(1) == owners.total()) {
-    return comm.agree([&] { return nodes.own_nodes > 0 ? std::vector<Piece>{make_whole(nodes, tree)} : std::vector<Piece>(); });
+    return comm.agree([&] { return nodes.own_nodes > 0 ? std::vector<Piece>{make_whole(nodes, tree, weights)} : std::vector<Piece>(); });
   }
+  if (!weights.empty()) throw std::logic_error("a core of nodes is ordered where all of it is");
   if (!is_one_piece) return gather_pieces(comm, nodes, tree, label_nodes(comm, nodes, owners, tree, largest));
   return gather_pieces(comm, nodes, tree, comm.agree([&] {
     return std::vector<Label>(static_cast<std::size_t>(nodes.count()), Label{tree.root(), 0});
@@ -288,7 +297,7 @@ void place(const Piece& piece, std::vector<Ints>& placed) {
   Ints& list = placed[static_cast<std::size_t>(piece.label.part)];
   const std::size_t before = list.size();
   list.resize(before + piece.nodes.size());
-  const Ints order = partition::order_nested_dissection(piece.graph);
+  const Ints order = partition::order_nested_dissection(piece.graph, piece.weights);
   for (std::size_t v = 0; v < order.size(); ++v) list[before + static_cast<std::size_t>(order[v])] = piece.nodes[v];
 }
 
@@ -314,11 +323,12 @@ Ints seek_separator(const Communicator& comm, const std::vector<Piece>& pieces, 
   Ints best;
   const auto found = comm::all_to_all(comm, [&] {
     std::vector<Ints> lists(static_cast<std::size_t>(comm.size()));
-    if (own != nullptr) best = own->nodes.size() < kSmallestCut ? Ints(own->nodes.size(), 0) : partition::separate(own->graph, 1);
+    if (own != nullptr)
+      best = own->nodes.size() < kSmallestCut ? Ints(own->nodes.size(), 0) : partition::separate(own->graph, 1, 0, own->weights);
     for (ListReader reader(copies.items); !reader.is_at_end();) {
       const Piece piece = unpack(reader);
       const int holder = tree[piece.label.part].begin;
-      lists[static_cast<std::size_t>(holder)] = partition::separate(piece.graph, 1, comm.rank() - holder);
+      lists[static_cast<std::size_t>(holder)] = partition::separate(piece.graph, 1, comm.rank() - holder, piece.weights);
     }
     return join(lists);
   });
@@ -364,8 +374,8 @@ int SeparatorTree::find_part(std::int32_t position) const {
 }
 
 std::vector<Ints> order_parts(const Communicator& comm, const NodeLinks& nodes, const IndexPartition& owners, SeparatorTree& tree,
-                              std::int32_t largest) {
-  std::vector<Piece> pieces = find_pieces(comm, nodes, owners, tree, largest);
+                              std::int32_t largest, const Ints& weights) {
+  std::vector<Piece> pieces = find_pieces(comm, nodes, owners, tree, largest, weights);
   std::vector<Ints> placed(tree.parts.size());
   for (int depth = 0; depth < tree.depth(); ++depth) {
     const Ints side = seek_separator(comm, pieces, tree, depth);

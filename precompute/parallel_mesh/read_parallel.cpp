@@ -120,16 +120,11 @@ partition::DistributedMesh cut(const comm::Communicator& comm, const std::string
   block.centres_m = {};
   partition::MeshBlock copy = comm.agree([&] { return block; });
   partition::DistributedMesh mesh = partition::redistribute(comm, name, copy, part, has_fixed, on_seam);
-  const std::optional<std::vector<std::int32_t>> ranks = options.recut->find_ranks(mesh.local);
+  const std::vector<std::int32_t> second = send_back(comm, block.elements, mesh.local, options.recut->find_ranks(mesh.local));
   const std::vector<std::int32_t> nodes(mesh.local.node_in_mesh.begin(), mesh.local.node_in_mesh.begin() + mesh.local.free_nodes);
-  if (ranks) {
-    const std::vector<std::int32_t> second = send_back(comm, block.elements, mesh.local, *ranks);
-    mesh = {};
-    on_seam.clear();
-    mesh = partition::redistribute(comm, name, block, second, has_fixed, on_seam);
-  } else {
-    block = std::move(copy);
-  }
+  mesh = {};
+  on_seam.clear();
+  mesh = partition::redistribute(comm, name, block, second, has_fixed, on_seam);
   options.recut->renumber(find_rows(comm, block, nodes, mesh.local));
   return mesh;
 }

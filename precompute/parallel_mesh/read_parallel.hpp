@@ -29,8 +29,8 @@ struct FixedNodes {
 /// A second cut, which sees the pieces of the first. All members are set, and collective.
 struct Recut {
   std::function<bool(std::int64_t nodes)> is_wanted;  // for a mesh of so many nodes
-  /// The rank of each element of the first cut; none on any rank: the first cut stays.
-  std::function<std::optional<std::vector<std::int32_t>>(const partition::LocalMesh& first)> find_ranks;
+  /// The rank of each element of the first cut.
+  std::function<std::vector<std::int32_t>(const partition::LocalMesh& first)> find_ranks;
   /// Gets the row of each own free node of the first cut as the mesh is cut in the end, wherever the second was wanted.
   std::function<void(const std::vector<std::int32_t>& rows)> renumber;
 };

@@ -132,7 +132,7 @@ Body read_in_parallel(Run& run, const Setting& setting) {
   body.fixed_nodes = mesh.fixed_nodes;
   body.surface = {std::move(mesh.boundary.vertices_m), std::move(mesh.boundary.triangles), std::move(mesh.boundary.row)};
   warn_of_mesh(run, body);
-  if (recut.is_used()) run.log.print(kByOrder);
+  if (recut.get_order() != nullptr) run.log.print(kByOrder);
   log_size(run, body.pieces.nodes, body.pieces.tets, body.pieces.components, body.fixed_nodes);
   run.log.print(partition::describe(body.pieces.report));
   run.log.end();
@@ -168,18 +168,16 @@ Body make_pieces(Run& run, const Setting& setting, Patience* patience) {
   }
 
   run.log.begin("partition", "the mesh over the ranks");
-  bool is_by_order = false;
   name_errors(body.source, run, [&] {
     if (wants_cut_by_order(run.job)) {
       CutMesh cut = cut_by_order(run.comm, mesh, fixed_nodes);
       body.pieces = std::move(cut.pieces);
       body.order = std::move(cut.order);
-      is_by_order = cut.is_by_order;
     } else {
       body.pieces = partition::distribute(run.comm, mesh, fixed_nodes, {.elimination_order = wants_elimination_order(run.job)});
     }
   });
-  if (run.comm.size() > 1) run.log.print(is_by_order ? kByOrder : kByMetis);
+  if (run.comm.size() > 1) run.log.print(body.order != nullptr ? kByOrder : kByMetis);
   broadcast_fixed_nodes(run.comm, std::move(fixed), body.pieces.local);
   mesh = {};
   for (std::int32_t& row : body.surface.row) row = body.pieces.row_of_node[row];

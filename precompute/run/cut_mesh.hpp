@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include "partition/dissect.hpp"
@@ -17,13 +16,12 @@ namespace carillon::run {
 
 struct CutMesh {
   partition::DistributedMesh pieces;
-  std::shared_ptr<const ldlt::MeshOrder> order;  // of the factorisation; null: it orders by itself
-  bool is_by_order = false;                      // whether the mesh is cut by it
+  std::shared_ptr<const ldlt::MeshOrder> order;  // of the factorisation, by which the mesh is cut; null: METIS cuts, it orders by itself
 };
 
 /// Cuts the mesh by METIS or, on several ranks with at least 300 nodes each on average, by the order of elimination: each element goes to
-/// the rank that eliminates the first of its nodes. METIS cuts where that would leave a rank without an element, or one with more than 1.5
-/// times the mean; and above `largest_ordered` nodes it cuts first, so that all ranks can order. Collective. Throws as
+/// the rank that eliminates the first of its nodes, or where that rank would have too many to one that would have too few, so that all
+/// have the same number. Above `largest_ordered` nodes METIS cuts first, so that all ranks can order. Collective. Throws as
 /// partition::distribute().
 CutMesh cut_by_order(const comm::Communicator& comm, const mesh::TetMesh& mesh, const std::vector<std::int32_t>& fixed_nodes,
                      std::int32_t largest_ordered = partition::kLargestGathered);
@@ -34,14 +32,12 @@ class RecutByOrder {
   explicit RecutByOrder(const comm::Communicator& comm);
   /// For ReadOptions; this must outlive the reading.
   parallel_mesh::Recut make_recut();
-  /// What the reading has made; null: the mesh was too small.
+  /// What the reading has made, and the mesh is cut by; null: the mesh was too small.
   std::shared_ptr<const ldlt::MeshOrder> get_order() const { return order_; }
-  bool is_used() const { return is_used_; }
 
  private:
   const comm::Communicator comm_;
   std::shared_ptr<ldlt::MeshOrder> order_;
-  bool is_used_ = false;
 };
 
 }  // namespace carillon::run

@@ -116,6 +116,74 @@ TEST(Condensation, has_the_core_of_the_definition) {
   EXPECT_GT(used, 10);
 }
 
+/// The core of elements by the definition: a node is dominated by one that is in all of its elements.
+void expect_core_of_elements(const Vertices& elements, int width, std::int32_t nodes) {
+  std::vector<std::set<std::int32_t>> of(static_cast<std::size_t>(nodes));
+  for (std::size_t k = 0; k < elements.size(); ++k)
+    if (elements[k] >= 0) of[elements[k]].insert(static_cast<std::int32_t>(k) / width);
+  Vertices number(static_cast<std::size_t>(nodes), -1);
+  std::int32_t kept = 0;
+  for (std::int32_t v = 0; v < nodes; ++v) {
+    bool is_dominated = false;
+    for (std::int32_t u = 0; u < nodes; ++u)
+      is_dominated = is_dominated || (u != v && !of[v].empty() && std::includes(of[u].begin(), of[u].end(), of[v].begin(), of[v].end()) &&
+                                      (of[u] != of[v] || u < v));
+    if (!is_dominated) number[v] = kept++;
+  }
+  const Condensation condensed(elements, width, nodes, 1);
+  const Graph graph = make_node_graph(elements, width, nodes);
+  if (2 * kept > nodes) {
+    EXPECT_EQ(condensed.core().neighbours, graph.neighbours);
+    EXPECT_EQ(condensed.count_weights(), Vertices(static_cast<std::size_t>(nodes), 1));
+    return;
+  }
+  EXPECT_EQ(condensed.numbers(), number);
+  Vertices list;
+  for (std::int32_t v = 0; v < nodes; ++v)
+    if (number[v] >= 0) list.push_back(v);
+  Vertices scratch(static_cast<std::size_t>(nodes), -1);
+  const Graph core = take_part(graph, list, scratch);
+  EXPECT_EQ(condensed.core().offsets, core.offsets);
+  EXPECT_EQ(condensed.core().neighbours, core.neighbours);
+  const Vertices weights = condensed.count_weights();
+  EXPECT_EQ(std::accumulate(weights.begin(), weights.end(), 0), nodes) << "each node stands once";
+  EXPECT_EQ(find_tries(condensed.core(), weights), condensed.find_tries());
+}
+
+TEST(Condensation, of_elements_needs_no_graph_of_all_nodes) {
+  const auto t10 = tests::make_box({4, 3, 3}, {1, 1, 1}, 2);
+  expect_core_of_elements(t10.tets, 10, static_cast<std::int32_t>(t10.nodes_m.size()));
+  const auto t4 = tests::make_box({3, 3, 2}, {1, 1, 1});
+  expect_core_of_elements(t4.tets, 4, static_cast<std::int32_t>(t4.nodes_m.size()));
+  Vertices fixed = t10.tets;
+  for (std::int32_t& node : fixed) node -= 40;
+  expect_core_of_elements(fixed, 10, static_cast<std::int32_t>(t10.nodes_m.size()) - 40);
+  std::mt19937 random(3);
+  for (int round = 0; round < 200; ++round) {
+    const auto nodes = static_cast<std::int32_t>(1 + random() % 20);
+    const int width = static_cast<int>(1 + random() % 6);
+    Vertices all(static_cast<std::size_t>(std::max(nodes, width)), -1);  // with gaps
+    std::iota(all.begin(), all.begin() + nodes, 0);
+    Vertices elements;
+    for (unsigned e = random() % 8; e > 0; --e) {
+      std::shuffle(all.begin(), all.end(), random);
+      elements.insert(elements.end(), all.begin(), all.begin() + width);
+    }
+    expect_core_of_elements(elements, width, nodes);
+  }
+  expect_core_of_elements({}, 10, 0);
+  expect_core_of_elements({}, 10, 3);
+}
+
+TEST(Condensation, of_elements_and_of_their_graph_give_the_same_separators) {
+  const auto box = tests::make_box({9, 8, 7}, {1, 1, 1}, 2);
+  const auto nodes = static_cast<std::int32_t>(box.nodes_m.size());
+  const Graph graph = make_node_graph(box.tets, 10, nodes);
+  const Condensation of_elements(box.tets, 10, nodes);
+  ASSERT_EQ(of_elements.numbers(), Condensation(graph).numbers());
+  EXPECT_EQ(of_elements.expand_sides(separate(of_elements.core(), 1, 0, of_elements.count_weights())), separate(graph, 1));
+}
+
 TEST(Condensation, of_hard_graphs_is_what_it_has_to_be) {
   std::set<std::pair<std::int32_t, std::int32_t>> clique, star, path;
   for (std::int32_t a = 0; a < 12; ++a)

@@ -30,7 +30,7 @@ class OrderedLattice {
         nodes_(static_cast<std::int32_t>(pencil_.dense_k.rows() / 3)),
         owners_(IndexPartition::make_even(comm_, nodes_)),
         order_(comm_, list_own_springs(), 2, owners_) {
-    const Ints part = order_.find_ranks(comm_, list_own_springs(), 2);
+    const Ints part = order_.find_ranks(comm_, list_own_springs(), 2).rank;
     Ints ranks(static_cast<std::size_t>(nodes_), -1);  // a node goes to the highest rank that touches it
     const Ints springs = comm_.all_gather(list_own_springs());
     const Ints parts = comm_.all_gather(part);

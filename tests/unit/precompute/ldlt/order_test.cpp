@@ -5,9 +5,11 @@
 #include <set>
 #include <vector>
 
+#include "partition/partition.hpp"
 #include "precompute/comm/exchange.hpp"
 #include "precompute/ldlt/elimination.hpp"
 #include "precompute/petsc/session.hpp"
+#include "tests/support/box_mesh.hpp"
 
 namespace carillon::ldlt {
 namespace {
@@ -64,35 +66,17 @@ class Case {
       nodes.links.items.insert(nodes.links.items.end(), near.begin(), near.end());
       nodes.links.close();
     }
-    const Elimination all = eliminate_on_paper(comm_, nodes, IndexPartition(comm_, nodes.own_nodes), largest_gathered);
-    position_ = comm_.all_gather(Ints(all.position.begin(), all.position.begin() + nodes.own_nodes));
-    Ints packed;
-    for (const HeldPart& held : all.parts)
-      for (std::size_t s = 0; s < held.forest.supernodes.size(); ++s) {
-        const Supernode& node = held.forest.supernodes[s];
-        packed.insert(packed.end(), {all.tree.parts[static_cast<std::size_t>(held.part)].first_front + static_cast<std::int32_t>(s),
-                                     node.first, node.width, held.parents[s], static_cast<std::int32_t>(node.rows.size())});
-        packed.insert(packed.end(), node.rows.begin(), node.rows.end());
-        for (std::int32_t k = 0; k < node.width; ++k) {
-          const TreePart& part = all.tree.parts[static_cast<std::size_t>(held.part)];
-          nodes_of_fronts_.push_back(held.nodes[static_cast<std::size_t>(node.first - part.first + k)]);
-          places_of_nodes_.push_back(node.first + k);
-        }
-      }
-    nodes_of_fronts_ = comm_.all_gather(nodes_of_fronts_);
-    places_of_nodes_ = comm_.all_gather(places_of_nodes_);
-    packed = comm_.all_gather(packed);
-    fronts_.resize(static_cast<std::size_t>(all.tree.fronts));
-    for (std::size_t at = 0; at < packed.size();) {
-      Known& front = fronts_[static_cast<std::size_t>(packed[at])];
-      front.first = packed[at + 1];
-      front.width = packed[at + 2];
-      front.parent = packed[at + 3];
-      const auto rows = packed.begin() + static_cast<std::ptrdiff_t>(at) + 5;
-      front.rows.assign(rows, rows + packed[at + 4]);
-      at += 5 + static_cast<std::size_t>(packed[at + 4]);
-    }
+    take(eliminate_on_paper(comm_, nodes, IndexPartition(comm_, nodes.own_nodes), largest_gathered), nodes.own_nodes);
   }
+
+  /// Rank 0 has all elements; graph: the links that they make.
+  Case(const std::vector<Ints>& graph, const Ints& elements, int width) : graph_(graph), comm_(PETSC_COMM_WORLD) {
+    const auto nodes = comm_.is_root() ? static_cast<std::int32_t>(graph.size()) : 0;
+    take(eliminate_elements(comm_, comm_.is_root() ? elements : Ints(), width, nodes), nodes);
+  }
+
+  int ranks() const { return comm_.size(); }
+  const Ints& position() const { return position_; }
 
   void expect_every_node_once() const {
     Ints sorted = position_;
@@ -142,6 +126,37 @@ class Case {
   }
 
  private:
+  /// What all ranks know, on every rank. Collective.
+  void take(const Elimination& all, std::int32_t own_nodes) {
+    position_ = comm_.all_gather(Ints(all.position.begin(), all.position.begin() + own_nodes));
+    Ints packed;
+    for (const HeldPart& held : all.parts)
+      for (std::size_t s = 0; s < held.forest.supernodes.size(); ++s) {
+        const Supernode& node = held.forest.supernodes[s];
+        packed.insert(packed.end(), {all.tree.parts[static_cast<std::size_t>(held.part)].first_front + static_cast<std::int32_t>(s),
+                                     node.first, node.width, held.parents[s], static_cast<std::int32_t>(node.rows.size())});
+        packed.insert(packed.end(), node.rows.begin(), node.rows.end());
+        for (std::int32_t k = 0; k < node.width; ++k) {
+          const TreePart& part = all.tree.parts[static_cast<std::size_t>(held.part)];
+          nodes_of_fronts_.push_back(held.nodes[static_cast<std::size_t>(node.first - part.first + k)]);
+          places_of_nodes_.push_back(node.first + k);
+        }
+      }
+    nodes_of_fronts_ = comm_.all_gather(nodes_of_fronts_);
+    places_of_nodes_ = comm_.all_gather(places_of_nodes_);
+    packed = comm_.all_gather(packed);
+    fronts_.resize(static_cast<std::size_t>(all.tree.fronts));
+    for (std::size_t at = 0; at < packed.size();) {
+      Known& front = fronts_[static_cast<std::size_t>(packed[at])];
+      front.first = packed[at + 1];
+      front.width = packed[at + 2];
+      front.parent = packed[at + 3];
+      const auto rows = packed.begin() + static_cast<std::ptrdiff_t>(at) + 5;
+      front.rows.assign(rows, rows + packed[at + 4]);
+      at += 5 + static_cast<std::size_t>(packed[at + 4]);
+    }
+  }
+
   const std::vector<Ints>& graph_;
   Communicator comm_;
   Ints position_;  // (nodes)
@@ -189,6 +204,50 @@ TEST(order, the_same_for_fewer_nodes_than_ranks) {
     few.expect_every_node_once();
     few.expect_fronts_hold_the_fill();
   }
+}
+
+/// The links of a graph as lists.
+std::vector<Ints> list_links(const partition::Graph& graph) {
+  std::vector<Ints> links;
+  for (std::int32_t v = 0; v < graph.vertex_count(); ++v)
+    links.emplace_back(graph.list_neighbours(v).begin(), graph.list_neighbours(v).end());
+  return links;
+}
+
+// Rank 0 condenses them, and links nodes of an element only to the first that is eliminated.
+TEST(order, the_same_from_elements_as_from_the_links_of_all_their_nodes) {
+  Ints pairs;  // elements of two nodes and a gap, which no node dominates
+  for (std::int32_t v = 0; v < 20; ++v) pairs.insert(pairs.end(), {v, -1, (v + 1) % 20});
+  Ints apart = {0, 1, 2, 3, 4, 5, 6, 7, -1, -1, -1, -1};  // and node 8 in none
+  const mesh::TetMesh t10 = tests::make_box({7, 5, 4}, {1, 1, 1}, 2);
+  Ints fixed = t10.tets;  // the first face is not there
+  for (std::int32_t& node : fixed) node -= 300;
+  const auto count_nodes = [](const Ints& elements) { return *std::max_element(elements.begin(), elements.end()) + 1; };
+  struct Body {
+    const Ints& elements;
+    int width;
+    std::int32_t nodes;
+  };
+  for (const auto& [elements, width, nodes] : {Body{pairs, 3, 20}, Body{apart, 4, 9}, Body{t10.tets, 10, count_nodes(t10.tets)},
+                                               Body{fixed, 10, count_nodes(fixed)}, Body{apart, 1, 9}}) {
+    const partition::Graph graph = partition::make_node_graph(elements, width, nodes);
+    const std::vector<Ints> links = list_links(graph);
+    const Case body(links, elements, width);
+    body.expect_every_node_once();
+    body.expect_fronts_hold_the_fill();
+    if (body.ranks() > 1) continue;  // parts are not merged
+    double operations = 0;
+    for (const Supernode& front : find_supernodes(partition::renumber(graph, body.position()), 0, nodes).supernodes)
+      operations += count_flops(front.width, front.size());
+    EXPECT_DOUBLE_EQ(body.count_operations(), operations) << "other fronts than those of the whole graph in this order";
+  }
+}
+
+TEST(order, from_elements_costs_no_more_than_from_links) {
+  const mesh::TetMesh box = tests::make_box({12, 9, 8}, {1, 1, 1}, 2);
+  const auto nodes = static_cast<std::int32_t>(box.nodes_m.size());
+  const std::vector<Ints> links = list_links(partition::make_node_graph(box.tets, 10, nodes));
+  EXPECT_LE(Case(links, box.tets, 10).count_operations(), 1.1 * Case(links, kAll).count_operations());
 }
 
 }  // namespace
