@@ -79,7 +79,8 @@ class Dominators {
   std::vector<char> mark_;  // (vertices) 1: a neighbour of v; 2: the first, or a neighbour of it too
 };
 
-/// All nodes that are in every element of a node, in compressed rows: of two in the same elements the second does not count for the first.
+/// All nodes that are in every element of a node, in compressed rows; of two nodes in the same elements only the lower-numbered dominates
+/// the other.
 struct ElementDominators {
   ElementDominators(std::span<const std::int32_t> elements, int width, const ElementLists& lists, std::int32_t nodes) {
     std::vector<std::int32_t> shared(static_cast<std::size_t>(nodes), 0);  // elements of v, up to this one, which all have the node

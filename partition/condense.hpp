@@ -14,10 +14,10 @@ namespace carillon::partition {
 /// T10 the middle of an edge is dominated by both ends. Vertices with the same neighbours dominate each other; the first of them stays.
 class Condensation {
  public:
-  /// One whose core would have less than `smallest_core` vertices, or more than half of them, is its own core.
+  /// One whose core would have fewer than `smallest_core` vertices, or more than half of them, is its own core.
   explicit Condensation(const Graph& graph, std::int32_t smallest_core = kSmallestCore);
-  /// Of the node graph of a mesh, which is not made: u dominates v if it is in all elements of v. So a vertex whose neighbours another has
-  /// by chance stays in the core. elements: as make_node_graph(), each with
+  /// Of the node graph of a mesh, which is not made: u dominates v if it is in all elements of v. So a vertex whose neighbours another one
+  /// happens to have as well stays in the core. elements: as make_node_graph(), each with
   /// different nodes.
   Condensation(std::span<const std::int32_t> elements, int width, std::int32_t nodes, std::int32_t smallest_core = kSmallestCore);
 

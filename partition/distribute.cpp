@@ -58,13 +58,13 @@ std::vector<std::int32_t> find_node_owners(const mesh::TetMesh& mesh, const std:
   return owner;
 }
 
-/// Gives each node that several ranks touch to that of them which has fewest nodes so far, and first of all those that it has alone.
+/// Counts the nodes that only one rank touches, then gives each other node to whichever of its ranks has fewest so far.
 void level_node_owners(const mesh::TetMesh& mesh, const std::vector<std::int32_t>& part, int ranks, std::vector<std::int32_t>& owner) {
   struct Touch {
     std::int32_t node, rank;
     auto operator<=>(const Touch&) const = default;
   };
-  std::vector<Touch> seams;  // with ranks other than the highest, and then with that
+  std::vector<Touch> seams;  // for all ranks of a node but the highest
   for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
     for (const std::int32_t node : mesh.tet(e))
       if (part[e] != owner[node]) seams.push_back({node, part[e]});

@@ -13,7 +13,7 @@
 namespace carillon::partition {
 
 /// What one rank has of the mesh: its own tetrahedra, the nodes it owns and the halo, which is the other nodes of its tetrahedra. A node
-/// that several ranks touch is owned by the highest of them.
+/// that several ranks touch is owned by one of them.
 struct LocalMesh {
   int order = 1;                           // 1 or 2
   std::vector<std::int32_t> tets;          // (e, 4) or (e, 10), local node numbers

@@ -31,7 +31,7 @@ constexpr double kSeparatorSeconds = 3e-6;  // of METIS per vertex, for each sep
 constexpr int kMostOrders = 8;
 
 /// Whether another order will probably save more time than it costs, where the best of `orders` has so many operations on nodes, 27 on
-/// numbers each. Of k + 1 normal numbers the least is 0.56 / k standard deviations below that of k, within a tenth.
+/// numbers each. Of k + 1 normal numbers the least is 0.56 / k standard deviations below that of k, within an eighth.
 bool pays_another_order(double node_operations, int orders, std::int64_t vertices, int tries) {
   const double operations = 27 * node_operations;
   const double saved = kScatter * 0.56 / orders * kFactorisations * operations / kOperationRate;
@@ -110,11 +110,11 @@ std::vector<std::int32_t> order_core(const Graph& graph, int tries, Estimate&& e
                           position.data());
     });
   };
-  const bool has_many = tries == 1 || vertices >= kManySeparators;
-  if (has_many) options[METIS_OPTION_NSEPS] = tries;
+  const bool seeks_all = tries == 1 || vertices >= kManySeparators;
+  if (seeks_all) options[METIS_OPTION_NSEPS] = tries;
   std::vector<std::int32_t> best;
   double fewest = std::numeric_limits<double>::infinity();
-  for (int orders = 0; orders == 0 || (has_many ? pays_another_order(fewest, orders, vertices, tries) : orders < tries);
+  for (int orders = 0; orders == 0 || (seeks_all ? pays_another_order(fewest, orders, vertices, tries) : orders < tries);
        ++orders, ++options[METIS_OPTION_SEED]) {
     order();
     const double operations = estimate(position);

@@ -8,6 +8,7 @@
 #include <array>
 #include <cerrno>
 #include <csignal>
+#include <cstdlib>
 #include <cstring>
 #include <optional>
 #include <string_view>
@@ -35,10 +36,12 @@ std::string find_message(const std::string& errors, const std::string& program) 
   return message.starts_with("error: ") ? message.substr(7) : message;
 }
 
-constexpr double kDaemonGraceS = 2.0;  // Open MPI's daemon removes its session folder in some 0.05 s
+constexpr double kDaemonGraceS = 10.0;  // Open MPI's daemon removes its session folder in some 0.05 s where nothing else runs
 constexpr double kEndPatienceS = 5.0;
 /// In the environment of what programs are started with, and so of all that these start.
 constexpr std::string_view kMark = "CARILLON_PROGRAMS=";
+/// Where Open MPI has its session folder: in ours, so that nothing stays when its daemon is killed.
+constexpr const char* kSessions = "OMPI_MCA_orte_tmpdir_base";
 
 /// What an exit code says without a result.
 base::ResultKind find_kind(int exit_code) {
@@ -96,6 +99,7 @@ std::string Programs::run(const std::string& program, std::vector<std::string> w
   command.folder = folder_;
   const std::string mark = std::string(kMark) + folder_.string();
   command.environment.emplace({mark});
+  if (std::getenv(kSessions) == nullptr) command.environment->push_back(std::string(kSessions) + "=" + folder_.string());
   for (char** entry = environ; *entry != nullptr; ++entry)
     if (!std::string_view(*entry).starts_with(kMark)) command.environment->emplace_back(*entry);
   command.output = shows && !is_quiet_ ? STDERR_FILENO : base::kCapture;

@@ -110,7 +110,8 @@ void to_rows(const Columns& x, Row* out) {
   }
 }
 
-/// The packed columns of a product. One for all matrices of the rank: fresh memory at each product costs as much as the product.
+/// The packed columns of a product, 128 bytes for each row of the rank. All matrices share them, and they stay until the process ends:
+/// fresh memory at each product costs as much as the product.
 std::vector<Row>& get_strip() {
   static thread_local std::vector<Row> strip;
   return strip;
@@ -171,7 +172,7 @@ void NodeMatrix::read(Mat matrix, double factor) {
   check(MatGetInfo(matrix, MAT_LOCAL, &info));
   const auto entries = static_cast<std::size_t>(info.nz_used);  // three of a scalar, nine of a block
   global.reserve(entries / 3);
-  values_.reserve(entries);
+  values_.reserve(entries / 3);
   const auto keep_blocks = [&] {
     if (!std::exchange(only_scalars, false)) return;
     std::vector<double> scalars;

@@ -7,6 +7,7 @@
 #include "precompute/ldlt/elimination.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "partition/condense.hpp"
@@ -236,6 +237,10 @@ Ints find_moved(const Communicator& comm, const Elimination& all, const Ints& po
       });
 }
 
+// Fewer corners are ordered with all other nodes: their parts would be too small for METIS to choose well, and it takes milliseconds.
+constexpr std::int32_t kSmallestCore = 256;
+constexpr std::int32_t kAnyNumber = std::numeric_limits<std::int32_t>::max();  // of nodes in one piece
+
 /// Own parts of the tree and their nodes. Local.
 void hold_parts(const Communicator& comm, Elimination& all, std::vector<Ints> placed) {
   for (std::size_t t = 0; t < placed.size(); ++t) {
@@ -298,8 +303,8 @@ std::vector<Ints> list_nodes(const Communicator& comm, const SeparatorTree& tree
   return lists;
 }
 
-/// Links that lead to the same fronts as those between all nodes of an element: from the first node of each element that is eliminated to
-/// its others. When that node goes, the others become a clique, so no row is lost, and none is gained. Lists as sort_links() takes them.
+/// Links that lead to the same fronts as those between all nodes of an element: from that node of each element which is eliminated first
+/// to its others. Then the others become a clique, so no row is lost, and none is gained. Lists as sort_links() takes them.
 /// Local.
 std::vector<Ints> list_star_links(const Communicator& comm, const SeparatorTree& tree, std::span<const std::int32_t> elements, int width,
                                   const Ints& position) {
@@ -368,10 +373,9 @@ Elimination eliminate_on_paper(const Communicator& comm, const NodeLinks& nodes,
   return all;
 }
 
-Elimination eliminate_elements(const Communicator& comm, std::span<const std::int32_t> elements, int width, std::int32_t nodes,
-                               std::int32_t largest_gathered) {
+Elimination eliminate_elements(const Communicator& comm, std::span<const std::int32_t> elements, int width, std::int32_t nodes) {
   Elimination all = comm.agree([&] { return Elimination(comm.size()); });
-  const auto condensed = comm.agree([&] { return partition::Condensation(elements, width, nodes); });
+  const auto condensed = comm.agree([&] { return partition::Condensation(elements, width, nodes, kSmallestCore); });
   NodeLinks core = comm.agree([&] {
     NodeLinks links;
     links.own_nodes = condensed.core().vertex_count();
@@ -381,7 +385,7 @@ Elimination eliminate_elements(const Communicator& comm, std::span<const std::in
   const IndexPartition core_owners(comm, core.own_nodes);
   core.first_node = static_cast<std::int32_t>(core_owners.own_begin());
   std::vector<Ints> placed =
-      order_parts(comm, core, core_owners, all.tree, largest_gathered, comm.agree([&] { return condensed.count_weights(); }));
+      order_parts(comm, core, core_owners, all.tree, kAnyNumber, comm.agree([&] { return condensed.count_weights(); }));
   comm.agree([&] { hold_parts(comm, all, std::move(placed)); });
   const Ints core_position = report_own_positions(comm, all, core_owners);
 

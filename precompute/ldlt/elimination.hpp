@@ -30,11 +30,10 @@ struct Elimination {
 /// Positions of own nodes and ghosts, from the ranks that hold them. Collective.
 Ints report_positions(const comm::Communicator& comm, const Elimination& all, const NodeLinks& nodes, const comm::IndexPartition& owners);
 
-/// Orders the nodes of a mesh whose elements are all on rank 0, and finds the fronts. elements: (e, width), negative: no node; nodes: how
-/// many there are, and their numbers are theirs in the whole order. Rank 0 has all positions afterwards. largest_gathered, errors: as
-/// below. Collective.
-Elimination eliminate_elements(const comm::Communicator& comm, std::span<const std::int32_t> elements, int width, std::int32_t nodes,
-                               std::int32_t largest_gathered = partition::kLargestGathered);
+/// Orders the nodes of a mesh whose elements are all on rank 0, and finds the fronts. elements: (e, width) of nodes 0 to nodes - 1,
+/// negative: none; on the other ranks nodes is 0. Rank 0 has all positions afterwards. Collective. Throws SystemError on all ranks when
+/// memory runs out.
+Elimination eliminate_elements(const comm::Communicator& comm, std::span<const std::int32_t> elements, int width, std::int32_t nodes);
 
 /// Orders the nodes and finds the fronts. largest_gathered: of order_parts. Collective. Throws SystemError on all ranks when memory runs
 /// out.

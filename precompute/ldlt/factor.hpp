@@ -16,7 +16,7 @@ struct Analysis {
   struct Rank {
     std::int64_t entries = 0;     // of L and D kept on the rank, the zeros that amalgamation stores included
     double flops = 0;             // of its part of a factorisation
-    std::int64_t peak_bytes = 0;  // factor, update matrices at their worst moment, and workspace of a solve
+    std::int64_t peak_bytes = 0;  // factor with the update matrices at their worst moment, or with the workspace of a solve
   };
   std::vector<Rank> ranks;
   std::int64_t entries = 0;  // sums over the ranks

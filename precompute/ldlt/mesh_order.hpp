@@ -22,7 +22,7 @@ struct ElementRanks {
 ///
 ///   MeshOrder order(comm, elements, 10, owners);
 ///   const Ints part = order.find_ranks(comm, elements, 10).rank;  // cut the mesh so, and number its rows
-///   order.renumber(comm, rows);                              // for Factor(pencil, &order)
+///   order.renumber(comm, rows);                                   // for Factor(pencil, &order)
 class MeshOrder {
  public:
   /// elements: (e, width) nodes of this rank's elements, each element on one rank; negative: fixed. owners: who answers for which node

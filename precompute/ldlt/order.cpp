@@ -285,7 +285,9 @@ std::vector<Piece> find_pieces(const Communicator& comm, const NodeLinks& nodes,
   if (is_one_piece && owners.begin(1) == owners.total()) {
     return comm.agree([&] { return nodes.own_nodes > 0 ? std::vector<Piece>{make_whole(nodes, tree, weights)} : std::vector<Piece>(); });
   }
-  if (!weights.empty()) throw std::logic_error("a core of nodes is ordered where all of it is");
+  comm.agree([&] {
+    if (!weights.empty()) throw std::logic_error("a core of nodes is ordered where all of it is");
+  });
   if (!is_one_piece) return gather_pieces(comm, nodes, tree, label_nodes(comm, nodes, owners, tree, largest));
   return gather_pieces(comm, nodes, tree, comm.agree([&] {
     return std::vector<Label>(static_cast<std::size_t>(nodes.count()), Label{tree.root(), 0});

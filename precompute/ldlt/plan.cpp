@@ -385,10 +385,12 @@ Analysis::Rank measure(Plan& plan) {
   }
   constexpr int kBlocks = kSolveColumns / kBlockColumns;
   const Room& room = plan.room = plan_room(plan.fronts, shared_panels, kBlocks, plan.count_block());
-  std::int64_t numbers = std::max(room.numbers + leaving + scratch, room.panels + shared_peak);
+  // Of a factorisation, and of the solves after it, whose right-hand sides lie in what it has left.
+  std::int64_t numbers = std::max(
+      {room.numbers + leaving + scratch, room.panels + shared_peak, room.numbers + (kBlocks - room.solve_blocks) * plan.count_block()});
   for (const SentBlocks& list : plan.sent) numbers += 9 * static_cast<std::int64_t>(list.columns.size());
   for (const ReceivedBlocks& list : plan.received) numbers += 9 * static_cast<std::int64_t>(list.count());
-  own.peak_bytes = 8 * (numbers + (kBlocks - room.solve_blocks) * plan.count_block());
+  own.peak_bytes = 8 * numbers;
   return own;
 }
 

@@ -21,7 +21,7 @@ struct CutMesh {
 
 /// Cuts the mesh by METIS or, on several ranks with at least 300 nodes each on average, by the order of elimination: each element goes to
 /// the rank that eliminates the first of its nodes, or where that rank would have too many to one that would have too few, so that all
-/// have the same number. Above `largest_ordered` nodes METIS cuts first, so that all ranks can order. Collective. Throws as
+/// have nearly the same number. Above `largest_ordered` nodes METIS cuts first, so that all ranks can order. Collective. Throws as
 /// partition::distribute().
 CutMesh cut_by_order(const comm::Communicator& comm, const mesh::TetMesh& mesh, const std::vector<std::int32_t>& fixed_nodes,
                      std::int32_t largest_ordered = partition::kLargestGathered);

@@ -106,6 +106,8 @@ class Case {
         for (const std::int32_t row : behind[static_cast<std::size_t>(p)])
           ASSERT_TRUE(row < front.first + front.width || std::binary_search(front.rows.begin(), front.rows.end(), row))
               << "row " << row << " of pivot " << p << " is missing";
+      const std::set<std::int32_t>& last = behind[static_cast<std::size_t>(front.first + front.width - 1)];
+      EXPECT_EQ(front.rows, Ints(last.begin(), last.end())) << "rows of a front are those of its last pivot";
       if (front.rows.empty()) {
         EXPECT_EQ(front.parent, -1);
         continue;
