@@ -245,8 +245,15 @@ Ints Condensation::expand_order(const Ints& position) const {
 }
 
 double estimate_operations(const Graph& core, const Ints& weights, const Ints& position) {
-  std::vector<double> width(position.size());
-  for (std::size_t v = 0; v < position.size(); ++v) width[static_cast<std::size_t>(position[v])] = weights[v];
+  double dominated = 0;
+  for (const std::int32_t weight : weights) dominated += weight - 1;
+  const double share = dominated / std::max(0.5 * static_cast<double>(core.neighbours.size()), 1.0);
+  std::vector<double> width(position.size(), 1.0);
+  for (std::int32_t v = 0; v < core.vertex_count(); ++v) {
+    const std::int32_t place = position[static_cast<std::size_t>(v)];
+    for (const std::int32_t u : core.list_neighbours(v))
+      if (position[static_cast<std::size_t>(u)] > place) width[static_cast<std::size_t>(place)] += share;
+  }
   return sum_operations(core, position, width);
 }
 

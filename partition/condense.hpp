@@ -41,7 +41,7 @@ class Condensation {
   /// with few neighbours first. position: (core vertices) a permutation; result: (vertices) a permutation.
   std::vector<std::int32_t> expand_order(const std::vector<std::int32_t>& position) const;
   /// Operations of a factorisation in the order that expand_order makes of this one, to compare orders by: partition::estimate_operations
-  /// with the vertices that come before each one.
+  /// with the vertices that expand_order puts before each one.
   double estimate_operations(const std::vector<std::int32_t>& position) const;
 
  private:
@@ -59,8 +59,10 @@ class Condensation {
   Graph core_;
 };
 
-/// Squares of the lengths of the columns of L, summed, where each vertex of a core is eliminated together with those that it stands for,
-/// as if these had all its rows, which is up to twice too much. weights: (vertices) how many that is; position: (vertices) the order.
+/// Squares of the lengths of the columns of L, summed, where what a vertex of a core dominates is eliminated together with it, as if it had
+/// all the rows of that vertex, which is up to twice too much. Each edge of the core stands for the same number of dominated vertices, as
+/// in a mesh of second order for the middle of the edge; they go with the end that is eliminated first. weights: (vertices) how many each
+/// stands for; position: (vertices) the order.
 double estimate_operations(const Graph& core, const std::vector<std::int32_t>& weights, const std::vector<std::int32_t>& position);
 
 /// Condensation::find_tries() of a core, or a part of one, whose vertices stand for so many.

@@ -175,6 +175,15 @@ TEST(Condensation, of_elements_needs_no_graph_of_all_nodes) {
   expect_core_of_elements({}, 10, 3);
 }
 
+TEST(Condensation, estimates_from_weights_alone_nearly_what_it_estimates_from_hosts) {
+  const auto box = tests::make_box({9, 8, 7}, {1, 1, 1}, 2);
+  const Condensation condensed(box.tets, 10, static_cast<std::int32_t>(box.nodes_m.size()));
+  const Graph& core = condensed.core();
+  const Vertices position = order_nested_dissection(core, condensed.count_weights());
+  const double exact = condensed.estimate_operations(position);
+  EXPECT_NEAR(estimate_operations(core, condensed.count_weights(), position), exact, 0.1 * exact);
+}
+
 TEST(Condensation, of_elements_and_of_their_graph_give_the_same_separators) {
   const auto box = tests::make_box({9, 8, 7}, {1, 1, 1}, 2);
   const auto nodes = static_cast<std::int32_t>(box.nodes_m.size());
