@@ -81,21 +81,12 @@ class Dominators {
 
 /// All nodes that are in every element of a node, in compressed rows; of two nodes in the same elements only the lower-numbered dominates
 /// the other.
-struct ElementDominators {
-  ElementDominators(std::span<const std::int32_t> elements, int width, const ElementLists& lists, std::int32_t nodes) {
-    std::vector<std::int32_t> shared(static_cast<std::size_t>(nodes), 0);  // elements of v, up to this one, which all have the node
-    for (std::int32_t v = 0; v < nodes; ++v) {
-      const auto of_v = lists.of(v);
-      for (std::size_t k = 0; k < of_v.size(); ++k)
-        for (const std::int32_t u : get(elements, of_v[k], width))
-          if (u >= 0) shared[static_cast<std::size_t>(u)] += shared[static_cast<std::size_t>(u)] == static_cast<std::int32_t>(k) ? 1 : 0;
-      for (const std::int32_t e : of_v.first(std::min<std::size_t>(of_v.size(), 1)))
-        for (const std::int32_t u : get(elements, e, width)) {
-          if (u < 0) continue;
-          const auto common = static_cast<std::size_t>(std::exchange(shared[static_cast<std::size_t>(u)], 0));
-          const std::size_t count = lists.of(u).size();
-          if (common == of_v.size() && u != v && (count > common || u < v)) list.push_back(u);
-        }
+class ElementDominators {
+ public:
+  ElementDominators(std::span<const std::int32_t> elements, int width, const ElementLists& lists)
+      : elements_(elements), width_(static_cast<std::size_t>(width)), lists_(lists), shared_(lists.begin.size() - 1, 0) {
+    for (std::int32_t v = 0; v < static_cast<std::int32_t>(shared_.size()); ++v) {
+      if (!lists.of(v).empty()) add(v);
       offsets.push_back(static_cast<std::int32_t>(list.size()));
     }
   }
@@ -104,38 +95,27 @@ struct ElementDominators {
   Ints list;
 
  private:
-  static std::span<const std::int32_t> get(std::span<const std::int32_t> elements, std::int32_t e, int width) {
-    return elements.subspan(static_cast<std::size_t>(e) * static_cast<std::size_t>(width), static_cast<std::size_t>(width));
-  }
-};
-
-int count_tries(std::int64_t core, std::int64_t all) { return 4 * core <= all ? 4 : 1; }
-
-/// width: (places) vertices that are eliminated together.
-double sum_operations(const Graph& core, const Ints& position, const std::vector<double>& width) {
-  const std::size_t count = position.size();
-  Ints at(count);
-  for (std::size_t v = 0; v < count; ++v) at[static_cast<std::size_t>(position[v])] = static_cast<std::int32_t>(v);
-  // Row by row of the factor: the places on the ways up the elimination tree from the neighbours before (Liu 1990).
-  std::vector<double> below(count, 0.0);
-  Ints parent(count, -1);
-  Ints seen_from(count, -1);
-  for (std::int32_t row = 0; row < static_cast<std::int32_t>(count); ++row) {
-    seen_from[static_cast<std::size_t>(row)] = row;
-    for (const std::int32_t u : core.list_neighbours(at[static_cast<std::size_t>(row)])) {
-      if (position[static_cast<std::size_t>(u)] > row) continue;
-      for (auto place = static_cast<std::size_t>(position[static_cast<std::size_t>(u)]); seen_from[place] != row;
-           place = static_cast<std::size_t>(parent[place])) {
-        seen_from[place] = row;
-        below[place] += width[static_cast<std::size_t>(row)];
-        if (parent[place] < 0) parent[place] = row;
-      }
+  void add(std::int32_t v) {
+    const auto of_v = lists_.of(v);
+    std::int32_t before = 0;  // elements of v
+    for (const std::int32_t e : of_v) {
+      for (const std::int32_t u : get(e))
+        if (u >= 0) shared_[static_cast<std::size_t>(u)] += shared_[static_cast<std::size_t>(u)] == before ? 1 : 0;
+      ++before;
+    }
+    for (const std::int32_t u : get(of_v.front())) {
+      if (u < 0) continue;
+      const std::size_t count = lists_.of(u).size();
+      if (std::exchange(shared_[static_cast<std::size_t>(u)], 0) == before && u != v && (count > of_v.size() || u < v)) list.push_back(u);
     }
   }
-  double operations = 0;
-  for (std::size_t k = 0; k < count; ++k) operations += width[k] * (below[k] + width[k] / 2) * (below[k] + width[k] / 2);
-  return operations;
-}
+  std::span<const std::int32_t> get(std::int32_t e) const { return elements_.subspan(static_cast<std::size_t>(e) * width_, width_); }
+
+  std::span<const std::int32_t> elements_;
+  std::size_t width_;
+  const ElementLists& lists_;
+  Ints shared_;  // (nodes) how many elements of v have the node, of which it is in all up to the last of them
+};
 
 }  // namespace
 
@@ -151,7 +131,7 @@ Condensation::Condensation(std::span<const std::int32_t> elements, int width, st
     : number_(static_cast<std::size_t>(nodes), -1) {
   const ElementLists lists = list_elements(elements, width, nodes);
   for (std::int32_t v = 0; v < nodes; ++v) degree_.push_back(static_cast<std::int32_t>(lists.of(v).size()));
-  const ElementDominators all(elements, width, lists, nodes);
+  const ElementDominators all(elements, width, lists);
   const Ints kept = choose_core(all.offsets, all.list, smallest_core);
   if (kept.empty()) {
     core_ = make_node_graph(elements, width, nodes);
@@ -185,14 +165,9 @@ Ints Condensation::choose_core(const Ints& offsets, const Ints& dominators, std:
   return kept;
 }
 
-int Condensation::find_tries() const { return count_tries(core_.vertex_count(), static_cast<std::int64_t>(number_.size())); }
-
-Ints Condensation::count_weights() const {
-  Ints weights(static_cast<std::size_t>(core_.vertex_count()), 1);
-  for (std::size_t v = 0; v < number_.size(); ++v)
-    if (number_[v] < 0)
-      ++weights[static_cast<std::size_t>(*std::min_element(hosts_.begin() + offsets_[v], hosts_.begin() + offsets_[v + 1]))];
-  return weights;
+double Condensation::dominated_per_edge() const {
+  const auto dominated = static_cast<double>(number_.size()) - core_.vertex_count();
+  return core_.neighbours.empty() ? 0 : dominated / (0.5 * static_cast<double>(core_.neighbours.size()));
 }
 
 Ints Condensation::expand_sides(const Ints& side) const {
@@ -211,13 +186,6 @@ std::int32_t Condensation::find_first_host(std::int32_t vertex, const Ints& posi
   for (std::int32_t k = offsets_[static_cast<std::size_t>(vertex)]; k < offsets_[static_cast<std::size_t>(vertex) + 1]; ++k)
     first = std::min(first, position[static_cast<std::size_t>(hosts_[static_cast<std::size_t>(k)])]);
   return first;
-}
-
-double Condensation::estimate_operations(const Ints& position) const {
-  std::vector<double> width(position.size(), 1.0);  // what is eliminated there
-  for (std::size_t v = 0; v < number_.size(); ++v)
-    if (number_[v] < 0) ++width[static_cast<std::size_t>(find_first_host(static_cast<std::int32_t>(v), position))];
-  return sum_operations(core_, position, width);
 }
 
 Ints Condensation::expand_order(const Ints& position) const {
@@ -244,21 +212,39 @@ Ints Condensation::expand_order(const Ints& position) const {
   return result;
 }
 
-double estimate_operations(const Graph& core, const Ints& weights, const Ints& position) {
-  double dominated = 0;
-  for (const std::int32_t weight : weights) dominated += weight - 1;
-  const double share = dominated / std::max(0.5 * static_cast<double>(core.neighbours.size()), 1.0);
-  std::vector<double> width(position.size(), 1.0);
-  for (std::int32_t v = 0; v < core.vertex_count(); ++v) {
-    const std::int32_t place = position[static_cast<std::size_t>(v)];
-    for (const std::int32_t u : core.list_neighbours(v))
-      if (position[static_cast<std::size_t>(u)] > place) width[static_cast<std::size_t>(place)] += share;
-  }
-  return sum_operations(core, position, width);
+int find_tries(const Graph& core, double dominated_per_edge) {
+  const double dominated = dominated_per_edge * 0.5 * static_cast<double>(core.neighbours.size());
+  return dominated >= 3.0 * core.vertex_count() ? 4 : 1;
 }
 
-int find_tries(const Graph& core, const Ints& weights) {
-  return count_tries(core.vertex_count(), std::accumulate(weights.begin(), weights.end(), std::int64_t{0}));
+double estimate_operations(const Graph& core, double dominated_per_edge, const Ints& position) {
+  const std::size_t count = position.size();
+  Ints at(count);
+  std::vector<double> width(count, 1.0);  // (places) what is eliminated there
+  for (std::size_t v = 0; v < count; ++v) {
+    at[static_cast<std::size_t>(position[v])] = static_cast<std::int32_t>(v);
+    for (const std::int32_t u : core.list_neighbours(static_cast<std::int32_t>(v)))
+      if (position[static_cast<std::size_t>(u)] > position[v]) width[static_cast<std::size_t>(position[v])] += dominated_per_edge;
+  }
+  // Row by row of the factor: the places on the ways up the elimination tree from the neighbours before (Liu 1990).
+  std::vector<double> below(count, 0.0);
+  Ints parent(count, -1);
+  Ints seen_from(count, -1);
+  for (std::int32_t row = 0; row < static_cast<std::int32_t>(count); ++row) {
+    seen_from[static_cast<std::size_t>(row)] = row;
+    for (const std::int32_t u : core.list_neighbours(at[static_cast<std::size_t>(row)])) {
+      if (position[static_cast<std::size_t>(u)] > row) continue;
+      for (auto place = static_cast<std::size_t>(position[static_cast<std::size_t>(u)]); seen_from[place] != row;
+           place = static_cast<std::size_t>(parent[place])) {
+        seen_from[place] = row;
+        below[place] += width[static_cast<std::size_t>(row)];
+        if (parent[place] < 0) parent[place] = row;
+      }
+    }
+  }
+  double operations = 0;
+  for (std::size_t k = 0; k < count; ++k) operations += width[k] * (below[k] + width[k] / 2) * (below[k] + width[k] / 2);
+  return operations;
 }
 
 }  // namespace carillon::partition

@@ -17,21 +17,15 @@ class Condensation {
   /// One whose core would have fewer than `smallest_core` vertices, or more than half of them, is its own core.
   explicit Condensation(const Graph& graph, std::int32_t smallest_core = kSmallestCore);
   /// Of the node graph of a mesh, which is not made: u dominates v if it is in all elements of v. So a vertex whose neighbours another one
-  /// happens to have as well stays in the core. elements: as make_node_graph(), each with
-  /// different nodes.
+  /// happens to have as well stays in the core. elements: as make_node_graph(), each with different nodes.
   Condensation(std::span<const std::int32_t> elements, int width, std::int32_t nodes, std::int32_t smallest_core = kSmallestCore);
 
   /// The graph of the vertices that no other dominates, in their order.
   const Graph& core() const { return core_; }
   /// (vertices) the number of each in the core, -1: dominated.
   const std::vector<std::int32_t>& numbers() const { return number_; }
-
-  /// How many separators or orders of the core to seek where one would be sought of the graph: METIS's time goes with the core, that of the
-  /// factorisation with the graph.
-  int find_tries() const;
-
-  /// (core vertices) how many vertices each stands for: itself, and those dominated of which it is the first host by number.
-  std::vector<std::int32_t> count_weights() const;
+  /// Dominated vertices for each edge of the core: 1 in a mesh of second order, where they are the middles of the edges.
+  double dominated_per_edge() const;
 
   /// A separator of the whole graph from one of the core. side: (core vertices) 0, 1 or 2, the separator; the same for every vertex of
   /// the graph. A dominated vertex is in the separator only if all are that dominate it.
@@ -40,9 +34,6 @@ class Condensation {
   /// An order of elimination of the whole graph from one of the core: a dominated vertex comes before the first that dominates it, those
   /// with few neighbours first. position: (core vertices) a permutation; result: (vertices) a permutation.
   std::vector<std::int32_t> expand_order(const std::vector<std::int32_t>& position) const;
-  /// Operations of a factorisation in the order that expand_order makes of this one, to compare orders by: partition::estimate_operations
-  /// with the vertices that expand_order puts before each one.
-  double estimate_operations(const std::vector<std::int32_t>& position) const;
 
  private:
   static constexpr std::int32_t kSmallestCore = 64;
@@ -59,13 +50,13 @@ class Condensation {
   Graph core_;
 };
 
-/// Squares of the lengths of the columns of L, summed, where what a vertex of a core dominates is eliminated together with it, as if it had
-/// all the rows of that vertex, which is up to twice too much. Each edge of the core stands for the same number of dominated vertices, as
-/// in a mesh of second order for the middle of the edge; they go with the end that is eliminated first. weights: (vertices) how many each
-/// stands for; position: (vertices) the order.
-double estimate_operations(const Graph& core, const std::vector<std::int32_t>& weights, const std::vector<std::int32_t>& position);
+/// How many separators or orders of a core, or of a part of one, to seek where one would be sought of the whole graph: METIS's time goes
+/// with the core, that of the factorisation with the graph.
+int find_tries(const Graph& core, double dominated_per_edge);
 
-/// Condensation::find_tries() of a core, or a part of one, whose vertices stand for so many.
-int find_tries(const Graph& core, const std::vector<std::int32_t>& weights);
+/// Operations of a factorisation in the order that expand_order makes of this one, to compare orders by: squares of the lengths of the
+/// columns of L, summed. The dominated vertices of each edge go with the end that is eliminated first, as if they had all its rows, which
+/// is up to twice too much. position: (core vertices) a permutation.
+double estimate_operations(const Graph& core, double dominated_per_edge, const std::vector<std::int32_t>& position);
 
 }  // namespace carillon::partition

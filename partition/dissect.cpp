@@ -129,31 +129,30 @@ class Dissector {
   Dissection result_;
 };
 
-/// Of a graph that is not condensed further.
-Ints separate_core(Graph graph, int tries, int seed) {
-  Ints side(static_cast<std::size_t>(graph.vertex_count()), 0);
-  if (graph.neighbours.empty()) {
+Ints separate_core(Graph core, double dominated_per_edge, int tries, int seed) {
+  Ints side(static_cast<std::size_t>(core.vertex_count()), 0);
+  if (core.neighbours.empty()) {
     for (std::size_t v = 0; v < side.size(); ++v) side[v] = 2 * v < side.size() ? 0 : 1;
     return side;
   }
   MetisOptions options = make_metis_options();
-  options[METIS_OPTION_NSEPS] = tries;
+  options[METIS_OPTION_NSEPS] = tries * find_tries(core, dominated_per_edge);
   options[METIS_OPTION_SEED] += seed;
   options[METIS_OPTION_UFACTOR] = kImbalance;
-  idx_t count = graph.vertex_count();
+  idx_t count = core.vertex_count();
   idx_t size = 0;
   call_metis("METIS_ComputeVertexSeparator", [&] {
-    return METIS_ComputeVertexSeparator(&count, graph.offsets.data(), graph.neighbours.data(), nullptr, options.data(), &size, side.data());
+    return METIS_ComputeVertexSeparator(&count, core.offsets.data(), core.neighbours.data(), nullptr, options.data(), &size, side.data());
   });
   return side;
 }
 
 }  // namespace
 
-std::vector<std::int32_t> separate(const Graph& graph, int tries, int seed, const std::vector<std::int32_t>& weights) {
-  if (!weights.empty()) return separate_core(graph, tries * find_tries(graph, weights), seed);
+std::vector<std::int32_t> separate(const Graph& graph, int tries, int seed, std::optional<double> dominated_per_edge) {
+  if (dominated_per_edge) return separate_core(graph, *dominated_per_edge, tries, seed);
   const Condensation condensed(graph);
-  return condensed.expand_sides(separate_core(condensed.core(), tries * condensed.find_tries(), seed));
+  return condensed.expand_sides(separate_core(condensed.core(), condensed.dominated_per_edge(), tries, seed));
 }
 
 std::vector<std::int32_t> make_clusters(const Graph& graph, std::int32_t count) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "partition/partition.hpp"
@@ -19,8 +20,9 @@ struct WeightedGraph {
 };
 
 /// 0 and 1, the sides, or 2, the separator between them, for each vertex: the smallest of `tries` found. Sides may be a fifth apart.
-/// Another seed finds others. weights: as order_nested_dissection. Throws SystemError when METIS runs out of memory, as all below.
-std::vector<std::int32_t> separate(const Graph& graph, int tries = 4, int seed = 0, const std::vector<std::int32_t>& weights = {});
+/// Another seed finds others. dominated_per_edge: as order_nested_dissection. Throws SystemError when METIS runs out of memory, as all
+/// below.
+std::vector<std::int32_t> separate(const Graph& graph, int tries = 4, int seed = 0, std::optional<double> dominated_per_edge = {});
 
 /// Vertices in `count` clusters of nearly equal size with few edges between them: the cluster of each.
 std::vector<std::int32_t> make_clusters(const Graph& graph, std::int32_t count);

@@ -93,14 +93,14 @@ void fill_empty_parts(std::vector<std::int32_t>& part, int parts) {
   }
 }
 
-/// METIS's order of a graph that is not condensed further; estimate(position): the operations by which orders are compared.
-template <typename Estimate>
-std::vector<std::int32_t> order_core(const Graph& graph, int tries, Estimate&& estimate) {
-  std::vector<std::int32_t> position(graph.vertex_count());
+/// METIS's order of a core.
+std::vector<std::int32_t> order_core(const Graph& core, double dominated_per_edge) {
+  std::vector<std::int32_t> position(core.vertex_count());
   std::iota(position.begin(), position.end(), 0);
-  if (graph.neighbours.empty()) return position;
+  if (core.neighbours.empty()) return position;
   // METIS takes the graph by pointers to mutable memory and leaves it unchanged in effect; a copy keeps the promise of const.
-  Graph copy = graph;
+  Graph copy = core;
+  const int tries = find_tries(core, dominated_per_edge);
   idx_t vertices = copy.vertex_count();
   std::vector<std::int32_t> vertex_at(vertices);
   MetisOptions options = make_metis_options();
@@ -117,7 +117,7 @@ std::vector<std::int32_t> order_core(const Graph& graph, int tries, Estimate&& e
   for (int orders = 0; orders == 0 || (seeks_all ? pays_another_order(fewest, orders, vertices, tries) : orders < tries);
        ++orders, ++options[METIS_OPTION_SEED]) {
     order();
-    const double operations = estimate(position);
+    const double operations = estimate_operations(core, dominated_per_edge, position);
     if (operations >= fewest) continue;
     fewest = operations;
     best = position;
@@ -270,14 +270,10 @@ Partition measure_parts(std::span<const std::int32_t> corners, std::vector<std::
   return result;
 }
 
-std::vector<std::int32_t> order_nested_dissection(const Graph& graph, const std::vector<std::int32_t>& weights) {
-  if (!weights.empty())
-    return order_core(graph, find_tries(graph, weights),
-                      [&](const std::vector<std::int32_t>& position) { return estimate_operations(graph, weights, position); });
+std::vector<std::int32_t> order_nested_dissection(const Graph& graph, std::optional<double> dominated_per_edge) {
+  if (dominated_per_edge) return order_core(graph, *dominated_per_edge);
   const Condensation condensed(graph);
-  return condensed.expand_order(order_core(condensed.core(), condensed.find_tries(), [&](const std::vector<std::int32_t>& position) {
-    return condensed.estimate_operations(position);
-  }));
+  return condensed.expand_order(order_core(condensed.core(), condensed.dominated_per_edge()));
 }
 
 Graph take_part(const Graph& graph, const std::vector<std::int32_t>& vertices, std::vector<std::int32_t>& number) {

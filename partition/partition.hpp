@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -67,9 +68,9 @@ Partition partition_elements(std::span<const std::int32_t> corners, int parts);
 Partition measure_parts(std::span<const std::int32_t> corners, std::vector<std::int32_t> part, int parts);
 
 /// Fill-reducing order of a graph by nested dissection, METIS's of the condensed graph (condense.hpp): result[v] is the position of vertex
-/// v in the elimination order (zero-based), a permutation. This is MUMPS' PERM_IN less one. weights: of a graph that is the core of a
-/// Condensation already, Condensation::count_weights() of its vertices; empty: of none. Throws SystemError when METIS runs out of memory.
-std::vector<std::int32_t> order_nested_dissection(const Graph& graph, const std::vector<std::int32_t>& weights = {});
+/// v in the elimination order (zero-based), a permutation. This is MUMPS' PERM_IN less one. dominated_per_edge: of a graph that is
+/// the core of a Condensation already, or a part of it; without, it is condensed here. Throws SystemError when METIS runs out of memory.
+std::vector<std::int32_t> order_nested_dissection(const Graph& graph, std::optional<double> dominated_per_edge = {});
 
 /// The graph of some vertices alone, which are numbered as they stand in the list, ascending. number: (vertices of the graph) -1, and so
 /// afterwards: scratch that serves many parts of one graph.

@@ -28,7 +28,7 @@ struct Element {
   Ints rows;  // positions, ascending
 };
 
-/// Eliminates a part on paper. links: of each of its positions those behind, and of a leaf all. Elements that have no row in the part go
+/// Eliminates a part on paper. links: of each of its positions those behind. Elements that have no row in the part go
 /// to `left` as they are, the roots of the part too; `parents` gets the front above each element.
 class PartEliminator {
  public:
@@ -78,7 +78,7 @@ class PartEliminator {
       const auto at = std::lower_bound(boundary_.begin(), boundary_.end(), position) - boundary_.begin();
       return hubs + part_.count + static_cast<std::int32_t>(at);
     };
-    std::vector<Ints> inward(static_cast<std::size_t>(part_.count) + boundary_.size());  // of pivots: elements; of the boundary: pivots too
+    std::vector<Ints> inward(static_cast<std::size_t>(part_.count) + boundary_.size());  // elements and pivots before
     Graph graph;
     graph.offsets.push_back(0);
     const auto close = [&] { graph.offsets.push_back(static_cast<std::int32_t>(graph.neighbours.size())); };
@@ -93,9 +93,8 @@ class PartEliminator {
       const Ints& near = inward[static_cast<std::size_t>(p)];
       graph.neighbours.insert(graph.neighbours.end(), near.begin(), near.end());
       for (const std::int32_t* to = links_.begin(p); to != links_.end(p); ++to) {
-        if (*to < part_.first) continue;  // in a subtree below: an element stands for it
         graph.neighbours.push_back(find(*to));
-        if (*to >= behind) inward[static_cast<std::size_t>(find(*to) - hubs)].push_back(hubs + p);
+        inward[static_cast<std::size_t>(find(*to) - hubs)].push_back(hubs + p);
       }
       close();
     }
@@ -113,7 +112,7 @@ class PartEliminator {
   Ints boundary_;
 };
 
-/// Lists of (position, count, links), each of the holder of its position, as rows of the held parts. Collective.
+/// Lists of (position, count, links to those behind), each of the holder of its position, as rows of the held parts. Collective.
 std::vector<Ragged> sort_links(const Communicator& comm, const Ints& items, const Elimination& all) {
   return comm.agree([&] {
     std::vector<Ragged> links(all.parts.size());
@@ -146,10 +145,11 @@ std::vector<Ragged> send_links(const Communicator& comm, const NodeLinks& nodes,
     for (std::int32_t v = 0; v < nodes.own_nodes; ++v) {
       const std::int32_t position = all.position[static_cast<std::size_t>(v)];
       Ints& list = lists[static_cast<std::size_t>(all.tree.find_holder(position))];
-      list.insert(list.end(),
-                  {position, nodes.links.offsets[static_cast<std::size_t>(v) + 1] - nodes.links.offsets[static_cast<std::size_t>(v)]});
+      list.insert(list.end(), {position, 0});
+      const std::size_t count = list.size() - 1;
       for (const std::int32_t* u = nodes.links.begin(v); u != nodes.links.end(v); ++u)
-        list.push_back(all.position[static_cast<std::size_t>(*u)]);
+        if (all.position[static_cast<std::size_t>(*u)] > position) list.push_back(all.position[static_cast<std::size_t>(*u)]);
+      list[count] = static_cast<std::int32_t>(list.size() - count) - 1;
     }
     return join(lists);
   });
@@ -325,29 +325,18 @@ std::vector<Ints> list_star_links(const Communicator& comm, const SeparatorTree&
     const auto e = static_cast<std::int32_t>(next.size());
     next.push_back(first < static_cast<std::int32_t>(count) ? std::exchange(head[static_cast<std::size_t>(first)], e) : -1);
   }
-  Ragged behind;
   Ints seen_from(count, -1);
-  for (std::int32_t p = 0; p < static_cast<std::int32_t>(count); ++p) {
-    seen_from[static_cast<std::size_t>(p)] = p;
-    for (std::int32_t e = head[static_cast<std::size_t>(p)]; e >= 0; e = next[static_cast<std::size_t>(e)])
-      for (const std::int32_t q :
-           std::span(places).subspan(static_cast<std::size_t>(e) * static_cast<std::size_t>(width), static_cast<std::size_t>(width)))
-        if (q >= 0 && std::exchange(seen_from[static_cast<std::size_t>(q)], p) != p) behind.items.push_back(q);
-    behind.close();
-  }
   for (const TreePart& part : tree.parts) {
     Ints& list = lists[static_cast<std::size_t>(part.begin)];
-    const std::int32_t end = part.first + part.count;
-    std::vector<Ints> before(static_cast<std::size_t>(part.count));
-    for (std::int32_t p = part.first; p < end; ++p) {
-      for (const std::int32_t* q = behind.begin(p); q != behind.end(p); ++q)
-        if (*q < end) before[static_cast<std::size_t>(*q - part.first)].push_back(p);
-    }
-    for (std::int32_t p = part.first; p < end; ++p) {
-      const Ints& near = before[static_cast<std::size_t>(p - part.first)];
-      list.insert(list.end(), {p, static_cast<std::int32_t>(near.size() + static_cast<std::size_t>(behind.end(p) - behind.begin(p)))});
-      list.insert(list.end(), near.begin(), near.end());
-      list.insert(list.end(), behind.begin(p), behind.end(p));
+    for (std::int32_t p = part.first; p < part.first + part.count; ++p) {
+      list.insert(list.end(), {p, 0});
+      const std::size_t behind = list.size() - 1;
+      seen_from[static_cast<std::size_t>(p)] = p;
+      for (std::int32_t e = head[static_cast<std::size_t>(p)]; e >= 0; e = next[static_cast<std::size_t>(e)])
+        for (const std::int32_t q :
+             std::span(places).subspan(static_cast<std::size_t>(e) * static_cast<std::size_t>(width), static_cast<std::size_t>(width)))
+          if (q >= 0 && std::exchange(seen_from[static_cast<std::size_t>(q)], p) != p) list.push_back(q);
+      list[behind] = static_cast<std::int32_t>(list.size() - behind) - 1;
     }
   }
   return lists;
@@ -384,8 +373,8 @@ Elimination eliminate_elements(const Communicator& comm, std::span<const std::in
   });
   const IndexPartition core_owners(comm, core.own_nodes);
   core.first_node = static_cast<std::int32_t>(core_owners.own_begin());
-  std::vector<Ints> placed =
-      order_parts(comm, core, core_owners, all.tree, kAnyNumber, comm.agree([&] { return condensed.count_weights(); }));
+  const double dominated_per_edge = comm.broadcast([&] { return condensed.dominated_per_edge(); });
+  std::vector<Ints> placed = order_parts(comm, core, core_owners, all.tree, kAnyNumber, dominated_per_edge);
   comm.agree([&] { hold_parts(comm, all, std::move(placed)); });
   const Ints core_position = report_own_positions(comm, all, core_owners);
 

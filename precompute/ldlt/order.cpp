@@ -10,7 +10,6 @@
 #include <algorithm>
 #include <array>
 #include <numeric>
-#include <stdexcept>
 #include <utility>
 
 #include "partition/dissect.hpp"
@@ -169,7 +168,6 @@ struct Piece {
   Label label;
   Ints nodes;  // global
   Graph graph;
-  Ints weights;  // of a core of a Condensation, how many nodes each stands for; empty: of no core
 };
 
 /// Some of a piece's vertices alone. number: scratch of partition::take_part.
@@ -178,8 +176,6 @@ Piece take(const Piece& piece, const Ints& vertices, Label label, Ints& number) 
   taken.label = label;
   for (const std::int32_t v : vertices) taken.nodes.push_back(piece.nodes[static_cast<std::size_t>(v)]);
   taken.graph = partition::take_part(piece.graph, vertices, number);
-  for (const std::int32_t v : vertices)
-    if (!piece.weights.empty()) taken.weights.push_back(piece.weights[static_cast<std::size_t>(v)]);
   return taken;
 }
 
@@ -199,9 +195,7 @@ std::array<Piece, 3> cut(const Piece& piece, const Ints& side, const SeparatorTr
 }
 
 void pack(const Piece& piece, Ints& list) {
-  list.insert(list.end(), {piece.label.part, static_cast<std::int32_t>(piece.weights.size())});
-  list.insert(list.end(), piece.weights.begin(), piece.weights.end());
-  list.push_back(static_cast<std::int32_t>(piece.nodes.size()));
+  list.insert(list.end(), {piece.label.part, static_cast<std::int32_t>(piece.nodes.size())});
   list.insert(list.end(), piece.nodes.begin(), piece.nodes.end());
   for (std::size_t v = 0; v < piece.nodes.size(); ++v) list.push_back(piece.graph.offsets[v + 1] - piece.graph.offsets[v]);
   list.insert(list.end(), piece.graph.neighbours.begin(), piece.graph.neighbours.end());
@@ -210,7 +204,6 @@ void pack(const Piece& piece, Ints& list) {
 Piece unpack(ListReader& reader) {
   Piece piece;
   piece.label.part = reader.next();
-  piece.weights = reader.take(reader.next());
   piece.nodes = reader.take(reader.next());
   piece.graph.offsets.push_back(0);
   for (std::size_t v = 0; v < piece.nodes.size(); ++v) piece.graph.offsets.push_back(piece.graph.offsets.back() + reader.next());
@@ -268,26 +261,22 @@ std::vector<Piece> gather_pieces(const Communicator& comm, const NodeLinks& node
 }
 
 /// The piece of all nodes, which are all this rank's.
-Piece make_whole(const NodeLinks& nodes, const SeparatorTree& tree, const Ints& weights) {
+Piece make_whole(const NodeLinks& nodes, const SeparatorTree& tree) {
   Piece whole;
   whole.label = {tree.root(), 0};
   whole.nodes.resize(static_cast<std::size_t>(nodes.own_nodes));
   std::iota(whole.nodes.begin(), whole.nodes.end(), 0);
   whole.graph = {nodes.links.offsets, nodes.links.items};
-  whole.weights = weights;
   return whole;
 }
 
 /// The pieces that this rank begins with. Collective.
 std::vector<Piece> find_pieces(const Communicator& comm, const NodeLinks& nodes, const IndexPartition& owners, const SeparatorTree& tree,
-                               std::int32_t largest, const Ints& weights) {
+                               std::int32_t largest) {
   const bool is_one_piece = owners.total() <= largest || comm.size() == 1;
   if (is_one_piece && owners.begin(1) == owners.total()) {
-    return comm.agree([&] { return nodes.own_nodes > 0 ? std::vector<Piece>{make_whole(nodes, tree, weights)} : std::vector<Piece>(); });
+    return comm.agree([&] { return nodes.own_nodes > 0 ? std::vector<Piece>{make_whole(nodes, tree)} : std::vector<Piece>(); });
   }
-  comm.agree([&] {
-    if (!weights.empty()) throw std::logic_error("a core of nodes is ordered where all of it is");
-  });
   if (!is_one_piece) return gather_pieces(comm, nodes, tree, label_nodes(comm, nodes, owners, tree, largest));
   return gather_pieces(comm, nodes, tree, comm.agree([&] {
     return std::vector<Label>(static_cast<std::size_t>(nodes.count()), Label{tree.root(), 0});
@@ -295,11 +284,11 @@ std::vector<Piece> find_pieces(const Communicator& comm, const NodeLinks& nodes,
 }
 
 /// Appends the piece's nodes to their part, in the order of METIS.
-void place(const Piece& piece, std::vector<Ints>& placed) {
+void place(const Piece& piece, std::optional<double> dominated_per_edge, std::vector<Ints>& placed) {
   Ints& list = placed[static_cast<std::size_t>(piece.label.part)];
   const std::size_t before = list.size();
   list.resize(before + piece.nodes.size());
-  const Ints order = partition::order_nested_dissection(piece.graph, piece.weights);
+  const Ints order = partition::order_nested_dissection(piece.graph, dominated_per_edge);
   for (std::size_t v = 0; v < order.size(); ++v) list[before + static_cast<std::size_t>(order[v])] = piece.nodes[v];
 }
 
@@ -309,7 +298,8 @@ bool is_cut(const Piece& piece, const SeparatorTree& tree, int depth) {
 }
 
 /// The sides of the piece that this rank cuts at this depth, empty: it cuts none. Collective: its group seeks separators with it.
-Ints seek_separator(const Communicator& comm, const std::vector<Piece>& pieces, const SeparatorTree& tree, int depth) {
+Ints seek_separator(const Communicator& comm, const std::vector<Piece>& pieces, const SeparatorTree& tree, int depth,
+                    std::optional<double> dominated_per_edge) {
   const Piece* own = nullptr;
   for (const Piece& piece : pieces)
     if (is_cut(piece, tree, depth)) own = &piece;
@@ -326,11 +316,11 @@ Ints seek_separator(const Communicator& comm, const std::vector<Piece>& pieces, 
   const auto found = comm::all_to_all(comm, [&] {
     std::vector<Ints> lists(static_cast<std::size_t>(comm.size()));
     if (own != nullptr)
-      best = own->nodes.size() < kSmallestCut ? Ints(own->nodes.size(), 0) : partition::separate(own->graph, 1, 0, own->weights);
+      best = own->nodes.size() < kSmallestCut ? Ints(own->nodes.size(), 0) : partition::separate(own->graph, 1, 0, dominated_per_edge);
     for (ListReader reader(copies.items); !reader.is_at_end();) {
       const Piece piece = unpack(reader);
       const int holder = tree[piece.label.part].begin;
-      lists[static_cast<std::size_t>(holder)] = partition::separate(piece.graph, 1, comm.rank() - holder, piece.weights);
+      lists[static_cast<std::size_t>(holder)] = partition::separate(piece.graph, 1, comm.rank() - holder, dominated_per_edge);
     }
     return join(lists);
   });
@@ -376,17 +366,17 @@ int SeparatorTree::find_part(std::int32_t position) const {
 }
 
 std::vector<Ints> order_parts(const Communicator& comm, const NodeLinks& nodes, const IndexPartition& owners, SeparatorTree& tree,
-                              std::int32_t largest, const Ints& weights) {
-  std::vector<Piece> pieces = find_pieces(comm, nodes, owners, tree, largest, weights);
+                              std::int32_t largest, std::optional<double> dominated_per_edge) {
+  std::vector<Piece> pieces = find_pieces(comm, nodes, owners, tree, largest);
   std::vector<Ints> placed(tree.parts.size());
   for (int depth = 0; depth < tree.depth(); ++depth) {
-    const Ints side = seek_separator(comm, pieces, tree, depth);
+    const Ints side = seek_separator(comm, pieces, tree, depth, dominated_per_edge);
     const auto received = comm::all_to_all(comm, [&] {
       std::vector<Ints> lists(static_cast<std::size_t>(comm.size()));
       for (Piece& piece : pieces) {
         if (!is_cut(piece, tree, depth)) continue;
         std::array<Piece, 3> sides = cut(piece, side, tree, owners);
-        place(sides[2], placed);
+        place(sides[2], dominated_per_edge, placed);
         pack(sides[1], lists[static_cast<std::size_t>(tree[sides[1].label.part].begin)]);
         piece = std::move(sides[0]);
       }
@@ -397,7 +387,7 @@ std::vector<Ints> order_parts(const Communicator& comm, const NodeLinks& nodes, 
     });
   }
   comm.agree([&] {
-    for (const Piece& piece : pieces) place(piece, placed);
+    for (const Piece& piece : pieces) place(piece, dominated_per_edge, placed);
   });
   Ints counts;
   for (const Ints& list : placed) counts.push_back(static_cast<std::int32_t>(list.size()));

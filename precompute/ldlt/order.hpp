@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "precompute/comm/communicator.hpp"
@@ -53,9 +54,9 @@ class SeparatorTree {
 
 /// The nodes (global numbers) of each part that this rank holds, in the order of elimination. Fills first and count of the parts. Parts of
 /// up to `largest_gathered` nodes are gathered on one rank and cut there; larger ones are cut by their quotient graph, and stay where they
-/// are. weights: where rank 0 has all nodes and they are the core of a Condensation, its count_weights(), on rank 0. Collective. Throws
-/// SystemError on all ranks when memory runs out.
+/// are. dominated_per_edge: of the core of a Condensation, on all ranks the same. Collective. Throws SystemError on all ranks when memory
+/// runs out.
 std::vector<Ints> order_parts(const comm::Communicator& comm, const NodeLinks& nodes, const comm::IndexPartition& owners,
-                              SeparatorTree& tree, std::int32_t largest_gathered, const Ints& weights = {});
+                              SeparatorTree& tree, std::int32_t largest_gathered, std::optional<double> dominated_per_edge = {});
 
 }  // namespace carillon::ldlt
