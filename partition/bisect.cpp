@@ -13,6 +13,8 @@
 #include <bit>
 #include <cmath>
 
+#include "precompute/comm/places.hpp"
+
 namespace carillon::partition {
 namespace {
 
@@ -77,29 +79,6 @@ void find_axes(const comm::Communicator& comm, const std::vector<Vec3>& centres,
   }
 }
 
-/// The largest numbers of so many bits for which count(g, number) is at most wanted[g]; counts ascend with the number. A bisection over the
-/// bits, all groups at once. count_below(numbers, counts) adds this rank's counts. Collective.
-template <typename CountBelow>
-std::vector<std::uint64_t> find_places(const comm::Communicator& comm, int bits, const std::vector<std::int64_t>& wanted,
-                                       CountBelow&& count_below) {
-  std::vector<std::uint64_t> value, trial;
-  std::vector<std::int64_t> counts;
-  comm.agree([&] {
-    value.assign(wanted.size(), 0);
-    trial = value;
-    counts.resize(wanted.size());
-  });
-  for (int bit = bits - 1; bit >= 0; --bit) {
-    for (std::size_t g = 0; g < wanted.size(); ++g) trial[g] = value[g] | std::uint64_t{1} << bit;
-    std::fill(counts.begin(), counts.end(), 0);
-    count_below(trial, counts);
-    comm.sum(counts);
-    for (std::size_t g = 0; g < wanted.size(); ++g)
-      if (counts[g] <= wanted[g]) value[g] = trial[g];
-  }
-  return value;
-}
-
 /// Collective.
 Cuts find_cuts(const comm::Communicator& comm, const std::vector<std::uint64_t>& key, std::int64_t first_element,
                const std::vector<std::int32_t>& group_of, const std::vector<Group>& groups) {
@@ -115,11 +94,11 @@ Cuts find_cuts(const comm::Communicator& comm, const std::vector<std::uint64_t>&
     }
   };
   Cuts cuts;
-  cuts.cut = find_places(comm, 64, wanted, count_below);
+  cuts.cut = comm::find_places(comm, 64, wanted, count_below);
   count_below(cuts.cut, below);
   comm.sum(below);
   for (std::size_t g = 0; g < wanted.size(); ++g) wanted[g] -= below[g];
-  cuts.tie = find_places(comm, 32, wanted, [&](const std::vector<std::uint64_t>& trial, std::vector<std::int64_t>& counts) {
+  cuts.tie = comm::find_places(comm, 32, wanted, [&](const std::vector<std::uint64_t>& trial, std::vector<std::int64_t>& counts) {
     for (std::size_t e = 0; e < key.size(); ++e) {
       const auto g = static_cast<std::size_t>(group_of[e]);
       counts[g] += key[e] == cuts.cut[g] && static_cast<std::uint64_t>(first_element) + e < trial[g];

@@ -5,6 +5,7 @@
 #include <span>
 #include <utility>
 
+#include "partition/level_elements.hpp"
 #include "precompute/comm/exchange.hpp"
 #include "precompute/comm/index_partition.hpp"
 #include "precompute/ldlt/mesh_order.hpp"
@@ -17,66 +18,6 @@ using Ints = std::vector<std::int32_t>;
 constexpr std::int64_t kNodesOfARank = 300;  // fewer: what travels in a solve is less than what the second cut costs
 
 bool is_worth_it(const comm::Communicator& comm, std::int64_t nodes) { return comm.size() > 1 && nodes >= kNodesOfARank * comm.size(); }
-
-constexpr std::int32_t kBeforeAll = -(1 << 30);  // below every position, all of which are less than 2^30 in magnitude
-
-/// Elements that go from a rank which would have too many to one that would have too few.
-struct Transfer {
-  int to = 0;
-  std::int64_t end = 0;                // of the elements of the giving rank that have gone with this transfer
-  std::int32_t position = kBeforeAll;  // of the first element that does not go
-};
-
-/// (ranks) Transfers from each, in the order of elimination, after which no rank has more than one element more than another.
-std::vector<std::vector<Transfer>> plan_transfers(std::vector<std::int64_t> counts) {
-  std::vector<std::vector<Transfer>> transfers(counts.size());
-  const auto ranks = static_cast<std::int64_t>(counts.size());
-  const std::int64_t all = std::accumulate(counts.begin(), counts.end(), std::int64_t{0});
-  const auto target = [&](std::size_t rank) { return all / ranks + (static_cast<std::int64_t>(rank) < all % ranks ? 1 : 0); };
-  std::size_t to = 0;
-  for (std::size_t from = 0; from < counts.size(); ++from)
-    for (std::int64_t gone = 0; counts[from] > target(from);) {
-      while (counts[to] >= target(to)) ++to;
-      const std::int64_t moved = std::min(counts[from] - target(from), target(to) - counts[to]);
-      counts[from] -= moved;
-      counts[to] += moved;
-      transfers[from].push_back({static_cast<int>(to), gone += moved});
-    }
-  return transfers;
-}
-
-/// Gives all ranks nearly the same number of elements: of a rank that eliminates more than its part, those whose nodes are eliminated
-/// first, which lie together, go to another one; elements with the same first node go together. Their rows of right-hand sides then travel
-/// in the solves (docs/decisions/distributed-factorisation.md). Collective.
-void level_elements(const comm::Communicator& comm, ldlt::ElementRanks& elements, const std::vector<std::int64_t>& counts) {
-  std::vector<std::vector<Transfer>> transfers = plan_transfers(counts);
-  const std::vector<Ints> positions = comm.agree([&] {
-    std::vector<Ints> sorted(counts.size());
-    for (std::size_t e = 0; e < elements.rank.size(); ++e)
-      sorted[static_cast<std::size_t>(elements.rank[e])].push_back(elements.position[e]);
-    for (Ints& list : sorted) std::sort(list.begin(), list.end());
-    return sorted;
-  });
-  // By bisection: the last position before which no more elements of the rank stand than shall go.
-  std::vector<std::int64_t> before;
-  for (std::int64_t step = -std::int64_t{kBeforeAll}; step > 0; step /= 2) {
-    before.clear();
-    for (std::size_t rank = 0; rank < transfers.size(); ++rank)
-      for (const Transfer& one : transfers[rank])
-        before.push_back(std::lower_bound(positions[rank].begin(), positions[rank].end(), one.position + step) - positions[rank].begin());
-    comm.sum(std::span<std::int64_t>(before));
-    auto at = before.begin();
-    for (std::vector<Transfer>& list : transfers)
-      for (Transfer& one : list)
-        if (*at++ <= one.end) one.position += static_cast<std::int32_t>(step);
-  }
-  for (std::size_t e = 0; e < elements.rank.size(); ++e) {
-    const std::vector<Transfer>& list = transfers[static_cast<std::size_t>(elements.rank[e])];
-    const auto goes = std::upper_bound(list.begin(), list.end(), elements.position[e],
-                                       [](std::int32_t position, const Transfer& one) { return position < one.position; });
-    if (goes != list.end()) elements.rank[e] = goes->to;
-  }
-}
 
 struct OrderedPieces {
   std::shared_ptr<ldlt::MeshOrder> order;  // by the numbers that nodes have before the cut
@@ -94,16 +35,12 @@ OrderedPieces order_pieces(const comm::Communicator& comm, const Ints& tets, int
   OrderedPieces pieces;
   pieces.order = std::make_shared<ldlt::MeshOrder>(comm, elements, width, comm::IndexPartition(comm, own_nodes));
   ldlt::ElementRanks ranks = pieces.order->find_ranks(comm, elements, width);
-  std::vector<std::int64_t> counts(static_cast<std::size_t>(comm.size()), 0);
-  for (std::size_t e = 0; e < ranks.rank.size(); ++e) {
+  for (std::size_t e = 0; e < ranks.rank.size(); ++e)
     if (ranks.rank[e] < 0) {  // all nodes are fixed: it may go anywhere, and alone
       ranks.rank[e] = 0;
       ranks.position[e] = -1 - static_cast<std::int32_t>(e);
     }
-    ++counts[static_cast<std::size_t>(ranks.rank[e])];
-  }
-  comm.sum(std::span<std::int64_t>(counts));
-  level_elements(comm, ranks, counts);
+  partition::level_elements(comm, ranks.rank, ranks.position);
   pieces.ranks = std::move(ranks.rank);
   return pieces;
 }
