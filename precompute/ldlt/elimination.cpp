@@ -21,6 +21,10 @@ using comm::Communicator;
 using comm::IndexPartition;
 using partition::Graph;
 
+// Fewer corners are ordered with all other nodes: their parts would be too small for METIS to choose well, and it takes milliseconds.
+constexpr std::int32_t kSmallestCore = 256;
+constexpr std::int32_t kAnyNumber = std::numeric_limits<std::int32_t>::max();  // of nodes in one piece
+
 /// What a subtree leaves behind: the rows of one of its roots, and which front that is.
 struct Element {
   std::int32_t part = 0;
@@ -236,10 +240,6 @@ Ints find_moved(const Communicator& comm, const Elimination& all, const Ints& po
         return first + held_of[part]->forest.position[static_cast<std::size_t>(position - first)];
       });
 }
-
-// Fewer corners are ordered with all other nodes: their parts would be too small for METIS to choose well, and it takes milliseconds.
-constexpr std::int32_t kSmallestCore = 256;
-constexpr std::int32_t kAnyNumber = std::numeric_limits<std::int32_t>::max();  // of nodes in one piece
 
 /// Own parts of the tree and their nodes. Local.
 void hold_parts(const Communicator& comm, Elimination& all, std::vector<Ints> placed) {
