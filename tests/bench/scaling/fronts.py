@@ -17,7 +17,7 @@ GANG = 2.4  # the same where the ranks of a front wait for one another, on very 
 GANG_STEP = 0.35  # ... of whose excess (1 - 2^(-0.35 levels))^2 is reached: fitted to the counts
 UNEVEN = 1.25  # messages and bytes of the fullest rank of a front over the mean: fitted to the counts, as those below
 MORE_SUMS = 1.27  # messages and bytes of a solve that the fullest rank of a front receives over the mean
-LONGEST = 1.62  # panels on the longest way to the root over those of mean fronts
+LONGEST = 1.6  # panels on the longest way to the root over those of mean fronts
 MEETINGS = 1.5  # fronts of a level that the fullest rank shares where each has at most one rank's work: subtrees are levelled
 SPREAD = 1.3  # tiles of the fullest rank of a front over the mean
 
