@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 #include "partition/condense.hpp"
@@ -82,30 +83,26 @@ class PartEliminator {
       const auto at = std::lower_bound(boundary_.begin(), boundary_.end(), position) - boundary_.begin();
       return hubs + part_.count + static_cast<std::int32_t>(at);
     };
-    std::vector<Ints> inward(static_cast<std::size_t>(part_.count) + boundary_.size());  // elements and pivots before
+    // From each vertex to those behind, ascending: so a vertex gets its neighbours before it ahead of those behind it.
+    const auto for_links = [&](auto&& visit) {
+      for (std::int32_t h = 0; h < hubs; ++h)
+        for (const std::int32_t row : elements_[static_cast<std::size_t>(h)].rows) visit(h, find(row));
+      for (std::int32_t p = 0; p < part_.count; ++p)
+        for (const std::int32_t* to = links_.begin(p); to != links_.end(p); ++to) visit(hubs + p, find(*to));
+    };
     Graph graph;
-    graph.offsets.push_back(0);
-    const auto close = [&] { graph.offsets.push_back(static_cast<std::int32_t>(graph.neighbours.size())); };
-    for (std::int32_t h = 0; h < hubs; ++h) {
-      for (const std::int32_t row : elements_[static_cast<std::size_t>(h)].rows) {
-        graph.neighbours.push_back(find(row));
-        inward[static_cast<std::size_t>(find(row) - hubs)].push_back(h);
-      }
-      close();
-    }
-    for (std::int32_t p = 0; p < part_.count; ++p) {
-      const Ints& near = inward[static_cast<std::size_t>(p)];
-      graph.neighbours.insert(graph.neighbours.end(), near.begin(), near.end());
-      for (const std::int32_t* to = links_.begin(p); to != links_.end(p); ++to) {
-        graph.neighbours.push_back(find(*to));
-        inward[static_cast<std::size_t>(find(*to) - hubs)].push_back(hubs + p);
-      }
-      close();
-    }
-    for (std::size_t b = static_cast<std::size_t>(part_.count); b < inward.size(); ++b) {
-      graph.neighbours.insert(graph.neighbours.end(), inward[b].begin(), inward[b].end());
-      close();
-    }
+    graph.offsets.assign(static_cast<std::size_t>(hubs + part_.count) + boundary_.size() + 1, 0);
+    for_links([&](std::int32_t from, std::int32_t to) {
+      ++graph.offsets[static_cast<std::size_t>(from) + 1];
+      ++graph.offsets[static_cast<std::size_t>(to) + 1];
+    });
+    std::partial_sum(graph.offsets.begin(), graph.offsets.end(), graph.offsets.begin());
+    graph.neighbours.resize(static_cast<std::size_t>(graph.offsets.back()));
+    Ints next(graph.offsets.begin(), graph.offsets.end() - 1);
+    for_links([&](std::int32_t from, std::int32_t to) {
+      graph.neighbours[static_cast<std::size_t>(next[static_cast<std::size_t>(from)]++)] = to;
+      graph.neighbours[static_cast<std::size_t>(next[static_cast<std::size_t>(to)]++)] = from;
+    });
     return graph;
   }
 
