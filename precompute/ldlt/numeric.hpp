@@ -35,6 +35,7 @@ struct Numbers {
   Buffer panels;
   std::vector<std::int64_t> front_offsets;       // where each front's panels begin
   std::vector<std::vector<SharedPanel>> shared;  // (shared fronts) of (pivot tiles)
+  std::vector<std::int64_t> shared_columns;      // where the pivot columns of each shared front begin while it is in work
   // At this rank's pivots, first those of its own fronts:
   std::vector<double> d_diagonal;   // the inverse of D: diagonal ...
   std::vector<double> d_off;        // ... and between a row and the next

@@ -376,9 +376,9 @@ Analysis::Rank measure(Plan& plan) {
     own.flops += front.map.count_operations()[static_cast<std::size_t>(front.place)];
     const std::int64_t numbers = front.map.count_numbers(front.place);
     const std::int64_t update = front.map.count_numbers(front.place, front.map.pivot_tiles());  // goes to the parent
-    shared_panels += numbers - update;
+    shared_panels += kColumnsBegin + numbers - update;
     const std::int64_t panels = std::int64_t{4} * 3 * kPanelNodes * 3 * (front.own_nodes() + std::int64_t{kWideRows});
-    shared_peak = std::max(shared_peak, kept + 2 * numbers + panels);  // its tiles, and what its children send for them
+    shared_peak = std::max(shared_peak, kept + numbers + update + panels);  // what its children send, and its tiles behind the pivots
     kept += update;
     for (const SharedChild& child : front.children)
       if (child.shared >= 0) kept -= child.map.count_numbers(child.map.find_place(plan.rank), child.map.pivot_tiles());

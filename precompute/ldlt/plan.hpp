@@ -75,6 +75,8 @@ struct SharedFront {
   std::vector<SumMessage> to_parent;            // what this rank has summed up for rows behind the pivots, by where it is collected
 
   std::int32_t own_nodes() const { return row_begin.back(); }
+  /// Numbers of its tiles in column j of tiles, one that it has.
+  std::int64_t count_column(int j) const { return 9 * std::int64_t{map.nodes(j)} * (own_nodes() - row_begin[static_cast<std::size_t>(j)]); }
   /// Place of tile j among the column tiles; pre: it is one.
   std::size_t find_column_tile(int j) const {
     return static_cast<std::size_t>(std::lower_bound(column_tiles.begin(), column_tiles.end(), j) - column_tiles.begin());

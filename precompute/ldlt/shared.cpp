@@ -3,6 +3,7 @@
 //             L11^-1 and D down its column; the owners of the column make W = A21 P^T L11^-T and L21 = W D^-1 and send W to those who
 //             have tiles in the same rows, or in the columns of that number; each updates its own tiles, the next column first, so that
 //             the next panel is under way while the rest is updated. What a child leaves goes tile by tile to the owners in the parent.
+//             Pivot columns lie a little behind the place of the panels that are made of them, as those of own fronts do (storage.hpp).
 // Source:     Gupta, Karypis, Kumar 1997 (fronts in two dimensions); Duff and Reid 1983 (extend-add). Kernels and pivots: numeric.cpp.
 //             The end, with messages under way: Hoefler, Siebert, Lumsdaine 2010, Scalable communication protocols for dynamic sparse
 //             data exchange (a reduction that does not block while messages are taken).
@@ -398,7 +399,7 @@ bool SharedFactoriser::update_next(const SharedFront& front, Work& work) {
 double* SharedFactoriser::find_column(const SharedFront& front, const Work& work, std::size_t at, std::int32_t column) {
   const int j = front.column_tiles[at];
   const std::int64_t height = 3 * std::int64_t{front.own_nodes()} - find_first_row(front, j);
-  return work.tiles.data() + work.column_begin[at] + column * height - find_first_row(front, j);
+  return work.columns[at] + column * height - find_first_row(front, j);
 }
 
 template <typename FindPieceRows>
@@ -438,12 +439,19 @@ void SharedFactoriser::add_update(const SharedFront& front, Work& work, const Sh
 }
 
 void SharedFactoriser::assemble(const SharedFront& front, Work& work, std::int32_t f) {
-  std::int64_t numbers = 0;
+  std::int64_t behind_pivots = 0;
+  for (const int j : front.column_tiles)
+    if (j >= front.map.pivot_tiles()) behind_pivots += front.count_column(j);
+  work.tiles = Buffer::make_zero(behind_pivots);
+  double* const pivots = numbers_.panels.data() + numbers_.shared_columns[static_cast<std::size_t>(f)];
+  double* next_pivot = pivots;
+  double* next_behind = work.tiles.data();
   for (const int j : front.column_tiles) {
-    work.column_begin.push_back(numbers);
-    numbers += (3 * std::int64_t{front.own_nodes()} - find_first_row(front, j)) * 3 * front.map.nodes(j);
+    double*& next = j < front.map.pivot_tiles() ? next_pivot : next_behind;
+    work.columns.push_back(next);
+    next += front.count_column(j);
   }
-  work.tiles = Buffer::make_zero(numbers);
+  std::fill(pivots, next_pivot, 0.0);
   const auto find = [&](std::int32_t column, std::int32_t row) {
     const int j = front.map.find_tile(column);
     const int i = front.map.find_tile(row);
@@ -517,15 +525,14 @@ void SharedFactoriser::send_update(std::int32_t parent, std::int32_t child, int 
 
 void SharedFactoriser::finish(const SharedFront& front, Work& work) {
   if (front.parent >= 0 && front.last_columns[static_cast<std::size_t>(front.place)] >= front.map.pivot_tiles()) {
-    const double* tiles = work.tiles.data();
-    const auto find = [&front, tiles, begin = std::move(work.column_begin)](std::int32_t a, std::int64_t c) {
+    const auto find = [&front, columns = std::move(work.columns)](std::int32_t a, std::int64_t c) {
       const std::int32_t row = front.width + a;
       const auto column = static_cast<std::int32_t>(front.width + c / 3);
       const int i = front.map.find_tile(row);
       const int j = front.map.find_tile(column);
       const std::int64_t within = 3 * std::int64_t{column - front.map.start(j)} + c % 3;
       const std::int64_t height = 3 * std::int64_t{front.own_nodes()} - find_first_row(front, j);
-      return tiles + begin[front.find_column_tile(j)] + within * height + find_first_row(front, i) - find_first_row(front, j) +
+      return columns[front.find_column_tile(j)] + within * height + find_first_row(front, i) - find_first_row(front, j) +
              3 * (row - front.map.start(i));
     };
     send_update(front.parent, front.place_in_parent, front.place, std::move(work.tiles), find);

@@ -55,13 +55,13 @@ class SharedFactoriser {
     int missing = 0;                            // of both
     bool is_assembled = false;
     bool is_done = false;
-    Buffer tiles;                            // by columns of tiles, each column in full height
-    std::vector<std::int64_t> column_begin;  // (column tiles) in them
-    int lead = 0;                            // the panel that is eliminated next
-    int panel = 0;                           // the panel by which the tiles are updated
-    std::size_t next = 0;                    // the column that is updated next by it, among the column tiles
-    std::map<int, Update> updates;           // by panel
-    std::map<int, Letter> diagonals;         // by panel: L11^-1 and D of other ranks
+    Buffer tiles;                     // behind the pivots, by columns of tiles, each column in full height
+    std::vector<double*> columns;     // (column tiles) where each begins: those of pivots in the place of the panels, the rest in `tiles`
+    int lead = 0;                     // the panel that is eliminated next
+    int panel = 0;                    // the panel by which the tiles are updated
+    std::size_t next = 0;             // the column that is updated next by it, among the column tiles
+    std::map<int, Update> updates;    // by panel
+    std::map<int, Letter> diagonals;  // by panel: L11^-1 and D of other ranks
   };
 
   void work_off();
