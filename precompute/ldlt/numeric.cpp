@@ -10,7 +10,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <deque>
 #include <limits>
 #include <numeric>
 
@@ -53,9 +52,6 @@ class Factoriser {
     wide_ = Buffer(scratch);
     block_ = Buffer(kMaxBlock * kMaxBlock);
     for (int parity = 0; parity < 2; ++parity) top_[parity] = numbers.panels.data() + plan.room.stack_begin[parity];
-    // In a virtual machine that returns free memory to its host, pages that were freed a while ago cost far more: so these come first.
-    for (const Front& front : plan.fronts)
-      if (front.parent < 0) leaving_.emplace_back(count_update_of(front.rows), Pages::kAtOnce);
     where_.assign(static_cast<std::size_t>(plan.local_nodes), -1);
     slot_.assign(plan.node_of_link.size(), -1);
     requests_.reserve(plan.received.size() + plan.sent.size());
@@ -80,14 +76,7 @@ class Factoriser {
     w_ = 3 * front.width;
     r_ = 3 * static_cast<int>(front.rows.size());
     f_ = w_ + r_;
-    Buffer leaving;
-    if (front.parent >= 0) {
-      update_ = top_[front.depth % 2] -= count_update(r_);
-    } else {
-      leaving = std::move(leaving_.front());
-      leaving_.pop_front();
-      update_ = leaving.data();
-    }
+    update_ = top_[front.depth % 2] -= count_update(r_);
     double* panels = numbers_.panels.data() + numbers_.front_offsets[static_cast<std::size_t>(s)];
     columns_ = panels + kColumnsBegin;
     point_at_columns();
@@ -103,10 +92,11 @@ class Factoriser {
     std::copy(top, top + 2, top_);
     eliminate(front, panels);
     for (std::size_t c = front.children.size(); c-- > 0;) add_child(front.children[c], Part::kRest);
+    if (front.parent >= 0) return;
     if (front.shared_parent >= 0)
-      shared_.send_update(
-          front.shared_parent, front.place_in_parent, 0, std::move(leaving),
-          [update = update_, r = r_](std::int32_t a, std::int64_t c) { return update + find_update_column(r, c) + std::int64_t{3} * a; });
+      shared_.send_update(front.shared_parent, front.place_in_parent, 0,
+                          [this](std::int32_t a, std::int64_t c) { return update_ + find_update_column(r_, c) + std::int64_t{3} * a; });
+    top_[front.depth % 2] += count_update(r_);
   }
 
   /// starts_: where row 0 of each column of the front would be.
@@ -311,7 +301,6 @@ class Factoriser {
   Ints node_runs_;            // the run of each of its nodes
 
   double* top_[2] = {nullptr, nullptr};  // of the stacks of update matrices, which grow downwards
-  std::deque<Buffer> leaving_;           // update matrices that shared fronts get, of the fronts that are to come
   Ints slot_;                            // (own nodes and ghosts) of the column that is sent, -1
   std::vector<MPI_Request> requests_;
   std::vector<std::vector<double>> sent_;

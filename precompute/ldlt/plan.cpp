@@ -360,7 +360,7 @@ void plan_rows(const Communicator& comm, Plan& plan, const PlanMaker& maker, con
 /// Room, peak of memory, entries and flops of this rank.
 Analysis::Rank measure(Plan& plan) {
   Analysis::Rank own;
-  std::int64_t leaving = 0;  // update matrices for shared fronts: sent, and perhaps not yet received
+  std::int64_t leaving = 0;  // what shared fronts get of update matrices: sent, and perhaps not yet received
   std::int64_t scratch = 0;
   for (const Front& front : plan.fronts) {
     own.entries += count_entries(front.width, front.size());

@@ -21,12 +21,13 @@ Room plan_room(const std::vector<Front>& fronts, std::int64_t shared_panels, int
   std::int64_t most_used[2] = {0, 0};
   std::int64_t most_below[2] = {0, 0};  // a stack with the panels and columns below it
   for (const Front& front : fronts) {
-    if (front.parent >= 0) used[front.depth % 2] += count_update_of(front.rows);
+    used[front.depth % 2] += count_update_of(front.rows);
     for (int parity = 0; parity < 2; ++parity) {
       most_used[parity] = std::max(most_used[parity], used[parity]);
       most_below[parity] = std::max(most_below[parity], room.panels + count_front_room(front.width, front.size()) + used[parity]);
     }
     room.panels += count_stored(front.width, front.size());
+    if (front.parent < 0) used[front.depth % 2] -= count_update_of(front.rows);  // the shared front has its letters
     for (const std::int32_t child : front.children)
       used[fronts[static_cast<std::size_t>(child)].depth % 2] -= count_update_of(fronts[static_cast<std::size_t>(child)].rows);
   }
@@ -48,7 +49,7 @@ void sort_by_room(const std::vector<DealtFront>& dealt, std::vector<Ints>& child
              most[static_cast<std::size_t>(b)] - left[static_cast<std::size_t>(b)];
     });
   };
-  std::vector<bool> is_root(dealt.size(), false);  // its update matrix lies elsewhere
+  std::vector<bool> is_root(dealt.size(), false);  // its update matrix is sent to a shared front at once
   for (const std::int32_t root : roots) is_root[static_cast<std::size_t>(root)] = true;
   for (std::size_t d = 0; d < dealt.size(); ++d) {
     sort(children[d]);
@@ -61,9 +62,9 @@ void sort_by_room(const std::vector<DealtFront>& dealt, std::vector<Ints>& child
     }
     const std::int32_t width = dealt[d].width();
     const auto size = static_cast<std::int32_t>(dealt[d].nodes.size() + dealt[d].rows.size());
-    const std::int64_t update = is_root[d] ? 0 : count_update_of(dealt[d].rows);
+    const std::int64_t update = count_update_of(dealt[d].rows);
     most[d] = std::max(most[d], before + count_front_room(width, size) + update);
-    left[d] = before - updates + count_stored(width, size) + update;
+    left[d] = before - updates + count_stored(width, size) + (is_root[d] ? 0 : update);
   }
   sort(roots);
 }

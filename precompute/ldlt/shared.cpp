@@ -27,6 +27,9 @@ constexpr int kTag = 64;
 /// Numbers of D^-1 before the rows of a panel: diagonal and off.
 constexpr std::int64_t kPivotNumbers = 2 * kMaxBlock;
 
+/// Columns of tiles behind the pivots share buffers of about this size (4 MB), for which there is room among the pages that wait.
+constexpr std::int64_t kPieceNumbers = std::int64_t{1} << 19;
+
 std::int64_t count_strips(std::int64_t rows) { return (rows + kWideRows - 1) / kWideRows * kWideRows; }
 
 /// Calls copy(in the strip, in the block, numbers) for the runs of some rows of strips of n columns, and of a block in columns.
@@ -439,19 +442,24 @@ void SharedFactoriser::add_update(const SharedFront& front, Work& work, const Sh
 }
 
 void SharedFactoriser::assemble(const SharedFront& front, Work& work, std::int32_t f) {
-  std::int64_t behind_pivots = 0;
-  for (const int j : front.column_tiles)
-    if (j >= front.map.pivot_tiles()) behind_pivots += front.count_column(j);
-  work.tiles = Buffer::make_zero(behind_pivots);
   double* const pivots = numbers_.panels.data() + numbers_.shared_columns[static_cast<std::size_t>(f)];
-  double* next_pivot = pivots;
-  double* next_behind = work.tiles.data();
-  for (const int j : front.column_tiles) {
-    double*& next = j < front.map.pivot_tiles() ? next_pivot : next_behind;
+  double* next = pivots;
+  auto column = front.column_tiles.begin();
+  for (; column != front.column_tiles.end() && *column < front.map.pivot_tiles(); ++column) {
     work.columns.push_back(next);
-    next += front.count_column(j);
+    next += front.count_column(*column);
   }
-  std::fill(pivots, next_pivot, 0.0);
+  std::fill(pivots, next, 0.0);
+  while (column != front.column_tiles.end()) {
+    std::int64_t numbers = 0;
+    const auto first = column;
+    for (; column != front.column_tiles.end() && numbers < kPieceNumbers; ++column) numbers += front.count_column(*column);
+    next = work.tiles.emplace_back(Buffer::make_zero(numbers)).data();
+    for (auto at = first; at != column; ++at) {
+      work.columns.push_back(next);
+      next += front.count_column(*at);
+    }
+  }
   const auto find = [&](std::int32_t column, std::int32_t row) {
     const int j = front.map.find_tile(column);
     const int i = front.map.find_tile(row);
@@ -477,14 +485,6 @@ void SharedFactoriser::assemble(const SharedFront& front, Work& work, std::int32
     const SharedChild& child = front.children[c];
     for (std::size_t from = 0; from < work.children[c].size(); ++from) {
       if (child.arriving[from] == 0) continue;
-      if (child.map.rank(static_cast<int>(from)) == plan_.rank) {
-        const KeptUpdate& kept = work.kept.at(static_cast<std::int32_t>(c));
-        add_update(front, work, child, static_cast<int>(from), [&](const Piece& piece, std::int64_t column) {
-          return kept.find(piece.a_begin, column) + (piece.find_first_row(column) - 3 * std::int64_t{piece.a_begin});
-        });
-        work.kept.erase(static_cast<std::int32_t>(c));
-        continue;
-      }
       const double* next = work.children[c][from].numbers();
       add_update(front, work, child, static_cast<int>(from), [&](const Piece& piece, std::int64_t column) {
         const double* rows = next;
@@ -499,11 +499,10 @@ void SharedFactoriser::assemble(const SharedFront& front, Work& work, std::int32
       static_cast<std::size_t>(std::upper_bound(front.column_tiles.begin(), front.column_tiles.end(), 0) - front.column_tiles.begin());
 }
 
-void SharedFactoriser::send_update(std::int32_t parent, std::int32_t child, int from, Buffer numbers, const FindRows& find) {
+void SharedFactoriser::send_update(std::int32_t parent, std::int32_t child, int from, const FindRows& find) {
   const SharedFront& above = plan_.shared[static_cast<std::size_t>(parent)];
   const SharedChild& below = above.children[static_cast<std::size_t>(child)];
   for (int to = 0; to < above.map.places(); ++to) {
-    if (to == above.place) continue;
     std::int64_t count = 0;
     for_pieces(below, from, above.map, to, [&](const Piece& piece) { count += piece.count(); });
     if (count == 0) continue;
@@ -515,27 +514,24 @@ void SharedFactoriser::send_update(std::int32_t parent, std::int32_t child, int 
         next = std::copy_n(find(piece.a_begin, c) + (row - 3 * std::int64_t{piece.a_begin}), 3 * std::int64_t{piece.a_end} - row, next);
       }
     });
-    mailbox_.send(above.map.rank(to), std::move(letter));
+    if (to == above.place)
+      take(std::move(letter));
+    else
+      mailbox_.send(above.map.rank(to), std::move(letter));
   }
-  if (below.arriving[static_cast<std::size_t>(from)] == 0) return;
-  Work& work = works_[static_cast<std::size_t>(parent)];
-  work.kept.emplace(child, KeptUpdate{std::move(numbers), find});
-  --work.missing;
 }
 
 void SharedFactoriser::finish(const SharedFront& front, Work& work) {
   if (front.parent >= 0 && front.last_columns[static_cast<std::size_t>(front.place)] >= front.map.pivot_tiles()) {
-    const auto find = [&front, columns = std::move(work.columns)](std::int32_t a, std::int64_t c) {
+    const auto find = [&](std::int32_t a, std::int64_t c) {
       const std::int32_t row = front.width + a;
       const auto column = static_cast<std::int32_t>(front.width + c / 3);
       const int i = front.map.find_tile(row);
       const int j = front.map.find_tile(column);
       const std::int64_t within = 3 * std::int64_t{column - front.map.start(j)} + c % 3;
-      const std::int64_t height = 3 * std::int64_t{front.own_nodes()} - find_first_row(front, j);
-      return columns[front.find_column_tile(j)] + within * height + find_first_row(front, i) - find_first_row(front, j) +
-             3 * (row - front.map.start(i));
+      return find_column(front, work, front.find_column_tile(j), within) + find_first_row(front, i) + 3 * (row - front.map.start(i));
     };
-    send_update(front.parent, front.place_in_parent, front.place, std::move(work.tiles), find);
+    send_update(front.parent, front.place_in_parent, front.place, find);
   }
   work = Work();
   work.is_done = true;

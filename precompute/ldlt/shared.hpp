@@ -27,8 +27,8 @@ class SharedFactoriser {
   /// Where the first row of node a is in column c of an update matrix; the rows of nodes in the same tile follow.
   using FindRows = std::function<const double*(std::int32_t a, std::int64_t c)>;
 
-  /// Sends what place `from` has of the update matrix of a child of shared front `parent`, and keeps it for what this rank itself needs.
-  void send_update(std::int32_t parent, std::int32_t child, int from, Buffer numbers, const FindRows& find);
+  /// Sends what place `from` has of the update matrix of a child of shared front `parent`, to this rank itself, too.
+  void send_update(std::int32_t parent, std::int32_t child, int from, const FindRows& find);
 
  private:
   /// A panel on its way through the tiles of this rank.
@@ -43,19 +43,13 @@ class SharedFactoriser {
     int missing = 0;  // ranks whose rows have not come
     bool is_ready = false;
   };
-  /// What a child leaves on this rank.
-  struct KeptUpdate {
-    Buffer numbers;
-    FindRows find;
-  };
   /// A front in work.
   struct Work {
     std::vector<std::vector<Letter>> children;  // (children) of (places): what has come
-    std::map<std::int32_t, KeptUpdate> kept;    // (children) what this rank has itself
-    int missing = 0;                            // of both
+    int missing = 0;
     bool is_assembled = false;
     bool is_done = false;
-    Buffer tiles;                     // behind the pivots, by columns of tiles, each column in full height
+    std::vector<Buffer> tiles;        // behind the pivots, by columns of tiles, each column in full height
     std::vector<double*> columns;     // (column tiles) where each begins: those of pivots in the place of the panels, the rest in `tiles`
     int lead = 0;                     // the panel that is eliminated next
     int panel = 0;                    // the panel by which the tiles are updated
