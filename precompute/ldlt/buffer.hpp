@@ -16,7 +16,7 @@ struct FreeNumbers {
 enum class Pages { kWhenTouched, kAtOnce };
 
 /// Uninitialised numbers, aligned for vectors. Large ones are pages of their own, of 2 MB where the system has such, which go back to it at
-/// once: update matrices come and go, and what the heap keeps of them would count as memory of the rank. Throws std::bad_alloc.
+/// once: letters, panels and tiles come and go, and what the heap keeps of them would count as memory of the rank. Throws std::bad_alloc.
 class Buffer {
  public:
   Buffer() = default;

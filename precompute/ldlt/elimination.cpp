@@ -83,7 +83,7 @@ class PartEliminator {
       const auto at = std::lower_bound(boundary_.begin(), boundary_.end(), position) - boundary_.begin();
       return hubs + part_.count + static_cast<std::int32_t>(at);
     };
-    // From each vertex to those behind, ascending: so a vertex gets its neighbours before it ahead of those behind it.
+    // Calls visit(vertex, one behind it) for each link, by ascending vertex: so a vertex gets the neighbours before it first.
     const auto for_links = [&](auto&& visit) {
       for (std::int32_t h = 0; h < hubs; ++h)
         for (const std::int32_t row : elements_[static_cast<std::size_t>(h)].rows) visit(h, find(row));

@@ -369,14 +369,14 @@ Analysis::Rank measure(Plan& plan) {
     if (front.shared_parent >= 0) leaving += count_update_of(front.rows);
   }
   std::int64_t kept = leaving;
-  std::int64_t shared_panels = 0;
+  std::int64_t shared_columns = 0;
   std::int64_t shared_peak = 0;
   for (const SharedFront& front : plan.shared) {
     own.entries += front.map.count_entries()[static_cast<std::size_t>(front.place)];
     own.flops += front.map.count_operations()[static_cast<std::size_t>(front.place)];
     const std::int64_t numbers = front.map.count_numbers(front.place);
     const std::int64_t update = front.map.count_numbers(front.place, front.map.pivot_tiles());  // goes to the parent
-    shared_panels += kColumnsBegin + numbers - update;
+    shared_columns += kColumnsBegin + numbers - update;
     const std::int64_t panels = std::int64_t{4} * 3 * kPanelNodes * 3 * (front.own_nodes() + std::int64_t{kWideRows});
     shared_peak = std::max(shared_peak, kept + numbers + update + panels);  // what its children send, and its tiles behind the pivots
     kept += update;
@@ -384,7 +384,7 @@ Analysis::Rank measure(Plan& plan) {
       if (child.shared >= 0) kept -= child.map.count_numbers(child.map.find_place(plan.rank), child.map.pivot_tiles());
   }
   constexpr int kBlocks = kSolveColumns / kBlockColumns;
-  const Room& room = plan.room = plan_room(plan.fronts, shared_panels, kBlocks, plan.count_block());
+  const Room& room = plan.room = plan_room(plan.fronts, shared_columns, kBlocks, plan.count_block());
   // Of a factorisation, and of the solves after it, whose right-hand sides lie in what it has left.
   std::int64_t numbers = std::max(
       {room.numbers + leaving + scratch, room.panels + shared_peak, room.numbers + (kBlocks - room.solve_blocks) * plan.count_block()});

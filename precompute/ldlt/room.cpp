@@ -15,7 +15,7 @@
 
 namespace carillon::ldlt {
 
-Room plan_room(const std::vector<Front>& fronts, std::int64_t shared_panels, int blocks, std::int64_t block) {
+Room plan_room(const std::vector<Front>& fronts, std::int64_t shared_columns, int blocks, std::int64_t block) {
   Room room;
   std::int64_t used[2] = {0, 0};
   std::int64_t most_used[2] = {0, 0};
@@ -32,7 +32,7 @@ Room plan_room(const std::vector<Front>& fronts, std::int64_t shared_panels, int
       used[fronts[static_cast<std::size_t>(child)].depth % 2] -= count_update_of(fronts[static_cast<std::size_t>(child)].rows);
   }
   const int apart = most_used[0] + most_below[1] <= most_used[1] + most_below[0] ? 0 : 1;
-  room.panels += shared_panels;
+  room.panels += shared_columns;
   room.numbers = std::max(most_used[apart] + most_below[1 - apart], room.panels);
   room.stack_begin[apart] = room.numbers;
   room.stack_begin[1 - apart] = room.numbers - most_used[apart];

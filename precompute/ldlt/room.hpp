@@ -1,4 +1,4 @@
-// The memory in which a rank makes its own fronts.
+// The memory in which a rank makes its own fronts, and the pivot columns of shared ones.
 #pragma once
 
 #include <cstdint>
@@ -22,9 +22,9 @@ struct Room {
   std::int64_t solve_begin() const { return (panels + 7) / 8 * 8; }  // aligned for vectors
 };
 
-/// The least room for own fronts in this order, and for the panels of shared ones. At most `blocks` of right-hand sides of `block` numbers
-/// are put where there is room for them.
-Room plan_room(const std::vector<Front>& fronts, std::int64_t shared_panels, int blocks, std::int64_t block);
+/// The least room for own fronts in this order, and for the pivot columns of shared ones, which become their panels. At most `blocks` of
+/// right-hand sides of `block` numbers are put where there is room for them.
+Room plan_room(const std::vector<Front>& fronts, std::int64_t shared_columns, int blocks, std::int64_t block);
 
 /// Sorts a rank's own fronts, given as places in `dealt`, where children come before parents: the children of each, and the roots, in the
 /// order in which panels and update matrices take least room together, those first that need most room above what they leave. Source: Liu

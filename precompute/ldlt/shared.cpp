@@ -27,7 +27,8 @@ constexpr int kTag = 64;
 /// Numbers of D^-1 before the rows of a panel: diagonal and off.
 constexpr std::int64_t kPivotNumbers = 2 * kMaxBlock;
 
-/// Columns of tiles behind the pivots share buffers of about this size (4 MB), for which there is room among the pages that wait.
+/// Columns of tiles behind the pivots share buffers of this size (4 MB) and at most a column more, for which there is room among the pages
+/// that wait.
 constexpr std::int64_t kPieceNumbers = std::int64_t{1} << 19;
 
 std::int64_t count_strips(std::int64_t rows) { return (rows + kWideRows - 1) / kWideRows * kWideRows; }

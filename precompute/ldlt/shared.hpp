@@ -46,7 +46,7 @@ class SharedFactoriser {
   /// A front in work.
   struct Work {
     std::vector<std::vector<Letter>> children;  // (children) of (places): what has come
-    int missing = 0;
+    int missing = 0;                            // letters of children
     bool is_assembled = false;
     bool is_done = false;
     std::vector<Buffer> tiles;        // behind the pivots, by columns of tiles, each column in full height

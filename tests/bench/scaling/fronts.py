@@ -172,8 +172,8 @@ def count_solve_path(tree, ranks):
 
 
 def count_peak_bytes(tree, ranks, entries):
-    """Of the fullest rank, without the program: its part of L, its tiles of the largest front, which are there twice while the children
-    send, and what its own subtrees have left for shared fronts."""
+    """Of the fullest rank, without the program: its part of L, its tiles of the largest front and as many numbers that the children send,
+    and what its own subtrees have left for shared fronts. A bound: pivot columns lie in the place of L."""
     levels = tree.list_levels(ranks)
     tiles = max((one.order**2 / 2 / max(one.ranks, 1.0) for one in levels), default=tree.root**2 / 2)
     left = sum(one.rows**2 / 2 for one in levels if one.ranks < 1)
