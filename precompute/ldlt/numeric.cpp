@@ -334,12 +334,10 @@ Numbers make_numbers(const Plan& plan) {
   std::int32_t pivots = plan.pivot_nodes;
   for (const SharedFront& front : plan.shared) {
     std::vector<SharedPanel>& panels = numbers.shared.emplace_back();
-    const std::int64_t columns = numbers.shared_columns.emplace_back(stored + kColumnsBegin);
-    std::int64_t columns_end = columns;
+    numbers.shared_columns.push_back(stored + kColumnsBegin);
     for (int k = 0; k < front.map.pivot_tiles(); ++k) {
       SharedPanel& panel = panels.emplace_back();
       if (!front.map.has_column(front.place, k)) continue;
-      columns_end += front.count_column(k);
       const std::int64_t n = 3 * std::int64_t{front.map.nodes(k)};
       if (front.map.owner(k, k) == front.place) {
         panel.pivots = 3 * pivots;
@@ -350,7 +348,7 @@ Numbers make_numbers(const Plan& plan) {
       panel.tiles = stored;
       stored += 3 * n * (front.own_nodes() - front.row_begin[static_cast<std::size_t>(k) + 1]);
     }
-    stored = columns_end;  // panels take no more than the columns that they are made of
+    stored = numbers.shared_columns.back() + front.count_pivot_columns();  // panels take no more than the columns that they are made of
   }
   numbers.panels = Buffer(plan.room.numbers, Pages::kAtOnce);
   numbers.d_diagonal.assign(3 * static_cast<std::size_t>(pivots), 0.0);

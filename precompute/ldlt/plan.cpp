@@ -368,20 +368,23 @@ Analysis::Rank measure(Plan& plan) {
     scratch = std::max(scratch, count_wide(front.width, front.size()));
     if (front.shared_parent >= 0) leaving += count_update_of(front.rows);
   }
-  std::int64_t kept = leaving;
+  std::int64_t kept = leaving;  // letters of this rank, to itself, too
   std::int64_t shared_columns = 0;
   std::int64_t shared_peak = 0;
   for (const SharedFront& front : plan.shared) {
     own.entries += front.map.count_entries()[static_cast<std::size_t>(front.place)];
     own.flops += front.map.count_operations()[static_cast<std::size_t>(front.place)];
-    const std::int64_t numbers = front.map.count_numbers(front.place);
-    const std::int64_t update = front.map.count_numbers(front.place, front.map.pivot_tiles());  // goes to the parent
-    shared_columns += kColumnsBegin + numbers - update;
+    shared_columns += kColumnsBegin + front.count_pivot_columns();
+    const std::int64_t update = front.count_update();  // goes to the parent
     const std::int64_t panels = std::int64_t{4} * 3 * kPanelNodes * 3 * (front.own_nodes() + std::int64_t{kWideRows});
-    shared_peak = std::max(shared_peak, kept + numbers + update + panels);  // what its children send, and its tiles behind the pivots
+    std::int64_t come = 0;  // from other ranks
+    for (const SharedChild& child : front.children)
+      for (int from = 0; from < child.map.places(); ++from)
+        if (child.map.rank(from) != plan.rank) come += child.arriving[static_cast<std::size_t>(from)];
+    shared_peak = std::max(shared_peak, kept + update + std::max(come + panels, update));  // at the end the tiles are copied into letters
     kept += update;
     for (const SharedChild& child : front.children)
-      if (child.shared >= 0) kept -= child.map.count_numbers(child.map.find_place(plan.rank), child.map.pivot_tiles());
+      if (child.shared >= 0) kept -= plan.shared[static_cast<std::size_t>(child.shared)].count_update();
   }
   constexpr int kBlocks = kSolveColumns / kBlockColumns;
   const Room& room = plan.room = plan_room(plan.fronts, shared_columns, kBlocks, plan.count_block());

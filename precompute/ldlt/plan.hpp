@@ -77,12 +77,23 @@ struct SharedFront {
   std::int32_t own_nodes() const { return row_begin.back(); }
   /// Numbers of its tiles in column j of tiles, one that it has.
   std::int64_t count_column(int j) const { return 9 * std::int64_t{map.nodes(j)} * (own_nodes() - row_begin[static_cast<std::size_t>(j)]); }
+  /// Of its tiles in the columns of pivots, and in those behind them.
+  std::int64_t count_pivot_columns() const { return count_columns(0, map.pivot_tiles()); }
+  std::int64_t count_update() const { return count_columns(map.pivot_tiles(), map.tiles()); }
   /// Place of tile j among the column tiles; pre: it is one.
   std::size_t find_column_tile(int j) const {
     return static_cast<std::size_t>(std::lower_bound(column_tiles.begin(), column_tiles.end(), j) - column_tiles.begin());
   }
   /// Whether a place has tiles behind panel k.
   bool is_updated(int by_place, int k) const { return last_columns[static_cast<std::size_t>(by_place)] > k; }
+
+ private:
+  std::int64_t count_columns(int begin, int end) const {
+    std::int64_t numbers = 0;
+    for (const int j : column_tiles)
+      if (j >= begin && j < end) numbers += count_column(j);
+    return numbers;
+  }
 };
 
 /// Calls visit(piece) for what place `from` of a child sends to place `to` of its parent, in the order of both.

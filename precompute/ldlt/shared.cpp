@@ -444,22 +444,22 @@ void SharedFactoriser::add_update(const SharedFront& front, Work& work, const Sh
 
 void SharedFactoriser::assemble(const SharedFront& front, Work& work, std::int32_t f) {
   double* const pivots = numbers_.panels.data() + numbers_.shared_columns[static_cast<std::size_t>(f)];
-  double* next = pivots;
-  auto column = front.column_tiles.begin();
-  for (; column != front.column_tiles.end() && *column < front.map.pivot_tiles(); ++column) {
-    work.columns.push_back(next);
-    next += front.count_column(*column);
-  }
-  std::fill(pivots, next, 0.0);
-  while (column != front.column_tiles.end()) {
-    std::int64_t numbers = 0;
-    const auto first = column;
-    for (; column != front.column_tiles.end() && numbers < kPieceNumbers; ++column) numbers += front.count_column(*column);
-    next = work.tiles.emplace_back(Buffer::make_zero(numbers)).data();
-    for (auto at = first; at != column; ++at) {
-      work.columns.push_back(next);
-      next += front.count_column(*at);
+  std::fill_n(pivots, front.count_pivot_columns(), 0.0);
+  const auto place = [&](auto first, auto last, double* at) {
+    for (; first != last; ++first) {
+      work.columns.push_back(at);
+      at += front.count_column(*first);
     }
+  };
+  const auto end = front.column_tiles.end();
+  auto first = std::lower_bound(front.column_tiles.begin(), end, front.map.pivot_tiles());
+  place(front.column_tiles.begin(), first, pivots);
+  while (first != end) {
+    std::int64_t numbers = 0;
+    auto last = first;
+    for (; last != end && numbers < kPieceNumbers; ++last) numbers += front.count_column(*last);
+    place(first, last, work.tiles.emplace_back(Buffer::make_zero(numbers)).data());
+    first = last;
   }
   const auto find = [&](std::int32_t column, std::int32_t row) {
     const int j = front.map.find_tile(column);

@@ -9,7 +9,9 @@
 #include <utility>
 
 #include "precompute/comm/communicator.hpp"
+#include "precompute/ldlt/numeric.hpp"
 #include "precompute/ldlt/plan.hpp"
+#include "precompute/ldlt/storage.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/base/error.hpp"
 #include "tests/unit/precompute/ldlt/pencil.hpp"
@@ -89,6 +91,40 @@ TEST(MeshOrder, only_rows_of_shared_fronts_travel) {
   std::int64_t blocks = 0;
   for (const ReceivedBlocks& received : plan.received) blocks += static_cast<std::int64_t>(received.columns.size());
   EXPECT_EQ(lattice.comm().sum(blocks), 0) << "columns of own fronts come from no other rank";
+}
+
+TEST(MeshOrder, panels_and_the_columns_that_they_are_made_of_fill_the_memory_that_is_planned_for_them) {
+  const OrderedLattice lattice(12, 9, 7, 1);
+  const Plan plan = make_plan(lattice.pencil().k, lattice.pencil().m, &lattice.order());
+  const Numbers numbers = make_numbers(plan);
+  std::int64_t at = 0;
+  for (std::size_t s = 0; s < plan.fronts.size(); ++s) {
+    EXPECT_EQ(numbers.front_offsets[s], at);
+    at += count_stored(plan.fronts[s].width, plan.fronts[s].size());
+  }
+  for (std::size_t f = 0; f < plan.shared.size(); ++f) {
+    const SharedFront& front = plan.shared[f];
+    std::int64_t column = numbers.shared_columns[f];
+    EXPECT_EQ(column, at + kColumnsBegin);
+    for (int k = 0; k < front.map.pivot_tiles(); ++k) {
+      const SharedPanel& panel = numbers.shared[f][static_cast<std::size_t>(k)];
+      EXPECT_EQ(panel.tiles >= 0, front.map.has_column(front.place, k));
+      if (panel.tiles < 0) continue;
+      const std::int64_t n = 3 * std::int64_t{front.map.nodes(k)};
+      if (panel.triangle >= 0) {
+        EXPECT_EQ(panel.triangle, at);
+        EXPECT_LE(at += count_triangle(n), column) << "written before its columns have been read";
+      }
+      EXPECT_EQ(panel.tiles, at);
+      at += 3 * n * (front.own_nodes() - front.row_begin[static_cast<std::size_t>(k) + 1]);
+      column += 3 * n * (front.own_nodes() - front.row_begin[static_cast<std::size_t>(k)]);
+      EXPECT_LE(at, column) << "panel " << k << " lies where the next columns are in work";
+    }
+    at = column;
+  }
+  EXPECT_EQ(at, plan.room.panels);
+  EXPECT_LE(at, numbers.panels.size());
+  EXPECT_EQ(lattice.comm().sum(static_cast<std::int64_t>(plan.shared.size())) > 0, lattice.comm().size() > 1);
 }
 
 TEST(MeshOrder, solves_and_counts_as_dense_matrices_do) {
