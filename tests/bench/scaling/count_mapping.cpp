@@ -54,7 +54,7 @@ std::int32_t refine(std::vector<std::int32_t>& tets, std::int32_t nodes) {
 
 /// Bytes of each rank at the peak of a factorisation: its L and D, the update matrices that are alive, its tiles of a shared front and what
 /// the children send for them. On the safe side of what precompute/ldlt/plan.cpp finds: pivot columns of shared fronts, which lie in the
-/// place of L, count as tiles, too, and stacks lie beside L. Without panels and blocks of A.
+/// place of L, count as tiles, too, and stacks in addition to L. Without panels and blocks of A.
 std::vector<double> count_peaks(const std::vector<ldlt::FrontCost>& fronts, const ldlt::Mapping& mapping,
                                 const ldlt::MappingCounts& counts) {
   struct Alive {
