@@ -66,6 +66,8 @@ std::int64_t count_slices(std::int64_t modes) { return std::max<std::int64_t>(1,
 
 std::int64_t predict_solves(std::int64_t modes) { return kSliceSolves * count_slices(modes) + 2 * modes; }
 
-std::int64_t predict_factorisations(std::int64_t modes) { return modes == 0 ? 3 : 2 + count_slices(modes); }
+std::int64_t predict_factorisations(std::int64_t modes, bool counts_low_end) {
+  return modes == 0 ? 3 : (counts_low_end ? 2 : 1) + count_slices(modes);
+}
 
 }  // namespace carillon::cost

@@ -22,6 +22,7 @@ struct ProblemSize {
   bool is_thin = false;         // slenderness above kVerySlender: low modes are refined by another solve
   bool is_dense = false;        // solved by LAPACK, whatever its size
   bool is_read_by_all = false;  // the mesh file is read by all ranks
+  bool counts_low_end = true;   // by a factorisation of its own; false: the first shift counts there, too
   double read_seconds = 0;      // reading or meshing, measured or predicted
   double factor_flops = 0;      // of one factorisation
   std::int64_t factor_entries = 0;
@@ -48,6 +49,6 @@ ProblemSize make_quadratic(const ProblemSize& size);
 /// Slices of the spectrum, right-hand sides of all of them, and factorisations with those of the counts, for so many modes.
 std::int64_t count_slices(std::int64_t modes);
 std::int64_t predict_solves(std::int64_t modes);
-std::int64_t predict_factorisations(std::int64_t modes);
+std::int64_t predict_factorisations(std::int64_t modes, bool counts_low_end = true);
 
 }  // namespace carillon::cost

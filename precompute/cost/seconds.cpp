@@ -1,12 +1,9 @@
 // Method:     Counts of what grows (elements, entries and operations of the factor, columns of the basis) times the rates of the table,
-//             fitted by least squares to the runs of tests/bench/predict; another machine is scaled by one number, the time of a kernel.
+//             fitted by least squares to the runs of tests/bench/predict; another machine is scaled by one number.
 // Source:     none. Deviations: none.
 #include "precompute/cost/seconds.hpp"
 
 #include <algorithm>
-#include <cstddef>
-#include <ctime>
-#include <vector>
 
 #include "precompute/cost/calibration.hpp"
 
@@ -69,7 +66,7 @@ PhaseSeconds predict_seconds(const ProblemSize& known) {
   const double columns = solves / to_double(count_slices(*size.modes));  // of one basis
   const double factorisation = calc_factorisation(size);
   seconds.analyse = (is_quadratic ? kAnalyseQuadraticRow : kAnalyseRow) * unknowns;
-  seconds.factor = to_double(predict_factorisations(*size.modes)) * factorisation;
+  seconds.factor = to_double(predict_factorisations(*size.modes, size.counts_low_end)) * factorisation;
   seconds.solve = kSolveEntry * to_double(size.factor_entries) * solves;
   seconds.orthogonalise = kBasisNumber * unknowns * columns * solves + kSmallNumber * columns * columns * solves;
   seconds.check = kCheckNumber * shapes + kCheckPair * shapes * modes;
@@ -85,23 +82,6 @@ PhaseSeconds calc_wall(const PhaseSeconds& cpu, const ProblemSize& size, int ran
     wall.*phase /= ranks;
   if (size.is_read_by_all) wall.read /= ranks;
   return wall;
-}
-
-double measure_speed() {
-  constexpr std::size_t kNumbers = 1024;
-  constexpr int kPasses = 4000;
-  std::vector<double> x(kNumbers, 1.0), y(kNumbers, 0.0);
-  double best = 1e300;
-  for (int attempt = 0; attempt < 8; ++attempt) {
-    const std::clock_t start = std::clock();
-    for (int pass = 0; pass < kPasses; ++pass) {
-      const double by = 1e-9 * pass;
-      for (std::size_t i = 0; i < kNumbers; ++i) y[i] += by * x[i];
-      x[static_cast<std::size_t>(pass) % kNumbers] += 1e-12 * y[0];
-    }
-    best = std::min(best, static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC);
-  }
-  return std::clamp(kNumbers * static_cast<double>(kPasses) / std::max(best, 1e-6) / kMultiplyAddsPerSecond, 0.05, 20.0);
 }
 
 }  // namespace carillon::cost

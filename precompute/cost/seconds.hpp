@@ -25,7 +25,8 @@ struct PhaseSeconds {
   double sum() const { return read + partition + assemble + sum_modes() + errors + coupling + collect + air + write; }
 };
 
-/// CPU seconds on the machine of the calibrated table; divide by measure_speed() for this one. What is unknown of the size is estimated.
+/// CPU seconds on the machine of the calibrated table; another takes them in proportion to kUpdateRate. What is unknown of the size is
+/// estimated.
 PhaseSeconds predict_seconds(const ProblemSize& size);
 
 /// Right-hand sides of the quartic energy of so many coupled modes.
@@ -36,8 +37,5 @@ double predict_factorisation_seconds(const ProblemSize& size);
 
 /// CPU seconds as wall clock on `ranks` ranks with a core each: what one rank does alone stays, the rest is divided.
 PhaseSeconds calc_wall(const PhaseSeconds& cpu, const ProblemSize& size, int ranks);
-
-/// Speed of this processor relative to that of the table, by a kernel that takes a tenth of a second: 2 is twice as fast.
-double measure_speed();
 
 }  // namespace carillon::cost

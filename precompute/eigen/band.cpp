@@ -17,7 +17,6 @@ using petsc::check;
 constexpr double kDenseRounding = 1e4;       // Of epsilon times the largest ratio of the diagonals: far above what LAPACK leaves of it.
 constexpr double kMechanismTolerance = 1e2;  // Of the same: eigenvalues below are zero as far as a count by inertia can resolve.
 constexpr double kMechanismRatio = 1e-4;     // Of the band's lower end: no mechanism is faster.
-constexpr double kLowEnd = 1e-4;             // Of the upper end, in lambda: a lower end below need not be counted.
 
 // Collective.
 double find_fastest(const Operators& operators) {
@@ -27,13 +26,9 @@ double find_fastest(const Operators& operators) {
   return operators.comm.max(fastest);
 }
 
-// Whether the lower end may be left to the shift inside the band. So far below the upper end few bodies have a mode, and a guess of some
-// modes too many costs next to nothing. A part of the band alone (max_modes) would be cut by the guess, CHOLMOD counts nothing at its
-// shift, and where rounding is near the end may have to move.
+// Where rounding is near the lower end, it may have to move.
 bool can_assume_low_end(const BandProblem& body) {
-  const Options& options = body.options;
-  return !options.max_modes && options.factorisation != Factorisation::kCholmod && body.asked.low <= kLowEnd * body.asked.high &&
-         body.asked.low > kDenseRounding * body.rounding();
+  return eigen::can_assume_low_end(body.options) && body.asked.low > kDenseRounding * body.rounding();
 }
 
 // What follows copies K and M.

@@ -20,6 +20,7 @@ namespace {
 using petsc::check;
 
 constexpr double kZeroFraction = 1e-7;  // Of high_hz: what is below is lost in the rounding of what is up there.
+constexpr double kLowEnd = 1e-4;        // Of the upper end, in lambda: a lower end below need not be counted.
 
 double calc_lambda(double freq_hz) {
   const double omega_rad_s = 2 * std::numbers::pi * freq_hz;
@@ -30,6 +31,11 @@ double calc_lambda(double freq_hz) {
 
 BandEnds find_ends(const Options& options) {
   return {calc_lambda(options.low_hz > 0 ? options.low_hz : kZeroFraction * options.high_hz), calc_lambda(options.high_hz)};
+}
+
+bool can_assume_low_end(const Options& options) {
+  const BandEnds ends = find_ends(options);
+  return !options.max_modes && options.factorisation != Factorisation::kCholmod && ends.low <= kLowEnd * ends.high;
 }
 
 Inertia count_below_low(const TakeCount& take, double low) { return take(find_count_below_low(low), kEdgeNudge, ShiftRule::kMayMoveUp); }

@@ -28,6 +28,11 @@ struct BandEnds {
 };
 BandEnds find_ends(const Options& options);
 
+/// Whether the count at the lower end may be left to the shift inside the band, as far as the options say. So far below the upper end few
+/// bodies have a mode, and a guess of some modes too many costs next to nothing. A part of the band alone (max_modes) would be cut by the
+/// guess, and CHOLMOD counts nothing at its shift.
+bool can_assume_low_end(const Options& options);
+
 /// InertiaCounter::count_below, or who asks it.
 using TakeCount = std::function<Inertia(double lambda, double reach, ShiftRule rule)>;
 

@@ -13,6 +13,7 @@
 #include <limits>
 #include <utility>
 
+#include "precompute/la/node_rows.hpp"
 #include "precompute/petsc/session.hpp"
 #include "precompute/petsc/work.hpp"
 
@@ -122,24 +123,37 @@ struct Block {
   std::array<double, 9> values{};
 };
 
-// Three rows of a node as blocks, ascending by node. The rows of an elastic body share their pattern, so inserting is rare.
-void read_node_row(Mat matrix, double factor, PetscInt row, std::vector<Block>& blocks) {
-  blocks.clear();
-  for (PetscInt d = 0; d < 3; ++d) {
-    PetscInt count = 0;
-    const PetscInt* columns = nullptr;
-    const PetscScalar* values = nullptr;
-    check(MatGetRow(matrix, row + d, &count, &columns, &values));
-    std::size_t at = 0;
-    for (PetscInt k = 0; k < count; ++k) {
-      const PetscInt node = columns[k] / 3;
-      while (at < blocks.size() && blocks[at].node < node) ++at;
-      if (at == blocks.size() || blocks[at].node != node) blocks.insert(blocks.begin() + static_cast<std::ptrdiff_t>(at), Block{node, {}});
-      blocks[at].values[static_cast<std::size_t>(3 * d + columns[k] % 3)] = factor * values[k];
+/// Three rows of an own node as blocks, ascending by the global number of the other node.
+class NodeRow {
+ public:
+  explicit NodeRow(const NodeRows& rows) : rows_(rows), first_(rows.first_row() / 3) {}
+
+  const std::vector<Block>& read(PetscInt node, double factor) {
+    blocks_.clear();
+    for (PetscInt d = 0; d < 3; ++d) {
+      std::size_t at = 0;
+      const auto add = [&](PetscInt other, PetscInt column, double value) {
+        while (at < blocks_.size() && blocks_[at].node < other) ++at;
+        if (at == blocks_.size() || blocks_[at].node != other)
+          blocks_.insert(blocks_.begin() + static_cast<std::ptrdiff_t>(at), Block{other, {}});
+        blocks_[at].values[static_cast<std::size_t>(3 * d + column % 3)] = factor * value;
+      };
+      bool is_own = true;  // columns of other ranks come after those of this one, from the lowest on
+      rows_.visit(
+          3 * node + d, [&](PetscInt column, double value) { add(first_ + column / 3, column, value); },
+          [&](PetscInt ghost, double value) {
+            if (std::exchange(is_own, false)) at = 0;
+            add(rows_.ghosts()[ghost] / 3, rows_.ghosts()[ghost], value);
+          });
     }
-    check(MatRestoreRow(matrix, row + d, &count, &columns, &values));
+    return blocks_;
   }
-}
+
+ private:
+  const NodeRows& rows_;
+  PetscInt first_;  // own node
+  std::vector<Block> blocks_;
+};
 
 bool is_scalar(const std::array<double, 9>& block) {
   for (const std::size_t i : {1, 2, 3, 5, 6, 7}) {
@@ -158,16 +172,15 @@ NodeMatrix::NodeMatrix(Mat matrix, double factor) { read(matrix, factor); }
 
 void NodeMatrix::read(Mat matrix, double factor) {
   const comm::Communicator comm = petsc::get_communicator(matrix);
-  PetscInt first = 0;
-  PetscInt last = 0;
-  check(MatGetOwnershipRange(matrix, &first, &last));
-  nodes_ = static_cast<std::size_t>((last - first) / 3);
+  const NodeRows rows(matrix);
+  const PetscInt first_node = rows.first_row() / 3;
+  nodes_ = static_cast<std::size_t>(rows.rows() / 3);
   bool only_diagonal = true;
   bool only_scalars = true;  // then one value per block is kept
   std::vector<PetscInt> global;
   start_.reserve(nodes_ + 1);
   start_.push_back(0);
-  std::vector<Block> blocks;
+  NodeRow node_row(rows);
   MatInfo info;
   check(MatGetInfo(matrix, MAT_LOCAL, &info));
   const auto entries = static_cast<std::size_t>(info.nz_used);  // three of a scalar, nine of a block
@@ -180,11 +193,10 @@ void NodeMatrix::read(Mat matrix, double factor) {
     values_.reserve(entries);
     for (const double value : scalars) values_.insert(values_.end(), {value, 0, 0, 0, value, 0, 0, 0, value});
   };
-  for (PetscInt row = first; row < last; row += 3) {
-    read_node_row(matrix, factor, row, blocks);
-    for (const auto& [node, block] : blocks) {
+  for (PetscInt own = 0; own < static_cast<PetscInt>(nodes_); ++own) {
+    for (const auto& [node, block] : node_row.read(own, factor)) {
       if (std::all_of(block.begin(), block.end(), [](double v) { return v == 0; })) continue;
-      only_diagonal = only_diagonal && 3 * node == row && is_diagonal_block(block);
+      only_diagonal = only_diagonal && node == first_node + own && is_diagonal_block(block);
       if (!is_scalar(block)) keep_blocks();
       global.push_back(node);
       values_.insert(values_.end(), block.begin(), only_scalars ? block.begin() + 1 : block.end());
@@ -206,17 +218,17 @@ void NodeMatrix::read(Mat matrix, double factor) {
     return;
   }
   if (kind_ == Kind::kBlocks) sum_rows();
-  const PetscInt first_node = first / 3;
+  const PetscInt last_node = first_node + static_cast<PetscInt>(nodes_);
   std::vector<PetscInt> ghosts;
   for (const PetscInt node : global) {
-    if (node < first_node || node >= last / 3) ghosts.push_back(node);
+    if (node < first_node || node >= last_node) ghosts.push_back(node);
   }
   std::sort(ghosts.begin(), ghosts.end());
   ghosts.erase(std::unique(ghosts.begin(), ghosts.end()), ghosts.end());
   ghosts_ = ghosts.size();
   neighbour_.reserve(global.size() + kAhead);
   for (const PetscInt node : global) {
-    if (node >= first_node && node < last / 3) {
+    if (node >= first_node && node < last_node) {
       neighbour_.push_back(static_cast<std::int32_t>(node - first_node));
     } else {
       const auto at = std::lower_bound(ghosts.begin(), ghosts.end(), node) - ghosts.begin();

@@ -10,12 +10,14 @@
 
 #include "partition/distribute.hpp"
 #include "precompute/cost/calibration.hpp"
+#include "precompute/eigen/solve_estimate.hpp"
 #include "precompute/estimate/correct.hpp"
 #include "precompute/mesh/read.hpp"
 #include "precompute/parallel_mesh/read_parallel.hpp"
 #include "precompute/petsc/session.hpp"
 #include "precompute/run/cut_mesh.hpp"
 #include "precompute/run/meshing.hpp"
+#include "precompute/run/modes.hpp"
 #include "precompute/run/refine_mesh.hpp"
 
 namespace carillon::run {
@@ -225,6 +227,7 @@ cost::ProblemSize estimate_size(const job::JobSpec& job, const Setting& setting)
     size = cost::estimate_file_size(error ? 0 : bytes, is_quadratic, setting.refinements);
   }
   size.modes = find_computed_count(job);
+  size.counts_low_end = !eigen::can_assume_low_end(make_options(job, setting));
   size.air_nodes = find_air_nodes(job, 0);
   if (job.nonlinear) size.coupled_modes = job.nonlinear->modes;
   return size;
@@ -234,6 +237,7 @@ cost::ProblemSize find_problem_size(const Run& run, const Setting& setting, cons
   cost::ProblemSize size;
   size.is_quadratic = setting.element == job::Element::T10;
   size.modes = find_computed_count(run.job);
+  size.counts_low_end = !eigen::can_assume_low_end(make_options(run.job, setting));
   size.nodes = body.pieces.nodes;
   size.tets = body.pieces.tets;
   size.unknowns = 3 * body.pieces.free_nodes;

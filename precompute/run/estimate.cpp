@@ -49,7 +49,8 @@ std::string estimate_costs(const std::string& text) {
   root.set("cpu_seconds", base::significant(seconds.sum(), 6)).set("phase_seconds", describe_seconds(seconds));
   for (const int ranks : {1, 2, 4}) root.member("memory_bytes").set(std::to_string(ranks), std::llround(cost::predict_bytes(size, ranks)));
   root.member("factor").set("entries", size.factor_entries).set("flops", base::significant(size.factor_flops, 6));
-  root.set("factorisations", cost::predict_factorisations(*size.modes)).set("right_sides", cost::predict_solves(*size.modes));
+  root.set("factorisations", cost::predict_factorisations(*size.modes, size.counts_low_end))
+      .set("right_sides", cost::predict_solves(*size.modes));
   return root.line();
 }
 

@@ -36,7 +36,7 @@ class ProgressLines {
 };
 
 eigen::Modes solve(Run& run, const Setting& setting, const fem::System& matrices, eigen::NodeLayout layout) {
-  eigen::Options options = make_options(run, setting);
+  eigen::Options options = make_options(run.job, setting);
   if (run.checkpoint) options.checkpoint = &run.checkpoint->get();
   options.progress = ProgressLines(run);
   run.log.begin("modes", fmt::format("{:g} Hz to {:g} Hz", options.low_hz, options.high_hz));
@@ -107,14 +107,14 @@ double find_low_hz(const job::JobSpec& job, const eigen::Modes& modes) {
   return modes.proof.counts.empty() ? job.band_hz[0] : std::max(job.band_hz[0], modes.proof.counts.front().freq_hz);
 }
 
-eigen::Options make_options(const Run& run, const Setting& setting) {
+eigen::Options make_options(const job::JobSpec& job, const Setting& setting) {
   eigen::Options options;
-  options.low_hz = run.job.band_hz[0];
-  options.high_hz = run.job.band_hz[1];
-  options.max_modes = find_computed_count(run.job);
+  options.low_hz = job.band_hz[0];
+  options.high_hz = job.band_hz[1];
+  options.max_modes = find_computed_count(job);
   options.tolerance = setting.tolerance;
-  options.factorisation = to_eigen(run.job.factorisation);
-  options.method = to_eigen(run.job.method);
+  options.factorisation = to_eigen(job.factorisation);
+  options.method = to_eigen(job.method);
   return options;
 }
 

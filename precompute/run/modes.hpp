@@ -9,7 +9,7 @@
 namespace carillon::run {
 
 /// The eigensolver's options for the job.
-eigen::Options make_options(const Run& run, const Setting& setting);
+eigen::Options make_options(const job::JobSpec& job, const Setting& setting);
 
 /// Lower end of the bank's band [Hz]: as the job says, or above it where rounding hides what is slower.
 double find_low_hz(const job::JobSpec& job, const eigen::Modes& modes);

@@ -27,9 +27,9 @@ std::array<double, 9> list(const cost::PhaseSeconds& costs) {
           costs.coupling, costs.collect,   costs.air,      costs.write};
 }
 
-double calc_factorisations(const eigen::Progress& progress) {
+double calc_factorisations(const eigen::Progress& progress, const cost::ProblemSize& size) {
   const auto made = progress.factorisations;
-  return static_cast<double>(std::max(cost::predict_factorisations(progress.modes_wanted), made));
+  return static_cast<double>(std::max(cost::predict_factorisations(progress.modes_wanted, size.counts_low_end), made));
 }
 
 }  // namespace
@@ -71,7 +71,7 @@ void ProgressEstimator::advance(const eigen::Progress& progress, double seconds)
 double ProgressEstimator::calc_modes_done() const {
   if (progress_.phase == eigen::Phase::kRigid || progress_.phase == eigen::Phase::kAnalyse) return 0;
   if (progress_.phase == eigen::Phase::kCheck) return costs_.sum_modes() - costs_.check;
-  const double factors = static_cast<double>(progress_.factorisations) / calc_factorisations(progress_);
+  const double factors = static_cast<double>(progress_.factorisations) / calc_factorisations(progress_, size_);
   const auto wanted =
       static_cast<double>(std::max<std::int64_t>(cost::predict_solves(std::max<std::int64_t>(size_.modes.value_or(1), 1)), 1));
   const double solved = std::min(static_cast<double>(progress_.solves) / wanted, kNearEnd);
@@ -87,7 +87,7 @@ double ProgressEstimator::calc_step() const {
       return costs_.analyse;
     case eigen::Phase::kCount:
     case eigen::Phase::kFactor:
-      return costs_.factor / calc_factorisations(progress_);
+      return costs_.factor / calc_factorisations(progress_, size_);
     case eigen::Phase::kCheck:
       return costs_.check;
     default:

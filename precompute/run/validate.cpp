@@ -1,5 +1,6 @@
 // Method:     The first half of a run, then the analysis of its factorisation. Memory and time of what is done here as measured, of the
-//             rest by precompute/cost, time at the pace of what was measured.
+//             rest by precompute/cost: factorisations at the pace of those that were timed, what is not timed at that of the loop of which
+//             factorisations mostly consist.
 //             The answer comes within --patience: a step is begun only if its cost by precompute/cost, on a processor that gives this
 //             process as little of its time as it did so far, fits what is left of it; else what the step would find is estimated.
 // Source:     none. Deviations: none.
@@ -20,6 +21,7 @@
 #include "precompute/cost/seconds.hpp"
 #include "precompute/eigen/memory.hpp"
 #include "precompute/eigen/solve_estimate.hpp"
+#include "precompute/ldlt/update_rate.hpp"
 #include "precompute/parallel_mesh/read_parallel.hpp"
 #include "precompute/petsc/session.hpp"
 #include "precompute/run/accuracy.hpp"
@@ -87,7 +89,7 @@ class Validation {
   void predict_modes();
   void predict_memory();
   void predict_time();
-  double get_pace() const;
+  double get_factor_pace() const;
   bool fits_here() const;
   bool has_volume() const { return !body_.estimate || body_.estimate->volume_m3 > 0; }
   std::int64_t get_max_modes() const {
@@ -106,7 +108,7 @@ class Validation {
   eigen::SolveEstimate solve_estimate_;
   cost::MemoryParts memory_;  // of one rank
   double assembled_s_ = 0;    // CPU seconds until then
-  double speed_ = 1;
+  double speed_ = 1;          // of this processor over that of the cost model
   bool is_analysed_ = false;
   double needed_s_ = 0;          // of the clock, predicted for the step that was not begun
   std::int64_t left_bytes_ = 0;  // for this rank and all it holds
@@ -125,7 +127,7 @@ void Validation::run() {
     setting = find_first_setting(run_);
     notes_.push_back("\"accuracy_cents\" chooses the mesh by trial: this is the first and coarsest trial, and those that follow need more");
   }
-  speed_ = cost::measure_speed();
+  speed_ = std::clamp(ldlt::measure_update_rate() / cost::kUpdateRate, 0.05, 20.0);
   heartbeat_.begin(
       fmt::format("reading {}", run_.job.body ? run::describe(*run_.job.body, {setting.nodes, setting.edge_m}) : run_.job.mesh.string()));
   if (has_time_to_read(setting)) {
@@ -141,8 +143,8 @@ void Validation::run() {
   predict_time();
 }
 
-/// Seconds on this machine over those of the cost model.
-double Validation::get_pace() const {
+/// Seconds of a factorisation on this machine over those of the cost model.
+double Validation::get_factor_pace() const {
   if (solve_estimate_.factor_seconds <= 0) return 1 / speed_;
   const double predicted = cost::predict_factorisation_seconds(size_);
   // Small factorisations are no measure of the pace.
@@ -311,7 +313,7 @@ void Validation::analyse_mesh(const Setting& setting) {
     assembled_s_ = base::get_process_cpu_s();
     heartbeat_.begin("analysing the factorisation");
     solve_estimate_ = name_errors(body_.source, run_, [&] {
-      return eigen::estimate_solve({system.matrices.stiffness, system.matrices.mass, make_layout(body_)}, make_options(run_, setting),
+      return eigen::estimate_solve({system.matrices.stiffness, system.matrices.mass, make_layout(body_)}, make_options(run_.job, setting),
                                    [&](const eigen::SolveEstimate& estimate) { return may_count(estimate); });
     });
     properties_ = std::move(system.properties);
@@ -354,14 +356,14 @@ void Validation::predict_memory() {
 }
 
 void Validation::predict_time() {
-  const double pace = get_pace();
   costs_ = cost::predict_seconds(size_);
   const double predicted_here = costs_.read + costs_.partition + costs_.assemble;
   using Phases = cost::PhaseSeconds;
-  for (double Phases::*phase : {&Phases::analyse, &Phases::factor, &Phases::solve, &Phases::orthogonalise, &Phases::check, &Phases::errors,
+  costs_.factor *= get_factor_pace();
+  for (double Phases::*phase : {&Phases::analyse, &Phases::solve, &Phases::orthogonalise, &Phases::check, &Phases::errors,
                                 &Phases::coupling, &Phases::collect, &Phases::air, &Phases::write})
-    costs_.*phase *= pace;
-  const double here = assembled_s_ > 0 ? assembled_s_ / std::max(predicted_here, 1e-9) : pace;
+    costs_.*phase /= speed_;
+  const double here = assembled_s_ > 0 ? assembled_s_ / std::max(predicted_here, 1e-9) : 1 / speed_;
   for (double Phases::*phase : {&Phases::read, &Phases::partition, &Phases::assemble}) costs_.*phase *= here;
   for (std::size_t i = 0; i < kRanks.size(); ++i) wall_s_[i] = cost::calc_wall(costs_, size_, kRanks[i]).sum();
 }

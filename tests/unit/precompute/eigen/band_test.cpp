@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <vector>
 
+#include "precompute/eigen/solve_estimate.hpp"
 #include "precompute/eigen/solve_modes.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/base/error.hpp"
@@ -39,6 +40,19 @@ TEST(SolveModes, agrees_with_dense_lapack_on_a_free_body) {
   EXPECT_EQ(modes.rigid_count, 6);
   EXPECT_EQ(modes.count_below_low, 6);
   EXPECT_GT(modes.factor.solves, 0) << "the sparse path was meant to be tested";
+}
+
+TEST(LowEnd, is_left_to_the_first_shift_where_it_is_far_below_the_upper_end) {
+  Options options;
+  EXPECT_TRUE(can_assume_low_end(options));
+  options.factorisation = Factorisation::kCholmod;
+  EXPECT_FALSE(can_assume_low_end(options));
+  options.factorisation = Factorisation::kAutomatic;
+  options.max_modes = 5;
+  EXPECT_FALSE(can_assume_low_end(options));
+  options.max_modes.reset();
+  options.low_hz = options.high_hz / 99;
+  EXPECT_FALSE(can_assume_low_end(options));
 }
 
 TEST(SolveModes, keeps_residuals_that_an_independent_calculation_confirms) {
