@@ -380,9 +380,10 @@ def test_hard():
         for rate_hz in (8000, 192000):
             bench.compare(f"{rate_hz} Hz", make_scene(0.5, sample_rate_hz=rate_hz), {**options, "rate_hz": rate_hz}, LOAD + STRIKE_AT % 0.1)
 
-        # A thousand modes.
-        bench.make_bank("a.hdf", 4, 1000)
-        bench.compare("1000 modes", make_scene(0.5), options, LOAD + STRIKE_AT % 0.1)
+        # A thousand modes, in a file of its own: the browser may keep one that it has read for a tenth of its age.
+        bank = bench.make_bank("thousand.hdf", 4, 1000)
+        scene = make_scene(0.5, bodies=[{**BODY, "bank": bank}])
+        bench.compare("1000 modes", scene, options, LOAD.replace("a.hdf", bank) + STRIKE_AT % 0.1)
 
 
 def test_live():
