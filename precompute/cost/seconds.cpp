@@ -1,5 +1,5 @@
 // Method:     Counts of what grows (elements, entries and operations of the factor, columns of the basis) times the rates of the table,
-//             fitted by least squares to the runs of tests/bench/predict; another machine is scaled by one number.
+//             fitted by least squares to the runs of tests/bench/predict; another machine is scaled by one number, its update rate.
 // Source:     none. Deviations: none.
 #include "precompute/cost/seconds.hpp"
 

@@ -25,8 +25,8 @@ struct PhaseSeconds {
   double sum() const { return read + partition + assemble + sum_modes() + errors + coupling + collect + air + write; }
 };
 
-/// CPU seconds on the machine of the calibrated table; another takes them in proportion to kUpdateRate. What is unknown of the size is
-/// estimated.
+/// CPU seconds on the machine of the calibrated table; another takes kUpdateRate / ldlt::measure_update_rate() times as long. What is
+/// unknown of the size is estimated.
 PhaseSeconds predict_seconds(const ProblemSize& size);
 
 /// Right-hand sides of the quartic energy of so many coupled modes.

@@ -208,12 +208,24 @@ std::optional<std::int64_t> find_computed_count(const job::JobSpec& job) {
   return static_cast<std::int64_t>(estimate::find_computed_count(static_cast<std::size_t>(*job.max_modes)));
 }
 
+namespace {
+
 /// Of a job that asks for the air; "auto" may leave it out.
 std::int64_t find_air_nodes(const job::JobSpec& job, std::int64_t surface_nodes) {
   if (job.air.method == job::AirMethod::none) return 0;
   const std::int64_t nodes = std::min<std::int64_t>(job.air.skin_nodes, surface_nodes > 0 ? surface_nodes : job.air.skin_nodes);
   return job.air.half_space ? 2 * nodes : nodes;
 }
+
+/// What the job asks for, of a mesh whose size is known as far as it is.
+void set_demand(const job::JobSpec& job, const Setting& setting, cost::ProblemSize& size) {
+  size.modes = find_computed_count(job);
+  size.counts_low_end = !eigen::can_assume_low_end(make_options(job, setting));
+  size.air_nodes = find_air_nodes(job, size.surface_nodes);
+  if (job.nonlinear) size.coupled_modes = job.nonlinear->modes;
+}
+
+}  // namespace
 
 cost::ProblemSize estimate_size(const job::JobSpec& job, const Setting& setting) {
   const bool is_quadratic = setting.element == job::Element::T10;
@@ -226,24 +238,18 @@ cost::ProblemSize estimate_size(const job::JobSpec& job, const Setting& setting)
     const auto bytes = static_cast<std::int64_t>(std::filesystem::file_size(job.mesh, error));
     size = cost::estimate_file_size(error ? 0 : bytes, is_quadratic, setting.refinements);
   }
-  size.modes = find_computed_count(job);
-  size.counts_low_end = !eigen::can_assume_low_end(make_options(job, setting));
-  size.air_nodes = find_air_nodes(job, 0);
-  if (job.nonlinear) size.coupled_modes = job.nonlinear->modes;
+  set_demand(job, setting, size);
   return size;
 }
 
 cost::ProblemSize find_problem_size(const Run& run, const Setting& setting, const Body& body) {
   cost::ProblemSize size;
   size.is_quadratic = setting.element == job::Element::T10;
-  size.modes = find_computed_count(run.job);
-  size.counts_low_end = !eigen::can_assume_low_end(make_options(run.job, setting));
   size.nodes = body.pieces.nodes;
   size.tets = body.pieces.tets;
   size.unknowns = 3 * body.pieces.free_nodes;
   size.surface_nodes = static_cast<std::int64_t>(body.surface.vertices_m.size());
-  size.air_nodes = find_air_nodes(run.job, size.surface_nodes);
-  if (run.job.nonlinear) size.coupled_modes = run.job.nonlinear->modes;
+  set_demand(run.job, setting, size);
   for (const RunPhase& phase : run.log.get_phases())
     if (phase.name == "read") size.read_seconds = phase.seconds;
   return size;

@@ -1,6 +1,5 @@
 // Method:     The first half of a run, then the analysis of its factorisation. Memory and time of what is done here as measured, of the
-//             rest by precompute/cost: factorisations at the pace of those that were timed, what is not timed at that of the loop of which
-//             factorisations mostly consist.
+//             rest by precompute/cost: factorisations at the pace of those that were timed, all else by this machine's update rate.
 //             The answer comes within --patience: a step is begun only if its cost by precompute/cost, on a processor that gives this
 //             process as little of its time as it did so far, fits what is left of it; else what the step would find is estimated.
 // Source:     none. Deviations: none.
