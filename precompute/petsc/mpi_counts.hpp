@@ -11,6 +11,6 @@ struct CarillonMpiCounts {
 };
 
 extern "C" {
-/// Defined by the profiling library alone. Null in a process that runs without it.
-[[gnu::weak]] void carillon_get_mpi_counts(CarillonMpiCounts* counts);
+/// Defined by the profiling library alone: a program looks it up while it runs.
+void carillon_get_mpi_counts(CarillonMpiCounts* counts);
 }
