@@ -187,14 +187,14 @@ void add_inputs(const store::Store& store, const std::set<fs::path>& used_inputs
 }
 
 /// "registry.damaged-3.sqlite", and the same with -journal, -wal and -shm.
-bool is_damaged_registry(std::string name) {
+bool is_damaged_registry(std::string_view name) {
   for (const std::string_view ending : {"-journal", "-wal", "-shm"}) {
-    if (name.ends_with(ending)) name.resize(name.size() - ending.size());
+    if (name.ends_with(ending)) name.remove_suffix(ending.size());
   }
   constexpr std::string_view kBegin = "registry.damaged-", kEnd = ".sqlite";
   if (!name.starts_with(kBegin) || !name.ends_with(kEnd) || name.size() <= kBegin.size() + kEnd.size()) return false;
-  const std::string number = name.substr(kBegin.size(), name.size() - kBegin.size() - kEnd.size());
-  return number.find_first_not_of("0123456789") == std::string::npos;
+  const std::string_view number = name.substr(kBegin.size(), name.size() - kBegin.size() - kEnd.size());
+  return number.find_first_not_of("0123456789") == std::string_view::npos;
 }
 
 /// "<id>-<12 hex digits>"

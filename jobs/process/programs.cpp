@@ -99,7 +99,7 @@ std::string Programs::run(const std::string& program, std::vector<std::string> w
   command.folder = folder_;
   const std::string mark = std::string(kMark) + folder_.string();
   command.environment.emplace({mark});
-  if (std::getenv(kSessions) == nullptr) command.environment->push_back(std::string(kSessions) + "=" + folder_.string());
+  if (std::getenv(kSessions) == nullptr) command.environment->push_back(fmt::format("{}={}", kSessions, folder_.string()));
   for (char** entry = environ; *entry != nullptr; ++entry)
     if (!std::string_view(*entry).starts_with(kMark)) command.environment->emplace_back(*entry);
   command.output = shows && !is_quiet_ ? STDERR_FILENO : base::kCapture;

@@ -11,7 +11,7 @@
 namespace carillon::report {
 namespace {
 
-constexpr std::size_t kMaxRows = 1000;
+constexpr std::size_t kMaxModeRows = 1000;
 constexpr double kResidualLimit = 1e-4;  // of a sane bank
 
 double calc_t60_s(const bank::Bank& bank, std::size_t mode) { return std::log(1000.0) / bank.decay_per_s[mode]; }
@@ -37,7 +37,7 @@ std::string name_mode(const bank::Bank& bank, std::size_t mode) {
 Axis make_frequency_axis() { return {.label = "frequency [Hz]", .is_log = true}; }
 
 /// Sticks over the frequency as high as the mode rings long; where not all decay, as high as their number.
-Html draw_modes(const bank::Bank& bank) {
+Html draw_mode_chart(const bank::Bank& bank) {
   bool rings_out = true;
   for (std::size_t i = 0; i < bank.mode_count(); ++i)
     rings_out = rings_out && bank.decay_per_s[i] > 0.0 && std::isfinite(bank.decay_per_s[i]);
@@ -82,7 +82,7 @@ Html make_mode_table(const bank::Bank& bank) {
                {"T60 [s]", true},
                {"residual", true},
                {"gain", true}});
-  const std::size_t shown = std::min(kMaxRows, bank.mode_count());
+  const std::size_t shown = std::min(kMaxModeRows, bank.mode_count());
   const bool is_corrected = !bank.corrected.is_empty();
   for (std::size_t i = 0; i < shown; ++i) {
     table.add({html("{}", i + 1), html("{:.2f}", bank.freq_hz(i)), make_cents(bank.algebraic_error_cents, i),
@@ -138,7 +138,7 @@ Html make_cut_table(const bank::Bank& bank) {
   Table table(
       {{"below [Hz]", true}, {"counted by inertia", true}, {"counted since the cut before", true}, {"modes here", true}, {"margin", true}});
   const std::size_t cuts = std::min({proof.cut_hz.size(), proof.below.size(), proof.margin.size()});
-  for (std::size_t i = 0; i < std::min(cuts, kMaxRows); ++i) {
+  for (std::size_t i = 0; i < std::min(cuts, kMaxModeRows); ++i) {
     std::int64_t here = 0;
     for (std::size_t m = 0; i > 0 && m < bank.mode_count(); ++m)
       here += static_cast<std::int64_t>(bank.freq_hz(m) >= proof.cut_hz[i - 1] && bank.freq_hz(m) < proof.cut_hz[i]);
@@ -158,7 +158,7 @@ Html make_modes_section(const Subject& subject) {
       html("<p>{} modes from {} to {}; the band is {} Hz to {} Hz{}.</p>\n", format_count(static_cast<std::int64_t>(bank.mode_count())),
            format_hz(bank.freq_hz(0)), format_hz(bank.freq_hz(bank.mode_count() - 1)), format_plain(bank.band_hz[0]),
            format_plain(bank.band_hz[1]), bank.complete ? "" : ", and not all of its modes are here");
-  out += draw_modes(bank);
+  out += draw_mode_chart(bank);
   if (!bank.discretisation_error_cents.empty() || !bank.algebraic_error_cents.empty())
     out += html("<p class=\"remark\">Whiskers along the frequency: both error bars together.</p>\n");
   out += make_mode_table(bank);

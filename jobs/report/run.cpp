@@ -12,7 +12,7 @@ namespace carillon::report {
 namespace {
 
 constexpr std::size_t kMaxBars = 32;
-constexpr std::size_t kMaxRows = 200;
+constexpr std::size_t kMaxTableRows = 200;
 
 /// The phases of a record in the order in which they happen, others behind them.
 std::vector<std::string> order_phases(const Json::Value& phases) {
@@ -46,7 +46,7 @@ Html make_phase_table(const Subject& subject) {
   const Json::Value& recorded = find(subject.record.run, "stations");
   Table table(
       {{"phase"}, {"wall clock", true}, {"CPU, all ranks", true}, {"peak so far, largest rank", true}, {"peak so far, all ranks", true}});
-  for (Json::ArrayIndex i = 0; recorded.isArray() && i < std::min<Json::ArrayIndex>(recorded.size(), kMaxRows); ++i) {
+  for (Json::ArrayIndex i = 0; recorded.isArray() && i < std::min<Json::ArrayIndex>(recorded.size(), kMaxTableRows); ++i) {
     const Json::Value& phase = recorded[i];
     const auto name = find_text(phase, "name");
     if (!name) continue;
@@ -89,7 +89,7 @@ Html make_rank_table(const Subject& subject) {
     const auto count = find_count(rank, key);
     return html("{}", count ? format_count(*count) : "-");
   };
-  for (Json::ArrayIndex i = 0; ranks.isArray() && i < std::min<Json::ArrayIndex>(ranks.size(), kMaxRows); ++i)
+  for (Json::ArrayIndex i = 0; ranks.isArray() && i < std::min<Json::ArrayIndex>(ranks.size(), kMaxTableRows); ++i)
     table.add({html("{}", i), cell(ranks[i], "elements"), cell(ranks[i], "owned_nodes"), cell(ranks[i], "halo_nodes")});
   if (table.empty()) return {};
   Facts facts;
@@ -100,7 +100,7 @@ Html make_rank_table(const Subject& subject) {
   Html out = html("<h3>How the mesh was shared</h3>\n");
   out += facts.finish();
   out += table.finish();
-  if (ranks.size() > kMaxRows) out += html("<p class=\"remark\">The first {} of {} ranks.</p>\n", kMaxRows, ranks.size());
+  if (ranks.size() > kMaxTableRows) out += html("<p class=\"remark\">The first {} of {} ranks.</p>\n", kMaxTableRows, ranks.size());
   return out;
 }
 

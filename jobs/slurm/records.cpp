@@ -22,7 +22,7 @@ constexpr const char* kSubmittedFile = "slurm.json";
 constexpr const char* kRetriesFile = "retries.json";
 constexpr const char* kJobsFile = "jobs";
 constexpr const char* kNumberFile = "number";
-constexpr std::streamoff kMaxOutputBytes = 4096;
+constexpr std::streamoff kOutputTailBytes = 4096;
 
 bool is_name(const std::string& text) { return text.size() == 32 && text.find_first_not_of("0123456789abcdef") == std::string::npos; }
 
@@ -156,8 +156,8 @@ std::string read_output(const fs::path& root, const SubmittedJob& submitted) {
   std::ifstream stream(make_output_file(root, submitted.batch, std::max(submitted.task, 0)), std::ios::binary | std::ios::ate);
   if (!stream) return "";
   const std::streamoff size = stream.tellg();
-  stream.seekg(std::max<std::streamoff>(0, size - kMaxOutputBytes));
-  std::string text(static_cast<std::size_t>(std::min(size, kMaxOutputBytes)), '\0');
+  stream.seekg(std::max<std::streamoff>(0, size - kOutputTailBytes));
+  std::string text(static_cast<std::size_t>(std::min(size, kOutputTailBytes)), '\0');
   stream.read(text.data(), static_cast<std::streamsize>(text.size()));
   text.resize(static_cast<std::size_t>(std::max<std::streamsize>(0, stream.gcount())));
   return text;

@@ -31,7 +31,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kHeadBytes = 4096;
+constexpr std::size_t kMeshHeadBytes = 4096;
 constexpr std::size_t kMaxTexts = 50;
 constexpr const char* kScheme = "carillon identity 1";
 
@@ -266,7 +266,7 @@ const RequestMaker::Known& RequestMaker::find_input(const fs::path& file, const 
   if (is_there && found != known_.end() && found->second.stamp == stamp) return found->second;
   std::string head;
   const Id id = hash_file(file, what, [&](std::string_view bytes) {
-    if (head.size() < kHeadBytes) head += bytes.substr(0, kHeadBytes - head.size());
+    if (head.size() < kMeshHeadBytes) head += bytes.substr(0, kMeshHeadBytes - head.size());
   });
   return known_.insert_or_assign(file, Known{id, head, stamp}).first->second;
 }

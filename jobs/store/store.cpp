@@ -37,7 +37,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kVersionText = "carillon store 1\n";
 constexpr std::uint64_t kMaxVersionBytes = 1000;
-constexpr std::size_t kHeadBytes = 4096;  // the seal of a bank
+constexpr std::size_t kSealBytes = 4096;  // the seal of a bank
 constexpr const char* kContentName = "content";
 constexpr off_t kMaxCopiedBytes = 16 << 20;
 constexpr std::size_t kMaxHostLength = 64;
@@ -303,7 +303,7 @@ Sum calc_sum(const OpenFolder& folder, const Id& id) {
   if (bank.value < 0 || ::fstat(bank.value, &info) != 0) throw_errno(folder.name() / main, "read", errno);
   return {id.text(),
           hash_file(folder.path() / main, "bank").text(),
-          hash_text(read_head(bank.value, kHeadBytes)).text(),
+          hash_text(read_head(bank.value, kSealBytes)).text(),
           static_cast<long long>(info.st_size),
           find_written_ns(info),
           {}};
@@ -421,7 +421,7 @@ std::optional<std::string> Store::find_bank_fault(const Id& id, Look look) const
     if (sum->id != id.text()) return "its folder is that of another bank";
     if (info.st_size < sum->bytes) return fmt::format("its bank is cut: {} bytes of {}", info.st_size, sum->bytes);
     if (info.st_size != sum->bytes) return fmt::format("its bank has {} bytes instead of {}", info.st_size, sum->bytes);
-    if (hash_text(read_head(file.value, kHeadBytes)).text() != sum->head)
+    if (hash_text(read_head(file.value, kSealBytes)).text() != sum->head)
       return "its bank is another one than was computed, or its seal is damaged";
     if (main == std::string_view(kRecordFile))
       if (auto fault = find_file_fault(*folder, *sum, look)) return fault;

@@ -15,8 +15,6 @@ namespace {
 
 using std::numbers::pi;
 
-double square(double x) { return x * x; }
-
 /// Intervals along the longest side for a number of half-waves along it: a multiple of ten.
 int choose_flat_grid(double half_waves) {
   const int wanted = 10 * static_cast<int>(std::ceil(0.4 * half_waves));
@@ -31,10 +29,6 @@ void warn_if_thick(double thickness_m, double rate, double high_hz, std::vector<
         fmt::format("above {:.0f} Hz a wavelength is less than ten thicknesses, and Kirchhoff's theory is several per cent "
                     "too high; finite elements (\"shape\": \"plate\") include shear and rotary inertia",
                     hz));
-}
-
-void sort_modes(std::vector<Mode>& modes) {
-  std::stable_sort(modes.begin(), modes.end(), [](const Mode& a, const Mode& b) { return a.lambda_rad2_s2 < b.lambda_rad2_s2; });
 }
 
 /// Z_(m+1)/Z_m and the like come from these; the standard library's are exact to about 1e-13 here.

@@ -1,6 +1,7 @@
 // A body whose modes are known: what each theory gives to the bank.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <memory>
@@ -28,6 +29,12 @@ struct ModeList {
   std::vector<Mode> modes;
   double complete_below_hz = 0.0;  // no mode is missing below; what the caller asked for, or less where it limited the count
 };
+
+inline void sort_modes(std::vector<Mode>& modes) {
+  std::stable_sort(modes.begin(), modes.end(), [](const Mode& a, const Mode& b) { return a.lambda_rad2_s2 < b.lambda_rad2_s2; });
+}
+
+inline double square(double x) { return x * x; }
 
 /// A closed surface, outward, in the frame of the job.
 struct ClosedSurface {

@@ -42,12 +42,6 @@ bank::RigidBody calc_rod_rigid(double length_m, double mass_kg, double area_m2, 
   return rigid;
 }
 
-void sort_modes(std::vector<Mode>& modes) {
-  std::stable_sort(modes.begin(), modes.end(), [](const Mode& a, const Mode& b) { return a.lambda_rad2_s2 < b.lambda_rad2_s2; });
-}
-
-double square(double x) { return x * x; }
-
 }  // namespace
 
 String::String(const job::StringBody& body, const material::Material& material) : length_m_(body.length_m) {

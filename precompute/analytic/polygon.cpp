@@ -22,8 +22,6 @@ constexpr double kMinError = 1e-12;          // relative, of the eigensolver
 constexpr double kDegenerate = 1e-7;         // relative distance of eigenvalues that may be one
 constexpr int kMaxRefined = 200;             // modes: what follows costs more than the elements do
 
-double square(double x) { return x * x; }
-
 bool is_singular(double angle) {
   const double n = pi / angle;
   return std::abs(n - std::round(n)) > 1e-9 * n || n < 0.75;

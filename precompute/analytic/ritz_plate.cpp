@@ -16,10 +16,8 @@ using job::Edge;
 using std::numbers::pi;
 
 constexpr int kMaxUnknowns = 3600;  // of one dense eigenproblem: about a minute
-constexpr double kSlow = 3.0;   // where a clamped edge meets a free one an eighth more functions gains as little as a third of the error
-constexpr double kZero = 1e-9;  // of the largest eigenvalue wanted: mechanisms
-
-double square(double x) { return x * x; }
+constexpr double kSlowRitz = 3.0;  // where a clamped edge meets a free one an eighth more functions gains as little as a third of the error
+constexpr double kZero = 1e-9;     // of the largest eigenvalue wanted: mechanisms
 
 EndConditions get_conditions(Edge edge) {
   return {edge == Edge::hinged || edge == Edge::clamped, edge == Edge::clamped || edge == Edge::sliding};
@@ -139,7 +137,7 @@ ModeList RitzPlate::list_modes(double high_hz, std::int64_t max_modes) {
       ++mechanisms;
       continue;
     }
-    const double apart = m < coarse.size() ? kSlow * std::abs(coarse[m] - lambda) : lambda;
+    const double apart = m < coarse.size() ? kSlowRitz * std::abs(coarse[m] - lambda) : lambda;
     list.modes.push_back(
         {lambda, 600.0 * std::log2(1.0 + apart / lambda), {static_cast<int>(m), 0, 0, 0}, fmt::format("{}", list.modes.size() + 1)});
   }

@@ -21,14 +21,9 @@ namespace {
 
 using partition::LocalMesh;
 
-std::span<const std::int32_t> get_tet(const LocalMesh& local, std::int32_t e) {
-  const auto width = static_cast<std::size_t>(local.nodes_per_tet());
-  return {&local.tets[e * width], width};
-}
-
 /// The positions of the nodes of tetrahedron e.
 std::span<const Vec3> copy_positions(const LocalMesh& local, std::int32_t e, std::array<Vec3, kMaxNodes>& x) {
-  const auto nodes = get_tet(local, e);
+  const auto nodes = local.get_tet(e);
   for (std::size_t i = 0; i < nodes.size(); ++i) x[i] = local.nodes_m[nodes[i]];
   return {x.data(), nodes.size()};
 }
@@ -38,7 +33,7 @@ std::vector<std::int32_t> order_by_row(const LocalMesh& local) {
   std::vector<std::int32_t> lowest(local.tet_count()), order(local.tet_count());
   std::vector<std::int64_t> begin(local.nodes_m.size() + 1, 0);
   for (std::int32_t e = 0; e < local.tet_count(); ++e) {
-    const auto nodes = get_tet(local, e);
+    const auto nodes = local.get_tet(e);
     lowest[e] = *std::min_element(nodes.begin(), nodes.end());
     ++begin[lowest[e] + 1];
   }
@@ -48,7 +43,7 @@ std::vector<std::int32_t> order_by_row(const LocalMesh& local) {
 }
 
 [[noreturn]] void fail_element(const LocalMesh& local, std::int32_t e) {
-  const std::int32_t node = get_tet(local, e)[0];
+  const std::int32_t node = local.get_tet(e)[0];
   const Vec3& x = local.nodes_m[node];
   // Elements and nodes are counted from 1, as the mesh check does.
   throw InputError(
@@ -71,7 +66,7 @@ System assemble(const comm::Communicator& comm, const LocalMesh& local, const Ma
     std::array<Vec3, kMaxNodes> x;
     for (const std::int32_t e : order_by_row(local)) {
       if (!calc_element(copy_positions(local, e, x), solids[materials.find(e)], mass, element)) fail_element(local, e);
-      rows.add(get_tet(local, e), local, element);
+      rows.add(local.get_tet(e), local, element);
     }
   });
   finish(comm, rows);

@@ -43,11 +43,6 @@ struct FaceRecord {
   std::int32_t entry;
 };
 
-std::span<const std::int32_t> get_tet(const LocalMesh& local, std::int32_t e) {
-  const auto width = static_cast<std::size_t>(local.nodes_per_tet());
-  return {&local.tets[static_cast<std::size_t>(e) * width], width};
-}
-
 /// The fixed nodes of this rank's elements, joined by them.
 std::vector<NodeRecord> list_nodes(const LocalMesh& local) {
   mesh::Parts joined(local.nodes_m.size());
@@ -55,7 +50,7 @@ std::vector<NodeRecord> list_nodes(const LocalMesh& local) {
   for (std::int32_t e = 0; e < local.tet_count(); ++e) {
     std::array<std::pair<std::int32_t, std::int32_t>, kMaxNodes> fixed;  // entry, node
     std::size_t count = 0;
-    for (const std::int32_t node : get_tet(local, e)) {
+    for (const std::int32_t node : local.get_tet(e)) {
       if (local.fixed_by[node] >= 0) fixed[count++] = {local.fixed_by[node], node};
     }
     std::sort(fixed.begin(), fixed.begin() + count);
@@ -76,7 +71,7 @@ std::vector<NodeRecord> list_nodes(const LocalMesh& local) {
 std::vector<FaceRecord> list_faces(const LocalMesh& local) {
   std::vector<FaceRecord> list;
   for (std::int32_t e = 0; e < local.tet_count(); ++e) {
-    const auto nodes = get_tet(local, e);
+    const auto nodes = local.get_tet(e);
     for (const auto& face : mesh::kFaces) {
       const std::int32_t entry = local.fixed_by[nodes[face[0]]];
       if (entry < 0 || local.fixed_by[nodes[face[1]]] != entry || local.fixed_by[nodes[face[2]]] != entry) continue;
@@ -299,7 +294,7 @@ std::vector<Near> find_near(const LocalMesh& local, const Layout& layout, const 
   for (std::size_t s = 0; s < layout.list.size(); ++s) nearby.emplace_back(layout, static_cast<std::int32_t>(s));
   std::vector<Near> list;
   for (std::int32_t e = 0; e < local.tet_count(); ++e) {
-    const auto nodes = get_tet(local, e);
+    const auto nodes = local.get_tet(e);
     std::int32_t best = -1;
     for (const std::int32_t node : nodes) {
       if (support_of[node] >= 0 && (best < 0 || support_of[node] < best)) best = support_of[node];
@@ -377,7 +372,7 @@ struct Sums {
 /// Adds one element's part for one mode.
 void add_element(const Sums& sums, const Near& near, const ElementMatrices& element, const double* phi, double lambda, double* reaction,
                  double* energy) {
-  const auto nodes = get_tet(sums.local, near.tet);
+  const auto nodes = sums.local.get_tet(near.tet);
   const int n = element.nodes, width = 3 * n;
   std::array<double, 3 * kMaxNodes> u{}, f;
   for (int i = 0; i < n; ++i) {
@@ -431,7 +426,7 @@ Supports calc_supports(const comm::Communicator& comm, const LocalMesh& local, c
     near = find_near(local, layout, support_of);
     place.assign(local.nodes_m.size(), -1);
     for (const Near& one : near)
-      for (const std::int32_t node : get_tet(local, one.tet)) {
+      for (const std::int32_t node : local.get_tet(one.tet)) {
         if (local.row[node] < 0 || place[node] >= 0) continue;
         place[node] = static_cast<std::int32_t>(fetched.size());
         fetched.push_back(node);
@@ -451,7 +446,7 @@ Supports calc_supports(const comm::Communicator& comm, const LocalMesh& local, c
     const std::size_t block = std::min<std::size_t>(kBlock, modes - first);
     fetch.get(static_cast<PetscInt>(first), static_cast<PetscInt>(block), phi);
     for (const Near& one : near) {
-      const auto nodes = get_tet(local, one.tet);
+      const auto nodes = local.get_tet(one.tet);
       for (std::size_t i = 0; i < nodes.size(); ++i) x[i] = local.nodes_m[nodes[i]];
       // The assembly has been through every element; a bad one ended it.
       if (!calc_element({x.data(), nodes.size()}, solids[static_cast<std::size_t>(materials.find(one.tet))], mass, element)) continue;

@@ -10,21 +10,21 @@ namespace carillon::job {
 namespace {
 
 // As carillon-mesh has them.
-constexpr double kMinLength = 1e-6, kMaxLength = 1e4;      // [m]
+constexpr double kMinBodyM = 1e-6, kMaxBodyM = 1e4;        // [m]
 constexpr double kMinOpening = 20.0, kMaxOpening = 340.0;  // [degrees]
 constexpr long long kMaxNodes = 20'000'000;
 constexpr long long kMaxRanks = 1'000'000;
-constexpr double kMaxGb = 1e9, kMaxSeconds = 1e9;
+constexpr double kMaxGb = 1e9, kMaxLimitS = 1e9;
 
-double read_length(base::Object& body, const std::string& key) {
+double read_body_length(base::Object& body, const std::string& key) {
   const double value = body.number(key, base::kPositive);
-  if (value < kMinLength || value > kMaxLength)
-    body.fail(key, fmt::format("lengths are metres, from {:g} to {:g}, and this is {:g}", kMinLength, kMaxLength, value));
+  if (value < kMinBodyM || value > kMaxBodyM)
+    body.fail(key, fmt::format("lengths are metres, from {:g} to {:g}, and this is {:g}", kMinBodyM, kMaxBodyM, value));
   return value;
 }
 
-std::optional<double> read_length_if(base::Object& body, const std::string& key) {
-  return body.has(key) ? std::optional(read_length(body, key)) : std::nullopt;
+std::optional<double> read_body_length_if(base::Object& body, const std::string& key) {
+  return body.has(key) ? std::optional(read_body_length(body, key)) : std::nullopt;
 }
 
 std::vector<std::string> list_shapes() {
@@ -40,7 +40,7 @@ void read_dimensions(base::Object& body, Body& result) {
       const std::string key = find_dimension_key(dimension);
       if (!body.has(key)) continue;
       if (dimension != "opening-angle") {
-        result.dimensions[dimension] = read_length(body, key);
+        result.dimensions[dimension] = read_body_length(body, key);
         continue;
       }
       const double angle = body.number(key);
@@ -57,18 +57,18 @@ void read_fineness(base::Object& body, Body& result) {
   if (result.nodes.value_or(0) > kMaxNodes)
     body.fail("nodes", fmt::format("the mesher makes at most {} nodes, and this asks for {}; larger bodies come as a \"mesh\" file",
                                    kMaxNodes, *result.nodes));
-  result.edge_m = read_length_if(body, "edge_m");
+  result.edge_m = read_body_length_if(body, "edge_m");
   if (result.nodes && result.edge_m) body.fail("edge_m", "\"nodes\" is given already; give one of the two");
 }
 
 void read_surface(base::Object& body, Body& result) {
   result.surface = body.path("surface");
-  result.wall_m = read_length_if(body, "wall_m");
+  result.wall_m = read_body_length_if(body, "wall_m");
   if (body.has("side")) {
     result.side = body.choice("side", {"middle", "outside", "inside"});
     if (!result.wall_m) body.fail("side", "is for walls; give the thickness with \"wall_m\"");
   }
-  result.height_m = read_length_if(body, "height_m");
+  result.height_m = read_body_length_if(body, "height_m");
   result.scale = body.number_if("scale", base::kPositive);
   result.close_holes = body.number_if("close_holes");
   if (result.close_holes && !(*result.close_holes >= 0.0 && *result.close_holes <= 1.0))
@@ -94,7 +94,7 @@ Resources read_resources(base::Object& job) {
   if (!resources) return read;
   if (auto ranks = resources->integer_if("ranks", 1, kMaxRanks)) read.ranks = static_cast<int>(*ranks);
   read.memory_gb = resources->number_if("memory_gb", {0.0, kMaxGb}).value_or(0.0);
-  read.time_limit_s = resources->number_if("time_limit_s", {0.0, kMaxSeconds}).value_or(0.0);
+  read.time_limit_s = resources->number_if("time_limit_s", {0.0, kMaxLimitS}).value_or(0.0);
   resources->finish();
   return read;
 }

@@ -103,17 +103,17 @@ std::vector<Drive> read_drives(base::Object& body) {
   return drives;
 }
 
-double read_length(base::Object& object, std::string_view key) { return read_within(object, key, kMinLengthM, kFarthestM); }
+double read_scene_length(base::Object& object, std::string_view key) { return read_within(object, key, kMinLengthM, kFarthestM); }
 
 Sheet read_sheet(base::Object object) {
   Sheet sheet;
-  sheet.thickness_m = read_length(object, "thickness_m");
+  sheet.thickness_m = read_scene_length(object, "thickness_m");
   sheet.shape = object.choice("shape", {"rectangle", "disc"});
   if (sheet.shape == "disc") {
-    sheet.radius_m = read_length(object, "radius_m");
+    sheet.radius_m = read_scene_length(object, "radius_m");
   } else {
-    sheet.length_m = read_length(object, "length_m");
-    sheet.width_m = read_length(object, "width_m");
+    sheet.length_m = read_scene_length(object, "length_m");
+    sheet.width_m = read_scene_length(object, "width_m");
     sheet.bow_m = read_within_or(object, "bow_m", 0.0, 0.0, kFarthestM);
     if (sheet.bow_m > 0.4 * sheet.length_m)
       object.fail("bow_m", fmt::format("is more than 0.4 of the length; give {:g} at most", 0.4 * sheet.length_m));
@@ -183,7 +183,7 @@ SimulatedBody read_simulated_body(base::Object& object, std::vector<std::string>
 Striker read_striker(base::Object& object) {
   Striker striker;
   striker.place = object.find_place("");
-  striker.ball.radius_m = read_length(object, "sphere_m");
+  striker.ball.radius_m = read_scene_length(object, "sphere_m");
   striker.ball.mass_kg = read_within(object, "mass_kg", 1e-9, kMaxMassKg);
   striker.ball.position_m = read_vector(object, "position_m", {}, kFarthestM);
   striker.ball.velocity_m_s = read_vector(object, "velocity_m_s", {}, kMaxSpeedMs);
@@ -206,7 +206,7 @@ Obstacle read_obstacle(base::Object& object) {
     plane->finish();
     obstacle.form = made;
   } else if (auto sphere = object.object_if("sphere")) {
-    obstacle.form = BallObstacle{read_vector(*sphere, "centre_m", {}, kFarthestM), read_length(*sphere, "radius_m")};
+    obstacle.form = BallObstacle{read_vector(*sphere, "centre_m", {}, kFarthestM), read_scene_length(*sphere, "radius_m")};
     sphere->finish();
   } else {
     const std::array<Vec3, 2> box = read_box(object.object("box"));

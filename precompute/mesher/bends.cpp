@@ -13,6 +13,8 @@
 #include <numeric>
 #include <set>
 
+#include "runtime/base/vector.hpp"
+
 namespace carillon::mesher {
 namespace {
 
@@ -25,11 +27,6 @@ constexpr double kSureTurnDeg = 25;  // fifteen sides and more are a circle
 constexpr int kRow = 4;              // panes that make an arc
 constexpr int kShortRow = 5;         // bends and panes that may be an arc: two panes between planes, or three and nothing next to them
 constexpr int kFollowed = 4;         // to each side
-
-Vec3 calc_unit(const Vec3& a) {
-  const double length = norm(a);
-  return length > 0 ? (1 / length) * a : Vec3{};
-}
 
 /// The outline of a pane.
 struct Outline {

@@ -19,7 +19,7 @@ namespace {
 constexpr int kMaxSteps = 10;
 // Below this target a mesh costs a few hundredths of a second, and the row of edges is tried.
 constexpr double kCheapTarget = 3000;
-constexpr int kRow = 24;
+constexpr int kTrials = 24;
 // Of the target, for a trial; and how many times as many nodes as the model has are more than a factor.
 constexpr double kTrialPart = 0.2, kUsual = 1.5;
 
@@ -125,7 +125,7 @@ mesh::TetMesh search_edge(const CountSearch& search, CountModel model, double& e
   }
   if (!is_met(search.tolerance) && target < kCheapTarget && best && failures == 0 && !is_level(trials, target)) {
     const double middle = best->edge_m;
-    for (int n = 0; n < kRow && !is_met(0.8 * search.tolerance); ++n)
+    for (int n = 0; n < kTrials && !is_met(0.8 * search.tolerance); ++n)
       attempt(std::min(middle * (1 + 0.015 * (n / 2 + 1) * (n % 2 == 0 ? 1 : -1)), search.longest_m));
   }
   if (!is_met(search.tolerance)) {

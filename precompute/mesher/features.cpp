@@ -14,14 +14,10 @@
 #include <utility>
 
 #include "precompute/mesher/triangle_surface.hpp"
+#include "runtime/base/vector.hpp"
 
 namespace carillon::mesher {
 namespace {
-
-Vec3 calc_unit(const Vec3& a) {
-  const double length = norm(a);
-  return length > 0 ? (1 / length) * a : Vec3{};
-}
 
 // A curve is a crease if over most of its length the mean normals of its two sides turn by most of the sharp angle. Set by trial
 // on the Stanford bunny (no curve but the creases of ears and paws) and on boxes, cylinders and screws (all of theirs).

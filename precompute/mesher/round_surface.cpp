@@ -18,6 +18,7 @@
 
 #include "precompute/mesh/parts.hpp"
 #include "precompute/mesher/bends.hpp"
+#include "runtime/base/vector.hpp"
 
 namespace carillon::mesher {
 namespace {
@@ -25,16 +26,11 @@ namespace {
 constexpr double kMaxBulge = 0.15;     // of an edge's length; more is no estimate of a smooth surface
 constexpr double kDefaultPart = 0.95;  // of the edges that bulge at all
 constexpr double kSameNormal = 3e-3;   // radians
-constexpr double kMaxTilt = 0.35;      // of the normal at a rim, radians
+constexpr double kMaxRimTilt = 0.35;   // of the normal at a rim, radians
 constexpr double kOnSide = 1e-8;       // barycentric
 constexpr int kMaxPieces = 16;
 
 using Weights = std::array<double, 3>;  // barycentric
-
-Vec3 calc_unit(const Vec3& a) {
-  const double length = norm(a);
-  return length > 0 ? (1 / length) * a : Vec3{};
-}
 
 }  // namespace
 
@@ -137,7 +133,7 @@ struct RoundSurface::Patches {
       }
       if (!(squares > 1e-6)) continue;
       const double tilt = std::atan2(-gap, squares);
-      if (std::abs(tilt) < kMaxTilt) turned[r] = std::cos(tilt) * normal + std::sin(tilt) * sideways;
+      if (std::abs(tilt) < kMaxRimTilt) turned[r] = std::cos(tilt) * normal + std::sin(tilt) * sideways;
     }
     for (std::size_t c = 0; c < corner.size(); ++c)
       if (norm(turned[root[c]]) > 0) corner[c] = turned[root[c]];

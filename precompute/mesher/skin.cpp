@@ -16,6 +16,7 @@
 #include <unordered_set>
 
 #include "precompute/mesh/parts.hpp"
+#include "runtime/base/vector.hpp"
 
 namespace carillon::mesher {
 namespace {
@@ -32,11 +33,6 @@ constexpr double kMinRingPart = 0.15, kMaxRingPart = 0.75;  // of edges at rings
 constexpr double kFlatFold = 0.98, kPerMitre = 1.3;         // a fold that takes nothing; edges over what its mitre takes
 constexpr double kRoom = 0.13, kRoomShape = 0.1;            // of a triangle between the mitres of folds, see make_room()
 constexpr double kMinHeight = 0.02;                         // of a triangle's longest edge: flatter ones have no normal
-
-Vec3 calc_unit(const Vec3& a) {
-  const double length = norm(a);
-  return length > 0 ? (1 / length) * a : Vec3{};
-}
 
 using EdgeSet = std::unordered_set<Edge, EdgeHash>;
 

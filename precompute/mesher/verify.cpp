@@ -25,7 +25,7 @@ constexpr double kCells = 3, kShort = 0.002;
 constexpr double kOpposite = 0.64;  // cosine of half the angle between two directions to the surface
 constexpr double kMinThickness = 1.0, kMinLength = 3;
 // Of an extent of the body, and in edges: what coarse elements may lack of its tips.
-constexpr double kMaxLost = 0.1, kMaxLostEdges = 2;
+constexpr double kMaxLostDistance = 0.1, kMaxLostDistanceEdges = 2;
 constexpr double kHopelessWalls = 3;  // edges this many times as long as the wall is thick do not bring a lost hollow back
 
 /// A region of the field: where the body is, or where it is not.
@@ -120,7 +120,7 @@ std::string describe_lost(const Body& body, const Vec3& made, double edge_m, con
   std::string text;
   for (int c = 0; c < 3; ++c) {
     const double extent = wanted[c] - 2 * body.repaired.offset_m, lost = extent - made[c];
-    if (lost > kMaxLost * extent && lost > kMaxLostEdges * edge_m)
+    if (lost > kMaxLostDistance * extent && lost > kMaxLostDistanceEdges * edge_m)
       text = fmt::format("{} {:.3g} m long along {} where the body is {:.3g} m: parts thinner than its elements are missing", is, made[c],
                          "xyz"[c], extent);
   }

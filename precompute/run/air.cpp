@@ -53,7 +53,7 @@ AirReport choose(const Run& run, const bank::Bank& bank) {
   return {false, fmt::format("{}, and from {:g} on the gains of a sphere do; {}", measure, bem::kCompact, loss), {}};
 }
 
-bem::AirOptions make_options(const job::Air& air) {
+bem::AirOptions make_air_options(const job::Air& air) {
   bem::AirOptions options;
   options.solve.error_db = air.error_db;
   options.most_nodes = static_cast<std::size_t>(air.skin_nodes);
@@ -115,7 +115,7 @@ AirReport add_air(Run& run, bank::Bank& bank) {
     run.log.end();
     return report;
   }
-  bem::AirOptions options = make_options(run.job.air);
+  bem::AirOptions options = make_air_options(run.job.air);
   options.warn = [&run](const std::string& text) { run.log.warn(text); };
   bem::Keeper keeper;
   keeper.report = [&run, tenths = 0](const std::string& text, double share) mutable {

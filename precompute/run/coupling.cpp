@@ -41,7 +41,7 @@ double calc_thickness(const Surface& surface, double volume_m3) {
   return area_m2 > 0 ? 2 * volume_m3 / area_m2 : 0.0;
 }
 
-condense::CondenseOptions make_options(Run& run, const AccurateBody& found, std::vector<std::int32_t> kept) {
+condense::CondenseOptions make_condense_options(Run& run, const AccurateBody& found, std::vector<std::int32_t> kept) {
   condense::CondenseOptions options;
   options.is_stretch = run.job.nonlinear->is_stretch;
   options.modes = std::min(run.job.nonlinear->modes, static_cast<int>(kept.size()));
@@ -56,7 +56,7 @@ condense::CondenseOptions make_options(Run& run, const AccurateBody& found, std:
   return options;
 }
 
-std::string describe(const condense::Condensed& result) {
+std::string describe_condensed(const condense::Condensed& result) {
   const bank::QuarticEnergy& energy = result.energy;
   return fmt::format("{} coupled modes up to {:.0f} Hz of {} that bend or twist, {} {}{}, error {:.1e}, {} solves; {}", energy.mode_count(),
                      result.top_hz, result.bending_count, energy.row_count(), energy.row_count() == 1 ? "field" : "fields",
@@ -95,7 +95,7 @@ CouplingReport couple_modes(Run& run, const AccurateBody& found) {
   run.log.begin("coupling", fmt::format("quartic energy of {} modes below {:g} Hz", run.job.nonlinear->modes, run.job.nonlinear->below_hz));
   const SolvedBody& solved = found.solved;
   const std::vector<std::int32_t> kept = find_kept_modes(run, solved);
-  const condense::CondenseOptions options = make_options(run, found, kept);
+  const condense::CondenseOptions options = make_condense_options(run, found, kept);
   condense::Condensed result = name_errors(found.body.source, run, [&] {
     if (solved.modes.lambda.empty()) throw InputError("\"nonlinear\" couples modes, and none lies in the band: widen \"band_hz\"");
     const fem::Materials& materials = solved.properties.materials;
@@ -107,7 +107,7 @@ CouplingReport couple_modes(Run& run, const AccurateBody& found) {
   });
   warn(run, result);
   if (run.comm.is_root() && !result.energy.is_empty()) {
-    report.result = describe(result);
+    report.result = describe_condensed(result);
     report.energy = std::move(result.energy);
     run.log.print(report.result);
     for (std::int32_t& mode : report.energy.modes)

@@ -28,7 +28,7 @@ void check_options(const Run& run) {
                                  run.options.solver_options[0], job::get_key(*run.job.analytic)));
 }
 
-Json::Value describe(const Run& run, const analytic::Made& made) {
+Json::Value describe_known_body(const Run& run, const analytic::Made& made) {
   Json::Value record = describe_program(run);
   record["theory"] = made.theory;
   record["method"] = made.method;
@@ -55,7 +55,8 @@ RunSummary write_known_body(Run& run) {
   comm::Communicator(run.comm).agree([&] {
     if (!run.comm.is_root()) return;
     for (const std::string& warning : made.warnings) run.log.warn(warning);
-    const std::string record = job::resolved_json(run.job, fs::absolute(summary.bank).parent_path(), write_json(describe(run, made)));
+    const std::string record =
+        job::resolved_json(run.job, fs::absolute(summary.bank).parent_path(), write_json(describe_known_body(run, made)));
     made.bank.provenance = record;
     bank::write_bank(made.bank, run.bank);
     base::write_file(job::find_resolved_path(run.bank), record);

@@ -21,10 +21,6 @@
 namespace carillon::shapes {
 namespace {
 
-double calc_det(const Vec3& a, const Vec3& b, const Vec3& c) {
-  return a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
-}
-
 // ---------------------------------------------------------------- the ball
 
 // A triangulated polyhedron with its vertices on the unit sphere.

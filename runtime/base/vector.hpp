@@ -18,6 +18,13 @@ inline Vec3 cross(const Vec3& a, const Vec3& b) {
 }
 inline double norm(const Vec3& a) { return std::sqrt(dot(a, a)); }
 inline Vec3 normalise(const Vec3& a) { return (1.0 / norm(a)) * a; }
+/// normalise(a), and zero of zero.
+inline Vec3 calc_unit(const Vec3& a) {
+  const double length = norm(a);
+  return length > 0 ? (1 / length) * a : Vec3{};
+}
+/// The determinant of the matrix with these rows.
+inline double calc_det(const Vec3& a, const Vec3& b, const Vec3& c) { return dot(a, cross(b, c)); }
 /// The unit vector of the axis that n is least along; the first of several.
 inline Vec3 find_least_axis(const Vec3& n) {
   std::size_t k = 0;

@@ -28,7 +28,7 @@ constexpr std::size_t kBlock = synth::kBlock;
 constexpr double kReferencePa = 20e-6;
 constexpr double kFastS = 0.125;
 constexpr double kFarthestHeardM = 15e3;  // what a body sends from further away is not heard (84 dB down, and memory has an end)
-constexpr int kMaxStrikes = 256;          // of a body, waiting or acting at once
+constexpr int kMaxWaitingStrikes = 256;   // of a body, waiting or acting at once
 constexpr int kMaxForces = 512;           // of a body that gets any
 
 double calc_distance(const Vec3& a, const Vec3& b) { return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]); }
@@ -292,7 +292,7 @@ class Rendering {
     }
     const std::vector<int> waypoints = playback_.count_waypoints(longest_s);
     synth::SynthesiserOptions room = session_.make_options();
-    room.max_strikes = kMaxStrikes;
+    room.max_strikes = kMaxWaitingStrikes;
     room.max_waypoints = waypoints.back();
     room.ticks = options_->measures ? &synth::get_cpu_ticks : nullptr;
     synth::Synthesiser& synthesiser = session_.open(room);

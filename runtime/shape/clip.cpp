@@ -14,10 +14,10 @@
 namespace carillon::shape {
 namespace {
 
-constexpr double kPrefer = 1e-5;   // of the size: how much better another axis must be
-constexpr double kFlush = 0.9998;  // cosine of a degree
-constexpr double kSeam = 3e-6;     // m; facets that are so flush have no step between them
-constexpr double kBrim = 1e-5;     // of the size: a corner may stand out so far beyond a facet
+constexpr double kPrefer = 1e-5;         // of the size: how much better another axis must be
+constexpr double kFlushCosine = 0.9998;  // cosine of a degree
+constexpr double kSeam = 3e-6;           // m; facets that are so flush have no step between them
+constexpr double kFacetBrim = 1e-5;      // of the size: a corner may stand out so far beyond a facet
 
 /// Polyhedron b in the frame of a; a stays as it is.
 struct Turned {
@@ -91,8 +91,8 @@ class Pair {
         const double gap = calc_gap(kind, static_cast<int>(i));
         if (std::abs(gap) > kSeam) continue;
         const Vec3 normal = kind == 0 ? -1.0 * mine[i] : mine[i];
-        if (std::any_of(seams.begin(), seams.end(), [&](const Axis& other) { return dot(other.normal, normal) > kFlush; })) continue;
-        if (std::any_of(theirs.begin(), theirs.end(), [&](const Vec3& n) { return dot(n, mine[i]) < -kFlush; }))
+        if (std::any_of(seams.begin(), seams.end(), [&](const Axis& other) { return dot(other.normal, normal) > kFlushCosine; })) continue;
+        if (std::any_of(theirs.begin(), theirs.end(), [&](const Vec3& n) { return dot(n, mine[i]) < -kFlushCosine; }))
           seams.push_back({gap, kind, static_cast<int>(i), -1, normal});
       }
     }
@@ -152,7 +152,7 @@ class Pair {
       next.clear();
       for (std::size_t i = 0; i < polygon.size(); ++i) {
         const Vertex &here = polygon[i], &there = polygon[(i + 1) % polygon.size()];
-        const double s = dot(out_of, here.x - p), t = dot(out_of, there.x - p), brim = kBrim * size_;
+        const double s = dot(out_of, here.x - p), t = dot(out_of, there.x - p), brim = kFacetBrim * size_;
         if (s <= brim) next.push_back(here);
         if ((s <= brim) == (t <= brim)) continue;
         Vertex v;
@@ -297,7 +297,7 @@ void find_polyhedra_touches(const Shape& a, const Frame& fa, const Shape& b, con
   if (facet.gap > 0.0) {
     const std::vector<Axis> seams = pair.find_seams();
     if (seams.size() > 1) return;  // edge to edge, they pass
-    if (seams.size() == 1 && dot(seams.front().normal, facet.normal) < kFlush) {
+    if (seams.size() == 1 && dot(seams.front().normal, facet.normal) < kFlushCosine) {
       pair.clip(seams.front(), margin, out);
       reduce(out, Box::kFar);
       return;
@@ -305,7 +305,7 @@ void find_polyhedra_touches(const Shape& a, const Frame& fa, const Shape& b, con
   }
   const Axis edges = pair.find_edge_axis();
   if (edges.gap > margin) return;
-  const bool crossed = edges.i >= 0 && edges.gap > facet.gap + prefer && dot(edges.normal, facet.normal) < kFlush;
+  const bool crossed = edges.i >= 0 && edges.gap > facet.gap + prefer && dot(edges.normal, facet.normal) < kFlushCosine;
   if (!crossed) pair.clip(facet, margin, out);
   if (out.empty() && edges.i >= 0 && (crossed || edges.gap > facet.gap - prefer)) pair.cross_edges(edges, out);
   double min = margin;

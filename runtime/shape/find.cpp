@@ -17,8 +17,6 @@
 namespace carillon::shape {
 namespace {
 
-constexpr double kFlat = 0.02;    // slope: how far below its neighbours a sample may be
-constexpr double kFlush = 0.01;   // slope of a skin that is not at its lowest place, but nearly parallel
 constexpr double kBrim = 1e-4;    // of the size: a corner may stand out so far beyond the brim of a face that it still stands on
 constexpr double kEnd = 1e-6;     // of an edge: two that cross where the next one begins must not be missed
 constexpr double kEdge = 1e-3;    // rad; the edges of two faces that lie on each other cross as well

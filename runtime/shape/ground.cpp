@@ -11,9 +11,6 @@
 namespace carillon::shape {
 namespace {
 
-constexpr double kFlat = 0.02;   // slope: how far below the plane a neighbour may be, so that what lands nearly flat lands with all of it
-constexpr double kFlush = 0.01;  // slope of a skin that is not at its lowest place, but nearly parallel
-
 Touch make_ground_touch(const Shape& a, const Frame& fa, const Vec3& x, double height) {
   Touch t;
   t.station_a = x;

@@ -18,6 +18,7 @@
 
 #include "runtime/base/error.hpp"
 #include "runtime/base/vector.hpp"
+#include "runtime/synth/smooth_step.hpp"
 
 namespace carillon::synth {
 namespace {
@@ -30,11 +31,6 @@ constexpr double kGravity = 9.81;                   // m/s^2
 constexpr double kSticking = 1e-3;                  // m/s; below, the direction of friction fades
 constexpr double kSkinM = 10e-6;                    // over which the load of rough bodies that slide grows by its own size
 constexpr double kStronger = 2.0;                   // a new contact takes the place of one that presses less than half as much
-
-double calc_smooth_step(double x) noexcept {
-  x = std::clamp(x, 0.0, 1.0);
-  return x * x * (3.0 - 2.0 * x);
-}
 
 double calc_motion(double speed_m_s) noexcept { return calc_smooth_step((speed_m_s - kAtRest) / (kMoving - kAtRest)); }
 

@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "runtime/base/chance.hpp"
+#include "runtime/synth/smooth_step.hpp"
 
 namespace carillon::synth {
 namespace {
@@ -80,12 +81,6 @@ struct Tables {
 const Tables& get_tables() {
   static const Tables tables;
   return tables;
-}
-
-/// 0 below 0, 1 above 1.
-double calc_smooth_step(double x) noexcept {
-  x = std::clamp(x, 0.0, 1.0);
-  return x * x * (3.0 - 2.0 * x);
 }
 
 /// Turns of the table of the longest octave, to 2^-64 of a turn.
