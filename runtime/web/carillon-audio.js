@@ -321,7 +321,8 @@ export class CarillonAudio extends EventTarget {
     if (!context.audioWorklet) throw new Error('the browser has no AudioWorklet for this page; open it by https or from localhost');
     const find = (file) => new URL(file, import.meta.url);
     const file = (simd === 'auto' ? hasSimd() : simd) ? 'carillon.wasm' : 'carillon-plain.wasm';
-    const [module] = await Promise.all([this.compile(find(file)), context.audioWorklet.addModule(find('carillon-worklet.js'))]);
+    const remedy = file === 'carillon.wasm' ? "make the page's folder again" : 'this browser has no WebAssembly SIMD: build the target carillon_page_plain';
+    const [module] = await Promise.all([this.compile(find(file), remedy), context.audioWorklet.addModule(find('carillon-worklet.js'))]);
 
     const channels = microphones_m.length;
     this.node = new AudioWorkletNode(context, 'carillon', {
@@ -357,9 +358,9 @@ export class CarillonAudio extends EventTarget {
     if (connect) this.node.connect(context.destination);
   }
 
-  async compile(url) {
+  async compile(url, remedy) {
     const answer = await fetch(url);
-    if (!answer.ok) throw new Error(`${url.pathname} cannot be read (${answer.status}); make the page's folder again`);
+    if (!answer.ok) throw new Error(`${url.pathname} cannot be read (${answer.status}); ${remedy}`);
     return WebAssembly.compile(await answer.arrayBuffer());
   }
 

@@ -15,7 +15,7 @@ import numpy as np
 from figure import hold, hold_refusal
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "system/exchange"))
-from banks import BIN, make_bank, render_blow, run  # noqa: E402
+from banks import BIN, fixtures, make_bank, render_blow, run, take_modes  # noqa: E402
 from faust_test import compile_dsp, play  # noqa: E402
 from glb_test import Glb  # noqa: E402
 
@@ -62,7 +62,7 @@ def faust_nyquist(folder):
 
 
 def faust_one_mode(folder):
-    bank = make_bank(folder, "one", max_modes=1)
+    bank = take_modes(folder, "glass_plate.hdf", 1)
     run(BIN / "carillon-bank", "export", bank, "-o", "body.dsp", "--points", "0.4,0.3,0.002", cwd=folder)
     numbers = re.search(r"swing\((\S+), (\S+), at\(point, (\S+)\)\)", (folder / "body.dsp").read_text()).groups()
     hz, d, gain = map(float, numbers)
@@ -94,12 +94,7 @@ def glb_many_vertices(folder):
 
 def glb_damaged(folder):
     """Cut at a hundred places, and one byte in every 97th changed: the bank, or one sentence."""
-    bank = make_bank(
-        folder,
-        "small",
-        {**{"plate": {"shape": "rectangle", "length_m": 0.4, "width_m": 0.3, "thickness_m": 0.004}}, "grid": 6},
-        max_modes=2,
-    )
+    bank = fixtures.get("small_plate.hdf")
     run(BIN / "carillon-bank", "export", bank, "-o", "whole.glb", cwd=folder)
     whole = (folder / "whole.glb").read_bytes()
     import subprocess
@@ -123,7 +118,7 @@ def glb_damaged(folder):
     hold_refusal(
         "glb_damaged",
         run(BIN / "carillon-bank", "import", bank, "-o", "x.hdf", cwd=folder, code=2).stderr,
-        ["small.hdf", "no GLB file"],
+        ["small_plate.hdf", "no GLB file"],
         "a bank",
     )
 

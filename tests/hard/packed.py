@@ -22,7 +22,7 @@ TESTS = pathlib.Path(__file__).resolve().parents[1]
 for folder in ("system/exchange", "system/bank", "bench/pack"):
     sys.path.insert(0, str(TESTS / folder))
 from bank_scripts import run_snippet  # noqa: E402
-from banks import BIN, make_bank, run  # noqa: E402
+from banks import BIN, fixtures, make_bank, run, take_modes  # noqa: E402
 
 SLACK_DB = 0.3  # between the stated error and the one found here: places and normals have moved by half a step of the lattice
 
@@ -88,12 +88,12 @@ def packed_short_waves(folder):
 
 
 def packed_one_mode(folder):
-    hold_error("packed_one_mode", folder, make_bank(folder, "one", plate(0.004, 24), max_modes=1), (-20, -80))
+    hold_error("packed_one_mode", folder, take_modes(folder, "glass_plate.hdf", 1), (-20, -80))
 
 
 def packed_far_away(folder):
     """A body a kilometre from the origin of its mesh: places are counted from its own corner."""
-    bank = make_bank(folder, "far", plate(0.004, 24), max_modes=60)
+    bank = take_modes(folder, "glass_plate.hdf", 60)
 
     def move(file):
         for name in ("mesh/vertices", "rigid/centre_m"):
@@ -105,7 +105,7 @@ def packed_far_away(folder):
 
 def packed_silent_modes(folder):
     """Modes that are not heard at all get few bits, and still have a shape: a change of their damping or gain would be heard."""
-    bank = make_bank(folder, "silent", plate(0.004, 24), max_modes=80)
+    bank = take_modes(folder, "glass_plate.hdf", 80)
 
     def silence(file):
         gain = file["modes/radiation_gain"][:]
@@ -127,7 +127,7 @@ def packed_silent_modes(folder):
 
 def packed_damaged(folder):
     """Sealed again after a change of one byte or a cut of the packed arrays: a bank, or one sentence, in 1.5 GB."""
-    bank = make_bank(folder, "small", plate(0.004, 8), max_modes=12)
+    bank = fixtures.get("small_plate.hdf")
     run(BIN / "carillon-bank", "pack", bank, "packed.hdf", "--keep-numbers", cwd=folder)
     good = (folder / "packed.hdf").read_bytes()
     sizes, bad = {}, 0

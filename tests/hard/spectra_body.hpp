@@ -65,4 +65,11 @@ void hold_bars(const std::string& id, const std::string& part, const Body& body,
 void hold_groups(const std::string& id, const std::string& part, const std::vector<double>& freq_hz, std::size_t first,
                  const std::vector<int>& sizes, double bound);
 
+inline eigen::Options make_band(double low_hz, double high_hz) {
+  eigen::Options options;
+  options.low_hz = low_hz;
+  options.high_hz = high_hz;
+  return options;
+}
+
 }  // namespace carillon::hard

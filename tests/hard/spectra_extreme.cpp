@@ -26,13 +26,6 @@ Body make_brick(int order, const material::Material& material = make_solid(kE, k
   return {move_nodes(box, [&](const Vec3& x) { return Vec3{x[0] + origin[0], x[1] + origin[1], x[2] + origin[2]}; }), {material}};
 }
 
-eigen::Options make_band(double low_hz, double high_hz) {
-  eigen::Options options;
-  options.low_hz = low_hz;
-  options.high_hz = high_hz;
-  return options;
-}
-
 /// What of a mode's kinetic energy is where x < 0; on every rank.
 std::vector<double> find_shares(const Answer& answer) {
   petsc::VecHandle phi, m_phi;

@@ -24,13 +24,6 @@ std::vector<double> read_known(const std::string& body, std::size_t count) {
 }
 
 /// A band that ends in the middle between two known modes, in the terms of a mesh that is `sharp` times too sharp.
-eigen::Options make_band(double low_hz, double high_hz) {
-  eigen::Options options;
-  options.low_hz = low_hz;
-  options.high_hz = high_hz;
-  return options;
-}
-
 Body make_cube(int cells, int order) {
   return {shapes::make_box({0.05, 0.05, 0.05}, {cells, cells, cells}, order), {make_solid(200e9, 0.3, 7850)}};
 }

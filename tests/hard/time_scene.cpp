@@ -22,7 +22,7 @@ using synth::Effect;
 using synth::Model;
 using synth::Synthesiser;
 using synth::Voice;
-constexpr double kRate = 48000.0;
+constexpr double kSceneRate = 48000.0;
 constexpr int kMillion = 1000000;
 
 /// With the room that a scene has.
@@ -30,15 +30,15 @@ void play_million_hits_with_little_room() {
   // What is not played is counted, work in a period stays below what that room can ask for, nothing else suffers.
   std::vector<std::pair<double, double>> modes;
   for (int m = 0; m < 64; ++m) modes.emplace_back(to_lambda(150.0 * (m + 1)), 5.0 + m);
-  const auto model = Model::make(make_bank(modes), {.rate_hz = kRate});
-  Synthesiser synthesiser({.rate_hz = kRate, .max_strikes = 64, .ring_events = 2000});
+  const auto model = Model::make(make_bank(modes), {.rate_hz = kSceneRate});
+  Synthesiser synthesiser({.rate_hz = kSceneRate, .max_strikes = 64, .ring_events = 2000});
   const int body = synthesiser.add_body(model, {.position_m = {0.0, 1.0, 0.0}});
   std::vector<float> left(128), right(128);
   float* const out[2] = {left.data(), right.data()};
   std::int64_t hits = 0, worst = 0, before = 0;
   double peak = 0.0;
   for (int block = 0; block < 375; ++block) {
-    for (; hits < kMillion && 1e-6 * static_cast<double>(hits) < (block + 1) * 128 / kRate; ++hits) {
+    for (; hits < kMillion && 1e-6 * static_cast<double>(hits) < (block + 1) * 128 / kSceneRate; ++hits) {
       synthesiser.push(
           events::Impulse{.time_s = 1e-6 * static_cast<double>(hits), .body = body, .impulse_n_s = {0.0, 0.0, 1e-3}, .duration_s = 1e-4});
     }
@@ -60,11 +60,11 @@ void play_million_hits_with_little_room() {
 TEST(time, million_hits) {
   // With room for them all: a hit a microsecond is a geometric series, which has a closed form at every sample.
   const double freq = 700.0, decay = 12.0;
-  Voice voice(Model::make(make_bank({{to_lambda(freq), decay}}), {.rate_hz = kRate}), {.max_strikes = 4096, .silence_pa = 1e-30});
+  Voice voice(Model::make(make_bank({{to_lambda(freq), decay}}), {.rate_hz = kSceneRate}), {.max_strikes = 4096, .silence_pa = 1e-30});
   std::vector<float> heard;
   int hits = 0;
   for (int block = 0; block < 375; ++block) {
-    for (; hits < kMillion && 1e-6 * hits < (block + 1) * 128 / kRate; ++hits)
+    for (; hits < kMillion && 1e-6 * hits < (block + 1) * 128 / kSceneRate; ++hits)
       voice.strike({.time_s = 1e-6 * hits, .impulse_n_s = {0.0, 0.0, 1e-3}});
     const std::vector<float> part = play(voice, 128);
     heard.insert(heard.end(), part.begin(), part.end());
@@ -112,8 +112,8 @@ std::vector<events::Event> make_scene() {
 }
 
 std::vector<float> play_scene(int block) {
-  const auto model = Model::make(testing::make_cube_bank(testing::make_many_modes(40)), {.rate_hz = kRate});
-  Synthesiser synthesiser({.rate_hz = kRate, .max_strikes = 128});
+  const auto model = Model::make(testing::make_cube_bank(testing::make_many_modes(40)), {.rate_hz = kSceneRate});
+  Synthesiser synthesiser({.rate_hz = kSceneRate, .max_strikes = 128});
   for (int body = 0; body < 3; ++body) {
     synthesiser.add_body(
         model, {.position_m = {0.5 * body, 1.0, 0.0},
@@ -167,8 +167,8 @@ TEST(time, sample_rate_change) {
   // While it plays: a model of another rate is refused, and the sound continues with the same bits.
   std::vector<std::vector<float>> heard;
   for (const bool asks : {false, true}) {
-    Synthesiser synthesiser({.rate_hz = kRate});
-    const int body = synthesiser.add_body(Model::make(make_bank(modes), {.rate_hz = kRate}));
+    Synthesiser synthesiser({.rate_hz = kSceneRate});
+    const int body = synthesiser.add_body(Model::make(make_bank(modes), {.rate_hz = kSceneRate}));
     synthesiser.push(events::Impulse{.time_s = 0.001, .body = body, .impulse_n_s = {0.0, 0.0, 1.0}, .duration_s = 1e-4});
     std::vector<float> left(9600), right(9600);
     for (int n = 0; n < 9600; n += 480) {
@@ -192,7 +192,7 @@ TEST(time, sample_rate_change) {
 TEST(time, one_step_contact) {
   const double rate_of_loss = 20.0, step_s = 2e-3;  // Z phi^2 / 2 [1/s]; the longest step of physics
   const double freq = 9000.0;
-  const auto model = Model::make(make_bank({{to_lambda(freq), 0.0}}), {.rate_hz = kRate});
+  const auto model = Model::make(make_bank({{to_lambda(freq), 0.0}}), {.rate_hz = kSceneRate});
   const auto make = [&](double t, ContactState state) {
     return events::LastingContact{.time_s = t,
                                   .id = 3,
@@ -209,7 +209,7 @@ TEST(time, one_step_contact) {
   synth::ContactForces brake(model, {.effects = {Effect::kContactDamping}});
   voice.attach(&brake);
   strike(voice);
-  const double begin = 4800 / kRate;
+  const double begin = 4800 / kSceneRate;
   const synth::ContactSurface other{};  // of no stiffness: no spring of the contact next to the impedance
   ASSERT_TRUE(brake.take(make(begin, ContactState::kBegin), other) && brake.take(make(begin + step_s, ContactState::kEnd), other));
   brake.reach(1.0);
@@ -244,7 +244,7 @@ TEST(time, sliding) {
   // Modes from 400 Hz to 9 kHz; the level of 2 s, and whatever is no sound.
   std::vector<std::pair<double, double>> modes;
   for (int m = 0; m < 10; ++m) modes.emplace_back(to_lambda(400.0 * std::pow(2.0, 0.5 * m)), 60.0);
-  const auto model = Model::make(make_bank(modes), {.rate_hz = kRate});
+  const auto model = Model::make(make_bank(modes), {.rate_hz = kSceneRate});
   const auto calc_level = [&](double floor_m, double speed_m_s, double load_n) {
     Voice voice(model, {.silence_pa = 1e-30});
     synth::ContactForces contacts(model, {.surface = {.roughness_m = 0.0, .modulus_pa = 70e9}});

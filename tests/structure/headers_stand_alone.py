@@ -1,24 +1,25 @@
 #!/usr/bin/env python3
-"""Every header of ours compiles by itself: what a source file of its own folder includes before anything else has done so in the build; the
-others are compiled here.
+"""Every header of ours compiles by itself, without the precompiled one.
 
-usage: headers_stand_alone.py SOURCE_DIR BUILD_DIR COMPILER
+usage: headers_stand_alone.py [-j N] SOURCE_DIR BUILD_DIR     BUILD_DIR: cmake --preset tidy, whose commands are those of single sources
 """
+import argparse
 import json
 import pathlib
-import re
 import shlex
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 
-source, build, compiler = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2]), sys.argv[3]
+parser = argparse.ArgumentParser(usage=__doc__)
+parser.add_argument("source", type=lambda text: pathlib.Path(text).resolve())
+parser.add_argument("build", type=pathlib.Path)
+parser.add_argument("-j", dest="jobs", type=int, default=2)
+options = parser.parse_args()
 
-# The ways in which the files of each folder of ours are compiled, from the build's own commands. There may be several.
-flags = {}
-proven = set()
-for command in json.loads((build / "compile_commands.json").read_text()):
-    folder = pathlib.Path(command["file"]).parent
+# The ways in which the files of each folder of ours are compiled. There may be several.
+ways = {}
+for command in json.loads((options.build / "compile_commands.json").read_text()):
     words = shlex.split(command["command"])
     kept = []
     for i, word in enumerate(words):
@@ -26,26 +27,24 @@ for command in json.loads((build / "compile_commands.json").read_text()):
             kept.append(word)
         elif word == "-isystem":
             kept += [word, words[i + 1]]
-    if kept not in flags.setdefault(folder, []):
-        flags[folder].append(kept)
-    directive = re.search(r'^\s*#\s*(\w+)\s*"?([^"\n]*)', pathlib.Path(command["file"]).read_text(), re.M)
-    if directive and directive.group(1) == "include" and (source / directive.group(2)).parent == folder:
-        proven.add(source / directive.group(2))
+    known = ways.setdefault(pathlib.Path(command["file"]).parent, [])
+    if kept not in known:
+        known.append(kept)
 
 
 def check(header):
-    errors = ""
-    for way in flags.get(header.parent, []):
-        result = subprocess.run([compiler, "-fsyntax-only", "-x", "c++", *way, str(header)], capture_output=True, text=True)
+    errors = "no source of its folder is compiled"
+    for way in ways.get(header.parent, []):
+        command = ["clang++", "-fsyntax-only", "-Wno-pragma-once-outside-header", "-x", "c++", *way, header]
+        result = subprocess.run(command, capture_output=True, text=True)
         if result.returncode == 0:
             return None
         errors = result.stderr[:600]
-    return f"{header.relative_to(source)}: does not compile by itself\n{errors}" if errors else None
+    return f"{header.relative_to(options.source)}: does not compile by itself\n{errors}"
 
 
-headers = [h for top in ("runtime", "precompute", "partition", "jobs") for h in sorted((source / top).rglob("*.hpp"))]
-others = [header for header in headers if header not in proven]
-with ThreadPoolExecutor(2) as pool:
-    failures = [message for message in pool.map(check, others) if message]
-print("\n".join(failures) if failures else f"{len(headers)} headers stand alone, {len(headers) - len(others)} of them in the build")
+headers = [h for top in ("runtime", "precompute", "partition", "jobs") for h in sorted((options.source / top).rglob("*.hpp"))]
+with ThreadPoolExecutor(options.jobs) as pool:
+    failures = [message for message in pool.map(check, headers) if message]
+print("\n".join(failures) or f"{len(headers)} headers stand alone")
 sys.exit(1 if failures or not headers else 0)

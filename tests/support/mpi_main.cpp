@@ -1,11 +1,13 @@
-// The main of every test binary that runs under mpirun: starts and ends MPI, PETSc and SLEPc once; a failure on any rank fails the run.
+// The main of the test programs that run under mpirun: starts and ends MPI, PETSc and SLEPc once; a failure on any rank fails the run.
 #include <gtest/gtest.h>
 #include <mpi.h>
 
 #include "precompute/petsc/session.hpp"
+#include "tests/support/choose_sources.hpp"
 
 int main(int argc, char** argv) {
   testing::InitGoogleTest(&argc, argv);
+  if (!carillon::tests::choose_sources(argc, argv)) return 2;
   carillon::petsc::Session session(argc, argv);
   int rank = 0;
   MPI_Comm_rank(MPI_COMM_WORLD, &rank);

@@ -1,18 +1,15 @@
 """Piles of wood boxes that ring, for the benchmarks of this folder: the starts of bench_piles."""
 import json
 import math
+import os
 import pathlib
 import subprocess
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 ENVIRONMENT = ROOT / "deploy/environment"  # how mpirun starts as any user on a machine of any size
-WOOD = {
-    "young_modulus_pa": 10e9,
-    "poisson_ratio": 0.3,
-    "density_kg_m3": 600,
-    "damping": {"rayleigh": {"alpha1_s": 1e-6, "alpha2_per_s": 20}},
-}
+sys.path.insert(0, str(ROOT / "tests/support"))
+import fixtures  # noqa: E402
 
 
 def run(*command, folder):
@@ -30,13 +27,8 @@ def run(*command, folder):
 
 def write_bank(bin_dir, folder):
     """box.hdf, of a box of 6 x 5 x 4 cm."""
-    job = {
-        "body": {"shape": "plate", "length_m": 0.06, "width_m": 0.05, "thickness_m": 0.04, "nodes": 500},
-        "material": WOOD,
-        "bank": "box.hdf",
-    }
-    (folder / "box.json").write_text(json.dumps(job))
-    run(bin_dir / "carillon-precompute", "box.json", folder=folder)
+    os.environ["CARILLON_BIN_DIR"] = str(bin_dir)
+    fixtures.copy("wood_box.hdf", folder, "box.hdf")
 
 
 def write_scene(folder, name, count, seconds, quality={}):

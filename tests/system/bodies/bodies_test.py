@@ -8,8 +8,12 @@ import os
 import pathlib
 import shutil
 import subprocess
+import sys
 import tempfile
 import unittest
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "support"))
+import fixtures  # noqa: E402
 
 BIN = pathlib.Path(os.environ["CARILLON_BIN_DIR"])
 BOX = {"shape": {"box": {"length_m": 0.2, "width_m": 0.03, "height_m": 0.01, "nodes": 400}}, "material": "aluminium"}
@@ -65,19 +69,19 @@ class BodiesTest(unittest.TestCase):
         cube = "\n".join(f"v {x} {y} {z}" for x in (0, 50) for y in (0, 50) for z in (0, 50))
         faces = ((1, 2, 4, 3), (5, 7, 8, 6), (1, 5, 6, 2), (3, 4, 8, 7), (1, 3, 7, 5), (2, 6, 8, 4))
         (self.folder / "part" / "cube.obj").write_text(cube + "\n" + "\n".join("f %d %d %d %d" % f for f in faces) + "\n")
-        self.run_program(BIN / "carillon-mesh", "--shape", "box", "--nodes", "400", "-q", "-o", "box.msh")
+        fixtures.copy("bar.msh", self.folder)
         oak = {"young_modulus_pa": 1.2e10, "poisson_ratio": 0.3, "density_kg_m3": 700, "damping": {"internal_friction": {"tan_phi": 0.01}}}
         scene = self.write_scene(
             {"body": {"membrane": {"shape": "circle", "radius_m": 0.2, "lowest_hz": 200, "density_kg_m2": 0.3}}, "max_modes": 20},
             {"body": {"surface": "part/cube.obj", "scale": 0.001, "nodes": 500}, "material": oak, "max_modes": 10},
-            {"mesh": "box.msh", "material": "steel", "max_modes": 10, "band_hz": [20, 40000]},
+            {"mesh": "bar.msh", "material": "steel", "max_modes": 10, "band_hz": [20, 40000]},
             {"body": {"string": {"length_m": 0.65, "lowest_hz": 196, "diameter_m": 0.001}}, "material": "steel", "max_modes": 20},
         )
         done = self.run_program(BIN / "carillon-render", scene, "-o", "out.wav")
         for words in (
             "computing the modes of membrane",
             "computing the modes of cube.obj",
-            "computing the modes of box.msh of steel",
+            "computing the modes of bar.msh of steel",
             "computing the modes of string",
         ):
             self.assertIn(words, done.stderr)

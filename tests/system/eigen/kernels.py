@@ -2,7 +2,7 @@
 """The ways back and the orthogonality of the eigensolver with every set of OpenBLAS kernels that this processor can run: each rounds in its
 own way, and none may decide.
 
-usage: kernels.py TEST_EIGEN
+usage: kernels.py TEST_RANKS
 """
 import os
 import re

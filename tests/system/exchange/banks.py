@@ -1,13 +1,16 @@
-"""Banks for these tests, made by the solver, and what a scene of one blow sounds like."""
+"""Banks for these tests, and what a scene of one blow sounds like."""
 import json
 import os
 import pathlib
 import subprocess
+import sys
 
 import numpy
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "support"))
+import fixtures  # noqa: E402
+
 BIN = pathlib.Path(os.environ["CARILLON_BIN_DIR"])
-PLATE = {"plate": {"shape": "rectangle", "length_m": 0.4, "width_m": 0.3, "thickness_m": 0.004}, "grid": 24}
 
 
 def run(*words, cwd=None, code=0):
@@ -16,12 +19,18 @@ def run(*words, cwd=None, code=0):
     return done
 
 
-def make_bank(folder, name, body=None, **job):
-    """The path of a bank; without a body, of a plate with known modes."""
-    job = {"body": body or PLATE, "material": "glass", "bank": f"{name}.hdf", **job}
+def make_bank(folder, name, body, **job):
+    """The path of a bank of a body that no other test has."""
+    job = {"body": body, "material": "glass", "bank": f"{name}.hdf", **job}
     (folder / f"{name}.json").write_text(json.dumps(job))
     run(BIN / "carillon-precompute", "-q", f"{name}.json", cwd=folder)
     return folder / f"{name}.hdf"
+
+
+def take_modes(folder, name, count):
+    """A copy of a fixture with its lowest modes alone, that may be changed."""
+    run(BIN / "carillon-bank", "edit", fixtures.get(name), name, "--modes", count, "--keep", "lowest", cwd=folder)
+    return folder / name
 
 
 def read_wav(file):

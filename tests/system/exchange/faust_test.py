@@ -12,7 +12,7 @@ import unittest
 import h5py
 import numpy
 
-from banks import BIN, calc_db, make_bank, render_blow, run
+from banks import BIN, calc_db, fixtures, render_blow, run, take_modes
 
 # Writes what `struck` answers to a blow in the first sample, as doubles. FAUSTFLOAT is the type of samples outside.
 MAIN = """
@@ -111,12 +111,7 @@ class FaustTest(unittest.TestCase):
         return calc_db(theirs - ours, ours)
 
     def test_every_point_sounds_as_in_a_scene(self):
-        bank = make_bank(
-            self.folder,
-            "bar",
-            {"plate": {"shape": "rectangle", "length_m": 0.3, "width_m": 0.04, "thickness_m": 0.008}, "grid": 24},
-            max_modes=60,
-        )
+        bank = fixtures.get("aluminium_bar.hdf")
         out = run(
             BIN / "carillon-bank", "export", bank, "-o", "bar.dsp", "--points", "0.1,0.01,0.004", "0.29,0.03,0.004", cwd=self.folder
         ).stdout
@@ -126,7 +121,7 @@ class FaustTest(unittest.TestCase):
             self.assertLess(self.compare(bank, "bar.dsp", point, 48000), -100)
 
     def test_the_instrument_plays_a_blow_of_the_impulse_that_it_says(self):
-        bank = make_bank(self.folder, "low", max_modes=1)
+        bank = take_modes(self.folder, "glass_plate.hdf", 1)
         run(BIN / "carillon-bank", "export", bank, "-o", "low.dsp", "--points", "1", cwd=self.folder)
         # Its own hammer into a filter that adds up: the impulse, 0.01 N s.
         text = (self.folder / "low.dsp").read_text().split("process =")[0] + "process = hammer : + ~ _;\n"
@@ -142,7 +137,7 @@ class FaustTest(unittest.TestCase):
         self.assertLess(heard[10], 0.006)
 
     def test_mistakes_end_in_a_sentence(self):
-        bank = make_bank(self.folder, "plate", max_modes=5)
+        bank = fixtures.get("glass_plate.hdf")
         for words, said in (
             (["--points", "1,2"], "give X,Y,Z in metres"),
             (["--points", "0"], "give 1 to 64"),

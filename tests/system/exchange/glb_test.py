@@ -13,7 +13,7 @@ import unittest
 import h5py
 import numpy
 
-from banks import BIN, calc_db, make_bank, render_blow, run
+from banks import BIN, calc_db, fixtures, render_blow, run
 
 TYPES = {5121: "u1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC3": 3}
@@ -53,8 +53,7 @@ class GlbTest(unittest.TestCase):
     def setUpClass(cls):
         cls.place = tempfile.TemporaryDirectory()
         cls.folder = pathlib.Path(cls.place.name)
-        bowl = {"shape": "bowl", "outer_radius_m": 0.06, "wall_m": 0.004, "nodes": 3000}
-        cls.bank = make_bank(cls.folder, "bowl", bowl, max_modes=60)
+        cls.bank = fixtures.copy("glass_bowl.hdf", cls.folder, "bowl.hdf")
         cls.out = run(BIN / "carillon-bank", "export", cls.bank, "-o", "bowl.glb", "--up", "z", cwd=cls.folder).stdout
         cls.glb = Glb((cls.folder / "bowl.glb").read_bytes())
         with h5py.File(cls.bank) as bank:

@@ -16,7 +16,7 @@ import unittest
 import h5py
 import numpy
 
-from banks import BIN, calc_db, make_bank, read_wav, run
+from banks import BIN, calc_db, fixtures, read_wav, run
 
 
 def parse_sfz(text):
@@ -55,8 +55,7 @@ class SamplesTest(unittest.TestCase):
     def setUpClass(cls):
         cls.place = tempfile.TemporaryDirectory()
         cls.folder = pathlib.Path(cls.place.name)
-        body = {"plate": {"shape": "rectangle", "length_m": 0.3, "width_m": 0.04, "thickness_m": 0.008}, "grid": 24}
-        cls.bank = make_bank(cls.folder, "bar", body, material="aluminium")
+        cls.bank = fixtures.copy("aluminium_bar.hdf", cls.folder, "bar.hdf")
         cls.out = cls.make(cls.bank, "bar", "--places 2 --layers 3 --mallets hard-wood,soft-felt --round-robin 2 --seconds 1.5")
         cls.regions = parse_sfz((cls.folder / "bar" / "bar.sfz").read_text())
 
@@ -131,10 +130,8 @@ class SamplesTest(unittest.TestCase):
     def test_a_sampler_plays_them(self):
         """Key and velocity choose the sample that the file says: FluidSynth's output has its spectrum."""
         environment = {**os.environ, "QT_QPA_PLATFORM": "offscreen", "XDG_RUNTIME_DIR": str(self.folder), "HOME": str(self.folder)}
-        body = {"plate": {"shape": "rectangle", "length_m": 0.6, "width_m": 0.04, "thickness_m": 0.008}, "grid": 24}
-        bank = make_bank(self.folder, "long", body, material="aluminium", band_hz=[20, 4000])
-        self.make(bank, "played", "--mallets soft-felt --places 2 --layers 2 --seconds 1 --speed 4 --format pcm16")
-        convert = ["polyphone", "-1", "-i", "long.sfz", "-d", ".", "-o", "long"]
+        self.make(fixtures.get("long_bar.hdf"), "played", "--mallets soft-felt --places 2 --layers 2 --seconds 1 --speed 4 --format pcm16")
+        convert = ["polyphone", "-1", "-i", "long_bar.sfz", "-d", ".", "-o", "long"]
         subprocess.run(convert, cwd=self.folder / "played", env=environment, check=True, capture_output=True, timeout=60)
         notes = [(0.5, 36, 127), (2.5, 37, 127), (4.5, 36, 60)]
         (self.folder / "played" / "notes.mid").write_bytes(make_midi(notes))
@@ -142,7 +139,7 @@ class SamplesTest(unittest.TestCase):
         heard, rate = read_wav(self.folder / "played" / "out.wav")
         self.assertEqual(rate, 48000)
         heard = heard[:, 0]
-        regions = parse_sfz((self.folder / "played" / "long.sfz").read_text())
+        regions = parse_sfz((self.folder / "played" / "long_bar.sfz").read_text())
         for time, key, velocity in notes:
             (region,) = [r for r in regions if int(r["lokey"]) == key and int(r["lovel"]) <= velocity <= int(r["hivel"])]
             start = int(time * rate)

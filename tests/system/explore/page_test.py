@@ -20,19 +20,14 @@ import h5py
 import numpy
 
 sys.path.insert(0, str(pathlib.Path(__file__).parents[1] / "web"))
+sys.path.insert(0, str(pathlib.Path(__file__).parents[2] / "support"))
+import fixtures  # noqa: E402
 from browser import Browser, serve  # noqa: E402
 
 BIN = pathlib.Path(os.environ["CARILLON_BIN_DIR"])
 GRAPHICS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", "--window-size=900,640"]
 EFFECTS = ["modal", "hertz_pulse", "air_delay", "doppler", "two_ears"]
 LIMIT_DB = -60.0
-JOB = {
-    "body": {"beam": {"length_m": 0.3, "width_m": 0.05, "thickness_m": 0.008, "theory": "timoshenko"}},
-    "material": "brass",
-    "band_hz": [20, 8000],
-    "max_modes": 30,
-    "bank": "bar.hdf",
-}
 BODY = {"name": "bar", "bank": "bar.hdf", "position_m": [-0.15, 0, 0.2], "rotation_deg": [35, 10, 0]}
 ROOM = {
     "duration_s": 1,
@@ -62,8 +57,7 @@ class PageTest(unittest.TestCase):
     def setUpClass(cls):
         cls.scratch = tempfile.TemporaryDirectory(prefix="carillon-page-")
         cls.root = pathlib.Path(cls.scratch.name)
-        (cls.root / "bar.json").write_text(json.dumps(JOB))
-        run(BIN / "carillon-precompute", "bar.json", "-q", cwd=cls.root)
+        fixtures.copy("brass_beam.hdf", cls.root, "bar.hdf")
         for name, scene in (("room", ROOM), ("fall", FALL)):
             (cls.root / f"{name}.json").write_text(json.dumps(scene))
             run(BIN / "carillon", "explore", f"{name}.json", "-o", name, cwd=cls.root)

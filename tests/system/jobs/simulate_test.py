@@ -63,10 +63,8 @@ class Simulations(Bench):
         self.assertFalse((folder / "report.html").exists())
         self.assertIn("steps of", self.run_it("log", id_).stdout)
         # Once more: answered from the store at once, and nothing is started.
-        before = time.monotonic()
         done = self.ask("submit", "b/other.json", "--run")["jobs"][0]
         self.assertEqual((done["state"], done["new"], done["attempts"]), ("done", False, state["attempts"]))
-        self.assertLess(time.monotonic() - before, 20)
         self.assertFalse(self.ask("explain", file)["would_run"])
         self.refuse("report", file, says="reports are of banks")
         (self.folder / "out").mkdir()

@@ -18,6 +18,7 @@
 
 #include "precompute/mesh/write.hpp"
 #include "runtime/bank/bank.hpp"
+#include "tests/support/paths.hpp"
 
 namespace carillon::tests {
 
@@ -82,7 +83,7 @@ class Folder {
                                                                              {"OPENBLAS_NUM_THREADS", "1"}})
       setenv(name, value, 1);
     const std::string command = fmt::format("cd '{}' && mpirun -np {} --oversubscribe --bind-to none '{}/carillon-precompute' {} 2>&1",
-                                            path_.string(), ranks, CARILLON_BIN_DIR, arguments);
+                                            path_.string(), ranks, carillon::tests::get_bin_dir(), arguments);
     Outcome outcome;
     FILE* pipe = popen(command.c_str(), "r");
     std::array<char, 4096> buffer;

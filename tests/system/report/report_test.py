@@ -19,6 +19,9 @@ import unittest
 import h5py
 import numpy
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "support"))
+import fixtures  # noqa: E402
+
 BIN = pathlib.Path(os.environ["CARILLON_BIN_DIR"])
 SOURCE = pathlib.Path(os.environ["CARILLON_SOURCE_DIR"])
 SECTIONS = [
@@ -143,16 +146,7 @@ class Reports(unittest.TestCase):
     def setUpClass(cls):
         cls.temporary = tempfile.TemporaryDirectory()
         cls.root = pathlib.Path(cls.temporary.name)
-        subprocess.run(
-            [
-                BIN / "carillon-mesh",
-                *"--shape bar --length 0.2 --width 0.03 --thickness 0.01 --nodes 900".split(),
-                "-o",
-                cls.root / "chime.msh",
-            ],
-            check=True,
-            capture_output=True,
-        )
+        fixtures.copy("bar.msh", cls.root, "chime.msh")
         cls.job = {
             "mesh": "chime.msh",
             "bank": "chime.hdf",

@@ -5,11 +5,13 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/paths.hpp"
+
 namespace carillon::analytic {
 
 /// A table of data/ without its head; cells as text.
 inline std::vector<std::vector<std::string>> read_rows(const std::string& name) {
-  std::ifstream file(std::string(CARILLON_ANALYTIC_DATA) + "/" + name);
+  std::ifstream file(carillon::tests::get_source_dir() + "/tests/unit/precompute/analytic/data/" + name);
   std::vector<std::vector<std::string>> rows;
   for (std::string line; std::getline(file, line);) {
     std::vector<std::string> cells(1);

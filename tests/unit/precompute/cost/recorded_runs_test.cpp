@@ -12,6 +12,7 @@
 #include "precompute/cost/calibration.hpp"
 #include "precompute/cost/memory.hpp"
 #include "precompute/cost/seconds.hpp"
+#include "tests/support/paths.hpp"
 
 namespace carillon::cost {
 namespace {
@@ -19,7 +20,7 @@ namespace {
 using Record = std::map<std::string, std::string>;
 
 std::vector<Record> read_records() {
-  std::ifstream file(CARILLON_SOURCE_DIR "/tests/unit/precompute/cost/recorded_runs.csv");
+  std::ifstream file(carillon::tests::get_source_dir() + "/tests/unit/precompute/cost/recorded_runs.csv");
   const auto split = [](const std::string& line) {
     std::vector<std::string> words;
     std::istringstream stream(line);

@@ -19,6 +19,7 @@
 #include "precompute/mesh/check.hpp"
 #include "precompute/shapes/shapes.hpp"
 #include "runtime/base/sort_order.hpp"
+#include "tests/support/paths.hpp"
 
 namespace carillon::tests {
 namespace {
@@ -155,7 +156,7 @@ TetMesh make_cone(int nodes, MeshKind kind) {
 }  // namespace
 
 std::vector<Truth> read_truth(const std::string& body) {
-  std::ifstream file(CARILLON_SOURCE_DIR "/tests/unit/precompute/estimate/data/known_frequencies.csv");
+  std::ifstream file(carillon::tests::get_source_dir() + "/tests/unit/precompute/estimate/data/known_frequencies.csv");
   std::vector<Truth> truth;
   for (std::string line; std::getline(file, line);) {
     if (!line.starts_with(body + ",")) continue;

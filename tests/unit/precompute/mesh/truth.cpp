@@ -8,6 +8,8 @@
 #include <iterator>
 #include <stdexcept>
 
+#include "tests/support/paths.hpp"
+
 namespace carillon::mesh {
 
 namespace {
@@ -18,7 +20,7 @@ Vec3 rounded(const Vec3& x) {
 }  // namespace
 
 std::filesystem::path fixture(const std::string& name) {
-  return std::filesystem::path(CARILLON_SOURCE_DIR) / "tests/unit/precompute/mesh/data" / name;
+  return std::filesystem::path(carillon::tests::get_source_dir()) / "tests/unit/precompute/mesh/data" / name;
 }
 
 Truth read_truth(int order) {

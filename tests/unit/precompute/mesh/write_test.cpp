@@ -8,6 +8,7 @@
 
 #include "precompute/mesh/check.hpp"
 #include "precompute/mesh/read.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/unit/precompute/mesh/truth.hpp"
 
 namespace carillon::mesh {
@@ -35,8 +36,8 @@ TEST_P(Written, gmsh_file_is_read_back_bit_for_bit) {
 /// Runs tests/unit/precompute/mesh/read_with_others.py; false when the reader is not installed.
 bool read_with(const std::string& reader, const std::filesystem::path& file, std::string& said) {
   const std::string out = file.string() + ".said";
-  const std::string command = std::string("/usr/bin/python3 ") + CARILLON_SOURCE_DIR + "/tests/unit/precompute/mesh/read_with_others.py " +
-                              reader + " " + file.string() + " > " + out + " 2>&1";
+  const std::string command = std::string("/usr/bin/python3 ") + carillon::tests::get_source_dir() +
+                              "/tests/unit/precompute/mesh/read_with_others.py " + reader + " " + file.string() + " > " + out + " 2>&1";
   const int status = std::system(command.c_str());
   said = read_text(out);
   return status == 0 || said.find("No module named") == std::string::npos;

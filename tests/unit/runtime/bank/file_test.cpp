@@ -13,6 +13,7 @@
 
 #include "runtime/bank/reduce.hpp"
 #include "tests/support/folder.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/unit/runtime/bank/example_bank.hpp"
 #include "tests/unit/runtime/bank/seal_again.hpp"
 
@@ -175,21 +176,25 @@ TEST_F(BankFile, EveryLawAndWhatMayBeAbsentComeBack) {
 
 TEST_F(BankFile, EveryReleasedVersionIsStillRead) {
   // Written when the version was new, by: make_example_bank version_1_0.hdf 1 2
-  expect_equal(read_bank(CARILLON_SOURCE_DIR "/tests/unit/runtime/bank/pinned/version_1_0.hdf"), example::make_first_bank(1, 2));
-  expect_equal(read_bank(CARILLON_SOURCE_DIR "/tests/unit/runtime/bank/pinned/version_1_1.hdf"), example::make_bank(1, 2));
+  expect_equal(read_bank(carillon::tests::get_source_dir() + "/tests/unit/runtime/bank/pinned/version_1_0.hdf"),
+               example::make_first_bank(1, 2));
+  expect_equal(read_bank(carillon::tests::get_source_dir() + "/tests/unit/runtime/bank/pinned/version_1_1.hdf"), example::make_bank(1, 2));
   // carillon-bank edit version_1_1.hdf version_1_2.hdf --shape-bits 8
-  expect_equal(read_bank(CARILLON_SOURCE_DIR "/tests/unit/runtime/bank/pinned/version_1_2.hdf"),
+  expect_equal(read_bank(carillon::tests::get_source_dir() + "/tests/unit/runtime/bank/pinned/version_1_2.hdf"),
                calc_reduced(example::make_bank(1, 2), {.shape_bits = 8}));
   // make_example_bank version_1_3.hdf 1 2 supports
-  expect_equal(read_bank(CARILLON_SOURCE_DIR "/tests/unit/runtime/bank/pinned/version_1_3.hdf"), example::make_supported_bank(1, 2));
+  expect_equal(read_bank(carillon::tests::get_source_dir() + "/tests/unit/runtime/bank/pinned/version_1_3.hdf"),
+               example::make_supported_bank(1, 2));
   // make_example_bank version_1_4.hdf 1 6 corrected
-  expect_equal(read_bank(CARILLON_SOURCE_DIR "/tests/unit/runtime/bank/pinned/version_1_4.hdf"), example::make_corrected_bank(1, 6));
+  expect_equal(read_bank(carillon::tests::get_source_dir() + "/tests/unit/runtime/bank/pinned/version_1_4.hdf"),
+               example::make_corrected_bank(1, 6));
   // make_example_bank version_1_5.hdf 1 4 radiation
-  const Bank radiating = read_bank(CARILLON_SOURCE_DIR "/tests/unit/runtime/bank/pinned/version_1_5.hdf");
+  const Bank radiating = read_bank(carillon::tests::get_source_dir() + "/tests/unit/runtime/bank/pinned/version_1_5.hdf");
   expect_equal(radiating, example::make_radiating_bank(1, 4));
   expect_near(radiating.multipoles, example::make_radiating_bank(1, 4).multipoles);
   // carillon-bank pack version_1_5.hdf box_radiation.hdf --error -40
-  expect_near(read_bank(CARILLON_SOURCE_DIR "/tests/unit/runtime/bank/packed/box_radiation.hdf").multipoles, radiating.multipoles);
+  expect_near(read_bank(carillon::tests::get_source_dir() + "/tests/unit/runtime/bank/packed/box_radiation.hdf").multipoles,
+              radiating.multipoles);
 }
 
 TEST_F(BankFile, SupportsComeBackAndRaiseTheVersionOnlyWhereThereAreSome) {

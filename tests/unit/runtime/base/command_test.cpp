@@ -63,17 +63,15 @@ TEST(Command, what_cannot_be_started_is_an_error_with_its_reason) {
   EXPECT_EQ(::waitpid(-1, nullptr, WNOHANG), -1) << "a zombie";
 }
 
-TEST(Command, slow_long_and_stopped_programs_are_killed) {
-  const auto begin = std::chrono::steady_clock::now();
-  EXPECT_TRUE(run({.words = {"sleep", "60"}, .output = kCapture}, {.patience_s = 0.2}).was_slow);
-  EXPECT_TRUE(run(make_shell("exec >&- 2>&-; sleep 60"), {.patience_s = 0.2}).was_slow) << "it has closed its outputs";
+TEST(Command, slow_long_and_stopped_programs_are_killed) {  // one that is not outlives the time limit of this test
+  EXPECT_TRUE(run({.words = {"sleep", "1000"}, .output = kCapture}, {.patience_s = 0.2}).was_slow);
+  EXPECT_TRUE(run(make_shell("exec >&- 2>&-; sleep 1000"), {.patience_s = 0.2}).was_slow) << "it has closed its outputs";
   EXPECT_TRUE(run(make_shell("yes"), {.max_bytes = 100000}).was_long);
   int asked = 0;
   const Finished stopped =
-      run(make_shell("echo now; sleep 60"), {.may_stop = [&](const Finished& now) { return ++asked > 1 && now.output == "now\n"; }});
+      run(make_shell("echo now; sleep 1000"), {.may_stop = [&](const Finished& now) { return ++asked > 1 && now.output == "now\n"; }});
   EXPECT_TRUE(stopped.was_stopped);
   EXPECT_EQ(stopped.signal, SIGKILL);
-  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(30));
   EXPECT_EQ(::waitpid(-1, nullptr, WNOHANG), -1) << "a zombie";
 }
 

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <chrono>
+#include <ctime>
 #include <limits>
 #include <set>
 
@@ -364,9 +364,9 @@ Streams make_knot(std::uint32_t triangles) {
 
 TEST(CodecSurface, with_ever_more_open_edges_at_one_vertex_does_not_take_the_square_of_its_length) {
   const std::vector<std::uint8_t> bytes = make_knot(200000).write();
-  const auto begin = std::chrono::steady_clock::now();
+  const std::clock_t begin = std::clock();  // CPU time: the machine may be busy
   try_read(example::as_bytes(bytes));
-  EXPECT_LT(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(), 5.0) << bytes.size() << " bytes";
+  EXPECT_LT(std::clock() - begin, 5 * CLOCKS_PER_SEC) << bytes.size() << " bytes";
 }
 
 }  // namespace

@@ -20,6 +20,7 @@
 #include "runtime/bank/write.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/material/table.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/unit/runtime/bank/example_bank.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 
@@ -87,7 +88,7 @@ TEST(Glb, of_a_bank_with_multipoles_is_the_same_bank_and_sounds_as_in_air) {
 TEST(Glb, of_every_released_bank_is_the_same_bank) {
   int count = 0;
   for (const auto& entry :
-       std::filesystem::directory_iterator(std::filesystem::path(CARILLON_SOURCE_DIR) / "tests/unit/runtime/bank/pinned")) {
+       std::filesystem::directory_iterator(std::filesystem::path(carillon::tests::get_source_dir()) / "tests/unit/runtime/bank/pinned")) {
     const bank::Bank bank = bank::read_bank(entry.path());
     EXPECT_EQ(bank::make_bank_bytes(parse_glb(to_glb(bank), "body.glb")), bank::make_bank_bytes(bank)) << entry.path();
     ++count;
@@ -194,7 +195,8 @@ TEST(Glb, cut_or_changed_at_any_byte_ends_in_the_bank_or_an_error) {
 }
 
 TEST(Glb, as_the_corpus_of_the_fuzz_target_is_read) {
-  const std::filesystem::path file = std::filesystem::path(CARILLON_SOURCE_DIR) / "tests/unit/runtime/exchange/corpus/box.glb";
+  const std::filesystem::path file =
+      std::filesystem::path(carillon::tests::get_source_dir()) / "tests/unit/runtime/exchange/corpus/box.glb";
   std::ifstream stream(file, std::ios::binary);
   const std::string bytes(std::istreambuf_iterator<char>(stream), {});
   EXPECT_EQ(parse_glb(bytes, "box.glb").mode_count(), 6);

@@ -13,6 +13,7 @@
 
 #include "runtime/base/error.hpp"
 #include "tests/support/folder.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/unit/runtime/head/oracle.hpp"
 
 namespace carillon::head {
@@ -47,7 +48,7 @@ class Sofa : public ::testing::Test {
   }
   std::filesystem::path write(const std::string& name, const std::string& options = "") {
     const std::filesystem::path file = folder_ / name;
-    const std::string script = std::string(CARILLON_SOURCE_DIR) + "/tests/unit/runtime/head/write_sofa.py ";
+    const std::string script = carillon::tests::get_source_dir() + "/tests/unit/runtime/head/write_sofa.py ";
     const int status = std::system(("/usr/bin/python3 " + script + file.string() + " " + options).c_str());
     EXPECT_EQ(status, 0) << "python3-h5py is needed";
     return file;

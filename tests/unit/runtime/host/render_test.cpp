@@ -21,6 +21,7 @@
 #include "runtime/host/report.hpp"
 #include "runtime/host/sound_file.hpp"
 #include "tests/support/folder.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/unit/runtime/head/oracle.hpp"
 #include "tests/unit/runtime/host/heard.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
@@ -239,7 +240,7 @@ TEST(Render, AMeasuredHeadIsThatOfItsFile) {
   const tests::Folder folder;
   Case c = make_case_with_head();
   c.scene.listener.sofa = folder / "head.sofa";
-  const std::string script = std::string(CARILLON_SOURCE_DIR) + "/tests/unit/runtime/head/write_sofa.py ";
+  const std::string script = carillon::tests::get_source_dir() + "/tests/unit/runtime/head/write_sofa.py ";
   ASSERT_EQ(std::system(("/usr/bin/python3 " + script + c.scene.listener.sofa.string() + " step=30").c_str()), 0)
       << "python3-h5py is needed";
   const Heard sound = c.render();

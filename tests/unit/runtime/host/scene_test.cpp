@@ -12,6 +12,7 @@
 #include "runtime/host/microphones.hpp"
 #include "runtime/host/pose.hpp"
 #include "tests/support/catch_message.hpp"
+#include "tests/support/paths.hpp"
 
 namespace carillon::host {
 namespace {
@@ -30,7 +31,7 @@ std::string with_strike(const std::string& keys) { return "{\"duration_s\": 1, "
 const std::string kMalletPlace = R"("time_s": 0, "body": "a", "triangle": 0, )";
 
 TEST(Scene, AWholeSceneIsRead) {
-  const Scene scene = parse(read_text(std::string(CARILLON_SOURCE_DIR) + "/tests/unit/runtime/host/scenes/drop.json"));
+  const Scene scene = parse(read_text(carillon::tests::get_source_dir() + "/tests/unit/runtime/host/scenes/drop.json"));
   EXPECT_EQ(scene.duration_s, 1.5);
   EXPECT_EQ(scene.sample_rate_hz, 48000);
   ASSERT_TRUE(scene.ground.has_value());

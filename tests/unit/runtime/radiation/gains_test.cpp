@@ -8,6 +8,7 @@
 
 #include "runtime/base/error.hpp"
 #include "runtime/radiation/flow.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/unit/runtime/radiation/sphere_bank.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 
@@ -21,7 +22,7 @@ constexpr double kRadius = 0.1;
 constexpr int kLevel = 4;  // 5120 triangles
 
 std::vector<SphereRow> read_rows() {
-  return testing::read_sphere_rows(CARILLON_SOURCE_DIR "/tests/unit/runtime/radiation/data/spheres.csv");
+  return testing::read_sphere_rows(carillon::tests::get_source_dir() + "/tests/unit/runtime/radiation/data/spheres.csv");
 }
 
 /// What a pulsating sphere of velocity 1 sends to 1 m.

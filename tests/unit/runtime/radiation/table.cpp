@@ -4,6 +4,7 @@
 
 #include "runtime/bank/surface.hpp"
 #include "runtime/radiation/gains.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/unit/runtime/radiation/sphere_bank.hpp"
 
 namespace {
@@ -29,7 +30,7 @@ double calc_osg02_gain(const bank::Bank& bank, std::size_t mode) {
 }
 
 void print_table() {
-  const auto rows = testing::read_sphere_rows(CARILLON_SOURCE_DIR "/tests/unit/runtime/radiation/data/spheres.csv");
+  const auto rows = testing::read_sphere_rows(carillon::tests::get_source_dir() + "/tests/unit/runtime/radiation/data/spheres.csv");
   const bank::Bank bank = testing::make_lobed_sphere(rows, kRadius, kLevel);
   const std::vector<double> sphere = radiation::calc_gains(bank, radiation::GainKind::kSphere);
   std::printf("| ka | l = 0 | l = 1 | l = 2 | l = 3 | l = 4 |\n|---|---|---|---|---|---|\n");

@@ -13,12 +13,15 @@
 #include "runtime/recording/player.hpp"
 #include "runtime/recording/recording.hpp"
 #include "tests/support/folder.hpp"
+#include "tests/support/paths.hpp"
 #include "tests/unit/runtime/recording/seal_again.hpp"
 
 namespace carillon::recording {
 namespace {
 
-std::string read_pinned() { return tests::read_all(CARILLON_SOURCE_DIR "/tests/unit/runtime/recording/corpus/octahedron.surface.hdf"); }
+std::string read_pinned() {
+  return tests::read_all(carillon::tests::get_source_dir() + "/tests/unit/runtime/recording/corpus/octahedron.surface.hdf");
+}
 
 TEST(Pinned, FilesOfVersionOneStayReadable) {
   const std::string bytes = read_pinned();

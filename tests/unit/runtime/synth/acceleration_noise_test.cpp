@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "runtime/base/error.hpp"
+#include "tests/support/paths.hpp"
 
 namespace carillon::synth {
 namespace {
@@ -32,7 +33,7 @@ struct Row {
 };
 
 std::vector<Row> read_rows() {
-  std::ifstream in(CARILLON_SOURCE_DIR "/tests/unit/runtime/synth/data/click.csv");
+  std::ifstream in(carillon::tests::get_source_dir() + "/tests/unit/runtime/synth/data/click.csv");
   std::string line;
   std::getline(in, line);
   std::vector<Row> rows;

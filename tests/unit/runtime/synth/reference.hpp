@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/paths.hpp"
+
 namespace carillon::testing {
 
 struct ImpulseRow {
@@ -22,7 +24,7 @@ inline std::ostream& operator<<(std::ostream& out, const ImpulseRow& row) {
 }
 
 inline std::vector<ImpulseRow> read_impulse_reference() {
-  std::ifstream in(std::string(CARILLON_SOURCE_DIR) + "/tests/unit/runtime/synth/data/oscillator_impulse.csv");
+  std::ifstream in(carillon::tests::get_source_dir() + "/tests/unit/runtime/synth/data/oscillator_impulse.csv");
   std::vector<ImpulseRow> rows;
   for (std::string line; std::getline(in, line);) {
     if (line.empty() || line[0] == '#' || line[0] == 'l') continue;
