@@ -223,15 +223,16 @@ function(carillon_test_program name)
   carillon_warnings(test_${name})
 endfunction()
 
-# carillon_test(NAME SOURCES ... LINK libs... [RANKS 1 2 3] [PROGRAM p] [LABELS ...] [TIMEOUT s] [PART part])
+# carillon_test(NAME SOURCES ... LINK libs... [RANKS 1 2 3] [PROGRAM p] [LABELS ...] [TIMEOUT s] [PART part] [SLOW Suite.Case ...])
 # GoogleTest cases of one module, in test_PROGRAM with those of others (CARILLON_TEST_PROGRAM, the program of the folder, where not given), and
 # one CTest test: NAME, or with RANKS those of test_ranks under mpirun, NAME.npN. One process for all cases: to start one that loads PETSc
 # takes longer than most cases. SEPARATE: names in the sources' unnamed namespaces are equal, so each is compiled alone. A case alone:
 # GTEST_FILTER=Suite.Case ctest -R '^NAME$'.
+# SLOW: these cases are a test of their own, NAME.slow, in part hard.
 # Labels: CARILLON_TEST_KIND, the kind of the folder; the part (docs/howto/test.md), basic where not given, where ranks are other than 2
 # `ranks`. Every test has a TIMEOUT (carillon_limit_time), which is its COST, too: CTest takes the longest first.
 function(carillon_test name)
-  cmake_parse_arguments(arg "SEPARATE" "TIMEOUT;PROGRAM;PART" "SOURCES;LINK;RANKS;LABELS" ${ARGN})
+  cmake_parse_arguments(arg "SEPARATE" "TIMEOUT;PROGRAM;PART" "SOURCES;LINK;RANKS;LABELS;SLOW" ${ARGN})
   if(NOT arg_TIMEOUT)
     set(arg_TIMEOUT 120)
   endif()
@@ -261,6 +262,17 @@ function(carillon_test name)
   list(TRANSFORM chosen REPLACE "^${PROJECT_SOURCE_DIR}/" "")
   list(JOIN chosen "," chosen)
   set(labels ${CARILLON_TEST_KIND} ${arg_LABELS})
+  set(cases --sources=${chosen})
+  if(arg_SLOW)
+    list(JOIN arg_SLOW "," slow)
+    set(mpi)
+    if(arg_RANKS)
+      carillon_mpi_command(mpi 1)
+    endif()
+    add_test(NAME ${name}.slow COMMAND ${mpi} $<TARGET_FILE:test_${arg_PROGRAM}> ${cases} --only=${slow} --gtest_brief=1)
+    set_tests_properties(${name}.slow PROPERTIES TIMEOUT ${limit} COST ${arg_TIMEOUT} LABELS "${labels};part.hard" ENVIRONMENT "${CARILLON_MPI_ENVIRONMENT}")
+    list(APPEND cases --without=${slow})
+  endif()
   if(arg_RANKS)
     foreach(ranks ${arg_RANKS})
       set(part ${arg_PART})
@@ -268,13 +280,13 @@ function(carillon_test name)
         set(part ranks)
       endif()
       carillon_mpi_command(mpi ${ranks})
-      add_test(NAME ${name}.np${ranks} COMMAND ${mpi} $<TARGET_FILE:test_ranks> --sources=${chosen} --gtest_brief=1)
+      add_test(NAME ${name}.np${ranks} COMMAND ${mpi} $<TARGET_FILE:test_ranks> ${cases} --gtest_brief=1)
       set_tests_properties(${name}.np${ranks} PROPERTIES TIMEOUT ${limit} COST ${arg_TIMEOUT} LABELS "mpi;${labels};part.${part}"
         ENVIRONMENT "${CARILLON_MPI_ENVIRONMENT}")
       carillon_take_cores(${name}.np${ranks} ${ranks})
     endforeach()
   else()
-    add_test(NAME ${name} COMMAND test_${arg_PROGRAM} --sources=${chosen} --gtest_brief=1)
+    add_test(NAME ${name} COMMAND test_${arg_PROGRAM} ${cases} --gtest_brief=1)
     set_tests_properties(${name} PROPERTIES TIMEOUT ${limit} COST ${arg_TIMEOUT} LABELS "${labels};part.${arg_PART}")
     if("mpi" IN_LIST labels)  # it starts programs
       carillon_take_cores(${name} 1)

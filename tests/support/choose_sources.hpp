@@ -11,37 +11,49 @@
 
 namespace carillon::tests {
 
-/// Leaves out every case that is in none of the sources of `--sources=tests/unit/runtime/bank/pack_test.cpp,...`, in addition to what
-/// --gtest_filter leaves out. Without that argument nothing changes. Call it after InitGoogleTest, which takes its own arguments.
-/// @return false, and one line on standard error, where a source has no case.
-inline bool choose_sources(int argc, char** argv) {
-  constexpr std::string_view kOption = "--sources=";
-  std::set<std::string> sources;
+/// The words behind `option`, "--sources=" for one, separated by commas.
+inline std::set<std::string> read_words(int argc, char** argv, std::string_view option) {
+  std::set<std::string> words;
   for (int i = 1; i < argc; ++i) {
-    if (std::string_view(argv[i]).substr(0, kOption.size()) != kOption) continue;
-    std::string_view rest = std::string_view(argv[i]).substr(kOption.size());
+    std::string_view rest = argv[i];
+    if (rest.substr(0, option.size()) != option) continue;
+    rest.remove_prefix(option.size());
     while (!rest.empty()) {
-      const std::string_view source = rest.substr(0, rest.find(','));
-      sources.emplace(source);
-      rest.remove_prefix(std::min(rest.size(), source.size() + 1));
+      const std::string_view word = rest.substr(0, rest.find(','));
+      words.emplace(word);
+      rest.remove_prefix(std::min(rest.size(), word.size() + 1));
     }
   }
-  if (sources.empty()) return true;
+  return words;
+}
+
+/// Chooses cases, in addition to what --gtest_filter chooses: with `--sources=tests/unit/runtime/bank/pack_test.cpp,...` those of these
+/// files, of them with `--only=Suite.Case,...` these, or with `--without=Suite.Case,...` the others. Call it after InitGoogleTest, which
+/// takes its own arguments.
+/// @return false, and a line on standard error, where a source has no case or a case is not there.
+inline bool choose_sources(int argc, char** argv) {
+  const std::set<std::string> sources = read_words(argc, argv, "--sources="), only = read_words(argc, argv, "--only="),
+                              without = read_words(argc, argv, "--without=");
   std::set<std::string> unseen = sources;
+  unseen.insert(only.begin(), only.end());
+  unseen.insert(without.begin(), without.end());
   std::string left_out;
   const testing::UnitTest& tests = *testing::UnitTest::GetInstance();
   for (int i = 0; i < tests.total_test_suite_count(); ++i) {
     const testing::TestSuite& suite = *tests.GetTestSuite(i);
     for (int j = 0; j < suite.total_test_count(); ++j) {
-      const testing::TestInfo& test = *suite.GetTestInfo(j);
-      const std::string_view file = test.file();  // may begin with the path to the clone
+      const std::string_view file = suite.GetTestInfo(j)->file();  // may begin with the path to the clone
       const std::size_t root = file.rfind("tests/");
       const std::string source(root == std::string_view::npos ? file : file.substr(root));
-      if (sources.count(source) == 0) left_out += std::string(suite.name()) + "." + test.name() + ":";
+      const std::string name = std::string(suite.name()) + "." + suite.GetTestInfo(j)->name();
+      const bool is_chosen =
+          (sources.empty() || sources.count(source) > 0) && (only.empty() || only.count(name) > 0) && without.count(name) == 0;
+      if (!is_chosen) left_out += name + ":";
       unseen.erase(source);
+      unseen.erase(name);
     }
   }
-  for (const std::string& source : unseen) std::fprintf(stderr, "--sources: this program has no case of %s\n", source.c_str());
+  for (const std::string& word : unseen) std::fprintf(stderr, "this program has no case of %s\n", word.c_str());
   std::string filter = GTEST_FLAG_GET(filter);
   if (!left_out.empty()) filter += (filter.find('-') == std::string::npos ? "-" : ":") + left_out;
   GTEST_FLAG_SET(filter, filter);
