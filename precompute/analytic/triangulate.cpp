@@ -14,7 +14,7 @@
 namespace carillon::analytic {
 namespace {
 
-using Edge = std::pair<std::int32_t, std::int32_t>;
+using NodePair = std::pair<std::int32_t, std::int32_t>;
 
 long double cross(const Point2& o, const Point2& a, const Point2& b) {
   return (static_cast<long double>(a[0]) - o[0]) * (static_cast<long double>(b[1]) - o[1]) -
@@ -61,8 +61,8 @@ std::vector<Triangle> cut_ears(const std::vector<Point2>& p) {
 }
 
 /// Which triangle lies to the left of each directed edge.
-std::map<Edge, std::size_t> list_edges(const std::vector<Triangle>& triangles) {
-  std::map<Edge, std::size_t> edges;
+std::map<NodePair, std::size_t> list_edges(const std::vector<Triangle>& triangles) {
+  std::map<NodePair, std::size_t> edges;
   for (std::size_t t = 0; t < triangles.size(); ++t)
     for (int k = 0; k < 3; ++k) edges[{triangles[t][k], triangles[t][(k + 1) % 3]}] = t;
   return edges;
@@ -78,11 +78,11 @@ double calc_angle(const Point2& tip, const Point2& a, const Point2& b) {
 void flip_edges(Net& net, const std::vector<bool>& apart) {
   const auto is_marked = [&](std::int32_t v) { return static_cast<std::size_t>(v) < apart.size() && apart[static_cast<std::size_t>(v)]; };
   constexpr double kSlack = 1e-9;
-  std::map<Edge, std::size_t> edges = list_edges(net.triangles);
-  std::vector<Edge> work;
+  std::map<NodePair, std::size_t> edges = list_edges(net.triangles);
+  std::vector<NodePair> work;
   for (const auto& [edge, t] : edges)
     if (edge.first < edge.second) work.push_back(edge);
-  const auto third = [&](std::size_t t, const Edge& e) {
+  const auto third = [&](std::size_t t, const NodePair& e) {
     for (const std::int32_t v : net.triangles[t])
       if (v != e.first && v != e.second) return v;
     return e.first;
@@ -104,14 +104,14 @@ void flip_edges(Net& net, const std::vector<bool>& apart) {
     net.triangles[t] = {c, a, d};
     for (const std::size_t changed : {s, t})
       for (int k = 0; k < 3; ++k) edges[{net.triangles[changed][k], net.triangles[changed][(k + 1) % 3]}] = changed;
-    for (const Edge& e : {Edge{a, c}, Edge{c, b}, Edge{b, d}, Edge{d, a}}) work.push_back(e);
+    for (const NodePair& e : {NodePair{a, c}, NodePair{c, b}, NodePair{b, d}, NodePair{d, a}}) work.push_back(e);
   }
 }
 
 /// Halves the longest edge of a triangle, and before that those of neighbours that are longer, until none is too long and no triangle has
 /// two of the points that are to be apart.
 void halve_edges(Net& net, double max_edge_m, const std::vector<bool>& apart, std::size_t max_triangles) {
-  std::map<Edge, std::size_t> edges = list_edges(net.triangles);
+  std::map<NodePair, std::size_t> edges = list_edges(net.triangles);
   const auto longest = [&](std::size_t t) {
     const Triangle& v = net.triangles[t];
     int best = 0;
@@ -125,7 +125,7 @@ void halve_edges(Net& net, double max_edge_m, const std::vector<bool>& apart, st
   const auto is_apart = [&](const Triangle& t) {
     return std::count_if(t.begin(), t.end(), [&](std::int32_t v) { return static_cast<std::size_t>(v) < apart.size() && apart[v]; }) < 2;
   };
-  const auto split = [&](std::size_t t, const Edge& e, std::int32_t middle) {
+  const auto split = [&](std::size_t t, const NodePair& e, std::int32_t middle) {
     const Triangle v = net.triangles[t];
     const int k = static_cast<int>(std::find(v.begin(), v.end(), e.first) - v.begin());
     const std::int32_t tip = v[(k + 2) % 3];
@@ -151,7 +151,7 @@ void halve_edges(Net& net, double max_edge_m, const std::vector<bool>& apart, st
     // Rivara's path: from neighbour to neighbour across longest edges that are longer still, to an edge that is the longest on both sides.
     std::size_t t = work.back();
     auto [k, length] = longest(t);
-    Edge e{net.triangles[t][k], net.triangles[t][(k + 1) % 3]};
+    NodePair e{net.triangles[t][k], net.triangles[t][(k + 1) % 3]};
     auto neighbour = edges.find({e.second, e.first});
     while (neighbour != edges.end() && longest(neighbour->second).second > length * (1.0 + 1e-12)) {
       t = neighbour->second;
