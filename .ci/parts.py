@@ -16,7 +16,7 @@ import random
 import subprocess
 import sys
 
-GROUPS = (("ranks", "hard"), ("programs", "bench"), ("docs", "integration"), ("sanitizers", "tidy", "threads"))
+GROUPS = (("ranks", "slow"), ("programs", "bench"), ("docs", "integration"), ("sanitizers", "tidy", "threads"))
 
 
 def choose(record, commit_count):
@@ -101,11 +101,11 @@ def self_test():
             ran.append(set(parts))
         assert all(set().union(*ran[i : i + 4]) == every for i in range(len(ran) - 3)), ran
     assert find_faults({"a": ["unit", "part.basic"], "b": ["part.ranks"]}) == []
-    assert len(find_faults({"a": ["unit"], "b": ["part.basic", "part.hard"], "c": ["part.new"]})) == 3
+    assert len(find_faults({"a": ["unit"], "b": ["part.basic", "part.slow"], "c": ["part.new"]})) == 3
     # Without a record, four commits in a row run everything.
     assert {part for count in range(7, 11) for part in choose({}, count)[1]} == every
-    assert "due in 3 submissions: sanitizers tidy threads" in describe(0, ["ranks", "hard"], {"turn": 3, "failed": []})
-    assert "run again: docs" in describe(0, ["ranks", "hard", "docs"], {"turn": 3, "failed": ["docs"]})
+    assert "due in 3 submissions: sanitizers tidy threads" in describe(0, ["ranks", "slow"], {"turn": 3, "failed": []})
+    assert "run again: docs" in describe(0, ["ranks", "slow", "docs"], {"turn": 3, "failed": ["docs"]})
 
 
 def main():

@@ -228,7 +228,7 @@ endfunction()
 # one CTest test: NAME, or with RANKS those of test_ranks under mpirun, NAME.npN. One process for all cases: to start one that loads PETSc
 # takes longer than most cases. SEPARATE: names in the sources' unnamed namespaces are equal, so each is compiled alone. A case alone:
 # GTEST_FILTER=Suite.Case ctest -R '^NAME$'.
-# SLOW: these cases are a test of their own, NAME.slow, in part hard.
+# SLOW: these cases are a test of their own, NAME.slow, in part slow.
 # Labels: CARILLON_TEST_KIND, the kind of the folder; the part (docs/howto/test.md), basic where not given, where ranks are other than 2
 # `ranks`. Every test has a TIMEOUT (carillon_limit_time), which is its COST, too: CTest takes the longest first.
 function(carillon_test name)
@@ -270,7 +270,7 @@ function(carillon_test name)
       carillon_mpi_command(mpi 1)
     endif()
     add_test(NAME ${name}.slow COMMAND ${mpi} $<TARGET_FILE:test_${arg_PROGRAM}> ${cases} --only=${slow} --gtest_brief=1)
-    set_tests_properties(${name}.slow PROPERTIES TIMEOUT ${limit} COST ${arg_TIMEOUT} LABELS "${labels};part.hard" ENVIRONMENT "${CARILLON_MPI_ENVIRONMENT}")
+    set_tests_properties(${name}.slow PROPERTIES TIMEOUT ${limit} COST ${arg_TIMEOUT} LABELS "${labels};part.slow" ENVIRONMENT "${CARILLON_MPI_ENVIRONMENT}")
     list(APPEND cases --without=${slow})
   endif()
   if(arg_RANKS)
