@@ -26,15 +26,12 @@ def read(side):
 
 
 def words_of_scripts(side):
-    """The cmake commands of the scripts that people run, without what they send to logs. The image has all programs, not those of the demo
-    alone."""
-    text = (
-        (SOURCE / "deploy/demo")
-        .read_text()
-        .replace("--target demo ", "")
-        .replace("--preset release", "--preset release" if side == "precompute" else "--preset runtime-only")
-    )
-    return [re.sub(r" *>.*", "", line).strip() for line in text.splitlines() if line.startswith("cmake ")]
+    """The commands behind `configure` and `build` of deploy/demo (deploy/environment), with the preset of the image."""
+    preset = "release" if side == "precompute" else "runtime-only"
+    demo = (SOURCE / "deploy/demo").read_text()
+    options = re.search(r"^configure release (.+)$", demo, re.M)[1]
+    assert "build release all" in demo
+    return [f"cmake --preset {preset} {options}", f'cmake --build --preset {preset} -j "$jobs"']
 
 
 def check(side, wanted):
