@@ -16,6 +16,10 @@ import random
 import subprocess
 import sys
 
+ROOT = pathlib.Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "tests/support"))
+import ctest
+
 GROUPS = (("ranks", "slow"), ("programs", "bench"), ("docs", "integration"), ("sanitizers", "tidy", "threads"))
 
 
@@ -60,8 +64,7 @@ def write_record(path, turn, failed):
 
 
 def count_commits():
-    root = pathlib.Path(__file__).resolve().parents[1]
-    return int(subprocess.run(["git", "-C", root, "rev-list", "--count", "HEAD"], capture_output=True, text=True, check=True).stdout)
+    return int(subprocess.run(["git", "-C", ROOT, "rev-list", "--count", "HEAD"], capture_output=True, text=True, check=True).stdout)
 
 
 def find_faults(tests):
@@ -75,16 +78,6 @@ def find_faults(tests):
             faults.append(f"{name} has {len(parts)} parts, {parts}; give it one: PART in its CMakeLists.txt")
     faults += [f"no submission runs part {part}: add it to a group of .ci/parts.py" for part in sorted(known - turns - {"basic", "long"})]
     return faults
-
-
-def read_tests(build):
-    listed = subprocess.run(["ctest", "--test-dir", build, "--show-only=json-v1"], capture_output=True, text=True, check=True)
-    tests = {}
-    for test in json.loads(listed.stdout)["tests"]:
-        properties = {entry["name"]: entry["value"] for entry in test["properties"]}
-        if "FIXTURES_SETUP" not in properties and "FIXTURES_CLEANUP" not in properties:
-            tests[test["name"]] = properties.get("LABELS", [])
-    return tests
 
 
 def self_test():
@@ -112,7 +105,7 @@ def main():
     if sys.argv[1:] == ["--self-test"]:
         return self_test()
     if sys.argv[1:2] == ["check"] and len(sys.argv) == 3:
-        faults = find_faults(read_tests(sys.argv[2]))
+        faults = find_faults({test["name"]: test["labels"] for test in ctest.list_tests(sys.argv[2]) if not test["is_fixture"]})
         print("\n".join(faults) or "every test has a part that has its turn")
         return bool(faults)
     path = find_record()

@@ -20,7 +20,7 @@ endif()
 
 # ---- sources compiled together, and precompiled headers: both save most of what parsing the same headers again costs ----
 
-option(CARILLON_UNITY "Compile the sources of a target together, about 60 kB at a time (half the CPU time of a build from nothing)" ON)
+option(CARILLON_UNITY "Compile the sources of a target together, about 60 kB at a time" ON)
 # Without optimisation gcc 12 reads intrinsics behind a precompiled header as if it optimised, and refuses Eigen's prefetches.
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND NOT CMAKE_BUILD_TYPE STREQUAL "Debug")
   set(precompiles ON)
@@ -282,8 +282,7 @@ function(carillon_test name)
       carillon_mpi_command(mpi ${ranks})
       add_test(NAME ${name}.np${ranks} COMMAND ${mpi} $<TARGET_FILE:test_ranks> ${cases} --gtest_brief=1)
       set_tests_properties(${name}.np${ranks} PROPERTIES TIMEOUT ${limit} COST ${arg_TIMEOUT} LABELS "mpi;${labels};part.${part}")
-      carillon_set_mpi_environment(${name}.np${ranks} ${ranks})
-      carillon_take_cores(${name}.np${ranks} ${ranks})
+      carillon_set_ranks(${name}.np${ranks} ${ranks})
     endforeach()
   else()
     add_test(NAME ${name} COMMAND test_${arg_PROGRAM} ${cases} --gtest_brief=1)
@@ -296,16 +295,17 @@ endfunction()
 
 # The environment and the command line under which tests start MPI programs: one thread a rank, and for Open MPI, which alone reads OMPI_*:
 # more ranks than cores allowed, root allowed, no binding to cores. MPIEXEC_* are those of CMake's FindMPI; what another MPI needs goes
-# into MPIEXEC_PREFLAGS.
-set(CARILLON_MPI_ENVIRONMENT OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 HWLOC_COMPONENTS=-gl;OMPI_MCA_pml=ob1
-  OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_rmaps_base_oversubscribe=1
-  OMPI_MCA_hwloc_base_binding_policy=none OMPI_MCA_mpi_yield_when_idle=1)
-# Ranks that yield while they wait get no time from other programs on the same cores: a test on two ranks next to a compiler takes three
-# times as long. They yield only where more of them than cores would take turns.
-function(carillon_set_mpi_environment test ranks)
-  set(environment ${CARILLON_MPI_ENVIRONMENT})
-  if(ranks LESS_EQUAL 2)
-    list(TRANSFORM environment REPLACE "yield_when_idle=1" "yield_when_idle=0")
+# into MPIEXEC_PREFLAGS. A waiting rank that yields loses its core to any other program (a test of two ranks next to a compiler takes three
+# times as long), one that polls keeps it from the rank it waits for: CARILLON_MPI_ENVIRONMENT yields, carillon_set_ranks() says for which tests not.
+set(CARILLON_MPI_SETTINGS OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 HWLOC_COMPONENTS=-gl OMPI_MCA_pml=ob1
+  OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_rmaps_base_oversubscribe=1 OMPI_MCA_hwloc_base_binding_policy=none)
+set(CARILLON_MPI_ENVIRONMENT ${CARILLON_MPI_SETTINGS} OMPI_MCA_mpi_yield_when_idle=1)
+# A test on so many ranks: its cores, and its environment, where more than two ranks yield.
+function(carillon_set_ranks test ranks)
+  carillon_take_cores(${test} ${ranks})
+  set(environment ${CARILLON_MPI_SETTINGS})
+  if(ranks GREATER 2)
+    set(environment ${CARILLON_MPI_ENVIRONMENT})
   endif()
   set_property(TEST ${test} APPEND PROPERTY ENVIRONMENT "${environment}")
 endfunction()

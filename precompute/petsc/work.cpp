@@ -22,7 +22,7 @@ void book_petsc_flops() {
   petsc_flops = all;
 }
 
-/// Null in a process without the profiling library. Looked up, since linkers differ in what they do with weak symbols.
+/// Null without the profiling library. By dlsym: mold resolves weak undefined symbols at link time.
 const auto get_mpi_counts = reinterpret_cast<decltype(&carillon_get_mpi_counts)>(dlsym(RTLD_DEFAULT, "carillon_get_mpi_counts"));
 
 double cpu_booked_s = 0;

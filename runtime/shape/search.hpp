@@ -19,9 +19,8 @@ void find_polyhedra_touches(const Shape& a, const Frame& frame_a, const Shape& b
 /// May a corner or ridge vertex of the skin be the first to touch what has this outward normal (mesh frame)? No neighbour is lower.
 bool carries(const Mesh& mesh, int vertex, const Vec3& normal);
 
-// Slopes. How far below the plane, or below its neighbours, a sample may be: what lands nearly flat lands with all of it. And of a skin
-// that is not at its lowest place, but nearly parallel.
-inline constexpr double kFlat = 0.02, kFlush = 0.01;
+inline constexpr double kFlat = 0.02;   // slope: tolerance of a flat contact patch
+inline constexpr double kFlush = 0.01;  // slope: tolerance of parallel surfaces
 
 inline constexpr int kFirst = 12, kAgain = 2;  // iterations between two curved sides, in a search and near a place known
 

@@ -17,6 +17,9 @@ import subprocess
 import sys
 
 HERE = pathlib.Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent / "support"))
+import ctest
+
 PAGE = HERE.parents[1] / "docs/reports/stability.md"
 GROUPS = ["meshes", "materials", "spectra", "ranks", "air", "motion", "time", "formats", "cross"]
 KEYS = {"id", "title", "risk", "method", "figure"}
@@ -40,13 +43,7 @@ def read_figures(folder):
 
 def read_tests(build):
     """The names of the tests with label hard."""
-    listed = subprocess.run(
-        ["ctest", "--test-dir", build, "-L", "hard", "-FA", "hard_figures", "--show-only=json-v1"],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    return [test["name"] for test in json.loads(listed.stdout)["tests"]]
+    return [test["name"] for test in ctest.list_tests(build, "-L", "hard", "-FA", "hard_figures")]
 
 
 def read_rows(page):

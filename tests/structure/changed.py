@@ -8,14 +8,14 @@ A changed source of a folder reaches the folders that may include it, and so on 
 run, and every script that names a program of such a folder, itself or through a module that it imports. A changed test runs, as do the
 scripts that import it. Of all these the tests of part basic are taken; a test whose own file has changed is taken from every part.
 """
-import json
 import pathlib
 import re
 import subprocess
 import sys
 
 HERE = pathlib.Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE))
+sys.path += [str(HERE), str(HERE.parent / "support")]
+import ctest
 import include_law
 
 TOPS = ("runtime", "partition", "precompute", "jobs")
@@ -113,14 +113,12 @@ def choose(changed, tests, source):
 
 def read_tests(build, source):
     """The tests that CTest knows, for choose()."""
-    listed = subprocess.run(["ctest", "--test-dir", build, "--show-only=json-v1"], capture_output=True, text=True, check=True)
     hard = {path: path.read_text() for path in (source / "tests/hard").glob("*.cpp")}
     tests = []
-    for test in json.loads(listed.stdout)["tests"]:
-        labels = next((entry["value"] for entry in test["properties"] if entry["name"] == "LABELS"), [])
-        part = next((label.removeprefix("part.") for label in labels if label.startswith("part.")), "")
+    for test in ctest.list_tests(build):
+        part = next((label.removeprefix("part.") for label in test["labels"] if label.startswith("part.")), "")
         sources = []
-        for word in test.get("command", []):
+        for word in test["command"]:
             if word.startswith("--sources="):
                 sources += word.removeprefix("--sources=").split(",")
             elif word.startswith(f"{source}/") and pathlib.Path(word).is_file() and not word.startswith(f"{source}/build"):

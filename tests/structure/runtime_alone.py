@@ -11,7 +11,6 @@ and what is loaded.
 
 usage: runtime_alone.py SOURCE_DIR BUILD_DIR WORK_DIR [--from-nothing]        WORK_DIR is removed at the end
 """
-import json
 import os
 import pathlib
 import re
@@ -19,6 +18,9 @@ import shutil
 import subprocess
 import sys
 import tempfile
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "support"))
+import ctest
 
 HIDDEN = re.compile(
     r"^(libopenmpi|openmpi|mpi-default|libpetsc|petsc|libslepc|slepc|libmetis|libmumps|libptscotch|libscotch|libscalapack|libhypre|"
@@ -104,13 +106,8 @@ def take_over(whole, build):
 def find_sample(build):
     """A regular expression of some tests of every program: one of each suite where each case is a test, and every script but those of
     pages, which run in a browser."""
-    listed = json.loads(
-        subprocess.run(
-            ["ctest", "--test-dir", build, "-LE", LEFT_OUT + "|web", "--show-only=json-v1"], capture_output=True, text=True, check=True
-        ).stdout
-    )
     sample = {}
-    for test in listed["tests"]:
+    for test in ctest.list_tests(build, "-LE", LEFT_OUT + "|web"):
         program = test["command"][0]
         is_case = any(word.startswith("--gtest_filter") for word in test["command"])
         sample.setdefault((program, test["name"].rsplit(".", 1)[0]) if is_case else test["name"], test["name"])

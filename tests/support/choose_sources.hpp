@@ -27,9 +27,8 @@ inline std::set<std::string> read_words(int argc, char** argv, std::string_view 
   return words;
 }
 
-/// Chooses cases, in addition to what --gtest_filter chooses: with `--sources=tests/unit/runtime/bank/pack_test.cpp,...` those of these
-/// files, of them with `--only=Suite.Case,...` these, or with `--without=Suite.Case,...` the others. Call it after InitGoogleTest, which
-/// takes its own arguments.
+/// Narrows --gtest_filter by `--sources=tests/unit/runtime/bank/pack_test.cpp,...`, `--only=Suite.Case,...` and
+/// `--without=Suite.Case,...`. Call it after InitGoogleTest.
 /// @return false, and a line on standard error, where a source has no case or a case is not there.
 inline bool choose_sources(int argc, char** argv) {
   const std::set<std::string> sources = read_words(argc, argv, "--sources="), only = read_words(argc, argv, "--only="),

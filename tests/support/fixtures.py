@@ -70,11 +70,6 @@ def get_bin_dir():
     return pathlib.Path(os.environ.get("CARILLON_BIN_DIR") or pathlib.Path(__file__).resolve().parents[2] / "build/release/bin").resolve()
 
 
-def get(name):
-    """The path of a fixture; made where no CTest fixture has done so, as for a script that runs by hand."""
-    return make(name)
-
-
 def copy(name, folder, as_name=None):
     """A copy in `folder`, that may be changed."""
     target = pathlib.Path(folder) / (as_name or name)
@@ -83,12 +78,13 @@ def copy(name, folder, as_name=None):
 
 
 def describe_programs(bin_dir):
-    """Changes when the programs that make fixtures do."""
+    """Size and date of the programs that make fixtures."""
     programs = (bin_dir / "carillon-mesh", bin_dir.parent / "libexec/carillon/carillon-precompute")
     return [[program.stat().st_size, program.stat().st_mtime_ns] for program in programs]
 
 
-def make(name):
+def get(name):
+    """The path of a fixture; made where no CTest fixture has done so, as for a script that runs by hand."""
     recipe = RECIPES[name]
     bin_dir = get_bin_dir()
     folder = bin_dir.parent / "fixtures"
@@ -118,4 +114,4 @@ if __name__ == "__main__":
         sys.exit()
     if len(sys.argv) != 2 or sys.argv[1] not in RECIPES:
         sys.exit(f"usage: fixtures.py NAME     one of {', '.join(RECIPES)}")
-    print(make(sys.argv[1]))
+    print(get(sys.argv[1]))
