@@ -12,6 +12,13 @@ through read_mesh and check_mesh in `test_meshes`, many in one process; where th
 one by one. With --keep the files at fault stay. The mutations follow the seed alone: --seed S --surfaces N damages the same N files on any
 machine. After every 100 surfaces the counts so far are printed. Counts are printed; exit code 1 where there was a crash, a hang or a result
 that is no mesh.
+
+Under the sanitizers:
+
+    cmake -B build/asan-mesh -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo \\
+      -DCMAKE_CXX_FLAGS="-fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer"
+    cmake --build build/asan-mesh --target carillon-mesh test_meshes
+    tests/system/mesher/mutate.py --bin build/asan-mesh/bin --surfaces 10000 --meshes 10000 --seed 4 --defer 0.15 0.5 --keep faults
 """
 import argparse
 import collections
