@@ -3,16 +3,22 @@
 bound, or in a refusal that names the place.
 
 usage: walls.py CASE
-The truth is a closed form, Ritz, or the same body as a solid in elements of the volume mesher, where it is named.
+       walls.py record     solves the references again: walls_references.json
+
+The truth is a closed form, Ritz, or where it is named the same body as a solid in elements of the volume mesher, or in finer elements. The
+latter take minutes, so their frequencies are kept.
 """
 import json
 import math
+import pathlib
 import sys
 
 import numpy as np
 
 from figure import hold, hold_refusal
 from programs import STEEL, Folder, calc_distance
+
+REFERENCES = pathlib.Path(__file__).with_name("walls_references.json")
 
 
 def make_grid(place, nu, nv, skip=lambda i, j: False):
@@ -83,6 +89,31 @@ def solve(surface, *words, **keys):
         return outcome.freq_hz, report
 
 
+def list_references():
+    """Name: surface, words of carillon-mesh, keys of the job."""
+    solid = ("--method", "delaunay", "--order", 2, "--edge")
+    references = {
+        f"fold of {angle} degrees": (make_bracket(angle, 0.003), (*solid, 0.0018), {"band_hz": (20, 60000), "max_modes": 8})
+        for angle in (175, 90, 60, 40)
+    }
+    references["box without a lid"] = (make_tub_skins(0.06, 0.05, 0.03, 0.002), (*solid, 0.002), {"band_hz": (20, 40000), "max_modes": 6})
+    references["tube with holes"] = (make_tube_with_holes(), ("--wall", 0.002, "--edge", 0.0025), {"band_hz": (20, 8000), "max_modes": 4})
+    return references
+
+
+def record():
+    found = {}
+    for name, (surface, words, keys) in list_references().items():
+        found[name] = [float(f"{hz:.9g}") for hz in solve(surface, *words, **keys)[0]]
+        print(name, found[name])
+    REFERENCES.write_text(json.dumps(found, indent=1) + "\n")
+
+
+def get_reference(name):
+    """Frequencies [Hz] of one of list_references()."""
+    return np.array(json.loads(REFERENCES.read_text())[name])
+
+
 def refuse(case, surface, words, *options):
     with Folder() as folder:
         made = mesh(folder, surface, *options)
@@ -141,9 +172,7 @@ def corners():
         rim = wall * (2 * (edges[0] + edges[1]) - 4 * wall) * (size[2] + (wall if side == "inside" else 0) - edges[2])
         hold("corners", abs(report["volume_m3"] / (volume + rim) - 1), 1e-9, f"box without a lid, volume, the surface is the {side}")
         if side == "outside":
-            solid, _ = solve(
-                make_tub_skins(*size, wall), "--method", "delaunay", "--order", 2, "--edge", 0.002, band_hz=(20, 40000), max_modes=6
-            )
+            solid = get_reference("box without a lid")
             parts = np.abs(1200 * np.log2(freq_hz / solid)) / report["bars"]
             hold("corners", parts.max(), 1, "distance from the solid over the error bar")
             hold("corners", calc_distance(freq_hz, solid), 2e-2, "against the solid in elements of the volume mesher")
@@ -193,9 +222,7 @@ def folds():
     for angle in (175, 90, 60, 40):
         freq_hz, report = solve(make_fold(angle), "--wall", wall, "--edge", 0.003, band_hz=(20, 60000), max_modes=8)
         hold("folds", abs(report["volume_m3"] / (2 * 0.04 * 0.08 * wall) - 1), 1e-9, f"{angle} degrees, volume")
-        solid, _ = solve(
-            make_bracket(angle, wall), "--method", "delaunay", "--order", 2, "--edge", 0.0018, band_hz=(20, 60000), max_modes=8
-        )
+        solid = get_reference(f"fold of {angle} degrees")
         # A sharp inner corner is singular: the sharper, the slower the error falls. The bars have to contain it.
         parts = np.abs(1200 * np.log2(freq_hz / solid)) / report["bars"]
         hold("folds", parts.max(), 1, f"{angle} degrees, distance from the solid over the error bar")
@@ -223,16 +250,20 @@ def walls_that_branch():
     refuse("walls_that_branch", join(plate, post), ["T-junction", "0.05, 0)", "modeller"], "--wall", 0.002)
 
 
+def make_tube_with_holes():
+    """A tube of 60 x 100 mm with six holes of 8 mm, 4 mm from the rim."""
+    turn = 2 * math.pi
+    return make_grid(
+        lambda u, v: (0.03 * math.cos(turn * u), 0.03 * math.sin(turn * u), 0.1 * v), 48, 24, lambda i, j: j in (1, 2) and i % 8 < 2
+    )
+
+
 def holes_at_a_rim():
     radius, long, wall, turn = 0.03, 0.1, 0.002, 2 * math.pi
-    tube = make_grid(
-        lambda u, v: (radius * math.cos(turn * u), radius * math.sin(turn * u), long * v), 48, 24, lambda i, j: j in (1, 2) and i % 8 < 2
-    )  # six holes of 8 mm, 4 mm from the rim
-    freq_hz, report = solve(tube, "--wall", wall, "--edge", 0.005, band_hz=(20, 8000), max_modes=4)
+    freq_hz, report = solve(make_tube_with_holes(), "--wall", wall, "--edge", 0.005, band_hz=(20, 8000), max_modes=4)
     area = turn * radius * long - 6 * (turn * radius / 24) * (long / 12)
     hold("holes_at_a_rim", abs(report["volume_m3"] / (area * wall) - 1), 2e-3, "volume")
-    fine, _ = solve(tube, "--wall", wall, "--edge", 0.0025, band_hz=(20, 8000), max_modes=4)
-    hold("holes_at_a_rim", calc_distance(freq_hz, fine), 1e-2, "against edges half as long")
+    hold("holes_at_a_rim", calc_distance(freq_hz, get_reference("tube with holes")), 1e-2, "against edges half as long")
 
 
 if __name__ == "__main__":
