@@ -39,7 +39,7 @@ MultiplyRows find_multiply() {
   return multiply_rows_plain;
 }
 
-using Matrix = Eigen::Matrix<std::complex<float>, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+using ComplexMatrix = Eigen::Matrix<std::complex<float>, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 struct Free {
   void operator()(float* memory) const { std::free(memory); }
@@ -76,9 +76,10 @@ void LinearSystem::multiply(const Sides& x, Sides& y) const {
 BlockInverse::BlockInverse(const LinearSystem& system) {
   for (std::size_t first = system.first; first < system.last; first += kBlockRows) {
     const auto rows = static_cast<Eigen::Index>(std::min(kBlockRows, system.last - first));
-    const Eigen::Map<const Matrix, 0, Eigen::OuterStride<>> block(&system.matrix[(first - system.first) * system.unknowns + first], rows,
-                                                                  rows, Eigen::OuterStride<>(static_cast<Eigen::Index>(system.unknowns)));
-    Matrix inverse = Matrix(block).partialPivLu().inverse();
+    const Eigen::Map<const ComplexMatrix, 0, Eigen::OuterStride<>> block(&system.matrix[(first - system.first) * system.unknowns + first],
+                                                                         rows, rows,
+                                                                         Eigen::OuterStride<>(static_cast<Eigen::Index>(system.unknowns)));
+    ComplexMatrix inverse = ComplexMatrix(block).partialPivLu().inverse();
     if (!inverse.allFinite()) inverse.setIdentity();
     blocks_.emplace_back(inverse.data(), inverse.data() + inverse.size());
   }
@@ -86,12 +87,12 @@ BlockInverse::BlockInverse(const LinearSystem& system) {
 
 double solve_directly(const LinearSystem& system, Sides& solution) {
   const auto unknowns = static_cast<Eigen::Index>(system.unknowns), sides = static_cast<Eigen::Index>(system.sides);
-  const Eigen::Map<const Matrix> matrix(system.matrix.data(), unknowns, unknowns), right(system.right.data(), unknowns, sides);
-  const Eigen::PartialPivLU<Matrix> factors(matrix);
-  Matrix found = factors.solve(right);
-  found += factors.solve(Matrix(right - matrix * found));
+  const Eigen::Map<const ComplexMatrix> matrix(system.matrix.data(), unknowns, unknowns), right(system.right.data(), unknowns, sides);
+  const Eigen::PartialPivLU<ComplexMatrix> factors(matrix);
+  ComplexMatrix found = factors.solve(right);
+  found += factors.solve(ComplexMatrix(right - matrix * found));
   solution = Sides(std::span(found.data(), static_cast<std::size_t>(found.size())), system.unknowns, system.sides);
-  const Matrix left = right - matrix * found;
+  const ComplexMatrix left = right - matrix * found;
   double worst = 0.0;
   for (Eigen::Index m = 0; m < sides; ++m)
     if (const double size = right.col(m).norm(); size > 0.0) worst = std::max(worst, static_cast<double>(left.col(m).norm()) / size);
