@@ -30,6 +30,7 @@ constexpr double kAtRest = 0.2e-3, kMoving = 2e-3;  // m/s
 constexpr double kGravity = 9.81;                   // m/s^2
 constexpr double kSticking = 1e-3;                  // m/s; below, the direction of friction fades
 constexpr double kSkinM = 10e-6;                    // over which the load of rough bodies that slide grows by its own size
+constexpr double kLargestExponent = 3.0;            // of what a height adds to a load: 19 loads, of which heights reach 13
 constexpr double kStronger = 2.0;                   // a new contact takes the place of one that presses less than half as much
 
 double calc_motion(double speed_m_s) noexcept { return calc_smooth_step((speed_m_s - kAtRest) / (kMoving - kAtRest)); }
@@ -95,6 +96,11 @@ ContactNoise calc_noise(const Press& press, const Texture& texture, const Textur
   // exp(s x - s^2 / 2) of a normal x has the mean 1 and the rms sqrt(exp(s^2) - 1) about it: that of the linear spring, up to one load.
   if (noise.decay_length_m > 0.0) noise.spread = 0.5 * std::log1p(std::pow(std::min(1.0, calc_moved(noise) / noise.decay_length_m), 2.0));
   return noise;
+}
+
+void scale(Texture::Gains& gains, double factor) noexcept {
+  for (float& height : gains.height_m) height *= static_cast<float>(factor);
+  gains.rms_m *= factor;
 }
 
 /// f = load (exp(h / over_m - spread) - 1).
@@ -401,7 +407,11 @@ ContactForces::Node ContactForces::make_node(const Slot& slot, const Record& val
                             slot.texture, slot.other_texture);
     const Shocks shocks = calc_shocks(node.noise, values.force_n);
     node.values.force_n = shocks.load_n;
-    node.noise.decay_length_m = shocks.over_m;
+    // Heights over u, so that the exponent of what is blended between two nodes lies between those of both. No load, no heights.
+    const double per_m = values.force_n > 0.0 && shocks.over_m > 0.0 ? 1.0 / shocks.over_m : 0.0;
+    scale(node.noise.gains, node.noise.motion * per_m);
+    scale(node.noise.other_gains, node.noise.other_motion * per_m);
+    if (per_m == 0.0) node.noise.spread = 0.0;
   }
   const double drag = rough * slot.friction / (slip + kSticking);
   const double damping = effects_.has(Effect::kContactDamping) ? std::sqrt(0.5 * node.level * values.impedance / rate_hz_) : 0.0;
@@ -452,12 +462,9 @@ void ContactForces::add_push(Slot& slot, const Node& from, const Node& to) noexc
   double largest = 0.0;
   for (std::size_t n = 0; n <= kSubBlock; ++n) {
     const double share = static_cast<double>(n) / kSubBlock;
-    const double load = blend(from.values.force_n, to.values.force_n, share);
-    const double give = blend(from.noise.decay_length_m, to.noise.decay_length_m, share),
-                 spread = blend(from.noise.spread, to.noise.spread, share);
-    const double moved = blend(from.noise.motion, to.noise.motion, share) * static_cast<double>(height[n]) +
-                         blend(from.noise.other_motion, to.noise.other_motion, share) * static_cast<double>(other_height[n]);
-    const double force = give > 0.0 ? blend(from.level, to.level, share) * load * std::expm1(moved / give - spread) : 0.0;
+    const double load = blend(from.values.force_n, to.values.force_n, share), spread = blend(from.noise.spread, to.noise.spread, share);
+    const double over_u = static_cast<double>(height[n]) + static_cast<double>(other_height[n]);
+    const double force = blend(from.level, to.level, share) * load * std::expm1(std::min(over_u - spread, kLargestExponent));
     push[0].signal[n] = static_cast<float>(force * (1.0 - share));
     push[1].signal[n] = static_cast<float>(force * share);
     largest = std::max(largest, std::abs(force));

@@ -87,12 +87,12 @@ struct ContactCounters {
 /// Force: the heights h of both surfaces, each read at the speed of the contact over it or at the slip, whichever is faster, press two
 /// springs in series: the contact's, k = 2 E* a, and the one of the rough skin. With u = F / k + skin the force has the rms of the linear
 /// spring, R = h_rms / u loads: without the load F, which changes slowly and is left out, f = a F (exp(s h / h_rms - s^2 / 2) - 1), s^2 =
-/// ln(1 + min(1, R)^2), a = max(1, R); up to R = 1 it never pulls. The skin is h_rms for what rolls, 10 um for what slides; it is blunted
-/// by the patch as it rolls. What is slower than sqrt(g / u), where a body that its weight presses on u bounces, does not press: the body
-/// rides over it. While one surface slides on the other (its share is slip over the larger sweep) friction follows, -mu f along the slip.
-/// What moves at less than 0.2 mm/s is at rest and gives no force at all. Damping: the impedance Z of the other body at the point takes Z
-/// (phi.n)^2 / 2 [1/s] of each mode, and the contact's spring what it loses
-/// however little it is moved: calc_spring_loss() (docs/decisions/contact-sound.md).
+/// ln(1 + min(1, R)^2), a = max(1, R); up to R = 1 it never pulls. Without a load there are no heights, and the exponent is at most 3. The
+/// skin is h_rms for what rolls, 10 um for what slides; it is blunted by the patch as it rolls. What is slower than sqrt(g / u), where a
+/// body that its weight presses on u bounces, does not press: the body rides over it. While one surface slides on the other (its share is
+/// slip over the larger sweep) friction follows, -mu f along the slip. What moves at less than 0.2 mm/s is at rest and gives no force at
+/// all. Damping: the impedance Z of the other body at the point takes Z (phi.n)^2 / 2 [1/s] of each mode, and the contact's spring what it
+/// loses however little it is moved: calc_spring_loss() (docs/decisions/contact-sound.md).
 ///
 /// Memory is taken in the constructor only. One thread at a time.
 class ContactForces {
@@ -150,7 +150,7 @@ class ContactForces {
   struct Node {
     Record values;
     double level = 0.0;  // 0..1: its rise and its fall
-    ContactNoise noise;
+    ContactNoise noise;  // its gains times motion over u: the heights in the exponent
     std::array<float, kStrikeRows> force{}, damping{};
     float give = 0.0F, half_loss = 0.0F;  // as ContactEnd has them
     std::array<const std::int16_t*, kStrikeRows> row{};
