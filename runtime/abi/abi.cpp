@@ -152,7 +152,7 @@ carillon_edits make_default() {
 
 template <>
 carillon_options make_default() {
-  const synth::SynthesiserOptions ours;
+  const synth::SynthesiserOptions ours{.microphones_m = {}};  // takes no memory, as carillon_options_init cannot fail
   carillon_options options{};
   options.rate_hz = ours.rate_hz;
   options.max_bodies = ours.max_bodies;
@@ -573,6 +573,7 @@ carillon_status carillon_vary_impulse(const carillon_bank* bank, double variatio
     if (variation == 0.0) return;
     synth::vary_strike(
         bank->bank, [&](const carillon::Vec3& point_m) { return bank->get_tree().find(point_m); }, variation, seed, strike, event);
+    if (events::find_fault(event) != nullptr) throw InputError("the varied strike is too large for a number");
     ours->triangle = event.triangle;
     ours->duration_s = event.duration_s;
     std::copy(event.barycentric.begin(), event.barycentric.end(), ours->barycentric);

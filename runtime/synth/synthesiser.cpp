@@ -24,6 +24,7 @@ constexpr double kMaxModes = 1 << 24;
 constexpr int kMaxBodies = 1 << 20;
 constexpr std::int64_t kGiveBackEvery = 8;  // blocks: 21 ms at 48 kHz
 constexpr int kMaxMicrophones = 256;
+constexpr int kMaxRoom = 1 << 24;
 
 SynthesiserOptions check(SynthesiserOptions options) {
   const auto refuse = [](const char* what) { throw InputError(std::string("a synthesiser needs ") + what); };
@@ -46,8 +47,10 @@ SynthesiserOptions check(SynthesiserOptions options) {
       refuse("a head that is made for its sample rate");
   }
   if (options.max_bodies < 1 || options.max_bodies > kMaxBodies) refuse("room for one to 1,048,576 bodies");
-  if (options.max_strikes < 1 || options.max_forces < 0 || options.max_waypoints < 2 || options.ring_events < 1)
-    refuse("room for strikes, waypoints and events");
+  const auto is_room = [](int places, int least) { return places >= least && places <= kMaxRoom; };
+  if (!is_room(options.max_strikes, 1) || !is_room(options.max_forces, 0) || !is_room(options.max_waypoints, 2) ||
+      !is_room(options.ring_events, 1))
+    refuse("room for strikes, waypoints and events, 16,777,216 each at most");
   if (!(options.longest_m > 0.0 && options.longest_m < 1e5)) refuse("a longest distance below 100 km");
   if (!(options.transfers_per_s > 0.0 && options.transfers_per_s < 1e15)) refuse("a positive number of transfers_per_s");
   return options;
@@ -123,8 +126,12 @@ int Synthesiser::add_body(std::shared_ptr<const Model> model, const BodySettings
   check_surroundings(settings.effects);
   if (events::find_fault(events::BodyMotion{.position_m = settings.position_m, .rotation = settings.rotation}) != nullptr)
     throw InputError("a body must be at a finite place, turned by a unit quaternion");
-  if (!(settings.longest_m >= 0.0 && settings.longest_m < 1e5) || settings.max_waypoints < 0)
-    throw InputError("a body needs a longest distance below 100 km and room for waypoints");
+  if (!(settings.longest_m >= 0.0 && settings.longest_m < 1e5) || settings.max_waypoints < 0 || settings.max_waypoints > kMaxRoom ||
+      settings.max_forces > kMaxRoom)
+    throw InputError("a body needs a longest distance below 100 km, and room for at most 16,777,216 waypoints and forces");
+  // A voice is made only once the body has Effect::kModal.
+  if (!(settings.silence_pa > 0.0) || !std::isfinite(settings.silence_pa))
+    throw InputError("a body's pressure of silence must be a positive number of Pa");
   if (const char* fault = find_fault(settings.surface); fault != nullptr) throw InputError(std::string("surface of a body: ") + fault);
   collect();
   const std::size_t free = find_free();
@@ -193,8 +200,13 @@ void Synthesiser::set_effects(int body, EffectSet effects) {
     SoundingBody::check(effects, *owned.wanted_model);
   else
     owned.body->check(effects);
-  owned.wanted = effects;
-  send_change(body);
+  const EffectSet before = std::exchange(owned.wanted, effects);
+  try {
+    send_change(body);
+  } catch (...) {
+    owned.wanted = before;
+    throw;
+  }
 }
 
 void Synthesiser::swap_model(int body, std::shared_ptr<const Model> model) {
@@ -202,8 +214,13 @@ void Synthesiser::swap_model(int body, std::shared_ptr<const Model> model) {
   collect();
   Owned& owned = owned_[check_owned(body)];
   SoundingBody::check(owned.wanted, *model);
-  owned.wanted_model = std::move(model);
-  send_change(body);
+  std::shared_ptr<const Model> before = std::exchange(owned.wanted_model, std::move(model));
+  try {
+    send_change(body);
+  } catch (...) {
+    owned.wanted_model = std::move(before);
+    throw;
+  }
 }
 
 EffectSet Synthesiser::get_effects(int body) const { return owned_[check_owned(body)].wanted; }
@@ -246,7 +263,18 @@ void Synthesiser::remove_body(int body) {
   commands_->push({.body = owned.body.get(), .number = body, .removes = true});
 }
 
-void Synthesiser::collect() {
+void Synthesiser::collect() noexcept {
+  const auto try_to_send = [this](int number) noexcept {
+    try {
+      send_change(number);
+    } catch (...) {  // no memory: it waits
+      has_unsent_ = true;
+    }
+  };
+  if (std::exchange(has_unsent_, false)) {
+    for (std::size_t i = 0; i < owned_.size(); ++i)
+      if (owned_[i].body != nullptr) try_to_send(static_cast<int>(i));
+  }
   Command command;
   while (gone_->pop(command)) {
     Owned& owned = owned_[static_cast<std::size_t>(command.number)];
@@ -259,11 +287,11 @@ void Synthesiser::collect() {
     for (const Effect effect : EffectSet::all()) owned.bytes[effect] -= less[effect];
     owned.change.reset();
     publish_bytes(command.number);
-    send_change(command.number);
+    try_to_send(command.number);
   }
 }
 
-bool Synthesiser::is_full() {
+bool Synthesiser::is_full() noexcept {
   collect();
   return find_free() == owned_.size();
 }

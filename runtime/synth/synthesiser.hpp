@@ -141,10 +141,11 @@ class Synthesiser {
   void remove_body(int body);
 
   /// Whether add_body() would find no room. [main-thread]
-  bool is_full();
+  bool is_full() noexcept;
 
-  /// Gives back the memory of removed bodies and effects that the audio thread has let go, and sends changes that wait. [main-thread]
-  void collect();
+  /// Gives back the memory of removed bodies and effects that the audio thread has let go, and sends changes that wait; one for which there
+  /// is no memory waits for the next call. [main-thread]
+  void collect() noexcept;
 
   /// Full scale per pascal; 1 at first. What is no finite number counts as 0. [any-thread]
   void set_gain(double per_pa) noexcept {
@@ -254,6 +255,7 @@ class Synthesiser {
   std::unique_ptr<Pipe<Command>> commands_;
   std::unique_ptr<Pipe<Command>> gone_;
   std::vector<Owned> owned_;  // by number; the main thread's
+  bool has_unsent_ = false;   // a change of one of them, for lack of memory
   std::unique_ptr<Published[]> published_bodies_;
   std::vector<SoundingBody*> playing_;  // by number; the audio thread's
   std::vector<std::uint64_t> awake_;    // bit i % 64 of word i / 64: body i has something to do

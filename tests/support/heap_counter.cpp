@@ -6,9 +6,11 @@
 namespace carillon::tests {
 namespace {
 
-void count_allocation(std::size_t size) noexcept {
+/// False: it is to fail.
+bool count_allocation(std::size_t size) noexcept {
   ++g_allocations;
   g_bytes += static_cast<long>(size);
+  return g_until_failure < 0 || g_until_failure-- != 0;
 }
 
 }  // namespace
@@ -16,19 +18,18 @@ void count_allocation(std::size_t size) noexcept {
 
 // Those for arrays, and the aligned one that does not throw, call these (C++20, [new.delete]).
 [[gnu::noinline]] void* operator new(std::size_t size) {
-  carillon::tests::count_allocation(size);
-  if (void* memory = std::malloc(size)) return memory;
+  const bool succeeds = carillon::tests::count_allocation(size);
+  if (void* memory = succeeds ? std::malloc(size) : nullptr) return memory;
   throw std::bad_alloc();
 }
 [[gnu::noinline]] void* operator new(std::size_t size, std::align_val_t align) {
-  carillon::tests::count_allocation(size);
+  const bool succeeds = carillon::tests::count_allocation(size);
   const auto a = static_cast<std::size_t>(align);
-  if (void* memory = std::aligned_alloc(a, (size + a - 1) / a * a)) return memory;
+  if (void* memory = succeeds ? std::aligned_alloc(a, (size + a - 1) / a * a) : nullptr) return memory;
   throw std::bad_alloc();
 }
 [[gnu::noinline]] void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
-  carillon::tests::count_allocation(size);
-  return std::malloc(size);
+  return carillon::tests::count_allocation(size) ? std::malloc(size) : nullptr;
 }
 [[gnu::noinline]] void operator delete(void* memory, const std::nothrow_t&) noexcept { std::free(memory); }
 [[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }

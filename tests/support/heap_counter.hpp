@@ -1,4 +1,4 @@
-// operator new replaced by one that counts: in test_heap alone, which links heap_counter.cpp.
+// operator new replaced by one that counts, and fails where it is told to: in test_heap alone, which links heap_counter.cpp.
 #pragma once
 
 #include <atomic>
@@ -8,5 +8,7 @@ namespace carillon::tests {
 
 /// Since the start of the program; what is given back does not count.
 inline std::atomic<long> g_allocations{0}, g_bytes{0};
+/// Allocations that still succeed; the one after them fails, once. Below 0: all succeed.
+inline std::atomic<long> g_until_failure{-1};
 
 }  // namespace carillon::tests
