@@ -105,6 +105,9 @@ constexpr std::size_t kMinSize<carillon_options> = offsetof(carillon_options, he
 template <>
 constexpr std::size_t kMinSize<carillon_effect_counters> = offsetof(carillon_effect_counters, head_units);
 
+template <>
+constexpr std::size_t kMinSize<carillon_counters> = offsetof(carillon_counters, contacts_accepted);
+
 template <typename T>
 T make_default() {
   return T{};
@@ -214,6 +217,7 @@ carillon_contact make_default() {
   contact.barycentric[0] = 1.0;
   contact.normal[2] = 1.0;
   contact.patch_radius_m = 1e-4;
+  contact.impedance_n_s_m = CARILLON_BY_MATERIAL;
   contact.other = -1;
   return contact;
 }
@@ -225,6 +229,7 @@ carillon_motion make_default() {
   return motion;
 }
 
+static_assert(CARILLON_BY_MATERIAL == events::LastingContact::kByMaterial);
 static_assert(CARILLON_EFFECT_COUNT + CARILLON_LATER_EFFECT_COUNT + 3 == synth::kEffectCount &&
               CARILLON_CASCADE == 1 << static_cast<int>(synth::Effect::kCascade) &&
               CARILLON_NONLINEAR == 1 << static_cast<int>(synth::Effect::kNonlinear) &&
@@ -347,6 +352,23 @@ void carillon_bank_centre_m(const carillon_bank* bank, double centre_m[3]) {
   if (centre_m == nullptr) return;
   const carillon::Vec3 centre = bank == nullptr ? carillon::Vec3{} : bank->bank.rigid.centre_m;
   std::copy(centre.begin(), centre.end(), centre_m);
+}
+
+void carillon_body_facts_init_sized(carillon_body_facts* facts, size_t size) { init(facts, size); }
+
+carillon_status carillon_bank_get_facts(const carillon_bank* bank, carillon_body_facts* facts) {
+  if (bank == nullptr || !read(facts)) return CARILLON_BAD_ARGUMENT;
+  const bank::RigidBody& rigid = bank->bank.rigid;
+  const bank::Material& material = bank->bank.material;
+  carillon_body_facts ours{};
+  ours.mass_kg = rigid.mass_kg;
+  ours.volume_m3 = rigid.volume_m3;
+  std::copy(rigid.inertia_kg_m2.begin(), rigid.inertia_kg_m2.end(), ours.inertia_kg_m2);
+  ours.density_kg_m3 = material.density_kg_m3;
+  ours.young_modulus_pa = material.young_modulus_pa;
+  ours.poisson_ratio = material.poisson_ratio;
+  write(ours, facts);
+  return CARILLON_OK;
 }
 
 carillon_status carillon_bank_nearest_point(const carillon_bank* bank, const double point_m[3], int32_t* triangle, double barycentric[3],
@@ -651,7 +673,12 @@ carillon_status carillon_get_counters(const carillon_synth* synth, carillon_coun
                           .mode_samples = ours.mode_samples,
                           .faded = ours.faded,
                           .underruns = ours.underruns,
-                          .zeroed = ours.zeroed},
+                          .zeroed = ours.zeroed,
+                          .contacts_accepted = ours.contacts.accepted,
+                          .contacts_refused = ours.contacts.refused,
+                          .contacts_dropped = ours.contacts.dropped,
+                          .contacts_thinned = ours.contacts.thinned,
+                          .contacts_without_use = ours.contacts.without_use},
         counters);
   return CARILLON_OK;
 }

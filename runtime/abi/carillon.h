@@ -26,7 +26,7 @@ extern "C" {
 
 /* Grows with every function and field that is added. The number in the name of libcarillon.so.2 is another one, which changes only when
  * programs would have to be compiled again. */
-#define CARILLON_ABI_VERSION 8
+#define CARILLON_ABI_VERSION 9
 
 /* That of the library. */
 CARILLON_API uint32_t carillon_abi_version(void);
@@ -79,6 +79,24 @@ CARILLON_API const double* carillon_bank_vertices_m(const carillon_bank* bank);
 CARILLON_API const int32_t* carillon_bank_triangles(const carillon_bank* bank);
 /* The centre of mass in that frame, which carillon_motion moves about the world. Zeros for a NULL bank. */
 CARILLON_API void carillon_bank_centre_m(const carillon_bank* bank, double centre_m[3]);
+/* What physics needs of the body. `inertia_kg_m2` is about the centre of mass, row by row, in the axes of the mesh. Of a body of several
+ * materials, or of one that is not the same in all directions, the moduli are those of its isotropic equivalent, and the density is mass
+ * over volume. Zeros where the bank does not know: bodies with known modes may have no volume. */
+typedef struct carillon_body_facts {
+  uint32_t size;
+  uint32_t reserved;
+  double mass_kg;
+  double volume_m3;
+  double inertia_kg_m2[9];
+  double density_kg_m3;
+  double young_modulus_pa;
+  double poisson_ratio;
+} carillon_body_facts;
+
+#define carillon_body_facts_init(facts) carillon_body_facts_init_sized((facts), sizeof(carillon_body_facts))
+CARILLON_API void carillon_body_facts_init_sized(carillon_body_facts* facts, size_t size);
+/* `facts->size` must be set. */
+CARILLON_API carillon_status carillon_bank_get_facts(const carillon_bank* bank, carillon_body_facts* facts);
 /* The place on the surface that is nearest to a point [m], as carillon_impulse and carillon_contact take it: the triangle and the
  * barycentric coordinates of its corners. closest_m, the place itself, and distance_m may be NULL. O(log triangles). [any], several at
  * once; the first call of a bank makes a tree, which takes memory and 0.2 to 0.5 ms for 1,000 triangles, and others wait for it:
@@ -267,6 +285,8 @@ typedef enum carillon_contact_state {
   CARILLON_CONTACT_END = 2
 } carillon_contact_state;
 
+#define CARILLON_BY_MATERIAL (-1.0)
+
 /* One moment of a contact that lasts, as one of its two bodies feels it; the other body gets one too, with the same id. Between two of them
  * all values change linearly. Vectors are in the frame of the body's mesh. */
 typedef struct carillon_contact {
@@ -287,7 +307,8 @@ typedef struct carillon_contact {
   double other_sweep_m_s; /* over the other's */
   double spin_rad_s;      /* relative angular speed about the tangents: rolling */
   double patch_radius_m;  /* Hertz radius of the touch under force_n */
-  double impedance_n_s_m; /* of the other body at the point, as a dashpot; 0: takes nothing */
+  double impedance_n_s_m; /* of the other body at the point, as a dashpot; 0: takes nothing; CARILLON_BY_MATERIAL, the default: of a
+                             plane wave into its material over the patch, rho c pi patch_radius_m^2 */
 } carillon_contact;
 
 /* Where a body is: its centre of mass in the world. */
@@ -354,16 +375,21 @@ CARILLON_API double carillon_horizon_s(const carillon_synth* synth);
 typedef struct carillon_counters {
   uint32_t size;
   uint32_t reserved;
-  int64_t strikes;      /* played */
-  int64_t refused;      /* for a body or a place on it that is not there, or without room */
-  int64_t late;         /* strikes moved to the horizon */
-  int64_t faults;       /* events that cannot be played */
-  int64_t overflows;    /* events for which the ring had no room */
-  int64_t resets;       /* bodies silenced because their state was no number */
-  int64_t mode_samples; /* work: modes times samples */
-  int64_t faded;        /* groups of 16 modes that had to go for the budget */
-  int64_t underruns;    /* times that the sound overtook the last carillon_push_mark */
-  int64_t zeroed;       /* numbers of the output that were none, and are 0 */
+  int64_t strikes;              /* played */
+  int64_t refused;              /* for a body or a place on it that is not there, or without room */
+  int64_t late;                 /* strikes moved to the horizon */
+  int64_t faults;               /* events that cannot be played */
+  int64_t overflows;            /* events for which the ring had no room */
+  int64_t resets;               /* bodies silenced because their state was no number */
+  int64_t mode_samples;         /* work: modes times samples */
+  int64_t faded;                /* groups of 16 modes that had to go for the budget */
+  int64_t underruns;            /* times that the sound overtook the last carillon_push_mark */
+  int64_t zeroed;               /* numbers of the output that were none, and are 0 */
+  int64_t contacts_accepted;    /* carillon_contacts that are played */
+  int64_t contacts_refused;     /* for a triangle that is not there */
+  int64_t contacts_dropped;     /* of touches that are weaker than the eight of the body that are played */
+  int64_t contacts_thinned;     /* that took the place of the one before, for lack of room */
+  int64_t contacts_without_use; /* for a body without CARILLON_ROUGHNESS, CARILLON_ROLLING and CARILLON_CONTACT_DAMPING */
 } carillon_counters;
 
 #define carillon_counters_init(counters) carillon_counters_init_sized((counters), sizeof(carillon_counters))

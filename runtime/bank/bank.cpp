@@ -11,6 +11,12 @@ namespace carillon::bank {
 
 double Bank::freq_hz(std::size_t mode) const { return std::sqrt(eigenvalue_rad2_s2[mode]) / (2.0 * std::numbers::pi); }
 
+double calc_wave_impedance(const Material& material) {
+  const double nu = std::min(material.poisson_ratio, 0.45);
+  const double modulus = material.young_modulus_pa * (1.0 - nu) / ((1.0 + nu) * (1.0 - 2.0 * nu));
+  return std::sqrt(modulus * material.density_kg_m3);
+}
+
 double calc_decay(const Damping& damping, const Material& material, double eigenvalue_rad2_s2) {
   const double omega = std::sqrt(eigenvalue_rad2_s2);
   if (damping.law == "internal_friction") return damping.coefficient[0] * omega / 2.0;

@@ -44,6 +44,9 @@ struct Material {
   double alpha2_per_s = 0.0;  // mass-proportional
 };
 
+/// rho c_L [Pa s/m]: of a plane wave into the material, per area. Poisson's ratio is kept from 1/2, where that wave is infinitely fast.
+double calc_wave_impedance(const Material& material);
+
 /// How the decays came about, by name and numbers. d in 1/s, lambda = omega^2, f = omega / 2 pi:
 ///   "rayleigh"           d = (alpha1 lambda + alpha2) / 2, with the alphas of Material; no numbers here
 ///   "internal_friction"  d = coefficient[0] omega / 2, where the coefficient is tan(phi) (vdDP96)

@@ -10,6 +10,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "runtime/bank/bank.hpp"
 #include "runtime/base/chance.hpp"
 #include "runtime/impact/spring.hpp"
 
@@ -99,12 +100,11 @@ double LastingContacts::calc_patch(const Group& g, double radius_m) const {
   return std::max(kSmallest, impact::calc_patch_radius(g.push_n, radius_m, compliance));
 }
 
-/// Of a plane wave into the body over the patch. Poisson's ratio is kept from 1/2, where the wave would be of infinite speed.
+/// Of a plane wave into the body over the patch.
 double LastingContacts::calc_impedance(int body, double patch_m) const {
   const Matter& m = get_matter(body);
-  const double nu = std::min(m.poisson_ratio, 0.45);
-  const double modulus = m.young_modulus_pa * (1.0 - nu) / ((1.0 + nu) * (1.0 - 2.0 * nu));
-  return std::sqrt(modulus * m.density_kg_m3) * std::numbers::pi * patch_m * patch_m;
+  const bank::Material material{.young_modulus_pa = m.young_modulus_pa, .poisson_ratio = m.poisson_ratio, .density_kg_m3 = m.density_kg_m3};
+  return bank::calc_wave_impedance(material) * std::numbers::pi * patch_m * patch_m;
 }
 
 void LastingContacts::record(const rigid::Space& space, const Group& g, Spot& spot, std::vector<events::Event>& events) {

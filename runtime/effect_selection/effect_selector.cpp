@@ -519,6 +519,7 @@ std::array<synth::ContactSurface, 2> EffectSelector::State::find_surfaces(const 
   const auto complete = [](synth::ContactSurface surface, const bank::Bank& bank) {
     const double nu = bank.material.poisson_ratio;
     if (surface.modulus_pa == 0.0) surface.modulus_pa = bank.material.young_modulus_pa / (1.0 - nu * nu);
+    if (surface.wave_impedance_pa_s_m == 0.0) surface.wave_impedance_pa_s_m = bank::calc_wave_impedance(bank.material);
     return surface;
   };
   const synth::ContactSurface own = complete(of.surface, *of.bank);
@@ -635,15 +636,17 @@ void EffectSelector::State::apply(const events::LastingContact& contact) {
   }
   if (contact.state == events::ContactState::kEnd) return;
   const bool moves = offer(body, contact, contact.time_s);
-  if (!(contact.impedance_n_s_m > 0.0) || !body.possible.has(Effect::kContactDamping)) return;
+  if (!body.possible.has(Effect::kContactDamping)) return;
+  const auto [own, other] = find_surfaces(contact);
+  const double impedance = synth::find_impedance(contact, other);
+  if (!(impedance > 0.0)) return;
   // A dashpot z at the point adds z (phi . n)^2 / 2 to a decay; a decay that is wrong by the part e changes an exposure by e^2 / 2.
   if (!body.bank->calc_projections(contact.triangle, contact.barycentric, contact.normal, projection)) return;
   double max = 0.0, sounding = 0.0;
-  const auto [own, other] = find_surfaces(contact);
   const synth::ContactSpring spring = synth::calc_contact_spring(contact.patch_radius_m, own.modulus_pa, other.modulus_pa);
   const std::span<const BankLevels::Mode> modes = body.bank->get_modes();
   for (std::size_t m = 0; m < modes.size(); ++m) {
-    const double taken = 0.5 * contact.impedance_n_s_m * projection[m] * projection[m] +
+    const double taken = 0.5 * impedance * projection[m] * projection[m] +
                          synth::calc_spring_loss(spring, 2.0 * std::numbers::pi * modes[m].freq_hz, projection[m]);
     const double part = taken / modes[m].decay_per_s;
     max = std::max(max, part);

@@ -84,7 +84,8 @@ const char* find_own_fault(const LastingContact& contact) noexcept {
   if (!is_amount(contact.sweep_m_s) || !is_amount(contact.other_sweep_m_s)) return "a sweep is negative or not finite";
   if (!is_amount(contact.spin_rad_s)) return "the spin is negative or not finite";
   if (!(is_amount(contact.patch_radius_m) && contact.patch_radius_m > 0.0)) return "the radius of the patch is not above 0";
-  if (!is_amount(contact.impedance_n_s_m)) return "the impedance is negative or not finite";
+  if (!is_amount(contact.impedance_n_s_m) && contact.impedance_n_s_m != LastingContact::kByMaterial)
+    return "the impedance is negative or not finite";
   return nullptr;
 }
 

@@ -78,6 +78,9 @@ enum class ContactState : std::uint8_t { kBegin, kHold, kEnd };
 /// One sample of a contact that lasts, on one of its two bodies; both get one, with the same id. Between records values change linearly.
 /// Vectors are in the frame of the body's mesh.
 struct LastingContact {
+  /// As impedance_n_s_m: that of a plane wave into the other body over the patch, by its material (synth::find_impedance).
+  static constexpr double kByMaterial = -1.0;
+
   double time_s = 0.0;
   std::uint64_t id = 0;  // of the pair and the spot; the same while the touch lasts
   std::int32_t body = 0;
@@ -85,14 +88,14 @@ struct LastingContact {
   std::int32_t triangle = 0;
   ContactState state = ContactState::kHold;
   Vec3 barycentric{1.0, 0.0, 0.0};
-  Vec3 normal{};                 // unit, from the other body into this one
-  Vec3 slip_m_s{};               // velocity of this surface against the other's
-  double force_n = 0.0;          // normal, at least 0
-  double sweep_m_s = 0.0;        // speed of the contact over this body's surface; 0 for a box that slides flat
-  double other_sweep_m_s = 0.0;  // over the other's
-  double spin_rad_s = 0.0;       // relative angular speed about the tangents: rolling
-  double patch_radius_m = 0.0;   // Hertz radius of the touch under force_n, above 0
-  double impedance_n_s_m = 0.0;  // of the other body at the point, as a dashpot; 0: takes nothing
+  Vec3 normal{};                         // unit, from the other body into this one
+  Vec3 slip_m_s{};                       // velocity of this surface against the other's
+  double force_n = 0.0;                  // normal, at least 0
+  double sweep_m_s = 0.0;                // speed of the contact over this body's surface; 0 for a box that slides flat
+  double other_sweep_m_s = 0.0;          // over the other's
+  double spin_rad_s = 0.0;               // relative angular speed about the tangents: rolling
+  double patch_radius_m = 0.0;           // Hertz radius of the touch under force_n, above 0
+  double impedance_n_s_m = kByMaterial;  // of the other body at the point, as a dashpot; 0: takes nothing
 };
 
 /// Where a body is: its centre of mass and attitude.

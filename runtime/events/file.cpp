@@ -90,9 +90,10 @@ void write(Out out, const LastingContact& e) {
                  format_number(e.time_s), e.id, e.body, e.other, e.triangle, kStateNames[static_cast<std::size_t>(e.state)]);
   fmt::format_to(out, R"("barycentric": {}, "normal": {}, "slip_m_s": {}, "force_n": {}, )", format_numbers(e.barycentric),
                  format_numbers(e.normal), format_numbers(e.slip_m_s), format_number(e.force_n));
-  fmt::format_to(out, R"("sweep_m_s": {}, "other_sweep_m_s": {}, "spin_rad_s": {}, "patch_radius_m": {}, "impedance_n_s_m": {}}}}})",
-                 format_number(e.sweep_m_s), format_number(e.other_sweep_m_s), format_number(e.spin_rad_s), format_number(e.patch_radius_m),
-                 format_number(e.impedance_n_s_m));
+  fmt::format_to(out, R"("sweep_m_s": {}, "other_sweep_m_s": {}, "spin_rad_s": {}, "patch_radius_m": {})", format_number(e.sweep_m_s),
+                 format_number(e.other_sweep_m_s), format_number(e.spin_rad_s), format_number(e.patch_radius_m));
+  if (e.impedance_n_s_m != LastingContact::kByMaterial) fmt::format_to(out, R"(, "impedance_n_s_m": {})", format_number(e.impedance_n_s_m));
+  fmt::format_to(out, "}}}}");
 }
 
 template <class Moving>
@@ -157,14 +158,17 @@ class EventReader {
     e.other_sweep_m_s = in_.number("other_sweep_m_s");
     e.spin_rad_s = in_.number("spin_rad_s");
     e.patch_radius_m = in_.number("patch_radius_m");
-    e.impedance_n_s_m = in_.number_or("impedance_n_s_m", 0.0);
+    if (in_.has("impedance_n_s_m")) {
+      e.impedance_n_s_m = in_.number("impedance_n_s_m");
+      check_size("impedance_n_s_m", e.impedance_n_s_m);
+      if (e.impedance_n_s_m < 0.0) in_.fail("impedance_n_s_m", "is negative");
+    }
     check_size("slip_m_s", e.slip_m_s);
     check_size("force_n", e.force_n);
     check_size("sweep_m_s", e.sweep_m_s);
     check_size("other_sweep_m_s", e.other_sweep_m_s);
     check_size("spin_rad_s", e.spin_rad_s);
     check_size("patch_radius_m", e.patch_radius_m);
-    check_size("impedance_n_s_m", e.impedance_n_s_m);
     return finish(e);
   }
 

@@ -20,6 +20,9 @@ synth::ContactSurface make_ground(const Scene& scene) {
   surface.roughness_m = scene.ground->roughness_m;
   surface.friction = scene.ground->friction;
   surface.modulus_pa = scene.ground->young_modulus_pa / (1.0 - scene.ground->poisson_ratio * scene.ground->poisson_ratio);
+  surface.wave_impedance_pa_s_m = bank::calc_wave_impedance({.young_modulus_pa = scene.ground->young_modulus_pa,
+                                                             .poisson_ratio = scene.ground->poisson_ratio,
+                                                             .density_kg_m3 = scene.ground->density_kg_m3});
   return surface;
 }
 

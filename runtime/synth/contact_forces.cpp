@@ -14,6 +14,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <string>
 
 #include "runtime/base/error.hpp"
@@ -131,6 +132,11 @@ ContactNoise calc_contact_noise(const events::LastingContact& contact, const Con
                     texture, other_texture);
 }
 
+double find_impedance(const events::LastingContact& contact, const ContactSurface& other) noexcept {
+  if (contact.impedance_n_s_m != events::LastingContact::kByMaterial) return contact.impedance_n_s_m;
+  return other.wave_impedance_pa_s_m * std::numbers::pi * contact.patch_radius_m * contact.patch_radius_m;
+}
+
 ContactSpring calc_contact_spring(double patch_m, double own_pa, double other_pa) noexcept {
   const double modulus_pa = calc_pair_modulus(own_pa, other_pa);
   if (!(modulus_pa > 0.0) || !(patch_m > 0.0)) return {};
@@ -156,6 +162,7 @@ const char* find_fault(const ContactSurface& surface) noexcept {
   if (!is_amount(surface.roughness_m)) return "the roughness is negative or not finite";
   if (!is_amount(surface.friction)) return "the friction is negative or not finite";
   if (!is_amount(surface.modulus_pa)) return "the modulus is negative or not finite";
+  if (!is_amount(surface.wave_impedance_pa_s_m)) return "the impedance of waves is negative or not finite";
   return nullptr;
 }
 
@@ -263,7 +270,7 @@ bool ContactForces::take(const events::LastingContact& contact, const ContactSur
   record.sweep_m_s = contact.sweep_m_s;
   record.other_sweep_m_s = contact.other_sweep_m_s;
   record.patch_m = contact.patch_radius_m;
-  record.impedance = contact.impedance_n_s_m;
+  record.impedance = find_impedance(contact, other);
   record.normal = contact.normal;
   record.slip_m_s = contact.slip_m_s;
   record.barycentric = contact.barycentric;

@@ -22,17 +22,19 @@ namespace carillon::synth {
 
 /// What a surface is like to those who touch it.
 struct ContactSurface {
-  double roughness_m = 2e-6;  // rms height: fine machined metal, N7 of ISO 1302 (Ra 1.6 um)
-  double friction = 0.4;      // Coulomb; a contact of two takes the geometric mean
-  double modulus_pa = 0.0;    // E / (1 - nu^2); 0: that of the model's bank
-  std::uint64_t seed = 0;     // of its profile, together with the id of a contact: bodies of different seeds have different profiles
+  double roughness_m = 2e-6;           // rms height: fine machined metal, N7 of ISO 1302 (Ra 1.6 um)
+  double friction = 0.4;               // Coulomb; a contact of two takes the geometric mean
+  double modulus_pa = 0.0;             // E / (1 - nu^2); 0: that of the model's bank
+  double wave_impedance_pa_s_m = 0.0;  // bank::calc_wave_impedance; 0: that of the model's bank
+  std::uint64_t seed = 0;  // of its profile, together with the id of a contact: bodies of different seeds have different profiles
 };
 
 /// What is wrong with a surface, as part of a sentence; nullptr: nothing.
 const char* find_fault(const ContactSurface& surface) noexcept;
 
 /// The ground of scenes: concrete, smoothly trowelled.
-inline constexpr ContactSurface kGroundSurface{.roughness_m = 20e-6, .friction = 0.5, .modulus_pa = 30e9 / (1.0 - 0.2 * 0.2)};
+inline constexpr ContactSurface kGroundSurface{
+    .roughness_m = 20e-6, .friction = 0.5, .modulus_pa = 30e9 / (1.0 - 0.2 * 0.2), .wave_impedance_pa_s_m = 8.944e6};  // 2,400 kg/m^3
 
 /// The noise of a lasting contact at one moment: f = a F (exp(s h / h_rms - s^2 / 2) - 1), a = max(1, R), of the heights h.
 struct ContactNoise {
@@ -47,6 +49,9 @@ struct ContactNoise {
 /// As ContactForces has it for a record that acts on a body of the surface `own`; both with their moduli. No throw; any thread.
 ContactNoise calc_contact_noise(const events::LastingContact& contact, const ContactSurface& own, const ContactSurface& other,
                                 double rate_hz) noexcept;
+
+/// What the other body takes at a contact as a dashpot [N s/m]: that of the record, or of the other's material over the patch.
+double find_impedance(const events::LastingContact& contact, const ContactSurface& other) noexcept;
 
 /// The spring of a contact as a mode meets it, however little it moves.
 struct ContactSpring {

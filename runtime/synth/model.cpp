@@ -112,6 +112,7 @@ std::shared_ptr<const Model> Model::make(const bank::Bank& bank, const ModelOpti
                                                           : std::cbrt(std::max(0.0, bank.rigid.volume_m3) * 3.0 / (4.0 * std::numbers::pi));
   const bank::Material& material = bank.material;
   model->plane_strain_modulus_pa_ = material.young_modulus_pa / (1.0 - material.poisson_ratio * material.poisson_ratio);
+  model->wave_impedance_pa_s_m_ = bank::calc_wave_impedance(material);
   for (const Sorted& sorted : ringing) model->add_ringing_mode(sorted.mode);
   model->add_damped_modes(damped);
   if (options.like != nullptr && model->has_modes_of(*options.like) &&
@@ -425,7 +426,7 @@ class TableReader {
 };
 
 // Of a build: another one that lays its tables out in another way has other sizes, or another number here.
-constexpr std::uint64_t kTablesMark = 0x63617272'00000001 + (sizeof(SoundTable) << 8) + (sizeof(StrikeTable) << 16);
+constexpr std::uint64_t kTablesMark = 0x63617272'00000002 + (sizeof(SoundTable) << 8) + (sizeof(StrikeTable) << 16);
 
 }  // namespace
 
@@ -436,6 +437,7 @@ std::vector<std::byte> Model::write_tables() const {
   writer.put(mass_kg_);
   writer.put(sphere_radius_m_);
   writer.put(plane_strain_modulus_pa_);
+  writer.put(wave_impedance_pa_s_m_);
   writer.put(static_cast<std::int64_t>(ringing_));
   writer.put(modes_);
   writer.put(sound_);
@@ -458,6 +460,7 @@ std::shared_ptr<const Model> Model::read_tables(std::span<const std::byte> bytes
   reader.take(model->mass_kg_);
   reader.take(model->sphere_radius_m_);
   reader.take(model->plane_strain_modulus_pa_);
+  reader.take(model->wave_impedance_pa_s_m_);
   reader.take(ringing);
   reader.take(model->modes_);
   reader.take(model->sound_);

@@ -91,6 +91,7 @@ class Model {
   double get_sphere_radius_m() const { return sphere_radius_m_; }
   /// E / (1 - nu^2) of the bank's material [Pa].
   double get_plane_strain_modulus_pa() const { return plane_strain_modulus_pa_; }
+  double get_wave_impedance_pa_s_m() const { return wave_impedance_pa_s_m_; }
   /// nullptr where the bank has no multipoles, or this build not the effect.
   const ModelDirectivity* get_directivity() const { return directivity_.get(); }
   /// nullptr where the bank has no nonlinear energy of modes that ring, or this build not the effect.
@@ -159,7 +160,7 @@ class Model {
   double rate_hz_ = 0.0;
   double mass_kg_ = 0.0, sphere_radius_m_ = 0.0;
   Vec3 centre_m_{};
-  double plane_strain_modulus_pa_ = 0.0;
+  double plane_strain_modulus_pa_ = 0.0, wave_impedance_pa_s_m_ = 0.0;
   std::vector<Mode> modes_;
   int ringing_ = 0;  // modes in groups, the first of modes_; the rest is damped_
   std::vector<SoundTable> sound_;

@@ -142,6 +142,8 @@ std::unique_ptr<BodyChange> SoundingBody::make_change(EffectSet from, EffectSet 
         Attitude(static_cast<std::size_t>(frame_.max_waypoints))});
   }
   change->modulus_pa = frame_.surface.modulus_pa > 0.0 ? frame_.surface.modulus_pa : model->get_plane_strain_modulus_pa();
+  change->wave_impedance_pa_s_m =
+      frame_.surface.wave_impedance_pa_s_m > 0.0 ? frame_.surface.wave_impedance_pa_s_m : model->get_wave_impedance_pa_s_m();
   if (needs_contacts(to) && (change->inherits || !needs_contacts(from))) {
     change->contacts = std::make_unique<ContactForces>(model, ContactForcesOptions{.surface = frame_.surface, .effects = to});
   }
@@ -189,6 +191,7 @@ void SoundingBody::apply(BodyChange& change, const ListenerTracks& listener, std
     }
   }
   surface_.modulus_pa = change.modulus_pa;
+  surface_.wave_impedance_pa_s_m = change.wave_impedance_pa_s_m;
   put_contacts(change);
   if (!change.propagation) return direct_voice();
   std::swap(next_propagation_, change.propagation);
@@ -343,14 +346,23 @@ bool SoundingBody::play(const Strike& strike, bool has_length, bool is_new, std:
   return is_taken;
 }
 
-bool SoundingBody::take(const events::LastingContact& contact, const ContactSurface& other, std::int64_t sample) noexcept {
-  if (!needs_contacts(effects_) || !contacts_) return false;
+bool SoundingBody::take(const events::LastingContact& contact, const ContactSurface& other, std::int64_t sample,
+                        ContactRecordCounters& counters) noexcept {
+  if (!needs_contacts(effects_) || !contacts_) {
+    ++counters.without_use;
+    return false;
+  }
   wake(sample);
   events::LastingContact own = contact;
   own.time_s -= static_cast<double>(first_) / frame_.rate_hz;
-  const std::int64_t refused = contacts_->get_counters().refused;
+  const ContactCounters before = contacts_->get_counters();
   const bool is_taken = contacts_->take(own, other);
-  work_.refused += contacts_->get_counters().refused - refused;
+  const ContactCounters& now = contacts_->get_counters();
+  work_.refused += now.refused - before.refused;
+  counters.accepted += now.accepted - before.accepted;
+  counters.refused += now.refused - before.refused;
+  counters.dropped += now.dropped - before.dropped;
+  counters.thinned += now.thinned - before.thinned;
   return is_taken;
 }
 

@@ -58,15 +58,21 @@ struct BodyChange {
   std::unique_ptr<BodyAccelerationNoise> acceleration_noise;
   std::unique_ptr<Propagation> propagation;
   std::unique_ptr<ContactForces> contacts;
-  double modulus_pa = 0.0;                   // of the surface
-  bool inherits = false;                     // voice, contacts and acceleration_noise take the place of those there
-  std::unique_ptr<VoiceHandover> handover;   // for the voice
-  std::unique_ptr<Directivity> directivity;  // for the propagation that is there, of the voice
+  double modulus_pa = 0.0, wave_impedance_pa_s_m = 0.0;  // of the surface
+  bool inherits = false;                                 // voice, contacts and acceleration_noise take the place of those there
+  std::unique_ptr<VoiceHandover> handover;               // for the voice
+  std::unique_ptr<Directivity> directivity;              // for the propagation that is there, of the voice
 
   EffectBytes calc_bytes() const;
 };
 
 /// What a body has done: work by effect, in the units of EffectCounters, and ticks if they are measured.
+/// Records of lasting contacts.
+struct ContactRecordCounters {
+  std::int64_t accepted = 0, refused = 0, dropped = 0, thinned = 0;  // ContactCounters
+  std::int64_t without_use = 0;                                      // for a body without an effect of contacts
+};
+
 struct BodyWork {
   PerEffect<std::int64_t> units{};
   PerEffect<std::int64_t> ticks{};
@@ -117,7 +123,8 @@ class SoundingBody {
   bool take(const events::Impulse& impulse, std::int64_t sample) noexcept;
   bool take(const events::Force& force, std::int64_t sample) noexcept;
   /// `other`: the surface of the other body.
-  bool take(const events::LastingContact& contact, const ContactSurface& other, std::int64_t sample) noexcept;
+  bool take(const events::LastingContact& contact, const ContactSurface& other, std::int64_t sample,
+            ContactRecordCounters& counters) noexcept;
   bool take(const events::BodyMotion& motion) noexcept;
 
   /// Adds to `mix` what is heard of it in samples `sample` to `sample + count`, all of one block.
@@ -172,7 +179,7 @@ class SoundingBody {
   std::unique_ptr<Voice> voice_;
   std::unique_ptr<BodyAccelerationNoise> acceleration_noise_;
   std::unique_ptr<ContactForces> contacts_;  // attached to voice_
-  ContactSurface surface_;                   // with the modulus of the model
+  ContactSurface surface_;                   // with the material of the model
   std::unique_ptr<Propagation> propagation_, next_propagation_;
   BodyChange* change_ = nullptr;
   bool fading_ = false;        // from air_ to next_air_, in this block

@@ -397,7 +397,7 @@ void Synthesiser::take(const events::LastingContact& contact) noexcept {
   const SoundingBody* other =
       contact.other >= 0 && contact.other < options_.max_bodies ? playing_[static_cast<std::size_t>(contact.other)] : nullptr;
   count(*body, [&] {
-    if (!body->take(contact, other != nullptr ? other->get_surface() : options_.ground, sample_)) return;
+    if (!body->take(contact, other != nullptr ? other->get_surface() : options_.ground, sample_, work_.contacts)) return;
     set_awake(contact.body);
     give_floor(*body);
   });
@@ -604,8 +604,11 @@ double Synthesiser::get_radiated_j(int body) const noexcept {
 }
 
 void Synthesiser::publish_counters() noexcept {
-  const std::array<std::int64_t, 8> values{work_.strikes,      work_.refused, work_.late,      work_.resets,
-                                           work_.mode_samples, work_.faded,   work_.underruns, work_.zeroed};
+  const ContactRecordCounters& contacts = work_.contacts;
+  const std::array values{work_.strikes,    work_.refused,    work_.late,          work_.resets,      work_.mode_samples,
+                          work_.faded,      work_.underruns,  work_.zeroed,        contacts.accepted, contacts.refused,
+                          contacts.dropped, contacts.thinned, contacts.without_use};
+  static_assert(values.size() == std::tuple_size_v<decltype(published_)>);
   for (std::size_t i = 0; i < values.size(); ++i) published_[i].store(values[i], std::memory_order_relaxed);
 }
 
@@ -620,7 +623,8 @@ SynthesiserCounters Synthesiser::get_counters() const noexcept {
           .mode_samples = get(4),
           .faded = get(5),
           .underruns = get(6),
-          .zeroed = get(7)};
+          .zeroed = get(7),
+          .contacts = {.accepted = get(8), .refused = get(9), .dropped = get(10), .thinned = get(11), .without_use = get(12)}};
 }
 
 }  // namespace carillon::synth

@@ -102,6 +102,7 @@ struct SynthesiserCounters {
   std::int64_t faded = 0;         // groups of modes that had to go for the budget
   std::int64_t underruns = 0;     // times that the sound overtook the last events::TimeWatermark
   std::int64_t zeroed = 0;        // numbers of the output that were none, and are 0
+  ContactRecordCounters contacts;
 };
 
 /// What it keeps true: body numbers name at most one body that sounds; all bodies have rendered the same samples, in blocks of kBlock from
@@ -277,7 +278,7 @@ class Synthesiser {
   std::atomic<float> gain_{1.0F};
   std::atomic<std::int64_t> position_{0};
   std::atomic<std::int64_t> horizon_{0};
-  std::array<std::atomic<std::int64_t>, 8> published_{};
+  std::array<std::atomic<std::int64_t>, 13> published_{};
 };
 
 }  // namespace carillon::synth

@@ -1,4 +1,4 @@
-// operator new replaced by one that counts, and fails where it is told to: in test_heap alone, which links heap_counter.cpp.
+// operator new replaced by one that counts, and fails where a test asks for it: in test_heap alone, which links heap_counter.cpp.
 #pragma once
 
 #include <atomic>

@@ -152,6 +152,18 @@ static void check_nearest(const carillon_bank* bank) {
   CHECK(carillon_bank_nearest_point(bank, point, NULL, weight, closest, &distance) == CARILLON_BAD_ARGUMENT);
   CHECK(carillon_bank_nearest_point(bank, point, &triangle, NULL, closest, &distance) == CARILLON_BAD_ARGUMENT);
   CHECK(carillon_bank_vertex_count(NULL) == 0 && carillon_bank_vertices_m(NULL) == NULL && carillon_bank_triangles(NULL) == NULL);
+  {
+    carillon_body_facts facts;
+    carillon_body_facts_init(&facts);
+    CHECK(facts.size == sizeof facts && facts.mass_kg == 0);
+    CHECK(carillon_bank_get_facts(bank, &facts) == CARILLON_OK);
+    CHECK(facts.mass_kg > 0 && fabs(facts.mass_kg - facts.density_kg_m3 * facts.volume_m3) < 1e-6 * facts.mass_kg);
+    CHECK(facts.young_modulus_pa > 0 && facts.poisson_ratio > -1 && facts.poisson_ratio < 0.5);
+    CHECK(facts.inertia_kg_m2[0] > 0 && facts.inertia_kg_m2[1] == facts.inertia_kg_m2[3]);
+    facts.size = 4;
+    CHECK(carillon_bank_get_facts(bank, &facts) == CARILLON_BAD_ARGUMENT);
+    CHECK(carillon_bank_get_facts(NULL, &facts) == CARILLON_BAD_ARGUMENT && carillon_bank_get_facts(bank, NULL) == CARILLON_BAD_ARGUMENT);
+  }
   carillon_bank_centre_m(NULL, centre);
   CHECK(centre[0] == 0 && centre[1] == 0 && centre[2] == 0);
   carillon_bank_centre_m(bank, NULL);
@@ -394,6 +406,8 @@ static void check_contacts(const carillon_model* model) {
   carillon_counters_init(&counters);
   carillon_counters_init(NULL);
   CHECK(carillon_get_counters(synth, &counters) == CARILLON_OK && counters.underruns == 0 && counters.faults == 3);
+  /* A body has no effects of contacts unless it asks for them. */
+  CHECK(counters.contacts_without_use == 3 && counters.contacts_accepted == 0);
   (void)play(synth, 200); /* beyond the mark */
   CHECK(carillon_get_counters(synth, &counters) == CARILLON_OK && counters.underruns == 1);
   carillon_destroy(synth);
@@ -436,8 +450,46 @@ static float slide(const carillon_model* model, uint32_t effects, double roughne
   return peak;
 }
 
+/* Records of lasting contacts are counted by what becomes of them: nine touches where there is room for eight, one of no triangle. */
+static void check_contact_counters(const carillon_model* model) {
+  const double place[3] = {0, 1, 0};
+  carillon_options options;
+  carillon_body_options body_options;
+  carillon_counters counters;
+  carillon_contact contact;
+  carillon_synth* synth;
+  int32_t body;
+  int i;
+  carillon_options_init(&options);
+  CHECK(carillon_create(&options, &synth, message, sizeof message) == CARILLON_OK);
+  carillon_body_options_init(&body_options);
+  body_options.effects |= CARILLON_ROUGHNESS;
+  for (i = 0; i < 3; ++i) body_options.position_m[i] = place[i];
+  CHECK(carillon_add_body_with(synth, model, &body_options, &body, message, sizeof message) == CARILLON_OK);
+  (void)play(synth, 1);
+  carillon_contact_init(&contact);
+  CHECK(contact.impedance_n_s_m == CARILLON_BY_MATERIAL);
+  contact.body = body;
+  contact.force_n = 1;
+  for (i = 1; i <= 9; ++i) {
+    contact.id = (uint64_t)i;
+    CHECK(carillon_push_contact(synth, &contact) == CARILLON_OK);
+  }
+  contact.triangle = 1 << 30;
+  CHECK(carillon_push_contact(synth, &contact) == CARILLON_OK);
+  contact.impedance_n_s_m = -2;
+  CHECK(carillon_push_contact(synth, &contact) == CARILLON_BAD_INPUT);
+  (void)play(synth, 2);
+  carillon_counters_init(&counters);
+  CHECK(carillon_get_counters(synth, &counters) == CARILLON_OK);
+  CHECK(counters.contacts_accepted == 8 && counters.contacts_dropped == 1 && counters.contacts_refused == 1);
+  CHECK(counters.contacts_thinned == 0 && counters.contacts_without_use == 0);
+  carillon_destroy(synth);
+}
+
 static void check_surfaces(const carillon_model* model) {
   const float rough = slide(model, CARILLON_ROUGHNESS, 5e-6);
+  check_contact_counters(model);
   CHECK(rough > 0);
   CHECK(slide(model, CARILLON_ROUGHNESS, 5e-9) < 0.5F * rough);
   CHECK(slide(model, CARILLON_ROUGHNESS, 0) == 0);

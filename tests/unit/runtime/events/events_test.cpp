@@ -146,7 +146,7 @@ TEST(Events, ContactsAreChecked) {
   EXPECT_EQ(spoil(right, [](LastingContact& e) { e.other_sweep_m_s = kNan; }), "a sweep is negative or not finite");
   EXPECT_EQ(spoil(right, [](LastingContact& e) { e.spin_rad_s = kNan; }), "the spin is negative or not finite");
   EXPECT_EQ(spoil(right, [](LastingContact& e) { e.patch_radius_m = 0.0; }), "the radius of the patch is not above 0");
-  EXPECT_EQ(spoil(right, [](LastingContact& e) { e.impedance_n_s_m = -1.0; }), "the impedance is negative or not finite");
+  EXPECT_EQ(spoil(right, [](LastingContact& e) { e.impedance_n_s_m = -2.0; }), "the impedance is negative or not finite");
 }
 
 TEST(Events, MotionsAndListenersAreChecked) {

@@ -267,6 +267,16 @@ TEST(Recording, CanBeWrittenByHand) {
   EXPECT_EQ(impulse.duration_s, 1e-4);
 }
 
+TEST(Recording, AContactMayLeaveTheImpedanceToTheMaterial) {
+  LastingContact contact;
+  contact.normal = {0.0, 0.0, 1.0}, contact.patch_radius_m = 1e-4;
+  const std::string text = format_recording({{{"ball", 20}}, {contact}});
+  EXPECT_EQ(text.find("impedance"), std::string::npos);
+  const Recording back = parse_recording(text, "run.jsonl");
+  EXPECT_EQ(std::get<LastingContact>(back.events[0]).impedance_n_s_m, LastingContact::kByMaterial);
+  expect_error(replace(text, R"("patch_radius_m")", R"("impedance_n_s_m": -1, "patch_radius_m")"), "impedance_n_s_m");
+}
+
 TEST(Recording, EveryPieceOfItIsRefusedButTheWhole) {
   const Recording recording{{{"ball", 20}}, {TimeWatermark{0.25}, Impulse{}, TimeWatermark{0.5}}};
   const std::string text = format_recording(recording);

@@ -496,6 +496,18 @@ double calc_dense_energy(const std::vector<InventedMode>& modes, const std::vect
   return energy;
 }
 
+TEST(ContactForces, TakeTheImpedanceOfTheOthersMaterialWhereTheRecordHasNone) {
+  LastingContact contact = make_sliding(0.0, 0.0);
+  contact.patch_radius_m = 1e-3;
+  // Concrete: 33.3 GPa along a wave, 2,400 kg/m^3.
+  const double concrete = std::sqrt(30e9 * 0.8 / (1.2 * 0.6) * 2400.0);
+  EXPECT_NEAR(find_impedance(contact, kGroundSurface), concrete * pi * 1e-6, 1e-3 * concrete * pi * 1e-6);
+  contact.impedance_n_s_m = 3.0;
+  EXPECT_EQ(find_impedance(contact, kGroundSurface), 3.0);
+  contact.impedance_n_s_m = 0.0;
+  EXPECT_EQ(find_impedance(contact, kGroundSurface), 0.0);
+}
+
 TEST(ContactForces, TakeTheEnergyThatTheDenseEquationsSay) {
   const std::vector<InventedMode> modes{{310.0, 1.0, 1.0, {0.0, 0.0, 0.9}},
                                         {870.0, 2.0, 1.0, {0.0, 0.0, -0.6}},
