@@ -1,0 +1,32 @@
+#!/usr/bin/python3
+"""Where npm's registry cannot be reached the page is left out, in one line, and the build goes on: the target's own command ends well."""
+import os
+import pathlib
+import subprocess
+import tempfile
+
+PAGE = pathlib.Path(os.environ["CARILLON_SOURCE_DIR"]) / "jobs/explore"
+
+with tempfile.TemporaryDirectory() as scratch:
+    folder = pathlib.Path(scratch)
+    done = subprocess.run(
+        [
+            "cmake",
+            "-DNPM=npm",
+            f"-DFROM={PAGE / 'page'}",
+            f"-DWORK={folder / 'work'}",
+            f"-DTO={folder / 'page'}",
+            "-DSOURCES=index.html",
+            "-P",
+            PAGE / "make_page.cmake",
+        ],
+        env=os.environ | {"npm_config_registry": "http://127.0.0.1:9", "npm_config_cache": str(folder / "cache")},
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    said = done.stdout + done.stderr
+    assert done.returncode == 0, said
+    lines = [line for line in said.splitlines() if line.strip()]
+    assert len(lines) == 1 and "carillon explore has no page" in lines[0] and "three.js" in lines[0], said
+    assert not (folder / "page").exists(), "there is half a page"
