@@ -23,9 +23,10 @@ namespace carillon::cli {
 namespace {
 
 constexpr const char* kAbout =
-    "Jobs and their banks. A bank is kept under the hash of the job, the bytes of its mesh and the version of the solver: what was "
-    "computed once is\n"
-    "never computed again, from whatever folder it is asked for. Start with: carillon submit JOB.json --run";
+    "From an object to its sound: carillon hear OBJECT --material steel. Of many: carillon submit JOB.json --run. A bank is kept under the\n"
+    "hash of the job, the bytes of its mesh and the version of the solver: what was computed once is never computed again, from whatever\n"
+    "folder it is asked for.";
+constexpr const char* kShortFooter = "What an ID is, exit codes, store and profile: carillon --help";
 constexpr const char* kFooter =
     "ID is an id or its beginning, or the job file. Exit codes: 0 done, 1 not done yet, 2 the input cannot be used, 3 a job failed, 4 the "
     "machine\n"
@@ -365,7 +366,7 @@ int find_command(int argc, char** argv) {
 
 Run parse_command_line(int argc, char** argv, Shared& shared) {
   CLI::App app(kAbout, "carillon");
-  app.footer(kFooter);
+  app.footer(kShortFooter);  // of the commands
   app.require_subcommand(1);
   app.fallthrough();
   Run run;
@@ -373,9 +374,10 @@ Run parse_command_line(int argc, char** argv, Shared& shared) {
   app.add_option("--profile", shared.profile_option, "Profile file");
   app.add_flag("--json", shared.json, "One JSON document (of commands that keep running: one object a line)");
   app.set_version_flag("--version", version::describe("carillon"));
-  for (const auto add : {add_submit, add_status, add_log, add_cancel, add_retry, add_explain, add_run, add_get, add_gc, add_verify,
-                         add_validate, add_study, add_report, add_hear, add_explore, add_materials, add_bank_for})
+  for (const auto add : {add_hear, add_explore, add_materials, add_submit, add_status, add_log, add_cancel, add_retry, add_explain, add_run,
+                         add_get, add_gc, add_verify, add_validate, add_study, add_report, add_bank_for})
     add(app, shared, run);
+  app.footer(kFooter);
   add_attempt(app, run);
   add_task(app, run);
   check_command(app, argc, argv);
