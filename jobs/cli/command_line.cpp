@@ -23,7 +23,8 @@ namespace carillon::cli {
 namespace {
 
 constexpr const char* kAbout =
-    "From an object to its sound: carillon hear OBJECT --material steel. Of many: carillon submit JOB.json --run. A bank is kept under the\n"
+    "From an object to its sound: carillon hear OBJECT --material steel. Of many: carillon submit JOB.json --run. A bank is kept under "
+    "the\n"
     "hash of the job, the bytes of its mesh and the version of the solver: what was computed once is never computed again, from whatever\n"
     "folder it is asked for.";
 constexpr const char* kShortFooter = "What an ID is, exit codes, store and profile: carillon --help";
@@ -135,8 +136,8 @@ void add_run(CLI::App& app, Shared& shared, Run& run) {
   CLI::App* command = app.add_subcommand("run",
                                          "Works through the queue on this machine until it is empty: as many jobs at once as cores and "
                                          "memory allow. Any number may run on one store.\n"
-                                         "Ctrl-C saves what runs and puts it back into the queue; once more ends it. Exit code 0: the "
-                                         "queue is empty, whatever became of single jobs.");
+                                         "Ctrl-C saves what runs and puts it back into the queue; once more ends it. Exit code 0: all "
+                                         "are done, 3: one failed or was cancelled.");
   command->add_flag("--keep", queue.runner.keep, "Stay and wait for more jobs when the queue is empty");
   command->add_option("--cores", queue.runner.cores, "Use at most so many")->check(CLI::Range(1, kMaxRanks));
   command->add_option("--memory-gb", queue.runner.memory_gb, "Use at most so much")->check(make_gb_check(1e-3));

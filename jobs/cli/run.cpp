@@ -38,7 +38,7 @@ int run_until_done(Shared& shared, const std::vector<store::Id>& ids, bool has_p
   options.attempt.program = base::find_self();
   options.quiet = shared.json;
   options.attempt.mpirun_options = shared.profile().mpirun_options;
-  if (const int code = queue::run(shared.store(), options); code != 0) return code;
+  if (const int code = queue::run(shared.store(), options); code != 0 && code != kExitSolve) return code;  // 3: of any job
   std::vector<registry::Job> jobs;
   for (const store::Id& id : ids) {
     if (auto job = shared.registry().find(id)) jobs.push_back(std::move(*job));
@@ -47,10 +47,7 @@ int run_until_done(Shared& shared, const std::vector<store::Id>& ids, bool has_p
 }
 
 int run_queue(Shared& shared, const QueueOptions& options) {
-  if (options.engine == "slurm") {
-    run_with_slurm(shared, options.queue);
-    return 0;
-  }
+  if (options.engine == "slurm") return run_with_slurm(shared, options.queue);
   queue::RunOptions wanted = options.queue;
   wanted.attempt.mpirun_options = shared.profile().mpirun_options;
   wanted.attempt.program = base::find_self();

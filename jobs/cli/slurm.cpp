@@ -4,7 +4,11 @@
 #include <time.h>
 
 #include <algorithm>
+#include <set>
+#include <utility>
+#include <vector>
 
+#include "jobs/cli/follow.hpp"
 #include "jobs/process/process.hpp"
 #include "jobs/queue/display.hpp"
 #include "jobs/slurm/engine.hpp"
@@ -78,16 +82,23 @@ queue::CommandResult cancel_in_slurm(Shared& shared, const store::Id& id) {
   return {true, "cancelled"};
 }
 
-void run_with_slurm(Shared& shared, const queue::RunOptions& options) {
+int run_with_slurm(Shared& shared, const queue::RunOptions& options) {
   shared.has_pictures = options.attempt.has_pictures;
   queue::Display display(shared.json, options.quiet,
                          [&](const store::Id& id) { return store::read_progress(shared.store().work_folder(id)); });
+  std::set<store::Id> worked;
   for (;;) {
     for (const Job& job : find_engine(shared).follow(shared.registry())) display.print_event(to_text(job.state), job);
     for (const Job& job : hand_over(shared)) display.print_event(job.state == JobState::failed ? "failed" : "queued", job);
     const std::vector<Job> open = list_open(shared);
+    for (const Job& job : open) worked.insert(job.id);
     display.show(open);
-    if (open.empty() && !options.runner.keep) return;
+    if (open.empty() && !options.runner.keep) {
+      std::vector<Job> ended;
+      for (const store::Id& id : worked)
+        if (auto job = shared.registry().find(id)) ended.push_back(std::move(*job));
+      return find_exit_code(ended);
+    }
     const double until_s = base::get_boot_s() + shared.profile().slurm.poll_s;
     while (base::get_boot_s() < until_s) {
       const timespec time{0, kStepNs};

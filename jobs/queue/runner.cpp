@@ -10,6 +10,7 @@
 
 #include "jobs/attempt/attempt.hpp"
 #include "jobs/queue/settle.hpp"
+#include "runtime/base/error.hpp"
 
 namespace carillon::queue {
 namespace {
@@ -40,7 +41,7 @@ int Runner::run() {
   for (;;) {
     double wait_s = kStepS;
     try {
-      if (step()) return exit_code_;
+      if (step()) return find_exit_code();
     } catch (const SystemError& error) {
       // A full disk passes; whatever else the registry cannot do ends this.
       if (!at_.disk.is_full(&error)) throw;
@@ -54,16 +55,28 @@ int Runner::run() {
   }
 }
 
+/// Whoever settled the jobs, their rows say how they ended.
+int Runner::find_exit_code() const {
+  if (exit_code_ != 0) return exit_code_;
+  const bool has_failed = std::any_of(worked_.begin(), worked_.end(), [&](const store::Id& id) {
+    const std::optional<Job> job = table_.find(id);
+    return job && (job->state == JobState::failed || job->state == JobState::cancelled);
+  });
+  return has_failed ? kExitSolve : 0;
+}
+
 bool Runner::step() {
   const bool is_first = std::exchange(is_first_step_, false);
   reap_children();
   for (const Job& job : settle(at_, table_)) show_end(job);
   std::vector<Job> jobs = list_open();
+  for (const Job& job : jobs) worked_.insert(job.id);
   release_lost(jobs);
   const bool has_ready = std::any_of(jobs.begin(), jobs.end(), [](const Job& job) { return job.state != JobState::running; });
   if (stops_ == 0 && has_ready) start_what_fits();
   start_claimed();
   if (has_ready) jobs = list_open();
+  for (const Job& job : jobs) worked_.insert(job.id);
   if (is_first) show_adopted(jobs);
   ask_cancelled(jobs);
   display_.show(jobs);

@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -31,7 +32,8 @@ class Runner {
   Runner(registry::JobTable& table, const Environment& at, Display& display, FindNeeds find_needs, RunnerOptions options)
       : table_(table), at_(at), display_(display), calc_needs_(std::move(find_needs)), options_(options) {}
 
-  /// Steps and waits until the queue is empty, or until two signals have come, or one and all attempts have ended. The exit code.
+  /// Steps and waits until the queue is empty, or until two signals have come, or one and all attempts have ended. The exit code: 0, 3 when
+  /// a job failed or was cancelled meanwhile, or 128 + the signal.
   int run();
   /// One round; true when there is nothing left to do.
   bool step();
@@ -40,6 +42,7 @@ class Runner {
 
  private:
   std::vector<registry::Job> list_open() const;
+  int find_exit_code() const;
   void reap_children();
   void show_end(const registry::Job& job);
   void show_adopted(const std::vector<registry::Job>& jobs);
@@ -65,6 +68,7 @@ class Runner {
   const FindNeeds calc_needs_;
   const RunnerOptions options_;
   std::map<pid_t, registry::Job> children_;
+  std::set<store::Id> worked_;                 // open while this ran
   std::map<store::Id, JobNeeds> needs_;        // until an attempt has ended
   std::map<store::Id, double> blocked_since_;  // boot seconds
   std::map<store::Id, double> lost_since_;

@@ -84,7 +84,7 @@ class Path(Bench):
         (self.folder / "hole.msh").write_text("$MeshFormat\nno mesh\n")
         file = self.write("bar.json", job)
         self.ask("submit", file)
-        self.run_it("run", "--quiet")
+        self.run_it("run", "--quiet", code=3)
         state = self.ask("status", file)["jobs"][0]
         self.assertEqual((state["state"], state["attempts"]), ("failed", 1))
         self.assertIn(str(self.folder / "hole.msh"), state["reason"])
@@ -116,7 +116,7 @@ class Path(Bench):
         del mesh["body"]
         self.write("2.json", mesh)
         self.run_it("submit", done, failed)
-        self.run_it("run", "--quiet")
+        self.run_it("run", "--quiet", code=3)
         self.run_it("submit", queued)
         wanted = {job["name"]: (job["id"], job["state"], job["reason"], job["bank"]) for job in self.ask("status")["jobs"]}
         self.assertEqual([state for _, state, *_ in wanted.values()], ["done", "failed", "queued"])
@@ -180,7 +180,7 @@ class Path(Bench):
     def test_explain_and_submit_agree_on_a_job_that_failed_before_it_ran(self):
         file = self.write("bar.json", make_job())
         self.run_it("submit", file, "--memory-gb", "1000000")
-        self.run_it("run", "--quiet")
+        self.run_it("run", "--quiet", code=3)
         self.assertEqual(self.ask("status")["jobs"][0]["state"], "failed")
         said = self.ask("explain", file)
         self.assertTrue(said["would_run"])

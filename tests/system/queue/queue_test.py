@@ -61,7 +61,7 @@ def hopeless(service):
         service.write_job("bad.json", "bad.msh"),
         service.write_job("huge.json", "bar.msh", 15000, resources={"memory_gb": 1e6}),
     )
-    check(service.wait_end(service.run()) == 0, "carillon run ends badly")
+    check(service.wait_end(service.run()) == 3, "carillon run ends badly")
     jobs = service.jobs()
     check(jobs[good]["state"] == "done", f"{jobs[good]}")
     check(jobs[bad]["state"] == "failed" and jobs[bad]["attempts"] == 1 and "cut short" in jobs[bad]["reason"], f"{jobs[bad]}")
@@ -85,7 +85,7 @@ def cancel(service):
     service.wait_for("a rank", lambda: service.processes()["rank"])
     service.call("cancel", first)
     check(service.job(first)["state"] == "cancelled", f"{service.job(first)}")
-    check(service.wait_end(run) == 0, "carillon run ends badly")
+    check(service.wait_end(run) == 3, "carillon run ends badly")
     service.check_nothing_left()
     check(not service.bank(first).exists() and not service.bank(second).exists(), "a bank of a cancelled job")
     service.call("retry", first, second)
