@@ -1,4 +1,4 @@
-// The Sonic Explorer: a folder that any web server can serve, a page on which bodies are struck and heard.
+// carillon explore: a folder that any web server can serve, a page on which bodies are struck and heard.
 #pragma once
 
 #include <cstdint>
