@@ -1,14 +1,17 @@
 #!/usr/bin/env python3
-"""Every header of ours compiles by itself, without the precompiled one.
+"""Every header of ours compiles by itself, without the precompiled one. Through ccache, where it is installed.
 
 usage: headers_stand_alone.py [-j N] SOURCE_DIR BUILD_DIR     BUILD_DIR: cmake --preset tidy, whose commands are those of single sources
 """
 import argparse
 import json
+import os
 import pathlib
 import shlex
+import shutil
 import subprocess
 import sys
+import tempfile
 from concurrent.futures import ThreadPoolExecutor
 
 parser = argparse.ArgumentParser(usage=__doc__)
@@ -32,11 +35,18 @@ for command in json.loads((options.build / "compile_commands.json").read_text())
         known.append(kept)
 
 
+launcher = ["ccache"] if shutil.which("ccache") else []
+environment = os.environ | {"CCACHE_BASEDIR": str(options.source), "CCACHE_NOHASHDIR": "1"}
+objects = tempfile.TemporaryDirectory()
+
+
 def check(header):
     errors = "no source of its folder is compiled"
     for way in ways.get(header.parent, []):
-        command = ["clang++", "-fsyntax-only", "-Wno-pragma-once-outside-header", "-x", "c++", *way, header]
-        result = subprocess.run(command, capture_output=True, text=True)
+        out = pathlib.Path(objects.name) / f"{abs(hash(header))}.o"
+        command = [*launcher, "clang++", "-c", "-o", out, "-Wno-pragma-once-outside-header", "-x", "c++", *way, header]
+        result = subprocess.run(command, capture_output=True, text=True, env=environment)
+        out.unlink(missing_ok=True)
         if result.returncode == 0:
             return None
         errors = result.stderr[:600]

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Where npm's registry cannot be reached the page is left out, in one line, and the build goes on: the target's own command ends well."""
+"""Where npm's registry cannot be reached the page is left out, in one line, and the build continues: the target's own command ends well."""
 import os
 import pathlib
 import subprocess
