@@ -17,8 +17,8 @@ from bench import BIN, Bench, make_job
 
 
 class Damage(Bench):
-    def run_queue(self):
-        return self.run_it("run", "--quiet")
+    def run_queue(self, code=0):
+        return self.run_it("run", "--quiet", code=code)
 
     def make_done(self, **changes):
         job = self.write("bar.json", make_job(**changes))
@@ -40,7 +40,7 @@ class Damage(Bench):
         self.run_it("submit", job)
         (file,) = self.store.glob("work/*/*/job.json")
         file.write_text(file.read_text().replace("7800", "2800"))
-        self.run_queue()
+        self.run_queue(code=3)
         state = self.ask("status")["jobs"][0]
         self.assertEqual((state["state"], state["attempts"]), ("failed", 1))
         self.assertIn("job.json", state["reason"])
@@ -57,7 +57,7 @@ class Damage(Bench):
         victim = self.write("victim", "important")
         (file,) = self.store.glob("work/*/*/job.json")
         file.write_text(file.read_text().replace('"bank.hdf"', json.dumps(str(victim))))
-        self.run_queue()
+        self.run_queue(code=3)
         self.assertEqual(victim.read_text(), "important")
         self.assertFalse(pathlib.Path(str(victim) + ".resolved.json").exists())
         self.assertEqual(self.ask("status")["jobs"][0]["state"], "failed")
@@ -162,7 +162,7 @@ class Damage(Bench):
         copy.chmod(0o644)
         whole = copy.read_bytes()
         copy.write_bytes(whole.replace(b"1", b"2", 1))
-        self.run_queue()
+        self.run_queue(code=3)
         state = self.ask("status")["jobs"][0]
         self.assertEqual((state["state"], state["attempts"]), ("failed", 1))
         self.assertIn("damaged", state["reason"])
@@ -361,7 +361,7 @@ class Damage(Bench):
         job = self.write("body.json", make_job(body={"surface": "body.off", "nodes": 300}))
         command = [programs / "carillon", "--store", self.store]
         subprocess.run([*command, "submit", job], check=True, stdout=subprocess.DEVNULL, env=self.environment)
-        subprocess.run([*command, "run", "--quiet"], check=True, env=self.environment, timeout=180)
+        self.assertEqual(subprocess.run([*command, "run", "--quiet"], env=self.environment, timeout=180).returncode, 3)
         state = self.ask("status")["jobs"][0]
         self.assertEqual((state["state"], state["attempts"]), ("failed", 1))
         self.assertIn("Segmentation fault", state["reason"])
