@@ -197,7 +197,7 @@ class Simulations(Bench):
         predicted = json.loads((work / "prediction.json").read_text())["memory_bytes"]
         self.assertGreaterEqual(state["memory_gb"], 1e-9 * predicted[str(state["ranks"])])
         self.run_it("cancel", file)
-        self.assertEqual(queue.wait(120), 0)
+        self.assertEqual(queue.wait(120), 3, "a cancelled job")
         self.assertEqual(self.ask("status", file)["jobs"][0]["state"], "cancelled")
         self.assertTrue((work / "checkpoint").exists())
 
