@@ -516,18 +516,13 @@ void EffectSelector::State::apply(const events::Impulse& impulse, double work_ns
 std::array<synth::ContactSurface, 2> EffectSelector::State::find_surfaces(const events::LastingContact& contact) const {
   const BodyFacts& of = facts.bodies[static_cast<std::size_t>(contact.body)];
   const bool has_other = contact.other >= 0 && static_cast<std::size_t>(contact.other) < facts.bodies.size();
-  const auto complete = [](synth::ContactSurface surface, const bank::Bank& bank) {
-    const double nu = bank.material.poisson_ratio;
-    if (surface.modulus_pa == 0.0) surface.modulus_pa = bank.material.young_modulus_pa / (1.0 - nu * nu);
-    if (surface.wave_impedance_pa_s_m == 0.0) surface.wave_impedance_pa_s_m = bank::calc_wave_impedance(bank.material);
-    return surface;
+  const auto complete = [](const BodyFacts& body) {
+    const bank::Material& m = body.bank->material;
+    return synth::complete(body.surface, m.young_modulus_pa / (1.0 - m.poisson_ratio * m.poisson_ratio), bank::calc_wave_impedance(m));
   };
-  const synth::ContactSurface own = complete(of.surface, *of.bank);
+  const synth::ContactSurface own = complete(of);
   synth::ContactSurface other = facts.ground;
-  if (has_other) {
-    const BodyFacts& there = facts.bodies[static_cast<std::size_t>(contact.other)];
-    other = complete(there.surface, *there.bank);
-  }
+  if (has_other) other = complete(facts.bodies[static_cast<std::size_t>(contact.other)]);
   return {own, other};
 }
 

@@ -31,7 +31,7 @@ constexpr double kAtRest = 0.2e-3, kMoving = 2e-3;  // m/s
 constexpr double kGravity = 9.81;                   // m/s^2
 constexpr double kSticking = 1e-3;                  // m/s; below, the direction of friction fades
 constexpr double kSkinM = 10e-6;                    // over which the load of rough bodies that slide grows by its own size
-constexpr double kLargestExponent = 3.0;            // of what a height adds to a load: 19 loads, of which heights reach 13
+constexpr double kLargestExponent = 3.0;            // 19 loads; heights reach 13
 constexpr double kStronger = 2.0;                   // a new contact takes the place of one that presses less than half as much
 
 double calc_motion(double speed_m_s) noexcept { return calc_smooth_step((speed_m_s - kAtRest) / (kMoving - kAtRest)); }
@@ -132,6 +132,12 @@ ContactNoise calc_contact_noise(const events::LastingContact& contact, const Con
                     texture, other_texture);
 }
 
+ContactSurface complete(ContactSurface surface, double modulus_pa, double wave_impedance_pa_s_m) noexcept {
+  if (surface.modulus_pa == 0.0) surface.modulus_pa = modulus_pa;
+  if (surface.wave_impedance_pa_s_m == 0.0) surface.wave_impedance_pa_s_m = wave_impedance_pa_s_m;
+  return surface;
+}
+
 double find_impedance(const events::LastingContact& contact, const ContactSurface& other) noexcept {
   if (contact.impedance_n_s_m != events::LastingContact::kByMaterial) return contact.impedance_n_s_m;
   return other.wave_impedance_pa_s_m * std::numbers::pi * contact.patch_radius_m * contact.patch_radius_m;
@@ -174,7 +180,7 @@ ContactForces::ContactForces(std::shared_ptr<const Model> model, ContactForcesOp
     throw InputError("a body needs room for 1 to " + std::to_string(kMaxContacts) + " contacts");
   if (options.max_records < 2 || options.max_records > 1 << 20)
     throw InputError("a body needs room for 2 to 1,048,576 records of contacts");
-  if (surface_.modulus_pa == 0.0) surface_.modulus_pa = model_->get_plane_strain_modulus_pa();
+  surface_ = complete(surface_, model_->get_plane_strain_modulus_pa(), model_->get_wave_impedance_pa_s_m());
   Texture::make_tables();
   rate_hz_ = model_->get_rate_hz();
   slots_.resize(static_cast<std::size_t>(options.max_contacts));
@@ -414,7 +420,7 @@ ContactForces::Node ContactForces::make_node(const Slot& slot, const Record& val
                             slot.texture, slot.other_texture);
     const Shocks shocks = calc_shocks(node.noise, values.force_n);
     node.values.force_n = shocks.load_n;
-    // Heights over u, so that the exponent of what is blended between two nodes lies between those of both. No load, no heights.
+    // Exponents are blended, so none exceeds those of both nodes. No load, no heights.
     const double per_m = values.force_n > 0.0 && shocks.over_m > 0.0 ? 1.0 / shocks.over_m : 0.0;
     scale(node.noise.gains, node.noise.motion * per_m);
     scale(node.noise.other_gains, node.noise.other_motion * per_m);

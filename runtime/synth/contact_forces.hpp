@@ -32,6 +32,9 @@ struct ContactSurface {
 /// What is wrong with a surface, as part of a sentence; nullptr: nothing.
 const char* find_fault(const ContactSurface& surface) noexcept;
 
+/// The surface with these constants of its material in place of those that are 0.
+ContactSurface complete(ContactSurface surface, double modulus_pa, double wave_impedance_pa_s_m) noexcept;
+
 /// The ground of scenes: concrete, smoothly trowelled.
 inline constexpr ContactSurface kGroundSurface{
     .roughness_m = 20e-6, .friction = 0.5, .modulus_pa = 30e9 / (1.0 - 0.2 * 0.2), .wave_impedance_pa_s_m = 8.944e6};  // 2,400 kg/m^3
@@ -50,7 +53,7 @@ struct ContactNoise {
 ContactNoise calc_contact_noise(const events::LastingContact& contact, const ContactSurface& own, const ContactSurface& other,
                                 double rate_hz) noexcept;
 
-/// What the other body takes at a contact as a dashpot [N s/m]: that of the record, or of the other's material over the patch.
+/// Impedance [N s/m] of the other body at a contact: the record's, else its material's over the patch.
 double find_impedance(const events::LastingContact& contact, const ContactSurface& other) noexcept;
 
 /// The spring of a contact as a mode meets it, however little it moves.
@@ -89,15 +92,17 @@ struct ContactCounters {
 /// samples and go linearly between. A gap of more than 50 ms is held and changed in its last 50 ms. A contact rises and falls within 5 ms
 /// on top of what its records say. When its last record, and the last mark (reach), are 20 ms old it falls as if it had ended: an underrun.
 ///
-/// Force: the heights h of both surfaces, each read at the speed of the contact over it or at the slip, whichever is faster, press two
-/// springs in series: the contact's, k = 2 E* a, and the one of the rough skin. With u = F / k + skin the force has the rms of the linear
-/// spring, R = h_rms / u loads: without the load F, which changes slowly and is left out, f = a F (exp(s h / h_rms - s^2 / 2) - 1), s^2 =
-/// ln(1 + min(1, R)^2), a = max(1, R); up to R = 1 it never pulls. Without a load there are no heights, and the exponent is at most 3. The
-/// skin is h_rms for what rolls, 10 um for what slides; it is blunted by the patch as it rolls. What is slower than sqrt(g / u), where a
-/// body that its weight presses on u bounces, does not press: the body rides over it. While one surface slides on the other (its share is
-/// slip over the larger sweep) friction follows, -mu f along the slip. What moves at less than 0.2 mm/s is at rest and gives no force at
-/// all. Damping: the impedance Z of the other body at the point takes Z (phi.n)^2 / 2 [1/s] of each mode, and the contact's spring what it
-/// loses however little it is moved: calc_spring_loss() (docs/decisions/contact-sound.md).
+/// Force: the heights h of both surfaces press two springs in series, the contact's, k = 2 E* a, and the rough skin's. Each surface is read
+/// at the speed of the contact over it or at the slip, whichever is faster. With u = F / k + skin the force has the rms of the linear
+/// spring, R = h_rms / u loads: f = a F (exp(s h / h_rms - s^2 / 2) - 1), s^2 = ln(1 + min(1, R)^2), a = max(1, R), without the slowly
+/// changing load F. Up to R = 1 it never pulls. Without a load there are no heights, and the exponent is at most 3.
+///
+/// The skin is h_rms for rolling, where the patch blunts it, and 10 um for sliding. Heights below sqrt(g / u), the frequency at which a
+/// body bounces on u under its weight, do not press: the body rides over them. Sliding adds friction, -mu f along the slip, by its share of
+/// the larger sweep. Below 0.2 mm/s a contact is at rest and gives no force.
+///
+/// Damping: the impedance Z of the other body adds Z (phi.n)^2 / 2 [1/s] to the decay of each mode, and the contact's spring its own loss:
+/// calc_spring_loss() (docs/decisions/contact-sound.md).
 ///
 /// Memory is taken in the constructor only. One thread at a time.
 class ContactForces {

@@ -141,11 +141,9 @@ std::unique_ptr<BodyChange> SoundingBody::make_change(EffectSet from, EffectSet 
         AccelerationNoise(model->get_sphere_radius_m(), model->get_mass_kg(), frame_.rate_hz, frame_.max_strikes, frame_.max_forces),
         Attitude(static_cast<std::size_t>(frame_.max_waypoints))});
   }
-  change->modulus_pa = frame_.surface.modulus_pa > 0.0 ? frame_.surface.modulus_pa : model->get_plane_strain_modulus_pa();
-  change->wave_impedance_pa_s_m =
-      frame_.surface.wave_impedance_pa_s_m > 0.0 ? frame_.surface.wave_impedance_pa_s_m : model->get_wave_impedance_pa_s_m();
+  change->surface = complete(frame_.surface, model->get_plane_strain_modulus_pa(), model->get_wave_impedance_pa_s_m());
   if (needs_contacts(to) && (change->inherits || !needs_contacts(from))) {
-    change->contacts = std::make_unique<ContactForces>(model, ContactForcesOptions{.surface = frame_.surface, .effects = to});
+    change->contacts = std::make_unique<ContactForces>(model, ContactForcesOptions{.surface = change->surface, .effects = to});
   }
   const bool sounds = to.has(Effect::kModal) || to.has(Effect::kAccelerationNoise);
   bool changes_air = to.common(kOfPropagation) != from.common(kOfPropagation);
@@ -190,8 +188,7 @@ void SoundingBody::apply(BodyChange& change, const ListenerTracks& listener, std
       acceleration_noise_->attitude.push(turned_s_, rotation_);
     }
   }
-  surface_.modulus_pa = change.modulus_pa;
-  surface_.wave_impedance_pa_s_m = change.wave_impedance_pa_s_m;
+  surface_ = change.surface;
   put_contacts(change);
   if (!change.propagation) return direct_voice();
   std::swap(next_propagation_, change.propagation);

@@ -58,21 +58,21 @@ struct BodyChange {
   std::unique_ptr<BodyAccelerationNoise> acceleration_noise;
   std::unique_ptr<Propagation> propagation;
   std::unique_ptr<ContactForces> contacts;
-  double modulus_pa = 0.0, wave_impedance_pa_s_m = 0.0;  // of the surface
-  bool inherits = false;                                 // voice, contacts and acceleration_noise take the place of those there
-  std::unique_ptr<VoiceHandover> handover;               // for the voice
-  std::unique_ptr<Directivity> directivity;              // for the propagation that is there, of the voice
+  ContactSurface surface;                    // with the material of the model
+  bool inherits = false;                     // voice, contacts and acceleration_noise take the place of those there
+  std::unique_ptr<VoiceHandover> handover;   // for the voice
+  std::unique_ptr<Directivity> directivity;  // for the propagation that is there, of the voice
 
   EffectBytes calc_bytes() const;
 };
 
-/// What a body has done: work by effect, in the units of EffectCounters, and ticks if they are measured.
 /// Records of lasting contacts.
 struct ContactRecordCounters {
   std::int64_t accepted = 0, refused = 0, dropped = 0, thinned = 0;  // ContactCounters
   std::int64_t without_use = 0;                                      // for a body without an effect of contacts
 };
 
+/// What a body has done: work by effect, in the units of EffectCounters, and ticks if they are measured.
 struct BodyWork {
   PerEffect<std::int64_t> units{};
   PerEffect<std::int64_t> ticks{};

@@ -144,8 +144,8 @@ class Synthesiser {
   /// Whether add_body() would find no room. [main-thread]
   bool is_full() noexcept;
 
-  /// Gives back the memory of removed bodies and effects that the audio thread has let go, and sends changes that wait; one for which there
-  /// is no memory waits for the next call. [main-thread]
+  /// Gives back the memory of removed bodies and effects that the audio thread has let go, and sends pending changes. A change that fails
+  /// for lack of memory stays pending. [main-thread]
   void collect() noexcept;
 
   /// Full scale per pascal; 1 at first. What is no finite number counts as 0. [any-thread]

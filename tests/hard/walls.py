@@ -5,8 +5,8 @@ bound, or in a refusal that names the place.
 usage: walls.py CASE
        walls.py record     solves the references again: walls_references.json
 
-The truth is a closed form, Ritz, or where it is named the same body as a solid in elements of the volume mesher, or in finer elements. The
-latter take minutes, so their frequencies are kept.
+References: closed forms, Ritz, and the same body as a solid in elements of the volume mesher or in finer elements. These solves take a
+minute, so their frequencies are in walls_references.json.
 """
 import json
 import math
@@ -19,6 +19,9 @@ from figure import hold, hold_refusal
 from programs import STEEL, Folder, calc_distance
 
 REFERENCES = pathlib.Path(__file__).with_name("walls_references.json")
+FOLD_ANGLES_DEG, FOLD_WALL_M = (175, 90, 60, 40), 0.003
+TUB_M, TUB_WALL_M = (0.06, 0.05, 0.03), 0.002
+HOLES_WALL_M = 0.002
 
 
 def make_grid(place, nu, nv, skip=lambda i, j: False):
@@ -93,11 +96,15 @@ def list_references():
     """Name: surface, words of carillon-mesh, keys of the job."""
     solid = ("--method", "delaunay", "--order", 2, "--edge")
     references = {
-        f"fold of {angle} degrees": (make_bracket(angle, 0.003), (*solid, 0.0018), {"band_hz": (20, 60000), "max_modes": 8})
-        for angle in (175, 90, 60, 40)
+        f"fold of {angle} degrees": (make_bracket(angle, FOLD_WALL_M), (*solid, 0.0018), {"band_hz": (20, 60000), "max_modes": 8})
+        for angle in FOLD_ANGLES_DEG
     }
-    references["box without a lid"] = (make_tub_skins(0.06, 0.05, 0.03, 0.002), (*solid, 0.002), {"band_hz": (20, 40000), "max_modes": 6})
-    references["tube with holes"] = (make_tube_with_holes(), ("--wall", 0.002, "--edge", 0.0025), {"band_hz": (20, 8000), "max_modes": 4})
+    references["box without a lid"] = (make_tub_skins(*TUB_M, TUB_WALL_M), (*solid, 0.002), {"band_hz": (20, 40000), "max_modes": 6})
+    references["tube with holes"] = (
+        make_tube_with_holes(),
+        ("--wall", HOLES_WALL_M, "--edge", 0.0025),
+        {"band_hz": (20, 8000), "max_modes": 4},
+    )
     return references
 
 
@@ -162,7 +169,7 @@ def make_tub_skins(long, wide, high, wall):
 
 def corners():
     # Three mitres meet in a corner; with a rim folded outwards they go to both sides.
-    size, wall = (0.06, 0.05, 0.03), 0.002
+    size, wall = TUB_M, TUB_WALL_M
     tub = make_tub(*size)
     for side, edges in (("outside", size), ("inside", [size[0] + 2 * wall, size[1] + 2 * wall, size[2] + wall])):
         hollow = (edges[0] - 2 * wall) * (edges[1] - 2 * wall) * (edges[2] - wall)
@@ -218,8 +225,8 @@ def wall_0_1_mm():
 
 
 def folds():
-    wall = 0.003
-    for angle in (175, 90, 60, 40):
+    wall = FOLD_WALL_M
+    for angle in FOLD_ANGLES_DEG:
         freq_hz, report = solve(make_fold(angle), "--wall", wall, "--edge", 0.003, band_hz=(20, 60000), max_modes=8)
         hold("folds", abs(report["volume_m3"] / (2 * 0.04 * 0.08 * wall) - 1), 1e-9, f"{angle} degrees, volume")
         solid = get_reference(f"fold of {angle} degrees")
@@ -259,7 +266,7 @@ def make_tube_with_holes():
 
 
 def holes_at_a_rim():
-    radius, long, wall, turn = 0.03, 0.1, 0.002, 2 * math.pi
+    radius, long, wall, turn = 0.03, 0.1, HOLES_WALL_M, 2 * math.pi
     freq_hz, report = solve(make_tube_with_holes(), "--wall", wall, "--edge", 0.005, band_hz=(20, 8000), max_modes=4)
     area = turn * radius * long - 6 * (turn * radius / 24) * (long / 12)
     hold("holes_at_a_rim", abs(report["volume_m3"] / (area * wall) - 1), 2e-3, "volume")

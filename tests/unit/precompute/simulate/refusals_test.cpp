@@ -54,7 +54,7 @@ struct Refusal {
   bool names_line = true;
 };
 
-/// What follows the name of the bar.
+/// The name of the bar, and its drive.
 std::string add_drive(std::string_view path, std::string_view node_set) {
   return fmt::format(R"("name": "bar", "drive": [{{"node_set": "{}", "path": [{}]}}])", node_set, path);
 }

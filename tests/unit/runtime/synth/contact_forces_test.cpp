@@ -1,4 +1,3 @@
-// Forces, damping, rest and times of one class on one set of records; longer than most files.
 // Bodies under contacts that last: against quadrature, against the dense equation of motion, and what they promise.
 #include "runtime/synth/contact_forces.hpp"
 
@@ -14,101 +13,14 @@
 #include <random>
 #include <vector>
 
-#include "runtime/synth/voice.hpp"
-#include "tests/unit/runtime/synth/cube_bank.hpp"
+#include "tests/unit/runtime/synth/contact_bench.hpp"
 #include "tests/unit/runtime/synth/quadrature.hpp"
 #include "tests/unit/runtime/synth/reference.hpp"
 
 namespace carillon::synth {
 namespace {
 
-using events::ContactState;
-using events::LastingContact;
-using std::numbers::pi;
-using testing::InventedMode;
-using testing::make_cube_bank;
-constexpr double kRate = 48000.0;
-const ContactSurface kOther{.roughness_m = 2e-6, .friction = 0.5, .modulus_pa = 70e9};
-const ContactSurface kRigidOther{.roughness_m = 2e-6, .friction = 0.5, .modulus_pa = 0.0};  // no spring: what is left is its impedance
-const EffectSet kNoise{Effect::kRoughness, Effect::kRolling};
-const EffectSet kBrake{Effect::kContactDamping};
-
-/// Slides flat at a speed: the other's surface only is swept.
-LastingContact make_sliding(double time_s, double speed_m_s, double force_n = 1.0) {
-  LastingContact c;
-  c.time_s = time_s;
-  c.id = 77;
-  c.barycentric = {0.2, 0.3, 0.5};
-  c.normal = {0.0, 0.0, 1.0};
-  c.slip_m_s = {speed_m_s, 0.0, 0.0};
-  c.force_n = force_n;
-  c.other_sweep_m_s = speed_m_s;
-  c.patch_radius_m = 20e-6;
-  return c;
-}
-
-/// One record every 2 ms from 0 on, the first and the last marked as such.
-std::vector<LastingContact> make_records(double end_s, const std::function<LastingContact(double)>& make) {
-  std::vector<LastingContact> records;
-  for (int i = 0; 2e-3 * i <= end_s; ++i) records.push_back(make(2e-3 * i));
-  records.front().state = ContactState::kBegin;
-  records.back().state = ContactState::kEnd;
-  return records;
-}
-
-/// Plays with the records given as they come due, 100 ms ahead.
-std::vector<float> play(Voice& voice, ContactForces& contacts, std::vector<LastingContact> records, double seconds, std::size_t block = 480,
-                        const ContactSurface& other = kOther) {
-  std::vector<float> out(static_cast<std::size_t>(seconds * kRate), 0.0F);
-  voice.attach(&contacts);
-  std::size_t next = 0;
-  for (std::size_t n = 0; n < out.size(); n += block) {
-    while (next < records.size() && records[next].time_s < static_cast<double>(n) / kRate + 0.1) contacts.take(records[next++], other);
-    contacts.reach(static_cast<double>(n) / kRate + 0.1);
-    voice.process(std::span(out).subspan(n, std::min(block, out.size() - n)));
-  }
-  return out;
-}
-
-double calc_rms(const std::vector<float>& x, double from_s, double to_s) {
-  double sum = 0.0;
-  const auto first = static_cast<std::size_t>(from_s * kRate), last = static_cast<std::size_t>(to_s * kRate);
-  for (std::size_t n = first; n < last; ++n) sum += static_cast<double>(x[n]) * x[n];
-  return std::sqrt(sum / static_cast<double>(last - first));
-}
-
-float calc_peak(const std::vector<float>& x) {
-  float peak = 0.0F;
-  for (const float p : x) peak = std::max(peak, std::abs(p));
-  return peak;
-}
-
-/// The noise forces themselves, sample by sample, along the contact's direction.
-std::vector<double> trace(ContactForces& contacts, const std::vector<LastingContact>& records, double seconds,
-                          const ContactSurface& other = kOther) {
-  std::vector<double> force;
-  std::size_t next = 0;
-  for (std::int64_t sample = 0; static_cast<double>(sample) < seconds * kRate; sample += kSubBlock) {
-    while (next < records.size() && records[next].time_s < static_cast<double>(sample) / kRate + 0.1) contacts.take(records[next++], other);
-    contacts.reach(static_cast<double>(sample) / kRate + 0.1);
-    const ContactBlock* drive = contacts.begin_sub_block(sample);
-    for (int n = 0; n < kSubBlock; ++n) {
-      double sum = 0.0;
-      for (int c = 0; drive != nullptr && drive->forces && c < drive->contacts; ++c) {
-        for (const ContactEnd& push : drive->push[c]) sum += static_cast<double>(push.signal[n]);
-      }
-      force.push_back(sum);
-    }
-  }
-  return force;
-}
-
-std::vector<InventedMode> make_modes() {
-  return {{120.0, 4.0, 0.7, {0.0, 0.0, 1.0}},
-          {700.0, 9.0, -0.4, {0.5, 0.0, 0.8}},
-          {5100.0, 60.0, 0.2, {0.1, 0.3, 0.6}, 0.1},
-          {17000.0, 300.0, 0.1, {0.0, 0.2, -0.7}}};
-}
+using namespace testing;
 
 TEST(ContactForces, DriveTheModesAsQuadratureSays) {
   // Force along e = n - mu s; the shape is the same at all corners but for the third mode's slope.
@@ -373,89 +285,6 @@ TEST(ContactForces, OfWhatSlidesStayFiniteAndEvenAtTheExtremes) {
   }
   const double heavy = calc_slide_db({.load_n = 2.0}), light = calc_slide_db({.load_n = 2e-3});
   EXPECT_NEAR(light, heavy - 60.0, 0.5) << "what hardly presses hardly sounds";
-}
-
-/// The loudest of a body that is pushed with 1 N for 50 ms, suddenly, at the place of make_sliding().
-float find_push_peak(const std::shared_ptr<const Model>& model) {
-  const LastingContact at = make_sliding(0.0, 0.0);
-  const std::vector<Vec3> steps(500, Vec3{0.0, 0.0, 1e-4});
-  Voice voice(model);
-  events::split_force({.time_s = 0.0, .step_s = 1e-4, .triangle = at.triangle, .barycentric = at.barycentric}, steps,
-                      [&](const events::Force& piece) { voice.push(piece); });
-  std::vector<float> out(4800);
-  voice.process(out);
-  return calc_peak(out);
-}
-
-/// Records as any program may send them: begins, holds and ends in any order, without a load, without a speed, a gap of no time.
-std::vector<LastingContact> make_random_stream(std::mt19937_64& random) {
-  const auto chance = [&] { return std::uniform_real_distribution(0.0, 1.0)(random); };
-  const auto amount = [&](double low, double high) { return chance() < 0.25 ? 0.0 : low * std::pow(high / low, chance()); };
-  std::vector<LastingContact> records;
-  const int count = 2 + static_cast<int>(6 * chance());
-  double time_s = 0.0;
-  for (int i = 0; i < count; ++i) {
-    LastingContact c = make_sliding(time_s, 0.0, amount(1e-4, 1e3));
-    const double turn = 2.0 * pi * chance(), slip = amount(1e-5, 10.0);
-    c.slip_m_s = {slip * std::cos(turn), slip * std::sin(turn), 0.0};
-    c.sweep_m_s = amount(1e-5, 10.0), c.other_sweep_m_s = amount(1e-5, 10.0);
-    c.patch_radius_m = 1e-12 * std::pow(1e10, chance());
-    c.impedance_n_s_m = amount(1e-3, 1e5);
-    c.state = static_cast<ContactState>(static_cast<int>(3 * chance()));
-    records.push_back(c);
-    time_s += amount(1e-5, 10e-3);
-  }
-  return records;
-}
-
-TEST(ContactForces, OfAnyStreamAreBoundedAndNoLouderThanAPlainPushByThem) {
-  const auto model = Model::make(make_cube_bank(make_modes()));
-  const double push = static_cast<double>(find_push_peak(model));
-  ASSERT_GT(push, 0.0);
-  for (std::uint64_t stream = 0; stream < 100000; ++stream) {
-    std::mt19937_64 random(stream);
-    const std::vector<LastingContact> records = make_random_stream(random);
-    const auto draw_roughness_m = [&] { return std::pow(10.0, std::uniform_real_distribution(-7.0, -4.0)(random)); };
-    const ContactSurface own{.roughness_m = draw_roughness_m(), .modulus_pa = 10e9},
-        other{.roughness_m = draw_roughness_m(), .modulus_pa = 30e9};
-    // Heights with waves of up to 6.4 mm over the skin of what slides: beyond 1 the shocks are larger than the load.
-    const double shocks = std::max(1.0, 5.3 * std::hypot(own.roughness_m, other.roughness_m) / 10e-6);
-    double load = 0.0, lowest = 0.0, highest = 0.0;
-    for (const LastingContact& record : records) load = std::max(load, record.force_n);
-    ContactForces traced(model, {.surface = own}), contacts(model, {.surface = own});
-    Voice voice(model);
-    const double seconds = records.back().time_s + 6e-3;
-    for (const double force : trace(traced, records, seconds, other)) lowest = std::min(lowest, force), highest = std::max(highest, force);
-    ASSERT_GE(lowest, -shocks * load * (1.0 + 1e-6)) << stream;
-    ASSERT_LE(highest, std::expm1(3.0) * shocks * load) << stream;
-    const std::vector<float> heard = play(voice, contacts, records, seconds, 1 << 20, other);
-    ASSERT_LE(static_cast<double>(calc_peak(heard)), 2.0 * (highest - lowest) * push) << stream;
-  }
-}
-
-/// What most programs send last: nothing but the id, the state and the time.
-TEST(ContactForces, OfATouchThatEndsWithZerosDoNotBurst) {
-  const auto model = Model::make(make_cube_bank(make_modes()));
-  std::array<float, 2> loudest{};
-  for (std::uint64_t id = 1; id <= 200; ++id) {
-    for (const bool has_zeros : {false, true}) {
-      std::vector<LastingContact> records;
-      for (int i = 0; i < 5; ++i) {
-        LastingContact c = make_sliding(1e-3 * i + (i == 4 ? 2e-3 : 0.0), 0.41, i == 4 ? 0.0 : 0.66);
-        c.id = id;
-        c.sweep_m_s = 0.005, c.other_sweep_m_s = 0.415, c.patch_radius_m = 7e-5;
-        if (i == 4 && has_zeros) c.slip_m_s = {}, c.sweep_m_s = c.other_sweep_m_s = 0.0, c.patch_radius_m = 1e-12;
-        c.state = i == 0 ? ContactState::kBegin : i < 4 ? ContactState::kHold : ContactState::kEnd;
-        records.push_back(c);
-      }
-      ContactForces contacts(model, {.surface = {.roughness_m = 2e-6, .modulus_pa = 10e9}});
-      Voice voice(model);
-      float& peak = loudest[has_zeros ? 1 : 0];
-      peak = std::max(peak, calc_peak(play(voice, contacts, records, 0.02, 480, kGroundSurface)));
-    }
-  }
-  EXPECT_GT(loudest[0], 0.0F);
-  EXPECT_LT(loudest[1], 1.2F * loudest[0]);
 }
 
 /// q'' + 2 D q' + Lambda q + Z(t) phi phi^T q' = 0, by Runge and Kutta's fourth order.
