@@ -23,11 +23,9 @@ namespace carillon::cli {
 namespace {
 
 constexpr const char* kAbout =
-    "From an object to its sound: carillon hear OBJECT --material steel. Of many: carillon submit JOB.json --run. A bank is kept under "
-    "the\n"
-    "hash of the job, the bytes of its mesh and the version of the solver: what was computed once is never computed again, from whatever\n"
-    "folder it is asked for.";
-constexpr const char* kShortFooter = "What an ID is, exit codes, store and profile: carillon --help";
+    "From an object to its sound: carillon hear OBJECT --material steel. Of many: carillon submit JOB.json --run.\n"
+    "A bank is kept under the hash of the job, its mesh and the version of the solver, and never computed twice.";
+constexpr const char* kShortFooter = "IDs, exit codes, store and profile: carillon --help";
 constexpr const char* kFooter =
     "ID is an id or its beginning, or the job file. Exit codes: 0 done, 1 not done yet, 2 the input cannot be used, 3 a job failed, 4 the "
     "machine\n"

@@ -2,12 +2,16 @@
 # three.js comes from npm's registry, as package-lock.json has it. Where the registry cannot be reached there is no page, and the build continues.
 file(MAKE_DIRECTORY ${WORK})
 file(COPY ${FROM}/package.json ${FROM}/package-lock.json DESTINATION ${WORK})
-execute_process(COMMAND ${NPM} ci --ignore-scripts --no-audit --no-fund --loglevel=error --fetch-retries=1 --fetch-retry-mintimeout=1000
-  WORKING_DIRECTORY ${WORK} RESULT_VARIABLE result OUTPUT_VARIABLE text ERROR_VARIABLE text)
-if(NOT result EQUAL 0)
-  string(REGEX MATCH "[^\n]*[^\n ][^\n]*" first "${text}")
-  message("carillon explore has no page: npm could not fetch three.js (${first}). Build again once its registry can be reached.")
-  return()
+set(fetched ${WORK}/node_modules/.package-lock.json)
+if(${FROM}/package-lock.json IS_NEWER_THAN ${fetched})
+  execute_process(COMMAND ${NPM} ci --ignore-scripts --no-audit --no-fund --loglevel=error --fetch-retries=1 --fetch-retry-mintimeout=1000
+    WORKING_DIRECTORY ${WORK} RESULT_VARIABLE result OUTPUT_VARIABLE text ERROR_VARIABLE text)
+  if(NOT result EQUAL 0)
+    string(REGEX MATCH "[^\n]*[^\n ][^\n]*" first "${text}")
+    message("carillon explore has no page: npm could not fetch three.js (${first}). Build again once its registry can be reached.")
+    return()
+  endif()
+  file(TOUCH ${fetched})
 endif()
 file(REMOVE_RECURSE ${TO})
 foreach(source ${SOURCES})

@@ -36,7 +36,7 @@ def run(*arguments, folder):
 
 
 def run_in_process(*arguments, folder):
-    """The same without the second that a process takes to load its libraries: for what ends before it draws."""
+    """The same without a new process, for errors found before drawing."""
     program, before, errors = load_program(), (os.getcwd(), sys.argv), io.StringIO()
     os.chdir(folder)
     sys.argv = [str(PROGRAM), *arguments]

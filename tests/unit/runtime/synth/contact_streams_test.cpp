@@ -70,6 +70,8 @@ TEST(ContactStreams, OfAnyStreamAreBoundedAndNoLouderThanAPlainPushByThem) {
     ASSERT_GE(lowest, -shocks * load * (1.0 + 1e-6)) << stream;
     ASSERT_LE(highest, std::expm1(3.0) * shocks * load) << stream;
     const std::vector<float> heard = play(voice, contacts, records, seconds, 1 << 20, other);
+    const ContactCounters& counters = contacts.get_counters();
+    ASSERT_EQ(counters.accepted + counters.dropped + counters.refused, static_cast<std::int64_t>(records.size())) << stream;
     ASSERT_LE(static_cast<double>(calc_peak(heard)), 2.0 * (highest - lowest) * push) << stream;
   }
 }
