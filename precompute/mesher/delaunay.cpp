@@ -22,63 +22,27 @@ void dump_c3t3_edges(const Complex&, const std::string&) {}
 #include <CGAL/make_mesh_3.h>
 #include <CGAL/perturb_mesh_3.h>
 #include <CGAL/refine_mesh_3.h>
-#include <pthread.h>
 
-#include <atomic>
-#include <chrono>
 #include <cmath>
-#include <condition_variable>
+#include <limits>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <stdexcept>
-#include <thread>
 #include <unordered_map>
 #include <utility>
 
 #include "precompute/mesher/body_queries.hpp"
 #include "precompute/mesher/tet_quality.hpp"
-#include "runtime/base/clock.hpp"
 
 namespace carillon::mesher {
 namespace {
 
 constexpr std::int64_t kMaxPinches = 10;
 constexpr double kPerturbed = 0.75;  // of the angle asked for: the rest is for smooth.cpp, in less time
-constexpr const char* kTouching = "parts of the surface touch, or nearly so";
-
-/// Sets `stop` once the thread that made it has computed for `limit_s` more. CGAL's refinement can loop without end where skins
-/// touch at a point; only this ends it. A sound body takes a tenth of the limit, so that meshes do not depend on it.
-class Watchdog {
- public:
-  Watchdog(double limit_s, std::atomic<bool>& stop) : stop_(stop) {
-    ::pthread_getcpuclockid(::pthread_self(), &clock_);
-    const double end_s = base::read_clock(clock_) + limit_s;
-    thread_ = std::thread([this, end_s] {
-      std::unique_lock lock(mutex_);
-      while (!wake_.wait_for(lock, std::chrono::milliseconds(100), [this] { return done_; }))
-        if (base::read_clock(clock_) > end_s) stop_ = true;
-    });
-  }
-  ~Watchdog() {
-    {
-      const std::lock_guard lock(mutex_);
-      done_ = true;
-    }
-    wake_.notify_all();
-    thread_.join();
-  }
-  Watchdog(const Watchdog&) = delete;
-  Watchdog& operator=(const Watchdog&) = delete;
-
- private:
-  std::atomic<bool>& stop_;
-  clockid_t clock_{};
-  std::mutex mutex_;
-  std::condition_variable wake_;
-  bool done_ = false;
-  std::thread thread_;
-};
+// How often refinement may query the surface. CGAL's can loop without end where skins touch at a point; only this ends it. Sound bodies
+// take 12 queries per node at most, those that touch themselves 50.
+constexpr std::int64_t kQueries = 500000;
+constexpr std::int64_t kQueriesPerNode = 100;
 
 /// BodyQueries as CGAL's concept MeshDomain_3. A body is asked only about what is finite: circumcentres of nearly flat tetrahedra may not
 /// be, and GMP ends the process where it is to compute exactly with what is not a number.
@@ -100,8 +64,10 @@ class QueriedDomain {
   using Index = BodyQueries::Index;
   using Intersection = BodyQueries::Crossing;
 
-  /// Once `stop` is true every query throws, because CGAL's loop over facets does not look at it itself.
-  QueriedDomain(const BodyQueries* queries, const std::atomic<bool>* stop) : queries_(queries), stop_(stop) {}
+  explicit QueriedDomain(const BodyQueries* queries) : queries_(queries) {}
+
+  /// Every query lowers it by one; a query throws where it is 0.
+  mutable std::int64_t queries_left = std::numeric_limits<std::int64_t>::max();
 
   struct Construct_initial_points {  // the concept has it; the first points are ours
     template <class Out>
@@ -149,12 +115,11 @@ class QueriedDomain {
   }
 
   const BodyQueries& get_queries() const {
-    if (*stop_) throw std::runtime_error(kTouching);
+    if (queries_left-- == 0) throw std::runtime_error("parts of the surface touch, or nearly so");
     return *queries_;
   }
 
   const BodyQueries* queries_;
-  const std::atomic<bool>* stop_;
 };
 
 /// The domain with its sharp curves, and a bound on the balls that are placed on them: where curves cannot be parted, CGAL places ever
@@ -198,10 +163,9 @@ class Mesh3Body final : public DelaunayBody {
     namespace p = CGAL::parameters;
     // The random numbers restart, so that the same sizes give the same mesh whatever was made before.
     CGAL::get_default_random() = CGAL::Random(0);
-    stop_ = false;
     queries_->is_refining = false;
     queries_->restart(sizes.max_nodes);
-    domain_ = std::make_unique<Domain>(queries_.get(), &stop_);
+    domain_ = std::make_unique<Domain>(queries_.get());
     if (!curves_.empty()) domain_->add_features(curves_.begin(), curves_.end());
     // The nodes on the sharp edges and twice as many more: they are part of a fifth of max_nodes.
     domain_->max_balls = 2000 + sizes.max_nodes / 8;
@@ -243,7 +207,6 @@ class Mesh3Body final : public DelaunayBody {
   }
 
  private:
-  std::atomic<bool> stop_{false};  // set by the watchdog
   std::unique_ptr<BodyQueries> queries_;
   std::unique_ptr<Domain> domain_;
   std::vector<Polyline> polylines_;         // the sharp curves,
@@ -256,14 +219,11 @@ class Mesh3Body final : public DelaunayBody {
     namespace p = CGAL::parameters;
     CGAL::Mesh_error_code unused = CGAL::CGAL_MESH_3_NO_ERROR;
     queries_->is_refining = true;
-    {
-      const Watchdog watchdog(2 + 1.5e-4 * static_cast<double>(max_nodes_), stop_);
-      CGAL::refine_mesh_3(complex_, *domain_, *criteria_, p::no_perturb(), p::no_exude(), topology,
-                          p::mesh_3_options(p::maximal_number_of_vertices = max_nodes_, p::pointer_to_error_code = &unused,
-                                            p::pointer_to_stop_atomic_boolean = &stop_));
-    }
+    domain_->queries_left = kQueries + kQueriesPerNode * static_cast<std::int64_t>(max_nodes_);
+    CGAL::refine_mesh_3(complex_, *domain_, *criteria_, p::no_perturb(), p::no_exude(), topology,
+                        p::mesh_3_options(p::maximal_number_of_vertices = max_nodes_, p::pointer_to_error_code = &unused));
+    domain_->queries_left = std::numeric_limits<std::int64_t>::max();
     queries_->is_refining = false;
-    if (stop_) throw std::runtime_error(kTouching);
   }
 
   /// At how many edges and nodes the boundary touches itself.

@@ -83,16 +83,16 @@ Seal parse_seal(std::string_view head, std::uint64_t length, const std::string& 
   Seal seal;
   const auto numbers = split(lines[0].substr(kMagic.size()), '.');
   const auto major = parse_number<int>(numbers[0]);
-  const auto minor = numbers.size() == 2 ? parse_number<int>(numbers[1]) : std::nullopt;
-  if (!major || !minor) throw InputError(fmt::format("{}: damaged seal: line 1 names no version; copy or write the bank again", name));
+  const int minor = numbers.size() == 2 ? parse_number<int>(numbers[1]).value_or(-1) : -1;
+  if (!major || minor < 0) throw InputError(fmt::format("{}: damaged seal: line 1 names no version; copy or write the bank again", name));
   if (*major > kVersionMajor) {
     throw InputError(fmt::format("{}: written as version {}.{}, this reader knows 1.x and {}.x: update Carillon or write the bank again",
-                                 name, *major, *minor, kVersionMajor));
+                                 name, *major, minor, kVersionMajor));
   }
   if (*major < 1)
-    throw InputError(fmt::format("{}: damaged seal: there was never a version {}.{}; write the bank again", name, *major, *minor));
+    throw InputError(fmt::format("{}: damaged seal: there was never a version {}.{}; write the bank again", name, *major, minor));
   seal.major = *major;
-  seal.minor = *minor;
+  seal.minor = minor;
 
   const auto damaged = [&](std::size_t line, std::string_view what) {
     return InputError(fmt::format("{}: damaged seal: line {} {}; copy or write the bank again", name, line + 1, what));
