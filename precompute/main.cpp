@@ -115,14 +115,6 @@ struct CommandLine {
   bool only_asks() const { return error && error->get_exit_code() == 0; }  // --help or --version
 };
 
-/// Whether this process prints for all that its launcher started. MPI, which knows the rank, has not started yet.
-bool is_first_of_all() {
-  for (const char* name : {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"}) {
-    if (const char* rank = std::getenv(name); rank != nullptr) return std::string_view(rank) == "0";
-  }
-  return true;
-}
-
 /// Does what was asked for.
 base::Result carry_out(const petsc::Session& session, const CommandLine& words) {
   const bool speaks = session.rank() == 0;
@@ -181,7 +173,7 @@ int run_program(const petsc::Session& session, const CommandLine& words) {
 
 /// Of one process: under mpirun the first prints.
 int print_estimate(const CommandLine& words) {
-  if (!is_first_of_all()) return 0;
+  if (!run::is_first_of_all()) return 0;
   base::Result result;
   try {
     fmt::print("{}\n", run::estimate_costs(words.estimate));
@@ -199,11 +191,11 @@ int main(int argc, char** argv) {
   std::string result;  // file; empty: none
   try {
     const CommandLine words(argc, argv);
-    if (words.only_asks()) return is_first_of_all() ? words.app.exit(*words.error) : 0;
+    if (words.only_asks()) return run::is_first_of_all() ? words.app.exit(*words.error) : 0;
     if (!words.error && !words.estimate.empty()) return print_estimate(words);
     if (!words.error && !words.options.folder.empty()) run::enter_folder(words.options.folder[0], words.options.folder[1]);
-    if (is_first_of_all()) result = words.result;
-    run::end_on_signals(is_first_of_all() ? 0 : 1);
+    if (run::is_first_of_all()) result = words.result;
+    run::end_on_signals("carillon-precompute", "the bank was not touched, or it is whole");
     if (!words.options.checkpoint.empty()) run::save_on_signals();
     const petsc::Session session(argc, argv, words.options.solver_options);
     if (!words.error) return run_program(session, words);

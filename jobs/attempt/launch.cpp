@@ -149,7 +149,7 @@ Launch make_launch(const Options& options, const std::string& token, const Scrat
   if (launcher != Launcher::alone) add({"--folder", options.root.c_str(), folder.c_str()});
   add({"--result", store::kResultFile});
   if (options.is_simulation && options.is_prediction) {
-    add({"--validate", "--json"});
+    add({"--validate", "--json", "--patience", "1000000", "--checkpoint", store::kCheckpointFile});  // for what it saves, too
   } else if (options.is_simulation) {
     add({"--checkpoint", store::kCheckpointFile, "--progress", store::kProgressFile});  // what it writes is in the job
   } else if (options.is_prediction) {

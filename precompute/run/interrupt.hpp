@@ -3,14 +3,20 @@
 
 #include <sys/types.h>
 
+#include <cstddef>
+#include <filesystem>
 #include <string>
 
 namespace carillon::run {
 
-/// From now on such a signal ends this process at once with exit code 128 + signal: rank 0 prints one line, and the child and the file of
-/// a Cleanup that exists are removed. Nothing else needs to be undone: outputs have no name before they are whole (base::write_file).
-/// mpirun ends the other ranks when one of them is ended like this. Call once, before the work.
-void end_on_signals(int rank);
+/// Whether this process prints for all that its launcher started; known before MPI has started.
+bool is_first_of_all();
+
+/// From now on such a signal ends this process at once with exit code 128 + signal: the first of all prints one line, "PROGRAM: stopped by
+/// SIGTERM; UNTOUCHED", and the child and the file of a Cleanup and the files of TemporaryFiles that exist are removed. Nothing else needs
+/// to be undone: outputs have no name before they are whole (base::write_file). mpirun ends the other ranks when one of them is ended like
+/// this. Both texts live as long as the process. Call once, before the work.
+void end_on_signals(const char* program, const char* untouched);
 
 /// From now on SIGTERM and SIGUSR1 ask for what has been done to be saved: where there is news they only set is_stop_asked(), and otherwise
 /// they end this process at once, with exit code kExitCheckpointed. Call once, after end_on_signals().
@@ -30,6 +36,20 @@ class Cleanup {
   Cleanup(const Cleanup&) = delete;
   Cleanup& operator=(const Cleanup&) = delete;
   void set_child(pid_t child);
+};
+
+/// A file that is of no use when the run ends: its destructor removes it, and so does a signal; not while a checkpoint needs it.
+class TemporaryFile {
+ public:
+  static constexpr std::size_t kMost = 8;  // at a time
+  explicit TemporaryFile(const std::filesystem::path& file);
+  ~TemporaryFile();
+  TemporaryFile(const TemporaryFile&) = delete;
+  TemporaryFile& operator=(const TemporaryFile&) = delete;
+  void set_needed(bool is_needed);
+
+ private:
+  std::size_t place_ = 0;
 };
 
 }  // namespace carillon::run

@@ -64,6 +64,11 @@ struct CommandLine {
         ->type_name("ROOT NAME");
     CLI::Option* validate =
         app.add_flag("--validate", options.validate, "check the job and its meshes, predict step, time and memory, and simulate nothing");
+    app.add_option("--patience", options.patience_s,
+                   "with --validate: seconds for the answer; of meshes that would take longer coarser ones are made, and that is said")
+        ->check(CLI::Range(0.0, 1e6))
+        ->capture_default_str()
+        ->needs(validate);
     app.add_flag("--json", options.json, "with --validate: print one JSON object")->needs(validate);
     app.set_version_flag("--version", version::describe("carillon-simulate"));
   }
@@ -98,10 +103,11 @@ int run_program(const CommandLine& words) {
 
 int main(int argc, char** argv) {
   CommandLine words;
-  run::end_on_signals(0);
+  run::end_on_signals("carillon-simulate", "files of earlier runs were not touched, or new ones are whole");
   try {
     words.app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
+    if (!run::is_first_of_all()) return error.get_exit_code() == 0 ? 0 : kExitInput;
     return words.app.exit(error) == 0 ? 0 : kExitInput;
   }
   try {
