@@ -28,7 +28,9 @@ constexpr double kDifference = 1e-3;  // of the shortest edge, or rad
 constexpr int kNewtonSteps = 25;
 constexpr double kCloseEnough = 1e-9, kRounding = 1e-5;  // of the displacement: a correction that ends, and one that may be its rounding
 constexpr double kLeastPart = 1e-3;                      // of the load
-constexpr double kShift = 1e-10;                         // of the highest stiffness over mass
+// Of the highest stiffness over mass: a shift of modes to begin with, and what rounding makes of rigid motion.
+constexpr double kFirstShift = 1e-6, kRigidShare = 1e-12;
+constexpr double kShiftOfMode = 0.3;  // of a mode's own stiffness over mass: rigid motion then does not drown it in rounding
 
 double& get_component(Quad& q, int axis) { return axis == 0 ? q.x : axis == 1 ? q.y : q.z; }
 
@@ -250,23 +252,30 @@ ElasticMode calc_mode(Domain& domain, const std::vector<HeldNode>& held, int num
   const int freedoms = tangent.count_freedoms();
   Vector mass(freedoms);
   tangent.for_each_free([&](std::size_t n, int, int freedom) { mass[freedom] = domain.get_masses_kg()[n]; });
-  const double shift = freedoms > 0 ? kShift * k.diagonal().cwiseQuotient(mass).maxCoeff() : 0.0;
+  const double highest = freedoms > 0 ? k.diagonal().cwiseQuotient(mass).maxCoeff() : 0.0;
+  double shift = kFirstShift * highest;
   constexpr int kRigid = 6, kMore = 6;
   const int width = std::min(freedoms, number + kRigid + kMore);
   const auto refuse = [&] {
     return InputError(fmt::format("the body has no mode {} that can be found; give a lower number, or a finer mesh", number));
   };
   if (width < 1) throw refuse();
-  Sparse shifted = k;
-  shifted.diagonal() += shift * mass;
-  const Eigen::SimplicialLDLT<Sparse> factor(shifted);
-  if (factor.info() != Eigen::Success) throw refuse();
+  Eigen::SimplicialLDLT<Sparse> factor;
+  const auto factorise = [&] {
+    Sparse shifted = k;
+    shifted.diagonal() += shift * mass;
+    factor.compute(shifted);
+    if (factor.info() != Eigen::Success) throw refuse();
+  };
+  factorise();
   Eigen::MatrixXd x(freedoms, width);
   std::uint64_t chance = 1;
   for (int j = 0; j < width; ++j)
     for (int i = 0; i < freedoms; ++i) x(i, j) = base::to_unit(base::draw(chance)) - 0.5;
   double last = -1.0;
+  int settled = 0;
   constexpr int kRounds = 200;
+  constexpr double kConverged = 1e-10;
   for (int round = 0; round < kRounds; ++round) {
     x = factor.solve(mass.asDiagonal() * x);
     // Columns of about equal size and at right angles: what is left of their products is no rounding.
@@ -276,13 +285,19 @@ ElasticMode calc_mode(Domain& domain, const std::vector<HeldNode>& held, int num
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> small(x.transpose() * (k * x));
     x = x * small.eigenvectors();
     int found = 0, elastic = 0;
-    while (found < width && (elastic += small.eigenvalues()[found] > 0.01 * shift ? 1 : 0) < number) ++found;
+    while (found < width && (elastic += small.eigenvalues()[found] > kRigidShare * highest ? 1 : 0) < number) ++found;
     if (found == width) throw refuse();
     const double value = small.eigenvalues()[found];
-    if (std::abs(value - last) > 1e-12 * value && round + 1 < kRounds) {
-      last = value;
-      continue;
+    if (shift > 2.0 * value) {
+      shift = kShiftOfMode * value;
+      factorise();
+    } else if (std::abs(value - last) <= kConverged * value) {
+      ++settled;
+    } else {
+      settled = 0;
     }
+    last = value;
+    if (settled < 2) continue;
     ElasticMode mode{std::sqrt(value), u};
     tangent.add(x.col(found), mode.shape);
     Vec3 far{};

@@ -103,9 +103,9 @@ void Motion::find_carried() {
 }
 
 void Motion::release() {
-  const double next_s = find_next_time_s() * (1.0 + 1e-12);  // rounded: a release at a step is at that step
-  if (!(next_s > next_release_s_)) return;
-  const auto is_released = [&](const Constraint& constraint) { return next_s > constraint.release_s; };
+  const double now_s = get_time_s() * (1.0 + 1e-12);  // rounded: a release at a step is at that step
+  if (now_s < next_release_s_) return;
+  const auto is_released = [&](const Constraint& constraint) { return now_s >= constraint.release_s; };
   std::erase_if(constrained_nodes_, [&](const ConstrainedNode& node) {
     if (!is_released(constraints_[static_cast<std::size_t>(node.constraint)])) return false;
     const auto place = static_cast<std::size_t>(node.place);

@@ -240,7 +240,10 @@ LAW = {
     ),
     "precompute/emission": (["runtime/base", "runtime/bank", "runtime/recording", "precompute/job", "precompute/comm"], ["fmt", "hdf5"]),
     "precompute/bem": (["runtime/base", "runtime/bank", "precompute/comm"], ["fmt", "eigen"]),
-    "precompute/transient": (["runtime/base", "precompute/job", "partition", "precompute/mesh", "precompute/comm"], ["fmt", "mpi", "eigen"]),
+    "precompute/transient": (
+        ["runtime/base", "precompute/job", "partition", "precompute/mesh", "precompute/comm"],
+        ["fmt", "mpi", "eigen"],
+    ),
     "precompute/io": (
         [
             "runtime/base",

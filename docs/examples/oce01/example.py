@@ -109,11 +109,11 @@ def play_pluck(stage):
         ("Euler's beam", f"{beam:.1f}", f"{2e3 * energy / 10:.4f}", f"{1e3 * energy:.4f}", "0", ""),
     ]
     work = record["books"][-1]["work_j"]
-    found = (f"{first:.1f}", f"{1e3 * bent['displacement_m']:.4f}", f"{1e3 * bent['energy_j']:.4f}", f"{1e3 * work:g}")
+    found = (f"{first:.1f}", f"{1e3 * bent['displacement_m']:.4f}", f"{1e3 * bent['energy_j']:.4f}", f"{1e3 * work:.1g}")
     tools.print_table([*rows, ("found", *found, f"{bent['cpu_seconds']:.2f}")])
     stage.compare("the first line of the plucked bar against the beam [Hz]", first, beam, 2.5)
     stage.expect("the bar has the energy of a bent beam to 5 %", abs(bent["energy_j"] / energy - 1) < 0.05)
-    stage.expect("nothing is put in when it is let go", work == 0 and record["books"][0]["elastic_j"] == bent["energy_j"])
+    stage.expect("nothing is put in when it is let go", abs(work) < 1e-9 * energy)
 
 
 def compare_blows(stage, off, on, rate, unit, limit_db=-30):

@@ -28,7 +28,7 @@ def predict(folder, *words):
 
 with tempfile.TemporaryDirectory(prefix="carillon-simulate-") as scratch:
     folder = pathlib.Path(scratch)
-    thick = make_bar(2, "T4")
+    thick = make_bar(0.4, "T4")
     thick["simulate"]["bodies"][0]["shape"] = {"bar": {"length_m": 0.4, "width_m": 0.2, "thickness_m": 0.2, "nodes": 40}}
     thick["simulate"]["impulses"][0]["point_m"] = [0.2, 0, 0.1]
     thick["simulate"] |= {"sample_rate_hz": 192000, "microphones": [[0, 0.01 * m, 0.5] for m in range(16)]}

@@ -100,16 +100,20 @@ TEST(Bent, ABodyThatIsLetGoSoundsAndPutsNothingIn) {
     if (!is_root) continue;
     EXPECT_GT(record.peak_pa, 1e-4) << bend;
     EXPECT_GT(record.energy_j, 1e-9) << bend;
-    EXPECT_EQ(record.work_j, 0.0) << bend;
+    EXPECT_LT(std::abs(record.work_j), 1e-12 * record.energy_j) << bend;
     EXPECT_LT(record.book_error, 1e-6) << bend;
   }
   // Clapeyron: F u / 2, and u = F L^3 / 3 E I to some percent.
   const Record pulled = play(make_scene(R"(, "bend": {"force_n": [0, 0, -10], "point_m": [0.05, 0, 0]})", ""));
-  if (is_root) EXPECT_NEAR(pulled.energy_j, 0.5 * 100.0 * 1e-3 / (3.0 * 70e9 * 0.02 * 1e-6 / 12.0), 0.08 * pulled.energy_j);
+  if (is_root) {
+    EXPECT_NEAR(pulled.energy_j, 0.5 * 100.0 * 1e-3 / (3.0 * 70e9 * 0.02 * 1e-6 / 12.0), 0.08 * pulled.energy_j);
+  }
   // Turned with its body: the same energy.
   const Record turned =
       play(make_scene(R"(, "bend": {"force_n": [0, 0, -10], "point_m": [0.05, 0, 0]}, "rotation_deg": [40, 50, 60])", ""));
-  if (is_root) EXPECT_NEAR(turned.energy_j, pulled.energy_j, 1e-6 * pulled.energy_j);
+  if (is_root) {
+    EXPECT_NEAR(turned.energy_j, pulled.energy_j, 1e-6 * pulled.energy_j);
+  }
 }
 
 TEST(Bent, DrivenNodesAreReleased) {
