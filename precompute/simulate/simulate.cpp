@@ -404,9 +404,9 @@ std::int64_t count_later_bytes(const Simulation& simulation, int ranks, bool has
   const double nodes = finer * assembly.node_count(), elements = finer * assembly.element_count();
   if (!spec.surface.empty()) later += static_cast<std::int64_t>(nodes * kSurfaceBytesPerNode);
   if (!spec.motion.empty()) later += static_cast<std::int64_t>(nodes * kFilmBytesPerNode);
-  // Of this rank, of all ranks, and as the bytes of the file; the last two on rank 0.
+  // Of this rank, which grows by doubling, of all ranks, and as the bytes of the file; the last two on rank 0.
   const std::int64_t state =
-      has_checkpoint ? kLaterBytes + (1 + 2 * ranks) * pressures + static_cast<std::int64_t>(3 * kNumber * (30.0 * nodes + 25.0 * elements))
+      has_checkpoint ? kLaterBytes + (3 + 2 * ranks) * pressures + static_cast<std::int64_t>(3 * kNumber * (30.0 * nodes + 25.0 * elements))
                      : 0;
   return pressures + std::max(later, state);
 }

@@ -275,9 +275,10 @@ ElasticMode calc_mode(Domain& domain, const std::vector<HeldNode>& held, int num
   double last = -1.0;
   int settled = 0;
   constexpr int kRounds = 200;
-  constexpr double kConverged = 1e-10;
+  constexpr double kConverged = 1e-10, kRounded = 1e-14;
   for (int round = 0; round < kRounds; ++round) {
-    x = factor.solve(mass.asDiagonal() * x);
+    const Eigen::MatrixXd force = mass.asDiagonal() * x;  // apart: solve() writes to x before it has read all of it
+    x = factor.solve(force);
     // Columns of about equal size and at right angles: what is left of their products is no rounding.
     const Eigen::MatrixXd weighted = mass.cwiseSqrt().asDiagonal() * x;
     const Eigen::MatrixXd q = Eigen::HouseholderQR<Eigen::MatrixXd>(weighted).householderQ() * Eigen::MatrixXd::Identity(freedoms, width);
@@ -291,7 +292,7 @@ ElasticMode calc_mode(Domain& domain, const std::vector<HeldNode>& held, int num
     if (shift > 2.0 * value) {
       shift = kShiftOfMode * value;
       factorise();
-    } else if (std::abs(value - last) <= kConverged * value) {
+    } else if (std::abs(value - last) <= kConverged * value + kRounded * highest) {
       ++settled;
     } else {
       settled = 0;
