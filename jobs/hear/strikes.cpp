@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "runtime/bank/blows.hpp"
+#include "runtime/bank/heard.hpp"
 
 namespace carillon::hear {
 
@@ -13,7 +14,7 @@ std::vector<HeardMode> list_modes(const bank::Bank& bank, std::size_t vertex, st
   const double loudest = amplitudes.empty() ? 0.0 : *std::max_element(amplitudes.begin(), amplitudes.end());
   std::vector<HeardMode> modes;
   for (std::size_t m = 0; m < std::min(count, bank.mode_count()); ++m) {
-    HeardMode mode{.freq_hz = bank.freq_hz(m), .t60_s = std::log(1000.0) / bank.decay_per_s[m]};
+    HeardMode mode{.freq_hz = bank.freq_hz(m), .t60_s = bank::calc_t60_s(bank.decay_per_s[m])};
     mode.error_cents =
         m < bank.discretisation_error_cents.size() ? bank.discretisation_error_cents[m] : std::numeric_limits<double>::infinity();
     mode.level_dba = amplitudes[m] > 0.0 ? 20.0 * std::log10(amplitudes[m] / loudest) : -std::numeric_limits<double>::infinity();

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <optional>
 #include <sstream>
 
@@ -35,9 +36,6 @@ const char* find_regime(double decay, double omega) {
   if (std::abs(decay - omega) <= 1e-9 * omega) return "critical";
   return decay < omega ? "under" : "over";
 }
-
-/// ln(1000) / d; infinite without damping.
-double calc_t60_s(double decay) { return std::log(1000.0) / decay; }
 
 std::string format_bytes(std::uintmax_t bytes) {
   return bytes < 1'000'000 ? fmt::format("{:.1f} kB", static_cast<double>(bytes) / 1e3)
@@ -89,25 +87,32 @@ std::string format_cents(const std::vector<double>& cents, std::size_t mode) {
   return mode < cents.size() && std::isfinite(cents[mode]) ? fmt::format("{:.2g}", cents[mode]) : "-";
 }
 
-std::string format_modes(const Bank& bank, std::size_t limit) {
+std::string format_modes(const Bank& bank, std::span<const HeardMode> heard, std::size_t limit) {
   const bool is_corrected = !bank.corrected.is_empty();
   std::string text =
-      fmt::format("\n{:>5} {:>11} {:>9} {:>9} {:>11} {:>8} {:>10} {:>11} {:>9} {:>10} {:>8} {:>9} {:>13}\n", "mode", "mesh [Hz]", "+-mesh",
-                  "+-body", "freq [Hz]", "+-body", "correction", "decay [1/s]", "T60 [s]", "d/omega", "regime", "residual", "gain");
+      fmt::format("\n{:>5} {:>11} {:>9} {:>9} {:>11} {:>8} {:>10} {:>11} {:>10} {:>10} {:>10} {:>9} {:>10} {:>8} {:>9} {:>13}\n", "mode",
+                  "mesh [Hz]", "+-mesh", "+-body", "freq [Hz]", "+-body", "correction", "decay [1/s]", "material", "air", "supports",
+                  "T60 [s]", "d/omega", "regime", "residual", "gain");
+  const auto format_part = [](double decay, bool is_known) { return is_known ? fmt::format("{:.4g}", decay) : std::string("-"); };
   const std::size_t shown = std::min(limit, bank.mode_count());
   for (std::size_t i = 0; i < shown; ++i) {
-    const double omega = std::sqrt(bank.eigenvalue_rad2_s2[i]), decay = bank.decay_per_s[i];
-    text += fmt::format("{:>5} {:>11.2f} {:>9} {:>9} {:>11} {:>8} {:>10} {:>11.4g} {:>9.3g} {:>10.3g} {:>8} {:>9.1e} {:>13.4g}\n", i + 1,
-                        bank.freq_hz(i), format_cents(bank.algebraic_error_cents, i), format_cents(bank.discretisation_error_cents, i),
-                        is_corrected ? fmt::format("{:.2f}", bank.corrected.freq_hz[i]) : "-", format_cents(bank.corrected.error_cents, i),
-                        is_corrected ? describe(bank.corrected.correction[i]) : "-", decay, calc_t60_s(decay), decay / omega,
-                        find_regime(decay, omega), bank.residual[i], bank.radiation_gain[i]);
+    const double omega = 2.0 * std::numbers::pi * heard[i].freq_hz, decay = heard[i].calc_decay_per_s();
+    text += fmt::format(
+        "{:>5} {:>11.2f} {:>9} {:>9} {:>11.2f} {:>8} {:>10} {:>11.4g} {:>10.4g} {:>10} {:>10} {:>9.3g} {:>10.3g} {:>8} {:>9.1e} "
+        "{:>13.4g}\n",
+        i + 1, bank.freq_hz(i), format_cents(bank.algebraic_error_cents, i), format_cents(bank.discretisation_error_cents, i),
+        heard[i].freq_hz, format_cents(bank.corrected.error_cents, i), is_corrected ? describe(bank.corrected.correction[i]) : "-", decay,
+        heard[i].material_per_s, format_part(heard[i].radiation_per_s, !bank.multipoles.is_empty()),
+        format_part(heard[i].supports_per_s, bank.supports.count() > 0), calc_t60_s(decay), decay / omega, find_regime(decay, omega),
+        bank.residual[i], bank.radiation_gain[i]);
   }
   if (shown < bank.mode_count())
     text += fmt::format("  ... {} more; --modes {} shows them all\n", bank.mode_count() - shown, bank.mode_count());
   text +=
       "mesh: the frequency of the mesh; +-mesh: cents to its exact mode, a bound; +-body: cents to the mode of the body, an estimate\n"
-      "freq: the same with the estimated error of the mesh taken off, which is what is played; sorted again where modes change places\n"
+      "freq: what is played: the estimated error of the mesh taken off, in air and on its supports as far as the bank knows them; sorted\n"
+      "again where modes change places\n"
+      "decay and T60: what is heard, the sum of what material, air and supports take from the mode\n"
       "gain: Pa at 1 m for unit modal velocity (q' = 1 m kg^1/2 / s); frequencies are undamped\n";
   return text;
 }
@@ -191,14 +196,20 @@ Json::Value make_list(const Range& values) {
   return list;
 }
 
-Json::Value make_mode(const Bank& bank, std::size_t i) {
-  const double omega = std::sqrt(bank.eigenvalue_rad2_s2[i]), decay = bank.decay_per_s[i];
+Json::Value make_mode(const Bank& bank, const HeardMode& heard, std::size_t i) {
+  const double omega = 2.0 * std::numbers::pi * heard.freq_hz, decay = heard.calc_decay_per_s();
   Json::Value mode;
   mode["frequency_hz"] = bank.freq_hz(i);
   mode["eigenvalue_rad2_s2"] = bank.eigenvalue_rad2_s2[i];
-  mode["decay_per_s"] = decay;
+  mode["decay_per_s"] = bank.decay_per_s[i];
   // JSON has no infinity: an undamped mode has no T60.
   mode["t60_s"] = std::isfinite(calc_t60_s(decay)) ? Json::Value(calc_t60_s(decay)) : Json::Value();
+  Json::Value& parts = mode["heard"];
+  parts["frequency_hz"] = heard.freq_hz;
+  parts["decay_per_s"] = decay;
+  parts["material_per_s"] = heard.material_per_s;
+  parts["radiation_per_s"] = heard.radiation_per_s;
+  parts["supports_per_s"] = heard.supports_per_s;
   mode["damping_ratio"] = decay / omega;
   mode["regime"] = find_regime(decay, omega);
   mode["residual"] = bank.residual[i];
@@ -267,7 +278,8 @@ Json::Value make_proof(const Proof& proof) {
 
 }  // namespace
 
-std::string format_info(const Bank& bank, const std::filesystem::path& file, std::size_t mode_limit, bool has_record) {
+std::string format_info(const Bank& bank, std::span<const HeardMode> heard, const std::filesystem::path& file, std::size_t mode_limit,
+                        bool has_record) {
   const auto [major, minor] = read_version(file);
   const RigidBody& rigid = bank.rigid;
   const Material& m = bank.material;
@@ -297,7 +309,7 @@ std::string format_info(const Bank& bank, const std::filesystem::path& file, std
                       rigid.centre_m[0], rigid.centre_m[1], rigid.centre_m[2]);
   text += fmt::format("inertia   xx {:.5g}, yy {:.5g}, zz {:.5g}, xy {:.3g}, xz {:.3g}, yz {:.3g} kg m^2\n", inertia[0], inertia[4],
                       inertia[8], inertia[1], inertia[2], inertia[5]);
-  if (mode_limit > 0 && bank.mode_count() > 0) text += format_modes(bank, mode_limit);
+  if (mode_limit > 0 && bank.mode_count() > 0) text += format_modes(bank, heard, mode_limit);
   const std::optional<Json::Value> provenance = parse_json(bank.provenance);
   // The record of the run; the job around it is left to --json.
   const bool is_recorded = provenance && provenance->isObject() && provenance->isMember("run") && (*provenance)["run"].isObject();
@@ -309,7 +321,7 @@ std::string format_info(const Bank& bank, const std::filesystem::path& file, std
   return text;
 }
 
-std::string format_info_json(const Bank& bank, const std::filesystem::path& file) {
+std::string format_info_json(const Bank& bank, std::span<const HeardMode> heard, const std::filesystem::path& file) {
   const auto [major, minor] = read_version(file);
   Json::Value root;
   root["file"] = file.string();
@@ -379,7 +391,7 @@ std::string format_info_json(const Bank& bank, const std::filesystem::path& file
   root["modes"] = Json::Value(Json::arrayValue);
   for (std::size_t i = 0; i < bank.mode_count(); ++i) {
     root["frequencies_hz"].append(bank.freq_hz(i));
-    root["modes"].append(make_mode(bank, i));
+    root["modes"].append(make_mode(bank, heard[i], i));
   }
   const auto provenance = parse_json(bank.provenance);
   root["provenance"] = provenance ? *provenance : Json::Value(bank.provenance);

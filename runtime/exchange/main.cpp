@@ -31,6 +31,7 @@
 #include "runtime/material/solids.hpp"
 #include "runtime/material/table.hpp"
 #include "runtime/radiation/gains.hpp"
+#include "runtime/support/heard.hpp"
 #include "runtime/version/version.hpp"
 
 namespace {
@@ -360,7 +361,9 @@ int run(int argc, char** argv) {
     exchange::run_import(imported);
   } else {
     const bank::Bank bank = bank::read_bank(file);
-    fmt::print("{}", json ? bank::format_info_json(bank, file) : base::printable_lines(bank::format_info(bank, file, modes, all)));
+    const std::vector<bank::HeardMode> heard = support::calc_heard(bank);
+    fmt::print("{}",
+               json ? bank::format_info_json(bank, heard, file) : base::printable_lines(bank::format_info(bank, heard, file, modes, all)));
   }
   if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
   return 0;

@@ -18,6 +18,7 @@
 
 #include "runtime/bank/corrected.hpp"
 #include "runtime/bank/edits.hpp"
+#include "runtime/bank/heard.hpp"
 #include "runtime/bank/of_material.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/printable.hpp"
@@ -199,7 +200,7 @@ void bind_bank(py::module_& module) {
   array(
       "t60_s",
       [](const bank::Bank& b, const py::object&) {
-        return make_per_mode(b, [&](std::size_t m) { return std::log(1000.0) / b.decay_per_s[m]; });
+        return make_per_mode(b, [&](std::size_t m) { return bank::calc_t60_s(b.decay_per_s[m]); });
       },
       "(m) float64 [s]: the time in which a mode falls by 60 dB.");
   array(

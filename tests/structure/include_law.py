@@ -52,7 +52,7 @@ LAW = {
     "runtime/sound": (["runtime/base"], ["fmt", "eigen", "cairo"]),
     "runtime/nonlinear": (["runtime/base", "runtime/bank"], ["fmt"]),
     "runtime/exchange": (
-        ["runtime/base", "runtime/gltf", "runtime/material", "runtime/version", "runtime/bank", "runtime/radiation"],
+        ["runtime/base", "runtime/gltf", "runtime/material", "runtime/version", "runtime/bank", "runtime/support", "runtime/radiation"],
         ["fmt", "cli", "eigen"],
     ),
     "runtime/synth": (["runtime/base", "runtime/bank", "runtime/events", "runtime/radiation", "runtime/head", "runtime/nonlinear"], []),
@@ -149,7 +149,7 @@ LAW = {
         ["runtime/base", "precompute/cost", "jobs/process", "jobs/outcome", "jobs/store", "jobs/registry", "jobs/attempt"],
         ["fmt"],
     ),
-    "jobs/report": (["runtime/base", "runtime/bank"], ["fmt", "json"]),
+    "jobs/report": (["runtime/base", "runtime/bank", "runtime/support"], ["fmt", "json"]),
     "jobs/cache": (["runtime/base", "precompute/job", "jobs/process", "jobs/store"], ["fmt"]),
     "jobs/explore": (
         ["runtime/base", "runtime/bank", "runtime/material", "runtime/version", "runtime/host", "jobs/process", "jobs/report"],
