@@ -27,6 +27,7 @@
 #include "precompute/run/open_job.hpp"
 #include "precompute/run/run.hpp"
 #include "precompute/run/solve_body.hpp"
+#include "runtime/bank/corrected.hpp"
 #include "runtime/base/file.hpp"
 
 namespace carillon::run {
@@ -99,8 +100,11 @@ std::string describe_wide_bars(const bank::Bank& bank, const Setting& setting, b
 std::string describe_result(const bank::Bank& bank) {
   std::string text = fmt::format("{}\n{}", bank::describe_completeness(bank), bank::describe_accuracy(bank));
   if (bank.mode_count() > 0) {
-    const auto [low, high] = std::minmax_element(bank.corrected.freq_hz.begin(), bank.corrected.freq_hz.end());
-    text += fmt::format("\n{:.2f} Hz to {:.2f} Hz", *low, *high);
+    std::vector<double> played_hz;
+    for (std::size_t m = 0; m < bank.mode_count(); ++m) played_hz.push_back(bank::find_played_hz(bank, m));
+    const auto [low, high] = std::minmax_element(played_hz.begin(), played_hz.end());
+    text += fmt::format("\n{:.2f} Hz to {:.2f} Hz as they are played; {:.2f} Hz to {:.2f} Hz of the mesh", *low, *high, bank.freq_hz(0),
+                        bank.freq_hz(bank.mode_count() - 1));
   }
   return text;
 }

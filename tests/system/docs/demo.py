@@ -34,7 +34,19 @@ for words in (
 ):
     assert words in run.stdout, words
 ours = [float(hz) for hz in re.findall(r"^  ours, .*?([0-9.]+) Hz", run.stdout, re.M)]
+corrected = [float(hz) for hz in re.findall(r"^        corrected for its mesh +([0-9.]+) Hz", run.stdout, re.M)]
 assert len(ours) == 2 and 700 < ours[1] < ours[0] < 1400, ours  # coarse T4 is stiffer than coarse T10
+# What is said to sound is what is played: not the mesh's frequency. It is repeated at the end.
+info = [
+    json.loads(
+        subprocess.run([bin_dir / "carillon-bank", "info", "--json", work / f"bunny_{kind}.hdf"], check=True, capture_output=True).stdout
+    )
+    for kind in ("t4", "t10")
+]
+heard = [min(mode["heard"]["frequency_hz"] for mode in bank["modes"]) for bank in info]
+assert len(corrected) == 2 and all(abs(said - hz) < 0.06 for said, hz in zip(corrected, heard)), (corrected, heard)
+assert abs(min(info[1]["corrected_frequencies_hz"]) - heard[1]) < 1e-6 and abs(ours[1] - heard[1]) > 0.5, (ours, heard)
+assert f"{heard[1]:.1f} Hz, played; by T4" in run.stdout[-400:], run.stdout[-400:]
 
 with wave.open(str(work / "chute.wav")) as sound:
     assert (sound.getnchannels(), sound.getframerate(), sound.getsampwidth()) == (2, 48000, 3), sound.getparams()
