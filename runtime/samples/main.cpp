@@ -32,6 +32,7 @@ void run(samples::SampleOptions& options, bool is_quiet) {
       next += 10;
     };
   const samples::SampleSet set = samples::make_samples(options);
+  if (!set.warning.empty()) fmt::print(stderr, "carillon-samples: warning: {}\n", base::printable(set.warning));
   if (is_quiet) return;
   fmt::print("samples     {}, {:.3g} MB\n", set.samples, 1e-6 * set.bytes);
   fmt::print("full scale  {:.4g} Pa at 1 m, at velocity 127\n", set.full_scale_pa);

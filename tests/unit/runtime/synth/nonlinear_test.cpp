@@ -276,7 +276,7 @@ TEST(NonlinearVoice, WhatIsRadiatedCountsTheModesOfAllKinds) {
     Voice voice(model, {.is_nonlinear = is_nonlinear, .has_cascade = has_cascade, .audits_energy = true});
     strike_softly(voice, 1e-6);
     (void)play(voice, 48000);
-    radiated_j.push_back(voice.get_counters().radiated_j);
+    radiated_j.push_back(voice.get_counters().energy.radiated_j);
   }
   EXPECT_GT(radiated_j[0], 0.0);
   EXPECT_NEAR(radiated_j[1] / radiated_j[0], 1.0, 1e-3);
