@@ -120,7 +120,8 @@ void Voice::render_sub_blocks(std::int64_t start, int sub_blocks, bool struck_at
     const bool struck = struck_at_all && strikes_.acts(sample, kSubBlock);
     const ContactBlock* drive = touched ? contacts_->begin_sub_block(sample) : nullptr;
     const bool audited = audits_ && (struck || drive != nullptr);
-    if (audited) note_energy(sample, (first + q) * kColumnsEach, false);
+    if (audited) note_energy(sample, (first + q) * kColumnsEach);
+    keeps_for_book_ = audited;
     if (drive != nullptr && drive->forces) wake(std::min(find_reach(drive->strength_n_s), driven_));
     if (q == made) {
       do ++made;
@@ -134,7 +135,7 @@ void Voice::render_sub_blocks(std::int64_t start, int sub_blocks, bool struck_at
     add_acting(sample, first + q, drive, struck, out);
     if (const bool acted = struck || (drive != nullptr && drive->forces); judged && (acted || bending_.is_watching()))
       bending_.look(state_.data(), starts_.data(), (first + q + 1) * kColumnsEach, live_, damped_.get_states(), acted);
-    if (audited) note_energy(sample + kSubBlock, (first + q + 1) * kColumnsEach, true);
+    if (audited) note_energy_acted(sample + kSubBlock, (first + q + 1) * kColumnsEach, drive != nullptr && drive->damps);
     if (directed) add_directed(first + q, q * kSubBlock);
     int bad = 0;
     for (int n = 0; n < kSubBlock; ++n) bad |= static_cast<int>(!(std::abs(out[n]) <= std::numeric_limits<float>::max()));
@@ -147,10 +148,11 @@ void Voice::render_sub_blocks(std::int64_t start, int sub_blocks, bool struck_at
   }
 }
 
-/// Where the states of what acts in this sub-block are kept for the ears: of all live groups, those not yet used zero; nullptr: nowhere.
+/// Where the states of what acts in this sub-block are kept for the ears and the book of energy: of all live groups, those not yet used
+/// zero; nullptr: nowhere.
 SampleStates* Voice::find_kept() noexcept {
-  if (!is_directed()) return nullptr;
-  SampleStates* kept = directed_[0]->get_kept().data();
+  if (!is_directed() && !keeps_for_book_) return nullptr;
+  SampleStates* kept = is_directed() ? directed_[0]->get_kept().data() : book_->get_kept();
   for (; kept_ < live_; ++kept_) kept[kept_] = SampleStates{};
   return kept;
 }
@@ -363,7 +365,7 @@ void Voice::audit() noexcept {
   const double before = std::exchange(energy_j_, calc_energy_j());
   if (undisturbed_ && before > kSmallest) counters_.energy_rise = std::max(counters_.energy_rise, energy_j_ / before - 1.0);
   undisturbed_ = true;
-  if (before != 0.0 || energy_j_ != 0.0) note_energy(horizon_, kColumns, false);
+  if (before != 0.0 || energy_j_ != 0.0) note_energy(horizon_, kColumns);
 }
 
 /// At the start of a column of this block; of the next for kColumns.
@@ -377,11 +379,21 @@ DampedState Voice::get_state_at(int m, int column) const noexcept {
   return {q, static_cast<double>(starts_[group].re[column][m % kGroup]) - mode.decay * q};
 }
 
-void Voice::note_energy(std::int64_t sample, int column, bool acted) noexcept {
+void Voice::note_energy(std::int64_t sample, int column) noexcept {
   book_->note(
-      sample, acted, [&](int m) { return get_state_at(m, column); },
+      sample, [&](int m) { return get_state_at(m, column); }, [&](int m) { return is_nonlinear() && nonlinear_->find_place(m) >= 0; },
+      is_nonlinear() ? nonlinear_->calc_energy_j() : 0.0);
+  counters_.energy = book_->get();
+}
+
+/// After a sub-block in which something acted. `damps`: what is kept is all the motion of the modes.
+void Voice::note_energy_acted(std::int64_t sample, int column, bool damps) noexcept {
+  book_->note_acted(
+      sample, find_kept(), live_, damps, [&](int m) { return get_state_at(m, column); },
       [&](int m) { return is_nonlinear() && nonlinear_->find_place(m) >= 0; }, is_nonlinear() ? nonlinear_->calc_energy_j() : 0.0);
   counters_.energy = book_->get();
+  keeps_for_book_ = false;
+  if (!is_directed()) kept_ = 0;
 }
 
 void Voice::reset() noexcept {

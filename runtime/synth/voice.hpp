@@ -169,7 +169,8 @@ class Voice {
   void fade_out(int groups) noexcept;
   void reset() noexcept;
   void audit() noexcept;
-  void note_energy(std::int64_t sample, int column, bool acted) noexcept;
+  void note_energy(std::int64_t sample, int column) noexcept;
+  void note_energy_acted(std::int64_t sample, int column, bool damps) noexcept;
   DampedState get_state_at(int mode, int column) const noexcept;
   double calc_ringing_energy_j(int mode) const noexcept;
   DampedState get_mode_state(int mode) const noexcept;
@@ -208,7 +209,7 @@ class Voice {
   int held_ = 0;              // of them not yet handed out: the last of block_
   int rendered_ = 0;          // samples in block_
   bool silent_ = true;        // block_ is all zero
-  bool audits_ = false, undisturbed_ = false;
+  bool audits_ = false, undisturbed_ = false, keeps_for_book_ = false;
   double energy_j_ = 0.0;             // at the start of the block, where it is audited
   std::unique_ptr<EnergyBook> book_;  // where it is audited
   ContactForces* contacts_ = nullptr;
