@@ -89,30 +89,27 @@ std::string format_cents(const std::vector<double>& cents, std::size_t mode) {
 
 std::string format_modes(const Bank& bank, std::span<const HeardMode> heard, std::size_t limit) {
   const bool is_corrected = !bank.corrected.is_empty();
-  std::string text =
-      fmt::format("\n{:>5} {:>11} {:>9} {:>9} {:>11} {:>8} {:>10} {:>11} {:>10} {:>10} {:>10} {:>9} {:>10} {:>8} {:>9} {:>13}\n", "mode",
-                  "mesh [Hz]", "+-mesh", "+-body", "freq [Hz]", "+-body", "correction", "decay [1/s]", "material", "air", "supports",
-                  "T60 [s]", "d/omega", "regime", "residual", "gain");
+  std::string text = fmt::format("\n{:>5} {:>10} {:>8} {:>7} {:>9} {:>7} {:>10} {:>9} {:>9} {:>9} {:>9} {:>8} {:>8} {:>8} {:>9}\n", "mode",
+                                 "mesh [Hz]", "+-mesh", "+-body", "freq [Hz]", "+-body", "correction", "d [1/s]", "material", "air",
+                                 "supports", "T60 [s]", "regime", "residual", "gain");
   const auto format_part = [](double decay, bool is_known) { return is_known ? fmt::format("{:.4g}", decay) : std::string("-"); };
   const std::size_t shown = std::min(limit, bank.mode_count());
   for (std::size_t i = 0; i < shown; ++i) {
     const double omega = 2.0 * std::numbers::pi * heard[i].freq_hz, decay = heard[i].calc_decay_per_s();
     text += fmt::format(
-        "{:>5} {:>11.2f} {:>9} {:>9} {:>11.2f} {:>8} {:>10} {:>11.4g} {:>10.4g} {:>10} {:>10} {:>9.3g} {:>10.3g} {:>8} {:>9.1e} "
-        "{:>13.4g}\n",
-        i + 1, bank.freq_hz(i), format_cents(bank.algebraic_error_cents, i), format_cents(bank.discretisation_error_cents, i),
-        heard[i].freq_hz, format_cents(bank.corrected.error_cents, i), is_corrected ? describe(bank.corrected.correction[i]) : "-", decay,
+        "{:>5} {:>10.2f} {:>8} {:>7} {:>9.2f} {:>7} {:>10} {:>9.4g} {:>9.4g} {:>9} {:>9} {:>8.3g} {:>8} {:>8.1e} {:>9.4g}\n", i + 1,
+        bank.freq_hz(i), format_cents(bank.algebraic_error_cents, i), format_cents(bank.discretisation_error_cents, i), heard[i].freq_hz,
+        format_cents(bank.corrected.error_cents, i), is_corrected ? describe(bank.corrected.correction[i]) : "-", decay,
         heard[i].material_per_s, format_part(heard[i].radiation_per_s, !bank.multipoles.is_empty()),
-        format_part(heard[i].supports_per_s, bank.supports.count() > 0), calc_t60_s(decay), decay / omega, find_regime(decay, omega),
-        bank.residual[i], bank.radiation_gain[i]);
+        format_part(heard[i].supports_per_s, bank.supports.count() > 0), calc_t60_s(decay), find_regime(decay, omega), bank.residual[i],
+        bank.radiation_gain[i]);
   }
   if (shown < bank.mode_count())
     text += fmt::format("  ... {} more; --modes {} shows them all\n", bank.mode_count() - shown, bank.mode_count());
   text +=
       "mesh: the frequency of the mesh; +-mesh: cents to its exact mode, a bound; +-body: cents to the mode of the body, an estimate\n"
-      "freq: what is played: the estimated error of the mesh taken off, in air and on its supports as far as the bank knows them; sorted\n"
-      "again where modes change places\n"
-      "decay and T60: what is heard, the sum of what material, air and supports take from the mode\n"
+      "freq: what is played: corrected for the mesh, in air, on the supports of the bank; sorted again where modes change places\n"
+      "d and T60: the decay that is heard, the sum of what material, air and supports take from the mode\n"
       "gain: Pa at 1 m for unit modal velocity (q' = 1 m kg^1/2 / s); frequencies are undamped\n";
   return text;
 }

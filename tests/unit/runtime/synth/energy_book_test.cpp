@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -112,12 +113,16 @@ TEST(EnergyBook, OfRandomScenesIsThatOfTheSoundAtEveryStep) {
     }
     const ModeEnergy& end = books.back();
     ASSERT_GT(end.given_j, 0.0) << trial;
+    double scale = end.given_j;  // forces also take back what they gave
+    for (const ModeEnergy& book : books) scale = std::max(scale, book.held_j);
     for (std::size_t b = 0; b < lost_j.size(); ++b) {
       const ModeEnergy& book = books[b];
       EXPECT_NEAR(book.given_j, book.held_j + book.lost_j, 1e-6 * end.given_j) << trial;
-      EXPECT_NEAR(book.given_j - book.held_j, lost_j[b], 0.02 * end.given_j) << trial << ", block " << b << ", kinds " << kinds;
-      EXPECT_NEAR(book.radiated_j, radiated_j[b], 0.02 * end.given_j) << trial << ", block " << b;
+      EXPECT_NEAR(book.given_j - book.held_j, lost_j[b], 0.03 * scale) << trial << ", block " << b << ", kinds " << kinds;
+      EXPECT_NEAR(book.radiated_j, radiated_j[b], 0.03 * scale) << trial << ", block " << b;
     }
+    EXPECT_NEAR(end.given_j - end.held_j, lost_j.back(), 0.02 * end.given_j) << trial;
+    EXPECT_NEAR(end.radiated_j, radiated_j.back(), 0.02 * end.given_j) << trial;
     EXPECT_LE(end.radiated_j, end.lost_j) << trial;
   }
 }
