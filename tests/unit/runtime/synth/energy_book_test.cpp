@@ -118,8 +118,13 @@ TEST(EnergyBook, OfRandomScenesIsThatOfTheSoundAtEveryStep) {
     for (std::size_t b = 0; b < lost_j.size(); ++b) {
       const ModeEnergy& book = books[b];
       EXPECT_NEAR(book.given_j, book.held_j + book.lost_j, 1e-6 * end.given_j) << trial;
-      EXPECT_NEAR(book.given_j - book.held_j, lost_j[b], 0.03 * scale) << trial << ", block " << b << ", kinds " << kinds;
-      EXPECT_NEAR(book.radiated_j, radiated_j[b], 0.03 * scale) << trial << ", block " << b;
+      // It is noted where something acts and at the start of each block, so that it is up to a block behind.
+      const double taken_j = book.given_j - book.held_j, within_j = 0.02 * scale;
+      EXPECT_LE(taken_j, lost_j[b] + within_j) << trial << ", block " << b << ", kinds " << kinds;
+      EXPECT_LE(book.radiated_j, radiated_j[b] + within_j) << trial << ", block " << b;
+      if (b == 0) continue;
+      EXPECT_GE(taken_j, lost_j[b - 1] - within_j) << trial << ", block " << b << ", kinds " << kinds;
+      EXPECT_GE(book.radiated_j, radiated_j[b - 1] - within_j) << trial << ", block " << b;
     }
     EXPECT_NEAR(end.given_j - end.held_j, lost_j.back(), 0.02 * end.given_j) << trial;
     EXPECT_NEAR(end.radiated_j, radiated_j.back(), 0.02 * end.given_j) << trial;
