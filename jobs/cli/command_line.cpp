@@ -198,6 +198,8 @@ void add_hear(CLI::App& app, Shared& shared, Run& run) {
                    "Height of the object in metres (y is up; of a shape: its dimension); several, separated by commas")
       ->delimiter(',');
   command->add_option("--scale", hear.scale, "Metres per unit of the file");
+  command->add_flag("--facets", hear.facets,
+                    "The facets are planes of the body, not samples of a smooth surface (as carillon-mesh --facets)");
   command->add_option("--mallet", hear.mallet, "steel, hard-wood, plastic, rubber, hard-felt, soft-felt or yarn")->capture_default_str();
   command->add_option("--accuracy", hear.accuracy_cents, "Refines until every error bar is within this many cents; without it a preview");
   command->add_flag("-q,--quiet", hear.is_quiet, "No progress");

@@ -177,6 +177,9 @@ class Listening {
     if (order_.scale && is_shape()) throw InputError("--scale is for files; a shape has its dimensions in metres");
     if (order_.wall_m && is_mesh()) throw InputError("--wall is for surfaces; a mesh is already a volume");
     if (order_.wall_m && !(*order_.wall_m > 0.0)) throw InputError("--wall is a thickness in metres, above 0");
+    if (order_.facets && (is_shape() || is_mesh()))
+      throw InputError(fmt::format("--facets is for surfaces; {}",
+                                   is_shape() ? "a shape has no facets" : "a mesh keeps those that `carillon-mesh --facets` made"));
     for (const double height : order_.heights_m)
       if (!(height > 0.0) || !std::isfinite(height)) throw InputError("--height is in metres, above 0");
     if (order_.scale && !(*order_.scale > 0.0)) throw InputError("--scale is metres per unit of the file, above 0");
@@ -336,6 +339,7 @@ class Listening {
     }
     body.set("surface", fs::absolute(order_.object).string()).set("scale", find_scale_of(wish));
     if (order_.wall_m) body.set("wall_m", *order_.wall_m);
+    if (order_.facets) body.set("facets", true);
     return body;
   }
 
@@ -352,6 +356,7 @@ class Listening {
     } else {
       words = {fs::absolute(order_.object).string(), "--scale", fmt::format("{:.17g}", find_scale_of(wish))};
       if (order_.wall_m) words.insert(words.end(), {"--wall", fmt::format("{:.17g}", *order_.wall_m)});
+      if (order_.facets) words.emplace_back("--facets");
       nodes = order_.wall_m || facts_.thickness > 0.0 ? job::kPreviewWallNodes : job::kPreviewSolidNodes;
     }
     words.insert(words.end(), {"--order", "2", "-q", "-o", file.string()});
@@ -380,6 +385,7 @@ class Listening {
     sound.modes = list_modes(bank, strikes.front(), kListed);
     for (HeardMode& mode : sound.modes) mode.error_cents += sound.poisson_cents;
     for (const double cents : bank.discretisation_error_cents) sound.worst_cents = std::max(sound.worst_cents, cents + sound.poisson_cents);
+    for (const double cents : bank.facet_error_cents) sound.facet_cents = std::max(sound.facet_cents, cents);
     const auto [low, high] = bank::find_extent(bank.vertices_m);
     const Vec3 middle = 0.5 * (low + high), extent = high - low;
     if (heard_.sounds.empty()) heard_.extent_m = {extent[0], extent[1], extent[2]};

@@ -19,6 +19,7 @@ struct Order {
   std::map<std::string, double> dimensions;  // of the shape, by its names ("outer-radius")
   std::optional<double> wall_m;              // a shell of this thickness
   std::optional<double> scale;               // metres per unit of the file
+  bool facets = false;                       // of the surface: planes of the body, not samples of a smooth surface
   std::vector<double> heights_m;             // of the object (up: y); several: one after the other
   std::vector<std::string> materials;        // names; empty: kDefaultMaterial
   std::string mallet = "hard-wood";
@@ -33,6 +34,7 @@ inline constexpr const char* kDefaultMaterial = "steel";
 struct HeardMode {
   double freq_hz = 0.0, t60_s = 0.0;
   double error_cents = 0.0;  // infinite: unknown
+  double facet_cents = 0.0;  // bank::Bank::facet_error_cents
   double level_dba = 0.0;    // of its beginning, below that of the loudest
 };
 
@@ -47,6 +49,7 @@ struct Sound {
   double highest_hz = 0.0;     // of its modes
   bool is_complete = true;     // every mode from 20 to 20000 Hz is there; false: only the lowest ones
   double worst_cents = 0.0;    // the widest error bar
+  double facet_cents = 0.0;    // the most that facets in doubt add to one; 0: none are in doubt
   bool is_edited = false;      // of another solve, by scaling
   double poisson_cents = 0.0;  // by which that may be off, since Poisson's ratio stayed; in the error bars
 };

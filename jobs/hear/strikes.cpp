@@ -16,6 +16,7 @@ std::vector<HeardMode> list_modes(const bank::Bank& bank, std::size_t vertex, st
     HeardMode mode{.freq_hz = bank.freq_hz(m), .t60_s = std::log(1000.0) / bank.decay_per_s[m]};
     mode.error_cents =
         m < bank.discretisation_error_cents.size() ? bank.discretisation_error_cents[m] : std::numeric_limits<double>::infinity();
+    if (m < bank.facet_error_cents.size()) mode.facet_cents = bank.facet_error_cents[m];
     mode.level_dba = amplitudes[m] > 0.0 ? 20.0 * std::log10(amplitudes[m] / loudest) : -std::numeric_limits<double>::infinity();
     modes.push_back(mode);
   }

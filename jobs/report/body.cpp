@@ -59,9 +59,10 @@ std::string describe_bars(const bank::Bank& bank) {
   const std::vector<double>& bars = is_corrected ? bank.corrected.error_cents : bank.discretisation_error_cents;
   if (bars.empty()) return text + ", and no estimates against the body";
   if (const double worst = find_worst(bars); std::isfinite(worst))
-    return text +
-           fmt::format(", and {}those of the body to about {} (an estimate)", is_corrected ? "corrected ones " : "", format_cents(worst));
-  return text + ", and not all of them have an estimate against the body";
+    text += fmt::format(", and {}those of the body to about {} (an estimate)", is_corrected ? "corrected ones " : "", format_cents(worst));
+  else
+    text += ", and not all of them have an estimate against the body";
+  return bank.facet_error_cents.empty() ? text : text + "; " + bank::describe_facets(bank);
 }
 
 Html make_warnings(const Subject& subject) {
@@ -76,7 +77,8 @@ std::vector<Bar> make_size_bars(const Subject& subject) {
   const auto modes = static_cast<double>(bank.mode_count()), vertices = static_cast<double>(bank.vertex_count());
   const double shapes = 2.0 * static_cast<double>(bank.shape.size());
   const double surface = 24.0 * vertices + 12.0 * static_cast<double>(bank.triangles.size());
-  const double bars = 8.0 * static_cast<double>(bank.algebraic_error_cents.size() + bank.discretisation_error_cents.size());
+  const double bars =
+      8.0 * static_cast<double>(bank.algebraic_error_cents.size() + bank.discretisation_error_cents.size() + bank.facet_error_cents.size());
   const double numbers = 8.0 * 6.0 * modes + bars;
   const double record = static_cast<double>(bank.provenance.size() + bank.regions.size());
   const double rest = std::max(0.0, subject.file_bytes - shapes - surface - numbers - record);

@@ -381,8 +381,8 @@ void place_nodes(mesh::TetMesh& mesh, const Body& body, const SurfaceOptions& op
   for (const Vec3& way : mesh.doubt_m) report.doubt_m = std::max(report.doubt_m, norm(way));
   if (report.doubt_m > 0)
     report.notes.push_back(fmt::format(
-        "Some facets are so coarse that they may be planes of the body or samples of a smooth surface, up to {:.3g} m apart: the error "
-        "bars contain both: a surface in finer facets settles it, or --facets if the facets are the body.",
+        "Some facets are so coarse that they may be planes of the body or samples of a smooth surface, up to {:.3g} m apart. What that "
+        "changes is stated next to the error bars. A surface in finer facets settles it, or --facets if they are planes.",
         report.doubt_m));
   if (mesh.order == 1) {
     report.volume_m3 = measure(mesh).volume_m3;

@@ -533,8 +533,8 @@ class ThinMesher {
       if (report_.doubt_m > 0)
         note(
             fmt::format("Some facets are so coarse that they may be planes of the body or samples of a smooth surface, up to {:.3g} m "
-                        "apart: the error bars "
-                        "contain both: a surface in finer facets settles it, or --facets if the facets are the body.",
+                        "apart. What that changes is stated next to the error bars. A surface in finer facets settles it, or --facets if "
+                        "they are planes.",
                         report_.doubt_m));
       else
         mesh.doubt_m.clear();

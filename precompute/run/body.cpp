@@ -69,6 +69,16 @@ void warn_of_mesh(Run& run, const Body& body) {
     run.log.warn(i == 0 && body.check.has_odd_size ? warnings[i] + "; " + describe_scale_key(run.job) : warnings[i]);
 }
 
+/// Once, however many meshes are made of the surface.
+void warn_of_facets(Run& run) {
+  const std::string text = fmt::format(
+      "some facets of the surface are so coarse that they may be planes of the body or samples of a smooth surface; what that changes is "
+      "stated next to the error bars (facets in doubt); a surface in finer facets settles it, or {} if they are planes",
+      run.job.body ? "\"facets\": true inside \"body\"" : "carillon-mesh --facets");
+  const std::vector<std::string>& before = run.log.get_warnings();
+  if (std::find(before.begin(), before.end(), text) == before.end()) run.log.warn(text);
+}
+
 /// Rank 0 only: the mesh of the element's order, checked, and what stays of it on this rank.
 mesh::TetMesh read_checked_mesh(Run& run, const Setting& setting, Body& body, Patience* patience) {
   const bool quadratic = setting.element == job::Element::T10;
@@ -86,10 +96,7 @@ mesh::TetMesh read_checked_mesh(Run& run, const Setting& setting, Body& body, Pa
   body.check = mesh::check_mesh(mesh, body.source);
   body.region_names = mesh.region_names;
   warn_of_mesh(run, body);
-  if (!mesh.doubt_m.empty())
-    run.log.warn(
-        "some facets of the surface are so coarse that they may be planes of the body or samples of a smooth surface; the error bars "
-        "contain both: a surface in finer facets settles it, or carillon-mesh --facets if the facets are the body");
+  if (!mesh.doubt_m.empty()) warn_of_facets(run);
   for (int i = 0; i < setting.refinements; ++i) mesh = refine_mesh(mesh);
   if (quadratic && mesh.order == 1) mesh = mesh::to_quadratic(mesh);
   if (!quadratic && mesh.order == 2) mesh = mesh::to_linear(mesh);

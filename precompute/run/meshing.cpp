@@ -108,6 +108,7 @@ mesh::TetMesh mesh_surface(const job::Body& body, int order, const Fineness& fin
   if (body.height_m) add("--height", format_length(*body.height_m));
   if (body.scale) add("--scale", format_length(*body.scale));
   if (body.close_holes) add("--close-holes", format_length(*body.close_holes));
+  if (body.facets) words.emplace_back("--facets");
   const std::string result_file = file + ".result";
   add("--result", result_file);
   add("--up", std::string(1, body.up));

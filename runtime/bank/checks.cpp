@@ -55,7 +55,8 @@ Check check_arrays(const Bank& bank) {
   expect("radiation_gain", bank.radiation_gain.size(), modes);
   expect("shape_scale", bank.shape_scale.size(), modes);
   for (const auto& [name, cents] : {std::pair("algebraic_error_cents", &bank.algebraic_error_cents),
-                                    std::pair("discretisation_error_cents", &bank.discretisation_error_cents)}) {
+                                    std::pair("discretisation_error_cents", &bank.discretisation_error_cents),
+                                    std::pair("facet_error_cents", &bank.facet_error_cents)}) {
     if (!cents->empty()) expect(name, cents->size(), modes);
   }
   if (const Corrected& corrected = bank.corrected; !corrected.is_empty()) {
@@ -128,6 +129,7 @@ Check check_numbers(const Bank& bank) {
   look("alpha2_per_s", &material.alpha2_per_s, 1);
   const auto look_all = [&](const char* name, const std::vector<double>& values) { look(name, values.data(), values.size()); };
   look_all("algebraic_error_cents", bank.algebraic_error_cents);
+  look_all("facet_error_cents", bank.facet_error_cents);
   look_all("corrected_frequency_hz", bank.corrected.freq_hz);
   look_all("corrected_decay", bank.corrected.decay_per_s);
   look_all("damping/coefficient", bank.damping.coefficient);

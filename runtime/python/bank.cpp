@@ -212,6 +212,13 @@ void bind_bank(py::module_& module) {
       "error_cents", [](const bank::Bank& b, const py::object&) { return make_bars(b, b.discretisation_error_cents); },
       "(m) float64 [cent]: estimated distance of frequency_hz from that of the body; infinite where it is unknown.");
   array(
+      "facet_error_cents",
+      [](const bank::Bank& b, const py::object&) {
+        return make_per_mode(b, [&](std::size_t m) { return b.facet_error_cents.empty() ? 0.0 : b.facet_error_cents[m]; });
+      },
+      "(m) float64 [cent]: estimate of what comes to error_cents if the facets of the surface are not what they were taken for, planes of "
+      "the body or samples of a smooth surface; 0 where that is not in doubt.");
+  array(
       "algebraic_error_cents", [](const bank::Bank& b, const py::object&) { return make_bars(b, b.algebraic_error_cents); },
       "(m) float64 [cent]: bound on the distance of the solver from the modes of the mesh; infinite where it is unknown.");
   array(

@@ -50,12 +50,14 @@ Json list_modes(const bank::Bank& bank) {
   for (std::size_t m = 0; m < bank.mode_count(); ++m) {
     const double decay = bank.decay_per_s[m];
     const double cents = m < bank.discretisation_error_cents.size() ? bank.discretisation_error_cents[m] : NAN;
-    modes.add(Json::object()
-                  .set("freq_hz", base::significant(bank.freq_hz(m), 9))
-                  .set("decay_per_s", base::significant(decay, 9))
-                  .set("t60_s", base::finite_or_null(std::log(1000.0) / decay, base::significant, 6))
-                  .set("gain", base::significant(bank.radiation_gain[m], 9))
-                  .set("error_cents", base::finite_or_null(cents, base::significant, 4)));
+    Json mode = Json::object();
+    mode.set("freq_hz", base::significant(bank.freq_hz(m), 9))
+        .set("decay_per_s", base::significant(decay, 9))
+        .set("t60_s", base::finite_or_null(std::log(1000.0) / decay, base::significant, 6))
+        .set("gain", base::significant(bank.radiation_gain[m], 9))
+        .set("error_cents", base::finite_or_null(cents, base::significant, 4));
+    if (m < bank.facet_error_cents.size()) mode.set("facet_cents", base::finite_or_null(bank.facet_error_cents[m], base::significant, 4));
+    modes.add(mode);
   }
   return modes;
 }

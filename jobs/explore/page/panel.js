@@ -198,11 +198,11 @@ export class Panel {
 
   showModes() {
     const { modes } = this.body.sound;
-    this.modes.fill(modes.map(({ freq_hz, t60_s, error_cents }, i) => {
-      const cents = describeCents(error_cents);
+    this.modes.fill(modes.map(({ freq_hz, t60_s, error_cents, facet_cents = 0 }, i) => {
+      const cents = describeCents(error_cents), facets = facet_cents > 0 ? `, facets in doubt ${describeCents(facet_cents)} cents more` : '';
       return {
         cells: [freq_hz.toFixed(1), formatSeconds(t60_s), cents],
-        label: `mode ${i + 1}: ${formatHz(freq_hz)}, T60 ${formatSeconds(t60_s)}, error bar ${cents} cents`,
+        label: `mode ${i + 1}: ${formatHz(freq_hz)}, T60 ${formatSeconds(t60_s)}, error bar ${cents} cents${facets}`,
       };
     }));
     this.spectrum.setModes(modes);

@@ -72,6 +72,22 @@ def make_cup(scale=1.0, sides=32, rows=8):
     return "\n".join(lines) + "\n"
 
 
+def make_rod(sides=12, rows=4):
+    """OBJ: a prism of 12 sides, 40 mm thick and 200 mm long: planes, or samples of a cylinder."""
+    lines = [
+        "v %.9g %.9g %.9g" % (0.02 * math.cos(2 * math.pi * i / sides), 0.2 * j / rows, 0.02 * math.sin(2 * math.pi * i / sides))
+        for j in range(rows + 1)
+        for i in range(sides)
+    ]
+    lines += ["f " + " ".join(str(1 + i) for i in range(sides))]
+    lines += ["f " + " ".join(str(sides * (rows + 1) - i) for i in range(sides))]
+    for j in range(rows):
+        for i in range(sides):
+            a, b = 1 + j * sides + i, 1 + j * sides + (i + 1) % sides
+            lines.append(f"f {a} {a + sides} {b + sides} {b}")
+    return "\n".join(lines) + "\n"
+
+
 def make_glb(off):
     """A GLB file of the triangles of an OFF text."""
     words = off.split()
@@ -210,6 +226,30 @@ class Hear(unittest.TestCase):
             spectrum = numpy.abs(numpy.fft.rfft(samples[: rate // 2, 0])) ** 2
             brightness.append(numpy.sum(spectrum * numpy.fft.rfftfreq(rate // 2, 1 / rate)) / numpy.sum(spectrum))
         self.assertGreater(brightness[1], 1.2 * brightness[0], "steel is brighter than felt")
+
+    def test_facets_in_doubt_stand_next_to_the_error_bars_and_can_be_settled(self):
+        (self.folder / "rod.obj").write_text(make_rod())
+        wish = ("rod.obj", "--scale", 1)
+        said = self.call("hear", "-q", *wish, "-o", "asked", "--accuracy", 20)
+        for words in ("+-facets", "facets in doubt", "--facets takes them for planes"):
+            self.assertIn(words, said)
+        asked = json.loads((self.folder / "asked/rod-steel.json").read_text())
+        self.assertEqual(asked["accuracy_cents"], 20)
+        smooth = self.hear(*wish, "-o", "smooth")["sounds"][0]
+        self.assertTrue(all(mode["facet_cents"] > mode["error_cents"] > 0 for mode in smooth["modes"][:6]), smooth["modes"])
+        self.assertGreater(smooth["facet_cents"], 20)
+        planes = self.hear(*wish, "-o", "planes", "--facets", "--accuracy", 20)["sounds"][0]
+        self.assertLessEqual(planes["worst_cents"], 20)
+        self.assertEqual({mode["facet_cents"] for mode in planes["modes"]} | {planes["facet_cents"]}, {0})
+        self.assertTrue(json.loads((self.folder / "planes/rod-steel.json").read_text())["body"]["facets"])
+        self.assertNotIn("facets", self.call("hear", "-q", *wish, "-o", "planes", "--facets"))
+        for one, other in zip(smooth["modes"][:6], planes["modes"]):
+            cents = abs(1200 * math.log2(one["freq_hz"] / other["freq_hz"]))
+            self.assertGreater(cents, one["error_cents"], "the prism is another body")
+            self.assertLess(cents, one["error_cents"] + one["facet_cents"] + other["error_cents"])
+        self.refuse("--shape", "bar", "--facets", contains=("--facets is for surfaces",))
+        (self.folder / "rod.msh").write_text("")
+        self.refuse("rod.msh", "--facets", contains=("--facets is for surfaces", "carillon-mesh --facets"))
 
     def test_shapes_wood_and_accuracy(self):
         heard = self.hear("--shape", "bar", "--length", 0.3, "--width", 0.03, "--thickness", 0.012, "--material", "oak", "--accuracy", 10)
