@@ -7,6 +7,7 @@
 #include "jobs/report/chart.hpp"
 #include "jobs/report/quantity.hpp"
 #include "jobs/report/sections.hpp"
+#include "runtime/bank/kinds.hpp"
 
 namespace carillon::report {
 namespace {
@@ -71,17 +72,21 @@ Series make_series(const bank::Bank& bank, const char* name, int colour, const s
 }
 
 Html make_mode_table(const bank::Bank& bank) {
-  Table table({{"mode", true},
-               {"frequency of the mesh [Hz]", true},
-               {"\u00b1 mesh [cent]", true},
-               {"\u00b1 body [cent]", true},
-               {"corrected [Hz]", true},
-               {"\u00b1 body [cent]", true},
-               {"correction"},
-               {"decay [1/s]", true},
-               {"T60 [s]", true},
-               {"residual", true},
-               {"gain", true}});
+  std::vector<Column> columns{{"mode", true},
+                              {"frequency of the mesh [Hz]", true},
+                              {"\u00b1 mesh [cent]", true},
+                              {"\u00b1 body [cent]", true},
+                              {"corrected [Hz]", true},
+                              {"\u00b1 body [cent]", true},
+                              {"correction"},
+                              {"decay [1/s]", true},
+                              {"T60 [s]", true},
+                              {"residual", true},
+                              {"gain", true},
+                              {"kind"}};
+  if (!bank.facet_error_cents.empty()) columns.push_back({"facets in doubt [cent]", true});
+  Table table(columns);
+  const std::vector<bank::ModeKind> kinds = bank::find_kinds(bank);
   const std::size_t shown = std::min(kMaxModeRows, bank.mode_count());
   const bool is_corrected = !bank.corrected.is_empty();
   for (std::size_t i = 0; i < shown; ++i) {
@@ -89,7 +94,7 @@ Html make_mode_table(const bank::Bank& bank) {
                make_cents(bank.discretisation_error_cents, i), is_corrected ? html("{:.2f}", bank.corrected.freq_hz[i]) : html("-"),
                make_cents(bank.corrected.error_cents, i), html("{}", is_corrected ? bank::describe(bank.corrected.correction[i]) : "-"),
                html("{:.4g}", bank.decay_per_s[i]), html("{:.3g}", calc_t60_s(bank, i)), html("{:.1e}", bank.residual[i]),
-               html("{:.4g}", bank.radiation_gain[i])});
+               html("{:.4g}", bank.radiation_gain[i]), html("{}", bank::describe(kinds[i])), make_cents(bank.facet_error_cents, i)});
   }
   Html out = table.finish();
   if (shown < bank.mode_count())
@@ -97,7 +102,8 @@ Html make_mode_table(const bank::Bank& bank) {
   return html(
       "<details><summary>All modes in numbers</summary>\n{}<p class=\"remark\">Frequencies are undamped. \u00b1 mesh: to the exact mode of "
       "the mesh, a bound; \u00b1 body: to the mode of the body, an estimate; corrected: with the estimated error of the mesh taken off, "
-      "which is played; gain: Pa at 1 m for unit modal velocity.</p>\n</details>\n",
+      "which is played; gain: Pa at 1 m for unit modal velocity; kind: how the body moves, where its shape says so; facets in doubt: what "
+      "comes to \u00b1 body if the facets are not what they were taken for.</p>\n</details>\n",
       out);
 }
 
@@ -206,6 +212,10 @@ Html make_error_section(const Subject& subject) {
     facts.add("body, largest", worst, "how far the mode of the body may be: an estimate");
   if (const Html worst = find_largest(bank.corrected.error_cents, bank, format_cents); !worst.empty())
     facts.add("corrected, largest", worst, "how far it may be from the corrected frequency: an estimate");
+  if (const Html worst = find_largest(bank.facet_error_cents, bank, format_cents); !worst.empty())
+    facts.add("facets in doubt, largest", worst,
+              "by how much farther the body may be if the facets are not what they were taken for, planes or samples of a smooth surface: "
+              "an estimate, in no bar; a surface in finer facets settles it, or \"facets\": true in the job");
   if (const Html worst = find_largest(bank.algebraic_error_cents, bank, format_cents); !worst.empty())
     facts.add("mesh, largest", worst, "how far the exact mode of this mesh may be: a bound");
   if (const auto asked = find_amount(subject.record.job, "accuracy_cents")) facts.add("asked for", html("{} cent", format_plain(*asked)));

@@ -8,6 +8,7 @@
 #include <optional>
 #include <sstream>
 
+#include "runtime/bank/kinds.hpp"
 #include "runtime/bank/pack.hpp"
 #include "runtime/bank/select.hpp"
 #include "runtime/base/printable.hpp"
@@ -90,25 +91,31 @@ std::string format_cents(const std::vector<double>& cents, std::size_t mode) {
 }
 
 std::string format_modes(const Bank& bank, std::size_t limit) {
-  const bool is_corrected = !bank.corrected.is_empty();
-  std::string text =
-      fmt::format("\n{:>5} {:>11} {:>9} {:>9} {:>11} {:>8} {:>10} {:>11} {:>9} {:>10} {:>8} {:>9} {:>13}\n", "mode", "mesh [Hz]", "+-mesh",
-                  "+-body", "freq [Hz]", "+-body", "correction", "decay [1/s]", "T60 [s]", "d/omega", "regime", "residual", "gain");
+  const bool is_corrected = !bank.corrected.is_empty(), is_doubtful = !bank.facet_error_cents.empty();
+  const auto format_facets = [&](const std::string& cents) { return is_doubtful ? fmt::format(" {:>8}", cents) : std::string(); };
+  std::string text = fmt::format("\n{:>5} {:>11} {:>9} {:>9} {:>11} {:>8}{} {:>10} {:>11} {:>9} {:>10} {:>8} {:>9} {:>13}  {}\n", "mode",
+                                 "mesh [Hz]", "+-mesh", "+-body", "freq [Hz]", "+-body", format_facets("+-facets"), "correction",
+                                 "decay [1/s]", "T60 [s]", "d/omega", "regime", "residual", "gain", "kind");
   const std::size_t shown = std::min(limit, bank.mode_count());
+  const std::vector<ModeKind> kinds = find_kinds(bank, shown);
   for (std::size_t i = 0; i < shown; ++i) {
     const double omega = std::sqrt(bank.eigenvalue_rad2_s2[i]), decay = bank.decay_per_s[i];
-    text += fmt::format("{:>5} {:>11.2f} {:>9} {:>9} {:>11} {:>8} {:>10} {:>11.4g} {:>9.3g} {:>10.3g} {:>8} {:>9.1e} {:>13.4g}\n", i + 1,
-                        bank.freq_hz(i), format_cents(bank.algebraic_error_cents, i), format_cents(bank.discretisation_error_cents, i),
-                        is_corrected ? fmt::format("{:.2f}", bank.corrected.freq_hz[i]) : "-", format_cents(bank.corrected.error_cents, i),
-                        is_corrected ? describe(bank.corrected.correction[i]) : "-", decay, calc_t60_s(decay), decay / omega,
-                        find_regime(decay, omega), bank.residual[i], bank.radiation_gain[i]);
+    text += fmt::format(
+        "{:>5} {:>11.2f} {:>9} {:>9} {:>11} {:>8}{} {:>10} {:>11.4g} {:>9.3g} {:>10.3g} {:>8} {:>9.1e} {:>13.4g}  {}\n", i + 1,
+        bank.freq_hz(i), format_cents(bank.algebraic_error_cents, i), format_cents(bank.discretisation_error_cents, i),
+        is_corrected ? fmt::format("{:.2f}", bank.corrected.freq_hz[i]) : "-", format_cents(bank.corrected.error_cents, i),
+        format_facets(format_cents(bank.facet_error_cents, i)), is_corrected ? describe(bank.corrected.correction[i]) : "-", decay,
+        calc_t60_s(decay), decay / omega, find_regime(decay, omega), bank.residual[i], bank.radiation_gain[i], describe(kinds[i]));
   }
   if (shown < bank.mode_count())
     text += fmt::format("  ... {} more; --modes {} shows them all\n", bank.mode_count() - shown, bank.mode_count());
   text +=
       "mesh: the frequency of the mesh; +-mesh: cents to its exact mode, a bound; +-body: cents to the mode of the body, an estimate\n"
       "freq: the same with the estimated error of the mesh taken off, which is what is played; sorted again where modes change places\n"
-      "gain: Pa at 1 m for unit modal velocity (q' = 1 m kg^1/2 / s); frequencies are undamped\n";
+      "gain: Pa at 1 m for unit modal velocity (q' = 1 m kg^1/2 / s); frequencies are undamped; kind: how the body moves, where its "
+      "shape shows it\n";
+  if (is_doubtful)
+    text += "+-facets: what comes to +-body if the facets are not what they were taken for, planes or samples of a smooth surface\n";
   return text;
 }
 
@@ -191,7 +198,7 @@ Json::Value make_list(const Range& values) {
   return list;
 }
 
-Json::Value make_mode(const Bank& bank, std::size_t i) {
+Json::Value make_mode(const Bank& bank, std::size_t i, const ModeKind& kind) {
   const double omega = std::sqrt(bank.eigenvalue_rad2_s2[i]), decay = bank.decay_per_s[i];
   Json::Value mode;
   mode["frequency_hz"] = bank.freq_hz(i);
@@ -207,6 +214,7 @@ Json::Value make_mode(const Bank& bank, std::size_t i) {
   };
   mode["algebraic_error_cents"] = get_cents(bank.algebraic_error_cents);
   mode["discretisation_error_cents"] = get_cents(bank.discretisation_error_cents);
+  mode["facet_error_cents"] = bank.facet_error_cents.empty() ? Json::Value(0.0) : get_cents(bank.facet_error_cents);
   if (const Corrected& corrected = bank.corrected; !corrected.is_empty()) {
     mode["corrected_frequency_hz"] = corrected.freq_hz[i];
     mode["corrected_decay_per_s"] = corrected.decay_per_s[i];
@@ -224,6 +232,7 @@ Json::Value make_mode(const Bank& bank, std::size_t i) {
     if (!air.mixing.is_empty()) radiation["coupled_modes"] = air.mixing.count[i];
   }
   mode["shape_scale"] = bank.shape_scale[i];
+  mode["kind"] = describe(kind);
   return mode;
 }
 
@@ -377,9 +386,10 @@ std::string format_info_json(const Bank& bank, const std::filesystem::path& file
   for (const std::size_t mode : sort_modes(bank))
     if (!bank.corrected.is_empty()) root["corrected_frequencies_hz"].append(bank.corrected.freq_hz[mode]);
   root["modes"] = Json::Value(Json::arrayValue);
+  const std::vector<ModeKind> kinds = find_kinds(bank);
   for (std::size_t i = 0; i < bank.mode_count(); ++i) {
     root["frequencies_hz"].append(bank.freq_hz(i));
-    root["modes"].append(make_mode(bank, i));
+    root["modes"].append(make_mode(bank, i, kinds[i]));
   }
   const auto provenance = parse_json(bank.provenance);
   root["provenance"] = provenance ? *provenance : Json::Value(bank.provenance);
@@ -388,6 +398,25 @@ std::string format_info_json(const Bank& bank, const std::filesystem::path& file
   builder["indentation"] = "  ";
   builder["precision"] = 17;
   return Json::writeString(builder, root) + "\n";
+}
+
+std::string format_info_csv(const Bank& bank) {
+  std::string text =
+      "mode,frequency_hz,corrected_frequency_hz,corrected_error_cents,facet_error_cents,decay_per_s,corrected_decay_per_s,t60_s,"
+      "radiation_gain,kind\n";
+  const Corrected& corrected = bank.corrected;
+  const auto format = [](const std::vector<double>& values, std::size_t mode) {
+    return mode < values.size() && std::isfinite(values[mode]) ? fmt::format("{}", values[mode]) : std::string();
+  };
+  const std::vector<ModeKind> kinds = find_kinds(bank);
+  for (std::size_t i = 0; i < kinds.size(); ++i) {
+    const double t60_s = calc_t60_s(bank.decay_per_s[i]);
+    text += fmt::format("{},{},{},{},{},{},{},{},{},\"{}\"\n", i + 1, bank.freq_hz(i), format(corrected.freq_hz, i),
+                        format(corrected.error_cents, i), bank.facet_error_cents.empty() ? "0" : format(bank.facet_error_cents, i),
+                        bank.decay_per_s[i], format(corrected.decay_per_s, i), std::isfinite(t60_s) ? fmt::format("{}", t60_s) : "",
+                        bank.radiation_gain[i], describe(kinds[i]));
+  }
+  return text;
 }
 
 Check calc_regions_check(const Bank& bank) {

@@ -14,6 +14,9 @@ std::string format_info(const Bank& bank, const std::filesystem::path& file, std
 /// All of a bank but its mesh and shapes as JSON, numbers to full double precision.
 std::string format_info_json(const Bank& bank, const std::filesystem::path& file);
 
+/// One line per mode with commas, after a line of names, which are those of format_info_json(); empty where something is unknown.
+std::string format_info_csv(const Bank& bank);
+
 /// The two properties that the library, which cannot read JSON, does not check.
 Check calc_regions_check(const Bank& bank);
 Check calc_provenance_check(const Bank& bank);

@@ -294,11 +294,12 @@ int run(int argc, char** argv) {
   app.require_subcommand(1);
   app.set_version_flag("--version", version::describe("carillon-bank"));
   std::string file;
-  bool json = false, all = false;
+  bool json = false, csv = false, all = false;
   std::size_t modes = 20;
   CLI::App* info = app.add_subcommand("info", "Shows a bank: frequencies, damping, residuals, counts");
   info->add_option("BANK", file, "The bank file")->required();
-  info->add_flag("--json", json, "Everything but mesh and shapes, as JSON");
+  CLI::Option* as_json = info->add_flag("--json", json, "Everything but mesh and shapes, as JSON");
+  info->add_flag("--csv", csv, "The modes alone, one line each, as a table with commas")->excludes(as_json);
   info->add_flag("--all", all, "The record of the run that made it too: versions, seconds, memory, partition, solver");
   info->add_option("--modes", modes, "Rows of the table of modes")->capture_default_str();
   CLI::App* checking =
@@ -360,7 +361,9 @@ int run(int argc, char** argv) {
     exchange::run_import(imported);
   } else {
     const bank::Bank bank = bank::read_bank(file);
-    fmt::print("{}", json ? bank::format_info_json(bank, file) : base::printable_lines(bank::format_info(bank, file, modes, all)));
+    fmt::print("{}", json  ? bank::format_info_json(bank, file)
+                     : csv ? bank::format_info_csv(bank)
+                           : base::printable_lines(bank::format_info(bank, file, modes, all)));
   }
   if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
   return 0;
