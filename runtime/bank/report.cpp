@@ -93,27 +93,26 @@ std::string format_cents(const std::vector<double>& cents, std::size_t mode) {
 std::string format_modes(const Bank& bank, std::size_t limit) {
   const bool is_corrected = !bank.corrected.is_empty(), is_doubtful = !bank.facet_error_cents.empty();
   const auto format_facets = [&](const std::string& cents) { return is_doubtful ? fmt::format(" {:>8}", cents) : std::string(); };
-  std::string text = fmt::format("\n{:>5} {:>11} {:>9} {:>9} {:>11} {:>8}{} {:>10} {:>11} {:>9} {:>10} {:>8} {:>9} {:>13}  {}\n", "mode",
-                                 "mesh [Hz]", "+-mesh", "+-body", "freq [Hz]", "+-body", format_facets("+-facets"), "correction",
-                                 "decay [1/s]", "T60 [s]", "d/omega", "regime", "residual", "gain", "kind");
+  std::string text =
+      fmt::format("\n{:>5} {:>10} {:>9} {:>9} {:>10} {:>8}{} {:>10} {:>10} {:>9} {:>8} {:>10}  {}\n", "mode", "mesh [Hz]", "+-mesh",
+                  "+-body", "freq [Hz]", "+-body", format_facets("+-facets"), "correction", "d [1/s]", "T60 [s]", "regime", "gain", "kind");
   const std::size_t shown = std::min(limit, bank.mode_count());
   const std::vector<ModeKind> kinds = find_kinds(bank, shown);
   for (std::size_t i = 0; i < shown; ++i) {
-    const double omega = std::sqrt(bank.eigenvalue_rad2_s2[i]), decay = bank.decay_per_s[i];
-    text += fmt::format(
-        "{:>5} {:>11.2f} {:>9} {:>9} {:>11} {:>8}{} {:>10} {:>11.4g} {:>9.3g} {:>10.3g} {:>8} {:>9.1e} {:>13.4g}  {}\n", i + 1,
-        bank.freq_hz(i), format_cents(bank.algebraic_error_cents, i), format_cents(bank.discretisation_error_cents, i),
-        is_corrected ? fmt::format("{:.2f}", bank.corrected.freq_hz[i]) : "-", format_cents(bank.corrected.error_cents, i),
-        format_facets(format_cents(bank.facet_error_cents, i)), is_corrected ? describe(bank.corrected.correction[i]) : "-", decay,
-        calc_t60_s(decay), decay / omega, find_regime(decay, omega), bank.residual[i], bank.radiation_gain[i], describe(kinds[i]));
+    const double decay = bank.decay_per_s[i];
+    text += fmt::format("{:>5} {:>10.2f} {:>9} {:>9} {:>10} {:>8}{} {:>10} {:>10.4g} {:>9.3g} {:>8} {:>10.4g}  {}\n", i + 1,
+                        bank.freq_hz(i), format_cents(bank.algebraic_error_cents, i), format_cents(bank.discretisation_error_cents, i),
+                        is_corrected ? fmt::format("{:.2f}", bank.corrected.freq_hz[i]) : "-", format_cents(bank.corrected.error_cents, i),
+                        format_facets(format_cents(bank.facet_error_cents, i)), is_corrected ? describe(bank.corrected.correction[i]) : "-",
+                        decay, calc_t60_s(decay), find_regime(decay, std::sqrt(bank.eigenvalue_rad2_s2[i])), bank.radiation_gain[i],
+                        describe(kinds[i]));
   }
   if (shown < bank.mode_count())
     text += fmt::format("  ... {} more; --modes {} shows them all\n", bank.mode_count() - shown, bank.mode_count());
   text +=
       "mesh: the frequency of the mesh; +-mesh: cents to its exact mode, a bound; +-body: cents to the mode of the body, an estimate\n"
       "freq: the same with the estimated error of the mesh taken off, which is what is played; sorted again where modes change places\n"
-      "gain: Pa at 1 m for unit modal velocity (q' = 1 m kg^1/2 / s); frequencies are undamped; kind: how the body moves, where its "
-      "shape shows it\n";
+      "d: decay; gain: Pa at 1 m for q' = 1 m kg^1/2 / s; frequencies are undamped; kind: how the body moves, where its shape shows it\n";
   if (is_doubtful)
     text += "+-facets: what comes to +-body if the facets are not what they were taken for, planes or samples of a smooth surface\n";
   return text;

@@ -198,7 +198,7 @@ class Reports(unittest.TestCase):
         self.assertFalse((self.root / "report/report-modes.png").exists())
 
     def test_modes_are_those_of_the_bank(self):
-        rows = self.page.rows("modes", 11)[1:]
+        rows = self.page.rows("modes", 12)[1:]
         with h5py.File(self.bank) as bank:
             freq, decay = bank["modes/frequency_hz"][:], bank["modes/decay"][:]
             columns = {
@@ -217,6 +217,9 @@ class Reports(unittest.TestCase):
         self.assertGreater(len(freq), 10)
         self.assertEqual(len(rows), len(freq))
         self.assertEqual([row[6] for row in rows], list(names))
+        info = json.loads(subprocess.run([BIN / "carillon-bank", "info", "--json", self.bank], capture_output=True, check=True).stdout)
+        self.assertEqual([row[11] for row in rows], [mode["kind"] for mode in info["modes"]])
+        self.assertIn("bending, 2 nodes", [row[11] for row in rows])
         for column, digits in zip(columns, [9, 6, 2, 2, 6, 2, 4, 3, 2, 4]):
             shown = numpy.array([float(row[column]) for row in rows])
             # Rounded to so many digits, and frequencies to a hundredth of a hertz.
@@ -467,7 +470,7 @@ class Reports(unittest.TestCase):
         self.assert_whole(page)
         (dots,) = [a["d"] for tag, a, _ in page.charts["modes"] if tag == "path" and a.get("class", "").startswith("dots")]
         self.assertEqual(dots.count("h0"), 2500)
-        self.assertEqual(len(page.rows("modes", 11)), 1001)
+        self.assertEqual(len(page.rows("modes", 12)), 1001)
         self.assertIn("The first 1000 of 2500 modes", page.text["modes"])
 
     def test_modes_that_ring_for_ever_are_drawn_by_their_number(self):
@@ -478,7 +481,7 @@ class Reports(unittest.TestCase):
         y = numpy.array([float(a["cy"]) for tag, a, _ in page.charts["modes"] if tag == "circle"])
         steps = numpy.diff(y)
         self.assertTrue(len(y) > 10 and max(steps) < 0 and max(abs(steps - steps.mean())) < 0.11, steps)
-        self.assertEqual({row[8] for row in page.rows("modes", 11)[1:]}, {"inf"})
+        self.assertEqual({row[8] for row in page.rows("modes", 12)[1:]}, {"inf"})
 
     def test_a_bank_without_modes_has_a_report(self):
         bank = self.root / "mute.hdf"
@@ -582,7 +585,7 @@ class Reports(unittest.TestCase):
         # The name that the user knows, not that of the snapshot; and all of the record.
         self.assertEqual(page.title, "chime.msh")
         self.assertEqual([name for name, is_missing in page.missing.items() if is_missing], ["pictures", "play"])
-        self.assertEqual(len(page.rows("modes", 11)), 4)
+        self.assertEqual(len(page.rows("modes", 12)), 4)
         carillon("report", job, "-o", self.root / "made", "--no-pictures", "--no-page")
         self.assertEqual((self.root / "made/report.html").read_bytes(), page.source)
         # Who asks for it first has it drawn, next to the bank and for all who ask later. The records there stay what was published.
