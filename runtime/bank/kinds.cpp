@@ -22,11 +22,11 @@
 namespace carillon::bank {
 namespace {
 
-constexpr double kLong = 2.5, kFlat = 0.25;         // length over width; thickness over width
+constexpr double kLong = 2.5, kFlat = 0.25;           // length over width; thickness over width
 constexpr double kSameWidth = 0.03, kSphere = 0.003;  // of second moments
 constexpr double kRound = 0.02;                       // of the area's moments about the axis
 constexpr double kRigidSlices = 0.9, kOneKind = 0.8, kOneOrder = 0.6;
-constexpr double kOnePlane = 0.9, kProduct = 0.65;
+constexpr double kOnePlane = 0.9, kProduct = 0.85;
 constexpr double kFlow = 0.8;    // of what the same normal motion could move if it had one sign
 constexpr double kStill = 0.03;  // of the largest: neither sign
 constexpr int kMaxOrder = 12, kCells = 12, kRings = 8;

@@ -146,6 +146,7 @@ with tempfile.TemporaryDirectory(prefix="carillon-kinds-") as scratch:
         {"body": {"shape": "plate", "length_m": sides[0], "width_m": sides[1], "thickness_m": thick, "nodes": 6000}, "max_modes": 6},
     )
     unit = thick * math.sqrt(E / (12 * (1 - NU**2) * RHO)) / (2 * math.pi * sides[0] ** 2)
-    lines = ("1 x 1", "2 x 0", "2 x 1", "0 x 2", "1 x 2", "3 x 0")
-    factors = (20.128, 21.603, 46.654, 50.293, 58.201, 67.494)
+    lines = ("1 x 1", "2 x 0", "2 x 1", "0 x 2")
+    factors = (20.128, 21.603, 46.654, 50.293, 58.201, 67.494)  # the last two are sums of 1 x 2 and 3 x 0: neither has such lines
     expect(found, {f"plate bending, {one} lines": [f * unit] for one, f in zip(lines, factors)}, 0.02)
+    expect(found, {"plate bending": [f * unit for f in factors[4:]]}, 0.02)
