@@ -186,14 +186,14 @@ class Slices {
     if (!(all > kRigidSlices * shape.energy())) return {};
     const bool has_widths = frame_.axes.moment[1] > (1.0 + kSameWidth) * frame_.axes.moment[2];
     const auto is_most = [&](double part) { return part > kOneKind * all; };
-    if (is_most(energy[0])) return finish(Motion::kLongitudinal, along[0]);
-    if (is_most(energy[3])) return finish(Motion::kTorsion, along[3]);
-    if (has_widths && is_most(energy[1])) return finish(Motion::kLateralBending, along[1]);
-    if (has_widths && is_most(energy[2])) return finish(Motion::kBending, along[2]);
+    if (is_most(energy[0])) return finish(MotionKind::kLongitudinal, along[0]);
+    if (is_most(energy[3])) return finish(MotionKind::kTorsion, along[3]);
+    if (has_widths && is_most(energy[1])) return finish(MotionKind::kLateralBending, along[1]);
+    if (has_widths && is_most(energy[2])) return finish(MotionKind::kBending, along[2]);
     if (has_widths || !is_most(energy[1] + energy[2])) return {};
     const double angle = 0.5 * std::atan2(2.0 * across, energy[1] - energy[2]);
     for (std::size_t s = 0; s < along[1].size(); ++s) along[1][s] = std::cos(angle) * along[1][s] + std::sin(angle) * along[2][s];
-    return finish(Motion::kBending, along[1]);
+    return finish(MotionKind::kBending, along[1]);
   }
 
  private:
@@ -223,7 +223,7 @@ class Slices {
     return slice;
   }
 
-  ModeKind finish(Motion motion, const std::vector<double>& along) const {
+  ModeKind finish(MotionKind motion, const std::vector<double>& along) const {
     ModeKind kind{.motion = motion};
     if (const int nodes = count_nodes(along); 3 * nodes <= static_cast<int>(slices_.size())) kind.nodes = nodes;
     return kind;
@@ -297,10 +297,10 @@ class Rings {
     const auto most = std::max_element(energy.begin(), energy.end());
     if (*most < kOneOrder * shape.energy()) return {};
     const int order = static_cast<int>(most - energy.begin());
-    if (order == 0 && around > kOneKind * energy[0]) return {.motion = Motion::kTorsion};
+    if (order == 0 && around > kOneKind * energy[0]) return {.motion = MotionKind::kTorsion};
     const bool breathes = radial > 0.5 * shape.energy() && square(outward) > kFlow * frame_.all_area * radial;
-    if (order == 0 && breathes) return {.motion = Motion::kBreathing};
-    return {.motion = Motion::kDiameters, .nodes = order};
+    if (order == 0 && breathes) return {.motion = MotionKind::kBreathing};
+    return {.motion = MotionKind::kDiameters, .nodes = order};
   }
 
  private:
@@ -321,9 +321,9 @@ ModeKind find_plate_kind(const Frame& frame, const Shape& shape) {
     cell[i][j] += frame.area[v] * shape[v][2];
     area[i][j] += frame.area[v];
   }
-  if (normal < (1.0 - kOnePlane) * shape.energy()) return {.motion = Motion::kInPlane};
+  if (normal < (1.0 - kOnePlane) * shape.energy()) return {.motion = MotionKind::kInPlane};
   if (normal < kOnePlane * shape.energy()) return {};
-  ModeKind kind{.motion = Motion::kPlateBending};
+  ModeKind kind{.motion = MotionKind::kPlateBending};
   double all = 0.0;
   for (int i = 0; i < kCells; ++i)
     for (int j = 0; j < kCells; ++j) {
@@ -394,24 +394,24 @@ class Skin {
   std::vector<Vec3> normal_;  // (V) area times normal, axes of the frame
 };
 
-const char* get_name(Motion motion) {
+const char* get_name(MotionKind motion) {
   switch (motion) {
-    case Motion::kBending:
+    case MotionKind::kBending:
       return "bending";
-    case Motion::kLateralBending:
+    case MotionKind::kLateralBending:
       return "lateral bending";
-    case Motion::kTorsion:
+    case MotionKind::kTorsion:
       return "torsion";
-    case Motion::kLongitudinal:
+    case MotionKind::kLongitudinal:
       return "longitudinal";
-    case Motion::kBreathing:
+    case MotionKind::kBreathing:
       return "breathing";
-    case Motion::kPlateBending:
+    case MotionKind::kPlateBending:
       return "plate bending";
-    case Motion::kInPlane:
+    case MotionKind::kInPlane:
       return "in plane";
-    case Motion::kDiameters:
-    case Motion::kUnknown:
+    case MotionKind::kDiameters:
+    case MotionKind::kUnknown:
       break;
   }
   return "-";
@@ -432,9 +432,9 @@ std::vector<ModeKind> find_kinds(const Bank& bank, std::size_t count) {
   for (std::size_t m = 0; m < kinds.size(); ++m) {
     const Shape shape(bank, frame, m);
     if (is_long) kinds[m] = slices.find(shape);
-    if (kinds[m].motion == Motion::kUnknown && skin.breathes(shape)) kinds[m].motion = Motion::kBreathing;
-    if (kinds[m].motion == Motion::kUnknown && rings) kinds[m] = rings->find(shape);
-    if (kinds[m].motion == Motion::kUnknown && is_flat && !rings && !is_long) kinds[m] = find_plate_kind(frame, shape);
+    if (kinds[m].motion == MotionKind::kUnknown && skin.breathes(shape)) kinds[m].motion = MotionKind::kBreathing;
+    if (kinds[m].motion == MotionKind::kUnknown && rings) kinds[m] = rings->find(shape);
+    if (kinds[m].motion == MotionKind::kUnknown && is_flat && !rings && !is_long) kinds[m] = find_plate_kind(frame, shape);
   }
   return kinds;
 }
@@ -442,7 +442,7 @@ std::vector<ModeKind> find_kinds(const Bank& bank, std::size_t count) {
 std::string describe(const ModeKind& kind) {
   const int nodes = kind.nodes.value_or(0);
   const auto count = [](int n, const char* what) { return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s"); };
-  if (kind.motion == Motion::kDiameters) return count(nodes, "diameter");
+  if (kind.motion == MotionKind::kDiameters) return count(nodes, "diameter");
   if (kind.lines && kind.nodes) return fmt::format("{}, {} x {} lines", get_name(kind.motion), nodes, *kind.lines);
   if (kind.nodes) return fmt::format("{}, {}", get_name(kind.motion), count(nodes, "node"));
   return get_name(kind.motion);

@@ -10,7 +10,7 @@
 
 namespace carillon::bank {
 
-enum class Motion : std::uint8_t {
+enum class MotionKind : std::uint8_t {
   kUnknown,         // none of those below, or several at once
   kBending,         // of a long body, along the thinner side of its section; of a section as wide as thick in any direction
   kLateralBending,  // along the wider side
@@ -23,7 +23,7 @@ enum class Motion : std::uint8_t {
 };
 
 struct ModeKind {
-  Motion motion = Motion::kUnknown;
+  MotionKind motion = MotionKind::kUnknown;
   // How often the motion changes its sign along the long axis: the nodes of a long body, the nodal lines across the length of a flat one;
   // the nodal diameters of a round one. None: not known.
   std::optional<int> nodes = {};
