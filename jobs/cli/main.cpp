@@ -12,6 +12,7 @@
 #include "jobs/cli/command_line.hpp"
 #include "jobs/cli/shared.hpp"
 #include "runtime/base/error.hpp"
+#include "runtime/base/message.hpp"
 
 namespace carillon::cli {
 namespace {
@@ -20,7 +21,7 @@ int fail(bool json, const std::string& what, int code) {
   std::fflush(stdout);
   if (json) {
     Json::Value root;
-    root["error"] = to_json(what);
+    root["error"] = to_json(base::shorten(what));
     root["exit_code"] = code;
     print_json(root);
   }

@@ -10,7 +10,7 @@
 #include "precompute/launch/environment.hpp"
 #include "runtime/base/command.hpp"
 #include "runtime/base/error.hpp"
-#include "runtime/base/printable.hpp"
+#include "runtime/base/message.hpp"
 
 int main(int argc, char** argv) {
   using namespace carillon;
@@ -24,7 +24,7 @@ int main(int argc, char** argv) {
     words.at(0) = base::find_helper("carillon-precompute").string();
     base::become(words);
   } catch (const std::exception& error) {
-    fmt::print(stderr, "carillon-precompute: error: {}\n", base::printable(error.what()));
+    fmt::print(stderr, "carillon-precompute: error: {}\n", base::show_message(error.what()));
     return kExitSystem;
   }
 }

@@ -1,4 +1,5 @@
-// Method: the handler only calls what POSIX allows in one (signal-safety(7)): kill, unlink, rmdir, write, poll, _exit.
+// Method: the handler only calls what POSIX allows in one (signal-safety(7)): write, poll, _exit, and what
+//   runtime/base/temporary does.
 // Source: POSIX.1-2008, 2.4.3. Deviations: none.
 #include "precompute/run/interrupt.hpp"
 
@@ -6,25 +7,20 @@
 #include <signal.h>
 #include <unistd.h>
 
-#include <array>
-#include <atomic>
 #include <cstring>
 
 #include "runtime/base/error.hpp"
+#include "runtime/base/temporary.hpp"
 
 namespace carillon::run {
 namespace {
 
 constexpr int kFirstRankMs = 200;
 
-std::array<char, 4096> cleanup_file{}, cleanup_folder{};
-volatile sig_atomic_t has_cleanup = 0;
 volatile sig_atomic_t own_rank = 0;
 volatile sig_atomic_t saves = 0;
 volatile sig_atomic_t has_news = 0;
 volatile sig_atomic_t stop_signal = 0;
-std::atomic<pid_t> child_process{0};
-static_assert(std::atomic<pid_t>::is_always_lock_free, "A handler may only touch lock-free atomics.");
 
 void print(const char* text) { (void)!write(STDERR_FILENO, text, std::strlen(text)); }
 
@@ -38,12 +34,7 @@ void handle(int signal) {
     stop_signal = signal;
     return;
   }
-  if (has_cleanup != 0) {
-    const pid_t child = child_process.load();
-    if (child > 0) kill(child, SIGKILL);
-    unlink(cleanup_file.data());
-    rmdir(cleanup_folder.data());
-  }
+  base::end_children_and_temporaries();
   if (own_rank == 0) {
     print("carillon-precompute: stopped by ");
     print(find_name(signal));
@@ -84,22 +75,5 @@ void set_news(bool is_new) { has_news = is_new ? 1 : 0; }
 bool is_stop_asked() { return stop_signal != 0; }
 
 std::string find_stop_name() { return stop_signal == 0 ? "a signal" : find_name(stop_signal); }
-
-Cleanup::Cleanup(const std::string& file) {
-  const std::string folder = file.substr(0, file.rfind('/'));
-  if (file.size() >= cleanup_file.size()) throw InputError(file + ": this path is too long for a temporary file");
-  std::memcpy(cleanup_file.data(), file.c_str(), file.size() + 1);
-  std::memcpy(cleanup_folder.data(), folder.c_str(), folder.size() + 1);
-  child_process = 0;
-  has_cleanup = 1;
-}
-
-Cleanup::~Cleanup() {
-  has_cleanup = 0;
-  unlink(cleanup_file.data());
-  rmdir(cleanup_folder.data());
-}
-
-void Cleanup::set_child(pid_t child) { child_process = child; }
 
 }  // namespace carillon::run

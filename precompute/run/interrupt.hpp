@@ -1,14 +1,12 @@
 // What happens when a run is stopped from outside by SIGTERM, SIGINT, SIGHUP or SIGUSR1.
 #pragma once
 
-#include <sys/types.h>
-
 #include <string>
 
 namespace carillon::run {
 
-/// From now on such a signal ends this process at once with exit code 128 + signal: rank 0 prints one line, and the child and the file of
-/// a Cleanup that exists are removed. Nothing else needs to be undone: outputs have no name before they are whole (base::write_file).
+/// From now on such a signal ends this process at once with exit code 128 + signal: rank 0 prints one line, the mesher is ended, and
+/// temporary folders are removed. Nothing else needs to be undone: outputs have no name before they are whole (base::write_file).
 /// mpirun ends the other ranks when one of them is ended like this. Call once, before the work.
 void end_on_signals(int rank);
 
@@ -21,15 +19,5 @@ void set_news(bool has_news);
 bool is_stop_asked();
 /// "SIGUSR1"; of the last one that came.
 std::string find_stop_name();
-
-/// While it lives, a signal also ends the process `child` and removes `file` and the empty folder it is in.
-class Cleanup {
- public:
-  explicit Cleanup(const std::string& file);
-  ~Cleanup();
-  Cleanup(const Cleanup&) = delete;
-  Cleanup& operator=(const Cleanup&) = delete;
-  void set_child(pid_t child);
-};
 
 }  // namespace carillon::run

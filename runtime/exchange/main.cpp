@@ -25,6 +25,7 @@
 #include "runtime/bank/report.hpp"
 #include "runtime/bank/write.hpp"
 #include "runtime/base/file.hpp"
+#include "runtime/base/message.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/base/standard_output.hpp"
 #include "runtime/exchange/commands.hpp"
@@ -244,7 +245,7 @@ void edit(const std::string& file, const std::string& out, Wishes& wishes) {
   const std::string dropped = bank::describe_dropped(bank, e);
   if (is_edited || !is_reduced) bank = bank::calc_edited(bank, e);  // first: what is heard most may change
   if (const auto question = material::ask_about_solid(bank.material.young_modulus_pa, bank.material.density_kg_m3))
-    fmt::print(stderr, "carillon-bank: warning: {}\n", base::printable(*question));
+    fmt::print(stderr, "carillon-bank: warning: {}\n", base::show_message(*question));
   const std::size_t coupled = bank.quartic.mode_count();
   if (is_reduced) bank = bank::calc_reduced(bank, wishes.reduction);
   if (is_piped)
@@ -368,7 +369,7 @@ int run(int argc, char** argv) {
 
 int fail(const char* what, int code) {
   std::fflush(stdout);
-  fmt::print(stderr, "carillon-bank: {}\n", base::printable(what));
+  fmt::print(stderr, "carillon-bank: {}\n", base::show_message(what));
   return code;
 }
 

@@ -7,6 +7,7 @@
 #include <new>
 
 #include "runtime/base/error.hpp"
+#include "runtime/base/message.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/host/program.hpp"
 #include "runtime/host/scene.hpp"
@@ -15,7 +16,7 @@
 namespace {
 
 int fail(int code, const char* message) {
-  fmt::print(stderr, "carillon-render: {}\n", carillon::base::printable(message));
+  fmt::print(stderr, "carillon-render: {}\n", carillon::base::show_message(message));
   return code;
 }
 

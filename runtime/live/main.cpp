@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "runtime/base/error.hpp"
+#include "runtime/base/message.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/live/device.hpp"
 #include "runtime/live/player.hpp"
@@ -16,7 +17,7 @@
 namespace {
 
 int fail(int code, const char* message) {
-  fmt::print(stderr, "carillon-live: {}\n", carillon::base::printable(message));
+  fmt::print(stderr, "carillon-live: {}\n", carillon::base::show_message(message));
   return code;
 }
 

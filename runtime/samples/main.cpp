@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "runtime/base/error.hpp"
+#include "runtime/base/message.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/samples/samples.hpp"
 #include "runtime/version/version.hpp"
@@ -19,7 +20,7 @@ using namespace carillon;
 
 int fail(int code, const char* message) {
   std::fflush(stdout);
-  fmt::print(stderr, "carillon-samples: {}\n", base::printable(message));
+  fmt::print(stderr, "carillon-samples: {}\n", base::show_message(message));
   return code;
 }
 
