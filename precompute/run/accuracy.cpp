@@ -317,8 +317,8 @@ void Search::check_forecast(const Setting& setting) {
     bytes = ratio < 1.0 ? forecast(setting, ratio).bytes - static_cast<double>(last.peak_bytes) : 0.0;
   }
   bytes = run_.comm.broadcast(bytes);
-  eigen::check_memory(run_.comm, static_cast<std::int64_t>(std::clamp(bytes, 0.0, 1e18) / run_.comm.size()), 0,
-                      "The next setting (" + run::describe(setting) + ")");
+  eigen::check_memory(run_.comm, static_cast<std::int64_t>(std::clamp(bytes, 0.0, 1e18) / run_.comm.size()),
+                      run_.options.get_memory_limit_bytes(), "The next setting (" + run::describe(setting) + ")");
 }
 
 Trial Search::judge(const Setting& setting, std::size_t first_phase) {
@@ -451,7 +451,8 @@ void check_count(const Run& run, const Setting& setting) {
   constexpr double kSurely = 0.5;  // of a factor that is estimated by a power of the unknowns, to a factor of two
   const cost::ProblemSize size = cost::estimate_meshed_size(setting.nodes.value_or(0), setting.element == job::Element::T10);
   const auto bytes = static_cast<std::int64_t>(kSurely * cost::predict_parts(size).factor);
-  eigen::check_memory(run.comm, bytes / run.comm.size(), 0, fmt::format("The coarsest mesh of this body ({} nodes)", size.nodes));
+  eigen::check_memory(run.comm, bytes / run.comm.size(), run.options.get_memory_limit_bytes(),
+                      fmt::format("The coarsest mesh of this body ({} nodes)", size.nodes));
 }
 
 }  // namespace
