@@ -13,7 +13,9 @@
 #include "precompute/run/enter_folder.hpp"
 #include "precompute/run/interrupt.hpp"
 #include "precompute/simulate/simulate.hpp"
+#include "runtime/base/environment.hpp"
 #include "runtime/base/error.hpp"
+#include "runtime/base/message.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/base/result.hpp"
 #include "runtime/version/version.hpp"
@@ -107,10 +109,11 @@ int main(int argc, char** argv) {
   try {
     if (!words.folder.empty()) run::enter_folder(words.folder[0], words.folder[1]);
   } catch (const std::exception& error) {
-    fmt::print(stderr, "carillon-simulate: error: {}\n", base::printable(error.what()));
+    fmt::print(stderr, "carillon-simulate: error: {}\n", base::show_message(error.what()));
     return base::get_exit_code(base::describe_error(std::current_exception(), "").kind);
   }
   if (!words.options.checkpoint.empty()) run::save_on_signals();
+  base::isolate_lone_process();
   const Session session(argc, argv);
   return run_program(words);
 }
