@@ -75,6 +75,7 @@ int run_hear(Shared& shared, const HearOptions& options) {
     root["page"] = to_json(heard.page.string());
     root["explorer"] = heard.explorer.empty() ? Json::Value() : to_json(heard.explorer.string());
     root["assumed"] = to_json(heard.assumed);
+    root["warnings"] = to_json(heard.warnings);
     for (const double x : heard.extent_m) root["extent_m"].append(x);
     root["sounds"] = Json::arrayValue;
     for (const hear::Sound& sound : heard.sounds) root["sounds"].append(describe(sound));
@@ -83,6 +84,7 @@ int run_hear(Shared& shared, const HearOptions& options) {
     return 0;
   }
   for (const std::string& line : heard.assumed) fmt::print("assumed      {}\n", show(line, 1000));
+  for (const std::string& line : heard.warnings) fmt::print("warning      {}\n", show(line, 1000));
   fmt::print("body         {:.3g} x {:.3g} x {:.3g} m\n", heard.extent_m[0], heard.extent_m[1], heard.extent_m[2]);
   for (const hear::Sound& sound : heard.sounds) print(sound);
   fmt::print("\nreport       {}\n", show(heard.page.string(), 1000));

@@ -361,6 +361,8 @@ class Listening {
       all.insert(all.end(), {"--nodes", std::to_string(count)});
       (void)programs_.run("carillon-mesh", all, true);
     });
+    for (const std::string& note : programs_.get_notes())
+      if (std::find(heard_.warnings.begin(), heard_.warnings.end(), note) == heard_.warnings.end()) heard_.warnings.push_back(note);
     meshes_[wish.height_m] = file;
     return file;
   }
@@ -414,7 +416,7 @@ class Listening {
   const Order& order_;
   Clock::time_point start_;
   const process::SignalWatch watch_;
-  const process::Programs programs_;
+  process::Programs programs_;
   std::string stem_;
   SurfaceFacts facts_;
   std::vector<std::string> materials_;

@@ -55,6 +55,7 @@ struct Heard {
   std::filesystem::path folder, page;  // page: report.html of the first sound
   std::filesystem::path explorer;      // folder of the page on which all sounds are struck; empty: it is not installed
   std::vector<std::string> assumed;    // assumptions, one line each
+  std::vector<std::string> warnings;   // how the mesh differs from the object, one line each
   std::array<double, 3> extent_m{};    // of the first sound's body
   std::vector<Sound> sounds;
   double seconds = 0.0;  // by the clock

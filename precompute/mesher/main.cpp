@@ -28,6 +28,7 @@
 #include "runtime/base/document.hpp"
 #include "runtime/base/file.hpp"
 #include "runtime/base/json.hpp"
+#include "runtime/base/message.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/base/result.hpp"
 #include "runtime/base/standard_output.hpp"
@@ -46,7 +47,7 @@ struct Order {
   std::optional<long long> nodes;
   std::string up, method, side;
   std::optional<int> order;
-  bool straight = false, facets = false;
+  bool straight = false, facets = false, refuses_open = false;
   bool estimate = false;
   bool look = false;
   std::optional<std::int64_t> coarsen;
@@ -56,7 +57,7 @@ struct Order {
 /// What came out, for both ways of making a mesh.
 struct Meshed {
   mesh::TetMesh mesh;
-  std::vector<std::string> notes;
+  std::vector<std::string> notes, remarks;
   std::vector<std::pair<std::string, double>> seconds;
   std::optional<mesher::SurfaceReport> surface;
 };
@@ -142,6 +143,7 @@ void check_options(const Order& order) {
                           : !order.side.empty()   ? "--side"
                           : order.close_holes     ? "--close-holes"
                           : order.facets          ? "--facets"
+                          : order.refuses_open    ? "--refuse-open"
                           : order.estimate        ? "--estimate"
                                                   : nullptr;
     if (foreign) {
@@ -176,6 +178,7 @@ Meshed make_from_surface(const Order& order, const mesher::Progress& progress) {
   options.order = order.order.value_or(0);
   options.straight = order.straight;
   options.facets = order.facets;
+  options.refuses_open = order.refuses_open;
   if (order.method == "delaunay") options.method = mesher::Method::kDelaunay;
   if (order.method == "stuffing") options.method = mesher::Method::kStuffing;
   if (order.method == "extrude") options.method = mesher::Method::kExtrusion;
@@ -186,6 +189,7 @@ Meshed make_from_surface(const Order& order, const mesher::Progress& progress) {
   mesher::SurfaceReport report;
   result.mesh = mesher::mesh_surface(options, report, progress);
   result.notes = report.notes;
+  result.remarks = report.remarks;
   result.seconds = report.seconds;
   result.surface = std::move(report);
   return result;
@@ -253,6 +257,7 @@ std::string format_json(const Order& order, const Meshed& result, const mesh::Ch
   for (const auto& [name, nodes] : result.mesh.node_sets) root.member("node_sets").set(name, nodes.size());
   for (const auto& [phase, value] : result.seconds) root.member("seconds").set(phase, base::decimals(value, 4));
   root.set("seconds_total", base::decimals(total_s, 4)).set("notes", base::Json::array(result.notes));
+  for (const std::string& remark : result.remarks) root.member("notes").add(remark);
   return root.text();
 }
 
@@ -280,8 +285,10 @@ std::string format_report(const Order& order, const Meshed& result, const mesh::
 void make_mesh(const Order& order) {
   const auto start = Clock::now();
   const mesher::Progress progress = [&](std::string_view phase) {
-    if (phase.starts_with("rough {") || phase.starts_with("estimate {")) {  // for programs
-      if (order.estimate) fmt::print(stderr, "{}\n", phase);
+    if (phase.starts_with("rough {") || phase.starts_with("estimate {") || phase.starts_with("note ")) {  // for programs
+      if (order.estimate)
+        fmt::print(stderr, "{}{}\n", phase.starts_with("note ") ? "carillon-mesh: note: " : "",
+                   base::printable(phase.starts_with("note ") ? phase.substr(5) : phase));
       std::fflush(stderr);
       return;
     }
@@ -307,7 +314,7 @@ void make_mesh(const Order& order) {
   progress("checking the mesh");
   auto phase = Clock::now();
   const mesh::CheckReport check = mesh::check_mesh(result.mesh, is_piped ? "the mesh" : order.out);
-  result.notes.insert(result.notes.end(), check.warnings.begin(), check.warnings.end());
+  result.remarks.insert(result.remarks.end(), check.warnings.begin(), check.warnings.end());  // programs check the mesh themselves
   result.seconds.emplace_back("check", calc_seconds(phase));
   progress(fmt::format("writing {}", order.out));
   phase = Clock::now();
@@ -322,9 +329,11 @@ void make_mesh(const Order& order) {
   std::FILE* const to = is_piped || order.quiet ? stderr : stdout;
   if (!order.quiet) fmt::print(to, "{}", base::printable_lines(format_report(order, result, check, total_s)));
   std::set<std::string> printed;
-  for (const std::string& note : result.notes) {
-    if (printed.insert(note).second)
-      fmt::print(to, "{}{}\n", order.quiet ? "carillon-mesh: note: " : "  note      ", base::printable(note));
+  for (const auto& [texts, word] : {std::pair(&result.notes, "note"), std::pair(&result.remarks, "remark")}) {
+    for (const std::string& text : *texts) {
+      if (!printed.insert(text).second) continue;
+      fmt::print(to, "{}{}\n", order.quiet ? fmt::format("carillon-mesh: {}: ", word) : "  note      ", base::printable(text));
+    }
   }
   if (std::fflush(to) != 0) throw SystemError("the report cannot be written");
 }
@@ -409,6 +418,7 @@ void make(int argc, char** argv, Order& order) {
   app.add_option("--order", order.order, "1: tetrahedra of four nodes, 2: of ten [2 where a wall is extruded, else 1]")
       ->check(CLI::IsMember({1, 2}));
   app.add_flag("--straight", order.straight, "Order 2: mid-side nodes in the middle of their edges, not on the true surface");
+  app.add_flag("--refuse-open", order.refuses_open, "Surface: refuse an open one without --wall, rather than close or wrap it");
   app.add_flag("--facets", order.facets, "Surface: its facets are the body; without this a smooth surface through their corners is");
   app.add_option(
          "--close-holes", order.close_holes,
@@ -453,7 +463,7 @@ void make(int argc, char** argv, Order& order) {
 /// Prints an error, writes the result file and returns the exit code.
 int end(const Order& order, const base::Result& result) {
   std::fflush(stdout);
-  if (result.kind != base::ResultKind::done) fmt::print(stderr, "carillon-mesh: {}\n", base::printable(result.message));
+  if (result.kind != base::ResultKind::done) fmt::print(stderr, "carillon-mesh: {}\n", base::show_message(result.message));
   if (!order.result.empty()) base::write_result(order.result, result);
   return base::get_exit_code(result.kind);
 }

@@ -46,6 +46,7 @@ struct SurfaceOptions {
   std::optional<std::int64_t> nodes = std::nullopt;  // nodes of the final mesh (order 2: with the mid-side ones), met within 10 %
   int order = 1;                                     // 1: four nodes a tetrahedron, 2: ten; 0: ten where a wall is extruded, else four
   std::optional<double> close_holes = std::nullopt;  // largest hole that is closed, as a part of the body's diagonal; 0.15 without it
+  bool refuses_open = false;                         // an open surface without wall_m is refused, neither closed nor wrapped
   bool facets = false;                               // the facets are the body, not samples of a smooth surface
   bool straight = false;                             // order 2: all mid-side nodes in the middle, none on the true surface
   double sharp_angle_deg = 40;                       // an edge whose two faces turn by more than this, and not by noise, stays sharp
@@ -105,6 +106,7 @@ struct SurfaceReport {
 
   std::vector<std::pair<std::string, double>> seconds;  // per phase, in the order they ran
   std::vector<std::string> notes;                       // sentences for the user: what was repaired, what fell short
+  std::vector<std::string> remarks;                     // what else is worth knowing: the mesh is the body of the file
 };
 
 /// Called with a short sentence at the start of each phase. Two sentences are for programs, a word and a JSON object: "rough {...}" of the

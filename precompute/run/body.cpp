@@ -73,8 +73,12 @@ void warn_of_mesh(Run& run, const Body& body) {
 mesh::TetMesh read_checked_mesh(Run& run, const Setting& setting, Body& body, Patience* patience) {
   const bool quadratic = setting.element == job::Element::T10;
   const job::JobSpec& job = run.job;
+  MesherWords words;
   mesh::TetMesh mesh =
-      job.body ? make_body_mesh(*job.body, quadratic ? 2 : 1, {setting.nodes, setting.edge_m}, patience) : mesh::read_mesh(job.mesh);
+      job.body ? make_body_mesh(*job.body, quadratic ? 2 : 1, {setting.nodes, setting.edge_m}, words, patience) : mesh::read_mesh(job.mesh);
+  body.mesher_warnings = std::move(words.warnings);
+  for (const std::string& warning : body.mesher_warnings) run.log.warn_once(warning);
+  for (const std::string& remark : words.remarks) run.log.print(remark);
   if (patience != nullptr && patience->estimate) return {};
   if (job.mesh_scale != 1.0) {
     for (std::vector<Vec3>* lengths : {&mesh.nodes_m, &mesh.doubt_m}) {
@@ -86,6 +90,8 @@ mesh::TetMesh read_checked_mesh(Run& run, const Setting& setting, Body& body, Pa
   body.check = mesh::check_mesh(mesh, body.source);
   body.region_names = mesh.region_names;
   warn_of_mesh(run, body);
+  if (job.body && job.body->shape.empty() && body.check.components > 1)
+    run.log.warn_once(fmt::format("the surface has {} parts that are not connected: each vibrates by itself", body.check.components));
   if (!mesh.doubt_m.empty())
     run.log.warn(
         "some facets of the surface are so coarse that they may be planes of the body or samples of a smooth surface; the error bars "

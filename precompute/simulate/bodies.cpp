@@ -36,16 +36,19 @@ transient::Law make_law(const job::Material& material) {
 }
 
 /// In the axes of the body's mesh. Rank 0.
-mesh::TetMesh make_mesh(const job::SimulatedBody& body) {
+mesh::TetMesh make_mesh(const job::SimulatedBody& body, std::vector<std::string>& warnings) {
   const int order = body.element == job::Element::T10 ? 2 : 1;
   mesh::TetMesh mesh;
   if (body.body) {
-    mesh = run::make_body_mesh(*body.body, order, {body.body->nodes, body.body->edge_m});
+    run::MesherWords words;
+    mesh = run::make_body_mesh(*body.body, order, {body.body->nodes, body.body->edge_m}, words);
+    warnings = std::move(words.warnings);
   } else {
     mesh = mesh::read_mesh(body.mesh);
     for (Vec3& x : mesh.nodes_m) x = body.mesh_scale * x;
   }
-  mesh::check_mesh(mesh, fmt::format("body \"{}\"", body.name));
+  const mesh::CheckReport check = mesh::check_mesh(mesh, fmt::format("body \"{}\"", body.name));
+  warnings.insert(warnings.end(), check.warnings.begin(), check.warnings.end());
   if (order == 2 && mesh.order == 1) mesh = mesh::to_quadratic(mesh);
   if (order == 1 && mesh.order == 2) mesh = mesh::to_linear(mesh);
   return mesh;
@@ -84,6 +87,7 @@ struct Made {
   };
   std::vector<Group> constrained;
   Vec3 centre_m{};
+  std::vector<std::string> warnings = {};  // of its mesh
 };
 
 /// The constrained groups of a body, each node once: those that follow paths, one by one, then those that are fixed, then the hinged.
@@ -124,7 +128,7 @@ Made make_solid(const job::SimulatedBody& body) {
   Made made;
   transient::SolidBody solid;
   solid.name = body.name;
-  solid.mesh = name_place(body.place, [&] { return make_mesh(body); });
+  solid.mesh = name_place(body.place, [&] { return make_mesh(body, made.warnings); });
   solid.law = make_law(body.material);
   solid.mass_damping_per_s = body.material.alpha2_per_s;
   mesh::TetMesh& mesh = solid.mesh;
@@ -326,11 +330,14 @@ Bodies make_bodies(const comm::Communicator& comm, const job::SimulationSpec& sp
   });
   std::vector<transient::AnyBody> moving;
   std::vector<Vec3> centres;
+  Bodies bodies;
+  for (std::size_t b = 0; b < made.size(); ++b)
+    for (const std::string& warning : made[b].warnings)
+      bodies.warnings.push_back(fmt::format("body \"{}\": {}", spec.bodies[b].name, warning));
   for (Made& one : made) {
     moving.push_back(std::move(one.body));
     centres.push_back(one.centre_m);
   }
-  Bodies bodies;
   bodies.assembly = std::make_shared<const transient::Assembly>(transient::make_assembly(comm, moving));
   bodies.centre_m = comm.broadcast(std::move(centres));
   share(comm, made, *bodies.assembly, bodies);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "precompute/comm/communicator.hpp"
@@ -24,7 +25,8 @@ struct Bodies {
   std::shared_ptr<const transient::Assembly> assembly;
   std::vector<transient::Constraint> constraints;
   std::vector<transient::Impulse> impulses;
-  std::vector<Vec3> centre_m;  // of mass, of each body
+  std::vector<Vec3> centre_m;         // of mass, of each body
+  std::vector<std::string> warnings;  // of their meshes, on rank 0
 };
 
 /// Reads and makes the meshes on rank 0, puts them in their places, and finds the nodes that are fixed, driven or struck. Collective.

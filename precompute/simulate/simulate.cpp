@@ -19,6 +19,7 @@
 #include "precompute/job/simulation.hpp"
 #include "precompute/run/interrupt.hpp"
 #include "precompute/run/run_log.hpp"
+#include "precompute/run/same_start.hpp"
 #include "precompute/simulate/bodies.hpp"
 #include "precompute/simulate/checkpoint.hpp"
 #include "precompute/simulate/motion_file.hpp"
@@ -66,6 +67,7 @@ struct Log {
 
 job::SimulationSpec read_spec(const comm::Communicator& comm, const fs::path& file, const SimulateOptions& options, std::string& text) {
   text = comm.broadcast([&] { return base::read_file(file, "job file", kMaxJobBytes); });
+  run::check_same(comm, "jobs", run::look_at_job(file, kMaxJobBytes));
   job::SimulationSpec spec = comm.agree([&] { return job::parse_simulation(text, fs::absolute(file)); });
   const auto replace = [](fs::path& path, const fs::path& other) {
     if (!other.empty()) path = fs::absolute(other).lexically_normal();
@@ -75,6 +77,8 @@ job::SimulationSpec read_spec(const comm::Communicator& comm, const fs::path& fi
   replace(spec.surface, options.surface);
   replace(spec.motion, options.motion);
   replace(spec.record, options.record);
+  for (const job::SimulationOutput& output : job::kSimulationOutputs)
+    run::check_same(comm, fmt::format("{} to write", output.name), run::look_at_place(spec.*output.file));
   comm.agree([&] {
     if (!comm.is_root()) return;
     if (const job::SimulationOutput* output = job::find_overwriting_output(spec))
@@ -349,7 +353,7 @@ std::string predict(const comm::Communicator& comm, Simulation& simulation, bool
       picture + static_cast<std::int64_t>(simulation.makes_sound() ? sound.frames * sound.receivers.size() * sizeof(double) : 0);
   base::Json memory = base::Json::object();
   for (std::int64_t ranks = 1; ranks <= kMaxPredictedRanks; ranks *= 2) memory.set(std::to_string(ranks), ranks * (peak + samples));
-  record.set("memory_bytes", std::move(memory));
+  record.set("memory_bytes", std::move(memory)).set("warnings", base::Json::array(simulation.spec.warnings));
   if (json) return record.text();
   return fmt::format(
       "{} elements, {} nodes\nstep {:.4g} s (the longest stable one is {:.4g} s), {:.0f} steps\nabout {:.3g} s on {} rank{}, {:.0f} MB a "
@@ -415,8 +419,9 @@ SimulateSummary simulate(const comm::Communicator& comm, const fs::path& job_fil
   simulation.spec = read_spec(comm, job_file, options, text);
   simulation.job_sha256 = base::to_hex(base::calc_sha256(text));
   const job::SimulationSpec& spec = simulation.spec;
-  for (const std::string& warning : spec.warnings) log.warn(warning);
   simulation.bodies = make_bodies(comm, spec, [&](const std::string& line) { log.print(line); });
+  simulation.spec.warnings.insert(simulation.spec.warnings.end(), simulation.bodies.warnings.begin(), simulation.bodies.warnings.end());
+  for (const std::string& warning : spec.warnings) log.warn(warning);
   make_motion(comm, simulation);
   transient::Motion& motion = *simulation.motion;
   SimulateSummary summary;
