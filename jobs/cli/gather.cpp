@@ -155,8 +155,12 @@ bool is_of_many(const std::string& word) {
 }
 
 std::vector<std::string> list_job_files(const std::string& word) {
+  const std::vector<Source> sources = read_word(word);
+  // A file of something else.
+  if (std::none_of(sources.begin(), sources.end(), [](const Source& source) { return source.error.empty(); }))
+    throw InputError(sources.front().error);
   std::vector<std::string> files;
-  for (const Source& source : read_word(word)) files.push_back(source.job_file);
+  for (const Source& source : sources) files.push_back(source.job_file);
   return files;
 }
 

@@ -32,7 +32,7 @@ Source gather_one(const std::string& word, const std::string& solver);
 bool is_of_jobs(const std::string& word);
 /// Is this a folder or a manifest?
 bool is_of_many(const std::string& word);
-/// What a word stands for, as Source::job_file. Throws as gather().
+/// What a word stands for, as Source::job_file. Throws as gather(), and where no job of it can be used.
 std::vector<std::string> list_job_files(const std::string& word);
 
 /// A job with the name that people know it by.

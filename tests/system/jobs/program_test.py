@@ -371,7 +371,7 @@ class Strangers(Bench):
         self.assertEqual(self.ask("status", files[1])["jobs"][0]["state"], "queued")
         self.refuse("submit", self.folder / ("y" * 4096 + ".json"), says="too long")
         self.refuse("status", "../../x", says="no job of this store")
-        self.refuse("log", "../" * 20 + "etc/passwd", says="not JSON")
+        self.refuse("log", "../" * 20 + "etc/passwd", says="passwd:1: ")
         self.refuse("get", "%", says="neither")
 
     def test_what_is_no_file_is_one_clear_error_at_once(self):
