@@ -56,7 +56,7 @@ PYBIND11_MODULE(_carillon, module) {
     }
   });
   module.def(
-      "make_environment",
+      "_make_environment",
       [](bool is_alone) {
         py::list entries;
         for (const std::string& entry : is_alone ? base::make_lone_environment() : base::make_environment())
