@@ -22,11 +22,13 @@
 #include "precompute/mesh/read.hpp"
 #include "precompute/mesh/write.hpp"
 #include "precompute/mesher/coarsen.hpp"
+#include "precompute/mesher/seams.hpp"
 #include "precompute/mesher/surface.hpp"
 #include "precompute/mesher/triangle_surface.hpp"
 #include "precompute/shapes/shapes.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/file.hpp"
+#include "runtime/base/file_limit.hpp"
 #include "runtime/base/json.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/base/result.hpp"
@@ -243,6 +245,7 @@ std::string format_json(const Order& order, const Meshed& result, const mesh::Ch
     root.set("method_reason", s.reason).set("smoothed_m", rounded(s.smoothed_m, 6)).set("input_triangles", s.input_triangles);
     root.set("layers", s.layers).set("edge_per_wall", rounded(s.edge_per_wall, 6));
     root.set("scale", exact(s.scale)).set("input_volume_m3", exact(s.input_volume_m3)).set("facet_pieces", s.facet_pieces);
+    root.set("unused_points", s.unused_points).set("seam_edges", s.seam_edges).set("seam_m", rounded(s.seam_m, 6));
     root.set("holes_closed", s.holes_closed).set("largest_hole_m", rounded(s.largest_hole_m, 9));
     root.set("largest_hole_part", rounded(s.largest_hole_part, 6)).set("holes_area_part", rounded(s.holes_area_part, 6));
     root.set("shells", s.shells).set("farthest_outside_m", rounded(s.farthest_outside_m, 9));
@@ -346,9 +349,11 @@ void make_mesh(const Order& order) {
   throw InputError(message);
 }
 
+/// Also of meshes that are not read: their reader says so.
 bool is_mesh_name(const std::filesystem::path& file) {
-  constexpr std::array<std::string_view, 5> kEndings{".msh", ".vtu", ".mesh", ".node", ".ele"};
-  const std::string ending = file.extension().string();
+  constexpr std::array<std::string_view, 17> kEndings{".msh", ".vtu", ".mesh", ".node", ".ele", ".meshb", ".vtk",  ".pvtu", ".vtkhdf",
+                                                      ".inp", ".bdf", ".nas",  ".unv",  ".med", ".xdmf",  ".cgns", ".exo"};
+  const std::string ending = base::find_extension(file);
   return std::find(kEndings.begin(), kEndings.end(), ending) != kEndings.end();
 }
 
@@ -357,7 +362,7 @@ void write_coarse(const Order& order) {
   if (order.surface.empty()) throw InputError("--coarsen is for surfaces; give a file");
   if (order.out.empty()) throw InputError("-o is missing: give the file for the surface, whose name ends in .off");
   const mesher::TriangleSurface coarse =
-      mesher::coarsen(mesher::read_surface(order.surface), static_cast<std::size_t>(std::max<std::int64_t>(*order.coarsen, 0)));
+      mesher::coarsen(mesher::read_input(order.surface).surface, static_cast<std::size_t>(std::max<std::int64_t>(*order.coarsen, 0)));
   std::string text = fmt::format("OFF\n{} {} 0\n", coarse.points.size(), coarse.triangles.size());
   for (const Vec3& p : coarse.points) text += fmt::format("{:.17g} {:.17g} {:.17g}\n", p[0], p[1], p[2]);
   for (const Triangle& t : coarse.triangles) text += fmt::format("3 {} {} {}\n", t[0], t[1], t[2]);
@@ -368,16 +373,18 @@ void write_coarse(const Order& order) {
 void print_look(const Order& order) {
   if (order.surface.empty()) throw InputError("--look is for surfaces and meshes; give a file");
   if (is_mesh_name(order.surface)) {
-    const mesh::TetMesh mesh = mesh::read_mesh(order.surface);
+    mesh::TetMesh mesh = mesh::read_mesh(order.surface);
+    const mesh::CheckReport check = mesh::check_mesh(mesh, order.surface);
     base::Json root = base::Json::object();
-    root.set("mesh", order.surface).set("nodes", mesh.nodes_m.size()).set("tets", mesh.tet_count());
-    root.set("extent", base::Json::array(mesher::calc_box(mesh.nodes_m).extent()));
+    root.set("mesh", order.surface).set("nodes", check.nodes).set("tets", check.tets).set("parts", check.components);
+    root.set("unused_nodes", check.unreferenced).set("extent", base::Json::array(check.box_high - check.box_low));
     fmt::print("{}\n", root.line());
     return;
   }
   const mesher::SurfaceLook look = mesher::look_at_surface(order.surface);
   base::Json root = base::Json::object();
   root.set("surface", order.surface).set("triangles", look.triangles).set("parts", look.parts).set("openings", look.openings);
+  root.set("unused_points", look.unused_points).set("seam_edges", look.seam_edges);
   root.set("extent", base::Json::array(look.extent));
   root.set("thickness", look.thickness > 0.0 ? base::Json(look.thickness) : base::Json());
   fmt::print("{}\n", root.line());
@@ -461,6 +468,7 @@ int end(const Order& order, const base::Result& result) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  base::report_file_limit();
   mesher::guard_program("carillon-mesh");
   Order order;
   try {

@@ -22,6 +22,7 @@
 #include "precompute/mesher/quiet.hpp"
 #include "precompute/mesher/repair.hpp"
 #include "precompute/mesher/round_surface.hpp"
+#include "precompute/mesher/seams.hpp"
 #include "precompute/mesher/smooth.hpp"
 #include "precompute/mesher/stuffing.hpp"
 #include "precompute/mesher/tet_quality.hpp"
@@ -142,6 +143,19 @@ void scale_surface(TriangleSurface& surface, const SurfaceOptions& options, Surf
   if (largest > 20 || largest < 1e-3)
     report.notes.push_back(fmt::format(
         "The body is {:.3g} m long. If the file is not in metres, give its height or a scale (0.001 for millimetres).", largest));
+}
+
+/// What was done to the surface as it was read.
+void note_input(SurfaceReport& report) {
+  if (report.seam_edges > 0)
+    report.notes.push_back(fmt::format(
+        "The seams of its faces were closed: {} borders, whose sides lay up to {:.2g} m apart, were joined (as are all within "
+        "{:.2g} m, {:g} of the body's diagonal).",
+        report.seam_edges, report.seam_m, kSeam * norm(Vec3{report.extent_m[0], report.extent_m[1], report.extent_m[2]}), kSeam));
+  if (report.unused_points > 0)
+    report.notes.push_back(fmt::format("{} point{} of the file belong{} to no triangle and {} dropped.", report.unused_points,
+                                       report.unused_points == 1 ? "" : "s", report.unused_points == 1 ? "s" : "",
+                                       report.unused_points == 1 ? "was" : "were"));
 }
 
 /// Scales the surface once more where joining, wrapping or rounding has changed its extent, so that the body itself has the height asked
@@ -623,8 +637,9 @@ std::optional<mesh::TetMesh> make_thin(const Body& body, const SurfaceOptions& o
 mesh::TetMesh make_mesh(const SurfaceOptions& given, SurfaceReport& report, Phases& phases) {
   SurfaceOptions options = given;
   Body body;
-  TriangleSurface raw = phases.run("reading", [&] { return read_surface(options.surface); });
-  report.input_triangles = static_cast<std::int64_t>(raw.triangles.size());
+  SurfaceInput input = phases.run("reading", [&] { return read_input(options.surface); });
+  TriangleSurface& raw = input.surface;
+  report.input_triangles = input.triangles;
   const auto calc_limit = [&](double start, double nodes) {
     return start + kCpuPerTriangle * static_cast<double>(report.input_triangles) + kCpuPerNode * nodes;
   };
@@ -633,6 +648,9 @@ mesh::TetMesh make_mesh(const SurfaceOptions& given, SurfaceReport& report, Phas
   std::optional<Sheet> sheet;
   if (options.wall_m) phases.run("repairing", [&] { return sheet = find_sheet(raw, options), 0; });
   scale_surface(raw, options, report, sheet.has_value());
+  report.unused_points = input.unused_points;
+  report.seam_edges = input.seams.edges;
+  report.seam_m = report.scale * input.seams.widest;
   show_rough_estimate(raw, options, sheet.has_value(), phases);
   if (sheet) {
     for (Vec3& p : sheet->surface.points) p = report.scale * p;
@@ -759,18 +777,21 @@ mesh::TetMesh mesh_surface(const SurfaceOptions& options, SurfaceReport& report,
   Phases phases(report, progress, options.surface.string());
   const Quiet quiet;
   try {
-    return make_mesh(options, report, phases);
+    mesh::TetMesh mesh = make_mesh(options, report, phases);
+    note_input(report);
+    return mesh;
   } catch (const std::bad_alloc&) {
     throw SystemError(fmt::format("{}: memory ran out while meshing; ask for longer edges or fewer nodes", options.surface.string()));
   }
 }
 
 SurfaceLook look_at_surface(const std::filesystem::path& surface) {
-  const TriangleSurface raw = read_surface(surface);
-  SurfaceLook look;
-  look.triangles = static_cast<std::int64_t>(raw.triangles.size());
+  SurfaceInput input = read_input(surface);
+  TriangleSurface& raw = input.surface;
+  weld(raw, kSamePoint * calc_box(raw.points).diagonal());
+  SurfaceLook look{.triangles = input.triangles, .unused_points = input.unused_points, .seam_edges = input.seams.edges};
   look.extent = calc_used_box(raw).extent();
-  look.parts = static_cast<std::int64_t>(split_parts(raw).size());
+  look.parts = count_bodies(raw);
   SurfaceOptions options;
   options.surface = surface;
   if (const std::optional<Sheet> sheet = find_sheet(raw, options)) {
