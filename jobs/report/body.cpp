@@ -47,6 +47,7 @@ Html make_tiles(const Subject& subject) {
 std::string describe_bars(const bank::Bank& bank) {
   const auto find_worst = [](const std::vector<double>& bars) { return *std::max_element(bars.begin(), bars.end()); };
   if (bank.mode_count() == 0) return "There are no frequencies that could be wrong";
+  if (bank.element == "imported") return "The accuracy is " + bank::describe_accuracy(bank);
   if (bank.element == "analytic") {
     std::string text = bank::describe_accuracy(bank);
     text[0] = 'F';
@@ -111,7 +112,9 @@ Html make_head(const Subject& subject, std::string_view title) {
   const bank::Bank& bank = subject.bank;
   Html out = html("<header>\n<h1>{}</h1>\n<p class=\"remark\">{}, bank of version {}.{}; {}</p>\n", title, subject.file.filename().string(),
                   subject.version[0], subject.version[1],
-                  bank.element == "analytic" ? "known modes" : fmt::format("{} elements, {} mass", bank.element, bank.mass));
+                  bank.element == "analytic"   ? "known modes"
+                  : bank.element == "imported" ? "modes imported from another program"
+                                               : fmt::format("{} elements, {} mass", bank.element, bank.mass));
   const auto faults =
       std::count_if(subject.checks.begin(), subject.checks.end(), [](const bank::Check& one) { return !one.faults.empty(); });
   if (faults > 0) {

@@ -172,7 +172,8 @@ struct Bank {
   std::array<double, 2> band_hz{20.0, 20000.0};
   bool complete = true;    // every mode of the band is here (false only when max_modes or calc_reduced cut the list, which keep those of
                            // the lowest corrected frequencies)
-  std::string element;     // "T4", "T10", or "analytic": known modes of a string, beam, membrane, plate or table (since 1.4)
+  std::string element;     // "T4", "T10"; "analytic": known modes of a string, beam, membrane, plate or table (since 1.4); "imported":
+                           // modes of another program, of unknown accuracy (since 1.8)
   std::string mass;        // "consistent" or "lumped"
   std::string provenance;  // JSON text: resolved job, versions, ranks, seconds and peak memory per phase
 

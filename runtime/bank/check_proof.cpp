@@ -260,6 +260,7 @@ std::string describe_accuracy(const Bank& bank) {
                ? std::string(unknown)
                : fmt::format("{} {:.2g} cent ({})", known, *std::max_element(cents.begin(), cents.end()), kind);
   };
+  if (bank.element == "imported") return "unknown: the frequencies are those of another program";
   if (bank.element == "analytic") {
     const std::vector<double>& cents = bank.discretisation_error_cents;
     const bool is_exact = std::all_of(cents.begin(), cents.end(), [](double c) { return c == 0.0; });

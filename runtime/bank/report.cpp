@@ -281,7 +281,9 @@ std::string format_info(const Bank& bank, const std::filesystem::path& file, std
   text += fmt::format("surface   {} vertices, {} triangles, shapes of {} bytes a component\n", bank.vertex_count(), bank.triangles.size(),
                       bank.shape_bytes);
   if (bank.packing) text += fmt::format("packed    {}\n", describe(*bank.packing));
-  if (bank.element == "analytic")
+  if (bank.element == "imported")
+    text += fmt::format("solve     none: imported modes of another program at {} points\n", bank.counts.nodes);
+  else if (bank.element == "analytic")
     text += fmt::format("solve     none: known modes at {} points, {} rigid modes\n", bank.counts.nodes, bank.counts.rigid_modes);
   else
     text += fmt::format("solve     {} elements, {} mass; {} nodes, {} tets, {} component{}, {} rigid modes deflated\n", bank.element,

@@ -25,8 +25,10 @@
 #include "runtime/bank/report.hpp"
 #include "runtime/bank/write.hpp"
 #include "runtime/base/file.hpp"
+#include "runtime/base/file_limit.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/base/standard_output.hpp"
+#include "runtime/base/whole_range.hpp"
 #include "runtime/exchange/commands.hpp"
 #include "runtime/material/solids.hpp"
 #include "runtime/material/table.hpp"
@@ -38,7 +40,7 @@ namespace {
 using namespace carillon;
 
 constexpr int kMost = std::numeric_limits<int>::max();
-const CLI::Range kCounts(1, kMost);
+const CLI::Validator kCounts(base::whole_range(1, kMost), base::describe_whole_range(1, kMost));
 
 /// Prints every check. InputError when a fault was found, after all lines were printed. `original`: the bank that was packed, or empty.
 void check(const std::string& file, const std::string& original) {
@@ -60,7 +62,6 @@ void check(const std::string& file, const std::string& original) {
   std::vector<bank::Check> checks = bank::calc_checks(bank);
   checks.push_back(bank::calc_regions_check(bank));
   checks.push_back(bank::calc_provenance_check(bank));
-  if (bank.packing && checks[0].faults.empty()) checks.push_back(bank::check_packing(bank));
   if (against) checks.push_back(*against);
   for (const bank::Check& check : checks) {
     fmt::print("{}", bank::format_check(check));
@@ -115,7 +116,8 @@ void add_options(CLI::App& editing, Wishes& wishes) {
   editing
       .add_option("--shape-bits", wishes.reduction.shape_bits,
                   "Bits of a component of a mode's shape; up to 8 the bank has one byte for it instead of two")
-      ->check(CLI::Range(bank::kMinShapeBits, bank::kMaxShapeBits))
+      ->check(base::whole_range(bank::kMinShapeBits, bank::kMaxShapeBits),
+              base::describe_whole_range(bank::kMinShapeBits, bank::kMaxShapeBits))
       ->capture_default_str();
 }
 
@@ -224,9 +226,10 @@ void add_export(CLI::App& app, exchange::ExportWishes& wishes) {
 }
 
 void add_import(CLI::App& app, exchange::ImportWishes& wishes) {
-  app.add_option("GLB", wishes.glb, "The GLB file")->required();
+  app.add_option("GLB", wishes.glb, "The GLB or glTF file (.glb, .gltf with its buffers)")->required();
   app.add_option("-o,--output", wishes.out, "The bank to write; - is standard output")->required();
-  app.add_option("--model", wishes.model, "Number of the modal model in the file, from 0")->check(CLI::Range(0, kMost));
+  app.add_option("--model", wishes.model, "Number of the modal model in the file, from 0")
+      ->check(base::whole_range(0, kMost), base::describe_whole_range(0, kMost));
   app.add_option("--material", wishes.material, "Material of a model without one, by its name (carillon materials)");
   app.add_flag("--plain", wishes.is_plain, "Read the extension alone, without the extras of carillon-bank export");
 }
@@ -338,7 +341,7 @@ int run(int argc, char** argv) {
   add_export(*exporting, exported);
   exchange::ImportWishes imported;
   CLI::App* importing =
-      app.add_subcommand("import", "Reads a GLB file with KHR_audio_rigid_bodies as a bank; from a file of export, the same bank");
+      app.add_subcommand("import", "Reads a GLB or glTF file with KHR_audio_rigid_bodies as a bank; from a file of export, the same bank");
   add_import(*importing, imported);
   try {
     app.parse(argc, argv);
@@ -375,6 +378,7 @@ int fail(const char* what, int code) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  base::report_file_limit();
   try {
     return run(argc, argv);
   } catch (const InputError& error) {

@@ -266,7 +266,7 @@ void bind_bank(py::module_& module) {
   number(
       "complete", [](const bank::Bank& b) { return b.complete; }, "Whether every mode of band_hz is in the bank.");
   number(
-      "element", [](const bank::Bank& b) { return b.element; }, "\"T4\", \"T10\" or \"analytic\".");
+      "element", [](const bank::Bank& b) { return b.element; }, "\"T4\", \"T10\", \"analytic\" or \"imported\".");
   type.def("__len__", [](const SharedBank& bank) { return bank.played->mode_count(); });
   type.def("__repr__", &describe);
   module.def("find_bank", &find_bank, "file"_a, "text"_a, "The bank file of a job; None if it names none.");
