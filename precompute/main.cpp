@@ -23,6 +23,7 @@
 #include "precompute/run/run_log.hpp"
 #include "precompute/run/validate.hpp"
 #include "runtime/base/error.hpp"
+#include "runtime/base/file_limit.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/base/result.hpp"
 #include "runtime/version/version.hpp"
@@ -196,6 +197,7 @@ int print_estimate(const CommandLine& words) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  base::report_file_limit();
   std::string result;  // file; empty: none
   try {
     const CommandLine words(argc, argv);

@@ -17,6 +17,7 @@
 #include "precompute/job/read_body.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/error.hpp"
+#include "runtime/base/whole_range.hpp"
 #include "runtime/version/version.hpp"
 
 namespace carillon::cli {
@@ -50,7 +51,7 @@ CLI::Validator make_engine_check() { return CLI::IsMember({"local", "slurm"}); }
 
 void add_resources(CLI::App& command, ResourceOptions& options) {
   command.add_option("--ranks", options.ranks, "MPI ranks of each job; without it, predicted from the mesh")
-      ->check(CLI::Range(1, kMaxRanks));
+      ->check(base::whole_range(1, kMaxRanks), base::describe_whole_range(1, kMaxRanks));
   command.add_option("--memory-gb", options.memory_gb, "Memory of each job, all ranks together; without it, predicted")
       ->check(make_gb_check(1e-6));
   command.add_option("--time-limit", options.time_limit,
@@ -137,7 +138,8 @@ void add_run(CLI::App& app, Shared& shared, Run& run) {
                                          "Ctrl-C saves what runs and puts it back into the queue; once more ends it. Exit code 0: all "
                                          "are done, 3: one failed or was cancelled.");
   command->add_flag("--keep", queue.runner.keep, "Stay and wait for more jobs when the queue is empty");
-  command->add_option("--cores", queue.runner.cores, "Use at most so many")->check(CLI::Range(1, kMaxRanks));
+  command->add_option("--cores", queue.runner.cores, "Use at most so many")
+      ->check(base::whole_range(1, kMaxRanks), base::describe_whole_range(1, kMaxRanks));
   command->add_option("--memory-gb", queue.runner.memory_gb, "Use at most so much")->check(make_gb_check(1e-3));
   command->add_flag("-q,--quiet", queue.quiet, "Print nothing");
   command->add_flag("--pictures", queue.attempt.has_pictures,
@@ -228,7 +230,9 @@ void add_explore(CLI::App& app, Shared& shared, Run& run) {
   command->add_flag("--whole", explore.keeps_banks,
                     "Keep banks as they are; without it those above 4 MB are packed, with an error of -60 dB(A)");
   CLI::Option* serves = command->add_flag("--serve", options->is_serving, "Serve it on this machine, until Ctrl-C");
-  command->add_option("--port", options->port, "With --serve: the port (default: a free one)")->check(CLI::Range(1, 65535))->needs(serves);
+  command->add_option("--port", options->port, "With --serve: the port (default: a free one)")
+      ->check(base::whole_range(1, 65535), base::describe_whole_range(1, 65535))
+      ->needs(serves);
   set_work(*command, shared, run, options, run_explore);
 }
 
@@ -310,7 +314,7 @@ void add_attempt(CLI::App& app, Run& run) {
   CLI::App* command =
       app.add_subcommand("attempt", "One attempt at the job of a folder of work, for carillon run and the scripts of Slurm")->group("");
   command->add_option("WORK", attempt.work, "work/ab/ID of a store")->required();
-  command->add_option("--ranks", attempt.ranks)->check(CLI::Range(1, kMaxRanks));
+  command->add_option("--ranks", attempt.ranks)->check(base::whole_range(1, kMaxRanks), base::describe_whole_range(1, kMaxRanks));
   command->add_option("--memory-gb", attempt.memory_gb);
   command->add_option("--time-limit-s", attempt.time_limit_s);
   command->add_option("--token", attempt.token);

@@ -12,6 +12,7 @@
 
 #include "runtime/base/error.hpp"
 #include "runtime/base/file.hpp"
+#include "runtime/base/foreign.hpp"
 
 namespace carillon::cli {
 namespace {
@@ -78,6 +79,7 @@ std::vector<Source> read_manifest(const std::string& word) {
   std::string text =
       is_stdin ? std::string(std::istreambuf_iterator<char>(std::cin), {})
                : base::read_file(word, "manifest", kMaxManifestBytes, "a job file ends in .json, and a manifest names one on each line");
+  base::refuse_utf16(text, word);
   if (text.find('\0') != std::string::npos)
     throw InputError(fmt::format("{}: this is no text; a job file ends in .json, and a manifest names one on each line", word));
   std::vector<Source> sources;

@@ -12,6 +12,7 @@
 #include "jobs/cli/command_line.hpp"
 #include "jobs/cli/shared.hpp"
 #include "runtime/base/error.hpp"
+#include "runtime/base/file_limit.hpp"
 
 namespace carillon::cli {
 namespace {
@@ -58,6 +59,7 @@ int run(int argc, char** argv) {
 }  // namespace carillon::cli
 
 int main(int argc, char** argv) {
+  carillon::base::report_file_limit();
   try {
     return carillon::cli::run(argc, argv);
   } catch (const std::exception& error) {

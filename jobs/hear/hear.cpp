@@ -19,6 +19,7 @@
 #include <utility>
 
 #include "jobs/explore/explore.hpp"
+#include "jobs/explore/names.hpp"
 #include "jobs/hear/assume.hpp"
 #include "jobs/hear/strikes.hpp"
 #include "jobs/process/programs.hpp"
@@ -34,6 +35,7 @@
 #include "runtime/base/document.hpp"
 #include "runtime/base/failure.hpp"
 #include "runtime/base/file.hpp"
+#include "runtime/base/foreign.hpp"
 #include "runtime/base/json.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/base/vector.hpp"
@@ -49,6 +51,7 @@ using Clock = std::chrono::steady_clock;
 constexpr int kMaxModes = 600;                // of what is not a preview
 constexpr const char* kExplorer = "explore";  // folder of the page
 constexpr std::size_t kStrikes = 4, kListed = 12;
+constexpr long long kMaxUnused = 1'000'000'000'000;
 constexpr double kSameCents = 5.0;                       // an edit that leaves Poisson's ratio may be so far off
 constexpr double kMinCents = 0.001, kMaxCents = 1200.0;  // of a job's accuracy_cents
 constexpr std::array<double, 2> kBandHz{20.0, 20000.0};
@@ -79,7 +82,7 @@ void check_object(const fs::path& object) {
   constexpr const char* kTakes = "a surface (.obj, .stl, .ply, .off, .gltf, .glb) or a mesh (.msh, .vtu, .mesh)";
   const std::string name = object.string(), ending = base::find_extension(object);
   std::error_code error;
-  if (!fs::exists(object, error)) throw InputError(fmt::format("{}: no such file; give {}", name, kTakes));
+  if (!fs::exists(object, error)) throw InputError(fmt::format("{}: no such file{}; give {}", name, base::hint_backslash(object), kTakes));
   if (fs::is_directory(object, error)) throw InputError(fmt::format("{}: a folder; give the file of {} in it", name, kTakes));
   if (is_surface_file(object) || is_mesh_file(object)) return;
   if (ending == ".json" || ending == ".jsonl")
@@ -190,7 +193,7 @@ class Listening {
 
   /// Reads the file and notes what is assumed.
   void look() {
-    stem_ = clean(is_shape() ? order_.shape : order_.object.stem().string());
+    stem_ = explore::cut_name(clean(is_shape() ? order_.shape : order_.object.stem().string()));
     heard_.folder = fs::absolute(order_.out.empty() ? fs::path(stem_ + "-sound") : order_.out);
     if (order_.materials.empty()) {
       materials_ = {kDefaultMaterial};
@@ -206,9 +209,15 @@ class Listening {
     const base::Document document = base::parse_document(text, "carillon-mesh --look");
     base::Object root = document.root();
     facts_.extent = root.numbers<3>("extent");
+    facts_.parts = root.integer("parts", 0, std::numeric_limits<long long>::max());
+    if (facts_.parts > 1)
+      heard_.assumed.push_back(fmt::format(
+          "parts: {} separate bodies, which do not touch, are one object here; give one file each to hear them apart", facts_.parts));
+    if (const long long unused = root.integer_if(is_mesh() ? "unused_nodes" : "unused_points", 0, kMaxUnused).value_or(0); unused > 0)
+      heard_.assumed.push_back(fmt::format("unused: {} point{} of the file belong{} to no element and {} left out", unused,
+                                           unused == 1 ? "" : "s", unused == 1 ? "s" : "", unused == 1 ? "is" : "are"));
     if (is_mesh()) return;
     facts_.triangles = root.integer("triangles", 0, std::numeric_limits<long long>::max());
-    facts_.parts = root.integer("parts", 0, std::numeric_limits<long long>::max());
     facts_.openings = root.integer("openings", 0, std::numeric_limits<long long>::max());
     facts_.thickness = root.has_number("thickness") ? root.number("thickness") : 0.0;
     if (!order_.wall_m && facts_.openings == 0)

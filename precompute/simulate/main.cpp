@@ -14,6 +14,7 @@
 #include "precompute/run/interrupt.hpp"
 #include "precompute/simulate/simulate.hpp"
 #include "runtime/base/error.hpp"
+#include "runtime/base/file_limit.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/base/result.hpp"
 #include "runtime/version/version.hpp"
@@ -97,6 +98,7 @@ int run_program(const CommandLine& words) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  base::report_file_limit();
   CommandLine words;
   run::end_on_signals(0);
   try {

@@ -17,6 +17,7 @@
 
 #include "runtime/base/descriptor.hpp"
 #include "runtime/base/failure.hpp"
+#include "runtime/base/foreign.hpp"
 
 namespace carillon::base {
 
@@ -40,7 +41,7 @@ void sync_folder(const fs::path& folder) {
 
 }  // namespace
 
-bool is_full_error(int error) { return error == ENOSPC || error == EDQUOT; }
+bool is_full_error(int error) { return error == ENOSPC || error == EDQUOT || error == EFBIG; }
 
 namespace {
 
@@ -49,7 +50,8 @@ int open_regular(const fs::path& file, std::string_view what, std::uint64_t& len
   // O_NONBLOCK: opening a pipe without a writer must not wait.
   const int fd = ::open(file.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
   if (fd < 0) {
-    throw InputError(fmt::format("{}: cannot open this {}: {}; check the path", file.string(), what, std::strerror(errno)));
+    throw InputError(
+        fmt::format("{}: cannot open this {}: {}; check the path{}", file.string(), what, std::strerror(errno), hint_backslash(file)));
   }
   struct stat info {};
   if (::fstat(fd, &info) != 0 || !S_ISREG(info.st_mode)) {
@@ -160,10 +162,10 @@ void WholeFile::refuse(int error) {
   if (descriptor_ >= 0) ::close(descriptor_);
   descriptor_ = -1;
   ::unlink(temporary_.c_str());
-  const bool is_full = is_full_error(error);
-  throw_system_error(
-      error, fmt::format("{}: cannot write: {}; {}", file_.string(), std::strerror(error),
-                         is_full ? "the disk or quota is full: make room on it" : "check the folder's rights and the space on the disk"));
+  const char* const advice = error == EFBIG         ? "files may not be so large here: raise the limit (ulimit -f)"
+                             : is_full_error(error) ? "the disk or quota is full: make room on it"
+                                                    : "check the folder's rights and the space on the disk";
+  throw_system_error(error, fmt::format("{}: cannot write: {}; {}", file_.string(), std::strerror(error), advice));
 }
 
 void WholeFile::append(std::string_view bytes) {

@@ -9,7 +9,9 @@
 #include <vector>
 
 #include "runtime/base/error.hpp"
+#include "runtime/base/file_limit.hpp"
 #include "runtime/base/printable.hpp"
+#include "runtime/base/whole_range.hpp"
 #include "runtime/samples/samples.hpp"
 #include "runtime/version/version.hpp"
 
@@ -48,6 +50,7 @@ void take_points(const std::vector<double>& numbers, samples::SampleOptions& opt
 }  // namespace
 
 int main(int argc, char** argv) {
+  base::report_file_limit();
   samples::SampleOptions options;
   bool is_quiet = false;
   std::string keys = samples::kKeysNames[0], format = "pcm24";
@@ -61,15 +64,17 @@ int main(int argc, char** argv) {
   app.add_option("-o,--output", options.folder, "The folder for the instrument and its samples")->required();
   app.add_option("--name", options.name, "Name of the instrument; without it that of the bank's file");
   CLI::Option* places = app.add_option("--places", options.places, "Number of points to strike, far from each other")
-                            ->check(CLI::Range(1, 64))
+                            ->check(base::whole_range(1, 64), base::describe_whole_range(1, 64))
                             ->capture_default_str();
   app.add_option("--at", at, "Points to strike: X Y Z in metres, three numbers each")->excludes(places)->option_text("X Y Z ...");
-  app.add_option("--layers", options.layers, "Layers of velocity")->check(CLI::Range(1, 16))->capture_default_str();
+  app.add_option("--layers", options.layers, "Layers of velocity")
+      ->check(base::whole_range(1, 16), base::describe_whole_range(1, 16))
+      ->capture_default_str();
   app.add_option("--mallets", options.mallets, "Names, separated by commas: steel, hard-wood, plastic, rubber, hard-felt, soft-felt, yarn")
       ->delimiter(',')
       ->capture_default_str();
   app.add_option("--round-robin", options.round_robin, "Number of alternating strikes around each point")
-      ->check(CLI::Range(1, 16))
+      ->check(base::whole_range(1, 16), base::describe_whole_range(1, 16))
       ->capture_default_str();
   app.add_option("--speed", options.speed_m_s, "Speed of the mallet at velocity 127, in m/s")->capture_default_str();
   app.add_option("--keys", keys,
@@ -77,7 +82,9 @@ int main(int argc, char** argv) {
       ->check(CLI::IsMember(samples::kKeysNames))
       ->capture_default_str();
   app.add_option("--first-key", options.first_key, "First key with --keys places, 0 to 127; 60 is middle C")->capture_default_str();
-  app.add_option("--rate", options.rate_hz, "Sample rate in Hz")->check(CLI::Range(8000, 192000))->capture_default_str();
+  app.add_option("--rate", options.rate_hz, "Sample rate in Hz")
+      ->check(base::whole_range(8000, 192000), base::describe_whole_range(8000, 192000))
+      ->capture_default_str();
   app.add_option("--format", format, "pcm16, pcm24, pcm32 or float")->check(CLI::IsMember(host::kSampleFormatNames))->capture_default_str();
   app.add_option("--seconds", options.max_seconds, "Longest sample, in s; a sample ends 80 dB below its peak")->capture_default_str();
   app.add_flag("-q,--quiet", is_quiet, "Print nothing but errors");

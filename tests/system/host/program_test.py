@@ -198,6 +198,17 @@ class RenderProgram(unittest.TestCase):
         self.assertTrue(np.isfinite(sound).all())
         self.assertAlmostEqual(20 * math.log10(np.abs(sound).max()), -1.0, places=3)
 
+    def test_a_rate_that_is_no_whole_number_and_a_limit_of_files_are_named(self):
+        scene = self.scene("limits.json")
+        run = render(scene, "-o", self.root / "limits.wav", "--rate", "47999.5")
+        self.assertEqual(run.returncode, 2)
+        self.assertIn("must be a whole number from 8000 to 192000, and is '47999.5'", run.stderr)
+        limit = ["prlimit", "--fsize=20000", BIN / "carillon-render", scene, "-o", self.root / "limits.wav"]
+        run = subprocess.run(limit, capture_output=True, text=True, check=False)
+        self.assertEqual(run.returncode, 4, run.stderr)
+        self.assertIn("File too large", run.stderr)
+        self.assertFalse((self.root / "limits.wav").exists())
+
     def test_radiation_chooses_whose_gains_are_heard(self):
         levels = {}
         for kind in ("osg02", "sphere"):
