@@ -203,7 +203,7 @@ Packing calc_error(const Bank& bank, const Blows& blows, const std::vector<doubl
 }
 
 /// Of each of `count` equal parts of the outer area, the vertex where it begins.
-std::vector<std::int32_t> choose_witnesses(const Skin& skin, std::size_t count) {
+std::vector<std::int32_t> choose_witnesses(const StruckSkin& skin, std::size_t count) {
   double area = 0.0, before = 0.0;
   for (const double a : skin.area_m2) area += a;
   std::vector<std::int32_t> witnesses;

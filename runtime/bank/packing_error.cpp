@@ -17,8 +17,8 @@ constexpr double kOffNormal = 0.0027;   // sin^2 of 3 degrees: no blow is quite 
 constexpr double kQuietest = 0x1p-20;   // what is heard at the loudest place times this is the least that counts, -60 dB
 constexpr double kWitnessShare = 0.25;  // of the witnesses may lie above the stated error
 
-Skin find_skin(const Bank& bank) {
-  Skin skin{std::vector<double>(bank.vertex_count(), 0.0), std::vector<Vec3>(bank.vertex_count(), Vec3{})};
+StruckSkin find_skin(const Bank& bank) {
+  StruckSkin skin{std::vector<double>(bank.vertex_count(), 0.0), std::vector<Vec3>(bank.vertex_count(), Vec3{})};
   for (const Triangle& triangle : bank.triangles) {
     const Vec3 normal = calc_normal(bank.vertices_m, triangle);
     for (const std::int32_t v : triangle) skin.normal[static_cast<std::size_t>(v)] = skin.normal[static_cast<std::size_t>(v)] + normal;

@@ -15,7 +15,7 @@ inline constexpr double kRoundingDb = 0.05;  // between figures that two machine
 double calc_db(double error, double signal);
 
 /// The vertices with their normals, and their shares of the area of the outer surface, on which a body is struck; 0 for those elsewhere.
-struct Skin {
+struct StruckSkin {
   std::vector<double> area_m2;
   std::vector<Vec3> normal;
 };
@@ -26,7 +26,7 @@ double calc_heard(const std::vector<double>& weight, const Vec3& normal, const s
 
 /// Blows at all vertices, and what is heard of them.
 struct Blows {
-  Skin skin;
+  StruckSkin skin;
   std::vector<double> weight;    // (m) of the modes
   std::vector<double> exposure;  // (V) at least `quietest`
   double quietest = 0.0;         // of the loudest place of the outer surface a part that hardly counts
