@@ -33,7 +33,6 @@ LIBRARIES = {
     "stb": ["stb_image.h"],
     "simbody": ["SimTKsimbody.h"],
     "sqlite": ["sqlite3.h"],
-    "httplib": ["httplib.h"],
     "pybind11": ["pybind11/"],
 }
 # folder: (folders of ours that it may include, libraries that it may include). std and POSIX are free everywhere.
@@ -153,7 +152,7 @@ LAW = {
     "jobs/cache": (["runtime/base", "precompute/job", "jobs/process", "jobs/store"], ["fmt"]),
     "jobs/explore": (
         ["runtime/base", "runtime/bank", "runtime/material", "runtime/version", "runtime/host", "jobs/process", "jobs/report"],
-        ["fmt", "json", "zlib", "httplib"],
+        ["fmt", "json", "zlib"],
     ),
     "jobs/hear": (
         ["runtime/base", "runtime/bank", "runtime/material", "precompute/job", "jobs/explore", "jobs/process", "jobs/report"],
@@ -313,7 +312,7 @@ INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 
 # The C library and POSIX: free everywhere. A header of C++ itself has neither a folder nor an ending.
 SYSTEM = re.compile(
-    r"^(sys/[a-z]+|unistd|fcntl|dirent|dlfcn|signal|pthread|poll|termios|errno|limits|"
+    r"^(sys/[a-z]+|unistd|fcntl|dirent|dlfcn|signal|pthread|poll|netinet/in|termios|errno|limits|"
     r"stddef|stdint|stdlib|stdio|string|math|time|sched|spawn|immintrin|xmmintrin|wasm_simd128|pwd|malloc)\.h$"
 )
 
