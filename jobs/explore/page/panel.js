@@ -71,9 +71,9 @@ export class Panel {
 
   showFacts() {
     const { bank, about } = this.body, size = (100 * this.body.shown.box.size * this.body.shown.size).toPrecision(3);
-    const parts = [`${bank.mode_count} modes`, `${size} cm across`];
-    if (about.change) parts.push(about.change);
-    find('facts').textContent = parts.join(' · ');
+    find('facts').textContent = `${bank.mode_count} modes · ${size} cm across`;
+    find('details').hidden = !about.change;
+    find('change').textContent = about.change ? `The bank is ${about.change}.` : '';
   }
 
   // ---- strikes

@@ -20,7 +20,9 @@ import h5py
 import numpy
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "support"))
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "web"))
 import fixtures  # noqa: E402
+from browser import CHROMIUM, Browser, serve  # noqa: E402
 
 BIN = pathlib.Path(os.environ["CARILLON_BIN_DIR"])
 SOURCE = pathlib.Path(os.environ["CARILLON_SOURCE_DIR"])
@@ -608,6 +610,24 @@ class Reports(unittest.TestCase):
         self.assertIn("-o", carillon("report", self.bank, code=2))
         self.assertIn("not a Carillon bank", carillon("report", self.root / "chime.msh", "-o", self.root / "none", code=2))
         self.assertFalse((self.root / "none").exists())
+
+    @unittest.skipUnless(os.path.exists(CHROMIUM), "there is no Chromium")
+    def test_every_screen_holds_the_report(self):
+        record = json.loads(self.resolved.read_text())
+        record["run"]["warnings"] = ["a warning without a space: " + 200 * "x"]
+        self.report("wide", record)
+        with serve(self.root) as server, Browser() as browser:
+            page = browser.open(f"{server.url}wide/report.html")
+            page.evaluate("for (const part of document.querySelectorAll('details')) part.open = true")
+            for width in (320, 390, 768, 1280):
+                page.resize(width, 800)
+                self.assertLessEqual(page.evaluate("document.documentElement.scrollWidth"), width)
+                # What is wider scrolls inside its box, and nothing else lies beyond the edge.
+                out = page.evaluate(
+                    "[...document.querySelectorAll('body *')].filter(it => !it.closest('.table, .chart, pre') &&"
+                    " it.getBoundingClientRect().right > innerWidth + 0.5).map(it => it.outerHTML.slice(0, 80))"
+                )
+                self.assertEqual(out, [], width)
 
     def test_no_pictures_when_none_are_asked_for(self):
         page = write_report(self.bank, self.resolved, self.root / "unasked", "", 0)
