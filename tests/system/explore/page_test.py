@@ -266,6 +266,22 @@ class PageTest(unittest.TestCase):
         self.assertGreater(page.evaluate("window.peak"), 0)
         self.assertEqual(page.errors, [])
 
+    def test_its_own_server_gives_the_browser_all_that_it_asks_for(self):
+        words = [BIN / "carillon", "--json", "explore", self.root / "fall", "--serve"]
+        with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as server:
+            try:
+                said = ""
+                while not said.endswith("\n}\n"):
+                    line = server.stdout.readline()
+                    self.assertTrue(line, said)
+                    said += line
+                page = self.browser.open(json.loads(said)["address"])
+                self.addCleanup(page.close)
+                page.wait_for("document.documentElement.dataset.state === 'ready'", timeout_s=100)
+                self.assertEqual(page.errors, [])
+            finally:
+                server.terminate()
+
     def test_every_screen_holds_the_page_and_its_panel(self):
         page = self.open("fall")
         # A bank that was packed says so under "Details", not in the line of facts.
