@@ -21,7 +21,7 @@ CLAMPED = (35.985, 73.394, 108.217, 131.581, 132.205, 165.0)  # lambda squared o
 CANTILEVER = (1.875104068711961, 4.694091132974175, 7.854757438237613)  # roots of 1 + cos x cosh x
 VIBRAPHONE = (184.980552, 739.889902, 1849.69685)  # the undercut bar's bending modes [Hz], by a Ritz solution of high order
 SOUND_M_S, GRAVITY = 343.0, 9.81
-COSTS = [("scene", "elements", "step [s]", "CPU s", "min for 1 s", "Table 1", "of it sound", "book error")]
+COSTS = [("scene", "elements", "step [s]", "CPU s", "minutes for 1 s", "Table 1, minutes", "of it sound", "book error")]
 
 
 def simulate(stage, job, name, changes=None, quick=None):
@@ -512,7 +512,7 @@ def play(stage):
             continue  # play_crinkle() has the same drives on the same kind of sheet
         part(stage)
     print()
-    tools.print_table(COSTS)
+    stage.show("costs", COSTS, COSTS[0][3:5] + COSTS[0][6:])
     total = sum(float(row[3]) for row in COSTS[1:])
     rate = TABLE_1["bar"][1]
     print(f"\n  {total:.0f} CPU seconds; the processor of Table 1, of 350 MHz, made {rate:,} element-steps a second")
