@@ -21,8 +21,11 @@
 #include "precompute/run/known_body.hpp"
 #include "precompute/run/run_job.hpp"
 #include "precompute/run/run_log.hpp"
+#include "precompute/run/same_start.hpp"
 #include "precompute/run/validate.hpp"
 #include "runtime/base/error.hpp"
+#include "runtime/base/file_limit.hpp"
+#include "runtime/base/message.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/base/result.hpp"
 #include "runtime/version/version.hpp"
@@ -92,6 +95,8 @@ struct CommandLine {
         ->type_name("X,Y,Z")
         ->excludes(validate);
     app.add_flag("--json", options.json, "with --validate: print one JSON object")->needs(validate);
+    app.add_option("--memory-gb", options.memory_gb, "refuse a solve for which all ranks of a machine together need more than so many GB")
+        ->check(CLI::Range(1e-6, 1e9));
     app.add_flag("--profile", options.profile, "count messages and the time inside MPI too, and write them to the record of the run");
     app.add_option("--estimate", estimate,
                    "print what a problem of this size would cost, as JSON: '{\"element\": \"T10\", \"nodes\": 9000, \"modes\": 100}'")
@@ -112,16 +117,21 @@ struct CommandLine {
     }
   }
 
+  /// What all ranks have to do alike. Whether they print, and where rank 0 writes how it went, may differ.
+  run::Given describe_work() const {
+    std::string work = error                         ? "a command line that cannot be read"
+                       : !options.radiate.empty()    ? "--radiate"
+                       : options.validate            ? "--validate"
+                       : options.at_m                ? "--at"
+                       : !options.matrices.empty()   ? "--matrices"
+                       : !options.checkpoint.empty() ? "--checkpoint"
+                                                     : "a job";
+    for (const std::string& word : options.solver_options) work += " " + word;
+    return {work, {work}};
+  }
+
   bool only_asks() const { return error && error->get_exit_code() == 0; }  // --help or --version
 };
-
-/// Whether this process prints for all that its launcher started. MPI, which knows the rank, has not started yet.
-bool is_first_of_all() {
-  for (const char* name : {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"}) {
-    if (const char* rank = std::getenv(name); rank != nullptr) return std::string_view(rank) == "0";
-  }
-  return true;
-}
 
 /// Does what was asked for.
 base::Result carry_out(const petsc::Session& session, const CommandLine& words) {
@@ -160,10 +170,15 @@ int run_program(const petsc::Session& session, const CommandLine& words) {
   base::Result result;
   bool has_failed = false;
   try {
-    result = carry_out(session, words);
+    run::check_same(PETSC_COMM_WORLD, "work", words.describe_work());
+    if (!words.error) result = carry_out(session, words);
   } catch (...) {
     result = base::describe_error(std::current_exception(), "out of memory; use a coarser mesh or a machine with more");
     has_failed = true;
+  }
+  if (words.error && !has_failed) {
+    result = {base::ResultKind::bad_input, words.error->what()};
+    if (session.rank() == 0) words.app.exit(*words.error);
   }
   std::error_code error;
   result.is_resumable = result.kind != base::ResultKind::done && std::filesystem::exists(words.options.checkpoint, error);
@@ -181,12 +196,12 @@ int run_program(const petsc::Session& session, const CommandLine& words) {
 
 /// Of one process: under mpirun the first prints.
 int print_estimate(const CommandLine& words) {
-  if (!is_first_of_all()) return 0;
+  if (!run::is_first_of_all()) return 0;
   base::Result result;
   try {
     fmt::print("{}\n", run::estimate_costs(words.estimate));
   } catch (const InputError& error) {
-    fmt::print(stderr, "carillon-precompute: error: {}\n", base::printable(error.what()));
+    fmt::print(stderr, "carillon-precompute: error: {}\n", base::show_message(error.what()));
     result = {base::ResultKind::bad_input, error.what()};
   }
   if (!words.result.empty()) base::write_result(words.result, result);
@@ -196,23 +211,20 @@ int print_estimate(const CommandLine& words) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  base::report_file_limit();
   std::string result;  // file; empty: none
   try {
     const CommandLine words(argc, argv);
-    if (words.only_asks()) return is_first_of_all() ? words.app.exit(*words.error) : 0;
+    if (words.only_asks()) return run::is_first_of_all() ? words.app.exit(*words.error) : 0;
     if (!words.error && !words.estimate.empty()) return print_estimate(words);
     if (!words.error && !words.options.folder.empty()) run::enter_folder(words.options.folder[0], words.options.folder[1]);
-    if (is_first_of_all()) result = words.result;
-    run::end_on_signals(is_first_of_all() ? 0 : 1);
+    if (run::is_first_of_all()) result = words.result;
+    run::end_on_signals("carillon-precompute", "the bank was not touched, or it is whole");
     if (!words.options.checkpoint.empty()) run::save_on_signals();
     const petsc::Session session(argc, argv, words.options.solver_options);
-    if (!words.error) return run_program(session, words);
-    if (session.rank() != 0) return kExitInput;
-    words.app.exit(*words.error);
-    if (!result.empty()) base::write_result(result, {base::ResultKind::bad_input, words.error->what()});
-    return kExitInput;
+    return run_program(session, words);
   } catch (const std::exception& error) {
-    fmt::print(stderr, "carillon-precompute: error: {}\n", base::printable(error.what()));
+    fmt::print(stderr, "carillon-precompute: error: {}\n", base::show_message(error.what()));
     if (!result.empty()) base::write_result(result, {base::ResultKind::system, error.what()});
     return kExitSystem;
   }

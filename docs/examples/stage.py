@@ -42,12 +42,84 @@ def print_table(rows):
             print("  " + "  ".join("-" * w for w in widths))
 
 
+def format_table(rows):
+    """The table as Markdown has it, all columns but the first at the right."""
+    head, *body = [[str(cell) for cell in row] for row in rows]
+    return "\n".join(f"| {' | '.join(row)} |" for row in (head, ["---", *["--:"] * (len(head) - 1)], *body)) + "\n"
+
+
+NUMBER = re.compile(r"[-+]?\d[\d,]*\.?\d*(?:e[-+]?\d+)?")
+
+
+def calc_unit(number):
+    """One in the last digit of a number as it is printed."""
+    digits, _, power = number.partition("e")
+    return 10.0 ** (int(power or 0) - len(digits.partition(".")[2]))
+
+
+def find_difference(page, run, varying):
+    """The first cell in which a table of the page is not that of the run, in words; nothing where they agree. Figures may differ by two
+    units of their last digit; the columns named in `varying`, of times and of rounding errors, are not compared."""
+    page, run = [[line[2:-2].split(" | ") for line in text.splitlines()] for text in (page, run)]
+    if len(page) != len(run) or page[0] != run[0]:
+        return f"{len(page)} rows of {', '.join(page[0])} on the page, {len(run)} of {', '.join(run[0])} in the run"
+    for old, new in zip(page[2:], run[2:]):
+        for head, before, after in zip(page[0], old, new):
+            if head in varying:
+                continue
+            numbers = list(zip(NUMBER.findall(before), NUMBER.findall(after)))
+            is_same = NUMBER.sub("", before) == NUMBER.sub("", after)
+            for one, other in numbers:
+                apart = abs(float(one.replace(",", "")) - float(other.replace(",", "")))
+                is_same = is_same and apart <= 2.01 * max(calc_unit(one), calc_unit(other))
+            if not is_same:
+                return f"{old[0]}, {head}: {before} on the page, {after} in the run"
+    return None
+
+
+class Page:
+    """The page of an example, with the tables of its runs: those of the whole form where the page has a place for them,
+
+        <!-- begin figures NAME -->
+        | ... |
+        <!-- end figures NAME -->
+
+    those of the short form, which tests run, in a comment of their own at its end."""
+
+    def __init__(self, file, quick):
+        self.file, self.quick = file, quick
+        self.text = file.read_text()
+
+    def find(self, name):
+        """(begin, end) of a table in the text, or nothing."""
+        begin, end = (
+            (f"<!-- short form {name}\n", "-->\n") if self.quick else (f"<!-- begin figures {name} -->\n", f"<!-- end figures {name} -->\n")
+        )
+        at = self.text.find(begin)
+        return None if at < 0 else (at + len(begin), self.text.index(end, at))
+
+    def get(self, name):
+        place = self.find(name)
+        return self.text[place[0] : place[1]] if place else None
+
+    def list_names(self):
+        """Of the tables that it shows."""
+        return re.findall(r"^<!-- begin figures ([\w-]+) -->$", self.text, re.M)
+
+    def set(self, name, table):
+        if place := self.find(name):
+            self.text = self.text[: place[0]] + table + self.text[place[1] :]
+        else:  # the short form for the first time
+            self.text += f"\n<!-- short form {name}\n{table}-->\n"
+
+
 class Stage:
     """One run of one example: `folder` holds its job and scene files, `out` takes what comes of them."""
 
     def __init__(self, folder, bin_dir, out, quick):
         self.folder, self.bin, self.out, self.quick = folder, bin_dir, out, quick
         self.checks = []
+        self.tables = {}  # name: (rows, columns that vary)
         self.pictures = []
         self.pictures_to = folder  # with --pictures
         self.out.mkdir(parents=True, exist_ok=True)
@@ -130,6 +202,29 @@ class Stage:
         self.run(f"the picture {picture}", self.bin / "carillon-draw", *command, "-o", picture)
         self.pictures.append(picture)
 
+    def show(self, name, rows, varying=()):
+        """Prints a table, which the page of the example has under this name. varying: heads of columns that differ from run to run."""
+        print_table(rows)
+        self.tables[name] = (rows, varying)
+
+    def check_page(self):
+        page = Page(self.folder / "README.md", self.quick)
+        for name in page.list_names():
+            if self.quick and name not in self.tables:
+                continue  # the short form leaves scenes out
+            rows, varying = self.tables[name]
+            table = page.get(name)
+            difference = find_difference(table, format_table(rows), varying) if table else "it has none yet"
+            why = f": {difference}; renew it with docs/examples/run {self.folder.name} --update" if difference else ""
+            self.expect(f"the page has the figures of this run, table {name}{why}", not difference)
+
+    def update_page(self):
+        page = Page(self.folder / "README.md", self.quick)
+        for name in page.list_names():
+            if name in self.tables:
+                page.set(name, format_table(self.tables[name][0]))
+        page.file.write_text(page.text)
+
     def expect(self, what, met):
         self.checks.append((what, bool(met)))
 
@@ -138,7 +233,12 @@ class Stage:
         off = 100 * (value / wanted - 1)
         self.expect(f"{what}: {value:.6g}, wanted {wanted:.6g} +- {percent:g} % (off by {off:+.3f} %)", abs(off) <= percent)
 
-    def finish(self, keep_pictures):
+    def finish(self, keep_pictures=False, update=False):
+        """Prints the checks; what failed in words, or nothing. update: the page gets the figures of this run, if all checks are met."""
+        if not update:
+            self.check_page()
+        elif all(met for _, met in self.checks):
+            self.update_page()
         if keep_pictures:
             for picture in self.pictures:
                 shutil.copy(self.out / picture, self.pictures_to)

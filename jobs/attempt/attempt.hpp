@@ -17,9 +17,10 @@ struct Options {
   std::filesystem::path root;  // that store, for ranks that have to find the folder themselves
   std::string id;              // and the job
   int ranks = 1;
-  double memory_gb = 0.0;     // admitted, for the record; 0: not known
-  double time_limit_s = 0.0;  // of this attempt; 0: none
-  std::string token;          // 32 hex digits; empty: made here
+  double memory_gb = 0.0;        // admitted, for the record; 0: not known
+  double memory_limit_gb = 0.0;  // the job's "memory_gb": it ends when its processes hold more together; 0: none
+  double time_limit_s = 0.0;     // of this attempt; 0: none
+  std::string token;             // 32 hex digits; empty: made here
   Launcher launcher = Launcher::automatic;
   std::vector<std::string> mpirun_options;  // words for mpirun or srun, before ours: which hosts, by which network
   bool has_pictures = false;       // draw the first modes for the report now, where memory_gb has room; carillon report does it later

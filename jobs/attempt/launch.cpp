@@ -17,14 +17,12 @@
 #include <cstdlib>
 #include <cstring>
 #include <map>
-#include <string_view>
 
 #include "jobs/store/store.hpp"
 #include "runtime/base/command.hpp"
 #include "runtime/base/descriptor.hpp"
+#include "runtime/base/environment.hpp"
 #include "runtime/base/file.hpp"
-
-extern "C" char** environ;
 
 namespace carillon::attempt {
 namespace {
@@ -47,26 +45,10 @@ std::string make_folder_name(const std::string& token) { return "carillon-" + to
 
 bool is_token(const std::string& token) { return token.size() == 32 && token.find_first_not_of("0123456789abcdef") == std::string::npos; }
 
-/// What an MPI program above us may have set, and would confuse ours.
-bool is_of_another_run(std::string_view entry) {
-  for (const std::string_view prefix :
-       {"OMPI_COMM_WORLD_", "OMPI_UNIVERSE_", "OMPI_FIRST_RANKS", "OMPI_NUM_APP", "OMPI_APP_CTX", "OMPI_FILE_LOCATION", "OMPI_COMMAND",
-        "OMPI_ARGV", "PMIX_", "PMI_", "OMPI_MCA_orte_hnp_uri", "OMPI_MCA_orte_local_daemon_uri", "OMPI_MCA_orte_num_nodes",
-        "OMPI_MCA_orte_ess", "OMPI_MCA_orte_app_num", "OMPI_MCA_ess", "OMPI_MCA_pmix"}) {
-    if (entry.starts_with(prefix)) return true;
-  }
-  return false;
-}
-
-/// `is_alone`: MPI of one rank is not to ask Slurm, which takes it a fifth of a second.
 std::vector<std::string> make_environment(const std::string& token, const Scratch* scratch, bool is_alone) {
   std::map<std::string, std::string> values;
-  for (char** entry = environ; *entry != nullptr; ++entry) {
-    const std::string_view text = *entry;
-    const std::size_t equal = text.find('=');
-    const bool is_foreign = (scratch != nullptr && is_of_another_run(text)) || (is_alone && text.starts_with("SLURM_"));
-    if (equal != std::string_view::npos && !is_foreign) values[std::string(text.substr(0, equal))] = text.substr(equal + 1);
-  }
+  for (const std::string& entry : is_alone ? base::make_lone_environment() : base::make_environment())
+    if (const std::size_t equal = entry.find('='); equal != std::string::npos) values[entry.substr(0, equal)] = entry.substr(equal + 1);
   values["CARILLON_ATTEMPT"] = token;
   values["OMP_NUM_THREADS"] = values["OPENBLAS_NUM_THREADS"] = "1";
   values["HWLOC_COMPONENTS"] = "-gl";  // Open MPI would ask every X server for graphics cards, and end with one that ends just then
@@ -129,7 +111,6 @@ Launch make_launch(const Options& options, const std::string& token, const Scrat
   Launcher launcher = options.launcher;
   if (launcher == Launcher::automatic) launcher = options.ranks == 1 ? Launcher::alone : Launcher::mpirun;
   launch.environment = make_environment(token, scratch, launcher == Launcher::alone);
-  if (launcher == Launcher::alone) launch.environment.emplace_back("OMPI_MCA_ess_singleton_isolated=1");  // no daemon for one rank
   if (launcher == Launcher::mpirun) {
     launch.arguments = {base::require_program("mpirun"), "-np", std::to_string(options.ranks), "--bind-to", "none", "--oversubscribe"};
     launch.arguments.insert(launch.arguments.end(), options.mpirun_options.begin(), options.mpirun_options.end());
@@ -148,8 +129,10 @@ Launch make_launch(const Options& options, const std::string& token, const Scrat
   const std::string folder = fmt::format("work/{}/{}", options.id.substr(0, 2), options.id);
   if (launcher != Launcher::alone) add({"--folder", options.root.c_str(), folder.c_str()});
   add({"--result", store::kResultFile});
+  if (options.memory_limit_gb > 0.0 && !options.is_simulation)
+    launch.arguments.insert(launch.arguments.end(), {"--memory-gb", fmt::format("{}", options.memory_limit_gb)});
   if (options.is_simulation && options.is_prediction) {
-    add({"--validate", "--json"});
+    add({"--validate", "--json", "--patience", "1000000", "--checkpoint", store::kCheckpointFile});  // for what it saves, too
   } else if (options.is_simulation) {
     add({"--checkpoint", store::kCheckpointFile, "--progress", store::kProgressFile});  // what it writes is in the job
   } else if (options.is_prediction) {

@@ -225,6 +225,8 @@ class Attempt {
     outcome::Ending ending{
         watched.exit_code, watched.was_asked_to_stop,   watched.was_out_of_time,    watched.was_hung,
         watched.still_s,   find_memory_kills() > kills, store::is_disk_full(work_), base::read_result(work_ / store::kResultFile)};
+    ending.memory_limit_gb = options_.memory_limit_gb;
+    if (watched.was_over_memory) ending.held_gb = watched.peak_memory_gb;
     ending.has_saved = find_mark(checkpoint) != mark && find_mark(checkpoint).first != 0;
     outcome_.is_further = outcome_.percent > percent_before && ending.has_saved;
     if (ending.exit_code != 0 && !ending.result) ending.dead_rank = find_dead_rank(read_end(log, error ? 0 : log_start));
@@ -303,6 +305,7 @@ std::vector<std::string> make_arguments(const fs::path& program, const Options& 
   std::vector<std::string> arguments{program, "attempt", options.work, "--ranks", std::to_string(options.ranks)};
   const auto add = [&](const char* name, const std::string& value) { arguments.insert(arguments.end(), {name, value}); };
   if (options.memory_gb > 0.0) add("--memory-gb", fmt::format("{}", options.memory_gb));
+  if (options.memory_limit_gb > 0.0) add("--memory-limit-gb", fmt::format("{}", options.memory_limit_gb));
   if (options.time_limit_s > 0.0) add("--time-limit-s", fmt::format("{}", options.time_limit_s));
   if (options.is_prediction) arguments.emplace_back("--predict");
   for (const std::string& word : options.mpirun_options) arguments.push_back("--mpirun-option=" + word);

@@ -88,7 +88,8 @@ class Watcher {
     if (options_.time_limit_s > 0.0 && elapsed_s_ >= options_.time_limit_s && !watched_.was_asked_to_stop) watched_.was_out_of_time = true;
     if (watched_.was_asked_to_stop || watched_.was_out_of_time) stop(step);
     look_s_ += step;
-    if (look_s_ < std::min(kLookS, 0.5 * elapsed_s_)) return;  // often at first: small jobs are short
+    const double pause_s = options_.memory_limit_gb > 0.0 ? kStepS : kLookS;
+    if (look_s_ < std::min(pause_s, 0.5 * elapsed_s_)) return;  // often at first: small jobs are short
     look(look_s_);
     look_s_ = 0.0;
   }
@@ -113,6 +114,11 @@ class Watcher {
     double bytes = 0.0;
     for (const auto& [pid, usage] : all) bytes += static_cast<double>(usage.resident_bytes);
     watched_.peak_memory_gb = std::max(watched_.peak_memory_gb, 1e-9 * bytes);
+    if (options_.memory_limit_gb > 0.0 && 1e-9 * bytes > options_.memory_limit_gb) {
+      watched_.was_over_memory = true;
+      process::end_with_environment(entry_);
+      return;
+    }
     const bool has_news = find_news();
     silent_s_ = has_news ? 0.0 : silent_s_ + since_s;
     double idle_s = 0.0;

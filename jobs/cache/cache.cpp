@@ -56,6 +56,20 @@ std::string name_place(const std::string& message, const fs::path& copy, const s
   return place + message.substr(end);
 }
 
+/// How the mesh of a bank differs from what was described. That previews are rough is known, and no warning here.
+std::vector<std::string> read_mesh_warnings(const fs::path& folder) {
+  constexpr std::size_t kMaxWarnings = 100;
+  std::vector<std::string> warnings;
+  try {
+    base::Object root = base::read_document(folder / store::kJobFile).root();
+    std::optional<base::Object> run = root.object_if("run"), mesh = run ? run->object_if("mesh") : std::nullopt;
+    if (!mesh || !mesh->has("warnings")) return warnings;
+    for (const base::Entry& entry : mesh->entries("warnings", kMaxWarnings)) warnings.push_back(entry.text);
+  } catch (const InputError&) {  // a damaged record costs the warnings, not the bank
+  }
+  return warnings;
+}
+
 class Maker {
  public:
   Maker(const job::JobSpec& asked, std::string solver, const fs::path& cache, bool is_quiet)
@@ -69,11 +83,18 @@ class Maker {
     const store::Id asked = store::require_id(request.id, "the job");
     if (is_preview_) request = recall_count(asked, request);
     Made made{.bank = find(store::require_id(request.id, "the job")), .warnings = job_.warnings};
-    if (!made.bank.empty()) return made;
+    if (made.bank.empty()) make(asked, made);
+    for (const std::string& warning : read_mesh_warnings(made.bank.parent_path()))
+      made.warnings.push_back(fmt::format("{}: {}", find_place(job_), warning));
+    return made;
+  }
+
+ private:
+  void make(const store::Id& asked, Made& made) {
     made.is_new = true;
     if (!is_preview_) {
       made.bank = solve();
-      return made;
+      return;
     }
     const std::int64_t wanted = *job_.body->nodes;
     const std::int64_t met = job::run_at_possible_count(wanted, "\"accuracy_cents\" takes what it needs", [&](std::int64_t nodes) {
@@ -81,21 +102,21 @@ class Maker {
       made.bank = solve();
     });
     if (met != wanted) remember_count(asked, met);
-    return made;
   }
 
- private:
   /// Empty: not found.
   fs::path find(const store::Id& id) const {
     std::error_code error;
     if (const fs::path own = store::find_default_store(); fs::exists(own / "VERSION", error)) {
       try {
         const store::Store store = store::Store::open_to_read(own);
-        if (store.has_bank(id)) return store.bank_folder(id) / store::kBankFile;
+        if (!store.find_bank_fault(id, store::Look::content)) return store.bank_folder(id) / store::kBankFile;
       } catch (const InputError&) {  // a store that cannot be read has nothing
       }
     }
-    return cache_.has_bank(id) ? cache_.bank_folder(id) / store::kBankFile : fs::path();
+    if (!cache_.find_bank_fault(id, store::Look::content)) return cache_.bank_folder(id) / store::kBankFile;
+    if (cache_.has_bank_folder(id)) cache_.set_bank_aside(id);
+    return {};
   }
 
   store::Request make_request() {

@@ -15,7 +15,7 @@ namespace carillon::cache {
 struct Made {
   std::filesystem::path bank;         // read-only
   bool is_new = false;                // solved now
-  std::vector<std::string> warnings;  // of the job
+  std::vector<std::string> warnings;  // of the job and its mesh
 };
 
 /// $XDG_CACHE_HOME/carillon, else ~/.cache/carillon. SystemError where there is no home.

@@ -17,6 +17,7 @@
 #include "precompute/job/read_body.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/error.hpp"
+#include "runtime/base/whole_range.hpp"
 #include "runtime/version/version.hpp"
 
 namespace carillon::cli {
@@ -27,7 +28,8 @@ constexpr const char* kAbout =
     "A bank is kept under the hash of the job, its mesh and the version of the solver, and never computed twice.";
 constexpr const char* kShortFooter = "IDs, exit codes, store and profile: carillon --help";
 constexpr const char* kFooter =
-    "ID is an id or its beginning, or the job file. Exit codes: 0 done, 1 not done yet, 2 the input cannot be used, 3 a job failed, 4 the "
+    "ID is an id or its beginning, the job file, or a name of carillon status (sweep.txt#21). Exit codes: 0 done, 1 not done yet, 2 the "
+    "input cannot be used, 3 a job failed, 4 the "
     "machine\n"
     "refused, 128 + n stopped by signal n. The store: --store, else \"store\" of the profile, else $XDG_DATA_HOME/carillon, else\n"
     "~/.local/share/carillon. The profile: --profile, else ~/.config/carillon/profile.json, {\"store\": DIR, \"on\": \"local\" or "
@@ -50,8 +52,9 @@ CLI::Validator make_engine_check() { return CLI::IsMember({"local", "slurm"}); }
 
 void add_resources(CLI::App& command, ResourceOptions& options) {
   command.add_option("--ranks", options.ranks, "MPI ranks of each job; without it, predicted from the mesh")
-      ->check(CLI::Range(1, kMaxRanks));
-  command.add_option("--memory-gb", options.memory_gb, "Memory of each job, all ranks together; without it, predicted")
+      ->check(base::whole_range(1, kMaxRanks), base::describe_whole_range(1, kMaxRanks));
+  command
+      .add_option("--memory-gb", options.memory_gb, "Memory of each job, all ranks together: what needs more ends; without it, predicted")
       ->check(make_gb_check(1e-6));
   command.add_option("--time-limit", options.time_limit,
                      "Of one attempt: seconds, or 15m, 2h; the next resumes from what is saved by then");
@@ -74,6 +77,7 @@ void add_submit(CLI::App& app, Shared& shared, Run& run) {
   command->add_option("JOB", options->words, "Job files, folders, manifests")->required();
   add_resources(*command, options->resources);
   command->add_flag("--keep-going", options->keep_going, "Submit the others when some jobs cannot be used (the exit code is still 2)");
+  command->add_flag("-q,--quiet", options->is_quiet, "Print nothing but warnings and errors");
   command->add_flag("--wait", options->wait, "Wait until they have ended; carillon run or Slurm has to work through the queue");
   CLI::Option* runs = command->add_flag("--run", options->run, "Work through the queue here until they have ended");
   command->add_flag("--pictures", options->has_pictures, "With --run: as carillon run --pictures")->needs(runs);
@@ -84,7 +88,8 @@ void add_status(CLI::App& app, Shared& shared, Run& run) {
   auto options = std::make_shared<StatusOptions>();
   CLI::App* command =
       app.add_subcommand("status", "Where jobs stand: state, phase, percent, modes, time left, and why one failed or waits.");
-  command->add_option("ID", options->words, "Ids (or their beginnings) or job files; without any, all jobs");
+  command->add_option("ID", options->words,
+                      "Ids, job files, folders, manifests, or names as this command shows them; without any, all jobs");
   command->add_flag("--watch", options->watch,
                     "Until they have ended: bars on a terminal, elsewhere one JSON object a line for every change. Exit code 0 when all "
                     "are done, 3 when one failed or was cancelled, also earlier where no ID is given");
@@ -96,7 +101,7 @@ void add_log(CLI::App& app, Shared& shared, Run& run) {
   auto options = std::make_shared<LogOptions>();
   CLI::App* command =
       app.add_subcommand("log", "What the solver printed for a job, all attempts one after the other. Exit code 1: nothing yet.");
-  command->add_option("ID", options->word, "Id (or its beginning) or job file")->required();
+  command->add_option("ID", options->word, "Id (or its beginning), job file, or name of carillon status")->required();
   command->add_flag("-f,--follow", options->follow, "Continue until the job has ended");
   set_work(*command, shared, run, options, run_log);
 }
@@ -106,7 +111,7 @@ void add_cancel(CLI::App& app, Shared& shared, Run& run) {
   CLI::App* command = app.add_subcommand("cancel",
                                          "Ends jobs that are queued, wait or run; what a running one has computed so far is kept for a "
                                          "retry. Exit code 1: one was done already.");
-  command->add_option("ID", options->words, "Ids (or their beginnings) or job files")->required();
+  command->add_option("ID", options->words, "Ids, job files, folders, manifests, or names of carillon status")->required();
   set_work(*command, shared, run, options, run_cancel);
 }
 
@@ -114,7 +119,7 @@ void add_retry(CLI::App& app, Shared& shared, Run& run) {
   auto options = std::make_shared<RetryOptions>();
   CLI::App* command =
       app.add_subcommand("retry", "Queues failed and cancelled jobs again, from their checkpoints; waiting ones need wait no longer.");
-  command->add_option("ID", options->words, "Ids (or their beginnings) or job files");
+  command->add_option("ID", options->words, "Ids, job files, folders, manifests, or names of carillon status");
   command->add_flag("--failed", options->all_failed, "All jobs that failed");
   add_resources(*command, options->resources);
   set_work(*command, shared, run, options, run_retry);
@@ -124,7 +129,7 @@ void add_explain(CLI::App& app, Shared& shared, Run& run) {
   auto options = std::make_shared<ExplainOptions>();
   CLI::App* command =
       app.add_subcommand("explain", "Would this job run, and why: which part of it changed since it was submitted last. Changes nothing.");
-  command->add_option("JOB", options->word, "Job file")->required();
+  command->add_option("JOB", options->word, "Job file, folder, manifest or one of its lines (sweep.txt#21)")->required();
   set_work(*command, shared, run, options, run_explain);
 }
 
@@ -135,9 +140,10 @@ void add_run(CLI::App& app, Shared& shared, Run& run) {
                                          "Works through the queue on this machine until it is empty: as many jobs at once as cores and "
                                          "memory allow. Any number may run on one store.\n"
                                          "Ctrl-C saves what runs and puts it back into the queue; once more ends it. Exit code 0: all "
-                                         "are done, 3: one failed or was cancelled.");
+                                         "are done, 3: one failed or was cancelled. With --json one object a line, else text.");
   command->add_flag("--keep", queue.runner.keep, "Stay and wait for more jobs when the queue is empty");
-  command->add_option("--cores", queue.runner.cores, "Use at most so many")->check(CLI::Range(1, kMaxRanks));
+  command->add_option("--cores", queue.runner.cores, "Use at most so many")
+      ->check(base::whole_range(1, kMaxRanks), base::describe_whole_range(1, kMaxRanks));
   command->add_option("--memory-gb", queue.runner.memory_gb, "Use at most so much")->check(make_gb_check(1e-3));
   command->add_flag("-q,--quiet", queue.quiet, "Print nothing");
   command->add_flag("--pictures", queue.attempt.has_pictures,
@@ -152,10 +158,14 @@ void add_get(CLI::App& app, Shared& shared, Run& run) {
   auto options = std::make_shared<GetOptions>();
   CLI::App* command = app.add_subcommand(
       "get",
-      "Prints the path of the finished bank, or of each file of a simulation, read-only in the store. Exit code 1: not there yet, with its "
-      "state.");
-  command->add_option("JOB", options->word, "Job file (what it holds now), or an id or its beginning")->required();
-  command->add_option("--to", options->to, "Copy the bank to this file or into this folder; the files of a simulation into this folder");
+      "Prints the path of each finished bank, or of each file of a simulation, read-only in the store. Exit code 1: one is not there yet, "
+      "with its state.");
+  command->add_option("JOB", options->words, "Job files (what they hold now), folders, manifests, ids or names of carillon status")
+      ->required();
+  command->add_option(
+      "--to", options->to,
+      "Copy the bank to this file or into this folder; several banks into this folder, each named as its job, and the files "
+      "of a simulation into it");
   set_work(*command, shared, run, options, run_get);
 }
 
@@ -198,6 +208,8 @@ void add_hear(CLI::App& app, Shared& shared, Run& run) {
                    "Height of the object in metres (y is up; of a shape: its dimension); several, separated by commas")
       ->delimiter(',');
   command->add_option("--scale", hear.scale, "Metres per unit of the file");
+  command->add_flag("--facets", hear.facets,
+                    "The facets are planes of the body, not samples of a smooth surface (as carillon-mesh --facets)");
   command->add_option("--mallet", hear.mallet, "steel, hard-wood, plastic, rubber, hard-felt, soft-felt or yarn")->capture_default_str();
   command->add_option("--accuracy", hear.accuracy_cents, "Refines until every error bar is within this many cents; without it a preview");
   command->add_flag("-q,--quiet", hear.is_quiet, "No progress");
@@ -228,7 +240,9 @@ void add_explore(CLI::App& app, Shared& shared, Run& run) {
   command->add_flag("--whole", explore.keeps_banks,
                     "Keep banks as they are; without it those above 4 MB are packed, with an error of -60 dB(A)");
   CLI::Option* serves = command->add_flag("--serve", options->is_serving, "Serve it on this machine, until Ctrl-C");
-  command->add_option("--port", options->port, "With --serve: the port (default: a free one)")->check(CLI::Range(1, 65535))->needs(serves);
+  command->add_option("--port", options->port, "With --serve: the port (default: a free one)")
+      ->check(base::whole_range(1, 65535), base::describe_whole_range(1, 65535))
+      ->needs(serves);
   set_work(*command, shared, run, options, run_explore);
 }
 
@@ -267,7 +281,8 @@ void add_verify(CLI::App& app, Shared& shared, Run& run) {
       "submitted. "
       "Exit code 3:\n"
       "something is damaged. With --repair, damaged banks are set aside and queued again, and damaged inputs copied again.");
-  command->add_option("ID", options->words, "Ids (or their beginnings) or job files; without any, the whole store");
+  command->add_option("ID", options->words,
+                      "Ids, job files, folders, manifests, or names of carillon status; without any, the whole store");
   command->add_flag("--repair", options->repairs, "Make again what is damaged");
   set_work(*command, shared, run, options, run_verify);
 }
@@ -310,8 +325,9 @@ void add_attempt(CLI::App& app, Run& run) {
   CLI::App* command =
       app.add_subcommand("attempt", "One attempt at the job of a folder of work, for carillon run and the scripts of Slurm")->group("");
   command->add_option("WORK", attempt.work, "work/ab/ID of a store")->required();
-  command->add_option("--ranks", attempt.ranks)->check(CLI::Range(1, kMaxRanks));
+  command->add_option("--ranks", attempt.ranks)->check(base::whole_range(1, kMaxRanks), base::describe_whole_range(1, kMaxRanks));
   command->add_option("--memory-gb", attempt.memory_gb);
+  command->add_option("--memory-limit-gb", attempt.memory_limit_gb);
   command->add_option("--time-limit-s", attempt.time_limit_s);
   command->add_option("--token", attempt.token);
   command->add_option("--mpirun-option", attempt.mpirun_options, "A word for mpirun; can be given many times")->allow_extra_args(false);

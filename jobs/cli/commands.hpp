@@ -20,7 +20,7 @@ struct SubmitOptions {
   std::vector<std::string> words;
   ResourceOptions resources;
   bool has_pictures = false;
-  bool wait = false, run = false, keep_going = false;
+  bool wait = false, run = false, keep_going = false, is_quiet = false;
 };
 int run_submit(Shared& shared, const SubmitOptions& options);
 
@@ -65,9 +65,9 @@ struct QueueOptions {
 };
 int run_queue(Shared& shared, const QueueOptions& options);
 
-/// carillon get: the bank of a job.
+/// carillon get: the banks of jobs.
 struct GetOptions {
-  std::string word;
+  std::vector<std::string> words;
   std::string to;  // empty: no copy
 };
 int run_get(Shared& shared, const GetOptions& options);

@@ -112,13 +112,10 @@ Explanation explain(Shared& shared, const store::Id& id, const std::optional<reg
   return {state, fmt::format("nothing new would run: it is {} already", state), false};
 }
 
-}  // namespace
-
-int run_explain(Shared& shared, const ExplainOptions& options) {
-  shared.only_reads = true;
-  const Source source = gather_one(options.word, read_solver_version());
-  shared.settle();
-  const store::Id id = store::require_id(source.request.id, options.word);
+/// JSON of one job; null where it was printed for people.
+Json::Value explain_one(Shared& shared, const Source& source) {
+  if (!source.error.empty()) throw InputError(source.error);
+  const store::Id id = store::require_id(source.request.id, source.job_file);
   const auto job = shared.registry().find(id);
   const auto last = shared.registry().find_last_submission(source.job_file);
   const Explanation explanation = explain(shared, id, job);
@@ -143,8 +140,7 @@ int run_explain(Shared& shared, const ExplainOptions& options) {
     root["bank"] = Json::Value();
     if (const auto results = list_results(shared.store(), id); explanation.word == "done" && results.count("bank") > 0)
       root["bank"] = to_json(results.at("bank").string());
-    print_json(root);
-    return 0;
+    return root;
   }
   fmt::print("{}  {}\n{}\n", id.short_text(), show(source.job_file), explanation.line);
   if (!last)
@@ -154,6 +150,20 @@ int run_explain(Shared& shared, const ExplainOptions& options) {
   else
     fmt::print("since this job file was submitted last (as {}) these changed:\n", last->request.id.substr(0, 12));
   for (const Change& change : changes) fmt::print("  {}\n", format_change(change, source.request));
+  return {};
+}
+
+}  // namespace
+
+int run_explain(Shared& shared, const ExplainOptions& options) {
+  shared.only_reads = true;
+  const std::string solver = read_solver_version();
+  const std::vector<Source> sources =
+      is_of_many(options.word) ? gather({options.word}, solver) : std::vector{gather_one(options.word, solver)};
+  shared.settle();
+  Json::Value root;
+  for (const Source& source : sources) root["jobs"].append(explain_one(shared, source));
+  if (shared.json) print_json(sources.size() == 1 ? root["jobs"][0] : root);
   return 0;
 }
 

@@ -12,7 +12,7 @@ namespace carillon::cli {
 int follow(Shared& shared, const std::vector<store::Id>& ids, bool lines);
 
 /// Works through the queue here (as carillon run does) until these have ended; exit code as follow().
-int run_until_done(Shared& shared, const std::vector<store::Id>& ids, bool has_pictures);
+int run_until_done(Shared& shared, const std::vector<store::Id>& ids, bool has_pictures, bool is_quiet);
 
 /// 0 when all are done, 3 when one is failed or cancelled, 1 when none is but some have not ended.
 int find_exit_code(const std::vector<registry::Job>& jobs);

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <charconv>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -12,6 +13,7 @@
 
 #include "runtime/base/error.hpp"
 #include "runtime/base/file.hpp"
+#include "runtime/base/foreign.hpp"
 
 namespace carillon::cli {
 namespace {
@@ -72,12 +74,13 @@ Source read_line(const std::string& line, const fs::path& manifest, int number) 
   return source;
 }
 
-std::vector<Source> read_manifest(const std::string& word) {
+std::vector<Source> read_manifest(const std::string& word, int only = 0) {
   const bool is_stdin = word == "-";
   const fs::path manifest = is_stdin ? fs::current_path() / "standard input" : fs::absolute(word);
   std::string text =
       is_stdin ? std::string(std::istreambuf_iterator<char>(std::cin), {})
                : base::read_file(word, "manifest", kMaxManifestBytes, "a job file ends in .json, and a manifest names one on each line");
+  base::refuse_utf16(text, word);
   if (text.find('\0') != std::string::npos)
     throw InputError(fmt::format("{}: this is no text; a job file ends in .json, and a manifest names one on each line", word));
   std::vector<Source> sources;
@@ -86,14 +89,27 @@ std::vector<Source> read_manifest(const std::string& word) {
     const std::size_t end = std::min(text.find('\n', at), text.size());
     const std::string line = strip(text.substr(at, end - at));
     at = end + 1;
-    if (!line.empty() && line[0] != '#') sources.push_back(read_line(line, manifest, number + 1));
+    if (!line.empty() && line[0] != '#' && (only == 0 || only == number + 1)) sources.push_back(read_line(line, manifest, number + 1));
   }
+  if (sources.empty() && only > 0) throw InputError(fmt::format("{}: there is no job on line {}", word, only));
   if (sources.empty()) throw InputError(fmt::format("{}: this manifest names no job; write one job file on each line", word));
   return sources;
 }
 
+/// File and line of "sweep.txt#21", where there is such a file; else line 0.
+std::pair<std::string, int> split_line(const std::string& word) {
+  const std::size_t mark = word.rfind('#');
+  std::error_code error;
+  int line = 0;
+  if (mark == std::string::npos || fs::exists(word, error) || !fs::is_regular_file(word.substr(0, mark), error)) return {word, 0};
+  const char* const end = word.data() + word.size();
+  const auto read = std::from_chars(word.data() + mark + 1, end, line);
+  return read.ec == std::errc() && read.ptr == end && line > 0 ? std::pair(word.substr(0, mark), line) : std::pair(word, 0);
+}
+
 std::vector<Source> read_word(const std::string& word) {
   std::error_code error;
+  if (const auto [manifest, line] = split_line(word); line > 0) return read_manifest(manifest, line);
   if (word != "-" && fs::is_directory(word, error)) return read_folder(word);
   if (word != "-" && ends_with(word, ".json")) return {read_file_source(word)};
   return read_manifest(word);
@@ -130,24 +146,73 @@ std::vector<Source> gather(const std::vector<std::string>& words, const std::str
   return sources;
 }
 
+bool is_of_jobs(const std::string& word) {
+  std::error_code error;
+  return fs::exists(word, error) || split_line(word).second > 0;
+}
+
+bool is_of_many(const std::string& word) {
+  std::error_code error;
+  return fs::is_directory(word, error) || (fs::is_regular_file(word, error) && !ends_with(word, ".json"));
+}
+
+std::vector<std::string> list_job_files(const std::string& word) {
+  const std::vector<Source> sources = read_word(word);
+  // A file of something else.
+  if (std::none_of(sources.begin(), sources.end(), [](const Source& source) { return source.error.empty(); }))
+    throw InputError(sources.front().error);
+  std::vector<std::string> files;
+  for (const Source& source : sources) files.push_back(source.job_file);
+  return files;
+}
+
 Source gather_one(const std::string& word, const std::string& solver) {
-  Source source;
-  source.job_file = name_of(word);
-  source.order = store::read_order(word);
-  source.request =
-      store::RequestMaker(solver, source.order.is_simulation() ? read_program_version("carillon-simulate") : "").make(source.order);
-  source.request.job_file = source.job_file;
+  if (split_line(word).second == 0) {
+    Source source;
+    source.job_file = name_of(word);
+    source.order = store::read_order(word);
+    source.request =
+        store::RequestMaker(solver, source.order.is_simulation() ? read_program_version("carillon-simulate") : "").make(source.order);
+    source.request.job_file = source.job_file;
+    return source;
+  }
+  Source source = gather({word}, solver).front();
+  if (!source.error.empty()) throw InputError(source.error);
   return source;
 }
 
-std::pair<store::Id, std::optional<registry::Job>> find_by_content(Shared& shared, const std::string& word) {
-  std::error_code error;
-  if (!store::parse_id(word) && (fs::exists(word, error) || word.ends_with(".json"))) {
-    const store::Id id = store::require_id(gather_one(word, read_solver_version()).request.id, word);
-    return {id, shared.registry().find(id)};
+std::vector<Named> find_all_by_content(Shared& shared, const std::vector<std::string>& words) {
+  std::vector<Named> found;
+  const auto add = [&](const store::Id& id, std::optional<registry::Job> job, const std::string& name) {
+    if (std::none_of(found.begin(), found.end(), [&](const Named& known) { return known.id == id; }))
+      found.push_back({id, std::move(job), name});
+  };
+  std::string solver;
+  for (const std::string& word : words) {
+    const bool is_content =
+        !store::parse_id(word) && (is_of_jobs(word) || (word.ends_with(".json") && word.find('/') != std::string::npos));
+    if (!is_content) {
+      registry::Job job = find_job(shared, word);
+      const store::Id id = job.id;
+      const std::string name = job.name;
+      add(id, std::move(job), name);
+      continue;
+    }
+    if (solver.empty()) solver = read_solver_version();
+    const std::vector<Source> sources = is_of_many(word) ? gather({word}, solver) : std::vector{gather_one(word, solver)};
+    for (const Source& source : sources) {
+      if (!source.error.empty()) throw InputError(source.error);
+      const store::Id id = store::require_id(source.request.id, source.job_file);
+      add(id, shared.registry().find(id), registry::find_name(source.job_file));
+    }
   }
-  registry::Job job = find_job(shared, word);
-  return {job.id, job};
+  return found;
+}
+
+std::pair<store::Id, std::optional<registry::Job>> find_by_content(Shared& shared, const std::string& word) {
+  const std::vector<Named> found = find_all_by_content(shared, {word});
+  if (found.size() != 1) throw InputError(fmt::format("{}: this stands for {} jobs; name one of them", word, found.size()));
+  return {found.front().id, found.front().job};
 }
 
 }  // namespace carillon::cli

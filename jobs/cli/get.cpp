@@ -1,14 +1,18 @@
-// carillon get: the bank of a job, or the files of a simulation.
+// carillon get: the banks of jobs, or the files of simulations.
 #include <fcntl.h>
 #include <fmt/core.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
+#include <map>
+#include <set>
 
 #include "jobs/cli/commands.hpp"
 #include "jobs/cli/gather.hpp"
 #include "jobs/store/files.hpp"
 #include "jobs/store/identity.hpp"
+#include "jobs/store/warning_kinds.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/file.hpp"
 
@@ -42,53 +46,121 @@ void copy_to(const fs::path& from, const fs::path& wanted) {
   if (error) refuse(error.value());
 }
 
+/// One job as it is now: its files, or why there are none.
+struct Got {
+  Named named;
+  std::string state, why;
+  std::vector<std::string> warnings;
+  std::map<std::string, fs::path> results;  // in the store, by key; empty: not there yet
+  std::map<std::string, fs::path> copies;   // of --to
+  bool is_done() const { return !results.empty(); }
+  bool is_bank() const { return results.count("bank") > 0; }
+};
+
+/// Every byte is looked at: what is served was made of this job.
+Got look_at(Shared& shared, Named named) {
+  Got got{std::move(named), {}, {}, {}, {}, {}};
+  const store::Id& id = got.named.id;
+  const std::optional<registry::Job>& job = got.named.job;
+  const auto fault = shared.store().find_bank_fault(id, store::Look::content);
+  if (!fault) {
+    got.state = "done";
+    got.warnings = store::read_warnings(shared.store(), id);
+    got.results = list_results(shared.store(), id);
+    return got;
+  }
+  const bool is_again = job && (job->state == registry::JobState::queued || job->state == registry::JobState::running ||
+                                job->state == registry::JobState::waiting);
+  const bool is_damaged = shared.store().has_bank_folder(id) && !is_again;
+  got.state = is_damaged ? "failed" : job ? to_text(job->state) : "new";
+  got.why = is_damaged ? fmt::format("{}; carillon retry {} computes it again", *fault, id.short_text())
+            : job      ? find_reason(shared, *job)
+                       : "carillon submit asks for it";
+  return got;
+}
+
+/// "bar" of bar.json, "sweep-21" of line 21 of sweep.txt.
+std::string make_stem(const std::string& name) {
+  const std::size_t mark = name.rfind('#');
+  const fs::path file = store::from_text(name.substr(0, mark));
+  return file.stem().string() + (mark == std::string::npos ? "" : "-" + name.substr(mark + 1));
+}
+
+/// Where the files of each job go: one bank to a file or into a folder, several into a folder by the names of their jobs.
+void choose_places(std::vector<Got>& all, const fs::path& to) {
+  std::error_code error;
+  const bool is_one = all.size() == 1;
+  if (is_one && !all[0].is_bank() && all[0].is_done() && !fs::is_directory(to, error))
+    throw InputError(fmt::format("{}: is no folder, and a simulation has several files; name a folder that is there", to.string()));
+  if (!is_one && fs::exists(to, error) && !fs::is_directory(to, error))
+    throw InputError(fmt::format("{}: is no folder, and these are {} jobs; name a folder", to.string(), all.size()));
+  std::set<std::string> taken;
+  for (Got& got : all) {
+    std::string stem = make_stem(got.named.name);
+    if (!taken.insert(stem).second) taken.insert(stem += "-" + got.named.id.short_text());
+    for (const auto& [key, file] : got.results)
+      got.copies[key] = !is_one         ? (got.is_bank() ? to / (stem + ".hdf") : to / stem / file.filename())
+                        : got.is_bank() ? to
+                                        : to / file.filename();
+  }
+}
+
+Json::Value describe(const Got& got, const fs::path& to, bool is_one) {
+  Json::Value root;
+  root["id"] = got.named.id.text();
+  root["name"] = to_json(got.named.name);
+  root["state"] = got.state;
+  root["reason"] = to_json(got.state == "new" ? "" : got.why);
+  root["warnings"] = to_json(got.warnings);
+  root["bank"] = got.is_bank() ? to_json(got.results.at("bank").string()) : Json::Value();
+  root["results"] = Json::objectValue;
+  for (const auto& [key, file] : got.results) root["results"][key] = to_json(file.string());
+  root["copy"] = Json::Value();
+  if (!got.copies.empty())
+    root["copy"] =
+        to_json((is_one || got.is_bank() ? (is_one ? to : got.copies.at("bank")) : got.copies.begin()->second.parent_path()).string());
+  return root;
+}
+
+void print(const std::vector<Got>& all) {
+  constexpr std::size_t kMaxMissing = 20;
+  store::WarningKinds kinds;
+  std::size_t missing = 0;
+  for (const Got& got : all) {
+    for (const auto& [key, file] : got.copies.empty() ? got.results : got.copies) fmt::print("{}\n", file.string());
+    for (const std::string& warning : got.warnings) kinds.add(show(got.named.name), show_message(warning));
+    if (got.is_done() || ++missing > kMaxMissing) continue;
+    fmt::print(stderr, "carillon: no result yet: {}{} is {}{}{}\n", got.named.id.short_text(),
+               all.size() > 1 ? " (" + show(got.named.name) + ")" : "", got.state, got.why.empty() ? "" : "; ", show_message(got.why));
+  }
+  if (missing > kMaxMissing) fmt::print(stderr, "carillon: ... and {} more\n", missing - kMaxMissing);
+  if (missing > 0 && all.size() > 1) fmt::print(stderr, "carillon: {} of {} jobs have no result yet\n", missing, all.size());
+  if (all.size() == 1)
+    for (const std::string& warning : all[0].warnings) fmt::print(stderr, "carillon: warning: {}\n", show_message(warning));
+  else
+    for (const std::string& line : kinds.list()) fmt::print(stderr, "carillon: warning {}\n", line);
+}
+
 }  // namespace
 
 int run_get(Shared& shared, const GetOptions& options) {
   shared.only_reads = true;
   shared.settle();
-  const auto [id, job] = find_by_content(shared, options.word);
-  // A copy is for good: every byte is looked at before.
-  const auto fault = shared.store().find_bank_fault(id, options.to.empty() ? store::Look::quick : store::Look::full);
-  const bool is_done = !fault, is_damaged = fault && shared.store().has_bank_folder(id);
-  const std::vector<std::string> warnings = is_done ? store::read_warnings(shared.store(), id) : std::vector<std::string>();
-  const auto results = is_done ? list_results(shared.store(), id) : std::map<std::string, fs::path>();
-  std::map<std::string, std::string> places;  // that are printed
-  const bool is_bank = results.count("bank") > 0;
-  std::error_code error;
-  if (is_done && !is_bank && !options.to.empty() && !fs::is_directory(options.to, error))
-    throw InputError(fmt::format("{}: is no folder, and a simulation has several files; name a folder that is there", options.to));
-  for (const auto& [key, file] : results) {
-    if (!options.to.empty()) copy_to(file, options.to);
-    places[key] = options.to.empty() ? file.string() : is_bank ? options.to : (fs::path(options.to) / file.filename()).string();
-  }
-  const bool is_again = job && (job->state == registry::JobState::queued || job->state == registry::JobState::running ||
-                                job->state == registry::JobState::waiting);
-  const std::string state = is_done ? "done" : is_damaged && !is_again ? "failed" : job ? to_text(job->state) : "new";
-  const std::string why = is_done                   ? ""
-                          : is_damaged && !is_again ? fmt::format("{}; carillon retry {} computes it again", *fault, id.short_text())
-                          : job                     ? find_reason(shared, *job)
-                                                    : "";
+  std::vector<Got> all;
+  for (Named& named : find_all_by_content(shared, options.words)) all.push_back(look_at(shared, std::move(named)));
+  if (!options.to.empty()) choose_places(all, options.to);
+  for (const Got& got : all)
+    for (const auto& [key, to] : got.copies) copy_to(got.results.at(key), to);
+  const bool is_one = all.size() == 1;
   if (shared.json) {
     Json::Value root;
-    root["id"] = id.text();
-    root["state"] = state;
-    root["reason"] = to_json(why);
-    root["warnings"] = to_json(warnings);
-    root["bank"] = is_bank ? to_json(results.at("bank").string()) : Json::Value();
-    root["results"] = Json::objectValue;
-    for (const auto& [key, file] : results) root["results"][key] = to_json(file.string());
-    root["copy"] = is_done && !options.to.empty() ? to_json(options.to) : Json::Value();
-    print_json(root);
-  } else if (is_done) {
-    for (const auto& [key, place] : places) fmt::print("{}\n", place);
-    for (const std::string& warning : warnings) fmt::print(stderr, "carillon: warning: {}\n", show_message(warning));
+    for (const Got& got : all) root["jobs"].append(describe(got, options.to, is_one));
+    print_json(is_one ? root["jobs"][0] : root);
   } else {
-    const std::string reason = job || is_damaged ? show_message(why) : "carillon submit asks for it";
-    fmt::print(stderr, "carillon: no result yet: {} is {}{}{}\n", id.short_text(), state, reason.empty() ? "" : "; ", reason);
+    print(all);
   }
   if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
-  return is_done ? 0 : kExitNotYet;
+  return std::all_of(all.begin(), all.end(), [](const Got& got) { return got.is_done(); }) ? 0 : kExitNotYet;
 }
 
 }  // namespace carillon::cli

@@ -23,12 +23,14 @@ Json::Value describe(const hear::Sound& sound) {
   entry["highest_hz"] = sound.highest_hz;
   entry["is_complete"] = sound.is_complete;
   entry["worst_cents"] = std::isfinite(sound.worst_cents) ? Json::Value(sound.worst_cents) : Json::Value();
+  entry["facet_cents"] = sound.facet_cents;
   entry["modes"] = Json::arrayValue;
-  for (const hear::HeardMode& mode : sound.modes) {
+  for (const hear::StruckMode& mode : sound.modes) {
     Json::Value& one = entry["modes"].append(Json::objectValue);
     one["freq_hz"] = mode.freq_hz;
     one["t60_s"] = std::isfinite(mode.t60_s) ? Json::Value(mode.t60_s) : Json::Value();
     one["error_cents"] = std::isfinite(mode.error_cents) ? Json::Value(mode.error_cents) : Json::Value();
+    one["facet_cents"] = mode.facet_cents;
     one["level_dba"] = std::isfinite(mode.level_dba) ? Json::Value(mode.level_dba) : Json::Value();
   }
   return entry;
@@ -42,13 +44,21 @@ void print(const hear::Sound& sound) {
   if (sound.is_edited) text += "; scaled from another solve";
   if (sound.poisson_cents > 0.0) text += fmt::format(", of which {} cents for Poisson's ratio", hear::format_cents(sound.poisson_cents));
   fmt::print("\n{}\n", text);
-  fmt::print("{:>5} {:>10} {:>8} {:>9} {:>9}\n", "mode", "Hz", "+-cents", "T60 [s]", "dB(A)");
+  const bool is_doubtful = sound.facet_cents > 0.0;
+  const auto format_facets = [&](const std::string& text) { return is_doubtful ? fmt::format(" {:>8}", text) : std::string(); };
+  fmt::print("{:>5} {:>10} {:>8}{} {:>9} {:>9}\n", "mode", "Hz", "+-cents", format_facets("+-facets"), "T60 [s]", "dB(A)");
   for (std::size_t m = 0; m < sound.modes.size(); ++m) {
-    const hear::HeardMode& mode = sound.modes[m];
-    fmt::print("{:>5} {:>10.1f} {:>8} {:>9.3g} {:>9}\n", m + 1, mode.freq_hz,
-               std::isfinite(mode.error_cents) ? hear::format_cents(mode.error_cents) : "-", mode.t60_s,
+    const hear::StruckMode& mode = sound.modes[m];
+    fmt::print("{:>5} {:>10.1f} {:>8}{} {:>9.3g} {:>9}\n", m + 1, mode.freq_hz,
+               std::isfinite(mode.error_cents) ? hear::format_cents(mode.error_cents) : "-",
+               format_facets(hear::format_cents(mode.facet_cents)), mode.t60_s,
                mode.level_dba > -99.5 ? fmt::format("{:.0f}", mode.level_dba) : "<-99");
   }
+  if (is_doubtful)
+    fmt::print(
+        "+-facets     facets in doubt: planes of the body, or samples of a smooth surface? Up to {} cents more if they are not what they\n"
+        "             were taken for. --facets takes them for planes; a surface in finer facets settles it too\n",
+        hear::format_cents(sound.facet_cents));
   fmt::print("sound        {}\nspectrogram  {}\n", show(sound.wav.string(), 1000), show(sound.spectrogram.string(), 1000));
 }
 
@@ -75,6 +85,7 @@ int run_hear(Shared& shared, const HearOptions& options) {
     root["page"] = to_json(heard.page.string());
     root["explorer"] = heard.explorer.empty() ? Json::Value() : to_json(heard.explorer.string());
     root["assumed"] = to_json(heard.assumed);
+    root["warnings"] = to_json(heard.warnings);
     for (const double x : heard.extent_m) root["extent_m"].append(x);
     root["sounds"] = Json::arrayValue;
     for (const hear::Sound& sound : heard.sounds) root["sounds"].append(describe(sound));
@@ -83,6 +94,7 @@ int run_hear(Shared& shared, const HearOptions& options) {
     return 0;
   }
   for (const std::string& line : heard.assumed) fmt::print("assumed      {}\n", show(line, 1000));
+  for (const std::string& line : heard.warnings) fmt::print("warning      {}\n", show(line, 1000));
   fmt::print("body         {:.3g} x {:.3g} x {:.3g} m\n", heard.extent_m[0], heard.extent_m[1], heard.extent_m[2]);
   for (const hear::Sound& sound : heard.sounds) print(sound);
   fmt::print("\nreport       {}\n", show(heard.page.string(), 1000));

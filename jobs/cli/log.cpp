@@ -44,12 +44,7 @@ bool has_ended(const registry::Job& job) {
   return job.state == registry::JobState::done || job.state == registry::JobState::failed || job.state == registry::JobState::cancelled;
 }
 
-}  // namespace
-
-int run_log(Shared& shared, const LogOptions& options) {
-  shared.only_reads = true;
-  shared.settle();
-  registry::Job job = find_job(shared, options.word);
+int print_log(Shared& shared, registry::Job job, bool follows) {
   off_t at = 0;
   if (shared.json) {
     const fs::path file = shared.store().find_folder(job.id) / store::kLogFile;
@@ -64,7 +59,7 @@ int run_log(Shared& shared, const LogOptions& options) {
     return 0;
   }
   for (;;) {
-    const bool is_last = !options.follow || has_ended(job);  // looked at before the log is read: nothing is printed after that
+    const bool is_last = !follows || has_ended(job);  // looked at before the log is read: nothing is printed after that
     for (std::string bytes; !(bytes = read_from(shared.store().find_folder(job.id) / store::kLogFile, at, 1 << 20)).empty();) {
       // A character may be cut where this piece ends; its other bytes come with the next.
       std::size_t whole = bytes.size();
@@ -84,6 +79,24 @@ int run_log(Shared& shared, const LogOptions& options) {
   }
   if (at == 0) fmt::print(stderr, "carillon: {} has printed nothing yet; it is {}\n", job.id.short_text(), to_text(job.state));
   return at == 0 ? kExitNotYet : 0;
+}
+
+}  // namespace
+
+int run_log(Shared& shared, const LogOptions& options) {
+  shared.only_reads = true;
+  shared.settle();
+  const std::vector<registry::Job> jobs = find_jobs(shared, {options.word});
+  if (jobs.size() == 1) return print_log(shared, jobs.front(), options.follow);
+  if (options.follow || shared.json)
+    throw InputError(fmt::format("{}: this stands for {} jobs, and {} is for one; name one of them", show(options.word), jobs.size(),
+                                 options.follow ? "--follow" : "--json"));
+  int code = 0;
+  for (const registry::Job& job : jobs) {
+    fmt::print("== {}  {}\n", job.id.short_text(), show(job.name));
+    code = std::max(code, print_log(shared, job, false));
+  }
+  return code;
 }
 
 }  // namespace carillon::cli

@@ -12,6 +12,8 @@
 #include "jobs/cli/command_line.hpp"
 #include "jobs/cli/shared.hpp"
 #include "runtime/base/error.hpp"
+#include "runtime/base/file_limit.hpp"
+#include "runtime/base/message.hpp"
 
 namespace carillon::cli {
 namespace {
@@ -20,7 +22,7 @@ int fail(bool json, const std::string& what, int code) {
   std::fflush(stdout);
   if (json) {
     Json::Value root;
-    root["error"] = to_json(what);
+    root["error"] = to_json(base::shorten(what));
     root["exit_code"] = code;
     print_json(root);
   }
@@ -58,6 +60,7 @@ int run(int argc, char** argv) {
 }  // namespace carillon::cli
 
 int main(int argc, char** argv) {
+  carillon::base::report_file_limit();
   try {
     return carillon::cli::run(argc, argv);
   } catch (const std::exception& error) {

@@ -5,6 +5,7 @@
 
 #include "jobs/cli/shared.hpp"
 #include "runtime/base/command.hpp"
+#include "runtime/base/environment.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::cli {
@@ -30,7 +31,8 @@ std::string read_program_version(const std::string& name) {
 
 void become(const std::string& program, std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), base::require_program(program).string());
-  base::become(arguments);
+  // What checks a job or measures is no rank of a run that this process may be in.
+  base::become(arguments, program == "carillon-study" ? base::make_environment() : base::make_lone_environment());
 }
 
 }  // namespace carillon::cli

@@ -32,11 +32,11 @@ void Shared::settle() {
   }
 }
 
-int run_until_done(Shared& shared, const std::vector<store::Id>& ids, bool has_pictures) {
+int run_until_done(Shared& shared, const std::vector<store::Id>& ids, bool has_pictures, bool is_quiet) {
   queue::RunOptions options;
   options.attempt.has_pictures = has_pictures;
   options.attempt.program = base::find_self();
-  options.quiet = shared.json;
+  options.quiet = shared.json || is_quiet;
   options.attempt.mpirun_options = shared.profile().mpirun_options;
   if (const int code = queue::run(shared.store(), options); code != 0 && code != kExitSolve) return code;  // 3: of any job
   std::vector<registry::Job> jobs;

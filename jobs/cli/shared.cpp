@@ -53,15 +53,33 @@ bool is_hex(const std::string& word) {
   return std::all_of(word.begin(), word.end(), [](char c) { return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f'); });
 }
 
+/// By Source::job_file, of its last submission from there.
+std::optional<registry::Job> find_submitted(Shared& shared, const std::string& job_file) {
+  const auto submission = shared.registry().find_last_submission(job_file);
+  return submission ? shared.registry().find(store::require_id(submission->request.id, "registry")) : std::nullopt;
+}
+
 /// The job of a file: of its last submission from there, else that of what it holds now.
-registry::Job find_by_file(Shared& shared, const std::string& word) {
-  const std::string job_file = store::to_text(fs::absolute(word).lexically_normal());
-  std::optional<registry::Job> job;
-  if (const auto submission = shared.registry().find_last_submission(job_file))
-    job = shared.registry().find(store::require_id(submission->request.id, "registry"));
-  if (!job && is_there(word)) job = shared.registry().find(store::require_id(gather_one(word, read_solver_version()).request.id, word));
-  if (!job) throw InputError(fmt::format("{}: no job of this store; carillon submit adds it", word));
-  return *job;
+std::optional<registry::Job> find_by_file(Shared& shared, const std::string& word) {
+  std::optional<registry::Job> job = find_submitted(shared, store::to_text(fs::absolute(word).lexically_normal()));
+  if (!job && is_of_jobs(word)) job = shared.registry().find(store::require_id(gather_one(word, read_solver_version()).request.id, word));
+  return job;
+}
+
+[[noreturn]] void refuse_many(const std::string& word, const std::vector<registry::Job>& jobs) {
+  std::vector<std::string> names;
+  for (const registry::Job& job : jobs)
+    if (names.size() < kMaxNamed) names.push_back(job.id.short_text());
+  throw InputError(fmt::format("{}: fits several jobs ({}{}); give one of these ids, or more of its digits", show(word),
+                               fmt::join(names, ", "), jobs.size() >= kMaxNamed ? " ..." : ""));
+}
+
+/// By the name that carillon status prints.
+std::optional<registry::Job> find_by_name(Shared& shared, const std::string& word) {
+  std::vector<registry::Job> jobs = shared.registry().list();
+  std::erase_if(jobs, [&](const registry::Job& job) { return job.name != word; });
+  if (jobs.size() > 1) refuse_many(word, jobs);
+  return jobs.empty() ? std::nullopt : std::optional(jobs.front());
 }
 
 }  // namespace
@@ -120,25 +138,43 @@ registry::Job find_job(Shared& shared, const std::string& word) {
   if (is_hex(word) && word.size() >= kMinPrefix) {
     const auto jobs = shared.registry().find_by_prefix(word, kMaxNamed);
     if (jobs.size() == 1) return jobs.front();
-    if (jobs.size() > 1) {
-      std::vector<std::string> names;
-      for (const registry::Job& job : jobs) names.push_back(job.id.short_text());
-      throw InputError(fmt::format("{}: fits several jobs ({}{}); give more digits", word, fmt::join(names, ", "),
-                                   jobs.size() == kMaxNamed ? " ..." : ""));
-    }
+    if (jobs.size() > 1) refuse_many(word, jobs);
   }
-  const bool is_file = is_there(word) || word.find('/') != std::string::npos || word.ends_with(".json");
-  if (is_file) return find_by_file(shared, word);
-  throw InputError(fmt::format("{}: neither the beginning of an id (at least {} digits) nor a job file; carillon status lists the ids",
-                               show(word), kMinPrefix));
+  const bool is_file = is_of_jobs(word);
+  if (is_file && is_of_many(word)) throw InputError(fmt::format("{}: this stands for several jobs; name one of them", word));
+  if (auto job = find_by_file(shared, word)) return *job;
+  // A file that is there is not a job of the same name elsewhere.
+  if (auto job = is_file ? std::nullopt : find_by_name(shared, word)) return *job;
+  if (is_file || word.find('/') != std::string::npos || word.ends_with(".json"))
+    throw InputError(fmt::format("{}: no job of this store; carillon submit adds it", word));
+  throw InputError(
+      fmt::format("{}: neither the beginning of an id (at least {} digits) nor a job file nor a name that carillon status lists",
+                  show(word), kMinPrefix));
 }
 
 std::vector<registry::Job> find_jobs(Shared& shared, const std::vector<std::string>& words) {
   std::vector<registry::Job> jobs;
-  for (const std::string& word : words) {
-    registry::Job job = find_job(shared, word);
+  const auto add = [&](registry::Job job) {
     if (std::none_of(jobs.begin(), jobs.end(), [&](const registry::Job& other) { return other.id == job.id; }))
       jobs.push_back(std::move(job));
+  };
+  for (const std::string& word : words) {
+    const bool is_id = is_hex(word) && word.size() >= kMinPrefix && !shared.registry().find_by_prefix(word, 1).empty();
+    if (is_id || !is_of_many(word)) {
+      add(find_job(shared, word));
+      continue;
+    }
+    const std::vector<std::string> files = list_job_files(word);
+    std::size_t known = 0;
+    for (const std::string& file : files) {
+      std::optional<registry::Job> job = find_submitted(shared, file);
+      known += job ? 1 : 0;
+      if (job) add(std::move(*job));
+    }
+    if (known == 0)
+      throw InputError(fmt::format("{}: none of its {} jobs is in this store; carillon submit adds them", word, files.size()));
+    if (known < files.size())
+      fmt::print(stderr, "carillon: {} of the {} jobs of {} are not in this store\n", files.size() - known, files.size(), show(word));
   }
   return jobs;
 }

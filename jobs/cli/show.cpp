@@ -11,6 +11,7 @@
 #include "jobs/store/json.hpp"
 #include "jobs/store/records.hpp"
 #include "runtime/base/error.hpp"
+#include "runtime/base/message.hpp"
 #include "runtime/base/printable.hpp"
 
 namespace carillon::cli {
@@ -27,18 +28,7 @@ std::string escape(const std::string& raw, std::size_t max) {
 
 std::string show(const std::string& text, std::size_t max) { return escape(text, max); }
 
-std::string show_message(const std::string& text) {
-  constexpr std::size_t kMaxMessage = 4000, kMaxWord = 600;
-  std::string shorter;
-  for (std::size_t at = 0; at < text.size();) {
-    const std::size_t end = std::min(text.find_first_of(" \n", at), text.size());
-    shorter += end - at > kMaxWord ? text.substr(at, kMaxWord / 2) + "..." + text.substr(end - kMaxWord / 4, kMaxWord / 4)
-                                   : text.substr(at, end - at);
-    if (end < text.size()) shorter += text[end];
-    at = end + 1;
-  }
-  return escape(shorter, kMaxMessage);
-}
+std::string show_message(const std::string& text) { return base::show_message(store::to_text(text)); }
 
 Json::Value to_json(const std::string& text) { return Json::Value(store::to_text(text)); }
 

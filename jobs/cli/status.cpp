@@ -10,13 +10,14 @@
 #include "jobs/cli/commands.hpp"
 #include "jobs/cli/follow.hpp"
 #include "jobs/process/process.hpp"
+#include "jobs/store/warning_kinds.hpp"
 #include "runtime/base/clock.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::cli {
 namespace {
 
-constexpr std::size_t kMaxRows = 50, kWideColumns = 1000, kBarWidth = 20;
+constexpr std::size_t kMaxRows = 50, kWideColumns = 1000, kBarWidth = 20, kMaxKinds = 10;
 
 /// Running first, then what waits, what failed, what is done; the newest first among those that have ended.
 void sort_for_people(std::vector<registry::Job>& jobs) {
@@ -114,7 +115,7 @@ int run_status(Shared& shared, const StatusOptions& options) {
     fmt::print("no jobs in {}; carillon submit JOB.json asks for a bank\n", show(shared.store().root().string()));
     return 0;
   }
-  const std::size_t rows = options.all || !options.words.empty() ? jobs.size() * 60 + 1 : kMaxRows;
+  const std::size_t rows = options.all || !options.words.empty() ? jobs.size() * 60 + 1 : kMaxRows + kMaxKinds + 1;
   for (const std::string& line : format_bars(shared, jobs, rows, kWideColumns)) fmt::print("{}\n", line);
   if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
   if (shared.is_disk_full()) return 0;
@@ -126,24 +127,35 @@ std::vector<std::string> format_bars(Shared& shared, const std::vector<registry:
   std::vector<registry::Job> jobs = unsorted;
   sort_for_people(jobs);
   std::vector<std::string> lines;
+  store::WarningKinds kinds;  // of the jobs that are shown
+  const std::size_t job_rows = jobs.size() == 1 ? rows : rows - std::min(rows / 4, kMaxKinds + 1);
   std::size_t shown = 0;
   for (const registry::Job& job : jobs) {
     const std::string reason = format_reason(shared, job);
-    if (lines.size() + (reason.empty() ? 1 : 2) + 2 > rows && jobs.size() > 1 && shown + 1 < jobs.size()) break;
+    if (lines.size() + (reason.empty() ? 1 : 2) + 2 > job_rows && jobs.size() > 1 && shown + 1 < jobs.size()) break;
     ++shown;
-    const std::vector<std::string> warnings = find_warnings(shared, job);
     const bool is_open = job.state == registry::JobState::running || job.state == registry::JobState::waiting;
     const std::string progress = is_open ? format_progress(shared, job) : "";
     lines.push_back(cut(fmt::format("{}  {:<9}  {}{}{}", job.id.short_text(), to_text(job.state), show(job.name, 40),
                                     progress.empty() ? "" : "  ", progress),
                         columns));
     if (!reason.empty()) lines.push_back(cut(fmt::format("              {}", reason), columns));
-    for (const std::string& warning : warnings) {
-      if (lines.size() + 2 <= rows || jobs.size() == 1) lines.push_back(cut("              warning: " + show_message(warning), columns));
+    for (const std::string& warning : find_warnings(shared, job)) {
+      if (jobs.size() == 1)
+        lines.push_back(cut("              warning: " + show_message(warning), columns));
+      else
+        kinds.add(show(job.name, 40), show_message(warning));
     }
   }
   if (shown < jobs.size()) lines.push_back(fmt::format("... and {} more; --all shows them", jobs.size() - shown));
   lines.push_back(cut(format_counts(jobs), columns));
+  std::size_t left = kinds.list().size();
+  for (const std::string& kind : kinds.list()) {
+    const bool is_room_for_all = left <= 1 || lines.size() + 1 < rows;
+    if (lines.size() >= rows) break;
+    lines.push_back(is_room_for_all ? cut("warning " + kind, columns) : fmt::format("... and {} more kinds of warnings", left));
+    --left;
+  }
   return lines;
 }
 

@@ -10,6 +10,7 @@
 #include "jobs/cli/follow.hpp"
 #include "jobs/cli/gather.hpp"
 #include "jobs/cli/slurm.hpp"
+#include "jobs/store/warning_kinds.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::cli {
@@ -35,7 +36,10 @@ void renew(Shared& shared, const SubmitOptions& options, const Source& source, b
       job.cancel_wanted = false;
       job.failures = 0;
     }
-    return options.resources.apply(job) || is_wanted;
+    const double memory_gb = source.request.resources.memory_gb;  // of the job file, as it is now, or of the command line
+    const bool is_other = memory_gb > 0.0 && memory_gb != job.resources.memory_gb;
+    if (is_other) job.resources.memory_gb = memory_gb;
+    return options.resources.apply(job) || is_wanted || is_other;
   });
 }
 
@@ -112,14 +116,16 @@ Json::Value describe_results(Shared& shared, const std::vector<SubmitResult>& re
 }
 
 void print_warnings(Shared& shared, const std::vector<SubmitResult>& results) {
-  std::size_t shown = 0;
+  store::WarningKinds kinds;
   for (const SubmitResult& result : results) {
     if (!result.job) continue;
-    for (const std::string& warning : find_own_warnings(shared, result)) {
-      if (++shown > kMaxShown) return;
-      fmt::print(stderr, "carillon: {}: warning: {}\n", show(result.job->name), show_message(warning));
-    }
+    for (const std::string& warning : find_own_warnings(shared, result)) kinds.add(show(result.job->name), show_message(warning));
   }
+  if (results.size() == 1 && results[0].job)
+    for (const std::string& warning : find_own_warnings(shared, results[0]))
+      fmt::print(stderr, "carillon: {}: warning: {}\n", show(results[0].job->name), show_message(warning));
+  else
+    for (const std::string& line : kinds.list()) fmt::print(stderr, "carillon: warning {}\n", line);
 }
 
 void print_lines(Shared& shared, const std::vector<SubmitResult>& results) {
@@ -194,19 +200,20 @@ int run_submit(Shared& shared, const SubmitOptions& options) {
   });
   if (is_for_slurm) hand_over(shared, results);
   shared.hands_over = is_for_slurm && follows;
-  if (!shared.json) print_lines(shared, results);
+  if (!shared.json && !options.is_quiet) print_lines(shared, results);
   if (!follows && shared.json) print_json(describe_results(shared, results));
   if (is_bad) std::fflush(stdout);
   int code = is_bad ? kExitInput : 0;
   if (follows && !ids.empty()) {
-    const int end = options.run && !is_for_slurm ? run_until_done(shared, ids, options.has_pictures) : follow(shared, ids, false);
+    const int end =
+        options.run && !is_for_slurm ? run_until_done(shared, ids, options.has_pictures, options.is_quiet) : follow(shared, ids, false);
     if (code == 0) code = end;
     for (SubmitResult& result : results) {
       if (result.job) result.job = shared.registry().find(result.job->id);
     }
     if (shared.json)
       print_json(describe_results(shared, results));
-    else if (!options.run || is_for_slurm)  // the queue has printed them
+    else if (!options.run || is_for_slurm || options.is_quiet)  // the queue has printed them
       print_warnings(shared, results);
   } else {
     if (!shared.json) print_warnings(shared, results);

@@ -7,6 +7,8 @@
 #include <set>
 #include <string>
 
+#include "jobs/explore/names.hpp"
+
 namespace carillon::explore {
 namespace {
 
@@ -44,7 +46,7 @@ Json::Value make_row(const std::vector<std::filesystem::path>& files, const std:
     const double width = box.high[0] - box.low[0];
     if (i > 0) x += kGap * 0.5 * (width + last);
     Json::Value body(Json::objectValue);
-    const std::string stem = files[i].stem().string();
+    const std::string stem = cut_name(files[i].stem().string());
     std::string name = stem;
     for (int k = 2; !taken.insert(name).second; ++k) name = fmt::format("{} {}", stem, k);
     body["name"] = name;

@@ -1,106 +1,350 @@
-// Method:     cpp-httplib; a thread waits for the signals, since its stop() may not be called from a handler.
-// Source:     none.
+// Method:     one thread, poll(2), sockets that never block. A connection holds a head of at most kMaxHead bytes, or a file of which one
+//             piece at a time is in memory. It has a deadline for all of its head and one for the next piece, and where all places are
+//             taken, the connection that has waited longest without a request makes room for the new one.
+// Source:     RFC 9112 9.6 (the end of a connection whose other side may still be sending).
 // Deviations: none.
 #include "jobs/explore/serve.hpp"
 
+#include <fcntl.h>
 #include <fmt/core.h>
-#include <httplib.h>
-#include <pthread.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <sys/signalfd.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
 
 #include <algorithm>
-#include <atomic>
-#include <chrono>
+#include <array>
+#include <cerrno>
 #include <csignal>
-#include <thread>
+#include <cstring>
+#include <iterator>
+#include <list>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "jobs/explore/request.hpp"
+#include "runtime/base/clock.hpp"
+#include "runtime/base/descriptor.hpp"
 
 namespace carillon::explore {
 namespace {
 
-/// SIGINT and SIGTERM wait for sigwait() in this thread and in those that it starts.
+namespace fs = std::filesystem;
+
+constexpr std::size_t kMaxHead = 16 << 10, kPiece = 256 << 10;
+constexpr std::size_t kMaxConnections = 200;  // of 1024 descriptors, which are usual, each may take two
+constexpr double kHeadS = 10.0;               // for a request, from the opening of the connection or the last answer on
+constexpr double kPieceS = 600.0;             // a browser that builds its picture may read nothing for long
+constexpr double kEndS = 10.0;                // for what a refused request still sends
+
+/// SIGINT and SIGTERM, readable as a descriptor in this thread and in those that it starts.
 class BlockedSignals {
  public:
   BlockedSignals() {
     sigemptyset(&signals_);
     for (const int signal : {SIGINT, SIGTERM}) sigaddset(&signals_, signal);
     pthread_sigmask(SIG_BLOCK, &signals_, &before_);
+    descriptor_ = base::Descriptor(::signalfd(-1, &signals_, SFD_CLOEXEC | SFD_NONBLOCK));
   }
   ~BlockedSignals() { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
   BlockedSignals(const BlockedSignals&) = delete;
   BlockedSignals& operator=(const BlockedSignals&) = delete;
 
-  int wait() const {
-    int signal = 0;
-    sigwait(&signals_, &signal);
-    return signal;
+  int descriptor() const { return descriptor_.get(); }
+  /// The number of the one that came; 0: none.
+  int take() const {
+    signalfd_siginfo info{};
+    return ::read(descriptor_.get(), &info, sizeof(info)) == sizeof(info) ? static_cast<int>(info.ssi_signo) : 0;
   }
 
  private:
   sigset_t signals_{}, before_{};
+  base::Descriptor descriptor_;
 };
 
-/// Whether a path of a request ends outside of the folder, by a symbolic link in it.
-bool leaves(const std::filesystem::path& folder, const std::string& path) {
-  std::error_code error;
-  const std::filesystem::path root = std::filesystem::canonical(folder, error);
-  const std::filesystem::path file =
-      std::filesystem::weakly_canonical(root / path.substr(std::min(path.find_first_not_of('/'), path.size())), error);
-  return error || std::mismatch(root.begin(), root.end(), file.begin(), file.end()).first != root.end();
+const char* find_reason(int status) {
+  switch (status) {
+    case 200:
+      return "OK";
+    case 206:
+      return "Partial Content";
+    case 400:
+      return "Bad Request";
+    case 404:
+      return "Not Found";
+    case 405:
+      return "Method Not Allowed";
+    case 416:
+      return "Range Not Satisfiable";
+    case 421:
+      return "Misdirected Request";
+    case 431:
+      return "Request Header Fields Too Large";
+    case 505:
+      return "HTTP Version Not Supported";
+    default:
+      return "Service Unavailable";
+  }
 }
+
+const char* find_type(const fs::path& file) {
+  static constexpr std::array<std::pair<const char*, const char*>, 9> kTypes{{{".html", "text/html; charset=utf-8"},
+                                                                              {".js", "application/javascript; charset=utf-8"},
+                                                                              {".css", "text/css; charset=utf-8"},
+                                                                              {".json", "application/json; charset=utf-8"},
+                                                                              {".jsonl", "application/x-ndjson"},
+                                                                              {".wasm", "application/wasm"},
+                                                                              {".png", "image/png"},
+                                                                              {".txt", "text/plain; charset=utf-8"},
+                                                                              {".gz", "application/gzip"}}};
+  const std::string ending = file.extension().string();
+  for (const auto& [name, type] : kTypes)
+    if (ending == name) return type;
+  return "application/octet-stream";
+}
+
+/// What is sent: a head, then a part of a file.
+struct Answer {
+  std::string head;
+  std::size_t head_sent = 0;
+  base::Descriptor file;
+  std::uint64_t at = 0, left = 0;  // bytes of the file
+  bool is_last = false;            // of its connection
+};
+
+/// The files of a folder under the two names of this machine.
+class Folder {
+ public:
+  Folder(const fs::path& folder, int port) : root_(fs::canonical(folder)) {
+    for (const char* name : {"127.0.0.1", "localhost"}) hosts_.push_back(fmt::format("{}:{}", name, port));
+  }
+
+  Answer answer(const FileRequest& request) const {
+    if (request.status != 200) return refuse(request, request.status);
+    if (std::find(hosts_.begin(), hosts_.end(), request.host) == hosts_.end()) return refuse(request, 421);
+    const fs::path path = find_file(request.path);
+    base::Descriptor file(path.empty() ? -1 : ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+    struct stat about {};
+    if (file.get() < 0 && (errno == EMFILE || errno == ENFILE) && !path.empty()) return refuse(request, 503);
+    if (file.get() < 0 || ::fstat(file.get(), &about) != 0 || !S_ISREG(about.st_mode)) return refuse(request, 404);
+    const auto size = static_cast<std::uint64_t>(about.st_size);
+    const Part part = find_part(request.range, size);
+    if (part.status == 416) return refuse(request, 416, fmt::format("Content-Range: bytes */{}\r\n", size));
+    std::string more = fmt::format("Content-Type: {}\r\nAccept-Ranges: bytes\r\n", find_type(path));
+    if (part.status == 206) more += fmt::format("Content-Range: bytes {}-{}/{}\r\n", part.begin, part.begin + part.length - 1, size);
+    Answer answer = begin(request, part.status, part.length, more);
+    answer.file = std::move(file);
+    answer.at = part.begin;
+    answer.left = request.is_head ? 0 : part.length;
+    return answer;
+  }
+
+  /// A text of one line, no file.
+  static Answer refuse(const FileRequest& request, int status, const std::string& more = {}) {
+    const std::string text = fmt::format("{} {}\n", status, find_reason(status));
+    Answer answer = begin(request, status, text.size(),
+                          more + "Content-Type: text/plain; charset=utf-8\r\n" + (status == 405 ? "Allow: GET, HEAD\r\n" : ""));
+    if (!request.is_head) answer.head += text;
+    return answer;
+  }
+
+ private:
+  /// The file of a path, links followed; empty where it is outside of the folder or absent.
+  fs::path find_file(const std::string& path) const {
+    std::error_code error;
+    const fs::path inside = path.substr(std::min(path.find_first_not_of('/'), path.size()));
+    fs::path file = fs::canonical(root_ / (path.back() == '/' ? inside / "index.html" : inside), error);
+    const bool is_inside = !error && std::mismatch(root_.begin(), root_.end(), file.begin(), file.end()).first == root_.end();
+    return is_inside ? file : fs::path();
+  }
+
+  static Answer begin(const FileRequest& request, int status, std::uint64_t length, const std::string& more) {
+    Answer answer;
+    answer.is_last = !request.is_reusable;
+    answer.head =
+        fmt::format("HTTP/1.1 {} {}\r\nCache-Control: no-cache\r\nX-Content-Type-Options: nosniff\r\nContent-Length: {}\r\n{}{}\r\n",
+                    status, find_reason(status), length, more, answer.is_last ? "Connection: close\r\n" : "");
+    return answer;
+  }
+
+  fs::path root_;
+  std::vector<std::string> hosts_;
+};
+
+/// One connection: it reads a head, sends its answer and reads the next, or ends.
+class Connection {
+ public:
+  explicit Connection(base::Descriptor socket) : socket_(std::move(socket)), until_s_(base::get_steady_s() + kHeadS) {}
+
+  int socket() const { return socket_.get(); }
+  short events() const { return state_ == State::kSending ? POLLOUT : POLLIN; }
+  bool is_sending() const { return state_ == State::kSending; }
+  double until_s() const { return until_s_; }
+
+  /// Does what its socket is ready for; whether it continues.
+  bool advance(const Folder& folder, std::vector<char>& buffer) {
+    if (state_ == State::kEnding) {
+      const ssize_t count = ::recv(socket(), buffer.data(), buffer.size(), 0);
+      return count > 0 || (count < 0 && is_early());
+    }
+    if (state_ == State::kReading) {
+      const ssize_t count = ::recv(socket(), buffer.data(), kMaxHead, 0);
+      if (count <= 0) return count < 0 && is_early();
+      taken_.append(buffer.data(), static_cast<std::size_t>(count));
+      find_request(folder);
+    }
+    return state_ != State::kSending || send(folder, buffer);
+  }
+
+ private:
+  enum class State { kReading, kSending, kEnding };
+
+  static bool is_early() { return errno == EAGAIN || errno == EINTR; }
+
+  /// Begins the answer to the request whose head is complete, or too long.
+  void find_request(const Folder& folder) {
+    const std::size_t begin = std::min(taken_.find_first_not_of("\r\n"), taken_.size());
+    std::size_t end = taken_.find("\n\r\n", begin), length = 3;
+    if (const std::size_t other = taken_.find("\n\n", begin); other < end) end = other, length = 2;
+    if (std::min(end, taken_.size()) > kMaxHead) {
+      FileRequest request;
+      request.is_reusable = false;
+      answer_ = Folder::refuse(request, 431);
+    } else if (end == std::string::npos) {
+      return;
+    } else {
+      answer_ = folder.answer(parse_request(std::string_view(taken_).substr(begin, end + 1 - begin)));
+      taken_.erase(0, end + length);
+    }
+    state_ = State::kSending;
+    until_s_ = base::get_steady_s() + kPieceS;
+  }
+
+  /// A piece of the answer.
+  bool send(const Folder& folder, std::vector<char>& buffer) {
+    const char* from = answer_.head.data() + answer_.head_sent;
+    std::size_t length = answer_.head.size() - answer_.head_sent;
+    const bool is_head = length > 0;
+    if (!is_head && answer_.left > 0) {
+      const ssize_t count =
+          ::pread(answer_.file.get(), buffer.data(), std::min<std::uint64_t>(kPiece, answer_.left), static_cast<off_t>(answer_.at));
+      if (count <= 0) return false;  // the file has become shorter
+      from = buffer.data();
+      length = static_cast<std::size_t>(count);
+    }
+    if (length > 0) {
+      const ssize_t sent = ::send(socket(), from, length, MSG_NOSIGNAL | (is_head && answer_.left > 0 ? MSG_MORE : 0));
+      if (sent < 0) return is_early();
+      until_s_ = base::get_steady_s() + kPieceS;
+      if (is_head) {
+        answer_.head_sent += static_cast<std::size_t>(sent);
+      } else {
+        answer_.at += static_cast<std::uint64_t>(sent);
+        answer_.left -= static_cast<std::uint64_t>(sent);
+      }
+    }
+    if (answer_.head_sent < answer_.head.size() || answer_.left > 0) return true;
+    const bool is_last = std::exchange(answer_, Answer()).is_last;
+    state_ = is_last ? State::kEnding : State::kReading;
+    until_s_ = base::get_steady_s() + (is_last ? kEndS : kHeadS);
+    if (is_last) return ::shutdown(socket(), SHUT_WR) == 0;
+    find_request(folder);  // the next one may have come with the last
+    return true;
+  }
+
+  base::Descriptor socket_;
+  State state_ = State::kReading;
+  std::string taken_;  // read and not yet answered
+  Answer answer_;
+  double until_s_;  // then it ends, if nothing happens
+};
+
+/// A socket that listens at the loopback address, and its port.
+std::pair<base::Descriptor, int> listen_at(int port) {
+  base::Descriptor socket(::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+  const int yes = 1;
+  ::setsockopt(socket.get(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof(yes));
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(static_cast<std::uint16_t>(port));
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof(address);
+  if (::bind(socket.get(), reinterpret_cast<const sockaddr*>(&address), size) != 0 || ::listen(socket.get(), SOMAXCONN) != 0 ||
+      ::getsockname(socket.get(), reinterpret_cast<sockaddr*>(&address), &size) != 0)
+    throw SystemError(port == 0 ? fmt::format("no port of the loopback address is free: {}", std::strerror(errno))
+                      : errno == EADDRINUSE
+                          ? fmt::format("port {} of the loopback address is taken; give another one with --port", port)
+                          : fmt::format("port {} of the loopback address: {}; give another one with --port", port, std::strerror(errno)));
+  return {std::move(socket), ntohs(address.sin_port)};
+}
+
+class Server {
+ public:
+  Server(const fs::path& folder, base::Descriptor socket, int port) : folder_(folder, port), socket_(std::move(socket)), buffer_(kPiece) {}
+
+  /// Until a signal comes; its number.
+  int run(const BlockedSignals& signals) {
+    for (std::vector<pollfd> waited;;) {
+      waited.assign({{signals.descriptor(), POLLIN, 0}, {socket_.get(), POLLIN, 0}});
+      double until_s = base::get_steady_s() + 3600.0;
+      for (const Connection& one : connections_) {
+        waited.push_back({one.socket(), one.events(), 0});
+        until_s = std::min(until_s, one.until_s());
+      }
+      const double wait_s = std::max(0.0, until_s - base::get_steady_s());
+      if (::poll(waited.data(), waited.size(), static_cast<int>(1e3 * wait_s) + 1) < 0 && errno != EINTR)
+        throw SystemError(fmt::format("the server cannot wait for requests: {}", std::strerror(errno)));
+      if (const int signal = signals.take(); signal != 0) return signal;
+      const double now_s = base::get_steady_s();
+      auto ready = waited.begin() + 2;
+      for (auto one = connections_.begin(); one != connections_.end(); ++ready) {
+        const bool stays = ready->revents != 0 ? one->advance(folder_, buffer_) : true;
+        one = stays && one->until_s() > now_s ? std::next(one) : connections_.erase(one);
+      }
+      if (waited[1].revents != 0) accept();
+    }
+  }
+
+ private:
+  /// Accepts waiting connections, at most as many as there are places, so that a flood of them cannot stop the answers.
+  void accept() {
+    for (std::size_t count = 0; count < kMaxConnections; ++count) {
+      base::Descriptor socket(::accept4(socket_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
+      const bool is_short = socket.get() < 0 && (errno == EMFILE || errno == ENFILE);
+      if (socket.get() < 0 && !is_short) return;
+      if ((is_short || connections_.size() >= kMaxConnections) && !make_room()) return;
+      if (!is_short) connections_.emplace_back(std::move(socket));
+    }
+  }
+
+  /// Ends the connection that is nearest to its end by itself, and one that is being answered only where there is no other.
+  bool make_room() {
+    const auto first = std::min_element(connections_.begin(), connections_.end(), [](const Connection& a, const Connection& b) {
+      return std::pair(a.is_sending(), a.until_s()) < std::pair(b.is_sending(), b.until_s());
+    });
+    if (first == connections_.end()) return false;
+    connections_.erase(first);
+    return true;
+  }
+
+  Folder folder_;
+  base::Descriptor socket_;
+  std::vector<char> buffer_;
+  std::list<Connection> connections_;
+};
 
 }  // namespace
 
-int serve(const std::filesystem::path& folder, int port, const std::function<void(const std::string& address)>& on_ready) {
+int serve(const fs::path& folder, int port, const std::function<void(const std::string& address)>& on_ready) {
   const BlockedSignals signals;
-  httplib::Server server;
-  server.set_socket_options([](socket_t socket) {  // not the library's SO_REUSEPORT, by which two servers would share a port
-    const int yes = 1;
-    ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof(yes));
-  });
-  server.set_default_headers({{"Cache-Control", "no-cache"}, {"X-Content-Type-Options", "nosniff"}});
-  // Of types that it knows as text the library makes brotli of the highest level, which takes seconds for a contacts file and brings
-  // nothing here: none of the large files has such a type.
-  for (const auto& [ending, type] : {std::pair{"html", "text/html; charset=utf-8"},
-                                     {"js", "application/javascript; charset=utf-8"},
-                                     {"css", "text/css; charset=utf-8"},
-                                     {"json", "application/json; charset=utf-8"},
-                                     {"jsonl", "application/x-ndjson"},
-                                     {"wasm", "application/wasm"},
-                                     {"hdf", "application/octet-stream"}})
-    server.set_file_extension_and_mimetype_mapping(ending, type);
-  if (!server.set_mount_point("/", folder.string()))
-    throw SystemError(fmt::format("{}: this folder does not exist any more", folder.string()));
-  const int bound = port == 0 ? server.bind_to_any_port("127.0.0.1") : (server.bind_to_port("127.0.0.1", port) ? port : -1);
-  if (bound <= 0)
-    throw SystemError(port == 0 ? std::string("no port of the loopback address is free")
-                                : fmt::format("port {} of the loopback address is taken; give another one with --port", port));
-  const std::string by_number = fmt::format("127.0.0.1:{}", bound), by_name = fmt::format("localhost:{}", bound);
-  server.set_pre_routing_handler([&](const httplib::Request& request, httplib::Response& response) {
-    const std::string host = request.get_header_value("Host");
-    if (host != by_number && host != by_name)
-      response.status = 421;  // misdirected request
-    else if (leaves(folder, request.path))
-      response.status = 404;
-    else
-      return httplib::Server::HandlerResponse::Unhandled;
-    return httplib::Server::HandlerResponse::Handled;
-  });
-  server.set_write_timeout(600);     // a browser that builds its picture may read nothing for long [s]
-  server.set_keep_alive_timeout(1);  // what an idle browser may delay the end by [s]
-  int signal = 0;
-  std::atomic<bool> has_ended = false;
-  std::thread waiter([&] {
-    signal = signals.wait();
-    while (!has_ended) {  // stop() does nothing before the server listens
-      server.stop();
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    }
-  });
-  on_ready(fmt::format("http://{}/", by_number));
-  server.listen_after_bind();
-  has_ended = true;
-  if (signal == 0) pthread_kill(waiter.native_handle(), SIGTERM);  // it ended by itself
-  waiter.join();
-  return signal;
+  std::error_code error;
+  if (!fs::is_directory(folder, error)) throw SystemError(fmt::format("{}: this folder does not exist any more", folder.string()));
+  auto [socket, bound] = listen_at(port);
+  Server server(folder, std::move(socket), bound);
+  on_ready(fmt::format("http://127.0.0.1:{}/", bound));
+  return server.run(signals);
 }
 
 }  // namespace carillon::explore

@@ -19,6 +19,7 @@
 #include <utility>
 
 #include "jobs/explore/explore.hpp"
+#include "jobs/explore/names.hpp"
 #include "jobs/hear/assume.hpp"
 #include "jobs/hear/strikes.hpp"
 #include "jobs/process/programs.hpp"
@@ -34,6 +35,7 @@
 #include "runtime/base/document.hpp"
 #include "runtime/base/failure.hpp"
 #include "runtime/base/file.hpp"
+#include "runtime/base/foreign.hpp"
 #include "runtime/base/json.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/base/vector.hpp"
@@ -49,6 +51,7 @@ using Clock = std::chrono::steady_clock;
 constexpr int kMaxModes = 600;                // of what is not a preview
 constexpr const char* kExplorer = "explore";  // folder of the page
 constexpr std::size_t kStrikes = 4, kListed = 12;
+constexpr long long kMaxUnused = 1'000'000'000'000;
 constexpr double kSameCents = 5.0;                       // an edit that leaves Poisson's ratio may be so far off
 constexpr double kMinCents = 0.001, kMaxCents = 1200.0;  // of a job's accuracy_cents
 constexpr std::array<double, 2> kBandHz{20.0, 20000.0};
@@ -79,7 +82,7 @@ void check_object(const fs::path& object) {
   constexpr const char* kTakes = "a surface (.obj, .stl, .ply, .off, .gltf, .glb) or a mesh (.msh, .vtu, .mesh)";
   const std::string name = object.string(), ending = base::find_extension(object);
   std::error_code error;
-  if (!fs::exists(object, error)) throw InputError(fmt::format("{}: no such file; give {}", name, kTakes));
+  if (!fs::exists(object, error)) throw InputError(fmt::format("{}: no such file{}; give {}", name, base::hint_backslash(object), kTakes));
   if (fs::is_directory(object, error)) throw InputError(fmt::format("{}: a folder; give the file of {} in it", name, kTakes));
   if (is_surface_file(object) || is_mesh_file(object)) return;
   if (ending == ".json" || ending == ".jsonl")
@@ -177,6 +180,9 @@ class Listening {
     if (order_.scale && is_shape()) throw InputError("--scale is for files; a shape has its dimensions in metres");
     if (order_.wall_m && is_mesh()) throw InputError("--wall is for surfaces; a mesh is already a volume");
     if (order_.wall_m && !(*order_.wall_m > 0.0)) throw InputError("--wall is a thickness in metres, above 0");
+    if (order_.facets && (is_shape() || is_mesh()))
+      throw InputError(fmt::format("--facets is for surfaces; {}",
+                                   is_shape() ? "a shape has no facets" : "a mesh keeps those that `carillon-mesh --facets` made"));
     for (const double height : order_.heights_m)
       if (!(height > 0.0) || !std::isfinite(height)) throw InputError("--height is in metres, above 0");
     if (order_.scale && !(*order_.scale > 0.0)) throw InputError("--scale is metres per unit of the file, above 0");
@@ -190,7 +196,7 @@ class Listening {
 
   /// Reads the file and notes what is assumed.
   void look() {
-    stem_ = clean(is_shape() ? order_.shape : order_.object.stem().string());
+    stem_ = explore::cut_name(clean(is_shape() ? order_.shape : order_.object.stem().string()));
     heard_.folder = fs::absolute(order_.out.empty() ? fs::path(stem_ + "-sound") : order_.out);
     if (order_.materials.empty()) {
       materials_ = {kDefaultMaterial};
@@ -206,9 +212,15 @@ class Listening {
     const base::Document document = base::parse_document(text, "carillon-mesh --look");
     base::Object root = document.root();
     facts_.extent = root.numbers<3>("extent");
+    facts_.parts = root.integer("parts", 0, std::numeric_limits<long long>::max());
+    if (facts_.parts > 1)
+      heard_.assumed.push_back(fmt::format(
+          "parts: {} separate bodies, which do not touch, are one object here; give one file each to hear them apart", facts_.parts));
+    if (const long long unused = root.integer_if(is_mesh() ? "unused_nodes" : "unused_points", 0, kMaxUnused).value_or(0); unused > 0)
+      heard_.assumed.push_back(fmt::format("unused: {} point{} of the file belong{} to no element and {} left out", unused,
+                                           unused == 1 ? "" : "s", unused == 1 ? "s" : "", unused == 1 ? "is" : "are"));
     if (is_mesh()) return;
     facts_.triangles = root.integer("triangles", 0, std::numeric_limits<long long>::max());
-    facts_.parts = root.integer("parts", 0, std::numeric_limits<long long>::max());
     facts_.openings = root.integer("openings", 0, std::numeric_limits<long long>::max());
     facts_.thickness = root.has_number("thickness") ? root.number("thickness") : 0.0;
     if (!order_.wall_m && facts_.openings == 0)
@@ -336,6 +348,7 @@ class Listening {
     }
     body.set("surface", fs::absolute(order_.object).string()).set("scale", find_scale_of(wish));
     if (order_.wall_m) body.set("wall_m", *order_.wall_m);
+    if (order_.facets) body.set("facets", true);
     return body;
   }
 
@@ -352,6 +365,7 @@ class Listening {
     } else {
       words = {fs::absolute(order_.object).string(), "--scale", fmt::format("{:.17g}", find_scale_of(wish))};
       if (order_.wall_m) words.insert(words.end(), {"--wall", fmt::format("{:.17g}", *order_.wall_m)});
+      if (order_.facets) words.emplace_back("--facets");
       nodes = order_.wall_m || facts_.thickness > 0.0 ? job::kPreviewWallNodes : job::kPreviewSolidNodes;
     }
     words.insert(words.end(), {"--order", "2", "-q", "-o", file.string()});
@@ -361,6 +375,8 @@ class Listening {
       all.insert(all.end(), {"--nodes", std::to_string(count)});
       (void)programs_.run("carillon-mesh", all, true);
     });
+    for (const std::string& note : programs_.get_notes())
+      if (std::find(heard_.warnings.begin(), heard_.warnings.end(), note) == heard_.warnings.end()) heard_.warnings.push_back(note);
     meshes_[wish.height_m] = file;
     return file;
   }
@@ -378,8 +394,9 @@ class Listening {
     sound.highest_hz = bank.freq_hz(bank.mode_count() - 1);
     sound.is_complete = bank.complete;
     sound.modes = list_modes(bank, strikes.front(), kListed);
-    for (HeardMode& mode : sound.modes) mode.error_cents += sound.poisson_cents;
+    for (StruckMode& mode : sound.modes) mode.error_cents += sound.poisson_cents;
     for (const double cents : bank.discretisation_error_cents) sound.worst_cents = std::max(sound.worst_cents, cents + sound.poisson_cents);
+    for (const double cents : bank.facet_error_cents) sound.facet_cents = std::max(sound.facet_cents, cents);
     const auto [low, high] = bank::find_extent(bank.vertices_m);
     const Vec3 middle = 0.5 * (low + high), extent = high - low;
     if (heard_.sounds.empty()) heard_.extent_m = {extent[0], extent[1], extent[2]};
@@ -414,7 +431,7 @@ class Listening {
   const Order& order_;
   Clock::time_point start_;
   const process::SignalWatch watch_;
-  const process::Programs programs_;
+  process::Programs programs_;
   std::string stem_;
   SurfaceFacts facts_;
   std::vector<std::string> materials_;

@@ -10,6 +10,6 @@
 namespace carillon::hear {
 
 /// The first `count` modes as a blow at a vertex makes them.
-std::vector<HeardMode> list_modes(const bank::Bank& bank, std::size_t vertex, std::size_t count);
+std::vector<StruckMode> list_modes(const bank::Bank& bank, std::size_t vertex, std::size_t count);
 
 }  // namespace carillon::hear

@@ -77,6 +77,15 @@ FailureCause classify_code(const Ending& ending) {
           0.0};
 }
 
+/// What to do about a limit that the user gave.
+std::string describe_limit(double need_gb, double limit_gb) {
+  return fmt::format(
+      "\"memory_gb\" of the job is {:g}, and it needs at least {:.2g}: carillon validate predicts how much, and \"resources\" of the job, "
+      "or "
+      "carillon retry --memory-gb, give it more",
+      limit_gb, need_gb);
+}
+
 }  // namespace
 
 FailureCause classify(const Ending& ending) {
@@ -84,6 +93,11 @@ FailureCause classify(const Ending& ending) {
   const bool has_error = is_error(ending.result);
   if (code == 0) return {Cause::done, "", 0.0};
   // What this attempt did explains whatever code follows from it; an error that the solver names does not come from a signal.
+  if (!has_error && ending.held_gb > 0.0)
+    return {Cause::memory_limit,
+            fmt::format("it held {:.2f} GB of memory and was ended; {}", ending.held_gb,
+                        describe_limit(ending.held_gb, ending.memory_limit_gb)),
+            ending.held_gb};
   if (!has_error && ending.was_hung)
     return {Cause::hung, fmt::format("hung: no progress and no work for {:.0f} s, and was killed", ending.hang_s), 0.0};
   if (!has_error && ending.was_out_of_time) {
@@ -97,6 +111,9 @@ FailureCause classify(const Ending& ending) {
   const FailureCause cause =
       has_error ? FailureCause{find_cause(ending.result->kind), make_sentence(ending.result->message), 1e-9 * ending.result->need_bytes}
                 : classify_code(ending);
+  if (cause.cause == Cause::memory && ending.memory_limit_gb > 0.0 && cause.memory_need_gb > ending.memory_limit_gb)
+    return {Cause::memory_limit, fmt::format("{}; {}", cause.reason, describe_limit(cause.memory_need_gb, ending.memory_limit_gb)),
+            cause.memory_need_gb};
   const bool explains_itself = cause.cause == Cause::disk_full || cause.cause == Cause::memory || cause.cause == Cause::no_solution;
   if (ending.is_disk_full && !explains_itself) return {Cause::disk_full, fmt::format("the disk or quota is full ({})", cause.reason), 0.0};
   return cause;

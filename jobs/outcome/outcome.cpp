@@ -15,10 +15,11 @@
 namespace carillon::outcome {
 namespace {
 
-constexpr std::array<std::pair<Cause, const char*>, 16> kWords{{{Cause::done, "done"},
+constexpr std::array<std::pair<Cause, const char*>, 17> kWords{{{Cause::done, "done"},
                                                                 {Cause::bad_input, "bad-input"},
                                                                 {Cause::no_solution, "no-solution"},
                                                                 {Cause::memory, "memory"},
+                                                                {Cause::memory_limit, "memory-limit"},
                                                                 {Cause::disk_full, "disk-full"},
                                                                 {Cause::system, "system"},
                                                                 {Cause::checkpointed, "checkpointed"},

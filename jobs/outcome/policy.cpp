@@ -23,6 +23,7 @@ RetryDecision decide(Cause cause, int failures, bool is_further) {
     case Cause::bad_input:
     case Cause::no_solution:
     case Cause::no_program:
+    case Cause::memory_limit:
       return {Next::failed, 0.0, failures};
     case Cause::stopped:
     case Cause::checkpointed:

@@ -21,6 +21,8 @@ struct Ending {
   std::optional<base::Result> result = {};  // what it left itself; none: a signal ended it, or it could not begin
   std::string dead_rank = {};               // whom mpirun names: "rank 1 on node3"; for people, it decides nothing
   bool has_saved = false;                   // its checkpoint is newer than before
+  double memory_limit_gb = 0.0;             // the job's "memory_gb"; 0: none
+  double held_gb = 0.0;                     // what it held when it was killed for more than the limit; 0: it was not
 };
 
 struct FailureCause {

@@ -2,19 +2,21 @@
 
 #include <fmt/core.h>
 #include <signal.h>
-#include <stdlib.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
 #include <optional>
+#include <sstream>
 #include <string_view>
 
 #include "jobs/process/process.hpp"
 #include "runtime/base/command.hpp"
+#include "runtime/base/environment.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/result.hpp"
 
@@ -36,12 +38,26 @@ std::string find_message(const std::string& errors, const std::string& program) 
   return message.starts_with("error: ") ? message.substr(7) : message;
 }
 
+/// "carillon-mesh: note: 1 hole was closed", "carillon: warning: ...": the sentences.
+std::vector<std::string> find_notes(const std::string& errors) {
+  std::vector<std::string> notes;
+  std::istringstream lines(errors);
+  for (std::string line; std::getline(lines, line);) {
+    const std::size_t word = line.find(": ");
+    if (!line.starts_with("carillon") || word == std::string::npos) continue;
+    for (const std::string_view kind : {": note: ", ": warning: "}) {
+      if (line.compare(word, kind.size(), kind) != 0) continue;
+      std::string note = line.substr(word + kind.size());
+      if (std::find(notes.begin(), notes.end(), note) == notes.end()) notes.push_back(std::move(note));
+    }
+  }
+  return notes;
+}
+
 constexpr double kDaemonGraceS = 10.0;  // Open MPI's daemon removes its session folder in some 0.05 s where nothing else runs
 constexpr double kEndPatienceS = 5.0;
 /// In the environment of what programs are started with, and so of all that these start.
 constexpr std::string_view kMark = "CARILLON_PROGRAMS=";
-/// Where Open MPI has its session folder: in ours, so that nothing stays when its daemon is killed.
-constexpr const char* kSessions = "OMPI_MCA_orte_tmpdir_base";
 
 /// What an exit code says without a result.
 base::ResultKind find_kind(int exit_code) {
@@ -74,34 +90,22 @@ SignalWatch::~SignalWatch() {
 
 int SignalWatch::get_signal() { return noted_signal; }
 
-Programs::Programs(bool is_quiet) : is_quiet_(is_quiet) {
-  std::error_code error;
-  std::string name = (std::filesystem::temp_directory_path(error) / "carillon-XXXXXX").string();
-  if (error || ::mkdtemp(name.data()) == nullptr)
-    throw SystemError(fmt::format("{}: no temporary folder can be made: {}; make room there, or name another by TMPDIR", name,
-                                  error ? error.message() : std::strerror(errno)));
-  folder_ = name;
-}
+Programs::Programs(bool is_quiet) : folder_("carillon-"), is_quiet_(is_quiet) {}
 
-Programs::~Programs() {
-  std::error_code error;
-  std::filesystem::remove_all(folder_, error);
-}
-
-std::string Programs::run(const std::string& program, std::vector<std::string> words, bool has_result, bool shows) const {
-  const std::filesystem::path result_file = folder_ / "result.json";
+std::string Programs::run(const std::string& program, std::vector<std::string> words, bool has_result, bool shows) {
+  const std::filesystem::path result_file = folder_.path() / "result.json";
   std::error_code error;
   std::filesystem::remove(result_file, error);
   base::Command command;
   command.words = {base::require_program(program).string()};
   command.words.insert(command.words.end(), words.begin(), words.end());
   if (has_result) command.words.insert(command.words.end(), {"--result", result_file.string()});
-  command.folder = folder_;
-  const std::string mark = std::string(kMark) + folder_.string();
-  command.environment.emplace({mark});
-  if (std::getenv(kSessions) == nullptr) command.environment->push_back(fmt::format("{}={}", kSessions, folder_.string()));
-  for (char** entry = environ; *entry != nullptr; ++entry)
-    if (!std::string_view(*entry).starts_with(kMark)) command.environment->emplace_back(*entry);
+  command.folder = folder_.path();
+  const std::string mark = std::string(kMark) + folder_.path().string();
+  command.environment = base::make_lone_environment();
+  std::erase_if(*command.environment, [](const std::string& entry) { return entry.starts_with(kMark); });
+  command.environment->push_back(mark);
+  command.signal_at_end = SIGTERM;  // it removes what it has in temporary folders
   command.output = shows && !is_quiet_ ? STDERR_FILENO : base::kCapture;
   command.errors = base::kCapture;
   const base::Finished finished = base::run(command, {.may_stop = [](const base::Finished&) { return SignalWatch::get_signal() != 0; }});
@@ -110,6 +114,7 @@ std::string Programs::run(const std::string& program, std::vector<std::string> w
     end_with_environment(mark, kEndPatienceS, kDaemonGraceS);
     throw SystemError(fmt::format("ended by signal {}", SignalWatch::get_signal()));
   }
+  notes_ = find_notes(finished.errors);
   if (finished.exit_code == 0) return finished.output;
   const std::optional<base::Result> said = has_result ? base::read_result(result_file) : std::nullopt;
   base::Result result = said.value_or(base::Result{.kind = find_kind(finished.exit_code)});

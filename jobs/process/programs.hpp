@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "runtime/base/temporary.hpp"
+
 namespace carillon::process {
 
 /// While it lives, the signals that ask a program to end (SIGINT, SIGTERM, SIGHUP) are noted. When it goes, a signal that came does what it
@@ -25,17 +27,17 @@ class Programs {
  public:
   /// is_quiet: their progress is not shown. Throws SystemError where no folder can be made.
   explicit Programs(bool is_quiet);
-  ~Programs();
-  Programs(const Programs&) = delete;
-  Programs& operator=(const Programs&) = delete;
 
   /// The standard output of a program of this installation. Files among the words are absolute. `has_result`: it takes --result. `shows`:
   /// its progress goes to standard error. It is killed once SignalWatch has a signal, and gone with all that it started when this returns.
   /// Throws InputError, SolveError, SystemError.
-  std::string run(const std::string& program, std::vector<std::string> words, bool has_result, bool shows = false) const;
+  std::string run(const std::string& program, std::vector<std::string> words, bool has_result, bool shows = false);
+  /// The notes and warnings of the program that ran last, and of those that it started: a sentence each.
+  const std::vector<std::string>& get_notes() const { return notes_; }
 
  private:
-  std::filesystem::path folder_;
+  base::TemporaryFolder folder_;
+  std::vector<std::string> notes_;
   bool is_quiet_;
 };
 

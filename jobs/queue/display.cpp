@@ -51,11 +51,13 @@ std::string cut(const std::string& text, int columns) {
 }  // namespace
 
 Display::Display(bool json, bool quiet, ReadProgress read_progress)
-    : read_progress_(std::move(read_progress)), json_(json), quiet_(quiet), is_terminal_(::isatty(STDOUT_FILENO) == 1 && !json) {
-  if (!is_terminal_) json_ = true;
-}
+    : read_progress_(std::move(read_progress)), json_(json), quiet_(quiet), is_terminal_(::isatty(STDOUT_FILENO) == 1 && !json) {}
 
-Display::~Display() { clear(); }
+Display::~Display() {
+  clear();
+  if (has_repeated_)
+    for (const std::string& line : kinds_.list()) print(clean("warning " + line));
+}
 
 void Display::clear() {
   if (has_bar_) std::fputs("\r\033[K", stdout);
@@ -87,7 +89,12 @@ void Display::print_event(const std::string& event, const registry::Job& job) {
   const bool is_in_bar = (event == "start" && job.reason.empty()) || event == "predict";
   if (is_in_bar) return;
   print(fmt::format("{} {}: {}{}{}", job.id.short_text(), clean(job.name), event, job.reason.empty() ? "" : ": ", clean(job.reason)));
-  for (const std::string& warning : warnings) print("  warning: " + clean(warning));
+  for (const std::string& warning : warnings) {
+    if (kinds_.add(job.name, warning))
+      print("  warning: " + clean(warning));
+    else
+      has_repeated_ = true;
+  }
 }
 
 void Display::print_note(const std::string& text) {
@@ -120,7 +127,7 @@ void Display::show(const std::vector<registry::Job>& jobs) {
                           clean(progress->phase), format_left(progress->seconds_left));
     }
   }
-  if (json_) return;
+  if (!is_terminal_) return;
   const std::string line = fmt::format("{} ended, {} running, {} queued{}", ended_, running, queued, first);
   fmt::print("\r\033[K{}", cut(line, find_columns() - 1));
   has_bar_ = true;

@@ -1,4 +1,4 @@
-// What `carillon run` shows: a bar on a terminal, JSON lines elsewhere.
+// What `carillon run` shows: lines for people, on a terminal with a bar; JSON lines where they are asked for.
 #pragma once
 
 #include <functional>
@@ -8,11 +8,12 @@
 #include <vector>
 
 #include "jobs/registry/job_table.hpp"
+#include "jobs/store/warning_kinds.hpp"
 
 namespace carillon::queue {
 
 /// Writes to the standard output alone, whole lines at a time. On a terminal the last line may be the bar; it is cleared before any other
-/// line, and at the end.
+/// line, and at the end. A warning for people is shown with the first job that has one of its kind, and counted at the end.
 class Display {
  public:
   using ReadProgress = std::function<std::optional<store::Progress>(const store::Id&)>;
@@ -39,6 +40,8 @@ class Display {
   FindWarnings find_warnings_;
   bool json_ = false, quiet_ = false, is_terminal_ = false;
   bool has_bar_ = false;
+  store::WarningKinds kinds_;
+  bool has_repeated_ = false;  // a warning of a kind that was shown before: all kinds are counted at the end
   std::map<std::string, double> shown_percent_;
   std::size_t ended_ = 0;
 };

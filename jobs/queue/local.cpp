@@ -52,6 +52,7 @@ pid_t LocalLauncher::start(const registry::Job& job, const StartOptions& options
   attempt.work = store_.work_folder(job.id);
   attempt.ranks = job.given.ranks;
   attempt.memory_gb = job.given.memory_gb;
+  attempt.memory_limit_gb = job.resources.memory_gb;
   attempt.time_limit_s = options.time_limit_s;
   attempt.token = job.token;
   attempt.is_prediction = options.is_prediction;

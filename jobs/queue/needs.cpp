@@ -11,6 +11,7 @@
 
 #include "jobs/attempt/attempt.hpp"
 #include "jobs/outcome/outcome.hpp"
+#include "jobs/outcome/policy.hpp"
 #include "precompute/cost/calibration.hpp"
 #include "precompute/cost/memory.hpp"
 #include "precompute/cost/seconds.hpp"
@@ -85,6 +86,13 @@ bool read_prediction(const fs::path& folder, Need& need) {
   }
 }
 
+/// More than the last attempt was given, where that ran out of memory; else 0.
+double find_least_gb(const fs::path& folder, const registry::Job& job) {
+  const std::optional<outcome::Outcome> before = outcome::read_outcome(folder);
+  if (!before || before->cause != outcome::Cause::memory) return 0.0;
+  return std::max(job.given.memory_gb, outcome::calc_next_memory(before->memory_need_gb, before->peak_memory_gb));
+}
+
 }  // namespace
 
 Need guess_need(const cost::ProblemSize& size) {
@@ -111,6 +119,7 @@ JobNeeds find_needs(const store::Store& store, const registry::Job& job) {
   const bool has_prediction = read_prediction(folder, needs.need);
   needs.wants_prediction = !has_prediction && job.resources.memory_gb <= 0.0 &&
                            (!size.is_known || static_cast<double>(cost::complete(size.problem).nodes) > kLargeNodes);
+  needs.need.min_gb = find_least_gb(folder, job);
   set_asked(needs, job);
   // Its checkpoint is of so many ranks.
   std::error_code error;

@@ -2,6 +2,7 @@
 
 #include <signal.h>
 
+#include <algorithm>
 #include <optional>
 
 #include "jobs/attempt/attempt.hpp"
@@ -41,7 +42,8 @@ int run(const store::Store& store, const RunOptions& options) {
   block_signals();
   const auto find_job_needs = [&](const Job& job) {
     JobNeeds needs = find_needs(store, job);
-    if (options.attempt.has_pictures && base::find_host().total_gb > kDrawingHosts * attempt::kDrawGb) needs.need.min_gb = attempt::kDrawGb;
+    if (options.attempt.has_pictures && base::find_host().total_gb > kDrawingHosts * attempt::kDrawGb)
+      needs.need.min_gb = std::max(needs.need.min_gb, attempt::kDrawGb);
     return needs;
   };
   LocalEnvironment local(store, options.attempt);

@@ -80,8 +80,6 @@ void apply(Job& job, const outcome::Outcome& outcome, const Clock& clock) {
   if (outcome.cause == outcome::Cause::done) return end(job, JobState::done, "");
   const outcome::RetryDecision decision = outcome::decide(outcome.cause, job.failures, outcome.is_further);
   job.failures = decision.failures;
-  if (outcome.cause == outcome::Cause::memory)
-    job.resources.memory_gb = std::max(job.given.memory_gb, outcome::calc_next_memory(outcome.memory_need_gb, outcome.peak_memory_gb));
   if (job.cancel_wanted) return end(job, JobState::cancelled, "cancelled while it ran; what it had saved is kept for a retry");
   if (decision.next == outcome::Next::failed) {
     const bool has_tried = decision.failures > outcome::kMaxRetries;
@@ -210,7 +208,7 @@ CommandResult requeue(registry::JobTable& table, const store::Id& id, bool has_w
 CommandResult retry(const store::Store& store, registry::Registry& registry, const store::Id& id, const std::function<void(Job&)>& change) {
   const std::optional<Job> known = registry.find(id);
   if (!known) return {false, "there is no such job"};
-  if (known->state == JobState::done && !store.find_bank_fault(id, store::Look::full))
+  if (known->state == JobState::done && !store.find_bank_fault(id, store::Look::content))
     return {false, "it is done; there is nothing to do again"};
   // A job that a process works on is not changed.
   if (known->state == JobState::done || known->state == JobState::failed || known->state == JobState::cancelled) {

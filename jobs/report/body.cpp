@@ -47,6 +47,7 @@ Html make_tiles(const Subject& subject) {
 std::string describe_bars(const bank::Bank& bank) {
   const auto find_worst = [](const std::vector<double>& bars) { return *std::max_element(bars.begin(), bars.end()); };
   if (bank.mode_count() == 0) return "There are no frequencies that could be wrong";
+  if (bank.element == "imported") return "The accuracy is " + bank::describe_accuracy(bank);
   if (bank.element == "analytic") {
     std::string text = bank::describe_accuracy(bank);
     text[0] = 'F';
@@ -59,9 +60,10 @@ std::string describe_bars(const bank::Bank& bank) {
   const std::vector<double>& bars = is_corrected ? bank.corrected.error_cents : bank.discretisation_error_cents;
   if (bars.empty()) return text + ", and no estimates against the body";
   if (const double worst = find_worst(bars); std::isfinite(worst))
-    return text +
-           fmt::format(", and {}those of the body to about {} (an estimate)", is_corrected ? "corrected ones " : "", format_cents(worst));
-  return text + ", and not all of them have an estimate against the body";
+    text += fmt::format(", and {}those of the body to about {} (an estimate)", is_corrected ? "corrected ones " : "", format_cents(worst));
+  else
+    text += ", and not all of them have an estimate against the body";
+  return bank.facet_error_cents.empty() ? text : text + "; " + bank::describe_facets(bank);
 }
 
 Html make_warnings(const Subject& subject) {
@@ -76,7 +78,8 @@ std::vector<Bar> make_size_bars(const Subject& subject) {
   const auto modes = static_cast<double>(bank.mode_count()), vertices = static_cast<double>(bank.vertex_count());
   const double shapes = 2.0 * static_cast<double>(bank.shape.size());
   const double surface = 24.0 * vertices + 12.0 * static_cast<double>(bank.triangles.size());
-  const double bars = 8.0 * static_cast<double>(bank.algebraic_error_cents.size() + bank.discretisation_error_cents.size());
+  const double bars =
+      8.0 * static_cast<double>(bank.algebraic_error_cents.size() + bank.discretisation_error_cents.size() + bank.facet_error_cents.size());
   const double numbers = 8.0 * 6.0 * modes + bars;
   const double record = static_cast<double>(bank.provenance.size() + bank.regions.size());
   const double rest = std::max(0.0, subject.file_bytes - shapes - surface - numbers - record);
@@ -111,7 +114,9 @@ Html make_head(const Subject& subject, std::string_view title) {
   const bank::Bank& bank = subject.bank;
   Html out = html("<header>\n<h1>{}</h1>\n<p class=\"remark\">{}, bank of version {}.{}; {}</p>\n", title, subject.file.filename().string(),
                   subject.version[0], subject.version[1],
-                  bank.element == "analytic" ? "known modes" : fmt::format("{} elements, {} mass", bank.element, bank.mass));
+                  bank.element == "analytic"   ? "known modes"
+                  : bank.element == "imported" ? "modes imported from another program"
+                                               : fmt::format("{} elements, {} mass", bank.element, bank.mass));
   const auto faults =
       std::count_if(subject.checks.begin(), subject.checks.end(), [](const bank::Check& one) { return !one.faults.empty(); });
   if (faults > 0) {

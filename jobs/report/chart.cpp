@@ -159,7 +159,7 @@ Html draw_bars(std::string_view title, const std::vector<Bar>& bars) {
   double max = 0.0;
   for (const Bar& bar : bars) max = std::max(max, bar.value);
   const double height = kRow * static_cast<double>(bars.size()) + 4.0;
-  Html out = html("<svg viewBox=\"0 0 {:.0f} {:.0f}\" role=\"img\" aria-label=\"{}\">\n", kWidth, height, title);
+  Html out = html("<div class=\"chart\"><svg viewBox=\"0 0 {:.0f} {:.0f}\" role=\"img\" aria-label=\"{}\">\n", kWidth, height, title);
   for (std::size_t i = 0; i < bars.size(); ++i) {
     const double top = kRow * static_cast<double>(i) + 2.0;
     const double width = max > 0.0 ? (kWidth - kLabel - kText) * (bars[i].value / max) : 0.0;
@@ -168,7 +168,7 @@ Html draw_bars(std::string_view title, const std::vector<Bar>& bars) {
                 std::max(width, 1.0));
     out += html("<text class=\"value\" x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n", kLabel + width + 8.0, top + 17.0, bars[i].text);
   }
-  return out += html("</svg>\n");
+  return out += html("</svg></div>\n");
 }
 
 Html draw_scatter(const Scatter& chart) {
@@ -194,7 +194,8 @@ Html draw_scatter(const Scatter& chart) {
   for (const Line& line : chart.lines) up.take(chart.y, line.y);
   const Frame frame;
   const Scale x(chart.x, across.low, across.high, frame.left, frame.right), y(chart.y, up.low, up.high, frame.bottom, frame.top);
-  Html out = html("<svg viewBox=\"0 0 {:.0f} {:.0f}\" role=\"img\" aria-label=\"{}\">\n", kWidth, frame.bottom + 40.0, chart.title);
+  Html out = html("<div class=\"chart\"><svg viewBox=\"0 0 {:.0f} {:.0f}\" role=\"img\" aria-label=\"{}\">\n", kWidth, frame.bottom + 40.0,
+                  chart.title);
   out += draw_axes(frame, chart, x, y);
   for (const Line& line : chart.lines) {
     if (!is_on(chart.y, line.y)) continue;
@@ -203,7 +204,7 @@ Html draw_scatter(const Scatter& chart) {
                 line.label);
   }
   for (std::size_t i = 0; i < placed.size(); ++i) out += draw_series(frame, chart.series[i], placed[i], x, y);
-  out += html("</svg>\n");
+  out += html("</svg></div>\n");
   out += draw_legend(chart.series);
   if (lost > 0) out += html("<p class=\"remark\">{} without a place on these axes.</p>\n", lost);
   return out;

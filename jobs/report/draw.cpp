@@ -2,17 +2,15 @@
 #include "jobs/report/draw.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <array>
-#include <cerrno>
-#include <cstring>
 #include <fstream>
 #include <optional>
 #include <vector>
 
 #include "runtime/base/command.hpp"
 #include "runtime/base/result.hpp"
+#include "runtime/base/temporary.hpp"
 
 namespace carillon::report {
 namespace {
@@ -56,16 +54,19 @@ Drawing draw_modes(const fs::path& given, const fs::path& bank, int modes, const
   const std::optional<fs::path> program = given.empty() ? base::find_program("carillon-draw") : std::optional(fs::absolute(given, error));
   if (!program || !base::is_program(*program)) return {"carillon-draw is not installed here"};
   // In a folder of its own, which is removed with its content, however the program ends.
-  std::string place = (fs::absolute(picture, error).parent_path() / ".drawing-XXXXXX").string();
-  if (::mkdtemp(place.data()) == nullptr) return {fmt::format("there is no place to draw: {}", std::strerror(errno))};
-  const fs::path drawn = fs::path(place) / picture.filename();
+  std::optional<base::TemporaryFolder> place;
+  try {
+    place.emplace(fs::absolute(picture, error).parent_path(), ".drawing-");
+  } catch (const SystemError& failure) {
+    return {fmt::format("there is no place to draw: {}", failure.what())};
+  }
+  const fs::path drawn = place->path() / picture.filename();
   Drawing drawing{run(*program, fs::absolute(bank, error), modes, drawn, limit_s)};
   if (drawing.fault.empty() && !is_whole_png(drawn)) drawing.fault = "carillon-draw left no picture";
   if (drawing.fault.empty()) {
     fs::rename(drawn, picture, error);
     if (error) drawing.fault = fmt::format("the picture cannot be kept: {}", error.message());
   }
-  fs::remove_all(place, error);
   return drawing;
 }
 

@@ -7,6 +7,7 @@
 #include "jobs/report/chart.hpp"
 #include "jobs/report/quantity.hpp"
 #include "jobs/report/sections.hpp"
+#include "runtime/bank/kinds.hpp"
 
 namespace carillon::report {
 namespace {
@@ -14,11 +15,11 @@ namespace {
 constexpr std::size_t kMaxModeRows = 1000;
 constexpr double kResidualLimit = 1e-4;  // of a sane bank
 
-double calc_t60_s(const bank::Bank& bank, std::size_t mode) { return std::log(1000.0) / bank.decay_per_s[mode]; }
-
-/// Both error bars of a mode together [cent]; 0 where none is known.
+/// The error bars of a mode's frequency as it is heard, together [cent]; 0 where none is known.
 double calc_cents(const bank::Bank& bank, std::size_t mode) {
   double cents = 0.0;
+  if (mode < bank.corrected.error_cents.size())
+    return std::isfinite(bank.corrected.error_cents[mode]) ? bank.corrected.error_cents[mode] : 0.0;
   for (const std::vector<double>* bars : {&bank.algebraic_error_cents, &bank.discretisation_error_cents})
     if (mode < bars->size() && std::isfinite((*bars)[mode])) cents += (*bars)[mode];
   return cents;
@@ -30,29 +31,30 @@ Html make_cents(const std::vector<double>& cents, std::size_t mode) {
   return mode < cents.size() && std::isfinite(cents[mode]) ? html("{:.2g}", cents[mode]) : html("-");
 }
 
-std::string name_mode(const bank::Bank& bank, std::size_t mode) {
-  return fmt::format("mode {}, {}", mode + 1, format_hz(bank.freq_hz(mode)));
+std::string name_mode(const Subject& subject, std::size_t mode) {
+  return fmt::format("mode {}, {}", mode + 1, format_hz(subject.heard[mode].freq_hz));
 }
 
 Axis make_frequency_axis() { return {.label = "frequency [Hz]", .is_log = true}; }
 
 /// Sticks over the frequency as high as the mode rings long; where not all decay, as high as their number.
-Html draw_mode_chart(const bank::Bank& bank) {
+Html draw_mode_chart(const Subject& subject) {
+  const bank::Bank& bank = subject.bank;
   bool rings_out = true;
-  for (std::size_t i = 0; i < bank.mode_count(); ++i)
-    rings_out = rings_out && bank.decay_per_s[i] > 0.0 && std::isfinite(bank.decay_per_s[i]);
+  for (const bank::HeardMode& mode : subject.heard)
+    rings_out = rings_out && mode.calc_decay_per_s() > 0.0 && std::isfinite(mode.calc_decay_per_s());
   Scatter chart{.title = "Modes by frequency",
                 .x = make_frequency_axis(),
                 .y = {.label = rings_out ? "falls by 60 dB in [s]" : "number of the mode", .is_log = rings_out},
                 .series = {{.name = "modes", .colour = 0, .marks = {}, .is_stick = true}},
                 .lines = {}};
   for (std::size_t i = 0; i < bank.mode_count(); ++i) {
-    const double freq = bank.freq_hz(i), cents = calc_cents(bank, i), width = std::exp2(std::min(cents, 12000.0) / 1200.0);
-    std::string title = name_mode(bank, i);
+    const double freq = subject.heard[i].freq_hz, cents = calc_cents(bank, i), width = std::exp2(std::min(cents, 12000.0) / 1200.0);
+    std::string title = name_mode(subject, i);
     if (cents > 0.0) title += fmt::format(" \u00b1 {}", format_cents(cents));
-    if (rings_out) title += fmt::format(", T60 {:.3g} s", calc_t60_s(bank, i));
+    if (rings_out) title += fmt::format(", T60 {:.3g} s", subject.heard[i].calc_t60_s());
     chart.series[0].marks.push_back({.x = freq,
-                                     .y = rings_out ? calc_t60_s(bank, i) : static_cast<double>(i + 1),
+                                     .y = rings_out ? subject.heard[i].calc_t60_s() : static_cast<double>(i + 1),
                                      .x_low = cents > 0.0 ? freq / width : 0.0,
                                      .x_high = cents > 0.0 ? freq * width : 0.0,
                                      .title = std::move(title)});
@@ -61,54 +63,68 @@ Html draw_mode_chart(const bank::Bank& bank) {
 }
 
 /// A number of each mode, not negative, over the frequency.
-Series make_series(const bank::Bank& bank, const char* name, int colour, const std::vector<double>& values, std::string (*format)(double)) {
+Series make_series(const Subject& subject, const char* name, int colour, const std::vector<double>& values, std::string (*format)(double)) {
   Series series{.name = name, .colour = colour, .marks = {}};
-  for (std::size_t i = 0; i < std::min(values.size(), bank.mode_count()); ++i) {
+  for (std::size_t i = 0; i < std::min(values.size(), subject.heard.size()); ++i) {
     series.marks.push_back(
-        {.x = bank.freq_hz(i), .y = values[i], .title = fmt::format("{}: {} {}", name_mode(bank, i), name, format(values[i]))});
+        {.x = subject.heard[i].freq_hz, .y = values[i], .title = fmt::format("{}: {} {}", name_mode(subject, i), name, format(values[i]))});
   }
   return series;
 }
 
-Html make_mode_table(const bank::Bank& bank) {
-  Table table({{"mode", true},
-               {"frequency of the mesh [Hz]", true},
-               {"\u00b1 mesh [cent]", true},
-               {"\u00b1 body [cent]", true},
-               {"corrected [Hz]", true},
-               {"\u00b1 body [cent]", true},
-               {"correction"},
-               {"decay [1/s]", true},
-               {"T60 [s]", true},
-               {"residual", true},
-               {"gain", true}});
+Html make_mode_table(const Subject& subject) {
+  const bank::Bank& bank = subject.bank;
+  std::vector<Column> columns{{"mode", true},
+                              {"frequency of the mesh [Hz]", true},
+                              {"\u00b1 mesh [cent]", true},
+                              {"\u00b1 body [cent]", true},
+                              {"heard [Hz]", true},
+                              {"\u00b1 body [cent]", true},
+                              {"correction"},
+                              {"decay [1/s]", true},
+                              {"of material", true},
+                              {"of radiation", true},
+                              {"of supports", true},
+                              {"T60 [s]", true},
+                              {"residual", true},
+                              {"gain", true},
+                              {"kind"}};
+  if (!bank.facet_error_cents.empty()) columns.push_back({"facets in doubt [cent]", true});
+  Table table(columns);
+  const std::vector<bank::ModeKind> kinds = bank::find_kinds(bank);
   const std::size_t shown = std::min(kMaxModeRows, bank.mode_count());
   const bool is_corrected = !bank.corrected.is_empty();
   for (std::size_t i = 0; i < shown; ++i) {
+    const bank::HeardMode& heard = subject.heard[i];
     table.add({html("{}", i + 1), html("{:.2f}", bank.freq_hz(i)), make_cents(bank.algebraic_error_cents, i),
-               make_cents(bank.discretisation_error_cents, i), is_corrected ? html("{:.2f}", bank.corrected.freq_hz[i]) : html("-"),
-               make_cents(bank.corrected.error_cents, i), html("{}", is_corrected ? bank::describe(bank.corrected.correction[i]) : "-"),
-               html("{:.4g}", bank.decay_per_s[i]), html("{:.3g}", calc_t60_s(bank, i)), html("{:.1e}", bank.residual[i]),
-               html("{:.4g}", bank.radiation_gain[i])});
+               make_cents(bank.discretisation_error_cents, i), html("{:.2f}", heard.freq_hz), make_cents(bank.corrected.error_cents, i),
+               html("{}", is_corrected ? bank::describe(bank.corrected.correction[i]) : "-"), html("{:.4g}", heard.calc_decay_per_s()),
+               html("{:.4g}", heard.material_per_s), bank.multipoles.is_empty() ? html("-") : html("{:.4g}", heard.radiation_per_s),
+               bank.supports.count() == 0 ? html("-") : html("{:.4g}", heard.supports_per_s), html("{:.3g}", heard.calc_t60_s()),
+               html("{:.1e}", bank.residual[i]), html("{:.4g}", bank.radiation_gain[i]), html("{}", bank::describe(kinds[i])),
+               make_cents(bank.facet_error_cents, i)});
   }
   Html out = table.finish();
   if (shown < bank.mode_count())
     out += html("<p class=\"remark\">The first {} of {} modes; carillon-bank info --json has them all.</p>\n", shown, bank.mode_count());
   return html(
       "<details><summary>All modes in numbers</summary>\n{}<p class=\"remark\">Frequencies are undamped. \u00b1 mesh: to the exact mode of "
-      "the mesh, a bound; \u00b1 body: to the mode of the body, an estimate; corrected: with the estimated error of the mesh taken off, "
-      "which is played; gain: Pa at 1 m for unit modal velocity.</p>\n</details>\n",
+      "the mesh, a bound; \u00b1 body: to the mode of the body, an estimate; heard: what is played, with the estimated error of the "
+      "mesh taken off, in air and on its supports as far as the bank knows them; decay and T60: what is heard, with its parts; gain: Pa at "
+      "1 m for unit modal velocity; kind: how the body moves, where its shape says so; facets in doubt: what comes to \u00b1 body if the "
+      "facets are not what they were taken for.</p>\n</details>\n",
       out);
 }
 
-Html find_largest(const std::vector<double>& values, const bank::Bank& bank, std::string (*format)(double)) {
+Html find_largest(const std::vector<double>& values, const Subject& subject, std::string (*format)(double)) {
   const auto worst = std::max_element(values.begin(), values.end());
   if (worst == values.end()) return {};
-  return html("{} at {}", format(*worst), name_mode(bank, static_cast<std::size_t>(worst - values.begin())));
+  return html("{} at {}", format(*worst), name_mode(subject, static_cast<std::size_t>(worst - values.begin())));
 }
 
 /// Both error bars over the frequency; bounds that are negligible against the estimates only in words.
-Html draw_errors(const bank::Bank& bank) {
+Html draw_errors(const Subject& subject) {
+  const bank::Bank& bank = subject.bank;
   constexpr double kNothing = 1e-3;
   const auto find_worst = [](const std::vector<double>& bars) {
     double worst = 0.0;
@@ -122,10 +138,10 @@ Html draw_errors(const bank::Bank& bank) {
                 .y = {.label = "error bar [cent]", .is_log = true},
                 .series = {},
                 .lines = {}};
-  if (body > 0.0) chart.series.push_back(make_series(bank, "body (estimate)", 0, bank.discretisation_error_cents, format_cents));
+  if (body > 0.0) chart.series.push_back(make_series(subject, "body (estimate)", 0, bank.discretisation_error_cents, format_cents));
   if (find_worst(bank.corrected.error_cents) > 0.0)
-    chart.series.push_back(make_series(bank, "body, corrected", 2, bank.corrected.error_cents, format_cents));
-  if (mesh > kNothing * body) chart.series.push_back(make_series(bank, "mesh (bound)", 1, bank.algebraic_error_cents, format_cents));
+    chart.series.push_back(make_series(subject, "body, corrected", 2, bank.corrected.error_cents, format_cents));
+  if (mesh > kNothing * body) chart.series.push_back(make_series(subject, "mesh (bound)", 1, bank.algebraic_error_cents, format_cents));
   Html out = draw_scatter(chart);
   if (body > 0.0 && mesh > 0.0 && mesh <= kNothing * body)
     out += html("<p class=\"remark\">Estimates against the body; the bounds of the mesh are negligible against them.</p>\n");
@@ -154,14 +170,15 @@ Html make_cut_table(const bank::Bank& bank) {
 Html make_modes_section(const Subject& subject) {
   const bank::Bank& bank = subject.bank;
   if (bank.mode_count() == 0) return leave_out("modes", "Modes", "the bank has no modes; its band holds none.");
-  Html out =
-      html("<p>{} modes from {} to {}; the band is {} Hz to {} Hz{}.</p>\n", format_count(static_cast<std::int64_t>(bank.mode_count())),
-           format_hz(bank.freq_hz(0)), format_hz(bank.freq_hz(bank.mode_count() - 1)), format_plain(bank.band_hz[0]),
-           format_plain(bank.band_hz[1]), bank.complete ? "" : ", and not all of its modes are here");
-  out += draw_mode_chart(bank);
+  const auto [lowest, highest] =
+      std::minmax_element(subject.heard.begin(), subject.heard.end(), [](const auto& a, const auto& b) { return a.freq_hz < b.freq_hz; });
+  Html out = html("<p>{} modes from {} to {}; the band is {} Hz to {} Hz{}.</p>\n",
+                  format_count(static_cast<std::int64_t>(bank.mode_count())), format_hz(lowest->freq_hz), format_hz(highest->freq_hz),
+                  format_plain(bank.band_hz[0]), format_plain(bank.band_hz[1]), bank.complete ? "" : ", and not all of its modes are here");
+  out += draw_mode_chart(subject);
   if (!bank.discretisation_error_cents.empty() || !bank.algebraic_error_cents.empty())
-    out += html("<p class=\"remark\">Whiskers along the frequency: both error bars together.</p>\n");
-  out += make_mode_table(bank);
+    out += html("<p class=\"remark\">Whiskers along the frequency: its error bars.</p>\n");
+  out += make_mode_table(subject);
   return make_section("modes", "Modes", out);
 }
 
@@ -202,15 +219,19 @@ Html make_error_section(const Subject& subject) {
     return leave_out("errors", "Error bars", "the bank has none; how far its frequencies are from those of the body is not known.");
   }
   Facts facts;
-  if (const Html worst = find_largest(bank.discretisation_error_cents, bank, format_cents); !worst.empty())
+  if (const Html worst = find_largest(bank.discretisation_error_cents, subject, format_cents); !worst.empty())
     facts.add("body, largest", worst, "how far the mode of the body may be: an estimate");
-  if (const Html worst = find_largest(bank.corrected.error_cents, bank, format_cents); !worst.empty())
+  if (const Html worst = find_largest(bank.corrected.error_cents, subject, format_cents); !worst.empty())
     facts.add("corrected, largest", worst, "how far it may be from the corrected frequency: an estimate");
-  if (const Html worst = find_largest(bank.algebraic_error_cents, bank, format_cents); !worst.empty())
+  if (const Html worst = find_largest(bank.facet_error_cents, subject, format_cents); !worst.empty())
+    facts.add("facets in doubt, largest", worst,
+              "by how much farther the body may be if the facets are not what they were taken for, planes or samples of a smooth surface: "
+              "an estimate, in no bar; a surface in finer facets settles it, or \"facets\": true in the job");
+  if (const Html worst = find_largest(bank.algebraic_error_cents, subject, format_cents); !worst.empty())
     facts.add("mesh, largest", worst, "how far the exact mode of this mesh may be: a bound");
   if (const auto asked = find_amount(subject.record.job, "accuracy_cents")) facts.add("asked for", html("{} cent", format_plain(*asked)));
   Html out = facts.finish();
-  out += draw_errors(bank);
+  out += draw_errors(subject);
   const Json::Value& trials = find(find(subject.record.run, "accuracy"), "trials");
   Table table({{"trial", true}, {"element"}, {"nodes", true}, {"worst error bar [cent]", true}, {"CPU time", true}});
   for (Json::ArrayIndex i = 0; trials.isArray() && i < std::min<Json::ArrayIndex>(trials.size(), 100); ++i) {
@@ -228,11 +249,11 @@ Html make_residual_section(const Subject& subject) {
   const bank::Bank& bank = subject.bank;
   if (bank.mode_count() == 0) return leave_out("residuals", "Residuals", "the bank has no modes.");
   Facts facts;
-  facts.add("largest", find_largest(bank.residual, bank, format_small), "||K\u03c6 \u2212 \u03bbM\u03c6|| / (\u03bb ||M\u03c6||)");
+  facts.add("largest", find_largest(bank.residual, subject, format_small), "||K\u03c6 \u2212 \u03bbM\u03c6|| / (\u03bb ||M\u03c6||)");
   Scatter chart{.title = "Residuals by frequency",
                 .x = make_frequency_axis(),
                 .y = {.label = "residual", .is_log = true},
-                .series = {make_series(bank, "residual", 0, bank.residual, format_small)},
+                .series = {make_series(subject, "residual", 0, bank.residual, format_small)},
                 .lines = {}};
   auto tolerance = find_amount(find(subject.record.run, "chosen"), "tolerance");
   if (!tolerance) tolerance = find_amount(find(subject.record.job, "solver"), "tolerance");

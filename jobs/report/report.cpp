@@ -9,6 +9,7 @@
 #include "jobs/report/draw.hpp"
 #include "jobs/report/sections.hpp"
 #include "runtime/base/file.hpp"
+#include "runtime/support/heard.hpp"
 
 namespace carillon::report {
 namespace {
@@ -16,6 +17,15 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kMaxDrawn = 12;  // carillon-draw takes no more
+
+/// Of a damaged bank the modes are those of the mesh.
+std::vector<bank::HeardMode> find_heard(const Subject& subject) {
+  try {
+    if (subject.is_sane()) return support::calc_heard(subject.bank);
+  } catch (const InputError&) {  // of its supports
+  }
+  return bank::list_heard(subject.bank, {});
+}
 
 Subject read_subject(const fs::path& file, const fs::path& resolved_job) {
   Subject subject;
@@ -26,6 +36,7 @@ Subject read_subject(const fs::path& file, const fs::path& resolved_job) {
   const std::uintmax_t bytes = fs::file_size(file, error);
   subject.file_bytes = error ? 0.0 : static_cast<double>(bytes);
   subject.checks = bank::calc_checks(subject.bank);
+  subject.heard = find_heard(subject);
   subject.record = read_record(resolved_job, subject.bank.provenance);
   return subject;
 }

@@ -10,6 +10,7 @@
 #include "jobs/report/html.hpp"
 #include "jobs/report/record.hpp"
 #include "runtime/bank/bank.hpp"
+#include "runtime/bank/heard.hpp"
 
 namespace carillon::report {
 
@@ -19,6 +20,7 @@ struct Subject {
   double file_bytes = 0.0;
   std::array<int, 2> version{};
   bank::Bank bank;
+  std::vector<bank::HeardMode> heard;  // by number in the bank
   std::vector<bank::Check> checks;
   Record record;
 

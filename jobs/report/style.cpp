@@ -28,25 +28,25 @@ section.missing h2 { font-size: 16px; margin: 0; color: var(--soft) }
 .tile { border: 1px solid var(--line); border-radius: 6px; padding: 10px 12px }
 .tile .what { color: var(--soft); font-size: 13px }
 .tile .value { font-size: 21px; font-variant-numeric: tabular-nums; white-space: nowrap }
-nav { margin: 0 0 18px; font-size: 14px }
-nav a { margin-right: 14px; white-space: nowrap }
+nav { display: flex; flex-wrap: wrap; gap: 4px 14px; margin: 0 0 18px; font-size: 14px }
 .table { overflow: auto; max-height: 900px; margin: 10px 0 }
 table { border-collapse: collapse; font-size: 14px; font-variant-numeric: tabular-nums }
 th, td { text-align: left; padding: 4px 16px 4px 0; border-bottom: 1px solid var(--line); vertical-align: top }
 th { font-weight: 600; color: var(--soft) }
 thead th { position: sticky; top: 0; background: #fff }
 td { overflow-wrap: anywhere }
-.n { text-align: right }
+.n { text-align: right; white-space: nowrap }
 .facts { table-layout: fixed; width: 100% }
 .facts th { font-weight: 400; width: 210px }
-.facts td.n { text-align: left; width: 330px }
+.facts td.n { text-align: left; white-space: normal; width: 330px }
 .ok { color: var(--c2) }
 .fault { color: var(--bad); font-weight: 600 }
 details { margin: 10px 0 }
 summary { cursor: pointer; color: var(--c0) }
 pre { background: #f6f7f9; border: 1px solid var(--line); border-radius: 6px; padding: 12px; overflow: auto; max-height: 520px; font-size: 13px; margin: 0 }
 img { max-width: 100%; height: auto; display: block; margin: 0 auto }
-svg { display: block; width: 100%; height: auto; margin: 10px 0 }
+.chart { overflow-x: auto; margin: 10px 0 }
+svg { display: block; width: 100%; min-width: 560px; height: auto }
 svg text { font-size: 13px; fill: var(--ink) }
 svg .tick text { font-size: 12px; fill: var(--soft) }
 svg .grid path { stroke: var(--line); stroke-width: 1; fill: none }
@@ -67,6 +67,14 @@ svg text.level { fill: var(--bad); font-size: 12px }
 .key.c0 { background: var(--c0) }
 .key.c1 { background: var(--c1) }
 .key.c2 { background: var(--c2) }
+@media (max-width: 700px) {
+  main { padding: 12px 8px 40px }
+  header, section, section.missing { padding: 14px }
+  iframe { height: 80vh }
+  .facts, .facts tbody, .facts tr, .facts th, .facts td, .facts td.n { display: block; width: auto }
+  .facts tr { padding: 4px 0; border-bottom: 1px solid var(--line) }
+  .facts th, .facts td { padding: 0; border: 0 }
+}
 @media print { body { background: #fff } section, header { break-inside: avoid; border: 0 } .table, pre { max-height: none } }
 )",
                            100000));

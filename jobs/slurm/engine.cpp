@@ -73,7 +73,9 @@ void apply(Job& row, const outcome::Outcome& outcome, bool has_asked_memory) {
   }
   const double given_gb = row.given.memory_gb;
   queue::apply(row, outcome, queue::LocalClock());
-  if (outcome.cause == outcome::Cause::memory) row.resources.memory_gb = std::max(row.resources.memory_gb, kMemoryGrowth * given_gb);
+  if (outcome.cause == outcome::Cause::memory)
+    row.resources.memory_gb = std::max(
+        {row.resources.memory_gb, kMemoryGrowth * given_gb, outcome::calc_next_memory(outcome.memory_need_gb, outcome.peak_memory_gb)});
 }
 
 store::Resources find_asked(const fs::path& work) {

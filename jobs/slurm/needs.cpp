@@ -39,7 +39,7 @@ Needs find_needs(const store::Store& store, const registry::Job& job, const Sett
     predict(store, job, needs.need, program);
     needs = queue::find_needs(store, job);
   }
-  if (settings.has_pictures) needs.need.min_gb = attempt::kDrawGb;
+  if (settings.has_pictures) needs.need.min_gb = std::max(needs.need.min_gb, attempt::kDrawGb);
   Needs found;
   store::Resources& resources = found.resources;
   resources.time_limit_s = needs.time_limit_s;

@@ -490,7 +490,7 @@ std::vector<bool> prepare_work(const Store& store, const std::vector<Asked>& ask
   for (std::size_t i = 0; i < asked.size(); ++i) {
     const Id id = require_id(asked[i].request->id, "the request");
     if (!seen.insert(id).second) continue;
-    if (!store.find_bank_fault(id, Look::full)) continue;
+    if (!store.find_bank_fault(id, Look::content)) continue;
     if (store.has_bank_folder(id)) store.set_bank_aside(id);
     const bool is_copied = ensure_inputs(store, *asked[i].order, *asked[i].request, inputs);
     if (store.has_work(id)) {

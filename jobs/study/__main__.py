@@ -127,6 +127,7 @@ def run_study(options):
 
 def main():
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
+    programs.leave_run()
     try:
         return run(sys.argv[1:])
     except InputError as error:

@@ -12,6 +12,7 @@
 
 #include "runtime/base/error.hpp"
 #include "runtime/base/file.hpp"
+#include "runtime/base/foreign.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/base/vector.hpp"
 
@@ -110,6 +111,7 @@ Columns read_names(const std::vector<std::string_view>& names, const std::string
 
 ModesTable read_modes_table(const std::filesystem::path& file) {
   const std::string text = base::read_file(file, "table of modes", kMaxBytes);
+  base::refuse_utf16(text, file.string());
   ModesTable table;
   std::optional<Columns> columns;
   std::size_t count = 0;

@@ -109,7 +109,10 @@ class Bank:
             with h5py.File(self.path, "r") as file:
                 self.vertices = file["mesh/vertices"][:]
                 self.triangles = file["mesh/triangles"][:]
-                self.freq_hz = file["modes/frequency_hz"][:]
+                self.mesh_hz = file["modes/frequency_hz"][:]
+                # What is played: the modes in air, else the corrected ones.
+                played = (key for key in ("radiation/freq_hz", "modes/corrected_frequency_hz", "modes/frequency_hz") if key in file)
+                self.freq_hz = file[next(played)][:]
                 self.centre = file["rigid/centre_m"][:]
                 self.note = f"{file['solve/element'][()].decode()}, {int(file['solve/nodes'][()]):,} nodes"
                 self.shape_extent = file["modes/shape"].shape
@@ -124,7 +127,7 @@ class Bank:
         def refuse(what):
             raise InputError(f"{self.path}: {what}; run carillon-bank check on it")
 
-        numbers = [self.vertices, self.freq_hz, self.centre]
+        numbers = [self.vertices, self.freq_hz, self.mesh_hz, self.centre]
         if any(not numpy.issubdtype(values.dtype, numpy.number) for values in [*numbers, self.triangles]):
             refuse("mesh, frequencies or centre are no numbers")
         if (
@@ -135,7 +138,11 @@ class Bank:
             or not len(self.triangles)
         ):
             refuse("the surface is no list of vertices and triangles")
-        if self.freq_hz.ndim != 1 or self.shape_extent != (len(self.vertices), len(self.freq_hz), 3):
+        if (
+            self.freq_hz.ndim != 1
+            or self.mesh_hz.shape != self.freq_hz.shape
+            or self.shape_extent != (len(self.vertices), len(self.freq_hz), 3)
+        ):
             refuse("frequencies, shapes and vertices do not fit each other")
         if not all(numpy.isfinite(values).all() for values in numbers) or numpy.abs(self.vertices).max() > 1e12:
             refuse("a coordinate or a frequency is no finite number")
@@ -677,7 +684,9 @@ def draw_modes(bank, numbers, up):
         renderer.AddActor(lines)
         above.ResetCameraClippingRange(*bounds)
         renderer.AddActor2D(make_text(f"Mode {number}", 0.5, 80 / height, 30, bold=True))
-        renderer.AddActor2D(make_text(f"{bank.freq_hz[number - 1]:,.1f} Hz", 0.5, 42 / height, 26))
+        played_hz, mesh_hz = (f"{values[number - 1]:,.1f}" for values in (bank.freq_hz, bank.mesh_hz))
+        label = f"{played_hz} Hz" if played_hz == mesh_hz else f"{played_hz} Hz (mesh: {mesh_hz})"
+        renderer.AddActor2D(make_text(label, 0.5, 42 / height, 26))
         row, column = divmod(index, columns)
         canvas[row * height : (row + 1) * height, column * width : (column + 1) * width] = draw([renderer, above], width, height)
     note = f"{bank.path.name}   ·   {bank.note}   ·   grey: undeformed; displacements exaggerated"

@@ -29,9 +29,8 @@ void check_memory(const comm::Communicator& comm, std::int64_t need_bytes, std::
   const comm::Communicator host(own_host);
   std::array<std::int64_t, 2> together{need_bytes, base::find_memory().resident};
   host.sum(together);
-  std::int64_t left = find_host_left();
-  if (limit_bytes > 0) left = std::min(left, std::max<std::int64_t>(limit_bytes - together[1], 0));
-  left = host.min(left);
+  const std::int64_t left = host.min(find_host_left());
+  const std::int64_t total = together[0] + together[1];
   MPI_Comm_free(&own_host);
   const std::int64_t own_left = base::find_address_space_left();
   const std::int64_t everywhere = comm.sum(need_bytes);
@@ -43,6 +42,11 @@ void check_memory(const comm::Communicator& comm, std::int64_t need_bytes, std::
                                     what, to_gb(need_bytes), to_gb(everywhere), to_gb(own_left), kRemedy),
                         static_cast<double>(together[0]));
     }
+    if (limit_bytes > 0 && total > limit_bytes)
+      throw MemoryError(fmt::format("{} needs about {:.2f} GB in addition to the {:.2f} GB that are taken, and the limit (--memory-gb) is "
+                                    "{:.2f} GB. {}",
+                                    what, to_gb(together[0]), to_gb(together[1]), to_gb(limit_bytes), kRemedy),
+                        static_cast<double>(total));
     if (together[0] > left) {
       std::array<char, 256> name{};
       gethostname(name.data(), name.size() - 1);

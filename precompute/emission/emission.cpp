@@ -35,7 +35,7 @@ using recording::HighPass;
 
 constexpr int kLeast = 16;                                              // boxes in a sample: images at -60 dB
 constexpr int kPlaceRing = 64;                                          // samples of places that are kept
-constexpr int kSourceRing = recording::kPoleTaps;                       // of volume accelerations
+constexpr int kSourceRing = recording::kPoleTaps + kBatch;              // of volume accelerations
 constexpr int kPoleAhead = recording::kPoleTaps / 2;                    // samples that the pole looks ahead
 constexpr int kBefore = kPoleAhead + kDerivativeHalf + LowPass::kHalf;  // intervals of uniform motion before the first step
 constexpr std::uint64_t kRayRate = 1000;                                // Hz
@@ -104,16 +104,17 @@ struct Emission::State {
   Options options;
   const RowLoops* loops = &find_loops();
   bool is_paper = false;
+  bool has_delta = false;  // the formula has it, and it is wanted
   double alpha = 0.0;
   std::vector<std::int32_t> node;   // (V) of the caller, each vertex of the triangles once
   std::vector<double> rest;         // (3 V, padded) m
   std::vector<Triangle> corners;    // (slots): vertices; triangles by body, each body padded to lanes
   std::vector<std::int64_t> place;  // (slots) among the triangles of all ranks by their numbers; -1: padding
   std::vector<double> area;         // (slots) at rest, m2
-  std::vector<std::int32_t> twin;   // (slots) the same triangle seen from its other side, with a lower slot; -1: none
+  std::vector<std::int32_t> twin;   // (slots) the same triangle seen from its other side, which is no twin; -1: none
   std::vector<bool> is_whole;       // (slots) such a one follows: kKirchhoff emits both at once
   struct Run {
-    std::size_t begin, end;  // slots
+    std::size_t begin, middle, end;  // slots; from the middle on twins
     recording::Pole pole;
   };
   std::vector<Run> runs;
@@ -126,6 +127,12 @@ struct Emission::State {
   std::unique_ptr<SurfaceFile> file;  // rank 0
   SurfaceTables tables;
   recording::Header header;
+  // What makes no sound and hides others; none without delta.
+  std::vector<std::int32_t> screen_node;             // of the caller, on this rank
+  std::vector<double> screen_rest;                   // m
+  std::vector<std::array<std::int64_t, 3>> screens;  // triangles of all ranks, into the screen nodes of all ranks, one rank behind another
+  std::size_t screen_rows = 0;                       // numbers of a row of `screen_places`
+  std::size_t screen_ring = 0;                       // rows that are kept, one every ray_frames samples
 
   // ---- the rate ----
   int steps = 0, box = 1;
@@ -145,14 +152,19 @@ struct Emission::State {
   std::unique_ptr<LowPass> places_filter, pressure_filter;
   std::vector<double> places;                // (kPlaceRing, 3 V padded) m
   std::vector<double> sources;               // (kSourceRing, slots): volume accelerations [m3/s2]; kPaper2001: pressure [Pa]
-  std::vector<double> pole;                  // (slots)
+  std::vector<double> pole;                  // (slots) of the next sample that leaves
   std::vector<HighPass> blockers;            // (slots)
   std::vector<float> seen_before, seen_now;  // (receivers, slots)
+  std::int64_t samples = 0;                  // whose first step has come; counted where there is delta
+  std::vector<Vec3> balls;                   // their centres now
+  std::vector<double> screen_places;         // (screen_ring, screen_rows): screen nodes, then balls [m]
   std::vector<Arrivals> arrivals;            // (receivers)
   std::vector<float> block;                  // (own triangles, kBlockFrames): accelerations of the block that is open
 
   // ---- room for work ----
-  std::vector<double> velocity, acceleration, mean, pressure;
+  std::vector<double> mean, pressure;
+  std::vector<double> velocity, acceleration;  // (kBatch, rows)
+  std::vector<double> next_poles;              // (kBatch, slots)
   std::vector<const double*> frames;
 
   std::size_t get_rows() const { return rest.size(); }
@@ -171,9 +183,14 @@ struct Emission::State {
   void add_pressures(const double* u);
   void close_interval();
   void take_sample(std::int64_t k);
-  void calc_sources(std::int64_t k);
-  void emit(std::int64_t k);
-  void advance_poles(std::int64_t k);
+  void calc_sources(std::int64_t first);
+  void emit(std::int64_t k, const double* poles);
+  void calc_poles(std::int64_t first);
+  void gather_screens(const SurfacePart& part);
+  double* get_screens(std::int64_t k) {
+    return screen_places.data() + static_cast<std::size_t>(k) / ray_frames % screen_ring * screen_rows;
+  }
+  void keep_screens(const double* u);
   void look(std::int64_t k);
   void record(std::int64_t k);
   void write_block(std::uint64_t number);
@@ -186,6 +203,7 @@ struct Emission::State {
 Emission::State::State(const comm::Communicator& communicator, SurfacePart part, Options wanted)
     : comm(communicator), options(std::move(wanted)) {
   is_paper = options.radiation == Radiation::kPaper2001;
+  has_delta = options.has_visibility && options.radiation != Radiation::kKirchhoff;  // on ranks without triangles, too
   const double fs = options.sample_rate_hz;
   comm.agree([&] {
     const std::size_t nodes = part.nodes_m.size();
@@ -199,6 +217,9 @@ Emission::State::State(const comm::Communicator& communicator, SurfacePart part,
     for (const Triangle& corner : part.triangles)
       for (const std::int32_t one : corner)
         if (one < 0 || static_cast<std::size_t>(one) >= nodes) throw InputError("a triangle of a surface names a node that is not there");
+    for (const Triangle& corner : part.silent)
+      for (const std::int32_t one : corner)
+        if (one < 0 || static_cast<std::size_t>(one) >= nodes) throw InputError("a silent triangle names a node that is not there");
     if (options.surface_file.empty()) return;
     if (is_paper) throw InputError("a recorded surface cannot be made with radiation paper2001; choose kirchhoff or leave out \"surface\"");
     if (!(options.keep_hz >= 1.0 && options.keep_hz <= fs)) throw InputError("keep_hz must be 1 Hz to the sample rate");
@@ -277,41 +298,47 @@ Emission::State::State(const comm::Communicator& communicator, SurfacePart part,
   std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
     return std::pair(part.body[a], part.triangle_number[a]) < std::pair(part.body[b], part.triangle_number[b]);
   });
+  const auto add_slot = [&](std::size_t t, std::int32_t of_twin) {
+    Triangle corner;
+    for (std::size_t c = 0; c < 3; ++c) corner[c] = vertex_of[static_cast<std::size_t>(part.triangles[t][c])];
+    corners.push_back(corner);
+    place.push_back(find_place(numbers, part.triangle_number[t]));
+    area.push_back(tables.area_m2[static_cast<std::size_t>(place.back())]);
+    twin.push_back(of_twin);
+  };
+  const auto pad = [&] {
+    const std::size_t end = round_up(corners.size());
+    corners.resize(end, Triangle{});
+    place.resize(end, -1);
+    area.resize(end, 0.0);
+    twin.resize(end, -1);
+    return end;
+  };
   for (std::size_t i = 0; i < order.size();) {
     const std::int32_t body = part.body[order[i]];
-    Run run{corners.size(), 0, recording::make_pole(tables.radius_m[static_cast<std::size_t>(body)], fs, options.sound_speed_m_s)};
+    Run run{corners.size(), 0, 0, recording::make_pole(tables.radius_m[static_cast<std::size_t>(body)], fs, options.sound_speed_m_s)};
+    // Of the two sides of a thin sheet the second one is behind all others.
+    std::map<Triangle, std::size_t> sides;  // corners from the lowest on, slot
+    std::vector<std::pair<std::size_t, std::int32_t>> second;
     for (; i < order.size() && part.body[order[i]] == body; ++i) {
-      const std::size_t t = order[i];
-      Triangle corner;
-      for (std::size_t c = 0; c < 3; ++c) corner[c] = vertex_of[static_cast<std::size_t>(part.triangles[t][c])];
-      corners.push_back(corner);
-      place.push_back(find_place(numbers, part.triangle_number[t]));
-      area.push_back(tables.area_m2[static_cast<std::size_t>(place.back())]);
+      Triangle turned = part.triangles[order[i]];
+      std::rotate(turned.begin(), std::min_element(turned.begin(), turned.end()), turned.end());
+      if (const auto other = sides.find({turned[0], turned[2], turned[1]}); other != sides.end()) {
+        second.emplace_back(order[i], static_cast<std::int32_t>(other->second));
+        sides.erase(other);
+        continue;
+      }
+      sides.emplace(turned, corners.size());
+      add_slot(order[i], -1);
     }
-    run.end = round_up(corners.size());
-    corners.resize(run.end, Triangle{});
-    place.resize(run.end, -1);
-    area.resize(run.end, 0.0);
+    run.middle = pad();
+    for (const auto& [t, of_twin] : second) add_slot(t, of_twin);
+    run.end = pad();
     runs.push_back(run);
   }
-  // The two sides of a thin sheet.
-  twin.assign(corners.size(), -1);
   is_whole.assign(corners.size(), false);
-  std::map<std::pair<std::int32_t, Triangle>, std::size_t> sides;  // body, and corners from the lowest on
-  for (const Run& run : runs)
-    for (std::size_t t = run.begin; t < run.end; ++t) {
-      if (place[t] < 0) continue;
-      Triangle turned = corners[t];
-      std::rotate(turned.begin(), std::min_element(turned.begin(), turned.end()), turned.end());
-      const auto body = static_cast<std::int32_t>(&run - runs.data());
-      const auto other = sides.find({body, {turned[0], turned[2], turned[1]}});
-      if (other == sides.end()) {
-        sides.emplace(std::pair(body, turned), t);
-      } else if (!is_whole[other->second]) {
-        twin[t] = static_cast<std::int32_t>(other->second);
-        is_whole[other->second] = true;
-      }
-    }
+  for (const std::int32_t one : twin)
+    if (one >= 0) is_whole[static_cast<std::size_t>(one)] = true;
 
   std::vector<std::int64_t> own_places;
   for (const std::int64_t one : place)
@@ -322,7 +349,10 @@ Emission::State::State(const comm::Communicator& communicator, SurfacePart part,
   comm.agree([&] {
     sum.assign(4 * node.size(), 0.0);
     first_mean.assign(rows, 0.0);
-    last_mean = mean = velocity = acceleration = first_mean;
+    last_mean = mean = first_mean;
+    velocity.assign(rows * kBatch, 0.0);
+    acceleration = velocity;
+    next_poles.assign(slots * kBatch, 0.0);
     if (is_paper) last_step = first_mean;
     places_filter = std::make_unique<LowPass>(rows, is_paper ? Kernel::kHann2001 : Kernel::kFlat);
     if (is_paper) pressure_filter = std::make_unique<LowPass>(slots, Kernel::kHann2001);
@@ -333,17 +363,18 @@ Emission::State::State(const comm::Communicator& communicator, SurfacePart part,
     pressure.assign(slots, 0.0);
     if (options.radiation != Radiation::kKirchhoff) {
       blockers.assign(slots, {});
-      if (options.has_visibility) seen_before.assign(slots * options.receivers.size(), 1.0F);
+      if (has_delta) seen_before.assign(slots * options.receivers.size(), 1.0F);
       seen_now = seen_before;
     }
     arrivals.assign(options.receivers.size(), Arrivals(static_cast<std::size_t>(options.frames)));
     if (!options.surface_file.empty()) block.assign(own_places.size() * recording::kBlockFrames, 0.0F);
-    frames.resize(2 * kDerivativeHalf + 1);
+    frames.resize(2 * kDerivativeHalf + kBatch);
     set_rate(options.steps_per_sample);
     interval = is_paper ? 0 : -kBefore;
     base::Sinc::get();
   });
 
+  if (has_delta) gather_screens(part);
   if (options.surface_file.empty()) return;
   header.sample_rate_hz = fs;
   header.air_density_kg_m3 = options.air_density_kg_m3;
@@ -375,8 +406,46 @@ void Emission::State::set_rate(int steps_per_sample) {
   pressure_filter->set_rate(steps, 0.5, half);
 }
 
+void Emission::State::gather_screens(const SurfacePart& part) {
+  std::vector<std::int64_t> numbers;
+  std::map<std::int32_t, bool> own;
+  for (const Triangle& corner : part.silent)
+    for (const std::int32_t one : corner) own[one] = true;
+  for (const auto& [one, is_there] : own) {
+    screen_node.push_back(one);
+    numbers.push_back(part.node_number[static_cast<std::size_t>(one)]);
+    for (const double x : part.nodes_m[static_cast<std::size_t>(one)]) screen_rest.push_back(x);
+  }
+  std::vector<std::array<std::int64_t, 3>> triangles;
+  for (const Triangle& corner : part.silent) {
+    triangles.emplace_back();
+    for (std::size_t c = 0; c < 3; ++c) triangles.back()[c] = part.node_number[static_cast<std::size_t>(corner[c])];
+  }
+  screens = comm.all_gather(triangles);
+  std::map<std::int64_t, std::int64_t> place_of;
+  const std::vector<std::int64_t> all = comm.all_gather(numbers);
+  for (std::size_t i = 0; i < all.size(); ++i) place_of.try_emplace(all[i], static_cast<std::int64_t>(i));
+  for (auto& corner : screens)
+    for (std::int64_t& one : corner) one = place_of.at(one);
+  balls.resize(options.ball_radius_m.size());
+  screen_rows = 3 * (screen_node.size() + balls.size());
+  screen_ring = static_cast<std::size_t>(kPlaceRing) / ray_frames + 2;
+  screen_places.assign(screen_ring * screen_rows, 0.0);
+}
+
+/// Of the sample that begins with these displacements.
+void Emission::State::keep_screens(const double* u) {
+  const std::int64_t k = samples++;
+  if (static_cast<std::uint64_t>(k) % ray_frames != 0) return;
+  double* to = get_screens(k);
+  for (std::size_t s = 0; s < screen_node.size(); ++s)
+    for (std::size_t axis = 0; axis < 3; ++axis) *to++ = screen_rest[3 * s + axis] + u[4 * static_cast<std::size_t>(screen_node[s]) + axis];
+  for (const Vec3& ball : balls) to = std::copy(ball.begin(), ball.end(), to);
+}
+
 void Emission::State::add_step(const double* u) {
   if (emitted >= options.frames) return;
+  if (screen_rows > 0 && (step_in_sample == 0 || (is_paper && step_in_sample == steps))) keep_screens(u);
   if (is_paper) {
     loops->add_places(sum.data(), u, node.data(), node.size());
     take_mean();
@@ -420,8 +489,8 @@ void Emission::State::add_mean(const double* value) {
     return;
   }
   std::swap(first_mean, last_mean);  // first_mean becomes the one before
-  std::copy_n(value, get_rows(), last_mean.begin());
-  feed(value);
+  std::swap(last_mean, mean);        // whose numbers `value` are
+  feed(last_mean.data());
 }
 
 /// All intervals before the first step, and the first two means.
@@ -477,57 +546,67 @@ void Emission::State::close_interval() {
 
 void Emission::State::take_sample(std::int64_t k) {
   if (is_paper) {
-    if (k >= 0) emit(k);
+    if (k >= 0) emit(k, nullptr);
     return;
   }
   // Places before those of the first interval are not whole.
   const std::int64_t derived = k - kDerivativeHalf;
-  if (derived < -kPoleAhead) return;
-  calc_sources(derived);
-  const std::int64_t now = derived - kPoleAhead;
+  static_assert(kPoleAhead % kBatch == 0);
+  if (derived < -kPoleAhead || (derived + kPoleAhead) % kBatch != kBatch - 1) return;
+  const std::int64_t first = derived - (kBatch - 1), now = first - kPoleAhead;
+  calc_sources(first);
   if (now < 0) return;
-  emit(now);
-  record(now);
-  if (options.radiation == Radiation::kKirchhoff) advance_poles(now);
+  const bool is_kirchhoff = options.radiation == Radiation::kKirchhoff;
+  if (is_kirchhoff) calc_poles(now);
+  for (std::int64_t b = 0; b < kBatch; ++b) {
+    emit(now + b, b == 0 ? pole.data() : next_poles.data() + static_cast<std::size_t>(b - 1) * corners.size());
+    record(now + b);
+  }
+  if (is_kirchhoff) std::copy_n(next_poles.end() - static_cast<std::ptrdiff_t>(corners.size()), corners.size(), pole.begin());
 }
 
-/// d(v.S)/dt of every triangle.
-void Emission::State::calc_sources(std::int64_t k) {
-  for (int j = -kDerivativeHalf; j <= kDerivativeHalf; ++j) frames[static_cast<std::size_t>(j + kDerivativeHalf)] = get_places(k + j);
+/// d(v.S)/dt of every triangle, of a batch of samples.
+void Emission::State::calc_sources(std::int64_t first) {
+  for (std::size_t j = 0; j < frames.size(); ++j) frames[j] = get_places(first - kDerivativeHalf + static_cast<std::int64_t>(j));
   loops->calc_derivatives(frames.data(), get_rows(), derivative.first.data(), derivative.second.data(), velocity.data(),
                           acceleration.data());
-  const double* x = get_places(k);
-  double* to = get_sources(k);
   // The mean of three, half of the cross product, and two derivatives by samples.
   const double scale = options.sample_rate_hz * options.sample_rate_hz / 6.0;
-  for (std::size_t t = 0; t < corners.size(); ++t) {
-    if (twin[t] >= 0) {  // what one side sends away the other takes in
-      to[t] = -to[twin[t]];
-      continue;
+  for (std::int64_t b = 0; b < kBatch; ++b) {
+    const double* x = get_places(first + b);
+    const double* v = velocity.data() + static_cast<std::size_t>(b) * get_rows();
+    const double* by = acceleration.data() + static_cast<std::size_t>(b) * get_rows();
+    double* to = get_sources(first + b);
+    for (const Run& run : runs) {
+      for (std::size_t t = run.begin; t < run.middle; ++t) {
+        const Triangle& corner = corners[t];
+        const Vec3 v0 = get_vertex(v, corner[0]), v1 = get_vertex(v, corner[1]), v2 = get_vertex(v, corner[2]);
+        const Vec3 x0 = get_vertex(x, corner[0]), e1 = get_vertex(x, corner[1]) - x0, e2 = get_vertex(x, corner[2]) - x0;
+        const Vec3 a = get_vertex(by, corner[0]) + get_vertex(by, corner[1]) + get_vertex(by, corner[2]);
+        to[t] = scale * (dot(a, cross(e1, e2)) + dot(v0 + v1 + v2, cross(v1 - v0, e2) + cross(e1, v2 - v0)));
+      }
+      // What one side sends away the other takes in.
+      for (std::size_t t = run.middle; t < run.end; ++t)
+        if (twin[t] >= 0) to[t] = -to[twin[t]];
     }
-    const Triangle& corner = corners[t];
-    const Vec3 v0 = get_vertex(velocity.data(), corner[0]), v1 = get_vertex(velocity.data(), corner[1]),
-               v2 = get_vertex(velocity.data(), corner[2]);
-    const Vec3 x0 = get_vertex(x, corner[0]), e1 = get_vertex(x, corner[1]) - x0, e2 = get_vertex(x, corner[2]) - x0;
-    const Vec3 a = get_vertex(acceleration.data(), corner[0]) + get_vertex(acceleration.data(), corner[1]) +
-                   get_vertex(acceleration.data(), corner[2]);
-    to[t] = scale * (dot(a, cross(e1, e2)) + dot(v0 + v1 + v2, cross(v1 - v0, e2) + cross(e1, v2 - v0)));
   }
 }
 
-void Emission::State::advance_poles(std::int64_t k) {
-  const double* frame[recording::kPoleTaps];
+/// Of the kBatch samples behind `first`, for which there is one.
+void Emission::State::calc_poles(std::int64_t first) {
+  const double* frame[recording::kPoleTaps + kBatch - 1];
+  double* out[kBatch];
   for (const Run& run : runs) {
-    for (int j = 0; j < recording::kPoleTaps; ++j) frame[j] = get_sources(k - kPoleAhead + 1 + j) + run.begin;
-    loops->sum_frames(frame, run.end - run.begin, run.pole.weight.data(), run.pole.keep, pole.data() + run.begin);
+    for (int j = 0; j < recording::kPoleTaps + kBatch - 1; ++j) frame[j] = get_sources(first - kPoleAhead + 1 + j) + run.begin;
+    for (std::size_t b = 0; b < kBatch; ++b) out[b] = next_poles.data() + b * corners.size() + run.begin;
+    loops->sum_frames(frame, run.middle - run.begin, run.pole.weight.data(), run.pole.keep, pole.data() + run.begin, out);
   }
 }
 
-/// Sample k leaves for the receivers.
-void Emission::State::emit(std::int64_t k) {
+/// Sample k leaves for the receivers. poles: (slots), of kKirchhoff.
+void Emission::State::emit(std::int64_t k, const double* poles) {
   if (static_cast<std::uint64_t>(k) >= options.frames) return;
   emitted = static_cast<std::uint64_t>(k) + 1;
-  const bool has_delta = options.has_visibility && options.radiation != Radiation::kKirchhoff;  // on ranks without triangles, too
   const double fade = std::min(1.0, static_cast<double>(static_cast<std::uint64_t>(k) % ray_frames) / static_cast<double>(ray_frames));
   if (has_delta && static_cast<std::uint64_t>(k) % ray_frames == 0) look(k);
   const double* x = get_places(k);
@@ -536,18 +615,18 @@ void Emission::State::emit(std::int64_t k) {
   const std::size_t slots = corners.size();
   const bool is_kirchhoff = options.radiation == Radiation::kKirchhoff;
   for (const Run& run : runs) {
-    for (std::size_t t = run.begin; t < run.end; ++t) {
-      if (place[t] < 0 || (is_kirchhoff && twin[t] >= 0)) continue;
+    for (std::size_t t = run.begin; t < (is_kirchhoff ? run.middle : run.end); ++t) {
+      if (place[t] < 0) continue;
       const Vec3 x0 = get_vertex(x, corners[t][0]), x1 = get_vertex(x, corners[t][1]), x2 = get_vertex(x, corners[t][2]);
       const Vec3 centre = (1.0 / 3.0) * (x0 + x1 + x2), twice = cross(x1 - x0, x2 - x0);
-      const double area_now = norm(twice);
+      const double area_now = norm(twice), per_area = 1.0 / area_now;
       // plain: alike to all sides; turned: times the cosine.
       double plain = 0.0, turned = 0.0;
       switch (options.radiation) {
         case Radiation::kKirchhoff:
           // Of two sides what is alike to all sides cancels, and the rest is there twice.
           plain = is_whole[t] ? 0.0 : rho / (4.0 * std::numbers::pi) * source[t];
-          turned = (is_whole[t] ? 2.0 : 1.0) * rho / (4.0 * std::numbers::pi) * (source[t] - run.pole.rate_per_s * pole[t]);
+          turned = (is_whole[t] ? 2.0 : 1.0) * rho / (4.0 * std::numbers::pi) * (source[t] - run.pole.rate_per_s * poles[t]);
           break;
         case Radiation::kRayleigh:
           plain = rho / (2.0 * std::numbers::pi) * blockers[t].next(source[t], alpha);
@@ -559,9 +638,9 @@ void Emission::State::emit(std::int64_t k) {
       for (std::size_t i = 0; i < arrivals.size(); ++i) {
         const Microphone& receiver = options.receivers[i];
         const Vec3 way = receiver.place_m - centre;
-        const double r = norm(way), cosine = dot(way, twice) / (r * area_now);
-        double p = (plain + turned * cosine) / r;
-        if (receiver.directivity != 0.0) p *= 1.0 - receiver.directivity - receiver.directivity * dot(receiver.axis, way) / r;
+        const double r = norm(way), per_r = 1.0 / r, cosine = dot(way, twice) * per_r * per_area;
+        double p = (plain + turned * cosine) * per_r;
+        if (receiver.directivity != 0.0) p *= 1.0 - receiver.directivity - receiver.directivity * dot(receiver.axis, way) * per_r;
         if (has_delta) {
           const std::size_t at = i * slots + t;
           p *= static_cast<double>(seen_before[at]) + fade * (static_cast<double>(seen_now[at]) - static_cast<double>(seen_before[at]));
@@ -585,7 +664,17 @@ void Emission::State::look(std::int64_t k) {
     const auto at = [&](std::size_t c) { return vertices[static_cast<std::size_t>(corner[c])]; };
     triangles.push_back({at(0), at(1), at(2)});
   }
-  triangles.insert(triangles.end(), options.walls_m.begin(), options.walls_m.end());
+  std::vector<job::RigidObstacle> walls = options.walls;
+  if (!screens.empty()) {
+    std::vector<Vec3> screen;
+    for (std::size_t s = 0; s < screen_node.size(); ++s) screen.push_back(get_vertex(get_screens(k), static_cast<std::int32_t>(s)));
+    screen = comm.all_gather(screen);
+    const auto at = [&](std::int64_t s) { return screen[static_cast<std::size_t>(s)]; };
+    for (const auto& corner : screens) triangles.push_back({at(corner[0]), at(corner[1]), at(corner[2])});
+  }
+  for (std::size_t b = 0; b < balls.size(); ++b)
+    walls.push_back(
+        job::BallObstacle{get_vertex(get_screens(k), static_cast<std::int32_t>(screen_node.size() + b)), options.ball_radius_m[b]});
   const Visibility visibility(triangles);
   seen_before = seen_now;
   for (std::size_t t = 0; t < corners.size(); ++t) {
@@ -595,8 +684,11 @@ void Emission::State::look(std::int64_t k) {
     const Vec3 out = cross(corner[1] - corner[0], corner[2] - corner[0]);
     for (std::size_t i = 0; i < arrivals.size(); ++i) {
       // A side that faces away is hidden by its own body; of a sheet, by its other side, which lies in the same plane.
-      const bool faces = dot(out, options.receivers[i].place_m - centre) > 0.0;
-      seen_now[i * corners.size() + t] = faces && visibility.is_free(centre, options.receivers[i].place_m, place[t]) ? 1.0F : 0.0F;
+      const Vec3& ear = options.receivers[i].place_m;
+      const bool is_seen = dot(out, ear - centre) > 0.0 &&
+                           std::none_of(walls.begin(), walls.end(), [&](const auto& wall) { return is_between(wall, centre, ear); }) &&
+                           visibility.is_free(centre, ear, place[t]);
+      seen_now[i * corners.size() + t] = is_seen ? 1.0F : 0.0F;
     }
   }
   if (k == 0) seen_before = seen_now;
@@ -719,7 +811,8 @@ void Emission::State::visit_state(Visit&& visit) {
   visit.one(keys_written);
   visit.one(emitted);
   visit.one(means);
-  for (auto* list : {&sum, &first_mean, &last_mean, &last_step, &places, &sources, &pole}) visit.list(*list);
+  visit.one(samples);
+  for (auto* list : {&sum, &first_mean, &last_mean, &last_step, &places, &sources, &pole, &screen_places}) visit.list(*list);
   visit.list(blockers);
   visit.list(seen_before);
   visit.list(seen_now);
@@ -731,6 +824,9 @@ Emission::Emission(const comm::Communicator& comm, SurfacePart part, Options opt
 Emission::~Emission() = default;
 
 void Emission::add_step(const double* displacement_m) { state_->add_step(displacement_m); }
+void Emission::set_balls(std::span<const Vec3> centres_m) {
+  if (state_->has_delta) state_->balls.assign(centres_m.begin(), centres_m.end());
+}
 bool Emission::has_fault() const { return state_->has_fault; }
 bool Emission::is_at_sample() const { return state_->step_in_sample == (state_->is_paper && state_->has_last ? 1 : 0); }
 void Emission::finish() { state_->finish(); }

@@ -19,6 +19,7 @@
 #include "precompute/comm/communicator.hpp"
 #include "precompute/emission/receivers.hpp"
 #include "precompute/emission/visibility.hpp"
+#include "precompute/job/obstacles.hpp"
 #include "runtime/base/triangle.hpp"
 #include "runtime/base/vector.hpp"
 
@@ -31,6 +32,7 @@ struct SurfacePart {
   std::vector<Triangle> triangles;            // nodes, counter-clockwise from the side of the air
   std::vector<std::int64_t> triangle_number;  // each once over all ranks
   std::vector<std::int32_t> body;             // of each triangle, from 0
+  std::vector<Triangle> silent;               // of what makes no sound and hides others, where there is visibility; each on one rank
 };
 
 /// kKirchhoff: Kirchhoff and Helmholtz with one pole a body [Pa]. kRayleigh: rho a_n A delta / (2 pi r) [Pa], right for a flat surface in
@@ -48,8 +50,9 @@ struct Options {
   std::optional<double> high_pass_hz;  // corner of the DC blocker, 0: none; unset: 20 Hz, or alpha = 0.1 with kPaper2001
   double air_density_kg_m3 = 1.21, sound_speed_m_s = 343.0;
   std::vector<Microphone> receivers;
-  bool has_visibility = true;          // delta of kRayleigh and kPaper2001; 1 everywhere without it
-  std::vector<Corners> walls_m;        // further triangles that hide what lies behind them; the same on every rank
+  bool has_visibility = true;             // delta of kRayleigh and kPaper2001; 1 everywhere without it
+  std::vector<job::RigidObstacle> walls;  // hide what lies behind them, as the silent triangles and these balls, which move: set_balls()
+  std::vector<double> ball_radius_m;
   std::filesystem::path surface_file;  // recorded surface; empty: none. kKirchhoff and kRayleigh
   double keep_hz = 1000.0;             // rate of its places
   bool is_resumed = false;             // load() follows: the recorded surface is continued
@@ -74,6 +77,8 @@ class Emission {
   /// written. Steps behind the end of the run are ignored. A pressure beyond 1e4 Pa or a number that is not finite does not throw but sets
   /// has_fault(), so that no rank ends alone.
   void add_step(const double* displacement_m);
+  /// Where the balls of ball_radius_m are [m], the same on every rank; before add_step() at the beginning of a sample, is_at_sample().
+  void set_balls(std::span<const Vec3> centres_m);
   bool has_fault() const;
 
   /// Another m from the next step on, which must be the first of a sample (is_at_sample()). Throws InputError unless m is a multiple of 4.

@@ -10,7 +10,8 @@ inline constexpr int kSlots = 24;           // samples that one value of a low-p
 inline constexpr int kDerivativeHalf = 16;  // samples on either side that a derivative takes
 inline constexpr int kSpread = 32;          // samples over which an arrival is spread
 inline constexpr std::size_t kLane = 32;  // counts of rows are multiples of it: no loop has an end of its own, which could round otherwise
-inline constexpr std::size_t kTogether = 8;  // values that a low-pass takes in at once: its open samples do not fit into the first cache
+inline constexpr std::size_t kTogether = 16;  // values that a low-pass takes in at once: its open samples do not fit into the first cache
+inline constexpr int kBatch = 8;              // samples that are made at once of frames that all of them need, for the same reason
 
 /// A double in units of 2^-46 Pa, by the bits of its sum with 1.5 * 2^52: 2^51 units to either side. Sums of whole numbers have no order.
 inline constexpr double kUnitsPerPa = 70368744177664.0;
@@ -22,10 +23,12 @@ struct RowLoops {
   void (*add_places)(double* sum, const double* u, const std::int32_t* node, std::size_t n);
   /// open (rows, kSlots) += the sum over i of value (count, rows) x weight[i] (kSlots), one i after the other.
   void (*add_rows)(double* open, const double* value, std::size_t rows, const double* const* weight, std::size_t count);
-  /// frame: 2 kDerivativeHalf + 1 samples of x (rows). first: odd, weights of x_j - x_-j; second: even, of x_j + x_-j; [0] of x_0.
+  /// v, a (kBatch, rows). frame: 2 kDerivativeHalf + kBatch samples of x (rows), of which sample b takes 2 kDerivativeHalf + 1 from b on.
+  /// first: odd, weights of x_j - x_-j; second: even, of x_j + x_-j; [0] of x_0.
   void (*calc_derivatives)(const double* const* frame, std::size_t rows, const double* first, const double* second, double* v, double* a);
-  /// out (rows) = keep * out + the sum of kSpread frames times their weights.
-  void (*sum_frames)(const double* const* frame, std::size_t rows, const double* weight, double keep, double* out);
+  /// out[b] (rows) = keep * the one before, for b = 0 `before`, + the sum of kSpread frames from b on times their weights. kBatch of them.
+  void (*sum_frames)(const double* const* frame, std::size_t rows, const double* weight, double keep, const double* before,
+                     double* const* out);
   /// to (kSpread) += pa times the sum of share[i] row (3, kSpread), in whole units; |pa| <= kLargestPa.
   void (*scatter)(std::int64_t* to, double pa, const float* row, const float* share);
 };

@@ -13,14 +13,22 @@ namespace {
 
 constexpr std::size_t kLeaf = 4;
 
-bool meets_box(const Vec3& low, const Vec3& high, const Vec3& from, const Vec3& inverse) {
-  double enter = 0.0, leave = 1.0;
+struct Cut {
+  double enter = 0.0, leave = 1.0;  // shares of the way
+};
+Cut cut_box(const Vec3& low, const Vec3& high, const Vec3& from, const Vec3& inverse) {
+  auto [enter, leave] = Cut{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     double a = (low[axis] - from[axis]) * inverse[axis], b = (high[axis] - from[axis]) * inverse[axis];
     if (a > b) std::swap(a, b);
     if (a > enter) enter = a;  // false for NaN: a way in the plane of a side counts as inside
     if (b < leave) leave = b;
   }
+  return {enter, leave};
+}
+
+bool meets_box(const Vec3& low, const Vec3& high, const Vec3& from, const Vec3& inverse) {
+  const auto [enter, leave] = cut_box(low, high, from, inverse);
   return enter <= leave * (1.0 + 1e-12);
 }
 
@@ -39,6 +47,22 @@ bool meets_triangle(const Corners& corner, const Vec3& from, const Vec3& way) {
 }
 
 }  // namespace
+
+bool is_between(const job::RigidObstacle& obstacle, const Vec3& from, const Vec3& to) {
+  const Vec3 way = to - from;
+  if (const auto* plane = std::get_if<job::PlaneObstacle>(&obstacle))
+    return dot(plane->normal, from - plane->point_m) < 0.0 || dot(plane->normal, to - plane->point_m) < 0.0;
+  if (const auto* ball = std::get_if<job::BallObstacle>(&obstacle)) {
+    const Vec3 reach = ball->centre_m - from;
+    const double nearest = std::clamp(dot(reach, way) / std::max(dot(way, way), 1e-300), 0.0, 1.0);
+    return norm(reach - nearest * way) < ball->radius_m;
+  }
+  const auto& box = std::get<job::BoxObstacle>(obstacle);
+  for (std::size_t axis = 0; axis < 3; ++axis)  // a way along a side is free, and its quotient would be no number
+    if (way[axis] == 0.0 && !(box.min_m[axis] < from[axis] && from[axis] < box.max_m[axis])) return false;
+  const auto [enter, leave] = cut_box(box.min_m, box.max_m, from, {1.0 / way[0], 1.0 / way[1], 1.0 / way[2]});
+  return enter < leave;
+}
 
 Visibility::Visibility(std::span<const Corners> triangles) : triangles_(triangles.begin(), triangles.end()), order_(triangles.size()) {
   std::iota(order_.begin(), order_.end(), 0);

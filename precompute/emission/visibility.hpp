@@ -6,11 +6,15 @@
 #include <span>
 #include <vector>
 
+#include "precompute/job/obstacles.hpp"
 #include "runtime/base/vector.hpp"
 
 namespace carillon::emission {
 
 using Corners = std::array<Vec3, 3>;  // of a triangle, m
+
+/// True when a part of the straight way lies inside the obstacle: also where one of its ends does.
+bool is_between(const job::RigidObstacle& obstacle, const Vec3& from, const Vec3& to);
 
 /// Triangles under a tree of boxes. What it keeps true: an answer depends on the list of triangles alone, not on who asks.
 class Visibility {

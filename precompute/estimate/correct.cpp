@@ -78,15 +78,11 @@ OwnIntervals find_intervals(const Level& level, const std::vector<ErrorParts>& p
       high = std::min(std::max(above, stated), stated + width);
       low = std::max(std::min(-all, stated), stated - width);
     } else if (bank::is_corrected(corrections.correction[m])) {
-      ErrorParts mesh = parts[m];
-      mesh.doubt = mesh.doubt_noise = 0.0;
-      const double reducible = calc_cents(mesh, level.kind);
       const double alone = level.kind == Kind::kT4 && !level.is_lumped ? kHalfT4 : kHalf,
                    both = level.kind == Kind::kT10Curved ? kThird : kQuarter;
       const double factor = corrections.correction[m] == Correction::kOneMesh ? alone : both;
-      const double width = factor * reducible + (all - reducible);  // a doubt of the surface is not made smaller
-      low = stated - width;
-      high = stated + width;
+      low = stated - factor * all;
+      high = stated + factor * all;
     }
     own.stated.push_back(stated);
     own.low.push_back(low);
@@ -120,7 +116,9 @@ Corrections correct(const Level& level, const std::vector<ErrorParts>& parts, co
     const double left = bank::is_corrected(verdict.correction[m]) ? calc_share_left(parts[m], level.kind, level.is_lumped) : 1.0;
     corrections.lambda.push_back(left * level.lambda[m]);
   }
-  corrections.cents = widen_for_order(level.lambda, find_intervals(level, parts, corrections, verdict.least_cents), level.unlisted);
+  const OwnIntervals own = find_intervals(level, parts, corrections, verdict.least_cents);
+  corrections.cents = widen_for_order(level.lambda, own, level.unlisted);
+  corrections.facet_cents = find_facet_cents(level, own, corrections.cents);
   if (is_too_short(level)) std::fill(corrections.cents.begin(), corrections.cents.end(), std::numeric_limits<double>::infinity());
   return corrections;
 }
@@ -153,6 +151,22 @@ Corrections calc_corrections(const Level& level, const Level* coarser) {
   for (const ErrorParts& mode : parts) verdict.correction.push_back(find_correction(mode, level.kind, level.is_lumped));
   const Corrections alone = correct(level, parts, verdict);
   return coarser == nullptr ? alone : correct(level, parts, compare(level, alone, *coarser));
+}
+
+std::vector<double> find_facet_cents(const Level& level, const OwnIntervals& own, const std::vector<double>& cents) {
+  if (std::all_of(level.parts.begin(), level.parts.end(), [](const ErrorParts& parts) { return calc_facet_cents(parts) == 0.0; }))
+    return {};
+  const std::vector<ErrorParts> parts = share_parts(level);
+  OwnIntervals either = own;
+  for (std::size_t m = 0; m < parts.size(); ++m) {
+    const double facets = calc_facet_cents(parts[m]);
+    either.low[m] -= facets;
+    either.high[m] += facets;
+    either.above[m] += facets;
+  }
+  std::vector<double> beyond = widen_for_order(level.lambda, either, level.unlisted);
+  for (std::size_t m = 0; m < beyond.size(); ++m) beyond[m] = std::max(beyond[m] - cents[m], 0.0);
+  return beyond;
 }
 
 double find_order(const Level& level, const Level* coarser, double edge_ratio) {

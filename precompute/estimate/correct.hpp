@@ -35,6 +35,7 @@ struct Corrections {
   std::vector<double> lambda;  // (m) [rad^2/s^2] stated values: corrected, or the mesh's
   std::vector<double> cents;   // (m) bar: the k-th lowest of `lambda` is so near to the k-th true one, k as in ErrorBars; infinite where
                                // is_too_short()
+  std::vector<double> facet_cents;  // (m) as ErrorBars::facet_cents, around `lambda`; empty: no facets in doubt
   // (m) half the mesh's bar (T4: 0.4 of it) by one mesh, a quarter (a third of curved elements) by two, the mesh's own interval where it is
   // rough, the mesh's bar where it is not corrected, and as far as two meshes are apart where they dispute
   std::vector<bank::Correction> correction;
@@ -43,6 +44,10 @@ struct Corrections {
 /// The corrections of `level`. coarser: another mesh of the same body and element with longer edges, in which the same modes are looked
 /// for; null: none. Pure.
 Corrections calc_corrections(const Level& level, const Level* coarser = nullptr);
+
+/// By how much [cents] each bar of `cents`, which follows from `own`, would be wider if it held the body with the other surface too
+/// (ErrorParts::doubt). (m), or empty where no facets are in doubt. Pure.
+std::vector<double> find_facet_cents(const Level& level, const OwnIntervals& own, const std::vector<double>& cents);
 
 /// The share of lambda that is left when interpolation, lumping and geometry are taken off; 0 < result. Pure.
 double calc_share_left(const ErrorParts& parts, Kind kind, bool is_lumped);

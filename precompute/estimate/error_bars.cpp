@@ -210,6 +210,7 @@ ErrorBars calc_error_bars(const comm::Communicator& comm, const partition::Local
     own.above.push_back(calc_cents(parts, level.kind));
   }
   bars.discretisation_cents = widen_for_order(solution.lambda, own, level.unlisted);
+  bars.facet_cents = find_facet_cents(level, own, bars.discretisation_cents);
   bars.corrected = calc_corrections(level);
   if (is_too_short(level)) bars.discretisation_cents = bars.corrected.cents;
   return bars;

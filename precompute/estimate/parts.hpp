@@ -36,7 +36,11 @@ ErrorParts predict_parts(const ErrorParts& parts, Kind kind, double order, doubl
 /// Pure.
 double calc_excess(const ErrorParts& parts, Kind kind);
 
-/// How far [cents] the true frequency can be from the mesh's, to either side, safety factors included. Pure.
+/// How far [cents] the true frequency of the body whose surface was meshed can be from the mesh's, to either side, safety factors included.
+/// Pure.
 double calc_cents(const ErrorParts& parts, Kind kind);
+
+/// How far [cents] that body and the one with the other surface can be apart, safety factors included; 0 without doubt. Pure.
+double calc_facet_cents(const ErrorParts& parts);
 
 }  // namespace carillon::estimate

@@ -7,6 +7,15 @@
 #include "precompute/estimate/parts.hpp"
 
 namespace carillon::estimate {
+namespace {
+
+/// How far another surface can move lambda, as a share of it.
+double calc_shift(double shift, double noise) {
+  constexpr double kShift = 1.5, kNoise = 0.15;
+  return kShift * std::abs(shift) + kNoise * noise;
+}
+
+}  // namespace
 
 double find_order(Kind kind) { return kind == Kind::kT4 ? 2.0 : 4.0; }
 
@@ -32,7 +41,7 @@ double calc_excess(const ErrorParts& parts, Kind kind) {
 }
 
 double calc_cents(const ErrorParts& parts, Kind kind) {
-  constexpr double kMaxOfEnergy = 0.99, kGeometry = 1.5, kNoise = 0.15, kT10 = 3.5, kT10Lumped = 4.5;
+  constexpr double kMaxOfEnergy = 0.99, kT10 = 3.5, kT10Lumped = 4.5;
   const double interpolation = calc_excess(parts, kind), lumping = std::abs(parts.lumping);
   // A share of the computed lambda as a share of the true one, which is smaller, times a safety factor.
   const auto enlarge = [&](double factor, double share) {
@@ -45,9 +54,9 @@ double calc_cents(const ErrorParts& parts, Kind kind) {
     mesh = enlarge(2.0, std::abs(interpolation - lumping)) + 0.4 * std::min(interpolation, lumping);
   else if (lumping > 0.0)  // how far up, and how far down
     mesh = std::max(enlarge(kT10Lumped, interpolation) - lumping, 1.75 * lumping - 0.65 * interpolation);
-  const double geometry = kGeometry * std::abs(parts.geometry) + kNoise * parts.geometry_noise;
-  const double doubt = kGeometry * std::abs(parts.doubt) + kNoise * parts.doubt_noise;
-  return 600.0 * std::log2(1.0 + mesh + geometry + doubt);
+  return 600.0 * std::log2(1.0 + mesh + calc_shift(parts.geometry, parts.geometry_noise));
 }
+
+double calc_facet_cents(const ErrorParts& parts) { return 600.0 * std::log2(1.0 + calc_shift(parts.doubt, parts.doubt_noise)); }
 
 }  // namespace carillon::estimate

@@ -211,6 +211,10 @@ PlateBody read_plate(base::Object object) {
 
 MeasuredBody read_measured(base::Object& object) {
   MeasuredBody body;
+  if (object.has_object("modes_csv"))
+    object.fail(
+        "modes_csv",
+        "names the file, with the other keys next to it: {\"modes_csv\": \"modes.csv\", \"mass_kg\": 0.4, \"size_m\": [0.1, 0.1, 0.1]}");
   body.csv = object.path("modes_csv");
   body.mass_kg = read_mass(object, "mass_kg");
   body.size_m = object.numbers<3>("size_m");

@@ -73,6 +73,7 @@ void read_surface(base::Object& body, Body& result) {
   result.close_holes = body.number_if("close_holes");
   if (result.close_holes && !(*result.close_holes >= 0.0 && *result.close_holes <= 1.0))
     body.fail("close_holes", fmt::format("is a part of the body's diagonal, from 0 to 1, and this is {:g}", *result.close_holes));
+  result.facets = body.boolean_or("facets", false);
   if (result.height_m && result.scale) body.fail("scale", "\"height_m\" gives the size already; give one of them");
   result.up = body.choice_or("up", {"x", "y", "z"}, "y")[0];
   result.method = body.choice_or("method", {"auto", "delaunay", "stuffing", "extrude"}, "auto");

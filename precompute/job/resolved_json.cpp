@@ -83,6 +83,7 @@ Json::Value write_body(const Body& body, const fs::path& base) {
     if (body.height_m) root["height_m"] = *body.height_m;
     if (body.scale) root["scale"] = *body.scale;
     if (body.close_holes) root["close_holes"] = *body.close_holes;
+    if (body.facets) root["facets"] = true;
     root["up"] = std::string(1, body.up);
     root["method"] = body.method;
   }

@@ -22,7 +22,7 @@ constexpr double kFarthestM = 1e4, kMaxSpeedMs = 343.0;  // of sound in air
 constexpr double kMaxSpinRadS = 1e5, kMaxGravity = 1e5;
 constexpr double kMaxSeconds = 3600.0, kMinStepS = 1e-12, kMaxStepS = 1e-3;
 constexpr double kMinLengthM = 1e-6, kMaxMassKg = 1e9;
-constexpr int kMaxCells = 2000;
+constexpr int kMaxCells = 2000, kMaxBendMode = 20;
 constexpr std::size_t kMaxBodies = 100, kMaxBlows = 10000, kMaxRows = 100'000, kMaxGroups = 1000, kMaxMicrophones = 16;
 /// Where a law of loss that is not Rayleigh's has the same loss as the one that is simulated.
 constexpr double kFitLowHz = 200.0, kFitHighHz = 5000.0;
@@ -98,9 +98,52 @@ std::vector<Drive> read_drives(base::Object& body) {
       drive.path.push_back(at);
     }
     if (drive.path.size() < 2) object.fail("path", "has one row; a motion needs two or more");
+    if (object.has("release_s")) drive.release_s = read_within(object, "release_s", 0.0, kMaxSeconds);
     object.finish();
   }
   return drives;
+}
+
+Bend read_bend(base::Object& object) {
+  Bend bend;
+  bend.place = object.find_place("");
+  const bool is_group = object.has("node_set") || object.has("box_m");
+  if ((object.has("mode") ? 1 : 0) + (object.has("force_n") ? 1 : 0) + (is_group ? 1 : 0) + (object.has("table_m") ? 1 : 0) != 1)
+    object.fail("",
+                "a body is bent by a \"mode\" (with \"amplitude_m\"), a \"force_n\" (with \"point_m\"), a \"node_set\" or \"box_m\" (with "
+                "\"displacement_m\"), or a \"table_m\" of rows [x, y, z, ux, uy, uz]; give one");
+  if (object.has("mode")) {
+    bend.mode = static_cast<int>(*object.integer_if("mode", 1, kMaxBendMode));
+    bend.amplitude_m = read_within(object, "amplitude_m", -kFarthestM, kFarthestM);
+    if (bend.amplitude_m == 0) object.fail("amplitude_m", "is 0, and bends nothing; give the largest displacement of the mode");
+  } else if (object.has("force_n")) {
+    bend.force_n = object.numbers<3>("force_n");
+    bend.point_m = read_vector(object, "point_m", {}, kFarthestM);
+  } else if (is_group) {
+    bend.displacement_m = object.numbers<3>("displacement_m");
+    for (const double x : bend.displacement_m)
+      if (!(std::abs(x) <= kFarthestM)) object.fail("displacement_m", fmt::format("{:g} is out of range; give metres", x));
+    bend.nodes = read_group(object);
+  } else {
+    for (const std::vector<double>& row : object.number_rows("table_m", 6, kMaxRows)) {
+      for (const double x : row)
+        if (!(std::abs(x) <= kFarthestM)) object.fail("table_m", fmt::format("{:g} is out of range; give metres", x));
+      bend.table.push_back({row[0], row[1], row[2], row[3], row[4], row[5]});
+    }
+  }
+  object.finish();
+  return bend;
+}
+
+std::vector<Bend> read_bends(base::Object& body) {
+  std::vector<Bend> bends;
+  for (base::Entry& entry : body.entries("bend", kMaxGroups)) {
+    if (!entry.object) body.fail("bend", "is an object, or a list of objects");
+    bends.push_back(read_bend(*entry.object));
+  }
+  if (bends.size() > 1 && std::any_of(bends.begin(), bends.end(), [](const Bend& one) { return one.mode > 0; }))
+    body.fail("bend", "has a mode, which is a whole shape; give it alone");
+  return bends;
 }
 
 double read_scene_length(base::Object& object, std::string_view key) { return read_within(object, key, kMinLengthM, kFarthestM); }
@@ -171,6 +214,7 @@ SimulatedBody read_simulated_body(base::Object& object, std::vector<std::string>
   body.material = read_solid(object, warnings);
   body.fixed = read_groups(object, "fixed");
   body.drives = read_drives(object);
+  body.bends = read_bends(object);
   body.position_m = read_vector(object, "position_m", {}, kFarthestM);
   body.rotation_deg = read_vector(object, "rotation_deg", {}, 1e6);
   body.velocity_m_s = read_vector(object, "velocity_m_s", {}, kMaxSpeedMs);
@@ -306,6 +350,8 @@ SimulationSpec read_root(base::Object root, const fs::path& file) {
                    : radiation == "rayleigh" ? SurfaceSound::rayleigh
                                              : SurfaceSound::paper2001;
   spec.visibility = job.boolean_or("visibility", spec.radiation != SurfaceSound::kirchhoff);
+  if (spec.visibility && spec.radiation == SurfaceSound::kirchhoff)
+    job.fail("visibility", "hides triangles, and \"kirchhoff\" needs all of a closed surface; take \"rayleigh\", or leave it out");
   spec.high_pass_hz = read_within_or(job, "high_pass_hz", 20.0, 0.0, 1000.0);
   spec.motion_hz = read_within_or(job, "motion_hz", 60.0, 1.0, spec.sample_rate_hz);
   job.finish();

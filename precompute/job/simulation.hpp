@@ -26,6 +26,19 @@ struct NodeGroup {
 struct Drive {
   NodeGroup nodes;
   std::vector<std::array<double, 4>> path;
+  std::optional<double> release_s = {};  // the nodes are free from then on; none: never
+};
+
+/// How a body is bent where the simulation begins, at rest: one of a mode, a force, and nodes that are moved. Axes of the body's mesh.
+struct Bend {
+  std::string place = {};  // "file:line" of the job, for messages
+  int mode = 0;            // 0: none
+  double amplitude_m = 0;  // of the mode: its largest displacement
+  std::optional<Vec3> force_n = {};
+  Vec3 point_m{};  // its nearest point of the surface
+  std::optional<NodeGroup> nodes = {};
+  Vec3 displacement_m{};
+  std::vector<std::array<double, 6>> table = {};  // places of nodes, and their displacements [m]
 };
 
 /// A thin sheet by its middle surface.
@@ -51,6 +64,7 @@ struct SimulatedBody {
   std::vector<NodeGroup> fixed;   // do not move; of a sheet: clamped
   std::vector<NodeGroup> hinged;  // of a sheet: do not move, and turn freely
   std::vector<Drive> drives;
+  std::vector<Bend> bends;
   Vec3 position_m{};                              // of the mesh's origin
   Vec3 rotation_deg{};                            // about the fixed axes of the world: x first, then y, then z
   Vec3 velocity_m_s{}, angular_velocity_rad_s{};  // at the start, about the centre of mass

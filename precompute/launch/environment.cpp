@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "precompute/launch/blas_kernels.hpp"
+#include "runtime/base/environment.hpp"
 
 namespace carillon::launch {
 namespace {
@@ -21,8 +22,7 @@ bool is_on_one_host() {
   const char* all = std::getenv("OMPI_COMM_WORLD_SIZE");
   const char* here = std::getenv("OMPI_COMM_WORLD_LOCAL_SIZE");
   if (all != nullptr || here != nullptr) return all != nullptr && here != nullptr && std::string_view(all) == here;
-  // Started alone, without a launcher.
-  return std::getenv("PMIX_RANK") == nullptr && std::getenv("PMI_RANK") == nullptr && std::getenv("SLURM_PROCID") == nullptr;
+  return !base::is_launched();
 }
 
 /// What OpenBLAS takes on this processor by itself; empty where the BLAS is another, or was built for one processor only.
@@ -54,6 +54,7 @@ void prepare_environment() {
   ::setenv("OMP_NUM_THREADS", "1", 1);
   ::unsetenv("PETSC_OPTIONS");
   ::unsetenv("PETSC_OPTIONS_YAML");
+  base::isolate_lone_process();
   if (is_on_one_host()) ::setenv("OMPI_MCA_pml", "ob1", 0);
   ::setenv("HWLOC_COMPONENTS", "-gl", 0);
   ::setenv("GLIBC_TUNABLES", "glibc.malloc.hugetlb=1", 0);

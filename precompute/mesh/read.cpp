@@ -7,6 +7,7 @@
 #include "precompute/mesh/build_mesh.hpp"
 #include "runtime/base/failure.hpp"
 #include "runtime/base/file.hpp"
+#include "runtime/base/foreign.hpp"
 
 namespace carillon::mesh {
 
@@ -24,6 +25,7 @@ std::string read_bytes(const std::filesystem::path& file) {
 /// The format by the first word of the content.
 MeshFormat find_format(std::string_view bytes, const std::string& name, const std::string& extension) {
   constexpr const char* kReadable = "carillon reads Gmsh .msh (2.2, 4.1), VTU, Medit .mesh and TetGen .node/.ele";
+  base::refuse_utf16(bytes, name);
   std::string_view head = bytes.substr(0, 4096);
   if (head.starts_with("\xEF\xBB\xBF")) head.remove_prefix(3);
   const auto begin = head.find_first_not_of(" \t\r\n");
@@ -41,7 +43,7 @@ MeshFormat find_format(std::string_view bytes, const std::string& name, const st
       extension == ".gltf")
     throw InputError(
         fmt::format("{}: a surface ({}), not a volume mesh; make one with carillon-mesh {} -o OUT.msh", name, extension, name));
-  throw InputError(fmt::format("{}:1: not a mesh file that is known (it begins with {}); {}", name,
+  throw InputError(fmt::format("{}:1: not a mesh file that is known (it begins with {}); {}: convert it", name,
                                quote_excerpt(head.substr(0, head.find('\n'))), kReadable));
 }
 

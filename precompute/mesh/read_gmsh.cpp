@@ -57,6 +57,7 @@ class GmshReader {
   const GmshType& find_type(int type, std::size_t place) const;
   void add_element(std::int64_t tag, int number, const GmshType& type, const std::vector<std::int32_t>& physicals, std::size_t place);
   void name_groups();
+  void clear_no_region();
   void merge_repeated();
   Vec3 read_point() {
     Vec3 x{};
@@ -439,6 +440,16 @@ void GmshReader::skip_section(std::string_view name, std::size_t place) {
   cursor_.fail(place, "section ${} has no ${}; the file was cut short: write or copy it again", name, end.substr(1));
 }
 
+/// The group that stands for region 0 is neither a region nor a set.
+void GmshReader::clear_no_region() {
+  const auto found =
+      std::find_if(names_.begin(), names_.end(), [](const auto& entry) { return entry.first.first == 3 && entry.second == kNoRegionName; });
+  if (found == names_.end()) return;
+  std::replace(raw_.regions.begin(), raw_.regions.end(), found->first.second, std::int32_t{0});
+  tet_groups_.erase(found->first);
+  names_.erase(found);
+}
+
 void GmshReader::name_groups() {
   const auto name_of = [&](const Group& group) {
     const auto found = names_.find(group);
@@ -505,6 +516,7 @@ TetMesh GmshReader::read() {
     if (!seen.contains(needed))
       cursor_.fail(cursor_.place(), "the file ends without a section ${}; it was cut short: write or copy it again", needed);
   merge_repeated();
+  clear_no_region();
   name_groups();
   std::vector<Vec3> doubt_m(doubt_m_.empty() ? 0 : raw_.nodes.size());
   for (std::size_t i = 0; i < doubt_m.size(); ++i)

@@ -51,6 +51,18 @@ std::string clean_name(std::string name) {
   return name;
 }
 
+/// The nodes of the elements of a region, ascending.
+std::vector<std::int32_t> find_region_nodes(const TetMesh& mesh, const std::vector<std::int32_t>& region_of, std::int32_t region) {
+  std::vector<char> is_in(mesh.nodes_m.size(), 0);
+  for (std::size_t e = 0; e < region_of.size(); ++e)
+    if (region_of[e] == region)
+      for (const std::int32_t node : mesh.tet(static_cast<std::int64_t>(e))) is_in[static_cast<std::size_t>(node)] = 1;
+  std::vector<std::int32_t> nodes;
+  for (std::size_t i = 0; i < is_in.size(); ++i)
+    if (is_in[i] != 0) nodes.push_back(static_cast<std::int32_t>(i));
+  return nodes;
+}
+
 /// The section of post-processing data with TetMesh::doubt_m, of the nodes that have any.
 void write_doubt(const TetMesh& mesh, bool binary, Output& out) {
   std::vector<std::size_t> nodes;
@@ -75,12 +87,25 @@ std::string make_gmsh(const TetMesh& mesh, GmshEncoding encoding) {
   std::vector<std::int32_t> regions(region_of);
   std::sort(regions.begin(), regions.end());
   regions.erase(std::unique(regions.begin(), regions.end()), regions.end());
-  std::vector<std::pair<std::string, const std::vector<std::int32_t>*>> sets;
-  const auto is_region = [&](const std::string& name) {
-    return std::any_of(regions.begin(), regions.end(), [&](std::int32_t r) { return r != 0 && name == fmt::format("physical:{}", r); });
+  // Region 0 has a group with a number that no region has.
+  std::int32_t no_region = 1;
+  while (std::binary_search(regions.begin(), regions.end(), no_region)) ++no_region;
+  std::vector<std::string> names;  // of the groups of the regions; empty: none
+  for (const std::int32_t r : regions) {
+    const auto found = mesh.region_names.find(r);
+    names.push_back(r == 0 ? kNoRegionName : found != mesh.region_names.end() ? clean_name(found->second) : "");
+  }
+  // The set of a region's nodes is that of its group.
+  const auto is_region = [&](const std::string& name, const std::vector<std::int32_t>& nodes) {
+    for (std::size_t r = 0; r < regions.size(); ++r) {
+      if (regions[r] == 0 || name != (names[r].empty() ? fmt::format("physical:{}", regions[r]) : names[r])) continue;
+      return nodes == find_region_nodes(mesh, region_of, regions[r]);
+    }
+    return false;
   };
+  std::vector<std::pair<std::string, const std::vector<std::int32_t>*>> sets;
   for (const auto& [name, nodes] : mesh.node_sets)
-    if (!is_region(name)) sets.emplace_back(clean_name(name), &nodes);
+    if (!is_region(clean_name(name), nodes)) sets.emplace_back(clean_name(name), &nodes);
   Output out(binary);
   out.text(fmt::format("$MeshFormat\n4.1 {} 8\n", binary ? 1 : 0));
   if (binary) {
@@ -88,8 +113,11 @@ std::string make_gmsh(const TetMesh& mesh, GmshEncoding encoding) {
     out.text("\n");
   }
   out.text("$EndMeshFormat\n");
-  if (!sets.empty()) {
-    out.text(fmt::format("$PhysicalNames\n{}\n", sets.size()));
+  const auto named = std::count_if(names.begin(), names.end(), [](const std::string& name) { return !name.empty(); });
+  if (!sets.empty() || named > 0) {
+    out.text(fmt::format("$PhysicalNames\n{}\n", sets.size() + static_cast<std::size_t>(named)));
+    for (std::size_t r = 0; r < regions.size(); ++r)
+      if (!names[r].empty()) out.text(fmt::format("3 {} \"{}\"\n", regions[r] != 0 ? regions[r] : no_region, names[r]));
     for (std::size_t s = 0; s < sets.size(); ++s) out.text(fmt::format("0 {} \"{}\"\n", s + 1, sets[s].first));
     out.text("$EndPhysicalNames\n");
   }
@@ -116,8 +144,8 @@ std::string make_gmsh(const TetMesh& mesh, GmshEncoding encoding) {
     out.int32(static_cast<std::int32_t>(r + 1));
     for (const Vec3& corner : {low, high})
       for (const double value : corner) out.real(value);
-    out.size(regions[r] != 0);
-    if (regions[r] != 0) out.int32(regions[r]);
+    out.size(1);
+    out.int32(regions[r] != 0 ? regions[r] : no_region);
     out.size(0);
     out.end_line();
   }

@@ -22,12 +22,15 @@
 #include "precompute/mesh/read.hpp"
 #include "precompute/mesh/write.hpp"
 #include "precompute/mesher/coarsen.hpp"
+#include "precompute/mesher/seams.hpp"
 #include "precompute/mesher/surface.hpp"
 #include "precompute/mesher/triangle_surface.hpp"
 #include "precompute/shapes/shapes.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/file.hpp"
+#include "runtime/base/file_limit.hpp"
 #include "runtime/base/json.hpp"
+#include "runtime/base/message.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/base/result.hpp"
 #include "runtime/base/standard_output.hpp"
@@ -46,7 +49,7 @@ struct Order {
   std::optional<long long> nodes;
   std::string up, method, side;
   std::optional<int> order;
-  bool straight = false, facets = false;
+  bool straight = false, facets = false, refuses_open = false;
   bool estimate = false;
   bool look = false;
   std::optional<std::int64_t> coarsen;
@@ -56,7 +59,7 @@ struct Order {
 /// What came out, for both ways of making a mesh.
 struct Meshed {
   mesh::TetMesh mesh;
-  std::vector<std::string> notes;
+  std::vector<std::string> notes, remarks;
   std::vector<std::pair<std::string, double>> seconds;
   std::optional<mesher::SurfaceReport> surface;
 };
@@ -142,6 +145,7 @@ void check_options(const Order& order) {
                           : !order.side.empty()   ? "--side"
                           : order.close_holes     ? "--close-holes"
                           : order.facets          ? "--facets"
+                          : order.refuses_open    ? "--refuse-open"
                           : order.estimate        ? "--estimate"
                                                   : nullptr;
     if (foreign) {
@@ -176,6 +180,7 @@ Meshed make_from_surface(const Order& order, const mesher::Progress& progress) {
   options.order = order.order.value_or(0);
   options.straight = order.straight;
   options.facets = order.facets;
+  options.refuses_open = order.refuses_open;
   if (order.method == "delaunay") options.method = mesher::Method::kDelaunay;
   if (order.method == "stuffing") options.method = mesher::Method::kStuffing;
   if (order.method == "extrude") options.method = mesher::Method::kExtrusion;
@@ -186,6 +191,7 @@ Meshed make_from_surface(const Order& order, const mesher::Progress& progress) {
   mesher::SurfaceReport report;
   result.mesh = mesher::mesh_surface(options, report, progress);
   result.notes = report.notes;
+  result.remarks = report.remarks;
   result.seconds = report.seconds;
   result.surface = std::move(report);
   return result;
@@ -243,6 +249,7 @@ std::string format_json(const Order& order, const Meshed& result, const mesh::Ch
     root.set("method_reason", s.reason).set("smoothed_m", rounded(s.smoothed_m, 6)).set("input_triangles", s.input_triangles);
     root.set("layers", s.layers).set("edge_per_wall", rounded(s.edge_per_wall, 6));
     root.set("scale", exact(s.scale)).set("input_volume_m3", exact(s.input_volume_m3)).set("facet_pieces", s.facet_pieces);
+    root.set("unused_points", s.unused_points).set("seam_edges", s.seam_edges).set("seam_m", rounded(s.seam_m, 6));
     root.set("holes_closed", s.holes_closed).set("largest_hole_m", rounded(s.largest_hole_m, 9));
     root.set("largest_hole_part", rounded(s.largest_hole_part, 6)).set("holes_area_part", rounded(s.holes_area_part, 6));
     root.set("shells", s.shells).set("farthest_outside_m", rounded(s.farthest_outside_m, 9));
@@ -253,6 +260,7 @@ std::string format_json(const Order& order, const Meshed& result, const mesh::Ch
   for (const auto& [name, nodes] : result.mesh.node_sets) root.member("node_sets").set(name, nodes.size());
   for (const auto& [phase, value] : result.seconds) root.member("seconds").set(phase, base::decimals(value, 4));
   root.set("seconds_total", base::decimals(total_s, 4)).set("notes", base::Json::array(result.notes));
+  for (const std::string& remark : result.remarks) root.member("notes").add(remark);
   return root.text();
 }
 
@@ -280,8 +288,10 @@ std::string format_report(const Order& order, const Meshed& result, const mesh::
 void make_mesh(const Order& order) {
   const auto start = Clock::now();
   const mesher::Progress progress = [&](std::string_view phase) {
-    if (phase.starts_with("rough {") || phase.starts_with("estimate {")) {  // for programs
-      if (order.estimate) fmt::print(stderr, "{}\n", phase);
+    if (phase.starts_with("rough {") || phase.starts_with("estimate {") || phase.starts_with("note ")) {  // for programs
+      if (order.estimate)
+        fmt::print(stderr, "{}{}\n", phase.starts_with("note ") ? "carillon-mesh: note: " : "",
+                   base::printable(phase.starts_with("note ") ? phase.substr(5) : phase));
       std::fflush(stderr);
       return;
     }
@@ -307,7 +317,7 @@ void make_mesh(const Order& order) {
   progress("checking the mesh");
   auto phase = Clock::now();
   const mesh::CheckReport check = mesh::check_mesh(result.mesh, is_piped ? "the mesh" : order.out);
-  result.notes.insert(result.notes.end(), check.warnings.begin(), check.warnings.end());
+  result.remarks.insert(result.remarks.end(), check.warnings.begin(), check.warnings.end());  // programs check the mesh themselves
   result.seconds.emplace_back("check", calc_seconds(phase));
   progress(fmt::format("writing {}", order.out));
   phase = Clock::now();
@@ -322,9 +332,11 @@ void make_mesh(const Order& order) {
   std::FILE* const to = is_piped || order.quiet ? stderr : stdout;
   if (!order.quiet) fmt::print(to, "{}", base::printable_lines(format_report(order, result, check, total_s)));
   std::set<std::string> printed;
-  for (const std::string& note : result.notes) {
-    if (printed.insert(note).second)
-      fmt::print(to, "{}{}\n", order.quiet ? "carillon-mesh: note: " : "  note      ", base::printable(note));
+  for (const auto& [texts, word] : {std::pair(&result.notes, "note"), std::pair(&result.remarks, "remark")}) {
+    for (const std::string& text : *texts) {
+      if (!printed.insert(text).second) continue;
+      fmt::print(to, "{}{}\n", order.quiet ? fmt::format("carillon-mesh: {}: ", word) : "  note      ", base::printable(text));
+    }
   }
   if (std::fflush(to) != 0) throw SystemError("the report cannot be written");
 }
@@ -346,9 +358,11 @@ void make_mesh(const Order& order) {
   throw InputError(message);
 }
 
+/// Also of meshes that are not read: their reader says so.
 bool is_mesh_name(const std::filesystem::path& file) {
-  constexpr std::array<std::string_view, 5> kEndings{".msh", ".vtu", ".mesh", ".node", ".ele"};
-  const std::string ending = file.extension().string();
+  constexpr std::array<std::string_view, 17> kEndings{".msh", ".vtu", ".mesh", ".node", ".ele", ".meshb", ".vtk",  ".pvtu", ".vtkhdf",
+                                                      ".inp", ".bdf", ".nas",  ".unv",  ".med", ".xdmf",  ".cgns", ".exo"};
+  const std::string ending = base::find_extension(file);
   return std::find(kEndings.begin(), kEndings.end(), ending) != kEndings.end();
 }
 
@@ -357,7 +371,7 @@ void write_coarse(const Order& order) {
   if (order.surface.empty()) throw InputError("--coarsen is for surfaces; give a file");
   if (order.out.empty()) throw InputError("-o is missing: give the file for the surface, whose name ends in .off");
   const mesher::TriangleSurface coarse =
-      mesher::coarsen(mesher::read_surface(order.surface), static_cast<std::size_t>(std::max<std::int64_t>(*order.coarsen, 0)));
+      mesher::coarsen(mesher::read_input(order.surface).surface, static_cast<std::size_t>(std::max<std::int64_t>(*order.coarsen, 0)));
   std::string text = fmt::format("OFF\n{} {} 0\n", coarse.points.size(), coarse.triangles.size());
   for (const Vec3& p : coarse.points) text += fmt::format("{:.17g} {:.17g} {:.17g}\n", p[0], p[1], p[2]);
   for (const Triangle& t : coarse.triangles) text += fmt::format("3 {} {} {}\n", t[0], t[1], t[2]);
@@ -368,16 +382,18 @@ void write_coarse(const Order& order) {
 void print_look(const Order& order) {
   if (order.surface.empty()) throw InputError("--look is for surfaces and meshes; give a file");
   if (is_mesh_name(order.surface)) {
-    const mesh::TetMesh mesh = mesh::read_mesh(order.surface);
+    mesh::TetMesh mesh = mesh::read_mesh(order.surface);
+    const mesh::CheckReport check = mesh::check_mesh(mesh, order.surface);
     base::Json root = base::Json::object();
-    root.set("mesh", order.surface).set("nodes", mesh.nodes_m.size()).set("tets", mesh.tet_count());
-    root.set("extent", base::Json::array(mesher::calc_box(mesh.nodes_m).extent()));
+    root.set("mesh", order.surface).set("nodes", check.nodes).set("tets", check.tets).set("parts", check.components);
+    root.set("unused_nodes", check.unreferenced).set("extent", base::Json::array(check.box_high - check.box_low));
     fmt::print("{}\n", root.line());
     return;
   }
   const mesher::SurfaceLook look = mesher::look_at_surface(order.surface);
   base::Json root = base::Json::object();
   root.set("surface", order.surface).set("triangles", look.triangles).set("parts", look.parts).set("openings", look.openings);
+  root.set("unused_points", look.unused_points).set("seam_edges", look.seam_edges);
   root.set("extent", base::Json::array(look.extent));
   root.set("thickness", look.thickness > 0.0 ? base::Json(look.thickness) : base::Json());
   fmt::print("{}\n", root.line());
@@ -409,6 +425,7 @@ void make(int argc, char** argv, Order& order) {
   app.add_option("--order", order.order, "1: tetrahedra of four nodes, 2: of ten [2 where a wall is extruded, else 1]")
       ->check(CLI::IsMember({1, 2}));
   app.add_flag("--straight", order.straight, "Order 2: mid-side nodes in the middle of their edges, not on the true surface");
+  app.add_flag("--refuse-open", order.refuses_open, "Surface: refuse an open one without --wall, rather than close or wrap it");
   app.add_flag("--facets", order.facets, "Surface: its facets are the body; without this a smooth surface through their corners is");
   app.add_option(
          "--close-holes", order.close_holes,
@@ -453,7 +470,7 @@ void make(int argc, char** argv, Order& order) {
 /// Prints an error, writes the result file and returns the exit code.
 int end(const Order& order, const base::Result& result) {
   std::fflush(stdout);
-  if (result.kind != base::ResultKind::done) fmt::print(stderr, "carillon-mesh: {}\n", base::printable(result.message));
+  if (result.kind != base::ResultKind::done) fmt::print(stderr, "carillon-mesh: {}\n", base::show_message(result.message));
   if (!order.result.empty()) base::write_result(order.result, result);
   return base::get_exit_code(result.kind);
 }
@@ -461,6 +478,7 @@ int end(const Order& order, const base::Result& result) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  base::report_file_limit();
   mesher::guard_program("carillon-mesh");
   Order order;
   try {

@@ -11,6 +11,7 @@
 #include "precompute/mesher/triangle_surface.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/file.hpp"
+#include "runtime/base/foreign.hpp"
 
 namespace carillon::mesher {
 namespace {
@@ -77,7 +78,8 @@ void add_polygon(const std::vector<Vec3>& points, Polygon polygon, std::vector<T
 }  // namespace
 
 TriangleSurface parse_surface(std::string_view bytes, const std::string& name, const std::string& format) {
-  if (bytes.starts_with("\xEF\xBB\xBF")) bytes.remove_prefix(3);  // a byte-order mark of UTF-8
+  if (format != "stl" || bytes.starts_with("\xFF\xFE")) base::refuse_utf16(bytes, name);  // a binary STL file may begin with any text
+  if (bytes.starts_with("\xEF\xBB\xBF")) bytes.remove_prefix(3);                          // a byte-order mark of UTF-8
   PolygonSoup soup = format == "obj"    ? parse_obj(bytes, name)
                      : format == "off"  ? parse_off(bytes, name)
                      : format == "ply"  ? parse_ply(bytes, name)
@@ -110,7 +112,7 @@ TriangleSurface parse_surface(std::string_view bytes, const std::string& name, c
 TriangleSurface read_surface(const std::filesystem::path& path) {
   const std::string format = find_format(path), name = path.string();
   std::error_code error;
-  if (!std::filesystem::exists(path, error)) throw InputError(fmt::format("{}: there is no such file", name));
+  if (!std::filesystem::exists(path, error)) throw InputError(fmt::format("{}: there is no such file{}", name, base::hint_backslash(path)));
   if (!std::filesystem::is_regular_file(path, error))
     throw InputError(fmt::format("{}: this is a folder or a device, not a file; give the file of a surface", name));
   const std::string bytes = base::read_file(path, "surface", kMaxBytes);

@@ -13,6 +13,7 @@
 
 #include "precompute/mesh/parts.hpp"
 #include "precompute/mesher/repair.hpp"
+#include "precompute/mesher/seams.hpp"
 #include "precompute/mesher/surface.hpp"
 #include "precompute/mesher/thin_wall.hpp"
 #include "precompute/mesher/triangle_surface.hpp"
@@ -27,17 +28,7 @@ constexpr double kLargestHole = 0.15;
 constexpr double kSmallestOpening = 0.02;      // of the diagonal, as kLargestHole
 constexpr double kOpeningTurn = 60;            // degrees, between what would fill it and the surface around it
 constexpr double kLargestHolesTogether = 0.3;  // of the closed surface's area
-// Points closer than this part of the diagonal are one: coordinates in single precision differ by more.
-constexpr double kSamePoint = 1e-9;
 constexpr std::size_t kMaxComponentsNested = 2000;
-
-struct PointHash {
-  std::size_t operator()(const std::array<std::int64_t, 3>& c) const {
-    std::size_t h = 0;
-    for (const std::int64_t x : c) h = (h ^ static_cast<std::size_t>(x)) * 0x9E3779B97F4A7C15ull;
-    return h ^ (h >> 29);
-  }
-};
 
 /// The faces at each undirected edge; +f+1 where the face runs along it upward (low to high index), -f-1 downward.
 using EdgeFaces = std::unordered_map<Edge, std::vector<std::int32_t>, EdgeHash>;
@@ -290,40 +281,6 @@ void orient_outward(TriangleSurface& surface, SurfaceReport& report) {
     if (flip[patch[f]]) std::swap(surface.triangles[f][1], surface.triangles[f][2]), ++report.flipped_triangles;
 }
 
-/// Joins points closer than the tolerance (0: equal ones) and drops points without a triangle.
-void weld(TriangleSurface& surface, double tolerance) {
-  std::unordered_map<std::array<std::int64_t, 3>, std::vector<std::int32_t>, PointHash> cells;
-  std::vector<std::int32_t> number(surface.points.size(), -1);
-  std::vector<Vec3> kept;
-  const Vec3 low = calc_box(surface.points).low;
-  const auto join = [&](const Vec3& p) {
-    std::array<std::int64_t, 3> cell;
-    for (int c = 0; c < 3; ++c)
-      cell[c] = tolerance > 0 ? static_cast<std::int64_t>(std::floor((p[c] - low[c]) / tolerance))
-                              : static_cast<std::int64_t>(std::hash<double>()(p[c]));
-    const int reach = tolerance > 0 ? 1 : 0;
-    for (int x = -reach; x <= reach; ++x)
-      for (int y = -reach; y <= reach; ++y)
-        for (int z = -reach; z <= reach; ++z) {
-          const auto found = cells.find({cell[0] + x, cell[1] + y, cell[2] + z});
-          if (found == cells.end()) continue;
-          for (const std::int32_t v : found->second)
-            if (norm(kept[static_cast<std::size_t>(v)] - p) <= tolerance) return v;
-        }
-    const auto fresh = static_cast<std::int32_t>(kept.size());
-    kept.push_back(p);
-    cells[cell].push_back(fresh);
-    return fresh;
-  };
-  for (Triangle& t : surface.triangles)
-    for (std::int32_t& v : t) {
-      auto& n = number[static_cast<std::size_t>(v)];
-      if (n < 0) n = join(surface.points[static_cast<std::size_t>(v)]);
-      v = n;
-    }
-  surface.points = std::move(kept);
-}
-
 /// Closes the surface by joining, orienting and filling. False if that is not enough; `holes` are those it found, if it came so far.
 bool close_surface(TriangleSurface& surface, double tolerance, bool cancel, const std::optional<double>& close_holes, SurfaceReport& report,
                    Holes& holes) {
@@ -416,6 +373,41 @@ std::optional<Sheet> find_sheet(const TriangleSurface& surface, const SurfaceOpt
   find_patches(find_edge_faces(sheet.surface.triangles), sheet.surface.triangles.size(), true, parts);
   report.components = parts;
   return sheet;
+}
+
+std::int64_t count_bodies(TriangleSurface surface) {
+  weld(surface, kSamePoint * calc_box(surface.points).diagonal());
+  const std::vector<TriangleSurface> parts = split_parts(surface);
+  if (parts.size() < 2 || parts.size() > kMaxComponentsNested) return static_cast<std::int64_t>(parts.size());
+  std::vector<Box> boxes;
+  for (const TriangleSurface& part : parts) boxes.push_back(calc_box(part.points));
+  const auto is_inside = [&](std::size_t p, std::size_t q) {
+    const Vec3& at = parts[p].points.front();
+    for (int c = 0; c < 3; ++c)
+      if (at[c] < boxes[q].low[c] || at[c] > boxes[q].high[c]) return false;
+    return std::abs(calc_winding(parts[q], at)) > 0.5;
+  };
+  const auto do_cross = [&](std::size_t p, std::size_t q) {
+    for (int c = 0; c < 3; ++c)
+      if (boxes[p].low[c] > boxes[q].high[c] || boxes[q].low[c] > boxes[p].high[c]) return false;
+    TriangleSurface both = parts[p];
+    const auto points = static_cast<std::int32_t>(both.points.size()), triangles = static_cast<std::int32_t>(both.triangles.size());
+    both.points.insert(both.points.end(), parts[q].points.begin(), parts[q].points.end());
+    for (const Triangle& t : parts[q].triangles) both.triangles.push_back({t[0] + points, t[1] + points, t[2] + points});
+    const auto crossing = find_crossing(both);
+    return crossing && ((*crossing)[0] < triangles) != ((*crossing)[1] < triangles);
+  };
+  mesh::Parts joined(parts.size());
+  std::vector<int> depth(parts.size(), 0);  // in how many others it lies: at odd ones it is the wall of a cavity
+  for (std::size_t p = 0; p < parts.size(); ++p)
+    for (std::size_t q = 0; q < parts.size(); ++q) {
+      if (q != p && is_inside(p, q)) ++depth[p];
+      if (q < p && do_cross(p, q)) joined.join(static_cast<std::int32_t>(p), static_cast<std::int32_t>(q));
+    }
+  std::int64_t count = 0;
+  for (std::size_t p = 0; p < parts.size(); ++p)
+    count += joined.find(static_cast<std::int32_t>(p)) == static_cast<std::int32_t>(p) && depth[p] % 2 == 0;
+  return std::max<std::int64_t>(count, 1);
 }
 
 RepairedSurface repair_surface(TriangleSurface surface, const SurfaceOptions& options, SurfaceReport& report) {

@@ -31,7 +31,6 @@ std::string describe(const SurfaceReport& r) {
   out += "seconds   ";
   for (const auto& [name, s] : r.seconds) out += fmt::format(" {} {:.2f};", name, s);
   out.back() = '\n';
-  for (const std::string& note : r.notes) out += "note       " + note + "\n";
   return out;
 }
 

@@ -22,6 +22,7 @@
 #include "precompute/mesher/quiet.hpp"
 #include "precompute/mesher/repair.hpp"
 #include "precompute/mesher/round_surface.hpp"
+#include "precompute/mesher/seams.hpp"
 #include "precompute/mesher/smooth.hpp"
 #include "precompute/mesher/stuffing.hpp"
 #include "precompute/mesher/tet_quality.hpp"
@@ -140,8 +141,21 @@ void scale_surface(TriangleSurface& surface, const SurfaceOptions& options, Surf
   report.extent_m = report.scale * extent;
   const double largest = std::max({report.extent_m[0], report.extent_m[1], report.extent_m[2]});
   if (largest > 20 || largest < 1e-3)
-    report.notes.push_back(fmt::format(
+    report.remarks.push_back(fmt::format(
         "The body is {:.3g} m long. If the file is not in metres, give its height or a scale (0.001 for millimetres).", largest));
+}
+
+/// What was done to the surface as it was read.
+void note_input(SurfaceReport& report) {
+  if (report.seam_edges > 0)
+    report.notes.push_back(fmt::format(
+        "The seams of its faces were closed: {} borders, whose sides lay up to {:.2g} m apart, were joined (as are all within "
+        "{:.2g} m, {:g} of the body's diagonal).",
+        report.seam_edges, report.seam_m, kSeam * norm(Vec3{report.extent_m[0], report.extent_m[1], report.extent_m[2]}), kSeam));
+  if (report.unused_points > 0)
+    report.notes.push_back(fmt::format("{} point{} of the file belong{} to no triangle and {} dropped.", report.unused_points,
+                                       report.unused_points == 1 ? "" : "s", report.unused_points == 1 ? "s" : "",
+                                       report.unused_points == 1 ? "was" : "were"));
 }
 
 /// Scales the surface once more where joining, wrapping or rounding has changed its extent, so that the body itself has the height asked
@@ -380,9 +394,9 @@ void place_nodes(mesh::TetMesh& mesh, const Body& body, const SurfaceOptions& op
   report.straightened_tets += place_on_smooth_surface(mesh, body, options.straight);
   for (const Vec3& way : mesh.doubt_m) report.doubt_m = std::max(report.doubt_m, norm(way));
   if (report.doubt_m > 0)
-    report.notes.push_back(fmt::format(
-        "Some facets are so coarse that they may be planes of the body or samples of a smooth surface, up to {:.3g} m apart: the error "
-        "bars contain both: a surface in finer facets settles it, or --facets if the facets are the body.",
+    report.remarks.push_back(fmt::format(
+        "Some facets are so coarse that they may be planes of the body or samples of a smooth surface, up to {:.3g} m apart. What that "
+        "changes is stated next to the error bars. A surface in finer facets settles it, or --facets if they are planes.",
         report.doubt_m));
   if (mesh.order == 1) {
     report.volume_m3 = measure(mesh).volume_m3;
@@ -399,7 +413,7 @@ void add_notes(const SurfaceOptions& options, const Body& body, SurfaceReport& r
         fmt::format("The mesh has {:+.1f} % of volume against the body: its elements are coarse for its shape; more nodes bring it closer.",
                     100 * error));
   if (report.min_dihedral_deg < 8)
-    report.notes.push_back(fmt::format("The flattest element has a dihedral angle of {:.1f} degrees.", report.min_dihedral_deg));
+    report.remarks.push_back(fmt::format("The flattest element has a dihedral angle of {:.1f} degrees.", report.min_dihedral_deg));
   if (options.height_m) {
     const int up = static_cast<int>(options.up);
     if (std::abs(report.mesh_extent_m[up] / *options.height_m - 1) > 0.02)
@@ -430,7 +444,7 @@ void round(Body& body, const SurfaceOptions& options, SurfaceReport& report) {
   report.facet_pieces = pieces;
   if (repaired.clean && pieces > 1 && !is_clean(rounded)) {
     report.facet_pieces = 1;
-    report.notes.push_back("The smooth surface through the facets' corners would run through itself; the facets were taken as they are.");
+    report.remarks.push_back("The smooth surface through the facets' corners would run through itself; the facets were taken as they are.");
     round.keep_facets();
     body.round = std::move(round);
     return;
@@ -573,7 +587,7 @@ std::optional<mesh::TetMesh> make_thin(const Body& body, const SurfaceOptions& o
   const auto give_up = [&](const std::string& fault) {
     if (must) throw InputError(fmt::format("{}: the wall cannot be extruded from this surface: it {}", options.surface.string(), fault));
     report.reason.clear();
-    report.notes.push_back(
+    report.remarks.push_back(
         fmt::format("The wall is thin, but it {}: the volume was meshed instead of the skin, which takes more nodes.", fault));
     return std::nullopt;
   };
@@ -620,19 +634,31 @@ std::optional<mesh::TetMesh> make_thin(const Body& body, const SurfaceOptions& o
   return give_up(fault);
 }
 
+[[noreturn]] void refuse_open(const SurfaceOptions& options, const Sheet& sheet) {
+  throw InputError(fmt::format(
+      "{}: it is an open surface ({} border{}), which has no thickness: give one with --wall (of a job's body: \"wall_m\"), or, "
+      "of a solid body, say up to which part of its diagonal holes are closed, with --close-holes (\"close_holes\")",
+      options.surface.string(), sheet.holes, sheet.holes == 1 ? "" : "s"));
+}
+
 mesh::TetMesh make_mesh(const SurfaceOptions& given, SurfaceReport& report, Phases& phases) {
   SurfaceOptions options = given;
   Body body;
-  TriangleSurface raw = phases.run("reading", [&] { return read_surface(options.surface); });
-  report.input_triangles = static_cast<std::int64_t>(raw.triangles.size());
+  SurfaceInput input = phases.run("reading", [&] { return read_input(options.surface); });
+  TriangleSurface& raw = input.surface;
+  report.input_triangles = input.triangles;
   const auto calc_limit = [&](double start, double nodes) {
     return start + kCpuPerTriangle * static_cast<double>(report.input_triangles) + kCpuPerNode * nodes;
   };
   const double asked = static_cast<double>(options.nodes.value_or(0));
   std::optional<CpuLimit> cpu_limit(std::in_place, calc_limit(kMinCpuOfRepair, asked));
   std::optional<Sheet> sheet;
-  if (options.wall_m) phases.run("repairing", [&] { return sheet = find_sheet(raw, options), 0; });
+  if (options.wall_m || options.refuses_open) phases.run("repairing", [&] { return sheet = find_sheet(raw, options), 0; });
+  if (sheet && !options.wall_m) refuse_open(options, *sheet);
   scale_surface(raw, options, report, sheet.has_value());
+  report.unused_points = input.unused_points;
+  report.seam_edges = input.seams.edges;
+  report.seam_m = report.scale * input.seams.widest;
   show_rough_estimate(raw, options, sheet.has_value(), phases);
   if (sheet) {
     for (Vec3& p : sheet->surface.points) p = report.scale * p;
@@ -674,8 +700,9 @@ mesh::TetMesh make_mesh(const SurfaceOptions& given, SurfaceReport& report, Phas
   if (options.nodes && options.method != Method::kStuffing && static_cast<double>(*options.nodes) < kHopeless * min_nodes)
     throw_count(options, CountError("", min_nodes, min_nodes));
   if (!options.edge_m && !options.nodes)
-    report.notes.push_back("Neither nodes nor edge was given: about 10,000 corner nodes (order 2: 30,000 nodes in all) were aimed at.");
+    report.remarks.push_back("Neither nodes nor edge was given: about 10,000 corner nodes (order 2: 30,000 nodes in all) were aimed at.");
 
+  for (const std::string& note : report.notes) phases.show("note " + note);  // the estimate may be all that is waited for
   phases.show(format_estimate("estimate", body, edge));
 
   report.method = options.method == Method::kStuffing ? Method::kStuffing : Method::kDelaunay;
@@ -739,7 +766,7 @@ mesh::TetMesh make_mesh(const SurfaceOptions& given, SurfaceReport& report, Phas
   if (report.removed_tets > 0)
     report.notes.push_back(fmt::format("{} elements were removed where the body only touched itself or was cut off.", report.removed_tets));
   if (report.parted_nodes > 0)
-    report.notes.push_back(fmt::format("The mesh was repaired at {} nodes where both skins of a thin part met.", report.parted_nodes));
+    report.remarks.push_back(fmt::format("The mesh was repaired at {} nodes where both skins of a thin part met.", report.parted_nodes));
   measure_mesh(linear, body, report);
   report.edge_m = edge;
   mesh::TetMesh out = options.order == 2 ? mesh::to_quadratic(linear) : std::move(linear);
@@ -759,18 +786,24 @@ mesh::TetMesh mesh_surface(const SurfaceOptions& options, SurfaceReport& report,
   Phases phases(report, progress, options.surface.string());
   const Quiet quiet;
   try {
-    return make_mesh(options, report, phases);
+    mesh::TetMesh mesh = make_mesh(options, report, phases);
+    if (report.removed_triangles > 0)
+      report.notes.push_back(fmt::format("{} of the {} triangles of the surface were dropped: they have no area, or are there twice.",
+                                         report.removed_triangles, report.input_triangles));
+    note_input(report);
+    return mesh;
   } catch (const std::bad_alloc&) {
     throw SystemError(fmt::format("{}: memory ran out while meshing; ask for longer edges or fewer nodes", options.surface.string()));
   }
 }
 
 SurfaceLook look_at_surface(const std::filesystem::path& surface) {
-  const TriangleSurface raw = read_surface(surface);
-  SurfaceLook look;
-  look.triangles = static_cast<std::int64_t>(raw.triangles.size());
+  SurfaceInput input = read_input(surface);
+  TriangleSurface& raw = input.surface;
+  weld(raw, kSamePoint * calc_box(raw.points).diagonal());
+  SurfaceLook look{.triangles = input.triangles, .unused_points = input.unused_points, .seam_edges = input.seams.edges};
   look.extent = calc_used_box(raw).extent();
-  look.parts = static_cast<std::int64_t>(split_parts(raw).size());
+  look.parts = count_bodies(raw);
   SurfaceOptions options;
   options.surface = surface;
   if (const std::optional<Sheet> sheet = find_sheet(raw, options)) {

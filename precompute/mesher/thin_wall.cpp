@@ -494,8 +494,9 @@ class ThinMesher {
     for (const auto& [a, b] : attempt.skin.folds) report_.sharp_edges_m += norm(p[b] - p[a]);
     report_.sharp_curves = attempt.skin.folds.empty() ? 0 : 1;
     const auto note = [&](std::string text) { report_.notes.push_back(std::move(text)); };
+    const auto remark = [&](std::string text) { report_.remarks.push_back(std::move(text)); };
     if (layers_ == 1)
-      note(fmt::format(
+      remark(fmt::format(
           "One layer of elements lies through the wall, in edges {:.1f} times as long as it is thick: errors fall with the square "
           "of the edges rather than their fourth power.",
           report_.edge_per_wall));
@@ -507,9 +508,9 @@ class ThinMesher {
                       report_.edge_per_wall, kMaxEdgePerWall));
     if (order_ == 1)
       note("One layer of linear elements is far too stiff in bending: its frequencies are of no use but for a first look; take order 2.");
-    if (attempt.rings > 0) note(fmt::format("Folds and rims have a ring of narrow elements ({} points of the skin).", attempt.rings));
+    if (attempt.rings > 0) remark(fmt::format("Folds and rims have a ring of narrow elements ({} points of the skin).", attempt.rings));
     if (source_.get_dropped() > 0)
-      note(fmt::format("{} sharp edges of facets are shorter than elements and were taken for noise.", source_.get_dropped()));
+      remark(fmt::format("{} sharp edges of facets are shorter than elements and were taken for noise.", source_.get_dropped()));
     if (lost_ > 0.1 * edge_)
       note(fmt::format("The elements cut off up to {:.3g} mm of the surface's details; more nodes keep them.", 1000 * lost_));
     if (source_.is_doubtful()) {
@@ -531,10 +532,10 @@ class ThinMesher {
           mesh.doubt_m[node] = source_.find_doubt(0.5 * (p[extruded.edges[e][0]] + p[extruded.edges[e][1]]));
       for (const Vec3& w : mesh.doubt_m) report_.doubt_m = std::max(report_.doubt_m, norm(w));
       if (report_.doubt_m > 0)
-        note(
+        remark(
             fmt::format("Some facets are so coarse that they may be planes of the body or samples of a smooth surface, up to {:.3g} m "
-                        "apart: the error bars "
-                        "contain both: a surface in finer facets settles it, or --facets if the facets are the body.",
+                        "apart. What that changes is stated next to the error bars. A surface in finer facets settles it, or --facets if "
+                        "they are planes.",
                         report_.doubt_m));
       else
         mesh.doubt_m.clear();

@@ -58,18 +58,6 @@ double calc_mean_edge(const comm::Communicator& comm, const partition::LocalMesh
   return sum[0] / sum[1];
 }
 
-/// The largest part of a bar that no mesh makes smaller: the facets of the surface leave it open what the body is.
-double calc_doubt(const estimate::Level& level) {
-  double worst = 0.0;
-  for (const estimate::ErrorParts& parts : level.parts) {
-    estimate::ErrorParts doubt;
-    doubt.doubt = parts.doubt;
-    doubt.doubt_noise = parts.doubt_noise;
-    worst = std::max(worst, estimate::calc_cents(doubt, level.kind));
-  }
-  return worst;
-}
-
 class Search {
  public:
   explicit Search(Run& run) : run_(run), asked_(*run.job.accuracy_cents) {
@@ -294,12 +282,6 @@ Decision Search::decide() {
   if (last.modes > 0 && last.worst_cents <= asked_) return {1, last.setting};
   if (const Trial* before = find_before(last); last.modes == 0 && before != nullptr && before->modes == 0)
     return {1, last.setting};  // twice none: there is none
-  if (const double doubt = calc_doubt(current_.solved.errors.bars.level); doubt > asked_)
-    give_up(fmt::format(
-        "{:.3g} cents of it cannot be reduced by any mesh: the facets of the surface are so coarse that they may be planes or samples of "
-        "a smooth surface; give a surface in finer facets, or, if the facets are the body, mesh it with carillon-mesh --facets "
-        "and give the mesh",
-        doubt));
   if (last.modes > 0 && last.algebraic_cents > 0.2 * asked_) tolerance_ = std::max(tolerance_ * 1e-2, 1e-12);
   if (report_.trials.size() >= kMaxTrials) give_up(fmt::format("{} settings were tried; ask for less, or give the mesh", kMaxTrials));
   return run_.job.body ? decide_on_body() : decide_on_file();
@@ -317,8 +299,8 @@ void Search::check_forecast(const Setting& setting) {
     bytes = ratio < 1.0 ? forecast(setting, ratio).bytes - static_cast<double>(last.peak_bytes) : 0.0;
   }
   bytes = run_.comm.broadcast(bytes);
-  eigen::check_memory(run_.comm, static_cast<std::int64_t>(std::clamp(bytes, 0.0, 1e18) / run_.comm.size()), 0,
-                      "The next setting (" + run::describe(setting) + ")");
+  eigen::check_memory(run_.comm, static_cast<std::int64_t>(std::clamp(bytes, 0.0, 1e18) / run_.comm.size()),
+                      run_.options.get_memory_limit_bytes(), "The next setting (" + run::describe(setting) + ")");
 }
 
 Trial Search::judge(const Setting& setting, std::size_t first_phase) {
@@ -346,6 +328,7 @@ void Search::judge_bars(Trial& trial) const {
   for (const std::size_t k : find_listed(bars.corrected)) {
     const double cents = bars.algebraic_cents[k] + bars.corrected.cents[k];
     trial.algebraic_cents = std::max(trial.algebraic_cents, bars.algebraic_cents[k]);
+    if (!bars.corrected.facet_cents.empty()) trial.facet_cents = std::max(trial.facet_cents, bars.corrected.facet_cents[k]);
     if (cents <= trial.worst_cents) continue;
     trial.worst_cents = cents;
     trial.worst_hz = std::sqrt(bars.corrected.lambda[k]) / (2 * std::numbers::pi);
@@ -451,7 +434,8 @@ void check_count(const Run& run, const Setting& setting) {
   constexpr double kSurely = 0.5;  // of a factor that is estimated by a power of the unknowns, to a factor of two
   const cost::ProblemSize size = cost::estimate_meshed_size(setting.nodes.value_or(0), setting.element == job::Element::T10);
   const auto bytes = static_cast<std::int64_t>(kSurely * cost::predict_parts(size).factor);
-  eigen::check_memory(run.comm, bytes / run.comm.size(), 0, fmt::format("The coarsest mesh of this body ({} nodes)", size.nodes));
+  eigen::check_memory(run.comm, bytes / run.comm.size(), run.options.get_memory_limit_bytes(),
+                      fmt::format("The coarsest mesh of this body ({} nodes)", size.nodes));
 }
 
 }  // namespace
@@ -496,6 +480,7 @@ Json::Value describe_accuracy(const AccuracyReport& report) {
     entry["worst_cents"] = trial.worst_cents;
     entry["worst_hz"] = trial.worst_hz;
     entry["algebraic_cents"] = trial.algebraic_cents;
+    entry["facet_cents"] = trial.facet_cents;
     entry["cpu_seconds"] = trial.cpu_seconds;
     entry["peak_bytes_all_ranks"] = Json::Int64(trial.peak_bytes);
     root["trials"].append(entry);

@@ -82,6 +82,13 @@ bank::Corrected make_corrected(const SolvedBody& solved) {
   return corrected;
 }
 
+/// Of the frequency of the mesh or the corrected one, whichever is the farther from that of the other body.
+std::vector<double> find_facet_cents(const estimate::ErrorBars& bars) {
+  std::vector<double> cents = bars.facet_cents;
+  for (std::size_t m = 0; m < cents.size(); ++m) cents[m] = std::max(cents[m], bars.corrected.facet_cents[m]);
+  return cents;
+}
+
 bank::Proof make_proof(const eigen::Modes& modes) {
   bank::Proof proof;
   for (const eigen::Count& count : modes.proof.counts) {
@@ -117,6 +124,7 @@ bank::Bank make_bank(const job::JobSpec& job, const Setting& setting, Body& body
   bank.shape = std::move(surface_modes.shape);
   bank.algebraic_error_cents = solved.errors.bars.algebraic_cents;
   bank.discretisation_error_cents = solved.errors.bars.discretisation_cents;
+  bank.facet_error_cents = find_facet_cents(solved.errors.bars);
   bank.corrected = make_corrected(solved);
   bank.rigid = {solved.properties.rigid.mass_kg, solved.properties.rigid.centre_m, solved.properties.rigid.inertia_kg_m2,
                 solved.properties.rigid.volume_m3};

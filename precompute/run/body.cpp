@@ -69,12 +69,26 @@ void warn_of_mesh(Run& run, const Body& body) {
     run.log.warn(i == 0 && body.check.has_odd_size ? warnings[i] + "; " + describe_scale_key(run.job) : warnings[i]);
 }
 
+/// Once, however many meshes are made of the surface.
+void warn_of_facets(Run& run) {
+  const std::string text = fmt::format(
+      "some facets of the surface are so coarse that they may be planes of the body or samples of a smooth surface; what that changes is "
+      "stated next to the error bars (facets in doubt); a surface in finer facets settles it, or {} if they are planes",
+      run.job.body ? "\"facets\": true inside \"body\"" : "carillon-mesh --facets");
+  const std::vector<std::string>& before = run.log.get_warnings();
+  if (std::find(before.begin(), before.end(), text) == before.end()) run.log.warn(text);
+}
+
 /// Rank 0 only: the mesh of the element's order, checked, and what stays of it on this rank.
 mesh::TetMesh read_checked_mesh(Run& run, const Setting& setting, Body& body, Patience* patience) {
   const bool quadratic = setting.element == job::Element::T10;
   const job::JobSpec& job = run.job;
+  MesherWords words;
   mesh::TetMesh mesh =
-      job.body ? make_body_mesh(*job.body, quadratic ? 2 : 1, {setting.nodes, setting.edge_m}, patience) : mesh::read_mesh(job.mesh);
+      job.body ? make_body_mesh(*job.body, quadratic ? 2 : 1, {setting.nodes, setting.edge_m}, words, patience) : mesh::read_mesh(job.mesh);
+  body.mesher_warnings = std::move(words.warnings);
+  for (const std::string& warning : body.mesher_warnings) run.log.warn_once(warning);
+  for (const std::string& remark : words.remarks) run.log.print(remark);
   if (patience != nullptr && patience->estimate) return {};
   if (job.mesh_scale != 1.0) {
     for (std::vector<Vec3>* lengths : {&mesh.nodes_m, &mesh.doubt_m}) {
@@ -86,10 +100,9 @@ mesh::TetMesh read_checked_mesh(Run& run, const Setting& setting, Body& body, Pa
   body.check = mesh::check_mesh(mesh, body.source);
   body.region_names = mesh.region_names;
   warn_of_mesh(run, body);
-  if (!mesh.doubt_m.empty())
-    run.log.warn(
-        "some facets of the surface are so coarse that they may be planes of the body or samples of a smooth surface; the error bars "
-        "contain both: a surface in finer facets settles it, or carillon-mesh --facets if the facets are the body");
+  if (job.body && job.body->shape.empty() && body.check.components > 1)
+    run.log.warn_once(fmt::format("the surface has {} parts that are not connected: each vibrates by itself", body.check.components));
+  if (!mesh.doubt_m.empty()) warn_of_facets(run);
   for (int i = 0; i < setting.refinements; ++i) mesh = refine_mesh(mesh);
   if (quadratic && mesh.order == 1) mesh = mesh::to_quadratic(mesh);
   if (!quadratic && mesh.order == 2) mesh = mesh::to_linear(mesh);

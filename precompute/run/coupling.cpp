@@ -10,6 +10,7 @@
 
 #include "precompute/condense/condense.hpp"
 #include "precompute/fem/assemble.hpp"
+#include "runtime/bank/surface.hpp"
 #include "runtime/base/sort_order.hpp"
 #include "runtime/base/vector.hpp"
 
@@ -30,17 +31,6 @@ std::vector<std::int32_t> find_kept_modes(const Run& run, const SolvedBody& solv
   return kept;
 }
 
-/// Twice the volume over the surface: the thickness of a sheet.
-double calc_thickness(const Surface& surface, double volume_m3) {
-  double area_m2 = 0;
-  for (const auto& t : surface.triangles) {
-    const Vec3 &a = surface.vertices_m[static_cast<std::size_t>(t[0])], &b = surface.vertices_m[static_cast<std::size_t>(t[1])],
-               &c = surface.vertices_m[static_cast<std::size_t>(t[2])];
-    area_m2 += 0.5 * norm(cross(b - a, c - a));
-  }
-  return area_m2 > 0 ? 2 * volume_m3 / area_m2 : 0.0;
-}
-
 condense::CondenseOptions make_condense_options(Run& run, const AccurateBody& found, std::vector<std::int32_t> kept) {
   condense::CondenseOptions options;
   options.is_stretch = run.job.nonlinear->is_stretch;
@@ -48,7 +38,9 @@ condense::CondenseOptions make_condense_options(Run& run, const AccurateBody& fo
   options.below_hz = run.job.nonlinear->below_hz;
   options.energy_error = run.job.nonlinear->energy_error;
   options.eligible = std::move(kept);
-  options.thickness_m = run.comm.broadcast([&] { return calc_thickness(found.body.surface, found.solved.properties.rigid.volume_m3); });
+  options.thickness_m = run.comm.broadcast([&] {
+    return bank::calc_thickness_m(found.body.surface.vertices_m, found.body.surface.triangles, found.solved.properties.rigid.volume_m3);
+  });
   options.report = [&run, tenths = 0](const std::string& text, double share) mutable {
     const int now = static_cast<int>(10.0 * share);
     if (std::exchange(tenths, now) != now) run.log.print(text);

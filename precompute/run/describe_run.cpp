@@ -36,6 +36,7 @@ Json::Value describe_mesh(const Body& body, const Setting& setting) {
   mesh["min_dihedral_deg"] = check.min_dihedral_deg;
   mesh["mean_ratio_min"] = check.mean_ratio_min;
   mesh["warnings"] = make_list(check.warnings);
+  for (const std::string& warning : body.mesher_warnings) mesh["warnings"].append(warning);
   return mesh;
 }
 

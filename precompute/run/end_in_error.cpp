@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <thread>
 
-#include "runtime/base/printable.hpp"
+#include "runtime/base/message.hpp"
 
 namespace carillon::run {
 
@@ -21,7 +21,7 @@ int end_in_error(MPI_Comm comm, const std::string& program, const std::string& f
     if (all_here == 0) std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
   if (rank == 0 || all_here == 0) {
-    fmt::print(stderr, "{}: error: {}\n", program, base::printable(result.message));
+    fmt::print(stderr, "{}: error: {}\n", program, base::show_message(result.message));
     if (!file.empty()) base::write_result(file, result);
   }
   std::fflush(stderr);

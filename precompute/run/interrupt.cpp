@@ -1,4 +1,5 @@
-// Method: the handler only calls what POSIX allows in one (signal-safety(7)): kill, unlink, rmdir, write, poll, _exit.
+// Method: the handler only calls what POSIX allows in one (signal-safety(7)): write, poll, _exit, and what
+//   runtime/base/temporary does.
 // Source: POSIX.1-2008, 2.4.3. Deviations: none.
 #include "precompute/run/interrupt.hpp"
 
@@ -8,23 +9,29 @@
 
 #include <array>
 #include <atomic>
+#include <cstdlib>
 #include <cstring>
+#include <string_view>
 
 #include "runtime/base/error.hpp"
+#include "runtime/base/temporary.hpp"
 
 namespace carillon::run {
 namespace {
 
 constexpr int kFirstRankMs = 200;
 
-std::array<char, 4096> cleanup_file{}, cleanup_folder{};
-volatile sig_atomic_t has_cleanup = 0;
-volatile sig_atomic_t own_rank = 0;
+struct Temporary {
+  std::array<char, 4096> file{};
+  volatile sig_atomic_t is_removed = 0;  // by a signal
+  bool is_used = false;
+};
+std::array<Temporary, TemporaryFile::kMost> temporaries;
+volatile sig_atomic_t is_speaker = 1;
+const char *program_name = "", *untouched_text = "";
 volatile sig_atomic_t saves = 0;
 volatile sig_atomic_t has_news = 0;
 volatile sig_atomic_t stop_signal = 0;
-std::atomic<pid_t> child_process{0};
-static_assert(std::atomic<pid_t>::is_always_lock_free, "A handler may only touch lock-free atomics.");
 
 void print(const char* text) { (void)!write(STDERR_FILENO, text, std::strlen(text)); }
 
@@ -38,16 +45,13 @@ void handle(int signal) {
     stop_signal = signal;
     return;
   }
-  if (has_cleanup != 0) {
-    const pid_t child = child_process.load();
-    if (child > 0) kill(child, SIGKILL);
-    unlink(cleanup_file.data());
-    rmdir(cleanup_folder.data());
-  }
-  if (own_rank == 0) {
-    print("carillon-precompute: stopped by ");
-    print(find_name(signal));
-    print(is_to_save ? "; the run can be resumed from the checkpoint\n" : "; the bank was not touched, or it is whole\n");
+  base::end_children_and_temporaries();
+  for (const Temporary& one : temporaries)
+    if (one.is_removed != 0) unlink(one.file.data());
+  if (is_speaker != 0) {
+    for (const char* text : {program_name, ": stopped by ", find_name(signal), "; "}) print(text);
+    print(is_to_save ? "the run can be resumed from the checkpoint" : untouched_text);
+    print("\n");
   } else {
     poll(nullptr, 0, kFirstRankMs);  // mpirun ends all ranks with the first that ends, which is to be the one that prints
   }
@@ -56,8 +60,17 @@ void handle(int signal) {
 
 }  // namespace
 
-void end_on_signals(int rank) {
-  own_rank = rank;
+bool is_first_of_all() {
+  for (const char* name : {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"}) {
+    if (const char* rank = std::getenv(name); rank != nullptr) return std::string_view(rank) == "0";
+  }
+  return true;
+}
+
+void end_on_signals(const char* program, const char* untouched) {
+  is_speaker = is_first_of_all() ? 1 : 0;
+  program_name = program;
+  untouched_text = untouched;
   struct sigaction action {};
   action.sa_handler = handle;
   sigfillset(&action.sa_mask);
@@ -85,21 +98,23 @@ bool is_stop_asked() { return stop_signal != 0; }
 
 std::string find_stop_name() { return stop_signal == 0 ? "a signal" : find_name(stop_signal); }
 
-Cleanup::Cleanup(const std::string& file) {
-  const std::string folder = file.substr(0, file.rfind('/'));
-  if (file.size() >= cleanup_file.size()) throw InputError(file + ": this path is too long for a temporary file");
-  std::memcpy(cleanup_file.data(), file.c_str(), file.size() + 1);
-  std::memcpy(cleanup_folder.data(), folder.c_str(), folder.size() + 1);
-  child_process = 0;
-  has_cleanup = 1;
+TemporaryFile::TemporaryFile(const std::filesystem::path& file) {
+  const std::string& name = file.native();
+  if (name.size() >= temporaries[0].file.size()) throw InputError(name + ": this path is too long for a temporary file");
+  while (temporaries.at(place_).is_used) ++place_;
+  Temporary& own = temporaries[place_];
+  std::memcpy(own.file.data(), name.c_str(), name.size() + 1);
+  own.is_used = true;
+  own.is_removed = 1;
 }
 
-Cleanup::~Cleanup() {
-  has_cleanup = 0;
-  unlink(cleanup_file.data());
-  rmdir(cleanup_folder.data());
+TemporaryFile::~TemporaryFile() {
+  Temporary& own = temporaries[place_];
+  if (own.is_removed != 0) unlink(own.file.data());
+  own.is_removed = 0;
+  own.is_used = false;
 }
 
-void Cleanup::set_child(pid_t child) { child_process = child; }
+void TemporaryFile::set_needed(bool is_needed) { temporaries[place_].is_removed = is_needed ? 0 : 1; }
 
 }  // namespace carillon::run

@@ -1,7 +1,6 @@
 #include "precompute/run/meshing.hpp"
 
 #include <fmt/core.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -13,17 +12,18 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <sstream>
 #include <string_view>
 #include <vector>
 
 #include "precompute/mesh/read.hpp"
-#include "precompute/run/interrupt.hpp"
 #include "precompute/shapes/shapes.hpp"
 #include "runtime/base/command.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/failure.hpp"
 #include "runtime/base/file.hpp"
 #include "runtime/base/result.hpp"
+#include "runtime/base/temporary.hpp"
 
 namespace carillon::run {
 namespace {
@@ -33,13 +33,11 @@ namespace fs = std::filesystem;
 // Beyond the time for the mesh: for the surface as it was read, should its repair not end, and for its reading.
 constexpr double kLonger = 1.2, kRoughSeconds = 1.5, kReadSeconds = 2.5, kMinReadSeconds = 8;
 
-constexpr std::size_t kKeptBytes = 4096;  // of what carillon-mesh prints on standard error
+constexpr std::size_t kKeptBytes = 1 << 16;  // of what carillon-mesh prints on standard error
 
 /// Runs carillon-mesh and keeps the end of its standard error. Once `may_stop` says so it is killed.
-base::Finished run_mesher(const std::vector<std::string>& words, Cleanup& cleanup,
-                          const std::function<bool(const std::string& errors)>& may_stop) {
+base::Finished run_mesher(const std::vector<std::string>& words, const std::function<bool(const std::string& errors)>& may_stop) {
   base::RunOptions options{.max_bytes = kKeptBytes, .keeps_tail = true};
-  options.started = [&](pid_t child) { cleanup.set_child(child); };
   if (may_stop) options.may_stop = [&](const base::Finished& now) { return may_stop(now.errors); };
   base::Finished finished;
   try {
@@ -47,7 +45,6 @@ base::Finished run_mesher(const std::vector<std::string>& words, Cleanup& cleanu
   } catch (const base::StartError& error) {
     throw SystemError(fmt::format("{}; it belongs next to this program", error.what()));
   }
-  cleanup.set_child(0);
   while (!finished.errors.empty() && finished.errors.back() == '\n') finished.errors.pop_back();
   return finished;
 }
@@ -87,16 +84,27 @@ std::optional<BodyEstimate> take_estimate(std::string& errors, std::string_view 
   return estimate;
 }
 
-std::string make_folder() {
-  std::string folder = (fs::temp_directory_path() / "carillon-mesh-XXXXXX").string();
-  if (::mkdtemp(folder.data()) == nullptr)
-    throw SystemError(fmt::format("{}: cannot make a temporary folder: {}", folder, std::strerror(errno)));
-  return folder;
+/// Moves what the mesher says of the mesh from its standard error to `said`; a sentence that it said twice, once.
+void take_words(std::string& errors, MesherWords& said) {
+  std::istringstream lines(errors);
+  std::string rest;
+  for (std::string line; std::getline(lines, line);) {
+    bool is_taken = false;
+    for (const auto& [begin, texts] :
+         {std::pair("carillon-mesh: note: ", &said.warnings), std::pair("carillon-mesh: remark: ", &said.remarks)}) {
+      if (!line.starts_with(begin)) continue;
+      const std::string text = line.substr(std::strlen(begin));
+      if (std::find(texts->begin(), texts->end(), text) == texts->end()) texts->push_back(text);
+      is_taken = true;
+    }
+    if (!is_taken) rest += rest.empty() ? line : "\n" + line;
+  }
+  errors = std::move(rest);
 }
 
-mesh::TetMesh mesh_surface(const job::Body& body, int order, const Fineness& fineness, Patience* patience) {
-  const std::string file = make_folder() + "/body.msh";
-  Cleanup cleanup(file);
+mesh::TetMesh mesh_surface(const job::Body& body, int order, const Fineness& fineness, MesherWords& said, Patience* patience) {
+  const base::TemporaryFolder folder("carillon-mesh-");
+  const std::string file = (folder.path() / "body.msh").string();
   std::vector<std::string> words{
       base::require_program("carillon-mesh").string(), body.surface.string(), "-o", file, "--order", std::to_string(order), "--quiet"};
   const auto add = [&](const char* option, const std::string& value) {
@@ -108,6 +116,8 @@ mesh::TetMesh mesh_surface(const job::Body& body, int order, const Fineness& fin
   if (body.height_m) add("--height", format_length(*body.height_m));
   if (body.scale) add("--scale", format_length(*body.scale));
   if (body.close_holes) add("--close-holes", format_length(*body.close_holes));
+  if (!body.close_holes && !body.wall_m) words.emplace_back("--refuse-open");
+  if (body.facets) words.emplace_back("--facets");
   const std::string result_file = file + ".result";
   add("--result", result_file);
   add("--up", std::string(1, body.up));
@@ -125,9 +135,9 @@ mesh::TetMesh mesh_surface(const job::Body& body, int order, const Fineness& fin
       return taken > max_s || (taken > kLonger * seconds + kRoughSeconds && has_line(errors, kRoughWord));
     };
   }
-  base::Finished ended = run_mesher(words, cleanup, may_stop);
+  base::Finished ended = run_mesher(words, may_stop);
   const std::optional<base::Result> result = base::read_result(result_file);
-  ::unlink(result_file.c_str());
+  take_words(ended.errors, said);
   if (patience != nullptr) {
     const std::optional<BodyEstimate> rough = take_estimate(ended.errors, kRoughWord), good = take_estimate(ended.errors, kEstimateWord);
     if (ended.was_stopped) {
@@ -154,20 +164,20 @@ mesh::TetMesh mesh_surface(const job::Body& body, int order, const Fineness& fin
   // It says itself where it broke down, if it still can; a signal that it sends itself comes from the surface, one from outside does not.
   const bool is_own =
       signal == SIGSEGV || signal == SIGBUS || signal == SIGABRT || signal == SIGFPE || signal == SIGILL || signal == SIGXCPU;
-  const std::string said = ended.errors.empty() ? "" : fmt::format(" after it wrote '{}'", ended.errors);
+  const std::string printed = ended.errors.empty() ? "" : fmt::format(" after it wrote '{}'", ended.errors);
   if (is_own)
     throw InputError(
         fmt::format("{}: carillon-mesh crashed on {}, by signal {} ({}){}; ask for another number of nodes, try \"method\": "
                     "\"stuffing\", or repair the surface in a modeller",
-                    failed, body.surface.string(), signal, ::strsignal(signal), said));
+                    failed, body.surface.string(), signal, ::strsignal(signal), printed));
   throw SystemError(fmt::format("{}: carillon-mesh was ended from outside, by signal {} ({}){}; did memory run out?", failed, signal,
-                                ::strsignal(signal), said));
+                                ::strsignal(signal), printed));
 }
 
 }  // namespace
 
-mesh::TetMesh make_body_mesh(const job::Body& body, int order, const Fineness& fineness, Patience* patience) {
-  if (body.shape.empty()) return mesh_surface(body, order, fineness, patience);
+mesh::TetMesh make_body_mesh(const job::Body& body, int order, const Fineness& fineness, MesherWords& words, Patience* patience) {
+  if (body.shape.empty()) return mesh_surface(body, order, fineness, words, patience);
   shapes::ShapeOptions options{.shape = body.shape, .dimensions = body.dimensions, .order = order};
   options.target_nodes = fineness.nodes;
   options.edge_m = fineness.edge_m;
@@ -180,14 +190,14 @@ mesh::TetMesh make_body_mesh(const job::Body& body, int order, const Fineness& f
 
 std::pair<std::vector<Vec3>, std::vector<Triangle>> coarsen_surface(const std::vector<Vec3>& nodes_m,
                                                                     const std::vector<Triangle>& triangles, std::size_t nodes) {
-  const std::string folder = make_folder(), file = folder + "/fine.off", coarse = folder + "/coarse.off";
-  Cleanup cleanup(file);
+  const base::TemporaryFolder folder("carillon-mesh-");
+  const std::string file = (folder.path() / "fine.off").string(), coarse = (folder.path() / "coarse.off").string();
   std::string text = fmt::format("OFF\n{} {} 0\n", nodes_m.size(), triangles.size());
   for (const Vec3& p : nodes_m) text += fmt::format("{:.17g} {:.17g} {:.17g}\n", p[0], p[1], p[2]);
   for (const Triangle& t : triangles) text += fmt::format("3 {} {} {}\n", t[0], t[1], t[2]);
   base::write_file(file, text);
-  const base::Finished ended = run_mesher(
-      {base::require_program("carillon-mesh").string(), file, "--coarsen", std::to_string(nodes), "-o", coarse, "--quiet"}, cleanup, {});
+  const base::Finished ended =
+      run_mesher({base::require_program("carillon-mesh").string(), file, "--coarsen", std::to_string(nodes), "-o", coarse, "--quiet"}, {});
   std::ifstream stream(coarse);
   std::pair<std::vector<Vec3>, std::vector<Triangle>> made;
   std::string word;
@@ -199,7 +209,6 @@ std::pair<std::vector<Vec3>, std::vector<Triangle>> coarsen_surface(const std::v
     for (Triangle& t : made.second) stream >> none >> t[0] >> t[1] >> t[2];
   }
   const bool is_read = !made.second.empty() && !stream.fail();
-  ::unlink(coarse.c_str());
   if (!is_read)
     throw InputError(fmt::format("the surface of {} nodes cannot be coarsened to {}: {}; give \"radiation\" a larger \"skin_nodes\"",
                                  nodes_m.size(), nodes, ended.errors.empty() ? "carillon-mesh gave no reason" : ended.errors));

@@ -30,6 +30,12 @@ struct BodyEstimate {
   bool is_rough = false;  // of the surface as it was read, before its repair
 };
 
+/// The mesher's words on a mesh that it made.
+struct MesherWords {
+  std::vector<std::string> warnings;  // how the mesh differs from the file: what was repaired, closed, wrapped or rounded
+  std::vector<std::string> remarks;
+};
+
 /// How long a mesher may take, and what it found out before it ended.
 struct Patience {
   double seconds = std::numeric_limits<double>::infinity();  // of the clock
@@ -40,8 +46,9 @@ struct Patience {
 /// the program carillon-mesh next to this one, started without a shell, in a temporary folder that is gone afterwards.
 /// Not collective. Throws InputError naming the job's line for what cannot be meshed, SystemError when carillon-mesh does not start or
 /// dies. With `patience`, a surface that is not meshed in time gives an empty mesh and patience->estimate; InputError when not even that
-/// is known some seconds later.
-mesh::TetMesh make_body_mesh(const job::Body& body, int order, const Fineness& fineness, Patience* patience = nullptr);
+/// is known some seconds later. What the mesher says, also of a mesh that it had no time for, is added to `words`.
+/// An open surface without "wall_m" is refused, unless the body has "close_holes".
+mesh::TetMesh make_body_mesh(const job::Body& body, int order, const Fineness& fineness, MesherWords& words, Patience* patience = nullptr);
 
 /// A closed surface with about `nodes` nodes, its volume kept, by the program carillon-mesh. Not collective. Throws as make_body_mesh().
 std::pair<std::vector<Vec3>, std::vector<Triangle>> coarsen_surface(const std::vector<Vec3>& nodes_m,

@@ -37,6 +37,7 @@ class ProgressLines {
 
 eigen::Modes solve(Run& run, const Setting& setting, const fem::System& matrices, eigen::NodeLayout layout) {
   eigen::Options options = make_options(run.job, setting);
+  options.memory_limit_bytes = run.options.get_memory_limit_bytes();
   if (run.checkpoint) options.checkpoint = &run.checkpoint->get();
   options.progress = ProgressLines(run);
   run.log.begin("modes", fmt::format("{:g} Hz to {:g} Hz", options.low_hz, options.high_hz));

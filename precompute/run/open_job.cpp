@@ -7,6 +7,7 @@
 
 #include "precompute/eigen/solver_options.hpp"
 #include "precompute/petsc/session.hpp"
+#include "precompute/run/same_start.hpp"
 #include "runtime/base/file.hpp"
 
 namespace carillon::run {
@@ -19,6 +20,7 @@ constexpr std::uint64_t kMaxJobBytes = 16 << 20;
 /// Rank 0 reads the text; all ranks parse it, so that all fail alike.
 job::JobSpec read_shared_job(const Run& run, const fs::path& file, job::BankKey bank) {
   const std::string text = run.comm.broadcast([&] { return base::read_file(file, "job file", kMaxJobBytes); });
+  check_same(run.comm, "jobs", look_at_job(file, kMaxJobBytes));
   return run.comm.agree([&] { return job::parse_job(text, fs::absolute(file), bank); });
 }
 
@@ -45,6 +47,7 @@ void open_job(Run& run, const fs::path& file, job::BankKey bank) {
     run.bank = run.options.bank;
     run.job.bank = fs::absolute(run.options.bank).lexically_normal();
   }
+  check_same(run.comm, "banks to write", look_at_place(run.job.bank));
   check_job(run);
   for (const std::string& warning : run.job.warnings) run.log.warn(warning);
 }

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <numbers>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -27,6 +28,7 @@
 #include "precompute/run/open_job.hpp"
 #include "precompute/run/run.hpp"
 #include "precompute/run/solve_body.hpp"
+#include "runtime/bank/corrected.hpp"
 #include "runtime/base/file.hpp"
 
 namespace carillon::run {
@@ -83,24 +85,37 @@ constexpr double kAudibleCents = 50.0;
 std::string describe_wide_bars(const bank::Bank& bank, const Setting& setting, bool is_asked) {
   const std::vector<double>& cents = bank.corrected.error_cents;
   if (cents.empty() || is_asked) return {};
-  const auto worst = std::max_element(cents.begin(), cents.end());
-  if (!(*worst > kAudibleCents)) return {};
-  if (std::isinf(*worst))
+  if (std::isinf(*std::max_element(cents.begin(), cents.end())))
     return "frequencies have no error bars: of so few modes of T4 with a lumped mass a whole kind may be missing; a consistent mass, "
            "\"element\": \"T10\", or a wider band brings them";
-  const auto wide = std::count_if(cents.begin(), cents.end(), [](double c) { return c > kAudibleCents; });
+  // A mode that dies at once has a resonance so wide that nothing within it is heard as wrong.
+  std::size_t worst = 0, wide = 0;
+  double worst_cents = 0.0;
+  for (std::size_t m = 0; m < cents.size(); ++m) {
+    const double omega = 2.0 * std::numbers::pi * bank.corrected.freq_hz[m];
+    const double half_width_cents = 1200.0 * std::log2(1.0 + bank.corrected.decay_per_s[m] / omega);
+    if (!(cents[m] > std::max(kAudibleCents, half_width_cents))) continue;
+    ++wide;
+    if (cents[m] > worst_cents) worst_cents = cents[worst = m];
+  }
+  if (wide == 0) return {};
   return fmt::format(
-      "frequencies can be wrong by {:.0f} cents (estimate, mode {}; {} of {} modes by more than {:g}): {}a finer mesh, or "
-      "\"accuracy_cents\" in the job, improves them",
-      *worst, worst - cents.begin() + 1, wide, cents.size(), kAudibleCents,
+      "frequencies can be wrong by {:.0f} cents (estimate, mode {}; {} of {} modes by more than {:g} and than half the width of their "
+      "resonance): "
+      "{}a "
+      "finer mesh, or \"accuracy_cents\" in the job, improves them",
+      worst_cents, worst + 1, wide, cents.size(), kAudibleCents,
       setting.element == job::Element::T4 ? "\"element\": \"T10\" (--order 2), " : "");
 }
 
 std::string describe_result(const bank::Bank& bank) {
   std::string text = fmt::format("{}\n{}", bank::describe_completeness(bank), bank::describe_accuracy(bank));
   if (bank.mode_count() > 0) {
-    const auto [low, high] = std::minmax_element(bank.corrected.freq_hz.begin(), bank.corrected.freq_hz.end());
-    text += fmt::format("\n{:.2f} Hz to {:.2f} Hz", *low, *high);
+    std::vector<double> played_hz;
+    for (std::size_t m = 0; m < bank.mode_count(); ++m) played_hz.push_back(bank::find_played_hz(bank, m));
+    const auto [low, high] = std::minmax_element(played_hz.begin(), played_hz.end());
+    text += fmt::format("\n{:.2f} Hz to {:.2f} Hz as they are played; {:.2f} Hz to {:.2f} Hz of the mesh", *low, *high, bank.freq_hz(0),
+                        bank.freq_hz(bank.mode_count() - 1));
   }
   return text;
 }

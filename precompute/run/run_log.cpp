@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 #include <hdf5.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <cstdlib>
@@ -70,6 +71,10 @@ void RunLog::warn(const std::string& text) {
   warnings_.push_back(text);
   std::fflush(stdout);
   fmt::print(stderr, "carillon-precompute: warning: {}\n", base::printable(text));
+}
+
+void RunLog::warn_once(const std::string& text) {
+  if (std::find(warnings_.begin(), warnings_.end(), text) == warnings_.end()) warn(text);
 }
 
 const RunPhase& RunLog::end() {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -20,11 +21,14 @@ struct RunOptions {
   std::filesystem::path bank;                 // overrides the job's "bank"; empty: does not
   std::filesystem::path matrices;             // folder for K and M as files; empty: none
   std::filesystem::path radiate;              // a bank that gets its multipoles, in place of a job; empty: none
+  double memory_gb = 0;                       // all ranks of a machine together may take so much; 0: what it has
   bool validate = false;                      // check and predict, do not solve
   double patience_s = 9;                      // of --validate: for the answer; steps that would take longer are left out
   double count_s = 1e6;                       // of --validate: for the count of the modes
   std::optional<std::array<double, 3>> at_m;  // print the modes at this point, where they are known, and write no bank
   bool json = false;                          // what is printed at the end is JSON
+
+  std::int64_t get_memory_limit_bytes() const { return static_cast<std::int64_t>(1e9 * memory_gb); }
 };
 
 }  // namespace carillon::run

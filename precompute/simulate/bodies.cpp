@@ -1,9 +1,11 @@
 #include "precompute/simulate/bodies.hpp"
 
 #include <fmt/core.h>
+#include <mpi.h>
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <set>
@@ -12,12 +14,15 @@
 #include "precompute/mesh/check.hpp"
 #include "precompute/mesh/read.hpp"
 #include "precompute/run/meshing.hpp"
+#include "precompute/transient/bend.hpp"
+#include "runtime/base/clock.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::simulate {
 namespace {
 
 constexpr double kMostStrikeDistance = 0.05;  // of a body's extent, between a blow's point and the skin
+constexpr double kTableReach = 1e-4;          // of a body's extent, between the place of a row and a node
 
 /// Runs `work` for a body; its InputError gets the line of the job.
 template <typename Work>
@@ -36,19 +41,37 @@ transient::Law make_law(const job::Material& material) {
 }
 
 /// In the axes of the body's mesh. Rank 0.
-mesh::TetMesh make_mesh(const job::SimulatedBody& body) {
+mesh::TetMesh make_mesh(const job::SimulatedBody& body, std::vector<std::string>& warnings) {
   const int order = body.element == job::Element::T10 ? 2 : 1;
   mesh::TetMesh mesh;
   if (body.body) {
-    mesh = run::make_body_mesh(*body.body, order, {body.body->nodes, body.body->edge_m});
+    run::MesherWords words;
+    mesh = run::make_body_mesh(*body.body, order, {body.body->nodes, body.body->edge_m}, words);
+    warnings = std::move(words.warnings);
   } else {
     mesh = mesh::read_mesh(body.mesh);
     for (Vec3& x : mesh.nodes_m) x = body.mesh_scale * x;
   }
-  mesh::check_mesh(mesh, fmt::format("body \"{}\"", body.name));
+  const mesh::CheckReport check = mesh::check_mesh(mesh, fmt::format("body \"{}\"", body.name));
+  warnings.insert(warnings.end(), check.warnings.begin(), check.warnings.end());
   if (order == 2 && mesh.order == 1) mesh = mesh::to_quadratic(mesh);
   if (order == 1 && mesh.order == 2) mesh = mesh::to_linear(mesh);
   return mesh;
+}
+
+/// Of the nearest place of the skin, which is near: about the body's centre of mass its extent is measured.
+std::vector<transient::NodeShare> find_struck_nodes(const transient::Assembly& assembly, std::size_t body,
+                                                    const std::vector<std::array<std::int32_t, 6>>& skin, const Vec3& centre_m,
+                                                    const Vec3& point_m, const std::string& place) {
+  double distance = 0, extent = 0;
+  const transient::Assembly::Body& struck = assembly.bodies[body];
+  for (std::int32_t n = struck.first_node; n < struck.last_node; ++n)
+    extent = std::max(extent, norm(assembly.nodes_m[static_cast<std::size_t>(n)] - centre_m));
+  std::vector<transient::NodeShare> shares = find_shares(assembly, skin, point_m, &distance);
+  if (distance > kMostStrikeDistance * extent)
+    throw InputError(fmt::format("{}: \"point_m\" is {:.3g} m from the surface of body \"{}\"; give a point on it, in the axes of its mesh",
+                                 place, distance, struck.name));
+  return shares;
 }
 
 std::vector<std::int32_t> find_group(const mesh::TetMesh& mesh, const job::NodeGroup& group) {
@@ -81,9 +104,13 @@ struct Made {
     std::vector<std::int32_t> nodes;
     std::vector<std::array<double, 4>> rows;  // of the path
     bool is_hinge = false;
+    double release_s = std::numeric_limits<double>::infinity();
   };
   std::vector<Group> constrained;
   Vec3 centre_m{};
+  std::vector<std::string> warnings = {};  // of its mesh
+  std::map<std::int32_t, Vec3> moved;      // nodes that bend the body, and their displacements in the axes of the mesh
+  std::vector<transient::Quad> start;      // (nodes) of a body that is bent
 };
 
 /// The constrained groups of a body, each node once: those that follow paths, one by one, then those that are fixed, then the hinged.
@@ -97,6 +124,7 @@ ConstrainedGroups find_constrained(const job::SimulatedBody& body, const mesh::T
   std::set<std::int32_t> driven, fixed, hinged;
   for (const job::Drive& drive : body.drives) {
     Made::Group group{find_group(mesh, drive.nodes), drive.path, false};
+    if (drive.release_s) group.release_s = *drive.release_s;
     for (const std::int32_t node : group.nodes)
       if (!driven.insert(node).second)
         throw InputError(fmt::format("{}: a node of this drive follows another path already; drive each node once", drive.nodes.place));
@@ -120,15 +148,68 @@ ConstrainedGroups find_constrained(const job::SimulatedBody& body, const mesh::T
   return constrained;
 }
 
+/// The node of each row of a table, by its place.
+std::vector<std::int32_t> find_table_nodes(const mesh::TetMesh& mesh, const job::Bend& bend) {
+  std::vector<std::pair<double, std::int32_t>> by_x;
+  Vec3 low = mesh.nodes_m[0], high = low;
+  for (std::size_t n = 0; n < mesh.nodes_m.size(); ++n) {
+    by_x.emplace_back(mesh.nodes_m[n][0], static_cast<std::int32_t>(n));
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      low[axis] = std::min(low[axis], mesh.nodes_m[n][axis]);
+      high[axis] = std::max(high[axis], mesh.nodes_m[n][axis]);
+    }
+  }
+  std::sort(by_x.begin(), by_x.end());
+  const double reach = kTableReach * norm(high - low);
+  std::vector<std::int32_t> nodes;
+  for (std::size_t row = 0; row < bend.table.size(); ++row) {
+    const Vec3 at{bend.table[row][0], bend.table[row][1], bend.table[row][2]};
+    double nearest = reach;
+    std::int32_t found = -1;
+    for (auto i = std::lower_bound(by_x.begin(), by_x.end(), std::pair(at[0] - reach, std::int32_t{-1}));
+         i != by_x.end() && i->first <= at[0] + reach; ++i)
+      if (const double distance = norm(mesh.nodes_m[static_cast<std::size_t>(i->second)] - at); distance <= nearest) {
+        nearest = distance;
+        found = i->second;
+      }
+    if (found < 0)
+      throw InputError(fmt::format("{}: row {} of \"table_m\" is at ({:g}, {:g}, {:g}) m, where the mesh has no node", bend.place, row + 1,
+                                   at[0], at[1], at[2]));
+    nodes.push_back(found);
+  }
+  return nodes;
+}
+
+/// Nodes that bend the body, before it is placed.
+std::map<std::int32_t, Vec3> find_moved(const job::SimulatedBody& body, const mesh::TetMesh& mesh, const ConstrainedGroups& constrained) {
+  std::map<std::int32_t, Vec3> moved;
+  for (const job::Bend& bend : body.bends) {
+    const auto move = [&](std::int32_t node, const Vec3& by) {
+      for (const auto* held : {&constrained.fixed, &constrained.hinged})
+        if (norm(by) > 0.0 && std::binary_search(held->begin(), held->end(), node))
+          throw InputError(fmt::format("{}: a node that is moved here is fixed or hinged; take it out of one of the two", bend.place));
+      if (!moved.emplace(node, by).second)
+        throw InputError(fmt::format("{}: a node is moved here for the second time; name it once", bend.place));
+    };
+    if (bend.nodes)
+      for (const std::int32_t node : find_group(mesh, *bend.nodes)) move(node, bend.displacement_m);
+    if (bend.table.empty()) continue;
+    const std::vector<std::int32_t> nodes = find_table_nodes(mesh, bend);
+    for (std::size_t row = 0; row < nodes.size(); ++row) move(nodes[row], {bend.table[row][3], bend.table[row][4], bend.table[row][5]});
+  }
+  return moved;
+}
+
 Made make_solid(const job::SimulatedBody& body) {
   Made made;
   transient::SolidBody solid;
   solid.name = body.name;
-  solid.mesh = name_place(body.place, [&] { return make_mesh(body); });
+  solid.mesh = name_place(body.place, [&] { return make_mesh(body, made.warnings); });
   solid.law = make_law(body.material);
   solid.mass_damping_per_s = body.material.alpha2_per_s;
   mesh::TetMesh& mesh = solid.mesh;
   ConstrainedGroups constrained = find_constrained(body, mesh);
+  made.moved = find_moved(body, mesh, constrained);
   made.constrained = std::move(constrained.driven);
   if (!constrained.fixed.empty()) {
     const bool is_hinge = body.drives.empty() && is_line(mesh.nodes_m, constrained.fixed);
@@ -190,6 +271,7 @@ Made make_sheet(const job::SimulatedBody& body) {
   vertices.nodes_m = sheet.mesh.vertices_m;
   vertices.node_sets = sheet.mesh.node_sets;
   ConstrainedGroups constrained = find_constrained(body, vertices);
+  made.moved = find_moved(body, vertices, constrained);
   std::vector<std::int32_t> group_of(vertices.nodes_m.size(), -1);  // clamped: the group
   sheet.clamped.resize(vertices.nodes_m.size());
   const auto clamp = [&](const std::vector<std::int32_t>& nodes, std::size_t group) {
@@ -198,7 +280,9 @@ Made make_sheet(const job::SimulatedBody& body) {
       sheet.clamped[static_cast<std::size_t>(node)] = true;
     }
   };
-  for (std::size_t g = 0; g < constrained.driven.size(); ++g) clamp(constrained.driven[g].nodes, g);
+  // Where it is let go later, the sheet turns freely: the fixed direction of a clamp is a part of its elements.
+  for (std::size_t g = 0; g < constrained.driven.size(); ++g)
+    if (std::isinf(constrained.driven[g].release_s)) clamp(constrained.driven[g].nodes, g);
   clamp(constrained.fixed, constrained.driven.size());
   const bool is_hinge = constrained.driven.empty() && constrained.fixed.empty() && is_line(vertices.nodes_m, constrained.hinged);
   made.constrained = std::move(constrained.driven);
@@ -221,6 +305,65 @@ Made make_sheet(const job::SimulatedBody& body) {
   return made;
 }
 
+/// The body as it is bent. Rank 0.
+Bent bend(const job::SimulationSpec& spec, std::size_t b, Made& made) {
+  const double begin_s = base::get_process_cpu_s();
+  const job::SimulatedBody& described = spec.bodies[b];
+  const Placement placement = find_placement(described);
+  const comm::Communicator alone(MPI_COMM_SELF);
+  const auto assembly = std::make_shared<const transient::Assembly>(transient::make_assembly(alone, std::vector{made.body}));
+  transient::Domain domain(alone, assembly);
+  const transient::Assembly::Body& body = assembly->bodies[0];
+  const auto find_number = [&](std::int32_t node) { return body.is_sheet ? node : body.node_of_mesh[static_cast<std::size_t>(node)]; };
+  std::map<std::int32_t, Vec3> held;
+  for (const Made::Group& group : made.constrained)
+    for (const std::int32_t node : group.nodes) held[find_number(node)] = {};
+  for (const auto& [node, by] : made.moved) held[find_number(node)] = placement.rotation * by;
+  std::vector<transient::HeldNode> held_nodes;
+  for (const auto& [node, by] : held) held_nodes.push_back({node, by});
+  Bent bent{.body = b};
+  std::vector<transient::Quad> u;
+  const job::Bend& first = described.bends.front();
+  name_place(first.place, [&] {
+    if (first.mode > 0) {
+      transient::ElasticMode mode = transient::calc_mode(domain, held_nodes, first.mode);
+      bent.mode_hz = mode.omega_rad_s / (2.0 * std::numbers::pi);
+      u = std::move(mode.shape);
+      const double a = first.amplitude_m;
+      for (transient::Quad& q : u) q = {a * q.x, a * q.y, a * q.z, 0.0};
+      return;
+    }
+    std::vector<transient::PulledNode> pulled;
+    for (const job::Bend& one : described.bends) {
+      if (!one.force_n) continue;
+      const auto skin = transient::list_skin(*assembly, 0);
+      for (const transient::NodeShare& share :
+           find_struck_nodes(*assembly, 0, skin, made.centre_m, placement.place(one.point_m), one.place))
+        pulled.push_back({share.node, share.share * (placement.rotation * *one.force_n)});
+    }
+    // Gravity that does not grow first is there from the start.
+    if (spec.settle_s == 0.0 && norm(spec.gravity_m_s2) > 0.0)
+      for (std::int32_t n = 0; n < domain.node_count(); ++n)
+        if (domain.is_point(n)) pulled.push_back({n, domain.get_masses_kg()[static_cast<std::size_t>(n)] * spec.gravity_m_s2});
+    u = transient::calc_equilibrium(domain, held_nodes, pulled);
+  });
+  for (const double energy : domain.calc_state(u.data()).energy_j) bent.energy_j += energy;
+  const std::size_t nodes = body.is_sheet ? u.size() : body.node_of_mesh.size();
+  for (std::size_t n = 0; n < nodes; ++n) {
+    const auto number = static_cast<std::size_t>(find_number(static_cast<std::int32_t>(n)));
+    made.start.push_back(u[number]);
+    if (domain.is_point(static_cast<std::int32_t>(number)))
+      bent.displacement_m = std::max(bent.displacement_m, norm({u[number].x, u[number].y, u[number].z}));
+  }
+  bent.cpu_s = base::get_process_cpu_s() - begin_s;
+  return bent;
+}
+
+std::string describe(const std::string& name, const Bent& bent) {
+  return fmt::format("body \"{}\": bent by {:.4g} m{}, {:.4g} J; {:.2g} CPU s", name, bent.displacement_m,
+                     bent.mode_hz > 0.0 ? fmt::format(" (mode at {:.5g} Hz)", bent.mode_hz) : "", bent.energy_j, bent.cpu_s);
+}
+
 std::string describe(const transient::AnyBody& body) {
   if (const auto* solid = std::get_if<transient::SolidBody>(&body))
     return fmt::format("body \"{}\": {} nodes, {} elements (T{})", solid->name, solid->mesh.nodes_m.size(), solid->mesh.tet_count(),
@@ -228,6 +371,22 @@ std::string describe(const transient::AnyBody& body) {
   const auto& sheet = std::get<transient::SheetBody>(body);
   return fmt::format("body \"{}\": {} vertices, {} triangles (sheet)", sheet.name, sheet.mesh.vertices_m.size(),
                      sheet.mesh.triangles.size());
+}
+
+/// Displacements of bent bodies in the numbers of the assembly, on every rank.
+void share_start(const comm::Communicator& comm, const std::vector<Made>& made, Bodies& bodies) {
+  bodies.start = comm.broadcast([&] {
+    std::vector<transient::Quad> start;
+    for (std::size_t b = 0; b < made.size(); ++b) {
+      if (made[b].start.empty()) continue;
+      start.resize(bodies.assembly->nodes_m.size());
+      const transient::Assembly::Body& body = bodies.assembly->bodies[b];
+      for (std::size_t n = 0; n < made[b].start.size(); ++n)
+        start[static_cast<std::size_t>(body.is_sheet ? body.first_node + static_cast<std::int32_t>(n) : body.node_of_mesh[n])] =
+            made[b].start[n];
+    }
+    return start;
+  });
 }
 
 /// Rank 0's lists on every rank.
@@ -241,6 +400,7 @@ void share(const comm::Communicator& comm, const std::vector<Made>& made, const 
   };
   struct Kind {
     std::int32_t is_hinge;
+    double release_s;
   };
   std::vector<Entry> entries;
   std::vector<Row> rows;
@@ -253,7 +413,7 @@ void share(const comm::Communicator& comm, const std::vector<Made>& made, const 
         for (const std::int32_t node : constrained.nodes)
           entries.push_back({constraint, body.is_sheet ? body.first_node + node : body.node_of_mesh[static_cast<std::size_t>(node)]});
         for (const auto& row : constrained.rows) rows.push_back({constraint, {row[0], row[1], row[2], row[3]}});
-        kinds.push_back({constrained.is_hinge ? 1 : 0});
+        kinds.push_back({constrained.is_hinge ? 1 : 0, constrained.release_s});
       }
   entries = comm.broadcast(std::move(entries));
   rows = comm.broadcast(std::move(rows));
@@ -265,36 +425,23 @@ void share(const comm::Communicator& comm, const std::vector<Made>& made, const 
   for (std::size_t h = 0; h < kinds.size(); ++h) {
     if (!paths[h].empty()) bodies.constraints[h].path = transient::Path(std::move(paths[h]));
     bodies.constraints[h].is_hinge = kinds[h].is_hinge != 0;
+    bodies.constraints[h].release_s = kinds[h].release_s;
   }
 }
 
 void add_blows(const job::SimulationSpec& spec, Bodies& bodies) {
   const transient::Assembly& assembly = *bodies.assembly;
-  struct Struck {
-    std::vector<std::array<std::int32_t, 6>> skin;
-    double extent_m = 0;  // of the body about its centre of mass
-  };
-  std::map<std::size_t, Struck> struck;
+  std::map<std::size_t, std::vector<std::array<std::int32_t, 6>>> skins;
   for (const job::Blow& blow : spec.blows) {
-    const auto& body = assembly.bodies[blow.body];
-    const auto [found, is_new] = struck.try_emplace(blow.body);
-    Struck& target = found->second;
-    if (is_new) {
-      target.skin = transient::list_skin(assembly, static_cast<std::int32_t>(blow.body));
-      for (std::int32_t n = body.first_node; n < body.last_node; ++n)
-        target.extent_m = std::max(target.extent_m, norm(assembly.nodes_m[static_cast<std::size_t>(n)] - bodies.centre_m[blow.body]));
-    }
+    const auto [skin, is_new] = skins.try_emplace(blow.body);
+    if (is_new) skin->second = transient::list_skin(assembly, static_cast<std::int32_t>(blow.body));
     const Placement placement = find_placement(spec.bodies[blow.body]);
-    double distance = 0;
     transient::Impulse impulse;
     impulse.time_s = blow.time_s - 0.5 * blow.duration_s;
     impulse.duration_s = blow.duration_s;
     impulse.impulse_n_s = placement.rotation * blow.impulse_n_s;
-    impulse.shares = find_shares(assembly, target.skin, placement.place(blow.point_m), &distance);
-    if (distance > kMostStrikeDistance * target.extent_m)
-      throw InputError(
-          fmt::format("{}: \"point_m\" is {:.3g} m from the surface of body \"{}\"; give a point on it, in the axes of its mesh",
-                      blow.place, distance, body.name));
+    impulse.shares =
+        find_struck_nodes(assembly, blow.body, skin->second, bodies.centre_m[blow.body], placement.place(blow.point_m), blow.place);
     bodies.impulses.push_back(std::move(impulse));
   }
 }
@@ -317,23 +464,32 @@ Placement find_placement(const job::SimulatedBody& body) {
 
 Bodies make_bodies(const comm::Communicator& comm, const job::SimulationSpec& spec, const std::function<void(const std::string&)>& report) {
   std::vector<Made> made(spec.bodies.size());
+  std::vector<Bent> bent;
   comm.agree([&] {
     if (!comm.is_root()) return;
     for (std::size_t b = 0; b < spec.bodies.size(); ++b) {
       made[b] = spec.bodies[b].sheet ? make_sheet(spec.bodies[b]) : make_solid(spec.bodies[b]);
       report(describe(made[b].body));
+      if (spec.bodies[b].bends.empty()) continue;
+      bent.push_back(bend(spec, b, made[b]));
+      report(describe(spec.bodies[b].name, bent.back()));
     }
   });
   std::vector<transient::AnyBody> moving;
   std::vector<Vec3> centres;
+  Bodies bodies;
+  for (std::size_t b = 0; b < made.size(); ++b)
+    for (const std::string& warning : made[b].warnings)
+      bodies.warnings.push_back(fmt::format("body \"{}\": {}", spec.bodies[b].name, warning));
   for (Made& one : made) {
     moving.push_back(std::move(one.body));
     centres.push_back(one.centre_m);
   }
-  Bodies bodies;
   bodies.assembly = std::make_shared<const transient::Assembly>(transient::make_assembly(comm, moving));
   bodies.centre_m = comm.broadcast(std::move(centres));
+  bodies.bent = std::move(bent);
   share(comm, made, *bodies.assembly, bodies);
+  share_start(comm, made, bodies);
   comm.agree([&] { add_blows(spec, bodies); });
   return bodies;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "precompute/comm/communicator.hpp"
@@ -19,12 +20,24 @@ struct Placement {
 };
 Placement find_placement(const job::SimulatedBody& body);
 
+/// What bending a body found out.
+struct Bent {
+  std::size_t body = 0;
+  double displacement_m = 0;  // the largest
+  double energy_j = 0;        // elastic
+  double mode_hz = 0;         // 0: of no mode
+  double cpu_s = 0;
+};
+
 /// Everything that moves and what constraints it, the same on every rank.
 struct Bodies {
   std::shared_ptr<const transient::Assembly> assembly;
   std::vector<transient::Constraint> constraints;
   std::vector<transient::Impulse> impulses;
-  std::vector<Vec3> centre_m;  // of mass, of each body
+  std::vector<std::string> warnings;   // of their meshes, on rank 0
+  std::vector<Vec3> centre_m;          // of mass, of each body
+  std::vector<transient::Quad> start;  // (nodes) displacements, of sheets' edges the angle in x; empty: no body is bent
+  std::vector<Bent> bent;              // on rank 0
 };
 
 /// Reads and makes the meshes on rank 0, puts them in their places, and finds the nodes that are fixed, driven or struck. Collective.

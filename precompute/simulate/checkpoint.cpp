@@ -27,7 +27,7 @@ struct Head {
   Hash identity;
   std::int32_t ranks;
 };
-constexpr char kMagic[8] = {'C', 'A', 'R', 'S', 'I', 'M', '0', '2'};
+constexpr char kMagic[8] = {'C', 'A', 'R', 'S', 'I', 'M', '0', '3'};
 
 std::string_view view(std::span<const std::byte> bytes) { return {reinterpret_cast<const char*>(bytes.data()), bytes.size()}; }
 
@@ -90,6 +90,7 @@ void save_checkpoint(const comm::Communicator& comm, const std::filesystem::path
     head.identity = identity;
     head.ranks = comm.size();
     std::vector<std::byte> bytes;
+    bytes.reserve(state.motion.size() + state.contacts.size() + sounds.size() + state.books.size() * sizeof(transient::EnergyBook) + 4096);
     base::put(bytes, head);
     base::put_list(bytes, state.books);
     base::put_list(bytes, state.motion);

@@ -13,7 +13,10 @@
 #include "precompute/run/enter_folder.hpp"
 #include "precompute/run/interrupt.hpp"
 #include "precompute/simulate/simulate.hpp"
+#include "runtime/base/environment.hpp"
 #include "runtime/base/error.hpp"
+#include "runtime/base/file_limit.hpp"
+#include "runtime/base/message.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/base/result.hpp"
 #include "runtime/version/version.hpp"
@@ -64,6 +67,11 @@ struct CommandLine {
         ->type_name("ROOT NAME");
     CLI::Option* validate =
         app.add_flag("--validate", options.validate, "check the job and its meshes, predict step, time and memory, and simulate nothing");
+    app.add_option("--patience", options.patience_s,
+                   "with --validate: seconds for the answer; of meshes that would take longer coarser ones are made, and that is said")
+        ->check(CLI::Range(0.0, 1e6))
+        ->capture_default_str()
+        ->needs(validate);
     app.add_flag("--json", options.json, "with --validate: print one JSON object")->needs(validate);
     app.set_version_flag("--version", version::describe("carillon-simulate"));
   }
@@ -97,20 +105,23 @@ int run_program(const CommandLine& words) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  base::report_file_limit();
   CommandLine words;
-  run::end_on_signals(0);
+  run::end_on_signals("carillon-simulate", "files of earlier runs were not touched, or new ones are whole");
   try {
     words.app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
+    if (!run::is_first_of_all()) return error.get_exit_code() == 0 ? 0 : kExitInput;
     return words.app.exit(error) == 0 ? 0 : kExitInput;
   }
   try {
     if (!words.folder.empty()) run::enter_folder(words.folder[0], words.folder[1]);
   } catch (const std::exception& error) {
-    fmt::print(stderr, "carillon-simulate: error: {}\n", base::printable(error.what()));
+    fmt::print(stderr, "carillon-simulate: error: {}\n", base::show_message(error.what()));
     return base::get_exit_code(base::describe_error(std::current_exception(), "").kind);
   }
   if (!words.options.checkpoint.empty()) run::save_on_signals();
+  base::isolate_lone_process();
   const Session session(argc, argv);
   return run_program(words);
 }

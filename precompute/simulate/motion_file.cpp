@@ -118,10 +118,7 @@ void MotionFile::add_sample(const transient::Motion& motion) {
 
 void MotionFile::finish() {
   domain_.get_comm().agree([&] {
-    if (!domain_.get_comm().is_root()) return;
-    write();
-    std::error_code ignored;
-    std::filesystem::remove(frames_, ignored);
+    if (domain_.get_comm().is_root()) write();
   });
 }
 

@@ -11,9 +11,10 @@
 
 namespace carillon::simulate {
 
-/// Frames are appended to FILE.frames, from which FILE is made at the end: an UnstructuredGrid of triangles whose points move (VTKHDF 2.0,
-/// "Steps"), with the point data "speed" [m/s] and the cell data "body"; strikers are not in it. A run that resumes continues where its
-/// checkpoint was. Collective, but for the constructor's checks.
+/// Frames are appended to FILE.frames, from which FILE is made at the end by way of FILE.part; the caller removes both
+/// (run::TemporaryFile): an UnstructuredGrid of triangles whose points move (VTKHDF 2.0, "Steps"), with the point data "speed" [m/s] and
+/// the cell data "body"; strikers are not in it. A run that resumes continues where its checkpoint was. Collective, but for the
+/// constructor's checks.
 class MotionFile {
  public:
   /// Throws InputError on every rank when is_resumed and there are no frames. Collective.
@@ -21,7 +22,7 @@ class MotionFile {
 
   /// A frame, if one is due at the present sample. Throws SystemError when the disk refuses. Collective.
   void add_sample(const transient::Motion& motion);
-  /// Makes the file and removes the frames. Collective.
+  /// Makes the file. Collective.
   void finish();
 
  private:

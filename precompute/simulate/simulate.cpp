@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <ctime>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string_view>
@@ -19,14 +19,18 @@
 #include "precompute/job/simulation.hpp"
 #include "precompute/run/interrupt.hpp"
 #include "precompute/run/run_log.hpp"
+#include "precompute/run/same_start.hpp"
 #include "precompute/simulate/bodies.hpp"
 #include "precompute/simulate/checkpoint.hpp"
+#include "precompute/simulate/coarsen.hpp"
 #include "precompute/simulate/motion_file.hpp"
 #include "precompute/simulate/sound_file.hpp"
 #include "precompute/transient/contact.hpp"
 #include "precompute/transient/motion.hpp"
+#include "runtime/base/clock.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/file.hpp"
+#include "runtime/base/host.hpp"
 #include "runtime/base/json.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/base/sha256.hpp"
@@ -39,16 +43,19 @@ namespace fs = std::filesystem;
 using transient::EnergyBook;
 
 constexpr std::uint64_t kMaxJobBytes = 16 << 20;
-constexpr double kBookEveryS = 0.01;     // of simulated time
-constexpr std::int64_t kLookEvery = 16;  // samples between two looks at signals
-constexpr double kFullScalePa = 1.0;     // of a WAV file whose peak is below; louder ones are scaled to a peak of 1
-constexpr double kBookGoal = 1e-6;       // of the largest energy: what a book should close to
-constexpr double kBookScatter = 3.0;     // off the square law by 2.7 at most: 11 scenes with errors above the goal, steps down to a sixth
-constexpr int kTrialSteps = 200;         // of --validate
-constexpr std::int64_t kMaxPredictedRanks = 1024;
+constexpr double kBookEveryS = 0.01;        // of simulated time
+constexpr std::int64_t kLookEvery = 16;     // samples between two looks at signals
+constexpr std::int64_t kMeasureEvery = 17;  // samples, of which the sound of one is timed
+constexpr double kFullScalePa = 1.0;        // of a WAV file whose peak is below; louder ones are scaled to a peak of 1
+constexpr double kBookGoal = 1e-6;          // of the largest energy: what a book should close to
+constexpr double kBookScatter = 3.0;  // off the square law by 2.7 at most: 11 scenes with errors above the goal, steps down to a sixth
+constexpr int kTrialSteps = 200;      // of --validate
+constexpr std::int64_t kTrialSamples = 64, kTimedSamples = 48;  // of its sound
+constexpr int kMaxPredictedRanks = 1024;
 constexpr std::int64_t kPictureBytes = 40 << 20;  // while the spectrogram is drawn: twice what was measured
-
-double find_cpu_s() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+constexpr std::int64_t kLaterBytes = 24 << 20;    // of libraries that are loaded when files are written
+constexpr double kSurfaceBytesPerNode = 8192;     // blocks of the recorded surface: two triangles of 256 samples, of all ranks and of one
+constexpr double kFilmBytesPerNode = 256;         // frames of the motion
 
 /// One line on rank 0.
 struct Log {
@@ -66,6 +73,7 @@ struct Log {
 
 job::SimulationSpec read_spec(const comm::Communicator& comm, const fs::path& file, const SimulateOptions& options, std::string& text) {
   text = comm.broadcast([&] { return base::read_file(file, "job file", kMaxJobBytes); });
+  run::check_same(comm, "jobs", run::look_at_job(file, kMaxJobBytes));
   job::SimulationSpec spec = comm.agree([&] { return job::parse_simulation(text, fs::absolute(file)); });
   const auto replace = [](fs::path& path, const fs::path& other) {
     if (!other.empty()) path = fs::absolute(other).lexically_normal();
@@ -75,6 +83,8 @@ job::SimulationSpec read_spec(const comm::Communicator& comm, const fs::path& fi
   replace(spec.surface, options.surface);
   replace(spec.motion, options.motion);
   replace(spec.record, options.record);
+  for (const job::SimulationOutput& output : job::kSimulationOutputs)
+    run::check_same(comm, fmt::format("{} to write", output.name), run::look_at_place(spec.*output.file));
   comm.agree([&] {
     if (!comm.is_root()) return;
     if (const job::SimulationOutput* output = job::find_overwriting_output(spec))
@@ -113,9 +123,29 @@ emission::Options make_emission_options(const job::SimulationSpec& spec, int ste
     receiver.directivity = spec.receivers.cardioid;
     receiver.axis = spec.receivers.facing;
   }
+  for (const job::Obstacle& obstacle : spec.obstacles) options.walls.push_back(obstacle.form);
+  for (const job::Striker& striker : spec.strikers) options.ball_radius_m.push_back(striker.ball.radius_m);
   options.surface_file = spec.surface;
   options.is_resumed = is_resumed;
   return options;
+}
+
+/// A receiver that hears nothing because it lies inside an obstacle.
+std::vector<std::string> find_deaf_receivers(const job::SimulationSpec& spec) {
+  std::vector<std::string> warnings;
+  if (!spec.visibility) return warnings;
+  const emission::Options options = make_emission_options(spec, 0, false);
+  for (std::size_t i = 0; i < options.receivers.size(); ++i)
+    for (const job::Obstacle& obstacle : spec.obstacles) {
+      const Vec3& place = options.receivers[i].place_m;
+      if (!emission::is_between(obstacle.form, place, place)) continue;
+      const std::string name = !spec.receivers.microphones_m.empty() ? fmt::format("microphone {}", i + 1)
+                               : i == 0                              ? "the left ear of the listener"
+                                                                     : "the right ear of the listener";
+      warnings.push_back(fmt::format("{}: this obstacle encloses {} at ({:.4g}, {:.4g}, {:.4g}) m, which hears nothing; move one of them",
+                                     obstacle.place, name, place[0], place[1], place[2]));
+    }
+  return warnings;
 }
 
 /// Each triangle on the rank that owns its lowest node.
@@ -126,15 +156,19 @@ emission::SurfacePart make_surface_part(const transient::Domain& domain, const j
   for (std::int32_t place = 0; place < domain.node_count(); ++place) part.node_number.push_back(domain.find_number(place));
   std::int64_t number = 0;
   for (std::size_t b = 0; b < assembly.bodies.size(); ++b) {
-    if (!spec.bodies[b].sounds) continue;
+    if (!spec.bodies[b].sounds && !spec.visibility) continue;
     // Corners alone, of quadratic elements too: their waves are longer than a facet, and four triangles each cost four times as much.
     for (const auto& facet : transient::list_skin(assembly, static_cast<std::int32_t>(b))) {
       const std::array<std::int32_t, 3> triangle{facet[0], facet[1], facet[2]};
       const std::int32_t owner = domain.find_place(*std::min_element(triangle.begin(), triangle.end()));
       const std::int64_t own = number;
-      number += spec.bodies[b].sheet ? 2 : 1;
+      if (spec.bodies[b].sounds) number += spec.bodies[b].sheet ? 2 : 1;
       if (owner < 0 || owner >= domain.own_count()) continue;
       const Triangle made{domain.find_place(triangle[0]), domain.find_place(triangle[1]), domain.find_place(triangle[2])};
+      if (!spec.bodies[b].sounds) {
+        part.silent.push_back(made);
+        continue;
+      }
       part.triangles.push_back(made);
       part.triangle_number.push_back(own);
       part.body.push_back(static_cast<std::int32_t>(b));
@@ -166,6 +200,26 @@ std::string find_overlap_place(const job::SimulationSpec& spec, std::string_view
   return spec.file.string();
 }
 
+/// What is removed when the run ends, on rank 0.
+struct TemporaryFiles {
+  std::vector<std::unique_ptr<run::TemporaryFile>> resumable;  // by a checkpoint
+  std::vector<std::unique_ptr<run::TemporaryFile>> others;
+};
+
+TemporaryFiles make_temporary_files(const comm::Communicator& comm, const job::SimulationSpec& spec) {
+  TemporaryFiles files;
+  if (!comm.is_root()) return files;
+  const auto make = [](const fs::path& output, const char* end) {
+    return std::make_unique<run::TemporaryFile>(fs::absolute(output).concat(end));
+  };
+  if (!spec.surface.empty()) files.resumable.push_back(make(spec.surface, ".part"));
+  if (!spec.motion.empty()) {
+    files.resumable.push_back(make(spec.motion, ".frames"));
+    files.others.push_back(make(spec.motion, ".part"));
+  }
+  return files;
+}
+
 /// All that moves, on this rank.
 struct Simulation {
   job::SimulationSpec spec;
@@ -177,8 +231,9 @@ struct Simulation {
   std::unique_ptr<emission::Emission> sound;
   std::unique_ptr<MotionFile> film;
   std::vector<EnergyBook> books;
-  int steps_per_sample = 0;  // that the sound has
-  double sound_cpu_s = 0, steps_cpu_s = 0;
+  int steps_per_sample = 0;     // that the sound has
+  std::int64_t first_step = 0;  // of this process: that of the checkpoint
+  double sound_cpu_s = 0, steps_cpu_s = 0, clock_s = 0;
 
   bool makes_sound() const { return !spec.sound.empty() || !spec.spectrogram.empty() || !spec.surface.empty(); }
 };
@@ -199,8 +254,14 @@ void make_motion(const comm::Communicator& comm, Simulation& simulation) {
   simulation.motion->set_start([&](std::int32_t node, const Vec3& rest_m) {
     const auto body = static_cast<std::size_t>(simulation.bodies.assembly->find_body_of_node(node));
     const job::SimulatedBody& described = spec.bodies[body];
-    return transient::Motion::Start{
-        {}, described.velocity_m_s + cross(described.angular_velocity_rad_s, rest_m - simulation.bodies.centre_m[body])};
+    transient::Motion::Start start;
+    start.velocity_m_s = described.velocity_m_s + cross(described.angular_velocity_rad_s, rest_m - simulation.bodies.centre_m[body]);
+    if (!simulation.bodies.start.empty()) {
+      const transient::Quad& u = simulation.bodies.start[static_cast<std::size_t>(node)];
+      start.displacement_m = {u.x, u.y, u.z};
+      start.angle_rad = u.x;
+    }
+    return start;
   });
   // The first forces, with the search for contacts: what overlaps is found here.
   try {
@@ -244,10 +305,6 @@ std::optional<double> find_closing_step(double step_s, double book_error) {
   return step_s * std::sqrt(kBookGoal / (kBookScatter * book_error));
 }
 
-std::int64_t count_element_steps(const Simulation& simulation) {
-  return static_cast<std::int64_t>(simulation.bodies.assembly->element_count()) * simulation.motion->get_step_count();
-}
-
 /// Of what the bytes of the job say, without names of files: the picture from the store is that of a run by hand.
 std::string make_title(const Simulation& simulation) {
   std::vector<std::string> names;
@@ -281,7 +338,9 @@ std::string write_outputs(const comm::Communicator& comm, Simulation& simulation
     if (!spec.spectrogram.empty()) base::write_file(spec.spectrogram, picture);
     double worst = 0;
     for (const EnergyBook& one : simulation.books) worst = std::max(worst, std::abs(one.relative_error));
-    const double rate = static_cast<double>(count_element_steps(simulation)) / std::max(1e-9, seconds);
+    // By CPU time: a busy machine does not slow down the program.
+    const double rate = static_cast<double>(simulation.bodies.assembly->element_count()) *
+                        static_cast<double>(simulation.motion->get_step_count() - simulation.first_step) / std::max(1e-9, cpu[0]);
     base::Json record = base::Json::object();
     record.set("version", version::describe("carillon-simulate")).set("job_sha256", simulation.job_sha256);
     record.set("job", spec.file.filename().string()).set("duration_s", spec.duration_s).set("sample_rate_hz", spec.sample_rate_hz);
@@ -303,11 +362,18 @@ std::string write_outputs(const comm::Communicator& comm, Simulation& simulation
       for (const double x : ball.spin_rad_s) striker.member("angular_velocity_rad_s").add(base::significant(x, 9));
       record.member("strikers").add(std::move(striker));
     }
+    for (const Bent& bent : simulation.bodies.bent) {
+      base::Json one = base::Json::object();
+      one.set("body", spec.bodies[bent.body].name).set("displacement_m", base::significant(bent.displacement_m, 6));
+      one.set("energy_j", base::significant(bent.energy_j, 9)).set("cpu_seconds", base::decimals(bent.cpu_s, 3));
+      if (bent.mode_hz > 0.0) one.set("mode_hz", base::significant(bent.mode_hz, 9));
+      record.member("bent").add(std::move(one));
+    }
     for (const EnergyBook& one : simulation.books) record.member("books").add(describe(one));
     for (const std::string& warning : spec.warnings) record.member("warnings").add(warning);
     if (!spec.record.empty()) base::write_file(spec.record, record.text());
     result = fmt::format(
-        "{:.6g} s in {} steps of {:.4g} s, {:.3g} element-steps a second, sound {:.1f} % of the CPU time\n"
+        "{:.6g} s in {} steps of {:.4g} s, {:.3g} element-steps a second of CPU time, sound {:.1f} % of the CPU time\n"
         "energy: kinetic {:.4g} J, elastic {:.4g} J, dissipated {:.4g} J, put in {:.4g} J; the book closes to {:.1e}",
         book.time_s, simulation.motion->get_step_count(), simulation.motion->get_step_s(), rate,
         100.0 * cpu[1] / std::max(1e-9, cpu[0] + cpu[1]), book.kinetic_j, book.elastic_j, book.dissipated_j, book.work_j, worst);
@@ -326,54 +392,130 @@ std::string write_outputs(const comm::Communicator& comm, Simulation& simulation
   return result;
 }
 
-/// What a run would cost: a few steps are taken.
-std::string predict(const comm::Communicator& comm, Simulation& simulation, bool json) {
+/// What a run takes in addition to what it has before its first step, on the rank that has most.
+std::int64_t count_later_bytes(const Simulation& simulation, int ranks, bool has_checkpoint, double finer) {
+  const job::SimulationSpec& spec = simulation.spec;
+  const transient::Assembly& assembly = *simulation.bodies.assembly;
+  constexpr std::int64_t kNumber = sizeof(double);
+  std::int64_t pressures = 0, later = kLaterBytes;  // of all receivers; what comes at the end
+  if (simulation.makes_sound()) {
+    const emission::Options sound = make_emission_options(spec, simulation.motion->get_steps_per_sample(), false);
+    const auto frames = static_cast<std::int64_t>(sound.frames);
+    pressures = kNumber * frames * static_cast<std::int64_t>(sound.receivers.size());
+    later += pressures + 2 * kNumber * frames;  // channels, and the sum of one
+  }
+  if (!spec.spectrogram.empty()) later += kPictureBytes;
+  const double nodes = finer * assembly.node_count(), elements = finer * assembly.element_count();
+  if (!spec.surface.empty()) later += static_cast<std::int64_t>(nodes * kSurfaceBytesPerNode);
+  if (!spec.motion.empty()) later += static_cast<std::int64_t>(nodes * kFilmBytesPerNode);
+  // Of this rank, which grows by doubling, of all ranks, and as the bytes of the file; the last two on rank 0.
+  const std::int64_t state =
+      has_checkpoint ? kLaterBytes + (3 + 2 * ranks) * pressures + static_cast<std::int64_t>(3 * kNumber * (30.0 * nodes + 25.0 * elements))
+                     : 0;
+  return pressures + std::max(later, state);
+}
+
+/// CPU seconds of the sound of one sample: it is made of surfaces that do not move, until all of its stages work.
+double measure_sound(const comm::Communicator& comm, const Simulation& simulation) {
+  if (!simulation.makes_sound()) return 0.0;
+  const int steps = simulation.motion->get_steps_per_sample();
+  emission::Options options = make_emission_options(simulation.spec, steps, false);
+  options.surface_file.clear();
+  options.frames = kTrialSamples + kTimedSamples;
+  emission::Emission sound(comm, make_surface_part(*simulation.domain, simulation.spec), options);
+  const auto play = [&](std::int64_t samples) {
+    const double before = base::get_process_cpu_s();
+    for (std::int64_t n = 0; n < samples * steps; ++n) sound.add_step(&simulation.motion->get_u()[0].x);
+    return (base::get_process_cpu_s() - before) / static_cast<double>(samples);
+  };
+  play(kTrialSamples);
+  return play(kTimedSamples);
+}
+
+/// What a run would cost: a few steps are taken, and the sound of some samples is made. finer: how many times as many nodes the job has.
+std::string predict(const comm::Communicator& comm, Simulation& simulation, const SimulateOptions& options, double finer,
+                    std::int64_t program_bytes) {
   transient::Motion& motion = *simulation.motion;
-  const auto start = std::chrono::steady_clock::now();
+  const double before = base::get_process_cpu_s();
   for (int step = 0; step < kTrialSteps; ++step) motion.advance();
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() / kTrialSteps;
-  const double steps = std::ceil(simulation.spec.duration_s / motion.get_step_s());
+  const double step_cpu_s = (base::get_process_cpu_s() - before) / kTrialSteps * finer;
+  const double sound_cpu_s = measure_sound(comm, simulation) * std::pow(finer, 2.0 / 3.0);
+  // An element's size, and so the step, goes with the third root of their number.
+  const double slower = std::cbrt(finer), steps = std::ceil(simulation.spec.duration_s / motion.get_step_s() * slower);
+  const double own_cpu_s = steps * step_cpu_s + simulation.spec.duration_s * simulation.spec.sample_rate_hz * sound_cpu_s;
+  const double cpu_s = comm.sum(own_cpu_s), most_cpu_s = comm.max(own_cpu_s), sound_s = comm.sum(sound_cpu_s);
   const std::vector<std::int64_t> peaks = run::gather_peak_bytes(comm);
-  const std::int64_t peak = peaks.empty() ? 0 : *std::max_element(peaks.begin(), peaks.end());
+  const auto bodies_bytes = static_cast<double>((peaks.empty() ? 0 : *std::max_element(peaks.begin(), peaks.end())) - program_bytes);
+  const auto count_bytes = [&](int ranks) {
+    return program_bytes + static_cast<std::int64_t>(finer * std::max(0.0, bodies_bytes)) +
+           count_later_bytes(simulation, ranks, !options.checkpoint.empty(), finer);
+  };
+  const double elements = finer * simulation.bodies.assembly->element_count(), nodes = finer * simulation.bodies.assembly->node_count();
   base::Json record = base::Json::object();
-  record.set("step_s", base::significant(motion.get_step_s(), 6)).set("steps", base::significant(steps, 12));
-  record.set("longest_step_s", base::significant(motion.get_longest_step_s(), 6));
-  record.set("elements", static_cast<std::int64_t>(simulation.bodies.assembly->element_count()));
-  record.set("nodes", static_cast<std::int64_t>(simulation.bodies.assembly->node_count())).set("ranks", comm.size());
-  record.set("seconds", base::significant(steps * seconds, 3)).set("memory_bytes_a_rank", peak);
-  record.set("cpu_seconds", base::significant(steps * seconds * comm.size(), 3));
+  record.set("step_s", base::significant(motion.get_step_s() / slower, 6)).set("steps", base::significant(steps, 12));
+  record.set("longest_step_s", base::significant(motion.get_longest_step_s() / slower, 6));
+  record.set("elements", std::llround(elements)).set("nodes", std::llround(nodes)).set("ranks", comm.size());
+  record.set("seconds", base::significant(most_cpu_s, 3)).set("memory_bytes_a_rank", count_bytes(comm.size()));
+  record.set("cpu_seconds", base::significant(cpu_s, 3));
+  record.set("sound_cpu_seconds", base::significant(simulation.spec.duration_s * simulation.spec.sample_rate_hz * sound_s, 3));
   // As carillon-precompute --validate says it, for the queue: ranks share the bodies, and are counted as if they did not.
-  const emission::Options sound = make_emission_options(simulation.spec, motion.get_steps_per_sample(), false);
-  const std::int64_t picture = simulation.spec.spectrogram.empty() ? 0 : kPictureBytes;
-  const auto samples =
-      picture + static_cast<std::int64_t>(simulation.makes_sound() ? sound.frames * sound.receivers.size() * sizeof(double) : 0);
   base::Json memory = base::Json::object();
-  for (std::int64_t ranks = 1; ranks <= kMaxPredictedRanks; ranks *= 2) memory.set(std::to_string(ranks), ranks * (peak + samples));
-  record.set("memory_bytes", std::move(memory));
-  if (json) return record.text();
+  for (int ranks = 1; ranks <= kMaxPredictedRanks; ranks *= 2) memory.set(std::to_string(ranks), ranks * count_bytes(ranks));
+  record.set("memory_bytes", std::move(memory)).set("warnings", base::Json::array(simulation.spec.warnings));
+  const std::string note =
+      finer > 1.0 ? fmt::format(
+                        "meshes were made with 1 node for {:.3g}, since theirs would take longer than the {:g} s of --patience: all "
+                        "of this is scaled from there, to a factor of two; --patience {:.0f} or more makes them",
+                        finer, options.patience_s, 10 * std::ceil(finer * options.patience_s / 10))
+                  : "";
+  if (finer > 1.0) record.set("note", note);
+  if (options.json) return record.text();
   return fmt::format(
-      "{} elements, {} nodes\nstep {:.4g} s (the longest stable one is {:.4g} s), {:.0f} steps\nabout {:.3g} s on {} rank{}, {:.0f} MB a "
-      "rank",
-      simulation.bodies.assembly->element_count(), simulation.bodies.assembly->node_count(), motion.get_step_s(),
-      motion.get_longest_step_s(), steps, steps * seconds, comm.size(), comm.size() == 1 ? "" : "s", static_cast<double>(peak) / 1e6);
+      "{:.0f} elements, {:.0f} nodes\nstep {:.4g} s (the longest stable one is {:.4g} s), {:.0f} steps\nabout {:.3g} CPU s on {} rank{}, "
+      "of "
+      "which sound {:.0f} %; {:.0f} MB a rank{}",
+      elements, nodes, motion.get_step_s() / slower, motion.get_longest_step_s() / slower, steps, cpu_s, comm.size(),
+      comm.size() == 1 ? "" : "s", 100.0 * simulation.spec.duration_s * simulation.spec.sample_rate_hz * sound_s / std::max(1e-9, cpu_s),
+      static_cast<double>(count_bytes(comm.size())) / 1e6, note.empty() ? "" : "\n" + note);
+}
+
+/// The least CPU time between two looks at the clock.
+double measure_clock() {
+  double least = std::numeric_limits<double>::infinity();
+  for (int look = 0; look < 100; ++look) {
+    const double before = base::get_process_cpu_s();
+    least = std::min(least, base::get_process_cpu_s() - before);
+  }
+  return least;
+}
+
+/// To the sound, which hears behind what hides it.
+void set_balls(Simulation& simulation) {
+  if (!simulation.spec.visibility || simulation.spec.strikers.empty()) return;
+  std::vector<Vec3> centres;
+  for (const transient::BallStriker& ball : simulation.contacts->get_strikers()) centres.push_back(ball.position_m);
+  simulation.sound->set_balls(centres);
 }
 
 /// The steps of one sample, and what they make the surfaces sound.
 void advance_sample(Simulation& simulation) {
   transient::Motion& motion = *simulation.motion;
   if (simulation.film) simulation.film->add_sample(motion);
-  // The clock is dear next to a step of a small body: one sample in sixteen is measured.
-  const bool is_measured = motion.get_sample() % kLookEvery == 0;
+  // The clock is dear next to a step of a small body: one sample in seventeen is measured, whatever part of the sound comes every eighth
+  // or sixteenth, and what two looks at the clock take is no sound.
+  const bool is_measured = simulation.sound && motion.get_sample() % kMeasureEvery == 0;
   do {
     motion.advance();
     if (!simulation.sound) continue;
-    const double before = is_measured ? find_cpu_s() : 0.0;
+    const double before = is_measured ? base::get_process_cpu_s() : 0.0;
     if (motion.get_steps_per_sample() != simulation.steps_per_sample) {
       simulation.steps_per_sample = motion.get_steps_per_sample();
       simulation.sound->set_steps_per_sample(simulation.steps_per_sample);
     }
+    if (motion.is_at_sample()) set_balls(simulation);
     simulation.sound->add_step(&motion.get_u()[0].x);
-    if (is_measured) simulation.sound_cpu_s += static_cast<double>(kLookEvery) * (find_cpu_s() - before);
+    if (is_measured)
+      simulation.sound_cpu_s += static_cast<double>(kMeasureEvery) * (base::get_process_cpu_s() - before - simulation.clock_s);
   } while (!motion.is_at_sample());
 }
 
@@ -415,26 +557,39 @@ SimulateSummary simulate(const comm::Communicator& comm, const fs::path& job_fil
   simulation.spec = read_spec(comm, job_file, options, text);
   simulation.job_sha256 = base::to_hex(base::calc_sha256(text));
   const job::SimulationSpec& spec = simulation.spec;
-  for (const std::string& warning : spec.warnings) log.warn(warning);
+  for (std::string& warning : find_deaf_receivers(spec)) simulation.spec.warnings.push_back(std::move(warning));
+  const std::int64_t program_bytes = base::find_memory().resident;
+  const double finer = !options.validate ? 1.0 : comm.agree([&] { return coarsen(simulation.spec, options.patience_s); });
   simulation.bodies = make_bodies(comm, spec, [&](const std::string& line) { log.print(line); });
+  simulation.spec.warnings.insert(simulation.spec.warnings.end(), simulation.bodies.warnings.begin(), simulation.bodies.warnings.end());
+  for (const std::string& warning : spec.warnings) log.warn(warning);
   make_motion(comm, simulation);
   transient::Motion& motion = *simulation.motion;
   SimulateSummary summary;
   if (options.validate) {
-    summary.result = predict(comm, simulation, options.json);
+    summary.result = predict(comm, simulation, options, finer, program_bytes);
     return summary;
   }
   const base::Sha256::Hash identity = find_identity(text, *simulation.bodies.assembly);
   const std::optional<SimulationState> saved = load_checkpoint(comm, options.checkpoint, identity);
+  const auto temporary = comm.agree([&] { return make_temporary_files(comm, spec); });
+  const auto keep_for_checkpoint = [&] {
+    for (const auto& file : temporary.resumable) file->set_needed(true);
+  };
+  if (saved) keep_for_checkpoint();
   if (simulation.makes_sound())
     simulation.sound = std::make_unique<emission::Emission>(comm, make_surface_part(*simulation.domain, spec),
                                                             make_emission_options(spec, motion.get_steps_per_sample(), saved.has_value()));
   if (!spec.motion.empty()) simulation.film = std::make_unique<MotionFile>(*simulation.domain, spec, saved.has_value());
   if (saved) {
     resume(comm, *saved, simulation);
+    simulation.first_step = motion.get_step_count();
     log.print(fmt::format("resumed at {:.6g} s", motion.get_time_s()));
   } else {
-    if (simulation.sound) simulation.sound->add_step(&motion.get_u()[0].x);
+    if (simulation.sound) {
+      set_balls(simulation);
+      simulation.sound->add_step(&motion.get_u()[0].x);
+    }
     simulation.books.push_back(motion.calc_book());
   }
   simulation.steps_per_sample = motion.get_steps_per_sample();
@@ -447,7 +602,8 @@ SimulateSummary simulate(const comm::Communicator& comm, const fs::path& job_fil
   const bool is_kept = !options.checkpoint.empty();
   if (is_kept) run::set_news(true);
   double last_save_s = 0.0;
-  const double cpu_s = find_cpu_s();
+  simulation.clock_s = measure_clock();
+  const double cpu_s = base::get_process_cpu_s();
   while (motion.get_sample() < frames) {
     advance_sample(simulation);
     if (motion.get_sample() % book_every == 0 || motion.get_sample() == frames) simulation.books.push_back(motion.calc_book());
@@ -461,6 +617,7 @@ SimulateSummary simulate(const comm::Communicator& comm, const fs::path& job_fil
                                                               : std::int32_t{kNothing});
     if (wanted == kNothing) continue;
     save_checkpoint(comm, options.checkpoint, identity, collect_state(comm, simulation));
+    keep_for_checkpoint();
     last_save_s = reporter.find_seconds();
     if (wanted == kSave) continue;
     summary.is_stopped = true;
@@ -468,7 +625,8 @@ SimulateSummary simulate(const comm::Communicator& comm, const fs::path& job_fil
                                  options.checkpoint.string());
     return summary;
   }
-  simulation.steps_cpu_s = find_cpu_s() - cpu_s - simulation.sound_cpu_s;
+  simulation.sound_cpu_s = std::max(0.0, simulation.sound_cpu_s);
+  simulation.steps_cpu_s = std::max(0.0, base::get_process_cpu_s() - cpu_s - simulation.sound_cpu_s);
   if (simulation.film) simulation.film->add_sample(motion);
   summary.result = write_outputs(comm, simulation, reporter.find_seconds());
   comm.agree([&] {
@@ -476,6 +634,7 @@ SimulateSummary simulate(const comm::Communicator& comm, const fs::path& job_fil
     reporter.finish();
     std::error_code ignored;
     if (is_kept) fs::remove(options.checkpoint, ignored);
+    for (const auto& file : temporary.resumable) file->set_needed(false);
   });
   return summary;
 }

@@ -15,6 +15,7 @@ struct SimulateOptions {
   double checkpoint_every_s = 300;
   std::filesystem::path sound, spectrogram, surface, motion, record;  // in place of the job's; empty: the job's
   bool validate = false;                                              // predict, do not simulate
+  double patience_s = 9;                                              // of a prediction: larger meshes are estimated from coarser ones
   bool json = false;                                                  // of what is predicted
 };
 

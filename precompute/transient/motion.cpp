@@ -60,13 +60,13 @@ Motion::Motion(Domain& domain, const MotionOptions& options, std::vector<Constra
     f_.resize(static_cast<std::size_t>(domain_.force_count()));
     for (auto* array : {&external_, &work_, &brake_loss_, &carried_, &home_, &reaction_}) array->resize(own);
     is_constrained_.resize(own, 0);
-    is_carried_.assign(assembly.bodies.size(), 1);
+    is_constrained_for_ever_.resize(own, 0);
     for (std::size_t h = 0; h < constraints_.size(); ++h)
       for (const std::int32_t number : constraints_[h].nodes) {
-        if (!constraints_[h].is_hinge) is_carried_[static_cast<std::size_t>(assembly.find_body_of_node(number))] = 0;
         const std::int32_t place = domain_.find_place(number);
         if (place < 0 || place >= domain_.own_count()) continue;
         is_constrained_[static_cast<std::size_t>(place)] = 1;
+        is_constrained_for_ever_[static_cast<std::size_t>(place)] = std::isfinite(constraints_[h].release_s) ? 0 : 1;
         constrained_nodes_.push_back({place, static_cast<std::int32_t>(h)});
       }
     find_hinges([&](std::int32_t node) { return assembly.nodes_m[static_cast<std::size_t>(node)]; });
@@ -81,13 +81,43 @@ Motion::Motion(Domain& domain, const MotionOptions& options, std::vector<Constra
       inverse_kg_.push_back(1.0 / mass);
       braked_kg_s_.push_back(is_constrained_[i] != 0 ? 0.0 : alpha2 * mass);
     }
-    for (std::size_t b = 0; b < assembly.bodies.size(); ++b) {
-      const bool is_braked = assembly.bodies[b].mass_damping_per_s > 0.0;
-      is_braked_ = is_braked_ || is_braked;
-      has_carried_ = has_carried_ || (is_braked && is_carried_[b] != 0);
-    }
+    for (const Assembly::Body& body : assembly.bodies) is_braked_ = is_braked_ || body.mass_damping_per_s > 0.0;
+    find_carried();
     has_external_ = is_braked_ || !constraints_.empty() || !impulses_.empty() || norm(options_.gravity_m_s2) > 0.0;
   });
+}
+
+void Motion::find_carried() {
+  const Assembly& assembly = domain_.get_assembly();
+  is_carried_.assign(assembly.bodies.size(), 1);
+  next_release_s_ = std::numeric_limits<double>::infinity();
+  for (const Constraint& constraint : constraints_) {
+    if (constraint.nodes.empty()) continue;  // or let go
+    next_release_s_ = std::min(next_release_s_, constraint.release_s);
+    for (const std::int32_t node : constraint.nodes)
+      if (!constraint.is_hinge) is_carried_[static_cast<std::size_t>(assembly.find_body_of_node(node))] = 0;
+  }
+  has_carried_ = false;
+  for (std::size_t b = 0; b < assembly.bodies.size(); ++b)
+    has_carried_ = has_carried_ || (assembly.bodies[b].mass_damping_per_s > 0.0 && is_carried_[b] != 0);
+}
+
+void Motion::release() {
+  const double now_s = get_time_s() * (1.0 + 1e-12);  // rounded: a release at a step is at that step
+  if (now_s < next_release_s_) return;
+  const auto is_released = [&](const Constraint& constraint) { return now_s >= constraint.release_s; };
+  std::erase_if(constrained_nodes_, [&](const ConstrainedNode& node) {
+    if (!is_released(constraints_[static_cast<std::size_t>(node.constraint)])) return false;
+    const auto place = static_cast<std::size_t>(node.place);
+    const auto body = static_cast<std::size_t>(domain_.find_body(node.place));
+    is_constrained_[place] = 0;
+    reaction_[place] = {};
+    braked_kg_s_[place] = domain_.get_assembly().bodies[body].mass_damping_per_s * domain_.get_masses_kg()[place];
+    return true;
+  });
+  for (Constraint& constraint : constraints_)
+    if (is_released(constraint)) constraint.nodes.clear();
+  find_carried();
 }
 
 void Motion::check_input(const std::vector<Constraint>& constraints, const std::vector<Impulse>& impulses) const {
@@ -100,7 +130,8 @@ void Motion::check_input(const std::vector<Constraint>& constraints, const std::
     if (node < 0 || node >= assembly.node_count())
       throw InputError(fmt::format("node {} is constrained or struck, and there are {} nodes", node, assembly.node_count()));
   };
-  for (const Constraint& constraint : constraints)
+  for (const Constraint& constraint : constraints) {
+    if (!(constraint.release_s >= 0.0)) throw InputError("nodes are let go at a time that is 0 s or later");
     for (const std::int32_t node : constraint.nodes) {
       check_node(node);
       if (std::exchange(is_constrained[static_cast<std::size_t>(node)], 1) != 0) {
@@ -109,6 +140,7 @@ void Motion::check_input(const std::vector<Constraint>& constraints, const std::
                                      assembly.bodies[static_cast<std::size_t>(assembly.find_body_of_node(node))].name, x[0], x[1], x[2]));
       }
     }
+  }
   for (std::size_t i = 0; i < impulses.size(); ++i) {
     if (!(impulses[i].duration_s > 0.0) || !(impulses[i].time_s >= 0.0) || !std::isfinite(norm(impulses[i].impulse_n_s)))
       throw InputError(fmt::format("impulse {}: its duration must be positive, its time not negative, its vector finite", i + 1));
@@ -126,7 +158,7 @@ void Motion::set_start(const std::function<Start(std::int32_t, const Vec3&)>& fi
     for (std::int32_t i = 0; i < domain_.node_count(); ++i) {
       const auto at = static_cast<std::size_t>(i);
       const Start start = find_start(domain_.find_number(i), domain_.get_rest_m()[at]);
-      u_[at] = to_quad(domain_.is_point(i) ? start.displacement_m : Vec3{});
+      u_[at] = to_quad(domain_.is_point(i) ? start.displacement_m : Vec3{start.angle_rad, 0.0, 0.0});
       v_[at] = to_quad(domain_.is_point(i) ? start.velocity_m_s : Vec3{});
       if (i >= domain_.own_count() || is_constrained_[at] == 0) continue;
       home_[at] = u_[at];
@@ -176,7 +208,7 @@ void Motion::begin() {
 
 void Motion::find_step(int iterations, bool is_start) {
   const Assembly& assembly = domain_.get_assembly();
-  const std::vector<double> omega = highest_.calc(domain_, u_.data(), is_constrained_, iterations);
+  const std::vector<double> omega = highest_.calc(domain_, u_.data(), is_constrained_for_ever_, iterations);
   omega_ = omega;
   longest_s_ = std::numeric_limits<double>::infinity();
   for (std::size_t b = 0; b < omega.size(); ++b)
@@ -302,6 +334,7 @@ void Motion::set_external_forces() {
     }
   const StepTime time{step_, time_s, act_s_, act_before_s_, step_s_, step_before_s_};
   for (ExternalForces* forces : outside_) forces->add_forces(time, u_.data(), v_.data(), external_.data());
+  release();
   // The force of a support is what brings a node where it has to be.
   std::vector<Vec3> next;
   for (const Constraint& constraint : constraints_) next.push_back(constraint.path.calc(find_next_time_s()));
@@ -590,6 +623,7 @@ void Motion::load(std::span<const std::byte> bytes) {
     most_j_ = head.most_j;
     longest_s_ = head.longest_s;
     begun_ = true;
+    release();
   });
 }
 

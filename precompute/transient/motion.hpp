@@ -37,6 +37,7 @@ struct Constraint {
   std::vector<std::int32_t> nodes;  // numbers of the assembly
   Path path;                        // none: fixed
   bool is_hinge = false;            // nodes of a line: the body swings about it, and mass damping does not brake the swing
+  double release_s = std::numeric_limits<double>::infinity();  // the nodes are free from then on
 };
 
 /// J (1 - cos(2 pi (t - t0) / T)) / T for t0 <= t <= t0 + T, shared among nodes (find_shares()).
@@ -105,6 +106,7 @@ class Motion {
  public:
   struct Start {
     Vec3 displacement_m{}, velocity_m_s{};
+    double angle_rad = 0.0;  // of an edge of a sheet, in place of both
   };
 
   /// Bodies are at rest in their rest shape. Domain lives as long as this; one Motion for a Domain. Throws on every rank: InputError for a
@@ -168,6 +170,9 @@ class Motion {
   /// Of all hinged bodies, whose nodes are at `find_place(number)`.
   void find_hinges(const std::function<Vec3(std::int32_t)>& find_place);
   void update_carried();
+  /// Lets go of constraints whose time has come.
+  void release();
+  void find_carried();
   double find_next_time_s() const;
   void begin();
   void begin_if_new() {
@@ -191,7 +196,9 @@ class Motion {
   std::vector<ExternalForces*> outside_;
   std::vector<ConstrainedNode> constrained_nodes_;
   std::vector<OwnShare> shares_;
-  std::vector<char> is_constrained_;              // (own)
+  std::vector<char> is_constrained_;           // (own)
+  std::vector<char> is_constrained_for_ever_;  // (own)
+  double next_release_s_ = std::numeric_limits<double>::infinity();
   std::vector<double> inverse_kg_, braked_kg_s_;  // (own)
   std::vector<char> is_carried_;                  // (bodies) mass damping leaves rigid motion alone
   struct Hinge {

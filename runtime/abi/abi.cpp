@@ -707,4 +707,8 @@ carillon_status carillon_get_effect_counters(const carillon_synth* synth, int32_
 
 double carillon_peak_pa(const carillon_synth* synth, int32_t body) { return synth == nullptr ? 0.0 : synth->synthesiser.get_peak_pa(body); }
 
+double carillon_deflection(const carillon_synth* synth, int32_t body) {
+  return synth == nullptr ? 0.0 : synth->synthesiser.get_deflection(body);
+}
+
 }  // extern "C"

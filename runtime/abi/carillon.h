@@ -26,7 +26,7 @@ extern "C" {
 
 /* Grows with every function and field that is added. The number in the name of libcarillon.so.2 is another one, which changes only when
  * programs would have to be compiled again. */
-#define CARILLON_ABI_VERSION 9
+#define CARILLON_ABI_VERSION 10
 
 /* That of the library. */
 CARILLON_API uint32_t carillon_abi_version(void);
@@ -419,6 +419,9 @@ CARILLON_API void carillon_effect_counters_init_sized(carillon_effect_counters* 
 CARILLON_API carillon_status carillon_get_effect_counters(const carillon_synth* synth, int32_t body, carillon_effect_counters* counters);
 /* [any] The loudest that its modes have been [Pa at 1 m]; 0 for a body that is not there. */
 CARILLON_API double carillon_peak_pa(const carillon_synth* synth, int32_t body);
+/* [any] How far its modes have bent it at most, in thicknesses (twice the volume over the surface). 0 up to half a thickness, within which
+ * linear modes hold; for banks with a nonlinear energy, strings and membranes; and for a body that is not there. */
+CARILLON_API double carillon_deflection(const carillon_synth* synth, int32_t body);
 
 #ifdef __cplusplus
 }

@@ -155,7 +155,10 @@ struct Bank {
   // estimate). Both are one-sided widths: f 2^(+-error / 1200).
   std::vector<double> algebraic_error_cents;       // (m), or empty: unknown
   std::vector<double> discretisation_error_cents;  // (m), or empty: unknown; infinite: of this mode unknown
-  Corrected corrected;                             // or empty: unknown; since 1.4
+  // (m), or empty: no facets in doubt; since 1.8. The surface that was solved came in facets that may be planes of the body or samples of a
+  // smooth surface. If it is the other of the two, modes lie within their error bar and this, an estimate; no bar has it in it.
+  std::vector<double> facet_error_cents;
+  Corrected corrected;  // or empty: unknown; since 1.4
 
   Multipoles multipoles;  // or empty: the air was not solved; since 1.5
   QuarticEnergy quartic;  // or empty: motion counts as linear; since 1.7
@@ -172,7 +175,8 @@ struct Bank {
   std::array<double, 2> band_hz{20.0, 20000.0};
   bool complete = true;    // every mode of the band is here (false only when max_modes or calc_reduced cut the list, which keep those of
                            // the lowest corrected frequencies)
-  std::string element;     // "T4", "T10", or "analytic": known modes of a string, beam, membrane, plate or table (since 1.4)
+  std::string element;     // "T4", "T10"; "analytic": known modes of a string, beam, membrane, plate or table (since 1.4); "imported":
+                           // modes of another program, of unknown accuracy (since 1.8)
   std::string mass;        // "consistent" or "lumped"
   std::string provenance;  // JSON text: resolved job, versions, ranks, seconds and peak memory per phase
 
@@ -222,6 +226,8 @@ std::vector<std::string> find_faults(const Bank& bank);
 /// how wrong its frequencies can be, the worst of all modes.
 std::string describe_completeness(const Bank& bank);
 std::string describe_accuracy(const Bank& bank);
+/// What facets in doubt add to its error bars, in a few words; empty where none are.
+std::string describe_facets(const Bank& bank);
 
 /// Reads a bank. Throws InputError for anything that is not a whole bank of a version this reader knows: missing file, not a bank,
 /// newer major version, truncated or changed bytes (checksum), arrays that disagree, content that is not sane. Bytes are untrusted: no

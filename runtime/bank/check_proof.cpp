@@ -206,7 +206,9 @@ Check check_error_bars(const Bank& bank) {
   Faults faults;
   std::string figure;
   for (const auto& [name, cents] :
-       {std::pair("algebraic", &bank.algebraic_error_cents), std::pair("discretisation", &bank.discretisation_error_cents)}) {
+       {std::pair("algebraic", &bank.algebraic_error_cents), std::pair("discretisation", &bank.discretisation_error_cents),
+        std::pair("facet", &bank.facet_error_cents)}) {
+    if (cents == &bank.facet_error_cents && cents->empty()) continue;
     for (std::size_t i = 0; i < cents->size(); ++i)
       if (!((*cents)[i] >= 0.0)) faults.add("{}_error_cents[{}] is {:.6g}, negative", name, i, (*cents)[i]);
     if (!figure.empty()) figure += "; ";
@@ -260,6 +262,7 @@ std::string describe_accuracy(const Bank& bank) {
                ? std::string(unknown)
                : fmt::format("{} {:.2g} cent ({})", known, *std::max_element(cents.begin(), cents.end()), kind);
   };
+  if (bank.element == "imported") return "unknown: the frequencies are those of another program";
   if (bank.element == "analytic") {
     const std::vector<double>& cents = bank.discretisation_error_cents;
     const bool is_exact = std::all_of(cents.begin(), cents.end(), [](double c) { return c == 0.0; });
@@ -270,7 +273,14 @@ std::string describe_accuracy(const Bank& bank) {
   return describe_largest(bank.algebraic_error_cents, "frequencies are those of the mesh to", "a bound", "no bounds against the mesh") +
          describe_largest(is_corrected ? bank.corrected.error_cents : bank.discretisation_error_cents,
                           is_corrected ? ", corrected ones those of the body to about" : " and those of the body to about", "an estimate",
-                          ", no estimates against the body");
+                          ", no estimates against the body") +
+         (bank.facet_error_cents.empty() ? "" : "; " + describe_facets(bank));
+}
+
+std::string describe_facets(const Bank& bank) {
+  if (bank.facet_error_cents.empty()) return {};
+  return fmt::format("facets in doubt: {:.2g} cent more if they are not what they were taken for, planes or samples of a smooth surface",
+                     *std::max_element(bank.facet_error_cents.begin(), bank.facet_error_cents.end()));
 }
 
 }  // namespace carillon::bank

@@ -17,6 +17,7 @@
 #include "runtime/bank/bank.hpp"
 #include "runtime/bank/edges.hpp"
 #include "runtime/bank/faults.hpp"
+#include "runtime/bank/pack.hpp"
 #include "runtime/bank/radiation_gain.hpp"
 #include "runtime/bank/surface.hpp"
 #include "runtime/base/document.hpp"
@@ -55,7 +56,8 @@ Check check_arrays(const Bank& bank) {
   expect("radiation_gain", bank.radiation_gain.size(), modes);
   expect("shape_scale", bank.shape_scale.size(), modes);
   for (const auto& [name, cents] : {std::pair("algebraic_error_cents", &bank.algebraic_error_cents),
-                                    std::pair("discretisation_error_cents", &bank.discretisation_error_cents)}) {
+                                    std::pair("discretisation_error_cents", &bank.discretisation_error_cents),
+                                    std::pair("facet_error_cents", &bank.facet_error_cents)}) {
     if (!cents->empty()) expect(name, cents->size(), modes);
   }
   if (const Corrected& corrected = bank.corrected; !corrected.is_empty()) {
@@ -128,6 +130,7 @@ Check check_numbers(const Bank& bank) {
   look("alpha2_per_s", &material.alpha2_per_s, 1);
   const auto look_all = [&](const char* name, const std::vector<double>& values) { look(name, values.data(), values.size()); };
   look_all("algebraic_error_cents", bank.algebraic_error_cents);
+  look_all("facet_error_cents", bank.facet_error_cents);
   look_all("corrected_frequency_hz", bank.corrected.freq_hz);
   look_all("corrected_decay", bank.corrected.decay_per_s);
   look_all("damping/coefficient", bank.damping.coefficient);
@@ -331,6 +334,8 @@ Check check_shapes(const Bank& bank) {
     step = std::max(step, bank.shape_scale[i]);
   }
   if (bank.shape_bytes != 1 && bank.shape_bytes != 2) faults.add("shapes of {} bytes a component, neither 1 nor 2", bank.shape_bytes);
+  if (std::find(bank.shape.begin(), bank.shape.end(), std::numeric_limits<std::int16_t>::min()) != bank.shape.end())
+    faults.add("shapes have a component of -32768 steps, and they end at {}", -kMaxSteps);
   const auto is_wide = [](std::int16_t steps) { return steps < -127 || steps > 127; };
   if (bank.shape_bytes == 1 && std::any_of(bank.shape.begin(), bank.shape.end(), is_wide))
     faults.add("shapes have components beyond 127 steps, which one byte does not hold");
@@ -510,7 +515,8 @@ Check check_material(const Bank& bank) {
 Check check_solve(const Bank& bank) {
   Faults faults;
   const Counts& counts = bank.counts;
-  if (bank.element != "T4" && bank.element != "T10" && bank.element != "analytic") faults.add("element is neither T4 nor T10 nor analytic");
+  if (bank.element != "T4" && bank.element != "T10" && bank.element != "analytic" && bank.element != "imported")
+    faults.add("element is neither T4 nor T10 nor analytic nor imported");
   if (bank.mass != "consistent" && bank.mass != "lumped") faults.add("mass is neither consistent nor lumped");
   if (counts.nodes < static_cast<std::int64_t>(bank.vertex_count()))
     faults.add("{} nodes are fewer than the vertices of the surface", counts.nodes);
@@ -521,6 +527,9 @@ Check check_solve(const Bank& bank) {
       (counts.rigid_modes / 6 == counts.components && counts.rigid_modes % 6 != 0)) {
     faults.add("{} rigid modes of {} components", counts.rigid_modes, counts.components);
   }
+  if (bank.element == "imported")
+    return {"solve", fmt::format("none here: modes of another program at {} points, {} rigid modes", counts.nodes, counts.rigid_modes),
+            faults.take()};
   if (bank.element == "analytic")
     return {"solve", fmt::format("known modes at {} points, {} rigid modes", counts.nodes, counts.rigid_modes), faults.take()};
   return {"solve",
@@ -540,6 +549,7 @@ std::vector<Check> calc_checks(const Bank& bank) {
   }
   checks.push_back(check_error_bars(bank));
   for (Check& check : check_proof(bank)) checks.push_back(std::move(check));
+  if (bank.packing) checks.push_back(check_packing(bank));
   return checks;
 }
 

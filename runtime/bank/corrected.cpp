@@ -93,6 +93,11 @@ void add_radiation(Bank& bank) {
 
 }  // namespace
 
+double find_played_hz(const Bank& bank, std::size_t mode) {
+  if (!bank.multipoles.is_empty()) return bank.multipoles.freq_hz[mode];
+  return bank.corrected.is_empty() ? bank.freq_hz(mode) : bank.corrected.freq_hz[mode];
+}
+
 std::vector<std::size_t> sort_played_modes(const Bank& bank) {
   return bank.multipoles.is_empty() ? sort_modes(bank) : base::find_sort_order(bank.multipoles.freq_hz);
 }

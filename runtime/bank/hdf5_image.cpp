@@ -14,6 +14,7 @@
 #include <cstring>
 #include <set>
 
+#include "runtime/bank/corrected.hpp"
 #include "runtime/bank/hdf5_id.hpp"
 
 namespace carillon::bank {
@@ -162,7 +163,7 @@ void write_vtk_views(hid_t file, const Bank& bank) {
     const Hdf5Id source = make_space({vertices, modes, 3});
     const hsize_t start[3] = {0, mode, 0}, extent[3] = {vertices, 1, 3};
     require(H5Sselect_hyperslab(source, H5S_SELECT_SET, start, nullptr, extent, nullptr), "select a mode");
-    const std::string name = fmt::format("mode_{:0{}}_{:.1f}Hz", mode + 1, digits, bank.freq_hz(mode));
+    const std::string name = fmt::format("mode_{:0{}}_{:.1f}Hz", mode + 1, digits, find_played_hz(bank, mode));
     make_view(arrays, name.c_str(), H5T_IEEE_F32LE, {vertices, 3}, "/modes/shape", source);
   }
 }

@@ -95,6 +95,8 @@ void add_later_fields(const Bank& bank, const FileForm& form, std::vector<Field>
   };
   add_errors("modes/algebraic_error_cents", "bound: the exact mode of the mesh is no further", bank.algebraic_error_cents);
   add_errors("modes/discretisation_error_cents", "estimate: the mode of the body is no further", bank.discretisation_error_cents);
+  add_errors("modes/facet_error_cents", "estimate: beyond its bar a mode is no further if the facets are not what they were taken for",
+             bank.facet_error_cents);
   if (const Corrected& corrected = bank.corrected; !corrected.is_empty()) {
     fields.insert(fields.end(), {{"modes/corrected_frequency_hz", "<f8", find_shape(corrected.freq_hz), "Hz",
                                   "undamped, with the estimated error of the mesh taken off", corrected.freq_hz.data()},
@@ -238,7 +240,7 @@ std::vector<Field> list_fields(const Bank& bank, const FileForm& form) {
       {"solve/rigid_modes", "<i8", {}, "1", "rigid modes that were deflated", &counts.rigid_modes},
       {"solve/band_hz", "<f8", {2}, "Hz", "modes were looked for from here to there", bank.band_hz.data()},
       {"solve/complete", "|u1", {}, "1", "1 when every mode of the band is here", &form.complete},
-      {"solve/element", text_type(form.element), {}, "1", "T4, T10, or analytic", form.element.data()},
+      {"solve/element", text_type(form.element), {}, "1", "T4, T10, analytic or imported", form.element.data()},
       {"solve/mass", text_type(form.mass), {}, "1", "consistent or lumped", form.mass.data()},
       {"provenance", text_type(form.provenance), {}, "1", "JSON text", form.provenance.data()},
   };
@@ -266,6 +268,7 @@ FileForm make_file_form(const Bank& bank) {
 }
 
 std::array<int, 2> find_version(const Bank& bank, bool is_packed) {
+  if (bank.element == "imported" || !bank.facet_error_cents.empty()) return is_packed ? std::array{2, 4} : std::array{1, 8};
   if (!bank.quartic.is_empty()) return is_packed ? std::array{2, 3} : std::array{1, 7};
   const bool is_mixed = !bank.multipoles.mixing.is_empty();
   if (is_packed) return {2, bank.multipoles.is_empty() ? 0 : is_mixed ? 2 : 1};

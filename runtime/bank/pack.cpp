@@ -11,7 +11,7 @@
 #include <cmath>
 #include <limits>
 
-#include "runtime/bank/reduce.hpp"
+#include "runtime/bank/packing_error.hpp"
 #include "runtime/bank/surface.hpp"
 #include "runtime/codec/fit_shapes.hpp"
 #include "runtime/codec/levels.hpp"
@@ -22,77 +22,15 @@ namespace {
 
 constexpr double kLatticePerSize = 32768.0, kLatticePerEdge = 8.0;  // steps of the lattice in the body's size, in its shortest edge
 constexpr double kMostLattice = 1 << 22;
-constexpr double kMostStep = 1.0;      // of a mode, over the mean motion of its vertices: none vanishes
-constexpr double kCavity = 16.0;       // error of walls that are no part of the outer surface, over that of the outer surface
-constexpr double kOffNormal = 0.0027;  // sin^2 of 3 degrees: no blow is quite along the normal of a vertex
-constexpr double kQuietest = 0x1p-20;  // what is heard at the loudest place times this is the least that counts, -60 dB
-constexpr double kOfSurface = 0.95;    // on which the error is no greater than is stated
-constexpr double kNearEnough = 0.4;    // dB that the error may stay below what was asked for
+constexpr double kMostStep = 1.0;    // of a mode, over the mean motion of its vertices: none vanishes
+constexpr double kCavity = 16.0;     // error of walls that are no part of the outer surface, over that of the outer surface
+constexpr double kOfSurface = 0.95;  // on which the error is no greater than is stated
+constexpr double kNearEnough = 0.4;  // dB that the error may stay below what was asked for
 constexpr int kMostSampled = 5, kMostNear = 3, kMostTries = 20;  // trials of a sample, of all until it is near, and of all
 constexpr std::size_t kSampled = 8;                              // one of so many vertices of the finest level counts in a trial
 constexpr double kFirstDb = -4.0;                                // of the first trial, beyond what was asked for
 constexpr double kMostChange = 20.0, kFiner = 2.0;               // dB from one trial to the next, by secants and without
 constexpr std::size_t kWitnesses = 24;
-constexpr double kWitnessShare = 0.25;  // of the witnesses may lie above the stated error
-constexpr double kExactDb = -200.0;     // stands for no error at all
-constexpr double kRoundingDb = 0.05;    // between figures that two machines find
-
-double calc_db(double error, double signal) {
-  return error > 0.0 ? std::max(10.0 * std::log10(error / std::max(signal, std::numeric_limits<double>::min())), kExactDb) : kExactDb;
-}
-
-/// The vertices with their normals, and their shares of the area of the outer surface, on which a body is struck; 0 for those elsewhere.
-struct Skin {
-  std::vector<double> area_m2;
-  std::vector<Vec3> normal;
-};
-
-Skin find_skin(const Bank& bank) {
-  Skin skin{std::vector<double>(bank.vertex_count(), 0.0), std::vector<Vec3>(bank.vertex_count(), Vec3{})};
-  for (const Triangle& triangle : bank.triangles) {
-    const Vec3 normal = calc_normal(bank.vertices_m, triangle);
-    for (const std::int32_t v : triangle) skin.normal[static_cast<std::size_t>(v)] = skin.normal[static_cast<std::size_t>(v)] + normal;
-  }
-  for (Vec3& normal : skin.normal)
-    if (const double length = norm(normal); length > 0.0) normal = (1.0 / length) * normal;
-  for (const Triangle& triangle : find_outer_triangles(bank.vertices_m, bank.triangles))
-    for (const std::int32_t v : triangle)
-      if (norm(skin.normal[static_cast<std::size_t>(v)]) > 0.0)
-        skin.area_m2[static_cast<std::size_t>(v)] += norm(calc_normal(bank.vertices_m, triangle)) / 6.0;
-  return skin;
-}
-
-/// What is heard of a mode that moves by `x`, by a blow of unit weight.
-double calc_heard(const Vec3& normal, const Vec3& x) {
-  const double along = dot(x, normal);
-  return along * along + kOffNormal * dot(x, x);
-}
-/// What is heard of a blow at a vertex with these shapes (m, 3) [steps of shape_scale].
-double calc_heard(const std::vector<double>& weight, const Vec3& normal, const std::int16_t* shape) {
-  double heard = 0.0;
-  for (const double w : weight) {
-    heard += w * calc_heard(normal, {double(shape[0]), double(shape[1]), double(shape[2])});
-    shape += 3;
-  }
-  return heard;
-}
-double calc_heard(const std::vector<double>& weight, const Vec3& normal, const std::int16_t* shape, const std::int16_t* other) {
-  double heard = 0.0;
-  for (const double w : weight) {
-    heard += w * calc_heard(normal, {double(shape[0] - other[0]), double(shape[1] - other[1]), double(shape[2] - other[2])});
-    shape += 3;
-    other += 3;
-  }
-  return heard;
-}
-
-/// calc_blow_exposure() for shapes in steps. Where nothing is heard, all modes count alike.
-std::vector<double> calc_weights(const Bank& bank) {
-  std::vector<double> weight = calc_blow_exposure(bank);
-  if (std::all_of(weight.begin(), weight.end(), [](double w) { return !(w > 0.0); })) std::fill(weight.begin(), weight.end(), 1.0);
-  for (std::size_t m = 0; m < weight.size(); ++m) weight[m] *= bank.shape_scale[m] * bank.shape_scale[m];
-  return weight;
-}
 
 /// Appends the row of a vertex (m, 3) to shapes.
 void append_row(const Bank& bank, std::int32_t vertex, std::vector<std::int16_t>& shape) {
@@ -187,22 +125,6 @@ std::vector<double> calc_motion(const Bank& bank) {
   return motion;
 }
 
-/// Blows at all vertices, and what is heard of them.
-struct Blows {
-  Skin skin;
-  std::vector<double> weight;    // (m) calc_weights()
-  std::vector<double> exposure;  // (V) at least `quietest`
-  double quietest = 0.0;         // kQuietest of the loudest place of the outer surface
-
-  explicit Blows(const Bank& bank) : skin(find_skin(bank)), weight(calc_weights(bank)), exposure(bank.vertex_count()) {
-    for (std::size_t v = 0; v < exposure.size(); ++v) {
-      exposure[v] = calc_heard(weight, skin.normal[v], bank.shape.data() + v * bank.mode_count() * 3);
-      if (skin.area_m2[v] > 0.0) quietest = std::max(quietest, kQuietest * exposure[v]);
-    }
-    for (double& heard : exposure) heard = std::max(heard, quietest);
-  }
-};
-
 /// Steps that give each mode the same share of `error` times what is heard at the loudest place, which is `loudest` [kg^-1/2].
 std::vector<float> calc_steps(const Bank& bank, const std::vector<double>& weight, double loudest, double error) {
   const double share = 12.0 * error * loudest / static_cast<double>(bank.mode_count());
@@ -281,7 +203,7 @@ Packing calc_error(const Bank& bank, const Blows& blows, const std::vector<doubl
 }
 
 /// Of each of `count` equal parts of the outer area, the vertex where it begins.
-std::vector<std::int32_t> choose_witnesses(const Skin& skin, std::size_t count) {
+std::vector<std::int32_t> choose_witnesses(const StruckSkin& skin, std::size_t count) {
   double area = 0.0, before = 0.0;
   for (const double a : skin.area_m2) area += a;
   std::vector<std::int32_t> witnesses;
@@ -384,11 +306,6 @@ class Packer {
 
 }  // namespace
 
-std::string describe(const Packing& packing) {
-  if (packing.worst_db <= kExactDb) return "no error";
-  return fmt::format("error at most {:.1f} dB(A) on 95 % of the surface, {:.1f} at the worst place", packing.error_db, packing.worst_db);
-}
-
 PackedBank calc_packed(const Bank& bank, double error_db, bool keep_numbers) {
   if (!(error_db >= kMinPackError && error_db <= kMaxPackError))
     throw InputError(fmt::format("an error of {} dB(A); give {} to {}", error_db, kMinPackError, kMaxPackError));
@@ -424,31 +341,6 @@ Check check_original(const Bank& packed, const Bank& original) {
   Check check{"original", describe(found), {}};
   if (found.error_db > packed.packing->error_db + kRoundingDb || found.worst_db > packed.packing->worst_db + kRoundingDb)
     check.faults.push_back(fmt::format("{}; less is stated: {}", describe(found), describe(*packed.packing)));
-  return check;
-}
-
-Check check_packing(const Bank& bank) {
-  const Packing& packing = *bank.packing;
-  Check check{"packing", describe(packing), {}};
-  const Blows blows(bank);
-  std::size_t above = 0;
-  double worst_db = kExactDb;
-  for (std::size_t i = 0; i < packing.witness.size(); ++i) {
-    const auto v = static_cast<std::size_t>(packing.witness[i]);
-    const std::int16_t* own = packing.witness_shape.data() + i * bank.mode_count() * 3;
-    const Vec3& normal = blows.skin.normal[v];
-    const double missed = calc_heard(blows.weight, normal, own, bank.shape.data() + v * bank.mode_count() * 3);
-    const double here_db = calc_db(missed, std::max(calc_heard(blows.weight, normal, own), blows.quietest));
-    worst_db = std::max(worst_db, here_db);
-    if (here_db > packing.error_db + kRoundingDb) ++above;
-    if (here_db > packing.worst_db + kRoundingDb)
-      check.faults.push_back(
-          fmt::format("the error is {:.1f} dB(A) at vertex {}, and {:.1f} is said to be the worst", here_db, v, packing.worst_db));
-  }
-  check.figure += fmt::format("; {:.1f} at the worst of {} witnesses", worst_db, packing.witness.size());
-  if (static_cast<double>(above) > kWitnessShare * static_cast<double>(packing.witness.size()))
-    check.faults.push_back(
-        fmt::format("the error is greater than {:.1f} dB(A) at {} of {} witnesses", packing.error_db, above, packing.witness.size()));
   return check;
 }
 

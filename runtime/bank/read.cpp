@@ -132,7 +132,8 @@ void allocate_later(const Seal& seal, const std::string& name, Loaded& loaded, c
   };
   Bank& bank = loaded.bank;
   for (auto [field, cents] : {std::pair("modes/algebraic_error_cents", &bank.algebraic_error_cents),
-                              std::pair("modes/discretisation_error_cents", &bank.discretisation_error_cents)}) {
+                              std::pair("modes/discretisation_error_cents", &bank.discretisation_error_cents),
+                              std::pair("modes/facet_error_cents", &bank.facet_error_cents)}) {
     if (seal.extents.contains(field)) make_list(field, "<f8", *cents);
   }
   if (seal.extents.contains("modes/corrected_frequency_hz")) {

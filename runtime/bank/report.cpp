@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <optional>
 #include <sstream>
 
+#include "runtime/bank/kinds.hpp"
 #include "runtime/bank/pack.hpp"
 #include "runtime/bank/select.hpp"
 #include "runtime/base/printable.hpp"
@@ -35,9 +37,6 @@ const char* find_regime(double decay, double omega) {
   if (std::abs(decay - omega) <= 1e-9 * omega) return "critical";
   return decay < omega ? "under" : "over";
 }
-
-/// ln(1000) / d; infinite without damping.
-double calc_t60_s(double decay) { return std::log(1000.0) / decay; }
 
 std::string format_bytes(std::uintmax_t bytes) {
   return bytes < 1'000'000 ? fmt::format("{:.1f} kB", static_cast<double>(bytes) / 1e3)
@@ -89,26 +88,40 @@ std::string format_cents(const std::vector<double>& cents, std::size_t mode) {
   return mode < cents.size() && std::isfinite(cents[mode]) ? fmt::format("{:.2g}", cents[mode]) : "-";
 }
 
-std::string format_modes(const Bank& bank, std::size_t limit) {
-  const bool is_corrected = !bank.corrected.is_empty();
-  std::string text =
-      fmt::format("\n{:>5} {:>11} {:>9} {:>9} {:>11} {:>8} {:>10} {:>11} {:>9} {:>10} {:>8} {:>9} {:>13}\n", "mode", "mesh [Hz]", "+-mesh",
-                  "+-body", "freq [Hz]", "+-body", "correction", "decay [1/s]", "T60 [s]", "d/omega", "regime", "residual", "gain");
+std::string format_modes(const Bank& bank, std::span<const HeardMode> heard, std::size_t limit) {
+  const bool is_corrected = !bank.corrected.is_empty(), is_doubtful = !bank.facet_error_cents.empty();
+  const auto format_facets = [&](const std::string& cents) { return is_doubtful ? fmt::format(" {:>8}", cents) : std::string(); };
+  const bool has_air = !bank.multipoles.is_empty(), has_supports = bank.supports.count() > 0;
+  const auto format_parts = [&](const std::string& material, const std::string& air, const std::string& supports) {
+    return (has_air || has_supports ? fmt::format(" {:>9}", material) : "") + (has_air ? fmt::format(" {:>9}", air) : "") +
+           (has_supports ? fmt::format(" {:>9}", supports) : "");
+  };
+  std::string text = fmt::format("\n{:>5} {:>10} {:>9} {:>9} {:>10} {:>8}{} {:>10} {:>10}{} {:>9} {:>8} {:>10}  {}\n", "mode", "mesh [Hz]",
+                                 "+-mesh", "+-body", "freq [Hz]", "+-body", format_facets("+-facets"), "correction", "d [1/s]",
+                                 format_parts("material", "air", "supports"), "T60 [s]", "regime", "gain", "kind");
   const std::size_t shown = std::min(limit, bank.mode_count());
+  const std::vector<ModeKind> kinds = find_kinds(bank, shown);
   for (std::size_t i = 0; i < shown; ++i) {
-    const double omega = std::sqrt(bank.eigenvalue_rad2_s2[i]), decay = bank.decay_per_s[i];
-    text += fmt::format("{:>5} {:>11.2f} {:>9} {:>9} {:>11} {:>8} {:>10} {:>11.4g} {:>9.3g} {:>10.3g} {:>8} {:>9.1e} {:>13.4g}\n", i + 1,
+    const HeardMode& mode = heard[i];
+    const double omega = 2.0 * std::numbers::pi * mode.freq_hz, decay = mode.calc_decay_per_s();
+    text += fmt::format("{:>5} {:>10.2f} {:>9} {:>9} {:>10.2f} {:>8}{} {:>10} {:>10.4g}{} {:>9.3g} {:>8} {:>10.4g}  {}\n", i + 1,
                         bank.freq_hz(i), format_cents(bank.algebraic_error_cents, i), format_cents(bank.discretisation_error_cents, i),
-                        is_corrected ? fmt::format("{:.2f}", bank.corrected.freq_hz[i]) : "-", format_cents(bank.corrected.error_cents, i),
-                        is_corrected ? describe(bank.corrected.correction[i]) : "-", decay, calc_t60_s(decay), decay / omega,
-                        find_regime(decay, omega), bank.residual[i], bank.radiation_gain[i]);
+                        mode.freq_hz, format_cents(bank.corrected.error_cents, i), format_facets(format_cents(bank.facet_error_cents, i)),
+                        is_corrected ? describe(bank.corrected.correction[i]) : "-", decay,
+                        format_parts(fmt::format("{:.3g}", mode.material_per_s), fmt::format("{:.3g}", mode.radiation_per_s),
+                                     fmt::format("{:.3g}", mode.supports_per_s)),
+                        mode.calc_t60_s(), find_regime(decay, omega), bank.radiation_gain[i], describe(kinds[i]));
   }
   if (shown < bank.mode_count())
     text += fmt::format("  ... {} more; --modes {} shows them all\n", bank.mode_count() - shown, bank.mode_count());
   text +=
       "mesh: the frequency of the mesh; +-mesh: cents to its exact mode, a bound; +-body: cents to the mode of the body, an estimate\n"
-      "freq: the same with the estimated error of the mesh taken off, which is what is played; sorted again where modes change places\n"
-      "gain: Pa at 1 m for unit modal velocity (q' = 1 m kg^1/2 / s); frequencies are undamped\n";
+      "freq: what is played: the estimated error of the mesh taken off, in air and on its supports as far as the bank knows them; sorted\n"
+      "again where modes change places\n"
+      "d and T60: decay that is heard, the sum of what material, air and supports take from the mode\n"
+      "gain: Pa at 1 m for q' = 1 m kg^1/2 / s; frequencies are undamped; kind: how the body moves, where its shape shows it\n";
+  if (is_doubtful)
+    text += "+-facets: what comes to +-body if the facets are not what they were taken for, planes or samples of a smooth surface\n";
   return text;
 }
 
@@ -191,14 +204,20 @@ Json::Value make_list(const Range& values) {
   return list;
 }
 
-Json::Value make_mode(const Bank& bank, std::size_t i) {
-  const double omega = std::sqrt(bank.eigenvalue_rad2_s2[i]), decay = bank.decay_per_s[i];
+Json::Value make_mode(const Bank& bank, const HeardMode& heard, std::size_t i, const ModeKind& kind) {
+  const double omega = 2.0 * std::numbers::pi * heard.freq_hz, decay = heard.calc_decay_per_s();
   Json::Value mode;
   mode["frequency_hz"] = bank.freq_hz(i);
   mode["eigenvalue_rad2_s2"] = bank.eigenvalue_rad2_s2[i];
-  mode["decay_per_s"] = decay;
+  mode["decay_per_s"] = bank.decay_per_s[i];
   // JSON has no infinity: an undamped mode has no T60.
   mode["t60_s"] = std::isfinite(calc_t60_s(decay)) ? Json::Value(calc_t60_s(decay)) : Json::Value();
+  Json::Value& parts = mode["heard"];
+  parts["frequency_hz"] = heard.freq_hz;
+  parts["decay_per_s"] = decay;
+  parts["material_per_s"] = heard.material_per_s;
+  parts["radiation_per_s"] = heard.radiation_per_s;
+  parts["supports_per_s"] = heard.supports_per_s;
   mode["damping_ratio"] = decay / omega;
   mode["regime"] = find_regime(decay, omega);
   mode["residual"] = bank.residual[i];
@@ -207,6 +226,7 @@ Json::Value make_mode(const Bank& bank, std::size_t i) {
   };
   mode["algebraic_error_cents"] = get_cents(bank.algebraic_error_cents);
   mode["discretisation_error_cents"] = get_cents(bank.discretisation_error_cents);
+  mode["facet_error_cents"] = bank.facet_error_cents.empty() ? Json::Value(0.0) : get_cents(bank.facet_error_cents);
   if (const Corrected& corrected = bank.corrected; !corrected.is_empty()) {
     mode["corrected_frequency_hz"] = corrected.freq_hz[i];
     mode["corrected_decay_per_s"] = corrected.decay_per_s[i];
@@ -224,6 +244,7 @@ Json::Value make_mode(const Bank& bank, std::size_t i) {
     if (!air.mixing.is_empty()) radiation["coupled_modes"] = air.mixing.count[i];
   }
   mode["shape_scale"] = bank.shape_scale[i];
+  mode["kind"] = describe(kind);
   return mode;
 }
 
@@ -267,7 +288,8 @@ Json::Value make_proof(const Proof& proof) {
 
 }  // namespace
 
-std::string format_info(const Bank& bank, const std::filesystem::path& file, std::size_t mode_limit, bool has_record) {
+std::string format_info(const Bank& bank, std::span<const HeardMode> heard, const std::filesystem::path& file, std::size_t mode_limit,
+                        bool has_record) {
   const auto [major, minor] = read_version(file);
   const RigidBody& rigid = bank.rigid;
   const Material& m = bank.material;
@@ -281,7 +303,9 @@ std::string format_info(const Bank& bank, const std::filesystem::path& file, std
   text += fmt::format("surface   {} vertices, {} triangles, shapes of {} bytes a component\n", bank.vertex_count(), bank.triangles.size(),
                       bank.shape_bytes);
   if (bank.packing) text += fmt::format("packed    {}\n", describe(*bank.packing));
-  if (bank.element == "analytic")
+  if (bank.element == "imported")
+    text += fmt::format("solve     none: imported modes of another program at {} points\n", bank.counts.nodes);
+  else if (bank.element == "analytic")
     text += fmt::format("solve     none: known modes at {} points, {} rigid modes\n", bank.counts.nodes, bank.counts.rigid_modes);
   else
     text += fmt::format("solve     {} elements, {} mass; {} nodes, {} tets, {} component{}, {} rigid modes deflated\n", bank.element,
@@ -297,7 +321,7 @@ std::string format_info(const Bank& bank, const std::filesystem::path& file, std
                       rigid.centre_m[0], rigid.centre_m[1], rigid.centre_m[2]);
   text += fmt::format("inertia   xx {:.5g}, yy {:.5g}, zz {:.5g}, xy {:.3g}, xz {:.3g}, yz {:.3g} kg m^2\n", inertia[0], inertia[4],
                       inertia[8], inertia[1], inertia[2], inertia[5]);
-  if (mode_limit > 0 && bank.mode_count() > 0) text += format_modes(bank, mode_limit);
+  if (mode_limit > 0 && bank.mode_count() > 0) text += format_modes(bank, heard, mode_limit);
   const std::optional<Json::Value> provenance = parse_json(bank.provenance);
   // The record of the run; the job around it is left to --json.
   const bool is_recorded = provenance && provenance->isObject() && provenance->isMember("run") && (*provenance)["run"].isObject();
@@ -309,7 +333,7 @@ std::string format_info(const Bank& bank, const std::filesystem::path& file, std
   return text;
 }
 
-std::string format_info_json(const Bank& bank, const std::filesystem::path& file) {
+std::string format_info_json(const Bank& bank, std::span<const HeardMode> heard, const std::filesystem::path& file) {
   const auto [major, minor] = read_version(file);
   Json::Value root;
   root["file"] = file.string();
@@ -377,9 +401,10 @@ std::string format_info_json(const Bank& bank, const std::filesystem::path& file
   for (const std::size_t mode : sort_modes(bank))
     if (!bank.corrected.is_empty()) root["corrected_frequencies_hz"].append(bank.corrected.freq_hz[mode]);
   root["modes"] = Json::Value(Json::arrayValue);
+  const std::vector<ModeKind> kinds = find_kinds(bank);
   for (std::size_t i = 0; i < bank.mode_count(); ++i) {
     root["frequencies_hz"].append(bank.freq_hz(i));
-    root["modes"].append(make_mode(bank, i));
+    root["modes"].append(make_mode(bank, heard[i], i, kinds[i]));
   }
   const auto provenance = parse_json(bank.provenance);
   root["provenance"] = provenance ? *provenance : Json::Value(bank.provenance);
@@ -388,6 +413,24 @@ std::string format_info_json(const Bank& bank, const std::filesystem::path& file
   builder["indentation"] = "  ";
   builder["precision"] = 17;
   return Json::writeString(builder, root) + "\n";
+}
+
+std::string format_info_csv(const Bank& bank, std::span<const HeardMode> heard) {
+  std::string text =
+      "mode,frequency_hz,heard_frequency_hz,corrected_error_cents,facet_error_cents,heard_decay_per_s,material_per_s,radiation_per_s,"
+      "supports_per_s,t60_s,radiation_gain,kind\n";
+  const auto format = [](const std::vector<double>& values, std::size_t mode) {
+    return mode < values.size() && std::isfinite(values[mode]) ? fmt::format("{}", values[mode]) : std::string();
+  };
+  const std::vector<ModeKind> kinds = find_kinds(bank);
+  for (std::size_t i = 0; i < kinds.size(); ++i) {
+    const double t60_s = heard[i].calc_t60_s();
+    text += fmt::format("{},{},{},{},{},{},{},{},{},{},{},\"{}\"\n", i + 1, bank.freq_hz(i), heard[i].freq_hz,
+                        format(bank.corrected.error_cents, i), bank.facet_error_cents.empty() ? "0" : format(bank.facet_error_cents, i),
+                        heard[i].calc_decay_per_s(), heard[i].material_per_s, heard[i].radiation_per_s, heard[i].supports_per_s,
+                        std::isfinite(t60_s) ? fmt::format("{}", t60_s) : "", bank.radiation_gain[i], describe(kinds[i]));
+  }
+  return text;
 }
 
 Check calc_regions_check(const Bank& bank) {

@@ -2,17 +2,24 @@
 #pragma once
 
 #include <filesystem>
+#include <span>
 #include <string>
 
 #include "runtime/bank/bank.hpp"
+#include "runtime/bank/heard.hpp"
 
 namespace carillon::bank {
 
-/// A page for people; at most `mode_limit` rows of modes. `has_record`: the record of the run that made the bank too.
-std::string format_info(const Bank& bank, const std::filesystem::path& file, std::size_t mode_limit, bool has_record);
+/// A page for people; at most `mode_limit` rows of modes. `heard`: support::calc_heard(). `has_record`: the record of the run that made the
+/// bank too.
+std::string format_info(const Bank& bank, std::span<const HeardMode> heard, const std::filesystem::path& file, std::size_t mode_limit,
+                        bool has_record);
 
 /// All of a bank but its mesh and shapes as JSON, numbers to full double precision.
-std::string format_info_json(const Bank& bank, const std::filesystem::path& file);
+std::string format_info_json(const Bank& bank, std::span<const HeardMode> heard, const std::filesystem::path& file);
+
+/// One line per mode with commas, after a line of names; empty where something is unknown.
+std::string format_info_csv(const Bank& bank, std::span<const HeardMode> heard);
 
 /// The two properties that the library, which cannot read JSON, does not check.
 Check calc_regions_check(const Bank& bank);

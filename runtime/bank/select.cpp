@@ -52,8 +52,8 @@ void select_modes(Bank& bank, const std::vector<std::size_t>& chosen) {
   }
   bank.shape.resize(bank.vertex_count() * row.size());
   for (auto* values : {&bank.decay_per_s, &bank.residual, &bank.radiation_gain, &bank.shape_scale, &bank.algebraic_error_cents,
-                       &bank.discretisation_error_cents, &bank.corrected.freq_hz, &bank.corrected.decay_per_s, &bank.corrected.error_cents,
-                       &bank.eigenvalue_rad2_s2}) {
+                       &bank.discretisation_error_cents, &bank.facet_error_cents, &bank.corrected.freq_hz, &bank.corrected.decay_per_s,
+                       &bank.corrected.error_cents, &bank.eigenvalue_rad2_s2}) {
     select_values(*values, chosen);
   }
   select_values(bank.corrected.correction, chosen);

@@ -53,6 +53,12 @@ std::array<Vec3, 2> find_extent(const std::vector<Vec3>& vertices_m) {
   return extent;
 }
 
+double calc_thickness_m(const std::vector<Vec3>& vertices_m, const std::vector<Triangle>& triangles, double volume_m3) {
+  double twice_area_m2 = 0.0;
+  for (const Triangle& triangle : triangles) twice_area_m2 += norm(calc_normal(vertices_m, triangle));
+  return volume_m3 > 0.0 && twice_area_m2 > 0.0 ? 4.0 * volume_m3 / twice_area_m2 : 0.0;
+}
+
 std::vector<Triangle> find_outer_triangles(const std::vector<Vec3>& vertices_m, const std::vector<Triangle>& triangles) {
   const std::vector<std::int32_t> shell = find_shells(triangles, vertices_m.size());
   std::vector<double> volume(triangles.size(), 0.0);  // of a shell, at its first triangle: six times, about its own first corner

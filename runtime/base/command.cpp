@@ -24,8 +24,8 @@
 
 #include "runtime/base/clock.hpp"
 #include "runtime/base/descriptor.hpp"
-
-extern "C" char** environ;
+#include "runtime/base/environment.hpp"
+#include "runtime/base/temporary.hpp"
 
 namespace carillon::base {
 namespace {
@@ -182,15 +182,19 @@ std::optional<int> await(pid_t child, double deadline_s, const std::function<boo
 /// Kills a program and takes its status where run() is left by an exception.
 class Reaper {
  public:
-  explicit Reaper(pid_t child) : child_(child) {}
+  explicit Reaper(pid_t child) : child_(child) { note_child(child); }
   ~Reaper() {
+    if (child_ > 0) forget_child(child_);
     if (child_ <= 0) return;
     ::kill(child_, SIGKILL);
     await(child_, get_boot_s() + kKillPatienceS, {});
   }
   Reaper(const Reaper&) = delete;
   Reaper& operator=(const Reaper&) = delete;
-  void release() { child_ = -1; }
+  void release() {
+    forget_child(child_);
+    child_ = -1;
+  }
 
  private:
   pid_t child_;
@@ -265,9 +269,12 @@ fs::path require_program(const std::string& name) {
   throw SystemError(fmt::format("{} is neither next to this program nor in PATH; install it, or put its folder in PATH", name));
 }
 
-void become(const std::vector<std::string>& words) {
+void become(const std::vector<std::string>& words, const std::optional<std::vector<std::string>>& environment) {
   std::fflush(nullptr);
-  ::execv(words.at(0).c_str(), to_pointers(words).data());
+  if (environment)
+    ::execve(words.at(0).c_str(), to_pointers(words).data(), to_pointers(*environment).data());
+  else
+    ::execv(words.at(0).c_str(), to_pointers(words).data());
   throw StartError(fmt::format("{}: cannot be started: {}", words[0], std::strerror(errno)), errno);
 }
 
@@ -282,11 +289,12 @@ pid_t start(const Command& command) {
   const std::string program = find_path(command.words.at(0));
   if (program.empty()) refuse(ENOENT);
   const std::vector<char*> words = to_pointers(command.words);
-  const std::vector<char*> environment = command.environment ? to_pointers(*command.environment) : std::vector<char*>();
+  const std::vector<std::string> entries = command.environment ? *command.environment : make_environment();
+  const std::vector<char*> environment = to_pointers(entries);
   Plan plan;
   plan.program = program.c_str();
   plan.words = words.data();
-  plan.environment = command.environment ? environment.data() : environ;
+  plan.environment = environment.data();
   plan.folder = command.folder.empty() ? nullptr : command.folder.c_str();
   plan.group = command.group;
   plan.signal_at_end = command.signal_at_end;

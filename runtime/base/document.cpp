@@ -17,6 +17,7 @@
 
 #include "runtime/base/failure.hpp"
 #include "runtime/base/file.hpp"
+#include "runtime/base/foreign.hpp"
 
 namespace carillon::base {
 namespace {
@@ -211,8 +212,10 @@ class Builder {
   std::string reason = rapidjson::GetParseError_En(result.Code());
   if (reason.ends_with('.')) reason.pop_back();
   if (!reason.empty()) reason[0] = static_cast<char>(std::tolower(static_cast<unsigned char>(reason[0])));
-  data.fail(static_cast<std::ptrdiff_t>(at),
-            fmt::format("this is not JSON (column {}): {}; correct the text there", at - line_begin + 1, reason));
+  data.fail(static_cast<std::ptrdiff_t>(at), fmt::format("this is not JSON (column {}): {}; {}", at - line_begin + 1, reason,
+                                                         result.Code() == rapidjson::kParseErrorStringEscapeInvalid
+                                                             ? "use / between the folders of a path, and write any other backslash twice"
+                                                             : "correct the text there"));
 }
 
 /// What is wrong with a word that begins like a number, as part of a sentence; nullptr when it is one by the grammar of JSON.
@@ -298,6 +301,7 @@ Document parse_document(std::string_view text, const std::filesystem::path& file
   auto data = std::make_shared<DocumentData>();
   data->file = file;
   data->first_line = first_line;
+  refuse_utf16(text, file.string());
   if (text.substr(0, 3) == "\xEF\xBB\xBF") text.remove_prefix(3);  // UTF-8 byte order mark
   data->text = std::string(text);
   if (const std::size_t at = text.find('\0'); at != std::string_view::npos) {
@@ -525,6 +529,9 @@ std::vector<Object> Object::objects(std::string_view key) {
 
 std::filesystem::path Object::path(std::string_view key) {
   const std::filesystem::path named = string(key);
+  std::error_code error;
+  if (const std::string hint = hint_backslash(named); !hint.empty() && !std::filesystem::exists(data_->file.parent_path() / named, error))
+    fail(key, fmt::format("there is no file \"{}\"{}", named.string(), hint));
   return std::filesystem::absolute(named.is_absolute() ? named : data_->file.parent_path() / named).lexically_normal();
 }
 

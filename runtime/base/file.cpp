@@ -17,6 +17,9 @@
 
 #include "runtime/base/descriptor.hpp"
 #include "runtime/base/failure.hpp"
+#include "runtime/base/foreign.hpp"
+#include "runtime/base/message.hpp"
+#include "runtime/base/temporary.hpp"
 
 namespace carillon::base {
 
@@ -40,7 +43,7 @@ void sync_folder(const fs::path& folder) {
 
 }  // namespace
 
-bool is_full_error(int error) { return error == ENOSPC || error == EDQUOT; }
+bool is_full_error(int error) { return error == ENOSPC || error == EDQUOT || error == EFBIG; }
 
 namespace {
 
@@ -49,12 +52,13 @@ int open_regular(const fs::path& file, std::string_view what, std::uint64_t& len
   // O_NONBLOCK: opening a pipe without a writer must not wait.
   const int fd = ::open(file.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
   if (fd < 0) {
-    throw InputError(fmt::format("{}: cannot open this {}: {}; check the path", file.string(), what, std::strerror(errno)));
+    throw InputError(
+        fmt::format("{}: cannot open this {}: {}; check the path{}", find_name(file), what, std::strerror(errno), hint_backslash(file)));
   }
   struct stat info {};
   if (::fstat(fd, &info) != 0 || !S_ISREG(info.st_mode)) {
     ::close(fd);
-    throw InputError(fmt::format("{}: a {} must be a regular file, and this is {}; name the file itself", file.string(), what,
+    throw InputError(fmt::format("{}: a {} must be a regular file, and this is {}; name the file itself", find_name(file), what,
                                  S_ISDIR(info.st_mode) ? "a folder" : "a pipe or a device"));
   }
   length = static_cast<std::uint64_t>(info.st_size);
@@ -67,7 +71,7 @@ std::size_t read_some(int fd, char* bytes, std::size_t count, const fs::path& fi
   while (done < count) {
     const ssize_t got = ::read(fd, bytes + done, count - done);
     if (got < 0 && errno == EINTR) continue;
-    if (got < 0) throw InputError(fmt::format("{}: cannot read this {}: {}; check the disk", file.string(), what, std::strerror(errno)));
+    if (got < 0) throw InputError(fmt::format("{}: cannot read this {}: {}; check the disk", find_name(file), what, std::strerror(errno)));
     if (got == 0) break;
     done += static_cast<std::size_t>(got);
   }
@@ -80,7 +84,7 @@ std::string read_file(const fs::path& file, std::string_view what, std::uint64_t
   std::uint64_t length = 0;
   const Descriptor fd(open_regular(file, what, length));
   if (length > max_bytes) {
-    throw InputError(fmt::format("{}: {} bytes are too many for a {} (at most {}); {}", file.string(), length, what, max_bytes, remedy));
+    throw InputError(fmt::format("{}: {} bytes are too many for a {} (at most {}); {}", find_name(file), length, what, max_bytes, remedy));
   }
   std::string bytes(static_cast<std::size_t>(length), '\0');
   bytes.resize(read_some(fd.get(), bytes.data(), bytes.size(), file, what));  // shorter when the file shrank meanwhile
@@ -160,10 +164,10 @@ void WholeFile::refuse(int error) {
   if (descriptor_ >= 0) ::close(descriptor_);
   descriptor_ = -1;
   ::unlink(temporary_.c_str());
-  const bool is_full = is_full_error(error);
-  throw_system_error(
-      error, fmt::format("{}: cannot write: {}; {}", file_.string(), std::strerror(error),
-                         is_full ? "the disk or quota is full: make room on it" : "check the folder's rights and the space on the disk"));
+  const char* const advice = error == EFBIG         ? "files may not be so large here: raise the limit (ulimit -f)"
+                             : is_full_error(error) ? "the disk or quota is full: make room on it"
+                                                    : "check the folder's rights and the space on the disk";
+  throw_system_error(error, fmt::format("{}: cannot write: {}; {}", find_name(file_), std::strerror(error), advice));
 }
 
 void WholeFile::append(std::string_view bytes) {
@@ -193,7 +197,7 @@ void write_file(const fs::path& file, std::string_view bytes) {
 namespace {
 
 [[noreturn]] void refuse_folder(const std::filesystem::path& folder, const std::error_code& error) {
-  throw SystemError(fmt::format("{}: {}; make room, or choose another place", folder.string(), error.message()));
+  throw SystemError(fmt::format("{}: {}; make room, or choose another place", find_name(folder), error.message()));
 }
 
 }  // namespace
@@ -204,25 +208,26 @@ WholeFolder::WholeFolder(std::filesystem::path place) : place_(std::move(place))
        above = above.parent_path())
     made_.push_back(above);
   std::filesystem::create_directories(place_.parent_path(), error);
-  std::string path = (place_.parent_path() / ("." + place_.filename().string() + ".XXXXXX")).string();
-  if (error || ::mkdtemp(path.data()) == nullptr) refuse_folder(place_, error ? error : std::error_code(errno, std::generic_category()));
-  path_ = path;
+  if (error) refuse_folder(place_, error);
+  path_ = make_temporary_folder(place_.parent_path().empty() ? "." : place_.parent_path(), "." + place_.filename().string() + ".");
   std::filesystem::permissions(path_, std::filesystem::perms(0755), error);
 }
 
 WholeFolder::~WholeFolder() {
   std::error_code error;
   if (path_.empty()) return;
-  std::filesystem::remove_all(path_, error);
+  remove_temporary_folder(path_);
   for (const std::filesystem::path& above : made_) std::filesystem::remove(above, error);  // only those that are empty
 }
 
 void WholeFolder::commit() {
+  const SignalPause pause;
   std::error_code error;
   const std::filesystem::path before = path_.string() + ".before";  // an earlier folder is not removed until the new one is there
   const bool has_before = std::filesystem::exists(place_, error);
   if (has_before) std::filesystem::rename(place_, before, error);
   if (error) refuse_folder(place_, error);
+  keep_temporary_folder(path_);
   std::filesystem::rename(path_, place_, error);
   if (error) {
     std::error_code ignored;
@@ -241,27 +246,28 @@ std::string find_extension(const std::filesystem::path& file) {
 
 void check_writable(const fs::path& file, std::string_view what) {
   std::error_code error;
-  if (file.filename().empty()) throw InputError(fmt::format("{}: the {} needs a file name after the folder", file.string(), what));
+  if (file.filename().empty()) throw InputError(fmt::format("{}: the {} needs a file name after the folder", find_name(file), what));
   const auto status = fs::status(file, error);
   if (fs::exists(status) && !fs::is_regular_file(status)) {
-    throw InputError(fmt::format("{}: the {} cannot be written here: this is {}; name a file", file.string(), what,
+    throw InputError(fmt::format("{}: the {} cannot be written here: this is {}; name a file", find_name(file), what,
                                  fs::is_directory(status) ? "a folder" : "a pipe or a device"));
   }
   struct stat info {};
   const fs::path folder = find_folder(file);
   fs::create_directories(folder, error);
   if (error || !fs::is_directory(folder)) {
-    throw InputError(fmt::format("{}: cannot make the folder of the {} ({}); choose another place", folder.string(), what,
+    throw InputError(fmt::format("{}: cannot make the folder of the {} ({}); choose another place", find_name(folder), what,
                                  error ? error.message() : "it is not a folder"));
   }
   if (::lstat(file.c_str(), &info) != 0 && errno != ENOENT) {  // a name too long, a loop of links
-    throw InputError(fmt::format("{}: the {} cannot be written here: {}; choose another name", file.string(), what, std::strerror(errno)));
+    throw InputError(
+        fmt::format("{}: the {} cannot be written here: {}; choose another name", find_name(file), what, std::strerror(errno)));
   }
   const fs::path probe = make_temporary_name(file);
   ::unlink(probe.c_str());  // of a process with our number that was killed; O_EXCL then follows no planted link
   const Descriptor fd(::open(probe.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600));
   if (fd.get() < 0) {
-    throw InputError(fmt::format("{}: the {} cannot be written here: {}; choose a folder that you may write to", file.string(), what,
+    throw InputError(fmt::format("{}: the {} cannot be written here: {}; choose a folder that you may write to", find_name(file), what,
                                  std::strerror(errno)));
   }
   ::unlink(probe.c_str());

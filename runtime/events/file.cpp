@@ -18,6 +18,7 @@
 
 #include "runtime/base/document.hpp"
 #include "runtime/base/file.hpp"
+#include "runtime/base/foreign.hpp"
 #include "runtime/base/printable.hpp"
 
 namespace carillon::events {
@@ -408,7 +409,10 @@ std::vector<RecordedBody> read_recording(const std::filesystem::path& file, cons
                                          const std::function<void(const std::vector<RecordedBody>&)>& begin) {
   Lines lines(file, sink, begin);
   std::string line;
+  bool is_begun = false;
   base::read_pieces(file, "contacts file", kPiece, [&](std::string_view piece) {
+    if (!is_begun) base::refuse_utf16(piece, file.string());
+    is_begun = true;
     while (!piece.empty()) {
       const std::size_t end = piece.find('\n');
       if (line.size() + std::min(end, piece.size()) > kLongestLine) {

@@ -124,8 +124,10 @@ void run_import(const ImportWishes& wishes) {
   check_other(wishes.glb, wishes.out);
   GlbReading reading{.model = wishes.model, .ignores_extras = wishes.is_plain};
   if (!wishes.material.empty()) reading.material = &material::MaterialTable::get().require("--material", wishes.material).material;
-  const std::string bytes = base::read_file(wishes.glb, "GLB file", kMaxGlbBytes);
-  const bank::Bank bank = parse_glb(bytes, wishes.glb.string(), reading);
+  const std::string bytes = base::read_file(wishes.glb, "GLB or glTF file", kMaxGlbBytes);
+  std::vector<std::string> notes;
+  const bank::Bank bank = parse_glb(bytes, wishes.glb.string(), reading, &notes);
+  for (const std::string& note : notes) fmt::print(stderr, "carillon-bank: note: {}: {}\n", base::printable(wishes.glb.string()), note);
   if (base::is_standard_output(wishes.out)) {
     base::check_standard_output("bank");
     base::write_standard_output(bank::make_bank_bytes(bank));

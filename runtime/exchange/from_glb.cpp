@@ -2,7 +2,8 @@
 //             are (bank::assemble_bank). Values that are in both must agree. Of another program's: lambda = (2 pi f)^2 + d^2, shapes
 //             rounded to 16 bits; mass properties by the divergence theorem where the model has none.
 // Source:     KHR_audio_rigid_bodies, draft of 2026 (K. Hiner); integrals over a polyhedron: Tonon 2004.
-// Deviations: the scale of the node is applied to the body; its rotation and translation place the body and are ignored.
+// Deviations: the scale of the node is applied to the body, and to its modes and mass where these are of the body without it; its rotation
+//             and translation place the body and are ignored.
 #include <fmt/format.h>
 
 #include <Eigen/Dense>
@@ -19,9 +20,11 @@
 #include "runtime/bank/corrected.hpp"
 #include "runtime/bank/layout.hpp"
 #include "runtime/bank/radiation_gain.hpp"
+#include "runtime/bank/report.hpp"
 #include "runtime/bank/surface.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/json.hpp"
+#include "runtime/base/printable.hpp"
 #include "runtime/base/sort_order.hpp"
 #include "runtime/base/vector.hpp"
 #include "runtime/exchange/damped.hpp"
@@ -35,10 +38,11 @@ namespace {
 using gltf::Component;
 
 constexpr std::size_t kMaxFields = 1000, kMaxListed = 10'000'000, kMaxNodes = 10'000'000;
-constexpr double kSameFreq = 1e-6;   // relative error of a frequency in float, through a sum of squares
-constexpr double kSameStep = 0.02;   // of a step of a shape: rounding of an integer stored as float
-constexpr double kSameLaw = 1e-5;    // of a decay in float against its law
-constexpr double kSameScale = 1e-4;  // along the three axes of a node
+constexpr double kSameFreq = 1e-6;    // relative error of a frequency in float, through a sum of squares
+constexpr double kSameStep = 0.02;    // of a step of a shape: rounding of an integer stored as float
+constexpr double kSameLaw = 1e-5;     // of a decay in float against its law
+constexpr double kSameScale = 1e-4;   // along the three axes of a node
+constexpr double kSameInertia = 0.3;  // of a body that is not quite even, or of a coarse surface
 constexpr const char* kChanged = "was changed since carillon-bank wrote it; --plain reads the extension alone";
 
 /// The model, as the extension has it.
@@ -52,7 +56,9 @@ struct Model {
 class Reader {
  public:
   Reader(std::string_view bytes, const std::string& name, const GlbReading& reading)
-      : file_(gltf::parse_glb(bytes, name)), reading_(&reading), root_(file_.root()) {}
+      : file_(gltf::parse(bytes, name)), reading_(&reading), root_(file_.root()) {}
+
+  const std::vector<std::string>& get_notes() const { return notes_; }
 
   bank::Bank read() {
     base::Object extension = find_extension();
@@ -262,11 +268,29 @@ class Reader {
     triangles.bytes = std::as_bytes(std::span(model_.triangles));
     arrays.push_back(triangles);
     bank::Bank bank = bank::assemble_bank(arrays, file_.name());
+    for (const bank::Check& check : {bank::calc_regions_check(bank), bank::calc_provenance_check(bank)})
+      if (!check.faults.empty()) throw InputError(fmt::format("{}: {}: the file {}", file_.name(), check.faults[0], kChanged));
     compare_modes(bank, swinging);
     return bank;
   }
 
   // ---- a model of another program ----
+
+  /// Points that no triangle has are no part of the body.
+  void drop_unused_points() {
+    std::vector<std::int32_t> number(model_.positions.size(), -1);
+    for (const auto& triangle : model_.triangles)
+      for (const std::int32_t v : triangle) number[static_cast<std::size_t>(v)] = 0;
+    for (std::size_t v = 0; v < number.size(); ++v)
+      if (number[v] == 0) {
+        number[v] = static_cast<std::int32_t>(used_.size());
+        used_.push_back(v);
+      }
+    for (auto& triangle : model_.triangles)
+      for (std::int32_t& v : triangle) v = number[static_cast<std::size_t>(v)];
+    if (const std::size_t dropped = number.size() - used_.size(); dropped > 0)
+      notes_.push_back(fmt::format("{} of its points belong to no triangle and were dropped", dropped));
+  }
 
   /// The scale of the first node with the model; 1 if there is none.
   double find_scale() {
@@ -348,6 +372,51 @@ class Reader {
     return material;
   }
 
+  /// Whether modes and mass are those of the body before its node scales it, by which of the two has the density of the material.
+  bool is_of_unscaled(base::Object& model, double scale, double volume_m3, double density_kg_m3) {
+    constexpr double kSameDensity = 0.1;  // that the facets of a surface may add or take away
+    std::optional<base::Object> own = model.object_if("massProperties");
+    if (std::abs(scale - 1.0) <= kSameScale || !(volume_m3 > 0.0)) return false;
+    const auto note = [&](const std::string& text) {
+      notes_.push_back(fmt::format("its node scales the body by {:.6g}, {}", scale, text));
+    };
+    if (!own || reading_->material != nullptr) {
+      note("and nothing says whether its modes are those of that size; they are taken as they are");
+      return false;
+    }
+    const double mass = own->number("mass", base::kPositive);
+    const double scaled = mass / (scale * scale * scale * volume_m3), unscaled = mass / volume_m3;
+    const double scaled_off = std::abs(std::log(scaled / density_kg_m3)), unscaled_off = std::abs(std::log(unscaled / density_kg_m3));
+    const bool is_unscaled = unscaled_off < scaled_off;
+    const std::string taken = is_unscaled ? fmt::format(
+                                                "its modes and its mass are those of scale 1, and were scaled, too (frequencies by "
+                                                "{:.6g}, the mass by {:.6g})",
+                                                1.0 / scale, scale * scale * scale)
+                                          : "its modes and its mass are those of that size";
+    if (std::min(scaled_off, unscaled_off) > kSameDensity)
+      note(fmt::format(
+          "and its mass contradicts the {:.5g} kg/m^3 of its material: {:.5g} with the scale, {:.5g} without; by the nearer one {}",
+          density_kg_m3, scaled, unscaled, taken));
+    else if (is_unscaled)
+      note("and by the density of its material " + taken);
+    return is_unscaled;
+  }
+
+  /// The bank of the same body, `scale` times as large.
+  static void scale_body(bank::Bank& bank, std::vector<double>& shapes, double scale) {
+    for (std::size_t m = 0; m < bank.mode_count(); ++m) {
+      bank.eigenvalue_rad2_s2[m] /= scale * scale;
+      bank.decay_per_s[m] = bank.damping.law == "mixed" ? bank.decay_per_s[m] / scale  // the same loss factor
+                                                        : bank::calc_decay(bank.damping, bank.material, bank.eigenvalue_rad2_s2[m]);
+    }
+    for (double& phi : shapes) phi /= scale * std::sqrt(scale);
+    for (Vec3& p : bank.vertices_m) p = scale * p;
+    bank.rigid.mass_kg *= std::pow(scale, 3);
+    bank.rigid.volume_m3 *= std::pow(scale, 3);
+    bank.rigid.centre_m = scale * bank.rigid.centre_m;
+    for (double& x : bank.rigid.inertia_kg_m2) x *= std::pow(scale, 5);
+  }
+
   /// The mass properties of the model, or of its surface filled with the material.
   void read_mass(base::Object& model, double scale, bank::Bank& bank) {
     const Solid solid = calc_solid(bank);
@@ -363,14 +432,17 @@ class Reader {
       for (std::size_t c = 0; c < 3; ++c) bank.rigid.centre_m[c] = scale * own->numbers_or<3>("centerOfMass", {0, 0, 0})[c];
       if (own->has("inertiaDiagonal")) diagonal = own->numbers<3>("inertiaDiagonal");
     }
+    for (std::size_t i = 0; i < 9; ++i) bank.rigid.inertia_kg_m2[i] = bank.rigid.mass_kg / solid.volume_m3 * solid.inertia_m5[i];
     if (diagonal && (*diagonal)[0] > 0.0 && (*diagonal)[1] > 0.0 && (*diagonal)[2] > 0.0) {
       const auto q = own->numbers_or<4>("inertiaOrientation", {0, 0, 0, 1});
       const Eigen::Matrix3d axes = Eigen::Quaterniond(q[3], q[0], q[1], q[2]).normalized().toRotationMatrix();
       const Eigen::Matrix3d inertia =
           axes * Eigen::Vector3d((*diagonal)[0], (*diagonal)[1], (*diagonal)[2]).asDiagonal() * axes.transpose();
-      for (std::size_t i = 0; i < 9; ++i) bank.rigid.inertia_kg_m2[i] = inertia(static_cast<int>(i / 3), static_cast<int>(i % 3));
-    } else {
-      for (std::size_t i = 0; i < 9; ++i) bank.rigid.inertia_kg_m2[i] = bank.rigid.mass_kg / solid.volume_m3 * solid.inertia_m5[i];
+      Eigen::Map<Eigen::Matrix3d> of_surface(bank.rigid.inertia_kg_m2.data());  // symmetric
+      if ((inertia - of_surface).norm() > kSameInertia * of_surface.norm())
+        notes_.push_back("its moments of inertia contradict its surface and its mass; those of the surface, filled evenly, were taken");
+      else
+        of_surface = inertia;
     }
     bank.material.density_kg_m3 = bank.rigid.mass_kg / solid.volume_m3;
   }
@@ -391,11 +463,16 @@ class Reader {
   }
 
   bank::Bank make(base::Object& extension, base::Object& model) {
-    const std::size_t modes = model_.freq_hz.size(), points = model_.positions.size();
-    const double scale = find_scale();
+    drop_unused_points();
+    const std::size_t modes = model_.freq_hz.size(), points = used_.size();
+    const double node_scale = find_scale();
     bank::Bank bank;
-    for (const Vec3& p : model_.positions) bank.vertices_m.push_back(scale * p);
+    for (const std::size_t v : used_) bank.vertices_m.push_back(model_.positions[v]);
     bank.triangles = model_.triangles;
+    bank.material = read_material(extension, model);
+    const bool is_of_unscaled_body = is_of_unscaled(model, node_scale, calc_solid(bank).volume_m3, bank.material.density_kg_m3);
+    const double scale = is_of_unscaled_body ? 1.0 : node_scale;
+    for (Vec3& p : bank.vertices_m) p = scale * p;
     std::vector<double> lambda(modes);
     for (std::size_t m = 0; m < modes; ++m)
       lambda[m] = std::pow(2.0 * std::numbers::pi * model_.freq_hz[m], 2) + model_.decay_per_s[m] * model_.decay_per_s[m];
@@ -406,23 +483,27 @@ class Reader {
       bank.decay_per_s.push_back(model_.decay_per_s[order[m]]);
       for (std::size_t v = 0; v < points; ++v)
         for (std::size_t c = 0; c < 3; ++c) {
-          const double phi = model_.shapes.get(order[m] * points + v, c);
+          const double phi = model_.shapes.get(order[m] * model_.positions.size() + used_[v], c);
           if (!std::isfinite(phi)) model.fail("shapes", fmt::format("mode {} moves point {} by {}", order[m], v, phi));
           shapes[(v * modes + m) * 3 + c] = phi;
         }
     }
     bank.residual.assign(modes, 0.0);
-    bank::quantise_shapes(bank, shapes);
-    bank.material = read_material(extension, model);
     read_mass(model, scale, bank);
     settle_damping(bank);
+    if (is_of_unscaled_body) scale_body(bank, shapes, node_scale);
+    bank::quantise_shapes(bank, shapes);
     bank::set_radiation_gains(bank, shapes);
     bank.counts = {.nodes = static_cast<std::int64_t>(points), .tets = 1, .components = 1, .rigid_modes = 6};
     bank.band_hz = {std::min(20.0, 0.99 * bank.freq_hz(0)), std::max(20000.0, 1.01 * bank.freq_hz(modes - 1))};
     bank.complete = false;
-    bank.element = "analytic";
+    bank.element = "imported";
     bank.mass = "consistent";
-    bank.provenance = base::Json::object().set("imported", kExtension).set("file", file_.name()).line();
+    bank.provenance = base::Json::object()
+                          .set("imported", kExtension)
+                          .set("file", base::printable(file_.name()))
+                          .set("notes", base::Json::array(notes_))
+                          .line();
     if (const std::vector<std::string> faults = bank::find_faults(bank); !faults.empty())
       throw InputError(
           fmt::format("{}: its model is not a valid bank: {}; correct it in the program that made it", file_.name(), faults[0]));
@@ -434,13 +515,18 @@ class Reader {
   base::Object root_;
   std::size_t number_ = 0;  // of the model
   Model model_;
+  std::vector<std::size_t> used_;  // the points of a model of another program that triangles have
+  std::vector<std::string> notes_;
   std::map<std::string, bank::FieldBytes> fields_;
 };
 
 }  // namespace
 
-bank::Bank parse_glb(std::string_view bytes, const std::string& name, const GlbReading& reading) {
-  return Reader(bytes, name, reading).read();
+bank::Bank parse_glb(std::string_view bytes, const std::string& name, const GlbReading& reading, std::vector<std::string>* notes) {
+  Reader reader(bytes, name, reading);
+  bank::Bank bank = reader.read();
+  if (notes != nullptr) *notes = reader.get_notes();
+  return bank;
 }
 
 }  // namespace carillon::exchange

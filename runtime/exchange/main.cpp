@@ -25,12 +25,16 @@
 #include "runtime/bank/report.hpp"
 #include "runtime/bank/write.hpp"
 #include "runtime/base/file.hpp"
+#include "runtime/base/file_limit.hpp"
+#include "runtime/base/message.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/base/standard_output.hpp"
+#include "runtime/base/whole_range.hpp"
 #include "runtime/exchange/commands.hpp"
 #include "runtime/material/solids.hpp"
 #include "runtime/material/table.hpp"
 #include "runtime/radiation/gains.hpp"
+#include "runtime/support/heard.hpp"
 #include "runtime/version/version.hpp"
 
 namespace {
@@ -38,7 +42,7 @@ namespace {
 using namespace carillon;
 
 constexpr int kMost = std::numeric_limits<int>::max();
-const CLI::Range kCounts(1, kMost);
+const CLI::Validator kCounts(base::whole_range(1, kMost), base::describe_whole_range(1, kMost));
 
 /// Prints every check. InputError when a fault was found, after all lines were printed. `original`: the bank that was packed, or empty.
 void check(const std::string& file, const std::string& original) {
@@ -60,7 +64,6 @@ void check(const std::string& file, const std::string& original) {
   std::vector<bank::Check> checks = bank::calc_checks(bank);
   checks.push_back(bank::calc_regions_check(bank));
   checks.push_back(bank::calc_provenance_check(bank));
-  if (bank.packing && checks[0].faults.empty()) checks.push_back(bank::check_packing(bank));
   if (against) checks.push_back(*against);
   for (const bank::Check& check : checks) {
     fmt::print("{}", bank::format_check(check));
@@ -115,7 +118,8 @@ void add_options(CLI::App& editing, Wishes& wishes) {
   editing
       .add_option("--shape-bits", wishes.reduction.shape_bits,
                   "Bits of a component of a mode's shape; up to 8 the bank has one byte for it instead of two")
-      ->check(CLI::Range(bank::kMinShapeBits, bank::kMaxShapeBits))
+      ->check(base::whole_range(bank::kMinShapeBits, bank::kMaxShapeBits),
+              base::describe_whole_range(bank::kMinShapeBits, bank::kMaxShapeBits))
       ->capture_default_str();
 }
 
@@ -224,9 +228,10 @@ void add_export(CLI::App& app, exchange::ExportWishes& wishes) {
 }
 
 void add_import(CLI::App& app, exchange::ImportWishes& wishes) {
-  app.add_option("GLB", wishes.glb, "The GLB file")->required();
+  app.add_option("GLB", wishes.glb, "The GLB or glTF file (.glb, .gltf with its buffers)")->required();
   app.add_option("-o,--output", wishes.out, "The bank to write; - is standard output")->required();
-  app.add_option("--model", wishes.model, "Number of the modal model in the file, from 0")->check(CLI::Range(0, kMost));
+  app.add_option("--model", wishes.model, "Number of the modal model in the file, from 0")
+      ->check(base::whole_range(0, kMost), base::describe_whole_range(0, kMost));
   app.add_option("--material", wishes.material, "Material of a model without one, by its name (carillon materials)");
   app.add_flag("--plain", wishes.is_plain, "Read the extension alone, without the extras of carillon-bank export");
 }
@@ -244,7 +249,7 @@ void edit(const std::string& file, const std::string& out, Wishes& wishes) {
   const std::string dropped = bank::describe_dropped(bank, e);
   if (is_edited || !is_reduced) bank = bank::calc_edited(bank, e);  // first: what is heard most may change
   if (const auto question = material::ask_about_solid(bank.material.young_modulus_pa, bank.material.density_kg_m3))
-    fmt::print(stderr, "carillon-bank: warning: {}\n", base::printable(*question));
+    fmt::print(stderr, "carillon-bank: warning: {}\n", base::show_message(*question));
   const std::size_t coupled = bank.quartic.mode_count();
   if (is_reduced) bank = bank::calc_reduced(bank, wishes.reduction);
   if (is_piped)
@@ -294,11 +299,12 @@ int run(int argc, char** argv) {
   app.require_subcommand(1);
   app.set_version_flag("--version", version::describe("carillon-bank"));
   std::string file;
-  bool json = false, all = false;
+  bool json = false, csv = false, all = false;
   std::size_t modes = 20;
   CLI::App* info = app.add_subcommand("info", "Shows a bank: frequencies, damping, residuals, counts");
   info->add_option("BANK", file, "The bank file")->required();
-  info->add_flag("--json", json, "Everything but mesh and shapes, as JSON");
+  CLI::Option* as_json = info->add_flag("--json", json, "Everything but mesh and shapes, as JSON");
+  info->add_flag("--csv", csv, "The modes alone, one line each, as a table with commas")->excludes(as_json);
   info->add_flag("--all", all, "The record of the run that made it too: versions, seconds, memory, partition, solver");
   info->add_option("--modes", modes, "Rows of the table of modes")->capture_default_str();
   CLI::App* checking =
@@ -338,7 +344,7 @@ int run(int argc, char** argv) {
   add_export(*exporting, exported);
   exchange::ImportWishes imported;
   CLI::App* importing =
-      app.add_subcommand("import", "Reads a GLB file with KHR_audio_rigid_bodies as a bank; from a file of export, the same bank");
+      app.add_subcommand("import", "Reads a GLB or glTF file with KHR_audio_rigid_bodies as a bank; from a file of export, the same bank");
   add_import(*importing, imported);
   try {
     app.parse(argc, argv);
@@ -360,7 +366,10 @@ int run(int argc, char** argv) {
     exchange::run_import(imported);
   } else {
     const bank::Bank bank = bank::read_bank(file);
-    fmt::print("{}", json ? bank::format_info_json(bank, file) : base::printable_lines(bank::format_info(bank, file, modes, all)));
+    const std::vector<bank::HeardMode> heard = support::calc_heard(bank);
+    fmt::print("{}", json  ? bank::format_info_json(bank, heard, file)
+                     : csv ? bank::format_info_csv(bank, heard)
+                           : base::printable_lines(bank::format_info(bank, heard, file, modes, all)));
   }
   if (std::fflush(stdout) != 0) throw SystemError("the output cannot be written");
   return 0;
@@ -368,13 +377,14 @@ int run(int argc, char** argv) {
 
 int fail(const char* what, int code) {
   std::fflush(stdout);
-  fmt::print(stderr, "carillon-bank: {}\n", base::printable(what));
+  fmt::print(stderr, "carillon-bank: {}\n", base::show_message(what));
   return code;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
+  base::report_file_limit();
   try {
     return run(argc, argv);
   } catch (const InputError& error) {

@@ -13,6 +13,7 @@
 
 #include "runtime/base/error.hpp"
 #include "runtime/base/file.hpp"
+#include "runtime/base/foreign.hpp"
 #include "runtime/gltf/chunks.hpp"
 
 namespace carillon::gltf {
@@ -158,10 +159,14 @@ std::string File::read_uri(base::Object& buffer) const {
   }
   const std::optional<std::string> decoded = decode_percent(uri);
   const std::filesystem::path file = decoded.value_or("");
-  if (!decoded || decoded->empty() || file.is_absolute() || decoded->find("..") != std::string::npos ||
+  if (!decoded || decoded->empty() || file.is_absolute() || std::find(file.begin(), file.end(), "..") != file.end() ||
       decoded->find("://") != std::string::npos)
     buffer.fail("uri", "is no file next to this one; put it there, or export a single .glb file");
-  return base::read_file(std::filesystem::path(name_).parent_path() / file, "buffer of a glTF file", kMaxBufferBytes);
+  const std::filesystem::path place = std::filesystem::path(name_).parent_path() / file;
+  std::error_code error;
+  if (!std::filesystem::exists(place, error))
+    buffer.fail("uri", fmt::format("{}: there is no such file; put it there, or export a single .glb file", place.string()));
+  return base::read_file(place, "buffer of a glTF file", kMaxBufferBytes);
 }
 
 std::string_view File::find_view(std::size_t number, base::Object& view) {
@@ -207,7 +212,16 @@ Numbers File::read(base::Object& owner, const char* key, const char* type, std::
   return numbers;
 }
 
-File parse_text(std::string_view text, const std::string& name) { return File(text, std::nullopt, name); }
+File parse_text(std::string_view text, const std::string& name) {
+  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);  // a byte-order mark of UTF-8
+  return File(text, std::nullopt, name);
+}
+
+File parse(std::string_view bytes, const std::string& name) {
+  base::refuse_utf16(bytes, name);
+  const auto begin = bytes.find_first_not_of("\xEF\xBB\xBF \t\r\n");
+  return begin != std::string_view::npos && bytes[begin] == '{' ? parse_text(bytes, name) : parse_glb(bytes, name);
+}
 
 File parse_glb(std::string_view bytes, const std::string& name) {
   const auto refuse = [&](const std::string& message) { throw InputError(fmt::format("{}: {}", name, message)); };

@@ -7,7 +7,10 @@
 #include <new>
 
 #include "runtime/base/error.hpp"
+#include "runtime/base/file_limit.hpp"
+#include "runtime/base/message.hpp"
 #include "runtime/base/printable.hpp"
+#include "runtime/base/whole_range.hpp"
 #include "runtime/host/program.hpp"
 #include "runtime/host/scene.hpp"
 #include "runtime/version/version.hpp"
@@ -15,13 +18,14 @@
 namespace {
 
 int fail(int code, const char* message) {
-  fmt::print(stderr, "carillon-render: {}\n", carillon::base::printable(message));
+  fmt::print(stderr, "carillon-render: {}\n", carillon::base::show_message(message));
   return code;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
+  carillon::base::report_file_limit();
   carillon::host::ProgramOptions options;
   CLI::App app("Simulates a scene of falling bodies and renders what two ears or microphones hear.", "carillon-render");
   app.failure_message([](const CLI::App* asked, const CLI::Error& error) {
@@ -39,7 +43,7 @@ int main(int argc, char** argv) {
       ->option_text("IN.jsonl");
   app.add_option("--record", options.record, "Contacts file to write: all that happens, to be played again")->option_text("OUT.jsonl");
   app.add_option("--rate", options.rate_hz, "Sample rate instead of the scene's, 8000 to 192000")
-      ->check(CLI::Range(8000, 192000))
+      ->check(carillon::base::whole_range(8000, 192000), carillon::base::describe_whole_range(8000, 192000))
       ->option_text("HZ");
   app.add_option("--format", options.format, "pcm16, pcm24 (default), pcm32 or float, instead of the scene's")
       ->check(CLI::IsMember(carillon::host::kSampleFormatNames))

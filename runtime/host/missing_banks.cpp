@@ -1,17 +1,15 @@
 #include "runtime/host/missing_banks.hpp"
 
 #include <fmt/format.h>
-#include <stdlib.h>
-#include <unistd.h>
+#include <signal.h>
 
-#include <cerrno>
-#include <cstring>
 #include <map>
 #include <optional>
 
 #include "runtime/base/command.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/result.hpp"
+#include "runtime/base/temporary.hpp"
 
 namespace carillon::host {
 namespace {
@@ -21,25 +19,6 @@ namespace fs = std::filesystem;
 constexpr const char* kMaker = "carillon";
 constexpr std::size_t kMaxPathBytes = 1 << 16;
 
-/// A file that another program writes, and that goes with this.
-class ResultFile {
- public:
-  ResultFile() {
-    std::string name = (fs::temp_directory_path() / "carillon-result-XXXXXX").string();
-    const int descriptor = ::mkstemp(name.data());
-    if (descriptor < 0) throw SystemError(fmt::format("{}: cannot make a temporary file: {}", name, std::strerror(errno)));
-    ::close(descriptor);
-    file_ = name;
-  }
-  ~ResultFile() { ::unlink(file_.c_str()); }
-  ResultFile(const ResultFile&) = delete;
-  ResultFile& operator=(const ResultFile&) = delete;
-  const fs::path& get() const { return file_; }
-
- private:
-  fs::path file_;
-};
-
 fs::path make_bank(const Scene& scene, const SceneBody& body, bool is_quiet) {
   const std::optional<fs::path> program = base::find_program(kMaker);
   if (!program)
@@ -47,7 +26,8 @@ fs::path make_bank(const Scene& scene, const SceneBody& body, bool is_quiet) {
         fmt::format("{}: body \"{}\" has no \"bank\", and the program that computes one, {}, is not installed here (it comes with "
                     "carillon-precompute); install it, or name a bank",
                     body.place, body.name, kMaker));
-  const ResultFile result_file;
+  const base::TemporaryFolder folder("carillon-");
+  const fs::path result_file = folder.path() / "result.json";
   base::Command command;
   command.words = {program->string(),
                    "bank-for",
@@ -57,13 +37,14 @@ fs::path make_bank(const Scene& scene, const SceneBody& body, bool is_quiet) {
                    "--first-line",
                    std::to_string(body.job.first_line),
                    "--result",
-                   result_file.get().string()};
+                   result_file.string()};
   if (is_quiet) command.words.emplace_back("-q");
   command.output = base::kCapture;
   command.errors = base::kInherit;
+  command.signal_at_end = SIGTERM;  // it removes what it has in temporary folders
   const base::Finished finished = base::run(command, {.input = body.job.text, .max_bytes = kMaxPathBytes});
   if (finished.exit_code == 0) return finished.output.substr(0, finished.output.find('\n'));
-  base::Result result = base::read_result(result_file.get()).value_or(base::Result{.kind = base::ResultKind::system});
+  base::Result result = base::read_result(result_file).value_or(base::Result{.kind = base::ResultKind::system});
   if (result.message.empty())
     result.message = finished.signal != 0
                          ? fmt::format("{}: body \"{}\": {} was ended by signal {}", body.place, body.name, kMaker, finished.signal)

@@ -196,8 +196,10 @@ void print_summary(std::FILE* notes, const Scene& scene, const Sound& sound, con
     fmt::print(notes, "  modes            {:.4g} J, and {:.4g} J at most\n", bodies.modes_j, bodies.max_modes_j);
     fmt::print(notes, "  lost             {:.4g} J, by friction, in contacts and by the damping of modes\n", bodies.lost_j);
     fmt::print(notes, "  difference       {:.2g} J at most\n", bodies.error_j);
-    fmt::print(notes, "  radiated         {:.4g} J of what damping takes from modes, by their radiation gains\n",
-               figures.audit->radiated_j);
+    const synth::ModeEnergy& modes = figures.audit->modes;
+    fmt::print(notes, "modes as played    were given {:.4g} J, of which they hold {:.4g} J at the end and have lost {:.4g} J\n",
+               modes.given_j, modes.held_j, modes.lost_j);
+    fmt::print(notes, "  radiated         {:.4g} J of what damping takes from modes, by their radiation gains\n", modes.radiated_j);
   }
   if (sound.peak_pa > 0.0) {
     fmt::print(notes, "peak               {:.4g} Pa at the {}\n", sound.peak_pa, scene.microphones_m.empty() ? "ears" : "microphones");
@@ -297,7 +299,13 @@ class Run {
                                     .progress = Progress("sound", options_->quiet)},
                                    store);
     figures_.sound_s = get_seconds_since(started);
-    if (options_->audit) figures_.audit = EnergyBooks{happened_.energy, sound.energy_rise, sound.radiated_j};
+    for (std::size_t i = 0; i < scene_.bodies.size(); ++i) {
+      const std::string warning = describe_bending(scene_.bodies[i].name, *body_banks_[i], sound.body_deflection[i]);
+      if (warning.empty()) continue;
+      fmt::print(stderr, "warning: {}\n", base::printable(warning));
+      scene_.warnings.push_back(warning);
+    }
+    if (options_->audit) figures_.audit = make_books(scene_, happened_.energy, sound);
     figures_.real_time_factor = (figures_.physics_s + figures_.sound_s) / scene_.duration_s;
     figures_.modes = sound.modes;
     figures_.gain = calc_gain(scene_.output, sound.peak_pa);

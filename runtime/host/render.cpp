@@ -4,6 +4,8 @@
 // Deviations: heads do not shade.
 #include "runtime/host/render.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -16,6 +18,7 @@
 #include "runtime/host/microphones.hpp"
 #include "runtime/host/pose.hpp"
 #include "runtime/host/session.hpp"
+#include "runtime/synth/bending.hpp"
 #include "runtime/synth/cpu_ticks.hpp"
 #include "runtime/synth/texture.hpp"
 
@@ -238,6 +241,7 @@ class Rendering {
       effects_.apply(static_cast<double>(start + kBlock) / rate_hz, *synthesiser_);
       playback_.push_until(static_cast<double>(start + kBlock) / rate_hz, *synthesiser_);
       synthesiser_->process(out.data(), static_cast<int>(out.size()), static_cast<int>(count));
+      if (options_->audits) note_energy();
       const std::size_t skipped = std::min(count, start < latency ? latency - start : 0);
       for (std::size_t c = 0; c < out.size(); ++c) heard[c] = blocks[c].data() + skipped;
       if (surfaces_) {
@@ -252,6 +256,12 @@ class Rendering {
 
   std::size_t get_latency() const { return static_cast<std::size_t>(synthesiser_->get_latency()); }
 
+  void note_energy() {
+    double held_j = 0.0;
+    for (std::size_t i = 0; i < scene_->bodies.size(); ++i) held_j += synthesiser_->get_mode_energy(static_cast<int>(i)).held_j;
+    max_modes_j_ = std::max(max_modes_j_, held_j);
+  }
+
   /// What the synthesiser has counted.
   void count(Sound& sound) const {
     if (options_->measures) sound.seconds_per_tick = 1e-9;
@@ -260,12 +270,14 @@ class Rendering {
     sound.refused = counters.refused;
     sound.faults = counters.faults + playback_.get_faults();
     sound.resets = counters.resets;
+    sound.max_modes_j = max_modes_j_;
     if (surfaces_) sound.surfaces = surfaces_->get_figures();
     for (std::size_t i = 0; i < scene_->bodies.size(); ++i) {
       const int body = static_cast<int>(i);
       sound.body_peak_pa.push_back(synthesiser_->get_peak_pa(body));
+      sound.body_deflection.push_back(synthesiser_->get_deflection(body));
       sound.energy_rise = std::max(sound.energy_rise, synthesiser_->get_energy_rise(body));
-      sound.radiated_j += synthesiser_->get_radiated_j(body);
+      sound.mode_energy += synthesiser_->get_mode_energy(body);
       sound.effect_counters.push_back(synthesiser_->get_effect_counters(body));
     }
   }
@@ -321,6 +333,7 @@ class Rendering {
   EffectTimeline effects_;
   EventPlayback playback_;
   synth::Synthesiser* synthesiser_;
+  double max_modes_j_ = 0.0;
   std::optional<SurfacePlayback> surfaces_;  // none where the scene has no recorded surfaces
 };
 
@@ -343,6 +356,17 @@ Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks
   rendering.count(sound);
   sound.seconds_cpu = base::get_process_cpu_s() - started_s;
   return sound;
+}
+
+std::string describe_bending(const std::string& name, const bank::Bank& bank, double thicknesses) {
+  if (!(thicknesses > 0.0)) return {};
+  const double thickness_m = synth::find_judged_thickness_m(bank);
+  return fmt::format(
+      "{}: bends by {:.3g} mm, {:.2g} times its thickness of {:.3g} mm (twice its volume over its surface); linear modes hold up to {:g} "
+      "of "
+      "it, and what is heard is only roughly right; compute its bank with \"nonlinear\" (docs/howto/nonlinear-bodies.md), or strike more "
+      "softly",
+      name, 1e3 * thicknesses * thickness_m, thicknesses, 1e3 * thickness_m, synth::kLinearThicknesses);
 }
 
 std::uint64_t count_frames(double duration_s, int rate_hz) { return static_cast<std::uint64_t>(std::llround(duration_s * rate_hz)); }

@@ -153,7 +153,10 @@ base::Json make_audit_json(const EnergyBooks& books) {
       .set("modes_share", make_figure(bodies.modes_share))
       .set("lost_j", make_figure(bodies.lost_j, 9))
       .set("difference_j", make_figure(bodies.error_j))
-      .set("radiated_j", make_figure(books.radiated_j));
+      .set("modes_given_j", make_figure(books.modes.given_j, 9))
+      .set("modes_held_j", make_figure(books.modes.held_j, 9))
+      .set("modes_lost_j", make_figure(books.modes.lost_j, 9))
+      .set("radiated_j", make_figure(books.modes.radiated_j));
 }
 
 base::Json make_blow_json(const Blow& blow) {
@@ -179,6 +182,7 @@ base::Json make_body_json(const Scene& scene, const Sound& sound, const Plan& pl
       .set("modes", sound.body_modes[i])
       .set("impulses", i < figures.tally.body_impulses.size() ? figures.tally.body_impulses[i] : std::int64_t{0})
       .set("peak_pa_at_1m", make_figure(sound.body_peak_pa[i]));
+  if (sound.body_deflection[i] > 0.0) json.set("deflection_thicknesses", make_figure(sound.body_deflection[i], 4));
   if (!body.mounting.text.empty()) json.set("supports", make_mounting_json(body.mounting));
   if (body.limited.modes != 0)
     json.member("limited_gains").set("modes", body.limited.modes).set("max_db", make_figure(body.limited.max_db, 4));
@@ -271,6 +275,15 @@ class JsonPieces {
 };
 
 }  // namespace
+
+EnergyBooks make_books(const Scene& scene, const contact::EnergyAudit& physics, const Sound& sound) {
+  EnergyBooks books{physics, sound.energy_rise, sound.mode_energy};
+  const double more_j = std::max(0.0, books.modes.held_j - physics.modes_j);
+  books.bodies.modes_j += more_j;
+  if (scene.strikes.empty() && physics.start_j != 0.0) books.bodies.lost_j -= more_j;
+  books.bodies.max_modes_j = std::max(physics.max_modes_j, sound.max_modes_j);
+  return books;
+}
 
 std::string describe_limited(const SceneBody& body) {
   if (body.limited.modes == 0) return {};

@@ -21,8 +21,13 @@ void write_trajectory(const Scene& scene, const std::vector<const bank::Bank*>& 
 struct EnergyBooks {
   contact::EnergyAudit bodies;  // of the physics; zeros where a contacts file took its place
   double modes_rise = 0.0;      // Sound::energy_rise
-  double radiated_j = 0.0;      // Sound::radiated_j
+  synth::ModeEnergy modes;      // Sound::mode_energy
 };
+
+/// The books of a rendering with --audit. What the physics says of the modes is what impacts gave them, also of bodies that are not heard;
+/// the sound's is what all that acts gave those that are. Of both the larger counts, and what is more than the physics says came out of
+/// what it counts as lost, in friction and contacts, unless strikes, mallets or a contacts file brought it from outside.
+EnergyBooks make_books(const Scene& scene, const contact::EnergyAudit& physics, const Sound& sound);
 
 /// One line about modes whose gains came down to what their damping takes; empty where there are none.
 std::string describe_limited(const SceneBody& body);

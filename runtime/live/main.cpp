@@ -8,7 +8,10 @@
 #include <vector>
 
 #include "runtime/base/error.hpp"
+#include "runtime/base/file_limit.hpp"
+#include "runtime/base/message.hpp"
 #include "runtime/base/printable.hpp"
+#include "runtime/base/whole_range.hpp"
 #include "runtime/live/device.hpp"
 #include "runtime/live/player.hpp"
 #include "runtime/version/version.hpp"
@@ -16,13 +19,14 @@
 namespace {
 
 int fail(int code, const char* message) {
-  fmt::print(stderr, "carillon-live: {}\n", carillon::base::printable(message));
+  fmt::print(stderr, "carillon-live: {}\n", carillon::base::show_message(message));
   return code;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
+  carillon::base::report_file_limit();
   carillon::live::PlayerOptions options;
   bool lists = false;
   CLI::App app("Plays a scene of falling bodies while it happens.", "carillon-live");
@@ -34,7 +38,9 @@ int main(int argc, char** argv) {
   auto* device = app.add_option("--device", options.device, "Output to play on, by its name")->option_text("NAME");
   app.add_flag("--null", options.null, "Play to nothing, at the pace of real time: works without a sound card")->excludes(device);
   app.set_version_flag("--version", carillon::version::describe("carillon-live"));
-  app.add_option("--frames", options.frames, "Frames of a block, 16 to 8192")->check(CLI::Range(16, 8192))->option_text("N");
+  app.add_option("--frames", options.frames, "Frames of a block, 16 to 8192")
+      ->check(carillon::base::whole_range(16, 8192), carillon::base::describe_whole_range(16, 8192))
+      ->option_text("N");
   app.add_option("--look-ahead", options.look_ahead_s, "Seconds by which physics runs ahead of the sound, 0.02 to 10")
       ->check(CLI::Range(0.02, 10.0))
       ->option_text("S");

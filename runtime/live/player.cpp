@@ -22,6 +22,7 @@
 #include "runtime/host/event_scheduler.hpp"
 #include "runtime/host/events.hpp"
 #include "runtime/host/planning.hpp"
+#include "runtime/host/render.hpp"
 #include "runtime/host/scene.hpp"
 #include "runtime/host/session.hpp"
 #include "runtime/host/strikes.hpp"
@@ -254,6 +255,11 @@ void play(const PlayerOptions& options) {
     if (!advanced) std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }
   device.stop();
+  for (std::size_t i = 0; i < scene.bodies.size(); ++i)
+    if (const std::string text =
+            host::describe_bending(scene.bodies[i].name, *body_banks[i], synthesiser.get_deflection(static_cast<int>(i)));
+        !text.empty())
+      warn({text});
   if (!options.quiet) print_statistics(device.get_statistics(), synthesiser.get_counters(), player, rate_hz);
 }
 

@@ -18,6 +18,7 @@
 
 #include "runtime/bank/corrected.hpp"
 #include "runtime/bank/edits.hpp"
+#include "runtime/bank/heard.hpp"
 #include "runtime/bank/of_material.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/printable.hpp"
@@ -199,7 +200,7 @@ void bind_bank(py::module_& module) {
   array(
       "t60_s",
       [](const bank::Bank& b, const py::object&) {
-        return make_per_mode(b, [&](std::size_t m) { return std::log(1000.0) / b.decay_per_s[m]; });
+        return make_per_mode(b, [&](std::size_t m) { return bank::calc_t60_s(b.decay_per_s[m]); });
       },
       "(m) float64 [s]: the time in which a mode falls by 60 dB.");
   array(
@@ -211,6 +212,13 @@ void bind_bank(py::module_& module) {
   array(
       "error_cents", [](const bank::Bank& b, const py::object&) { return make_bars(b, b.discretisation_error_cents); },
       "(m) float64 [cent]: estimated distance of frequency_hz from that of the body; infinite where it is unknown.");
+  array(
+      "facet_error_cents",
+      [](const bank::Bank& b, const py::object&) {
+        return make_per_mode(b, [&](std::size_t m) { return b.facet_error_cents.empty() ? 0.0 : b.facet_error_cents[m]; });
+      },
+      "(m) float64 [cent]: estimate of what comes to error_cents if the facets of the surface are not what they were taken for, planes of "
+      "the body or samples of a smooth surface; 0 where that is not in doubt.");
   array(
       "algebraic_error_cents", [](const bank::Bank& b, const py::object&) { return make_bars(b, b.algebraic_error_cents); },
       "(m) float64 [cent]: bound on the distance of the solver from the modes of the mesh; infinite where it is unknown.");
@@ -266,7 +274,7 @@ void bind_bank(py::module_& module) {
   number(
       "complete", [](const bank::Bank& b) { return b.complete; }, "Whether every mode of band_hz is in the bank.");
   number(
-      "element", [](const bank::Bank& b) { return b.element; }, "\"T4\", \"T10\" or \"analytic\".");
+      "element", [](const bank::Bank& b) { return b.element; }, "\"T4\", \"T10\", \"analytic\" or \"imported\".");
   type.def("__len__", [](const SharedBank& bank) { return bank.played->mode_count(); });
   type.def("__repr__", &describe);
   module.def("find_bank", &find_bank, "file"_a, "text"_a, "The bank file of a job; None if it names none.");

@@ -5,7 +5,9 @@
 #include <new>
 #include <utility>
 
+#include "runtime/base/environment.hpp"
 #include "runtime/base/error.hpp"
+#include "runtime/base/message.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/version/version.hpp"
 
@@ -26,7 +28,9 @@ PyObject* make_exception(py::module_& module, const char* name, PyObject* base, 
 PyObject *input_error = nullptr, *solve_error = nullptr, *system_error = nullptr;
 
 /// Names of files may be no UTF-8, of which Python would make an exception of its own.
-void set_error(PyObject* type, const std::exception& error) { PyErr_SetString(type, base::printable_lines(error.what()).c_str()); }
+void set_error(PyObject* type, const std::exception& error) {
+  PyErr_SetString(type, base::printable_lines(base::shorten(error.what())).c_str());
+}
 
 }  // namespace
 }  // namespace carillon::python
@@ -51,6 +55,16 @@ PYBIND11_MODULE(_carillon, module) {
       set_error(system_error, error);
     }
   });
+  module.def(
+      "_make_environment",
+      [](bool is_alone) {
+        py::list entries;
+        for (const std::string& entry : is_alone ? base::make_lone_environment() : base::make_environment())
+          entries.append(py::bytes(entry));
+        return entries;
+      },
+      py::arg("is_alone"),
+      "That of this process without what mpirun has set for its ranks, NAME=value; is_alone: for a solver of one rank.");
   bind_bank(module);
   bind_render(module);
   bind_synthesiser(module);

@@ -59,6 +59,9 @@ Rendered render(host::Scene scene) {
   rendered.warnings.insert(rendered.warnings.end(), happened.warnings.begin(), happened.warnings.end());
   if (sound.refused > 0) rendered.warnings.push_back(std::to_string(sound.refused) + " events could not be played: too many at once");
   if (sound.faults > 0) rendered.warnings.push_back(std::to_string(sound.faults) + " events have numbers that cannot be played");
+  for (std::size_t i = 0; i < scene.bodies.size(); ++i)
+    if (std::string warning = host::describe_bending(scene.bodies[i].name, *body_banks[i], sound.body_deflection[i]); !warning.empty())
+      rendered.warnings.push_back(std::move(warning));
   return rendered;
 }
 

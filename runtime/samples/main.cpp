@@ -9,7 +9,10 @@
 #include <vector>
 
 #include "runtime/base/error.hpp"
+#include "runtime/base/file_limit.hpp"
+#include "runtime/base/message.hpp"
 #include "runtime/base/printable.hpp"
+#include "runtime/base/whole_range.hpp"
 #include "runtime/samples/samples.hpp"
 #include "runtime/version/version.hpp"
 
@@ -19,7 +22,7 @@ using namespace carillon;
 
 int fail(int code, const char* message) {
   std::fflush(stdout);
-  fmt::print(stderr, "carillon-samples: {}\n", base::printable(message));
+  fmt::print(stderr, "carillon-samples: {}\n", base::show_message(message));
   return code;
 }
 
@@ -32,6 +35,7 @@ void run(samples::SampleOptions& options, bool is_quiet) {
       next += 10;
     };
   const samples::SampleSet set = samples::make_samples(options);
+  if (!set.warning.empty()) fmt::print(stderr, "carillon-samples: warning: {}\n", base::printable(set.warning));
   if (is_quiet) return;
   fmt::print("samples     {}, {:.3g} MB\n", set.samples, 1e-6 * set.bytes);
   fmt::print("full scale  {:.4g} Pa at 1 m, at velocity 127\n", set.full_scale_pa);
@@ -48,6 +52,7 @@ void take_points(const std::vector<double>& numbers, samples::SampleOptions& opt
 }  // namespace
 
 int main(int argc, char** argv) {
+  base::report_file_limit();
   samples::SampleOptions options;
   bool is_quiet = false;
   std::string keys = samples::kKeysNames[0], format = "pcm24";
@@ -61,15 +66,17 @@ int main(int argc, char** argv) {
   app.add_option("-o,--output", options.folder, "The folder for the instrument and its samples")->required();
   app.add_option("--name", options.name, "Name of the instrument; without it that of the bank's file");
   CLI::Option* places = app.add_option("--places", options.places, "Number of points to strike, far from each other")
-                            ->check(CLI::Range(1, 64))
+                            ->check(base::whole_range(1, 64), base::describe_whole_range(1, 64))
                             ->capture_default_str();
   app.add_option("--at", at, "Points to strike: X Y Z in metres, three numbers each")->excludes(places)->option_text("X Y Z ...");
-  app.add_option("--layers", options.layers, "Layers of velocity")->check(CLI::Range(1, 16))->capture_default_str();
+  app.add_option("--layers", options.layers, "Layers of velocity")
+      ->check(base::whole_range(1, 16), base::describe_whole_range(1, 16))
+      ->capture_default_str();
   app.add_option("--mallets", options.mallets, "Names, separated by commas: steel, hard-wood, plastic, rubber, hard-felt, soft-felt, yarn")
       ->delimiter(',')
       ->capture_default_str();
   app.add_option("--round-robin", options.round_robin, "Number of alternating strikes around each point")
-      ->check(CLI::Range(1, 16))
+      ->check(base::whole_range(1, 16), base::describe_whole_range(1, 16))
       ->capture_default_str();
   app.add_option("--speed", options.speed_m_s, "Speed of the mallet at velocity 127, in m/s")->capture_default_str();
   app.add_option("--keys", keys,
@@ -77,7 +84,9 @@ int main(int argc, char** argv) {
       ->check(CLI::IsMember(samples::kKeysNames))
       ->capture_default_str();
   app.add_option("--first-key", options.first_key, "First key with --keys places, 0 to 127; 60 is middle C")->capture_default_str();
-  app.add_option("--rate", options.rate_hz, "Sample rate in Hz")->check(CLI::Range(8000, 192000))->capture_default_str();
+  app.add_option("--rate", options.rate_hz, "Sample rate in Hz")
+      ->check(base::whole_range(8000, 192000), base::describe_whole_range(8000, 192000))
+      ->capture_default_str();
   app.add_option("--format", format, "pcm16, pcm24, pcm32 or float")->check(CLI::IsMember(host::kSampleFormatNames))->capture_default_str();
   app.add_option("--seconds", options.max_seconds, "Longest sample, in s; a sample ends 80 dB below its peak")->capture_default_str();
   app.add_flag("-q,--quiet", is_quiet, "Print nothing but errors");

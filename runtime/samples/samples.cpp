@@ -255,13 +255,16 @@ class Maker {
           }
         }
     set.samples = samples_.size();
+    set.warning = host::describe_bending(name_, *bank_, deflection_);
     set.error_db = error_count_ > 0 ? 10.0 * std::log10(std::max(error_sum_ / error_count_, 1e-30)) : 0.0;
   }
 
   Sample render(const std::vector<events::Event>& events, Sample sample) {
     scene_.duration_s = options_->max_seconds;
     sound::SoundStore store(options_->rate_hz, 1);
-    host::calc_sound(scene_, {bank_}, host::make_events(events), {.rate_hz = options_->rate_hz, .fades_end = true}, store);
+    const host::Sound sound =
+        host::calc_sound(scene_, {bank_}, host::make_events(events), {.rate_hz = options_->rate_hz, .fades_end = true}, store);
+    deflection_ = std::max(deflection_, sound.body_deflection[0]);
     sample.frames.resize(store.get_frames());
     store.read(0, sample.frames);
     for (const float p : sample.frames) sample.peak_pa = std::max(sample.peak_pa, static_cast<double>(std::abs(p)));
@@ -363,6 +366,7 @@ class Maker {
   double extent_m_ = 0.0;
   std::vector<Vec3> points_;
   std::vector<Sample> samples_;
+  double deflection_ = 0.0;  // in thicknesses
   double error_sum_ = 0.0;
   int error_count_ = 0;
   mutable std::int32_t shapes_triangle_ = -1;

@@ -22,6 +22,7 @@ namespace {
 
 constexpr double kReferencePa = 20e-6;
 constexpr double kRangeDb = 90.0;
+constexpr int kWindowsOfSound = 10, kShortestWindow = 32;
 
 struct Color {
   double r, g, b;
@@ -227,14 +228,17 @@ ShortTimeSpectrum calc_short_time_spectrum(const SoundStore& sound, std::size_t 
   const std::size_t channels = sound.get_channels();
   const int rate_hz = sound.get_rate_hz();
   ShortTimeSpectrum spectrum;
-  // About 23 Hz to a bin: the modes of a bowl stand apart and impacts stay sharp.
-  spectrum.window = 256;
-  while (spectrum.window < 16384 && spectrum.window * 23.5 < rate_hz) spectrum.window *= 2;
+  // About 23 Hz to a bin: the modes of a bowl stand apart and impacts stay sharp. A short sound has a shorter window, so that its onset
+  // shows, and zeros behind it, so that its lines are drawn where they are.
+  int length = 256;
+  while (length < 16384 && length * 23.5 < rate_hz) length *= 2;
+  spectrum.window = length;
+  while (spectrum.window > kShortestWindow && spectrum.window * kWindowsOfSound > samples) spectrum.window /= 2;
   const int window = spectrum.window;
-  spectrum.bin_hz = static_cast<double>(rate_hz) / window;
+  spectrum.bin_hz = static_cast<double>(rate_hz) / length;
   spectrum.duration_s = static_cast<double>(std::max<std::int64_t>(samples, 1)) / rate_hz;
   spectrum.frames = frames;
-  spectrum.bins = static_cast<std::size_t>(window) / 2 + 1;
+  spectrum.bins = static_cast<std::size_t>(length) / 2 + 1;
   spectrum.level_db.assign(frames * spectrum.bins, kFloorDb);
 
   std::vector<double> hann(static_cast<std::size_t>(window));
@@ -243,7 +247,7 @@ ShortTimeSpectrum calc_short_time_spectrum(const SoundStore& sound, std::size_t 
   const double hop = static_cast<double>(samples) / static_cast<double>(frames);
   const int parts = std::max(1, static_cast<int>(std::ceil(hop / (0.5 * window))));
   Eigen::FFT<double> fft;
-  std::vector<double> piece(static_cast<std::size_t>(window));
+  std::vector<double> piece(static_cast<std::size_t>(length), 0.0);
   std::vector<float> heard;  // of one window, all channels
   std::vector<std::complex<double>> transform;
   std::vector<double> power(spectrum.bins);

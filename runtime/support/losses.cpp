@@ -16,6 +16,7 @@
 #include <iterator>
 #include <numbers>
 
+#include "runtime/bank/heard.hpp"
 #include "runtime/bank/nearest.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/json.hpp"
@@ -212,7 +213,7 @@ void add_holder(const bank::Bank& bank, const Holder& holder, Sums& sums) {
 }
 
 std::string format_t60(double decay_per_s) {
-  return decay_per_s > 0.0 ? fmt::format("{:.3g} s", std::log(1000.0) / decay_per_s) : std::string("for ever");
+  return decay_per_s > 0.0 ? fmt::format("{:.3g} s", bank::calc_t60_s(decay_per_s)) : std::string("for ever");
 }
 
 }  // namespace

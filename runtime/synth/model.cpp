@@ -20,6 +20,7 @@
 #include "runtime/base/error.hpp"
 #include "runtime/base/large.hpp"
 #include "runtime/radiation/transfers.hpp"
+#include "runtime/synth/bending.hpp"
 #include "runtime/synth/effects.hpp"
 #include "runtime/synth/nonlinear_modes.hpp"
 #include "runtime/synth/oscillator.hpp"
@@ -122,6 +123,7 @@ std::shared_ptr<const Model> Model::make(const bank::Bank& bank, const ModelOpti
   else
     model->copy_shapes(bank);
   model->find_bounds();
+  model->find_bending(find_judged_thickness_m(bank));
   if (kCompiledEffects.has(Effect::kDirectivity) && (options.transfers != nullptr || !bank.multipoles.is_empty()))
     model->add_directivity(options.transfers != nullptr ? options.transfers : std::make_shared<const radiation::Transfers>(bank));
   if (kCompiledEffects.has(Effect::kNonlinear)) model->add_nonlinear(bank.quartic);
@@ -311,6 +313,66 @@ void Model::find_bounds() {
   }
 }
 
+void Model::find_bending(double thickness_m) {
+  constexpr std::size_t kLowest = 32, kSpread = 96;  // modes, vertices
+  constexpr double kShortestS = 0.08;
+  bending_ = {};
+  const std::size_t columns = surface_->columns;
+  if (!(thickness_m > 0.0) || columns == 0 || modes_.empty()) return;
+  bending_.thickness_m = thickness_m;
+  bending_.step_m.assign(columns, 0.0F);
+  bending_.largest.assign(columns, 0.0F);
+  const std::size_t lanes = sound_.size() * kGroup;
+  bending_.back_re.assign(ModelBending::kBack * lanes, 0.0F);
+  bending_.back_im.assign(ModelBending::kBack * lanes, 0.0F);
+  const std::size_t vertices = surface_->shape.size() / (3 * columns);
+  const auto calc_square = [&](std::size_t vertex, std::size_t column) {
+    double square = 0.0;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double x = get_row(static_cast<std::int32_t>(vertex), axis)[column];
+      square += x * x;
+    }
+    return square;
+  };
+  const auto set = [&](std::size_t column, double step_m, double largest) {
+    bending_.step_m[column] = static_cast<float>(step_m);
+    bending_.largest[column] = static_cast<float>(std::sqrt(largest) * (1.0 + 1e-6));
+  };
+  std::vector<std::size_t> order;
+  for (std::size_t m = 0; m < static_cast<std::size_t>(ringing_); ++m) {
+    const double omega = std::sqrt(modes_[m].lambda), omega_d = std::sqrt((omega - modes_[m].decay) * (omega + modes_[m].decay));
+    set(m, modes_[m].scale / omega_d, static_cast<double>(surface_->largest[m]));
+    for (std::size_t k = 0; k < ModelBending::kBack; ++k) {
+      const double back_s = ModelBending::kBackSamples * static_cast<double>(k + 1) / rate_hz_;
+      const std::complex<double> turn = std::exp(modes_[m].decay * back_s) * std::polar(1.0, -omega_d * back_s);
+      bending_.back_re[k * lanes + m] = static_cast<float>(turn.real());
+      bending_.back_im[k * lanes + m] = static_cast<float>(turn.imag());
+    }
+    order.push_back(m);
+  }
+  for (std::size_t m = 0; m < damped_.size(); ++m) {
+    double largest = 0.0;
+    for (std::size_t v = 0; v < vertices; ++v) largest = std::max(largest, calc_square(v, get_damped_column(m)));
+    set(get_damped_column(m), damped_[m].scale, largest);
+  }
+  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return modes_[a].lambda < modes_[b].lambda; });
+  double longest_s = kShortestS;
+  if (!order.empty()) longest_s = std::max(longest_s, std::numbers::pi / std::sqrt(modes_[order.front()].lambda));
+  bending_.watched = static_cast<int>(std::min(longest_s * rate_hz_ / kSubBlock + 1.0, 1e9));
+  order.resize(std::min(order.size(), kLowest));
+  std::vector<char> taken(vertices, 0);
+  for (std::size_t v = 0; v < vertices; v += std::max<std::size_t>(1, vertices / kSpread)) taken[v] = 1;
+  for (const std::size_t m : order) {
+    std::size_t most = 0;
+    double largest = -1.0;
+    for (std::size_t v = 0; v < vertices; ++v)
+      if (const double square = calc_square(v, m); square > largest) largest = square, most = v;
+    taken[most] = 1;
+  }
+  for (std::size_t v = 0; v < vertices; ++v)
+    if (taken[v] != 0) bending_.vertex.push_back(static_cast<std::int32_t>(v));
+}
+
 void Model::add_directivity(std::shared_ptr<const radiation::Transfers> transfers) {
   // A mode of order L is nowhere louder than L + 1 times its rms over directions (addition theorem); of the many orders that bodies have
   // none that was looked at comes to four times.
@@ -426,7 +488,7 @@ class TableReader {
 };
 
 // Of a build: another one that lays its tables out in another way has other sizes, or another number here.
-constexpr std::uint64_t kTablesMark = 0x63617272'00000002 + (sizeof(SoundTable) << 8) + (sizeof(StrikeTable) << 16);
+constexpr std::uint64_t kTablesMark = 0x63617272'00000003 + (sizeof(SoundTable) << 8) + (sizeof(StrikeTable) << 16);
 
 }  // namespace
 
@@ -436,6 +498,7 @@ std::vector<std::byte> Model::write_tables() const {
   writer.put(rate_hz_);
   writer.put(mass_kg_);
   writer.put(sphere_radius_m_);
+  writer.put(bending_.thickness_m);
   writer.put(plane_strain_modulus_pa_);
   writer.put(wave_impedance_pa_s_m_);
   writer.put(static_cast<std::int64_t>(ringing_));
@@ -459,6 +522,8 @@ std::shared_ptr<const Model> Model::read_tables(std::span<const std::byte> bytes
   reader.take(model->rate_hz_);
   reader.take(model->mass_kg_);
   reader.take(model->sphere_radius_m_);
+  double thickness_m = 0.0;
+  reader.take(thickness_m);
   reader.take(model->plane_strain_modulus_pa_);
   reader.take(model->wave_impedance_pa_s_m_);
   reader.take(ringing);
@@ -481,6 +546,7 @@ std::shared_ptr<const Model> Model::read_tables(std::span<const std::byte> bytes
       if (vertex < 0 || (surface->columns > 0 && static_cast<std::size_t>(vertex) >= vertices)) TableReader::refuse();
   model->ringing_ = static_cast<int>(ringing);
   model->surface_ = std::move(surface);
+  model->find_bending(thickness_m);
   return model;
 }
 
@@ -513,7 +579,8 @@ std::size_t Model::calc_bytes() const {
   return sound_.size() * (sizeof(SoundTable) + sizeof(RotationTable) + sizeof(StrikeTable) + sizeof(weight_[0]) + sizeof(reach_[0])) +
          damped_.size() * sizeof(DampedMode) + modes_.size() * sizeof(Mode) + surface_->triangles.size() * sizeof(surface_->triangles[0]) +
          surface_->shape.size() * sizeof(surface_->shape[0]) + surface_->largest.size() * sizeof(surface_->largest[0]) +
-         (nonlinear_ ? calc_nonlinear_bytes(*nonlinear_) : 0) +
+         (bending_.step_m.size() + bending_.largest.size() + 2 * bending_.back_re.size()) * sizeof(float) +
+         bending_.vertex.size() * sizeof(std::int32_t) + (nonlinear_ ? calc_nonlinear_bytes(*nonlinear_) : 0) +
          (directivity_
               ? directivity_->sound.size() * (sizeof(SoundTable) + sizeof(weight_[0]) + sizeof(reach_[0])) +
                     (directivity_->tilt.size() + directivity_->level.size()) * sizeof(float) + directivity_->transfers->calc_bytes()

@@ -54,6 +54,17 @@ struct ModelDirectivity {
   Vec3 offset_m{};  // from the centre of mass to that of the multipoles, axes of the mesh
 };
 
+/// What a BendingWatch has of a model. Columns are those of a row of shapes.
+struct ModelBending {
+  static constexpr int kBack = 7, kBackSamples = 4;  // times before the end of a sub-block, and how far apart
+  double thickness_m = 0.0;             // find_judged_thickness_m(); 0: deflections are not judged, and all that follows is empty
+  std::vector<float> step_m;            // (columns) displacement of one step of the shape, for the imaginary part 1 of a state, or q = 1
+  std::vector<float> largest;           // (columns) steps where the mode moves most
+  std::vector<float> back_re, back_im;  // (kBack, ringing columns) the turn of a state back to these times
+  std::vector<std::int32_t> vertex;     // where deflections are summed
+  int watched = 0;                      // sub-blocks after the last in which something acted: half a period of the lowest mode and more
+};
+
 struct ModelNonlinear;  // nonlinear_modes.hpp
 
 /// Immutable; any number of voices on any threads may share one.
@@ -98,6 +109,7 @@ class Model {
   const ModelNonlinear* get_nonlinear() const { return nonlinear_.get(); }
   /// Whether Effect::kCascade has what it needs: a nonlinear energy with a thickness, a mass, and ringing modes above the coupled ones.
   bool has_cascade() const;
+  const ModelBending& get_bending() const { return bending_; }
   /// Centre of mass in the frame of the mesh.
   const Vec3& get_centre_m() const { return centre_m_; }
   /// Memory of the tables, which all voices share, with the transfers, which models of one bank may.
@@ -138,6 +150,7 @@ class Model {
   }
 
  private:
+  friend class BendingWatch;
   friend class ContactForces;
   friend class Directivity;
   friend class Voice;
@@ -151,6 +164,7 @@ class Model {
   bool has_modes_of(const Model& other) const;
   void copy_shapes(const bank::Bank& bank);
   void find_bounds();
+  void find_bending(double thickness_m);
   void add_directivity(std::shared_ptr<const radiation::Transfers> transfers);
   void add_nonlinear(const bank::QuarticEnergy& energy);
   const std::int16_t* get_row(std::int32_t vertex, int axis) const {
@@ -168,7 +182,8 @@ class Model {
   std::vector<StrikeTable> strike_;
   std::vector<std::array<float, kGroup>> weight_;  // bound on the pressure of a mode is weight times the size of its state
   std::vector<float> reach_;                       // Pa at 1 m per N s: what a strike can make of a group, or of a later one
-  std::vector<DampedMode> damped_;                 // ascending in substeps; those that follow come first
+  ModelBending bending_;
+  std::vector<DampedMode> damped_;  // ascending in substeps; those that follow come first
   std::shared_ptr<const ModelSurface> surface_;
   std::shared_ptr<const ModelDirectivity> directivity_;
   std::shared_ptr<const ModelNonlinear> nonlinear_;

@@ -394,8 +394,12 @@ Effect SoundingBody::make_modal_sound(std::span<float> mono) noexcept {
     voice_->process(mono);
     const VoiceCounters after = voice_->get_counters();
     work_.resets += after.resets - before.resets;
+    work_.deflection = std::max(work_.deflection, after.deflection);
     work_.energy_rise = std::max(work_.energy_rise, after.energy_rise);
-    work_.radiated_j += after.radiated_j - before.radiated_j;
+    work_.energy.given_j += after.energy.given_j - before.energy.given_j;
+    work_.energy.lost_j += after.energy.lost_j - before.energy.lost_j;
+    work_.energy.radiated_j += after.energy.radiated_j - before.energy.radiated_j;
+    work_.energy.held_j = after.energy.held_j;
     work_.units[Effect::kModal] += after.mode_samples - before.mode_samples;
     work_.units[Effect::kNonlinear] += after.coupled_samples - before.coupled_samples;
     work_.units[Effect::kCascade] += after.cascade_samples - before.cascade_samples;

@@ -78,7 +78,8 @@ struct BodyWork {
   PerEffect<std::int64_t> ticks{};
   std::int64_t strikes = 0, refused = 0, late = 0, resets = 0;
   float peak_pa = 0.0F;
-  double energy_rise = 0.0, radiated_j = 0.0;  // VoiceCounters
+  double deflection = 0.0, energy_rise = 0.0;  // VoiceCounters
+  ModeEnergy energy;
 };
 
 using TickFunction = std::uint64_t (*)() noexcept;

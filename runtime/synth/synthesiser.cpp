@@ -161,8 +161,10 @@ int Synthesiser::add_body(std::shared_ptr<const Model> model, const BodySettings
     published.ticks[effect].store(0, std::memory_order_relaxed);
   }
   published.peak_pa.store(0.0F, std::memory_order_relaxed);
+  published.deflection.store(0.0, std::memory_order_relaxed);
   published.energy_rise.store(0.0, std::memory_order_relaxed);
-  published.radiated_j.store(0.0, std::memory_order_relaxed);
+  for (auto* energy : {&published.given_j, &published.lost_j, &published.held_j, &published.radiated_j})
+    energy->store(0.0, std::memory_order_relaxed);
   Owned& owned = owned_[free];
   owned = Owned{.body = std::move(body),
                 .change = std::move(change),
@@ -564,8 +566,12 @@ void Synthesiser::publish(int number) noexcept {
     if (options_.ticks != nullptr) published.ticks[effect].store(work.ticks[effect], std::memory_order_relaxed);
   }
   published.peak_pa.store(work.peak_pa, std::memory_order_relaxed);
+  published.deflection.store(work.deflection, std::memory_order_relaxed);
   published.energy_rise.store(work.energy_rise, std::memory_order_relaxed);
-  published.radiated_j.store(work.radiated_j, std::memory_order_relaxed);
+  published.given_j.store(work.energy.given_j, std::memory_order_relaxed);
+  published.lost_j.store(work.energy.lost_j, std::memory_order_relaxed);
+  published.held_j.store(work.energy.held_j, std::memory_order_relaxed);
+  published.radiated_j.store(work.energy.radiated_j, std::memory_order_relaxed);
 }
 
 EffectCounters Synthesiser::get_effect_counters(int body) const noexcept {
@@ -593,14 +599,21 @@ bool Synthesiser::measure_amplitudes(int body, std::span<float> by_bank_mode) co
   return true;
 }
 
+double Synthesiser::get_deflection(int body) const noexcept {
+  if (body < 0 || body >= options_.max_bodies) return 0.0;
+  return published_bodies_[static_cast<std::size_t>(body)].deflection.load(std::memory_order_relaxed);
+}
+
 double Synthesiser::get_energy_rise(int body) const noexcept {
   if (body < 0 || body >= options_.max_bodies) return 0.0;
   return published_bodies_[static_cast<std::size_t>(body)].energy_rise.load(std::memory_order_relaxed);
 }
 
-double Synthesiser::get_radiated_j(int body) const noexcept {
-  if (body < 0 || body >= options_.max_bodies) return 0.0;
-  return published_bodies_[static_cast<std::size_t>(body)].radiated_j.load(std::memory_order_relaxed);
+ModeEnergy Synthesiser::get_mode_energy(int body) const noexcept {
+  if (body < 0 || body >= options_.max_bodies) return {};
+  const Published& of = published_bodies_[static_cast<std::size_t>(body)];
+  const auto get = [](const std::atomic<double>& x) { return x.load(std::memory_order_relaxed); };
+  return {get(of.given_j), get(of.lost_j), get(of.held_j), get(of.radiated_j)};
 }
 
 void Synthesiser::publish_counters() noexcept {

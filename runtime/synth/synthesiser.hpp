@@ -70,7 +70,7 @@ struct BodySettings {
   int max_waypoints = 0;
   int max_forces = -1;  // as there; -1: what it says there
   Isa isa = Isa::kBest;
-  bool audits_energy = false;  // get_energy_rise(), get_radiated_j()
+  bool audits_energy = false;  // get_energy_rise(), get_mode_energy()
 };
 
 /// What the effects of one body have done since it was added, and what they hold. An effect that is off keeps its units and holds nothing.
@@ -185,14 +185,18 @@ class Synthesiser {
   EffectCounters get_effect_counters(int body) const noexcept;
   /// The loudest that its modes have been so far [Pa at 1 m]. [any-thread]
   double get_peak_pa(int body) const noexcept;
+  /// How far its modes have bent it at most so far, in thicknesses (find_judged_thickness_m()). 0 while that is not above
+  /// kLinearThicknesses, up to which linear modes hold, and of bodies whose deflection is not judged. [any-thread]
+  double get_deflection(int body) const noexcept;
   /// How far each mode of a body swings at this moment: the amplitude of its coordinate q [m kg^1/2], by number in the bank. Modes that do
   /// not ring, and those that the model has not, are 0. False for a number that is no body's. [audio-thread], between calls of process().
   bool measure_amplitudes(int body, std::span<float> by_bank_mode) const noexcept;
   /// Of a body that audits_energy: the largest share by which the energy of its modes rose over a block in which nothing acted on it.
   /// [any-thread]
   double get_energy_rise(int body) const noexcept;
-  /// Of a body that audits_energy: what its modes have radiated, VoiceCounters::radiated_j. [any-thread]
-  double get_radiated_j(int body) const noexcept;
+  /// Of a body that audits_energy: what its modes have been given, hold and have lost. [any-thread], the four not of one moment where
+  /// another thread is in process().
+  ModeEnergy get_mode_energy(int body) const noexcept;
 
  private:
   /// What the main thread asks of the audio thread, and what comes back: a body that goes, or a change that is over.
@@ -215,7 +219,7 @@ class Synthesiser {
   struct Published {
     PerEffect<std::atomic<std::int64_t>> units{}, ticks{}, bytes{};
     std::atomic<float> peak_pa{0.0F};
-    std::atomic<double> energy_rise{0.0}, radiated_j{0.0};
+    std::atomic<double> deflection{0.0}, energy_rise{0.0}, given_j{0.0}, lost_j{0.0}, held_j{0.0}, radiated_j{0.0};
   };
   template <typename T>
   class Pipe;

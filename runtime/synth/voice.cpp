@@ -12,7 +12,6 @@
 #include <numbers>
 #include <utility>
 
-#include "runtime/bank/air.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/synth/fp_guard.hpp"
 
@@ -23,6 +22,8 @@ namespace {
 constexpr bool kHasContacts = kCompiledEffects.has_any(kContactEffects);
 constexpr std::int64_t kCullEvery = 8;  // blocks
 
+constexpr int kColumnsEach = kColumns / kSubBlocks;  // of a sub-block
+
 bool acts_in_sub_block(const QueuedPulse& pulse, std::int64_t sample) noexcept {
   const double begin = pulse.begin - static_cast<double>(sample - 1);
   return begin <= kSubBlock && begin + pulse.length > 0.0;
@@ -30,18 +31,14 @@ bool acts_in_sub_block(const QueuedPulse& pulse, std::int64_t sample) noexcept {
 
 }  // namespace
 
-double calc_radiated_share(double gain, double decay_per_s) noexcept {
-  const double radiation_per_s = bank::calc_radiation_decay(gain);
-  return radiation_per_s < decay_per_s ? radiation_per_s / decay_per_s : 1.0;
-}
-
 Voice::Voice(std::shared_ptr<const Model> model, VoiceOptions options)
     : model_(std::move(model)),
       kernels_(&get_kernels(options.isa)),
       silence_pa_(options.silence_pa),
       audits_(options.audits_energy),
       strikes_(*model_, options.max_strikes, options.max_forces),
-      damped_(*model_) {
+      damped_(*model_),
+      bending_(*model_) {
   if (!(silence_pa_ > 0.0) || !std::isfinite(silence_pa_)) throw InputError("the pressure of silence must be a positive number of Pa");
   groups_ = static_cast<int>(model_->sound_.size());
   limit_ = cut_ = driven_ = groups_;
@@ -55,12 +52,7 @@ Voice::Voice(std::shared_ptr<const Model> model, VoiceOptions options)
       throw InputError("a cascade needs a bank with a nonlinear energy, a mass, a thickness, and modes above the coupled ones");
     nonlinear_ = std::make_unique<NonlinearModes>(*model_, options.has_cascade);
   }
-  if (!audits_) return;
-  radiation_.resize(static_cast<std::size_t>(model_->ringing_));
-  for (std::size_t m = 0; m < radiation_.size(); ++m) {
-    const Model::Mode& mode = model_->modes_[m];
-    radiation_[m].part = calc_radiated_share(mode.gain, mode.decay) * -std::expm1(-2.0 * mode.decay * kBlock / model_->rate_hz_);
-  }
+  if (audits_) book_ = std::make_unique<EnergyBook>(*model_);
 }
 
 void Voice::process(std::span<float> pressure_pa) noexcept {
@@ -113,7 +105,10 @@ void Voice::begin_block() noexcept {
 void Voice::render_sub_blocks(std::int64_t start, int sub_blocks, bool struck_at_all, bool touched) noexcept {
   const auto first = static_cast<int>(start % kBlock / kSubBlock);
   const bool directed = is_directed();
-  const bool whole = sub_blocks == kSubBlocks && !struck_at_all && !touched && !directed;  // the starts are kept for the ears
+  const bool judged = model_->bending_.thickness_m > 0.0;
+  const bool watched = judged && bending_.is_watching();
+  // The starts are kept for the ears, and where the bending is watched.
+  const bool whole = sub_blocks == kSubBlocks && !struck_at_all && !touched && !directed && !watched;
   if (live_ > 0 && whole) {
     kernels_->ring(model_->sound_.data(), model_->turn_.data(), state_.data(), live_, block_.data());
   } else if (live_ > 0 && first == 0) {
@@ -124,6 +119,9 @@ void Voice::render_sub_blocks(std::int64_t start, int sub_blocks, bool struck_at
     const std::int64_t sample = start + q * kSubBlock;
     const bool struck = struck_at_all && strikes_.acts(sample, kSubBlock);
     const ContactBlock* drive = touched ? contacts_->begin_sub_block(sample) : nullptr;
+    const bool audited = audits_ && (struck || drive != nullptr);
+    if (audited) note_energy(sample, (first + q) * kColumnsEach);
+    keeps_for_book_ = audited;
     if (drive != nullptr && drive->forces) wake(std::min(find_reach(drive->strength_n_s), driven_));
     if (q == made) {
       do ++made;
@@ -135,6 +133,9 @@ void Voice::render_sub_blocks(std::int64_t start, int sub_blocks, bool struck_at
       }
     }
     add_acting(sample, first + q, drive, struck, out);
+    if (const bool acted = struck || (drive != nullptr && drive->forces); judged && (acted || bending_.is_watching()))
+      bending_.look(state_.data(), starts_.data(), (first + q + 1) * kColumnsEach, live_, damped_.get_states(), acted);
+    if (audited) note_energy_acted(sample + kSubBlock, (first + q + 1) * kColumnsEach, drive != nullptr && drive->damps);
     if (directed) add_directed(first + q, q * kSubBlock);
     int bad = 0;
     for (int n = 0; n < kSubBlock; ++n) bad |= static_cast<int>(!(std::abs(out[n]) <= std::numeric_limits<float>::max()));
@@ -147,10 +148,11 @@ void Voice::render_sub_blocks(std::int64_t start, int sub_blocks, bool struck_at
   }
 }
 
-/// Where the states of what acts in this sub-block are kept for the ears: of all live groups, those not yet used zero; nullptr: nowhere.
+/// Where the states of what acts in this sub-block are kept for the ears and the book of energy: of all live groups, those not yet used
+/// zero; nullptr: nowhere.
 SampleStates* Voice::find_kept() noexcept {
-  if (!is_directed()) return nullptr;
-  SampleStates* kept = directed_[0]->get_kept().data();
+  if (!is_directed() && !keeps_for_book_) return nullptr;
+  SampleStates* kept = is_directed() ? directed_[0]->get_kept().data() : book_->get_kept();
   for (; kept_ < live_; ++kept_) kept[kept_] = SampleStates{};
   return kept;
 }
@@ -363,13 +365,35 @@ void Voice::audit() noexcept {
   const double before = std::exchange(energy_j_, calc_energy_j());
   if (undisturbed_ && before > kSmallest) counters_.energy_rise = std::max(counters_.energy_rise, energy_j_ / before - 1.0);
   undisturbed_ = true;
-  if (before == 0.0 && energy_j_ == 0.0) return;
-  for (std::size_t m = 0; m < radiation_.size(); ++m) {
-    Radiation& mode = radiation_[m];
-    const DampedState state = get_mode_state(static_cast<int>(m));  // among the coupled ones, too
-    const double energy_j = 0.5 * (state.v * state.v + model_->modes_[m].lambda * state.q * state.q);
-    counters_.radiated_j += mode.part * std::exchange(mode.energy_j, energy_j);
-  }
+  if (before != 0.0 || energy_j_ != 0.0) note_energy(horizon_, kColumns);
+}
+
+/// At the start of a column of this block; of the next for kColumns.
+DampedState Voice::get_state_at(int m, int column) const noexcept {
+  if (column == kColumns || m >= model_->ringing_ || (is_nonlinear() && nonlinear_->find_place(m) >= 0)) return get_mode_state(m);
+  const auto group = static_cast<std::size_t>(m / kGroup);
+  if (m / kGroup >= live_) return {};
+  const auto& mode = model_->modes_[static_cast<std::size_t>(m)];
+  const double omega = std::sqrt(mode.lambda), omega_d = std::sqrt((omega - mode.decay) * (omega + mode.decay));
+  const double q = static_cast<double>(starts_[group].im[column][m % kGroup]) / omega_d;
+  return {q, static_cast<double>(starts_[group].re[column][m % kGroup]) - mode.decay * q};
+}
+
+void Voice::note_energy(std::int64_t sample, int column) noexcept {
+  book_->note(
+      sample, [&](int m) { return get_state_at(m, column); }, [&](int m) { return is_nonlinear() && nonlinear_->find_place(m) >= 0; },
+      is_nonlinear() ? nonlinear_->calc_energy_j() : 0.0);
+  counters_.energy = book_->get();
+}
+
+/// After a sub-block in which something acted. `damps`: what is kept is all the motion of the modes.
+void Voice::note_energy_acted(std::int64_t sample, int column, bool damps) noexcept {
+  book_->note_acted(
+      sample, find_kept(), live_, damps, [&](int m) { return get_state_at(m, column); },
+      [&](int m) { return is_nonlinear() && nonlinear_->find_place(m) >= 0; }, is_nonlinear() ? nonlinear_->calc_energy_j() : 0.0);
+  counters_.energy = book_->get();
+  keeps_for_book_ = false;
+  if (!is_directed()) kept_ = 0;
 }
 
 void Voice::reset() noexcept {
@@ -384,13 +408,14 @@ void Voice::reset() noexcept {
 
 std::size_t Voice::calc_bytes() const {
   return sizeof(Voice) + strikes_.calc_bytes() + damped_.calc_bytes() + state_.capacity() * sizeof(ModeState) +
-         starts_.capacity() * sizeof(ColumnStates) + bounds_.capacity() * sizeof(float) + radiation_.capacity() * sizeof(Radiation) +
-         calc_nonlinear_bytes();
+         starts_.capacity() * sizeof(ColumnStates) + bounds_.capacity() * sizeof(float) + (book_ ? book_->calc_bytes() : 0) +
+         bending_.calc_bytes() + calc_nonlinear_bytes();
 }
 
 VoiceCounters Voice::get_counters() const noexcept {
   VoiceCounters counters = counters_;
   static_cast<StrikeCounters&>(counters) = strikes_.get_counters();
+  counters.deflection = bending_.get_largest();
   return counters;
 }
 

@@ -14,9 +14,11 @@
 #include <vector>
 
 #include "runtime/events/events.hpp"
+#include "runtime/synth/bending.hpp"
 #include "runtime/synth/contact_forces.hpp"
 #include "runtime/synth/damped_modes.hpp"
 #include "runtime/synth/directivity.hpp"
+#include "runtime/synth/energy_book.hpp"
 #include "runtime/synth/kernels.hpp"
 #include "runtime/synth/model.hpp"
 #include "runtime/synth/nonlinear_modes.hpp"
@@ -31,7 +33,7 @@ struct VoiceOptions {
   Isa isa = Isa::kBest;
   bool is_nonlinear = false;   // coupled modes of the model move as Effect::kNonlinear has it
   bool has_cascade = false;    // and those above them as Effect::kCascade has it; only with is_nonlinear
-  bool audits_energy = false;  // VoiceCounters::energy_rise and radiated_j
+  bool audits_energy = false;  // VoiceCounters::energy_rise and energy
 };
 
 struct VoiceCounters : StrikeCounters {
@@ -40,12 +42,9 @@ struct VoiceCounters : StrikeCounters {
   std::int64_t coupled_samples = 0;  // coupled modes x samples while they moved
   std::int64_t cascade_samples = 0;  // modes above them x samples, likewise
   double energy_rise = 0.0;          // the largest share by which the energy rose over a block in which nothing acted; 0 unless asked for
-  double radiated_j = 0.0;           // share of what damping took from what rang at the start of each block; 0 unless asked for
+  double deflection = 0.0;           // the largest, in thicknesses; 0 while it has not been above kLinearThicknesses
+  ModeEnergy energy;                 // zeros unless asked for
 };
-
-/// The share of a mode's damping that is sound: d_r = bank::calc_radiation_decay(gain) of the bank's decay d, which counts as all there
-/// is; 1 where d_r is more, as gains that radiation::limit_gains() has not limited may have it.
-double calc_radiated_share(double gain, double decay_per_s) noexcept;
 
 /// What a voice of one model needs to take the place of a voice of another.
 class VoiceHandover {
@@ -154,12 +153,6 @@ class Voice {
   double calc_energy_j() const noexcept;
 
  private:
-  /// What a mode radiates, where the energy is audited.
-  struct Radiation {
-    double part = 0.0;      // of the energy at the start of a block: what is radiated in it
-    double energy_j = 0.0;  // at the start of the block
-  };
-
   void render(int sub_blocks) noexcept;
   void begin_block() noexcept;
   void render_sub_blocks(std::int64_t start, int sub_blocks, bool struck_at_all, bool touched) noexcept;
@@ -176,6 +169,9 @@ class Voice {
   void fade_out(int groups) noexcept;
   void reset() noexcept;
   void audit() noexcept;
+  void note_energy(std::int64_t sample, int column) noexcept;
+  void note_energy_acted(std::int64_t sample, int column, bool damps) noexcept;
+  DampedState get_state_at(int mode, int column) const noexcept;
   double calc_ringing_energy_j(int mode) const noexcept;
   DampedState get_mode_state(int mode) const noexcept;
   void set_mode_state(int mode, const DampedState& state) noexcept;
@@ -213,15 +209,16 @@ class Voice {
   int held_ = 0;              // of them not yet handed out: the last of block_
   int rendered_ = 0;          // samples in block_
   bool silent_ = true;        // block_ is all zero
-  bool audits_ = false, undisturbed_ = false;
+  bool audits_ = false, undisturbed_ = false, keeps_for_book_ = false;
   double energy_j_ = 0.0;             // at the start of the block, where it is audited
-  std::vector<Radiation> radiation_;  // of the ringing modes, where it is audited
+  std::unique_ptr<EnergyBook> book_;  // where it is audited
   ContactForces* contacts_ = nullptr;
   std::array<Directivity*, 2> directed_{};  // the first is there when one is
   int kept_ = 0;                            // groups whose states are kept in this sub-block
   VoiceCounters counters_;                  // without those of strikes_
   StrikeQueue strikes_;
   DampedModes damped_;
+  BendingWatch bending_;
   std::unique_ptr<NonlinearModes> nonlinear_;  // or none
   std::vector<ModeState> state_;               // zero beyond live_
   std::vector<ColumnStates> starts_;           // out of date beyond live_, and once a whole block was rendered

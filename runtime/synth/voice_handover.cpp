@@ -92,11 +92,19 @@ void Voice::take_over(Voice& other, VoiceHandover& handover) noexcept {
   horizon_ = other.horizon_;
   held_ = rendered_ = 0;
   counters_ = other.counters_;
+  bending_.take_over(other.bending_);
+  const auto begin_book = [&] {
+    if (!book_) return;
+    book_->begin(
+        horizon_, counters_.energy, [&](int m) { return get_mode_state(m); },
+        [&](int m) { return is_nonlinear() && nonlinear_->find_place(m) >= 0; }, is_nonlinear() ? nonlinear_->calc_energy_j() : 0.0);
+    counters_.energy = book_->get();
+  };
   floor_pa_ = other.floor_pa_;
   strikes_.take_over(other.strikes_);
   fade_.fill(0.0F);
   inherits_ = other.is_awake();
-  if (!inherits_) return;
+  if (!inherits_) return begin_book();
   for (std::size_t m = 0; m < handover.from_mode_.size(); ++m) {
     const int from = handover.from_mode_[m];
     if (from < 0) continue;
@@ -106,6 +114,7 @@ void Voice::take_over(Voice& other, VoiceHandover& handover) noexcept {
     const double q = old.q * std::sqrt(other.model_->modes_[static_cast<std::size_t>(from)].lambda) / omega;
     set_mode_state(static_cast<int>(m), {q, old.v});
   }
+  begin_book();
   // Modes that are coupled ring out as those in groups do, in both voices: what one of them sounds beyond that is heard from the first
   // sample on. Their lanes are put back to rest.
   if (other.is_nonlinear())

@@ -319,10 +319,11 @@ export class CarillonAudio extends EventTarget {
     Object.assign(this, { context, gain_per_pa, ground, bodies: new Set(), touches: 0, playbacks: 0, ids: 0, offset_s: 0 });
     this.listener = { position_m: [0, -1.5, 0.5], rotation: kNotTurned, ...listener };
     if (!context.audioWorklet) throw new Error('the browser has no AudioWorklet for this page; open it by https or from localhost');
-    const find = (file) => new URL(file, import.meta.url);
-    const file = (simd === 'auto' ? hasSimd() : simd) ? 'carillon.wasm' : 'carillon-plain.wasm';
-    const remedy = file === 'carillon.wasm' ? "make the page's folder again" : 'this browser has no WebAssembly SIMD: build the target carillon_page_plain';
-    const [module] = await Promise.all([this.compile(find(file), remedy), context.audioWorklet.addModule(find('carillon-worklet.js'))]);
+    // Bundlers take along the files that they find as a literal of such a URL. The module without SIMD is rarely built, so no literal asks for it.
+    const [module] = await Promise.all([
+      this.compile(new URL('./carillon.wasm', import.meta.url), simd === 'auto' ? hasSimd() : simd),
+      context.audioWorklet.addModule(new URL('./carillon-worklet.js', import.meta.url)),
+    ]);
 
     const channels = microphones_m.length;
     this.node = new AudioWorkletNode(context, 'carillon', {
@@ -345,7 +346,7 @@ export class CarillonAudio extends EventTarget {
     });
     this.node.onprocessorerror = () => this.report('the audio worklet has failed; load the page again');
 
-    const thread = new Worker(find('carillon-worker.js'), { type: 'module' }), between = new MessageChannel();
+    const thread = new Worker(new URL('./carillon-worker.js', import.meta.url), { type: 'module' }), between = new MessageChannel();
     this.worker = new Line(thread, (data) => this.report(data.message ?? 'the workshop has failed; load the page again'));
     const failed = new Promise((_, reject) => {
       thread.onerror = (event) => reject(new Error(`the worker of the sound engine cannot be started: ${event.message ?? 'unknown'}`));
@@ -358,8 +359,10 @@ export class CarillonAudio extends EventTarget {
     if (connect) this.node.connect(context.destination);
   }
 
-  async compile(url, remedy) {
-    const answer = await fetch(url);
+  /** withSimd: the URL of the module with SIMD; that without lies next to it. */
+  async compile(withSimd, isSimd) {
+    const url = isSimd ? withSimd : new URL('carillon-plain.wasm', withSimd), answer = await fetch(url);
+    const remedy = isSimd ? "make the page's folder again" : 'this browser has no WebAssembly SIMD: build the target carillon_page_plain';
     if (!answer.ok) throw new Error(`${url.pathname} cannot be read (${answer.status}); ${remedy}`);
     return WebAssembly.compile(await answer.arrayBuffer());
   }

@@ -33,7 +33,6 @@ LIBRARIES = {
     "stb": ["stb_image.h"],
     "simbody": ["SimTKsimbody.h"],
     "sqlite": ["sqlite3.h"],
-    "httplib": ["httplib.h"],
     "pybind11": ["pybind11/"],
 }
 # folder: (folders of ours that it may include, libraries that it may include). std and POSIX are free everywhere.
@@ -52,7 +51,7 @@ LAW = {
     "runtime/sound": (["runtime/base"], ["fmt", "eigen", "cairo"]),
     "runtime/nonlinear": (["runtime/base", "runtime/bank"], ["fmt"]),
     "runtime/exchange": (
-        ["runtime/base", "runtime/gltf", "runtime/material", "runtime/version", "runtime/bank", "runtime/radiation"],
+        ["runtime/base", "runtime/gltf", "runtime/material", "runtime/version", "runtime/bank", "runtime/support", "runtime/radiation"],
         ["fmt", "cli", "eigen"],
     ),
     "runtime/synth": (["runtime/base", "runtime/bank", "runtime/events", "runtime/radiation", "runtime/head", "runtime/nonlinear"], []),
@@ -149,11 +148,11 @@ LAW = {
         ["runtime/base", "precompute/cost", "jobs/process", "jobs/outcome", "jobs/store", "jobs/registry", "jobs/attempt"],
         ["fmt"],
     ),
-    "jobs/report": (["runtime/base", "runtime/bank"], ["fmt", "json"]),
+    "jobs/report": (["runtime/base", "runtime/bank", "runtime/support"], ["fmt", "json"]),
     "jobs/cache": (["runtime/base", "precompute/job", "jobs/process", "jobs/store"], ["fmt"]),
     "jobs/explore": (
         ["runtime/base", "runtime/bank", "runtime/material", "runtime/version", "runtime/host", "jobs/process", "jobs/report"],
-        ["fmt", "json", "zlib", "httplib"],
+        ["fmt", "json", "zlib"],
     ),
     "jobs/hear": (
         ["runtime/base", "runtime/bank", "runtime/material", "precompute/job", "jobs/explore", "jobs/process", "jobs/report"],
@@ -238,9 +237,12 @@ LAW = {
         ],
         ["fmt", "petsc", "eigen"],
     ),
-    "precompute/emission": (["runtime/base", "runtime/bank", "runtime/recording", "precompute/comm"], ["fmt", "hdf5"]),
+    "precompute/emission": (["runtime/base", "runtime/bank", "runtime/recording", "precompute/job", "precompute/comm"], ["fmt", "hdf5"]),
     "precompute/bem": (["runtime/base", "runtime/bank", "precompute/comm"], ["fmt", "eigen"]),
-    "precompute/transient": (["runtime/base", "precompute/job", "partition", "precompute/mesh", "precompute/comm"], ["fmt", "mpi"]),
+    "precompute/transient": (
+        ["runtime/base", "precompute/job", "partition", "precompute/mesh", "precompute/comm"],
+        ["fmt", "mpi", "eigen"],
+    ),
     "precompute/io": (
         [
             "runtime/base",
@@ -313,7 +315,7 @@ INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 
 # The C library and POSIX: free everywhere. A header of C++ itself has neither a folder nor an ending.
 SYSTEM = re.compile(
-    r"^(sys/[a-z]+|unistd|fcntl|dirent|dlfcn|signal|pthread|poll|termios|errno|limits|"
+    r"^(sys/[a-z]+|unistd|fcntl|dirent|dlfcn|signal|pthread|poll|netinet/in|termios|errno|limits|"
     r"stddef|stdint|stdlib|stdio|string|math|time|sched|spawn|immintrin|xmmintrin|wasm_simd128|pwd|malloc)\.h$"
 )
 

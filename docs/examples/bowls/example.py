@@ -39,7 +39,7 @@ def play(stage):
     )
     stage.compare("base frequency of the oak bowl, which then follows, against OSG02 [Hz]", base["oak"], 216.7, 7.0 if stage.quick else 5.0)
     print()
-    tools.print_table(rows)
+    stage.show("bowls", rows)
     print("\n  erratum: with alpha2 = 50 1/s the oak bowl decays with 32.4 1/s; the printed 22.4 belongs to alpha2 = 30")
     # The same motion: what the aluminium bowl's fall did is played on the oak bowl.
     drop = tools.read_json(stage.folder / "drop.json")

@@ -32,7 +32,7 @@ def play(stage):
         stage.compare(f"{name} in the sound against three-dimensional elasticity [Hz]", hz, exact, 0.5 if stage.quick else 0.1)
         stage.compare(f"{name} in the sound against the real chime [Hz]", hz, measured, 2.0)
     print()
-    tools.print_table(rows)
+    stage.show("chimes", rows)
 
     # Table 1 has the D: base frequency 587.4 (of the adjusted length) and decay 0.6.
     base = measure.find_peak(tail, rate, CHIMES["D5"][3])

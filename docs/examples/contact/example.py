@@ -26,12 +26,13 @@ def play(stage):
 
     rate, samples, _ = stage.render("slide", tools.read_json(stage.folder / "slide.json"))
     slide = list_levels(samples, rate, 0.1)
-    tools.print_table(
+    stage.show(
+        "sliding",
         [("sliding [s]", "speed [m/s]", "level [dB]", "mean frequency [Hz]")]
         + [
             (f"{t:.1f}", f"{max(0.0, 1 - 1.68 * (t + 0.05)):.2f}", "silent" if level is None else f"{level:.1f}", f"{mean:.0f}")
             for t, level, mean in slide
-        ]
+        ],
     )
     levels = [level for _, level, _ in slide[:5]]
     # A tenth of a second of noise has its level to a dB or two.
@@ -50,8 +51,9 @@ def play(stage):
 
     rate, samples, _ = stage.render("roll", tools.read_json(stage.folder / "roll.json"))
     roll = list_levels(samples, rate, 0.1)
-    tools.print_table(
-        [("rolling [s]", "level [dB]", "mean frequency [Hz]")] + [(f"{t:.1f}", f"{level:.1f}", f"{mean:.0f}") for t, level, mean in roll]
+    stage.show(
+        "rolling",
+        [("rolling [s]", "level [dB]", "mean frequency [Hz]")] + [(f"{t:.1f}", f"{level:.1f}", f"{mean:.0f}") for t, level, mean in roll],
     )
     turn = min(range(1, len(roll)), key=lambda i: roll[i][1])  # it is set down in the first tenth
     stage.expect(f"the ball is quietest where it turns, at 0.84 s ({roll[turn][0]:.1f} s and on)", 0.65 < roll[turn][0] < 0.95)
@@ -66,9 +68,10 @@ def play(stage):
         rate, samples, _ = stage.render(f"lie-{name}", {**scene, "effects": effects}, picture=False)
         ring = samples[int(0.31 * rate) :]
         decays[name] = [measure.calc_decay(ring, rate, hz, 300.0, 30.0) for hz in struck_hz]
-    tools.print_table(
+    stage.show(
+        "decays",
         [("mode [Hz]", "free [1/s]", "touched [1/s]")]
-        + [(f"{hz:.0f}", f"{free:.2f}", f"{held:.2f}") for hz, free, held in zip(struck_hz, decays["free"], decays["touched"])]
+        + [(f"{hz:.0f}", f"{free:.2f}", f"{held:.2f}") for hz, free, held in zip(struck_hz, decays["free"], decays["touched"])],
     )
     for hz, free in zip(struck_hz, decays["free"]):
         stage.compare(f"decay at {hz:.0f} Hz without contact damping against the bank's law [1/s]", free, 2 * math.pi * hz * 0.004 / 2, 3.0)

@@ -4,7 +4,6 @@ import pathlib
 import sys
 
 import measure
-import stage as tools
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
 import outlines
@@ -95,7 +94,7 @@ def play(stage):
             stage.compare("T: base frequency in the sound against OSG02, whose size was chosen for it [Hz]", heard, PAPER_HZ, 1.0)
             stage.compare("T: decay in the sound against OSG02 [1/s]", decay, PAPER_DECAY, 8.0)
     print()
-    tools.print_table(rows)
+    stage.show("letters", rows)
     ratio = linear["frequencies_hz"][0] / base["T"]
     print(
         f"\n  the same mesh of the T with linear elements, as in the paper: {linear['frequencies_hz'][0]:.1f} Hz, {ratio:.2f} times as high"

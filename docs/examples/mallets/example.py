@@ -65,7 +65,7 @@ def play(stage):
             f"{head}: the head's energy is found again to 1e-5 (off by {sum(percent) - 100:+.1g} %)", abs(sum(percent) - 100) < 1e-3
         )
         stage.expect(f"{head}: the impulse is less than on a rigid wall", 0 < blow["impulse_n_s"] < 2 * 0.02 * 1.0)
-    tools.print_table(rows)
+    stage.show("heads", rows)
     order = sorted(blows, key=lambda head: blows[head]["contact_s"])
     stage.expect(
         f"from the shortest to the longest touch: {', '.join(order)}", order == ["steel", "wood", "hard felt", "rubber", "soft felt"]

@@ -131,4 +131,4 @@ def play(stage):
                 exact = 2.5011326104 * math.sqrt(7e10 * stiffness / 2.6 / density) / (2 * math.pi * size * job["body"]["radius_m"])
                 stage.compare(f"sphere, {name}: the sound against Lamb's closed form [Hz]", hz, exact, 0.5 if stage.quick else 0.05)
     print()
-    tools.print_table(rows)
+    stage.show("scaling", rows, rows[0][5:8])

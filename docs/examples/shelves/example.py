@@ -35,7 +35,7 @@ def play(stage):
         "plastic over aluminium: half the stiffness at the same density", base["plastic"] / base["aluminium"], math.sqrt(0.5), 0.1
     )
     print()
-    tools.print_table(rows)
+    stage.show("shelves", rows)
     print(
         "\n  erratum: the printed 154.6 Hz of wood is 691.5 Hz / sqrt(20) to four digits; the constants printed next to it, a sqrt(E / rho)"
         " that is 0.122 of\n  the aluminium's, give the sound above"

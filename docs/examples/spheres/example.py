@@ -3,7 +3,6 @@ import math
 
 import numpy
 
-import stage as tools
 
 AIR_DENSITY, SOUND_SPEED = 1.21, 343.0
 YOUNG, POISSON, DENSITY = 7e10, 0.3, 2700.0  # of the aluminium balls
@@ -153,4 +152,4 @@ def play(stage):
             max(worst) < bound,
         )
     print()
-    tools.print_table(rows)
+    stage.show("spheres", rows)

@@ -56,4 +56,4 @@ def play(stage):
         stage.compare(f"length of {name} against OSG02's Table 2 [m]", length, adjusted, 0.3)
         stage.compare(f"length of {name} against three-dimensional elasticity [m]", length, exact, 0.2 if stage.quick else 0.05)
     print()
-    tools.print_table(rows)
+    stage.show("tuning", rows)

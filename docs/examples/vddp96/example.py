@@ -107,7 +107,7 @@ def play(stage):
         rows.append((f"{point[0]:g}, {point[1]:g}", f"{centroid:.2f}", f"{wanted:.2f}"))
         centroids.append((min(point), centroid))
         stage.compare(f"centroid of a blow at {point}", centroid, wanted, 3e-6)  # half of the last digit
-    tools.print_table(rows)
+    stage.show("brightness", rows)
     draw_brightness(stage, centroids)
     stage.expect("brighter with every step towards the edge", all(a[1] < b[1] for a, b in zip(centroids, centroids[1:])))
     for job in sorted((stage.folder / "room").glob("*.json")):

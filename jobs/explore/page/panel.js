@@ -71,9 +71,9 @@ export class Panel {
 
   showFacts() {
     const { bank, about } = this.body, size = (100 * this.body.shown.box.size * this.body.shown.size).toPrecision(3);
-    const parts = [`${bank.mode_count} modes`, `${size} cm across`];
-    if (about.change) parts.push(about.change);
-    find('facts').textContent = parts.join(' · ');
+    find('facts').textContent = `${bank.mode_count} modes · ${size} cm across`;
+    find('details').hidden = !about.change;
+    find('change').textContent = about.change ? `The bank is ${about.change}.` : '';
   }
 
   // ---- strikes
@@ -198,11 +198,11 @@ export class Panel {
 
   showModes() {
     const { modes } = this.body.sound;
-    this.modes.fill(modes.map(({ freq_hz, t60_s, error_cents }, i) => {
-      const cents = describeCents(error_cents);
+    this.modes.fill(modes.map(({ freq_hz, t60_s, error_cents, facet_cents = 0 }, i) => {
+      const cents = describeCents(error_cents), facets = facet_cents > 0 ? `, facets in doubt ${describeCents(facet_cents)} cents more` : '';
       return {
         cells: [freq_hz.toFixed(1), formatSeconds(t60_s), cents],
-        label: `mode ${i + 1}: ${formatHz(freq_hz)}, T60 ${formatSeconds(t60_s)}, error bar ${cents} cents`,
+        label: `mode ${i + 1}: ${formatHz(freq_hz)}, T60 ${formatSeconds(t60_s)}, error bar ${cents} cents${facets}`,
       };
     }));
     this.spectrum.setModes(modes);

@@ -3,7 +3,7 @@
 export class Recorder {
   /** The output of an AudioNode with two channels. */
   static async open(context, node) {
-    await context.audioWorklet.addModule(new URL('recorder-worklet.js', import.meta.url));
+    await context.audioWorklet.addModule(new URL('./recorder-worklet.js', import.meta.url));
     const tap = new AudioWorkletNode(context, 'carillon-recorder', { numberOfInputs: 1, numberOfOutputs: 0, channelCount: 2, channelCountMode: 'explicit' });
     node.connect(tap);
     return new Recorder(tap, context.sampleRate);

@@ -12,7 +12,8 @@ table { border-collapse: collapse; margin: 1em 0; font-size: 13px; }
 td, th { border-bottom: 1px solid #ddd; padding: 3px 9px; text-align: right; }
 td:first-child, th:first-child { text-align: left; }
 pre { background: #f4f4f4; padding: 8px 12px; } figure { margin: 1em 0; } figcaption { color: #555; }
-svg { max-width: 100%; height: auto; }"""
+svg { max-width: 100%; height: auto; }
+p, li { overflow-wrap: anywhere; } pre, .table { overflow-x: auto; }"""
 
 
 def write(lab, sections, setting):
@@ -59,7 +60,8 @@ def to_inline(text):
 
 def format_html(sections, setting, machine, findings):
     out = [
-        '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>What accuracy costs in time</title>',
+        '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1"><title>What accuracy costs in time</title>',
         f"<style>{STYLE}</style></head><body>",
         "<h1>What accuracy costs in time</h1>",
         f"<pre>{html.escape(setting)}</pre><p>{to_inline(machine)}</p>",
@@ -83,10 +85,10 @@ def format_html(sections, setting, machine, findings):
             else:
                 head, *rows = item.rows
                 out.append(
-                    f"<p>{to_inline(item.text)}</p><table><tr>"
+                    f'<p>{to_inline(item.text)}</p><div class="table"><table><tr>'
                     + "".join(f"<th>{to_inline(cell)}</th>" for cell in head)
                     + "</tr>"
                     + "".join("<tr>" + "".join(f"<td>{to_inline(cell)}</td>" for cell in row) + "</tr>" for row in rows)
-                    + "</table>"
+                    + "</table></div>"
                 )
     return "\n".join(out) + "\n</body></html>\n"

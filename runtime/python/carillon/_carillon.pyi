@@ -41,6 +41,8 @@ class Bank:
     @property
     def error_cents(self) -> Doubles: ...  # (m)
     @property
+    def facet_error_cents(self) -> Doubles: ...  # (m)
+    @property
     def algebraic_error_cents(self) -> Doubles: ...  # (m)
     @property
     def shape_steps(self) -> numpy.typing.NDArray[numpy.int16]: ...  # (V, m, 3)

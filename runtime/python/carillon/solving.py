@@ -10,6 +10,7 @@ import threading
 import typing
 import warnings
 
+from . import _carillon
 from ._carillon import Bank, InputError, SolveError, SystemError, find_bank
 from .documents import write_json
 
@@ -34,15 +35,17 @@ def make_command(ranks: int) -> typing.List[str]:
     return ["mpirun", "-np", str(ranks), "--bind-to", "none", "--oversubscribe", find_program(SOLVER)]
 
 
-def make_environment() -> typing.Dict[str, str]:
-    """One thread a rank."""
-    environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "HWLOC_COMPONENTS": "-gl"}
+def make_environment(ranks: int) -> typing.Dict[bytes, bytes]:
+    """One thread a rank, and no rank of an MPI run that this process may be in."""
+    entries = (entry.partition(b"=") for entry in _carillon._make_environment(is_alone=ranks == 1))
+    environment = {name: value for name, _, value in entries}
+    environment.update({b"OMP_NUM_THREADS": b"1", b"OPENBLAS_NUM_THREADS": b"1", b"HWLOC_COMPONENTS": b"-gl"})
     if os.geteuid() == 0:
-        environment.update(OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1")
+        environment.update({b"OMPI_ALLOW_RUN_AS_ROOT": b"1", b"OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": b"1"})
     return environment
 
 
-def run(command: typing.List[str]) -> typing.Tuple[int, str]:
+def run(command: typing.List[str], ranks: int) -> typing.Tuple[int, str]:
     """Exit code and what it prints on standard error. Whatever interrupts this (Ctrl-C) ends it, too."""
     if shutil.which(command[0]) is None:
         raise SystemError(f"{command[0]} is not along PATH; install it (package openmpi-bin)")
@@ -53,7 +56,7 @@ def run(command: typing.List[str]) -> typing.Tuple[int, str]:
         signal.signal(signal.SIGINT, lambda number, _: interrupts.append(number))
     try:
         solver = subprocess.Popen(
-            command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=make_environment()
+            command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=make_environment(ranks)
         )
     finally:
         if handler is not None:
@@ -101,7 +104,7 @@ def solve(job: typing.Union[dict, str, os.PathLike], *, ranks: int = 1, bank: ty
             here, text, file = os.fspath(job), "", pathlib.Path(job)
         kept = os.path.abspath(bank) if bank is not None else find_bank(here, text)
         written, result = kept or str(folder / "bank.hdf"), folder / "result"
-        code, said = run(make_command(ranks) + [str(file), "-q", "--bank", written, "--result", str(result)])
+        code, said = run(make_command(ranks) + [str(file), "-q", "--bank", written, "--result", str(result)], ranks)
         said = said.replace(str(file), here) if text else said
         if code != 0:
             read = json.loads(result.read_text(errors="backslashreplace")) if result.is_file() else {}

@@ -34,7 +34,19 @@ for words in (
 ):
     assert words in run.stdout, words
 ours = [float(hz) for hz in re.findall(r"^  ours, .*?([0-9.]+) Hz", run.stdout, re.M)]
+corrected = [float(hz) for hz in re.findall(r"^        corrected for its mesh +([0-9.]+) Hz", run.stdout, re.M)]
 assert len(ours) == 2 and 700 < ours[1] < ours[0] < 1400, ours  # coarse T4 is stiffer than coarse T10
+# What is said to sound is what is played: not the mesh's frequency. It is repeated at the end.
+info = [
+    json.loads(
+        subprocess.run([bin_dir / "carillon-bank", "info", "--json", work / f"bunny_{kind}.hdf"], check=True, capture_output=True).stdout
+    )
+    for kind in ("t4", "t10")
+]
+heard = [min(mode["heard"]["frequency_hz"] for mode in bank["modes"]) for bank in info]
+assert len(corrected) == 2 and all(abs(said - hz) < 0.06 for said, hz in zip(corrected, heard)), (corrected, heard)
+assert abs(min(info[1]["corrected_frequencies_hz"]) - heard[1]) < 1e-6 and abs(ours[1] - heard[1]) > 0.5, (ours, heard)
+assert f"{heard[1]:.1f} Hz, played; by T4" in run.stdout[-400:], run.stdout[-400:]
 
 with wave.open(str(work / "chute.wav")) as sound:
     assert (sound.getnchannels(), sound.getframerate(), sound.getsampwidth()) == (2, 48000, 3), sound.getparams()
@@ -47,7 +59,13 @@ assert abs(20 * numpy.log10(abs(samples).max()) + 1.0) < 0.01, abs(samples).max(
 assert abs(samples).max(axis=0).min() > 0.1, "both ears hear it"
 report = json.loads((work / "chute-report.json").read_text())
 struck = {body["name"]: body["impulses"] for body in report["per_body"]}
-assert all(count > 0 for count in struck.values()) and len(struck) == 4, struck  # the bunny and all three shelves sound
+assert all(count > 0 for count in struck.values()) and len(struck) == 7, struck  # four bunnies and three shelves sound
+trajectory = json.loads((work / "chute-trajectory.json").read_text())
+names = [body["name"] for body in trajectory["bodies"]]
+pairs = {tuple(sorted((names[hit["body"]], names[hit["other"]]))) for hit in trajectory["impulses"] if hit["other"] >= 0}
+meet = {pair for pair in pairs if all(name.startswith("bunny") for name in pair)}
+assert len({name for pair in meet for name in pair}) == 4, meet  # every bunny strikes another one
+assert {name for pair in pairs for name in pair if name.endswith("shelf")} == set(names[4:]), pairs
 # The shelves end as shelves on a wall do, and not after a minute; every mode decays faster than its material makes it.
 for body in report["per_body"]:
     if not body["name"].endswith("shelf"):
@@ -73,4 +91,5 @@ print(energy)
 gained = max(energy["rise_j"], energy["hit_rise_j"])
 assert energy["largest_kinetic_j"] > 0.1 and gained <= 1e-7 * energy["largest_kinetic_j"] + 1e-9 * energy["weight_n"], energy
 assert energy["modes_rise"] <= 1e-9, energy
+assert abs(energy["difference_j"]) < 1e-3 * energy["start_j"], energy  # what the bunnies had is found again
 assert (work / "audited.wav").read_bytes() == (work / "chute.wav").read_bytes(), "keeping books changed the sound"

@@ -3,9 +3,9 @@
 
 usage: run_docs.py PAGE.md BIN_DIR
 
-Blocks fenced as ```sh are run with `bash -e`; blocks fenced as ```json NAME or ```python NAME are written to the file NAME first, in the
-order in which they stand. Blocks of another kind (```console, ```text) are shown, not run. Inside a page, `carillon-...` is the build under
-test.
+Blocks fenced as ```sh are run with `bash -e`; blocks fenced as ```json NAME, ```python NAME or ```text NAME are written to the file NAME
+first, in the order in which they stand. Blocks of another kind (```console) or without a name are shown, not run. Inside a page,
+`carillon-...` is the build under test.
 """
 import os
 import pathlib
@@ -21,7 +21,7 @@ ran = 0
 with tempfile.TemporaryDirectory(prefix="carillon-docs-") as folder:
     environment["XDG_CACHE_HOME"] = f"{folder}/.cache"
     for kind, name, text in blocks:
-        if kind in ("json", "python") and name:
+        if kind in ("json", "python", "text") and name:
             target = pathlib.Path(folder) / name
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_text(text)

@@ -106,7 +106,15 @@ class Explore(unittest.TestCase):
         bar, drum = (body["position_m"] for body in scene["bodies"])
         self.assertAlmostEqual(bar[2], 0.004, places=6)  # half its thickness
         self.assertGreater(drum[0] - 0.15, bar[0] + 0.3)  # they do not overlap
-        for name in ("index.html", "main.js", "three/three.module.min.js", "three/LICENSE", "audio/carillon-audio.js"):
+        for name in (
+            "index.html",
+            "main.js",
+            "three/three.module.min.js",
+            "three/LICENSE",
+            "LICENSE.txt",
+            "NOTICES.txt",
+            "audio/carillon-audio.js",
+        ):
             self.assertTrue((self.root / "two" / name).is_file(), name)
         # It is a scene: carillon-render plays it. And made again in the same place it is the same.
         self.call_render("two/scene.json", "-o", "two.wav")

@@ -266,6 +266,48 @@ class PageTest(unittest.TestCase):
         self.assertGreater(page.evaluate("window.peak"), 0)
         self.assertEqual(page.errors, [])
 
+    def test_its_own_server_gives_the_browser_all_that_it_asks_for(self):
+        words = [BIN / "carillon", "--json", "explore", self.root / "fall", "--serve"]
+        with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as server:
+            try:
+                said = ""
+                while not said.endswith("\n}\n"):
+                    line = server.stdout.readline()
+                    self.assertTrue(line, said)
+                    said += line
+                page = self.browser.open(json.loads(said)["address"])
+                self.addCleanup(page.close)
+                page.wait_for("document.documentElement.dataset.state === 'ready'", timeout_s=100)
+                self.assertEqual(page.errors, [])
+            finally:
+                server.terminate()
+
+    def test_every_screen_holds_the_page_and_its_panel(self):
+        page = self.open("fall")
+        # A bank that was packed says so under "Details", not in the line of facts.
+        change = "packed, error at most -60.2 dB(A) on 95 % of the surface, -57.9 at the worst place"
+        self.assertTrue(page.evaluate("document.getElementById('details').hidden"))
+        page.evaluate(f"carillon.panel.body.about.change = {json.dumps(change)}; carillon.panel.showFacts()")
+        self.assertNotIn("packed", page.evaluate("document.getElementById('facts').textContent"))
+        self.assertFalse(page.evaluate("document.getElementById('details').hidden || document.getElementById('details').open"))
+        page.evaluate("for (const part of document.querySelectorAll('details')) part.open = true")
+        self.assertIn(change, page.evaluate("document.querySelector('#details[open] #change').innerText"))
+        for width, height in ((320, 640), (390, 844), (768, 1024), (1280, 800)):
+            page.resize(width, height)
+            self.assertLessEqual(page.evaluate("document.documentElement.scrollWidth"), width)
+            self.assertLessEqual(
+                page.evaluate("document.getElementById('panel').scrollWidth - document.getElementById('panel').clientWidth"), 0
+            )
+            wide = "[...document.querySelectorAll('output')].filter(it => it.scrollWidth > it.clientWidth).map(it => it.textContent)"
+            self.assertEqual(page.evaluate(wide), [], width)
+            # Between the widest content and the edge there is the panel's padding.
+            room = page.evaluate(
+                "(panel => panel.clientWidth - parseFloat(getComputedStyle(panel).paddingRight) + panel.getBoundingClientRect().left"
+                " - Math.max(...[...panel.querySelectorAll('*')].map(it => it.getBoundingClientRect().right)))"
+                "(document.getElementById('panel'))"
+            )
+            self.assertGreaterEqual(room, -2, width)  # the outline of a list of modes may lie on the edge
+
     def test_a_surface_of_many_pieces_arrives_whole(self):
         run(BIN / "make_example_bank", "large.hdf", "62", "4", cwd=self.root)  # 46,128 triangles: more than one piece for the audio thread
         run(BIN / "carillon", "explore", "large.hdf", "-o", "large", "--whole", cwd=self.root)

@@ -8,6 +8,7 @@ import json
 import math
 import os
 import pathlib
+import random
 import signal
 import struct
 import subprocess
@@ -69,6 +70,38 @@ def make_cup(scale=1.0, sides=32, rows=8):
         for i in range(sides):
             lines += [f"f {at(i, j)} {at(i + 1, j + 1)} {at(i + 1, j)}", f"f {at(i, j)} {at(i, j + 1)} {at(i + 1, j + 1)}"]
     lines += [f"f {len(lines[: sides * (rows + 1)]) + 1} {at(i, 0)} {at(i + 1, 0)}" for i in range(sides)]
+    return "\n".join(lines) + "\n"
+
+
+def make_box_of_faces(size, jitter):
+    """A box whose six faces have corners of their own, each off its place by up to `jitter`, and a point far away that none has."""
+    points, triangles, chance = [(5.0, 0.0, 0.0)], [], random.Random(1)
+    for axis in range(3):
+        for side in (0, 1):
+            u, v = [(axis + 1) % 3, (axis + 2) % 3][:: 1 if side else -1]
+            for i, j in ((0, 0), (1, 0), (1, 1), (0, 1)):
+                point = [0.0] * 3
+                point[axis], point[u], point[v] = side * size[axis], i * size[u], j * size[v]
+                points.append(tuple(x + chance.uniform(-jitter, jitter) for x in point))
+            first = len(points) - 4
+            triangles += [(first, first + 1, first + 2), (first, first + 2, first + 3)]
+    rows = [f"{x!r} {y!r} {z!r}" for x, y, z in points] + ["3 %d %d %d" % t for t in triangles]
+    return "\n".join(["OFF", f"{len(points)} {len(triangles)} 0", *rows]) + "\n"
+
+
+def make_rod(sides=12, rows=4):
+    """OBJ: a prism of 12 sides, 40 mm thick and 200 mm long: planes, or samples of a cylinder."""
+    lines = [
+        "v %.9g %.9g %.9g" % (0.02 * math.cos(2 * math.pi * i / sides), 0.2 * j / rows, 0.02 * math.sin(2 * math.pi * i / sides))
+        for j in range(rows + 1)
+        for i in range(sides)
+    ]
+    lines += ["f " + " ".join(str(1 + i) for i in range(sides))]
+    lines += ["f " + " ".join(str(sides * (rows + 1) - i) for i in range(sides))]
+    for j in range(rows):
+        for i in range(sides):
+            a, b = 1 + j * sides + i, 1 + j * sides + (i + 1) % sides
+            lines.append(f"f {a} {a + sides} {b + sides} {b}")
     return "\n".join(lines) + "\n"
 
 
@@ -165,6 +198,15 @@ class Hear(unittest.TestCase):
         self.assertEqual(len(scene["strikes"]), 4)
         self.assertLess(heard["seconds"], 60)
 
+    def test_a_box_of_faces_that_do_not_quite_meet_under_a_long_name_is_the_box(self):
+        name = "x" * 230 + ".off"
+        (self.folder / name).write_text(make_box_of_faces((0.1, 0.06, 0.02), 1e-7))
+        heard = self.hear(name, "--material", "steel")
+        self.assertIn("1 point of the file belongs to no element", " ".join(heard["assumed"]))
+        self.assertLess(len(heard["sounds"][0]["name"].encode()), 200)
+        mode = heard["sounds"][0]["modes"][0]
+        self.assertLess(abs(1200 * math.log2(mode["freq_hz"] / 8803.2)), mode["error_cents"])  # of 20,000 nodes without the seams
+
     def test_a_glb_is_in_metres_and_sounds_as_the_same_off(self):
         off = make_ball(0.25, 3)
         (self.folder / "ball.off").write_text(off)
@@ -210,6 +252,25 @@ class Hear(unittest.TestCase):
             spectrum = numpy.abs(numpy.fft.rfft(samples[: rate // 2, 0])) ** 2
             brightness.append(numpy.sum(spectrum * numpy.fft.rfftfreq(rate // 2, 1 / rate)) / numpy.sum(spectrum))
         self.assertGreater(brightness[1], 1.2 * brightness[0], "steel is brighter than felt")
+
+    def test_facets_in_doubt_stand_next_to_the_error_bars_and_can_be_settled(self):
+        (self.folder / "rod.obj").write_text(make_rod())
+        wish = ("rod.obj", "--scale", 1)
+        said = self.call("hear", "-q", *wish, "-o", "smooth", "--accuracy", 20)  # of the bars, which no doubt widens
+        for words in ("+-facets", "facets in doubt", "--facets takes them for planes"):
+            self.assertIn(words, said)
+        info = subprocess.run([BIN / "carillon-bank", "info", "--json", self.folder / "smooth/rod-steel.hdf"], capture_output=True)
+        smooth = sorted(json.loads(info.stdout)["modes"], key=lambda mode: mode["corrected_frequency_hz"])
+        self.assertTrue(all(mode["facet_error_cents"] > 10 > mode["corrected_error_cents"] for mode in smooth[:6]), smooth[:6])
+        planes = self.hear(*wish, "-o", "planes", "--facets")["sounds"][0]
+        self.assertEqual({mode["facet_cents"] for mode in planes["modes"]} | {planes["facet_cents"]}, {0})
+        for one, other in zip(smooth[:6], planes["modes"]):
+            cents = abs(1200 * math.log2(one["corrected_frequency_hz"] / other["freq_hz"]))
+            self.assertGreater(cents, one["corrected_error_cents"], "the prism is another body")
+            self.assertLess(cents, one["corrected_error_cents"] + one["facet_error_cents"] + other["error_cents"])
+        self.refuse("--shape", "bar", "--facets", contains=("--facets is for surfaces",))
+        (self.folder / "rod.msh").write_text("")
+        self.refuse("rod.msh", "--facets", contains=("--facets is for surfaces", "carillon-mesh --facets"))
 
     def test_shapes_wood_and_accuracy(self):
         heard = self.hear("--shape", "bar", "--length", 0.3, "--width", 0.03, "--thickness", 0.012, "--material", "oak", "--accuracy", 10)

@@ -51,6 +51,33 @@ class Damage(Bench):
         record = json.loads((pathlib.Path(self.run_it("get", job).stdout.strip()).parent / "job.json").read_text())
         self.assertEqual(record["material"]["density_kg_m3"], 7800)
 
+    def test_a_bank_of_another_job_is_not_served_whatever_its_sum_says(self):
+        job, bank = self.make_done()
+        other = self.write("other.json", make_job(material={**make_job()["material"], "density_kg_m3": 7900}))
+        self.run_it("submit", other, "--run")
+        forged = pathlib.Path(self.run_it("get", other).stdout.strip())
+        times = forged.stat()
+        bank.unlink()
+        shutil.copy2(forged, bank)
+        id_, other_id = bank.parent.name, forged.parent.name
+        first = (forged.parent / "bank.sum").read_text().splitlines()[0]
+        for has_sum in (True, False):  # one of an earlier version has none
+            sum_file = bank.parent / "bank.sum"
+            sum_file.chmod(0o644)
+            sum_file.unlink()
+            if has_sum:
+                sum_file.write_text(first.replace(other_id, id_) + "\n")
+            os.utime(bank, ns=(times.st_atime_ns, times.st_mtime_ns))
+            for words in ((), ("--to", "copy.hdf")):
+                got = self.run_it("get", job, *words, code=1)
+                self.assertEqual(got.stdout, "")
+                self.assertIn("another job", got.stderr)
+            self.assertFalse((self.folder / "copy.hdf").exists())
+            sum_file.touch()
+        self.run_it("retry", job)
+        self.run_queue()
+        self.assertNotEqual(pathlib.Path(self.run_it("get", job).stdout.strip()).read_bytes(), forged.read_bytes())
+
     def test_the_bank_goes_nowhere_else(self):
         job = self.write("bar.json", make_job())
         self.run_it("submit", job)
@@ -246,7 +273,7 @@ class Damage(Bench):
         for number, content in enumerate((flipped, second, flipped[: len(whole) // 2], second)):
             with self.subTest(number):
                 spoil(content)
-                self.assertEqual(self.run_it("get", job).stdout.strip(), str(bank))  # a path, and a look that costs nothing
+                self.assertIn("computes it again", self.run_it("get", job, code=1).stderr)  # a path is no less read than a copy
                 (self.folder / "copy.hdf").unlink(missing_ok=True)
                 self.assertIn("computes it again", self.run_it("get", job, "--to", self.folder / "copy.hdf", code=1).stderr)
                 self.assertFalse((self.folder / "copy.hdf").exists())

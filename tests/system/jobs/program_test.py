@@ -14,7 +14,7 @@ import unittest
 
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
-from bench import BIN, Bench, make_job
+from bench import BIN, Bench, make_job, make_simulation
 
 
 class Path(Bench):
@@ -171,11 +171,118 @@ class Path(Bench):
 
     def test_more_ranks_than_cores_run_on_the_cores_and_it_is_said(self):
         self.run_it("submit", self.write("bar.json", make_job()), "--ranks", "1000")
-        events = [json.loads(line) for line in self.run_it("run", "--cores", "1").stdout.splitlines()]
+        events = [json.loads(line) for line in self.run_it("run", "--json", "--cores", "1").stdout.splitlines()]
         start = next(event for event in events if event["event"] == "start")
         self.assertEqual(start["ranks"], 1)
         self.assertIn("requested 1000 ranks, using 1", start["reason"])
         self.assertEqual([(job["state"], job["reason"]) for job in self.ask("status")["jobs"]], [("done", "")])
+
+    def test_jobs_of_a_manifest_go_by_the_names_that_status_prints(self):
+        lengths = (0.2, 0.21, 0.22)
+        lines = [json.dumps(make_job(body={**make_job()["body"], "length_m": length})) for length in lengths]
+        self.write("sweep.txt", "# three bars\n" + "\n".join(lines) + "\n" + "own/bar.json\n")
+        self.write("own/bar.json", make_job(body={**make_job()["body"], "length_m": 0.23}))
+        self.assertEqual(self.run_it("submit", "-q", "sweep.txt").stdout, "")
+        said = self.run_it("run").stdout
+        for name in ("sweep.txt#2", "sweep.txt#3", "sweep.txt#4", "bar.json"):
+            self.assertIn(f" {name}: done\n", said)  # text, also where this is no terminal
+        names = {job["name"]: job["id"] for job in self.ask("status")["jobs"]}
+        bank = self.ask("get", "sweep.txt#3")
+        self.assertEqual(bank["id"], names["sweep.txt#3"])
+        self.assertEqual(self.ask("get", "sweep.txt")["jobs"][1]["bank"], bank["bank"])
+        self.assertEqual([job["id"] for job in self.ask("status", "sweep.txt#3", "own")["jobs"]], [names["sweep.txt#3"], names["bar.json"]])
+        printed = self.run_it("get", "sweep.txt", "--to", "copies").stdout.split()
+        self.assertEqual(printed, [f"copies/{name}.hdf" for name in ("sweep-2", "sweep-3", "sweep-4", "bar")])
+        self.assertEqual((self.folder / "copies/sweep-3.hdf").read_bytes(), pathlib.Path(bank["bank"]).read_bytes())
+        self.assertIn("6 modes", self.run_it("log", "sweep.txt#2").stdout)
+        self.assertEqual(self.run_it("log", "sweep.txt").stdout.count("== "), 4)
+        self.assertEqual([job["state"] for job in self.ask("explain", "sweep.txt")["jobs"]], ["done"] * 4)
+        self.run_it("cancel", "sweep.txt#4", code=1)
+        self.run_it("retry", "sweep.txt", code=1)
+        self.refuse("get", "sweep.txt#9", says="line 9")
+        self.refuse("get", "sweep.txt#1", says="line 1")
+        # A line that was not submitted is no reason to hide the others.
+        self.write("sweep.txt", (self.folder / "sweep.txt").read_text() + json.dumps(make_job(max_modes=2)) + "\n")
+        got = self.run_it("get", "sweep.txt", code=1)
+        self.assertEqual(len(got.stdout.split()), 4)
+        self.assertIn("sweep.txt#6", got.stderr)
+        self.assertEqual(len(self.ask("status", "sweep.txt")["jobs"]), 4)
+
+    def test_warnings_of_many_jobs_are_few_lines(self):
+        count = 12
+        lines = [
+            json.dumps(make_job(body={**make_job()["body"], "length_m": 0.2 + 0.01 * i}, element="T4", band_hz=[20, 20000]))
+            for i in range(count)
+        ]
+        self.write("sweep.txt", "\n".join(lines))
+        said = self.run_it("submit", "sweep.txt", "--run").stdout
+        warnings = [line for line in self.ask("status")["jobs"] if line["warnings"]]
+        self.assertGreater(len(warnings), count // 2)
+        for text in (said, self.run_it("status").stdout, self.run_it("get", "sweep.txt").stderr):
+            shown = [line for line in text.splitlines() if "warning" in line]
+            self.assertLess(len(shown), 5, text)
+            self.assertTrue(any(f"warning in {len(warnings)} jobs" in line for line in shown), text)
+
+    def test_memory_gb_is_a_limit(self):
+        large = make_job(body={**make_job()["body"], "nodes": 20000})
+        self.ask("submit", self.write("large.json", {**large, "resources": {"ranks": 1, "memory_gb": 0.2}}))
+        self.run_it("run", "--quiet", code=3)
+        job = self.ask("status")["jobs"][0]
+        self.assertEqual((job["state"], job["attempts"]), ("failed", 1))
+        self.assertIn('"memory_gb" of the job is 0.2, and it needs at least', job["reason"])
+        self.run_it("retry", "large.json", "--memory-gb", "3")
+        self.run_it("run", "--quiet")
+        # A simulation has no check of its own: it is ended when it holds more.
+        simulation = make_simulation(duration_s=1000.0, resources={"ranks": 1, "memory_gb": 0.01})
+        self.ask("submit", self.write("long.json", simulation))
+        self.run_it("run", "--quiet", code=3)
+        job = self.ask("status", "long.json")["jobs"][0]
+        self.assertEqual((job["state"], job["attempts"]), ("failed", 1))
+        self.assertIn('"memory_gb" of the job is 0.01', job["reason"])
+
+    def test_what_the_mesher_did_to_a_surface_is_said(self):
+        corners = [(x, y, z) for z in (0, 0.02) for y in (0, 0.06) for x in (0, 0.1)]
+        faces = [
+            (0, 2, 3),
+            (0, 3, 1),
+            (4, 5, 7),
+            (4, 7, 6),
+            (0, 1, 5),
+            (0, 5, 4),
+            (2, 6, 7),
+            (2, 7, 3),
+            (0, 4, 6),
+            (0, 6, 2),
+            (1, 3, 7),
+            (1, 7, 5),
+        ]
+
+        def write_surface(name, triangles):
+            text = f"OFF\n{len(corners)} {len(triangles)} 0\n" + "".join("%g %g %g\n" % corner for corner in corners)
+            self.write(name, text + "".join("3 %d %d %d\n" % triangle for triangle in triangles))
+
+        def write_job(name, **body):
+            return self.write(
+                f"{name}.json", make_job(body={"surface": f"{name}.off", "nodes": 1500, **body}, band_hz=[20, 20000], max_modes=2)
+            )
+
+        write_surface("open.off", faces[:2] + faces[4:])  # a box without its lid
+        write_surface("twice.off", [*faces, faces[3]])
+        opened, twice = write_job("open"), write_job("twice")
+        self.refuse("validate", opened, says=["open surface", '"wall_m"', '"close_holes"'])
+        self.ask("submit", opened, twice)
+        self.run_it("run", "--quiet", code=3)
+        states = {job["name"]: job for job in self.ask("status")["jobs"]}
+        self.assertEqual(states["open.json"]["state"], "failed")
+        self.assertIn("open surface", states["open.json"]["reason"])
+        self.assertIn("1 of the 13 triangles", " ".join(states["twice.json"]["warnings"]))
+        self.assertIn("1 of the 13 triangles", " ".join(self.ask("get", twice)["warnings"]))
+        self.assertIn("1 of the 13 triangles", " ".join(self.ask("validate", twice)["warnings"]))
+        # Said explicitly, it is closed, and that is said too.
+        closed = write_job("open", close_holes=1)
+        self.ask("submit", closed)
+        self.run_it("run", "--quiet")
+        self.assertIn("hole was closed", " ".join(self.ask("get", closed)["warnings"]))
 
     def test_explain_and_submit_agree_on_a_job_that_failed_before_it_ran(self):
         file = self.write("bar.json", make_job())
@@ -264,7 +371,7 @@ class Strangers(Bench):
         self.assertEqual(self.ask("status", files[1])["jobs"][0]["state"], "queued")
         self.refuse("submit", self.folder / ("y" * 4096 + ".json"), says="too long")
         self.refuse("status", "../../x", says="no job of this store")
-        self.refuse("log", "../" * 20 + "etc/passwd", says="not JSON")
+        self.refuse("log", "../" * 20 + "etc/passwd", says="passwd:1: ")
         self.refuse("get", "%", says="neither")
 
     def test_what_is_no_file_is_one_clear_error_at_once(self):

@@ -100,7 +100,7 @@ class Service:
         log = self.path / f"run-{len(self.runs)}.jsonl"
         with open(log, "w") as out:
             process = subprocess.Popen(
-                [*prefix, self.bin / "carillon", "--store", self.store, "run", *options],
+                [*prefix, self.bin / "carillon", "--store", self.store, "run", "--json", *options],
                 cwd=self.path,
                 stdin=subprocess.DEVNULL,
                 stdout=out,

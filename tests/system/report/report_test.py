@@ -20,7 +20,9 @@ import h5py
 import numpy
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "support"))
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "web"))
 import fixtures  # noqa: E402
+from browser import CHROMIUM, Browser, serve  # noqa: E402
 
 BIN = pathlib.Path(os.environ["CARILLON_BIN_DIR"])
 SOURCE = pathlib.Path(os.environ["CARILLON_SOURCE_DIR"])
@@ -198,7 +200,7 @@ class Reports(unittest.TestCase):
         self.assertFalse((self.root / "report/report-modes.png").exists())
 
     def test_modes_are_those_of_the_bank(self):
-        rows = self.page.rows("modes", 11)[1:]
+        rows = self.page.rows("modes", 12)[1:]
         with h5py.File(self.bank) as bank:
             freq, decay = bank["modes/frequency_hz"][:], bank["modes/decay"][:]
             columns = {
@@ -217,6 +219,9 @@ class Reports(unittest.TestCase):
         self.assertGreater(len(freq), 10)
         self.assertEqual(len(rows), len(freq))
         self.assertEqual([row[6] for row in rows], list(names))
+        info = json.loads(subprocess.run([BIN / "carillon-bank", "info", "--json", self.bank], capture_output=True, check=True).stdout)
+        self.assertEqual([row[11] for row in rows], [mode["kind"] for mode in info["modes"]])
+        self.assertIn("bending, 2 nodes", [row[11] for row in rows])
         for column, digits in zip(columns, [9, 6, 2, 2, 6, 2, 4, 3, 2, 4]):
             shown = numpy.array([float(row[column]) for row in rows])
             # Rounded to so many digits, and frequencies to a hundredth of a hertz.
@@ -467,7 +472,7 @@ class Reports(unittest.TestCase):
         self.assert_whole(page)
         (dots,) = [a["d"] for tag, a, _ in page.charts["modes"] if tag == "path" and a.get("class", "").startswith("dots")]
         self.assertEqual(dots.count("h0"), 2500)
-        self.assertEqual(len(page.rows("modes", 11)), 1001)
+        self.assertEqual(len(page.rows("modes", 12)), 1001)
         self.assertIn("The first 1000 of 2500 modes", page.text["modes"])
 
     def test_modes_that_ring_for_ever_are_drawn_by_their_number(self):
@@ -478,7 +483,7 @@ class Reports(unittest.TestCase):
         y = numpy.array([float(a["cy"]) for tag, a, _ in page.charts["modes"] if tag == "circle"])
         steps = numpy.diff(y)
         self.assertTrue(len(y) > 10 and max(steps) < 0 and max(abs(steps - steps.mean())) < 0.11, steps)
-        self.assertEqual({row[8] for row in page.rows("modes", 11)[1:]}, {"inf"})
+        self.assertEqual({row[8] for row in page.rows("modes", 12)[1:]}, {"inf"})
 
     def test_a_bank_without_modes_has_a_report(self):
         bank = self.root / "mute.hdf"
@@ -582,7 +587,7 @@ class Reports(unittest.TestCase):
         # The name that the user knows, not that of the snapshot; and all of the record.
         self.assertEqual(page.title, "chime.msh")
         self.assertEqual([name for name, is_missing in page.missing.items() if is_missing], ["pictures", "play"])
-        self.assertEqual(len(page.rows("modes", 11)), 4)
+        self.assertEqual(len(page.rows("modes", 12)), 4)
         carillon("report", job, "-o", self.root / "made", "--no-pictures", "--no-page")
         self.assertEqual((self.root / "made/report.html").read_bytes(), page.source)
         # Who asks for it first has it drawn, next to the bank and for all who ask later. The records there stay what was published.
@@ -608,6 +613,24 @@ class Reports(unittest.TestCase):
         self.assertIn("-o", carillon("report", self.bank, code=2))
         self.assertIn("not a Carillon bank", carillon("report", self.root / "chime.msh", "-o", self.root / "none", code=2))
         self.assertFalse((self.root / "none").exists())
+
+    @unittest.skipUnless(os.path.exists(CHROMIUM), "there is no Chromium")
+    def test_every_screen_holds_the_report(self):
+        record = json.loads(self.resolved.read_text())
+        record["run"]["warnings"] = ["a warning without a space: " + 200 * "x"]
+        self.report("wide", record)
+        with serve(self.root) as server, Browser() as browser:
+            page = browser.open(f"{server.url}wide/report.html")
+            page.evaluate("for (const part of document.querySelectorAll('details')) part.open = true")
+            for width in (320, 390, 768, 1280):
+                page.resize(width, 800)
+                self.assertLessEqual(page.evaluate("document.documentElement.scrollWidth"), width)
+                # What is wider scrolls inside its box, and nothing else lies beyond the edge.
+                out = page.evaluate(
+                    "[...document.querySelectorAll('body *')].filter(it => !it.closest('.table, .chart, pre') &&"
+                    " it.getBoundingClientRect().right > innerWidth + 0.5).map(it => it.outerHTML.slice(0, 80))"
+                )
+                self.assertEqual(out, [], width)
 
     def test_no_pictures_when_none_are_asked_for(self):
         page = write_report(self.bank, self.resolved, self.root / "unasked", "", 0)

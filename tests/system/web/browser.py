@@ -264,6 +264,10 @@ class Page:
         self.call("Input.dispatchKeyEvent", {"type": "keyDown", "text": text, **of_key} if text else {"type": "rawKeyDown", **of_key})
         self.call("Input.dispatchKeyEvent", {"type": "keyUp", **of_key})
 
+    def resize(self, width, height):
+        """Shows the page on a screen of that many CSS pixels."""
+        self.call("Emulation.setDeviceMetricsOverride", {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False})
+
     def screenshot(self, file):
         pathlib.Path(file).write_bytes(base64.b64decode(self.call("Page.captureScreenshot", {"format": "png"})["data"]))
 

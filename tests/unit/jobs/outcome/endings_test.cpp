@@ -72,6 +72,21 @@ TEST(Endings, a_lack_of_memory_has_the_need_of_the_result) {
   EXPECT_DOUBLE_EQ(found.memory_need_gb, 12.5);
 }
 
+TEST(Endings, more_than_memory_gb_is_not_tried_again) {
+  Ending ending{.exit_code = 4, .result = base::Result{.kind = base::ResultKind::memory, .message = "it needs much", .need_bytes = 12.5e9}};
+  ending.memory_limit_gb = 16.0;  // the machine has less
+  EXPECT_EQ(classify(ending).cause, Cause::memory);
+  ending.memory_limit_gb = 8.0;
+  EXPECT_EQ(classify(ending).cause, Cause::memory_limit);
+  EXPECT_NE(classify(ending).reason.find("\"memory_gb\" of the job is 8, and it needs at least 12"), std::string::npos)
+      << classify(ending).reason;
+  ending = {.exit_code = 137};
+  ending.memory_limit_gb = 8.0;
+  ending.held_gb = 8.25;
+  EXPECT_EQ(classify(ending).cause, Cause::memory_limit);
+  EXPECT_EQ(decide(Cause::memory_limit, 0, true).next, Next::failed);
+}
+
 TEST(Endings, a_full_disk_explains_a_crash) {
   EXPECT_EQ(classify({.exit_code = 135, .is_disk_full = true}).cause, Cause::disk_full);
   EXPECT_EQ(classify({.exit_code = 3, .is_disk_full = true}).cause, Cause::no_solution);

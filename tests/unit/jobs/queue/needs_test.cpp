@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "jobs/outcome/outcome.hpp"
+#include "jobs/queue/admission.hpp"
 #include "precompute/cost/calibration.hpp"
 #include "precompute/cost/seconds.hpp"
 #include "tests/unit/jobs/registry/jobs.hpp"
@@ -41,6 +43,23 @@ TEST_F(Needs, a_surface_without_a_size_is_meshed_with_the_default_and_needs_no_p
   EXPECT_DOUBLE_EQ(needs.need.seconds, predict(cost::kDefaultNodes));
   EXPECT_TRUE(find(R"({"body": {"surface": "a.obj", "edge_m": 0.001}})", store::InputKind::surface).wants_prediction);
   EXPECT_DOUBLE_EQ(find(R"({"body": {"surface": "a.obj", "nodes": 700}})", store::InputKind::surface).need.seconds, predict(700));
+}
+
+TEST_F(Needs, grow_where_the_last_attempt_ran_out_of_memory) {
+  const char* const text = R"({"body": {"shape": "bar", "nodes": 5000}})";
+  const double before_gb = queue::calc_memory(find(text, store::InputKind::shape).need, 1);
+  const auto find_after = [&](outcome::Cause cause, double asked_gb) {
+    outcome::Outcome outcome;
+    outcome.cause = cause;
+    outcome.memory_need_gb = 100.0;
+    outcome::write_outcome(store_.work_folder(make_id(number_)), outcome);
+    registry::Job job{.id = make_id(number_)};
+    job.resources.memory_gb = asked_gb;
+    return queue::calc_memory(queue::find_needs(store_, job).need, 1);
+  };
+  EXPECT_GT(find_after(outcome::Cause::memory, 0.0), 100.0);
+  EXPECT_DOUBLE_EQ(find_after(outcome::Cause::killed, 0.0), before_gb);
+  EXPECT_DOUBLE_EQ(find_after(outcome::Cause::memory, 2.0), 2.0);  // what was asked for is not raised
 }
 
 TEST_F(Needs, fewer_modes_take_less_time) {

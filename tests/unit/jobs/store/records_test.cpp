@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "jobs/store/store.hpp"
+#include "jobs/store/warning_kinds.hpp"
 #include "tests/support/folder.hpp"
 
 namespace {
@@ -92,6 +93,20 @@ TEST(Records, progress_is_the_last_whole_line) {
   }
   folder.write("progress.jsonl", first + "\n[1]\n{\"phase\": 7}\n\x01\xff\n{\"phase\": \"x\", \"percent\": 1e400}\n");
   ASSERT_TRUE(store::read_progress(folder.path()));
+}
+
+TEST(Warnings, of_many_jobs_are_few_lines) {
+  store::WarningKinds kinds;
+  for (int i = 0; i < 200; ++i) {
+    const std::string job = "bar-" + std::to_string(i) + ".json";
+    EXPECT_EQ(kinds.add(job, "frequencies can be wrong by " + std::to_string(50 + i) + " cents"), i == 0);
+    EXPECT_FALSE(kinds.add(job, "frequencies can be wrong by 1 cents"));  // twice in one job
+  }
+  EXPECT_TRUE(kinds.add("cup.json", "/jobs/cup.json:3: the density is small"));
+  const std::vector<std::string> lines = kinds.list();
+  ASSERT_EQ(lines.size(), 2U);
+  EXPECT_EQ(lines[0], "in 200 jobs, as in bar-0.json: frequencies can be wrong by 50 cents");
+  EXPECT_EQ(lines[1], "in cup.json: /jobs/cup.json:3: the density is small");
 }
 
 }  // namespace

@@ -252,6 +252,18 @@ TEST(Store, a_quota_that_is_full_is_a_full_disk) {
             store::is_disk_full(folder.path()));  // words decide nothing
 }
 
+TEST(Store, a_file_system_without_locks_and_a_limit_of_files_are_named) {
+  for (const auto& [error, words] : {std::pair{ENOLCK, "this file system keeps no locks"}, {EFBIG, "ulimit -f"}}) {
+    try {
+      store::throw_errno("/some/file", "lock", error);
+    } catch (const SystemError& refusal) {
+      const std::string what = refusal.what();
+      EXPECT_NE(what.find(words), std::string::npos) << what;
+      EXPECT_EQ(what.find("check the disk"), std::string::npos) << what;
+    }
+  }
+}
+
 TEST(Store, names_of_temporary_folders_are_known_again) {
   const Folder folder;
   const store::Store store = store::Store::open(folder / "store");

@@ -138,6 +138,7 @@ TEST(KnownJobs, that_are_wrong_are_refused_in_words) {
               HasSubstr("one point"));
   EXPECT_THAT(fault(R"({"plate": {"shape": "circle", "radius_m": 0.1, "thickness_m": 0.1}})"), HasSubstr("plate theory"));
   EXPECT_THAT(fault(R"({"modes_csv": "x.csv", "mass_kg": 1, "size_m": [1, 0, 1]})"), HasSubstr("size_m"));
+  EXPECT_THAT(fault(R"({"modes_csv": {"file": "x.csv", "mass_kg": 1, "size_m": [1, 1, 1]}})"), HasSubstr(R"({"modes_csv": "modes.csv", )"));
   EXPECT_THAT(fault(R"({"string": {"length_m": 1}, "shape": "bar"})"), HasSubstr("already"));
   EXPECT_THAT(fault(R"({"string": {"length_m": 1, "tension_n": 5, "mass_kg_m": 1}})", R"(, "element": "T4")"),
               HasSubstr("bodies of elements"));

@@ -122,6 +122,35 @@ TEST(Correction, of_a_mode_that_is_not_corrected_to_half_its_bar_leaves_the_mesh
   EXPECT_NEAR(rough.cents[0], std::max(stated + all, -stated), 1e-9);
 }
 
+TEST(Facets, in_doubt_are_no_part_of_any_bar_and_are_stated_next_to_it) {
+  Level sure = make_level({1000, 1020, 2500}, {0.01, 0.02, 0.45}), level = sure;
+  level.parts[0].doubt = -0.02;
+  level.parts[1].doubt = 0.1;
+  level.parts[1].doubt_noise = 0.2;
+  const estimate::Corrections alone = estimate::calc_corrections(sure), both = estimate::calc_corrections(level);
+  EXPECT_EQ(both.cents, alone.cents);
+  EXPECT_EQ(both.lambda, alone.lambda);
+  EXPECT_TRUE(alone.facet_cents.empty());
+  ASSERT_EQ(both.facet_cents.size(), 3U);
+  // Where the k-th of the other body can be: every mode goes as far as its own facets let it, then all are sorted.
+  std::vector<double> low, high;
+  for (std::size_t m = 0; m < 2; ++m) {
+    const double facets = 600 * std::log2(1 + (m == 0 ? 1.5 * 0.02 : 1.5 * 0.1 + 0.15 * 0.2));
+    const double at = 600 * std::log2(alone.lambda[m]), bar = estimate::calc_cents(level.parts[m], level.kind) / 2;
+    EXPECT_NEAR(estimate::calc_facet_cents(level.parts[m]), facets, 1e-9);
+    low.push_back(at - bar - facets);
+    high.push_back(at + bar + facets);
+  }
+  std::sort(low.begin(), low.end());
+  std::sort(high.begin(), high.end());
+  for (std::size_t k = 0; k < 2; ++k) {
+    const double at = 600 * std::log2(alone.lambda[k]), reach = alone.cents[k] + both.facet_cents[k] + 1e-9;
+    EXPECT_LE(at - reach, low[k]) << k;
+    EXPECT_GE(at + reach, high[k]) << k;
+  }
+  EXPECT_LT(both.facet_cents[2], 1e-9) << "the third is far from the others";
+}
+
 TEST(TwoMeshes, that_agree_shorten_the_bar_to_a_quarter) {
   // The truth is 1000 Hz; the error is the estimate, sixteen times as large on the coarser mesh.
   const auto sharp = [](double i) { return 1000 * std::sqrt(1 + i); };

@@ -97,6 +97,21 @@ TEST(JobSpec, a_shape_may_stand_in_short_form) {
     EXPECT_THROW(read(bad), InputError) << bad;
 }
 
+TEST(JobSpec, facets_of_a_surface_may_be_planes) {
+  const auto read = [](const std::string& keys) {
+    return parse_job(R"({"body": {)" + keys + R"(}, "material": "glass"})", "/jobs/job.json", BankKey::optional);
+  };
+  const std::string with = resolved_json(read(R"("surface": "die.obj", "facets": true)"), "/jobs", "");
+  EXPECT_TRUE(read(R"("surface": "die.obj", "facets": true)").body->facets);
+  EXPECT_NE(with.find("\"facets\""), std::string::npos);
+  EXPECT_TRUE(parse_job(with, "/jobs/again.json", BankKey::optional).body->facets);
+  const std::string without = resolved_json(read(R"("surface": "die.obj")"), "/jobs", "");
+  EXPECT_EQ(without.find("facets"), std::string::npos) << "jobs without it keep their hash";
+  EXPECT_EQ(resolved_json(read(R"("surface": "die.obj", "facets": false)"), "/jobs", ""), without);
+  EXPECT_THROW(read(R"("surface": "die.obj", "facets": "yes")"), InputError);
+  EXPECT_THROW(read(R"("shape": "bowl", "outer_radius_m": 0.06, "facets": true)"), InputError);
+}
+
 TEST(JobSpec, what_says_neither_nodes_nor_accuracy_becomes_a_preview) {
   const auto make = [](const std::string& body) {
     JobSpec job = parse_job("{" + body + ", \"material\": \"glass\"}", "/jobs/job.json", BankKey::optional);

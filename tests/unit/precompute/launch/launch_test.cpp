@@ -70,6 +70,24 @@ TEST(Environment, has_the_transport_of_one_host_only_on_one_host) {
   EXPECT_THAT(std::getenv("OMPI_MCA_pml"), StrEq("ob1"));
 }
 
+TEST(Environment, isolates_a_rank_that_no_launcher_started) {
+  const std::array<Environment, 5> none{{{"OMPI_MCA_ess_singleton_isolated", nullptr},
+                                         {"OMPI_COMM_WORLD_SIZE", nullptr},
+                                         {"PMIX_RANK", nullptr},
+                                         {"PMI_RANK", nullptr},
+                                         {"SLURM_PROCID", nullptr}}};
+  {
+    const Environment rank("PMIX_RANK", "0");
+    prepare_environment();
+    EXPECT_EQ(std::getenv("OMPI_MCA_ess_singleton_isolated"), nullptr);
+  }
+  prepare_environment();
+  EXPECT_THAT(std::getenv("OMPI_MCA_ess_singleton_isolated"), StrEq("1"));
+  ::setenv("OMPI_MCA_ess_singleton_isolated", "0", 1);
+  prepare_environment();
+  EXPECT_THAT(std::getenv("OMPI_MCA_ess_singleton_isolated"), StrEq("0"));  // the choice is the user's
+}
+
 TEST(Environment, preloads_before_what_the_user_preloads) {
   const Environment before("LD_PRELOAD", "/lib/other.so");
   preload("/lib/ours.so");

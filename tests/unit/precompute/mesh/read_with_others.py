@@ -25,6 +25,9 @@ def main(reader, path):
         mesh = meshio.read(path)
         cells = np.vstack([b.data for b in mesh.cells if b.type in ("tetra", "tetra10")])
         report(reader, mesh.points, cells)
+        groups = np.concatenate([d for b, d in zip(mesh.cells, mesh.cell_data["gmsh:physical"]) if b.type in ("tetra", "tetra10")])
+        for tag in np.unique(groups):
+            print(f"group {tag} {(groups == tag).sum()}")
         return
     import gmsh
 
@@ -44,6 +47,10 @@ def main(reader, path):
             _, _, points = gmsh.model.mesh.getElements(0, entity)
             count += sum(len(p) for p in points)
         print(f"set {gmsh.model.getPhysicalName(dim, tag)} {count}")
+    # What it exports is what lies in groups.
+    gmsh.write(path + ".exported.msh")
+    gmsh.open(path + ".exported.msh")
+    print(f"exported {sum(len(e) for e in gmsh.model.mesh.getElements(3)[1])}")
     for line in gmsh.logger.get():
         if line.startswith(("Error", "Warning")):
             print(line)

@@ -72,6 +72,47 @@ INSTANTIATE_TEST_SUITE_P(fixtures, Written,
                          testing::Combine(testing::Values("gmsh41_text_1.msh", "gmsh41_binary_2.msh", "vtk_raw_1.vtu"),
                                           testing::Values(GmshEncoding::kBinary, GmshEncoding::kText)));
 
+TEST(write, a_mesh_without_regions_is_read_and_exported_by_others) {
+  for (const char* file : {"vtk_raw_1.vtu", "gmsh41_binary_2.msh"}) {
+    const tests::Folder scratch;
+    TetMesh mesh = read_mesh(fixture(file));
+    mesh.regions.assign(mesh.regions.size(), 0);
+    mesh.region_names.clear();
+    write_gmsh(mesh, scratch / "out.msh");
+    const TetMesh back = read_mesh(scratch / "out.msh");
+    EXPECT_EQ(back.regions, mesh.regions);
+    EXPECT_EQ(back.region_names, mesh.region_names);
+    EXPECT_EQ(back.node_sets, mesh.node_sets);
+    std::string said;
+    if (!read_with("meshio", scratch / "out.msh", said)) GTEST_SKIP() << "meshio is not installed";
+    EXPECT_NE(said.find("volume 0.006000 tets 89 mid-off 0"), std::string::npos) << said;
+    if (!read_with("gmsh", scratch / "out.msh", said)) GTEST_SKIP() << "gmsh's Python module is not installed";
+    EXPECT_NE(said.find("exported 89"), std::string::npos) << said;
+  }
+}
+
+TEST(write, named_regions_and_elements_without_one_come_back) {
+  TetMesh mesh = read_mesh(fixture("vtk_ascii_1.vtu"));
+  for (std::size_t e = 0; e < mesh.regions.size(); ++e) mesh.regions[e] = static_cast<std::int32_t>(e % 3);  // 0, 1, 2
+  mesh.region_names = {{1, "steel"}};
+  mesh.node_sets.clear();
+  const tests::Folder scratch;
+  write_gmsh(mesh, scratch / "out.msh");
+  const TetMesh once = read_mesh(scratch / "out.msh");
+  EXPECT_EQ(once.regions, mesh.regions);
+  EXPECT_EQ(once.region_names, mesh.region_names);
+  ASSERT_EQ(once.node_sets.size(), 2u);  // of the nodes of its regions
+  write_gmsh(once, scratch / "again.msh");
+  const TetMesh twice = read_mesh(scratch / "again.msh");
+  EXPECT_EQ(twice.regions, once.regions);
+  EXPECT_EQ(twice.region_names, once.region_names);
+  EXPECT_EQ(twice.node_sets, once.node_sets);
+  std::string said;
+  if (!read_with("meshio", scratch / "again.msh", said)) GTEST_SKIP() << "meshio is not installed";
+  EXPECT_NE(said.find("group 1 30"), std::string::npos) << said;
+  EXPECT_NE(said.find("group 3 30"), std::string::npos) << said;  // region 0, under a number that none has
+}
+
 TEST(write, regions_and_names_survive_in_the_order_of_the_elements) {
   TetMesh mesh = read_mesh(fixture("vtk_ascii_1.vtu"));
   for (std::size_t e = 0; e < mesh.regions.size(); ++e) mesh.regions[e] = static_cast<std::int32_t>(e % 3);

@@ -585,6 +585,7 @@ static void check_bodies(const carillon_bank* bank, const carillon_model* model)
   CHECK(carillon_get_effect_counters(synth, 99, &effects) == CARILLON_OK && effects.units[0] == 0);
   CHECK(carillon_get_effect_counters(synth, body, NULL) == CARILLON_BAD_ARGUMENT &&
         carillon_get_effect_counters(NULL, 0, &effects) == CARILLON_BAD_ARGUMENT);
+  CHECK(carillon_deflection(synth, body) == 0 && carillon_deflection(synth, -1) == 0 && carillon_deflection(NULL, 0) == 0);
   CHECK(carillon_peak_pa(synth, body) > 0 && carillon_peak_pa(synth, -1) == 0 && carillon_peak_pa(NULL, 0) == 0);
 
   /* No number of the output is none, whatever comes. */

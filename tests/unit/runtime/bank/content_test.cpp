@@ -278,6 +278,19 @@ const Spoiled kSpoiled[] = {
      },
      "sand"},
     {"short_error", [](Bank& b) { b.algebraic_error_cents.pop_back(); }, "algebraic_error_cents holds 5 values"},
+    {"short_facets", [](Bank& b) { b.facet_error_cents = {1.0}; }, "facet_error_cents holds 1 values"},
+    {"negative_facets",
+     [](Bank& b) {
+       b.facet_error_cents.assign(b.mode_count(), 1.0);
+       b.facet_error_cents[2] = -3;
+     },
+     "facet_error_cents[2] is -3, negative"},
+    {"nan_facets",
+     [](Bank& b) {
+       b.facet_error_cents.assign(b.mode_count(), 1.0);
+       b.facet_error_cents[0] = kNan;
+     },
+     "facet_error_cents[0] is nan"},
     {"nan_error", [](Bank& b) { b.discretisation_error_cents[1] = kNan; }, "discretisation_error_cents[1] is nan"},
     {"negative_error", [](Bank& b) { b.discretisation_error_cents[1] = -2; }, "discretisation_error_cents[1] is -2, negative"},
     {"unknown_law", [](Bank& b) { b.damping.law = "wishful"; }, "\"wishful\" is none that is known"},

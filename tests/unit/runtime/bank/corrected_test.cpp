@@ -10,6 +10,7 @@
 #include <string>
 
 #include "runtime/bank/edits.hpp"
+#include "runtime/bank/layout.hpp"
 #include "runtime/bank/reduce.hpp"
 #include "runtime/bank/select.hpp"
 #include "tests/unit/runtime/bank/example_bank.hpp"
@@ -36,6 +37,27 @@ TEST(Corrected, AreReadAsTheyWereWrittenAndRaiseTheVersion) {
   EXPECT_EQ(read.corrected.decay_per_s, bank.corrected.decay_per_s);
   EXPECT_EQ(read.corrected.error_cents, bank.corrected.error_cents);
   EXPECT_EQ(read.corrected.correction, bank.corrected.correction);
+}
+
+TEST(Facets, InDoubtAreReadAsTheyWereWrittenRaiseTheVersionAndFollowTheirModes) {
+  const std::filesystem::path file = testing::TempDir() + "facets.hdf";
+  Bank bank = example::make_corrected_bank(2, kModes);
+  for (std::size_t m = 0; m < kModes; ++m) bank.facet_error_cents.push_back(10.0 * static_cast<double>(m + 1));
+  write_bank(bank, file);
+  EXPECT_EQ(read_version(file), (std::array<int, 2>{1, 8}));
+  EXPECT_EQ(read_bank(file).facet_error_cents, bank.facet_error_cents);
+  EXPECT_EQ(read_bank(file).corrected.error_cents, bank.corrected.error_cents);
+  EXPECT_NE(describe_accuracy(bank).find("; facets in doubt: 90 cent more"), std::string::npos) << describe_accuracy(bank);
+  const Bank played = calc_corrected(bank);
+  for (std::size_t m = 0; m < kModes; ++m)
+    EXPECT_EQ(played.facet_error_cents[m], 10.0 * (played.discretisation_error_cents[m] - 0.25 + 1.0)) << m;
+  Bank lowest = bank;
+  keep_lowest(lowest, 3);
+  EXPECT_EQ(lowest.facet_error_cents.size(), 3U);
+  EXPECT_EQ(find_version(bank, true), (std::array<int, 2>{2, 4}));
+  bank.facet_error_cents.clear();
+  EXPECT_EQ(find_version(bank), (std::array<int, 2>{1, 4})) << "as it was written before";
+  EXPECT_TRUE(describe_facets(bank).empty());
 }
 
 TEST(Corrected, AreInAscendingOrderAndEveryModeKeepsWhatIsItsOwn) {

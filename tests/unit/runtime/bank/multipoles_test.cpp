@@ -602,7 +602,7 @@ TEST(MultipoleInfo, SaysOrdersErrorDampingAndAddedMass) {
   const std::filesystem::path file = folder.path() / "bank.hdf";
   const Bank bank = example::make_radiating_bank(2, kModes);
   write_bank(bank, file);
-  const std::string text = format_info(bank, file, 20, false);
+  const std::string text = format_info(bank, list_heard(bank, {}), file, 20, false);
   std::size_t strong = 0;
   double mass = 0.0;
   for (std::size_t m = 0; m < kModes; ++m) {
@@ -619,8 +619,9 @@ TEST(MultipoleInfo, SaysOrdersErrorDampingAndAddedMass) {
   char figure[32];
   std::snprintf(figure, sizeof figure, "lowers one by %.2g cents", cents);
   EXPECT_NE(text.find(figure), std::string::npos) << text;
-  EXPECT_NE(format_info_json(bank, file).find("\"worst_error_db\" : -45"), std::string::npos);
-  EXPECT_EQ(format_info(example::make_bank(2, 5), file, 20, false).find("radiation "), std::string::npos);
+  EXPECT_NE(format_info_json(bank, list_heard(bank, {}), file).find("\"worst_error_db\" : -45"), std::string::npos);
+  EXPECT_EQ(format_info(example::make_bank(2, 5), list_heard(example::make_bank(2, 5), {}), file, 20, false).find("radiation "),
+            std::string::npos);
 }
 
 }  // namespace

@@ -368,6 +368,19 @@ TEST(Pack, witnesses_say_whether_the_shapes_are_those_that_were_packed) {
   EXPECT_GT(check_packing(better).faults.size(), 20u);
 }
 
+TEST(Pack, whose_shapes_contradict_its_witnesses_is_read_by_no_program) {
+  const Bank bank = make_ball_bank(3, 9);
+  PackedBank packed = calc_packed(bank, -60.0);
+  EXPECT_NO_THROW((void)parse_bank(bytes_of(make_packed_bytes(packed))));
+  packed.shape = calc_packed(bank, -12.0).shape;  // sealed with the errors and witnesses of the finer one
+  try {
+    (void)parse_bank(bytes_of(make_packed_bytes(packed)));
+    FAIL() << "it was read";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("not a sane bank: the error is"), std::string::npos) << error.what();
+  }
+}
+
 TEST(Pack, a_bank_without_modes_has_nothing_to_check) {
   Bank bank = example::make_bank(2, 0);
   bank.packing = Packing{-40.0, -30.0, {1, 2}, {}};
@@ -437,7 +450,7 @@ TEST(Pack, files_with_damaged_surfaces_and_shapes_are_refused_or_sane) {
   for (const std::int32_t vertex : {-1, static_cast<std::int32_t>(packed.bank.vertex_count()), 1 << 30}) {
     PackedBank bad = packed;
     bad.bank.packing->witness[2] = vertex;
-    EXPECT_FALSE(try_read(make_packed_bytes(bad))) << vertex;
+    EXPECT_THROW((void)make_packed_bytes(bad), InputError) << vertex;
   }
   PackedBank of_other = packed;
   of_other.shape = calc_packed(example::make_bank(2, 6), -40.0).shape;

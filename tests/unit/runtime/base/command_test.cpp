@@ -12,6 +12,8 @@
 #include <filesystem>
 #include <fstream>
 
+#include "runtime/base/environment.hpp"
+
 namespace carillon::base {
 namespace {
 
@@ -31,6 +33,31 @@ TEST(Command, gives_what_a_program_prints_and_how_it_ended) {
   const Finished killed = run(make_shell("kill -SEGV $$"));
   EXPECT_EQ(killed.signal, SIGSEGV);
   EXPECT_EQ(killed.exit_code, 128 + SIGSEGV);
+}
+
+TEST(Command, is_no_rank_of_the_run_that_this_process_is_in) {
+  // What mpirun of Open MPI 4.1 sets for a rank, and what its users set.
+  for (const char* name : {"OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_RANK", "OMPI_MCA_ess", "OMPI_MCA_orte_hnp_uri", "PMIX_RANK", "PMIX_ID",
+                           "PRTE_LAUNCHED", "PMI_RANK", "OMPI_MCA_btl", "PRTE_MCA_rmaps_default_mapping_policy", "SLURM_JOB_ID"})
+    ::setenv(name, "x", 1);
+  const auto list = [](const std::vector<std::string>& environment) {
+    return run({.words = {"sh", "-c", "env | grep -E '^(OMPI|PMI|PRTE|SLURM)' | sort"}, .environment = environment, .output = kCapture})
+        .output;
+  };
+  const std::string own = run(make_shell("env | grep -E '^(OMPI|PMI|PRTE|SLURM)' | sort")).output;
+  EXPECT_NE(own.find("OMPI_MCA_btl=x\n"), std::string::npos) << own;
+  EXPECT_NE(own.find("PRTE_MCA_rmaps_default_mapping_policy=x\n"), std::string::npos) << own;
+  EXPECT_NE(own.find("SLURM_JOB_ID=x\n"), std::string::npos) << own;
+  for (const char* begin : {"OMPI_COMM", "OMPI_MCA_ess", "OMPI_MCA_orte", "PMI", "PRTE_LAUNCHED"})
+    EXPECT_EQ(own.find(begin), std::string::npos) << own;
+  EXPECT_EQ(list(make_environment()), own);
+  const std::string lone = list(make_lone_environment());
+  EXPECT_NE(lone.find("OMPI_MCA_ess_singleton_isolated=1\n"), std::string::npos) << lone;
+  EXPECT_NE(lone.find("OMPI_MCA_orte_create_session_dirs=0\n"), std::string::npos) << lone;
+  EXPECT_EQ(lone.find("SLURM_"), std::string::npos) << lone;
+  for (const char* name : {"OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_RANK", "OMPI_MCA_ess", "OMPI_MCA_orte_hnp_uri", "PMIX_RANK", "PMIX_ID",
+                           "PRTE_LAUNCHED", "PMI_RANK", "OMPI_MCA_btl", "PRTE_MCA_rmaps_default_mapping_policy", "SLURM_JOB_ID"})
+    ::unsetenv(name);
 }
 
 TEST(Command, words_reach_the_program_as_they_are) {

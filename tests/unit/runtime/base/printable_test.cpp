@@ -1,10 +1,14 @@
 #include "runtime/base/printable.hpp"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cstdint>
 #include <set>
 #include <string>
+
+#include "runtime/base/message.hpp"
 
 namespace {
 
@@ -68,5 +72,29 @@ TEST(Printable, bytes_that_are_no_utf8_are_written_as_numbers) {
 }
 
 TEST(Printable, texts_of_several_lines_keep_their_lines) { EXPECT_EQ(printable_lines("a\n\tb\x1b"), "a\n\tb\\u001b"); }
+
+TEST(Message, is_cut_where_it_is_too_long_for_a_person) {
+  using carillon::base::show_message;
+  EXPECT_EQ(show_message("job.json:3: no such key; give another"), "job.json:3: no such key; give another");
+  const std::string message = show_message("scene.json:7: body \"" + std::string(9000, 'a') + "\" is unknown; name another");
+  EXPECT_LT(message.size(), 1000U);
+  EXPECT_TRUE(message.starts_with("scene.json:7: body \"aaa"));
+  EXPECT_TRUE(message.ends_with("aaa\" is unknown; name another"));
+  std::string words;
+  for (int i = 0; i < 9000; ++i) words += "\u00e9 ";
+  const std::string cut = show_message(words + "; name another");
+  EXPECT_LT(cut.size(), 4100U);
+  EXPECT_TRUE(cut.ends_with("; name another"));
+  EXPECT_EQ(cut.find("\\x"), std::string::npos);  // no character was cut
+}
+
+TEST(Message, names_a_file_and_not_its_descriptor) {
+  using carillon::base::find_name;
+  EXPECT_EQ(find_name("a/b.json"), "a/b.json");
+  const int folder = ::open("/usr", O_RDONLY | O_DIRECTORY);
+  EXPECT_EQ(find_name("/proc/self/fd/" + std::to_string(folder) + "/job.json"), "/usr/job.json");
+  ::close(folder);
+  EXPECT_EQ(find_name("/proc/self/fd/" + std::to_string(folder) + "/job.json"), "/proc/self/fd/" + std::to_string(folder) + "/job.json");
+}
 
 }  // namespace

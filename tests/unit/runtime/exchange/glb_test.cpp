@@ -13,6 +13,8 @@
 #include <iterator>
 #include <numbers>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "runtime/bank/bank.hpp"
 #include "runtime/bank/corrected.hpp"
@@ -20,6 +22,7 @@
 #include "runtime/bank/write.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/material/table.hpp"
+#include "tests/support/folder.hpp"
 #include "tests/support/paths.hpp"
 #include "tests/unit/runtime/bank/example_bank.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
@@ -149,6 +152,108 @@ TEST(Glb, of_another_program_may_scale_its_node_and_leave_the_mass_out) {
   EXPECT_THAT(find_error(replace_json(bytes, "[2, 2, 2]", "[2, 2, 3]"), plain),
               ::testing::HasSubstr("not scaled by the same along all axes"));
   EXPECT_THAT(find_error(replace_json(bytes, R"("scale": [2, 2, 2])", R"("scale": [0, 0, 0])"), plain), ::testing::StartsWith("body.glb"));
+}
+
+/// The same model as a .gltf file whose buffer has this "uri", and the bytes of that buffer.
+std::pair<std::string, std::string> to_gltf(const std::string& glb, const std::string& uri) {
+  std::uint32_t length = 0;
+  std::memcpy(&length, glb.data() + 12, 4);
+  std::string text = glb.substr(20, length);
+  const std::size_t at = text.find(R"("byteLength": )", text.find(R"("buffers": )"));
+  EXPECT_NE(at, std::string::npos);
+  text.insert(at, "\"uri\": \"" + uri + "\", ");
+  return {text, glb.substr(28 + length)};
+}
+
+std::string to_base64(const std::string& bytes) {
+  static const std::string digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    std::uint32_t bits = 0;
+    for (std::size_t k = 0; k < 3; ++k) bits = bits << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0U);
+    for (std::size_t k = 0; k < 4; ++k) text += i + k > bytes.size() ? '=' : digits[bits >> (18 - 6 * k) & 63];
+  }
+  return text;
+}
+
+TEST(Glb, as_text_with_its_buffer_inside_or_next_to_it_is_the_same_bank) {
+  const bank::Bank bank = make_damped();
+  const std::string glb = to_glb(bank);
+  const std::string data = to_base64(to_gltf(glb, "").second);
+  EXPECT_EQ(bank::make_bank_bytes(parse_glb(to_gltf(glb, "data:application/octet-stream;base64," + data).first, "body.gltf")),
+            bank::make_bank_bytes(bank));
+  const tests::Folder folder;
+  const std::string name = (folder / "body.gltf").string();
+  const auto [text, bytes] = to_gltf(glb, "my%20modes%20%c3%a4..bin");
+  EXPECT_THAT(find_error(text), ::testing::HasSubstr("there is no such file"));
+  std::ofstream(folder / "my modes \xC3\xA4..bin", std::ios::binary) << bytes;
+  EXPECT_EQ(bank::make_bank_bytes(parse_glb("\xEF\xBB\xBF" + text, name)), bank::make_bank_bytes(bank));
+  std::ofstream(folder / "my modes \xC3\xA4..bin", std::ios::binary) << bytes.substr(0, 100);
+  EXPECT_THROW((void)parse_glb(text, name), InputError);
+  for (const char* uri : {"../modes.bin", "/etc/passwd", "https://example.org/modes.bin", "data:text/plain,AAAA", "%zz"})
+    EXPECT_THAT(find_error(to_gltf(glb, uri).first),
+                ::testing::AnyOf(::testing::HasSubstr("is no file next to this one"), ::testing::HasSubstr("is not base64")))
+        << uri;
+  std::string wide = "\xFF\xFE";
+  for (const char c : text) wide += {c, '\0'};
+  EXPECT_THAT(find_error(wide), ::testing::HasSubstr("UTF-16"));
+}
+
+TEST(Glb, of_another_program_is_called_imported_and_its_accuracy_unknown) {
+  const bank::Bank plain = parse_glb(to_glb(make_damped()), "body.glb", {.model = {}, .ignores_extras = true, .material = nullptr});
+  EXPECT_EQ(plain.element, "imported");
+  EXPECT_THAT(bank::describe_accuracy(plain), ::testing::StartsWith("unknown"));
+  const bank::Bank again = parse_glb(to_glb(plain), "again.glb");
+  EXPECT_EQ(bank::make_bank_bytes(again), bank::make_bank_bytes(plain));
+}
+
+/// A cube of 0.1 m in a node that scales it, with the mass of a cube of so many kg and of `size` times 0.1 m.
+std::string make_scaled(double scale, double mass_kg, double size_of_mass = 1.0) {
+  bank::Bank bank = testing::make_cube_bank({{820.0, 12.0, 0.3, {0.4, -0.7, 1.1}, 0.07}});
+  bank.rigid.mass_kg *= mass_kg;
+  bank.material.density_kg_m3 *= mass_kg;
+  for (double& x : bank.rigid.inertia_kg_m2) x *= mass_kg * size_of_mass * size_of_mass;
+  const std::string size = std::to_string(scale), before = R"("nodes": [{"name": "body", )";
+  std::string bytes =
+      replace_json(to_glb(bank), before, R"("nodes": [{"scale": [)" + size + ", " + size + ", " + size + R"(], "name": "body", )");
+  const std::size_t at = bytes.find(R"("density": )");
+  return replace_json(bytes, bytes.substr(at, bytes.find(',', at) - at), R"("density": 1000)");
+}
+
+TEST(Glb, whose_node_scales_the_body_has_the_modes_of_the_size_that_fits_its_mass) {
+  const GlbReading plain{.model = {}, .ignores_extras = true, .material = nullptr};
+  std::vector<std::string> notes;
+  for (const double scale : {0.5, 2.0, 3.0}) {
+    const double cube = scale * scale * scale;
+    const bank::Bank moved = parse_glb(make_scaled(scale, 1.0), "body.glb", plain, &notes);  // the mass is that of 0.1 m
+    EXPECT_NEAR(moved.freq_hz(0), 820.0 / scale, 1e-3);
+    EXPECT_NEAR(moved.rigid.mass_kg, cube, 1e-5 * cube);
+    EXPECT_NEAR(moved.rigid.inertia_kg_m2[0], cube * 0.01 * scale * scale / 6.0, 1e-5 * cube);
+    EXPECT_NEAR(moved.material.density_kg_m3, 1000.0, 0.01);
+    EXPECT_NEAR(moved.vertices_m[7][0], 0.05 * scale, 1e-7);
+    // Mass-normalised: the kinetic energy of a mode stays, and phi goes with one over the root of the mass.
+    const bank::Bank alone = parse_glb(make_scaled(1.0, 1.0), "body.glb", plain);
+    EXPECT_NEAR(moved.shape_at(3, 0)[2], alone.shape_at(3, 0)[2] / std::sqrt(cube), 1e-4);
+    ASSERT_EQ(notes.size(), 1u);
+    const bank::Bank kept = parse_glb(make_scaled(scale, cube, scale), "body.glb", plain, &notes);  // the mass is that of the scaled cube
+    EXPECT_NEAR(kept.freq_hz(0), 820.0, 1e-3);
+    EXPECT_NEAR(kept.material.density_kg_m3, 1000.0, 0.01);
+    EXPECT_TRUE(notes.empty());
+  }
+  const bank::Bank neither = parse_glb(make_scaled(2.0, 3.0, 2.0), "body.glb", plain, &notes);
+  EXPECT_NEAR(neither.freq_hz(0), 820.0, 1e-3);
+  ASSERT_EQ(notes.size(), 1u);
+  EXPECT_THAT(notes[0], ::testing::HasSubstr("contradicts"));
+  const bank::Bank uneven = parse_glb(make_scaled(1.0, 1.0, 2.0), "body.glb", plain, &notes);
+  EXPECT_NEAR(uneven.rigid.inertia_kg_m2[0], 0.01 / 6.0, 1e-6);  // that of the surface
+  ASSERT_EQ(notes.size(), 1u);
+  EXPECT_THAT(notes[0], ::testing::HasSubstr("moments of inertia contradict"));
+}
+
+TEST(Glb, whose_provenance_is_no_json_is_refused) {
+  bank::Bank bank = make_damped();
+  bank.provenance = "{no JSON";
+  EXPECT_THAT(find_error(to_glb(bank)), ::testing::HasSubstr("provenance is not JSON text"));
 }
 
 TEST(Glb, without_a_material_takes_the_one_that_is_named) {

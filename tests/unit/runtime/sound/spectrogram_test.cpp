@@ -79,6 +79,22 @@ TEST(Spectrogram, ALongSoundIsAveragedBetweenItsColumns) {
   EXPECT_EQ(where, 35u);
 }
 
+TEST(Spectrogram, AShortSoundShowsItsOnset) {
+  // A tone of 3 kHz begins in the middle of 30 ms, and of other short sounds: a twentieth before there is nothing, a twentieth behind all.
+  for (const double seconds : {0.01, 0.03, 0.1, 0.3}) {
+    SoundStore sound(48000, 1);
+    const int samples = static_cast<int>(seconds * 48000);
+    for (int n = 0; n < samples; ++n)
+      sound.append(std::array{n < samples / 2 ? 0.0F : static_cast<float>(std::sin(2 * std::numbers::pi * 3000.0 * n / 48000))});
+    const auto spectrum = calc_short_time_spectrum(sound, 200);
+    const auto level = [&](std::size_t frame) { return spectrum.level_db[frame * spectrum.bins + 128]; };
+    EXPECT_EQ(spectrum.bin_hz, 48000.0 / 2048.0);
+    EXPECT_EQ(level(89), kFloorDb) << seconds;
+    EXPECT_NEAR(level(110), 90.97, 0.1) << seconds;
+  }
+  EXPECT_EQ(calc_short_time_spectrum(make_tone(1000.0, 1.0, 48000, 0.43), 10).window, 2048);
+}
+
 TEST(Spectrogram, TheRidgeOfAToneIsAtItsPixelRow) {
   const SpectrogramLayout at;
   for (const int rate : {48000, 44100, 8000}) {

@@ -1,0 +1,350 @@
+// Method: borders are the edges of one triangle. Those near each other are found by a grid for each length of border. Two run along each
+//   other if they have two points in common, to the tolerance, far apart: ends that meet are made one point, ends on the other's inside
+//   cut its triangle.
+// Source: own.
+// Deviations: none.
+#include "precompute/mesher/seams.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <tuple>
+#include <unordered_map>
+#include <utility>
+
+#include "precompute/mesh/parts.hpp"
+
+namespace carillon::mesher {
+namespace {
+
+constexpr double kPartOfEdge = 0.25;  // of a border: farther points are not on it
+constexpr double kLeastOverlap = 20;  // widths of a seam, or else half of the shorter border, which two borders have in common
+constexpr double kFoldedDeg = 2;      // sheets that turn back on each other by more than 180 less this are the two sides of a wall
+constexpr double kMaxLooks = 2e8;     // at borders; a heap of millions of borders in one place is left as it is
+constexpr int kMostPasses = 3;        // a cut may make borders that only then run along another
+
+template <std::size_t N>
+struct CellHash {
+  std::size_t operator()(const std::array<std::int64_t, N>& c) const {
+    std::size_t h = 0;
+    for (const std::int64_t x : c) h = (h ^ static_cast<std::size_t>(x)) * 0x9E3779B97F4A7C15ull;
+    return h ^ (h >> 29);
+  }
+};
+
+/// An edge of one triangle.
+struct Border {
+  std::int32_t triangle = 0;
+  int side = 0;  // from this corner to the next
+  std::int32_t from = 0, to = 0;
+  double length = 0.0;
+};
+
+std::vector<Border> find_borders(const TriangleSurface& surface) {
+  std::unordered_map<Edge, int, EdgeHash> count;
+  count.reserve(2 * surface.triangles.size());
+  for (const Triangle& t : surface.triangles)
+    for (int c = 0; c < 3; ++c) ++count[make_edge(t[c], t[(c + 1) % 3])];
+  std::vector<Border> borders;
+  for (std::size_t f = 0; f < surface.triangles.size(); ++f)
+    for (int c = 0; c < 3; ++c) {
+      const Triangle& t = surface.triangles[f];
+      const std::int32_t a = t[c], b = t[(c + 1) % 3];
+      if (a == b || count[make_edge(a, b)] != 1) continue;
+      const double length = norm(surface.points[static_cast<std::size_t>(b)] - surface.points[static_cast<std::size_t>(a)]);
+      if (length > 0.0) borders.push_back({static_cast<std::int32_t>(f), c, a, b, length});
+    }
+  return borders;
+}
+
+/// Borders by the cells that they pass, of one grid for each power of two of their lengths.
+class BorderGrid {
+ public:
+  BorderGrid(const std::vector<Border>& borders, const std::vector<Vec3>& points, const Vec3& low, double reach)
+      : low_(low), reach_(reach) {
+    for (std::size_t b = 0; b < borders.size(); ++b) {
+      const int level = std::max(std::ilogb(borders[b].length), std::ilogb(4.0 * reach)) + 1;
+      if (std::find(levels_.begin(), levels_.end(), level) == levels_.end()) levels_.push_back(level);
+      const Vec3 &p = points[static_cast<std::size_t>(borders[b].from)], &q = points[static_cast<std::size_t>(borders[b].to)];
+      for_each_cell(level, p, q, [&](const Cell& cell) { cells_[cell].push_back(static_cast<std::int32_t>(b)); });
+    }
+  }
+  /// Calls visit(border) for all that may lie within reach of p, of some more than once.
+  template <class Visit>
+  void visit_near(const Vec3& p, const Visit& visit) const {
+    for (const int level : levels_)
+      for_each_cell(level, p, p, [&](const Cell& cell) {
+        if (const auto found = cells_.find(cell); found != cells_.end())
+          for (const std::int32_t b : found->second) visit(b);
+      });
+  }
+
+ private:
+  using Cell = std::array<std::int64_t, 4>;
+  template <class Work>
+  void for_each_cell(int level, const Vec3& p, const Vec3& q, const Work& work) const {
+    const double size = std::ldexp(1.0, level);
+    std::array<std::int64_t, 3> from{}, to{};
+    for (std::size_t k = 0; k < 3; ++k) {
+      // Half of the reach for the border and half for the point.
+      from[k] = static_cast<std::int64_t>(std::floor((std::min(p[k], q[k]) - low_[k] - 0.5 * reach_) / size));
+      to[k] = static_cast<std::int64_t>(std::floor((std::max(p[k], q[k]) - low_[k] + 0.5 * reach_) / size));
+    }
+    for (std::int64_t x = from[0]; x <= to[0]; ++x)
+      for (std::int64_t y = from[1]; y <= to[1]; ++y)
+        for (std::int64_t z = from[2]; z <= to[2]; ++z) work(Cell{level, x, y, z});
+  }
+
+  Vec3 low_;
+  double reach_;
+  std::vector<int> levels_;
+  std::unordered_map<Cell, std::vector<std::int32_t>, CellHash<4>> cells_;
+};
+
+/// An end of one border on another.
+struct Contact {
+  std::int32_t first = 0, second = 0;  // the borders, the lower number first
+  std::int32_t point = 0;              // the end,
+  std::int32_t on = 0;                 // the border that it lies on,
+  double along = 0.0;                  // and where: 0 and 1 are its ends
+  double distance = 0.0;
+};
+
+/// Joins the seams of one surface at one tolerance. Keeps true: the surface is as it was until run() has found what to join.
+class SeamJoiner {
+ public:
+  SeamJoiner(TriangleSurface& surface, double tolerance)
+      : surface_(surface), tolerance_(tolerance), borders_(find_borders(surface)), same_(surface.points.size()) {
+    for (std::size_t b = 0; b < borders_.size(); ++b)
+      for (const std::int32_t end : {borders_[b].from, borders_[b].to}) borders_at_[end].push_back(static_cast<std::int32_t>(b));
+  }
+
+  std::int64_t count_borders() const { return static_cast<std::int64_t>(borders_.size()); }
+
+  /// How far the farthest point was moved.
+  double get_widest() const { return widest_; }
+
+  /// False if there are no seams; nothing is changed then.
+  bool run() {
+    find_contacts();
+    for (std::size_t i = 0; i < contacts_.size();) {
+      std::size_t end = i;
+      while (end < contacts_.size() && contacts_[end].first == contacts_[i].first && contacts_[end].second == contacts_[i].second) ++end;
+      join_pair(i, end);
+      i = end;
+    }
+    if (!is_changed_) return false;
+    cut_triangles();
+    for (std::size_t v = 0; v < surface_.points.size(); ++v)
+      widest_ = std::max(widest_, norm(surface_.points[v] - at(same_.find(static_cast<std::int32_t>(v)))));
+    return true;
+  }
+
+ private:
+  const Vec3& at(std::int32_t v) const { return surface_.points[static_cast<std::size_t>(v)]; }
+  const Border& border(std::int32_t b) const { return borders_[static_cast<std::size_t>(b)]; }
+
+  /// Within what distance a point may lie on this border.
+  double find_reach(const Border& b) const { return std::min(tolerance_, kPartOfEdge * b.length); }
+
+  void find_contacts() {
+    const BorderGrid grid(borders_, surface_.points, calc_box(surface_.points).low, 2.0 * tolerance_);
+    double looks = 0.0;
+    std::vector<std::int32_t> near;
+    for (const auto& [v, own] : borders_at_) {
+      near.clear();
+      grid.visit_near(at(v), [&](std::int32_t b) { near.push_back(b); });
+      std::sort(near.begin(), near.end());
+      near.erase(std::unique(near.begin(), near.end()), near.end());
+      for (const std::int32_t b : near) {
+        const Border& other = border(b);
+        looks += static_cast<double>(own.size());
+        if (looks > kMaxLooks) return contacts_.clear();
+        const Vec3 way = at(other.to) - at(other.from);
+        const double along = std::clamp(dot(at(v) - at(other.from), way) / dot(way, way), 0.0, 1.0);
+        const double distance = norm(at(v) - (at(other.from) + along * way));
+        if (distance > find_reach(other)) continue;
+        for (const std::int32_t o : own)
+          if (o != b && distance <= find_reach(border(o))) contacts_.push_back({std::min(o, b), std::max(o, b), v, b, along, distance});
+      }
+    }
+    std::sort(contacts_.begin(), contacts_.end(), [](const Contact& a, const Contact& b) {
+      return std::tie(a.first, a.second, a.on, a.point) < std::tie(b.first, b.second, b.on, b.point);
+    });
+  }
+
+  /// Whether the triangles of two borders lie on each other, as the two sides of a wall do at its rim.
+  bool is_folded(const Border& a, const Border& b) const {
+    const Vec3 along = (1.0 / a.length) * (at(a.to) - at(a.from));
+    const auto find_inward = [&](const Border& x) {
+      const Triangle& t = surface_.triangles[static_cast<std::size_t>(x.triangle)];
+      const Vec3 way = at(t[static_cast<std::size_t>((x.side + 2) % 3)]) - at(x.from);
+      return way - dot(way, along) * along;
+    };
+    const Vec3 p = find_inward(a), q = find_inward(b);
+    if (norm(p) <= tolerance_ || norm(q) <= tolerance_) return false;  // of a triangle so flat nothing can be said
+    return std::atan2(norm(cross(p, q)), dot(p, q)) < kFoldedDeg * std::numbers::pi / 180.0;
+  }
+
+  /// The contacts of two borders, from begin to end.
+  void join_pair(std::size_t begin, std::size_t end) {
+    const Border &a = border(contacts_[begin].first), &b = border(contacts_[begin].second);
+    double overlap = 0.0, widest = 0.0;
+    for (std::size_t i = begin; i < end; ++i) {
+      widest = std::max(widest, contacts_[i].distance);
+      for (std::size_t j = begin; j < i; ++j) overlap = std::max(overlap, norm(at(contacts_[i].point) - at(contacts_[j].point)));
+    }
+    const double shorter = std::min(a.length, b.length);
+    if (!(overlap >= std::min(0.5 * shorter, kLeastOverlap * tolerance_) && overlap > 2.0 * widest) || is_folded(a, b)) return;
+    for (std::size_t i = begin; i < end; ++i) {
+      const Contact& contact = contacts_[i];
+      const Border& on = border(contact.on);
+      const double reach = find_reach(on);
+      const std::int32_t near_end = contact.along < 0.5 ? on.from : on.to;
+      if (contact.point == near_end) continue;
+      is_changed_ = true;
+      widest_ = std::max(widest_, contact.distance);
+      if (norm(at(contact.point) - at(near_end)) <= reach)
+        same_.join(contact.point, near_end);
+      else
+        cuts_[contact.on].emplace_back(contact.along, contact.point);
+    }
+  }
+
+  /// Gives all triangles the points that stand for theirs, and cuts those on whose side others end.
+  void cut_triangles() {
+    const std::size_t before = surface_.triangles.size();
+    for (Triangle& t : surface_.triangles)
+      for (std::int32_t& v : t) v = same_.find(v);
+    std::unordered_map<std::int32_t, std::vector<std::int32_t>> cut_borders;  // of a triangle
+    for (const auto& [b, cuts] : cuts_) cut_borders[border(b).triangle].push_back(b);
+    for (std::size_t f = 0; f < before; ++f) {
+      const auto found = cut_borders.find(static_cast<std::int32_t>(f));
+      if (found == cut_borders.end()) continue;
+      std::vector<Triangle> pieces{surface_.triangles[f]};
+      std::sort(found->second.begin(), found->second.end());
+      for (const std::int32_t b : found->second) cut_side(b, pieces);
+      surface_.triangles[f] = pieces.front();
+      surface_.triangles.insert(surface_.triangles.end(), pieces.begin() + 1, pieces.end());
+    }
+  }
+
+  void cut_side(std::int32_t b, std::vector<Triangle>& pieces) {
+    std::vector<std::pair<double, std::int32_t>>& cuts = cuts_[b];
+    std::sort(cuts.begin(), cuts.end());
+    std::int32_t from = same_.find(border(b).from);
+    const std::int32_t to = same_.find(border(b).to);
+    for (const auto& [along, point] : cuts) {
+      const std::int32_t v = same_.find(point);
+      if (v == from || v == to) continue;
+      for (std::size_t p = 0; p < pieces.size(); ++p)
+        for (std::size_t c = 0; c < 3; ++c) {
+          const Triangle piece = pieces[p];
+          if (piece[c] != from || piece[(c + 1) % 3] != to || piece[(c + 2) % 3] == v) continue;
+          pieces[p] = {from, v, piece[(c + 2) % 3]};
+          pieces.push_back({v, to, piece[(c + 2) % 3]});
+          from = v;
+          p = pieces.size();
+          break;
+        }
+    }
+  }
+
+  TriangleSurface& surface_;
+  double tolerance_;
+  std::vector<Border> borders_;
+  mesh::Parts same_;
+  std::map<std::int32_t, std::vector<std::int32_t>> borders_at_;               // of a point
+  std::vector<Contact> contacts_;                                              // by their borders
+  std::map<std::int32_t, std::vector<std::pair<double, std::int32_t>>> cuts_;  // of a border: where, and by which point
+  bool is_changed_ = false;
+  double widest_ = 0.0;
+};
+
+}  // namespace
+
+void weld(TriangleSurface& surface, double tolerance) {
+  std::unordered_map<std::array<std::int64_t, 3>, std::vector<std::int32_t>, CellHash<3>> cells;
+  std::vector<std::int32_t> number(surface.points.size(), -1);
+  std::vector<Vec3> kept;
+  const Vec3 low = calc_box(surface.points).low;
+  const auto join = [&](const Vec3& p) {
+    std::array<std::int64_t, 3> cell;
+    for (int c = 0; c < 3; ++c)
+      cell[c] = tolerance > 0 ? static_cast<std::int64_t>(std::floor((p[c] - low[c]) / tolerance))
+                              : static_cast<std::int64_t>(std::hash<double>()(p[c]));
+    const int reach = tolerance > 0 ? 1 : 0;
+    for (int x = -reach; x <= reach; ++x)
+      for (int y = -reach; y <= reach; ++y)
+        for (int z = -reach; z <= reach; ++z) {
+          const auto found = cells.find({cell[0] + x, cell[1] + y, cell[2] + z});
+          if (found == cells.end()) continue;
+          for (const std::int32_t v : found->second)
+            if (norm(kept[static_cast<std::size_t>(v)] - p) <= tolerance) return v;
+        }
+    const auto fresh = static_cast<std::int32_t>(kept.size());
+    kept.push_back(p);
+    cells[cell].push_back(fresh);
+    return fresh;
+  };
+  for (Triangle& t : surface.triangles)
+    for (std::int32_t& v : t) {
+      auto& n = number[static_cast<std::size_t>(v)];
+      if (n < 0) n = join(surface.points[static_cast<std::size_t>(v)]);
+      v = n;
+    }
+  surface.points = std::move(kept);
+}
+
+std::int64_t drop_unused_points(TriangleSurface& surface) {
+  std::vector<std::int32_t> number(surface.points.size(), -1);
+  for (const Triangle& t : surface.triangles)
+    for (const std::int32_t v : t) number[static_cast<std::size_t>(v)] = 0;
+  std::int32_t kept = 0;
+  for (std::size_t v = 0; v < number.size(); ++v)
+    if (number[v] == 0) {
+      surface.points[static_cast<std::size_t>(kept)] = surface.points[v];
+      number[v] = kept++;
+    }
+  const auto dropped = static_cast<std::int64_t>(surface.points.size()) - kept;
+  surface.points.resize(static_cast<std::size_t>(kept));
+  for (Triangle& t : surface.triangles)
+    for (std::int32_t& v : t) v = number[static_cast<std::size_t>(v)];
+  return dropped;
+}
+
+Seams join_seams(TriangleSurface& surface) {
+  const double diagonal = calc_box(surface.points).diagonal();
+  TriangleSurface joined = surface;
+  weld(joined, kSamePoint * diagonal);
+  Seams seams;
+  std::int64_t left = 0;
+  // The narrowest first: what they close is no border any more, and the rim of a thin wall keeps its two sides.
+  for (const double tolerance : {1e-3 * kSeam, 1e-2 * kSeam, 0.1 * kSeam, kSeam})
+    for (int pass = 0; pass < kMostPasses; ++pass) {
+      TriangleSurface candidate = joined;
+      SeamJoiner joiner(candidate, tolerance * diagonal);
+      left = joiner.count_borders();
+      if (left == 0 || !joiner.run()) break;
+      const auto after = static_cast<std::int64_t>(find_borders(candidate).size());
+      if (after >= left) break;
+      joined = std::move(candidate);
+      seams.edges += left - after;
+      seams.widest = std::max(seams.widest, joiner.get_widest());
+    }
+  if (seams.edges > 0) surface = std::move(joined);
+  return seams;
+}
+
+SurfaceInput read_input(const std::filesystem::path& path) {
+  SurfaceInput input;
+  input.surface = read_surface(path);
+  input.triangles = static_cast<std::int64_t>(input.surface.triangles.size());
+  input.unused_points = drop_unused_points(input.surface);
+  input.seams = join_seams(input.surface);
+  return input;
+}
+
+}  // namespace carillon::mesher

@@ -1,0 +1,48 @@
+#include "precompute/run/same_start.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <system_error>
+
+#include "runtime/base/error.hpp"
+#include "runtime/base/file.hpp"
+#include "runtime/base/sha256.hpp"
+
+namespace carillon::run {
+
+namespace fs = std::filesystem;
+
+Given look_at_job(const fs::path& file, std::uint64_t max_bytes) {
+  Given given{fs::absolute(file).lexically_normal().string(), {}};
+  try {
+    given.forms = {base::to_hex(base::calc_sha256(base::read_file(file, "job file", max_bytes)))};
+  } catch (const std::exception&) {  // the machine of rank 0 alone may have it
+  }
+  return given;
+}
+
+Given look_at_place(const fs::path& file) {
+  if (file.empty()) return {"none", {""}};
+  const fs::path place = fs::absolute(file).lexically_normal();
+  std::error_code error;
+  return {place.string(), {place.string(), fs::weakly_canonical(place, error).string()}};
+}
+
+void check_same(const comm::Communicator& comm, const std::string& what, const Given& given) {
+  if (comm.size() == 1) return;
+  std::vector<std::string> first = given.forms;
+  first.insert(first.begin(), given.shown);
+  first = comm.broadcast(std::move(first));
+  const bool is_known = first.size() > 1 && !given.forms.empty();
+  const bool is_same = !is_known || std::any_of(given.forms.begin(), given.forms.end(), [&](const std::string& form) {
+    return std::find(first.begin() + 1, first.end(), form) != first.end();
+  });
+  comm.agree(is_same
+                 ? std::string()
+                 : fmt::format("the ranks of one run were given different {}: rank 0 has {}, and rank {} has {}; they do one job together: "
+                               "start each job by itself (mpirun -np N ... JOB.json), or all by carillon submit",
+                               what, first[0], comm.rank(), given.shown));
+}
+
+}  // namespace carillon::run

@@ -1,0 +1,28 @@
+// How a mode is heard: its frequency, and all that takes its energy.
+#pragma once
+
+#include <cmath>
+#include <span>
+#include <vector>
+
+#include "runtime/bank/bank.hpp"
+
+namespace carillon::bank {
+
+/// The time in which a mode of that decay falls by 60 dB, ln(1000) / d; infinite without damping.
+inline double calc_t60_s(double decay_per_s) { return std::log(1000.0) / decay_per_s; }
+
+/// A mode as it is heard. Without multipoles the part of the radiation is unknown, and counts as one of the material's.
+struct HeardMode {
+  double freq_hz = 0.0;  // undamped
+  double material_per_s = 0.0, radiation_per_s = 0.0, supports_per_s = 0.0;
+
+  double calc_decay_per_s() const { return material_per_s + radiation_per_s + supports_per_s; }
+  double calc_t60_s() const { return bank::calc_t60_s(calc_decay_per_s()); }
+};
+
+/// The modes of a bank as they are played (calc_corrected(), supports applied). `by_supports_per_s` (m): what supports have added to its
+/// decays; empty: nothing.
+std::vector<HeardMode> list_heard(const Bank& played, std::span<const double> by_supports_per_s);
+
+}  // namespace carillon::bank

@@ -1,0 +1,82 @@
+// Source:     Open MPI 4.1: orte/orted/orted_submit.c and mpirun -np 2 env; OpenPMIx 4.2 (PMIX_); PRRTE 3 (PRTE_); MPICH 4, Hydra (PMI_).
+// Deviations: none.
+#include "runtime/base/environment.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <string_view>
+#include <utility>
+
+extern "C" char** environ;
+
+namespace carillon::base {
+namespace {
+
+/// Beginnings of the names that launchers set for their ranks. PRTE_MCA_ and most of OMPI_MCA_ belong to the user.
+constexpr std::array<std::string_view, 29> kOfRuns{"OMPI_COMM_WORLD_",
+                                                   "OMPI_UNIVERSE_",
+                                                   "OMPI_FIRST_RANKS",
+                                                   "OMPI_NUM_APP",
+                                                   "OMPI_APP_CTX",
+                                                   "OMPI_FILE_LOCATION",
+                                                   "OMPI_COMMAND",
+                                                   "OMPI_ARGV",
+                                                   "OMPI_PARENT_",
+                                                   "OMPI_MCA_ess",
+                                                   "OMPI_MCA_pmix",
+                                                   "OMPI_MCA_initial_wdir",
+                                                   "OMPI_MCA_mpi_oversubscribe",
+                                                   "OMPI_MCA_shmem_RUNTIME_QUERY_hint",
+                                                   "OMPI_MCA_orte_app_num",
+                                                   "OMPI_MCA_orte_bound_at_launch",
+                                                   "OMPI_MCA_orte_ess",
+                                                   "OMPI_MCA_orte_hnp_uri",
+                                                   "OMPI_MCA_orte_jobfam_session_dir",
+                                                   "OMPI_MCA_orte_launch",
+                                                   "OMPI_MCA_orte_local_daemon_uri",
+                                                   "OMPI_MCA_orte_num_nodes",
+                                                   "OMPI_MCA_orte_precondition_transports",
+                                                   "OMPI_MCA_orte_top_session_dir",
+                                                   "PMIX_",
+                                                   "PMI_",
+                                                   "PMI2_",
+                                                   "PRTE_",
+                                                   "MPI_LOCAL"};
+
+/// How Open MPI starts a single rank.
+constexpr std::array<std::pair<const char*, const char*>, 2> kLone{
+    {{"OMPI_MCA_ess_singleton_isolated", "1"}, {"OMPI_MCA_orte_create_session_dirs", "0"}}};
+
+bool is_of_run(std::string_view entry) {
+  return !entry.starts_with("PRTE_MCA_") &&
+         std::any_of(kOfRuns.begin(), kOfRuns.end(), [&](std::string_view begin) { return entry.starts_with(begin); });
+}
+
+}  // namespace
+
+bool is_launched() {
+  constexpr std::array kRanks{"OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"};
+  return std::any_of(kRanks.begin(), kRanks.end(), [](const char* name) { return std::getenv(name) != nullptr; });
+}
+
+void isolate_lone_process() {
+  if (is_launched()) return;
+  for (const auto& [name, value] : kLone) ::setenv(name, value, 0);
+}
+
+std::vector<std::string> make_environment() {
+  std::vector<std::string> entries;
+  for (char** entry = environ; *entry != nullptr; ++entry)
+    if (!is_of_run(*entry)) entries.emplace_back(*entry);
+  return entries;
+}
+
+std::vector<std::string> make_lone_environment() {
+  std::vector<std::string> entries = make_environment();
+  std::erase_if(entries, [](const std::string& entry) { return entry.starts_with("SLURM_"); });
+  for (const auto& [name, value] : kLone) entries.push_back(std::string(name) + "=" + value);
+  return entries;
+}
+
+}  // namespace carillon::base

@@ -1,0 +1,187 @@
+// Method: a table of fixed size, as a handler may neither allocate nor lock. It does not walk folders: rm(1) does, in a process of its own.
+// Source: signal-safety(7); glibc 2.34 _Fork(); flock(2).
+// Deviations: poll() in place of a sleep.
+#include "runtime/base/temporary.hpp"
+
+#include <fcntl.h>
+#include <fmt/core.h>
+#include <poll.h>
+#include <signal.h>
+#include <stdlib.h>
+#include <sys/file.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <cerrno>
+#include <cstring>
+#include <system_error>
+
+#include "runtime/base/descriptor.hpp"
+#include "runtime/base/failure.hpp"
+#include "runtime/base/message.hpp"
+
+namespace carillon::base {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kMark = ".carillon-temporary";
+constexpr const char* kLetters = "XXXXXX";
+constexpr std::size_t kMaxFolders = 16, kMaxChildren = 16, kMaxPath = 4096;
+constexpr int kStepMs = 20, kPatienceMs = 3000;
+constexpr std::array kSignals{SIGINT, SIGTERM, SIGHUP};
+
+struct Slot {
+  std::atomic<int> state{0};  // 0: free, 1: being filled or emptied, 2: a folder
+  std::array<char, kMaxPath> path{};
+  int lock = -1;
+};
+std::array<Slot, kMaxFolders> slots;
+std::array<std::atomic<pid_t>, kMaxChildren> children{};
+std::atomic<int> folder_count{0};
+static_assert(std::atomic<int>::is_always_lock_free && std::atomic<pid_t>::is_always_lock_free, "A handler may touch nothing else.");
+
+void handle(int signal) {
+  end_children_and_temporaries();
+  struct sigaction action {};
+  action.sa_handler = SIG_DFL;
+  ::sigaction(signal, &action, nullptr);
+  ::raise(signal);
+}
+
+bool is_ours(int signal) {
+  struct sigaction action {};
+  return ::sigaction(signal, nullptr, &action) == 0 && action.sa_handler == handle;
+}
+
+/// From the first folder to the last. Who ignores or handles a signal keeps doing so.
+void set_handlers(bool is_first) {
+  for (const int signal : kSignals) {
+    struct sigaction action {};
+    if (::sigaction(signal, nullptr, &action) != 0) continue;
+    if (is_first ? action.sa_handler != SIG_DFL : !is_ours(signal)) continue;
+    action = {};
+    action.sa_handler = is_first ? handle : SIG_DFL;
+    sigfillset(&action.sa_mask);
+    action.sa_flags = is_first ? SA_RESTART : 0;
+    ::sigaction(signal, &action, nullptr);
+  }
+}
+
+/// Removes folders whose process is gone.
+void sweep(const fs::path& parent, const std::string& begin) {
+  std::error_code error;
+  for (fs::directory_iterator it(parent, error), end; !error && it != end; it.increment(error)) {
+    const std::string name = it->path().filename().string();
+    std::error_code other;
+    if (!name.starts_with(begin) || name.size() != begin.size() + std::strlen(kLetters)) continue;
+    if (!fs::is_directory(it->symlink_status(other))) continue;
+    const Descriptor mark(::open((it->path() / kMark).c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC));
+    if (mark.get() >= 0 && ::flock(mark.get(), LOCK_EX | LOCK_NB) == 0) fs::remove_all(it->path(), other);
+  }
+}
+
+Slot* find_slot(const fs::path& folder) {
+  for (Slot& slot : slots)
+    if (slot.state.load() == 2 && folder == slot.path.data()) return &slot;
+  return nullptr;
+}
+
+/// Its folder is no business of the handler any more.
+void release(Slot& slot) {
+  slot.state.store(1);
+  if (slot.lock >= 0) ::close(slot.lock);
+  slot.lock = -1;
+  slot.state.store(0);
+  if (folder_count.fetch_sub(1) == 1) set_handlers(false);
+}
+
+}  // namespace
+
+fs::path make_temporary_folder(const fs::path& parent, const std::string& begin) {
+  sweep(parent, begin);
+  std::string path = (parent / (begin + kLetters)).string();
+  if (path.size() >= kMaxPath || ::mkdtemp(path.data()) == nullptr)
+    throw_system_error(errno, fmt::format("{}: no temporary folder can be made here: {}; make room there, or name another place (temporary "
+                                          "files: TMPDIR)",
+                                          find_name(path), std::strerror(errno)));
+  if (folder_count.fetch_add(1) == 0) set_handlers(true);
+  for (Slot& slot : slots) {
+    int expected = 0;
+    if (!slot.state.compare_exchange_strong(expected, 1)) continue;
+    std::memcpy(slot.path.data(), path.c_str(), path.size() + 1);
+    slot.lock = ::open((path + "/" + kMark).c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+    if (slot.lock >= 0) (void)::flock(slot.lock, LOCK_EX | LOCK_NB);
+    slot.state.store(2);
+    return path;
+  }
+  folder_count.fetch_sub(1);  // more at once than anything here makes: the destructor removes it
+  return path;
+}
+
+void remove_temporary_folder(const fs::path& folder) noexcept {
+  if (folder.empty()) return;
+  std::error_code error;
+  fs::remove_all(folder, error);
+  if (Slot* slot = find_slot(folder)) release(*slot);
+}
+
+void keep_temporary_folder(const fs::path& folder) noexcept {
+  if (Slot* slot = find_slot(folder)) release(*slot);
+  ::unlink((folder / kMark).c_str());
+}
+
+TemporaryFolder::TemporaryFolder(const std::string& begin) {
+  std::error_code error;
+  const fs::path parent = fs::temp_directory_path(error);
+  path_ = make_temporary_folder(error ? fs::path("/tmp") : parent, begin);
+}
+
+void note_child(pid_t child) noexcept {
+  for (std::atomic<pid_t>& slot : children) {
+    pid_t none = 0;
+    if (slot.compare_exchange_strong(none, child)) return;
+  }
+}
+
+void forget_child(pid_t child) noexcept {
+  for (std::atomic<pid_t>& slot : children) {
+    pid_t expected = child;
+    if (slot.compare_exchange_strong(expected, 0)) return;
+  }
+}
+
+void end_children_and_temporaries() noexcept {
+  for (const int signal : {SIGTERM, SIGKILL}) {
+    for (std::atomic<pid_t>& slot : children)
+      if (const pid_t child = slot.load(); child > 0) ::kill(child, signal);
+    for (int waited_ms = 0; waited_ms < kPatienceMs; waited_ms += kStepMs) {
+      bool is_left = false;
+      for (std::atomic<pid_t>& slot : children) {
+        const pid_t child = slot.load();
+        if (child <= 0) continue;
+        const pid_t ended = ::waitpid(child, nullptr, WNOHANG);
+        if (ended == child || (ended < 0 && errno == ECHILD))
+          slot.store(0);
+        else
+          is_left = true;
+      }
+      if (!is_left) break;
+      ::poll(nullptr, 0, kStepMs);
+    }
+  }
+  for (Slot& slot : slots) {
+    if (slot.state.load() != 2) continue;
+    const pid_t child = ::_Fork();
+    if (child == 0) {
+      ::execl("/bin/rm", "rm", "-rf", "--", slot.path.data(), nullptr);
+      ::_exit(127);
+    }
+    while (child > 0 && ::waitpid(child, nullptr, 0) < 0 && errno == EINTR) {
+    }
+  }
+}
+
+}  // namespace carillon::base

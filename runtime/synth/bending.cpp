@@ -1,0 +1,113 @@
+// Method:     the displacement of a vertex is the sum over modes of phi q at an instant. It is summed at the vertices where the lowest
+//             modes move most and at others spread over the surface, at the end of each sub-block while that is called for, and every
+//             four samples where nothing acts.
+// Source:     docs/equations.md E4, E13.
+// Deviations: while something acts, between sub-blocks, and between those vertices it may be some per cent larger.
+#include "runtime/synth/bending.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string_view>
+
+#include "runtime/bank/surface.hpp"
+
+namespace carillon::synth {
+namespace {
+
+using Lanes = std::array<float, kGroup>;
+
+float add_up(const Lanes& lanes) noexcept {
+  float sum = 0.0F;
+  for (const float x : lanes) sum += x;
+  return sum;
+}
+
+}  // namespace
+
+double find_judged_thickness_m(const bank::Bank& bank) {
+  if (!bank.quartic.is_empty()) return 0.0;
+  const auto names = [&](std::string_view kind) { return bank.provenance.find(kind) != std::string::npos; };
+  if (bank.element == "analytic" && (names("\"string\"") || names("\"membrane\""))) return 0.0;
+  return bank::calc_thickness_m(bank.vertices_m, bank.triangles, bank.rigid.volume_m3);
+}
+
+BendingWatch::BendingWatch(const Model& model) : model_(&model) {
+  const ModelBending& bending = model.get_bending();
+  if (!(bending.thickness_m > 0.0)) return;
+  move_.resize(bending.step_m.size());
+  re_.resize(model.get_damped_column(0));
+  im_.resize(model.get_damped_column(0));
+}
+
+void BendingWatch::look(const ModeState* states, const ColumnStates* starts, int column, int groups, std::span<const DampedState> damped,
+                        bool acted) noexcept {
+  const ModelBending& bending = model_->get_bending();
+  left_ = acted ? bending.watched : left_ - 1;
+  Lanes swing{};  // bounds on what comes when nothing acts any more
+  for (int g = 0; g < groups; ++g) {
+    const std::size_t first = static_cast<std::size_t>(g) * kGroup;
+    for (std::size_t lane = 0; lane < kGroup; ++lane) {
+      const bool is_last = column == kColumns;
+      const float re = is_last ? static_cast<float>(states[g].re[lane]) : starts[g].re[column][lane];
+      const float im = is_last ? static_cast<float>(states[g].im[lane]) : starts[g].im[column][lane];
+      re_[first + lane] = re;
+      im_[first + lane] = im;
+      swing[lane] += bending.step_m[first + lane] * bending.largest[first + lane] * (std::abs(re) + std::abs(im));
+    }
+  }
+  const double limit_m = bending.thickness_m * std::max(kLinearThicknesses, largest_);
+  // Modes that do not ring are watched as long as the others may be.
+  if (add_up(swing) <= limit_m && damped.empty()) {
+    left_ = 0;
+    return;
+  }
+  for (int back = 0; back <= (acted ? 0 : ModelBending::kBack); ++back) look_at(back, groups, damped);
+}
+
+/// So many times before the end of the sub-block.
+void BendingWatch::look_at(int back, int groups, std::span<const DampedState> damped) noexcept {
+  const ModelBending& bending = model_->get_bending();
+  const std::size_t lanes = im_.size(), turn = static_cast<std::size_t>(std::max(0, back - 1)) * lanes;
+  Lanes bound{};
+  for (std::size_t first = 0; first < static_cast<std::size_t>(groups) * kGroup; first += kGroup) {
+    for (std::size_t lane = 0; lane < kGroup; ++lane) {
+      const std::size_t c = first + lane;
+      const float im = back == 0 ? im_[c] : im_[c] * bending.back_re[turn + c] + re_[c] * bending.back_im[turn + c];
+      move_[c] = bending.step_m[c] * im;
+      bound[lane] += bending.largest[c] * std::abs(move_[c]);
+    }
+  }
+  double bound_m = add_up(bound);
+  for (std::size_t m = 0; m < damped.size(); ++m) {  // as at the end: they move slowly, or are gone
+    const std::size_t c = lanes + m;
+    move_[c] = bending.step_m[c] * static_cast<float>(damped[m].q);
+    bound_m += static_cast<double>(bending.largest[c] * std::abs(move_[c]));
+  }
+  const double limit_m = bending.thickness_m * std::max(kLinearThicknesses, largest_);
+  if (!(bound_m > limit_m)) return;
+  const double found_m = calc_deflection_m(groups);
+  if (found_m > limit_m) largest_ = found_m / bending.thickness_m;
+}
+
+/// The largest displacement of the vertices that are looked at [m].
+double BendingWatch::calc_deflection_m(int groups) const noexcept {
+  const ModelBending& bending = model_->get_bending();
+  double largest = 0.0;
+  for (const std::int32_t vertex : bending.vertex) {
+    double square = 0.0;
+    for (int axis = 0; axis < 3; ++axis) {
+      const std::int16_t* row = model_->get_row(vertex, axis);
+      Lanes sum{};
+      for (std::size_t first = 0; first < static_cast<std::size_t>(groups) * kGroup; first += kGroup)
+        for (std::size_t lane = 0; lane < kGroup; ++lane) sum[lane] += static_cast<float>(row[first + lane]) * move_[first + lane];
+      auto along = static_cast<double>(add_up(sum));
+      for (std::size_t c = im_.size(); c < move_.size(); ++c) along += static_cast<double>(static_cast<float>(row[c]) * move_[c]);
+      square += along * along;
+    }
+    largest = std::max(largest, square);
+  }
+  return std::sqrt(largest);
+}
+
+}  // namespace carillon::synth

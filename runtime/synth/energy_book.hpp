@@ -1,0 +1,132 @@
+// Where the energy of the modes comes from and goes: what acts gives it, and damping takes it.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "runtime/synth/damped_modes.hpp"
+#include "runtime/synth/kernels.hpp"
+#include "runtime/synth/model.hpp"
+#include "runtime/synth/oscillator.hpp"
+
+namespace carillon::synth {
+
+/// Energies of a body's modes [J]: given = held + lost, at any time.
+struct ModeEnergy {
+  double given_j = 0.0;     // by all that acts: pulses, forces, sliding and rolling; less what contacts that damp take
+  double lost_j = 0.0;      // to damping, and with modes that were silenced
+  double held_j = 0.0;      // at the moment
+  double radiated_j = 0.0;  // of what is lost
+
+  ModeEnergy& operator+=(const ModeEnergy& other) noexcept {
+    given_j += other.given_j;
+    lost_j += other.lost_j;
+    held_j += other.held_j;
+    radiated_j += other.radiated_j;
+    return *this;
+  }
+};
+
+/// The share of a mode's damping that is sound: d_r = bank::calc_radiation_decay(gain) of the bank's decay d, which counts as all there
+/// is; 1 where d_r is more, as gains that radiation::limit_gains() has not limited may have it.
+double calc_radiated_share(double gain, double decay_per_s) noexcept;
+
+/// The book of one voice. What acts does so for whole sub-blocks: the states are noted before and after each, and at the start of each
+/// block. A mode that nothing acts on loses what it has less. Where something does, damping takes the integral of 2 d q'^2, summed over
+/// samples, and what the mode has more by the end than that leaves was given.
+class EnergyBook {
+ public:
+  explicit EnergyBook(const Model& model);
+
+  /// What the states at a sample are. get(m): of a mode of the model; is_coupled(m): it is one of those that move together, with the energy
+  /// `coupled_j`, whose damping is taken as that of linear modes.
+  template <class Get, class IsCoupled>
+  void note(std::int64_t sample, const Get& get, const IsCoupled& is_coupled, double coupled_j) noexcept {
+    note(sample, false, nullptr, 0, false, get, is_coupled, coupled_j);
+  }
+  /// The same at the end of a sub-block in which something acted, whose beginning was noted. `kept`: what it made of the states of the
+  /// ringing modes at each sample, of `groups` groups; `is_all`: that is all their motion, and not what is added to it.
+  template <class Get, class IsCoupled>
+  void note_acted(std::int64_t sample, const SampleStates* kept, int groups, bool is_all, const Get& get, const IsCoupled& is_coupled,
+                  double coupled_j) noexcept {
+    note(sample, true, kept, groups, is_all, get, is_coupled, coupled_j);
+  }
+  /// Begins at these states, as if what they hold had been given before.
+  template <class Get, class IsCoupled>
+  void begin(std::int64_t sample, const ModeEnergy& before, const Get& get, const IsCoupled& is_coupled, double coupled_j) noexcept {
+    note(sample_, get, is_coupled, coupled_j);
+    sample_ = sample;
+    const double held_j = sums_.held_j;
+    sums_ = before;
+    // A model that lacks modes of the one before it, or has more: they go and come with their energy.
+    sums_.lost_j += before.held_j - held_j;
+    sums_.held_j = held_j;
+  }
+
+  const ModeEnergy& get() const noexcept { return sums_; }
+  /// Room for what is kept, a group each.
+  SampleStates* get_kept() noexcept { return kept_.data(); }
+  std::size_t calc_bytes() const noexcept { return modes_.capacity() * sizeof(Mode) + kept_.capacity() * sizeof(SampleStates); }
+
+ private:
+  struct Mode {
+    DampedState state;
+    double lambda = 0.0, energy_j = 0.0, share = 0.0;  // share: that is radiated
+    double loss = 0.0;                                 // 2 d over a sample
+    double decay = 0.0, omega_d = 0.0;                 // of those that ring
+    double turn_re = 0.0, turn_im = 0.0;               // over a sample
+    OscillatorMap alone{};                             // over a sub-block, of those that do not
+    std::array<double, kSubBlocks> falls{};            // 1 - e^-2 d t over one sub-block to a block
+  };
+  double calc_lost_j(const Mode& mode, const SampleStates& kept, int lane, bool is_all) const noexcept;
+  template <class Get, class IsCoupled>
+  void note(std::int64_t sample, bool acted, const SampleStates* kept, int groups, bool is_all, const Get& get, const IsCoupled& is_coupled,
+            double coupled_j) noexcept;
+
+  std::vector<Mode> modes_;
+  std::vector<SampleStates> kept_;
+  std::int64_t sample_ = 0;
+  double coupled_j_ = 0.0;
+  ModeEnergy sums_;
+};
+
+template <class Get, class IsCoupled>
+void EnergyBook::note(std::int64_t sample, bool acted, const SampleStates* kept, int groups, bool is_all, const Get& get,
+                      const IsCoupled& is_coupled, double coupled_j) noexcept {
+  const std::int64_t passed = (sample - sample_) / kSubBlock;
+  sample_ = sample;
+  double held_j = coupled_j, coupled_lost_j = 0.0;
+  for (std::size_t m = 0; m < modes_.size(); ++m) {
+    Mode& mode = modes_[m];
+    const auto number = static_cast<int>(m);
+    const DampedState before = mode.state, now = get(number);
+    const double before_j = mode.energy_j, now_j = 0.5 * (now.v * now.v + mode.lambda * now.q * now.q);
+    if (before_j == 0.0 && now_j == 0.0) continue;
+    double lost_j = passed <= 0 ? 0.0 : before_j * (passed <= kSubBlocks ? mode.falls[static_cast<std::size_t>(passed - 1)] : 1.0);
+    const bool is_alone = !is_coupled(number);
+    if (is_alone && acted && mode.omega_d > 0.0 && number / kGroup < groups) {
+      lost_j = calc_lost_j(mode, kept[number / kGroup], number % kGroup, is_all);
+    } else if (is_alone && acted) {  // near critical damping: as if the force had come at the end
+      const double q = mode.alone.qq * before.q + mode.alone.qv * before.v, v = mode.alone.vq * before.q + mode.alone.vv * before.v;
+      lost_j = before_j - 0.5 * (v * v + mode.lambda * q * q);
+    }
+    mode.state = now;
+    mode.energy_j = now_j;
+    sums_.radiated_j += mode.share * lost_j;
+    if (!is_alone) {
+      coupled_lost_j += lost_j;
+      continue;
+    }
+    held_j += now_j;
+    sums_.lost_j += acted ? lost_j : before_j - now_j;
+    if (acted) sums_.given_j += now_j - before_j + lost_j;
+  }
+  sums_.lost_j += acted ? coupled_lost_j : coupled_j_ - coupled_j;
+  if (acted) sums_.given_j += coupled_j - coupled_j_ + coupled_lost_j;
+  coupled_j_ = coupled_j;
+  sums_.held_j = held_j;
+}
+
+}  // namespace carillon::synth

@@ -1,0 +1,97 @@
+// Texts in UTF-16, paths with backslashes, and files beyond the limit on their size.
+#include "runtime/base/foreign.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <cerrno>
+#include <string>
+
+#include "runtime/base/document.hpp"
+#include "runtime/base/failure.hpp"
+#include "runtime/base/file.hpp"
+#include "runtime/base/file_limit.hpp"
+#include "tests/support/folder.hpp"
+
+namespace carillon::base {
+namespace {
+
+std::string widen(const std::string& text, bool is_little) {
+  std::string wide;
+  for (const char c : text) wide += is_little ? std::string{c, '\0'} : std::string{'\0', c};
+  return wide;
+}
+
+std::string find_error(const std::string& text) {
+  try {
+    (void)parse_document(text, "job.json");
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Foreign, a_text_in_utf16_is_named_as_such) {
+  const std::string job = R"({"mesh": "bar.msh"})";
+  for (const std::string& text : {"\xFF\xFE" + widen(job, true), "\xFE\xFF" + widen(job, false), widen(job, true), widen(job, false)}) {
+    EXPECT_EQ(find_error(text).rfind("job.json: this text is UTF-16", 0), 0u) << find_error(text);
+    EXPECT_NE(find_error(text).find("UTF-8"), std::string::npos);
+  }
+}
+
+TEST(Foreign, other_bytes_are_no_utf16) {
+  EXPECT_NO_THROW(refuse_utf16("", "a"));
+  EXPECT_NO_THROW(refuse_utf16("{}", "a"));
+  EXPECT_NO_THROW(refuse_utf16("\xEF\xBB\xBF{}", "a"));
+  EXPECT_NO_THROW(refuse_utf16(std::string(200, '\0'), "a"));
+  EXPECT_NO_THROW(refuse_utf16(std::string("a\0b\0c\0", 6), "a"));  // too short to be sure
+  EXPECT_NO_THROW(refuse_utf16("\xFF\xFEsolid", "a"));
+}
+
+TEST(Foreign, backslashes_in_paths_are_named) {
+  EXPECT_NE(find_error(R"({"mesh": "C:\meshes\cup.msh"})").find("use / between the folders"), std::string::npos);
+  try {
+    Object job = parse_document(R"({"mesh": "..\\in\\bar.msh"})", "job.json").root();
+    (void)job.path("mesh");
+    FAIL() << "taken";
+  } catch (const InputError& error) {
+    EXPECT_STREQ(error.what(), R"(job.json:1: "mesh": there is no file "..\in\bar.msh"; use / between folders, not \)");
+  }
+  try {
+    (void)read_file("in\\bar.msh", "mesh file", 100);
+    FAIL() << "read";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("use / between folders"), std::string::npos) << error.what();
+  }
+  EXPECT_EQ(hint_backslash("in/bar.msh"), "");
+}
+
+TEST(Foreign, a_backslash_in_the_name_of_a_file_that_is_there_is_no_fault) {
+  const tests::Folder folder;
+  write_file(folder / "a\\b.msh", "x");
+  Object job = parse_document(R"({"mesh": "a\\b.msh"})", folder / "job.json").root();
+  EXPECT_EQ(job.path("mesh"), folder / "a\\b.msh");
+}
+
+/// Ends with 0 if a file beyond the limit is refused in words, and nothing of it is there.
+[[noreturn]] void write_beyond_limit(const std::filesystem::path& file) {
+  report_file_limit();
+  const rlimit limit{20'000, 20'000};
+  if (::setrlimit(RLIMIT_FSIZE, &limit) != 0) std::_Exit(1);
+  try {
+    write_file(file, std::string(50'000, 'x'));
+  } catch (const DiskFullError& error) {
+    std::_Exit(std::string(error.what()).find("ulimit -f") != std::string::npos && !std::filesystem::exists(file) ? 0 : 2);
+  } catch (...) {
+    std::_Exit(3);
+  }
+  std::_Exit(4);
+}
+
+TEST(Foreign, a_file_beyond_the_limit_is_an_error_and_no_signal) {
+  const tests::Folder folder;
+  EXPECT_EXIT(write_beyond_limit(folder / "sound.wav"), ::testing::ExitedWithCode(0), "");
+}
+
+}  // namespace
+}  // namespace carillon::base

@@ -1,0 +1,125 @@
+// Temporary folders of processes that end in every way. The signals are real, and sent to real processes.
+#include "runtime/base/temporary.hpp"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <stdlib.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "runtime/base/command.hpp"
+
+namespace carillon::base {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Temporary : public testing::Test {
+ protected:
+  Temporary() {
+    std::string name = (fs::temp_directory_path() / "temporary-test-XXXXXX").string();
+    parent_ = ::mkdtemp(name.data());
+  }
+  ~Temporary() override { fs::remove_all(parent_); }
+
+  /// A process that has a folder with content, says so, and waits in `wait`; it gets the signal. Its status.
+  template <class Wait>
+  int end_one(int signal, const Wait& wait) {
+    int ready[2];
+    EXPECT_EQ(::pipe(ready), 0);
+    const pid_t child = ::fork();
+    if (child == 0) {
+      const TemporaryFolder folder(parent_, ".page.");
+      fs::create_directories(folder.path() / "a/b");
+      std::ofstream(folder.path() / "a/b/bank.hdf") << "content";
+      (void)!::write(ready[1], "1", 1);
+      wait(folder);
+      ::_exit(0);
+    }
+    char got = 0;
+    EXPECT_EQ(::read(ready[0], &got, 1), 1);
+    ::close(ready[0]);
+    ::close(ready[1]);
+    ::kill(child, signal);
+    int status = 0;
+    EXPECT_EQ(::waitpid(child, &status, 0), child);
+    return status;
+  }
+  static void sleep_for_long(const TemporaryFolder&) {
+    for (;;) ::pause();
+  }
+
+  bool is_empty() const { return fs::is_empty(parent_); }
+
+  fs::path parent_;
+};
+
+TEST_F(Temporary, goes_with_its_scope_and_stays_when_it_is_kept) {
+  {
+    const TemporaryFolder folder(parent_, "carillon-");
+    std::ofstream(folder.path() / "file") << "content";
+    EXPECT_FALSE(is_empty());
+  }
+  EXPECT_TRUE(is_empty());
+  const fs::path kept = make_temporary_folder(parent_, ".page.");
+  std::ofstream(kept / "index.html") << "content";
+  keep_temporary_folder(kept);
+  (void)TemporaryFolder(parent_, ".page.");
+  EXPECT_EQ(std::distance(fs::directory_iterator(kept), fs::directory_iterator()), 1);  // no mark of ours among the files
+}
+
+TEST_F(Temporary, goes_when_a_signal_ends_the_process) {
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    const int status = end_one(signal, sleep_for_long);
+    EXPECT_TRUE(WIFSIGNALED(status) && WTERMSIG(status) == signal) << status;  // as the caller expects
+    EXPECT_TRUE(is_empty()) << signal;
+  }
+}
+
+TEST_F(Temporary, goes_with_the_program_that_writes_there) {
+  const int status = end_one(SIGTERM, [](const TemporaryFolder& folder) {
+    (void)run({.words = {"sh", "-c", "i=0; while :; do i=$((i+1)); mkdir -p d$i; : >d$i/f; done"}, .folder = folder.path()});
+  });
+  EXPECT_TRUE(WIFSIGNALED(status)) << status;
+  EXPECT_TRUE(is_empty());
+}
+
+TEST_F(Temporary, of_a_killed_process_goes_with_the_next_one) {
+  end_one(SIGKILL, sleep_for_long);
+  EXPECT_FALSE(is_empty());
+  (void)TemporaryFolder(parent_, ".other.");
+  EXPECT_FALSE(is_empty());
+  (void)TemporaryFolder(parent_, ".page.");
+  EXPECT_TRUE(is_empty());
+}
+
+TEST_F(Temporary, spares_what_others_have) {
+  fs::create_directory(parent_ / ".page.backup");  // a user's own, whose name looks like one of ours
+  const TemporaryFolder mine(parent_, ".page.");   // and one in use
+  (void)TemporaryFolder(parent_, ".page.");
+  EXPECT_TRUE(fs::exists(parent_ / ".page.backup"));
+  EXPECT_TRUE(fs::exists(mine.path()));
+}
+
+TEST_F(Temporary, leaves_signals_to_who_ignores_them) {
+  ::signal(SIGHUP, SIG_IGN);  // nohup
+  {
+    const TemporaryFolder folder(parent_, "carillon-");
+    ::raise(SIGHUP);
+    EXPECT_TRUE(fs::exists(folder.path()));
+  }
+  struct sigaction action {};
+  ::sigaction(SIGHUP, nullptr, &action);
+  EXPECT_EQ(action.sa_handler, SIG_IGN);
+  ::sigaction(SIGTERM, nullptr, &action);
+  EXPECT_EQ(action.sa_handler, SIG_DFL);
+  ::signal(SIGHUP, SIG_DFL);
+}
+
+}  // namespace
+}  // namespace carillon::base
