@@ -200,9 +200,9 @@ class Reports(unittest.TestCase):
         self.assertFalse((self.root / "report/report-modes.png").exists())
 
     def test_modes_are_those_of_the_bank(self):
-        rows = self.page.rows("modes", 12)[1:]
+        rows = self.page.rows("modes", 15)[1:]
         with h5py.File(self.bank) as bank:
-            freq, decay = bank["modes/frequency_hz"][:], bank["modes/decay"][:]
+            freq, decay = bank["modes/frequency_hz"][:], bank["modes/corrected_decay"][:]
             columns = {
                 0: numpy.arange(1, len(freq) + 1),
                 1: freq,
@@ -211,17 +211,17 @@ class Reports(unittest.TestCase):
                 4: bank["modes/corrected_frequency_hz"][:],
                 5: bank["modes/corrected_error_cents"][:],
                 7: decay,
-                8: math.log(1000) / decay,
-                9: bank["modes/residual"][:],
-                10: bank["modes/radiation_gain"][:],
+                11: math.log(1000) / decay,
+                12: bank["modes/residual"][:],
+                13: bank["modes/radiation_gain"][:],
             }
             names = numpy.array(["one mesh", "two meshes", "rough", "too stiff", "lumped T10", "disputed"])[bank["modes/correction"][:]]
         self.assertGreater(len(freq), 10)
         self.assertEqual(len(rows), len(freq))
         self.assertEqual([row[6] for row in rows], list(names))
         info = json.loads(subprocess.run([BIN / "carillon-bank", "info", "--json", self.bank], capture_output=True, check=True).stdout)
-        self.assertEqual([row[11] for row in rows], [mode["kind"] for mode in info["modes"]])
-        self.assertIn("bending, 2 nodes", [row[11] for row in rows])
+        self.assertEqual([row[14] for row in rows], [mode["kind"] for mode in info["modes"]])
+        self.assertIn("bending, 2 nodes", [row[14] for row in rows])
         for column, digits in zip(columns, [9, 6, 2, 2, 6, 2, 4, 3, 2, 4]):
             shown = numpy.array([float(row[column]) for row in rows])
             # Rounded to so many digits, and frequencies to a hundredth of a hertz.
@@ -232,8 +232,8 @@ class Reports(unittest.TestCase):
 
     def test_charts_have_a_mark_for_each_mode_in_order(self):
         with h5py.File(self.bank) as bank:
-            freq, residual = bank["modes/frequency_hz"][:], bank["modes/residual"][:]
-            bars = bank["modes/discretisation_error_cents"][:]
+            freq, residual = bank["modes/corrected_frequency_hz"][:], bank["modes/residual"][:]
+            bars, heard_bars = bank["modes/discretisation_error_cents"][:], bank["modes/corrected_error_cents"][:]
         for section in ("modes", "residuals", "errors"):
             marks = [(float(a["cx"]), float(a["cy"]), title) for tag, a, title in self.page.charts[section] if tag == "circle"]
             marks = marks[: len(freq)]
@@ -250,12 +250,12 @@ class Reports(unittest.TestCase):
             line = numpy.polyfit(numpy.log(values), y, 1)
             self.assertLess(line[0], 0)
             self.assertLess(max(abs(numpy.polyval(line, numpy.log(values)) - y)), 0.1, section)
-        # Whiskers as wide as both error bars together.
+        # Whiskers as wide as the error bars of what is heard.
         (whiskers,) = [a["d"] for tag, a, _ in self.page.charts["modes"] if tag == "path" and a.get("class", "").startswith("bar")]
         ends = [tuple(map(float, ends)) for ends in re.findall(r"M([\d.]+) [\d.]+v6m0 -3H([\d.]+)", whiskers)]
         slope = (x[-1] - x[0]) / math.log(freq[-1] / freq[0])
         for i, (low, high) in enumerate(ends):
-            self.assertAlmostEqual(high - low, 2 * bars[i] * math.log(2) / 1200 * slope, delta=0.21)
+            self.assertAlmostEqual(high - low, 2 * heard_bars[i] * math.log(2) / 1200 * slope, delta=0.21)
         self.assertEqual(len(ends), len(freq))
 
     def test_the_proof_is_that_of_the_bank(self):
@@ -472,7 +472,7 @@ class Reports(unittest.TestCase):
         self.assert_whole(page)
         (dots,) = [a["d"] for tag, a, _ in page.charts["modes"] if tag == "path" and a.get("class", "").startswith("dots")]
         self.assertEqual(dots.count("h0"), 2500)
-        self.assertEqual(len(page.rows("modes", 12)), 1001)
+        self.assertEqual(len(page.rows("modes", 15)), 1001)
         self.assertIn("The first 1000 of 2500 modes", page.text["modes"])
 
     def test_modes_that_ring_for_ever_are_drawn_by_their_number(self):
@@ -483,7 +483,7 @@ class Reports(unittest.TestCase):
         y = numpy.array([float(a["cy"]) for tag, a, _ in page.charts["modes"] if tag == "circle"])
         steps = numpy.diff(y)
         self.assertTrue(len(y) > 10 and max(steps) < 0 and max(abs(steps - steps.mean())) < 0.11, steps)
-        self.assertEqual({row[8] for row in page.rows("modes", 12)[1:]}, {"inf"})
+        self.assertEqual({row[11] for row in page.rows("modes", 15)[1:]}, {"inf"})
 
     def test_a_bank_without_modes_has_a_report(self):
         bank = self.root / "mute.hdf"
@@ -587,7 +587,7 @@ class Reports(unittest.TestCase):
         # The name that the user knows, not that of the snapshot; and all of the record.
         self.assertEqual(page.title, "chime.msh")
         self.assertEqual([name for name, is_missing in page.missing.items() if is_missing], ["pictures", "play"])
-        self.assertEqual(len(page.rows("modes", 12)), 4)
+        self.assertEqual(len(page.rows("modes", 15)), 4)
         carillon("report", job, "-o", self.root / "made", "--no-pictures", "--no-page")
         self.assertEqual((self.root / "made/report.html").read_bytes(), page.source)
         # Who asks for it first has it drawn, next to the bank and for all who ask later. The records there stay what was published.
