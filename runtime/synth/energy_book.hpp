@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -104,13 +105,18 @@ void EnergyBook::note(std::int64_t sample, bool acted, const SampleStates* kept,
     const DampedState before = mode.state, now = get(number);
     const double before_j = mode.energy_j, now_j = 0.5 * (now.v * now.v + mode.lambda * now.q * now.q);
     if (before_j == 0.0 && now_j == 0.0) continue;
-    double lost_j = passed <= 0 ? 0.0 : before_j * (passed <= kSubBlocks ? mode.falls[static_cast<std::size_t>(passed - 1)] : 1.0);
     const bool is_alone = !is_coupled(number);
+    double lost_j = 0.0;
     if (is_alone && acted && mode.omega_d > 0.0 && number / kGroup < groups) {
       lost_j = calc_lost_j(mode, kept[number / kGroup], number % kGroup, is_all);
     } else if (is_alone && acted) {  // near critical damping: as if the force had come at the end
       const double q = mode.alone.qq * before.q + mode.alone.qv * before.v, v = mode.alone.vq * before.q + mode.alone.vv * before.v;
       lost_j = before_j - 0.5 * (v * v + mode.lambda * q * q);
+    } else if (is_alone && now_j > 0.0) {
+      lost_j = before_j - now_j;
+    } else if (passed > 0) {  // coupled, or silenced; under a force the amplitude changes evenly
+      const double mean_j = acted ? (before_j + std::sqrt(before_j * now_j) + now_j) / 3.0 : before_j;
+      lost_j = mean_j * (passed <= kSubBlocks ? mode.falls[static_cast<std::size_t>(passed - 1)] : 1.0);
     }
     mode.state = now;
     mode.energy_j = now_j;

@@ -400,7 +400,9 @@ class RenderProgram(unittest.TestCase):
             self.assertEqual(run.returncode, 0, run.stderr)
             radiated_j = json.loads((self.root / "radiates-report.json").read_text())["energy"]["radiated_j"]
             expected_j = given_j * min(1.0, 2 * math.pi * gain**2 / (1.21 * 343 * decay_per_s))
-            self.assertAlmostEqual(radiated_j / expected_j, 1.0, delta=0.002)
+            # The loss of a jump is summed over samples: at most half a sample too long, or d / rate of the energy.
+            self.assertLess(radiated_j, (1 + decay_per_s / 48000) * expected_j)
+            self.assertGreater(radiated_j, (1 - decay_per_s / 48000) * expected_j)
 
     def test_mallets_are_solved_reported_and_replayed_to_the_same_bytes(self):
         def strike(**mallet):

@@ -160,13 +160,14 @@ TEST(NonlinearVoice, StronglyIsTheOscillatorOfDuffing) {
 }
 
 TEST(NonlinearVoice, OffIsTheVoiceOfABankWithoutTheEnergy) {
-  const bank::Bank with = make_bank();
+  bank::Bank with = make_bank();
+  with.rigid.volume_m3 = 0.0;  // without a thickness, neither is watched for bending
   bank::Bank without = with;
   without.quartic = {};
   Voice a(make_model(with)), b(make_model(without));
   for (Voice* voice : {&a, &b}) strike_softly(*voice, 1.0);
   EXPECT_EQ(play(a, 24000), play(b, 24000));
-  EXPECT_LE(a.calc_bytes(), b.calc_bytes());
+  EXPECT_EQ(a.calc_bytes(), b.calc_bytes());
   EXPECT_EQ(a.get_counters().coupled_samples, 0);
   EXPECT_THROW(Voice(make_model(without), {.is_nonlinear = true}), InputError);
 }
@@ -280,7 +281,7 @@ TEST(NonlinearVoice, WhatIsRadiatedCountsTheModesOfAllKinds) {
   }
   EXPECT_GT(radiated_j[0], 0.0);
   EXPECT_NEAR(radiated_j[1] / radiated_j[0], 1.0, 1e-3);
-  EXPECT_NEAR(radiated_j[2] / radiated_j[0], 1.0, 6e-3);  // what the cascade loses while it is struck is left out
+  EXPECT_NEAR(radiated_j[2] / radiated_j[0], 1.0, 1e-3);
 }
 
 TEST(NonlinearVoice, ACascadeThatIsOffIsNotThere) {
