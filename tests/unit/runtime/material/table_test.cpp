@@ -115,12 +115,12 @@ TEST(MaterialTable, has_woods_that_are_stiffest_along_the_grain_and_could_exist)
     EXPECT_LE(e[2] / e[0], 0.09);
     EXPECT_GE(e[1] / e[0], 0.04);
     EXPECT_LE(e[1] / e[0], 0.2);
-    EXPECT_LE(g[1] / e[0], 0.035);
+    EXPECT_LE(g[1] / e[0], row.material.name == "beech" ? 0.035 : 0.031);
     EXPECT_EQ(*std::min_element(g.begin(), g.end()), g[1]);
-    // Speed of sound along the grain of all woods: 3,500 to 6,000 m/s (Cremer; Wegst 2006).
+    // Speed of sound along the grain of all woods: 3,500 to 6,000 m/s (Cremer; Wegst 2006); of all but four here 4,000 to 5,400.
     const double speed = std::sqrt(e[0] / row.material.density_kg_m3);
-    EXPECT_GE(speed, 3500);
-    EXPECT_LE(speed, 6000);
+    const bool is_slow = std::set<std::string>{"rosewood", "grenadilla", "pear", "iroko"}.contains(row.material.name);
+    EXPECT_NEAR(speed, is_slow ? 3800 : 4700, is_slow ? 300 : 700) << row.material.name;
     // Q along the grain of woods of instruments: 70 to 200 (Haines 1979; Bremaud 2012).
     const double omega = 2 * std::numbers::pi * 1000, q = omega / (2 * row.material.calc_decay_per_s(omega * omega));
     EXPECT_GE(q, 70);
