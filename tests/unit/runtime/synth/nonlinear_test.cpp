@@ -280,7 +280,7 @@ TEST(NonlinearVoice, WhatIsRadiatedCountsTheModesOfAllKinds) {
   }
   EXPECT_GT(radiated_j[0], 0.0);
   EXPECT_NEAR(radiated_j[1] / radiated_j[0], 1.0, 1e-3);
-  EXPECT_NEAR(radiated_j[2] / radiated_j[0], 1.0, 6e-3);  // what the cascade loses while it is struck is left out
+  EXPECT_NEAR(radiated_j[2] / radiated_j[0], 1.0, 6e-3);  // without the losses of the cascade during the strike
 }
 
 TEST(NonlinearVoice, ACascadeThatIsOffIsNotThere) {
