@@ -419,8 +419,8 @@ CARILLON_API void carillon_effect_counters_init_sized(carillon_effect_counters* 
 CARILLON_API carillon_status carillon_get_effect_counters(const carillon_synth* synth, int32_t body, carillon_effect_counters* counters);
 /* [any] The loudest that its modes have been [Pa at 1 m]; 0 for a body that is not there. */
 CARILLON_API double carillon_peak_pa(const carillon_synth* synth, int32_t body);
-/* [any] How far its modes have bent it at most, in thicknesses (twice the volume over the surface). 0 up to half a thickness, within which
- * linear modes hold; for banks with a nonlinear energy, strings and membranes; and for a body that is not there. */
+/* [any] Largest deflection by its modes so far, in thicknesses (twice the volume over the surface). 0 up to half a thickness, the range of
+ * linear modes; for banks with a nonlinear energy, strings and membranes; and for a body that is not there. */
 CARILLON_API double carillon_deflection(const carillon_synth* synth, int32_t body);
 
 #ifdef __cplusplus

@@ -155,8 +155,8 @@ struct Bank {
   // estimate). Both are one-sided widths: f 2^(+-error / 1200).
   std::vector<double> algebraic_error_cents;       // (m), or empty: unknown
   std::vector<double> discretisation_error_cents;  // (m), or empty: unknown; infinite: of this mode unknown
-  // (m), or empty: no facets in doubt; since 1.8. The surface that was solved came in facets that may be planes of the body or samples of a
-  // smooth surface. If it is the other of the two, modes lie within their error bar and this, an estimate; no bar has it in it.
+  // (m), or empty: no facets in doubt; since 1.8. Estimated extra error if facets solved as planes are samples of a smooth surface, or the
+  // reverse. Not contained in the bars above.
   std::vector<double> facet_error_cents;
   Corrected corrected;  // or empty: unknown; since 1.4
 
@@ -176,7 +176,7 @@ struct Bank {
   bool complete = true;    // every mode of the band is here (false only when max_modes or calc_reduced cut the list, which keep those of
                            // the lowest corrected frequencies)
   std::string element;     // "T4", "T10"; "analytic": known modes of a string, beam, membrane, plate or table (since 1.4); "imported":
-                           // modes of another program, of unknown accuracy (since 1.8)
+                           // modes of another program, accuracy unknown (since 1.8)
   std::string mass;        // "consistent" or "lumped"
   std::string provenance;  // JSON text: resolved job, versions, ranks, seconds and peak memory per phase
 
@@ -226,7 +226,7 @@ std::vector<std::string> find_faults(const Bank& bank);
 /// how wrong its frequencies can be, the worst of all modes.
 std::string describe_completeness(const Bank& bank);
 std::string describe_accuracy(const Bank& bank);
-/// What facets in doubt add to its error bars, in a few words; empty where none are.
+/// The extra error of ambiguous facets, in a few words; empty without any.
 std::string describe_facets(const Bank& bank);
 
 /// Reads a bank. Throws InputError for anything that is not a whole bank of a version this reader knows: missing file, not a bank,

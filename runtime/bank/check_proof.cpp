@@ -279,7 +279,7 @@ std::string describe_accuracy(const Bank& bank) {
 
 std::string describe_facets(const Bank& bank) {
   if (bank.facet_error_cents.empty()) return {};
-  return fmt::format("facets in doubt: {:.2g} cent more if they are not what they were taken for, planes or samples of a smooth surface",
+  return fmt::format("facets in doubt: {:.2g} cent more in the other case (planes of the body, or samples of a smooth surface)",
                      *std::max_element(bank.facet_error_cents.begin(), bank.facet_error_cents.end()));
 }
 

@@ -23,7 +23,7 @@ Bank calc_corrected(Bank bank);
 /// and the shapes of modes that the air couples, where it has multipoles.
 Bank choose_frequencies(Bank bank, Frequencies frequencies);
 
-/// The undamped frequency [Hz] at which a mode of a bank as it is in its file is played: in air, else corrected, else that of the mesh.
+/// Undamped playing frequency [Hz] of a mode of a bank as stored: in air, else corrected, else that of the mesh.
 double find_played_hz(const Bank& bank, std::size_t mode);
 
 /// Numbers of the modes in the order in which calc_corrected() leaves them.

@@ -1,4 +1,4 @@
-// How a mode is heard: its frequency, and all that takes its energy.
+// Audible frequency and decay of a mode, with the parts of the decay.
 #pragma once
 
 #include <cmath>
@@ -9,10 +9,10 @@
 
 namespace carillon::bank {
 
-/// The time in which a mode of that decay falls by 60 dB, ln(1000) / d; infinite without damping.
+/// Time of a fall by 60 dB, ln(1000) / d; infinite without damping.
 inline double calc_t60_s(double decay_per_s) { return std::log(1000.0) / decay_per_s; }
 
-/// A mode as it is heard. Without multipoles the part of the radiation is unknown, and counts as one of the material's.
+/// A mode as heard. Without multipoles the decay by radiation is unknown, and part of the material's.
 struct HeardMode {
   double freq_hz = 0.0;  // undamped
   double material_per_s = 0.0, radiation_per_s = 0.0, supports_per_s = 0.0;
@@ -21,8 +21,8 @@ struct HeardMode {
   double calc_t60_s() const { return bank::calc_t60_s(calc_decay_per_s()); }
 };
 
-/// The modes of a bank as they are played (calc_corrected(), supports applied). `by_supports_per_s` (m): what supports have added to its
-/// decays; empty: nothing.
+/// The modes of a bank for playing (calc_corrected(), supports applied). `by_supports_per_s` (m): part of its decays by supports; empty:
+/// none.
 std::vector<HeardMode> list_heard(const Bank& played, std::span<const double> by_supports_per_s);
 
 }  // namespace carillon::bank

@@ -1,12 +1,9 @@
-// Method:     the body is looked at in the principal axes of its surface. A long one is cut into slices, whose rigid motion is fitted to
-// the
-//             shape: where the slices take nearly all of the motion with them, and nearly all of that is of one kind, it is bending,
-//             torsion or longitudinal motion, with its nodes where the sign changes from slice to slice. A round one is divided into rings,
-//             in which the motion is a sum of cos(n phi) and sin(n phi): one n that has most of it is the number of nodal diameters. On a
-//             flat one the motion out of the plane is a table of cells; where it is a product of a function of the length and one of the
-//             width (singular values), each has its nodal lines. A mode that fits nothing has no kind.
-// Source:     the kinds are those of textbooks (Fletcher and Rossing, The Physics of Musical Instruments, ch. 2, 3 and 21).
-// Deviations: motion is weighed by the area of the surface, not by the mass inside.
+// Method:     principal axes of the surface. Long bodies: slices with fitted rigid motions; a dominant component is bending, torsion or
+//             longitudinal motion, its sign changes from slice to slice are nodes. Round bodies: Fourier series around the axis, ring by
+//             ring; a dominant order n is the number of nodal diameters. Flat bodies: cells of the motion out of the plane; a dominant
+//             product of functions of length and width (singular values) has the nodal lines of both. All others: kind unknown.
+// Source:     Fletcher and Rossing, The Physics of Musical Instruments, ch. 2, 3 and 21.
+// Deviations: weights are areas of the surface, not masses inside.
 #include "runtime/bank/kinds.hpp"
 
 #include <fmt/format.h>
@@ -24,17 +21,17 @@ namespace {
 
 constexpr double kLong = 2.5, kFlat = 0.25;           // length over width; thickness over width
 constexpr double kSameWidth = 0.03, kSphere = 0.003;  // of second moments
-constexpr double kRound = 0.02;                       // of the area's moments about the axis
+constexpr double kRound = 0.02;                       // Fourier coefficients of the area about the axis
 constexpr double kRigidSlices = 0.9, kOneKind = 0.8, kOneOrder = 0.6;
 constexpr double kOnePlane = 0.9, kProduct = 0.85;
-constexpr double kFlow = 0.8;    // of what the same normal motion could move if it had one sign
-constexpr double kStill = 0.03;  // of the largest: neither sign
+constexpr double kFlow = 0.8;    // squared volume flow over that of a uniform motion of the same energy
+constexpr double kStill = 0.03;  // of the largest value; less counts as 0
 constexpr int kMaxOrder = 12, kCells = 12, kRings = 8;
-constexpr std::size_t kFewPoints = 8;  // too few for a slice or a ring
+constexpr std::size_t kFewPoints = 8;  // vertices of a slice, at least
 
 double square(double x) { return x * x; }
 
-/// Eigenvalues of a symmetric matrix, descending, with unit vectors (rows) that form a right-handed frame; Jacobi's method.
+/// Eigenvalues of a symmetric matrix, descending, and a right-handed frame of unit eigenvectors (rows); Jacobi's method.
 struct Axes {
   Vec3 moment{};
   Mat3 axis{};
@@ -79,14 +76,14 @@ struct Frame {
   double all_area = 0.0;
 
   double size(int k) const { return extent[1][k] - extent[0][k]; }
-  /// Which of `count` equal parts of the extent along axis k a place lies in.
+  /// Index of a place among `count` equal parts of the extent along axis k.
   std::size_t find_part(const Vec3& p, int k, int count) const {
     const double along = (p[k] - extent[0][k]) / std::max(size(k), 1e-300);
     return static_cast<std::size_t>(std::clamp(static_cast<int>(along * count), 0, count - 1));
   }
 };
 
-/// Turns axes 0 and 1, which the second moments leave open, along the sides of a square.
+/// Turns axes 0 and 1, arbitrary for equal second moments, along the sides of a square.
 void align(Frame& frame) {
   std::complex<double> fourth = 0.0;
   for (std::size_t v = 0; v < frame.place.size(); ++v)
@@ -121,7 +118,7 @@ Frame make_frame(const Bank& bank) {
   return frame;
 }
 
-/// How often the sign changes; values near 0 have none.
+/// Number of sign changes, without values near 0.
 int count_nodes(const std::vector<double>& values) {
   double largest = 0.0, last = 0.0;
   for (const double x : values) largest = std::max(largest, std::abs(x));
@@ -151,7 +148,7 @@ class Shape {
   double energy_ = 0.0;
 };
 
-/// A long body in slices that move as rigid ones.
+/// A long body in rigid slices.
 class Slices {
  public:
   explicit Slices(const Frame& frame) : frame_(frame) {
@@ -164,7 +161,7 @@ class Slices {
   }
 
   ModeKind find(const Shape& shape) const {
-    std::array<std::vector<double>, 4> along;  // axes 0, 1, 2 and the turn about axis 0, slice by slice
+    std::array<std::vector<double>, 4> along;  // by slice: translations along axes 0, 1, 2, rotation about axis 0
     std::array<double, 4> energy{};
     double across = 0.0;  // sum of t1 t2
     for (const Slice& slice : slices_) {
@@ -178,7 +175,7 @@ class Slices {
       }
       along[3].push_back(angle[0]);
       energy[3] += angle[0] * turn[0];
-      energy[1] += angle[2] * turn[2];  // a slice that tilts bends
+      energy[1] += angle[2] * turn[2];  // tilt of slices: part of bending
       energy[2] += angle[1] * turn[1];
       across += slice.area * mean[1] * mean[2];
     }
@@ -201,7 +198,7 @@ class Slices {
     std::vector<std::size_t> vertices;
     double area = 0.0;
     Vec3 centre{};
-    Mat3 by_moment{};  // from the moment of the motion to the angle
+    Mat3 by_moment{};  // inverse of the moments of area: angular momentum to rotation
   };
 
   Slice make_slice(std::vector<std::size_t> vertices) const {
@@ -233,10 +230,10 @@ class Slices {
   std::vector<Slice> slices_;
 };
 
-/// The axis of a round body; none of others.
+/// The axis of a round body, else nullopt.
 std::optional<int> find_round_axis(const Frame& frame) {
   const Vec3& m = frame.axes.moment;
-  if (m[0] < (1.0 + kSphere) * m[2]) return std::nullopt;  // any axis
+  if (m[0] < (1.0 + kSphere) * m[2]) return std::nullopt;  // as a sphere: no single axis
   const int axis = m[0] - m[1] < m[1] - m[2] ? 2 : 0, x = (axis + 1) % 3, y = (axis + 2) % 3;
   if (m[std::min(x, y)] > (1.0 + kSameWidth) * m[std::max(x, y)]) return std::nullopt;
   const double middle = 0.5 * (frame.extent[0][axis] + frame.extent[1][axis]), half = std::max(0.5 * frame.size(axis), 1e-300);
@@ -327,11 +324,11 @@ ModeKind find_plate_kind(const Frame& frame, const Shape& shape) {
   double all = 0.0;
   for (int i = 0; i < kCells; ++i)
     for (int j = 0; j < kCells; ++j) {
-      if (area[i][j] == 0.0) return kind;  // not a rectangle, or too coarse
+      if (area[i][j] == 0.0) return kind;  // no rectangle, or too coarse
       cell[i][j] /= area[i][j];
       all += square(cell[i][j]);
     }
-  // The largest singular value by iteration; from two beginnings, lest one is at right angles to what is looked for.
+  // The largest singular value by power iteration, from every row: one start may be orthogonal to its vector.
   std::vector<double> along(kCells), across(kCells);
   double largest = 0.0;
   for (int row = 0; row < kCells; ++row) {
@@ -366,7 +363,7 @@ ModeKind find_plate_kind(const Frame& frame, const Shape& shape) {
   return kind;
 }
 
-/// The skin that faces the open air, for breathing.
+/// The outer surface, for breathing.
 class Skin {
  public:
   Skin(const Bank& bank, const Frame& frame) : normal_(bank.vertex_count()) {
@@ -423,7 +420,7 @@ std::vector<ModeKind> find_kinds(const Bank& bank, std::size_t count) {
   std::vector<ModeKind> kinds(std::min(count, bank.mode_count()));
   if (kinds.empty()) return kinds;
   const Frame frame = make_frame(bank);
-  if (!(frame.all_area > 0.0) || !std::isfinite(frame.all_area)) return kinds;  // not a sane bank
+  if (!(frame.all_area > 0.0) || !std::isfinite(frame.all_area)) return kinds;  // degenerate surface
   const bool is_long = frame.size(0) > kLong * frame.size(1), is_flat = frame.size(2) < kFlat * frame.size(1);
   const std::optional<int> axis = find_round_axis(frame);
   const Slices slices(frame);

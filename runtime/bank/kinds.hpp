@@ -1,4 +1,4 @@
-// What kind of motion a mode is: bending, torsion, nodal diameters ..., from its shape on the surface.
+// Kinds of motion of modes (bending, torsion, nodal diameters ...), from their shapes on the surface.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +11,8 @@
 namespace carillon::bank {
 
 enum class MotionKind : std::uint8_t {
-  kUnknown,         // none of those below, or several at once
-  kBending,         // of a long body, along the thinner side of its section; of a section as wide as thick in any direction
+  kUnknown,         // another kind, or a mixture
+  kBending,         // of a long body, along the thinner side of its section; square and round sections: any direction
   kLateralBending,  // along the wider side
   kTorsion,         // about the long axis, or about the axis of a round body
   kLongitudinal,    // along the long axis
@@ -24,13 +24,12 @@ enum class MotionKind : std::uint8_t {
 
 struct ModeKind {
   MotionKind motion = MotionKind::kUnknown;
-  // How often the motion changes its sign along the long axis: the nodes of a long body, the nodal lines across the length of a flat one;
-  // the nodal diameters of a round one. None: not known.
+  // Nodes of a long body, nodal lines across the length of a flat one, nodal diameters of a round one. None: unknown.
   std::optional<int> nodes = {};
   std::optional<int> lines = {};  // nodal lines along the length of a flat body
 };
 
-/// Of the first `count` modes, or of all when there are no more. Cost: a pass over their shapes. Pure; any thread.
+/// Of the first `count` modes, at most all. Cost: a pass over their shapes. Pure; any thread.
 std::vector<ModeKind> find_kinds(const Bank& bank, std::size_t count = SIZE_MAX);
 
 /// "bending, 2 nodes", "plate bending, 2 x 1 lines", "3 diameters", "breathing"; "-" for kUnknown.

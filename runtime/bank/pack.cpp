@@ -22,10 +22,10 @@ namespace {
 
 constexpr double kLatticePerSize = 32768.0, kLatticePerEdge = 8.0;  // steps of the lattice in the body's size, in its shortest edge
 constexpr double kMostLattice = 1 << 22;
-constexpr double kMostStep = 1.0;    // of a mode, over the mean motion of its vertices: none vanishes
-constexpr double kCavity = 16.0;     // error of walls that are no part of the outer surface, over that of the outer surface
-constexpr double kOfSurface = 0.95;  // on which the error is no greater than is stated
-constexpr double kNearEnough = 0.4;  // dB that the error may stay below what was asked for
+constexpr double kMostStep = 1.0;    // step of a mode over the mean motion of its vertices, so that none vanishes
+constexpr double kCavity = 16.0;     // error of inner walls over that of the outer surface
+constexpr double kOfSurface = 0.95;  // share of the surface within the stated error
+constexpr double kNearEnough = 0.4;  // dB below the wanted error
 constexpr int kMostSampled = 5, kMostNear = 3, kMostTries = 20;  // trials of a sample, of all until it is near, and of all
 constexpr std::size_t kSampled = 8;                              // one of so many vertices of the finest level counts in a trial
 constexpr double kFirstDb = -4.0;                                // of the first trial, beyond what was asked for

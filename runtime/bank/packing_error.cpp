@@ -13,9 +13,9 @@
 namespace carillon::bank {
 namespace {
 
-constexpr double kOffNormal = 0.0027;   // sin^2 of 3 degrees: no blow is quite along the normal of a vertex
-constexpr double kQuietest = 0x1p-20;   // what is heard at the loudest place times this is the least that counts, -60 dB
-constexpr double kWitnessShare = 0.25;  // of the witnesses may lie above the stated error
+constexpr double kOffNormal = 0.0027;   // sin^2 of 3 degrees: assumed tilt of blows against the normal
+constexpr double kQuietest = 0x1p-20;   // -60 dB: floor of audible energy, relative to the loudest place
+constexpr double kWitnessShare = 0.25;  // largest share of witnesses above the stated error
 
 StruckSkin find_skin(const Bank& bank) {
   StruckSkin skin{std::vector<double>(bank.vertex_count(), 0.0), std::vector<Vec3>(bank.vertex_count(), Vec3{})};
@@ -32,12 +32,12 @@ StruckSkin find_skin(const Bank& bank) {
   return skin;
 }
 
-/// What is heard of a mode that moves by `x`, by a blow of unit weight.
+/// Audible energy of a mode of shape `x` after a blow of unit weight.
 double calc_heard(const Vec3& normal, const Vec3& x) {
   const double along = dot(x, normal);
   return along * along + kOffNormal * dot(x, x);
 }
-/// calc_blow_exposure() for shapes in steps. Where nothing is heard, all modes count alike.
+/// calc_blow_exposure() for shapes in steps; equal weights for an inaudible body.
 std::vector<double> calc_weights(const Bank& bank) {
   std::vector<double> weight = calc_blow_exposure(bank);
   if (std::all_of(weight.begin(), weight.end(), [](double w) { return !(w > 0.0); })) std::fill(weight.begin(), weight.end(), 1.0);

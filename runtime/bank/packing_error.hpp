@@ -1,4 +1,4 @@
-// The error of shapes that were packed, in what is heard of blows. Internal to carillon::bank.
+// Error of packed shapes in the sound of blows. Internal to carillon::bank.
 #pragma once
 
 #include <cstdint>
@@ -8,28 +8,28 @@
 
 namespace carillon::bank {
 
-inline constexpr double kExactDb = -200.0;   // stands for no error at all
-inline constexpr double kRoundingDb = 0.05;  // between figures that two machines find
+inline constexpr double kExactDb = -200.0;   // no error at all
+inline constexpr double kRoundingDb = 0.05;  // between results of two machines
 
-/// An error over a signal [dB].
+/// Ratio of an error to a signal [dB].
 double calc_db(double error, double signal);
 
-/// The vertices with their normals, and their shares of the area of the outer surface, on which a body is struck; 0 for those elsewhere.
+/// Normals of the vertices, and their shares of the area of the outer surface, the place of blows; 0 elsewhere.
 struct StruckSkin {
   std::vector<double> area_m2;
   std::vector<Vec3> normal;
 };
 
-/// What is heard of a blow at a vertex with these shapes (m, 3) [steps of shape_scale], and of the difference to other ones.
+/// Audible energy of a blow at a vertex with these shapes (m, 3) [steps of shape_scale], and of the difference to other shapes.
 double calc_heard(const std::vector<double>& weight, const Vec3& normal, const std::int16_t* shape);
 double calc_heard(const std::vector<double>& weight, const Vec3& normal, const std::int16_t* shape, const std::int16_t* other);
 
-/// Blows at all vertices, and what is heard of them.
+/// Blows at all vertices, and their audible energy.
 struct Blows {
   StruckSkin skin;
-  std::vector<double> weight;    // (m) of the modes
+  std::vector<double> weight;    // (m)
   std::vector<double> exposure;  // (V) at least `quietest`
-  double quietest = 0.0;         // of the loudest place of the outer surface a part that hardly counts
+  double quietest = 0.0;         // kQuietest times the loudest place of the outer surface
 
   explicit Blows(const Bank& bank);
 };

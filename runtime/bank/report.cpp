@@ -116,12 +116,12 @@ std::string format_modes(const Bank& bank, std::span<const HeardMode> heard, std
     text += fmt::format("  ... {} more; --modes {} shows them all\n", bank.mode_count() - shown, bank.mode_count());
   text +=
       "mesh: the frequency of the mesh; +-mesh: cents to its exact mode, a bound; +-body: cents to the mode of the body, an estimate\n"
-      "freq: what is played: the estimated error of the mesh taken off, in air and on its supports as far as the bank knows them; sorted\n"
-      "again where modes change places\n"
-      "d and T60: decay that is heard, the sum of what material, air and supports take from the mode\n"
-      "gain: Pa at 1 m for q' = 1 m kg^1/2 / s; frequencies are undamped; kind: how the body moves, where its shape shows it\n";
+      "freq: frequency of playing: without the estimated error of the mesh, in air and on its supports if the bank has them;\n"
+      "playing sorts modes by it\n"
+      "d and T60: decay by material, air and supports together\n"
+      "gain: Pa at 1 m for q' = 1 m kg^1/2 / s; frequencies are undamped; kind: kind of motion, if its shape shows one\n";
   if (is_doubtful)
-    text += "+-facets: what comes to +-body if the facets are not what they were taken for, planes or samples of a smooth surface\n";
+    text += "+-facets: cents beyond +-body in the other case of facets in doubt (planes of the body, or samples of a smooth surface)\n";
   return text;
 }
 

@@ -10,15 +10,14 @@
 
 namespace carillon::bank {
 
-/// A page for people; at most `mode_limit` rows of modes. `heard`: support::calc_heard(). `has_record`: the record of the run that made the
-/// bank too.
+/// A page for people; at most `mode_limit` rows of modes. `heard`: support::calc_heard(). `has_record`: with the record of its run.
 std::string format_info(const Bank& bank, std::span<const HeardMode> heard, const std::filesystem::path& file, std::size_t mode_limit,
                         bool has_record);
 
 /// All of a bank but its mesh and shapes as JSON, numbers to full double precision.
 std::string format_info_json(const Bank& bank, std::span<const HeardMode> heard, const std::filesystem::path& file);
 
-/// One line per mode with commas, after a line of names; empty where something is unknown.
+/// CSV: a line of names, then one line per mode; unknown values are empty.
 std::string format_info_csv(const Bank& bank, std::span<const HeardMode> heard);
 
 /// The two properties that the library, which cannot read JSON, does not check.

@@ -17,7 +17,7 @@ Vec3 calc_normal(const std::vector<Vec3>& vertices_m, const Triangle& triangle);
 std::array<Vec3, 2> find_extent(const std::vector<Vec3>& vertices_m);
 
 /// Twice the volume over the area of all triangles [m]: the thickness of a sheet or a wall; of a rod half its diameter, of a ball two
-/// thirds of its radius. 0 where there is no volume or no area.
+/// thirds of its radius. 0 without volume or area.
 double calc_thickness_m(const std::vector<Vec3>& vertices_m, const std::vector<Triangle>& triangles, double volume_m3);
 
 /// The triangles that face the open air, in their order: those of closed shells (connected through edges) that enclose a positive volume.

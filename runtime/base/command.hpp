@@ -40,7 +40,7 @@ inline constexpr int kCapture = -3;  // of run(): kept
 /// How a program is started.
 struct Command {
   std::vector<std::string> words;                                      // the program, a path or a name along PATH, and its arguments
-  std::optional<std::vector<std::string>> environment = std::nullopt;  // "NAME=value"; none: make_environment(), of no run of MPI
+  std::optional<std::vector<std::string>> environment = std::nullopt;  // "NAME=value"; none: make_environment()
   std::filesystem::path folder = {};                                   // working directory; empty: that of this process
   int input = kNull, output = kNull, errors = kNull;                   // kNull, kInherit, kCapture or a descriptor
   enum class Group { same, own, session } group = Group::same;         // process group or session that it starts in
@@ -66,7 +66,7 @@ class StartError : public SystemError {
 /// handler of pthread_atfork() runs (MPI has some) and no memory is copied. kCapture is /dev/null here.
 pid_t start(const Command& command);
 
-/// This process becomes the program words[0], a path, with its own environment or another. Throws StartError where it cannot.
+/// Replaces this process by the program words[0], a path, with its own environment or another. Throws StartError.
 [[noreturn]] void become(const std::vector<std::string>& words, const std::optional<std::vector<std::string>>& environment = std::nullopt);
 
 /// What became of a program.

@@ -13,7 +13,7 @@ extern "C" char** environ;
 namespace carillon::base {
 namespace {
 
-/// Beginnings of the names that launchers set for their ranks. PRTE_MCA_ and most of OMPI_MCA_ belong to the user.
+/// Prefixes of the variables of launchers for their ranks. PRTE_MCA_ and most of OMPI_MCA_ belong to the user.
 constexpr std::array<std::string_view, 29> kOfRuns{"OMPI_COMM_WORLD_",
                                                    "OMPI_UNIVERSE_",
                                                    "OMPI_FIRST_RANKS",
@@ -44,7 +44,7 @@ constexpr std::array<std::string_view, 29> kOfRuns{"OMPI_COMM_WORLD_",
                                                    "PRTE_",
                                                    "MPI_LOCAL"};
 
-/// How Open MPI starts a single rank.
+/// Variables of Open MPI for a single rank without a daemon.
 constexpr std::array<std::pair<const char*, const char*>, 2> kLone{
     {{"OMPI_MCA_ess_singleton_isolated", "1"}, {"OMPI_MCA_orte_create_session_dirs", "0"}}};
 

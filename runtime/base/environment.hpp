@@ -1,4 +1,4 @@
-// The environment of programs that this one starts.
+// Environment of child processes.
 #pragma once
 
 #include <string>
@@ -6,18 +6,18 @@
 
 namespace carillon::base {
 
-/// Has a launcher of MPI (mpirun, srun) started this process, or a program that did?
+/// True in a process that a launcher of MPI (mpirun, srun) started, and in its children.
 bool is_launched();
 
-/// Has MPI start this process by itself, unless it was launched, or the user decided otherwise: without a daemon, which would need a
-/// network and 0.15 s, and without a session folder, which would be left by a process that a signal ends.
+/// In a process without a launcher: MPI starts without a daemon (a network and 0.15 s) and without a session folder (left behind after a
+/// signal), unless the user's settings differ.
 void isolate_lone_process();
 
-/// That of this process, "NAME=value", without what a launcher of MPI (mpirun, srun, prterun) has set for its ranks: a program that has it
-/// is no rank of a run that this process may be in. What users set for MPI stays.
+/// The environment of this process, "NAME=value", without the variables of a launcher of MPI (mpirun, srun, prterun) for its ranks: the
+/// child is no rank of its run. The user's own settings of MPI stay.
 std::vector<std::string> make_environment();
 
-/// The same for a solver of one rank: isolated, and without SLURM_, as asking Slurm takes MPI 0.2 s.
+/// The same for a solver of one rank: isolated, and without SLURM_ (0.2 s for a query of Slurm).
 std::vector<std::string> make_lone_environment();
 
 }  // namespace carillon::base

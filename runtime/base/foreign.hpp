@@ -1,4 +1,4 @@
-// What users of other systems bring along, named so that it can be corrected: texts in UTF-16, and paths with backslashes.
+// Errors that name habits of other systems: texts in UTF-16, paths with backslashes.
 #pragma once
 
 #include <filesystem>
@@ -9,11 +9,10 @@
 
 namespace carillon::base {
 
-/// Throws InputError that begins with `name` if a text begins as UTF-16 does: with a mark, or with characters of which every other byte is
-/// zero. Safe with any bytes.
+/// Throws InputError that begins with `name` for text in UTF-16: a byte-order mark, or zeros in every other byte. Any bytes are safe.
 void refuse_utf16(std::string_view bytes, std::string_view name);
 
-/// For the end of a message that there is no such file: "; use / between folders, not \" if its path has backslashes, else nothing.
+/// Last part of the message for a missing file: "; use / between folders, not \" for a path with backslashes, else empty.
 std::string hint_backslash(const std::filesystem::path& file);
 
 }  // namespace carillon::base

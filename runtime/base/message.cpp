@@ -15,7 +15,7 @@ constexpr const char* kCut = "...";
 
 bool is_continuation(char c) { return (static_cast<unsigned char>(c) & 0xC0U) == 0x80U; }
 
-/// Two thirds of `max` from the beginning, the rest from the end, no character of UTF-8 cut.
+/// Keeps two thirds of `max` from the beginning, the rest from the end, and characters of UTF-8 whole.
 std::string cut_middle(std::string_view text, std::size_t max) {
   if (text.size() <= max) return std::string(text);
   std::size_t head = 2 * max / 3, tail = text.size() - (max - 2 * max / 3);

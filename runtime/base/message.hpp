@@ -1,4 +1,4 @@
-// Messages of errors, which may name what strangers wrote.
+// Messages of errors, with untrusted text in them.
 #pragma once
 
 #include <filesystem>
@@ -7,13 +7,13 @@
 
 namespace carillon::base {
 
-/// `text` with what is too long for a person cut in its middle: words of more than 600 bytes, and all of it at 4,000.
+/// Cuts words above 600 bytes and texts above 4,000 in their middle.
 std::string shorten(std::string_view text);
 
 /// A message for a terminal: shortened and printable, on one line.
 std::string show_message(std::string_view text);
 
-/// The name by which people know a file: where "/proc/self/fd/N/NAME" leads, while N is open; others as they are.
+/// The path of a file for people: the target of "/proc/self/fd/N/NAME" while N is open; other paths unchanged.
 std::string find_name(const std::filesystem::path& file);
 
 }  // namespace carillon::base

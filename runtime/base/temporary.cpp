@@ -1,4 +1,4 @@
-// Method: a table of fixed size, as a handler may neither allocate nor lock. It does not walk folders: rm(1) does, in a process of its own.
+// Method: a table of fixed size, as a handler may neither allocate nor lock. Folders are removed by rm(1), in a process of its own.
 // Source: signal-safety(7); glibc 2.34 _Fork(); flock(2).
 // Deviations: poll() in place of a sleep.
 #include "runtime/base/temporary.hpp"
@@ -56,7 +56,7 @@ bool is_ours(int signal) {
   return ::sigaction(signal, nullptr, &action) == 0 && action.sa_handler == handle;
 }
 
-/// From the first folder to the last. Who ignores or handles a signal keeps doing so.
+/// In place from the first folder to the last. Ignored and handled signals stay so.
 void set_handlers(bool is_first) {
   for (const int signal : kSignals) {
     struct sigaction action {};
@@ -70,7 +70,7 @@ void set_handlers(bool is_first) {
   }
 }
 
-/// Removes folders whose process is gone.
+/// Removes the folders of dead processes.
 void sweep(const fs::path& parent, const std::string& begin) {
   std::error_code error;
   for (fs::directory_iterator it(parent, error), end; !error && it != end; it.increment(error)) {
@@ -89,7 +89,7 @@ Slot* find_slot(const fs::path& folder) {
   return nullptr;
 }
 
-/// Its folder is no business of the handler any more.
+/// Takes a folder out of the table of the handler.
 void release(Slot& slot) {
   slot.state.store(1);
   if (slot.lock >= 0) ::close(slot.lock);
@@ -117,7 +117,7 @@ fs::path make_temporary_folder(const fs::path& parent, const std::string& begin)
     slot.state.store(2);
     return path;
   }
-  folder_count.fetch_sub(1);  // more at once than anything here makes: the destructor removes it
+  folder_count.fetch_sub(1);  // table full: removed by its destructor alone
   return path;
 }
 

@@ -1,8 +1,8 @@
 // Temporary folders that do not outlive their process.
 //
-// A folder has a file that the process keeps locked. What a killed process left is recognised by that file without a lock, and removed by
-// the next that makes a folder of that name there. SIGINT, SIGTERM and SIGHUP, where nothing else handles them, remove the folders of the
-// process and end the programs that it waits for, before they end it.
+// The process holds a lock on a file in each folder. Leftovers of killed processes have that file without a lock; the next process to make
+// a folder of the same name there removes them. SIGINT, SIGTERM and SIGHUP, unless ignored or handled elsewhere, end the children of the
+// process and remove its folders before its end.
 #pragma once
 
 #include <sys/types.h>
@@ -12,14 +12,14 @@
 
 namespace carillon::base {
 
-/// Makes the folder PARENT/BEGINxxxxxx. Throws SystemError where it cannot be made.
+/// Makes the folder PARENT/BEGINxxxxxx. Throws SystemError.
 std::filesystem::path make_temporary_folder(const std::filesystem::path& parent, const std::string& begin);
-/// Removes it with all in it.
+/// Removes it with its content.
 void remove_temporary_folder(const std::filesystem::path& folder) noexcept;
-/// It is no temporary folder any more.
+/// Makes it permanent.
 void keep_temporary_folder(const std::filesystem::path& folder) noexcept;
 
-/// One of them, removed at the end.
+/// A temporary folder, removed by the destructor.
 class TemporaryFolder {
  public:
   /// In $TMPDIR, else /tmp; or in `parent`.
@@ -34,12 +34,11 @@ class TemporaryFolder {
   std::filesystem::path path_;
 };
 
-/// A program that this process waits for, until it is forgotten.
+/// Children for end_children_and_temporaries().
 void note_child(pid_t child) noexcept;
 void forget_child(pid_t child) noexcept;
 
-/// Ends those programs (SIGTERM, later SIGKILL) and removes all temporary folders of this process. Async-signal-safe: for handlers that end
-/// the process.
+/// Ends the children (SIGTERM, later SIGKILL) and removes all temporary folders of this process. Async-signal-safe.
 void end_children_and_temporaries() noexcept;
 
 }  // namespace carillon::base

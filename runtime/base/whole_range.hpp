@@ -1,4 +1,4 @@
-// Options of command lines that are whole numbers.
+// Whole numbers as options of command lines.
 #pragma once
 
 #include <fmt/core.h>
@@ -9,7 +9,7 @@
 
 namespace carillon::base {
 
-/// For CLI::Option::check(): what is wrong with the word of an option that is to be a whole number from low to high; empty if nothing is.
+/// Check of a whole number from low to high for CLI::Option::check(): the fault of a word, or empty.
 inline std::function<std::string(const std::string&)> whole_range(long long low, long long high) {
   return [low, high](const std::string& word) -> std::string {
     long long value = 0;
@@ -20,7 +20,7 @@ inline std::function<std::string(const std::string&)> whole_range(long long low,
   };
 }
 
-/// What --help says of such an option.
+/// Type of the option in --help.
 inline std::string describe_whole_range(long long low, long long high) { return fmt::format("INT in [{} - {}]", low, high); }
 
 }  // namespace carillon::base

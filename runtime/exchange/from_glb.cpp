@@ -2,8 +2,8 @@
 //             are (bank::assemble_bank). Values that are in both must agree. Of another program's: lambda = (2 pi f)^2 + d^2, shapes
 //             rounded to 16 bits; mass properties by the divergence theorem where the model has none.
 // Source:     KHR_audio_rigid_bodies, draft of 2026 (K. Hiner); integrals over a polyhedron: Tonon 2004.
-// Deviations: the scale of the node is applied to the body, and to its modes and mass where these are of the body without it; its rotation
-//             and translation place the body and are ignored.
+// Deviations: the scale of the node applies to the body, and to modes and mass given for the unscaled body; its rotation and translation,
+//             the pose of the body, are ignored.
 #include <fmt/format.h>
 
 #include <Eigen/Dense>
@@ -39,10 +39,10 @@ using gltf::Component;
 
 constexpr std::size_t kMaxFields = 1000, kMaxListed = 10'000'000, kMaxNodes = 10'000'000;
 constexpr double kSameFreq = 1e-6;    // relative error of a frequency in float, through a sum of squares
-constexpr double kSameStep = 0.02;    // of a step of a shape: rounding of an integer stored as float
-constexpr double kSameLaw = 1e-5;     // of a decay in float against its law
-constexpr double kSameScale = 1e-4;   // along the three axes of a node
-constexpr double kSameInertia = 0.3;  // of a body that is not quite even, or of a coarse surface
+constexpr double kSameStep = 0.02;    // steps of a shape: rounding of an integer stored as float
+constexpr double kSameLaw = 1e-5;     // relative error of a decay in float against its law
+constexpr double kSameScale = 1e-4;   // relative difference between the axes of a node
+constexpr double kSameInertia = 0.3;  // relative difference for uneven bodies and coarse surfaces
 constexpr const char* kChanged = "was changed since carillon-bank wrote it; --plain reads the extension alone";
 
 /// The model, as the extension has it.
@@ -276,7 +276,7 @@ class Reader {
 
   // ---- a model of another program ----
 
-  /// Points that no triangle has are no part of the body.
+  /// Removes points outside all triangles.
   void drop_unused_points() {
     std::vector<std::int32_t> number(model_.positions.size(), -1);
     for (const auto& triangle : model_.triangles)
@@ -372,9 +372,9 @@ class Reader {
     return material;
   }
 
-  /// Whether modes and mass are those of the body before its node scales it, by which of the two has the density of the material.
+  /// True for modes and mass of the unscaled body: its density is nearer to the material's than that of the scaled body.
   bool is_of_unscaled(base::Object& model, double scale, double volume_m3, double density_kg_m3) {
-    constexpr double kSameDensity = 0.1;  // that the facets of a surface may add or take away
+    constexpr double kSameDensity = 0.1;  // relative error of the volume inside facets
     std::optional<base::Object> own = model.object_if("massProperties");
     if (std::abs(scale - 1.0) <= kSameScale || !(volume_m3 > 0.0)) return false;
     const auto note = [&](const std::string& text) {
@@ -402,11 +402,11 @@ class Reader {
     return is_unscaled;
   }
 
-  /// The bank of the same body, `scale` times as large.
+  /// Enlarges the body by `scale`.
   static void scale_body(bank::Bank& bank, std::vector<double>& shapes, double scale) {
     for (std::size_t m = 0; m < bank.mode_count(); ++m) {
       bank.eigenvalue_rad2_s2[m] /= scale * scale;
-      bank.decay_per_s[m] = bank.damping.law == "mixed" ? bank.decay_per_s[m] / scale  // the same loss factor
+      bank.decay_per_s[m] = bank.damping.law == "mixed" ? bank.decay_per_s[m] / scale  // equal loss factor
                                                         : bank::calc_decay(bank.damping, bank.material, bank.eigenvalue_rad2_s2[m]);
     }
     for (double& phi : shapes) phi /= scale * std::sqrt(scale);
@@ -515,7 +515,7 @@ class Reader {
   base::Object root_;
   std::size_t number_ = 0;  // of the model
   Model model_;
-  std::vector<std::size_t> used_;  // the points of a model of another program that triangles have
+  std::vector<std::size_t> used_;  // points in triangles, of a model of another program
   std::vector<std::string> notes_;
   std::map<std::string, bank::FieldBytes> fields_;
 };

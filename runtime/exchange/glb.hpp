@@ -32,11 +32,10 @@ struct GlbReading {
   const material::Material* material = nullptr;  // of a model that names none
 };
 
-/// The bank of a GLB or glTF file; `name` is that of the file, and buffers of their own are next to it. From a file of write_glb() it is
-/// the same bank, bit for bit. From another program's it has the surface, frequencies, decays and shapes (16 bits) of the extension, and
-/// its mass properties, else those of the surface filled with the material. A node may scale the body: its modes and mass are those of the
-/// size with which its mass has the density of its material, and `notes` gets sentences on that. Throws InputError that begins with the
-/// name for files that are damaged, changed or incomplete.
+/// The bank of a GLB or glTF file `name`, with separate buffers in the same folder. From a file of write_glb(): the same bank, bit for bit.
+/// From another program's: surface, frequencies, decays and shapes (16 bits) of the extension, and its mass properties, else those of the
+/// surface filled with the material. For a node with a scale, the density of the material decides on the size that modes and mass belong
+/// to, with a sentence in `notes`. Throws InputError that begins with the name for damaged, changed and incomplete files.
 bank::Bank parse_glb(std::string_view bytes, const std::string& name, const GlbReading& reading = {},
                      std::vector<std::string>* notes = nullptr);
 

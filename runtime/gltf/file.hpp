@@ -116,7 +116,7 @@ class File {
 File parse_glb(std::string_view bytes, const std::string& name);
 /// The same of a .gltf file.
 File parse_text(std::string_view text, const std::string& name);
-/// The same of either, by its first bytes.
+/// Either of them, by its first bytes.
 File parse(std::string_view bytes, const std::string& name);
 
 }  // namespace carillon::gltf

@@ -363,9 +363,7 @@ std::string describe_bending(const std::string& name, const bank::Bank& bank, do
   const double thickness_m = synth::find_judged_thickness_m(bank);
   return fmt::format(
       "{}: bends by {:.3g} mm, {:.2g} times its thickness of {:.3g} mm (twice its volume over its surface); linear modes hold up to {:g} "
-      "of "
-      "it, and what is heard is only roughly right; compute its bank with \"nonlinear\" (docs/howto/nonlinear-bodies.md), or strike more "
-      "softly",
+      "of it, and the sound is approximate; compute its bank with \"nonlinear\" (docs/howto/nonlinear-bodies.md), or strike more softly",
       name, 1e3 * thicknesses * thickness_m, thicknesses, 1e3 * thickness_m, synth::kLinearThicknesses);
 }
 

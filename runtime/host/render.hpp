@@ -54,8 +54,8 @@ struct Sound {
   std::vector<double> body_peak_pa;                    // per body, at 1 m
   std::vector<double> body_deflection;                 // per body, Synthesiser::get_deflection
   double energy_rise = 0.0;                            // Synthesiser::get_energy_rise, the most of any body; where it is audited
-  synth::ModeEnergy mode_energy;                       // Synthesiser::get_mode_energy, of all bodies; where it is audited
-  double max_modes_j = 0.0;                            // the most that the modes of all bodies held together
+  synth::ModeEnergy mode_energy;                       // Synthesiser::get_mode_energy, of all bodies; with audits
+  double max_modes_j = 0.0;                            // largest energy of the modes of all bodies at once
   std::int64_t strikes = 0;                            // impulses that were played
   std::int64_t refused = 0;                            // events that could not be: too many at once
   std::int64_t faults = 0;                             // events that no synthesiser plays: numbers that are not finite ...
@@ -90,7 +90,7 @@ inline constexpr double kFadeShare = 1.0 / 65536.0;
 Sound calc_sound(const Scene& scene, const std::vector<const bank::Bank*>& banks, const Events& events, const RenderOptions& options,
                  sound::SoundStore& store);
 
-/// A warning that a body was bent beyond what its linear modes hold for; empty where it was not. `thicknesses`: Sound::body_deflection.
+/// Warning of a deflection beyond the range of linear modes, else empty. `thicknesses`: Sound::body_deflection.
 std::string describe_bending(const std::string& name, const bank::Bank& bank, double thicknesses);
 
 /// Of a sound of that length.

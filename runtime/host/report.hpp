@@ -24,9 +24,9 @@ struct EnergyBooks {
   synth::ModeEnergy modes;      // Sound::mode_energy
 };
 
-/// The books of a rendering with --audit. What the physics says of the modes is what impacts gave them, also of bodies that are not heard;
-/// the sound's is what all that acts gave those that are. Of both the larger counts, and what is more than the physics says came out of
-/// what it counts as lost, in friction and contacts, unless strikes, mallets or a contacts file brought it from outside.
+/// Energy books of a rendering with --audit. The energy of modes is the larger of two: in the physics, from impacts on all bodies; in the
+/// sound, from all forces on audible bodies. A surplus of the sound comes off the losses of the physics (friction, contacts), unless it
+/// came from outside (strikes, mallets, a contacts file).
 EnergyBooks make_books(const Scene& scene, const contact::EnergyAudit& physics, const Sound& sound);
 
 /// One line about modes whose gains came down to what their damping takes; empty where there are none.

@@ -217,8 +217,8 @@ void bind_bank(py::module_& module) {
       [](const bank::Bank& b, const py::object&) {
         return make_per_mode(b, [&](std::size_t m) { return b.facet_error_cents.empty() ? 0.0 : b.facet_error_cents[m]; });
       },
-      "(m) float64 [cent]: estimate of what comes to error_cents if the facets of the surface are not what they were taken for, planes of "
-      "the body or samples of a smooth surface; 0 where that is not in doubt.");
+      "(m) float64 [cent]: estimated extra of error_cents in the other case of facets in doubt (planes of the body, or samples of a smooth "
+      "surface); 0 without doubt.");
   array(
       "algebraic_error_cents", [](const bank::Bank& b, const py::object&) { return make_bars(b, b.algebraic_error_cents); },
       "(m) float64 [cent]: bound on the distance of the solver from the modes of the mesh; infinite where it is unknown.");

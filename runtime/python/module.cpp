@@ -64,7 +64,7 @@ PYBIND11_MODULE(_carillon, module) {
         return entries;
       },
       py::arg("is_alone"),
-      "That of this process without what mpirun has set for its ranks, NAME=value; is_alone: for a solver of one rank.");
+      "The environment of this process, NAME=value, without the variables of mpirun for its ranks; is_alone: for a solver of one rank.");
   bind_bank(module);
   bind_render(module);
   bind_synthesiser(module);

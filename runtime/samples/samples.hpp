@@ -38,7 +38,7 @@ struct SampleSet {
   std::size_t samples = 0;
   double bytes = 0.0;          // of the WAV files
   double full_scale_pa = 0.0;  // pressure at 1 m at full scale and velocity 127
-  std::string warning;         // of strikes that bend the body beyond its linear modes; empty: none did
+  std::string warning;         // of strikes beyond the range of linear modes; empty: none
   double error_db = 0.0;       // mean over velocities: modes as played by their layer against those of the blow, A-weighted energy of the
                                // difference over that of the blow; what more layers make smaller
 };

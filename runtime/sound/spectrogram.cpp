@@ -228,8 +228,8 @@ ShortTimeSpectrum calc_short_time_spectrum(const SoundStore& sound, std::size_t 
   const std::size_t channels = sound.get_channels();
   const int rate_hz = sound.get_rate_hz();
   ShortTimeSpectrum spectrum;
-  // About 23 Hz to a bin: the modes of a bowl stand apart and impacts stay sharp. A short sound has a shorter window, so that its onset
-  // shows, and zeros behind it, so that its lines are drawn where they are.
+  // About 23 Hz to a bin: separate modes of a bowl, sharp impacts. Short sounds: a shorter window, for their onset, zero-padded to the same
+  // bins.
   int length = 256;
   while (length < 16384 && length * 23.5 < rate_hz) length *= 2;
   spectrum.window = length;

@@ -12,11 +12,11 @@ namespace carillon::sound {
 /// Short-time spectrum. level_db is (frames, bins) row-major: the level re 20 uPa of a steady tone in that bin, mean square of all
 /// channels.
 struct ShortTimeSpectrum {
-  int window = 0;       // samples of a Hann window: a tenth of the sound at most, but 32 at least
+  int window = 0;       // samples of a Hann window: at most a tenth of the sound, at least 32
   double bin_hz = 0.0;  // width of a bin
   double duration_s = 0.0;
   std::size_t frames = 0;  // centred at (frame + 1/2) / frames * duration
-  std::size_t bins = 0;    // from 0 to half the sample rate, as of a window of a long sound: 23 Hz apart up to 48 kHz
+  std::size_t bins = 0;    // from 0 to half the sample rate, 23 Hz apart up to 48 kHz, for short sounds too
   std::vector<double> level_db;
 };
 inline constexpr double kFloorDb = -120.0;  // what silence counts as

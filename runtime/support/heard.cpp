@@ -9,7 +9,7 @@ namespace carillon::support {
 
 std::vector<bank::HeardMode> calc_heard(const bank::Bank& bank) {
   const std::vector<std::size_t> order = bank::sort_played_modes(bank);
-  bank::Bank played;  // no frequency and no decay depends on surface and shapes, which are most of a bank
+  bank::Bank played;  // without surface and shapes: most of a bank, and no part of frequencies and decays
   played.eigenvalue_rad2_s2 = bank.eigenvalue_rad2_s2;
   played.decay_per_s = bank.decay_per_s;
   played.residual = bank.residual;

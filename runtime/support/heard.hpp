@@ -1,4 +1,4 @@
-// The modes of a bank as a scene that says nothing else makes them heard.
+// The modes of a bank as heard in a scene of default settings.
 #pragma once
 
 #include <vector>
@@ -8,8 +8,8 @@
 
 namespace carillon::support {
 
-/// By number in the file: corrected, in air where the bank has multipoles, on the supports that the bank names. Where the air couples modes
-/// the mode is the one in air whose place the number has. Throws InputError as calc_losses() does.
+/// By number in the file: corrected, in air for a bank with multipoles, on the bank's supports. Modes coupled by the air: the mode in air
+/// at the same rank. Throws InputError as calc_losses() does.
 std::vector<bank::HeardMode> calc_heard(const bank::Bank& bank);
 
 }  // namespace carillon::support

@@ -420,7 +420,7 @@ ContactForces::Node ContactForces::make_node(const Slot& slot, const Record& val
                             slot.texture, slot.other_texture);
     const Shocks shocks = calc_shocks(node.noise, values.force_n);
     node.values.force_n = shocks.load_n;
-    // Exponents are blended, so none exceeds those of both nodes. No load, no heights.
+    // Interpolated exponents, so that none exceeds those of both nodes. No load: no heights.
     const double per_m = values.force_n > 0.0 && shocks.over_m > 0.0 ? 1.0 / shocks.over_m : 0.0;
     scale(node.noise.gains, node.noise.motion * per_m);
     scale(node.noise.other_gains, node.noise.other_motion * per_m);

@@ -32,7 +32,7 @@ struct ContactSurface {
 /// What is wrong with a surface, as part of a sentence; nullptr: nothing.
 const char* find_fault(const ContactSurface& surface) noexcept;
 
-/// The surface with these constants of its material in place of those that are 0.
+/// The surface with these constants of its material in place of zeros.
 ContactSurface complete(ContactSurface surface, double modulus_pa, double wave_impedance_pa_s_m) noexcept;
 
 /// The ground of scenes: concrete, smoothly trowelled.
@@ -93,13 +93,13 @@ struct ContactCounters {
 /// on top of what its records say. When its last record, and the last mark (reach), are 20 ms old it falls as if it had ended: an underrun.
 ///
 /// Force: the heights h of both surfaces press two springs in series, the contact's, k = 2 E* a, and the rough skin's. Each surface is read
-/// at the speed of the contact over it or at the slip, whichever is faster. With u = F / k + skin the force has the rms of the linear
+/// at the larger of the speed of the contact over it and the slip. With u = F / k + skin the force has the rms of the linear
 /// spring, R = h_rms / u loads: f = a F (exp(s h / h_rms - s^2 / 2) - 1), s^2 = ln(1 + min(1, R)^2), a = max(1, R), without the slowly
 /// changing load F. Up to R = 1 it never pulls. Without a load there are no heights, and the exponent is at most 3.
 ///
-/// The skin is h_rms for rolling, where the patch blunts it, and 10 um for sliding. Heights below sqrt(g / u), the frequency at which a
-/// body bounces on u under its weight, do not press: the body rides over them. Sliding adds friction, -mu f along the slip, by its share of
-/// the larger sweep. Below 0.2 mm/s a contact is at rest and gives no force.
+/// The skin is h_rms for rolling (blunted by the patch) and 10 um for sliding. No force comes from heights below sqrt(g / u), the bouncing
+/// frequency of a body on u under its weight: the body rides over them. Sliding adds friction, -mu f along the slip, by its share of the
+/// larger sweep. Below 0.2 mm/s a contact is at rest and gives no force.
 ///
 /// Damping: the impedance Z of the other body adds Z (phi.n)^2 / 2 [1/s] to the decay of each mode, and the contact's spring its own loss:
 /// calc_spring_loss() (docs/decisions/contact-sound.md).

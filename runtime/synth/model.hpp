@@ -54,15 +54,15 @@ struct ModelDirectivity {
   Vec3 offset_m{};  // from the centre of mass to that of the multipoles, axes of the mesh
 };
 
-/// What a BendingWatch has of a model. Columns are those of a row of shapes.
+/// Tables for a BendingWatch. Columns are those of a row of shapes.
 struct ModelBending {
-  static constexpr int kBack = 7, kBackSamples = 4;  // times before the end of a sub-block, and how far apart
-  double thickness_m = 0.0;             // find_judged_thickness_m(); 0: deflections are not judged, and all that follows is empty
+  static constexpr int kBack = 7, kBackSamples = 4;  // times before the end of a sub-block, and their distance
+  double thickness_m = 0.0;                          // find_judged_thickness_m(); 0: deflections are not judged, the rest is empty
   std::vector<float> step_m;            // (columns) displacement of one step of the shape, for the imaginary part 1 of a state, or q = 1
-  std::vector<float> largest;           // (columns) steps where the mode moves most
-  std::vector<float> back_re, back_im;  // (kBack, ringing columns) the turn of a state back to these times
-  std::vector<std::int32_t> vertex;     // where deflections are summed
-  int watched = 0;                      // sub-blocks after the last in which something acted: half a period of the lowest mode and more
+  std::vector<float> largest;           // (columns) largest motion of the mode [steps]
+  std::vector<float> back_re, back_im;  // (kBack, ringing columns) rotation of a state back to these times
+  std::vector<std::int32_t> vertex;     // places of the sums of deflections
+  int watched = 0;                      // sub-blocks after the last one with a force: half a period of the lowest mode and more
 };
 
 struct ModelNonlinear;  // nonlinear_modes.hpp

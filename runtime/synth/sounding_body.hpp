@@ -59,9 +59,9 @@ struct BodyChange {
   std::unique_ptr<Propagation> propagation;
   std::unique_ptr<ContactForces> contacts;
   ContactSurface surface;                    // with the material of the model
-  bool inherits = false;                     // voice, contacts and acceleration_noise take the place of those there
+  bool inherits = false;                     // replaces voice, contacts and acceleration_noise of the body
   std::unique_ptr<VoiceHandover> handover;   // for the voice
-  std::unique_ptr<Directivity> directivity;  // for the propagation that is there, of the voice
+  std::unique_ptr<Directivity> directivity;  // of the voice, for the propagation in place
 
   EffectBytes calc_bytes() const;
 };
@@ -72,7 +72,7 @@ struct ContactRecordCounters {
   std::int64_t without_use = 0;                                      // for a body without an effect of contacts
 };
 
-/// What a body has done: work by effect, in the units of EffectCounters, and ticks if they are measured.
+/// Work of a body by effect, in the units of EffectCounters, and measured ticks.
 struct BodyWork {
   PerEffect<std::int64_t> units{};
   PerEffect<std::int64_t> ticks{};

@@ -144,8 +144,8 @@ class Synthesiser {
   /// Whether add_body() would find no room. [main-thread]
   bool is_full() noexcept;
 
-  /// Gives back the memory of removed bodies and effects that the audio thread has let go, and sends pending changes. A change that fails
-  /// for lack of memory stays pending. [main-thread]
+  /// Frees the memory of removed bodies and effects after their release by the audio thread, and sends pending changes. A change without
+  /// enough memory stays pending. [main-thread]
   void collect() noexcept;
 
   /// Full scale per pascal; 1 at first. What is no finite number counts as 0. [any-thread]
@@ -185,8 +185,8 @@ class Synthesiser {
   EffectCounters get_effect_counters(int body) const noexcept;
   /// The loudest that its modes have been so far [Pa at 1 m]. [any-thread]
   double get_peak_pa(int body) const noexcept;
-  /// How far its modes have bent it at most so far, in thicknesses (find_judged_thickness_m()). 0 while that is not above
-  /// kLinearThicknesses, up to which linear modes hold, and of bodies whose deflection is not judged. [any-thread]
+  /// Largest deflection by its modes so far, in thicknesses (find_judged_thickness_m()). 0 up to kLinearThicknesses, the range of linear
+  /// modes, and without a judged thickness. [any-thread]
   double get_deflection(int body) const noexcept;
   /// How far each mode of a body swings at this moment: the amplitude of its coordinate q [m kg^1/2], by number in the bank. Modes that do
   /// not ring, and those that the model has not, are 0. False for a number that is no body's. [audio-thread], between calls of process().
@@ -194,8 +194,8 @@ class Synthesiser {
   /// Of a body that audits_energy: the largest share by which the energy of its modes rose over a block in which nothing acted on it.
   /// [any-thread]
   double get_energy_rise(int body) const noexcept;
-  /// Of a body that audits_energy: what its modes have been given, hold and have lost. [any-thread], the four not of one moment where
-  /// another thread is in process().
+  /// Energy given to, held by, lost and radiated by the modes of a body with audits_energy. [any-thread]; during process() the four may be
+  /// of different moments.
   ModeEnergy get_mode_energy(int body) const noexcept;
 
  private:

@@ -319,7 +319,7 @@ export class CarillonAudio extends EventTarget {
     Object.assign(this, { context, gain_per_pa, ground, bodies: new Set(), touches: 0, playbacks: 0, ids: 0, offset_s: 0 });
     this.listener = { position_m: [0, -1.5, 0.5], rotation: kNotTurned, ...listener };
     if (!context.audioWorklet) throw new Error('the browser has no AudioWorklet for this page; open it by https or from localhost');
-    // Bundlers take along the files that they find as a literal of such a URL. The module without SIMD is rarely built, so no literal asks for it.
+    // Bundlers include the files of literal URLs. The module without SIMD has none, as it is rarely built.
     const [module] = await Promise.all([
       this.compile(new URL('./carillon.wasm', import.meta.url), simd === 'auto' ? hasSimd() : simd),
       context.audioWorklet.addModule(new URL('./carillon-worklet.js', import.meta.url)),
@@ -359,7 +359,7 @@ export class CarillonAudio extends EventTarget {
     if (connect) this.node.connect(context.destination);
   }
 
-  /** withSimd: the URL of the module with SIMD; that without lies next to it. */
+  /** withSimd: the URL of the module with SIMD; the one without is in the same folder. */
   async compile(withSimd, isSimd) {
     const url = isSimd ? withSimd : new URL('carillon-plain.wasm', withSimd), answer = await fetch(url);
     const remedy = isSimd ? "make the page's folder again" : 'this browser has no WebAssembly SIMD: build the target carillon_page_plain';

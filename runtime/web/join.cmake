@@ -1,4 +1,4 @@
-# A script of another thread with what it imports inside, so that a page's bundler has one file to take along for it:
+# Joins the script of a thread and its import into one file for a page's bundler:
 # cmake -DMODULE=carillon-wasm.js -DSCRIPT=carillon-worker.js -DTO=file -P join.cmake
 file(READ ${MODULE} module)
 file(READ ${SCRIPT} script)

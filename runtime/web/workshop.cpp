@@ -45,7 +45,7 @@ constexpr std::size_t kMostEvents = std::size_t{1} << 30;  // bytes of a plan's 
 
 Json to_json(const Vec3& x) { return Json::array(x); }
 
-/// The modes of a bank as it is played, as JSON; `error_cents` null where it is not known. `losses`: those that are applied to it.
+/// The modes of a bank for playing, as JSON; unknown `error_cents` are null. `losses`: already applied to the bank.
 Json list_modes(const bank::Bank& bank, const support::Losses& losses) {
   Json modes = Json::array();
   const std::vector<bank::HeardMode> heard = bank::list_heard(bank, losses.decay_per_s);

@@ -36,7 +36,7 @@ def make_command(ranks: int) -> typing.List[str]:
 
 
 def make_environment(ranks: int) -> typing.Dict[bytes, bytes]:
-    """One thread a rank, and no rank of an MPI run that this process may be in."""
+    """One thread a rank, outside any MPI run of this process."""
     entries = (entry.partition(b"=") for entry in _carillon._make_environment(is_alone=ranks == 1))
     environment = {name: value for name, _, value in entries}
     environment.update({b"OMP_NUM_THREADS": b"1", b"OPENBLAS_NUM_THREADS": b"1", b"HWLOC_COMPONENTS": b"-gl"})

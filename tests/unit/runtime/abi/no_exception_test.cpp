@@ -113,7 +113,7 @@ TEST(NoException, LeavesWhenMemoryFailsAtAnyPlace) {
     EXPECT_TRUE(status == CARILLON_SYSTEM || status == CARILLON_OK || (status == CARILLON_BAD_INPUT && session.get_synth() == nullptr))
         << place << ": " << status;
     if (session.get_body() < 0) continue;
-    // Pending changes are made later.
+    // Pending changes follow in later calls.
     for (int i = 0; i < 3; ++i) {
       process(session.get_synth(), 2);
       carillon_collect(session.get_synth());

@@ -1,4 +1,4 @@
-// Shapes of textbooks on lattices of points: what kind they are is known.
+// Known kinds: shapes of textbooks on lattices of points.
 #include "runtime/bank/kinds.hpp"
 
 #include <gtest/gtest.h>
@@ -15,7 +15,7 @@ namespace {
 using Field = std::function<Vec3(const Vec3&)>;
 constexpr double kPi = std::numbers::pi;
 
-/// Two triangles for each cell of a map of (i, j) to points; the points of equal place are not joined, which kinds do not need.
+/// Two triangles for each cell of a map of (i, j) to points, with duplicate points at the edges.
 void add_patch(Bank& bank, int rows, int columns, const std::function<Vec3(double, double)>& map) {
   const auto first = static_cast<std::int32_t>(bank.vertices_m.size());
   for (int i = 0; i <= rows; ++i)
@@ -70,7 +70,7 @@ std::vector<std::string> find(Bank bank, const std::vector<Field>& fields) {
   return kinds;
 }
 
-/// A free bar of length 1 in bending, x from -1/2: Euler and Bernoulli's shape with n + 1 nodes; and its slope.
+/// Deflection and slope of a free Euler-Bernoulli bar of length 1, x from -1/2, with n + 1 nodes.
 std::array<double, 2> bend(int n, double x) {
   const double k = (n + 0.5) * kPi - (n == 1 ? -0.0177 : n == 2 ? 0.0008 : 0.0), s = k * (x + 0.5);
   const double sigma = (std::cosh(k) - std::cos(k)) / (std::sinh(k) - std::sin(k));
@@ -79,7 +79,7 @@ std::array<double, 2> bend(int n, double x) {
 }
 
 TEST(Kinds, of_a_bar_are_those_of_beam_theory_in_any_position) {
-  // Bending of slices that turn with the axis: u = -z w', w.
+  // Bending: u = -z w', w.
   const double s = std::sqrt(0.5);
   const Mat3 straight{Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}}, turned{Vec3{s, s, 0}, Vec3{-0.5, 0.5, s}, Vec3{0.5, -0.5, s}};
   for (const Mat3& axes : {straight, turned}) {
@@ -99,20 +99,20 @@ TEST(Kinds, of_a_bar_are_those_of_beam_theory_in_any_position) {
         return Vec3{0, -turn * p[2], turn * p[1]};
       }));
       wanted.push_back("torsion, " + nodes);
-      fields.push_back(along([n](const Vec3& p) {  // with the contraction of a Poisson's ratio of 0.3
+      fields.push_back(along([n](const Vec3& p) {  // Poisson's ratio 0.3
         const double x = n * kPi * (p[0] + 0.5), strain = -0.3 * n * kPi * -std::sin(x);
         return Vec3{std::cos(x), strain * p[1], strain * p[2]};
       }));
       wanted.push_back("longitudinal, " + nodes);
     }
-    // Two at once are neither, and nor is a section that does not stay in shape.
+    // Unknown: a mixture of two kinds, and a section that changes its shape.
     fields.push_back(along([](const Vec3& p) { return Vec3{0, bend(1, p[0])[0], bend(2, p[0])[0]}; }));
     wanted.push_back("-");
     fields.push_back(along([](const Vec3& p) { return Vec3{0, 0, std::cos(30 * kPi * p[1])}; }));
     wanted.push_back("-");
     EXPECT_EQ(find(make_box({1.0, 0.1, 0.04}, {60, 8, 4}, axes), fields), wanted);
   }
-  // A section as wide as thick bends in any direction.
+  // A square section bends in any direction.
   const Field slanted = [](const Vec3& p) { return Vec3{0, 0.6 * bend(2, p[0])[0], 0.8 * bend(2, p[0])[0]}; };
   EXPECT_EQ(find(make_box({1.0, 0.05, 0.05}, {60, 4, 4}), {slanted}), std::vector<std::string>{"bending, 3 nodes"});
 }
@@ -140,7 +140,7 @@ TEST(Kinds, of_round_bodies_are_their_nodal_diameters) {
   EXPECT_EQ(find(make_round(bell), fields), wanted);
   EXPECT_EQ(find(make_round(tube), fields), wanted);
   EXPECT_EQ(find(make_round(tube), {ring(0)}), std::vector<std::string>{"breathing"});
-  // A disc: w = J_n-like.
+  // A disc: w = r^n cos(n phi).
   const auto disc = [](double s) { return s < 0.5 ? std::array{2 * s, 0.01} : std::array{2 - 2 * s, -0.01}; };
   const auto drum = [](int n) {
     return [n](const Vec3& q) {

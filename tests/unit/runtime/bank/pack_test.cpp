@@ -372,7 +372,7 @@ TEST(Pack, whose_shapes_contradict_its_witnesses_is_read_by_no_program) {
   const Bank bank = make_ball_bank(3, 9);
   PackedBank packed = calc_packed(bank, -60.0);
   EXPECT_NO_THROW((void)parse_bank(bytes_of(make_packed_bytes(packed))));
-  packed.shape = calc_packed(bank, -12.0).shape;  // sealed with the errors and witnesses of the finer one
+  packed.shape = calc_packed(bank, -12.0).shape;  // under the errors and witnesses of the finer packing
   try {
     (void)parse_bank(bytes_of(make_packed_bytes(packed)));
     FAIL() << "it was read";

@@ -36,7 +36,7 @@ TEST(Command, gives_what_a_program_prints_and_how_it_ended) {
 }
 
 TEST(Command, is_no_rank_of_the_run_that_this_process_is_in) {
-  // What mpirun of Open MPI 4.1 sets for a rank, and what its users set.
+  // Variables of mpirun (Open MPI 4.1) for a rank, and settings of its users.
   for (const char* name : {"OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_RANK", "OMPI_MCA_ess", "OMPI_MCA_orte_hnp_uri", "PMIX_RANK", "PMIX_ID",
                            "PRTE_LAUNCHED", "PMI_RANK", "OMPI_MCA_btl", "PRTE_MCA_rmaps_default_mapping_policy", "SLURM_JOB_ID"})
     ::setenv(name, "x", 1);

@@ -44,7 +44,7 @@ TEST(Foreign, other_bytes_are_no_utf16) {
   EXPECT_NO_THROW(refuse_utf16("{}", "a"));
   EXPECT_NO_THROW(refuse_utf16("\xEF\xBB\xBF{}", "a"));
   EXPECT_NO_THROW(refuse_utf16(std::string(200, '\0'), "a"));
-  EXPECT_NO_THROW(refuse_utf16(std::string("a\0b\0c\0", 6), "a"));  // too short to be sure
+  EXPECT_NO_THROW(refuse_utf16(std::string("a\0b\0c\0", 6), "a"));  // too short
   EXPECT_NO_THROW(refuse_utf16("\xFF\xFEsolid", "a"));
 }
 
@@ -73,7 +73,7 @@ TEST(Foreign, a_backslash_in_the_name_of_a_file_that_is_there_is_no_fault) {
   EXPECT_EQ(job.path("mesh"), folder / "a\\b.msh");
 }
 
-/// Ends with 0 if a file beyond the limit is refused in words, and nothing of it is there.
+/// Exit code 0: an error that names the limit, and no file.
 [[noreturn]] void write_beyond_limit(const std::filesystem::path& file) {
   report_file_limit();
   const rlimit limit{20'000, 20'000};

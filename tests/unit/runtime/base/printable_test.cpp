@@ -85,7 +85,7 @@ TEST(Message, is_cut_where_it_is_too_long_for_a_person) {
   const std::string cut = show_message(words + "; name another");
   EXPECT_LT(cut.size(), 4100U);
   EXPECT_TRUE(cut.ends_with("; name another"));
-  EXPECT_EQ(cut.find("\\x"), std::string::npos);  // no character was cut
+  EXPECT_EQ(cut.find("\\x"), std::string::npos);  // whole characters
 }
 
 TEST(Message, names_a_file_and_not_its_descriptor) {

@@ -154,7 +154,7 @@ TEST(Glb, of_another_program_may_scale_its_node_and_leave_the_mass_out) {
   EXPECT_THAT(find_error(replace_json(bytes, R"("scale": [2, 2, 2])", R"("scale": [0, 0, 0])"), plain), ::testing::StartsWith("body.glb"));
 }
 
-/// The same model as a .gltf file whose buffer has this "uri", and the bytes of that buffer.
+/// The same model as a .gltf file with this "uri" of its buffer, and the bytes of the buffer.
 std::pair<std::string, std::string> to_gltf(const std::string& glb, const std::string& uri) {
   std::uint32_t length = 0;
   std::memcpy(&length, glb.data() + 12, 4);
@@ -207,7 +207,7 @@ TEST(Glb, of_another_program_is_called_imported_and_its_accuracy_unknown) {
   EXPECT_EQ(bank::make_bank_bytes(again), bank::make_bank_bytes(plain));
 }
 
-/// A cube of 0.1 m in a node that scales it, with the mass of a cube of so many kg and of `size` times 0.1 m.
+/// A cube of 0.1 m in a node with a scale, with the mass properties of a cube of `mass_kg` and an edge of `size_of_mass` times 0.1 m.
 std::string make_scaled(double scale, double mass_kg, double size_of_mass = 1.0) {
   bank::Bank bank = testing::make_cube_bank({{820.0, 12.0, 0.3, {0.4, -0.7, 1.1}, 0.07}});
   bank.rigid.mass_kg *= mass_kg;
@@ -225,17 +225,17 @@ TEST(Glb, whose_node_scales_the_body_has_the_modes_of_the_size_that_fits_its_mas
   std::vector<std::string> notes;
   for (const double scale : {0.5, 2.0, 3.0}) {
     const double cube = scale * scale * scale;
-    const bank::Bank moved = parse_glb(make_scaled(scale, 1.0), "body.glb", plain, &notes);  // the mass is that of 0.1 m
+    const bank::Bank moved = parse_glb(make_scaled(scale, 1.0), "body.glb", plain, &notes);  // mass of 0.1 m
     EXPECT_NEAR(moved.freq_hz(0), 820.0 / scale, 1e-3);
     EXPECT_NEAR(moved.rigid.mass_kg, cube, 1e-5 * cube);
     EXPECT_NEAR(moved.rigid.inertia_kg_m2[0], cube * 0.01 * scale * scale / 6.0, 1e-5 * cube);
     EXPECT_NEAR(moved.material.density_kg_m3, 1000.0, 0.01);
     EXPECT_NEAR(moved.vertices_m[7][0], 0.05 * scale, 1e-7);
-    // Mass-normalised: the kinetic energy of a mode stays, and phi goes with one over the root of the mass.
+    // Mass-normalised: phi goes with 1 / sqrt(mass).
     const bank::Bank alone = parse_glb(make_scaled(1.0, 1.0), "body.glb", plain);
     EXPECT_NEAR(moved.shape_at(3, 0)[2], alone.shape_at(3, 0)[2] / std::sqrt(cube), 1e-4);
     ASSERT_EQ(notes.size(), 1u);
-    const bank::Bank kept = parse_glb(make_scaled(scale, cube, scale), "body.glb", plain, &notes);  // the mass is that of the scaled cube
+    const bank::Bank kept = parse_glb(make_scaled(scale, cube, scale), "body.glb", plain, &notes);  // mass of the scaled cube
     EXPECT_NEAR(kept.freq_hz(0), 820.0, 1e-3);
     EXPECT_NEAR(kept.material.density_kg_m3, 1000.0, 0.01);
     EXPECT_TRUE(notes.empty());
@@ -245,7 +245,7 @@ TEST(Glb, whose_node_scales_the_body_has_the_modes_of_the_size_that_fits_its_mas
   ASSERT_EQ(notes.size(), 1u);
   EXPECT_THAT(notes[0], ::testing::HasSubstr("contradicts"));
   const bank::Bank uneven = parse_glb(make_scaled(1.0, 1.0, 2.0), "body.glb", plain, &notes);
-  EXPECT_NEAR(uneven.rigid.inertia_kg_m2[0], 0.01 / 6.0, 1e-6);  // that of the surface
+  EXPECT_NEAR(uneven.rigid.inertia_kg_m2[0], 0.01 / 6.0, 1e-6);  // of the surface
   ASSERT_EQ(notes.size(), 1u);
   EXPECT_THAT(notes[0], ::testing::HasSubstr("moments of inertia contradict"));
 }

@@ -1,4 +1,4 @@
-// The decays that tables show are those that are heard: each mode of a struck body alone, its fall fitted to the sound.
+// Decays of the tables against decays fitted to the sound of single modes.
 #include <gtest/gtest.h>
 #include <unistd.h>
 

@@ -108,7 +108,7 @@ TEST(MaterialTable, has_woods_that_are_stiffest_along_the_grain_and_could_exist)
     EXPECT_GT(calc_definiteness(row.material.calc_elasticity_pa()), 1e-4);
     if (row.group != "wood") continue;
     ++woods;
-    // Wood Handbook, table 5-1: tangential 0.015 to 0.09 of along, radial 0.04 to 0.2, rolling shear 0.003 to 0.03; of beech
+    // Over E along the grain (Wood Handbook, table 5-1): tangential 0.015 to 0.09, radial 0.04 to 0.2, rolling shear 0.003 to 0.03; beech
     // 0.034 (Hearmon 1948).
     EXPECT_GT(e[1], e[2]);
     EXPECT_GE(e[2] / e[0], 0.014);
@@ -171,7 +171,7 @@ TEST(MaterialTable, has_the_woods_of_instrument_makers_under_their_usual_names) 
                            "red oak",
                            "teak"})
     EXPECT_NE(MaterialTable::get().find(name), nullptr) << name;
-  // However they are written, names stand for one row only.
+  // Each name, in any spelling, belongs to one row.
   std::set<std::string> folded;
   for (const Row& row : MaterialTable::get().rows()) {
     std::vector<std::string> names{row.material.name};
@@ -181,7 +181,7 @@ TEST(MaterialTable, has_the_woods_of_instrument_makers_under_their_usual_names) 
       EXPECT_TRUE(folded.insert(name).second) << name;
     }
   }
-  // Density at 12 % moisture [kg/m^3] and E along the grain [GPa], of the sources: the bending modulus and 10 %.
+  // Density at 12 % moisture [kg/m^3] and bending modulus [GPa] of the sources, 10 % below E along the grain.
   for (const auto& [name, density, bending] : {std::tuple{"rosewood", 830, 11.50},
                                                {"bubinga", 890, 18.41},
                                                {"wenge", 870, 17.59},

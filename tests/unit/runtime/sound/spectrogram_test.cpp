@@ -80,7 +80,7 @@ TEST(Spectrogram, ALongSoundIsAveragedBetweenItsColumns) {
 }
 
 TEST(Spectrogram, AShortSoundShowsItsOnset) {
-  // A tone of 3 kHz begins in the middle of 30 ms, and of other short sounds: a twentieth before there is nothing, a twentieth behind all.
+  // A tone of 3 kHz from the middle of short sounds: silence a twentieth before its onset, full level a twentieth after it.
   for (const double seconds : {0.01, 0.03, 0.1, 0.3}) {
     SoundStore sound(48000, 1);
     const int samples = static_cast<int>(seconds * 48000);

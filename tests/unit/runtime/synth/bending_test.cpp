@@ -1,5 +1,5 @@
-// Bodies that bend beyond what linear modes hold for: against a plate's closed form and against the whole displacement field, which is
-// integrated mode by mode and summed at every vertex at every sample.
+// Deflections beyond the range of linear modes, against a plate's closed form and against the whole displacement field (all modes, all
+// vertices of one side, every second sample).
 #include "runtime/synth/bending.hpp"
 
 #include <gtest/gtest.h>
@@ -83,7 +83,7 @@ double play(const bank::Bank& bank, const std::vector<events::Event>& events, st
   return synthesiser.get_deflection(body);
 }
 
-/// The triangle that has a vertex, and the coordinates of that corner.
+/// An impulse at a vertex.
 events::Impulse make_strike(const bank::Bank& bank, std::int32_t vertex, double time_s, double impulse_n_s, double duration_s) {
   for (std::size_t t = 0; t < bank.triangles.size(); ++t)
     for (std::size_t c = 0; c < 3; ++c)
@@ -103,7 +103,7 @@ TEST(Bending, ASheetUnderALoadThatGrowsSlowlyBendsAsNavierHasIt) {
   constexpr double kSide = 0.2, kThickness = 0.001, kEnd = 0.3, kStep = 1e-3;
   constexpr int kCells = 20;
   const bank::Bank bank = make_sheet(kSide, kThickness, kCells, 13, 400.0);
-  // Timoshenko, Woinowsky-Krieger, "Theory of plates and shells" (1959), table 23: w = 0.01160 F a^2 / D in the middle, by a force there.
+  // Timoshenko, Woinowsky-Krieger, "Theory of plates and shells" (1959), table 23: w = 0.01160 F a^2 / D under a force at the centre.
   const double stiffness = kYoungPa * std::pow(kThickness, 3) / (12.0 * (1.0 - kPoisson * kPoisson));
   const double thickness = kThickness / (1.0 + 2.0 * kThickness / kSide);  // twice the volume over the surface
   const auto load = [&](double thicknesses) {
@@ -144,7 +144,7 @@ TEST(Bending, RandomBlowsAreJudgedAsByTheWholeDisplacementField) {
     bank::Bank bank = make_sheet(pick(0.05, 0.4), pick(3e-4, 4e-3), cells, 3 + trial % 4, 1.0);
     for (std::size_t m = 0; m < bank.mode_count(); ++m) {
       const double omega = std::sqrt(bank.eigenvalue_rad2_s2[m]);
-      bank.decay_per_s[m] = trial % 4 == 0 && m % 3 == 1 ? omega * pick(0.9, 1.6) : pick(0.5, 60.0);  // some do not ring
+      bank.decay_per_s[m] = trial % 4 == 0 && m % 3 == 1 ? omega * pick(0.9, 1.6) : pick(0.5, 60.0);  // some overdamped
     }
     const double thickness = find_judged_thickness_m(bank);
     std::vector<events::Impulse> blows;
@@ -160,7 +160,7 @@ TEST(Bending, RandomBlowsAreJudgedAsByTheWholeDisplacementField) {
       time_s += pick(1e-3, 3e-2);
     }
     const double found = play(bank, events, 80, trial % 2 == 0 ? kBlock : 77);
-    // Between blows every mode has its closed form: exp(-d t) times cosine and sine, or their hyperbolic kind.
+    // Closed form of each mode between blows: exp(-d t) times cos and sin, or cosh and sinh.
     double largest = 0.0;
     const std::size_t modes = bank.mode_count();
     std::vector<double> q(modes), v(modes);

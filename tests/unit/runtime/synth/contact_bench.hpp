@@ -24,12 +24,11 @@ using std::numbers::pi;
 
 inline constexpr double kRate = 48000.0;
 inline const ContactSurface kOther{.roughness_m = 2e-6, .friction = 0.5, .modulus_pa = 70e9};
-inline const ContactSurface kRigidOther{
-    .roughness_m = 2e-6, .friction = 0.5, .modulus_pa = 0.0};  // no spring: what is left is its impedance
+inline const ContactSurface kRigidOther{.roughness_m = 2e-6, .friction = 0.5, .modulus_pa = 0.0};  // no spring, impedance alone
 inline const EffectSet kNoise{Effect::kRoughness, Effect::kRolling};
 inline const EffectSet kBrake{Effect::kContactDamping};
 
-/// Slides flat at a speed: the other's surface only is swept.
+/// Flat sliding: the contact moves over the other surface alone.
 inline LastingContact make_sliding(double time_s, double speed_m_s, double force_n = 1.0) {
   LastingContact c;
   c.time_s = time_s;
@@ -43,7 +42,7 @@ inline LastingContact make_sliding(double time_s, double speed_m_s, double force
   return c;
 }
 
-/// One record every 2 ms from 0 on, the first and the last marked as such.
+/// One record every 2 ms from 0 on; begin and end are marked.
 inline std::vector<LastingContact> make_records(double end_s, const std::function<LastingContact(double)>& make) {
   std::vector<LastingContact> records;
   for (int i = 0; 2e-3 * i <= end_s; ++i) records.push_back(make(2e-3 * i));
@@ -52,7 +51,7 @@ inline std::vector<LastingContact> make_records(double end_s, const std::functio
   return records;
 }
 
-/// Plays with the records given as they come due, 100 ms ahead.
+/// Plays the records, each given 100 ms before its time.
 inline std::vector<float> play(Voice& voice, ContactForces& contacts, std::vector<LastingContact> records, double seconds,
                                std::size_t block = 480, const ContactSurface& other = kOther) {
   std::vector<float> out(static_cast<std::size_t>(seconds * kRate), 0.0F);
@@ -79,7 +78,7 @@ inline float calc_peak(const std::vector<float>& x) {
   return peak;
 }
 
-/// The noise forces themselves, sample by sample, along the contact's direction.
+/// Noise force of each sample along the contact's direction.
 inline std::vector<double> trace(ContactForces& contacts, const std::vector<LastingContact>& records, double seconds,
                                  const ContactSurface& other = kOther) {
   std::vector<double> force;

@@ -16,7 +16,7 @@ namespace {
 
 using namespace testing;
 
-/// The loudest of a body that is pushed with 1 N for 50 ms, suddenly, at the place of make_sliding().
+/// Peak of a body under a sudden push of 1 N for 50 ms at the place of make_sliding().
 float find_push_peak(const std::shared_ptr<const Model>& model) {
   const LastingContact at = make_sliding(0.0, 0.0);
   const std::vector<Vec3> steps(500, Vec3{0.0, 0.0, 1e-4});
@@ -28,7 +28,7 @@ float find_push_peak(const std::shared_ptr<const Model>& model) {
   return calc_peak(out);
 }
 
-/// Records as any program may send them: begins, holds and ends in any order, without a load, without a speed, a gap of no time.
+/// Records of an unreliable sender: states in any order, zero loads, zero speeds, equal times.
 std::vector<LastingContact> make_random_stream(std::mt19937_64& random) {
   const auto chance = [&] { return std::uniform_real_distribution(0.0, 1.0)(random); };
   const auto amount = [&](double low, double high) { return chance() < 0.25 ? 0.0 : low * std::pow(high / low, chance()); };
@@ -59,7 +59,7 @@ TEST(ContactStreams, OfAnyStreamAreBoundedAndNoLouderThanAPlainPushByThem) {
     const auto draw_roughness_m = [&] { return std::pow(10.0, std::uniform_real_distribution(-7.0, -4.0)(random)); };
     const ContactSurface own{.roughness_m = draw_roughness_m(), .modulus_pa = 10e9},
         other{.roughness_m = draw_roughness_m(), .modulus_pa = 30e9};
-    // R of the heights, waves of 6.4 mm included, over the skin: beyond 1 shocks exceed the load.
+    // R of the heights (with waves of 6.4 mm) over the skin; above 1 shocks exceed the load.
     const double shocks = std::max(1.0, 5.3 * std::hypot(own.roughness_m, other.roughness_m) / 10e-6);
     double load = 0.0, lowest = 0.0, highest = 0.0;
     for (const LastingContact& record : records) load = std::max(load, record.force_n);

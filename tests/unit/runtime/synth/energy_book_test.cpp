@@ -1,4 +1,4 @@
-// The books of the modes: against the work of blows in closed form, and against what is lost and radiated as it follows from the sound.
+// Energy books of the modes against the work of blows in closed form, and against losses and radiation derived from the sound.
 #include "runtime/synth/energy_book.hpp"
 
 #include <gtest/gtest.h>
@@ -24,14 +24,14 @@ constexpr double kRate = 48000.0, kPi = std::numbers::pi;
 TEST(EnergyBook, ABlowOnABodyAtRestGivesHalfOfItsSquaredShare) {
   const bank::Bank bank = make_cube_bank({{300.0, 5.0}, {1200.0, 900.0}, {2500.0, 40.0}, {800.0, 6000.0}});
   Voice voice(Model::make(bank), {.audits_energy = true});
-  // At the beginning of a sub-block, so that nothing of it is lost before the end but by the law of the book.
+  // At the start of a sub-block: all of its decay is in the book's law.
   ASSERT_TRUE(voice.strike({.time_s = 320.0 / kRate, .impulse_n_s = {0.0, 0.0, 0.02}}));
   std::vector<float> sound(kBlock);
   for (int b = 0; b < 4; ++b) voice.process(sound);
   const ModeEnergy energy = voice.get_counters().energy;
   double expected = 0.0;
   for (std::size_t m = 0; m < 4; ++m) expected += 0.5 * std::pow(bank.shape_at(0, m)[2] * 0.02, 2);
-  // Of modes that die within a sub-block the book knows less; these two are half of it.
+  // The book is coarse for modes that decay within a sub-block, half of the energy here.
   EXPECT_NEAR(energy.given_j, expected, 0.35 * expected);
   EXPECT_NEAR(energy.given_j, energy.held_j + energy.lost_j, 1e-12 * expected);
   const bank::Bank slow = make_cube_bank({{300.0, 5.0}, {2500.0, 40.0}});
@@ -41,7 +41,7 @@ TEST(EnergyBook, ABlowOnABodyAtRestGivesHalfOfItsSquaredShare) {
   EXPECT_NEAR(rings.get_counters().energy.given_j, 2.0 * 0.5 * 0.02 * 0.02, 0.03 * 0.02 * 0.02);
 }
 
-/// What happens to a body: pulses, forces and touches that slide and roll, at random times.
+/// Events of a body: pulses, forces, sliding and rolling contacts at random times.
 std::vector<events::Event> make_events(std::mt19937_64& random, int kinds, double end_s) {
   const auto pick = [&](double low, double high) { return std::uniform_real_distribution(low, high)(random); };
   std::vector<events::Event> events;
@@ -79,7 +79,7 @@ TEST(EnergyBook, OfRandomScenesIsThatOfTheSoundAtEveryStep) {
   const auto pick = [&](double low, double high) { return std::uniform_real_distribution(low, high)(random); };
   constexpr double kEnd = 0.35;
   for (int trial = 0; trial < 28; ++trial) {
-    // One mode, so that its velocity is the pressure over the gain.
+    // A single mode: its velocity is the pressure over the gain.
     const double freq = std::exp(pick(std::log(80.0), std::log(6000.0))), decay = std::exp(pick(0.0, std::log(400.0)));
     const double gain = pick(0.1, 0.9) * std::sqrt(decay / bank::calc_radiation_decay(1.0));
     const bank::Bank bank = make_cube_bank({{freq, decay, gain, {pick(-1, 1), pick(-1, 1), 1.0}}});
@@ -113,12 +113,12 @@ TEST(EnergyBook, OfRandomScenesIsThatOfTheSoundAtEveryStep) {
     }
     const ModeEnergy& end = books.back();
     ASSERT_GT(end.given_j, 0.0) << trial;
-    double scale = end.given_j;  // forces also take back what they gave
+    double scale = end.given_j;  // forces also do negative work
     for (const ModeEnergy& book : books) scale = std::max(scale, book.held_j);
     for (std::size_t b = 0; b < lost_j.size(); ++b) {
       const ModeEnergy& book = books[b];
       EXPECT_NEAR(book.given_j, book.held_j + book.lost_j, 1e-6 * end.given_j) << trial;
-      // It is noted where something acts and at the start of each block, so that it is up to a block behind.
+      // The book may be a block behind: entries are at forces and at the start of each block.
       const double taken_j = book.given_j - book.held_j, within_j = 0.02 * scale;
       EXPECT_LE(taken_j, lost_j[b] + within_j) << trial << ", block " << b << ", kinds " << kinds;
       EXPECT_LE(book.radiated_j, radiated_j[b] + within_j) << trial << ", block " << b;
