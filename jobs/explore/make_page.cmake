@@ -1,5 +1,5 @@
 # Makes the page of carillon explore: cmake -DNPM=npm -DFROM=page/ -DWORK=folder -DTO=folder -DSOURCES=a;b -P make_page.cmake
-# three.js comes from npm's registry, as package-lock.json has it. Where the registry cannot be reached there is no page, and the build continues.
+# three.js comes from npm's registry, pinned by package-lock.json. Without the registry the page is left out, and the build continues.
 file(MAKE_DIRECTORY ${WORK})
 file(COPY ${FROM}/package.json ${FROM}/package-lock.json DESTINATION ${WORK})
 set(fetched ${WORK}/node_modules/.package-lock.json)
