@@ -117,7 +117,7 @@ struct CommandLine {
     }
   }
 
-  /// What all ranks have to do alike. Whether they print, and where rank 0 writes how it went, may differ.
+  /// The work that must be equal on all ranks. Options of output and of rank 0's result files may differ.
   run::Given describe_work() const {
     std::string work = error                         ? "a command line that cannot be read"
                        : !options.radiate.empty()    ? "--radiate"

@@ -43,7 +43,7 @@ def print_table(rows):
 
 
 def format_table(rows):
-    """The table as Markdown has it, all columns but the first at the right."""
+    """The table in Markdown, all columns but the first right-aligned."""
     head, *body = [[str(cell) for cell in row] for row in rows]
     return "\n".join(f"| {' | '.join(row)} |" for row in (head, ["---", *["--:"] * (len(head) - 1)], *body)) + "\n"
 
@@ -52,14 +52,14 @@ NUMBER = re.compile(r"[-+]?\d[\d,]*\.?\d*(?:e[-+]?\d+)?")
 
 
 def calc_unit(number):
-    """One in the last digit of a number as it is printed."""
+    """One unit in the last printed digit of a number."""
     digits, _, power = number.partition("e")
     return 10.0 ** (int(power or 0) - len(digits.partition(".")[2]))
 
 
 def find_difference(page, run, varying):
-    """The first cell in which a table of the page is not that of the run, in words; nothing where they agree. Figures may differ by two
-    units of their last digit; the columns named in `varying`, of times and of rounding errors, are not compared."""
+    """The first differing cell of the page's and the run's table, as text; None for equal tables. Tolerance: two units of the last digit.
+    varying: names of columns left out, such as times and rounding errors."""
     page, run = [[line[2:-2].split(" | ") for line in text.splitlines()] for text in (page, run)]
     if len(page) != len(run) or page[0] != run[0]:
         return f"{len(page)} rows of {', '.join(page[0])} on the page, {len(run)} of {', '.join(run[0])} in the run"
@@ -78,20 +78,20 @@ def find_difference(page, run, varying):
 
 
 class Page:
-    """The page of an example, with the tables of its runs: those of the whole form where the page has a place for them,
+    """The page of an example with the tables of its runs. Tables of the full form, at their places in the page:
 
         <!-- begin figures NAME -->
         | ... |
         <!-- end figures NAME -->
 
-    those of the short form, which tests run, in a comment of their own at its end."""
+    Tables of the short form, which tests run: each in a comment at the end of the page."""
 
     def __init__(self, file, quick):
         self.file, self.quick = file, quick
         self.text = file.read_text()
 
     def find(self, name):
-        """(begin, end) of a table in the text, or nothing."""
+        """(begin, end) of a table in the text, or None."""
         begin, end = (
             (f"<!-- short form {name}\n", "-->\n") if self.quick else (f"<!-- begin figures {name} -->\n", f"<!-- end figures {name} -->\n")
         )
@@ -103,13 +103,13 @@ class Page:
         return self.text[place[0] : place[1]] if place else None
 
     def list_names(self):
-        """Of the tables that it shows."""
+        """Names of the tables shown."""
         return re.findall(r"^<!-- begin figures ([\w-]+) -->$", self.text, re.M)
 
     def set(self, name, table):
         if place := self.find(name):
             self.text = self.text[: place[0]] + table + self.text[place[1] :]
-        else:  # the short form for the first time
+        else:  # first run of the short form
             self.text += f"\n<!-- short form {name}\n{table}-->\n"
 
 
@@ -203,7 +203,7 @@ class Stage:
         self.pictures.append(picture)
 
     def show(self, name, rows, varying=()):
-        """Prints a table, which the page of the example has under this name. varying: heads of columns that differ from run to run."""
+        """Prints a table of the example's page. varying: heads of columns that differ from run to run."""
         print_table(rows)
         self.tables[name] = (rows, varying)
 
@@ -211,7 +211,7 @@ class Stage:
         page = Page(self.folder / "README.md", self.quick)
         for name in page.list_names():
             if self.quick and name not in self.tables:
-                continue  # the short form leaves scenes out
+                continue  # a scene left out of the short form
             rows, varying = self.tables[name]
             table = page.get(name)
             difference = find_difference(table, format_table(rows), varying) if table else "it has none yet"
@@ -234,7 +234,7 @@ class Stage:
         self.expect(f"{what}: {value:.6g}, wanted {wanted:.6g} +- {percent:g} % (off by {off:+.3f} %)", abs(off) <= percent)
 
     def finish(self, keep_pictures=False, update=False):
-        """Prints the checks; what failed in words, or nothing. update: the page gets the figures of this run, if all checks are met."""
+        """Prints the checks and returns the failed ones as text, or None. update: writes the figures to the page if all checks are met."""
         if not update:
             self.check_page()
         elif all(met for _, met in self.checks):

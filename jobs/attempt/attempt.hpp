@@ -17,8 +17,8 @@ struct Options {
   std::filesystem::path root;  // that store, for ranks that have to find the folder themselves
   std::string id;              // and the job
   int ranks = 1;
-  double memory_gb = 0.0;        // admitted, for the record; 0: not known
-  double memory_limit_gb = 0.0;  // the job's "memory_gb": it ends when its processes hold more together; 0: none
+  double memory_gb = 0.0;        // admitted, for the record; 0: unknown
+  double memory_limit_gb = 0.0;  // the job's "memory_gb", limit for all its processes together; 0: none
   double time_limit_s = 0.0;     // of this attempt; 0: none
   std::string token;             // 32 hex digits; empty: made here
   Launcher launcher = Launcher::automatic;

@@ -132,7 +132,8 @@ Launch make_launch(const Options& options, const std::string& token, const Scrat
   if (options.memory_limit_gb > 0.0 && !options.is_simulation)
     launch.arguments.insert(launch.arguments.end(), {"--memory-gb", fmt::format("{}", options.memory_limit_gb)});
   if (options.is_simulation && options.is_prediction) {
-    add({"--validate", "--json", "--patience", "1000000", "--checkpoint", store::kCheckpointFile});  // for what it saves, too
+    add({"--validate", "--json", "--patience", "1000000", "--checkpoint",
+         store::kCheckpointFile});  // predicts the memory of checkpoints as well
   } else if (options.is_simulation) {
     add({"--checkpoint", store::kCheckpointFile, "--progress", store::kProgressFile});  // what it writes is in the job
   } else if (options.is_prediction) {

@@ -89,7 +89,7 @@ class Watcher {
     if (watched_.was_asked_to_stop || watched_.was_out_of_time) stop(step);
     look_s_ += step;
     const double pause_s = options_.memory_limit_gb > 0.0 ? kStepS : kLookS;
-    if (look_s_ < std::min(pause_s, 0.5 * elapsed_s_)) return;  // often at first: small jobs are short
+    if (look_s_ < std::min(pause_s, 0.5 * elapsed_s_)) return;  // short intervals at first, for small jobs
     look(look_s_);
     look_s_ = 0.0;
   }

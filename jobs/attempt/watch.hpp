@@ -14,7 +14,7 @@ struct Watched {
   int exit_code = 0;  // 128 + signal when a signal ended it
   bool was_asked_to_stop = false;
   bool was_out_of_time = false;
-  bool was_over_memory = false;  // held more than options.memory_limit_gb, and was killed
+  bool was_over_memory = false;  // killed above options.memory_limit_gb
   bool was_hung = false;
   double still_s = 0.0;         // was_hung: how long nothing had moved
   double peak_memory_gb = 0.0;  // resident, all processes below `child` together

@@ -56,7 +56,7 @@ std::string name_place(const std::string& message, const fs::path& copy, const s
   return place + message.substr(end);
 }
 
-/// How the mesh of a bank differs from what was described. That previews are rough is known, and no warning here.
+/// Differences between a bank's mesh and its description. No warnings about the roughness of previews.
 std::vector<std::string> read_mesh_warnings(const fs::path& folder) {
   constexpr std::size_t kMaxWarnings = 100;
   std::vector<std::string> warnings;
@@ -65,7 +65,7 @@ std::vector<std::string> read_mesh_warnings(const fs::path& folder) {
     std::optional<base::Object> run = root.object_if("run"), mesh = run ? run->object_if("mesh") : std::nullopt;
     if (!mesh || !mesh->has("warnings")) return warnings;
     for (const base::Entry& entry : mesh->entries("warnings", kMaxWarnings)) warnings.push_back(entry.text);
-  } catch (const InputError&) {  // a damaged record costs the warnings, not the bank
+  } catch (const InputError&) {  // a damaged record loses its warnings; the bank is still served
   }
   return warnings;
 }

@@ -112,7 +112,7 @@ Explanation explain(Shared& shared, const store::Id& id, const std::optional<reg
   return {state, fmt::format("nothing new would run: it is {} already", state), false};
 }
 
-/// JSON of one job; null where it was printed for people.
+/// JSON of one job; null after printing text.
 Json::Value explain_one(Shared& shared, const Source& source) {
   if (!source.error.empty()) throw InputError(source.error);
   const store::Id id = store::require_id(source.request.id, source.job_file);

@@ -96,7 +96,7 @@ std::vector<Source> read_manifest(const std::string& word, int only = 0) {
   return sources;
 }
 
-/// File and line of "sweep.txt#21", where there is such a file; else line 0.
+/// File and line of "sweep.txt#21"; line 0 without such a file.
 std::pair<std::string, int> split_line(const std::string& word) {
   const std::size_t mark = word.rfind('#');
   std::error_code error;
@@ -158,7 +158,7 @@ bool is_of_many(const std::string& word) {
 
 std::vector<std::string> list_job_files(const std::string& word) {
   const std::vector<Source> sources = read_word(word);
-  // A file of something else.
+  // A file other than a job or a manifest.
   if (std::none_of(sources.begin(), sources.end(), [](const Source& source) { return source.error.empty(); }))
     throw InputError(sources.front().error);
   std::vector<std::string> files;

@@ -25,23 +25,23 @@ struct Source {
 /// hashes their inputs; what is wrong with one job is in its `error`. Throws InputError for a word that leads to no job at all.
 std::vector<Source> gather(const std::vector<std::string>& words, const std::string& solver);
 
-/// One job file, or one line of a manifest ("sweep.txt#21"). Throws what is wrong with it.
+/// One job file, or one line of a manifest ("sweep.txt#21"). Throws InputError for an unusable job.
 Source gather_one(const std::string& word, const std::string& solver);
 
-/// Is this a file, a folder, or a line of a manifest that is there?
+/// True for an existing file, folder or line of a manifest.
 bool is_of_jobs(const std::string& word);
-/// Is this a folder or a manifest?
+/// True for a folder or a manifest.
 bool is_of_many(const std::string& word);
-/// What a word stands for, as Source::job_file. Throws as gather(), and where no job of it can be used.
+/// The job files of a word, as Source::job_file. Throws as gather(), and for a word without any usable job.
 std::vector<std::string> list_job_files(const std::string& word);
 
-/// A job with the name that people know it by.
+/// A job with its displayed name.
 struct Named {
   store::Id id;
-  std::optional<registry::Job> job;  // none: it was not submitted
+  std::optional<registry::Job> job;  // none: never submitted
   std::string name;                  // "bar.json", "sweep.txt#21"
 };
-/// The jobs that words mean by their content now: files, folders, manifests and their lines; ids and names as they are in the registry.
+/// Jobs by the present content of files, folders, manifests and their lines; ids and names as in the registry.
 std::vector<Named> find_all_by_content(Shared& shared, const std::vector<std::string>& words);
 /// The id that a word means by its content, and its row if there is one: the job file of now, not of its last submission.
 std::pair<store::Id, std::optional<registry::Job>> find_by_content(Shared& shared, const std::string& word);

@@ -46,18 +46,18 @@ void copy_to(const fs::path& from, const fs::path& wanted) {
   if (error) refuse(error.value());
 }
 
-/// One job as it is now: its files, or why there are none.
+/// Present state of one job: its files, or the reason for their absence.
 struct Got {
   Named named;
   std::string state, why;
   std::vector<std::string> warnings;
-  std::map<std::string, fs::path> results;  // in the store, by key; empty: not there yet
-  std::map<std::string, fs::path> copies;   // of --to
+  std::map<std::string, fs::path> results;  // in the store, by key; empty: not done
+  std::map<std::string, fs::path> copies;   // written by --to
   bool is_done() const { return !results.empty(); }
   bool is_bank() const { return results.count("bank") > 0; }
 };
 
-/// Every byte is looked at: what is served was made of this job.
+/// Checks the bank's digest and its job before serving it.
 Got look_at(Shared& shared, Named named) {
   Got got{std::move(named), {}, {}, {}, {}, {}};
   const store::Id& id = got.named.id;
@@ -86,7 +86,7 @@ std::string make_stem(const std::string& name) {
   return file.stem().string() + (mark == std::string::npos ? "" : "-" + name.substr(mark + 1));
 }
 
-/// Where the files of each job go: one bank to a file or into a folder, several into a folder by the names of their jobs.
+/// Destinations of the files of each job: one bank to a file or into a folder, several into a folder by the names of their jobs.
 void choose_places(std::vector<Got>& all, const fs::path& to) {
   std::error_code error;
   const bool is_one = all.size() == 1;

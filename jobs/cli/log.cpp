@@ -59,7 +59,7 @@ int print_log(Shared& shared, registry::Job job, bool follows) {
     return 0;
   }
   for (;;) {
-    const bool is_last = !follows || has_ended(job);  // looked at before the log is read: nothing is printed after that
+    const bool is_last = !follows || has_ended(job);  // read before the log: the log is complete after the end of the job
     for (std::string bytes; !(bytes = read_from(shared.store().find_folder(job.id) / store::kLogFile, at, 1 << 20)).empty();) {
       // A character may be cut where this piece ends; its other bytes come with the next.
       std::size_t whole = bytes.size();

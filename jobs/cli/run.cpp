@@ -38,7 +38,8 @@ int run_until_done(Shared& shared, const std::vector<store::Id>& ids, bool has_p
   options.attempt.program = base::find_self();
   options.quiet = shared.json || is_quiet;
   options.attempt.mpirun_options = shared.profile().mpirun_options;
-  if (const int code = queue::run(shared.store(), options); code != 0 && code != kExitSolve) return code;  // 3: of any job
+  if (const int code = queue::run(shared.store(), options); code != 0 && code != kExitSolve)
+    return code;  // 3: failure of any job in the queue
   std::vector<registry::Job> jobs;
   for (const store::Id& id : ids) {
     if (auto job = shared.registry().find(id)) jobs.push_back(std::move(*job));

@@ -53,7 +53,7 @@ bool is_hex(const std::string& word) {
   return std::all_of(word.begin(), word.end(), [](char c) { return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f'); });
 }
 
-/// By Source::job_file, of its last submission from there.
+/// The last submission with this Source::job_file.
 std::optional<registry::Job> find_submitted(Shared& shared, const std::string& job_file) {
   const auto submission = shared.registry().find_last_submission(job_file);
   return submission ? shared.registry().find(store::require_id(submission->request.id, "registry")) : std::nullopt;
@@ -74,7 +74,7 @@ std::optional<registry::Job> find_by_file(Shared& shared, const std::string& wor
                                fmt::join(names, ", "), jobs.size() >= kMaxNamed ? " ..." : ""));
 }
 
-/// By the name that carillon status prints.
+/// By the name in the table of carillon status.
 std::optional<registry::Job> find_by_name(Shared& shared, const std::string& word) {
   std::vector<registry::Job> jobs = shared.registry().list();
   std::erase_if(jobs, [&](const registry::Job& job) { return job.name != word; });
@@ -143,7 +143,7 @@ registry::Job find_job(Shared& shared, const std::string& word) {
   const bool is_file = is_of_jobs(word);
   if (is_file && is_of_many(word)) throw InputError(fmt::format("{}: this stands for several jobs; name one of them", word));
   if (auto job = find_by_file(shared, word)) return *job;
-  // A file that is there is not a job of the same name elsewhere.
+  // An existing file takes precedence over a job of the same name elsewhere.
   if (auto job = is_file ? std::nullopt : find_by_name(shared, word)) return *job;
   if (is_file || word.find('/') != std::string::npos || word.ends_with(".json"))
     throw InputError(fmt::format("{}: no job of this store; carillon submit adds it", word));

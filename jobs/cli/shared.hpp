@@ -87,10 +87,10 @@ std::string read_program_version(const std::string& name);
 /// Replaces this process by a program of this installation. Returns only by SystemError.
 [[noreturn]] void become(const std::string& program, std::vector<std::string> arguments);
 
-/// The rows that `words` name: ids, prefixes of ids that fit one job, job files (their last submission), names as carillon status prints
-/// them, and folders and manifests, whose jobs that were never submitted are left out. InputError for what is none.
+/// The rows of `words`: ids, unique prefixes of ids, job files (their last submission), names as printed by carillon status, folders and
+/// manifests (without jobs never submitted). InputError for any other word.
 std::vector<registry::Job> find_jobs(Shared& shared, const std::vector<std::string>& words);
-/// The same of one word that names one job.
+/// The same for one word and one job.
 registry::Job find_job(Shared& shared, const std::string& word);
 
 /// Whether carillon submit puts a row that has ended back into the queue; `has_work`: its folder of work is there.

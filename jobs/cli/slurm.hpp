@@ -19,7 +19,7 @@ std::size_t hand_over_to_slurm(Shared& shared);
 queue::CommandResult cancel_in_slurm(Shared& shared, const store::Id& id);
 
 /// carillon run --on slurm: hands over, follows, and hands over again what can be tried again, until no job of Slurm's is open (`keep`: for
-/// ever). Of the options those count that are no matter of this machine: keep, quiet, has_pictures. The exit code: 0, or 3 when a job
+/// ever). Options used: keep, quiet, has_pictures; the others concern this machine. The exit code: 0, or 3 when a job
 /// failed or was cancelled.
 int run_with_slurm(Shared& shared, const queue::RunOptions& options);
 

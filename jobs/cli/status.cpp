@@ -127,7 +127,7 @@ std::vector<std::string> format_bars(Shared& shared, const std::vector<registry:
   std::vector<registry::Job> jobs = unsorted;
   sort_for_people(jobs);
   std::vector<std::string> lines;
-  store::WarningKinds kinds;  // of the jobs that are shown
+  store::WarningKinds kinds;  // of the jobs shown
   const std::size_t job_rows = jobs.size() == 1 ? rows : rows - std::min(rows / 4, kMaxKinds + 1);
   std::size_t shown = 0;
   for (const registry::Job& job : jobs) {

@@ -36,7 +36,7 @@ void renew(Shared& shared, const SubmitOptions& options, const Source& source, b
       job.cancel_wanted = false;
       job.failures = 0;
     }
-    const double memory_gb = source.request.resources.memory_gb;  // of the job file, as it is now, or of the command line
+    const double memory_gb = source.request.resources.memory_gb;  // of the present job file or the command line
     const bool is_other = memory_gb > 0.0 && memory_gb != job.resources.memory_gb;
     if (is_other) job.resources.memory_gb = memory_gb;
     return options.resources.apply(job) || is_wanted || is_other;
@@ -213,7 +213,7 @@ int run_submit(Shared& shared, const SubmitOptions& options) {
     }
     if (shared.json)
       print_json(describe_results(shared, results));
-    else if (!options.run || is_for_slurm || options.is_quiet)  // the queue has printed them
+    else if (!options.run || is_for_slurm || options.is_quiet)  // printed by the queue already
       print_warnings(shared, results);
   } else {
     if (!shared.json) print_warnings(shared, results);

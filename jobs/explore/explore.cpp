@@ -188,7 +188,7 @@ class Work {
     }
     done_.duration_s = report_["duration_s"].asDouble();
     for (const Json::Value& warning : report_["warnings"]) done_.warnings.push_back(warning.asString());
-    for (const std::string& note : programs_.get_notes())  // of banks that were made for it
+    for (const std::string& note : programs_.get_notes())  // of banks made for this page
       if (std::find(done_.warnings.begin(), done_.warnings.end(), note) == done_.warnings.end()) done_.warnings.push_back(note);
     if (take_head(scene)) done_.warnings.emplace_back("listener: pages have no heads; on this one the ears are free");
     done_.has_recording = report_["peak_pa"].isNumeric() && report_["peak_pa"].asDouble() > 0.0;

@@ -1,11 +1,11 @@
-// Names that other names are made of.
+// Names as parts of longer names.
 #pragma once
 
 #include <string>
 
 namespace carillon::explore {
 
-/// A name of a file short enough for what is added to it there and for the name of a body: at most 100 bytes, of whole characters.
+/// Cuts a name to 100 bytes at a character boundary: room for suffixes of file names, and the limit of a body's name.
 std::string cut_name(std::string name);
 
 }  // namespace carillon::explore

@@ -1,6 +1,6 @@
-// Method:     one pass over the lines; of the headers only those are kept that a server of files needs.
+// Method:     one pass over the lines; keeps only the headers needed to serve files.
 // Source:     RFC 9110 (semantics: 14.1 and 14.2 ranges), RFC 9112 (message syntax: 3 request line, 5 headers, 9.3 persistence).
-// Deviations: targets in absolute form ("GET http://...") are refused: they are for proxies.
+// Deviations: targets in absolute form ("GET http://...") are refused; only proxies need them.
 #include "jobs/explore/request.hpp"
 
 #include <algorithm>
@@ -22,7 +22,7 @@ std::string_view trim(std::string_view text) {
   return begin == std::string_view::npos ? std::string_view() : text.substr(begin, text.find_last_not_of(" \t") - begin + 1);
 }
 
-/// What stands before the separator; the text then begins behind it.
+/// Removes and returns the text before the separator; removes the separator too.
 std::string_view take(std::string_view& text, char separator) {
   const auto end = std::min(text.find(separator), text.size());
   const std::string_view first = text.substr(0, end);
@@ -30,7 +30,7 @@ std::string_view take(std::string_view& text, char separator) {
   return first;
 }
 
-/// Digits alone; nothing for anything else and for what 64 bits do not hold.
+/// A number of digits alone; none for other characters and for overflow of 64 bits.
 std::optional<std::uint64_t> parse_count(std::string_view text, int base = 10) {
   std::uint64_t value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, base);
@@ -38,7 +38,7 @@ std::optional<std::uint64_t> parse_count(std::string_view text, int base = 10) {
   return value;
 }
 
-/// The path of a target, its percent encoding decoded; empty where it is no path.
+/// The path of a target, percent encoding decoded; empty for an invalid path.
 std::string decode_path(std::string_view target) {
   target = target.substr(0, target.find_first_of("?#"));
   std::string path;

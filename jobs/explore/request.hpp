@@ -1,4 +1,4 @@
-// Requests of HTTP/1.1 as a server of files takes them.
+// Requests of HTTP/1.1 for files.
 #pragma once
 
 #include <cstdint>
@@ -8,24 +8,24 @@
 namespace carillon::explore {
 
 struct FileRequest {
-  int status = 200;         // else what refuses it: 400, 405, 505
-  bool is_head = false;     // HEAD: the answer has no body
-  bool is_reusable = true;  // whether its connection may carry another one
-  std::string path;         // decoded, without what follows "?"; begins with "/"
+  int status = 200;         // HTTP status of the answer: 200, 400, 405, 505
+  bool is_head = false;     // HEAD: answer without a body
+  bool is_reusable = true;  // keep-alive
+  std::string path;         // decoded, without the query; begins with "/"
   std::string host;
   std::string range;  // value of the header; empty: none
 };
 
-/// Reads request line and headers, without the empty line that ends them. A request with a body is not reusable: the body is never read.
+/// Parses request line and headers, without the final empty line. A request with a body is not reusable: its body is never read.
 FileRequest parse_request(std::string_view head);
 
-/// Which bytes of a file are sent.
+/// A range of bytes of a file.
 struct Part {
   int status = 200;  // 206: a part; 416: none
   std::uint64_t begin = 0, length = 0;
 };
 
-/// Of the value of a Range header. One range is served; several, and what is no range, give the whole file, as RFC 9110 14.2 allows.
+/// Parses the value of a Range header. Several ranges and invalid ones give the whole file (RFC 9110 14.2).
 Part find_part(std::string_view range, std::uint64_t size);
 
 }  // namespace carillon::explore

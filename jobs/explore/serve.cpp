@@ -1,7 +1,7 @@
-// Method:     one thread, poll(2), sockets that never block. A connection holds a head of at most kMaxHead bytes, or a file of which one
-//             piece at a time is in memory. It has a deadline for all of its head and one for the next piece, and where all places are
-//             taken, the connection that has waited longest without a request makes room for the new one.
-// Source:     RFC 9112 9.6 (the end of a connection whose other side may still be sending).
+// Method:     one thread, poll(2), non-blocking sockets. A connection holds a head of at most kMaxHead bytes, or one piece of a file,
+//             with a deadline for the whole head and one for the next piece. Without free places a new connection replaces the idle one
+//             with the longest wait.
+// Source:     RFC 9112 9.6 (lingering close while the client still sends).
 // Deviations: none.
 #include "jobs/explore/serve.hpp"
 
@@ -34,12 +34,12 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxHead = 16 << 10, kPiece = 256 << 10;
-constexpr std::size_t kMaxConnections = 200;  // of 1024 descriptors, which are usual, each may take two
-constexpr double kHeadS = 10.0;               // for a request, from the opening of the connection or the last answer on
-constexpr double kPieceS = 600.0;             // a browser that builds its picture may read nothing for long
-constexpr double kEndS = 10.0;                // for what a refused request still sends
+constexpr std::size_t kMaxConnections = 200;  // two descriptors each, of the usual 1024
+constexpr double kHeadS = 10.0;               // for a request, since the connection or the last answer
+constexpr double kPieceS = 600.0;             // a browser that renders may pause its reading for long
+constexpr double kEndS = 10.0;                // for the rest of a refused request
 
-/// SIGINT and SIGTERM, readable as a descriptor in this thread and in those that it starts.
+/// SIGINT and SIGTERM as a descriptor; blocked in this thread and in threads started by it.
 class BlockedSignals {
  public:
   BlockedSignals() {
@@ -53,7 +53,7 @@ class BlockedSignals {
   BlockedSignals& operator=(const BlockedSignals&) = delete;
 
   int descriptor() const { return descriptor_.get(); }
-  /// The number of the one that came; 0: none.
+  /// Number of a pending signal; 0: none.
   int take() const {
     signalfd_siginfo info{};
     return ::read(descriptor_.get(), &info, sizeof(info)) == sizeof(info) ? static_cast<int>(info.ssi_signo) : 0;
@@ -105,16 +105,16 @@ const char* find_type(const fs::path& file) {
   return "application/octet-stream";
 }
 
-/// What is sent: a head, then a part of a file.
+/// An answer: a head, then a part of a file.
 struct Answer {
   std::string head;
   std::size_t head_sent = 0;
   base::Descriptor file;
   std::uint64_t at = 0, left = 0;  // bytes of the file
-  bool is_last = false;            // of its connection
+  bool is_last = false;            // closes the connection
 };
 
-/// The files of a folder under the two names of this machine.
+/// The files of a folder, for requests with a host name of this machine.
 class Folder {
  public:
   Folder(const fs::path& folder, int port) : root_(fs::canonical(folder)) {
@@ -141,7 +141,7 @@ class Folder {
     return answer;
   }
 
-  /// A text of one line, no file.
+  /// An answer of one line of text, without a file.
   static Answer refuse(const FileRequest& request, int status, const std::string& more = {}) {
     const std::string text = fmt::format("{} {}\n", status, find_reason(status));
     Answer answer = begin(request, status, text.size(),
@@ -151,7 +151,7 @@ class Folder {
   }
 
  private:
-  /// The file of a path, links followed; empty where it is outside of the folder or absent.
+  /// The file of a path, links followed; empty if absent or outside of the folder.
   fs::path find_file(const std::string& path) const {
     std::error_code error;
     const fs::path inside = path.substr(std::min(path.find_first_not_of('/'), path.size()));
@@ -173,7 +173,7 @@ class Folder {
   std::vector<std::string> hosts_;
 };
 
-/// One connection: it reads a head, sends its answer and reads the next, or ends.
+/// One connection: reads a head, sends its answer, and reads the next or ends.
 class Connection {
  public:
   explicit Connection(base::Descriptor socket) : socket_(std::move(socket)), until_s_(base::get_steady_s() + kHeadS) {}
@@ -183,7 +183,7 @@ class Connection {
   bool is_sending() const { return state_ == State::kSending; }
   double until_s() const { return until_s_; }
 
-  /// Does what its socket is ready for; whether it continues.
+  /// Reads or writes once after poll(); false: the connection has ended.
   bool advance(const Folder& folder, std::vector<char>& buffer) {
     if (state_ == State::kEnding) {
       const ssize_t count = ::recv(socket(), buffer.data(), buffer.size(), 0);
@@ -203,7 +203,7 @@ class Connection {
 
   static bool is_early() { return errno == EAGAIN || errno == EINTR; }
 
-  /// Begins the answer to the request whose head is complete, or too long.
+  /// Begins the answer to a complete or oversized head.
   void find_request(const Folder& folder) {
     const std::size_t begin = std::min(taken_.find_first_not_of("\r\n"), taken_.size());
     std::size_t end = taken_.find("\n\r\n", begin), length = 3;
@@ -222,7 +222,7 @@ class Connection {
     until_s_ = base::get_steady_s() + kPieceS;
   }
 
-  /// A piece of the answer.
+  /// Sends a piece of the answer.
   bool send(const Folder& folder, std::vector<char>& buffer) {
     const char* from = answer_.head.data() + answer_.head_sent;
     std::size_t length = answer_.head.size() - answer_.head_sent;
@@ -230,7 +230,7 @@ class Connection {
     if (!is_head && answer_.left > 0) {
       const ssize_t count =
           ::pread(answer_.file.get(), buffer.data(), std::min<std::uint64_t>(kPiece, answer_.left), static_cast<off_t>(answer_.at));
-      if (count <= 0) return false;  // the file has become shorter
+      if (count <= 0) return false;  // a file cut meanwhile
       from = buffer.data();
       length = static_cast<std::size_t>(count);
     }
@@ -250,18 +250,18 @@ class Connection {
     state_ = is_last ? State::kEnding : State::kReading;
     until_s_ = base::get_steady_s() + (is_last ? kEndS : kHeadS);
     if (is_last) return ::shutdown(socket(), SHUT_WR) == 0;
-    find_request(folder);  // the next one may have come with the last
+    find_request(folder);  // pipelined requests
     return true;
   }
 
   base::Descriptor socket_;
   State state_ = State::kReading;
-  std::string taken_;  // read and not yet answered
+  std::string taken_;  // bytes read and not yet answered
   Answer answer_;
-  double until_s_;  // then it ends, if nothing happens
+  double until_s_;  // deadline
 };
 
-/// A socket that listens at the loopback address, and its port.
+/// A listening socket at the loopback address, and its port.
 std::pair<base::Descriptor, int> listen_at(int port) {
   base::Descriptor socket(::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
   const int yes = 1;
@@ -284,7 +284,7 @@ class Server {
  public:
   Server(const fs::path& folder, base::Descriptor socket, int port) : folder_(folder, port), socket_(std::move(socket)), buffer_(kPiece) {}
 
-  /// Until a signal comes; its number.
+  /// Serves until a signal; returns its number.
   int run(const BlockedSignals& signals) {
     for (std::vector<pollfd> waited;;) {
       waited.assign({{signals.descriptor(), POLLIN, 0}, {socket_.get(), POLLIN, 0}});
@@ -308,7 +308,7 @@ class Server {
   }
 
  private:
-  /// Accepts waiting connections, at most as many as there are places, so that a flood of them cannot stop the answers.
+  /// Accepts at most kMaxConnections at a time, so that a flood of connections cannot starve the answers.
   void accept() {
     for (std::size_t count = 0; count < kMaxConnections; ++count) {
       base::Descriptor socket(::accept4(socket_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
@@ -319,7 +319,7 @@ class Server {
     }
   }
 
-  /// Ends the connection that is nearest to its end by itself, and one that is being answered only where there is no other.
+  /// Ends the idle connection with the earliest deadline; one with an unfinished answer only if none is idle.
   bool make_room() {
     const auto first = std::min_element(connections_.begin(), connections_.end(), [](const Connection& a, const Connection& b) {
       return std::pair(a.is_sending(), a.until_s()) < std::pair(b.is_sending(), b.until_s());

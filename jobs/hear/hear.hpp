@@ -19,7 +19,7 @@ struct Order {
   std::map<std::string, double> dimensions;  // of the shape, by its names ("outer-radius")
   std::optional<double> wall_m;              // a shell of this thickness
   std::optional<double> scale;               // metres per unit of the file
-  bool facets = false;                       // of the surface: planes of the body, not samples of a smooth surface
+  bool facets = false;                       // of the surface: true planes of the body, not samples of a smooth surface
   std::vector<double> heights_m;             // of the object (up: y); several: one after the other
   std::vector<std::string> materials;        // names; empty: kDefaultMaterial
   std::string mallet = "hard-wood";
@@ -44,12 +44,12 @@ struct Sound {
   std::string material;
   double height_m = 0.0;  // 0: as the file has it
   std::filesystem::path bank, scene, wav, spectrogram;
-  std::vector<StruckMode> modes;  // the first ones
+  std::vector<StruckMode> modes;  // the lowest modes
   std::size_t mode_count = 0;
   double highest_hz = 0.0;     // of its modes
   bool is_complete = true;     // every mode from 20 to 20000 Hz is there; false: only the lowest ones
   double worst_cents = 0.0;    // the widest error bar
-  double facet_cents = 0.0;    // the most that facets in doubt add to one; 0: none are in doubt
+  double facet_cents = 0.0;    // largest addition by facets in doubt; 0: no facets in doubt
   bool is_edited = false;      // of another solve, by scaling
   double poisson_cents = 0.0;  // by which that may be off, since Poisson's ratio stayed; in the error bars
 };
@@ -58,7 +58,7 @@ struct Heard {
   std::filesystem::path folder, page;  // page: report.html of the first sound
   std::filesystem::path explorer;      // folder of the page on which all sounds are struck; empty: it is not installed
   std::vector<std::string> assumed;    // assumptions, one line each
-  std::vector<std::string> warnings;   // how the mesh differs from the object, one line each
+  std::vector<std::string> warnings;   // differences between mesh and object, one line each
   std::array<double, 3> extent_m{};    // of the first sound's body
   std::vector<Sound> sounds;
   double seconds = 0.0;  // by the clock

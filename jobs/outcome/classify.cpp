@@ -77,7 +77,7 @@ FailureCause classify_code(const Ending& ending) {
           0.0};
 }
 
-/// What to do about a limit that the user gave.
+/// Advice on a memory limit set by the user.
 std::string describe_limit(double need_gb, double limit_gb) {
   return fmt::format(
       "\"memory_gb\" of the job is {:g}, and it needs at least {:.2g}: carillon validate predicts how much, and \"resources\" of the job, "

@@ -15,7 +15,7 @@ enum class Cause {
   done,          // the bank is in the store
   bad_input,     // the job or its mesh cannot be used (exit code 2)
   no_solution,   // the numerics found none (3)
-  memory_limit,  // more than the job's "memory_gb"
+  memory_limit,  // above the job's "memory_gb"
   memory,        // not enough: said by the program (4), or it was killed for it
   disk_full,     // no room on a disk
   system,        // the machine refused something else (4)

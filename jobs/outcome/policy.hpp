@@ -22,7 +22,7 @@ struct Ending {
   std::string dead_rank = {};               // whom mpirun names: "rank 1 on node3"; for people, it decides nothing
   bool has_saved = false;                   // its checkpoint is newer than before
   double memory_limit_gb = 0.0;             // the job's "memory_gb"; 0: none
-  double held_gb = 0.0;                     // what it held when it was killed for more than the limit; 0: it was not
+  double held_gb = 0.0;                     // memory at the kill for exceeding the limit; 0: no such kill
 };
 
 struct FailureCause {

@@ -38,7 +38,7 @@ std::string find_message(const std::string& errors, const std::string& program) 
   return message.starts_with("error: ") ? message.substr(7) : message;
 }
 
-/// "carillon-mesh: note: 1 hole was closed", "carillon: warning: ...": the sentences.
+/// The sentences of "carillon-mesh: note: 1 hole was closed", "carillon: warning: ...".
 std::vector<std::string> find_notes(const std::string& errors) {
   std::vector<std::string> notes;
   std::istringstream lines(errors);
@@ -105,7 +105,7 @@ std::string Programs::run(const std::string& program, std::vector<std::string> w
   command.environment = base::make_lone_environment();
   std::erase_if(*command.environment, [](const std::string& entry) { return entry.starts_with(kMark); });
   command.environment->push_back(mark);
-  command.signal_at_end = SIGTERM;  // it removes what it has in temporary folders
+  command.signal_at_end = SIGTERM;  // lets the program remove its temporary folders
   command.output = shows && !is_quiet_ ? STDERR_FILENO : base::kCapture;
   command.errors = base::kCapture;
   const base::Finished finished = base::run(command, {.may_stop = [](const base::Finished&) { return SignalWatch::get_signal() != 0; }});

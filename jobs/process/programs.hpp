@@ -32,7 +32,7 @@ class Programs {
   /// its progress goes to standard error. It is killed once SignalWatch has a signal, and gone with all that it started when this returns.
   /// Throws InputError, SolveError, SystemError.
   std::string run(const std::string& program, std::vector<std::string> words, bool has_result, bool shows = false);
-  /// The notes and warnings of the program that ran last, and of those that it started: a sentence each.
+  /// Notes and warnings of the last program and of its children, one sentence each.
   const std::vector<std::string>& get_notes() const { return notes_; }
 
  private:

@@ -1,4 +1,4 @@
-// What `carillon run` shows: lines for people, on a terminal with a bar; JSON lines where they are asked for.
+// Output of `carillon run`: text, on a terminal with a progress bar, or JSON lines.
 #pragma once
 
 #include <functional>
@@ -13,7 +13,7 @@
 namespace carillon::queue {
 
 /// Writes to the standard output alone, whole lines at a time. On a terminal the last line may be the bar; it is cleared before any other
-/// line, and at the end. A warning for people is shown with the first job that has one of its kind, and counted at the end.
+/// line, and at the end. In text, one warning of each kind is shown at its first job; all are counted at the end.
 class Display {
  public:
   using ReadProgress = std::function<std::optional<store::Progress>(const store::Id&)>;
@@ -41,7 +41,7 @@ class Display {
   bool json_ = false, quiet_ = false, is_terminal_ = false;
   bool has_bar_ = false;
   store::WarningKinds kinds_;
-  bool has_repeated_ = false;  // a warning of a kind that was shown before: all kinds are counted at the end
+  bool has_repeated_ = false;  // a repeated kind of warning: the end has the counts
   std::map<std::string, double> shown_percent_;
   std::size_t ended_ = 0;
 };

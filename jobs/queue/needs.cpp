@@ -86,7 +86,7 @@ bool read_prediction(const fs::path& folder, Need& need) {
   }
 }
 
-/// More than the last attempt was given, where that ran out of memory; else 0.
+/// More memory than the last attempt had, after its end for lack of memory; else 0.
 double find_least_gb(const fs::path& folder, const registry::Job& job) {
   const std::optional<outcome::Outcome> before = outcome::read_outcome(folder);
   if (!before || before->cause != outcome::Cause::memory) return 0.0;

@@ -17,7 +17,7 @@ struct RunOptions {
 /// Starts what fits, settles what ends, adopts what others left running, until no local job is queued, waiting or running. Any number may
 /// run at once on one store. The first SIGINT or SIGTERM asks all attempts that this process started to save and stop, and puts them back
 /// into the queue; the second ends them. Takes over the signals of the process. Returns 0 when all jobs are done, 3 when one failed or was
-/// cancelled, 130 or 143 when it was stopped. SystemError when the store cannot be used any more.
+/// cancelled, 130 or 143 after SIGINT or SIGTERM. SystemError for an unusable store.
 int run(const store::Store& store, const RunOptions& options);
 
 }  // namespace carillon::queue

@@ -55,7 +55,7 @@ int Runner::run() {
   }
 }
 
-/// From the rows of the jobs, as another process may have settled them.
+/// Reads the rows of the jobs: another process may have settled them.
 int Runner::find_exit_code() const {
   if (exit_code_ != 0) return exit_code_;
   const bool has_failed = std::any_of(worked_.begin(), worked_.end(), [&](const store::Id& id) {

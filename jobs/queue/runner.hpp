@@ -32,7 +32,7 @@ class Runner {
   Runner(registry::JobTable& table, const Environment& at, Display& display, FindNeeds find_needs, RunnerOptions options)
       : table_(table), at_(at), display_(display), calc_needs_(std::move(find_needs)), options_(options) {}
 
-  /// Steps and waits until the queue is empty, or until two signals have come, or one and all attempts have ended. The exit code: 0, 3 when
+  /// Steps and waits until the queue is empty, a second signal arrives, or all attempts have ended after a first one. Exit code: 0, 3 when
   /// a job failed or was cancelled meanwhile, or 128 + the signal.
   int run();
   /// One round; true when there is nothing left to do.
@@ -68,7 +68,7 @@ class Runner {
   const FindNeeds calc_needs_;
   const RunnerOptions options_;
   std::map<pid_t, registry::Job> children_;
-  std::set<store::Id> worked_;                 // open while this ran
+  std::set<store::Id> worked_;                 // open jobs of this run
   std::map<store::Id, JobNeeds> needs_;        // until an attempt has ended
   std::map<store::Id, double> blocked_since_;  // boot seconds
   std::map<store::Id, double> lost_since_;

@@ -15,7 +15,7 @@ namespace {
 constexpr std::size_t kMaxModeRows = 1000;
 constexpr double kResidualLimit = 1e-4;  // of a sane bank
 
-/// The error bars of a mode's frequency as it is heard, together [cent]; 0 where none is known.
+/// Sum of the error bars of a mode's heard frequency [cent]; 0: unknown.
 double calc_cents(const bank::Bank& bank, std::size_t mode) {
   double cents = 0.0;
   if (mode < bank.corrected.error_cents.size())

@@ -18,11 +18,11 @@ namespace fs = std::filesystem;
 
 constexpr int kMaxDrawn = 12;  // carillon-draw takes no more
 
-/// Of a damaged bank the modes are those of the mesh.
+/// Modes as heard; for a damaged bank, those of the mesh.
 std::vector<bank::HeardMode> find_heard(const Subject& subject) {
   try {
     if (subject.is_sane()) return support::calc_heard(subject.bank);
-  } catch (const InputError&) {  // of its supports
+  } catch (const InputError&) {  // invalid supports
   }
   return bank::list_heard(subject.bank, {});
 }

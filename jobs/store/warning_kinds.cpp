@@ -8,7 +8,7 @@
 namespace carillon::store {
 namespace {
 
-/// The words of a text, without those that differ from job to job.
+/// The words of a text without numbers, file names and quotations.
 std::string find_key(const std::string& text) {
   std::istringstream words(text);
   std::string key;

@@ -110,7 +110,7 @@ class Bank:
                 self.vertices = file["mesh/vertices"][:]
                 self.triangles = file["mesh/triangles"][:]
                 self.mesh_hz = file["modes/frequency_hz"][:]
-                # What is played: the modes in air, else the corrected ones.
+                # Frequencies as played: of the modes in air, else corrected, else of the mesh.
                 played = (key for key in ("radiation/freq_hz", "modes/corrected_frequency_hz", "modes/frequency_hz") if key in file)
                 self.freq_hz = file[next(played)][:]
                 self.centre = file["rigid/centre_m"][:]

@@ -32,7 +32,7 @@ struct SurfacePart {
   std::vector<Triangle> triangles;            // nodes, counter-clockwise from the side of the air
   std::vector<std::int64_t> triangle_number;  // each once over all ranks
   std::vector<std::int32_t> body;             // of each triangle, from 0
-  std::vector<Triangle> silent;               // of what makes no sound and hides others, where there is visibility; each on one rank
+  std::vector<Triangle> silent;               // silent surfaces that hide others, for visibility; each on one rank
 };
 
 /// kKirchhoff: Kirchhoff and Helmholtz with one pole a body [Pa]. kRayleigh: rho a_n A delta / (2 pi r) [Pa], right for a flat surface in
@@ -50,8 +50,8 @@ struct Options {
   std::optional<double> high_pass_hz;  // corner of the DC blocker, 0: none; unset: 20 Hz, or alpha = 0.1 with kPaper2001
   double air_density_kg_m3 = 1.21, sound_speed_m_s = 343.0;
   std::vector<Microphone> receivers;
-  bool has_visibility = true;             // delta of kRayleigh and kPaper2001; 1 everywhere without it
-  std::vector<job::RigidObstacle> walls;  // hide what lies behind them, as the silent triangles and these balls, which move: set_balls()
+  bool has_visibility = true;             // delta of kRayleigh and kPaper2001; without it 1 everywhere
+  std::vector<job::RigidObstacle> walls;  // screens, as the silent triangles and the moving balls of set_balls()
   std::vector<double> ball_radius_m;
   std::filesystem::path surface_file;  // recorded surface; empty: none. kKirchhoff and kRayleigh
   double keep_hz = 1000.0;             // rate of its places
@@ -77,7 +77,8 @@ class Emission {
   /// written. Steps behind the end of the run are ignored. A pressure beyond 1e4 Pa or a number that is not finite does not throw but sets
   /// has_fault(), so that no rank ends alone.
   void add_step(const double* displacement_m);
-  /// Where the balls of ball_radius_m are [m], the same on every rank; before add_step() at the beginning of a sample, is_at_sample().
+  /// Centres of the balls of ball_radius_m [m], the same on every rank. Call before add_step() at the beginning of a sample,
+  /// is_at_sample().
   void set_balls(std::span<const Vec3> centres_m);
   bool has_fault() const;
 

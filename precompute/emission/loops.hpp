@@ -10,8 +10,8 @@ inline constexpr int kSlots = 24;           // samples that one value of a low-p
 inline constexpr int kDerivativeHalf = 16;  // samples on either side that a derivative takes
 inline constexpr int kSpread = 32;          // samples over which an arrival is spread
 inline constexpr std::size_t kLane = 32;  // counts of rows are multiples of it: no loop has an end of its own, which could round otherwise
-inline constexpr std::size_t kTogether = 16;  // values that a low-pass takes in at once: its open samples do not fit into the first cache
-inline constexpr int kBatch = 8;              // samples that are made at once of frames that all of them need, for the same reason
+inline constexpr std::size_t kTogether = 16;  // values per call of a low-pass: its open samples exceed the L1 cache
+inline constexpr int kBatch = 8;              // samples per call from common frames, for the same reason
 
 /// A double in units of 2^-46 Pa, by the bits of its sum with 1.5 * 2^52: 2^51 units to either side. Sums of whole numbers have no order.
 inline constexpr double kUnitsPerPa = 70368744177664.0;

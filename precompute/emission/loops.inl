@@ -15,7 +15,7 @@ void add_places(double* __restrict sum, const double* __restrict u, const std::i
 }
 
 void add_rows(double* __restrict open, const double* __restrict value, std::size_t rows, const double* const* weight, std::size_t count) {
-  constexpr std::size_t kRows = 2, kVectors = kSlots / 8;  // as many sums as there are registers for
+  constexpr std::size_t kRows = 2, kVectors = kSlots / 8;  // sums that fit the registers
   static_assert(kLane % kRows == 0 && kSlots % 8 == 0);
   Eight w[kTogether][kVectors];
   for (std::size_t i = 0; i < count; ++i)

@@ -58,7 +58,7 @@ bool is_between(const job::RigidObstacle& obstacle, const Vec3& from, const Vec3
     return norm(reach - nearest * way) < ball->radius_m;
   }
   const auto& box = std::get<job::BoxObstacle>(obstacle);
-  for (std::size_t axis = 0; axis < 3; ++axis)  // a way along a side is free, and its quotient would be no number
+  for (std::size_t axis = 0; axis < 3; ++axis)  // a way along a side is free; its quotient is NaN
     if (way[axis] == 0.0 && !(box.min_m[axis] < from[axis] && from[axis] < box.max_m[axis])) return false;
   const auto [enter, leave] = cut_box(box.min_m, box.max_m, from, {1.0 / way[0], 1.0 / way[1], 1.0 / way[2]});
   return enter < leave;

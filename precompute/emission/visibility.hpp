@@ -13,7 +13,7 @@ namespace carillon::emission {
 
 using Corners = std::array<Vec3, 3>;  // of a triangle, m
 
-/// True when a part of the straight way lies inside the obstacle: also where one of its ends does.
+/// True if a part of the straight way, or one of its ends, lies inside the obstacle.
 bool is_between(const job::RigidObstacle& obstacle, const Vec3& from, const Vec3& to);
 
 /// Triangles under a tree of boxes. What it keeps true: an answer depends on the list of triangles alone, not on who asks.

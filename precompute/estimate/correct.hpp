@@ -45,8 +45,8 @@ struct Corrections {
 /// for; null: none. Pure.
 Corrections calc_corrections(const Level& level, const Level* coarser = nullptr);
 
-/// By how much [cents] each bar of `cents`, which follows from `own`, would be wider if it held the body with the other surface too
-/// (ErrorParts::doubt). (m), or empty where no facets are in doubt. Pure.
+/// (m) Additional width [cents] of each bar of `cents`, computed from `own`, to cover the body with the other surface too
+/// (ErrorParts::doubt). Empty without facets in doubt. Pure.
 std::vector<double> find_facet_cents(const Level& level, const OwnIntervals& own, const std::vector<double>& cents);
 
 /// The share of lambda that is left when interpolation, lumping and geometry are taken off; 0 < result. Pure.

@@ -42,8 +42,8 @@ struct ErrorBars {
   /// the sorted frequencies, whatever modes change places, those that are not in the list among them. k counts the elastic modes below the
   /// band too. Infinite where is_too_short().
   std::vector<double> discretisation_cents;
-  /// By how much farther the k-th frequency can be if the facets of the surface are not what they were taken for, planes or samples of a
-  /// smooth surface: an estimate. No mesh makes it smaller, and no bar has it in it. Empty: no facets in doubt.
+  /// Estimated additional error of the k-th frequency if the facets, taken as planes or as samples of a smooth surface, are the other kind.
+  /// Independent of the mesh and not part of any bar. Empty: no facets in doubt.
   std::vector<double> facet_cents;
 
   Level level;  // their input: for predictions and reports

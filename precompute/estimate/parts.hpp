@@ -36,11 +36,11 @@ ErrorParts predict_parts(const ErrorParts& parts, Kind kind, double order, doubl
 /// Pure.
 double calc_excess(const ErrorParts& parts, Kind kind);
 
-/// How far [cents] the true frequency of the body whose surface was meshed can be from the mesh's, to either side, safety factors included.
+/// Bound [cents] on the difference between the frequencies of the mesh and of the body with the meshed surface, safety factors included.
 /// Pure.
 double calc_cents(const ErrorParts& parts, Kind kind);
 
-/// How far [cents] that body and the one with the other surface can be apart, safety factors included; 0 without doubt. Pure.
+/// Bound [cents] on the difference between that body and the one with the other surface, safety factors included; 0 without doubt. Pure.
 double calc_facet_cents(const ErrorParts& parts);
 
 }  // namespace carillon::estimate

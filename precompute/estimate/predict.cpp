@@ -9,7 +9,7 @@
 namespace carillon::estimate {
 namespace {
 
-/// How far another surface can move lambda, as a share of it.
+/// Bound on the relative shift of lambda by the other surface.
 double calc_shift(double shift, double noise) {
   constexpr double kShift = 1.5, kNoise = 0.15;
   return kShift * std::abs(shift) + kNoise * noise;

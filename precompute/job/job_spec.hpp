@@ -75,7 +75,7 @@ struct Body {
   std::optional<double> height_m = {};     // surface: scaled to this extent along `up`
   std::optional<double> scale = {};        // surface: metres per unit of the file
   std::optional<double> close_holes = {};  // surface: holes up to this part of the body's diagonal are closed
-  bool facets = false;                     // surface: its facets are planes of the body, not samples of a smooth surface
+  bool facets = false;                     // surface: facets are true planes of the body, not samples of a smooth surface
   char up = 'y';                           // surface: 'x', 'y' or 'z'
   std::string method = "auto";             // surface: "auto", "delaunay", "stuffing" or "extrude"
   std::optional<long long> nodes = {};     // of the mesh, mid-side nodes among them; at most one of nodes and edge_m

@@ -26,16 +26,16 @@ struct NodeGroup {
 struct Drive {
   NodeGroup nodes;
   std::vector<std::array<double, 4>> path;
-  std::optional<double> release_s = {};  // the nodes are free from then on; none: never
+  std::optional<double> release_s = {};  // time of release; none: never released
 };
 
-/// How a body is bent where the simulation begins, at rest: one of a mode, a force, and nodes that are moved. Axes of the body's mesh.
+/// Initial shape of a bent body, at rest: by a mode, a force, or displaced nodes. Axes of the body's mesh.
 struct Bend {
   std::string place = {};  // "file:line" of the job, for messages
   int mode = 0;            // 0: none
-  double amplitude_m = 0;  // of the mode: its largest displacement
+  double amplitude_m = 0;  // largest displacement of the mode
   std::optional<Vec3> force_n = {};
-  Vec3 point_m{};  // its nearest point of the surface
+  Vec3 point_m{};  // of the force; moved to the nearest point of the surface
   std::optional<NodeGroup> nodes = {};
   Vec3 displacement_m{};
   std::vector<std::array<double, 6>> table = {};  // places of nodes, and their displacements [m]

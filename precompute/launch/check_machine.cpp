@@ -15,14 +15,14 @@
 namespace carillon::launch {
 namespace {
 
-constexpr rlim_t kFileBytes = 16U << 20;  // of shared memory between ranks, the largest file at the start
+constexpr rlim_t kFileBytes = 16U << 20;  // shared memory between ranks, MPI's largest file at its start
 
 }  // namespace
 
 void check_machine() {
   std::error_code error;
   std::string probe = (std::filesystem::temp_directory_path(error) / "carillon-XXXXXX").string();
-  if (!error) {  // a folder that is not there Open MPI makes, or takes another
+  if (!error) {  // Open MPI creates a missing folder, or takes another
     if (::mkdtemp(probe.data()) == nullptr)
       throw SystemError(fmt::format("{}: no temporary file can be made here: {}; make room there, or name another folder by TMPDIR",
                                     std::filesystem::path(probe).parent_path().string(), std::strerror(errno)));

@@ -1,10 +1,9 @@
-// What Open MPI needs of the machine and says in many words where it is missing.
+// Requirements of Open MPI on the machine; its own messages about them are long and unclear.
 #pragma once
 
 namespace carillon::launch {
 
-/// Throws SystemError where no file can be made in the folder of temporary files, or files may not be as long as those that MPI makes at
-/// its start.
+/// Throws SystemError for a folder of temporary files without write access, or a limit on file sizes below the needs of MPI's start.
 void check_machine();
 
 }  // namespace carillon::launch

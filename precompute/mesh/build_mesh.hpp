@@ -42,8 +42,7 @@ struct RawMesh {
 inline constexpr int kVtkOrder[10] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9};
 inline constexpr int kGmshOrder[10] = {0, 1, 2, 3, 4, 5, 6, 7, 9, 8};
 
-/// What the physical group of region 0, that of elements without one, is called in a Gmsh file: other programs export no volume that is in
-/// no group.
+/// Name of the physical group of region 0 (elements without a region) in a Gmsh file: other programs do not export volumes without a group.
 inline constexpr const char* kNoRegionName = "carillon region 0";
 
 /// Joins tetrahedra that repeat an earlier one, node by node, under another region. Returns the new position of every old one.

@@ -440,7 +440,7 @@ void GmshReader::skip_section(std::string_view name, std::size_t place) {
   cursor_.fail(place, "section ${} has no ${}; the file was cut short: write or copy it again", name, end.substr(1));
 }
 
-/// The group that stands for region 0 is neither a region nor a set.
+/// Drops the group of region 0, which is neither a region nor a set.
 void GmshReader::clear_no_region() {
   const auto found =
       std::find_if(names_.begin(), names_.end(), [](const auto& entry) { return entry.first.first == 3 && entry.second == kNoRegionName; });

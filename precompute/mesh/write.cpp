@@ -87,7 +87,7 @@ std::string make_gmsh(const TetMesh& mesh, GmshEncoding encoding) {
   std::vector<std::int32_t> regions(region_of);
   std::sort(regions.begin(), regions.end());
   regions.erase(std::unique(regions.begin(), regions.end()), regions.end());
-  // Region 0 has a group with a number that no region has.
+  // The group of region 0 gets an unused number.
   std::int32_t no_region = 1;
   while (std::binary_search(regions.begin(), regions.end(), no_region)) ++no_region;
   std::vector<std::string> names;  // of the groups of the regions; empty: none
@@ -95,7 +95,7 @@ std::string make_gmsh(const TetMesh& mesh, GmshEncoding encoding) {
     const auto found = mesh.region_names.find(r);
     names.push_back(r == 0 ? kNoRegionName : found != mesh.region_names.end() ? clean_name(found->second) : "");
   }
-  // The set of a region's nodes is that of its group.
+  // Readers derive the set of a region's nodes from its group.
   const auto is_region = [&](const std::string& name, const std::vector<std::int32_t>& nodes) {
     for (std::size_t r = 0; r < regions.size(); ++r) {
       if (regions[r] == 0 || name != (names[r].empty() ? fmt::format("physical:{}", regions[r]) : names[r])) continue;

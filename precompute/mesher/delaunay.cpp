@@ -39,8 +39,8 @@ namespace {
 
 constexpr std::int64_t kMaxPinches = 10;
 constexpr double kPerturbed = 0.75;  // of the angle asked for: the rest is for smooth.cpp, in less time
-// How often refinement may query the surface. CGAL's can loop without end where skins touch at a point; only this ends it. Sound bodies
-// take 12 queries per node at most, those that touch themselves 50.
+// Limit on queries of the surface by refinement: CGAL's can loop without end at touching skins. Sound bodies take at most 12 queries per
+// node, self-touching ones 50.
 constexpr std::int64_t kQueries = 500000;
 constexpr std::int64_t kQueriesPerNode = 100;
 
@@ -66,7 +66,7 @@ class QueriedDomain {
 
   explicit QueriedDomain(const BodyQueries* queries) : queries_(queries) {}
 
-  /// Every query lowers it by one; a query throws where it is 0.
+  /// Decremented by every query; a query at 0 throws.
   mutable std::int64_t queries_left = std::numeric_limits<std::int64_t>::max();
 
   struct Construct_initial_points {  // the concept has it; the first points are ours

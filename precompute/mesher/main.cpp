@@ -317,7 +317,8 @@ void make_mesh(const Order& order) {
   progress("checking the mesh");
   auto phase = Clock::now();
   const mesh::CheckReport check = mesh::check_mesh(result.mesh, is_piped ? "the mesh" : order.out);
-  result.remarks.insert(result.remarks.end(), check.warnings.begin(), check.warnings.end());  // programs check the mesh themselves
+  result.remarks.insert(result.remarks.end(), check.warnings.begin(),
+                        check.warnings.end());  // not printed for programs, which check the mesh themselves
   result.seconds.emplace_back("check", calc_seconds(phase));
   progress(fmt::format("writing {}", order.out));
   phase = Clock::now();
@@ -358,7 +359,7 @@ void make_mesh(const Order& order) {
   throw InputError(message);
 }
 
-/// Also of meshes that are not read: their reader says so.
+/// True for unsupported mesh formats as well, which the reader refuses.
 bool is_mesh_name(const std::filesystem::path& file) {
   constexpr std::array<std::string_view, 17> kEndings{".msh", ".vtu", ".mesh", ".node", ".ele", ".meshb", ".vtk",  ".pvtu", ".vtkhdf",
                                                       ".inp", ".bdf", ".nas",  ".unv",  ".med", ".xdmf",  ".cgns", ".exo"};

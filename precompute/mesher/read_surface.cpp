@@ -78,7 +78,7 @@ void add_polygon(const std::vector<Vec3>& points, Polygon polygon, std::vector<T
 }  // namespace
 
 TriangleSurface parse_surface(std::string_view bytes, const std::string& name, const std::string& format) {
-  if (format != "stl" || bytes.starts_with("\xFF\xFE")) base::refuse_utf16(bytes, name);  // a binary STL file may begin with any text
+  if (format != "stl" || bytes.starts_with("\xFF\xFE")) base::refuse_utf16(bytes, name);  // a binary STL file may begin with any bytes
   if (bytes.starts_with("\xEF\xBB\xBF")) bytes.remove_prefix(3);                          // a byte-order mark of UTF-8
   PolygonSoup soup = format == "obj"    ? parse_obj(bytes, name)
                      : format == "off"  ? parse_off(bytes, name)

@@ -398,7 +398,7 @@ std::int64_t count_bodies(TriangleSurface surface) {
     return crossing && ((*crossing)[0] < triangles) != ((*crossing)[1] < triangles);
   };
   mesh::Parts joined(parts.size());
-  std::vector<int> depth(parts.size(), 0);  // in how many others it lies: at odd ones it is the wall of a cavity
+  std::vector<int> depth(parts.size(), 0);  // number of enclosing parts; odd: wall of a cavity
   for (std::size_t p = 0; p < parts.size(); ++p)
     for (std::size_t q = 0; q < parts.size(); ++q) {
       if (q != p && is_inside(p, q)) ++depth[p];

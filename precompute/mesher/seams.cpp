@@ -1,6 +1,5 @@
-// Method: borders are the edges of one triangle. Those near each other are found by a grid for each length of border. Two run along each
-//   other if they have two points in common, to the tolerance, far apart: ends that meet are made one point, ends on the other's inside
-//   cut its triangle.
+// Method: borders are the edges of one triangle. A grid for each length of border finds near ones. Two borders run along each other if they
+//   share two distant points, within the tolerance. Ends that meet become one point; an end inside the other border cuts its triangle.
 // Source: own.
 // Deviations: none.
 #include "precompute/mesher/seams.hpp"
@@ -19,11 +18,11 @@
 namespace carillon::mesher {
 namespace {
 
-constexpr double kPartOfEdge = 0.25;  // of a border: farther points are not on it
-constexpr double kLeastOverlap = 20;  // widths of a seam, or else half of the shorter border, which two borders have in common
-constexpr double kFoldedDeg = 2;      // sheets that turn back on each other by more than 180 less this are the two sides of a wall
-constexpr double kMaxLooks = 2e8;     // at borders; a heap of millions of borders in one place is left as it is
-constexpr int kMostPasses = 3;        // a cut may make borders that only then run along another
+constexpr double kPartOfEdge = 0.25;  // of a border's length: limit of the tolerance
+constexpr double kLeastOverlap = 20;  // common length of two borders, in widths of the seam; or half of the shorter border
+constexpr double kFoldedDeg = 2;      // angle between the two sides of a wall at its rim, at most
+constexpr double kMaxLooks = 2e8;     // comparisons of borders; more (millions of borders in one place): left unjoined
+constexpr int kMostPasses = 3;        // a cut can create new pairs of borders
 
 template <std::size_t N>
 struct CellHash {
@@ -37,7 +36,7 @@ struct CellHash {
 /// An edge of one triangle.
 struct Border {
   std::int32_t triangle = 0;
-  int side = 0;  // from this corner to the next
+  int side = 0;  // between this corner and the next
   std::int32_t from = 0, to = 0;
   double length = 0.0;
 };
@@ -59,7 +58,7 @@ std::vector<Border> find_borders(const TriangleSurface& surface) {
   return borders;
 }
 
-/// Borders by the cells that they pass, of one grid for each power of two of their lengths.
+/// Borders by grid cells, with one grid for each power of two of their lengths.
 class BorderGrid {
  public:
   BorderGrid(const std::vector<Border>& borders, const std::vector<Vec3>& points, const Vec3& low, double reach)
@@ -71,7 +70,7 @@ class BorderGrid {
       for_each_cell(level, p, q, [&](const Cell& cell) { cells_[cell].push_back(static_cast<std::int32_t>(b)); });
     }
   }
-  /// Calls visit(border) for all that may lie within reach of p, of some more than once.
+  /// Calls visit(border) for all candidates within reach of p, with repetitions.
   template <class Visit>
   void visit_near(const Vec3& p, const Visit& visit) const {
     for (const int level : levels_)
@@ -88,7 +87,7 @@ class BorderGrid {
     const double size = std::ldexp(1.0, level);
     std::array<std::int64_t, 3> from{}, to{};
     for (std::size_t k = 0; k < 3; ++k) {
-      // Half of the reach for the border and half for the point.
+      // Half of the reach is for the border, half for the point.
       from[k] = static_cast<std::int64_t>(std::floor((std::min(p[k], q[k]) - low_[k] - 0.5 * reach_) / size));
       to[k] = static_cast<std::int64_t>(std::floor((std::max(p[k], q[k]) - low_[k] + 0.5 * reach_) / size));
     }
@@ -106,13 +105,13 @@ class BorderGrid {
 /// An end of one border on another.
 struct Contact {
   std::int32_t first = 0, second = 0;  // the borders, the lower number first
-  std::int32_t point = 0;              // the end,
-  std::int32_t on = 0;                 // the border that it lies on,
-  double along = 0.0;                  // and where: 0 and 1 are its ends
+  std::int32_t point = 0;              // the end
+  std::int32_t on = 0;                 // the border under it
+  double along = 0.0;                  // position on that border, 0 to 1
   double distance = 0.0;
 };
 
-/// Joins the seams of one surface at one tolerance. Keeps true: the surface is as it was until run() has found what to join.
+/// Joins the seams of one surface at one tolerance. Keeps true: the surface is unchanged until run() has found seams.
 class SeamJoiner {
  public:
   SeamJoiner(TriangleSurface& surface, double tolerance)
@@ -123,10 +122,10 @@ class SeamJoiner {
 
   std::int64_t count_borders() const { return static_cast<std::int64_t>(borders_.size()); }
 
-  /// How far the farthest point was moved.
+  /// Largest displacement of a point.
   double get_widest() const { return widest_; }
 
-  /// False if there are no seams; nothing is changed then.
+  /// False: no seams, and no change.
   bool run() {
     find_contacts();
     for (std::size_t i = 0; i < contacts_.size();) {
@@ -146,7 +145,7 @@ class SeamJoiner {
   const Vec3& at(std::int32_t v) const { return surface_.points[static_cast<std::size_t>(v)]; }
   const Border& border(std::int32_t b) const { return borders_[static_cast<std::size_t>(b)]; }
 
-  /// Within what distance a point may lie on this border.
+  /// Tolerance for points on this border.
   double find_reach(const Border& b) const { return std::min(tolerance_, kPartOfEdge * b.length); }
 
   void find_contacts() {
@@ -175,7 +174,7 @@ class SeamJoiner {
     });
   }
 
-  /// Whether the triangles of two borders lie on each other, as the two sides of a wall do at its rim.
+  /// True for overlapping triangles, such as both sides of a wall at its rim.
   bool is_folded(const Border& a, const Border& b) const {
     const Vec3 along = (1.0 / a.length) * (at(a.to) - at(a.from));
     const auto find_inward = [&](const Border& x) {
@@ -184,7 +183,7 @@ class SeamJoiner {
       return way - dot(way, along) * along;
     };
     const Vec3 p = find_inward(a), q = find_inward(b);
-    if (norm(p) <= tolerance_ || norm(q) <= tolerance_) return false;  // of a triangle so flat nothing can be said
+    if (norm(p) <= tolerance_ || norm(q) <= tolerance_) return false;  // a degenerate triangle
     return std::atan2(norm(cross(p, q)), dot(p, q)) < kFoldedDeg * std::numbers::pi / 180.0;
   }
 
@@ -213,7 +212,7 @@ class SeamJoiner {
     }
   }
 
-  /// Gives all triangles the points that stand for theirs, and cuts those on whose side others end.
+  /// Replaces joined points in all triangles, and cuts triangles at ends on their sides.
   void cut_triangles() {
     const std::size_t before = surface_.triangles.size();
     for (Triangle& t : surface_.triangles)
@@ -258,7 +257,7 @@ class SeamJoiner {
   mesh::Parts same_;
   std::map<std::int32_t, std::vector<std::int32_t>> borders_at_;               // of a point
   std::vector<Contact> contacts_;                                              // by their borders
-  std::map<std::int32_t, std::vector<std::pair<double, std::int32_t>>> cuts_;  // of a border: where, and by which point
+  std::map<std::int32_t, std::vector<std::pair<double, std::int32_t>>> cuts_;  // of a border: positions and points
   bool is_changed_ = false;
   double widest_ = 0.0;
 };
@@ -321,7 +320,7 @@ Seams join_seams(TriangleSurface& surface) {
   weld(joined, kSamePoint * diagonal);
   Seams seams;
   std::int64_t left = 0;
-  // The narrowest first: what they close is no border any more, and the rim of a thin wall keeps its two sides.
+  // Narrow seams first: their borders are gone before a wider tolerance could join both sides of a thin wall's rim.
   for (const double tolerance : {1e-3 * kSeam, 1e-2 * kSeam, 0.1 * kSeam, kSeam})
     for (int pass = 0; pass < kMostPasses; ++pass) {
       TriangleSurface candidate = joined;

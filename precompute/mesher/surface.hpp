@@ -61,9 +61,9 @@ struct SurfaceReport {
   std::int64_t input_triangles = 0;
   std::int64_t removed_triangles = 0;  // duplicate or degenerate ones
   std::int64_t flipped_triangles = 0;  // turned so that all of them face outward
-  std::int64_t unused_points = 0;      // of the file, which no triangle has; dropped
-  std::int64_t seam_edges = 0;         // borders that were joined with their neighbours,
-  double seam_m = 0;                   // by points at most this far apart
+  std::int64_t unused_points = 0;      // of the file, without a triangle; dropped
+  std::int64_t seam_edges = 0;         // borders joined with their neighbours
+  double seam_m = 0;                   // largest distance of joined points
   std::int64_t holes_closed = 0;       // boundary loops filled with triangles
   double largest_hole_m = 0;           // across; as a part of the body's diagonal (the diameter of a circle of its area); and the area
   double largest_hole_part = 0, holes_area_part = 0;  // of all holes over that of the closed surface
@@ -109,7 +109,7 @@ struct SurfaceReport {
 
   std::vector<std::pair<std::string, double>> seconds;  // per phase, in the order they ran
   std::vector<std::string> notes;                       // sentences for the user: what was repaired, what fell short
-  std::vector<std::string> remarks;                     // what else is worth knowing: the mesh is the body of the file
+  std::vector<std::string> remarks;                     // other facts about a mesh that matches the file
 };
 
 /// Called with a short sentence at the start of each phase. Two sentences are for programs, a word and a JSON object: "rough {...}" of the
@@ -137,10 +137,10 @@ std::string describe(const SurfaceReport& report);
 struct SurfaceLook {
   std::int64_t triangles = 0;
   Vec3 extent{};                                   // in the file's units
-  std::int64_t openings = 0;                       // borders of an open surface; 0: closed, but for holes that would be closed
+  std::int64_t openings = 0;                       // borders of an open surface; 0: closed, or holes small enough to close
   std::int64_t parts = 0;                          // separate bodies
   std::int64_t unused_points = 0, seam_edges = 0;  // as in SurfaceReport
-  double thickness = 0.0;                          // of a closed surface that is both sides of a wall, in the file's units; 0: it is none
+  double thickness = 0.0;                          // of a wall given by both its sides, in the file's units; 0: none
 };
 
 /// Throws InputError as read_surface().

@@ -22,7 +22,7 @@ struct Trial {
   double worst_cents = 0.0;      // largest error bar, algebraic and discretisation together
   double worst_hz = 0.0;         // of the mode that has it
   double algebraic_cents = 0.0;  // largest of that part
-  double facet_cents = 0.0;      // largest of what facets in doubt add; no part of a bar
+  double facet_cents = 0.0;      // largest addition by facets in doubt; not part of a bar
   double cpu_seconds = 0.0;      // all ranks
   std::int64_t peak_bytes = 0;   // all ranks, the process so far
   estimate::Level level;         // its modes and what the estimate says of them
@@ -54,9 +54,9 @@ struct AccurateBody {
 /// Solves the job's body in the cheapest setting whose largest error bar is no more than the job's accuracy_cents: a coarse one first,
 /// whose error bars and their rates of convergence predict the mesh size, with tetrahedra of four and of ten nodes; then that
 /// one; then finer ones while they do not meet it. Bodies are meshed as fine as is needed; a mesh file is taken with either element and
-/// refined uniformly, which cannot correct the facets it was made with. What facets in doubt add is no part of a bar and is only recorded.
-/// Logs every trial, and at the end what the next stricter setting would cost. Collective. Throws on every rank what the solve throws, and
-/// SolveError when no setting within reach meets it, with what was reached, why no more, and what the next stricter setting would cost.
+/// refined uniformly, which cannot correct the facets it was made with. The additional error by facets in doubt is recorded, not part of a
+/// bar. Logs every trial, and at the end the cost of the next stricter setting. Collective. Throws on every rank the errors of the solve,
+/// and SolveError if no setting within reach meets it, with the accuracy reached, the reason, and the cost of the next stricter setting.
 AccurateBody solve_to_accuracy(Run& run);
 
 /// What solve_to_accuracy() tries first.

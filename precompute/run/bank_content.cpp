@@ -82,7 +82,7 @@ bank::Corrected make_corrected(const SolvedBody& solved) {
   return corrected;
 }
 
-/// Of the frequency of the mesh or the corrected one, whichever is the farther from that of the other body.
+/// The larger of the values for the mesh's and for the corrected frequency.
 std::vector<double> find_facet_cents(const estimate::ErrorBars& bars) {
   std::vector<double> cents = bars.facet_cents;
   for (std::size_t m = 0; m < cents.size(); ++m) cents[m] = std::max(cents[m], bars.corrected.facet_cents[m]);

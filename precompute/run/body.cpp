@@ -69,7 +69,7 @@ void warn_of_mesh(Run& run, const Body& body) {
     run.log.warn(i == 0 && body.check.has_odd_size ? warnings[i] + "; " + describe_scale_key(run.job) : warnings[i]);
 }
 
-/// Once, however many meshes are made of the surface.
+/// Warns once, for any number of meshes of the surface.
 void warn_of_facets(Run& run) {
   const std::string text = fmt::format(
       "some facets of the surface are so coarse that they may be planes of the body or samples of a smooth surface; what that changes is "

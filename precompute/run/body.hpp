@@ -28,7 +28,7 @@ struct Body {
   partition::DistributedMesh pieces;
   std::shared_ptr<const ldlt::MeshOrder> order;      // of the factorisation (CutMesh); until the modes are sought
   mesh::CheckReport check;                           // rank 0
-  std::vector<std::string> mesher_warnings;          // how the mesh differs from the surface; rank 0
+  std::vector<std::string> mesher_warnings;          // differences between mesh and surface; rank 0
   std::int64_t fixed_nodes = 0;                      // rank 0
   Surface surface;                                   // rank 0
   std::map<std::int32_t, std::string> region_names;  // rank 0

@@ -1,5 +1,5 @@
-// Method: the handler only calls what POSIX allows in one (signal-safety(7)): write, poll, _exit, and what
-//   runtime/base/temporary does.
+// Method: the handler calls only async-signal-safe functions (signal-safety(7)): write, poll, unlink, _exit, and those of
+//   runtime/base/temporary.
 // Source: POSIX.1-2008, 2.4.3. Deviations: none.
 #include "precompute/run/interrupt.hpp"
 
@@ -23,7 +23,7 @@ constexpr int kFirstRankMs = 200;
 
 struct Temporary {
   std::array<char, 4096> file{};
-  volatile sig_atomic_t is_removed = 0;  // by a signal
+  volatile sig_atomic_t is_removed = 0;  // removed by a signal
   bool is_used = false;
 };
 std::array<Temporary, TemporaryFile::kMost> temporaries;

@@ -1,4 +1,4 @@
-// What happens when a run is stopped from outside by SIGTERM, SIGINT, SIGHUP or SIGUSR1.
+// Handling of SIGTERM, SIGINT, SIGHUP and SIGUSR1.
 #pragma once
 
 #include <cstddef>
@@ -7,29 +7,29 @@
 
 namespace carillon::run {
 
-/// Whether this process prints for all that its launcher started; known before MPI has started.
+/// True for the process that prints for all ranks of its launcher; known before MPI_Init.
 bool is_first_of_all();
 
-/// From now on such a signal ends this process at once with exit code 128 + signal: the first of all prints one line, "PROGRAM: stopped by
-/// SIGTERM; UNTOUCHED", the mesher is ended, and temporary folders and TemporaryFiles that exist are removed. Nothing else needs
-/// to be undone: outputs have no name before they are whole (base::write_file). mpirun ends the other ranks when one of them is ended like
-/// this. Both texts live as long as the process. Call once, before the work.
+/// From now on such a signal ends this process at once with exit code 128 + signal. The first rank prints one line, "PROGRAM: stopped by
+/// SIGTERM; UNTOUCHED"; the mesher is ended, and temporary folders and TemporaryFiles are removed. Outputs need no cleanup: they get their
+/// names when complete (base::write_file). mpirun ends the other ranks after the first. Both texts live as long as the process. Call once,
+/// before the work.
 void end_on_signals(const char* program, const char* untouched);
 
-/// From now on SIGTERM and SIGUSR1 ask for what has been done to be saved: where there is news they only set is_stop_asked(), and otherwise
-/// they end this process at once, with exit code kExitCheckpointed. Call once, after end_on_signals().
+/// From now on SIGTERM and SIGUSR1 ask for a checkpoint: with unsaved work they only set is_stop_asked(); otherwise they end this process
+/// at once, with exit code kExitCheckpointed. Call once, after end_on_signals().
 void save_on_signals();
-/// Whether there is something that is not saved: nothing, at first. Local.
+/// Sets the presence of unsaved work; none at first. Local.
 void set_news(bool has_news);
-/// Whether such a signal came. Local.
+/// True after such a signal. Local.
 bool is_stop_asked();
-/// "SIGUSR1"; of the last one that came.
+/// Name of the last signal, such as "SIGUSR1".
 std::string find_stop_name();
 
-/// A file that is of no use when the run ends: its destructor removes it, and so does a signal; not while a checkpoint needs it.
+/// A file removed by its destructor and by signals, but not while a checkpoint needs it.
 class TemporaryFile {
  public:
-  static constexpr std::size_t kMost = 8;  // at a time
+  static constexpr std::size_t kMost = 8;  // existing at one time
   explicit TemporaryFile(const std::filesystem::path& file);
   ~TemporaryFile();
   TemporaryFile(const TemporaryFile&) = delete;

@@ -33,7 +33,7 @@ namespace fs = std::filesystem;
 // Beyond the time for the mesh: for the surface as it was read, should its repair not end, and for its reading.
 constexpr double kLonger = 1.2, kRoughSeconds = 1.5, kReadSeconds = 2.5, kMinReadSeconds = 8;
 
-constexpr std::size_t kKeptBytes = 1 << 16;  // of what carillon-mesh prints on standard error
+constexpr std::size_t kKeptBytes = 1 << 16;  // of carillon-mesh's standard error
 
 /// Runs carillon-mesh and keeps the end of its standard error. Once `may_stop` says so it is killed.
 base::Finished run_mesher(const std::vector<std::string>& words, const std::function<bool(const std::string& errors)>& may_stop) {
@@ -84,7 +84,7 @@ std::optional<BodyEstimate> take_estimate(std::string& errors, std::string_view 
   return estimate;
 }
 
-/// Moves what the mesher says of the mesh from its standard error to `said`; a sentence that it said twice, once.
+/// Moves the mesher's sentences about the mesh from its standard error to `said`, without repetitions.
 void take_words(std::string& errors, MesherWords& said) {
   std::istringstream lines(errors);
   std::string rest;

@@ -30,9 +30,9 @@ struct BodyEstimate {
   bool is_rough = false;  // of the surface as it was read, before its repair
 };
 
-/// The mesher's words on a mesh that it made.
+/// The mesher's messages on a mesh.
 struct MesherWords {
-  std::vector<std::string> warnings;  // how the mesh differs from the file: what was repaired, closed, wrapped or rounded
+  std::vector<std::string> warnings;  // differences between mesh and file: repairs, closed holes, wrapping, rounding
   std::vector<std::string> remarks;
 };
 
@@ -46,7 +46,7 @@ struct Patience {
 /// the program carillon-mesh next to this one, started without a shell, in a temporary folder that is gone afterwards.
 /// Not collective. Throws InputError naming the job's line for what cannot be meshed, SystemError when carillon-mesh does not start or
 /// dies. With `patience`, a surface that is not meshed in time gives an empty mesh and patience->estimate; InputError when not even that
-/// is known some seconds later. What the mesher says, also of a mesh that it had no time for, is added to `words`.
+/// is known some seconds later. The mesher's messages, also on an unfinished mesh, are added to `words`.
 /// An open surface without "wall_m" is refused, unless the body has "close_holes".
 mesh::TetMesh make_body_mesh(const job::Body& body, int order, const Fineness& fineness, MesherWords& words, Patience* patience = nullptr);
 

@@ -88,7 +88,7 @@ std::string describe_wide_bars(const bank::Bank& bank, const Setting& setting, b
   if (std::isinf(*std::max_element(cents.begin(), cents.end())))
     return "frequencies have no error bars: of so few modes of T4 with a lumped mass a whole kind may be missing; a consistent mass, "
            "\"element\": \"T10\", or a wider band brings them";
-  // A mode that dies at once has a resonance so wide that nothing within it is heard as wrong.
+  // Errors within the width of a strongly damped mode's resonance are inaudible.
   std::size_t worst = 0, wide = 0;
   double worst_cents = 0.0;
   for (std::size_t m = 0; m < cents.size(); ++m) {

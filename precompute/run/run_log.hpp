@@ -38,7 +38,7 @@ class RunLog {
   void print(const std::string& text) const;
   /// Prints a warning to standard error, on rank 0, and keeps it for the record. Not collective.
   void warn(const std::string& text);
-  /// The same, unless it was said before: of a body that is meshed several times.
+  /// The same without repetitions, for a body meshed several times.
   void warn_once(const std::string& text);
   /// Ends the phase and prints its seconds and memory. Collective.
   const RunPhase& end();

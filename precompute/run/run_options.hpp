@@ -21,7 +21,7 @@ struct RunOptions {
   std::filesystem::path bank;                 // overrides the job's "bank"; empty: does not
   std::filesystem::path matrices;             // folder for K and M as files; empty: none
   std::filesystem::path radiate;              // a bank that gets its multipoles, in place of a job; empty: none
-  double memory_gb = 0;                       // all ranks of a machine together may take so much; 0: what it has
+  double memory_gb = 0;                       // limit for all ranks of a machine together; 0: its available memory
   bool validate = false;                      // check and predict, do not solve
   double patience_s = 9;                      // of --validate: for the answer; steps that would take longer are left out
   double count_s = 1e6;                       // of --validate: for the count of the modes

@@ -17,7 +17,7 @@ Given look_at_job(const fs::path& file, std::uint64_t max_bytes) {
   Given given{fs::absolute(file).lexically_normal().string(), {}};
   try {
     given.forms = {base::to_hex(base::calc_sha256(base::read_file(file, "job file", max_bytes)))};
-  } catch (const std::exception&) {  // the machine of rank 0 alone may have it
+  } catch (const std::exception&) {  // may exist on the machine of rank 0 only
   }
   return given;
 }

@@ -172,7 +172,7 @@ bool Validation::has_time_to_read(const Setting& setting) {
     constexpr double kNodesPerCorner = 7.5;
     mesh::TetMesh coarse;
     try {
-      MesherWords none;  // of a shape
+      MesherWords none;  // a shape has no messages
       coarse = make_body_mesh(*run_.job.body, 2, {.nodes = kCoarseNodes, .edge_m = {}}, none);
     } catch (const InputError&) {
       return true;  // it is said of the mesh itself

@@ -22,7 +22,7 @@ namespace carillon::simulate {
 namespace {
 
 constexpr double kMostStrikeDistance = 0.05;  // of a body's extent, between a blow's point and the skin
-constexpr double kTableReach = 1e-4;          // of a body's extent, between the place of a row and a node
+constexpr double kTableReach = 1e-4;          // of a body's extent, between the position of a row and a node
 
 /// Runs `work` for a body; its InputError gets the line of the job.
 template <typename Work>
@@ -59,7 +59,7 @@ mesh::TetMesh make_mesh(const job::SimulatedBody& body, std::vector<std::string>
   return mesh;
 }
 
-/// Of the nearest place of the skin, which is near: about the body's centre of mass its extent is measured.
+/// Nodes and shares of the nearest point of the skin. Refuses points too far from it for the body's extent about its centre of mass.
 std::vector<transient::NodeShare> find_struck_nodes(const transient::Assembly& assembly, std::size_t body,
                                                     const std::vector<std::array<std::int32_t, 6>>& skin, const Vec3& centre_m,
                                                     const Vec3& point_m, const std::string& place) {
@@ -109,8 +109,8 @@ struct Made {
   std::vector<Group> constrained;
   Vec3 centre_m{};
   std::vector<std::string> warnings = {};  // of its mesh
-  std::map<std::int32_t, Vec3> moved;      // nodes that bend the body, and their displacements in the axes of the mesh
-  std::vector<transient::Quad> start;      // (nodes) of a body that is bent
+  std::map<std::int32_t, Vec3> moved;      // displaced nodes of a bent body; displacements in the axes of the mesh
+  std::vector<transient::Quad> start;      // (nodes) initial displacements of a bent body
 };
 
 /// The constrained groups of a body, each node once: those that follow paths, one by one, then those that are fixed, then the hinged.
@@ -148,7 +148,7 @@ ConstrainedGroups find_constrained(const job::SimulatedBody& body, const mesh::T
   return constrained;
 }
 
-/// The node of each row of a table, by its place.
+/// The node at the position of each row of a table.
 std::vector<std::int32_t> find_table_nodes(const mesh::TetMesh& mesh, const job::Bend& bend) {
   std::vector<std::pair<double, std::int32_t>> by_x;
   Vec3 low = mesh.nodes_m[0], high = low;
@@ -180,7 +180,7 @@ std::vector<std::int32_t> find_table_nodes(const mesh::TetMesh& mesh, const job:
   return nodes;
 }
 
-/// Nodes that bend the body, before it is placed.
+/// Displaced nodes of a bent body, in the axes of its mesh.
 std::map<std::int32_t, Vec3> find_moved(const job::SimulatedBody& body, const mesh::TetMesh& mesh, const ConstrainedGroups& constrained) {
   std::map<std::int32_t, Vec3> moved;
   for (const job::Bend& bend : body.bends) {
@@ -280,7 +280,7 @@ Made make_sheet(const job::SimulatedBody& body) {
       sheet.clamped[static_cast<std::size_t>(node)] = true;
     }
   };
-  // Where it is let go later, the sheet turns freely: the fixed direction of a clamp is a part of its elements.
+  // A released edge turns freely: elements include the direction of clamps that stay.
   for (std::size_t g = 0; g < constrained.driven.size(); ++g)
     if (std::isinf(constrained.driven[g].release_s)) clamp(constrained.driven[g].nodes, g);
   clamp(constrained.fixed, constrained.driven.size());
@@ -305,7 +305,7 @@ Made make_sheet(const job::SimulatedBody& body) {
   return made;
 }
 
-/// The body as it is bent. Rank 0.
+/// Computes the initial shape of a bent body. Rank 0.
 Bent bend(const job::SimulationSpec& spec, std::size_t b, Made& made) {
   const double begin_s = base::get_process_cpu_s();
   const job::SimulatedBody& described = spec.bodies[b];
@@ -341,7 +341,7 @@ Bent bend(const job::SimulationSpec& spec, std::size_t b, Made& made) {
            find_struck_nodes(*assembly, 0, skin, made.centre_m, placement.place(one.point_m), one.place))
         pulled.push_back({share.node, share.share * (placement.rotation * *one.force_n)});
     }
-    // Gravity that does not grow first is there from the start.
+    // Without a ramp, gravity acts from the start.
     if (spec.settle_s == 0.0 && norm(spec.gravity_m_s2) > 0.0)
       for (std::int32_t n = 0; n < domain.node_count(); ++n)
         if (domain.is_point(n)) pulled.push_back({n, domain.get_masses_kg()[static_cast<std::size_t>(n)] * spec.gravity_m_s2});
@@ -373,7 +373,7 @@ std::string describe(const transient::AnyBody& body) {
                      sheet.mesh.triangles.size());
 }
 
-/// Displacements of bent bodies in the numbers of the assembly, on every rank.
+/// Displacements of bent bodies in the numbering of the assembly, on every rank.
 void share_start(const comm::Communicator& comm, const std::vector<Made>& made, Bodies& bodies) {
   bodies.start = comm.broadcast([&] {
     std::vector<transient::Quad> start;

@@ -20,12 +20,12 @@ struct Placement {
 };
 Placement find_placement(const job::SimulatedBody& body);
 
-/// What bending a body found out.
+/// Results of bending a body.
 struct Bent {
   std::size_t body = 0;
   double displacement_m = 0;  // the largest
   double energy_j = 0;        // elastic
-  double mode_hz = 0;         // 0: of no mode
+  double mode_hz = 0;         // 0: not bent by a mode
   double cpu_s = 0;
 };
 
@@ -36,7 +36,7 @@ struct Bodies {
   std::vector<transient::Impulse> impulses;
   std::vector<std::string> warnings;   // of their meshes, on rank 0
   std::vector<Vec3> centre_m;          // of mass, of each body
-  std::vector<transient::Quad> start;  // (nodes) displacements, of sheets' edges the angle in x; empty: no body is bent
+  std::vector<transient::Quad> start;  // (nodes) displacements; for edges of sheets the angle, in x; empty: no bent body
   std::vector<Bent> bent;              // on rank 0
 };
 

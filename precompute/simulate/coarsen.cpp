@@ -12,12 +12,12 @@
 namespace carillon::simulate {
 namespace {
 
-constexpr double kNodesPerSecond = 20000.0;  // meshed, cut, and stepped some hundred times
-constexpr double kBytesPerNode = 100.0;      // of mesh files, at least
-constexpr long long kCoarseNodes = 1000;     // of a mesh that says how many nodes an edge makes
-constexpr double kSurfaceShare = 5.0;        // meshing a surface takes so many times as long as meshing a shape
+constexpr double kNodesPerSecond = 20000.0;  // for meshing, partition and some hundred steps
+constexpr double kBytesPerNode = 100.0;      // of mesh files, lower bound
+constexpr long long kCoarseNodes = 1000;     // of a trial mesh that relates edge length to nodes
+constexpr double kSurfaceShare = 5.0;        // time to mesh a surface over that of a shape
 
-/// That the body is to have; 0: as its mesher likes.
+/// Nodes asked for; 0: the mesher's choice.
 double estimate_nodes(const job::Body& body, int order) {
   if (body.nodes) return static_cast<double>(*body.nodes);
   if (!body.edge_m || body.shape.empty()) return 0.0;
@@ -39,7 +39,7 @@ double coarsen(job::SimulationSpec& spec, double seconds) {
   double finer = 1.0;
   for (job::SimulatedBody& body : spec.bodies) {
     if (!body.mesh.empty()) {
-      std::error_code error;  // it is said where the mesh is read
+      std::error_code error;  // reported by the reader of the mesh
       const auto bytes = std::filesystem::file_size(body.mesh, error);
       if (!error && static_cast<double>(bytes) / kBytesPerNode > most)
         throw InputError(

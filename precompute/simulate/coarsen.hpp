@@ -1,13 +1,12 @@
-// Jobs that --validate cannot prepare in time, made coarser.
+// Coarser meshes for --validate, to prepare large jobs in time.
 #pragma once
 
 #include "precompute/job/simulation.hpp"
 
 namespace carillon::simulate {
 
-/// Gives shapes and surfaces that would take longer than `seconds` to mesh and prepare as many nodes as that allows, and returns how many
-/// times as many they were to have; 1: nothing was changed. Throws InputError for a mesh file that is too large, which has no coarser form.
-/// Not collective.
+/// Reduces the nodes of shapes and surfaces to those that can be meshed and prepared in `seconds`. Returns the largest ratio of nodes
+/// before to after; 1: unchanged. Throws InputError for a mesh file too large to read in time. Not collective.
 double coarsen(job::SimulationSpec& spec, double seconds);
 
 }  // namespace carillon::simulate

@@ -11,10 +11,9 @@
 
 namespace carillon::simulate {
 
-/// Frames are appended to FILE.frames, from which FILE is made at the end by way of FILE.part; the caller removes both
-/// (run::TemporaryFile): an UnstructuredGrid of triangles whose points move (VTKHDF 2.0, "Steps"), with the point data "speed" [m/s] and
-/// the cell data "body"; strikers are not in it. A run that resumes continues where its checkpoint was. Collective, but for the
-/// constructor's checks.
+/// An UnstructuredGrid of moving triangles (VTKHDF 2.0, "Steps") with the point data "speed" [m/s] and the cell data "body", without
+/// strikers. Frames are appended to FILE.frames; the end writes FILE from them by way of FILE.part. The caller removes both
+/// (run::TemporaryFile). A resumed run continues at its checkpoint. Collective, but for the constructor's checks.
 class MotionFile {
  public:
   /// Throws InputError on every rank when is_resumed and there are no frames. Collective.

@@ -44,16 +44,16 @@ using transient::EnergyBook;
 
 constexpr std::uint64_t kMaxJobBytes = 16 << 20;
 constexpr double kBookEveryS = 0.01;        // of simulated time
-constexpr std::int64_t kLookEvery = 16;     // samples between two looks at signals
-constexpr std::int64_t kMeasureEvery = 17;  // samples, of which the sound of one is timed
-constexpr double kFullScalePa = 1.0;        // of a WAV file whose peak is below; louder ones are scaled to a peak of 1
-constexpr double kBookGoal = 1e-6;          // of the largest energy: what a book should close to
+constexpr std::int64_t kLookEvery = 16;     // samples between two polls of signals
+constexpr std::int64_t kMeasureEvery = 17;  // samples between two measurements of the sound's CPU time
+constexpr double kFullScalePa = 1.0;        // of a WAV file; louder sounds are scaled to a peak of 1
+constexpr double kBookGoal = 1e-6;          // error of an energy book over the largest energy
 constexpr double kBookScatter = 3.0;  // off the square law by 2.7 at most: 11 scenes with errors above the goal, steps down to a sixth
 constexpr int kTrialSteps = 200;      // of --validate
-constexpr std::int64_t kTrialSamples = 64, kTimedSamples = 48;  // of its sound
+constexpr std::int64_t kTrialSamples = 64, kTimedSamples = 48;  // of the trial's sound
 constexpr int kMaxPredictedRanks = 1024;
-constexpr std::int64_t kPictureBytes = 40 << 20;  // while the spectrogram is drawn: twice what was measured
-constexpr std::int64_t kLaterBytes = 24 << 20;    // of libraries that are loaded when files are written
+constexpr std::int64_t kPictureBytes = 40 << 20;  // for drawing the spectrogram, twice the measured memory
+constexpr std::int64_t kLaterBytes = 24 << 20;    // libraries loaded for writing files
 constexpr double kSurfaceBytesPerNode = 8192;     // blocks of the recorded surface: two triangles of 256 samples, of all ranks and of one
 constexpr double kFilmBytesPerNode = 256;         // frames of the motion
 
@@ -130,7 +130,7 @@ emission::Options make_emission_options(const job::SimulationSpec& spec, int ste
   return options;
 }
 
-/// A receiver that hears nothing because it lies inside an obstacle.
+/// Warnings of receivers inside an obstacle, which receive no sound.
 std::vector<std::string> find_deaf_receivers(const job::SimulationSpec& spec) {
   std::vector<std::string> warnings;
   if (!spec.visibility) return warnings;
@@ -200,9 +200,9 @@ std::string find_overlap_place(const job::SimulationSpec& spec, std::string_view
   return spec.file.string();
 }
 
-/// What is removed when the run ends, on rank 0.
+/// Files removed at the end of the run, on rank 0.
 struct TemporaryFiles {
-  std::vector<std::unique_ptr<run::TemporaryFile>> resumable;  // by a checkpoint
+  std::vector<std::unique_ptr<run::TemporaryFile>> resumable;  // kept for a checkpoint
   std::vector<std::unique_ptr<run::TemporaryFile>> others;
 };
 
@@ -231,8 +231,8 @@ struct Simulation {
   std::unique_ptr<emission::Emission> sound;
   std::unique_ptr<MotionFile> film;
   std::vector<EnergyBook> books;
-  int steps_per_sample = 0;     // that the sound has
-  std::int64_t first_step = 0;  // of this process: that of the checkpoint
+  int steps_per_sample = 0;     // of the sound
+  std::int64_t first_step = 0;  // of this process; after a resumption, that of the checkpoint
   double sound_cpu_s = 0, steps_cpu_s = 0, clock_s = 0;
 
   bool makes_sound() const { return !spec.sound.empty() || !spec.spectrogram.empty() || !spec.surface.empty(); }
@@ -338,7 +338,7 @@ std::string write_outputs(const comm::Communicator& comm, Simulation& simulation
     if (!spec.spectrogram.empty()) base::write_file(spec.spectrogram, picture);
     double worst = 0;
     for (const EnergyBook& one : simulation.books) worst = std::max(worst, std::abs(one.relative_error));
-    // By CPU time: a busy machine does not slow down the program.
+    // By CPU time, independent of other load on the machine.
     const double rate = static_cast<double>(simulation.bodies.assembly->element_count()) *
                         static_cast<double>(simulation.motion->get_step_count() - simulation.first_step) / std::max(1e-9, cpu[0]);
     base::Json record = base::Json::object();
@@ -392,30 +392,30 @@ std::string write_outputs(const comm::Communicator& comm, Simulation& simulation
   return result;
 }
 
-/// What a run takes in addition to what it has before its first step, on the rank that has most.
+/// Bytes of a run beyond those before its first step, largest over ranks.
 std::int64_t count_later_bytes(const Simulation& simulation, int ranks, bool has_checkpoint, double finer) {
   const job::SimulationSpec& spec = simulation.spec;
   const transient::Assembly& assembly = *simulation.bodies.assembly;
   constexpr std::int64_t kNumber = sizeof(double);
-  std::int64_t pressures = 0, later = kLaterBytes;  // of all receivers; what comes at the end
+  std::int64_t pressures = 0, later = kLaterBytes;  // of all receivers; at the end of the run
   if (simulation.makes_sound()) {
     const emission::Options sound = make_emission_options(spec, simulation.motion->get_steps_per_sample(), false);
     const auto frames = static_cast<std::int64_t>(sound.frames);
     pressures = kNumber * frames * static_cast<std::int64_t>(sound.receivers.size());
-    later += pressures + 2 * kNumber * frames;  // channels, and the sum of one
+    later += pressures + 2 * kNumber * frames;  // channels, and the sum for one of them
   }
   if (!spec.spectrogram.empty()) later += kPictureBytes;
   const double nodes = finer * assembly.node_count(), elements = finer * assembly.element_count();
   if (!spec.surface.empty()) later += static_cast<std::int64_t>(nodes * kSurfaceBytesPerNode);
   if (!spec.motion.empty()) later += static_cast<std::int64_t>(nodes * kFilmBytesPerNode);
-  // Of this rank, which grows by doubling, of all ranks, and as the bytes of the file; the last two on rank 0.
+  // State of this rank (a vector grown by doubling); on rank 0 also that of all ranks and the bytes of the file.
   const std::int64_t state =
       has_checkpoint ? kLaterBytes + (3 + 2 * ranks) * pressures + static_cast<std::int64_t>(3 * kNumber * (30.0 * nodes + 25.0 * elements))
                      : 0;
   return pressures + std::max(later, state);
 }
 
-/// CPU seconds of the sound of one sample: it is made of surfaces that do not move, until all of its stages work.
+/// CPU seconds of the sound of one sample, from surfaces at rest, after warm-up of all stages.
 double measure_sound(const comm::Communicator& comm, const Simulation& simulation) {
   if (!simulation.makes_sound()) return 0.0;
   const int steps = simulation.motion->get_steps_per_sample();
@@ -432,7 +432,7 @@ double measure_sound(const comm::Communicator& comm, const Simulation& simulatio
   return play(kTimedSamples);
 }
 
-/// What a run would cost: a few steps are taken, and the sound of some samples is made. finer: how many times as many nodes the job has.
+/// Predicted cost of a run, from a few steps and the sound of some samples. finer: nodes of the job over nodes of these meshes.
 std::string predict(const comm::Communicator& comm, Simulation& simulation, const SimulateOptions& options, double finer,
                     std::int64_t program_bytes) {
   transient::Motion& motion = *simulation.motion;
@@ -440,7 +440,7 @@ std::string predict(const comm::Communicator& comm, Simulation& simulation, cons
   for (int step = 0; step < kTrialSteps; ++step) motion.advance();
   const double step_cpu_s = (base::get_process_cpu_s() - before) / kTrialSteps * finer;
   const double sound_cpu_s = measure_sound(comm, simulation) * std::pow(finer, 2.0 / 3.0);
-  // An element's size, and so the step, goes with the third root of their number.
+  // Element size and step scale with the cube root of the nodes.
   const double slower = std::cbrt(finer), steps = std::ceil(simulation.spec.duration_s / motion.get_step_s() * slower);
   const double own_cpu_s = steps * step_cpu_s + simulation.spec.duration_s * simulation.spec.sample_rate_hz * sound_cpu_s;
   const double cpu_s = comm.sum(own_cpu_s), most_cpu_s = comm.max(own_cpu_s), sound_s = comm.sum(sound_cpu_s);
@@ -479,7 +479,7 @@ std::string predict(const comm::Communicator& comm, Simulation& simulation, cons
       static_cast<double>(count_bytes(comm.size())) / 1e6, note.empty() ? "" : "\n" + note);
 }
 
-/// The least CPU time between two looks at the clock.
+/// Least CPU time between two readings of the clock.
 double measure_clock() {
   double least = std::numeric_limits<double>::infinity();
   for (int look = 0; look < 100; ++look) {
@@ -489,7 +489,7 @@ double measure_clock() {
   return least;
 }
 
-/// To the sound, which hears behind what hides it.
+/// Passes the balls' centres to the sound, for visibility.
 void set_balls(Simulation& simulation) {
   if (!simulation.spec.visibility || simulation.spec.strikers.empty()) return;
   std::vector<Vec3> centres;
@@ -501,8 +501,8 @@ void set_balls(Simulation& simulation) {
 void advance_sample(Simulation& simulation) {
   transient::Motion& motion = *simulation.motion;
   if (simulation.film) simulation.film->add_sample(motion);
-  // The clock is dear next to a step of a small body: one sample in seventeen is measured, whatever part of the sound comes every eighth
-  // or sixteenth, and what two looks at the clock take is no sound.
+  // Reading the clock costs as much as a step of a small body: one sample in 17 is measured, coprime with the sound's periods of 8
+  // and 16 samples, less the time of two readings.
   const bool is_measured = simulation.sound && motion.get_sample() % kMeasureEvery == 0;
   do {
     motion.advance();

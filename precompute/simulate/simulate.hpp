@@ -15,8 +15,8 @@ struct SimulateOptions {
   double checkpoint_every_s = 300;
   std::filesystem::path sound, spectrogram, surface, motion, record;  // in place of the job's; empty: the job's
   bool validate = false;                                              // predict, do not simulate
-  double patience_s = 9;                                              // of a prediction: larger meshes are estimated from coarser ones
-  bool json = false;                                                  // of what is predicted
+  double patience_s = 9;                                              // of a prediction; larger jobs are scaled from coarser meshes
+  bool json = false;                                                  // output of the prediction
 };
 
 /// What main prints at the end; on rank 0.

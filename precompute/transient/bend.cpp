@@ -1,7 +1,6 @@
-// Method:     the tangent stiffness by differences of the forces, many nodes at a time that share no neighbour (Curtis, Powell and Reid),
-// by
-//             five points, which is exact for solids; Newton's steps for an equilibrium, in parts of the load where they do not converge;
-//             subspace iteration with a shift below 0 for modes; sparse L D L^T.
+// Method:     tangent stiffness by five-point differences of the forces (exact for solids), many nodes without common neighbours at a time
+//             (Curtis, Powell and Reid); Newton's method for an equilibrium, with load steps if it does not converge; subspace iteration
+//             with a negative shift for modes; sparse L D L^T.
 // Source:     Curtis, Powell and Reid 1974; Bathe 1996, 8.4 and 11.6; docs/equations.md E11.
 // Deviations: none.
 #include "precompute/transient/bend.hpp"
@@ -26,15 +25,15 @@ using Vector = Eigen::VectorXd;
 
 constexpr double kDifference = 1e-3;  // of the shortest edge, or rad
 constexpr int kNewtonSteps = 25;
-constexpr double kCloseEnough = 1e-9, kRounding = 1e-5;  // of the displacement: a correction that ends, and one that may be its rounding
-constexpr double kLeastPart = 1e-3;                      // of the load
-// Of the highest stiffness over mass: a shift of modes to begin with, and what rounding makes of rigid motion.
+constexpr double kCloseEnough = 1e-9, kRounding = 1e-5;  // corrections over the displacement: convergence, and rounding level
+constexpr double kLeastPart = 1e-3;                      // smallest load step over the load
+// Over the highest stiffness over mass: the first shift of modes, and the rounding error of rigid modes.
 constexpr double kFirstShift = 1e-6, kRigidShare = 1e-12;
-constexpr double kShiftOfMode = 0.3;  // of a mode's own stiffness over mass: rigid motion then does not drown it in rounding
+constexpr double kShiftOfMode = 0.3;  // over a mode's eigenvalue: keeps the rounding errors of rigid modes small
 
 double& get_component(Quad& q, int axis) { return axis == 0 ? q.x : axis == 1 ? q.y : q.z; }
 
-/// Degrees of freedom, and the stiffness about any shape.
+/// Degrees of freedom, and the tangent stiffness about any shape.
 class Tangent {
  public:
   Tangent(Domain& domain, const std::vector<HeldNode>& held) : domain_(domain) {
@@ -76,7 +75,7 @@ class Tangent {
   double get_edge_m() const { return edge_m_; }
   bool is_held(std::size_t node) const { return held_[node] != 0; }
 
-  /// f (free) of the elastic forces at u.
+  /// (free) Elastic forces at u.
   Vector calc_forces(const std::vector<Quad>& u) {
     force_.resize(static_cast<std::size_t>(domain_.force_count()));
     domain_.set_elastic_forces(u.data(), force_.data());
@@ -138,7 +137,7 @@ class Tangent {
   }
 
  private:
-  /// Nodes of one colour have no neighbour in common, and as many axes.
+  /// Nodes of one colour have no common neighbours, and equal numbers of axes.
   void colour() {
     std::vector<std::int32_t> of(near_.size(), -1), used;
     std::vector<int> axes_of;
@@ -175,7 +174,7 @@ double find_largest(const Domain& domain, const std::vector<Quad>& u) {
   return most;
 }
 
-/// Newton's steps to `load` times what pulls, from u, whose held nodes are to move by `moved`; false: they do not converge.
+/// Newton's method for the equilibrium under `load`, from u, with displacements `moved` of held nodes; false: no convergence.
 bool find_balance(Domain& domain, Tangent& tangent, const Vector& load, std::vector<Quad> moved, std::vector<Quad>& u) {
   const double extent = [&] {
     Vec3 low = domain.get_rest_m()[0], high = low;
@@ -277,9 +276,9 @@ ElasticMode calc_mode(Domain& domain, const std::vector<HeldNode>& held, int num
   constexpr int kRounds = 200;
   constexpr double kConverged = 1e-10, kRounded = 1e-14;
   for (int round = 0; round < kRounds; ++round) {
-    const Eigen::MatrixXd force = mass.asDiagonal() * x;  // apart: solve() writes to x before it has read all of it
+    const Eigen::MatrixXd force = mass.asDiagonal() * x;  // a copy: solve() writes to x before it has read all of it
     x = factor.solve(force);
-    // Columns of about equal size and at right angles: what is left of their products is no rounding.
+    // Orthonormalise the columns (in the mass norm) against rounding errors in their products.
     const Eigen::MatrixXd weighted = mass.cwiseSqrt().asDiagonal() * x;
     const Eigen::MatrixXd q = Eigen::HouseholderQR<Eigen::MatrixXd>(weighted).householderQ() * Eigen::MatrixXd::Identity(freedoms, width);
     x = mass.cwiseSqrt().cwiseInverse().asDiagonal() * q;

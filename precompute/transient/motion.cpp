@@ -92,7 +92,7 @@ void Motion::find_carried() {
   is_carried_.assign(assembly.bodies.size(), 1);
   next_release_s_ = std::numeric_limits<double>::infinity();
   for (const Constraint& constraint : constraints_) {
-    if (constraint.nodes.empty()) continue;  // or let go
+    if (constraint.nodes.empty()) continue;  // or released
     next_release_s_ = std::min(next_release_s_, constraint.release_s);
     for (const std::int32_t node : constraint.nodes)
       if (!constraint.is_hinge) is_carried_[static_cast<std::size_t>(assembly.find_body_of_node(node))] = 0;
@@ -103,7 +103,7 @@ void Motion::find_carried() {
 }
 
 void Motion::release() {
-  const double now_s = get_time_s() * (1.0 + 1e-12);  // rounded: a release at a step is at that step
+  const double now_s = get_time_s() * (1.0 + 1e-12);  // against rounding of a release at a step
   if (now_s < next_release_s_) return;
   const auto is_released = [&](const Constraint& constraint) { return now_s >= constraint.release_s; };
   std::erase_if(constrained_nodes_, [&](const ConstrainedNode& node) {

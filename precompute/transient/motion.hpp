@@ -37,7 +37,7 @@ struct Constraint {
   std::vector<std::int32_t> nodes;  // numbers of the assembly
   Path path;                        // none: fixed
   bool is_hinge = false;            // nodes of a line: the body swings about it, and mass damping does not brake the swing
-  double release_s = std::numeric_limits<double>::infinity();  // the nodes are free from then on
+  double release_s = std::numeric_limits<double>::infinity();  // time of release
 };
 
 /// J (1 - cos(2 pi (t - t0) / T)) / T for t0 <= t <= t0 + T, shared among nodes (find_shares()).
@@ -106,7 +106,7 @@ class Motion {
  public:
   struct Start {
     Vec3 displacement_m{}, velocity_m_s{};
-    double angle_rad = 0.0;  // of an edge of a sheet, in place of both
+    double angle_rad = 0.0;  // for an edge of a sheet, instead of both
   };
 
   /// Bodies are at rest in their rest shape. Domain lives as long as this; one Motion for a Domain. Throws on every rank: InputError for a
@@ -170,7 +170,7 @@ class Motion {
   /// Of all hinged bodies, whose nodes are at `find_place(number)`.
   void find_hinges(const std::function<Vec3(std::int32_t)>& find_place);
   void update_carried();
-  /// Lets go of constraints whose time has come.
+  /// Releases constraints at their release_s.
   void release();
   void find_carried();
   double find_next_time_s() const;

@@ -1,8 +1,7 @@
-// Method:     the displacement of a vertex is the sum over modes of phi q at an instant. It is summed at the vertices where the lowest
-//             modes move most and at others spread over the surface, at the end of each sub-block while that is called for, and every
-//             four samples where nothing acts.
+// Method:     the displacement of a vertex is the sum over modes of phi q, at the antinodes of the lowest modes and at vertices spread over
+//             the surface; at the end of sub-blocks with forces, and every four samples without.
 // Source:     docs/equations.md E4, E13.
-// Deviations: while something acts, between sub-blocks, and between those vertices it may be some per cent larger.
+// Deviations: under forces, and between these vertices, the true maximum is up to some per cent larger.
 #include "runtime/synth/bending.hpp"
 
 #include <algorithm>
@@ -44,7 +43,7 @@ void BendingWatch::look(const ModeState* states, const ColumnStates* starts, int
                         bool acted) noexcept {
   const ModelBending& bending = model_->get_bending();
   left_ = acted ? bending.watched : left_ - 1;
-  Lanes swing{};  // bounds on what comes when nothing acts any more
+  Lanes swing{};  // bound on the displacement in free motion from now on
   for (int g = 0; g < groups; ++g) {
     const std::size_t first = static_cast<std::size_t>(g) * kGroup;
     for (std::size_t lane = 0; lane < kGroup; ++lane) {
@@ -65,7 +64,7 @@ void BendingWatch::look(const ModeState* states, const ColumnStates* starts, int
   for (int back = 0; back <= (acted ? 0 : ModelBending::kBack); ++back) look_at(back, groups, damped);
 }
 
-/// So many times before the end of the sub-block.
+/// At `back` steps before the end of the sub-block.
 void BendingWatch::look_at(int back, int groups, std::span<const DampedState> damped) noexcept {
   const ModelBending& bending = model_->get_bending();
   const std::size_t lanes = im_.size(), turn = static_cast<std::size_t>(std::max(0, back - 1)) * lanes;
@@ -90,7 +89,7 @@ void BendingWatch::look_at(int back, int groups, std::span<const DampedState> da
   if (found_m > limit_m) largest_ = found_m / bending.thickness_m;
 }
 
-/// The largest displacement of the vertices that are looked at [m].
+/// Largest displacement of the vertices of ModelBending [m].
 double BendingWatch::calc_deflection_m(int groups) const noexcept {
   const ModelBending& bending = model_->get_bending();
   double largest = 0.0;

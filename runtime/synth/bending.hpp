@@ -1,4 +1,4 @@
-// How far a body bends, where that is too far for modes that do not know of each other.
+// The largest deflection of a body with linear modes, beyond the range of linear modes.
 #pragma once
 
 #include <cstddef>
@@ -15,23 +15,22 @@ namespace carillon::synth {
 /// Linear modes hold up to this deflection, in thicknesses: a plate that is held at its edges is then some 100 cents sharp.
 inline constexpr double kLinearThicknesses = 0.5;
 
-/// The thickness [m] by which the deflections of a bank are judged, bank::calc_thickness_m(). 0 where deflections are not judged: of banks
-/// with a nonlinear energy, of strings and membranes, whose tension grows with the slope and not with the thickness, and where the bank has
-/// no volume.
+/// Reference thickness of deflections [m], bank::calc_thickness_m(). 0, no judgement: nonlinear banks, banks without a volume, and strings
+/// and membranes, whose tension grows with the slope.
 double find_judged_thickness_m(const bank::Bank& bank);
 
-/// The largest deflection of a voice so far. It is looked for where something acts on the body and for some time after, and only while a
-/// bound on it, the sum over modes of amplitude times largest shape, is above the limit and above what was found before. Then the
-/// displacement is summed over all modes at the places of ModelBending. Memory is taken in the constructor only. [audio-thread]
+/// Running maximum of a voice's deflection, during and shortly after forces. A bound, the sum over modes of amplitude times largest shape,
+/// comes first; above the limit and the maximum, displacements are summed over all modes at the vertices of ModelBending. Allocates in the
+/// constructor only. [audio-thread]
 class BendingWatch {
  public:
   /// The model must outlive the result.
   explicit BendingWatch(const Model& model);
 
-  /// Whether the body is looked at although nothing acts on it.
+  /// True for some time after the last force.
   bool is_watching() const noexcept { return left_ > 0; }
-  /// At the end of a sub-block in which something acted, or which is watched: at the start of a column of the block, or behind the last
-  /// one. Where nothing acted, times within the sub-block are looked at, too.
+  /// Takes the states at the end of a sub-block with forces, or of one that is watched: at the start of `column`, kColumns for the end of
+  /// the block. Without forces, times within the sub-block as well.
   void look(const ModeState* states, const ColumnStates* starts, int column, int groups, std::span<const DampedState> damped,
             bool acted) noexcept;
 
@@ -47,7 +46,7 @@ class BendingWatch {
   const Model* model_;
   double largest_ = 0.0;
   int left_ = 0;  // sub-blocks that are watched from now on
-  // Of the moment, by column: the states of the ringing modes, and by how much a step of each shape moves [m].
+  // By column: states of the ringing modes, and the displacement per step of each shape [m].
   std::vector<float> re_, im_, move_;
 };
 

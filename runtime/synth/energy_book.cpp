@@ -31,7 +31,7 @@ EnergyBook::EnergyBook(const Model& model) {
   }
 }
 
-/// What damping takes of a ringing mode over a sub-block, of which `mode` has the beginning.
+/// Loss of a ringing mode to damping in the sub-block that begins in mode.state [J].
 double EnergyBook::calc_lost_j(const Mode& mode, const SampleStates& kept, int lane, bool is_all) const noexcept {
   double re = is_all ? 0.0 : mode.state.v + mode.decay * mode.state.q, im = is_all ? 0.0 : mode.omega_d * mode.state.q, sum = 0.0;
   const double tilt = mode.decay / mode.omega_d;

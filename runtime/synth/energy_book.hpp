@@ -1,4 +1,4 @@
-// Where the energy of the modes comes from and goes: what acts gives it, and damping takes it.
+// Energy balance of the modes: work of forces, and losses to damping.
 #pragma once
 
 #include <array>
@@ -16,10 +16,10 @@ namespace carillon::synth {
 
 /// Energies of a body's modes [J]: given = held + lost, at any time.
 struct ModeEnergy {
-  double given_j = 0.0;     // by all that acts: pulses, forces, sliding and rolling; less what contacts that damp take
+  double given_j = 0.0;     // net work of pulses, forces, sliding, rolling and contact damping
   double lost_j = 0.0;      // to damping, and with modes that were silenced
   double held_j = 0.0;      // at the moment
-  double radiated_j = 0.0;  // of what is lost
+  double radiated_j = 0.0;  // part of lost_j
 
   ModeEnergy& operator+=(const ModeEnergy& other) noexcept {
     given_j += other.given_j;
@@ -34,27 +34,26 @@ struct ModeEnergy {
 /// is; 1 where d_r is more, as gains that radiation::limit_gains() has not limited may have it.
 double calc_radiated_share(double gain, double decay_per_s) noexcept;
 
-/// The book of one voice. What acts does so for whole sub-blocks: the states are noted before and after each, and at the start of each
-/// block. A mode that nothing acts on loses what it has less. Where something does, damping takes the integral of 2 d q'^2, summed over
-/// samples, and what the mode has more by the end than that leaves was given.
+/// Balance of one voice, from the states before and after each sub-block with forces and at the start of each block. Loss in free motion:
+/// the decrease of energy. Loss under forces: the integral of 2 d q'^2, summed over samples; the rest of the change is work.
 class EnergyBook {
  public:
   explicit EnergyBook(const Model& model);
 
-  /// What the states at a sample are. get(m): of a mode of the model; is_coupled(m): it is one of those that move together, with the energy
-  /// `coupled_j`, whose damping is taken as that of linear modes.
+  /// States at a sample, after free motion. get(m): of mode m of the model; is_coupled(m): of the nonlinear modes, whose energy is
+  /// `coupled_j` and whose damping counts as that of linear modes.
   template <class Get, class IsCoupled>
   void note(std::int64_t sample, const Get& get, const IsCoupled& is_coupled, double coupled_j) noexcept {
     note(sample, false, nullptr, 0, false, get, is_coupled, coupled_j);
   }
-  /// The same at the end of a sub-block in which something acted, whose beginning was noted. `kept`: what it made of the states of the
-  /// ringing modes at each sample, of `groups` groups; `is_all`: that is all their motion, and not what is added to it.
+  /// The same at the end of a sub-block with forces, after note() at its beginning. `kept`: their part of the states of the ringing modes
+  /// at each sample, of `groups` groups; `is_all`: the whole states.
   template <class Get, class IsCoupled>
   void note_acted(std::int64_t sample, const SampleStates* kept, int groups, bool is_all, const Get& get, const IsCoupled& is_coupled,
                   double coupled_j) noexcept {
     note(sample, true, kept, groups, is_all, get, is_coupled, coupled_j);
   }
-  /// Begins at these states, as if what they hold had been given before.
+  /// Continues the balance `before` from these states.
   template <class Get, class IsCoupled>
   void begin(std::int64_t sample, const ModeEnergy& before, const Get& get, const IsCoupled& is_coupled, double coupled_j) noexcept {
     note(sample_, get, is_coupled, coupled_j);
@@ -67,7 +66,7 @@ class EnergyBook {
   }
 
   const ModeEnergy& get() const noexcept { return sums_; }
-  /// Room for what is kept, a group each.
+  /// Buffer for `kept`, one per group.
   SampleStates* get_kept() noexcept { return kept_.data(); }
   std::size_t calc_bytes() const noexcept { return modes_.capacity() * sizeof(Mode) + kept_.capacity() * sizeof(SampleStates); }
 

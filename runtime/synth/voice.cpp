@@ -148,8 +148,8 @@ void Voice::render_sub_blocks(std::int64_t start, int sub_blocks, bool struck_at
   }
 }
 
-/// Where the states of what acts in this sub-block are kept for the ears and the book of energy: of all live groups, those not yet used
-/// zero; nullptr: nowhere.
+/// Buffer for the forces' part of the states in this sub-block, for the ears and the energy book: all live groups, new ones zeroed;
+/// nullptr if neither needs it.
 SampleStates* Voice::find_kept() noexcept {
   if (!is_directed() && !keeps_for_book_) return nullptr;
   SampleStates* kept = is_directed() ? directed_[0]->get_kept().data() : book_->get_kept();
@@ -386,7 +386,7 @@ void Voice::note_energy(std::int64_t sample, int column) noexcept {
   counters_.energy = book_->get();
 }
 
-/// After a sub-block in which something acted. `damps`: what is kept is all the motion of the modes.
+/// After a sub-block with forces. `damps`: the buffer has the whole states.
 void Voice::note_energy_acted(std::int64_t sample, int column, bool damps) noexcept {
   book_->note_acted(
       sample, find_kept(), live_, damps, [&](int m) { return get_state_at(m, column); },

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""docs/licences.md lists every shared library that a program loads, for that program; NOTICES and that page name all that is linked into
-the sound engine of pages, and every library of headers of the include law.
+"""docs/licences.md lists the shared libraries loaded by each program; NOTICES and that page list all libraries linked into the sound engine
+of pages, and the header libraries of the include law.
 
-usage: licences.py SOURCE_DIR BUILD_DIR [--page OBJECTS]      OBJECTS: the list of what carillon.wasm is linked of
+usage: licences.py SOURCE_DIR BUILD_DIR [--page OBJECTS]      OBJECTS: the list of link inputs of carillon.wasm
 """
 import fnmatch
 import pathlib
@@ -22,7 +22,7 @@ GROUPS = {
     "sound": lambda name: name in ("carillon-render", "carillon-samples", "carillon-live", "_carillon", "carillon-simulate"),
     "solver": lambda name: name in ("carillon-precompute", "carillon-simulate", "libcarillon_mpi_profile.so"),
 }
-# Inputs of the engine's link, and headers that its objects include, by the name that the notices have.
+# Link inputs of the engine and headers of its objects, with their names in the notices.
 LINKED = {
     r"libc\.a|libc-.*\.a": "musl",
     r"libdlmalloc.*\.a": "dlmalloc",
@@ -33,7 +33,7 @@ LINKED = {
     r"lib(standalonewasm|noexit|stubs|al|jsmath).*\.a": "emscripten",
 }
 INCLUDED = {"fmt": "fmt", "rapidjson": "RapidJSON", "stb_image.h": "stb_image"}
-# Of the include law (tests/structure/include_law.py): headers that become code of a program.
+# Header libraries of the include law (tests/structure/include_law.py).
 HEADERS = {
     "rapidjson": "RapidJSON",
     "eigen": "Eigen",
@@ -47,7 +47,7 @@ faults = []
 
 
 def list_rows(text):
-    """[(files, who loads them)] of the table of shared libraries."""
+    """[(files, programs)] of the table of shared libraries."""
     table = text[text.index("| library | files |") :].split("\n\n")[0]
     return [
         (re.findall(r"`([^`]+)`", cells[1]), [word.strip(" `") for word in cells[3].split(",")])
@@ -56,7 +56,7 @@ def list_rows(text):
 
 
 def find_stem(name):
-    """libdb-5.3.so, libfmt.so.9 and libHYPRE-2.26.0.so without what an update changes."""
+    """The name of a library without its version: libdb-5.3.so, libfmt.so.9, libHYPRE-2.26.0.so."""
     return re.sub(r"(-\d+(\.\d+)+)?\.so.*$", "", name)
 
 
@@ -98,7 +98,7 @@ def check_headers():
 
 
 def check_page(objects):
-    """Links the engine again, with the names of all that the linker takes."""
+    """Links the engine again and lists all inputs of the linker."""
     with tempfile.TemporaryDirectory() as folder:
         words = ["em++", f"@{objects}", "-O1", "-fwasm-exceptions", "-sSTANDALONE_WASM", "--no-entry", "-sALLOW_MEMORY_GROWTH"]
         words += ["-sEXPORTED_FUNCTIONS=_malloc,_free", "-Wl,--trace", "-o", f"{folder}/engine.wasm"]

@@ -59,7 +59,7 @@ def play(stage):
         law = 0.5 * (ALPHA1 * (2 * math.pi * base) ** 2 + ALPHA2)
         rows.append((name, f"{base:.2f}", f"{paper[0]:.1f}", f"{decay:.1f}", f"{law:.1f}", f"{paper[1]:.1f}", f"{paper[2]:.1f}"))
         stage.compare(f"decay of the {name} in the sound against its damping law [1/s]", decay, law, 10.0)
-        if not stage.quick:  # corrected frequencies of T10 meshes that grow finer: 981.6 Hz with 40,374 nodes, 981.2 Hz with 89,890
+        if not stage.quick:  # corrected frequencies of finer T10 meshes: 981.6 Hz with 40,374 nodes, 981.2 Hz with 89,890
             stage.compare(f"base frequency of the {name} against the limit of finer meshes [Hz]", base, 981.2 / scale, 2.5)
     stage.show("decays", rows)
 

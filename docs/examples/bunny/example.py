@@ -1,4 +1,4 @@
-"""OSG02's bunny of two materials: the ceramic one is solved, the metal one made of its bank without a solve."""
+"""OSG02's bunny of two materials: a solve for the ceramic one, scaling of its bank for the metal one."""
 import math
 import sys
 
@@ -10,7 +10,7 @@ import stage as tools
 
 SURFACE = "/usr/share/glmark2/models/bunny.obj"  # the Stanford bunny of Debian's glmark2-data
 STIFFER = 12.5  # 4.98e10 and 2.56e10 Pa in place of 3.99e9 and 2.05e9; the density is the same
-# OSG02 Table 1: base frequency and decay as printed, decay by the row's alphas at the frequency that its stiffness asks for; the alphas.
+# OSG02 Table 1: base frequency and decay as printed, decay by the row's alphas at the frequency of its stiffness; the alphas.
 PAPER = {"ceramic": (855.9, 19.5, 19.5, 1e-6, 10.0), "metal": (855.9, 19.5, 18.1, 1e-7, 0.0)}
 
 

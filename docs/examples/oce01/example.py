@@ -97,7 +97,7 @@ def play_bar(stage):
 
 
 def play_pluck(stage):
-    """Figure 5, plucked: the bar is bent by 10 N at its end, and let go."""
+    """Figure 5, plucked: the bar bent by 10 N at its end, then released."""
     beam = calc_bending_hz(0, 0.2, 0.01, 70e9, 2700)
     short = {"simulate.duration_s": 0.06}
     rate, samples, record = simulate(stage, "pluck.json", "bar-plucked", None, short)

@@ -36,7 +36,7 @@ for words in (
 ours = [float(hz) for hz in re.findall(r"^  ours, .*?([0-9.]+) Hz", run.stdout, re.M)]
 corrected = [float(hz) for hz in re.findall(r"^        corrected for its mesh +([0-9.]+) Hz", run.stdout, re.M)]
 assert len(ours) == 2 and 700 < ours[1] < ours[0] < 1400, ours  # coarse T4 is stiffer than coarse T10
-# What is said to sound is what is played: not the mesh's frequency. It is repeated at the end.
+# Stated frequencies are those played, not the mesh's; the base frequency is repeated at the end.
 info = [
     json.loads(
         subprocess.run([bin_dir / "carillon-bank", "info", "--json", work / f"bunny_{kind}.hdf"], check=True, capture_output=True).stdout
@@ -59,7 +59,7 @@ assert abs(20 * numpy.log10(abs(samples).max()) + 1.0) < 0.01, abs(samples).max(
 assert abs(samples).max(axis=0).min() > 0.1, "both ears hear it"
 report = json.loads((work / "chute-report.json").read_text())
 struck = {body["name"]: body["impulses"] for body in report["per_body"]}
-assert all(count > 0 for count in struck.values()) and len(struck) == 7, struck  # four bunnies and three shelves sound
+assert all(count > 0 for count in struck.values()) and len(struck) == 7, struck  # all seven bodies sound
 trajectory = json.loads((work / "chute-trajectory.json").read_text())
 names = [body["name"] for body in trajectory["bodies"]]
 pairs = {tuple(sorted((names[hit["body"]], names[hit["other"]]))) for hit in trajectory["impulses"] if hit["other"] >= 0}
@@ -91,5 +91,5 @@ print(energy)
 gained = max(energy["rise_j"], energy["hit_rise_j"])
 assert energy["largest_kinetic_j"] > 0.1 and gained <= 1e-7 * energy["largest_kinetic_j"] + 1e-9 * energy["weight_n"], energy
 assert energy["modes_rise"] <= 1e-9, energy
-assert abs(energy["difference_j"]) < 1e-3 * energy["start_j"], energy  # what the bunnies had is found again
+assert abs(energy["difference_j"]) < 1e-3 * energy["start_j"], energy  # conservation of energy
 assert (work / "audited.wav").read_bytes() == (work / "chute.wav").read_bytes(), "keeping books changed the sound"

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The figures of an example's page are those of its run: how tables are compared, and how a page is renewed.
+"""Comparison of the tables of an example's page with those of a run, and updates of the page.
 
 usage: stage_test.py SOURCE_DIR
 """
@@ -28,7 +28,7 @@ class Figures(unittest.TestCase):
         self.scratch.cleanup()
 
     def play(self, rows, quick=False, update=False, fails=False):
-        """What a run of these figures says against the page."""
+        """(unmet checks, failure) of a run with these figures."""
         stage = tools.Stage(self.folder, self.folder, self.folder / "out", quick)
         stage.show("bowls", rows, ["CPU s"])
         stage.expect("something", not fails)

@@ -36,7 +36,7 @@ def run(*arguments, folder):
 
 
 def run_in_process(*arguments, folder):
-    """The same without a new process, for errors found before drawing."""
+    """The same in this process, for errors before drawing."""
     program, before, errors = load_program(), (os.getcwd(), sys.argv), io.StringIO()
     os.chdir(folder)
     sys.argv = [str(PROGRAM), *arguments]

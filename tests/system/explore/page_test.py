@@ -284,7 +284,7 @@ class PageTest(unittest.TestCase):
 
     def test_every_screen_holds_the_page_and_its_panel(self):
         page = self.open("fall")
-        # A bank that was packed says so under "Details", not in the line of facts.
+        # Packing is stated under "Details", not in the line of facts.
         change = "packed, error at most -60.2 dB(A) on 95 % of the surface, -57.9 at the worst place"
         self.assertTrue(page.evaluate("document.getElementById('details').hidden"))
         page.evaluate(f"carillon.panel.body.about.change = {json.dumps(change)}; carillon.panel.showFacts()")
@@ -300,7 +300,7 @@ class PageTest(unittest.TestCase):
             )
             wide = "[...document.querySelectorAll('output')].filter(it => it.scrollWidth > it.clientWidth).map(it => it.textContent)"
             self.assertEqual(page.evaluate(wide), [], width)
-            # Between the widest content and the edge there is the panel's padding.
+            # The panel's padding separates its widest content from the edge.
             room = page.evaluate(
                 "(panel => panel.clientWidth - parseFloat(getComputedStyle(panel).paddingRight) + panel.getBoundingClientRect().left"
                 " - Math.max(...[...panel.querySelectorAll('*')].map(it => it.getBoundingClientRect().right)))"

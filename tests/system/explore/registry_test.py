@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Where npm's registry cannot be reached the page is left out, in one line, and the build continues: the target's own command ends well."""
+"""Without npm's registry the page is left out, with one line of output, and the build succeeds."""
 import os
 import pathlib
 import subprocess

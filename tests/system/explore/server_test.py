@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The server of carillon explore under hostile requests: it answers visitors all the while, and its memory stays bounded.
+"""The server of carillon explore under hostile requests: bounded memory, and answers to other visitors.
 
 Finds the programs in $CARILLON_BIN_DIR.
 """
@@ -16,15 +16,15 @@ import tempfile
 import unittest
 
 BIN = pathlib.Path(os.environ["CARILLON_BIN_DIR"])
-LARGE = 8 << 20  # bytes of the file that is asked for
-MEMORY = 64 << 20  # bytes that the server may take, whatever comes
+LARGE = 8 << 20  # bytes of the requested file
+MEMORY = 64 << 20  # limit of the server's memory in bytes
 WAIT_S = 60  # for one answer, on a busy machine
 
 
 class Served(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)  # this side of the connections needs some, too
+        soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)  # the clients' ends need descriptors as well
         resource.setrlimit(resource.RLIMIT_NOFILE, (min(hard, max(soft, 4096)), hard))
         cls.scratch = tempfile.TemporaryDirectory(prefix="carillon-server-")
         cls.folder = pathlib.Path(cls.scratch.name)
@@ -51,7 +51,7 @@ class Served(unittest.TestCase):
         self.held = []
 
     def tearDown(self):
-        # At once, however many connections are open.
+        # Ends at once, with any number of open connections.
         self.server.send_signal(signal.SIGINT)
         self.assertEqual(self.server.wait(timeout=WAIT_S), 0)
         self.server.stdout.close()
@@ -63,7 +63,7 @@ class Served(unittest.TestCase):
         self.held.append(connection)
         try:
             connection.sendall(data)
-        except OSError:  # it may have been ended before all was sent
+        except OSError:  # ended by the server before all was sent
             pass
         return connection
 
@@ -76,7 +76,7 @@ class Served(unittest.TestCase):
         return response, body
 
     def send(self, text, body=b""):
-        """The status of the answer to a request as it is written here."""
+        """HTTP status of the answer to a raw request."""
         connection = self.connect(text.replace("HOST", f"Host: 127.0.0.1:{self.port}").encode() + body)
         response = http.client.HTTPResponse(connection)
         response.begin()
@@ -84,7 +84,7 @@ class Served(unittest.TestCase):
         return response.status
 
     def read_memory(self):
-        """The largest that it ever took [bytes]."""
+        """Peak resident memory of the server [bytes]."""
         status = pathlib.Path(f"/proc/{self.server.pid}/status").read_text()
         return 1024 * int(re.search(r"VmHWM:\s+(\d+)", status)[1])
 
@@ -110,7 +110,7 @@ class Served(unittest.TestCase):
 
     def test_files_that_are_not_read_take_no_memory(self):
         request = f"GET /large.wasm HTTP/1.1\r\nHost: 127.0.0.1:{self.port}\r\nRange: bytes={'0-,' * 1500}0-\r\n\r\n".encode()
-        for _ in range(400):  # more than there are places
+        for _ in range(400):  # more than the server's limit
             self.connect(request * 3)
         self.assert_well()
 
@@ -118,7 +118,7 @@ class Served(unittest.TestCase):
         for k in range(600):
             self.connect((b"", b"GET / HT", b"GET / HTTP/1.1\r\nHost: ", b"GET / HTTP/1.1\r\nX: y\r\n")[k % 4])
         self.assert_well()
-        for connection in self.held[-60::6]:  # drops of a slow request do not hold a place
+        for connection in self.held[-60::6]:  # slow requests, byte by byte
             try:
                 connection.sendall(b"x")
             except OSError:
@@ -134,7 +134,7 @@ class Served(unittest.TestCase):
             self.assertEqual(response.status, 404 if path == "/none" else 200)
             self.assertIsNone(response.getheader("Connection"))
         connection.close()
-        # Sent at once, and in single bytes.
+        # Pipelined requests, and one in single bytes.
         request = f"GET / HTTP/1.1\r\nHost: localhost:{self.port}\r\n\r\n".encode()
         both = self.connect(request * 2)
         for byte in request:
@@ -172,7 +172,7 @@ class Served(unittest.TestCase):
         self.assertEqual(self.send(f"POST / HTTP/1.1\r\nHOST\r\nContent-Length: {len(body)}\r\n\r\n", body), 405)
         self.assertEqual(self.send("PUT /x HTTP/1.1\r\nHOST\r\nTransfer-Encoding: chunked\r\n\r\n", b"1000000\r\n" + body), 405)
         self.assertEqual(self.send(f"GET / HTTP/1.1\r\nHOST\r\nContent-Length: {len(body)}\r\n\r\n", body), 200)
-        self.connect(b"G" * (16 << 20))  # a line that never ends
+        self.connect(b"G" * (16 << 20))  # a line without an end
         self.assert_well()
 
 

@@ -74,7 +74,7 @@ def make_cup(scale=1.0, sides=32, rows=8):
 
 
 def make_box_of_faces(size, jitter):
-    """A box whose six faces have corners of their own, each off its place by up to `jitter`, and a point far away that none has."""
+    """A box of six faces with separate corners, each displaced by up to `jitter`, and a distant unused point."""
     points, triangles, chance = [(5.0, 0.0, 0.0)], [], random.Random(1)
     for axis in range(3):
         for side in (0, 1):
@@ -205,7 +205,7 @@ class Hear(unittest.TestCase):
         self.assertIn("1 point of the file belongs to no element", " ".join(heard["assumed"]))
         self.assertLess(len(heard["sounds"][0]["name"].encode()), 200)
         mode = heard["sounds"][0]["modes"][0]
-        self.assertLess(abs(1200 * math.log2(mode["freq_hz"] / 8803.2)), mode["error_cents"])  # of 20,000 nodes without the seams
+        self.assertLess(abs(1200 * math.log2(mode["freq_hz"] / 8803.2)), mode["error_cents"])  # reference: 20,000 nodes without seams
 
     def test_a_glb_is_in_metres_and_sounds_as_the_same_off(self):
         off = make_ball(0.25, 3)
@@ -256,7 +256,7 @@ class Hear(unittest.TestCase):
     def test_facets_in_doubt_stand_next_to_the_error_bars_and_can_be_settled(self):
         (self.folder / "rod.obj").write_text(make_rod())
         wish = ("rod.obj", "--scale", 1)
-        said = self.call("hear", "-q", *wish, "-o", "smooth", "--accuracy", 20)  # of the bars, which no doubt widens
+        said = self.call("hear", "-q", *wish, "-o", "smooth", "--accuracy", 20)  # applies to the bars, without facets in doubt
         for words in ("+-facets", "facets in doubt", "--facets takes them for planes"):
             self.assertIn(words, said)
         info = subprocess.run([BIN / "carillon-bank", "info", "--json", self.folder / "smooth/rod-steel.hdf"], capture_output=True)

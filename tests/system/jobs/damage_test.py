@@ -61,7 +61,7 @@ class Damage(Bench):
         shutil.copy2(forged, bank)
         id_, other_id = bank.parent.name, forged.parent.name
         first = (forged.parent / "bank.sum").read_text().splitlines()[0]
-        for has_sum in (True, False):  # one of an earlier version has none
+        for has_sum in (True, False):  # earlier versions wrote none
             sum_file = bank.parent / "bank.sum"
             sum_file.chmod(0o644)
             sum_file.unlink()
@@ -273,7 +273,7 @@ class Damage(Bench):
         for number, content in enumerate((flipped, second, flipped[: len(whole) // 2], second)):
             with self.subTest(number):
                 spoil(content)
-                self.assertIn("computes it again", self.run_it("get", job, code=1).stderr)  # a path is no less read than a copy
+                self.assertIn("computes it again", self.run_it("get", job, code=1).stderr)  # checked for a path as for a copy
                 (self.folder / "copy.hdf").unlink(missing_ok=True)
                 self.assertIn("computes it again", self.run_it("get", job, "--to", self.folder / "copy.hdf", code=1).stderr)
                 self.assertFalse((self.folder / "copy.hdf").exists())

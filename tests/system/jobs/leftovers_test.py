@@ -1,7 +1,7 @@
 #!/usr/bin/python3
-"""What Ctrl-C, SIGTERM and SIGKILL leave: no process, no temporary file, no half result; of SIGKILL, nothing after the next run.
+"""No process, temporary file or partial result is left after Ctrl-C or SIGTERM; after SIGKILL, none is left by the next run.
 
-A signal comes some time after the first temporary folder was seen. Whenever that is, the same holds.
+Signals are sent at several delays after the first temporary folder appears.
 
 usage: leftovers_test.py BIN_DIR
 """
@@ -36,7 +36,7 @@ class Leftovers(Bench):
         return sorted(path for folder in (self.temporary, self.out) for path in folder.iterdir())
 
     def find_processes(self):
-        """Those of this test, by an entry of their environment."""
+        """Processes of this test, marked in their environment."""
         found = []
         for process in pathlib.Path("/proc").glob("[0-9]*"):
             try:
@@ -62,9 +62,9 @@ class Leftovers(Bench):
         program.send_signal(number)
         said = program.communicate(timeout=60)[1]
         if program.returncode == 0:
-            return False  # it was done before
+            return False  # done before the signal
         self.assertIn(program.returncode, (-number, 128 + number), said)
-        for _ in range(2000):  # what was started goes at once, and is waited for here
+        for _ in range(2000):  # its children end at once; wait for them
             if not self.find_processes():
                 break
             time.sleep(0.01)
@@ -72,7 +72,7 @@ class Leftovers(Bench):
         return True
 
     def check(self, *words):
-        """At several moments; `clean` is the state before."""
+        """Sends signals at several delays; nothing may be left."""
         ended = 0
         for number in (signal.SIGINT, signal.SIGTERM):
             for delay_s in (0.0, 0.1, 0.5, 1.5):

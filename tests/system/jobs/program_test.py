@@ -185,7 +185,7 @@ class Path(Bench):
         self.assertEqual(self.run_it("submit", "-q", "sweep.txt").stdout, "")
         said = self.run_it("run").stdout
         for name in ("sweep.txt#2", "sweep.txt#3", "sweep.txt#4", "bar.json"):
-            self.assertIn(f" {name}: done\n", said)  # text, also where this is no terminal
+            self.assertIn(f" {name}: done\n", said)  # text, also without a terminal
         names = {job["name"]: job["id"] for job in self.ask("status")["jobs"]}
         bank = self.ask("get", "sweep.txt#3")
         self.assertEqual(bank["id"], names["sweep.txt#3"])
@@ -201,7 +201,7 @@ class Path(Bench):
         self.run_it("retry", "sweep.txt", code=1)
         self.refuse("get", "sweep.txt#9", says="line 9")
         self.refuse("get", "sweep.txt#1", says="line 1")
-        # A line that was not submitted is no reason to hide the others.
+        # A line never submitted does not hide the others.
         self.write("sweep.txt", (self.folder / "sweep.txt").read_text() + json.dumps(make_job(max_modes=2)) + "\n")
         got = self.run_it("get", "sweep.txt", code=1)
         self.assertEqual(len(got.stdout.split()), 4)
@@ -232,7 +232,7 @@ class Path(Bench):
         self.assertIn('"memory_gb" of the job is 0.2, and it needs at least', job["reason"])
         self.run_it("retry", "large.json", "--memory-gb", "3")
         self.run_it("run", "--quiet")
-        # A simulation has no check of its own: it is ended when it holds more.
+        # A simulation does not check its memory itself: the queue ends it above the limit.
         simulation = make_simulation(duration_s=1000.0, resources={"ranks": 1, "memory_gb": 0.01})
         self.ask("submit", self.write("long.json", simulation))
         self.run_it("run", "--quiet", code=3)
@@ -278,7 +278,7 @@ class Path(Bench):
         self.assertIn("1 of the 13 triangles", " ".join(states["twice.json"]["warnings"]))
         self.assertIn("1 of the 13 triangles", " ".join(self.ask("get", twice)["warnings"]))
         self.assertIn("1 of the 13 triangles", " ".join(self.ask("validate", twice)["warnings"]))
-        # Said explicitly, it is closed, and that is said too.
+        # An explicit "close_holes" closes it, with a warning.
         closed = write_job("open", close_holes=1)
         self.ask("submit", closed)
         self.run_it("run", "--quiet")

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""A cylinder made of facets is the cylinder, however it is cut; where the facets may be the body, the error bars hold for the one that was
-meshed, and with the facets in doubt for both. Bells from a lathe likewise: in few rings the facets are in doubt, in many they are not.
+"""A faceted cylinder is solved as the cylinder, for any triangulation. With facets in doubt the error bars hold for the meshed body, and
+with the doubt for both. Bells from a lathe: facets are in doubt with few rings, not with many.
 
 Truth: the free steel cylinder of radius 20 mm and length 200 mm, "cylinder-10" of tests/unit/precompute/estimate/data/known_frequencies.csv
 (Fourier-Ritz, 7 digits). The prisms, and the bell of planes, are meshed with "facets": true and solved on their own.
@@ -37,7 +37,7 @@ def write_cylinder(path, sides, rings, quads):
 
 
 def write_bell(path, sides, points):
-    """An OBJ file in millimetres: a wall of 3 mm, both of its sides, turned about y from a profile of so many pieces."""
+    """An OBJ file in millimetres: both sides of a wall of 3 mm, a solid of revolution about y from a profile of `points` pieces."""
     outer = []
     for i in range(points + 1):
         s = i / points
@@ -113,7 +113,7 @@ with tempfile.TemporaryDirectory(prefix="carillon-facets-") as scratch:
         expect_inside(f"{sides} sides, {rings} rings", found, bars, TRUTH, 2)
         all_found.append(found)
     assert all(abs(c) < 1 for found in all_found for c in cents(found, all_found[0])), all_found
-    # Facets that may be the body: the bars are those of what was meshed, and with the facets in doubt they contain the other too.
+    # Facets in doubt: the bars hold for the meshed body, and with the doubt for the other too.
     for sides, is_round in ((8, False), (12, True)):
         name = f"either-{sides}"
         write_cylinder(folder / f"{name}.obj", sides, 4, True)
@@ -124,7 +124,7 @@ with tempfile.TemporaryDirectory(prefix="carillon-facets-") as scratch:
         expect_inside(f"{sides} sides against what was meshed", found, add(bars, own_bars if not is_round else [0] * 99), meshed)
         expect_inside(f"{sides} sides against the other", found, add(bars, facets), other)
         assert max(map(abs, cents(found, other))) > max(bars), "no bar contains the other body"
-        # More ranks, the same; and the mesh file carries the doubt as well.
+        # The same on more ranks and from a mesh file, which carries the doubt.
         subprocess.run(
             [bin_dir / "carillon-mesh", f"{name}.obj", "--order", "2", "--nodes", "5000", "-o", f"{name}-file.msh"],
             cwd=folder,
@@ -133,13 +133,13 @@ with tempfile.TemporaryDirectory(prefix="carillon-facets-") as scratch:
         )
         _, two, facets_two = run(folder, f"{name}-two", {"mesh": f"{name}-file.msh"}, ranks=2)
         assert all(abs(b / a - 1) < 1e-3 for a, b in zip(bars + facets, two + facets_two)), (bars, two, facets, facets_two)
-    # The accuracy is about the bars; the doubt is stated next to them, once.
+    # The accuracy applies to the bars; the doubt is one warning.
     _, bars, facets = run(folder, "asked", {"body": {"surface": "either-12.obj"}, "accuracy_cents": 5})
     record = json.loads((folder / "asked.hdf.resolved.json").read_text())["run"]
     assert record["accuracy"]["chosen"]["worst_cents"] <= 5 < max(facets) and record["accuracy"]["chosen"]["facet_cents"] > 5, record
     assert sum("facets in doubt" in text for text in record["warnings"]) == 1, record["warnings"]
 
-    # A bell turned from a profile of few points, and the same from many.
+    # A bell from a profile of few points, and from many.
     for points, sides in ((6, 64), (40, 256)):
         write_bell(folder / f"bell-{sides}.obj", sides, points)
     job = {"nodes": 9000, "scale": 0.001}

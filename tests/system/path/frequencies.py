@@ -97,7 +97,7 @@ def check_short_list(folder):
 
 
 def check_damped(folder):
-    """Bars within half the width of a resonance, which are not heard, are no reason for a warning."""
+    """No warning for error bars within half the width of a resonance, which are inaudible."""
     for name, tan_phi in ("ringing", 0.01), ("dead", 1.2):
         material = STEEL | {"damping": {"internal_friction": {"tan_phi": tan_phi}}}
         said, modes = solve(folder, name, material=material, band_hz=[20, 9000], element="T10", body=BAR | {"nodes": 250})

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The kind of a mode that carillon-bank gives is that of the closed form which has its frequency.
+"""The kinds of modes of carillon-bank against those of closed forms at the same frequencies.
 
 A free steel bar: Timoshenko's bending in both planes (Huang 1961), torsion (St Venant) and longitudinal motion (Rayleigh). A ball: Lamb's
 breathing mode. A ring: its nodal diameters in and out of the plane (Love 1927). A plate: Leissa 1973, table C20. A lumpy body: none.
@@ -37,7 +37,7 @@ def find_roots(f, low, high, steps=20000):
 
 
 def bending(length, width, height, high_hz):
-    """Of a free bar along `height` [Hz]."""
+    """Bending frequencies of a free bar along `height` [Hz]."""
     area, moment = width * height, width * height**3 / 12
     shear = 10 * (1 + NU) / (12 + 11 * NU) * E / (2 * (1 + NU))
     r2, s2 = moment / (area * length**2), E * moment / (shear * area * length**2)
@@ -56,7 +56,7 @@ def bending(length, width, height, high_hz):
 
 
 def solve(folder, name, job):
-    """[(Hz that is heard, kind)]"""
+    """[(heard frequency [Hz], kind)]"""
     (folder / f"{name}.json").write_text(json.dumps({"bank": f"{name}.hdf", "material": STEEL, **job}))
     for words in (["carillon-precompute", f"{name}.json", "-q"], ["carillon-bank", "info", f"{name}.hdf", "--csv"]):
         done = subprocess.run([bin_dir / words[0], *words[1:]], cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True)
@@ -76,7 +76,7 @@ def solve(folder, name, job):
 
 
 def expect(found, wanted, tolerance):
-    """wanted: {kind: [Hz, ...]}, each once for each time it is there."""
+    """wanted: {kind: [Hz, ...]}, repeated for multiple modes."""
     for kind, frequencies in wanted.items():
         own = sorted(hz for hz, other in found if other == kind)
         assert len(own) == len(frequencies), (kind, own, frequencies)

@@ -1,8 +1,8 @@
 #!/usr/bin/python3
-"""How solvers start: one by one by the ranks of an MPI run, together for different work, and on a machine without a network.
+"""Starts of solvers: one by one by ranks of an MPI run, together for different work, and on a machine without a network.
 
-A program of one rank that a rank starts (hear, submit, bank-for, validate, the Python module) is no rank of that run. Solvers that a user
-starts in it belong together, and must be given the same. The oracle is a frequency: a free bar's is proportional to 1 / length^2.
+A program of one rank started by a rank (hear, submit, bank-for, validate, the Python module) is no rank of that run. Solvers started in it
+by the user are one run and must have the same job. The oracle is a frequency: a free bar's is proportional to 1 / length^2.
 
 usage: starts.py BIN_DIR
 """
@@ -15,7 +15,7 @@ import tempfile
 import unittest
 
 BIN = pathlib.Path(sys.argv.pop(1)).resolve()
-PYTHON = BIN.parent / "python"  # the module, where it was built
+PYTHON = BIN.parent / "python"  # the module, if built
 LENGTHS_M = (0.2, 0.3)
 
 
@@ -54,7 +54,7 @@ class Case(unittest.TestCase):
         return done
 
     def run_ranks(self, script, code=0):
-        """Two ranks, each a shell with its own folder RANK; what they print."""
+        """Output of two ranks, each a shell with its own folder RANK."""
         script = f"rank=$OMPI_COMM_WORLD_RANK; {script}"
         done = self.run_it("mpirun", "-np", 2, "--bind-to", "none", "/bin/sh", "-c", script, code=code)
         return done.stdout + done.stderr

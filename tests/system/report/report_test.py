@@ -250,7 +250,7 @@ class Reports(unittest.TestCase):
             line = numpy.polyfit(numpy.log(values), y, 1)
             self.assertLess(line[0], 0)
             self.assertLess(max(abs(numpy.polyval(line, numpy.log(values)) - y)), 0.1, section)
-        # Whiskers as wide as the error bars of what is heard.
+        # Whiskers: error bars of the heard frequencies.
         (whiskers,) = [a["d"] for tag, a, _ in self.page.charts["modes"] if tag == "path" and a.get("class", "").startswith("bar")]
         ends = [tuple(map(float, ends)) for ends in re.findall(r"M([\d.]+) [\d.]+v6m0 -3H([\d.]+)", whiskers)]
         slope = (x[-1] - x[0]) / math.log(freq[-1] / freq[0])
@@ -625,7 +625,7 @@ class Reports(unittest.TestCase):
             for width in (320, 390, 768, 1280):
                 page.resize(width, 800)
                 self.assertLessEqual(page.evaluate("document.documentElement.scrollWidth"), width)
-                # What is wider scrolls inside its box, and nothing else lies beyond the edge.
+                # Wide content scrolls inside its box; nothing else exceeds the edge.
                 out = page.evaluate(
                     "[...document.querySelectorAll('body *')].filter(it => !it.closest('.table, .chart, pre') &&"
                     " it.getBoundingClientRect().right > innerWidth + 0.5).map(it => it.outerHTML.slice(0, 80))"

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""What carillon-simulate leaves when a signal or an error ends it: a message that names it, and no file but those that a checkpoint needs.
+"""carillon-simulate ended by a signal or an error: a message that names it, and no files left but those of a checkpoint.
 
 usage: ends.py BIN_DIR
 """
@@ -18,7 +18,7 @@ def list_files(folder):
 
 
 def stop(folder, number, *words):
-    """Sends a signal once frames are there."""
+    """Sends a signal after the first frame."""
     process = subprocess.Popen(
         list_words(1, "job.json", *words), cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
@@ -34,25 +34,25 @@ def stop(folder, number, *words):
 
 with tempfile.TemporaryDirectory(prefix="carillon-simulate-") as scratch:
     folder = pathlib.Path(scratch).resolve()
-    os.environ["TMPDIR"] = scratch + "-tmp"  # what MPI has there is not ours
+    os.environ["TMPDIR"] = scratch + "-tmp"  # outside `folder`: holds MPI's own files
     pathlib.Path(os.environ["TMPDIR"]).mkdir()
     job = make_bar(5) | {"motion": "bar.vtkhdf", "surface": "bar.surface", "spectrogram": "bar.png"}
     write_job(folder / "job.json", job)
     for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
         stop(folder, number)
         assert list_files(folder) == ["job.json"], (number, list_files(folder))
-    # A checkpoint was asked for, and none is there yet.
+    # Before the first checkpoint.
     stop(folder, signal.SIGINT, "--checkpoint", "state")
     assert list_files(folder) == ["job.json"], list_files(folder)
 
-    # An error in the middle: a blow that turns elements inside out.
+    # An error during the run: a blow that inverts elements.
     job["simulate"]["impulses"][0]["impulse_n_s"] = [0, 0, -50]
     write_job(folder / "job.json", job)
     for words in ([], ["--checkpoint", "state"]):
         done = run(folder, "-q", "job.json", *words)
         assert done.returncode == 3 and done.stderr.count("error:") == 1, done
         assert list_files(folder) == ["job.json"], list_files(folder)
-    # With a checkpoint that is there its files stay.
+    # After a checkpoint its files stay.
     done = run(folder, "-q", "job.json", "--checkpoint", "state", "--checkpoint-every", "0")
     assert done.returncode == 3, done
     assert list_files(folder) == ["bar.surface.part", "bar.vtkhdf.frames", "job.json", "state"], list_files(folder)

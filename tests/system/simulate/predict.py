@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Memory that carillon-simulate --validate says against the most that the run has, and a mesh that is too large for --patience.
+"""Memory predicted by carillon-simulate --validate against the peak of the run, and a mesh too large for --patience.
 
 usage: predict.py BIN_DIR
 """
@@ -13,7 +13,7 @@ from jobs import list_words, make_bar, make_plate, run, write_job
 
 
 def measure_bytes(folder, *words):
-    """The most memory of a run."""
+    """Peak memory of a run."""
     process = subprocess.Popen(list_words(1, "-q", "job.json", *words), cwd=folder, stdin=subprocess.DEVNULL)
     _, status, used = os.wait4(process.pid, 0)
     assert status == 0, status
@@ -53,10 +53,10 @@ with tempfile.TemporaryDirectory(prefix="carillon-simulate-") as scratch:
         print(f"{name}: {memory / 1e6:.0f} MB said, {took / 1e6:.0f} MB taken")
         assert took <= memory < 3 * took + 100e6, (name, memory, took)
         assert said[name]["memory_bytes"]["1"] == memory, said[name]
-    # The sound is in the time: of so small a body nearly all of it.
+    # The time includes the sound, most of it for such a small body.
     assert said["sixteen microphones"]["sound_cpu_seconds"] > 0.3 * said["sixteen microphones"]["cpu_seconds"], said
 
-    # Five million nodes: what a coarser mesh has, scaled.
+    # Five million nodes: scaled from a coarser mesh.
     fine["simulate"]["bodies"][0]["shape"]["bar"]["nodes"] = 5000000
     write_job(folder / "job.json", fine)
     large = predict(folder, "--patience", "1")
@@ -68,6 +68,6 @@ with tempfile.TemporaryDirectory(prefix="carillon-simulate-") as scratch:
     write_job(folder / "job.json", fine)
     done = run(folder, "--validate", "job.json", "--patience", "1")
     assert done.returncode == 2 and "--patience 10 or more" in done.stderr and "job.json:" in done.stderr, done
-    # Only --validate has it.
+    # --patience is an option of --validate alone.
     done = run(folder, "job.json", "--patience", "1")
     assert done.returncode == 2 and "--validate" in done.stderr, done

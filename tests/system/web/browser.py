@@ -265,7 +265,7 @@ class Page:
         self.call("Input.dispatchKeyEvent", {"type": "keyUp", **of_key})
 
     def resize(self, width, height):
-        """Shows the page on a screen of that many CSS pixels."""
+        """Sets the size of the screen in CSS pixels."""
         self.call("Emulation.setDeviceMetricsOverride", {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False})
 
     def screenshot(self, file):

@@ -1,9 +1,9 @@
 #!/usr/bin/python3
-"""The sound engine in a page that a bundler has built. Vite builds a page that plays a bank; headless Chromium plays the built folder: all
-that it asks for is there, and its sound is that of carillon-render. For bundlers that are not run here: each file of the engine is named
-by a literal URL, and the files of other threads import nothing.
+"""The sound engine in a page built by a bundler. Vite builds a page that plays a bank; headless Chromium plays the built folder: all
+requested files exist, and the sound is that of carillon-render. For other bundlers: each file of the engine is named by a literal
+URL, and the files of other threads import nothing.
 
-usage: bundle_test.py files | vite      vite: where npm's registry cannot be reached it says so, and passes
+usage: bundle_test.py files | vite      vite: skipped, with a message, without npm's registry
 """
 
 import json
@@ -28,7 +28,7 @@ SCENE = {
     "strikes": [STRIKE],
     "output": {"gain": 0.01, "format": "float", "fade_end": False},
 }
-# No address of a file stands here: the bundler finds them in the engine's own module.
+# Without addresses of files: the bundler finds them in the engine's module.
 MAIN = """
 import { CarillonAudio } from './engine/carillon-audio.js';
 window.play = async () => {

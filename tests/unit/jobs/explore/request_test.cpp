@@ -1,4 +1,4 @@
-// Requests to the server of pages: what is read of them, and which part of a file they get.
+// Requests to the server of pages: parsing, and ranges of bytes.
 #include "jobs/explore/request.hpp"
 
 #include <gtest/gtest.h>

@@ -59,7 +59,7 @@ TEST_F(Needs, grow_where_the_last_attempt_ran_out_of_memory) {
   };
   EXPECT_GT(find_after(outcome::Cause::memory, 0.0), 100.0);
   EXPECT_DOUBLE_EQ(find_after(outcome::Cause::killed, 0.0), before_gb);
-  EXPECT_DOUBLE_EQ(find_after(outcome::Cause::memory, 2.0), 2.0);  // what was asked for is not raised
+  EXPECT_DOUBLE_EQ(find_after(outcome::Cause::memory, 2.0), 2.0);  // a requested limit is not raised
 }
 
 TEST_F(Needs, fewer_modes_take_less_time) {

@@ -133,7 +133,7 @@ TEST(Visibility, AnObstacleHidesWhatLiesBehindItAndNothingElse) {
   EXPECT_FALSE(is_between(job::BoxObstacle{{1, -1, -1}, {2, 1, 1}}, from, from));
 }
 
-/// What is heard of a ball that sounds behind a square plate, which makes no sound itself and moves along x.
+/// Sound of a ball behind a silent square plate that moves along x.
 std::vector<double> hear_behind_plate(double from_x, double speed, Radiation radiation) {
   Options options = make_options(3000, {0.0, 0.0, 1.0}, 4);
   options.radiation = radiation;
@@ -155,11 +155,11 @@ TEST(Visibility, ASilentSurfaceHidesWhereItIsNow) {
     EXPECT_EQ(find_most(hear_behind_plate(0.0, 0.0, radiation), 0, 3000), 0.0);
     const std::vector<double> free = hear_behind_plate(5.0, 0.0, radiation);
     EXPECT_GT(find_most(free, 1000, 3000), 1e-9);
-    // It comes with 20 m/s, and its edge reaches the way after 20 ms: 960 samples.
+    // At 20 m/s its edge reaches the way after 20 ms: 960 samples.
     const std::vector<double> shut = hear_behind_plate(0.5, -20.0, radiation);
     for (std::size_t n = 0; n < 900; ++n) ASSERT_EQ(shut[n], free[n]) << n;
     EXPECT_EQ(find_most(shut, 1250, 1480), 0.0);
-    EXPECT_GT(find_most(shut, 1800, 3000), 1e-9);  // it has passed
+    EXPECT_GT(find_most(shut, 1800, 3000), 1e-9);  // the plate has passed
   }
 }
 
@@ -173,7 +173,7 @@ TEST(Visibility, ABallThatFliesThroughTheWayHidesForAWhile) {
     auto sound = std::make_unique<Emission>(MPI_COMM_SELF, part, options);
     for (std::size_t n = 0; n <= 12000; ++n) {
       const double t = static_cast<double>(n) / 192e3;
-      if (n == stop_at) {  // saved and continued
+      if (n == stop_at) {  // checkpoint and resumption
         const std::vector<std::byte> state = sound->save();
         sound = std::make_unique<Emission>(MPI_COMM_SELF, part, options);
         sound->load(state);

@@ -132,7 +132,7 @@ TEST(Facets, in_doubt_are_no_part_of_any_bar_and_are_stated_next_to_it) {
   EXPECT_EQ(both.lambda, alone.lambda);
   EXPECT_TRUE(alone.facet_cents.empty());
   ASSERT_EQ(both.facet_cents.size(), 3U);
-  // Where the k-th of the other body can be: every mode goes as far as its own facets let it, then all are sorted.
+  // Interval of the other body's k-th mode: each mode shifted by its own facets, then sorted.
   std::vector<double> low, high;
   for (std::size_t m = 0; m < 2; ++m) {
     const double facets = 600 * std::log2(1 + (m == 0 ? 1.5 * 0.02 : 1.5 * 0.1 + 0.15 * 0.2));

@@ -1,4 +1,4 @@
-// What Open MPI lacks on a machine is named before it starts.
+// Errors for machines that lack requirements of Open MPI.
 #include "precompute/launch/check_machine.hpp"
 
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@
 namespace carillon::launch {
 namespace {
 
-/// Ends with 0 if the machine is refused with these words.
+/// Exits with 0 after a refusal with these words.
 [[noreturn]] void expect_refusal(const char* words) {
   try {
     check_machine();

@@ -47,7 +47,7 @@ def main(reader, path):
             _, _, points = gmsh.model.mesh.getElements(0, entity)
             count += sum(len(p) for p in points)
         print(f"set {gmsh.model.getPhysicalName(dim, tag)} {count}")
-    # What it exports is what lies in groups.
+    # Gmsh exports only elements in groups.
     gmsh.write(path + ".exported.msh")
     gmsh.open(path + ".exported.msh")
     print(f"exported {sum(len(e) for e in gmsh.model.mesh.getElements(3)[1])}")

@@ -101,7 +101,7 @@ TEST(write, named_regions_and_elements_without_one_come_back) {
   const TetMesh once = read_mesh(scratch / "out.msh");
   EXPECT_EQ(once.regions, mesh.regions);
   EXPECT_EQ(once.region_names, mesh.region_names);
-  ASSERT_EQ(once.node_sets.size(), 2u);  // of the nodes of its regions
+  ASSERT_EQ(once.node_sets.size(), 2u);  // nodes of its regions
   write_gmsh(once, scratch / "again.msh");
   const TetMesh twice = read_mesh(scratch / "again.msh");
   EXPECT_EQ(twice.regions, once.regions);
@@ -110,7 +110,7 @@ TEST(write, named_regions_and_elements_without_one_come_back) {
   std::string said;
   if (!read_with("meshio", scratch / "again.msh", said)) GTEST_SKIP() << "meshio is not installed";
   EXPECT_NE(said.find("group 1 30"), std::string::npos) << said;
-  EXPECT_NE(said.find("group 3 30"), std::string::npos) << said;  // region 0, under a number that none has
+  EXPECT_NE(said.find("group 3 30"), std::string::npos) << said;  // region 0, under an unused number
 }
 
 TEST(write, regions_and_names_survive_in_the_order_of_the_elements) {

@@ -1,4 +1,4 @@
-// Seams between the faces of CAD programs, points without a triangle, and how many bodies a file has.
+// Seams between the faces of CAD programs, unused points, and numbers of bodies.
 #include "precompute/mesher/seams.hpp"
 
 #include <gtest/gtest.h>
@@ -15,10 +15,10 @@ namespace {
 using namespace testing;
 using Counts = std::array<std::array<int, 2>, 6>;
 
-/// Rectangles into which the faces are cut: on both sides of an edge the same, and different ones.
+/// Divisions of the faces: equal and different on both sides of an edge.
 constexpr Counts kMatching{{{3, 2}, {3, 2}, {2, 4}, {2, 4}, {4, 3}, {4, 3}}}, kDiffering{{{3, 2}, {5, 1}, {2, 7}, {1, 1}, {6, 4}, {9, 5}}};
 
-/// A box from `corner`, whose faces have points of their own, each off its place by up to `jitter` along each axis.
+/// A box from `corner` of faces with separate points, each displaced by up to `jitter` along each axis.
 Polygons make_box_of_faces(const std::array<double, 3>& corner, const std::array<double, 3>& size, const Counts& counts, double jitter) {
   Polygons box;
   std::mt19937 random(7);
@@ -105,7 +105,7 @@ TEST(seams, a_closed_plate_as_thin_as_a_seam_keeps_its_thickness) {
 }
 
 TEST(seams, sheets_near_each_other_stay_apart) {
-  const double gap = 2e-6;  // less than what is joined
+  const double gap = 2e-6;  // below the tolerance
   const SurfaceLook facing =
       look_at_surface(write_text("facing.obj", to_obj(join(make_sheet(0.1, 0.06, 0), make_sheet(0.1, 0.06, gap, 0, true)))));
   EXPECT_EQ(facing.openings, 2);

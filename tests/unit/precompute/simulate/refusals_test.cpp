@@ -99,7 +99,7 @@ std::string spoil(const Refusal& refusal) {
 
 TEST(RefusedJobs, one_error_names_file_and_line_and_nothing_is_written) {
   const auto& world = comm::world();
-  const tests::Folder own;  // of this rank; all use that of rank 0
+  const tests::Folder own;  // all ranks use that of rank 0
   const std::filesystem::path folder = world.broadcast(own.path().string());
   for (const Refusal& refusal : list_refusals()) {
     const std::filesystem::path job = folder / "job.json";
@@ -121,7 +121,7 @@ TEST(RefusedJobs, one_error_names_file_and_line_and_nothing_is_written) {
     }
     const std::filesystem::directory_iterator files(folder);
     EXPECT_EQ(std::distance(begin(files), end(files)), 1) << refusal.name;
-    (void)world.sum(0.0);  // no rank writes the next job before all have looked
+    (void)world.sum(0.0);  // barrier before the next job is written
   }
 }
 
@@ -136,7 +136,7 @@ TEST(RefusedJobs, a_long_step_is_none) {
   SimulateOptions options;
   options.quiet = true;
   EXPECT_FALSE(simulate(world, job, options).is_stopped);
-  (void)world.sum(0.0);  // rank 0 keeps its folder until all are done
+  (void)world.sum(0.0);  // barrier before rank 0 removes its folder
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Small scenes from job to record: what hides sound, bodies that are bent and let go, and what is predicted.
+// Small scenes from job to record: visibility, bent bodies, and predictions.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -74,13 +74,13 @@ TEST(Walls, ObstaclesStrikersAndSilentBodiesHideWhatLiesBehindThem) {
   EXPECT_TRUE(is(hear(R"(, "strikers": [{"sphere_m": 0.2, "mass_kg": 1, "position_m": [0, 0, 0.25]}])"), 0.0));
   EXPECT_TRUE(is(hear("", plate(0, R"("sounds": false,)")), 0.0));
   EXPECT_TRUE(is(hear(R"(, "obstacles": [{"box": {"min": [-1, -1, 0.2], "max": [1, 1, 0.3]}}])", "", "paper2001"), 0.0));
-  // Next to the way, behind the microphone, and where it is not asked for.
+  // An obstacle next to the way, behind the microphone, and without visibility.
   EXPECT_TRUE(is(hear(R"(, "obstacles": [{"box": {"min": [0.2, -1, 0.2], "max": [1, 1, 0.3]}}])"), free));
   EXPECT_TRUE(is(hear(R"(, "obstacles": [{"box": {"min": [-1, -1, 0.6], "max": [1, 1, 0.7]}}])"), free));
   EXPECT_TRUE(is(hear("", plate(0.6, R"("sounds": false,)")), free));
   EXPECT_GT(hear(R"(, "visibility": false, "obstacles": [{"box": {"min": [-1, -1, 0.2], "max": [1, 1, 0.3]}}])") + (is_root ? 0.0 : 1.0),
             0.5 * free);
-  // The microphone is inside.
+  // A microphone inside the obstacle.
   const Record deaf = play(make_scene(
       "", fmt::format(R"({}, "radiation": "rayleigh", "obstacles": [{{"sphere": {{"centre_m": [0, 0, 0.5], "radius_m": 0.1}}}}])", kBlow)));
   EXPECT_TRUE(!is_root || (deaf.peak_pa == 0.0 && deaf.warnings == 1)) << deaf.warnings;
@@ -90,7 +90,7 @@ TEST(Walls, KirchhoffHasNoVisibility) { EXPECT_THROW(play(make_scene("", R"(, "v
 
 TEST(Bent, ABodyThatIsLetGoSoundsAndPutsNothingIn) {
   const bool is_root = comm::world().is_root();
-  // A force, a mode, and the end held where it is; without sound before, and with the energy of the start alone.
+  // Bent by a force, a mode, and a displaced end; no work after the start.
   for (
       const char* bend :
       {R"(, "bend": {"force_n": [0, 0, -10], "point_m": [0.05, 0, 0.005]})", R"(, "bend": {"mode": 1, "amplitude_m": 1e-5})",
@@ -108,7 +108,7 @@ TEST(Bent, ABodyThatIsLetGoSoundsAndPutsNothingIn) {
   if (is_root) {
     EXPECT_NEAR(pulled.energy_j, 0.5 * 100.0 * 1e-3 / (3.0 * 70e9 * 0.02 * 1e-6 / 12.0), 0.08 * pulled.energy_j);
   }
-  // Turned with its body: the same energy.
+  // Rotation of the body leaves the energy unchanged.
   const Record turned =
       play(make_scene(R"(, "bend": {"force_n": [0, 0, -10], "point_m": [0.05, 0, 0]}, "rotation_deg": [40, 50, 60])", ""));
   if (is_root) {

@@ -1,4 +1,4 @@
-// Bodies that are bent before they are let go: against beams in closed form, and against the steps of the motion themselves.
+// Bent bodies against beams in closed form, and against their own motion.
 #include "precompute/transient/bend.hpp"
 
 #include <gtest/gtest.h>
@@ -25,7 +25,7 @@ std::vector<SolidBody> make_bar(int order, const std::array<double, 3>& edges_m,
 
 constexpr double kYoung = 70e9, kDensity = 2700.0, kLength = 0.2, kWidth = 0.02, kThickness = 0.01, kFirst = 1.875104068711961;
 
-/// A bar without lateral contraction, as beams are, clamped at -x.
+/// A bar without lateral contraction, like a beam, clamped at -x.
 struct Clamped {
   World world{make_bar(2, {kLength, kWidth, kThickness}, {20, 2, 1}, make_law(kYoung, 0.0, kDensity)), MPI_COMM_SELF};
   std::vector<HeldNode> held;
@@ -57,9 +57,9 @@ TEST(Bend, ABarUnderAForceAtItsEndYieldsAsABeam) {
   const double bent = std::pow(kLength, 3) / (3.0 * kYoung * inertia), sheared = 1.2 * kLength / (0.5 * kYoung * kWidth * kThickness);
   const std::vector<Quad> u = pull(1.0);
   EXPECT_NEAR(bar.find_tip(u), bent + sheared, 5e-3 * bent);
-  // Clapeyron: half of what the force would do on its whole way.
+  // Clapeyron: half of force times displacement.
   EXPECT_NEAR(bar.calc_energy(u), 0.5 * bar.find_tip(u), 5e-3 * bent);
-  // Bent far: 0.25 of its length by the elastica (Bisshopp and Drucker 1945: 0.302 L, and 0.056 L back, under F L^2 / E I = 1).
+  // Large displacement: the elastica (Bisshopp and Drucker 1945: 0.302 L, and 0.056 L back, under F L^2 / E I = 1).
   const std::vector<Quad> far = pull(kYoung * inertia / (kLength * kLength));
   double back = 0.0;
   for (const std::int32_t node : bar.end) back -= far[static_cast<std::size_t>(node)].x / static_cast<double>(bar.end.size());
@@ -91,12 +91,12 @@ TEST(Bend, AModeIsABeamsAndLetGoItSwingsAtItsFrequency) {
   EXPECT_NEAR(first.omega_rad_s / beam, 1.0, 5e-3);
   EXPECT_GT(bar.find_tip(first.shape), 0.0);
   constexpr double kAmplitude = 1e-5;
-  // The clamped beam has a quarter of its mass in its first mode, as its end moves.
+  // Modal mass of the clamped beam's first mode, for unit displacement of its end: a quarter of its mass.
   std::vector<Quad> u = first.shape;
   for (Quad& q : u) q = {kAmplitude * q.x, kAmplitude * q.y, kAmplitude * q.z, 0.0};
   const double mass = kDensity * kLength * kWidth * kThickness, energy = bar.calc_energy(u);
   EXPECT_NEAR(energy, 0.125 * mass * std::pow(first.omega_rad_s * kAmplitude, 2), 0.01 * energy);
-  // Two and a half periods in motion: at every time the cosine, and no energy comes or goes.
+  // Two and a half periods: a cosine in time, with constant energy.
   Motion motion(bar.world.domain, {}, {{bar.clamp, {}, false}});
   motion.set_start([&](std::int32_t node, const Vec3&) {
     const Quad& at = u[static_cast<std::size_t>(node)];
@@ -133,7 +133,7 @@ TEST(Bend, WhatCannotBeInBalanceIsRefused) {
   EXPECT_THROW(calc_mode(small.domain, {}, 20), InputError);
 }
 
-// A strip as a sheet: its edges turn, too.
+// A strip as a sheet, with angles of edges.
 TEST(Bend, ASheetYieldsAsABeam) {
   constexpr double kThin = 5e-4;
   SheetBody sheet;

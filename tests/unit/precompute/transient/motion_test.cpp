@@ -161,7 +161,7 @@ TEST(Bar, that_is_stretched_is_faster) {
 
 // ---- supports ----
 
-/// A bar that is bent by its end in 1 ms, held there, and let go after 1.25 ms.
+/// A bar bent by its end within 1 ms, held there, and released at 1.25 ms.
 struct Plucked {
   World world{make_body(1, {0.06, 0.02, 0.02}, {6, 2, 2}, make_law(1e8, 0.3, 1100))};
   Motion motion;
@@ -195,7 +195,7 @@ TEST(Constraint, nodes_are_let_go_and_no_energy_comes_with_it) {
     bar.motion.advance_sample();
     far = std::max(far, bar.find_end());
     const EnergyBook book = bar.motion.calc_book();
-    EXPECT_NEAR(book.work_j, held.work_j, 1e-12 * held.work_j);  // what was put in stays all that was put in
+    EXPECT_NEAR(book.work_j, held.work_j, 1e-12 * held.work_j);  // no work by the release
     EXPECT_LT(std::abs(book.relative_error), 1e-6);
   }
   EXPECT_GT(far, 2e-4);
@@ -214,7 +214,7 @@ TEST(Constraint, a_run_that_resumes_behind_or_before_the_release_has_the_same_bi
 }
 
 TEST(Constraint, a_body_that_nothing_else_holds_flies_on) {
-  // Let go in the middle of its path, it keeps its momentum.
+  // Released in the middle of its path, it keeps its momentum.
   Plucked bar(5e-4, false);
   while (bar.motion.get_time_s() < 6e-4) bar.motion.advance_sample();
   const Vec3 thrown = bar.motion.calc_momentum().linear;
