@@ -1,7 +1,5 @@
-// One integration, whose bodies, contacts, modes and books change together in every step; longer than most files.
 // Method: see impact.hpp. A row is a direction of relative motion at a contact; phi of a row has the sign of the body in it, so that the
 // motion of row r is  free_r + sum_s A_rs f_s,   A = h^2/2 J M^-1 J^T + sum over modes phi_r g phi_s.
-// One pass over the modes of a step takes the force in and finds where they go freely in the next.
 // Source: discrete gradients, Gonzalez 1996 (J. Nonlinear Sci. 6, 449); modes inside an impact of a ball and a beam, Timoshenko 1913.
 // Deviations: frames and mobilities are constant in one impact; gyroscopic couples act as the constant accelerations given.
 #include "runtime/impact/impact.hpp"
@@ -9,23 +7,21 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <stdexcept>
 #include <string>
 
 namespace carillon::impact {
 namespace {
 
-constexpr double kSlowest = 1e-6;  // m/s: speed for which the step is chosen where nothing approaches
-constexpr double kTaper = 0.05;    // of how long a contact has pressed: time constant with which a rebound comes to its limit
-constexpr double kStill = 1e-3;    // m/s: what rests and moves no faster has settled
-constexpr int kLimitings = 8;      // rounds in which contacts that share bodies settle on it,
+constexpr double kSlowest = 1e-6;  // m/s: speed for the choice of the step without an approach
+constexpr double kTaper = 0.05;    // of the time of pressing: time constant of a rebound at its limit
+constexpr double kStill = 1e-3;    // m/s: settled contacts are slower
+constexpr int kLimitings = 8;      // rounds for contacts that share bodies,
 constexpr double kOver = 1e-4;     // to this part of the force of a step
 
-std::size_t pad(int n) { return static_cast<std::size_t>((n + kLanes - 1) / kLanes * kLanes); }
 bool is_finite(const Vec3& x) { return std::isfinite(x[0]) && std::isfinite(x[1]) && std::isfinite(x[2]); }
 
-/// Zero for what is not positive definite, such as a head without spin.
+/// Zero unless positive definite, as for a head without spin.
 Mat3 invert_inertia(const Mat3& m) {
   const Mat3 minors{cross(m[1], m[2]), cross(m[2], m[0]), cross(m[0], m[1])};
   const double determinant = dot(m[0], minors[0]);
@@ -41,57 +37,6 @@ Vec3 make_tangent(const Vec3& n) {
   const Vec3 axis = find_least_axis(n);
   const Vec3 t = axis - dot(axis, n) * n;
   return 1.0 / std::sqrt(dot(t, t)) * t;
-}
-
-struct State {
-  const double *a, *b, *c, *e, *g;
-  const double* phi;
-  double *q, *v, *x;
-  std::size_t padded;
-};
-
-/// q, v over one step under the forces f of the rows; x: where q goes freely in the next; w_free = phi x. kRows = 0: `rows` of them.
-template <int kRows>
-void move_modes(const State& s, int rows, const double* __restrict f, double* __restrict w_free, double* __restrict lanes) {
-  const int n = kRows ? kRows : rows;
-  for (int r = 0; r < n * kLanes; ++r) lanes[r] = 0.0;
-  for (std::size_t i = 0; i < s.padded; i += kLanes) {
-    double drive[kLanes] = {}, next[kLanes];
-    for (int r = 0; r < n; ++r) {
-      const double* __restrict phi = s.phi + static_cast<std::size_t>(r) * s.padded + i;
-      for (int l = 0; l < kLanes; ++l) drive[l] += phi[l] * f[r];
-    }
-    for (int l = 0; l < kLanes; ++l) {
-      const std::size_t k = i + static_cast<std::size_t>(l);
-      const double q = s.x[k] + s.g[k] * drive[l], v = s.c[k] * s.q[k] + s.e[k] * s.v[k] + s.b[k] * drive[l];
-      next[l] = s.a[k] * q + s.b[k] * v;
-      s.q[k] = q;
-      s.v[k] = v;
-      s.x[k] = next[l];
-    }
-    for (int r = 0; r < n; ++r) {
-      const double* __restrict phi = s.phi + static_cast<std::size_t>(r) * s.padded + i;
-      for (int l = 0; l < kLanes; ++l) lanes[r * kLanes + l] += phi[l] * next[l];
-    }
-  }
-  for (int r = 0; r < n; ++r) {
-    const double* sum = lanes + r * kLanes;
-    w_free[r] = ((sum[0] + sum[4]) + (sum[2] + sum[6])) + ((sum[1] + sum[5]) + (sum[3] + sum[7]));
-  }
-}
-
-double calc_dot(const double* x, const double* y, std::size_t padded) {
-  double lanes[kLanes] = {};
-  for (std::size_t i = 0; i < padded; i += kLanes)
-    for (std::size_t l = 0; l < kLanes; ++l) lanes[l] += x[i + l] * y[i + l];
-  return ((lanes[0] + lanes[4]) + (lanes[2] + lanes[6])) + ((lanes[1] + lanes[5]) + (lanes[3] + lanes[7]));
-}
-
-double calc_dot(const double* x, const double* y, const double* z, std::size_t padded) {
-  double lanes[kLanes] = {};
-  for (std::size_t i = 0; i < padded; i += kLanes)
-    for (std::size_t l = 0; l < kLanes; ++l) lanes[l] += x[i + l] * y[i + l] * z[i + l];
-  return ((lanes[0] + lanes[4]) + (lanes[2] + lanes[6])) + ((lanes[1] + lanes[5]) + (lanes[3] + lanes[7]));
 }
 
 void check(bool right, const char* what) {
@@ -117,7 +62,7 @@ Impact::Impact(std::vector<Body> bodies, const std::vector<Contact>& contacts, c
   books_.start += calc_rigid_energy() + calc_spring_energies();
 }
 
-/// Takes a body in, and the energy of its modes into the books.
+/// Adds a body, and the energy of its modes to the books.
 void Impact::place_body(Body body) {
   check_body(body);
   const auto modes = body.modes ? static_cast<std::size_t>(body.modes->size()) : 0;
@@ -128,17 +73,7 @@ void Impact::place_body(Body body) {
   body.impulse_n_s = body.couple_n_m_s = body.shift_n_s2 = body.turning_n_m_s2 = {};
   body.work_j = 0.0;
   inverse_inertia_.push_back(body.mass_kg > 0.0 && !body.on_joints ? invert_inertia(body.inertia_kg_m2) : Mat3{});
-  if (modes > 0) {
-    Group group;
-    group.body = static_cast<int>(bodies_.size());
-    group.q = body.q;
-    group.v = body.q_dot;
-    group.q.resize(pad(body.modes->size()), 0.0);
-    group.v.resize(group.q.size(), 0.0);
-    group.energy = body.modes->calc_energy(body.q, body.q_dot);
-    books_.start += group.energy;
-    groups_.push_back(std::move(group));
-  }
+  if (modes > 0) books_.start += modes_.add_body(static_cast<int>(bodies_.size()), *body.modes, body.q, body.q_dot);
   bodies_.push_back(std::move(body));
 }
 
@@ -188,7 +123,7 @@ void Impact::add_contact(const Contact& contact) {
   place_contact(contact, static_cast<int>(contacts_.size()), touch.row);
   touches_.push_back(touch);
   contacts_.push_back(contact);
-  contacts_.back().shape_a = contacts_.back().shape_b = {};  // they are in the groups now
+  contacts_.back().shape_a = contacts_.back().shape_b = {};  // now in modes_
   pulses_.emplace_back().contact = static_cast<int>(contacts_.size()) - 1;
   silent_.push_back(0);
   normal_impulse_.push_back(0.0);
@@ -233,45 +168,9 @@ void Impact::place_contact(const Contact& contact, int index, int row) {
   for (const bool first : {true, false}) {
     const int body = first ? contact.a : contact.b;
     const std::span<const double> shape = first ? contact.shape_a : contact.shape_b;
-    if (body >= 0 && !shape.empty()) place_shapes(body, shape, first ? 1.0 : -1.0, row, rows);
+    if (body >= 0 && !shape.empty())
+      modes_.place(body, shape, first ? 1.0 : -1.0, row, {axes, static_cast<std::size_t>(rows)}, above_band_);
   }
-}
-
-/// The rows' shape values of one side into the body's group, and those above its band into a group of their own.
-void Impact::place_shapes(int body, std::span<const double> shape, double sign, int row, int rows) {
-  const auto find = [&](bool tail) {
-    return std::find_if(groups_.begin(), groups_.end(),
-                        [&](const Group& g) { return g.body == body && g.tail == tail && (!tail || g.rows.front() == row); });
-  };
-  Group& group = *find(false);
-  const Modes& modes = *bodies_[static_cast<std::size_t>(body)].modes;
-  const auto n = static_cast<std::size_t>(modes.size()), padded = pad(modes.size());
-  const auto place = static_cast<std::size_t>(std::find(group.rows.begin(), group.rows.end(), row) - group.rows.begin());
-  if (place == group.rows.size()) {
-    for (int k = 0; k < rows; ++k) group.rows.push_back(row + k);
-    group.phi.resize(group.rows.size() * padded, 0.0);
-  }
-  for (int k = 0; k < rows; ++k) {
-    const Vec3 axis = sign * rows_[static_cast<std::size_t>(row + k)].axis;
-    double* phi = group.phi.data() + (place + static_cast<std::size_t>(k)) * padded;
-    for (std::size_t i = 0; i < n; ++i) phi[i] = axis[0] * shape[3 * i] + axis[1] * shape[3 * i + 1] + axis[2] * shape[3 * i + 2];
-  }
-  if (!above_band_ || !modes.has_tail()) return;
-  std::vector<double> above = modes.calc_tail_shapes(modes.calc_tail_compliance({group.phi.data() + place * padded, n}));
-  above.resize(pad(kTailModes), 0.0);
-  const auto known = find(true);
-  if (known != groups_.end()) {
-    known->phi = std::move(above);
-    return;
-  }
-  Group tail;
-  tail.body = body;
-  tail.tail = true;
-  tail.rows = {row};
-  tail.phi = std::move(above);
-  tail.q.assign(tail.phi.size(), 0.0);
-  tail.v = tail.q;
-  groups_.push_back(std::move(tail));
 }
 
 double Impact::calc_row_speed(const Row& row) const {
@@ -298,13 +197,7 @@ void Impact::choose_step(const Options& options) {
     for (std::size_t side = 0; side < 2; ++side)
       inverse_mass[c] += dot(row.linear[side], row.to_velocity[side]) + dot(row.angular[side], row.to_spin[side]);
     double modal = 0.0;
-    for (const Group& group : groups_)
-      for (std::size_t r = 0; r < group.rows.size(); ++r) {
-        if (group.rows[r] != touches_[c].row) continue;
-        const double* phi = group.phi.data() + r * group.q.size();
-        speed[c] -= calc_dot(phi, group.v.data(), group.q.size());
-        modal += calc_dot(phi, phi, group.q.size());
-      }
+    modes_.add_approach(touches_[c].row, speed[c], modal);
     closing_[c] = std::max({0.0, speed[c], -calc_row_speed(row)});
     if (inverse_mass[c] == 0.0) inverse_mass[c] = modal;
     fastest_ = std::max(fastest_, speed[c]);
@@ -314,7 +207,7 @@ void Impact::choose_step(const Options& options) {
   for (std::size_t c = first; c < touches_.size(); ++c) {
     if (!(inverse_mass[c] > 0.0)) continue;
     Touch& touch = touches_[c];
-    // What is pushed by its neighbours and does not approach by itself is taken at the fastest speed.
+    // A contact that only its neighbours push is taken at the fastest speed.
     const double v = speed[c] > 0.01 * fastest_ ? speed[c] : fastest_;
     const ElasticPulse pulse = calc_elastic_pulse(touch.spring, 1.0 / inverse_mass[c], v);
     shortest = std::min(shortest, pulse.length_s);
@@ -329,12 +222,7 @@ void Impact::choose_step(const Options& options) {
   }
   if (h_ > 0.0) return;
   if (options.part_s > 0.0) part_s_ = options.part_s;
-  double longest = std::min(shortest / options.steps_per_pulse, options.longest_step_s);
-  for (const Group& group : groups_) {
-    const double band = bodies_[static_cast<std::size_t>(group.body)].modes->get_band();
-    if (!group.rows.empty() && band > 0.0) longest = std::min(longest, 0.5 * std::numbers::pi / band);  // 1/(4 f_c)
-  }
-  step_index_ = find_step(longest);
+  step_index_ = find_step(modes_.limit_step(std::min(shortest / options.steps_per_pulse, options.longest_step_s)));
   h_ = get_step(step_index_);
 }
 
@@ -355,39 +243,18 @@ void Impact::set_up_step() {
       mobility_[i * n + j] = mobility_[j * n + i] = gain;
       A_[i * n + j] = A_[j * n + i] = 0.5 * h_ * h_ * gain;
     }
-  for (Group& group : groups_) {
-    const Modes& modes = *bodies_[static_cast<std::size_t>(group.body)].modes;
-    group.p = group.tail ? modes.find_tail_propagator(step_index_) : modes.find_propagator(step_index_);
-    const std::size_t padded = group.q.size(), m = group.rows.size();
-    group.x.resize(padded);
-    for (std::size_t i = 0; i < padded; ++i) group.x[i] = group.p->a[i] * group.q[i] + group.p->b[i] * group.v[i];
-    group.w.assign(m, 0.0);
-    group.w_free.assign(m, 0.0);
-    group.compliance.assign(m * m, 0.0);
-    for (std::size_t r = 0; r < m; ++r) {
-      const double* phi = group.phi.data() + r * padded;
-      group.w[r] = calc_dot(phi, group.q.data(), padded);
-      group.w_free[r] = calc_dot(phi, group.x.data(), padded);
-      for (std::size_t s = 0; s <= r; ++s) {
-        const double compliance = calc_dot(phi, group.p->g.data(), group.phi.data() + s * padded, padded);
-        const auto i = static_cast<std::size_t>(group.rows[r]), j = static_cast<std::size_t>(group.rows[s]);
-        group.compliance[r * m + s] = group.compliance[s * m + r] = compliance;
-        A_[i * n + j] += compliance;
-        if (r != s) A_[j * n + i] += compliance;
-      }
-    }
-  }
+  modes_.set_up(step_index_, n, A_);
 }
 
-/// The forces of the step, none of which throws its bodies apart faster than its restitution allows.
+/// The forces of the step, within the restitution of each contact.
 void Impact::solve_forces() {
   bool found = solver_.solve(touches_, A_, free_, h_, force_);
   for (int round = 0; round < kLimitings && limit_forces(); ++round) found = solver_.solve(touches_, A_, free_, h_, force_) && found;
   if (!found) ++misses_;
 }
 
-/// Bounds the normal forces, where modes push, under which rigid bodies would part too fast at the end of the step; true where there are
-/// any. What is left to the limit goes down as exp(-t / tau), so that a force is not cut off, which would be heard.
+/// Bounds the normal forces of modes under which rigid bodies would part too fast at the end of the step; true with any. The distance to
+/// the limit falls as exp(-t / tau), without an audible cut of a force.
 bool Impact::limit_forces() {
   const std::size_t n = rows_.size();
   bool any = false;
@@ -424,8 +291,7 @@ void Impact::step() {
       free_[r] += half * (dot(rows_[r].linear[side], body.acceleration_m_s2) + dot(rows_[r].angular[side], body.spin_acceleration_rad_s2));
     }
   }
-  for (const Group& group : groups_)
-    for (std::size_t r = 0; r < group.rows.size(); ++r) free_[static_cast<std::size_t>(group.rows[r])] += group.w_free[r] - group.w[r];
+  modes_.add_free_motion(free_);
   for (std::size_t c = 0; c < touches_.size(); ++c)
     closing_[c] = std::max(closing_[c], -calc_row_speed(rows_[static_cast<std::size_t>(touches_[c].row)]));
 
@@ -449,7 +315,7 @@ void Impact::step() {
     const auto row = static_cast<std::size_t>(t.row);
     const double before = t.compression_m;
     t.compression_m -= moved_[row];
-    // What is not allowed to push yields where it is pressed further: it takes up no energy, and gives back less than it has.
+    // A contact without a force yields to further pressure: it takes up no energy, and gives back less than it has.
     if (std::isfinite(t.max_n)) t.compression_m = std::min(t.compression_m, before);
     t.max_n = std::numeric_limits<double>::infinity();
     pressed_s_[c] = t.compression_m > 0.0 ? pressed_s_[c] + h_ : 0.0;
@@ -508,28 +374,12 @@ void Impact::step() {
     }
     books_.given += body.mass_kg * dot(body.acceleration_m_s2, moved) + dot(body.inertia_kg_m2 * body.spin_acceleration_rad_s2, turned);
   }
-  for (Group& group : groups_) {
-    const std::size_t m = group.rows.size();
-    group.f.resize(m);
-    group.lanes.resize(m * kLanes);
-    for (std::size_t r = 0; r < m; ++r) group.f[r] = force_[static_cast<std::size_t>(group.rows[r])];
-    for (std::size_t r = 0; r < m; ++r) {
-      double w = group.w_free[r];
-      for (std::size_t s = 0; s < m; ++s) w += group.compliance[r * m + s] * group.f[s];
-      group.work += group.f[r] * (w - group.w[r]);
-      group.w[r] = w;
-    }
-    const Propagator& p = *group.p;
-    const State state{p.a.data(),       p.b.data(),     p.c.data(),     p.e.data(),     p.g.data(),
-                      group.phi.data(), group.q.data(), group.v.data(), group.x.data(), group.q.size()};
-    const auto move = m == 1 ? move_modes<1> : m == 3 ? move_modes<3> : move_modes<0>;
-    move(state, static_cast<int>(m), group.f.data(), group.w_free.data(), group.lanes.data());
-  }
+  modes_.move(force_);
   ++steps_;
   quiet_ = struck ? 0 : quiet_ + 1;
 }
 
-/// Have all parted, but for what rests and has settled, or had its time?
+/// True after all have parted, but for settled contacts and those that had their time.
 bool Impact::is_over() const {
   const double quiet_s = quiet_ * h_;
   if (quiet_s < part_s_) return false;
@@ -614,7 +464,7 @@ void Impact::update(std::span<const Body> bodies, std::span<const Contact> conta
     contact.shape_a = contact.shape_b = {};
     contacts_[c] = contact;
     if (!rubs) continue;
-    // What of the anchor spring is along the new normal is lost.
+    // The part of the anchor spring along the new normal is lost.
     t.stretch = {dot(stretch, rows_[row + 1].axis), dot(stretch, rows_[row + 2].axis)};
     books_.dissipated_friction +=
         0.5 * t.tangential_n_m * (dot(stretch, stretch) - t.stretch[0] * t.stretch[0] - t.stretch[1] * t.stretch[1]);
@@ -647,12 +497,7 @@ double Impact::calc_spring_energies() const {
 
 std::vector<Body> Impact::get_bodies() const {
   std::vector<Body> bodies = bodies_;
-  for (const Group& group : groups_) {
-    if (group.tail) continue;
-    Body& body = bodies[static_cast<std::size_t>(group.body)];
-    body.q.assign(group.q.begin(), group.q.begin() + body.modes->size());
-    body.q_dot.assign(group.v.begin(), group.v.begin() + body.modes->size());
-  }
+  for (std::size_t b = 0; b < bodies.size(); ++b) modes_.read_state(static_cast<int>(b), bodies[b].q, bodies[b].q_dot);
   return bodies;
 }
 
@@ -660,16 +505,10 @@ Books Impact::get_books() const {
   Books books = books_;
   books.rigid = calc_rigid_energy();
   books.spring = calc_spring_energies();
-  for (const Group& group : groups_) {
-    if (group.tail) {
-      books.above_band += group.work;
-      continue;
-    }
-    const auto n = static_cast<std::size_t>(bodies_[static_cast<std::size_t>(group.body)].modes->size());
-    const double modal = bodies_[static_cast<std::size_t>(group.body)].modes->calc_energy({group.q.data(), n}, {group.v.data(), n});
-    books.modal += modal;
-    books.dissipated_modes += group.energy + group.work - modal;
-  }
+  const ModalEnergy modes = modes_.calc_energy();
+  books.modal = modes.modal;
+  books.dissipated_modes = modes.dissipated;
+  books.above_band = modes.above_band;
   return books;
 }
 

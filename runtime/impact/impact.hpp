@@ -14,11 +14,11 @@
 #pragma once
 
 #include <array>
-#include <memory>
 #include <span>
 #include <vector>
 
 #include "runtime/base/vector.hpp"
+#include "runtime/impact/modal_groups.hpp"
 #include "runtime/impact/modes.hpp"
 #include "runtime/impact/solve.hpp"
 #include "runtime/impact/spring.hpp"
@@ -142,26 +142,12 @@ class Impact {
     std::array<Vec3, 2> linear{}, angular{};       // relative motion of the row by the motion of the body
     std::array<Vec3, 2> to_velocity{}, to_spin{};  // and the accelerations of the body by its force
   };
-  /// Modes that move together: a body's own, or those above its band at one contact.
-  struct Group {
-    int body = 0;
-    bool tail = false;
-    std::shared_ptr<const Propagator> p;
-    std::vector<int> rows;
-    std::vector<double> phi;          // (rows, padded modes)
-    std::vector<double> q, v, x;      // state and where it goes freely
-    std::vector<double> w, w_free;    // (rows): phi q, phi x
-    double energy = 0.0, work = 0.0;  // at the beginning; by the forces
-    std::vector<double> compliance;   // (rows, rows): phi g phi
-    std::vector<double> f, lanes;     // of the step
-  };
 
   void check_contact(const Contact& contact) const;
   static void check_body(const Body& body);
   void place_body(Body body);
   void add_contact(const Contact& contact);
   void place_contact(const Contact& contact, int index, int row);
-  void place_shapes(int body, std::span<const double> shape, double sign, int row, int rows);
   void choose_step(const Options& options);
   void set_up_step();
   void step();
@@ -177,7 +163,7 @@ class Impact {
   std::vector<Contact> contacts_;
   std::vector<Touch> touches_;
   std::vector<Row> rows_;
-  std::vector<Group> groups_;
+  ModalGroups modes_;
   std::vector<double> A_, free_, force_, moved_;
   std::vector<double> mobility_;   // (rows, rows), of the rigid bodies: relative velocity per impulse
   std::vector<double> pressed_s_;  // of each contact: how long it has been pressed
