@@ -663,11 +663,8 @@ class Remesher {
 }  // namespace
 
 std::vector<Edge> find_border(const TriangleSurface& surface) {
-  std::unordered_map<Edge, int, EdgeHash> count;
-  for (const Triangle& t : surface.triangles)
-    for (int c = 0; c < 3; ++c) ++count[make_edge(t[c], t[(c + 1) % 3])];
   std::vector<Edge> border;
-  for (const auto& [edge, n] : count)
+  for (const auto& [edge, n] : count_faces(surface))
     if (n == 1) border.push_back(edge);
   std::sort(border.begin(), border.end());
   return border;

@@ -28,6 +28,7 @@
 #include "precompute/mesher/tet_quality.hpp"
 #include "precompute/mesher/thin_wall.hpp"
 #include "precompute/mesher/triangle_surface.hpp"
+#include "precompute/mesher/two_sides.hpp"
 #include "precompute/mesher/verify.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/failure.hpp"
@@ -392,18 +393,8 @@ void curve(mesh::TetMesh& mesh, const Body& body, SurfaceReport& report) {
 /// Puts the nodes of the skins on the smooth surface and sums the volume again.
 void place_nodes(mesh::TetMesh& mesh, const Body& body, const SurfaceOptions& options, SurfaceReport& report) {
   report.straightened_tets += place_on_smooth_surface(mesh, body, options.straight);
-  for (const Vec3& way : mesh.doubt_m) report.doubt_m = std::max(report.doubt_m, norm(way));
-  if (report.doubt_m > 0)
-    report.remarks.push_back(fmt::format(
-        "Some facets are so coarse that they may be planes of the body or samples of a smooth surface, up to {:.3g} m apart. What that "
-        "changes is stated next to the error bars. A surface in finer facets settles it, or --facets if they are planes.",
-        report.doubt_m));
-  if (mesh.order == 1) {
-    report.volume_m3 = measure(mesh).volume_m3;
-    return;
-  }
-  report.volume_m3 = 0;
-  for (std::int64_t e = 0; e < mesh.tet_count(); ++e) report.volume_m3 += mesh::calc_curved_volume(mesh, e);
+  remark_doubt(mesh, report);
+  report.volume_m3 = calc_mesh_volume(mesh);
 }
 
 void add_notes(const SurfaceOptions& options, const Body& body, SurfaceReport& report) {
@@ -686,14 +677,8 @@ mesh::TetMesh make_mesh(const SurfaceOptions& given, SurfaceReport& report, Phas
   if (std::optional<mesh::TetMesh> thin = make_thin(body, options, report, phases)) return std::move(*thin);
   if (options.order == 0) options.order = 1;
   set_model(body, options, report.input_volume_m3, report.input_area_m2);
-  const double diagonal = calc_box(surface.points).diagonal();
   double edge = find_first_edge(body, options);
-  if (options.edge_m && edge > diagonal)
-    throw InputError(fmt::format("{}: edges of {:.3g} m are longer than the body ({:.3g} m); ask for shorter ones",
-                                 options.surface.string(), edge, diagonal));
-  if (const double nodes = body.model.calc_nodes(edge); nodes > 1.5 * kMaxNodes)
-    throw InputError(fmt::format("{}: edges of {:.3g} m would give about {:.3g} nodes, more than {:.0g}; ask for longer ones",
-                                 options.surface.string(), edge, nodes, kMaxNodes));
+  check_edge(options, edge, calc_box(surface.points).diagonal(), body.model.calc_nodes(edge), 1.5 * kMaxNodes);
   const double min_nodes = calc_min_nodes(body);
   cpu_limit.emplace(calc_limit(kMinCpu, options.nodes ? asked : std::max(body.model.calc_nodes(edge), min_nodes)));
   if (!options.nodes && min_nodes > 1.5 * kMaxNodes) throw_count(options, CountError("", min_nodes, min_nodes));
