@@ -33,7 +33,7 @@ constexpr double kRuleHz = 10000, kPlateSpeed = 5400;  // [m/s] of longitudinal 
 constexpr double kPerRadius = 0.35, kMaxPerRadius = 0.7;
 constexpr double kMinPerWall = 0.8;        // shortest edges of curved places, in walls
 constexpr double kPointsPerArea = 1.1547;  // of a triangulation, times its edges' square
-constexpr double kCountTolerance = 0.10, kCountAim = 0.07;
+constexpr double kCountAim = 0.07;
 constexpr int kMaxAttempts = 8;
 constexpr double kRimRing = 0.7, kFoldRing = 0.2,
                  kFoldRingOfEdge = 0.5;  // walls from a rim to its ring, and from the inner corner of a fold
