@@ -26,6 +26,15 @@ constexpr double kSameCurve = 0.01;
 
 }  // namespace
 
+void check_edge(const SurfaceOptions& options, double edge_m, double diagonal_m, double nodes, double most) {
+  if (options.edge_m && edge_m > diagonal_m)
+    throw InputError(fmt::format("{}: edges of {:.3g} m are longer than the body ({:.3g} m); ask for shorter ones",
+                                 options.surface.string(), edge_m, diagonal_m));
+  if (nodes > most)
+    throw InputError(fmt::format("{}: edges of {:.3g} m would give about {:.3g} nodes, more than {:.0g}; ask for longer ones",
+                                 options.surface.string(), edge_m, nodes, kMaxNodes));
+}
+
 DistanceField make_field(const Body& body, const SurfaceOptions& options, double edge_m) {
   const Vec3 extent = calc_box(body.repaired.surface.points).extent();
   const double diagonal = norm(extent);

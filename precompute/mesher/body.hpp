@@ -32,6 +32,9 @@ struct Body {
   CountModel model{};
 };
 
+/// Refuses edges longer than the body, and those that would give more than `most` nodes (InputError).
+void check_edge(const SurfaceOptions& options, double edge_m, double diagonal_m, double nodes, double most);
+
 /// Samples the distance for elements of edge_m. Throws InputError if the wall leaves no hollow or the surface encloses nothing.
 DistanceField make_field(const Body& body, const SurfaceOptions& options, double edge_m);
 

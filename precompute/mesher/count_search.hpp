@@ -10,6 +10,8 @@
 
 namespace carillon::mesher {
 
+inline constexpr double kCountTolerance = 0.10;  // promised
+
 /// About how many nodes a body gets: `factor` times a law of the edge length, and `base`. Solids: volume and skin apart; fitted to balls,
 /// cylinders, cubes and the solid bunny with two rows of elements and more, where it is right within 5 %, and to plates with one. Walls
 /// (`is_wall`, area of both skins): the skins alone until the wall leaves room between them; fitted to the hollow bunny with edges of a

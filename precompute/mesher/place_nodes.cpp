@@ -6,6 +6,8 @@
 // Deviations: none.
 #include "precompute/mesher/place_nodes.hpp"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <set>
@@ -90,6 +92,15 @@ std::int64_t place_on_smooth_surface(mesh::TetMesh& mesh, const Body& body, bool
     }
   for (std::size_t v = 0; v < mesh.nodes_m.size(); ++v) mesh.nodes_m[v] = mesh.nodes_m[v] + way[v];
   return straight ? 0 : mesh::straighten_folded_elements(mesh);
+}
+
+void remark_doubt(const mesh::TetMesh& mesh, SurfaceReport& report) {
+  for (const Vec3& way : mesh.doubt_m) report.doubt_m = std::max(report.doubt_m, norm(way));
+  if (report.doubt_m > 0)
+    report.remarks.push_back(fmt::format(
+        "Some facets are so coarse that they may be planes of the body or samples of a smooth surface, up to {:.3g} m apart. What that "
+        "changes is stated next to the error bars. A surface in finer facets settles it, or --facets if they are planes.",
+        report.doubt_m));
 }
 
 }  // namespace carillon::mesher

@@ -12,4 +12,7 @@ namespace carillon::mesher {
 /// Returns the number of elements made straight. Nothing to do without body.round.
 std::int64_t place_on_smooth_surface(mesh::TetMesh& mesh, const Body& body, bool straight);
 
+/// Largest doubt of the nodes into the report, with a remark on coarse facets.
+void remark_doubt(const mesh::TetMesh& mesh, SurfaceReport& report);
+
 }  // namespace carillon::mesher

@@ -42,16 +42,13 @@ struct Border {
 };
 
 std::vector<Border> find_borders(const TriangleSurface& surface) {
-  std::unordered_map<Edge, int, EdgeHash> count;
-  count.reserve(2 * surface.triangles.size());
-  for (const Triangle& t : surface.triangles)
-    for (int c = 0; c < 3; ++c) ++count[make_edge(t[c], t[(c + 1) % 3])];
+  const FaceCounts count = count_faces(surface);
   std::vector<Border> borders;
   for (std::size_t f = 0; f < surface.triangles.size(); ++f)
     for (int c = 0; c < 3; ++c) {
       const Triangle& t = surface.triangles[f];
       const std::int32_t a = t[c], b = t[(c + 1) % 3];
-      if (a == b || count[make_edge(a, b)] != 1) continue;
+      if (a == b || count.at(make_edge(a, b)) != 1) continue;
       const double length = norm(surface.points[static_cast<std::size_t>(b)] - surface.points[static_cast<std::size_t>(a)]);
       if (length > 0.0) borders.push_back({static_cast<std::int32_t>(f), c, a, b, length});
     }

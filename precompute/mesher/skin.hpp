@@ -4,24 +4,25 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <unordered_set>
 #include <vector>
 
 #include "precompute/mesher/triangle_surface.hpp"
 
 namespace carillon::mesher {
 
-/// A triangle surface, open or closed, without an edge of three triangles. Folds are its sharp edges; its border is found by itself.
+/// A triangle surface, open or closed, without an edge of three triangles. Folds: its sharp edges without the border.
 struct Skin {
   TriangleSurface surface;
   std::vector<Edge> folds;
 };
 
-/// How long edges may be.
+/// Wanted length of edges.
 struct SkinSizes {
   double largest_m = 0;
-  double smallest_m = 0;     // where the surface bends more and more tightly
-  double per_radius = 0.35;  // of the smaller radius of curvature, as the remeshed surface has it
-  double reach_m = 0;        // how far a wall reaches from the surface: at folds edges span what its mitre takes, and margin_m more
+  double smallest_m = 0;     // at the tightest bends
+  double per_radius = 0.35;  // of the smaller radius of curvature of the remeshed surface
+  double reach_m = 0;        // thickness of a wall on the surface: edges at folds span its mitre and margin_m more
   double margin_m = 0;
 };
 
@@ -39,8 +40,8 @@ std::vector<std::array<Vec3, 3>> find_skin_normals(const Skin& skin);
 /// where they are. The same input gives the same triangles.
 Skin remesh(const Skin& skin, const SkinSizes& sizes, const SkinPlaces& places);
 
-/// Where edges leave a fold or border, a ring of narrow triangles follows it: each is cut at the distance from the fold that `distance_m`
-/// says. Where that is 0, or nearly the whole edge, it stays.
+/// A ring of narrow triangles along folds and borders: edges that leave them are cut at `distance_m` from the fold. A distance of 0, or of
+/// nearly the whole edge, cuts nothing.
 struct LeavingEdge {
   std::int32_t point = 0;  // on the fold
   Vec3 way{}, across{};    // unit: along the edge, and at right angles to the fold
@@ -50,11 +51,15 @@ inline constexpr double kMinSine = 0.3;
 using RingDistance = std::function<double(const LeavingEdge& edge)>;
 Skin add_rings(const Skin& skin, const SkinPlaces& places, const RingDistance& distance_m);
 
-/// Moves points and turns edges where a copy of a triangle, whose points lie `levels_m` along their `ways`, is folded over or much smaller
-/// than the other: in corners, where the mitres of several folds meet. Points on folds stay on them.
+/// Moves points and turns edges in corners between the mitres of several folds: no copy of a triangle, with its points `levels_m` along
+/// their `ways`, is folded over or much smaller than the other. Points on folds stay on them.
 Skin make_room(const Skin& skin, const SkinPlaces& places, const std::vector<Vec3>& ways, const std::array<double, 2>& levels_m);
 
-/// The edges of one triangle.
+/// The edges of one triangle, ascending.
 std::vector<Edge> find_border(const TriangleSurface& surface);
+
+using EdgeSet = std::unordered_set<Edge, EdgeHash>;
+/// Folds and borders.
+EdgeSet find_features(const Skin& skin);
 
 }  // namespace carillon::mesher

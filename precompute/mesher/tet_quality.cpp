@@ -15,6 +15,7 @@
 #include <unordered_map>
 
 #include "precompute/mesh/check.hpp"
+#include "precompute/mesh/curved.hpp"
 
 namespace carillon::mesher {
 namespace {
@@ -184,6 +185,13 @@ TetMeasures measure(const mesh::TetMesh& mesh) {
   }
   out.mean_edge_m = mesh.tet_count() > 0 ? edges / (6.0 * static_cast<double>(mesh.tet_count())) : 0;
   return out;
+}
+
+double calc_mesh_volume(const mesh::TetMesh& mesh) {
+  if (mesh.order == 1) return measure(mesh).volume_m3;
+  double sum = 0;
+  for (std::int64_t e = 0; e < mesh.tet_count(); ++e) sum += mesh::calc_curved_volume(mesh, e);
+  return sum;
 }
 
 std::vector<Triangle> find_boundary(const mesh::TetMesh& mesh) {

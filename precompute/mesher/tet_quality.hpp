@@ -17,6 +17,9 @@ struct TetMeasures {
 };
 TetMeasures measure(const mesh::TetMesh& mesh);
 
+/// Of straight or curved elements [m3].
+double calc_mesh_volume(const mesh::TetMesh& mesh);
+
 /// Faces that belong to one element, counter-clockwise seen from outside.
 std::vector<Triangle> find_boundary(const mesh::TetMesh& mesh);
 

@@ -1,7 +1,6 @@
-// One path from a surface to the elements of a wall, whose every step is measured against that surface; longer than most files.
 // Method: the skin is remeshed to edges by rule, its folds and rims get a ring of narrow triangles, and it is extruded. The number of nodes
-//   is met by changing the edges. What came out is compared with the volume of the parallel body, tested against running through itself
-//   and for tips that the triangles cut off.
+//   is met by changing the edges. The mesh is compared with the volume of the parallel body, and tested for crossings of its skin and for
+//   tips cut off by the triangles.
 // Source: the volume between parallel surfaces: Steiner's formula (Gray, "Tubes", 2nd ed., Birkhaeuser 2004); the length of bending waves:
 //   Cremer, Heckl and Petersson, "Structure-borne sound", 3rd ed., Springer 2005. How long edges may be: measured,
 //   docs/howto/thin-walls.md.
@@ -14,20 +13,15 @@
 #include <cmath>
 #include <map>
 #include <numbers>
-#include <numeric>
-#include <set>
-#include <unordered_map>
 
-#include "precompute/mesh/curved.hpp"
-#include "precompute/mesh/parts.hpp"
-#include "precompute/mesher/bends.hpp"
 #include "precompute/mesher/extrude.hpp"
+#include "precompute/mesher/place_nodes.hpp"
 #include "precompute/mesher/repair.hpp"
 #include "precompute/mesher/skin.hpp"
 #include "precompute/mesher/tet_quality.hpp"
+#include "precompute/mesher/wall_source.hpp"
 #include "runtime/base/failure.hpp"
 #include "runtime/base/json.hpp"
-#include "runtime/base/sort_order.hpp"
 
 namespace carillon::mesher {
 namespace {
@@ -37,20 +31,18 @@ constexpr double kMaxEdgePerWall = 8;
 constexpr double kWavesPerEdge = 12;
 constexpr double kRuleHz = 10000, kPlateSpeed = 5400;  // [m/s] of longitudinal waves in plates of steel, glass or aluminium
 constexpr double kPerRadius = 0.35, kMaxPerRadius = 0.7;
-constexpr double kMinPerWall = 0.8;        // the shortest edge that curvature may ask for, in walls
+constexpr double kMinPerWall = 0.8;        // shortest edges of curved places, in walls
 constexpr double kPointsPerArea = 1.1547;  // of a triangulation, times its edges' square
-constexpr double kCountTolerance = 0.10, kCountAim = 0.07;
+constexpr double kCountAim = 0.07;
 constexpr int kMaxAttempts = 8;
 constexpr double kRimRing = 0.7, kFoldRing = 0.2,
                  kFoldRingOfEdge = 0.5;  // walls from a rim to its ring, and from the inner corner of a fold
 constexpr double kRingFrom = 1.05;       // the mitre of a fold with a ring: it turns by 36 degrees
-constexpr double kNoiseLength = 2;       // edges: shorter isolated folds are noise
-constexpr std::size_t kScan = 2000;      // triangles of a surface whose sharp edges may be noise
 constexpr double kMaxHalfTurn = 1.32;    // of a fold that is mitred [radians]
 constexpr double kMaxVolumeError = 0.05, kMaxLost = 0.35;
 constexpr double kDefaultMaxNodes = 200'000;
 
-/// Points of the skin times this are nodes of the mesh, about.
+/// Nodes of the mesh per point of the skin, about.
 double calc_nodes_per_point(int order, int layers) { return order == 1 ? layers + 1 : 4 * (2 * layers + 1); }
 
 struct ThinSizes {
@@ -59,9 +51,9 @@ struct ThinSizes {
   double nodes = 0;  // about
 };
 
-/// Several layers pay where edges are shorter than the wall is thick, so that elements stay of one size in all directions.
+/// Edges shorter than the wall is thick get several layers: elements of one size in all directions.
 ThinSizes choose_sizes(double area_m2, double wall_m, const SurfaceOptions& options) {
-  constexpr double kPerLayer = 0.65;  // edges that are shorter than this part of a layer get another one
+  constexpr double kPerLayer = 0.65;  // shortest edge over the thickness of a layer
   constexpr int kMaxLayers = 6;
   ThinSizes sizes;
   for (;; ++sizes.layers) {
@@ -74,147 +66,6 @@ ThinSizes choose_sizes(double area_m2, double wall_m, const SurfaceOptions& opti
 }
 
 /// What the skin is made of, and what leads back to the surface.
-class Source {
- public:
-  Source(const Body& body, const SurfaceOptions& options, double edge_m)
-      : round_(body.round ? &*body.round : nullptr),
-        surface_(body.repaired.surface),
-        nearest_(body.repaired.surface),
-        facets_(round_ ? round_->get_facets() : body.repaired.surface) {
-    std::vector<Edge> folds;
-    if (round_) {
-      folds = round_->list_folds();
-    } else {
-      constexpr double kFlatDeg = 1;
-      for (const Bend& bend : find_bends(facets_, options.sharp_angle_deg).edges)
-        if (bend.count == 2 && (options.facets ? bend.turn_deg > kFlatDeg : bend.sharp)) folds.push_back(bend.ends);
-    }
-    refuse_shared();
-    const std::size_t all = folds.size();
-    if (!options.facets) drop_noise(folds, options.sharp_angle_deg, edge_m);
-    dropped_ = all - folds.size();
-    start_ = {facets_, folds};
-    find_lines(folds);
-  }
-
-  const Skin& get_start() const { return start_; }
-  const TriangleSurface& get_facets() const { return facets_; }
-  std::size_t get_dropped() const { return dropped_; }
-
-  Vec3 find(const Vec3& p) const {
-    const auto [at, triangle] = nearest_.find_on(p);
-    return round_ ? round_->find(triangle, at) : at;
-  }
-  Vec3 find_doubt(const Vec3& p) const {
-    if (!round_) return {};
-    const auto [at, triangle] = nearest_.find_on(p);
-    return round_->find_doubt(triangle, at);
-  }
-  bool is_doubtful() const { return round_ && round_->is_doubtful(); }
-  double calc_distance(const Vec3& p) const { return norm(nearest_.find(p) - p); }
-
-  /// The nearest point of the folds and borders.
-  Vec3 find_on_lines(const Vec3& p) const {
-    double best = HUGE_VAL;
-    Vec3 found = p;
-    for (const Line& line : lines_) {
-      const double off = norm(p - line.middle) - line.half;
-      if (off > 0 && off * off >= best) continue;
-      const double t = std::clamp(dot(p - line.a, line.way) / line.square, 0.0, 1.0);
-      const Vec3 q = line.a + t * line.way;
-      const double square = dot(p - q, p - q);
-      if (square < best) best = square, found = q;
-    }
-    return round_ ? find(found) : found;  // from the chord of the cut to the curve
-  }
-
- private:
-  struct Line {
-    Vec3 a, way, middle;
-    double square, half;
-  };
-
-  /// Isolated folds that are shorter than elements are noise; where there are many, all are.
-  void drop_noise(std::vector<Edge>& folds, double sharp_angle_deg, double edge_m) const {
-    if (facets_.triangles.size() > kScan) {
-      // Of a scan, only what is sharp at the size of elements too.
-      std::map<Vec3, std::int32_t> number;
-      for (const Triangle& t : facets_.triangles)
-        for (const std::int32_t v : t) number[facets_.points[v]] = v;
-      std::set<Edge> kept;
-      const double diagonal = calc_box(facets_.points).diagonal();
-      for (const Polyline& curve : find_sharp_curves(facets_, sharp_angle_deg, std::min(2 * edge_m, 0.1 * diagonal), 2 * edge_m))
-        for (std::size_t i = 1; i < curve.size(); ++i) {
-          const std::int32_t a = number.at(curve[i - 1]), b = number.at(curve[i]);
-          kept.insert(make_edge(a, b));
-        }
-      std::erase_if(folds, [&](const Edge& e) { return !kept.contains(e); });
-    }
-    mesh::Parts parts(facets_.points.size());
-    for (const auto& [a, b] : folds) parts.join(a, b);
-    std::map<std::int32_t, double> length;
-    const auto& p = facets_.points;
-    for (const auto& [a, b] : folds) length[parts.find(a)] += norm(p[b] - p[a]);
-    std::erase_if(folds, [&](const Edge& e) { return length[parts.find(e[0])] < kNoiseLength * edge_m; });
-  }
-
-  /// Throws where three triangles meet in an edge, or two parts of the surface in a point.
-  void refuse_shared() const {
-    std::unordered_map<Edge, int, EdgeHash> count;
-    for (const Triangle& t : facets_.triangles)
-      for (int c = 0; c < 3; ++c) ++count[make_edge(t[c], t[(c + 1) % 3])];
-    for (const Triangle& t : facets_.triangles)
-      for (int c = 0; c < 3; ++c) {
-        const int faces = count.at(make_edge(t[c], t[(c + 1) % 3]));
-        if (faces > 2)
-          throw WallError(fmt::format("cannot branch: {} triangles meet in one edge at {} (a T-junction)", faces,
-                                      format_place(0.5 * (facets_.points[t[c]] + facets_.points[t[(c + 1) % 3]]))));
-      }
-    // The corners at a point are connected by edges, or it is shared.
-    const std::size_t count_of_corners = 3 * facets_.triangles.size();
-    mesh::Parts parts(count_of_corners);
-    std::unordered_map<Edge, std::array<std::int32_t, 2>, EdgeHash> first;  // by edge: the corners at its lower and its higher point
-    for (std::size_t f = 0; f < facets_.triangles.size(); ++f)
-      for (int c = 0; c < 3; ++c) {
-        const Triangle& t = facets_.triangles[f];
-        std::array<std::int32_t, 2> corners{static_cast<std::int32_t>(3 * f) + c, static_cast<std::int32_t>(3 * f) + (c + 1) % 3};
-        if (t[c] > t[(c + 1) % 3]) std::swap(corners[0], corners[1]);
-        const auto [found, fresh] = first.try_emplace(make_edge(t[c], t[(c + 1) % 3]), corners);
-        if (fresh) continue;
-        for (int end = 0; end < 2; ++end) parts.join(corners[end], found->second[end]);
-      }
-    std::vector<std::int32_t> part(facets_.points.size(), -1);
-    for (std::int32_t c = 0; c < static_cast<std::int32_t>(count_of_corners); ++c) {
-      const std::int32_t v = facets_.triangles[c / 3][c % 3];
-      if (part[v] >= 0 && part[v] != parts.find(c))
-        throw WallError(
-            fmt::format("cannot be connected at one point only: two parts of the surface touch at {}", format_place(facets_.points[v])));
-      part[v] = parts.find(c);
-    }
-  }
-
-  void find_lines(const std::vector<Edge>& folds) {
-    std::vector<Edge> edges = round_ ? round_->list_lines() : folds;
-    if (!round_) {
-      const auto border = find_border(facets_);
-      edges.insert(edges.end(), border.begin(), border.end());
-    }
-    const auto& points = round_ ? surface_.points : facets_.points;
-    for (const auto& [a, b] : edges) {
-      const Vec3 way = points[b] - points[a];
-      if (dot(way, way) > 0) lines_.push_back({points[a], way, points[a] + 0.5 * way, dot(way, way), 0.5 * norm(way)});
-    }
-  }
-
-  const RoundSurface* round_;
-  const TriangleSurface& surface_;  // on which round_ was cut
-  NearestPoint nearest_;
-  const TriangleSurface& facets_;
-  Skin start_;
-  std::vector<Line> lines_;
-  std::size_t dropped_ = 0;
-};
-
 /// The volume between the levels low and high [m] of the surface, along its normals, by Steiner's formula.
 double calc_parallel_volume(const TriangleSurface& surface, double low, double high) {
   std::map<Edge, std::vector<std::int32_t>> faces;
@@ -263,7 +114,7 @@ std::array<double, 2> find_levels(Side side, double wall_m) {
 
 struct Attempt {
   Skin skin;
-  std::int64_t rings = 0;  // points that they added
+  std::int64_t rings = 0;  // points added by rings
   std::int64_t nodes = 0;
 };
 
@@ -302,8 +153,9 @@ class ThinMesher {
     run_("remeshing the skin", [&] { attempt = meet_count(); });
     Extruded extruded;
     run_("extruding", [&] { extruded = extrude_or_retry(attempt); });
-    run_("comparing with the body", [&] { compare(attempt.skin, extruded); });
+    run_("comparing with the body", [&] { compare(attempt.skin, extruded.mesh); });
     fill_report(attempt, extruded);
+    spread_doubt(attempt.skin.surface, extruded);
     return std::move(extruded.mesh);
   }
 
@@ -329,8 +181,8 @@ class ThinMesher {
       const Vec3 &out = ways[static_cast<std::size_t>(v)], &across = leaving.across;
       double distance = on_border[v] != 0 ? kRimRing * wall : 0;
       if (norm(out) > kRingFrom) {
-        // The mitre takes so much of the ring's side at the wall's inner corner. A measured corner lies off the plane of edge and fold
-        // where the wall is round, and counts along the edge.
+        // Width of the mitre at the wall's inner corner. The measured corner of a round wall lies off the plane of edge and fold, and
+        // counts along the edge.
         const auto point = static_cast<std::size_t>(v);
         const double shift = low_source_ ? dot(low[point] - plain.surface.points[point], leaving.way) / leaving.sine
                                          : std::max(levels_[0] * dot(out, across), levels_[1] * dot(out, across));
@@ -350,9 +202,9 @@ class ThinMesher {
     const double first = edge_;
     double nearest = 0;
     Attempt best;
-    // Curved places may get coarser than the rule, as far as their arcs allow, and finer with the rest.
+    // Curved places: coarser than the rule as far as their arcs allow, and finer with the rest.
     const double rule = options_.edge_m ? edge_ : find_edge_rule(body_.wall_m);
-    double low = 0, high = HUGE_VAL;  // edges that gave too many and too few
+    double low = 0, high = HUGE_VAL;  // edges with too many and too few nodes
     for (int n = 0; n < kMaxAttempts; ++n) {
       Attempt attempt = make_skin(edge_, std::min(kMaxPerRadius, std::max(radius * edge_ / rule, 0.5 * radius)));
       const auto count = static_cast<double>(attempt.nodes);
@@ -372,7 +224,7 @@ class ThinMesher {
     return best;
   }
 
-  /// Where the mitres of folds meet in corners, triangles need room for both sides of the wall; whether they find it depends on the edges.
+  /// Triangles in corners, between the mitres of folds, need room for both sides of the wall; other edges may give it.
   Extruded extrude_or_retry(Attempt& attempt) {
     constexpr std::array<double, 7> kFactors{1, 1.06, 0.94, 1.12, 0.88, 1.2, 0.8};
     const bool may_retry = !low_source_ && !attempt.skin.folds.empty();
@@ -424,13 +276,9 @@ class ThinMesher {
     return low;
   }
 
-  /// Throws where the mesh is not the body.
-  void compare(const Skin& skin, const Extruded& extruded) {
-    mesh::TetMesh linear;
-    linear.nodes_m = extruded.mesh.nodes_m;
-    for (std::int64_t e = 0; e < extruded.mesh.tet_count(); ++e)
-      linear.tets.insert(linear.tets.end(), extruded.mesh.tet(e).begin(), extruded.mesh.tet(e).begin() + 4);
-    TriangleSurface hull{linear.nodes_m, find_boundary(linear)};
+  /// Throws WallError for a mesh that is not the body.
+  void compare(const Skin& skin, const mesh::TetMesh& mesh) {
+    const TriangleSurface hull{mesh.nodes_m, find_boundary(mesh)};
     if (const auto crossing = find_crossing(hull)) {
       const Triangle& t = hull.triangles[(*crossing)[0]];
       const Vec3 at = (1.0 / 3) * (hull.points[t[0]] + hull.points[t[1]] + hull.points[t[2]]);
@@ -438,7 +286,7 @@ class ThinMesher {
                                   1000 * body_.wall_m, format_place(at)));
     }
     report_.shells = static_cast<std::int64_t>(split_parts(hull).size());
-    // Tips and steps that the triangles cut off.
+    // Tips and steps cut off by the triangles.
     const NearestPoint nearest(skin.surface);
     double farthest = 0;
     Vec3 where{};
@@ -454,24 +302,20 @@ class ThinMesher {
       throw WallError(
           fmt::format("in edges of {:.3g} mm lacks {:.3g} mm of the surface at {}", 1000 * edge_, 1000 * farthest, format_place(where)));
     report_.farthest_outside_m = 0;
-    report_.volume_m3 = 0;
-    if (order_ == 2)
-      for (std::int64_t e = 0; e < extruded.mesh.tet_count(); ++e) report_.volume_m3 += mesh::calc_curved_volume(extruded.mesh, e);
-    else
-      report_.volume_m3 = measure(linear).volume_m3;
+    report_.volume_m3 = calc_mesh_volume(mesh);
     report_.expected_volume_m3 =
         body_.expected_volume_m3 > 0 ? body_.expected_volume_m3 : calc_parallel_volume(body_.skin.repaired.surface, levels_[0], levels_[1]);
     const double off = report_.volume_m3 / report_.expected_volume_m3 - 1;
     if (std::abs(off) > kMaxVolumeError)
       throw WallError(fmt::format("in edges of {:.3g} mm has {:+.1f} % of the body's volume too {}", 1000 * edge_, 100 * std::abs(off),
                                   off > 0 ? "much" : "little"));
-    const TetMeasures measures = measure(linear);
+    const TetMeasures measures = measure(mesh);
     report_.min_dihedral_deg = measures.min_dihedral_deg;
     report_.max_dihedral_deg = measures.max_dihedral_deg;
   }
 
-  void fill_report(const Attempt& attempt, Extruded& extruded) {
-    mesh::TetMesh& mesh = extruded.mesh;
+  void fill_report(const Attempt& attempt, const Extruded& extruded) {
+    const mesh::TetMesh& mesh = extruded.mesh;
     const auto& p = attempt.skin.surface.points;
     double sum = 0;
     for (const auto& [a, b] : extruded.edges) sum += norm(p[b] - p[a]);
@@ -509,37 +353,35 @@ class ThinMesher {
     if (order_ == 1)
       note("One layer of linear elements is far too stiff in bending: its frequencies are of no use but for a first look; take order 2.");
     if (attempt.rings > 0) remark(fmt::format("Folds and rims have a ring of narrow elements ({} points of the skin).", attempt.rings));
-    if (source_.get_dropped() > 0)
-      remark(fmt::format("{} sharp edges of facets are shorter than elements and were taken for noise.", source_.get_dropped()));
+    if (source_.count_dropped_folds() > 0)
+      remark(fmt::format("{} sharp edges of facets are shorter than elements and were taken for noise.", source_.count_dropped_folds()));
     if (lost_ > 0.1 * edge_)
       note(fmt::format("The elements cut off up to {:.3g} mm of the surface's details; more nodes keep them.", 1000 * lost_));
-    if (source_.is_doubtful()) {
-      mesh.doubt_m.assign(mesh.nodes_m.size(), Vec3{});
-      const auto points = static_cast<std::int32_t>(p.size());
-      std::vector<Vec3> way(p.size());
-      for (std::int32_t v = 0; v < points; ++v) {
-        way[v] = source_.find_doubt(p[v]);
-        for (int l = 0; l <= layers_; ++l) mesh.doubt_m[l * points + v] = way[v];
-      }
-      // Mid nodes of the skin's edges have their own, the others the mean of their ends'.
-      if (order_ == 2)
-        for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
-          for (std::size_t m = 0; m < 6; ++m)
-            mesh.doubt_m[mesh.tet(e)[4 + m]] =
-                0.5 * (way[mesh.tet(e)[mesh::kEdges[m][0]] % points] + way[mesh.tet(e)[mesh::kEdges[m][1]] % points]);
-      for (std::size_t e = 0; e < extruded.mid_nodes.size(); ++e)
-        for (const std::int32_t node : extruded.mid_nodes[e])
-          mesh.doubt_m[node] = source_.find_doubt(0.5 * (p[extruded.edges[e][0]] + p[extruded.edges[e][1]]));
-      for (const Vec3& w : mesh.doubt_m) report_.doubt_m = std::max(report_.doubt_m, norm(w));
-      if (report_.doubt_m > 0)
-        remark(
-            fmt::format("Some facets are so coarse that they may be planes of the body or samples of a smooth surface, up to {:.3g} m "
-                        "apart. What that changes is stated next to the error bars. A surface in finer facets settles it, or --facets if "
-                        "they are planes.",
-                        report_.doubt_m));
-      else
-        mesh.doubt_m.clear();
+  }
+
+  /// Doubt of the surface at every node of the mesh; none for a surface without doubt.
+  void spread_doubt(const TriangleSurface& skin, Extruded& extruded) {
+    if (!source_.is_doubtful()) return;
+    mesh::TetMesh& mesh = extruded.mesh;
+    const auto& p = skin.points;
+    mesh.doubt_m.assign(mesh.nodes_m.size(), Vec3{});
+    const auto points = static_cast<std::int32_t>(p.size());
+    std::vector<Vec3> way(p.size());
+    for (std::int32_t v = 0; v < points; ++v) {
+      way[v] = source_.find_doubt(p[v]);
+      for (int l = 0; l <= layers_; ++l) mesh.doubt_m[l * points + v] = way[v];
     }
+    // Mid nodes of the skin's edges have their own, the others the mean of their ends'.
+    if (order_ == 2)
+      for (std::int64_t e = 0; e < mesh.tet_count(); ++e)
+        for (std::size_t m = 0; m < 6; ++m)
+          mesh.doubt_m[mesh.tet(e)[4 + m]] =
+              0.5 * (way[mesh.tet(e)[mesh::kEdges[m][0]] % points] + way[mesh.tet(e)[mesh::kEdges[m][1]] % points]);
+    for (std::size_t e = 0; e < extruded.mid_nodes.size(); ++e)
+      for (const std::int32_t node : extruded.mid_nodes[e])
+        mesh.doubt_m[node] = source_.find_doubt(0.5 * (p[extruded.edges[e][0]] + p[extruded.edges[e][1]]));
+    remark_doubt(mesh, report_);
+    if (!(report_.doubt_m > 0)) mesh.doubt_m.clear();
   }
 
   const ThinBody& body_;
@@ -548,8 +390,8 @@ class ThinMesher {
   const RunPhase& run_;
   double edge_;
   std::array<double, 2> levels_;
-  Source source_;
-  std::optional<Source> low_source_;
+  WallSource source_;
+  std::optional<WallSource> low_source_;
   SkinPlaces places_;
   int order_, layers_;
   double lost_ = 0;
@@ -574,97 +416,11 @@ std::string format_thin_estimate(double area_m2, double wall_m, const SurfaceOpt
   return estimate.line();
 }
 
-std::optional<TwoSides> find_two_sides(const TriangleSurface& closed) {
-  constexpr double kFacing = 0.9;  // cosine
-  constexpr double kMaxOfDiagonal = 0.2, kMaxOfMedian = 3;
-  constexpr double kMinSide = 0.3, kMaxRim = 0.25;  // of the area
-  constexpr std::size_t kMaxTriangles = 200'000;
-  const std::size_t count = closed.triangles.size();
-  if (count > kMaxTriangles) return std::nullopt;
-  const NearestPoint tree(closed);
-  std::vector<Vec3> normal(count);
-  std::vector<double> area(count), way(count, HUGE_VAL);
-  std::vector<std::int32_t> other(count, -1);
-  for (std::size_t f = 0; f < count; ++f) {
-    const Triangle& t = closed.triangles[f];
-    const Vec3 a = cross(closed.points[t[1]] - closed.points[t[0]], closed.points[t[2]] - closed.points[t[0]]);
-    area[f] = 0.5 * norm(a);
-    if (area[f] > 0) normal[f] = normalise(a);
-  }
-  for (std::size_t f = 0; f < count; ++f) {
-    if (!(area[f] > 0)) continue;
-    const Triangle& t = closed.triangles[f];
-    const Vec3 middle = (1.0 / 3) * (closed.points[t[0]] + closed.points[t[1]] + closed.points[t[2]]);
-    const auto hit = tree.find_hit(middle, -1.0 * normal[f], static_cast<std::int32_t>(f));
-    if (!hit || -dot(normal[f], normal[hit->second]) < kFacing) continue;
-    way[f] = hit->first;
-    other[f] = hit->second;
-  }
-  const double all = std::accumulate(area.begin(), area.end(), 0.0);
-  double sum = 0, median = HUGE_VAL;
-  for (const std::size_t f : base::find_sort_order(way))
-    if ((sum += area[f]) >= 0.5 * all) {
-      median = way[f];
-      break;
-    }
-  if (!(median < kMaxOfDiagonal * calc_box(closed.points).diagonal())) return std::nullopt;
-  std::vector<char> thin(count, 0);
-  for (std::size_t f = 0; f < count; ++f) thin[f] = way[f] < kMaxOfMedian * median;
-  // The sides: thin triangles that are connected by edges.
-  mesh::Parts parts(count);
-  std::unordered_map<Edge, std::int32_t, EdgeHash> first;
-  for (std::size_t f = 0; f < count; ++f) {
-    if (thin[f] == 0) continue;
-    const Triangle& t = closed.triangles[f];
-    for (int c = 0; c < 3; ++c) {
-      const auto [found, fresh] = first.try_emplace(make_edge(t[c], t[(c + 1) % 3]), static_cast<std::int32_t>(f));
-      if (!fresh) parts.join(static_cast<std::int32_t>(f), found->second);
-    }
-  }
-  std::map<std::int32_t, double> sides;
-  for (std::size_t f = 0; f < count; ++f)
-    if (thin[f] != 0) sides[parts.find(static_cast<std::int32_t>(f))] += area[f];
-  std::vector<std::pair<double, std::int32_t>> largest;
-  for (const auto& [side, a] : sides) largest.emplace_back(-a, side);
-  std::sort(largest.begin(), largest.end());
-  if (largest.size() < 2 || -largest[1].first < kMinSide * all) return std::nullopt;
-  if (all + largest[0].first + largest[1].first > kMaxRim * all) return std::nullopt;
-  double facing = 0;
-  TwoSides result;
-  result.thickness_m = median;
-  for (std::size_t f = 0; f < count; ++f) {
-    if (thin[f] == 0) continue;
-    const std::int32_t side = parts.find(static_cast<std::int32_t>(f));
-    for (int n = 0; n < 2; ++n) {
-      if (side != largest[n].second) continue;
-      (n == 0 ? result.outer : result.inner).triangles.push_back(closed.triangles[f]);
-      if (thin[other[f]] != 0 && parts.find(other[f]) == largest[1 - n].second) facing += area[f];
-    }
-  }
-  constexpr double kMinFacing = 0.9;
-  if (facing < kMinFacing * -(largest[0].first + largest[1].first)) return std::nullopt;
-  for (TriangleSurface* side : {&result.outer, &result.inner}) {
-    std::unordered_map<std::int32_t, std::int32_t> number;
-    for (Triangle& t : side->triangles)
-      for (std::int32_t& v : t) {
-        const auto [found, fresh] = number.try_emplace(v, static_cast<std::int32_t>(side->points.size()));
-        if (fresh) side->points.push_back(closed.points[v]);
-        v = found->second;
-      }
-  }
-  return result;
-}
-
 mesh::TetMesh mesh_thin_wall(const ThinBody& body, const SurfaceOptions& options, SurfaceReport& report, const RunPhase& run,
                              const std::function<void(const std::string&)>& show) {
   const double area = calc_area(body.skin.repaired.surface);
   const ThinSizes sizes = choose_sizes(area, body.wall_m, options);
-  if (sizes.nodes > kMaxNodes)
-    throw InputError(fmt::format("{}: edges of {:.3g} m would give about {:.3g} nodes, more than {:.0g}; ask for longer ones",
-                                 options.surface.string(), sizes.edge_m, sizes.nodes, kMaxNodes));
-  if (const double size = calc_box(body.skin.repaired.surface.points).diagonal(); sizes.edge_m > size && options.edge_m)
-    throw InputError(fmt::format("{}: edges of {:.3g} m are longer than the body ({:.3g} m); ask for shorter ones",
-                                 options.surface.string(), sizes.edge_m, size));
+  check_edge(options, sizes.edge_m, calc_box(body.skin.repaired.surface.points).diagonal(), sizes.nodes, kMaxNodes);
   show(fmt::format("estimate {}", format_thin_estimate(area, body.wall_m, options)));
   return ThinMesher(body, options, report, run).make();
 }

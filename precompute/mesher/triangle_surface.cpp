@@ -13,6 +13,13 @@
 
 namespace carillon::mesher {
 
+FaceCounts count_faces(const TriangleSurface& surface) {
+  FaceCounts count;
+  for (const Triangle& t : surface.triangles)
+    for (int c = 0; c < 3; ++c) ++count[make_edge(t[c], t[(c + 1) % 3])];
+  return count;
+}
+
 Box calc_box(const std::vector<Vec3>& points) {
   constexpr double kHuge = std::numeric_limits<double>::max();
   Box box{{kHuge, kHuge, kHuge}, {-kHuge, -kHuge, -kHuge}};

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <unordered_map>
 #include <vector>
 
 #include "precompute/mesh/tet_mesh.hpp"
@@ -31,6 +32,10 @@ struct TriangleSurface {
   std::vector<Vec3> points;         // (P)
   std::vector<Triangle> triangles;  // (T), counter-clockwise seen from outside once repaired
 };
+
+/// Triangles at each edge.
+using FaceCounts = std::unordered_map<Edge, int, EdgeHash>;
+FaceCounts count_faces(const TriangleSurface& surface);
 
 /// The corners of the axis-aligned box around some points: lowest, highest.
 struct Box {

@@ -1,0 +1,19 @@
+// Bodies that are meshed as walls, by extrusion of their skins.
+#pragma once
+
+#include <optional>
+
+#include "precompute/mesh/tet_mesh.hpp"
+#include "precompute/mesher/phases.hpp"
+#include "precompute/mesher/thin_wall.hpp"
+
+namespace carillon::mesher {
+
+/// An open sheet with a wall. Throws InputError if it cannot be extruded.
+mesh::TetMesh make_sheet(Sheet sheet, const SurfaceOptions& options, SurfaceReport& report, Phases& phases);
+
+/// The wall of a closed body by extrusion: as asked for, or thinner than its elements are long. Empty for a body left to the volume
+/// meshers, with the reason in the report. Throws InputError if extrusion was asked for and is impossible.
+std::optional<mesh::TetMesh> make_thin(const Body& body, const SurfaceOptions& options, SurfaceReport& report, Phases& phases);
+
+}  // namespace carillon::mesher
