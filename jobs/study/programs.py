@@ -20,15 +20,10 @@ def read_seconds(text):
     return value
 
 
-# Beginnings of the names that launchers of MPI set for their ranks (runtime/base/environment.cpp).
-OF_RUNS = ("OMPI_COMM_WORLD_", "OMPI_UNIVERSE_", "OMPI_FIRST_RANKS", "OMPI_NUM_APP", "OMPI_APP_CTX", "OMPI_FILE_LOCATION", "OMPI_COMMAND")
-OF_RUNS += ("OMPI_ARGV", "OMPI_MCA_ess", "OMPI_MCA_pmix", "OMPI_MCA_orte_", "OMPI_MCA_initial_wdir", "PMIX_", "PMI_", "PRTE_")
-
-
 def leave_run():
-    """What this process starts is no rank of an MPI run that the process may be in."""
-    for name in [name for name in os.environ if name.startswith(OF_RUNS)]:
-        del os.environ[name]
+    """Where this process is in an MPI run, carillon study takes its place: what that starts is no rank of the run."""
+    if not {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK"}.isdisjoint(os.environ):
+        os.execv(find_program(None, "carillon"), ["carillon", "study", *sys.argv[1:]])
 
 
 def find_program(given, name="carillon-precompute"):

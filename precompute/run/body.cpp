@@ -69,14 +69,11 @@ void warn_of_mesh(Run& run, const Body& body) {
     run.log.warn(i == 0 && body.check.has_odd_size ? warnings[i] + "; " + describe_scale_key(run.job) : warnings[i]);
 }
 
-/// Once, however many meshes are made of the surface.
 void warn_of_facets(Run& run) {
-  const std::string text = fmt::format(
+  run.log.warn_once(fmt::format(
       "some facets of the surface are so coarse that they may be planes of the body or samples of a smooth surface; what that changes is "
       "stated next to the error bars (facets in doubt); a surface in finer facets settles it, or {} if they are planes",
-      run.job.body ? "\"facets\": true inside \"body\"" : "carillon-mesh --facets");
-  const std::vector<std::string>& before = run.log.get_warnings();
-  if (std::find(before.begin(), before.end(), text) == before.end()) run.log.warn(text);
+      run.job.body ? "\"facets\": true inside \"body\"" : "carillon-mesh --facets"));
 }
 
 /// Rank 0 only: the mesh of the element's order, checked, and what stays of it on this rank.

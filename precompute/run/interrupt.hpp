@@ -7,9 +7,6 @@
 
 namespace carillon::run {
 
-/// Whether this process prints for all that its launcher started; known before MPI has started.
-bool is_first_of_all();
-
 /// From now on such a signal ends this process at once with exit code 128 + signal: the first of all prints one line, "PROGRAM: stopped by
 /// SIGTERM; UNTOUCHED", the mesher is ended, and temporary folders and TemporaryFiles that exist are removed. Nothing else needs
 /// to be undone: outputs have no name before they are whole (base::write_file). mpirun ends the other ranks when one of them is ended like

@@ -9,6 +9,9 @@ namespace carillon::base {
 /// Has a launcher of MPI (mpirun, srun) started this process, or a program that did?
 bool is_launched();
 
+/// Whether this process prints for all that its launcher started; known before MPI has started.
+bool is_first_of_all();
+
 /// Has MPI start this process by itself, unless it was launched, or the user decided otherwise: without a daemon, which would need a
 /// network and 0.15 s, and without a session folder, which would be left by a process that a signal ends.
 void isolate_lone_process();

@@ -16,4 +16,7 @@ std::string show_message(std::string_view text);
 /// The name by which people know a file: where "/proc/self/fd/N/NAME" leads, while N is open; others as they are.
 std::string find_name(const std::filesystem::path& file);
 
+/// What to do about `error`, a value of errno, of a file that cannot be made, written or locked: the end of a message.
+const char* find_advice(int error);
+
 }  // namespace carillon::base
