@@ -23,6 +23,7 @@
 #include "precompute/run/run_log.hpp"
 #include "precompute/run/same_start.hpp"
 #include "precompute/run/validate.hpp"
+#include "runtime/base/environment.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/file_limit.hpp"
 #include "runtime/base/message.hpp"
@@ -196,7 +197,7 @@ int run_program(const petsc::Session& session, const CommandLine& words) {
 
 /// Of one process: under mpirun the first prints.
 int print_estimate(const CommandLine& words) {
-  if (!run::is_first_of_all()) return 0;
+  if (!base::is_first_of_all()) return 0;
   base::Result result;
   try {
     fmt::print("{}\n", run::estimate_costs(words.estimate));
@@ -215,10 +216,10 @@ int main(int argc, char** argv) {
   std::string result;  // file; empty: none
   try {
     const CommandLine words(argc, argv);
-    if (words.only_asks()) return run::is_first_of_all() ? words.app.exit(*words.error) : 0;
+    if (words.only_asks()) return base::is_first_of_all() ? words.app.exit(*words.error) : 0;
     if (!words.error && !words.estimate.empty()) return print_estimate(words);
     if (!words.error && !words.options.folder.empty()) run::enter_folder(words.options.folder[0], words.options.folder[1]);
-    if (run::is_first_of_all()) result = words.result;
+    if (base::is_first_of_all()) result = words.result;
     run::end_on_signals("carillon-precompute", "the bank was not touched, or it is whole");
     if (!words.options.checkpoint.empty()) run::save_on_signals();
     const petsc::Session session(argc, argv, words.options.solver_options);

@@ -158,8 +158,7 @@ Json::Value explain_one(Shared& shared, const Source& source) {
 int run_explain(Shared& shared, const ExplainOptions& options) {
   shared.only_reads = true;
   const std::string solver = read_solver_version();
-  const std::vector<Source> sources =
-      is_of_many(options.word) ? gather({options.word}, solver) : std::vector{gather_one(options.word, solver)};
+  const std::vector<Source> sources = gather({options.word}, solver);
   shared.settle();
   Json::Value root;
   for (const Source& source : sources) root["jobs"].append(explain_one(shared, source));

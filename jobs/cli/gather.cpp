@@ -167,15 +167,6 @@ std::vector<std::string> list_job_files(const std::string& word) {
 }
 
 Source gather_one(const std::string& word, const std::string& solver) {
-  if (split_line(word).second == 0) {
-    Source source;
-    source.job_file = name_of(word);
-    source.order = store::read_order(word);
-    source.request =
-        store::RequestMaker(solver, source.order.is_simulation() ? read_program_version("carillon-simulate") : "").make(source.order);
-    source.request.job_file = source.job_file;
-    return source;
-  }
   Source source = gather({word}, solver).front();
   if (!source.error.empty()) throw InputError(source.error);
   return source;
@@ -199,8 +190,7 @@ std::vector<Named> find_all_by_content(Shared& shared, const std::vector<std::st
       continue;
     }
     if (solver.empty()) solver = read_solver_version();
-    const std::vector<Source> sources = is_of_many(word) ? gather({word}, solver) : std::vector{gather_one(word, solver)};
-    for (const Source& source : sources) {
+    for (const Source& source : gather({word}, solver)) {
       if (!source.error.empty()) throw InputError(source.error);
       const store::Id id = store::require_id(source.request.id, source.job_file);
       add(id, shared.registry().find(id), registry::find_name(source.job_file));

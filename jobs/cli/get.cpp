@@ -117,8 +117,7 @@ Json::Value describe(const Got& got, const fs::path& to, bool is_one) {
   for (const auto& [key, file] : got.results) root["results"][key] = to_json(file.string());
   root["copy"] = Json::Value();
   if (!got.copies.empty())
-    root["copy"] =
-        to_json((is_one || got.is_bank() ? (is_one ? to : got.copies.at("bank")) : got.copies.begin()->second.parent_path()).string());
+    root["copy"] = to_json((is_one ? to : got.is_bank() ? got.copies.at("bank") : got.copies.begin()->second.parent_path()).string());
   return root;
 }
 

@@ -149,12 +149,11 @@ std::vector<std::string> format_bars(Shared& shared, const std::vector<registry:
   }
   if (shown < jobs.size()) lines.push_back(fmt::format("... and {} more; --all shows them", jobs.size() - shown));
   lines.push_back(cut(format_counts(jobs), columns));
-  std::size_t left = kinds.list().size();
-  for (const std::string& kind : kinds.list()) {
-    const bool is_room_for_all = left <= 1 || lines.size() + 1 < rows;
-    if (lines.size() >= rows) break;
-    lines.push_back(is_room_for_all ? cut("warning " + kind, columns) : fmt::format("... and {} more kinds of warnings", left));
-    --left;
+  const std::vector<std::string> warnings = kinds.list();
+  for (std::size_t k = 0; k < warnings.size() && lines.size() < rows; ++k) {
+    const bool has_room = k + 1 == warnings.size() || lines.size() + 1 < rows;
+    lines.push_back(has_room ? cut("warning " + warnings[k], columns)
+                             : fmt::format("... and {} more kinds of warnings", warnings.size() - k));
   }
   return lines;
 }

@@ -119,13 +119,14 @@ void print_warnings(Shared& shared, const std::vector<SubmitResult>& results) {
   store::WarningKinds kinds;
   for (const SubmitResult& result : results) {
     if (!result.job) continue;
-    for (const std::string& warning : find_own_warnings(shared, result)) kinds.add(show(result.job->name), show_message(warning));
+    for (const std::string& warning : find_own_warnings(shared, result)) {
+      if (results.size() > 1)
+        kinds.add(show(result.job->name), show_message(warning));
+      else
+        fmt::print(stderr, "carillon: {}: warning: {}\n", show(result.job->name), show_message(warning));
+    }
   }
-  if (results.size() == 1 && results[0].job)
-    for (const std::string& warning : find_own_warnings(shared, results[0]))
-      fmt::print(stderr, "carillon: {}: warning: {}\n", show(results[0].job->name), show_message(warning));
-  else
-    for (const std::string& line : kinds.list()) fmt::print(stderr, "carillon: warning {}\n", line);
+  for (const std::string& line : kinds.list()) fmt::print(stderr, "carillon: warning {}\n", line);
 }
 
 void print_lines(Shared& shared, const std::vector<SubmitResult>& results) {

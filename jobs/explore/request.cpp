@@ -8,6 +8,8 @@
 #include <charconv>
 #include <optional>
 
+#include "runtime/base/percent.hpp"
+
 namespace carillon::explore {
 namespace {
 
@@ -31,9 +33,9 @@ std::string_view take(std::string_view& text, char separator) {
 }
 
 /// A number of digits alone; none for other characters and for overflow of 64 bits.
-std::optional<std::uint64_t> parse_count(std::string_view text, int base = 10) {
+std::optional<std::uint64_t> parse_count(std::string_view text) {
   std::uint64_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, base);
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (text.empty() || error != std::errc() || end != text.data() + text.size()) return std::nullopt;
   return value;
 }
@@ -41,18 +43,8 @@ std::optional<std::uint64_t> parse_count(std::string_view text, int base = 10) {
 /// The path of a target, percent encoding decoded; empty for an invalid path.
 std::string decode_path(std::string_view target) {
   target = target.substr(0, target.find_first_of("?#"));
-  std::string path;
-  for (std::size_t i = 0; i < target.size(); ++i) {
-    if (target[i] != '%') {
-      path += target[i];
-      continue;
-    }
-    const auto code = i + 3 <= target.size() ? parse_count(target.substr(i + 1, 2), 16) : std::nullopt;
-    if (!code || *code == 0) return {};
-    path += static_cast<char>(*code);
-    i += 2;
-  }
-  return path.empty() || path[0] != '/' ? std::string() : path;
+  const std::string path = base::decode_percent(target).value_or("");
+  return path.starts_with('/') ? path : std::string();
 }
 
 }  // namespace

@@ -20,6 +20,8 @@
 #include <fstream>
 #include <sstream>
 
+#include "runtime/base/message.hpp"
+
 namespace carillon::process {
 namespace {
 
@@ -145,9 +147,7 @@ int end_with_environment(std::string_view entry, double patience_s, double grace
 
 std::optional<Lock> Lock::take(const fs::path& file) {
   const auto refuse = [&](const char* what) {
-    throw SystemError(fmt::format("{}: cannot {}: {}; {}", file.string(), what, std::strerror(errno),
-                                  errno == ENOLCK || errno == EOPNOTSUPP ? "this file system keeps no locks: choose another folder"
-                                                                         : "check the folder's rights and the space on the disk"));
+    throw SystemError(fmt::format("{}: cannot {}: {}; {}", file.string(), what, std::strerror(errno), base::find_advice(errno)));
   };
   for (;;) {
     const int descriptor = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);

@@ -91,8 +91,8 @@ Html make_mode_table(const Subject& subject) {
                               {"kind"}};
   if (!bank.facet_error_cents.empty()) columns.push_back({"facets in doubt [cent]", true});
   Table table(columns);
-  const std::vector<bank::ModeKind> kinds = bank::find_kinds(bank);
   const std::size_t shown = std::min(kMaxModeRows, bank.mode_count());
+  const std::vector<bank::ModeKind> kinds = bank::find_kinds(bank, shown);
   const bool is_corrected = !bank.corrected.is_empty();
   for (std::size_t i = 0; i < shown; ++i) {
     const bank::HeardMode& heard = subject.heard[i];

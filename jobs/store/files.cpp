@@ -11,6 +11,7 @@
 
 #include "runtime/base/failure.hpp"
 #include "runtime/base/file.hpp"
+#include "runtime/base/message.hpp"
 
 namespace carillon::store {
 namespace {
@@ -36,11 +37,9 @@ void make_folder(const fs::path& folder) {
 }
 
 void throw_errno(const fs::path& path, const std::string& verb, int error) {
-  const char* advice = error == EFBIG                                        ? "files may not be so large here: raise the limit (ulimit -f)"
-                       : error == ENOLCK || error == EOPNOTSUPP              ? "this file system keeps no locks: choose another folder"
-                       : base::is_full_error(error)                          ? kFullAdvice
+  const char* advice = error != EFBIG && base::is_full_error(error)          ? kFullAdvice
                        : error == EACCES || error == EPERM || error == EROFS ? "check owner, group and rights"
-                                                                             : "check the disk";
+                                                                             : base::find_advice(error);
   throw_system_error(error, fmt::format("{}: cannot {}: {}; {}", path.string(), verb, std::strerror(error), advice));
 }
 

@@ -127,8 +127,8 @@ def run_study(options):
 
 def main():
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
-    programs.leave_run()
     try:
+        programs.leave_run()
         return run(sys.argv[1:])
     except InputError as error:
         code, text = 2, error

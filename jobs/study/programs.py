@@ -20,15 +20,10 @@ def read_seconds(text):
     return value
 
 
-# Prefixes of the variables that MPI launchers set for their ranks (runtime/base/environment.cpp).
-OF_RUNS = ("OMPI_COMM_WORLD_", "OMPI_UNIVERSE_", "OMPI_FIRST_RANKS", "OMPI_NUM_APP", "OMPI_APP_CTX", "OMPI_FILE_LOCATION", "OMPI_COMMAND")
-OF_RUNS += ("OMPI_ARGV", "OMPI_MCA_ess", "OMPI_MCA_pmix", "OMPI_MCA_orte_", "OMPI_MCA_initial_wdir", "PMIX_", "PMI_", "PRTE_")
-
-
 def leave_run():
-    """Takes child processes out of the MPI run of this process."""
-    for name in [name for name in os.environ if name.startswith(OF_RUNS)]:
-        del os.environ[name]
+    """In an MPI run, replaces this process by `carillon study`, which starts its children outside the run."""
+    if not {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK"}.isdisjoint(os.environ):
+        os.execv(find_program(None, "carillon"), ["carillon", "study", *sys.argv[1:]])
 
 
 def find_program(given, name="carillon-precompute"):

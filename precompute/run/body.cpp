@@ -71,12 +71,10 @@ void warn_of_mesh(Run& run, const Body& body) {
 
 /// Warns once, for any number of meshes of the surface.
 void warn_of_facets(Run& run) {
-  const std::string text = fmt::format(
+  run.log.warn_once(fmt::format(
       "some facets of the surface are so coarse that they may be planes of the body or samples of a smooth surface; what that changes is "
       "stated next to the error bars (facets in doubt); a surface in finer facets settles it, or {} if they are planes",
-      run.job.body ? "\"facets\": true inside \"body\"" : "carillon-mesh --facets");
-  const std::vector<std::string>& before = run.log.get_warnings();
-  if (std::find(before.begin(), before.end(), text) == before.end()) run.log.warn(text);
+      run.job.body ? "\"facets\": true inside \"body\"" : "carillon-mesh --facets"));
 }
 
 /// Rank 0 only: the mesh of the element's order, checked, and what stays of it on this rank.

@@ -9,10 +9,9 @@
 
 #include <array>
 #include <atomic>
-#include <cstdlib>
 #include <cstring>
-#include <string_view>
 
+#include "runtime/base/environment.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/temporary.hpp"
 
@@ -60,15 +59,8 @@ void handle(int signal) {
 
 }  // namespace
 
-bool is_first_of_all() {
-  for (const char* name : {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"}) {
-    if (const char* rank = std::getenv(name); rank != nullptr) return std::string_view(rank) == "0";
-  }
-  return true;
-}
-
 void end_on_signals(const char* program, const char* untouched) {
-  is_speaker = is_first_of_all() ? 1 : 0;
+  is_speaker = base::is_first_of_all() ? 1 : 0;
   program_name = program;
   untouched_text = untouched;
   struct sigaction action {};

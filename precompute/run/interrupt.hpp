@@ -7,9 +7,6 @@
 
 namespace carillon::run {
 
-/// True for the process that prints for all ranks of its launcher; known before MPI_Init.
-bool is_first_of_all();
-
 /// From now on such a signal ends this process at once with exit code 128 + signal. The first rank prints one line, "PROGRAM: stopped by
 /// SIGTERM; UNTOUCHED"; the mesher is ended, and temporary folders and TemporaryFiles are removed. Outputs need no cleanup: they get their
 /// names when complete (base::write_file). mpirun ends the other ranks after the first. Both texts live as long as the process. Call once,

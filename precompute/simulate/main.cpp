@@ -111,7 +111,7 @@ int main(int argc, char** argv) {
   try {
     words.app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    if (!run::is_first_of_all()) return error.get_exit_code() == 0 ? 0 : kExitInput;
+    if (!base::is_first_of_all()) return error.get_exit_code() == 0 ? 0 : kExitInput;
     return words.app.exit(error) == 0 ? 0 : kExitInput;
   }
   try {

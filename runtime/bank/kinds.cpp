@@ -391,28 +391,9 @@ class Skin {
   std::vector<Vec3> normal_;  // (V) area times normal, axes of the frame
 };
 
-const char* get_name(MotionKind motion) {
-  switch (motion) {
-    case MotionKind::kBending:
-      return "bending";
-    case MotionKind::kLateralBending:
-      return "lateral bending";
-    case MotionKind::kTorsion:
-      return "torsion";
-    case MotionKind::kLongitudinal:
-      return "longitudinal";
-    case MotionKind::kBreathing:
-      return "breathing";
-    case MotionKind::kPlateBending:
-      return "plate bending";
-    case MotionKind::kInPlane:
-      return "in plane";
-    case MotionKind::kDiameters:
-    case MotionKind::kUnknown:
-      break;
-  }
-  return "-";
-}
+constexpr std::array kNames{"-", "bending", "lateral bending", "torsion", "longitudinal", "breathing", "", "plate bending", "in plane"};
+
+const char* get_name(MotionKind motion) { return kNames.at(static_cast<std::size_t>(motion)); }
 
 }  // namespace
 

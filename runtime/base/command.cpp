@@ -184,8 +184,8 @@ class Reaper {
  public:
   explicit Reaper(pid_t child) : child_(child) { note_child(child); }
   ~Reaper() {
-    if (child_ > 0) forget_child(child_);
     if (child_ <= 0) return;
+    forget_child(child_);
     ::kill(child_, SIGKILL);
     await(child_, get_boot_s() + kKillPatienceS, {});
   }

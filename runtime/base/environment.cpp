@@ -53,12 +53,18 @@ bool is_of_run(std::string_view entry) {
          std::any_of(kOfRuns.begin(), kOfRuns.end(), [&](std::string_view begin) { return entry.starts_with(begin); });
 }
 
+/// Rank of this process in its launcher of MPI; nullptr without one.
+const char* find_rank() {
+  for (const char* name : {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"})
+    if (const char* rank = std::getenv(name)) return rank;
+  return nullptr;
+}
+
 }  // namespace
 
-bool is_launched() {
-  constexpr std::array kRanks{"OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"};
-  return std::any_of(kRanks.begin(), kRanks.end(), [](const char* name) { return std::getenv(name) != nullptr; });
-}
+bool is_launched() { return find_rank() != nullptr; }
+
+bool is_first_of_all() { return !is_launched() || find_rank() == std::string_view("0"); }
 
 void isolate_lone_process() {
   if (is_launched()) return;

@@ -9,6 +9,9 @@ namespace carillon::base {
 /// True in a process that a launcher of MPI (mpirun, srun) started, and in its children.
 bool is_launched();
 
+/// True for the process that prints for all ranks of its launcher; known before MPI_Init.
+bool is_first_of_all();
+
 /// In a process without a launcher: MPI starts without a daemon (a network and 0.15 s) and without a session folder (left behind after a
 /// signal), unless the user's settings differ.
 void isolate_lone_process();

@@ -164,10 +164,7 @@ void WholeFile::refuse(int error) {
   if (descriptor_ >= 0) ::close(descriptor_);
   descriptor_ = -1;
   ::unlink(temporary_.c_str());
-  const char* const advice = error == EFBIG         ? "files may not be so large here: raise the limit (ulimit -f)"
-                             : is_full_error(error) ? "the disk or quota is full: make room on it"
-                                                    : "check the folder's rights and the space on the disk";
-  throw_system_error(error, fmt::format("{}: cannot write: {}; {}", find_name(file_), std::strerror(error), advice));
+  throw_system_error(error, fmt::format("{}: cannot write: {}; {}", find_name(file_), std::strerror(error), find_advice(error)));
 }
 
 void WholeFile::append(std::string_view bytes) {

@@ -1,8 +1,10 @@
 #include "runtime/base/message.hpp"
 
 #include <algorithm>
+#include <cerrno>
 #include <system_error>
 
+#include "runtime/base/file.hpp"
 #include "runtime/base/printable.hpp"
 
 namespace carillon::base {
@@ -47,6 +49,13 @@ std::string find_name(const fs::path& file) {
   std::error_code error;
   const fs::path opened = fs::read_symlink(text.substr(0, slash), error);
   return error || !opened.is_absolute() ? text : opened.string() + text.substr(slash);
+}
+
+const char* find_advice(int error) {
+  return error == EFBIG                           ? "files may not be so large here: raise the limit (ulimit -f)"
+         : error == ENOLCK || error == EOPNOTSUPP ? "this file system keeps no locks: choose another folder"
+         : is_full_error(error)                   ? "the disk or quota is full: make room on it"
+                                                  : "check the folder's rights and the space on the disk";
 }
 
 }  // namespace carillon::base

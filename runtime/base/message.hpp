@@ -16,4 +16,7 @@ std::string show_message(std::string_view text);
 /// The path of a file for people: the target of "/proc/self/fd/N/NAME" while N is open; other paths unchanged.
 std::string find_name(const std::filesystem::path& file);
 
+/// Advice for the end of a message on a file that cannot be made, written or locked; error: of errno.
+const char* find_advice(int error);
+
 }  // namespace carillon::base

@@ -7,13 +7,13 @@
 
 #include <algorithm>
 #include <bit>
-#include <charconv>
 #include <filesystem>
 #include <limits>
 
 #include "runtime/base/error.hpp"
 #include "runtime/base/file.hpp"
 #include "runtime/base/foreign.hpp"
+#include "runtime/base/percent.hpp"
 #include "runtime/gltf/chunks.hpp"
 
 namespace carillon::gltf {
@@ -53,23 +53,6 @@ std::optional<std::string> decode_base64(std::string_view text) {
     }
   }
   return bytes;
-}
-
-/// A URI without its escapes (RFC 3986, 2.1); nothing if one is invalid.
-std::optional<std::string> decode_percent(std::string_view uri) {
-  std::string text;
-  for (std::size_t i = 0; i < uri.size(); ++i) {
-    if (uri[i] != '%') {
-      text += uri[i];
-      continue;
-    }
-    unsigned value = 0;
-    const char* const begin = uri.data() + i + 1;
-    if (uri.size() - i < 3 || std::from_chars(begin, begin + 2, value, 16).ptr != begin + 2 || value == 0) return std::nullopt;
-    text += static_cast<char>(value);
-    i += 2;
-  }
-  return text;
 }
 
 /// Throws InputError for a text that would take too much memory.
@@ -157,7 +140,7 @@ std::string File::read_uri(base::Object& buffer) const {
     if (!bytes) buffer.fail("uri", "its data is not base64; export it again");
     return *bytes;
   }
-  const std::optional<std::string> decoded = decode_percent(uri);
+  const std::optional<std::string> decoded = base::decode_percent(uri);
   const std::filesystem::path file = decoded.value_or("");
   if (!decoded || decoded->empty() || file.is_absolute() || std::find(file.begin(), file.end(), "..") != file.end() ||
       decoded->find("://") != std::string::npos)

@@ -20,6 +20,7 @@ import unittest.mock
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "support"))
 import fixtures  # noqa: E402
+import serving  # noqa: E402
 
 BIN = pathlib.Path(os.environ["CARILLON_BIN_DIR"])
 PAGE = BIN.parent / "share/carillon/explore"
@@ -32,13 +33,7 @@ SCENE = {
 
 class Server:
     def __init__(self, *words):
-        self.process = subprocess.Popen([BIN / "carillon", "--json", "explore", *words, "--serve"], stdout=subprocess.PIPE, text=True)
-        text = ""
-        while not text.endswith("\n}\n"):
-            line = self.process.stdout.readline()
-            assert line, text
-            text += line
-        self.said = json.loads(text)
+        self.process, self.said = serving.start(*words)
         self.host, port = re.fullmatch(r"http://([0-9.]+):(\d+)/", self.said["address"]).groups()
         self.port = int(port)
 

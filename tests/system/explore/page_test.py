@@ -22,6 +22,7 @@ import numpy
 sys.path.insert(0, str(pathlib.Path(__file__).parents[1] / "web"))
 sys.path.insert(0, str(pathlib.Path(__file__).parents[2] / "support"))
 import fixtures  # noqa: E402
+import serving  # noqa: E402
 from browser import Browser, serve  # noqa: E402
 
 BIN = pathlib.Path(os.environ["CARILLON_BIN_DIR"])
@@ -267,15 +268,10 @@ class PageTest(unittest.TestCase):
         self.assertEqual(page.errors, [])
 
     def test_its_own_server_gives_the_browser_all_that_it_asks_for(self):
-        words = [BIN / "carillon", "--json", "explore", self.root / "fall", "--serve"]
-        with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as server:
+        server, said = serving.start(self.root / "fall")
+        with server:
             try:
-                said = ""
-                while not said.endswith("\n}\n"):
-                    line = server.stdout.readline()
-                    self.assertTrue(line, said)
-                    said += line
-                page = self.browser.open(json.loads(said)["address"])
+                page = self.browser.open(said["address"])
                 self.addCleanup(page.close)
                 page.wait_for("document.documentElement.dataset.state === 'ready'", timeout_s=100)
                 self.assertEqual(page.errors, [])

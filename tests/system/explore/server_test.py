@@ -4,18 +4,17 @@
 Finds the programs in $CARILLON_BIN_DIR.
 """
 import http.client
-import json
 import os
 import pathlib
 import re
 import resource
 import signal
 import socket
-import subprocess
 import tempfile
 import unittest
 
-BIN = pathlib.Path(os.environ["CARILLON_BIN_DIR"])
+import serving
+
 LARGE = 8 << 20  # bytes of the requested file
 MEMORY = 64 << 20  # limit of the server's memory in bytes
 WAIT_S = 60  # for one answer, on a busy machine
@@ -40,14 +39,8 @@ class Served(unittest.TestCase):
         cls.scratch.cleanup()
 
     def setUp(self):
-        words = [BIN / "carillon", "--json", "explore", self.folder, "--serve"]
-        self.server = subprocess.Popen(words, stdout=subprocess.PIPE, text=True, preexec_fn=lambda: limit_files(1024))
-        said = ""
-        while not said.endswith("\n}\n"):
-            line = self.server.stdout.readline()
-            self.assertTrue(line, said)
-            said += line
-        self.port = int(re.search(r":(\d+)/$", json.loads(said)["address"])[1])
+        self.server, said = serving.start(self.folder, preexec_fn=lambda: limit_files(1024))
+        self.port = int(re.search(r":(\d+)/$", said["address"])[1])
         self.held = []
 
     def tearDown(self):

@@ -8,6 +8,8 @@ import sys
 import tempfile
 import unittest
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "support"))
+
 BIN = pathlib.Path(sys.argv.pop(1)).resolve()
 MATERIAL = {"young_modulus_pa": 2e11, "poisson_ratio": 0.3, "density_kg_m3": 7800, "damping": {"rayleigh": {"alpha1_s": 1e-7}}}
 ALUMINIUM = {

@@ -15,6 +15,7 @@ import unittest
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
 from bench import BIN, Bench, make_job
+from surfaces import format_off, make_box
 
 BAR = {"length_m": 0.2, "width_m": 0.03, "thickness_m": 0.012, "nodes": 20000}
 
@@ -100,24 +101,7 @@ class Leftovers(Bench):
         self.assertFalse(list((self.out / "page").glob(".carillon*")))
 
     def test_a_solve(self):
-        surface = self.folder / "box.off"
-        corners = [(x, y, z) for z in (0, 0.02) for y in (0, 0.06) for x in (0, 0.1)]
-        faces = [
-            (0, 2, 3),
-            (0, 3, 1),
-            (4, 5, 7),
-            (4, 7, 6),
-            (0, 1, 5),
-            (0, 5, 4),
-            (2, 6, 7),
-            (2, 7, 3),
-            (0, 4, 6),
-            (0, 6, 2),
-            (1, 3, 7),
-            (1, 7, 5),
-        ]
-        text = "OFF\n8 12 0\n" + "".join("%g %g %g\n" % corner for corner in corners)
-        surface.write_text(text + "".join("3 %d %d %d\n" % face for face in faces))
+        self.write("box.off", format_off(*make_box(0.1, 0.06, 0.02)))
         self.write("job.json", {"body": {"surface": "box.off", "nodes": 30000}, "material": "steel", "bank": "out/box.hdf"})
         self.check(BIN / "carillon-precompute", "-q", "job.json")
 

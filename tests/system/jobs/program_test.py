@@ -15,6 +15,7 @@ import unittest
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
 from bench import BIN, Bench, make_job, make_simulation
+from surfaces import format_off, make_box
 
 
 class Path(Bench):
@@ -241,33 +242,15 @@ class Path(Bench):
         self.assertIn('"memory_gb" of the job is 0.01', job["reason"])
 
     def test_what_the_mesher_did_to_a_surface_is_said(self):
-        corners = [(x, y, z) for z in (0, 0.02) for y in (0, 0.06) for x in (0, 0.1)]
-        faces = [
-            (0, 2, 3),
-            (0, 3, 1),
-            (4, 5, 7),
-            (4, 7, 6),
-            (0, 1, 5),
-            (0, 5, 4),
-            (2, 6, 7),
-            (2, 7, 3),
-            (0, 4, 6),
-            (0, 6, 2),
-            (1, 3, 7),
-            (1, 7, 5),
-        ]
-
-        def write_surface(name, triangles):
-            text = f"OFF\n{len(corners)} {len(triangles)} 0\n" + "".join("%g %g %g\n" % corner for corner in corners)
-            self.write(name, text + "".join("3 %d %d %d\n" % triangle for triangle in triangles))
+        points, faces = make_box(0.1, 0.06, 0.02)
 
         def write_job(name, **body):
             return self.write(
                 f"{name}.json", make_job(body={"surface": f"{name}.off", "nodes": 1500, **body}, band_hz=[20, 20000], max_modes=2)
             )
 
-        write_surface("open.off", faces[:2] + faces[4:])  # a box without its lid
-        write_surface("twice.off", [*faces, faces[3]])
+        self.write("open.off", format_off(points, faces[:2] + faces[4:]))  # a box without its lid
+        self.write("twice.off", format_off(points, [*faces, faces[3]]))
         opened, twice = write_job("open"), write_job("twice")
         self.refuse("validate", opened, says=["open surface", '"wall_m"', '"close_holes"'])
         self.ask("submit", opened, twice)

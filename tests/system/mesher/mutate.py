@@ -37,6 +37,10 @@ import tempfile
 import time
 
 HERE = pathlib.Path(__file__).resolve().parent
+sys.dont_write_bytecode = True
+sys.path.insert(0, str(HERE.parents[1] / "support"))
+from surfaces import make_box  # noqa: E402
+
 DATA = HERE.parents[1] / "unit/precompute/mesh/data"
 ODD = [0.0, -0.0, 1e-42, 1e-310, -4.16e-19, 1e-12, 1e-7, 1e7, -1.07e8, 3e29, 1e31, float("nan"), float("inf"), 0.05, 0.1]
 WORDS = [
@@ -65,21 +69,7 @@ WORDS = [
 
 
 def box():
-    points = [(x, y, z) for z in (0, 0.03) for y in (0, 0.05) for x in (0, 0.1)]
-    return points, [
-        (0, 3, 1),
-        (0, 2, 3),
-        (4, 5, 7),
-        (4, 7, 6),
-        (0, 1, 5),
-        (0, 5, 4),
-        (2, 6, 7),
-        (2, 7, 3),
-        (0, 4, 6),
-        (0, 6, 2),
-        (1, 3, 7),
-        (1, 7, 5),
-    ]
+    return make_box(0.1, 0.05, 0.03)
 
 
 def sphere(levels=2, radius=0.05):

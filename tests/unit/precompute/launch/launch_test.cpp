@@ -62,7 +62,8 @@ TEST(Environment, has_one_thread_and_what_the_user_chose) {
 }
 
 TEST(Environment, has_the_transport_of_one_host_only_on_one_host) {
-  const Environment pml("OMPI_MCA_pml", nullptr), all("OMPI_COMM_WORLD_SIZE", "4"), here("OMPI_COMM_WORLD_LOCAL_SIZE", "2");
+  const Environment pml("OMPI_MCA_pml", nullptr), all("OMPI_COMM_WORLD_SIZE", "4"), here("OMPI_COMM_WORLD_LOCAL_SIZE", "2"),
+      rank("OMPI_COMM_WORLD_RANK", "0");
   prepare_environment();
   EXPECT_EQ(std::getenv("OMPI_MCA_pml"), nullptr);
   ::setenv("OMPI_COMM_WORLD_LOCAL_SIZE", "4", 1);
@@ -72,7 +73,7 @@ TEST(Environment, has_the_transport_of_one_host_only_on_one_host) {
 
 TEST(Environment, isolates_a_rank_that_no_launcher_started) {
   const std::array<Environment, 5> none{{{"OMPI_MCA_ess_singleton_isolated", nullptr},
-                                         {"OMPI_COMM_WORLD_SIZE", nullptr},
+                                         {"OMPI_COMM_WORLD_RANK", nullptr},
                                          {"PMIX_RANK", nullptr},
                                          {"PMI_RANK", nullptr},
                                          {"SLURM_PROCID", nullptr}}};

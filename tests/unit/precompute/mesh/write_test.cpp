@@ -43,6 +43,15 @@ bool read_with(const std::string& reader, const std::filesystem::path& file, std
   return status == 0 || said.find("No module named") == std::string::npos;
 }
 
+/// Writes a mesh and reads it again: its regions, their names and its sets are those that it had.
+void expect_same_again(const TetMesh& mesh, const std::filesystem::path& file) {
+  write_gmsh(mesh, file);
+  const TetMesh back = read_mesh(file);
+  EXPECT_EQ(back.regions, mesh.regions);
+  EXPECT_EQ(back.region_names, mesh.region_names);
+  EXPECT_EQ(back.node_sets, mesh.node_sets);
+}
+
 TEST_P(Written, gmsh_file_is_read_by_meshio_with_volume_and_sets) {
   const auto& [file, encoding] = GetParam();
   const tests::Folder scratch;
@@ -78,11 +87,7 @@ TEST(write, a_mesh_without_regions_is_read_and_exported_by_others) {
     TetMesh mesh = read_mesh(fixture(file));
     mesh.regions.assign(mesh.regions.size(), 0);
     mesh.region_names.clear();
-    write_gmsh(mesh, scratch / "out.msh");
-    const TetMesh back = read_mesh(scratch / "out.msh");
-    EXPECT_EQ(back.regions, mesh.regions);
-    EXPECT_EQ(back.region_names, mesh.region_names);
-    EXPECT_EQ(back.node_sets, mesh.node_sets);
+    expect_same_again(mesh, scratch / "out.msh");
     std::string said;
     if (!read_with("meshio", scratch / "out.msh", said)) GTEST_SKIP() << "meshio is not installed";
     EXPECT_NE(said.find("volume 0.006000 tets 89 mid-off 0"), std::string::npos) << said;
@@ -102,11 +107,7 @@ TEST(write, named_regions_and_elements_without_one_come_back) {
   EXPECT_EQ(once.regions, mesh.regions);
   EXPECT_EQ(once.region_names, mesh.region_names);
   ASSERT_EQ(once.node_sets.size(), 2u);  // nodes of its regions
-  write_gmsh(once, scratch / "again.msh");
-  const TetMesh twice = read_mesh(scratch / "again.msh");
-  EXPECT_EQ(twice.regions, once.regions);
-  EXPECT_EQ(twice.region_names, once.region_names);
-  EXPECT_EQ(twice.node_sets, once.node_sets);
+  expect_same_again(once, scratch / "again.msh");
   std::string said;
   if (!read_with("meshio", scratch / "again.msh", said)) GTEST_SKIP() << "meshio is not installed";
   EXPECT_NE(said.find("group 1 30"), std::string::npos) << said;
