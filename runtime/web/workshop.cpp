@@ -45,7 +45,7 @@ constexpr std::size_t kMostEvents = std::size_t{1} << 30;  // bytes of a plan's 
 
 Json to_json(const Vec3& x) { return Json::array(x); }
 
-/// The modes of a bank for playing, as JSON; unknown `error_cents` are null. `losses`: already applied to the bank.
+/// The modes of a bank for playing, as JSON; unknown `error_cents` and `radiation_per_s` are null. `losses`: already applied to the bank.
 Json list_modes(const bank::Bank& bank, const support::Losses& losses) {
   Json modes = Json::array();
   const std::vector<bank::HeardMode> heard = bank::list_heard(bank, losses.decay_per_s);
@@ -57,7 +57,7 @@ Json list_modes(const bank::Bank& bank, const support::Losses& losses) {
         .set("decay_per_s", base::significant(bank.decay_per_s[m], 9))
         .set("t60_s", base::finite_or_null(mode.calc_t60_s(), base::significant, 6))
         .set("material_per_s", base::significant(mode.material_per_s, 6))
-        .set("radiation_per_s", base::significant(mode.radiation_per_s, 6))
+        .set("radiation_per_s", base::finite_or_null(bank.multipoles.is_empty() ? NAN : mode.radiation_per_s, base::significant, 6))
         .set("supports_per_s", base::significant(mode.supports_per_s, 6))
         .set("gain", base::significant(bank.radiation_gain[m], 9))
         .set("error_cents", base::finite_or_null(cents, base::significant, 4));
