@@ -145,7 +145,7 @@ def show_blows(stage, sounds, found):
                     f"{name}, {BLOWS[name][0]:g} kg at {BLOWS[name][1][strength]:g} m/s",
                     f"{report['mallets'][0]['modes_j']:.2g}",
                     f"{abs(samples).max():.2g}",
-                    f"{min(cents):.0f} to {max(cents):.0f}" if cents else "-",
+                    f"{round(min(cents))} to {round(max(cents))}" if cents else "-",
                     f"{100 * report['playing_cpu_s'] / report['duration_s']:.0f} %",
                 )
             )
