@@ -119,8 +119,7 @@ std::string format_modes(const Bank& bank, std::span<const HeardMode> heard, std
       "{0}: the frequency of {1}; +-{0}: cents to its exact mode, a bound; +-body: cents to the mode of the body, an estimate\n", origin,
       bank.element == "imported" ? "the other program" : "the " + origin);
   text +=
-      "freq: frequency of playing: without the estimated error of the mesh, in air and on its supports if the bank has them;\n"
-      "playing sorts modes by it\n"
+      "freq: frequency of playing, which sorts modes by it: without the estimated error of the mesh, in air and on the bank's supports\n"
       "d and T60: decay by material, air and supports together\n"
       "gain: Pa at 1 m for q' = 1 m kg^1/2 / s; frequencies are undamped; kind: kind of motion, if its shape shows one\n";
   if (is_doubtful)
