@@ -7,6 +7,7 @@
 #include <cmath>
 #include <new>
 
+#include "precompute/mesh/check.hpp"
 #include "precompute/mesh/curved.hpp"
 #include "precompute/mesh/check.hpp"
 #include "precompute/mesher/body_surface.hpp"
