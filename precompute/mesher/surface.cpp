@@ -9,7 +9,6 @@
 
 #include "precompute/mesh/check.hpp"
 #include "precompute/mesh/curved.hpp"
-#include "precompute/mesh/check.hpp"
 #include "precompute/mesher/body_surface.hpp"
 #include "precompute/mesher/curve_mesh.hpp"
 #include "precompute/mesher/guard.hpp"
