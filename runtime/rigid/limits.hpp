@@ -11,5 +11,8 @@ inline constexpr double kFarTooDeep = 5e-5;  // m; from here on it comes up at a
 inline constexpr double kBalanced = 1e-4;    // of gravity: what a solution with zero velocity may leave
 inline constexpr int kMaxGuesses = 12;       // of a factorised problem, where it is small or rest is to be proven
 inline constexpr double kSharpest = 5e-4;    // m; the least radius of a contact
+inline constexpr double kSlow = 5e-3;        // m/s; of what may be about to rest
+inline constexpr double kLong = 0.3;         // s; what was slow for so long is no faster than kSlow: less balance is enough
+inline constexpr double kReach = 0.3;        // of the size of the smaller body: from so far touches are found
 
 }  // namespace carillon::rigid
