@@ -31,6 +31,8 @@ struct Contact {
 
   /// That it gave a in its last step [N].
   Vec3 calc_force() const { return touching && step_s > 0.0 ? (1.0 / step_s) * impulse : Vec3{}; }
+  /// Does it carry, or is it about to, outside of impacts with modes?
+  bool carries() const { return !presses && cord < 0 && touch.gap_m <= kTouch; }
   bool is_closed() const { return touching && touch.gap_m <= kTouch; }
 };
 

@@ -47,10 +47,10 @@ class System {
       full_.resize(6 * bodies, 6 * bodies);
       return;
     }
-    below_.resize(static_cast<std::size_t>(bodies));
-    for (int i = 0; i < bodies; ++i) below_[static_cast<std::size_t>(i)].push_back(i);
+    below_.resize(bodies);
+    for (int i = 0; i < bodies; ++i) below_[i].push_back(i);
     for (const Point& p : points)
-      if (p.a >= 0 && p.b >= 0 && p.a != p.b) below_[static_cast<std::size_t>(std::min(p.a, p.b))].push_back(std::max(p.a, p.b));
+      if (p.a >= 0 && p.b >= 0 && p.a != p.b) below_[std::min(p.a, p.b)].push_back(std::max(p.a, p.b));
     std::vector<int> counts;
     for (std::vector<int>& rows : below_) {
       std::sort(rows.begin(), rows.end());
@@ -60,7 +60,7 @@ class System {
     sparse_.resize(6 * bodies, 6 * bodies);
     sparse_.reserve(counts);
     for (int column = 0; column < 6 * bodies; ++column)
-      for (const int row : below_[static_cast<std::size_t>(column / 6)])
+      for (const int row : below_[column / 6])
         for (int i = 0; i < 6; ++i) sparse_.insert(6 * row + i, column) = 0.0;
     sparse_.makeCompressed();
     sparse_solver_.analyzePattern(sparse_);
@@ -109,7 +109,7 @@ class System {
   /// The block (row, column), row >= column.
   Place at(int row, int column) {
     if (is_dense()) return Place(&full_(6 * row, 6 * column), Eigen::OuterStride<>(full_.outerStride()));
-    const std::vector<int>& rows = below_[static_cast<std::size_t>(column)];
+    const std::vector<int>& rows = below_[column];
     const auto slot = std::lower_bound(rows.begin(), rows.end(), row) - rows.begin();
     return Place(sparse_.valuePtr() + sparse_.outerIndexPtr()[6 * column] + 6 * slot,
                  Eigen::OuterStride<>(6 * static_cast<Eigen::Index>(rows.size())));
@@ -160,10 +160,10 @@ bool Solver::solve_directly(std::vector<Mover>& movers, std::vector<Point>& poin
   for (int guess = 0; guess < max_guesses && !confirmed; ++guess) {
     system.clear();
     for (int i = 0; i < bodies; ++i) {
-      const Mover& m = free[static_cast<std::size_t>(i)];
+      const Mover& m = free[i];
       Eigen::Matrix3d inverse;
       for (int r = 0; r < 3; ++r)
-        for (int c = 0; c < 3; ++c) inverse(r, c) = m.inverse_inertia[static_cast<std::size_t>(r)][static_cast<std::size_t>(c)];
+        for (int c = 0; c < 3; ++c) inverse(r, c) = m.inverse_inertia[r][c];
       system.add_inertia(i, 1.0 / m.inverse_mass, inverse.inverse());
     }
     movers = free;

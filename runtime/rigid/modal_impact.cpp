@@ -1,44 +1,19 @@
-// Impacts with modes from their prediction to their end, all of it on the same impacts; longer than most files.
-// Method: an impact whose bodies ring is integrated with their modes. Where the modes would get less than 2 % of the energy, the rigid
-//   impact and the Hertz pulse stand.
+// Method: an impact whose bodies ring is integrated with their modes, a small step at a time, until its contacts have parted.
 // Source: runtime/impact/impact.hpp; docs/decisions/impact.md.
 // Deviations: none.
 #include "runtime/rigid/modal_impact.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <set>
 
-#include "runtime/impact/predict.hpp"
 #include "runtime/rigid/limits.hpp"
 
 namespace carillon::rigid {
 namespace {
 
-constexpr int kMaxHits = 8;          // of one impact
-constexpr int kMaxTogether = 12;     // with those that rest
 constexpr double kLongest = 50e-3;   // s; what presses for longer rests
 constexpr double kRight = 0.01;      // of the kinetic energy: the most that a step of an impact on joints is corrected by
 constexpr double kSamePlace = 0.05;  // of the size
-
-/// (n) along a direction.
-std::vector<double> project(const std::vector<double>& shape, const Vec3& along) {
-  std::vector<double> phi(shape.size() / 3);
-  for (int m = 0; double& value : phi) {
-    value = shape[m] * along[0] + shape[m + 1] * along[1] + shape[m + 2] * along[2];
-    m += 3;
-  }
-  return phi;
-}
-
-/// Does it carry, or is it about to, outside of all impacts?
-bool is_resting(const Contact& c) { return !c.presses && c.cord < 0 && c.touch.gap_m <= kTouch; }
-
-impact::Spring make_spring(const Bodies& bodies, const Hit& hit) {
-  return {.stiffness =
-              impact::calc_hertz_stiffness(bodies.calc_compliance(hit.a, hit.b), bodies.calc_contact_radius(hit.touch, hit.a, hit.b))};
-}
 
 }  // namespace
 
@@ -51,21 +26,9 @@ ModalImpact* ModalImpacts::find(int body) {
   return nullptr;
 }
 
-/// An impact that a hit belongs to: one of its bodies is in it. None where either body is in one that moves bodies outside of the island.
-ModalImpact* ModalImpacts::find_own(const Step& step, const Hit& hit) {
-  ModalImpact* own = nullptr;
-  for (const int body : {hit.a, hit.b}) {
-    ModalImpact* modal = find(body);
-    if (modal == nullptr) continue;
-    if (!std::all_of(modal->bodies.begin(), modal->bodies.end(), [&](int other) { return step.has(other); })) return nullptr;
-    if (own == nullptr) own = modal;
-  }
-  return own;
-}
-
 /// Where the point of a contact is now, by the body that moves.
 Vec3 ModalImpacts::find_station(const ModalContact& contact) const {
-  const int body = bodies_.moves(contact.a) ? contact.a : contact.b;
+  const int body = bodies_.moves(contact.forces.a) ? contact.forces.a : contact.forces.b;
   return bodies_.state(body).centre + bodies_.placed(body).rotation * contact.station;
 }
 
@@ -74,49 +37,11 @@ bool ModalImpacts::is_pressed(const Pair& pair, const Vec3& where) const {
   const double near = kSamePlace * bodies_.calc_size(pair.a, pair.b);
   for (const ModalImpact& modal : impacts_)
     for (const ModalContact& contact : modal.contacts) {
-      const bool is_same = (contact.a == pair.a && contact.b == pair.b) || (contact.b == pair.a && contact.a == pair.b);
+      const Forces& f = contact.forces;
+      const bool is_same = (f.a == pair.a && f.b == pair.b) || (f.b == pair.a && f.a == pair.b);
       if (is_same && norm(find_station(contact) - where) < near) return true;
     }
   return false;
-}
-
-bool ModalImpacts::predict(const Step& step, Collision& collision) {
-  bool integrate = false;
-  for (int n = 0; Hit & hit : collision.hits) {
-    const Contact& c = collision.contacts[n].get();
-    Point& point = collision.points[n++];
-    if (!(hit.approach_m_s > kSlowest) || c.is_closed()) continue;
-    if (!hit.is_cord && find_own(step, hit) != nullptr) {
-      integrate = true;
-      continue;
-    }
-    if (hit.is_cord || (!bodies_.has_modes(hit.a) && !bodies_.has_modes(hit.b))) continue;
-    if (!(hit.restitution > 0.0)) continue;  // it stays: weight keeps the surfaces together (rigid_impact.cpp)
-    const double inverse_mass = dot(hit.touch.normal, calc_mobility(collision.movers, point) * hit.touch.normal);
-    std::vector<double> phi[2];
-    impact::Side sides[2];
-    // A shelf has one modal state: while an impact of another island has it, those that strike it meanwhile do so as rigid bodies.
-    bool is_free = true;
-    for (const int side : {0, 1}) {
-      const int body = side == 0 ? hit.a : hit.b;
-      if (!bodies_.has_modes(body)) continue;
-      if (bodies_.is_in_impact(body)) {
-        is_free = false;
-        continue;
-      }
-      phi[side] = project(find_shape(bodies_, hit, side == 0), transpose(bodies_.placed(body).rotation) * hit.touch.normal);
-      const ModalState& state = states_.advance(body, bodies_.get_time());
-      sides[side] = {bodies_.solid(body).modes.get(), phi[side], state.q, state.q_dot};
-    }
-    const impact::Prediction p =
-        impact::predict(make_spring(bodies_, hit), 1.0 / inverse_mass, hit.approach_m_s, hit.restitution, sides[0], sides[1]);
-    integrate = integrate || (!p.is_enough && is_free);
-    if (p.restitution < hit.restitution) {
-      hit.restitution = p.restitution;
-      point.wanted = (hit.restitution * hit.approach_m_s) * hit.touch.normal;
-    }
-  }
-  return integrate;
 }
 
 /// The motion of a body as an impact begins or continues with it.
@@ -140,24 +65,6 @@ void ModalImpacts::set_motion(int body, impact::Body& b) const {
   b.spin_acceleration_rad_s2 = rates[member].angular;
 }
 
-impact::Body ModalImpacts::make_body(int body) {
-  impact::Body b;
-  b.centre_m = bodies_.state(body).centre;
-  if (bodies_.moves(body)) {
-    b.mass_kg = bodies_.solid(body).mass_kg;
-    b.velocity_m_s = bodies_.state(body).velocity;
-    b.spin_rad_s = bodies_.placed(body).spin;
-    set_motion(body, b);
-  }
-  if (bodies_.has_modes(body)) {
-    const ModalState& state = states_.advance(body, bodies_.get_time());
-    b.modes = bodies_.solid(body).modes.get();
-    b.q = state.q;
-    b.q_dot = state.q_dot;
-  }
-  return b;
-}
-
 /// Shapes of a body in world axes.
 std::vector<double> ModalImpacts::turn_to_world(int body, const std::vector<double>& shape) const {
   const int size = static_cast<int>(shape.size());
@@ -172,186 +79,6 @@ std::vector<double> ModalImpacts::turn_to_world(int body, const std::vector<doub
   return world;
 }
 
-/// What is struck and leans on something else is struck with what stands behind it: adds the contacts that rest on the bodies of `order`,
-/// and on the bodies that these lean on. False where they are too many, or bodies on joints or another impact are among them: the rigid
-/// impact stands.
-bool ModalImpacts::add_resting(const Collision& collision, const Instants& instants, std::vector<int>& order) const {
-  const std::vector<Hit>& hits = collision.hits;
-  const int count = static_cast<int>(hits.size());
-  std::vector<char> is_taken(count, 0);
-  std::set<int> struck;
-  for (const int n : order) {
-    is_taken[n] = 1;
-    for (const int body : {hits[n].a, hits[n].b})
-      if (bodies_.moves(body) && !bodies_.is_moved_by_impact(body)) struck.insert(body);
-  }
-  const auto hit_count = order.size();
-  for (bool grows = true; std::exchange(grows, false);)
-    for (int n = 0; n < count; ++n) {
-      const Contact& c = collision.contacts[n].get();
-      if (is_taken[n] || !is_resting(c)) continue;
-      const bool leans = std::any_of(struck.begin(), struck.end(),
-                                     [&](int body) { return bodies_.share_motion(body, c.a) || bodies_.share_motion(body, c.b); });
-      if (!leans) continue;
-      for (const int body : {c.a, c.b}) {
-        if (body < 0) continue;
-        if (bodies_.find_articulation(body) != nullptr || bodies_.is_in_impact(body)) return false;
-        if (instants.is_crowded(body, bodies_.get_time())) return false;
-        if (bodies_.moves(body)) struck.insert(body);
-      }
-      is_taken[n] = 1;
-      order.push_back(n);
-      grows = true;
-    }
-  std::sort(order.begin(), order.end());
-  return order.size() == hit_count || order.size() <= kMaxTogether;
-}
-
-/// Are two members of one articulation struck?
-bool ModalImpacts::shares_articulations(const std::vector<Hit>& hits, const std::vector<int>& order) const {
-  std::map<const Articulation*, int> struck;
-  for (const int n : order)
-    for (const int body : {hits[n].a, hits[n].b}) {
-      const Articulation* articulation = bodies_.moves(body) ? bodies_.find_articulation(body) : nullptr;
-      if (articulation == nullptr) continue;
-      const int first = articulation->struck >= 0 ? articulation->bodies[articulation->struck] : body;
-      if (struck.emplace(articulation, first).first->second != body) return true;
-    }
-  return false;
-}
-
-std::optional<ModalImpacts::Selection> ModalImpacts::select(const Step& step, const Collision& collision, const Instants& instants) {
-  const std::vector<Hit>& hits = collision.hits;
-  Selection selection;
-  std::vector<int>& order = selection.order;
-  std::vector<char>& rests = selection.rests;
-  rests.assign(hits.size(), 1);
-  for (int n = 0; n < static_cast<int>(hits.size()); ++n) {
-    if (!(hits[n].approach_m_s > kSlowest) || hits[n].is_cord) continue;
-    order.push_back(n);
-    rests[n] = 0;
-  }
-  if (order.empty() || !add_resting(collision, instants, order) || shares_articulations(hits, order)) return std::nullopt;
-  // A hit on a body (such as a shelf) that is in an impact of another island stays out of this one.
-  std::erase_if(order,
-                [&](int n) { return find_own(step, hits[n]) == nullptr && (find(hits[n].a) != nullptr || find(hits[n].b) != nullptr); });
-  if (std::all_of(order.begin(), order.end(), [&](int n) { return rests[n] != 0; })) return std::nullopt;  // all hits stay out
-  return selection;
-}
-
-/// The impact that the selected contacts join: those of all bodies that meet become one. None: they begin one; where they are too many
-/// together the old ones end, and the fastest begin it. False: none of that, as too many rest.
-bool ModalImpacts::join(const std::vector<Hit>& hits, Selection& selection, TouchSets& touches, ModalImpact*& joined) {
-  std::vector<int>& order = selection.order;
-  for (const int n : order)
-    for (const int body : {hits[n].a, hits[n].b}) {
-      ModalImpact* found = find(body);
-      if (found == nullptr || found == joined) continue;
-      if (joined == nullptr)
-        joined = found;
-      else
-        end(*found, touches);  // what it has in its springs is lost
-    }
-  const bool leans = std::any_of(order.begin(), order.end(), [&](int n) { return selection.rests[n] != 0; });
-  const auto together = order.size() + (joined != nullptr ? joined->contacts.size() : 0);
-  if (leans) return together <= kMaxTogether;
-  if (together <= kMaxHits) return true;
-  if (joined != nullptr) end(*std::exchange(joined, nullptr), touches);
-  if (order.size() > kMaxHits) {
-    std::stable_sort(order.begin(), order.end(), [&](int x, int y) { return hits[x].approach_m_s > hits[y].approach_m_s; });
-    order.resize(kMaxHits);
-    std::sort(order.begin(), order.end());
-  }
-  return true;
-}
-
-/// The number of a body in an impact, which it joins where it was not in it; -1: static. An impact that has not begun gets it by `made`.
-int ModalImpacts::add_body(ModalImpact& modal, int body, std::vector<impact::Body>& made) {
-  if (body < 0 || (!bodies_.moves(body) && !bodies_.has_modes(body))) return -1;
-  const auto at = std::find(modal.bodies.begin(), modal.bodies.end(), body);
-  if (at != modal.bodies.end()) return static_cast<int>(at - modal.bodies.begin());
-  modal.bodies.push_back(body);
-  bodies_.set_in_impact(body, true);
-  if (Articulation* articulation = bodies_.moves(body) ? bodies_.find_articulation(body) : nullptr; articulation != nullptr)
-    articulation->struck = bodies_.get_member(body);
-  if (modal.impact != nullptr) return modal.impact->join(make_body(body));
-  made.push_back(make_body(body));
-  return static_cast<int>(made.size()) - 1;
-}
-
-/// A contact and how the impact sees it, without its bodies and shapes.
-std::pair<ModalContact, impact::Contact> ModalImpacts::make_contact(Hit& hit, bool rests) {
-  ModalContact contact;
-  contact.a = hit.a;
-  contact.b = hit.b;
-  const int body = bodies_.moves(hit.a) ? hit.a : hit.b;
-  contact.station = transpose(bodies_.placed(body).rotation) * (hit.touch.where_m - bodies_.state(body).centre);
-  contact.place_a = find_place(bodies_, hit, true);
-  if (bodies_.has_modes(hit.a)) contact.shape_a = find_shape(bodies_, hit, true);
-  if (hit.b >= 0) contact.place_b = find_place(bodies_, hit, false);
-  if (bodies_.has_modes(hit.b)) contact.shape_b = find_shape(bodies_, hit, false);
-  impact::Contact spring;
-  spring.where_m = hit.touch.where_m;
-  spring.normal = hit.touch.normal;
-  // Surfaces are where the motion of the rigid bodies has them; what modes lift or lower there is small, and must not press a spring.
-  spring.rests = rests;
-  spring.gap_m = rests ? 0.0 : std::max(hit.touch.gap_m, 0.0);
-  spring.spring = make_spring(bodies_, hit);
-  spring.restitution = bodies_.calc_restitution(hit.a, hit.b);
-  spring.is_limit = true;
-  spring.friction = bodies_.calc_friction(hit.a, hit.b);
-  return {std::move(contact), spring};
-}
-
-bool ModalImpacts::begin(const Step& step, Collision& collision, const Instants& instants, TouchSets& touches) {
-  std::optional<Selection> selection = select(step, collision, instants);
-  ModalImpact* joined = nullptr;
-  if (!selection || !join(collision.hits, *selection, touches, joined)) return false;
-  const bool is_new = joined == nullptr;
-  if (is_new) {
-    joined = &impacts_.emplace_back();
-    joined->start_s = bodies_.get_time();
-  }
-  ModalImpact& modal = *joined;
-  std::vector<impact::Body> bodies;
-  std::vector<impact::Contact> springs;
-  std::list<std::vector<double>> shapes;  // kept until the impact has them
-  for (const int n : selection->order) {
-    Hit& hit = collision.hits[n];
-    int a = add_body(modal, hit.a, bodies), b = add_body(modal, hit.b, bodies);
-    auto [contact, spring] = make_contact(hit, selection->rests[n] != 0);
-    if (!contact.shape_a.empty()) spring.shape_a = shapes.emplace_back(turn_to_world(hit.a, contact.shape_a));
-    if (!contact.shape_b.empty()) spring.shape_b = shapes.emplace_back(turn_to_world(hit.b, contact.shape_b));
-    if (a < 0) {
-      // Static bodies are side b.
-      std::swap(a, b);
-      spring.normal = -1.0 * spring.normal;
-      std::swap(spring.shape_a, spring.shape_b);
-      std::swap(contact.a, contact.b);
-      std::swap(contact.place_a, contact.place_b);
-      std::swap(contact.shape_a, contact.shape_b);
-    }
-    spring.a = a;
-    spring.b = b;
-    Contact& c = collision.contacts[n].get();
-    c.presses = true;
-    c.touching = false;
-    c.impulse = c.couple = {};
-    contact.waiting.a = contact.a;
-    contact.waiting.b = contact.b;
-    contact.waiting.place_a = contact.place_a;
-    contact.waiting.place_b = contact.place_b;
-    modal.contacts.push_back(std::move(contact));
-    if (is_new)
-      springs.push_back(spring);
-    else
-      modal.impact->join(spring);
-  }
-  if (is_new) modal.impact = std::make_unique<impact::Impact>(std::move(bodies), std::move(springs));
-  ++ledger_.costs.impacts;
-  return true;
-}
-
 void ModalImpacts::end(const std::vector<Hit>& hits, TouchSets& touches) {
   for (const Hit& hit : hits)
     for (const int body : {hit.a, hit.b})
@@ -362,7 +89,7 @@ void ModalImpacts::end_where_resting(const Step& step, TouchSets& touches) {
   if (impacts_.empty()) return;
   for (const Pair* pair : step.island().pairs)
     for (const Contact& c : pair->contacts) {
-      if (!is_resting(c)) continue;
+      if (!c.carries()) continue;
       for (const int body : {pair->a, pair->b}) {
         ModalImpact* modal = bodies_.moves(body) ? find(body) : nullptr;
         if (modal != nullptr && std::abs(bodies_.calc_approach(c.touch, c.a, c.b)) <= kSlowest) end(*modal, touches);
@@ -402,8 +129,8 @@ void ModalImpacts::advance(const Step& step, double to_s, double part_s, double 
     for (int k = 0; const ModalContact& contact : modal.contacts) {
       impact::Contact& spring = springs.emplace_back(modal.impact->get_contact(k++));
       spring.where_m = find_station(contact);
-      if (!contact.shape_a.empty()) spring.shape_a = shapes.emplace_back(turn_to_world(contact.a, contact.shape_a));
-      if (!contact.shape_b.empty()) spring.shape_b = shapes.emplace_back(turn_to_world(contact.b, contact.shape_b));
+      if (!contact.shape_a.empty()) spring.shape_a = shapes.emplace_back(turn_to_world(contact.forces.a, contact.shape_a));
+      if (!contact.shape_b.empty()) spring.shape_b = shapes.emplace_back(turn_to_world(contact.forces.b, contact.shape_b));
     }
     modal.impact->update(bodies, springs);
     const double begun_s = modal.impact->get_time();
@@ -495,7 +222,7 @@ void ModalImpacts::undo_pull(const Step& step, int body, const joints::Spatial& 
 void ModalImpacts::keep_pulses(ModalImpact& modal) {
   for (const impact::Pulse& pulse : modal.impact->take_pulses()) {
     ModalContact& contact = modal.contacts[pulse.contact];
-    Forces& forces = contact.waiting;
+    Forces& forces = contact.forces;
     const double start_s = modal.start_s + pulse.start_s;
     // A contact that was open for a while begins again.
     if (!forces.on_a.empty() &&
@@ -503,22 +230,22 @@ void ModalImpacts::keep_pulses(ModalImpact& modal) {
       report(contact);
     if (forces.on_a.empty()) forces.time_s = start_s;
     forces.step_s = pulse.step_s;
-    const Mat3 to_a = transpose(bodies_.placed(contact.a).rotation),
-               to_b = contact.b >= 0 ? transpose(bodies_.placed(contact.b).rotation) : Mat3{};
+    const Mat3 to_a = transpose(bodies_.placed(forces.a).rotation),
+               to_b = forces.b >= 0 ? transpose(bodies_.placed(forces.b).rotation) : Mat3{};
     for (const Vec3& impulse : pulse.impulse_n_s) {
       forces.on_a.push_back(to_a * impulse);
-      if (contact.b >= 0) forces.on_b.push_back(to_b * (-1.0 * impulse));
+      if (forces.b >= 0) forces.on_b.push_back(to_b * (-1.0 * impulse));
     }
   }
 }
 
 void ModalImpacts::report(ModalContact& contact) {
-  if (contact.waiting.on_a.empty()) return;
-  Forces next = contact.waiting;
-  next.on_a.clear();
-  next.on_b.clear();
-  next.continues = true;
-  forces_.push_back(std::exchange(contact.waiting, std::move(next)));
+  Forces& forces = contact.forces;
+  if (forces.on_a.empty()) return;
+  forces_.push_back(forces);
+  forces.on_a.clear();
+  forces.on_b.clear();
+  forces.continues = true;
 }
 
 /// Returns the modal states of an impact's bodies. It may be ahead of `time_s` by a part of its step.
@@ -543,7 +270,7 @@ void ModalImpacts::release(ModalImpact& modal, double time_s, TouchSets& touches
     if (bodies_.moves(body) && reached_s > time_s) s = fly(bodies_.solid(body), s, bodies_.gravity(), time_s - reached_s);
     bodies_.place(body);
   }
-  for (const ModalContact& contact : modal.contacts) touches.release(contact.a, contact.b);
+  for (const ModalContact& contact : modal.contacts) touches.release(contact.forces.a, contact.forces.b);
   modal.impact = nullptr;
   modal.bodies.clear();
 }

@@ -17,11 +17,9 @@ namespace carillon::rigid {
 
 /// A contact of an impact with modes.
 struct ModalContact {
-  int a = 0, b = -1;
-  shape::Place place_a, place_b;
+  Forces forces;                         // bodies, places, and what was not reported yet
   std::vector<double> shape_a, shape_b;  // axes of the meshes; empty: does not ring
   Vec3 station{};                        // of the point, from the centre of the one that moves, axes of its mesh
-  Forces waiting;                        // what was not reported yet
 };
 
 /// An impact with modes that is not over.
