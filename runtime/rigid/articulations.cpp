@@ -14,7 +14,7 @@
 
 namespace carillon::rigid {
 
-/// One a group of bodies that joints hold together. What is fixed is the world.
+/// One for each group of bodies that joints hold together. Fixed bodies are the world.
 void Bodies::make_articulations(const std::vector<joints::Joint>& joints) {
   if (joints.empty()) return;
   articulation_of_.assign(solids_.size(), -1);

@@ -1,4 +1,4 @@
-// Method: states, and frames that follow from them; what two bodies that touch have in common.
+// Method: states, and frames that follow from them; mean properties of two bodies that touch.
 // Source: K. L. Johnson, "Contact mechanics" (1985), eq. 11.24.
 // Deviations: none.
 #include "runtime/rigid/bodies.hpp"

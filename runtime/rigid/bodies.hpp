@@ -1,4 +1,4 @@
-// The bodies of a simulation: what they are, where they are and how they move; those on joints in joint coordinates.
+// The bodies of a simulation: properties, states and frames; bodies on joints in joint coordinates.
 #pragma once
 
 #include <memory>
@@ -33,11 +33,11 @@ struct Articulation {
   int struck = -1;  // member that an impact with modes moves; -1: none
 };
 
-/// All bodies and the ground, body -1. Invariants: what is fixed or asleep does not move; frames and spins are those of the states but
+/// All bodies and the ground, body -1. Invariants: fixed and sleeping bodies do not move; frames and spins are those of the states, except
 /// between a change of state() and the place() that follows it; bodies on joints are where the coordinates of their articulation have them.
 class Bodies {
  public:
-  /// Bodies on joints must make trees (joints::make_mechanism), and their velocities are brought to what the joints allow.
+  /// Bodies on joints must make trees (joints::make_mechanism), and their velocities are projected onto the motions that the joints allow.
   Bodies(std::vector<Solid> solids, std::vector<State> states, std::optional<Ground> ground, const Vec3& gravity,
          const std::vector<joints::Joint>& joints = {}, double joint_tolerance = joints::kTolerance);
 
@@ -65,7 +65,7 @@ class Bodies {
   void set_asleep(int body, bool sleeps) { asleep_[body] = sleeps ? 1 : 0; }
   bool are_all_asleep() const;
   bool has_modes(int body) const { return body >= 0 && solids_[body].modes != nullptr; }
-  /// Has it no curved surface?
+  /// Is its surface without curved parts?
   bool is_flat(int body) const { return body < 0 || solids_[body].shape->is_polyhedron(); }
   /// Is it, or are its modes, in an impact with modes?
   bool is_in_impact(int body) const { return body >= 0 && in_impact_[body] != 0; }
@@ -77,19 +77,19 @@ class Bodies {
     return articulation != nullptr ? articulation->struck >= 0 : is_in_impact(body);
   }
 
-  /// Of the point of a body that is there [m/s]; the ground and what is fixed have none.
+  /// Velocity of the point of a body at that place [m/s]; zero for the ground and fixed bodies.
   Vec3 calc_velocity(int body, const Vec3& where) const;
-  /// How fast the surfaces of a and b close at a touch [m/s].
+  /// Closing speed of the surfaces of a and b at a touch [m/s].
   double calc_approach(const shape::Touch& touch, int a, int b) const;
-  /// The most that any two points of a pair can approach by [m/s].
+  /// Upper bound of the closing speed of any two points of a pair [m/s].
   double calc_closing_speed(int a, int b) const;
-  /// Of the fastest point of a body, at most [m/s].
+  /// Upper bound of the speed of any point of a body [m/s].
   double calc_speed(int body) const { return norm(states_[body].velocity) + norm(placed_[body].spin) * solids_[body].radius_m; }
   shape::Box calc_box(int body, double grown_m) const;
   /// Kinetic and of gravity [J].
   double calc_energy(const std::vector<int>& bodies) const;
   double calc_kinetic(const std::vector<int>& bodies) const;
-  /// Motion and what joints have lost.
+  /// Energy of motion, and losses in joints.
   void add_to(Books& books) const;
 
   // Of two bodies that touch, or of one and the ground:
@@ -100,7 +100,7 @@ class Bodies {
   double calc_compliance(int a, int b) const;  // 1/E* [1/Pa]
   /// 1/R is the summed curvature, kept within 1/(0.5 mm) and one over half the size of the smaller body.
   double calc_contact_radius(const shape::Touch& touch, int a, int b) const;
-  /// How long an impact there lasts (calc_hertz_duration) in which so much mass meets at that speed [s].
+  /// Duration of an impact there (calc_hertz_duration) of that effective mass and speed [s].
   double calc_contact_time(const shape::Touch& touch, int a, int b, double mass_kg, double speed_m_s) const {
     return calc_hertz_duration(calc_compliance(a, b), calc_contact_radius(touch, a, b), mass_kg, speed_m_s);
   }
@@ -119,7 +119,7 @@ class Bodies {
   }
   /// Does a joint hold the two together, so that they do not collide?
   bool is_joined(int a, int b) const { return !joined_.empty() && joined_.contains(std::minmax(a, b)); }
-  /// How far the velocity asked for at the start is from what the joints of a body allow [m/s]; 0 without.
+  /// Difference between the velocity given at the start and the motions that the joints of a body allow [m/s]; 0 without joints.
   double get_start_error(int body) const;
   /// `time_s` later without contacts. Throws SolveError where the integration fails.
   joints::Coordinates fly(const Articulation& articulation, const joints::Coordinates& from, double time_s) const;
@@ -128,9 +128,9 @@ class Bodies {
   State make_member_state(int body, const joints::Motion& motion) const;
   /// Impulses at once, one a member.
   void apply_impulses(Articulation& articulation, const std::vector<joints::Spatial>& impulses);
-  /// The most that any point of it may accelerate by, in addition to gravity: twice what the joints do now [m/s^2].
+  /// Bound of the acceleration of any of its points by joints: twice the present one [m/s^2].
   double calc_joint_acceleration(const Articulation& articulation) const;
-  /// Would it stay where it is without velocity and contacts?
+  /// Is it in equilibrium without velocity and contacts?
   bool is_balanced(const Articulation& articulation) const;
   /// Velocity and spin that a member gains per impulse and couple on itself.
   impact::Mobility calc_own_mobility(const Articulation& articulation, int member) const;

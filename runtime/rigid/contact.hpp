@@ -1,4 +1,4 @@
-// Contacts: what is followed from step to step, and the impacts and forces that are reported.
+// Contacts that persist from step to step, and the impacts and forces that are reported.
 #pragma once
 
 #include <algorithm>
@@ -17,21 +17,21 @@ namespace carillon::rigid {
 struct Contact {
   shape::Touch touch;
   int a = 0, b = -1;  // bodies; -1: the ground
-  int cord = -1;      // it is one: the gap is what it lacks to be taut, the normal points from a to b; or a stop
+  int cord = -1;      // of a cord or stop: gap = length until taut, normal from a to b; -1: a touch
   bool touching = false;
-  bool presses = false;      // in an impact with modes
-  Vec3 impulse{}, couple{};  // of the last step, on a [N s, N m s]
-  double step_s = 0.0;       // its length
-  double until_s = 0.0;      // its end
-  double lost_j = 0.0;       // by it, in that step
-  bool rests = false;        // it did when a body of it fell asleep,
-  Vec3 rest_n{};             // and gave a this force,
-  bool is_load = false;      // which acts on whichever body is awake, and `impulse` is that and what it takes in addition
+  bool presses = false;                           // in an impact with modes
+  Vec3 impulse{}, couple{};                       // of the last step, on a [N s, N m s]
+  double step_s = 0.0;                            // its length
+  double until_s = 0.0;                           // its end
+  double lost_j = 0.0;                            // by it, in that step
+  bool rests = false;                             // it was closed when one of its bodies fell asleep,
+  Vec3 rest_n{};                                  // with this force on a,
+  bool is_load = false;                           // which acts on the body that is awake; `impulse` includes it
   std::array<std::int32_t, 2> triangles{-1, -1};  // of a and b, where it struck last
 
-  /// That it gave a in its last step [N].
+  /// Force on a in its last step [N].
   Vec3 calc_force() const { return touching && step_s > 0.0 ? (1.0 / step_s) * impulse : Vec3{}; }
-  /// Does it carry, or is it about to, outside of impacts with modes?
+  /// Closed, and in no impact with modes; not of cords.
   bool carries() const { return !presses && cord < 0 && touch.gap_m <= kTouch; }
   bool is_closed() const { return touching && touch.gap_m <= kTouch; }
 };
@@ -45,7 +45,7 @@ struct Pair {
   bool searched = false;
   std::int64_t window = -1;  // in which it was last near
   int cord = -1;             // it is one
-  double sag_m = 0.0;        // so deep an impact with modes left it: what it rests on has yielded, and need not bring it up
+  double sag_m = 0.0;        // depth in which an impact with modes left it: not pushed out, as the surface has yielded
 
   bool touches() const {
     return std::any_of(contacts.begin(), contacts.end(), [](const Contact& c) { return c.touching; });

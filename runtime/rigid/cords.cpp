@@ -1,8 +1,8 @@
-// Method: a cord is a contact between the two places it is tied to: the gap is what it lacks to be taut, the normal lies along it, it pulls
-//   and never pushes. In a step the normal is that of the middle of the step: with it a taut cord keeps its length and does no work while
-//   its body swings.
+// Method: a cord is a contact between the two places it is tied to: the gap is the length until it is taut, the normal lies along it, it
+//   pulls and never pushes. In a step the normal is that of the middle of the step: with it a taut cord keeps its length and does no work
+//   while its body swings.
 // Source: J. J. Moreau, "Unilateral contact and dry friction in finite freedom dynamics" (1988).
-// Deviations: a cord has no mass, and what it does to its body's surface when it comes taut is not heard. A stop of a joint is such a
+// Deviations: a cord has no mass, and its jerk on the surface of a body is not heard. A stop of a joint is such a
 //   contact, too, with a normal along the way of its joint, and is not heard either.
 #include "runtime/rigid/cords.hpp"
 
@@ -25,7 +25,7 @@ struct Pose {
 };
 Pose get_pose(const State& state) { return {state.centre, make_rotation(state.rotation)}; }
 
-/// Where a stop pushes and what is left of the way to it, the bodies being there.
+/// Place of a stop and the way that is left to it, the bodies being there.
 StopTouch calc_stop_touch(const Stop& stop, const Pose& a, const Pose& b) {
   const Vec3 axis = b.rotation * stop.axis, at_a = a.centre + a.rotation * stop.at_a;
   const double sign = stop.is_lower ? 1.0 : -1.0;
@@ -141,9 +141,9 @@ Point make_cord_point(const Bodies& bodies, const Step& step, const Cord& cord, 
   p.normal = distance > 0.0 ? (1.0 / distance) * way : c.touch.normal;
   const Vec3 u = a.velocity - b.velocity;
   const double along = dot(u, p.normal), error = dot(u, c.touch.normal), gap = c.touch.gap_m;
-  // Taut: as fast along the middle at the end as against it now, which keeps the length; what it stretches by now it does not keep.
+  // Taut: as fast along the middle at the end as against it now, which keeps the length; the present stretch is not kept.
   double speed = c.touching && gap <= kTouch ? error - along : -along - 2.0 * std::max(gap, 0.0) / h;
-  // What is too long is taken in as what is too deep comes up, at half the power that the cord loses (step.cpp).
+  // Excess length is taken in as depth is pushed out, at half the power that the cord loses (step_points.cpp).
   if (gap < -kDeep) {
     const double pull = dot(c.impulse, c.touch.normal), paid = pull > 0.0 ? std::max(0.5 * c.lost_j / pull, 0.0) : 0.0;
     speed += std::min(0.02 * (-kDeep - gap) / h, gap < -kFarTooDeep ? 5e-3 : paid);

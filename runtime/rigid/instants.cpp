@@ -15,9 +15,9 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr double kInstant = 1e-9;  // m; how well an instant of impact is found,
-constexpr int kLooks = 20;         // and in how many looks at most
-constexpr double kNear = 1e-6;     // m; what is nearer at the end of a step strikes there
+constexpr double kInstant = 1e-9;  // m; tolerance of an instant of impact,
+constexpr int kLooks = 20;         // and evaluations at most
+constexpr double kNear = 1e-6;     // m; a touch that is nearer at the end of a step strikes there
 constexpr double kCrowded = 2e-3;  // s; for so long an island is crowded
 
 }  // namespace
@@ -30,7 +30,7 @@ bool is_fast(const Bodies& bodies, const Contact& c, double h) {
   if (bodies.moves(c.b)) pull += dot(bodies.gravity(), c.touch.normal);
   const double square = approach * approach + 2.0 * std::max(pull, 0.0) * gap;
   if (square <= kSlowest * kSlowest) return false;
-  // What has just rebounded comes back within the step only if it is slow.
+  // A touch that has just rebounded comes back within the step only if it is slow.
   if (approach < 0.0) return pull > 0.0 && -approach + std::sqrt(square) <= pull * h;
   return gap <= approach * h + 0.5 * norm(bodies.gravity()) * h * h + 1e-6;
 }

@@ -9,7 +9,7 @@
 
 namespace carillon::rigid {
 
-/// Will this touch come so fast within the step that it strikes?
+/// Will this touch close within the step, and fast enough for an impact?
 bool is_fast(const Bodies& bodies, const Contact& contact, double step_s);
 
 /// Finds the instants of impacts on the predicted paths of a step, and knows which islands have so many that they are crowded: those strike
@@ -23,7 +23,7 @@ class Instants {
   /// The touches that close within the step.
   std::vector<ContactRef> list_closing(const Step& step, double step_s) const;
   /// Searches the pairs of an impact again, as they are at its instant: an edge that passes another one closely was taken for a plane until
-  /// now. Leaves what really strikes: what closes within step.together_s of the first, which is nearer than `near_m` (infinite: of now).
+  /// now. Keeps the touches that close within step.together_s of the first one, whose gap is at most `near_m` (infinite: of now).
   bool confirm(const Step& step, std::vector<ContactRef>& first, double step_s, double near_m) const;
 
   void set_crowded(const Island& island, double time_s);

@@ -20,12 +20,11 @@ struct Costs {
   std::int64_t flights = 0;  // of mechanisms: integrations of their free motion
 };
 
-/// What every stage books: energy that is lost to all of them, and its work. Energies that something holds (motion, modes, springs) are
-/// summed from their holders when they are asked for. Invariant: a stage that takes energy from these holders adds it here, so that the
-/// sum of the Books is constant.
+/// Losses and costs of all stages. Energies that bodies, modes and springs hold are summed from these when they are asked for. Invariant: a
+/// stage that takes energy from them books it here, so that the sum of the Books is constant.
 class Ledger {
  public:
-  /// Negative: energy that was not there [J].
+  /// Negative: energy from nowhere [J].
   void lose(double energy_j) { lost_j_ += energy_j; }
   /// Adds the losses to the books.
   void add_to(Books& books) const { books.lost_j += lost_j_; }

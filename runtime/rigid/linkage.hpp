@@ -1,4 +1,4 @@
-// What an impulse on one body does to all bodies on the same joints, at one configuration.
+// Response of all members of an articulation to an impulse on one of them, at one configuration.
 #pragma once
 
 #include <cstddef>
@@ -12,7 +12,7 @@ namespace carillon::rigid {
 /// The mobility of one mechanism at one configuration. A column is calculated when it is first asked for, and stays valid until set().
 class Linkage {
  public:
-  /// Forgets what it knew of another configuration.
+  /// Discards the columns of another configuration.
   void set(joints::Mechanism& mechanism, joints::Coordinates at) {
     mechanism_ = &mechanism;
     at_ = std::move(at);

@@ -1,4 +1,4 @@
-// What holds bodies together: joints, cords and the stops of joints.
+// Links between bodies: joints, cords and the stops of joints.
 #pragma once
 
 #include <optional>

@@ -57,7 +57,7 @@ bool ModalImpacts::predict(const Step& step, Collision& collision) {
       continue;
     }
     if (hit.is_cord || (!bodies_.has_modes(hit.a) && !bodies_.has_modes(hit.b))) continue;
-    if (!(hit.restitution > 0.0)) continue;  // it stays: weight keeps the surfaces together (rigid_impact.cpp)
+    if (!(hit.restitution > 0.0)) continue;  // weight keeps the surfaces together (rigid_impact.cpp)
     const double inverse_mass = dot(hit.touch.normal, calc_mobility(collision.movers, point) * hit.touch.normal);
     std::vector<double> phi[2];
     impact::Side sides[2];
@@ -85,9 +85,8 @@ bool ModalImpacts::predict(const Step& step, Collision& collision) {
   return integrate;
 }
 
-/// What is struck and leans on something else is struck with what stands behind it: adds the contacts that rest on the bodies of `order`,
-/// and on the bodies that these lean on. False where they are too many, or bodies on joints or another impact are among them: the rigid
-/// impact stands.
+/// A body that leans on another one is struck with it: adds the contacts that rest on the bodies of `order`, and on the bodies that these
+/// lean on. False where they are too many, or bodies on joints or another impact are among them: the rigid impact stands.
 bool ModalImpacts::add_resting(const Collision& collision, const Instants& instants, std::vector<int>& order) const {
   const std::vector<Hit>& hits = collision.hits;
   const int count = static_cast<int>(hits.size());
@@ -163,7 +162,7 @@ bool ModalImpacts::join(const std::vector<Hit>& hits, Selection& selection, Touc
       if (joined == nullptr)
         joined = found;
       else
-        end(*found, touches);  // what it has in its springs is lost
+        end(*found, touches);  // the energy of its springs is lost
     }
   const bool leans = std::any_of(order.begin(), order.end(), [&](int n) { return selection.rests[n] != 0; });
   const auto together = order.size() + (joined != nullptr ? joined->contacts.size() : 0);
@@ -224,7 +223,7 @@ std::pair<ModalContact, impact::Contact> ModalImpacts::make_contact(Hit& hit, bo
   impact::Contact spring;
   spring.where_m = hit.touch.where_m;
   spring.normal = hit.touch.normal;
-  // Surfaces are where the motion of the rigid bodies has them; what modes lift or lower there is small, and must not press a spring.
+  // The gap is that of rigid surfaces: the displacement by modes is small, and must not press a spring.
   spring.rests = rests;
   spring.gap_m = rests ? 0.0 : std::max(hit.touch.gap_m, 0.0);
   spring.spring = make_spring(bodies_, hit);

@@ -11,7 +11,7 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr double kLongest = 50e-3;   // s; what presses for longer rests
+constexpr double kLongest = 50e-3;   // s; an impact that lasts longer is a contact at rest
 constexpr double kRight = 0.01;      // of the kinetic energy: the most that a step of an impact on joints is corrected by
 constexpr double kSamePlace = 0.05;  // of the size
 
@@ -117,7 +117,7 @@ void ModalImpacts::advance(const Step& step, double to_s, double part_s, double 
       if (n < 0) continue;
       impact::Body& b = bodies[k];
       set_motion(body, b);
-      // What cords and other contacts do acts as long as the impact continues in this part, whose own steps may be longer.
+      // Cords and other contacts act as long as the impact continues in this part, whose own steps may be longer.
       const Vec3 free = b.on_joints ? step.free[n].state.velocity : bodies_.state(body).velocity + step.length_s * bodies_.gravity();
       pulls[k] = {(1.0 / step.length_s) * (step.movers[n].velocity - free),
                   (1.0 / step.length_s) * (step.movers[n].spin - step.free[n].placed.spin)};

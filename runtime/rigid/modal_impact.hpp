@@ -17,7 +17,7 @@ namespace carillon::rigid {
 
 /// A contact of an impact with modes.
 struct ModalContact {
-  Forces forces;                         // bodies, places, and what was not reported yet
+  Forces forces;                         // bodies, places, and impulses that are not reported yet
   std::vector<double> shape_a, shape_b;  // axes of the meshes; empty: does not ring
   Vec3 station{};                        // of the point, from the centre of the one that moves, axes of its mesh
 };
@@ -31,7 +31,7 @@ struct ModalImpact {
 };
 
 /// Impacts that are integrated with the modes of their bodies inside (runtime/impact), over as many small steps as they take. Their bodies
-/// take their motion from them; what gravity and other contacts do to these enters as accelerations, a small step at a time. Invariant: a
+/// take their motion from them; gravity and other contacts enter as accelerations, a small step at a time. Invariant: a
 /// body, and so its modal state, is in one impact at a time.
 class ModalImpacts {
  public:
@@ -41,7 +41,7 @@ class ModalImpacts {
   /// Is there an impact between the two bodies of a pair, at that place? Points get other names while bodies roll.
   bool is_pressed(const Pair& pair, const Vec3& where) const;
 
-  /// Caps the restitution of every hit by what its modes take; true where an impact has to be integrated.
+  /// Limits the restitution of every hit by the energy that its modes take; true where an impact has to be integrated.
   bool predict(const Step& step, Collision& collision);
   /// Begins an impact, or lets the hits join one that is not over. False where there are too many points: the rigid impact stands.
   bool begin(const Step& step, Collision& collision, const Instants& instants, TouchSets& touches);
@@ -49,12 +49,12 @@ class ModalImpacts {
   void end(const std::vector<Hit>& hits, TouchSets& touches);
   /// An impact has no other contacts than its own: where one of its bodies comes to touch something slowly, it ends.
   void end_where_resting(const Step& step, TouchSets& touches);
-  /// Moves the impacts of an island to the time `to_s`, `part_s` later. The step says what gravity and the other contacts do to their
-  /// bodies. Forces are reported where the window ends.
+  /// Moves the impacts of an island to the time `to_s`, `part_s` later. The step has the effect of gravity and of other contacts on
+  /// their bodies. Forces are reported where the window ends.
   void advance(const Step& step, double to_s, double part_s, double window_end_s, TouchSets& touches);
   /// Forces since the last call.
   std::vector<Forces> take_forces() { return std::exchange(forces_, {}); }
-  /// In the modes of bodies in impacts, in springs, and lost there.
+  /// Energies in modes and springs of impacts, and losses there.
   void add_to(Books& books) const;
 
  private:

@@ -24,10 +24,10 @@ class ModalStates {
  public:
   ModalStates(const Bodies& bodies, Ledger& ledger) : bodies_(bodies), ledger_(ledger), states_(bodies.count()) {}
 
-  /// Moved freely to a time, or as it is where it is later; what damping takes is lost.
+  /// Moved freely to a time, unless it is later already; losses by damping are booked.
   ModalState& advance(int body, double time_s);
   void set(int body, ModalState state) { states_[body] = std::move(state); }
-  /// What the pulses of a rigid impact give the modes, at most `available_j` that the motion lost; the rest of that is lost.
+  /// Excites modes by the pulses of a rigid impact, with at most `available_j`, which the motion lost; the rest of it is booked as lost.
   void excite(Strike& strike, double available_j);
   /// Energies at a time, and losses until then.
   void add_to(Books& books, double time_s) const;

@@ -1,6 +1,6 @@
-// Method: what has been slow for a while sleeps if contact forces exist that balance it at rest. An island sleeps as a whole. Where others
-//   of the island move, bodies sleep by themselves, with the forces of the others on them as they are. These forces are watched: where they
-//   change by more than a part of its weight a sleeping body wakes, alone, and so may those that lean on it, one after another.
+// Method: a body that has been slow for a while sleeps if contact forces exist that balance it at rest. An island sleeps as a whole. Where
+//   others of the island move, bodies sleep by themselves, with the forces of the others on them as they are. These forces are watched:
+//   where they change by more than a part of its weight a sleeping body wakes, alone, and so may those that lean on it, one after another.
 // Source: J. J. Moreau, "Unilateral contact and dry friction in finite freedom dynamics" (1988), the solution with zero velocities.
 // Deviations: none.
 #include "runtime/rigid/rest.hpp"
@@ -16,7 +16,7 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr double kPatience = 0.02;  // s; what was slower than kSlow for so long may be about to rest
+constexpr double kPatience = 0.02;  // s; slower than kSlow for so long, a body may be about to rest
 constexpr double kApart = 0.1;      // s; slow for so long, a body may sleep among others that move,
 constexpr double kCalm = 0.05;      // s; if those that it touches have been slow for so long
 constexpr double kStill = 5e-4;     // m/s; and nothing is faster where it touches
@@ -28,7 +28,7 @@ void Rest::reset(const std::vector<int>& bodies) {
   for (const int body : bodies) paces_[body].slow_s = 0.0;
 }
 
-/// Counts how long bodies have been slow; true where it is time to look whether they rest.
+/// Adds up the time for which bodies have been slow; true where a proof of rest may be tried.
 bool Rest::count_slow(const std::vector<int>& bodies, double time_s) {
   bool all = true;
   for (const int body : bodies) {
@@ -124,7 +124,7 @@ std::vector<char> Rest::find_slow() const {
     });
     for (const bool is_a : {true, false}) {
       const int body = is_a ? pair->a : pair->b, other = is_a ? pair->b : pair->a;
-      // Forces on what is on joints are the joints' affair.
+      // Forces on articulated bodies belong to the joints.
       const bool is_calm = !bodies_.moves(other) || (paces_[other].slow_s > kCalm && !bodies_.is_moved_by_impact(other) &&
                                                      bodies_.find_articulation(other) == nullptr);
       if (is_one(body) && (pair->cord >= 0 || moves_there || !is_calm)) is_slow[body] = 0;
@@ -142,7 +142,7 @@ void Rest::try_parts() {
     if (is_one(pair->a) && is_one(pair->b) && pair->touches()) groups.join(pair->a, pair->b);
   struct Part {
     Island island;
-    std::vector<Pair*> bounds;  // to what keeps moving, with or without forces
+    std::vector<Pair*> bounds;  // to bodies that keep moving, with or without forces
   };
   std::map<int, Part> parts;
   for (Pair* pair : windows_.near()) {
@@ -165,7 +165,7 @@ void Rest::try_parts() {
       for (const Contact& c : pair->contacts) add_pull(bodies_, c, is_a, c.calc_force(), pulls[at - part.island.bodies.begin()]);
     }
     for (Pair* pair : part.island.pairs) touches_.refresh(*pair);
-    // What stands without the others bears them as a fixed body does; what leans on them, or is carried, lies on them as a load.
+    // A part that stands without the others bears them as a fixed body does; one that leans on them, or is carried, is their load.
     const Balance found = try_sleep(part.island, options_.step_s, pulls);
     if (found == Balance::none) continue;
     for (Pair* pair : part.bounds)
@@ -177,7 +177,7 @@ void Rest::try_parts() {
   }
 }
 
-/// Wakes a body and what it carries, or it alone.
+/// Wakes a body and all that touch it, and so on, or it alone.
 std::vector<int> Rest::wake(int body, int by, bool alone) {
   std::vector<int> woken{body}, awake;
   while (!woken.empty()) {
@@ -198,7 +198,7 @@ std::vector<int> Rest::wake(int body, int by, bool alone) {
         if (!sleeps)
           c.rests = c.is_load = false;
         else if (dot((c.a == i ? 1.0 : -1.0) * c.rest_n, bodies_.gravity()) <= 0.0)
-          c.is_load = false;  // what sleeps under it bears what it gets
+          c.is_load = false;  // the sleeping body below it bears any load
     }
     for (Pair& pair : touches_.cord_pairs()) {
       if (pair.a != i && pair.b != i) continue;
@@ -230,7 +230,7 @@ void Rest::watch(Pair& pair, double step_s) {
     const double approach = bodies_.calc_approach(c.touch, c.a, c.b);
     const double pull = (a_moves ? -1.0 : 1.0) * dot(bodies_.gravity(), c.touch.normal);
     const double fallen_m = 0.5 * std::max(pull, 0.0) * step_s * step_s;
-    // Where the two rest on each other wake_unbalanced() watches what is slow.
+    // Where the two rest on each other, slow changes are left to wake_unbalanced().
     return (resting == 0 || approach > kSlowest) && c.touch.gap_m - approach * step_s - fallen_m <= kTouch;
   });
   if (comes) wake(body, by);

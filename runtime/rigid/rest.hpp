@@ -11,8 +11,8 @@
 
 namespace carillon::rigid {
 
-/// Puts bodies to sleep that contact forces balance, and wakes them where these forces change. Invariant: what sleeps has no velocity, and
-/// its contacts keep the forces under which it fell asleep.
+/// Puts bodies to sleep that contact forces balance, and wakes them where these forces change. Invariant: a sleeping body has no velocity,
+/// and its contacts keep the forces under which it fell asleep.
 class Rest {
  public:
   Rest(Bodies& bodies, TouchSets& touches, Windows& windows, StepProblem& problem, const Options& options, Ledger& ledger)
@@ -27,15 +27,15 @@ class Rest {
 
   /// These bodies are not about to rest.
   void reset(const std::vector<int>& bodies);
-  /// Counts how long the bodies of an island have been slow; puts it to sleep where it is balanced at rest. True: it sleeps.
+  /// Adds up the time for which the bodies of an island have been slow; puts it to sleep where it is balanced at rest. True: it sleeps.
   bool try_island(Island& island, double step_s);
   /// The same of bodies whose island keeps moving elsewhere. At the beginning of a window, on the contacts of the last step.
   void try_parts();
   /// The same of an articulation that touches nothing for the length of a window.
   bool try_articulation(Articulation& articulation, double length_s);
 
-  /// Updates the touches of a pair for a step. What sleeps of it wakes where what it rested on has gone away, or where another is about to
-  /// touch it.
+  /// Updates the touches of a pair for a step. A sleeping body of it wakes where a contact that it rested on has opened, or where another
+  /// body is about to touch it.
   void watch(Pair& pair, double step_s);
   /// Wakes the bodies that sleep among others whose forces on them are no longer those under which they rest.
   void wake_unbalanced();

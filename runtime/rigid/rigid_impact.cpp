@@ -1,4 +1,4 @@
-// Method: the points of an impact and what touches their bodies are solved at once, with Newton's restitution and Coulomb's cone.
+// Method: the points of an impact and the contacts of their bodies are solved at once, with Newton's restitution and Coulomb's cone.
 // Source: B. Mirtich, "Impulse-based dynamic simulation of rigid body systems" (1996).
 // Deviations: impulses are scaled back where friction and restitution together would gain energy.
 #include "runtime/rigid/rigid_impact.hpp"

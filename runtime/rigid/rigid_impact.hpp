@@ -34,7 +34,7 @@ class RigidImpact {
   Collision make(const Step& step, std::vector<ContactRef> contacts) const;
   /// The impulses of all hits.
   void solve(Collision& collision);
-  /// Gives the bodies these impulses; the contacts touch or rebound after that. Returns the record of it, and what the motion lost [J].
+  /// Gives the bodies these impulses; the contacts touch or rebound after that. Returns the record of it, and the loss of the motion [J].
   Strike apply(Collision& collision, double& lost_j);
 
  private:

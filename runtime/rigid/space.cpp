@@ -12,7 +12,7 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr double kShortest = 1e-9;  // s; what is left of a step and shorter than this is not made
+constexpr double kShortest = 1e-9;  // s; a shorter rest of a step is left out
 constexpr int kMaxMissed = 30;      // in a step: instants at which nothing struck after all
 constexpr int kMaxImpacts = 4;      // of an island in a step, each at its instant; an island with more is crowded
 constexpr int kMinImpacts = 2;      // the same of the largest islands, each of whose impacts costs more
@@ -146,14 +146,14 @@ void Space::move(double to_s, double part_s) {
   const double before_j = bodies_.calc_energy(step_.island().bodies);
   std::vector<State> moved;
   std::vector<char> in_impact;  // one that ends in this part has been moved by it, too
-  double loads_j = 0.0;         // done by what sleeps on them
+  double loads_j = 0.0;         // work of sleeping bodies that lie on them
   for (int n = 0; n < step_.count(); ++n) {
     in_impact.push_back(bodies_.is_moved_by_impact(step_.body(n)) ? 1 : 0);
     const bool is_free = step_.free[n].articulation < 0;
     moved.push_back(is_free ? step_.calc_moved(n, part_s) : State{});
     if (is_free && in_impact.back() == 0) loads_j += step_.calc_load_work(n, moved.back(), part_s);
   }
-  ledger_.lose(-loads_j);  // what lies on them does not fall as they do: until it wakes, within kDeep, this energy comes from nowhere
+  ledger_.lose(-loads_j);  // a load does not fall with its support until it wakes, within kDeep: this energy comes from nowhere
   std::vector<const ArticulationStep*> flown;
   for (const ArticulationStep& a : step_.articulations)
     if (a.articulation->struck < 0) flown.push_back(&a);

@@ -2,7 +2,7 @@
 //
 // Time goes in windows of 2 ms. Bodies that can meet nothing within one fly through it in closed form. The others go through it in small
 // steps. In each of them the velocities at its end follow from one complementarity problem over all points that touch (solver.hpp), begun
-// at the impulses of the step before; places follow from the mean of both velocities, so that what neither slides nor strikes keeps its
+// at the impulses of the step before; places follow from the mean of both velocities, so that contacts without slip and impacts keep the
 // energy. A touch that comes fast is no part of that: its instant is found, the step ends there, and the impact is solved by itself.
 // An island that a solution with zero velocity balances is put to sleep.
 //
@@ -30,13 +30,13 @@
 
 namespace carillon::rigid {
 
-/// All bodies of a simulation and their contacts. At the start of a window all bodies are at its time. What is fixed or asleep does not
+/// All bodies of a simulation and their contacts. At the start of a window all bodies are at its time. Fixed and sleeping bodies do not
 /// move, bodies on joints never leave them, and the energies of calc_books() have a constant sum. Islands are stepped apart.
 class Space {
  public:
   static constexpr double kWindow = Windows::kLength;  // s
 
-  /// Bodies on joints must make trees (joints::make_mechanism), and their velocities are brought to what the joints allow.
+  /// Bodies on joints must make trees (joints::make_mechanism), and their velocities are projected onto the motions that the joints allow.
   Space(std::vector<Solid> solids, std::vector<State> states, std::optional<Ground> ground, const Vec3& gravity, const Options& options,
         const Links& links = {});
   Space(const Space&) = delete;  // stages refer to each other
@@ -56,7 +56,7 @@ class Space {
   bool is_all_asleep() const { return bodies_.are_all_asleep(); }
   /// Where all is asleep: to the end of the next window, without a step.
   void skip_window(double end_s);
-  /// Of the point of a body that is there [m/s]; the ground and what is fixed have none.
+  /// Velocity of the point of a body at that place [m/s]; zero for the ground and fixed bodies.
   Vec3 calc_velocity(int body, const Vec3& where) const { return bodies_.calc_velocity(body, where); }
   const Vec3& get_spin(int body) const { return bodies_.placed(body).spin; }
   /// Contacts of bodies that are awake.
@@ -66,12 +66,12 @@ class Space {
   /// Forces of impacts with modes since the last call.
   std::vector<Forces> take_forces() { return modal_impacts_.take_forces(); }
   Books calc_books() const;
-  /// How long a contact lasts (calc_hertz_duration) in which so much mass meets at that speed.
+  /// Duration of an impact (calc_hertz_duration) of that effective mass and speed [s].
   double calc_contact_time(const Hit& hit, double mass_kg, double speed_m_s) const {
     return bodies_.calc_contact_time(hit.touch, hit.a, hit.b, mass_kg, speed_m_s);
   }
   int count_mechanisms() const { return static_cast<int>(bodies_.articulations().size()); }
-  /// How far the velocity asked for at the start is from what the joints of a body allow [m/s]; 0 without.
+  /// Difference between the velocity given at the start and the motions that the joints of a body allow [m/s]; 0 without joints.
   double get_start_error(int body) const { return bodies_.get_start_error(body); }
   /// Does a joint hold the two together, so that they do not collide?
   bool is_joined(int a, int b) const { return bodies_.is_joined(a, b); }

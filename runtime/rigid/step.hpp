@@ -59,7 +59,7 @@ class Step {
   std::vector<Mover> movers;
   std::vector<FreeMotion> free;
   std::vector<ArticulationStep> articulations;
-  std::vector<joints::Spatial> loads;  // impulses of what sleeps on the bodies
+  std::vector<joints::Spatial> loads;  // impulses of sleeping bodies on these
   std::vector<Point> points;
   std::vector<ContactRef> rows;  // of the points
   std::vector<Vec3> turned;      // angular impulses on the bodies

@@ -101,7 +101,7 @@ void StepProblem::predict_articulation(Step& step, int number, bool at_rest) {
   }
 }
 
-/// What sleeps on bodies of an island pulls on them as it did when it fell asleep.
+/// Bodies that sleep on those of an island keep the forces on them that they had when they fell asleep.
 void StepProblem::add_loads(Step& step) const {
   step.loads.assign(step.count(), {});
   for (const Pair* pair : step.island().pairs) {
@@ -165,7 +165,7 @@ Point StepProblem::make_lasting_point(const Step& step, Pair& pair, const Contac
     const Vec3 other = sb.middle + 0.5 * (sb.first + sb.last);
     where = p.a >= 0 ? 0.5 * (where + other) : other;
   }
-  // What the arms turn beyond that point until the end of the step belongs to the velocity there.
+  // The turn of the arms from that point until the end of the step belongs to the velocity there.
   Vec3 beyond{};
   if (p.a >= 0) {
     p.arm_a = where - sa.centre;
@@ -175,12 +175,12 @@ Point StepProblem::make_lasting_point(const Step& step, Pair& pair, const Contac
     p.arm_b = where - sb.centre;
     beyond = beyond - cross(step.free[p.b].placed.spin, sb.has_joints ? sb.last - p.arm_b : 0.5 * (sb.last - sb.first));
   }
-  // What touches and is at rest stays so exactly: a picometre is no gap, and would be a force.
+  // A touch at rest stays so exactly: a picometre is no gap, and would be a force.
   const bool rests = t.gap_m <= kTouch && c.touching && std::abs(approach) < kAtRest;
-  // What is too deep and parts may come back to where it is now: a push that ends its parting would do work.
+  // A deep touch that parts may come back to its present depth: a push that ends its parting would do work.
   const double free_way = t.gap_m < -kDeep ? 0.0 : t.gap_m;
   double speed = rests ? 0.0 : std::min(0.0, approach - 2.0 * free_way / h);
-  // What is too deep comes up, at half the power that the contact loses, so that no energy comes of it.
+  // A deep touch is pushed out, at half the power that the contact loses, so that no energy is gained.
   if (t.gap_m < -kDeep) {
     const double push = dot(c.impulse, t.normal), paid = push > 0.0 ? 0.5 * c.lost_j / push : 0.0;
     const double up = std::min(0.02 * (-kDeep - t.gap_m) / h, t.gap_m < -kFarTooDeep - pair.sag_m ? 0.005 : paid);
@@ -208,7 +208,7 @@ void StepProblem::make_points(Step& step, bool leaves_impacts) const {
       const ContactRef row{pair, k++};
       const double approach = bodies_.calc_approach(c.touch, c.a, c.b);
       if (c.presses || (leaves_impacts && is_fast(bodies_, c, h))) continue;
-      // The impact has these bodies; what stands still and rings continues to carry others.
+      // The impact moves these bodies; static ones that ring continue to carry others.
       if (c.cord < 0 && (bodies_.is_moved_by_impact(pair->a) || bodies_.is_moved_by_impact(pair->b))) continue;
       if (c.touch.gap_m > kTouch + 2.0 * h * std::max(approach, 0.0) + 4.0 * norm(bodies_.gravity()) * h * h && !c.touching) continue;
       step.points.push_back(c.cord >= 0 ? make_cord_point(bodies_, step, touches_.cord(c.cord), c) : make_lasting_point(step, *pair, c));

@@ -17,12 +17,12 @@ constexpr int kMaxDirect = 24;               // points of a small island
 constexpr int kMaxAtOnce = 12;               // bodies that are about to rest and are factorised without sweeps before
 constexpr double kLoose = 1000.0;            // times the tolerance
 constexpr double kLooseOfSpeed = 1e-3;       // of the fastest of its bodies, where that is more,
-constexpr double kLoosest = 0.3 * kSlowest;  // and no more than this: what stands must not strike
+constexpr double kLoosest = 0.3 * kSlowest;  // and no more than this: standing bodies must not strike
 constexpr int kGuesses = 6;                  // of a factorised problem in a step
 constexpr double kRetry = 4e-3;              // s; an island whose guesses failed goes by sweeps for so long,
 constexpr double kRetrySmall = 1e-3;         // s; a small one for so long
 constexpr int kProofSweeps = 120;            // that look for rest,
-constexpr int kMaxProofSweeps = 1200;        // of what was slow for kLong
+constexpr int kMaxProofSweeps = 1200;        // of bodies that were slow for kLong
 
 }  // namespace
 
@@ -59,13 +59,13 @@ void StepProblem::find_impulses(Step& step) {
   const bool rolls = std::any_of(points.begin(), points.end(), [](const Point& p) { return p.rolling_m > 0.0; });
   const auto factorise = [&](bool are_swept) {
     if (solver_.solve_directly(movers, points, is_small ? kMaxGuesses : kGuesses, are_swept) && !gains_energy(free, step)) return true;
-    // What rolls keeps its energy better that way, even where a guess fails now and then.
+    // Rolling bodies keep their energy better that way, even where a guess fails now and then.
     const double pause_s = !is_small ? kRetry : rolls ? 0.0 : kRetrySmall;
     for (const int body : bodies) next_guess_s_[body] = bodies_.get_time() + pause_s;
     return false;
   };
   const auto sweep = [&](int max) {
-    const bool is_loose = !settles && !is_small;  // what moves fast needs less than what is about to stand still
+    const bool is_loose = !settles && !is_small;  // fast motion needs less accuracy than bodies that are about to stand still
     const double tolerance = is_loose ? std::max(kLoose * tolerance_m_s, std::min(kLooseOfSpeed * fastest, kLoosest)) : tolerance_m_s,
                  left = solver_.solve(movers, points, tolerance, max);
     ledger_.costs.sweeps += solver_.get_sweeps();
@@ -74,7 +74,7 @@ void StepProblem::find_impulses(Step& step) {
   const bool may_guess = std::all_of(bodies.begin(), bodies.end(), [&](int body) { return bodies_.get_time() >= next_guess_s_[body]; });
   const bool at_once = is_small || (settles && count <= kMaxAtOnce);
   if (at_once && may_guess) {
-    // What slid in the last step is guessed to slide; what rolls is guessed again.
+    // A point that slid in the last step is guessed to slide; rolling ones are guessed again.
     if (factorise(is_small && !rolls)) return;
     movers = free;
     points = begun;
@@ -97,7 +97,7 @@ void StepProblem::find_impulses(Step& step) {
   sweep(options_.max_sweeps);
 }
 
-/// The angular impulses of all points on each body, and what they do to the velocities of the articulations.
+/// The angular impulses of all points on each body, and the velocities that they give the articulations.
 void StepProblem::sum_impulses(Step& step) const {
   step.turned.assign(step.count(), Vec3{});
   for (int n = 0; n < step.count(); ++n) step.turned[n] = step.loads[n].angular;
@@ -143,7 +143,7 @@ bool StepProblem::solve_rest(Step& step, double h, const std::vector<joints::Spa
   const double bound = slow_s > kLong ? kSlow / (g * kLong) : kBalanced;
   const std::vector<Mover> free = movers;
   const auto holds = [&] {
-    std::vector<char> carried(step.count(), 0);  // what drifts where nothing pulls is at rest nowhere
+    std::vector<char> carried(step.count(), 0);  // a body that nothing carries is not at rest, even without gravity
     for (int n = 0; n < static_cast<int>(pulls.size()); ++n) carried[n] = dot(pulls[n].linear, bodies_.gravity()) < 0.0 ? 1 : 0;
     for (const Point& p : points)
       for (const int n : {p.a, p.b})

@@ -23,12 +23,12 @@ class StepProblem {
   /// Small islands by factorisation; large ones in sweeps, which begin at the impulses of the step before.
   void solve(Step& step);
   /// Are there contact forces that balance the bodies of an island, which have no velocity? They are in the step then. `pulls`: forces and
-  /// couples of others on each body, or empty. What has been slow for long needs no better balance than its mean acceleration.
+  /// couples of others on each body, or empty. The longer a body has been slow, the less balance is enough.
   bool solve_rest(Step& step, double length_s, const std::vector<joints::Spatial>& pulls, double slow_s);
   /// Writes impulses and losses into the contacts; the first `at_s` of the step is made.
   void keep_impulses(const Step& step, double at_s) const;
-  /// Contacts do no work on an island, but for rounding, for what comes up from too deep and for surfaces whose curvature changes within a
-  /// step. What the island gained by that its motion pays back, where it touches what does not move (a free one would lose momentum).
+  /// Contacts do no work on an island, except for rounding, for contacts that are pushed out and for surfaces whose curvature changes
+  /// within a step. Such a gain is taken from the motion, where the island touches a static body (a free one would lose momentum).
   void remove_gain(const Step& step, double before_j);
 
  private:

@@ -96,7 +96,7 @@ void TouchSets::release(int a, int b) {
   for (Contact& c : pair.contacts) {
     if (!c.presses) continue;
     c.presses = c.touching = false;
-    // Where its modes yielded the body stands lower than it would on what is rigid.
+    // Where modes have yielded, the body stands lower than on a rigid surface.
     pair.sag_m = std::max(pair.sag_m, -c.touch.gap_m);
   }
 }

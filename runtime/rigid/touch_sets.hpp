@@ -28,7 +28,7 @@ class TouchSets {
   std::vector<Pair>& cord_pairs() { return cord_pairs_; }
   const std::vector<Pair>& cord_pairs() const { return cord_pairs_; }
   const Cord& cord(int number) const { return cords_[number]; }
-  /// Forgets pairs that are not near in this window; what sleeps keeps its contacts.
+  /// Removes pairs that are not near in this window, unless both bodies are still.
   void forget_far(std::int64_t window);
 
   /// The touches as the bodies are now, found again.

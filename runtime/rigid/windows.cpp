@@ -1,7 +1,7 @@
 // Method: windows, in which bodies that can meet nothing fly; boxes that hold all that a body may reach in one give the pairs that are
 //   near.
-// Source: B. Mirtich, "Impulse-based dynamic simulation of rigid body systems" (1996): bounds on what can meet, flight in closed form.
-// Deviations: windows have a length; what an impact makes faster than its window was planned for is looked at again.
+// Source: B. Mirtich, "Impulse-based dynamic simulation of rigid body systems" (1996): bounds of reach, flight in closed form.
+// Deviations: windows have a length; a body that an impact makes faster than planned is checked again.
 #include "runtime/rigid/windows.hpp"
 
 #include <algorithm>
@@ -16,7 +16,7 @@ namespace carillon::rigid {
 namespace {
 
 constexpr double kMaxSteps = 1024;        // of a window
-constexpr double kThin = 0.15;            // of the thickness of the thinner body: what moves as far in a long step takes short ones
+constexpr double kThin = 0.15;            // of the thickness of the thinner body: a pair that moves as far in a long step takes short ones
 constexpr double kSag = 5e-6;             // m; a point on an arc may leave its chord by this in a step,
 constexpr double kSagOfThickness = 5e-4;  // or by so much of the thickness of its body
 constexpr double kFlatSteps = 2.0;        // times the step of others: that of groups in which flat bodies alone touch
@@ -158,7 +158,7 @@ void Windows::fly(Articulation& articulation) {
   ledger_.costs.body_steps += static_cast<std::int64_t>(articulation.bodies.size());
 }
 
-/// Joins the groups that an impact may make one in this window: what sleeps between them wakes with it.
+/// Joins groups with sleeping bodies between them: an impact that wakes these makes one group of them within the window.
 void Windows::join_sleeping(Groups& groups) const {
   const auto join = [&](const Pair& pair) {
     if (!bodies_.is_fixed(pair.a) && !bodies_.is_fixed(pair.b)) groups.join(pair.a, pair.b);
@@ -194,7 +194,7 @@ void Windows::choose_steps() {
   for (const Pair* pair : near_) {
     const int body = bodies_.moves(pair->a) ? pair->a : pair->b;
     if (!bodies_.moves(body)) continue;
-    // What is fast for its size must not pass through another between two looks, and what is thin must not sink in.
+    // Bodies that are fast for their size must not pass through each other between two searches, and thin ones must not sink in.
     const double speed = bodies_.calc_closing_speed(pair->a, pair->b) + g * length_s;
     ask(body, 2.0 * length_s * speed / (kReach * bodies_.calc_size(pair->a, pair->b)));
     const bool is_thin = kFlatSteps * options_.step_s * speed > kThin * bodies_.calc_thickness(pair->a, pair->b);
@@ -203,7 +203,7 @@ void Windows::choose_steps() {
   for (int i = 0; i < count; ++i) {
     if (!bodies_.moves(i)) continue;
     if (bodies_.find_articulation(i) != nullptr || bodies_.is_moved_by_impact(i)) ask(i, length_s / options_.step_s);
-    // The arc of what turns fast leaves its chord by r (w h)^2 / 2 within a step.
+    // The arc of a point of a spinning body leaves its chord by r (w h)^2 / 2 within a step.
     const Solid& solid = bodies_.solid(i);
     const double sag = std::max(kSag, kSagOfThickness * solid.shape->get_thickness_m());
     ask(i, length_s * norm(bodies_.placed(i).spin) * std::sqrt(solid.radius_m / (2.0 * sag)));
@@ -281,7 +281,7 @@ void Windows::wake(int body, int by) {
   reach_m_s_[body] = norm(bodies_.gravity()) * kLength;
 }
 
-/// What flew to the end of the window, to the end of the present step of the one that may meet it, whose steps it takes from there on.
+/// Moves a body that flew to the end of the window back to the end of the present step of the body that may meet it, whose steps it takes.
 void Windows::undo_flight(int body, int by) {
   if (body < 0 || !flying_[body]) return;
   const double flown_s = find_time(step_ + strides_[by]) - start_s_;

@@ -29,7 +29,7 @@ class Windows {
   /// The same of an articulation. False: it may meet something.
   bool may_fly(const Articulation& articulation) const;
   void fly(Articulation& articulation);
-  /// How finely each group of bodies that may meet in this window goes through it: some take several of the small steps at once.
+  /// The step length of each group of bodies that may meet in this window: some take several of the small steps at once.
   void choose_steps();
   /// A window in which all bodies sleep.
   void skip(double end_s);
@@ -62,7 +62,7 @@ class Windows {
 
   /// A body that wakes takes the steps of the one that wakes it, which is due: so they do not depend on other islands.
   void wake(int body, int by);
-  /// What a body may meet that an impact made faster than its window was planned for.
+  /// Adds the pairs that a body may reach after an impact made it faster than the window was planned for.
   void extend(int body);
 
  private:
