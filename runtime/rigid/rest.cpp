@@ -28,8 +28,7 @@ void Rest::reset(const std::vector<int>& bodies) {
   for (const int body : bodies) paces_[body].slow_s = 0.0;
 }
 
-/// Adds up the time for which bodies have been slow; true where a proof of rest may be tried.
-bool Rest::count_slow(const std::vector<int>& bodies, double time_s) {
+bool Rest::may_sleep(const std::vector<int>& bodies, double time_s) {
   bool all = true;
   for (const int body : bodies) {
     Pace& pace = paces_[body];
@@ -39,12 +38,8 @@ bool Rest::count_slow(const std::vector<int>& bodies, double time_s) {
   return all;
 }
 
-bool Rest::try_island(Island& island, double step_s) {
-  return count_slow(island.bodies, step_s) && try_sleep(island, step_s, {}) != Balance::none;
-}
-
 bool Rest::try_articulation(Articulation& articulation, double length_s) {
-  if (!articulation.is_anchored || !count_slow(articulation.bodies, length_s) || !bodies_.is_balanced(articulation)) return false;
+  if (!articulation.is_anchored || !may_sleep(articulation.bodies, length_s) || !bodies_.is_balanced(articulation)) return false;
   for (const int body : articulation.bodies) ledger_.lose(calc_kinetic(bodies_.solid(body), bodies_.state(body)));
   std::fill(articulation.now.u.begin(), articulation.now.u.end(), 0.0);
   bodies_.place(articulation);

@@ -27,8 +27,10 @@ class Rest {
 
   /// These bodies are not about to rest.
   void reset(const std::vector<int>& bodies);
-  /// Adds up the time for which the bodies of an island have been slow; puts it to sleep where it is balanced at rest. True: it sleeps.
-  bool try_island(Island& island, double step_s);
+  /// Adds up the time for which bodies have been slow; true where a proof of rest may be tried.
+  bool may_sleep(const std::vector<int>& bodies, double time_s);
+  /// Puts an island to sleep where it is balanced at rest. True: it sleeps.
+  bool try_island(Island& island, double step_s) { return try_sleep(island, step_s, {}) != Balance::none; }
   /// The same of bodies whose island keeps moving elsewhere. At the beginning of a window, on the contacts of the last step.
   void try_parts();
   /// The same of an articulation that touches nothing for the length of a window.
@@ -52,7 +54,6 @@ class Rest {
   };
   enum class Balance { none, stands, leans };  // leans: only with the forces of others
 
-  bool count_slow(const std::vector<int>& bodies, double time_s);
   Balance try_sleep(Island& island, double step_s, const std::vector<joints::Spatial>& pulls);
   std::vector<char> find_slow() const;
   std::vector<int> wake(int body, int by, bool alone = false);

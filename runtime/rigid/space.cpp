@@ -101,7 +101,7 @@ void Space::step_island(Island& island, double start_s, double length_s) {
   while (length_s - done > kShortest) {
     const double h = length_s - done;
     bodies_.set_time(start_s + done);
-    if (!std::exchange(begun, true) && rest_.try_island(island, h)) break;
+    if (!std::exchange(begun, true) && rest_.may_sleep(island.bodies, h) && rest_.try_island(island, h)) break;
     modal_impacts_.end_where_resting(step_, touches_);
     problem_.predict(step_, h, false);
     problem_.make_points(step_, impacts < max_impacts);
