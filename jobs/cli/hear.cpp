@@ -27,8 +27,9 @@ Json::Value describe(const hear::Sound& sound) {
   entry["modes"] = Json::arrayValue;
   for (const hear::StruckMode& mode : sound.modes) {
     Json::Value& one = entry["modes"].append(Json::objectValue);
-    one["freq_hz"] = mode.freq_hz;
-    one["t60_s"] = std::isfinite(mode.t60_s) ? Json::Value(mode.t60_s) : Json::Value();
+    one["freq_hz"] = mode.heard.freq_hz;
+    const double t60_s = mode.heard.calc_t60_s();
+    one["t60_s"] = std::isfinite(t60_s) ? Json::Value(t60_s) : Json::Value();
     one["error_cents"] = std::isfinite(mode.error_cents) ? Json::Value(mode.error_cents) : Json::Value();
     one["facet_cents"] = mode.facet_cents;
     one["level_dba"] = std::isfinite(mode.level_dba) ? Json::Value(mode.level_dba) : Json::Value();
@@ -49,9 +50,9 @@ void print(const hear::Sound& sound) {
   fmt::print("{:>5} {:>10} {:>8}{} {:>9} {:>9}\n", "mode", "Hz", "+-cents", format_facets("+-facets"), "T60 [s]", "dB(A)");
   for (std::size_t m = 0; m < sound.modes.size(); ++m) {
     const hear::StruckMode& mode = sound.modes[m];
-    fmt::print("{:>5} {:>10.1f} {:>8}{} {:>9.3g} {:>9}\n", m + 1, mode.freq_hz,
+    fmt::print("{:>5} {:>10.1f} {:>8}{} {:>9.3g} {:>9}\n", m + 1, mode.heard.freq_hz,
                std::isfinite(mode.error_cents) ? hear::format_cents(mode.error_cents) : "-",
-               format_facets(hear::format_cents(mode.facet_cents)), mode.t60_s,
+               format_facets(hear::format_cents(mode.facet_cents)), mode.heard.calc_t60_s(),
                mode.level_dba > -99.5 ? fmt::format("{:.0f}", mode.level_dba) : "<-99");
   }
   if (is_doubtful)

@@ -41,6 +41,7 @@
 #include "runtime/base/vector.hpp"
 #include "runtime/material/mallets.hpp"
 #include "runtime/material/table.hpp"
+#include "runtime/support/heard.hpp"
 
 namespace carillon::hear {
 namespace {
@@ -382,7 +383,8 @@ class Listening {
   }
 
   void play(Sound& sound) {
-    const bank::Bank bank = bank::choose_frequencies(bank::read_bank(sound.bank), bank::Frequencies::kCorrected);
+    bank::Bank bank = bank::choose_frequencies(bank::read_bank(sound.bank), bank::Frequencies::kCorrected);
+    const std::vector<bank::HeardMode> modes = support::mount(bank);
     if (bank.mode_count() == 0 || bank.freq_hz(0) > kBandHz[1])
       throw InputError(fmt::format("{}: it has no mode from {:g} to {:g} Hz, so it is inaudible; make it larger ({})", sound.name,
                                    kBandHz[0], kBandHz[1],
@@ -393,7 +395,7 @@ class Listening {
     sound.mode_count = bank.mode_count();
     sound.highest_hz = bank.freq_hz(bank.mode_count() - 1);
     sound.is_complete = bank.complete;
-    sound.modes = list_modes(bank, strikes.front(), kListed);
+    sound.modes = list_modes(bank, modes, strikes.front(), kListed);
     for (StruckMode& mode : sound.modes) mode.error_cents += sound.poisson_cents;
     for (const double cents : bank.discretisation_error_cents) sound.worst_cents = std::max(sound.worst_cents, cents + sound.poisson_cents);
     for (const double cents : bank.facet_error_cents) sound.facet_cents = std::max(sound.facet_cents, cents);

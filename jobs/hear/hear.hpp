@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "runtime/bank/heard.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::hear {
@@ -32,7 +33,7 @@ inline constexpr const char* kDefaultMaterial = "steel";
 
 /// One mode as it is heard at the first strike.
 struct StruckMode {
-  double freq_hz = 0.0, t60_s = 0.0;
+  bank::HeardMode heard;
   double error_cents = 0.0;  // infinite: unknown
   double facet_cents = 0.0;  // bank::Bank::facet_error_cents
   double level_dba = 0.0;    // of its beginning, below that of the loudest

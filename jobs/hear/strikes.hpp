@@ -9,7 +9,8 @@
 
 namespace carillon::hear {
 
-/// The first `count` modes as a blow at a vertex makes them.
-std::vector<StruckMode> list_modes(const bank::Bank& bank, std::size_t vertex, std::size_t count);
+/// The first `count` modes as a blow at a vertex makes them. `heard`: of support::mount().
+std::vector<StruckMode> list_modes(const bank::Bank& bank, const std::vector<bank::HeardMode>& heard, std::size_t vertex,
+                                   std::size_t count);
 
 }  // namespace carillon::hear

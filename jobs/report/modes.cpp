@@ -74,9 +74,11 @@ Series make_series(const Subject& subject, const char* name, int colour, const s
 
 Html make_mode_table(const Subject& subject) {
   const bank::Bank& bank = subject.bank;
+  const std::string frequency = fmt::format("{} [Hz]", bank::name_origin(bank)),
+                    bound = fmt::format("\u00b1 {} [cent]", bank::name_origin(bank));
   std::vector<Column> columns{{"mode", true},
-                              {"frequency of the mesh [Hz]", true},
-                              {"\u00b1 mesh [cent]", true},
+                              {frequency.c_str(), true},
+                              {bound.c_str(), true},
                               {"\u00b1 body [cent]", true},
                               {"heard [Hz]", true},
                               {"\u00b1 body [cent]", true},
@@ -108,12 +110,12 @@ Html make_mode_table(const Subject& subject) {
   if (shown < bank.mode_count())
     out += html("<p class=\"remark\">The first {} of {} modes; carillon-bank info --json has them all.</p>\n", shown, bank.mode_count());
   return html(
-      "<details><summary>All modes in numbers</summary>\n{}<p class=\"remark\">Frequencies are undamped. \u00b1 mesh: to the exact mode of "
-      "the mesh, a bound; \u00b1 body: to the mode of the body, an estimate; heard: what is played, with the estimated error of the "
+      "<details><summary>All modes in numbers</summary>\n{}<p class=\"remark\">Frequencies are undamped. \u00b1 {}: to the exact mode, a "
+      "bound; \u00b1 body: to the mode of the body, an estimate; heard: what is played, with the estimated error of the "
       "mesh taken off, in air and on its supports as far as the bank knows them; decay and T60: what is heard, with its parts; gain: Pa at "
       "1 m for unit modal velocity; kind: how the body moves, where its shape says so; facets in doubt: what comes to \u00b1 body if the "
       "facets are not what they were taken for.</p>\n</details>\n",
-      out);
+      out, bank::name_origin(bank));
 }
 
 Html find_largest(const std::vector<double>& values, const Subject& subject, std::string (*format)(double)) {

@@ -7,7 +7,9 @@
 #include <cmath>
 #include <new>
 
+#include "precompute/mesh/check.hpp"
 #include "precompute/mesh/curved.hpp"
+#include "precompute/mesh/check.hpp"
 #include "precompute/mesher/body_surface.hpp"
 #include "precompute/mesher/curve_mesh.hpp"
 #include "precompute/mesher/guard.hpp"
@@ -222,7 +224,7 @@ mesh::TetMesh make_mesh(const SurfaceOptions& given, SurfaceReport& report, Phas
   if (!options.edge_m && !options.nodes)
     report.remarks.push_back("Neither nodes nor edge was given: about 10,000 corner nodes (order 2: 30,000 nodes in all) were aimed at.");
 
-  for (const std::string& note : report.notes) phases.show("note " + note);  // an estimate is often all that is wanted
+  for (const std::string& note : report.notes) phases.show("note " + note);  // estimates often end here
   phases.show(format_estimate("estimate", body, edge));
 
   mesh::TetMesh linear = make_volume_mesh(body, options, edge, report, phases);

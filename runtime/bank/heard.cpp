@@ -4,6 +4,10 @@
 
 namespace carillon::bank {
 
+const char* name_origin(const Bank& bank) {
+  return bank.element == "analytic" ? "theory" : bank.element == "imported" ? "imported" : "mesh";
+}
+
 std::vector<HeardMode> list_heard(const Bank& played, std::span<const double> by_supports_per_s) {
   std::vector<HeardMode> heard;
   const bool has_air = played.multipoles.is_in_decay && !played.multipoles.is_empty();

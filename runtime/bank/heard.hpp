@@ -21,6 +21,9 @@ struct HeardMode {
   double calc_t60_s() const { return bank::calc_t60_s(calc_decay_per_s()); }
 };
 
+/// Origin of a bank's frequencies: "mesh", "theory" or "imported".
+const char* name_origin(const Bank& bank);
+
 /// The modes of a bank for playing (calc_corrected(), supports applied). `by_supports_per_s` (m): part of its decays by supports; empty:
 /// none.
 std::vector<HeardMode> list_heard(const Bank& played, std::span<const double> by_supports_per_s);

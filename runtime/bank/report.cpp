@@ -96,15 +96,16 @@ std::string format_modes(const Bank& bank, std::span<const HeardMode> heard, std
     return (has_air || has_supports ? fmt::format(" {:>9}", material) : "") + (has_air ? fmt::format(" {:>9}", air) : "") +
            (has_supports ? fmt::format(" {:>9}", supports) : "");
   };
-  std::string text = fmt::format("\n{:>5} {:>10} {:>9} {:>9} {:>10} {:>8}{} {:>10} {:>10}{} {:>9} {:>8} {:>10}  {}\n", "mode", "mesh [Hz]",
-                                 "+-mesh", "+-body", "freq [Hz]", "+-body", format_facets("+-facets"), "correction", "d [1/s]",
-                                 format_parts("material", "air", "supports"), "T60 [s]", "regime", "gain", "kind");
+  const std::string origin = name_origin(bank);
+  std::string text = fmt::format("\n{:>5} {:>13} {:>10} {:>9} {:>10} {:>8}{} {:>10} {:>10}{} {:>9} {:>8} {:>10}  {}\n", "mode",
+                                 origin + " [Hz]", "+-" + origin, "+-body", "freq [Hz]", "+-body", format_facets("+-facets"), "correction",
+                                 "d [1/s]", format_parts("material", "air", "supports"), "T60 [s]", "regime", "gain", "kind");
   const std::size_t shown = std::min(limit, bank.mode_count());
   const std::vector<ModeKind> kinds = find_kinds(bank, shown);
   for (std::size_t i = 0; i < shown; ++i) {
     const HeardMode& mode = heard[i];
     const double omega = 2.0 * std::numbers::pi * mode.freq_hz, decay = mode.calc_decay_per_s();
-    text += fmt::format("{:>5} {:>10.2f} {:>9} {:>9} {:>10.2f} {:>8}{} {:>10} {:>10.4g}{} {:>9.3g} {:>8} {:>10.4g}  {}\n", i + 1,
+    text += fmt::format("{:>5} {:>13.2f} {:>10} {:>9} {:>10.2f} {:>8}{} {:>10} {:>10.4g}{} {:>9.3g} {:>8} {:>10.4g}  {}\n", i + 1,
                         bank.freq_hz(i), format_cents(bank.algebraic_error_cents, i), format_cents(bank.discretisation_error_cents, i),
                         mode.freq_hz, format_cents(bank.corrected.error_cents, i), format_facets(format_cents(bank.facet_error_cents, i)),
                         is_corrected ? describe(bank.corrected.correction[i]) : "-", decay,
@@ -114,10 +115,11 @@ std::string format_modes(const Bank& bank, std::span<const HeardMode> heard, std
   }
   if (shown < bank.mode_count())
     text += fmt::format("  ... {} more; --modes {} shows them all\n", bank.mode_count() - shown, bank.mode_count());
+  text += fmt::format(
+      "{0}: the frequency of {1}; +-{0}: cents to its exact mode, a bound; +-body: cents to the mode of the body, an estimate\n", origin,
+      bank.element == "imported" ? "the other program" : "the " + origin);
   text +=
-      "mesh: the frequency of the mesh; +-mesh: cents to its exact mode, a bound; +-body: cents to the mode of the body, an estimate\n"
-      "freq: frequency of playing: without the estimated error of the mesh, in air and on its supports if the bank has them;\n"
-      "playing sorts modes by it\n"
+      "freq: frequency of playing, which sorts modes by it: without the estimated error of the mesh, in air and on the bank's supports\n"
       "d and T60: decay by material, air and supports together\n"
       "gain: Pa at 1 m for q' = 1 m kg^1/2 / s; frequencies are undamped; kind: kind of motion, if its shape shows one\n";
   if (is_doubtful)

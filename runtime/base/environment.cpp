@@ -1,11 +1,15 @@
-// Source:     Open MPI 4.1: orte/orted/orted_submit.c and mpirun -np 2 env; OpenPMIx 4.2 (PMIX_); PRRTE 3 (PRTE_); MPICH 4, Hydra (PMI_).
+// Source:     Open MPI 4.1: orte/orted/orted_submit.c and mpirun -np 2 env; OpenPMIx 4.2 (PMIX_); PRRTE 3 (PRTE_); MPICH 4, Hydra (PMI_);
+//             srun(1), output environment variables; slurm.h of Slurm 22.05, numbers of steps.
 // Deviations: none.
 #include "runtime/base/environment.hpp"
 
 #include <algorithm>
 #include <array>
+#include <charconv>
+#include <cstdint>
 #include <cstdlib>
 #include <string_view>
+#include <system_error>
 #include <utility>
 
 extern "C" char** environ;
@@ -53,11 +57,24 @@ bool is_of_run(std::string_view entry) {
          std::any_of(kOfRuns.begin(), kOfRuns.end(), [&](std::string_view begin) { return entry.starts_with(begin); });
 }
 
+/// True within a step of srun. A job script of sbatch and an interactive shell of salloc are steps as well, with SLURM_PROCID 0: theirs
+/// have no number, or one of the reserved ones.
+bool is_slurm_step() {
+  constexpr std::uint64_t kLastStep = 0xfffffff0;  // SLURM_MAX_NORMAL_STEP_ID
+  const char* step = std::getenv("SLURM_STEP_ID");
+  if (step == nullptr) step = std::getenv("SLURM_STEPID");
+  if (step == nullptr) return false;
+  std::uint64_t number = 0;
+  const std::string_view text = step;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  return error == std::errc() && end == text.data() + text.size() && number <= kLastStep;
+}
+
 /// Rank of this process in its launcher of MPI; nullptr without one.
 const char* find_rank() {
-  for (const char* name : {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"})
+  for (const char* name : {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK"})
     if (const char* rank = std::getenv(name)) return rank;
-  return nullptr;
+  return is_slurm_step() ? std::getenv("SLURM_PROCID") : nullptr;
 }
 
 }  // namespace

@@ -6,7 +6,7 @@
 
 namespace carillon::base {
 
-/// True in a process that a launcher of MPI (mpirun, srun) started, and in its children.
+/// True in a process that a launcher of MPI (mpirun, srun) started, and in its children; false in a job script of sbatch.
 bool is_launched();
 
 /// True for the process that prints for all ranks of its launcher; known before MPI_Init.

@@ -18,13 +18,13 @@
 
 #include "runtime/bank/corrected.hpp"
 #include "runtime/bank/edits.hpp"
-#include "runtime/bank/heard.hpp"
 #include "runtime/bank/of_material.hpp"
 #include "runtime/base/document.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/material/table.hpp"
 #include "runtime/python/module.hpp"
 #include "runtime/python/shared_bank.hpp"
+#include "runtime/support/heard.hpp"
 
 namespace carillon::python {
 namespace {
@@ -196,13 +196,16 @@ void bind_bank(py::module_& module) {
       "(m) float64 [Hz], ascending: undamped.");
   array(
       "decay_per_s", [](const bank::Bank& b, const py::object& self) { return view(b.decay_per_s, self); },
-      "(m) float64 [1/s]: amplitudes fall as exp(-d t).");
+      "(m) float64 [1/s]: amplitudes fall as exp(-d t), by material and radiation.");
   array(
       "t60_s",
       [](const bank::Bank& b, const py::object&) {
-        return make_per_mode(b, [&](std::size_t m) { return bank::calc_t60_s(b.decay_per_s[m]); });
+        const std::vector<bank::HeardMode> heard = support::calc_heard_as_played(b);
+        return make_per_mode(b, [&](std::size_t m) { return heard[m].calc_t60_s(); });
       },
-      "(m) float64 [s]: the time in which a mode falls by 60 dB.");
+      "(m) float64 [s]: the time in which a mode falls by 60 dB, as carillon-bank info has it: with the decay by the bank's supports, "
+      "which "
+      "decay_per_s is without.");
   array(
       "radiation_gain", [](const bank::Bank& b, const py::object& self) { return view(b.radiation_gain, self); },
       "(m) float64: pressure [Pa] at 1 m for unit modal velocity (1 m kg^1/2 / s), by O'Brien, Shen and Gatchalian 2002.");

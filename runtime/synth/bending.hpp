@@ -37,17 +37,20 @@ class BendingWatch {
   /// In thicknesses; 0 while it has not been above kLinearThicknesses.
   double get_largest() const noexcept { return largest_; }
   void take_over(const BendingWatch& other) noexcept { largest_ = other.largest_; }
-  std::size_t calc_bytes() const noexcept { return (re_.capacity() + im_.capacity() + move_.capacity()) * sizeof(float); }
+  std::size_t calc_bytes() const noexcept {
+    return (re_.capacity() + im_.capacity() + move_.capacity() + rest_.capacity()) * sizeof(float);
+  }
 
  private:
   void look_at(int back, int groups, std::span<const DampedState> damped) noexcept;
-  double calc_deflection_m(int groups) const noexcept;
+  double calc_deflection_m(int groups, double limit_m) noexcept;
 
   const Model* model_;
   double largest_ = 0.0;
   int left_ = 0;  // sub-blocks that are watched from now on
   // By column: states of the ringing modes, and the displacement per step of each shape [m].
   std::vector<float> re_, im_, move_;
+  std::vector<float> rest_;  // by group: bound on the displacement by it and all later ones [m]
 };
 
 }  // namespace carillon::synth

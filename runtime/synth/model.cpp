@@ -326,14 +326,6 @@ void Model::find_bending(double thickness_m) {
   bending_.back_re.assign(ModelBending::kBack * lanes, 0.0F);
   bending_.back_im.assign(ModelBending::kBack * lanes, 0.0F);
   const std::size_t vertices = surface_->shape.size() / (3 * columns);
-  const auto calc_square = [&](std::size_t vertex, std::size_t column) {
-    double square = 0.0;
-    for (int axis = 0; axis < 3; ++axis) {
-      const double x = get_row(static_cast<std::int32_t>(vertex), axis)[column];
-      square += x * x;
-    }
-    return square;
-  };
   const auto set = [&](std::size_t column, double step_m, double largest) {
     bending_.step_m[column] = static_cast<float>(step_m);
     bending_.largest[column] = static_cast<float>(std::sqrt(largest) * (1.0 + 1e-6));
@@ -350,27 +342,31 @@ void Model::find_bending(double thickness_m) {
     }
     order.push_back(m);
   }
-  for (std::size_t m = 0; m < damped_.size(); ++m) {
-    double largest = 0.0;
-    for (std::size_t v = 0; v < vertices; ++v) largest = std::max(largest, calc_square(v, get_damped_column(m)));
-    set(get_damped_column(m), damped_[m].scale, largest);
-  }
   std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return modes_[a].lambda < modes_[b].lambda; });
   double longest_s = kShortestS;
   if (!order.empty()) longest_s = std::max(longest_s, std::numbers::pi / std::sqrt(modes_[order.front()].lambda));
   bending_.watched = static_cast<int>(std::min(longest_s * rate_hz_ / kSubBlock + 1.0, 1e9));
   order.resize(std::min(order.size(), kLowest));
-  std::vector<char> taken(vertices, 0);
-  for (std::size_t v = 0; v < vertices; v += std::max<std::size_t>(1, vertices / kSpread)) taken[v] = 1;
-  for (const std::size_t m : order) {
-    std::size_t most = 0;
-    double largest = -1.0;
-    for (std::size_t v = 0; v < vertices; ++v)
-      if (const double square = calc_square(v, m); square > largest) largest = square, most = v;
-    taken[most] = 1;
+  for (std::size_t m = 0; m < damped_.size(); ++m) order.push_back(get_damped_column(m));
+  // Antinodes, by rows: shapes are stored vertex by vertex.
+  std::vector<double> most(order.size(), -1.0);
+  std::vector<std::int32_t> antinode(order.size(), 0);
+  for (std::size_t v = 0; v < vertices; ++v) {
+    const auto vertex = static_cast<std::int32_t>(v);
+    const std::array rows{get_row(vertex, 0), get_row(vertex, 1), get_row(vertex, 2)};
+    for (std::size_t k = 0; k < order.size(); ++k) {
+      double square = 0.0;
+      for (const std::int16_t* row : rows) square += static_cast<double>(row[order[k]]) * row[order[k]];
+      if (square > most[k]) most[k] = square, antinode[k] = vertex;
+    }
   }
-  for (std::size_t v = 0; v < vertices; ++v)
-    if (taken[v] != 0) bending_.vertex.push_back(static_cast<std::int32_t>(v));
+  const std::size_t ringing = order.size() - damped_.size();
+  for (std::size_t m = 0; m < damped_.size(); ++m) set(get_damped_column(m), damped_[m].scale, most[ringing + m]);
+  bending_.vertex.assign(antinode.begin(), antinode.begin() + static_cast<std::ptrdiff_t>(ringing));
+  for (std::size_t v = 0; v < vertices; v += std::max<std::size_t>(1, vertices / kSpread))
+    bending_.vertex.push_back(static_cast<std::int32_t>(v));
+  std::sort(bending_.vertex.begin(), bending_.vertex.end());
+  bending_.vertex.erase(std::unique(bending_.vertex.begin(), bending_.vertex.end()), bending_.vertex.end());
 }
 
 void Model::add_directivity(std::shared_ptr<const radiation::Transfers> transfers) {

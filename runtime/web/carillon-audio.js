@@ -228,7 +228,7 @@ export class Body {
     }
     this.audio.engine.tell({ name: 'web_set_effects', numbers: [this.number, this.possible] });
   }
-  /** Whether 'state' events have the amplitudes of its modes. */
+  /** Whether 'state' events have the amplitudes of its modes and its largest deflection so far [thicknesses], 0 up to half a thickness. */
   watch(isWatched) {
     this.audio.engine.tell({ type: 'watch', body: this.number, modes: isWatched ? this.bank.mode_count : 0 });
   }
@@ -374,9 +374,9 @@ export class CarillonAudio extends EventTarget {
     const { time_s, context_time_s, load, peak_pa, counters } = state;
     this.offset_s = context_time_s - time_s;
     this.counters_ = counters;
-    const bodies = state.bodies.map(({ body, amplitudes }) => {
+    const bodies = state.bodies.map(({ body, amplitudes, deflection_thicknesses }) => {
       const of = [...this.bodies].find(({ number }) => number === body);
-      return { id: of?.id, body: of, awake: amplitudes.some((x) => x > 0), amplitudes };
+      return { id: of?.id, body: of, awake: amplitudes.some((x) => x > 0), amplitudes, deflection_thicknesses };
     });
     this.dispatchEvent(new CustomEvent('state', { detail: { time_s, context_time_s, load, peak_pa, counters, bodies } }));
   }

@@ -158,7 +158,9 @@ class CarillonProcessor extends AudioWorkletProcessor {
     const first = this.loads[0], last = this.loads[this.loads.length - 1];
     const load = this.loads.length > 1 ? (last.busy_ms - first.busy_ms) / 1000 / (last.now_s - first.now_s) : 0;
     const bodies = [];
-    for (const [body, modes] of this.watched) bodies.push({ body, amplitudes: this.measure(body, modes) });
+    for (const [body, modes] of this.watched) {
+      bodies.push({ body, amplitudes: this.measure(body, modes), deflection_thicknesses: this.wasm.exports.web_deflection(body) });
+    }
     const time_s = this.wasm.exports.web_time_s();
     this.port.postMessage({ type: 'state', time_s, context_time_s: now_s, load, peak_pa: this.peak / (this.gain_per_pa || 1), bodies, counters: this.count() });
     this.peak = 0;

@@ -195,6 +195,8 @@ WEB_EXPORT(int, web_measure)(int body, int modes) {
 }
 /// The loudest that a body has been [Pa at 1 m].
 WEB_EXPORT(double, web_peak_pa)(int body) { return engine == nullptr ? 0.0 : engine->get_synthesiser().get_peak_pa(body); }
+/// See synth::Synthesiser::get_deflection().
+WEB_EXPORT(double, web_deflection)(int body) { return engine == nullptr ? 0.0 : engine->get_synthesiser().get_deflection(body); }
 /// strikes, refused, late, faults, overflows, resets, mode_samples, faded, underruns, zeroed and the budget are then the words.
 WEB_EXPORT(int, web_count)() {
   return run([&] {

@@ -13,7 +13,6 @@
 
 #include "runtime/bank/corrected.hpp"
 #include "runtime/bank/edits.hpp"
-#include "runtime/bank/heard.hpp"
 #include "runtime/bank/of_material.hpp"
 #include "runtime/bank/surface.hpp"
 #include "runtime/base/document.hpp"
@@ -30,7 +29,7 @@
 #include "runtime/material/mallets.hpp"
 #include "runtime/material/table.hpp"
 #include "runtime/radiation/gains.hpp"
-#include "runtime/support/losses.hpp"
+#include "runtime/support/heard.hpp"
 #include "runtime/synth/effects.hpp"
 #include "runtime/web/event_words.hpp"
 
@@ -45,10 +44,9 @@ constexpr std::size_t kMostEvents = std::size_t{1} << 30;  // bytes of a plan's 
 
 Json to_json(const Vec3& x) { return Json::array(x); }
 
-/// The modes of a bank for playing, as JSON; unknown `error_cents` are null. `losses`: already applied to the bank.
-Json list_modes(const bank::Bank& bank, const support::Losses& losses) {
+/// The modes of a bank for playing, as JSON; unknown `error_cents` and `radiation_per_s` are null. `heard`: of support::mount().
+Json list_modes(const bank::Bank& bank, const std::vector<bank::HeardMode>& heard) {
   Json modes = Json::array();
-  const std::vector<bank::HeardMode> heard = bank::list_heard(bank, losses.decay_per_s);
   for (std::size_t m = 0; m < bank.mode_count(); ++m) {
     const bank::HeardMode& mode = heard[m];
     const double cents = m < bank.discretisation_error_cents.size() ? bank.discretisation_error_cents[m] : NAN;
@@ -57,7 +55,7 @@ Json list_modes(const bank::Bank& bank, const support::Losses& losses) {
         .set("decay_per_s", base::significant(bank.decay_per_s[m], 9))
         .set("t60_s", base::finite_or_null(mode.calc_t60_s(), base::significant, 6))
         .set("material_per_s", base::significant(mode.material_per_s, 6))
-        .set("radiation_per_s", base::significant(mode.radiation_per_s, 6))
+        .set("radiation_per_s", base::finite_or_null(bank.multipoles.is_empty() ? NAN : mode.radiation_per_s, base::significant, 6))
         .set("supports_per_s", base::significant(mode.supports_per_s, 6))
         .set("gain", base::significant(bank.radiation_gain[m], 9))
         .set("error_cents", base::finite_or_null(cents, base::significant, 4));
@@ -240,10 +238,9 @@ std::string Workshop::add_bank(int bank, std::span<const std::byte> bytes, const
       .set("poisson_ratio", b.material.poisson_ratio)
       .set("density_kg_m3", b.material.density_kg_m3)
       .set("damping_law", b.damping.law);
-  bank::Bank heard = bank::choose_frequencies(b, bank::Frequencies::kCorrected);
-  const support::Losses losses = support::calc_losses(heard, {});
-  support::apply(losses, heard);
-  facts.set("modes", list_modes(heard, losses));
+  bank::Bank played = bank::choose_frequencies(b, bank::Frequencies::kCorrected);
+  const std::vector<bank::HeardMode> heard = support::mount(played);
+  facts.set("modes", list_modes(played, heard));
   banks_[bank] = std::move(read);
   return facts.line();
 }
@@ -263,14 +260,13 @@ std::string Workshop::make_body(int body, int bank, std::string_view scene, std:
   const std::shared_ptr<const bank::Bank>& as_read = find_bank(bank);
   MadeBody made{.bank = bank, .scene = read_scene(scene, 1), .played = nullptr, .model = nullptr};
   host::SceneBody& described = made.scene.bodies[0];
-  support::Losses losses;
+  std::vector<bank::HeardMode> heard;
   try {
     // As host::read_banks does it, of an edited bank.
     const std::optional<bank::Edits> wanted = read_edits(*as_read, edits);
     auto played = std::make_shared<bank::Bank>(
         bank::choose_frequencies(wanted ? bank::calc_edited(*as_read, *wanted) : *as_read, made.scene.frequencies));
-    losses = support::calc_losses(*played, described.support);
-    support::apply(losses, *played);
+    heard = support::mount(*played, described.support);
     const radiation::PutGains put = radiation::put_gains(*played, made.scene.radiation);
     described.sphere_radius_m = put.sphere_radius_m;
     described.limited = put.limited;
@@ -296,7 +292,7 @@ std::string Workshop::make_body(int body, int bank, std::string_view scene, std:
       .set("rotation", Json::array(described.spec.initial.rotation))
       .set("centre_m", to_json(b.rigid.centre_m))
       .set("mass_kg", b.rigid.mass_kg)
-      .set("modes", list_modes(b, losses))
+      .set("modes", list_modes(b, heard))
       .set("sounding_modes", made.model->get_mode_count())
       .set("limited_modes", static_cast<std::int64_t>(described.limited.modes))
       .set("silence_pa", made.scene.quality.silence_pa.value_or(synth::BodySettings{}.silence_pa))

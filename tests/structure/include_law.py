@@ -155,7 +155,16 @@ LAW = {
         ["fmt", "json", "zlib"],
     ),
     "jobs/hear": (
-        ["runtime/base", "runtime/bank", "runtime/material", "precompute/job", "jobs/explore", "jobs/process", "jobs/report"],
+        [
+            "runtime/base",
+            "runtime/bank",
+            "runtime/material",
+            "runtime/support",
+            "precompute/job",
+            "jobs/explore",
+            "jobs/process",
+            "jobs/report",
+        ],
         ["fmt"],
     ),
     "jobs/slurm": (

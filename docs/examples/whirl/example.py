@@ -76,7 +76,7 @@ def play(stage):
     stage.solve("string.json", "damped", changes={"max_modes": 2, "nonlinear": "stretch"})
     mode = {**scene, "duration_s": 4, "bodies": [{**scene["bodies"][0], "bank": "mode.hdf"}]}
 
-    print("  one mode in one plane, alone: as Duffing's equation has it")
+    rows = [("what", "found", "wanted", "to first order")]
     for far_mm in (1, 3):
         w = far_mm * 1e-3
         alpha = BETA * w * w / OMEGA**2
@@ -86,6 +86,10 @@ def play(stage):
         found = find_lines(rate, samples[int(0.1 * rate) :, 0], 1)[0] / OMEGA
         cents = 1200 * math.log2(found / ratio)
         stage.expect(f"{far_mm} mm: sharp by {1200 * math.log2(ratio):.2f} cents, found {1200 * math.log2(found):.2f}", abs(cents) < 0.3)
+        first_order = 1200 * math.log2(1 + 3 * alpha / 8)
+        rows.append(
+            (f"one plane, {far_mm} mm: sharp by [cents]", *(f"{1200 * math.log2(x):.2f}" for x in (found, ratio)), f"{first_order:.2f}")
+        )
 
     # To first order an ellipse of half axes a and b turns by beta a b / (4 omega), against its own sense. The line of the motion that goes
     # round one way lies twice that from the line of the other.
@@ -101,6 +105,14 @@ def play(stage):
     stage.compare("its mean frequency over that of soft motion, less 1", (fast + slow) / (2 * OMEGA) - 1, mean / OMEGA - 1, 0.5)
     stage.compare("the same to first order", (fast + slow) / (2 * OMEGA) - 1, 3 * BETA * (a * a + b * b) / (8 * OMEGA**2), 2)
 
+    mean_found, turn_first, mean_first = (
+        (fast + slow) / (2 * OMEGA),
+        BETA * a * b / (4 * OMEGA),
+        3 * BETA * (a * a + b * b) / (8 * OMEGA**2),
+    )
+    rows.append(("ellipse of 4 by 2 mm: turns by [rad/s]", f"{(fast - slow) / 2:.3f}", f"{abs(turn):.3f}", f"{turn_first:.3f}"))
+    rows.append(("its mean frequency over that of soft motion", f"{mean_found:.5f}", f"{mean / OMEGA:.5f}", f"{1 + mean_first:.5f}"))
+
     # With loss the pitch follows the amplitude down.
     w = 4e-3
     damped = {**mode, "duration_s": 3, "bodies": [{**scene["bodies"][0], "bank": "damped.hdf"}]}
@@ -115,6 +127,8 @@ def play(stage):
         stage.expect(
             f"glide at {(begin + end) / 2:.1f} s: {found:.3f} Hz, wanted {wanted:.3f}", abs(1200 * math.log2(found / wanted)) < 1.5
         )
+        rows.append((f"with loss, at {(begin + end) / 2:.1f} s [Hz]", f"{found:.2f}", f"{wanted:.2f}", "-"))
+    stage.show("whirl", rows)
 
     rate, samples, report = stage.render("whirl", scene)
     rate, linear, _ = stage.render("straight", {**scene, "bodies": [{**scene["bodies"][0], "nonlinear": False}]}, picture=False)

@@ -12,6 +12,8 @@ const kPlanS = 0.5;
 /** Two significant digits, without an exponent. */
 const short = (value) => Number(value.toPrecision(2)).toString();
 const describeCents = (cents) => (!Number.isFinite(cents) ? '–' : cents < 0.1 ? '< 0.1' : short(cents));
+/** Rates [1/s] and times [s], with the digits of carillon-bank info. */
+const formatFigure = (value, digits) => (value === null ? '–' : Number.isFinite(value) ? Number(value.toPrecision(digits)).toString() : '∞');
 const times = (value) => (value === 1 ? 'unchanged' : `× ${value < 1 ? value.toFixed(2) : value.toFixed(value < 10 ? 2 : 0)}`);
 
 export class Panel {
@@ -206,7 +208,27 @@ export class Panel {
       };
     }));
     this.spectrum.setModes(modes);
+    this.showDecay(0);
     void this.showLevels();
+  }
+
+  /** Heard decay of a mode and its parts. Radiation that the bank does not know is part of the material. */
+  showDecay(index) {
+    const mode = this.body.sound.modes[index];
+    if (!mode) return;
+    const parts = [mode.decay_per_s, mode.material_per_s, mode.radiation_per_s, mode.supports_per_s];
+    const t60 = (rate) => (rate === null ? null : Math.log(1000) / rate);
+    const makeRow = (name, cells) => {
+      const row = document.createElement('tr');
+      row.append(Object.assign(document.createElement('th'), { scope: 'row', textContent: name }));
+      row.append(...cells.map((text) => Object.assign(document.createElement('td'), { textContent: text })));
+      return row;
+    };
+    find('decay').caption.textContent = `Decay of mode ${index + 1}`;
+    find('decay').tBodies[0].replaceChildren(
+      makeRow('1/s', parts.map((rate, i) => formatFigure(rate, i === 0 ? 4 : 3))),
+      makeRow('T60 [s]', parts.map((rate) => formatFigure(t60(rate), 3))),
+    );
   }
 
   async showLevels() {
@@ -225,6 +247,7 @@ export class Panel {
     this.mode = mode;
     this.modes.item(mode)?.classList.add('shown');
     this.spectrum.show(mode);
+    this.showDecay(mode);
     const { body, current } = this;
     this.player.solo(current, mode);
     const shape = await body.bank.shape(mode);
@@ -289,6 +312,7 @@ export class Panel {
     find('level').style.transform = `scaleX(${Math.max(0, Math.min(1, 1 + Math.log10(Math.max(1e-4, peak)) / 3)).toFixed(3)})`;
     const heard = bodies?.find(({ amplitudes }) => amplitudes);
     if (heard) this.showRinging(heard.amplitudes);
+    if (heard && heard.body === this.body.sound) this.showBending(heard.deflection_thicknesses);
     this.spectrum.draw();
     this.load = load;
     this.counters = counters;
@@ -298,6 +322,14 @@ export class Panel {
     const { modes } = this.body.sound, speeds = Array.from(amplitudes, (a, i) => a * (modes[i]?.freq_hz ?? 0) * (modes[i]?.gain ?? 1));
     this.loudest = Math.max(0.97 * (this.loudest ?? 0), ...speeds, 1e-30);
     this.spectrum.setRinging(speeds.map((speed) => Math.max(0, 1 + Math.log10(Math.max(1e-9, speed / this.loudest)) / 3)));
+  }
+  /** As carillon-render warns; 0: within the range of linear modes. */
+  showBending(thicknesses) {
+    const text = thicknesses > 0 ? `${this.body.name} has bent by ${short(thicknesses)} times its thickness. Linear modes hold up to 0.5 of it: `
+      + 'the sound is approximate. Strike more softly, or compute its bank with "nonlinear".' : '';
+    if (find('bent').textContent === text) return;
+    Object.assign(find('bent'), { textContent: text, hidden: text === '' });
+    this.say(text);
   }
   showEars(distance_m) {
     find('ears').textContent = `distance ${distance_m.toFixed(2)} m, delay ${(1000 * distance_m / 343).toFixed(1)} ms`;

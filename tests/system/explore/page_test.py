@@ -212,6 +212,50 @@ class PageTest(unittest.TestCase):
         page.evaluate("document.getElementById('modes').blur()")
         page.wait_for("!carillon.panel.body.shown.isBent")
 
+    def test_a_mode_shows_its_heard_decay_as_carillon_bank_info_has_it(self):
+        run(BIN / "make_example_bank", "mounted.hdf", "2", "9", "mounted", cwd=self.root)
+        run(BIN / "carillon", "explore", "mounted.hdf", "bar.hdf", "-o", "mounted", cwd=self.root)
+        rows = [line.split() for line in run(BIN / "carillon-bank", "info", "mounted.hdf", cwd=self.root).splitlines()]
+        rows = sorted((row for row in rows if "under" in row), key=lambda row: float(row[4]))
+        page = self.open("mounted")
+        page.evaluate("document.getElementById('modes').focus()")
+        read = "[...document.querySelectorAll('#decay tr')].map(row => [...row.querySelectorAll('td')].map(cell => cell.innerText))"
+        for number, row in enumerate(rows, 1):
+            page.wait_for(f"document.querySelector('#decay caption').innerText === 'Decay of mode {number}'")
+            rates, times = page.evaluate(read)[1:]
+            at = row.index("under")
+            self.assertEqual([float(text) for text in rates], [float(text) for text in row[at - 5 : at - 1]])
+            self.assertEqual(float(times[0]), float(row[at - 1]))
+            self.press(page, "ArrowDown")
+        # Radiation that a bank does not know is no number.
+        page.evaluate("carillon.panel.select(1)")
+        self.assertEqual(page.evaluate(read)[1][2:], ["–", "0"])
+        self.assertEqual(page.errors, [])
+
+    def test_a_body_that_is_bent_too_far_warns_as_carillon_render_does(self):
+        page = self.open("room")
+        blow = {"triangle": 3, "impulse_n_s": [0, 0, 8], "duration_s": 0.001}
+        strike = f"carillon.panel.body.sound.strike({json.dumps(blow)})"
+        page.evaluate("carillon.player.wake()")
+        page.evaluate(strike.replace("[0, 0, 8]", "[0, 0, 0.01]"))
+        page.wait_for("carillon.panel.counters?.strikes >= 1")
+        self.assertTrue(page.evaluate("document.getElementById('bent').hidden"))
+        page.evaluate(strike)
+        page.wait_for("!document.getElementById('bent').hidden")
+        time.sleep(0.2)
+        scene = json.loads((self.root / "room/scene.json").read_text())
+        with h5py.File(self.root / "bar.hdf") as bank:
+            point_m = bank["mesh/vertices"][:][bank["mesh/triangles"][:][3]].mean(axis=0).tolist()
+        scene["strikes"] = [{"time_s": 0.1, "body": "bar", "point_m": point_m} | {key: blow[key] for key in ("impulse_n_s", "duration_s")}]
+        (self.root / "room/bent.json").write_text(json.dumps(scene))
+        run(BIN / "carillon-render", "bent.json", "-q", "-o", "bent.wav", "--report", "report.json", cwd=self.root / "room")
+        (body,) = json.loads((self.root / "room/report.json").read_text())["per_body"]
+        said = page.evaluate("document.getElementById('bent').innerText")
+        found = float(said.split("bent by ")[1].split(" times")[0])
+        self.assertAlmostEqual(found / body["deflection_thicknesses"], 1, delta=0.07)  # two digits, another place in the sub-block
+        self.assertGreater(found, 0.5)
+        self.assertEqual(page.errors, [])
+
     def test_drags_scrape_holds_press_and_sliders_edit(self):
         page = self.open("room")
         spot = page.evaluate("carillon.view.project(carillon.panel.body.shown.findWorldPoint(carillon.panel.body.places[1]))")

@@ -7,6 +7,7 @@
 
 #include "precompute/launch/blas_kernels.hpp"
 #include "precompute/launch/environment.hpp"
+#include "runtime/base/environment.hpp"
 
 namespace carillon::launch {
 namespace {
@@ -72,11 +73,13 @@ TEST(Environment, has_the_transport_of_one_host_only_on_one_host) {
 }
 
 TEST(Environment, isolates_a_rank_that_no_launcher_started) {
-  const std::array<Environment, 5> none{{{"OMPI_MCA_ess_singleton_isolated", nullptr},
+  const std::array<Environment, 7> none{{{"OMPI_MCA_ess_singleton_isolated", nullptr},
                                          {"OMPI_COMM_WORLD_RANK", nullptr},
                                          {"PMIX_RANK", nullptr},
                                          {"PMI_RANK", nullptr},
-                                         {"SLURM_PROCID", nullptr}}};
+                                         {"SLURM_PROCID", nullptr},
+                                         {"SLURM_STEP_ID", nullptr},
+                                         {"SLURM_STEPID", nullptr}}};
   {
     const Environment rank("PMIX_RANK", "0");
     prepare_environment();
@@ -87,6 +90,28 @@ TEST(Environment, isolates_a_rank_that_no_launcher_started) {
   ::setenv("OMPI_MCA_ess_singleton_isolated", "0", 1);
   prepare_environment();
   EXPECT_THAT(std::getenv("OMPI_MCA_ess_singleton_isolated"), StrEq("0"));  // the choice is the user's
+}
+
+TEST(Environment, takes_a_job_script_of_sbatch_for_no_rank) {
+  const std::array<Environment, 6> none{{{"OMPI_COMM_WORLD_RANK", nullptr},
+                                         {"PMIX_RANK", nullptr},
+                                         {"PMI_RANK", nullptr},
+                                         {"SLURM_PROCID", "0"},
+                                         {"SLURM_STEP_ID", nullptr},
+                                         {"SLURM_STEPID", nullptr}}};
+  EXPECT_FALSE(base::is_launched());
+  for (const char* step : {"4294967291", "4294967290", "batch", ""}) {  // of sbatch, of salloc's shell
+    ::setenv("SLURM_STEP_ID", step, 1);
+    EXPECT_FALSE(base::is_launched()) << step;
+    EXPECT_TRUE(base::is_first_of_all()) << step;
+  }
+  ::setenv("SLURM_STEP_ID", "0", 1);
+  EXPECT_TRUE(base::is_launched());
+  ::setenv("SLURM_PROCID", "3", 1);
+  EXPECT_FALSE(base::is_first_of_all());
+  ::unsetenv("SLURM_STEP_ID");
+  ::setenv("SLURM_STEPID", "2", 1);
+  EXPECT_TRUE(base::is_launched());
 }
 
 TEST(Environment, preloads_before_what_the_user_preloads) {

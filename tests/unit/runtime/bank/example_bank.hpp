@@ -154,10 +154,8 @@ inline Bank make_radiating_bank(int n = 2, std::size_t modes = 9) {
   return bank;
 }
 
-/// The bank of make_bank() with its ends x = 0 and x = 0.3 m fixed, as version 1.3 has it: made-up reactions, the second end half of the
-/// first.
-inline Bank make_supported_bank(int n = 2, std::size_t modes = 5) {
-  Bank bank = make_bank(n, modes);
+/// Fixes the ends x = 0 and x = 0.3 m: made-up reactions, the second end half of the first.
+inline void add_supports(Bank& bank) {
   Supports& supports = bank.supports;
   supports.text = R"({"supports": [{"name": "x-min", "on": "brick wall", "joint": "screwed"}, {"name": "x-max"}]})";
   const Vec3& c = kCornerM;
@@ -165,13 +163,26 @@ inline Bank make_supported_bank(int n = 2, std::size_t modes = 5) {
   supports.normal = {{-1.0, 0.0, 0.0}, {1.0, 0.0, 0.0}};
   supports.area_m2 = {2e-4, 2e-4};
   supports.thickness_m = {0.01, 0.01};
-  for (std::size_t m = 0; m < modes; ++m) {
+  for (std::size_t m = 0; m < bank.mode_count(); ++m) {
     for (const double part : {1.0, 0.5}) {
       const double force = part * 0.4 * bank.eigenvalue_rad2_s2[m] * std::sqrt(bank.rigid.mass_kg);
       supports.reaction.insert(supports.reaction.end(), {0.1 * force, 0.2 * force, force, 0.01 * force, -0.2 * force, 0.05 * force});
       supports.energy.push_back(part / (4.0 + static_cast<double>(m)));
     }
   }
+}
+
+/// The bank of make_bank() on supports, as version 1.3 has it.
+inline Bank make_supported_bank(int n = 2, std::size_t modes = 5) {
+  Bank bank = make_bank(n, modes);
+  add_supports(bank);
+  return bank;
+}
+
+/// Every part of the decay: material, radiation and supports.
+inline Bank make_mounted_bank(int n = 2, std::size_t modes = 9) {
+  Bank bank = make_radiating_bank(n, modes);
+  add_supports(bank);
   return bank;
 }
 

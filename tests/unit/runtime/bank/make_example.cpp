@@ -1,4 +1,5 @@
-// make_example_bank OUT [squares a side] [modes] [supports|corrected|radiation]: writes the example bank, for the scripts among the tests.
+// make_example_bank OUT [squares a side] [modes] [supports|corrected|radiation|mounted]: writes the example bank, for the scripts among the
+// tests.
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
@@ -8,7 +9,7 @@
 
 int main(int argc, char** argv) try {
   if (argc < 2) {
-    std::fputs("usage: make_example_bank OUT [squares a side] [modes] [supports|corrected|radiation]\n", stderr);
+    std::fputs("usage: make_example_bank OUT [squares a side] [modes] [supports|corrected|radiation|mounted]\n", stderr);
     return 1;
   }
   const int n = argc > 2 ? std::atoi(argv[2]) : 2;
@@ -19,6 +20,7 @@ int main(int argc, char** argv) try {
   carillon::bank::write_bank(kind == "supports"    ? example::make_supported_bank(n, count)
                              : kind == "corrected" ? example::make_corrected_bank(n, count)
                              : kind == "radiation" ? example::make_radiating_bank(n, count)
+                             : kind == "mounted"   ? example::make_mounted_bank(n, count)
                                                    : example::make_bank(n, count),
                              argv[1]);
   return 0;

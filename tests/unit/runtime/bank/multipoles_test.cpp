@@ -624,5 +624,18 @@ TEST(MultipoleInfo, SaysOrdersErrorDampingAndAddedMass) {
             std::string::npos);
 }
 
+TEST(Info, HeadsFrequenciesWithTheirOrigin) {
+  const tests::Folder folder;
+  const std::filesystem::path file = folder.path() / "bank.hdf";
+  Bank bank = example::make_bank(2, 5);
+  write_bank(bank, file);
+  for (const auto& [element, head] : {std::pair{"T10", " mesh [Hz] "}, {"analytic", " theory [Hz] "}, {"imported", " imported [Hz] "}}) {
+    bank.element = element;
+    const std::string text = format_info(bank, list_heard(bank, {}), file, 5, false);
+    EXPECT_NE(text.find(head), std::string::npos) << text;
+    EXPECT_EQ(text.find("of the mesh\n") == std::string::npos && text.find("+-mesh") == std::string::npos, bank.element != "T10") << text;
+  }
+}
+
 }  // namespace
 }  // namespace carillon::bank

@@ -119,7 +119,7 @@ TEST(MaterialTable, has_woods_that_are_stiffest_along_the_grain_and_could_exist)
     EXPECT_EQ(*std::min_element(g.begin(), g.end()), g[1]);
     // Speed of sound along the grain of all woods: 3,500 to 6,000 m/s (Cremer; Wegst 2006); of all but four here 4,000 to 5,400.
     const double speed = std::sqrt(e[0] / row.material.density_kg_m3);
-    const bool is_slow = std::set<std::string>{"rosewood", "grenadilla", "pear", "iroko"}.contains(row.material.name);
+    const bool is_slow = std::set<std::string>{"rosewood", "grenadilla", "pear", "boxwood"}.contains(row.material.name);
     EXPECT_NEAR(speed, is_slow ? 3800 : 4700, is_slow ? 300 : 700) << row.material.name;
     // Q along the grain of woods of instruments: 70 to 200 (Haines 1979; Bremaud 2012).
     const double omega = 2 * std::numbers::pi * 1000, q = omega / (2 * row.material.calc_decay_per_s(omega * omega));
@@ -181,15 +181,69 @@ TEST(MaterialTable, has_the_woods_of_instrument_makers_under_their_usual_names) 
       EXPECT_TRUE(folded.insert(name).second) << name;
     }
   }
-  // Density at 12 % moisture [kg/m^3] and bending modulus [GPa] of the sources, 10 % below E along the grain.
+  // Density at 12 % moisture [kg/m^3] and bending modulus [GPa] of the sources, 10 % below E along the grain. The Wood Handbook gives
+  // oven-dry mass over the volume at 12 %: density is 1.12 of that, to 5 kg/m^3. Its table in inch-pound units for birch to basswood.
   for (const auto& [name, density, bending] : {std::tuple{"rosewood", 830, 11.50},
+                                               {"brazilian rosewood", 835, 13.93},
+                                               {"honduran rosewood", 1025, 22.0},
+                                               {"cocobolo", 1095, 18.7},
+                                               {"padauk", 745, 11.72},
                                                {"bubinga", 890, 18.41},
                                                {"wenge", 870, 17.59},
+                                               {"zebrawood", 805, 16.37},
+                                               {"purpleheart", 905, 20.26},
+                                               {"jatoba", 910, 18.93},
+                                               {"sapele", 670, 12.04},
+                                               {"koa", 610, 10.37},
+                                               {"ebony", 1035, 17.20},
+                                               {"grenadilla", 1270, 17.95},
+                                               {"pear", 690, 7.80},
+                                               {"boxwood", 965, 12.27},
+                                               {"sycamore", 640, 10.0},
+                                               {"american sycamore", 545, 9.791},
+                                               {"teak", 655, 12.28},
+                                               {"iroko", 660, 10.90},
+                                               {"norway spruce", 405, 9.70},
                                                {"engelmann spruce", 390, 8.9},
-                                               {"cherry", 560, 10.3}}) {
+                                               {"douglas fir", 540, 13.4},
+                                               {"cherry", 560, 10.3},
+                                               {"ash", 670, 12.0},
+                                               {"maple", 705, 12.6},
+                                               {"red oak", 705, 12.5},
+                                               {"oak", 760, 12.3},
+                                               {"yellow poplar", 470, 10.9},
+                                               {"birch", 695, 13.86},
+                                               {"soft maple", 605, 11.31},
+                                               {"alder", 460, 9.51},
+                                               {"basswood", 415, 10.07}}) {
     const Material& m = MaterialTable::get().find(name)->material;
     EXPECT_EQ(m.density_kg_m3, density) << name;
     EXPECT_NEAR(m.orthotropic->young_modulus_pa[0] / (1.1e9 * bending), 1, 5e-3) << name;
+  }
+}
+
+TEST(MaterialTable, has_the_elastic_ratios_of_the_wood_handbook) {
+  // Tables 5-1 and 5-2: ET, ER, GLR, GLT, GRT over EL; nu LR, LT, RT. 0: not in the table, or not compared.
+  struct Ratios {
+    const char* name;
+    double et, er, glr, glt, grt, lr, lt, rt;
+  };
+  for (const Ratios& r : {Ratios{"maple", 0.065, 0.132, 0.111, 0.063, 0, 0.424, 0.476, 0.774},
+                          {"douglas fir", 0.050, 0.068, 0.064, 0.078, 0.007, 0, 0, 0},
+                          {"balsa", 0.015, 0.046, 0, 0, 0, 0, 0, 0},
+                          {"red oak", 0.082, 0.154, 0, 0, 0, 0, 0, 0},
+                          {"oak", 0.072, 0.163, 0, 0, 0, 0, 0, 0}}) {
+    const auto& [e, g, nu, axes] = *MaterialTable::get().find(r.name)->material.orthotropic;
+    const std::array<std::array<double, 2>, 8> pairs{{{r.et, e[2] / e[0]},
+                                                      {r.er, e[1] / e[0]},
+                                                      {r.glr, g[0] / e[0]},
+                                                      {r.glt, g[2] / e[0]},
+                                                      {r.grt, g[1] / e[0]},
+                                                      {r.lr, nu[0]},
+                                                      {r.lt, nu[2]},
+                                                      {r.rt, nu[1]}}};
+    for (const auto& [table, ours] : pairs)
+      if (table > 0) EXPECT_NEAR(ours, table, 1e-3) << r.name;
   }
 }
 
