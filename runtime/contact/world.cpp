@@ -166,10 +166,8 @@ rigid::Space make_space(const WorldSpec& spec, const WorldOptions& options) {
               spec.ground->poisson_ratio};
   const rigid::Links links = make_links(spec, solids, states);
   try {
-    rigid::Space space(std::move(solids), std::move(states), ground, spec.gravity_m_s2,
-                       {.step_s = options.contact_step_s, .islands = options.islands, .joint_tolerance = options.joint_tolerance}, links);
-    check_start(spec, space);
-    return space;
+    return rigid::Space(std::move(solids), std::move(states), ground, spec.gravity_m_s2,
+                        {.step_s = options.contact_step_s, .islands = options.islands, .joint_tolerance = options.joint_tolerance}, links);
   } catch (const std::invalid_argument& error) {  // joints that make no tree
     throw InputError(error.what());
   }
@@ -182,6 +180,7 @@ class World::Course {
  public:
   Course(const WorldSpec& spec, const WorldOptions& options)
       : options_(options), space_(make_space(spec, options)), lasting_(list_matter(spec)) {
+    check_start(spec, space_);
     if (options_.masks_hits) masks_.emplace(count());
     check_overlaps(spec);
     prepare_shapes(spec.ground.has_value());

@@ -65,7 +65,7 @@ Impact::Impact(std::vector<Body> bodies, const std::vector<Contact>& contacts, c
 /// Adds a body, and the energy of its modes to the books.
 void Impact::place_body(Body body) {
   check_body(body);
-  const auto modes = body.modes ? static_cast<std::size_t>(body.modes->size()) : 0;
+  const std::size_t modes = body.modes ? body.modes->size() : 0;
   if (body.q.empty()) body.q.assign(modes, 0.0);
   if (body.q_dot.empty()) body.q_dot.assign(modes, 0.0);
   check(body.q.size() == modes && body.q_dot.size() == modes, "a modal state has another size than the modes");
@@ -96,7 +96,7 @@ void Impact::check_contact(const Contact& contact) const {
   for (const bool first : {true, false}) {
     const int body = first ? contact.a : contact.b;
     const std::span<const double> shape = first ? contact.shape_a : contact.shape_b;
-    check(shape.empty() || (body >= 0 && shape.size() == 3 * bodies_[static_cast<std::size_t>(body)].q.size()),
+    check(shape.empty() || (body >= 0 && shape.size() == 3 * bodies_[body].q.size()),
           "shape values of another number than the body's modes");
   }
 }
@@ -113,23 +113,21 @@ void Impact::check_body(const Body& body) {
 
 void Impact::add_contact(const Contact& contact) {
   check_contact(contact);
-  Touch touch;
-  touch.spring = contact.spring;
-  touch.friction = contact.friction;
-  touch.compression_m = -contact.gap_m;
-  touch.row = static_cast<int>(rows_.size());
-  rows_.resize(rows_.size() + touch.count_rows());
+  ContactLaw law;
+  law.spring = contact.spring;
+  law.friction = contact.friction;
+  law.compression_m = -contact.gap_m;
+  law.row = static_cast<int>(rows_.size());
+  rows_.resize(rows_.size() + law.count_rows());
   force_.resize(rows_.size(), 0.0);
-  place_contact(contact, static_cast<int>(contacts_.size()), touch.row);
-  touches_.push_back(touch);
-  contacts_.push_back(contact);
-  contacts_.back().shape_a = contacts_.back().shape_b = {};  // now in modes_
-  pulses_.emplace_back().contact = static_cast<int>(contacts_.size()) - 1;
-  silent_.push_back(0);
-  normal_impulse_.push_back(0.0);
-  closing_.push_back(0.0);
-  pressed_s_.push_back(0.0);
-  is_limited_.push_back(contact.is_limit && !(contact.shape_a.empty() && contact.shape_b.empty()) ? 1 : 0);
+  const int index = static_cast<int>(contacts_.size());
+  place_contact(contact, index, law.row);
+  laws_.push_back(law);
+  History& history = contacts_.emplace_back();
+  history.given = contact;
+  history.given.shape_a = history.given.shape_b = {};  // now in modes_
+  history.is_limited = contact.is_limit && !(contact.shape_a.empty() && contact.shape_b.empty());
+  history.pulse.contact = index;
 }
 
 /// Axes, mobilities and shape values of a contact, new or moved; its rows begin with `row`.
@@ -143,7 +141,7 @@ void Impact::place_contact(const Contact& contact, int index, int row) {
     for (std::size_t side = 0; side < 2; ++side) {
       const int body = side == 0 ? contact.a : contact.b;
       if (body < 0) continue;
-      const auto b = static_cast<std::size_t>(body);
+      const auto b = body;
       one.body[side] = body;
       if (!(bodies_[b].mass_kg > 0.0)) continue;
       one.linear[side] = (side == 0 ? 1.0 : -1.0) * axes[k];
@@ -163,13 +161,13 @@ void Impact::place_contact(const Contact& contact, int index, int row) {
       one.to_spin[side] = inverse_inertia_[b] * one.angular[side];
       if (dot(one.to_spin[side], one.to_spin[side]) == 0.0) one.angular[side] = {};
     }
-    rows_[static_cast<std::size_t>(row + k)] = one;
+    rows_[row + k] = one;
   }
   for (const bool first : {true, false}) {
     const int body = first ? contact.a : contact.b;
     const std::span<const double> shape = first ? contact.shape_a : contact.shape_b;
     if (body >= 0 && !shape.empty())
-      modes_.place(body, shape, first ? 1.0 : -1.0, row, {axes, static_cast<std::size_t>(rows)}, above_band_);
+      modes_.place(body, shape, first ? 1.0 : -1.0, row, std::span<const Vec3>(axes).first(rows), above_band_);
   }
 }
 
@@ -177,48 +175,46 @@ double Impact::calc_row_speed(const Row& row) const {
   double speed = 0.0;
   for (std::size_t side = 0; side < 2; ++side) {
     if (row.body[side] < 0) continue;
-    const Body& body = bodies_[static_cast<std::size_t>(row.body[side])];
+    const Body& body = bodies_[row.body[side]];
     speed += dot(row.linear[side], body.velocity_m_s) + dot(row.angular[side], body.spin_rad_s);
   }
   return speed;
 }
 
-double Impact::calc_approach(int contact) const {
-  return -calc_row_speed(rows_[static_cast<std::size_t>(touches_[static_cast<std::size_t>(contact)].row)]);
-}
+double Impact::calc_approach(int contact) const { return -calc_row_speed(rows_[laws_[contact].row]); }
 
 /// Step length, hysteresis and anchor springs, from the elastic pulses that the rigid bodies would have. With h_ set: only of new contacts.
 void Impact::choose_step(const Options& options) {
-  const std::size_t first = h_ > 0.0 ? touches_.size() - 1 : 0;
-  std::vector<double> speed(touches_.size(), 0.0), inverse_mass(touches_.size(), 0.0);
-  for (std::size_t c = first; c < touches_.size(); ++c) {
-    const Row& row = rows_[static_cast<std::size_t>(touches_[c].row)];
+  const std::size_t first = h_ > 0.0 ? laws_.size() - 1 : 0;
+  std::vector<double> speed(laws_.size(), 0.0), inverse_mass(laws_.size(), 0.0);
+  for (std::size_t c = first; c < laws_.size(); ++c) {
+    const Row& row = rows_[laws_[c].row];
     speed[c] = -calc_row_speed(row);
     for (std::size_t side = 0; side < 2; ++side)
       inverse_mass[c] += dot(row.linear[side], row.to_velocity[side]) + dot(row.angular[side], row.to_spin[side]);
     double modal = 0.0;
-    modes_.add_approach(touches_[c].row, speed[c], modal);
-    closing_[c] = std::max({0.0, speed[c], -calc_row_speed(row)});
+    modes_.add_approach(laws_[c].row, speed[c], modal);
+    contacts_[c].closing_m_s = std::max({0.0, speed[c], -calc_row_speed(row)});
     if (inverse_mass[c] == 0.0) inverse_mass[c] = modal;
     fastest_ = std::max(fastest_, speed[c]);
   }
   fastest_ = std::max(fastest_, kSlowest);
   double shortest = options.longest_step_s * options.steps_per_pulse;
-  for (std::size_t c = first; c < touches_.size(); ++c) {
+  for (std::size_t c = first; c < laws_.size(); ++c) {
     if (!(inverse_mass[c] > 0.0)) continue;
-    Touch& touch = touches_[c];
+    ContactLaw& law = laws_[c];
     // A contact that only its neighbours push is taken at the fastest speed.
     const double v = speed[c] > 0.01 * fastest_ ? speed[c] : fastest_;
-    const ElasticPulse pulse = calc_elastic_pulse(touch.spring, 1.0 / inverse_mass[c], v);
+    const ElasticPulse pulse = calc_elastic_pulse(law.spring, 1.0 / inverse_mass[c], v);
     shortest = std::min(shortest, pulse.length_s);
     part_s_ = std::max(part_s_, pulse.length_s);
-    if (contacts_[c].restitution != hysteresis_of_) {
-      hysteresis_of_ = contacts_[c].restitution;
+    if (contacts_[c].given.restitution != hysteresis_of_) {
+      hysteresis_of_ = contacts_[c].given.restitution;
       hysteresis_ = calc_hysteresis(hysteresis_of_, 1.0);
     }
-    touch.spring.hysteresis_s_m = hysteresis_ / v;
-    const double peak = std::max(pulse.compression_m, touch.compression_m);
-    touch.tangential_n_m = contacts_[c].tangential_ratio * touch.spring.stiffness * std::pow(peak, touch.spring.exponent - 1.0);
+    law.spring.hysteresis_s_m = hysteresis_ / v;
+    const double peak = std::max(pulse.compression_m, law.compression_m);
+    law.tangential_n_m = contacts_[c].given.tangential_ratio * law.spring.stiffness * std::pow(peak, law.spring.exponent - 1.0);
   }
   if (h_ > 0.0) return;
   if (options.part_s > 0.0) part_s_ = options.part_s;
@@ -248,8 +244,8 @@ void Impact::set_up_step() {
 
 /// The forces of the step, within the restitution of each contact.
 void Impact::solve_forces() {
-  bool found = solver_.solve(touches_, A_, free_, h_, force_);
-  for (int round = 0; round < kLimitings && limit_forces(); ++round) found = solver_.solve(touches_, A_, free_, h_, force_) && found;
+  bool found = solver_.solve(laws_, A_, free_, h_, force_);
+  for (int round = 0; round < kLimitings && limit_forces(); ++round) found = solver_.solve(laws_, A_, free_, h_, force_) && found;
   if (!found) ++misses_;
 }
 
@@ -258,20 +254,21 @@ void Impact::solve_forces() {
 bool Impact::limit_forces() {
   const std::size_t n = rows_.size();
   bool any = false;
-  for (std::size_t c = 0; c < touches_.size(); ++c) {
-    Touch& t = touches_[c];
-    const auto row = static_cast<std::size_t>(t.row);
+  for (std::size_t c = 0; c < laws_.size(); ++c) {
+    ContactLaw& t = laws_[c];
+    const auto row = t.row;
     const double gain = h_ * mobility_[row * n + row];
-    if (!is_limited_[c] || contacts_[c].restitution >= 1.0 || !(force_[row] > 0.0) || !(gain > 0.0)) continue;
-    const double before = calc_row_speed(rows_[row]), limit = contacts_[c].restitution * closing_[c];
+    if (!contacts_[c].is_limited || contacts_[c].given.restitution >= 1.0 || !(force_[row] > 0.0) || !(gain > 0.0)) continue;
+    const double before = calc_row_speed(rows_[row]), limit = contacts_[c].given.restitution * contacts_[c].closing_m_s;
     double parting = before;
     for (std::size_t side = 0; side < 2; ++side) {
       if (rows_[row].body[side] < 0) continue;
-      const Body& body = bodies_[static_cast<std::size_t>(rows_[row].body[side])];
+      const Body& body = bodies_[rows_[row].body[side]];
       parting += h_ * (dot(rows_[row].linear[side], body.acceleration_m_s2) + dot(rows_[row].angular[side], body.spin_acceleration_rad_s2));
     }
     for (std::size_t r = 0; r < n; ++r) parting += h_ * mobility_[row * n + r] * force_[r];
-    const double left = limit - before, allowed = left > 0.0 ? before - left * std::expm1(-h_ / (kTaper * (pressed_s_[c] + h_))) : limit;
+    const double left = limit - before,
+                 allowed = left > 0.0 ? before - left * std::expm1(-h_ / (kTaper * (contacts_[c].pressed_s + h_))) : limit;
     const double over = (parting - allowed) / gain;
     if (over <= kOver * force_[row]) continue;
     t.max_n = std::max(0.0, force_[row] - over);
@@ -287,17 +284,16 @@ void Impact::step() {
     free_[r] = h_ * calc_row_speed(rows_[r]);
     for (std::size_t side = 0; side < 2; ++side) {
       if (rows_[r].body[side] < 0) continue;
-      const Body& body = bodies_[static_cast<std::size_t>(rows_[r].body[side])];
+      const Body& body = bodies_[rows_[r].body[side]];
       free_[r] += half * (dot(rows_[r].linear[side], body.acceleration_m_s2) + dot(rows_[r].angular[side], body.spin_acceleration_rad_s2));
     }
   }
   modes_.add_free_motion(free_);
-  for (std::size_t c = 0; c < touches_.size(); ++c)
-    closing_[c] = std::max(closing_[c], -calc_row_speed(rows_[static_cast<std::size_t>(touches_[c].row)]));
+  for (std::size_t c = 0; c < laws_.size(); ++c)
+    contacts_[c].closing_m_s = std::max(contacts_[c].closing_m_s, -calc_row_speed(rows_[laws_[c].row]));
 
-  const bool reached = std::any_of(touches_.begin(), touches_.end(), [&](const Touch& t) {
-    return t.compression_m > 0.0 || t.compression_m - free_[static_cast<std::size_t>(t.row)] > 0.0;
-  });
+  const bool reached = std::any_of(laws_.begin(), laws_.end(),
+                                   [&](const ContactLaw& t) { return t.compression_m > 0.0 || t.compression_m - free_[t.row] > 0.0; });
   if (reached)
     solve_forces();
   else
@@ -308,21 +304,21 @@ void Impact::step() {
     moved_[i] = free_[i];
     for (std::size_t j = 0; j < n; ++j) moved_[i] += A_[i * n + j] * force_[j];
     pushed = pushed || force_[i] != 0.0;
-    struck = struck || (force_[i] != 0.0 && !contacts_[static_cast<std::size_t>(rows_[i].contact)].rests);
+    struck = struck || (force_[i] != 0.0 && !contacts_[rows_[i].contact].given.rests);
   }
-  for (std::size_t c = 0; c < touches_.size(); ++c) {
-    Touch& t = touches_[c];
-    const auto row = static_cast<std::size_t>(t.row);
+  for (std::size_t c = 0; c < laws_.size(); ++c) {
+    ContactLaw& t = laws_[c];
+    const auto row = t.row;
     const double before = t.compression_m;
     t.compression_m -= moved_[row];
     // A contact without a force yields to further pressure: it takes up no energy, and gives back less than it has.
     if (std::isfinite(t.max_n)) t.compression_m = std::min(t.compression_m, before);
     t.max_n = std::numeric_limits<double>::infinity();
-    pressed_s_[c] = t.compression_m > 0.0 ? pressed_s_[c] + h_ : 0.0;
+    contacts_[c].pressed_s = t.compression_m > 0.0 ? contacts_[c].pressed_s + h_ : 0.0;
     books_.dissipated_contact -=
         force_[row] * moved_[row] + (calc_spring_energy(t.spring, t.compression_m) - calc_spring_energy(t.spring, before));
     Vec3 impulse = h_ * force_[row] * rows_[row].axis;
-    normal_impulse_[c] += h_ * force_[row];
+    contacts_[c].impulse_n_s += h_ * force_[row];
     if (t.friction > 0.0) {
       const std::array<double, 2> u0 = t.stretch;
       t.stretch = calc_shortened({u0[0] + moved_[row + 1], u0[1] + moved_[row + 2]}, t.friction * force_[row] / t.tangential_n_m);
@@ -332,15 +328,15 @@ void Impact::step() {
         impulse = impulse + h_ * force_[row + 1 + k] * rows_[row + 1 + k].axis;
       }
     }
-    Pulse& pulse = pulses_[c];
+    Pulse& pulse = contacts_[c].pulse;
     if (dot(impulse, impulse) > 0.0) {
       if (pulse.impulse_n_s.empty()) pulse.start_s = get_time();
       pulse.step_s = h_;
-      pulse.impulse_n_s.resize(pulse.impulse_n_s.size() + static_cast<std::size_t>(silent_[c]));
+      pulse.impulse_n_s.resize(pulse.impulse_n_s.size() + contacts_[c].silent);
       pulse.impulse_n_s.push_back(impulse);
-      silent_[c] = 0;
+      contacts_[c].silent = 0;
     } else if (!pulse.impulse_n_s.empty()) {
-      ++silent_[c];
+      ++contacts_[c].silent;
     }
   }
   // Rigid motion: accelerations of the step are constant.
@@ -383,10 +379,10 @@ void Impact::step() {
 bool Impact::is_over() const {
   const double quiet_s = quiet_ * h_;
   if (quiet_s < part_s_) return false;
-  for (std::size_t c = 0; c < touches_.size(); ++c) {
-    if (touches_[c].compression_m <= 0.0) continue;
-    if (!contacts_[c].rests) return false;
-    const double moved = moved_[static_cast<std::size_t>(touches_[c].row)];
+  for (std::size_t c = 0; c < laws_.size(); ++c) {
+    if (laws_[c].compression_m <= 0.0) continue;
+    if (!contacts_[c].given.rests) return false;
+    const double moved = moved_[laws_[c].row];
     if (std::abs(moved) > kStill * h_ && quiet_s < settling_s_) return false;
   }
   return true;
@@ -404,15 +400,15 @@ void Impact::join(const Contact& contact) {
   add_contact(contact);
   choose_step({});
   set_up_step();
-  books_.start += calc_spring_energy(touches_.back().spring, touches_.back().compression_m);
+  books_.start += calc_spring_energy(laws_.back().spring, laws_.back().compression_m);
   ended_ = false;
 }
 
 void Impact::push(int body, const Vec3& velocity_m_s, const Vec3& spin_rad_s) {
-  check(body >= 0 && static_cast<std::size_t>(body) < bodies_.size(), "there is no such body");
+  check(body >= 0 && body < static_cast<int>(bodies_.size()), "there is no such body");
   check(is_finite(velocity_m_s) && is_finite(spin_rad_s), "a push is not finite");
   const double before = calc_rigid_energy();
-  Body& b = bodies_[static_cast<std::size_t>(body)];
+  Body& b = bodies_[body];
   b.velocity_m_s = b.velocity_m_s + velocity_m_s;
   b.spin_rad_s = b.spin_rad_s + spin_rad_s;
   books_.given += calc_rigid_energy() - before;
@@ -427,9 +423,9 @@ void Impact::update(std::span<const Body> bodies, std::span<const Contact> conta
   }
   for (std::size_t c = 0; c < contacts.size(); ++c) {
     check_contact(contacts[c]);
-    check(
-        contacts[c].a == contacts_[c].a && contacts[c].b == contacts_[c].b && (contacts[c].friction > 0.0) == (contacts_[c].friction > 0.0),
-        "an update has other contacts");
+    check(contacts[c].a == contacts_[c].given.a && contacts[c].b == contacts_[c].given.b &&
+              (contacts[c].friction > 0.0) == (contacts_[c].given.friction > 0.0),
+          "an update has other contacts");
   }
   const double before = calc_rigid_energy();
   for (std::size_t b = 0; b < bodies.size(); ++b) {
@@ -451,18 +447,18 @@ void Impact::update(std::span<const Body> bodies, std::span<const Contact> conta
   }
   books_.given += calc_rigid_energy() - before;
   for (std::size_t c = 0; c < contacts.size(); ++c) {
-    Touch& t = touches_[c];
-    const auto row = static_cast<std::size_t>(t.row);
+    ContactLaw& t = laws_[c];
+    const auto row = t.row;
     const bool rubs = t.friction > 0.0;
     const Vec3 stretch = rubs ? t.stretch[0] * rows_[row + 1].axis + t.stretch[1] * rows_[row + 2].axis : Vec3{};
-    Contact contact = contacts_[c];
+    Contact contact = contacts_[c].given;
     contact.where_m = contacts[c].where_m;
     contact.normal = contacts[c].normal;
     contact.shape_a = contacts[c].shape_a;
     contact.shape_b = contacts[c].shape_b;
     place_contact(contact, static_cast<int>(c), t.row);
     contact.shape_a = contact.shape_b = {};
-    contacts_[c] = contact;
+    contacts_[c].given = contact;
     if (!rubs) continue;
     // The part of the anchor spring along the new normal is lost.
     t.stretch = {dot(stretch, rows_[row + 1].axis), dot(stretch, rows_[row + 2].axis)};
@@ -489,7 +485,7 @@ double Impact::calc_rigid_energy() const {
 
 double Impact::calc_spring_energies() const {
   double sum = 0.0;
-  for (const Touch& t : touches_)
+  for (const ContactLaw& t : laws_)
     sum += calc_spring_energy(t.spring, t.compression_m) +
            0.5 * t.tangential_n_m * (t.stretch[0] * t.stretch[0] + t.stretch[1] * t.stretch[1]);
   return sum;
@@ -514,10 +510,10 @@ Books Impact::get_books() const {
 
 std::vector<Pulse> Impact::take_pulses() {
   std::vector<Pulse> taken;
-  for (std::size_t c = 0; c < pulses_.size(); ++c) {
-    if (!pulses_[c].impulse_n_s.empty()) taken.push_back(pulses_[c]);
-    pulses_[c].impulse_n_s.clear();
-    silent_[c] = 0;
+  for (History& contact : contacts_) {
+    if (!contact.pulse.impulse_n_s.empty()) taken.push_back(contact.pulse);
+    contact.pulse.impulse_n_s.clear();
+    contact.silent = 0;
   }
   return taken;
 }

@@ -121,9 +121,9 @@ class Impact {
   int get_misses() const { return misses_; }
   /// Last step's force on a [N], world axes; compression [m].
   Vec3 get_force(int contact) const;
-  double get_compression(int contact) const { return touches_[static_cast<std::size_t>(contact)].compression_m; }
-  const Contact& get_contact(int contact) const { return contacts_[static_cast<std::size_t>(contact)]; }  // without its shapes
-  double get_impulse(int contact) const { return normal_impulse_[static_cast<std::size_t>(contact)]; }  // normal, since the beginning [N s]
+  double get_compression(int contact) const { return laws_[contact].compression_m; }
+  const Contact& get_contact(int contact) const { return contacts_[contact].given; }  // without its shapes
+  double get_impulse(int contact) const { return contacts_[contact].impulse_n_s; }    // normal, since the beginning [N s]
   /// Rigid approach speed of a contact [m/s], > 0 closing.
   double calc_approach(int contact) const;
 
@@ -143,6 +143,17 @@ class Impact {
     std::array<Vec3, 2> to_velocity{}, to_spin{};  // and the accelerations of the body by its force
   };
 
+  /// A contact since its beginning.
+  struct History {
+    Contact given;             // without its shapes
+    double pressed_s = 0.0;    // how long it has been pressed
+    double closing_m_s = 0.0;  // the largest speed of approach
+    double impulse_n_s = 0.0;  // normal
+    bool is_limited = false;   // do modes push against a limit?
+    Pulse pulse;
+    int silent = 0;  // steps without a force that the pulse does not have yet
+  };
+
   void check_contact(const Contact& contact) const;
   static void check_body(const Body& body);
   void place_body(Body body);
@@ -160,15 +171,12 @@ class Impact {
 
   std::vector<Body> bodies_;
   std::vector<Mat3> inverse_inertia_;
-  std::vector<Contact> contacts_;
-  std::vector<Touch> touches_;
+  std::vector<History> contacts_;
+  std::vector<ContactLaw> laws_;  // of the contacts
   std::vector<Row> rows_;
   ModalGroups modes_;
   std::vector<double> A_, free_, force_, moved_;
-  std::vector<double> mobility_;   // (rows, rows), of the rigid bodies: relative velocity per impulse
-  std::vector<double> pressed_s_;  // of each contact: how long it has been pressed
-  std::vector<char> is_limited_;   // of each contact: do modes push against a limit?
-  std::vector<double> closing_;    // of each contact: the largest speed of approach so far [m/s]
+  std::vector<double> mobility_;  // (rows, rows), of the rigid bodies: relative velocity per impulse
   StepSolver solver_;
   bool above_band_ = true, ended_ = false;
   int step_index_ = 0, steps_ = 0, quiet_ = 0, misses_ = 0;
@@ -176,9 +184,6 @@ class Impact {
   double h_ = 0.0, part_s_ = 0.0, settling_s_ = 0.0, fastest_ = 0.0;
   double on_joints_j_ = 0.0;  // work done on bodies on joints
   Books books_;
-  std::vector<Pulse> pulses_;
-  std::vector<int> silent_;  // steps without a force that a pulse has not been given yet
-  std::vector<double> normal_impulse_;
 };
 
 }  // namespace carillon::impact

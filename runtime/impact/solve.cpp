@@ -23,9 +23,9 @@ constexpr int kSweeps = 200;
 constexpr double kFast = 1e-3;  // where a step leaves so little of the error, the next one takes the same factorisation
 
 /// The normal force of a step at whose end the compression is y1.
-StepForce calc_normal_force(const Touch& touch, double y1, double h_s) {
-  const StepForce one = calc_step_force(touch.spring, touch.compression_m, y1, h_s);
-  return one.force > touch.max_n ? StepForce{touch.max_n, 0.0} : one;
+StepForce calc_normal_force(const ContactLaw& law, double y1, double h_s) {
+  const StepForce one = calc_step_force(law.spring, law.compression_m, y1, h_s);
+  return one.force > law.max_n ? StepForce{law.max_n, 0.0} : one;
 }
 
 }  // namespace
@@ -36,13 +36,13 @@ std::array<double, 2> calc_shortened(const std::array<double, 2>& x, double long
   return {x[0] * (longest / length), x[1] * (longest / length)};
 }
 
-void StepSolver::solve_one(const Touch& touch, double compliance, double free, double h_s, double& f) const {
+void StepSolver::solve_one(const ContactLaw& law, double compliance, double free, double h_s, double& f) const {
   // In the compression m: r(m) = m - m_free + A F(y0 + m) grows with slope >= 1; r <= 0 at m_free - A F(m_free), r >= 0 at m_free.
-  const double m_free = -free, y0 = touch.compression_m;
-  double high = m_free, low = m_free - compliance * calc_normal_force(touch, y0 + m_free, h_s).force;
+  const double m_free = -free, y0 = law.compression_m;
+  double high = m_free, low = m_free - compliance * calc_normal_force(law, y0 + m_free, h_s).force;
   double m = std::clamp(m_free - compliance * f, low, high);
   for (int i = 0; i < 100; ++i) {
-    const StepForce one = calc_normal_force(touch, y0 + m, h_s);
+    const StepForce one = calc_normal_force(law, y0 + m, h_s);
     f = one.force;
     const double r = m - m_free + compliance * f;
     (r > 0.0 ? high : low) = m;
@@ -52,18 +52,18 @@ void StepSolver::solve_one(const Touch& touch, double compliance, double free, d
     m = next;
     if (change <= 2e-16 * (std::abs(m) + std::abs(m_free))) break;
   }
-  f = calc_normal_force(touch, y0 + m, h_s).force;
+  f = calc_normal_force(law, y0 + m, h_s).force;
 }
 
 /// Fills law_ with the forces at `moved` (and slopes_), and pressing_ and pressed_ with the contacts that have any and their rows; returns
 /// the largest.
-double StepSolver::calc_law(const std::vector<Touch>& touches, const std::vector<double>& moved, double h_s, bool with_slopes) {
+double StepSolver::calc_law(const std::vector<ContactLaw>& laws, const std::vector<double>& moved, double h_s, bool with_slopes) {
   double largest = 0.0;
   pressing_.clear();
   pressed_.clear();
-  for (std::size_t c = 0; c < touches.size(); ++c) {
-    const Touch& t = touches[c];
-    const auto row = static_cast<std::size_t>(t.row);
+  for (std::size_t c = 0; c < laws.size(); ++c) {
+    const ContactLaw& t = laws[c];
+    const auto row = t.row;
     const StepForce normal = calc_normal_force(t, t.compression_m - moved[row], h_s);
     auto& slope = slopes_[c];
     if (with_slopes) slope = {};
@@ -92,9 +92,9 @@ double StepSolver::calc_law(const std::vector<Touch>& touches, const std::vector
 }
 
 /// Fills residual_ with m - free - A law(m); returns its largest entry, as a share of the motion along normals or tangents.
-double StepSolver::calc_residual(const std::vector<Touch>& touches, const std::vector<double>& A, const std::vector<double>& free,
+double StepSolver::calc_residual(const std::vector<ContactLaw>& laws, const std::vector<double>& A, const std::vector<double>& free,
                                  const std::vector<double>& moved, double h_s, bool with_slopes) {
-  calc_law(touches, moved, h_s, with_slopes);
+  calc_law(laws, moved, h_s, with_slopes);
   const std::size_t n = free.size();
   change_.resize(pressed_.size());
   for (std::size_t j = 0; j < pressed_.size(); ++j) change_[j] = -law_[pressed_[j]];
@@ -110,7 +110,7 @@ double StepSolver::calc_residual(const std::vector<Touch>& touches, const std::v
 }
 
 /// Factorises 1 - A law' of the rows that press; columns of what does not are those of 1. False where it is singular.
-bool StepSolver::factorise(const std::vector<Touch>& touches, const std::vector<double>& A) {
+bool StepSolver::factorise(const std::vector<ContactLaw>& laws, const std::vector<double>& A) {
   const std::size_t rows = residual_.size(), n = pressed_.size();
   if (compliance_of_ != pressed_) {
     compliance_of_ = pressed_;
@@ -126,7 +126,7 @@ bool StepSolver::factorise(const std::vector<Touch>& touches, const std::vector<
   const dense::Functions& functions = dense::get_functions();
   std::size_t at = 0;
   for (const std::size_t c : pressing_) {
-    const std::size_t own = touches[c].count_rows();
+    const std::size_t own = laws[c].count_rows();
     for (std::size_t j = 0; j < own; ++j) {
       double* column = jacobian_.data() + (at + j) * n;
       column[at + j] = 1.0;
@@ -141,7 +141,7 @@ bool StepSolver::factorise(const std::vector<Touch>& touches, const std::vector<
 
 /// The step of Newton, (1 - A law') step_ = residual_, with the law' that was factorised: the rows that press follow from that, the others
 /// from theirs.
-void StepSolver::find_step(const std::vector<Touch>& touches, const std::vector<double>& A) {
+void StepSolver::find_step(const std::vector<ContactLaw>& laws, const std::vector<double>& A) {
   const std::size_t rows = residual_.size(), n = pressed_then_.size();
   const dense::Functions& functions = dense::get_functions();
   solved_.resize(n);
@@ -151,7 +151,7 @@ void StepSolver::find_step(const std::vector<Touch>& touches, const std::vector<
   change_.assign(n, 0.0);
   std::size_t at = 0;
   for (const std::size_t c : pressing_then_) {
-    const std::size_t own = touches[c].count_rows();
+    const std::size_t own = laws[c].count_rows();
     for (std::size_t k = 0; k < own; ++k)
       for (std::size_t j = 0; j < own; ++j) change_[at + k] += slopes_then_[c][k][j] * solved_[at + j];
     at += own;
@@ -182,13 +182,13 @@ std::array<double, 2> StepSolver::solve_friction(const std::array<double, 3>& A,
 }
 
 /// Contact after contact, each with the others' forces given; true where the forces settle. Without friction: a descent on a convex energy.
-bool StepSolver::sweep(const std::vector<Touch>& touches, const std::vector<double>& A, const std::vector<double>& free, double h_s,
+bool StepSolver::sweep(const std::vector<ContactLaw>& laws, const std::vector<double>& A, const std::vector<double>& free, double h_s,
                        bool rubs, std::vector<double>& f) const {
   const std::size_t n = free.size();
   for (int s = 0; s < kSweeps; ++s) {
     double change = 0.0, largest = 0.0;
-    for (const Touch& t : touches) {
-      const auto row = static_cast<std::size_t>(t.row);
+    for (const ContactLaw& t : laws) {
+      const auto row = t.row;
       const auto calc_motion = [&](std::size_t i, std::size_t first, std::size_t last) {  // by all forces but first .. last
         double m = free[i];
         for (std::size_t j = 0; j < n; ++j)
@@ -216,41 +216,41 @@ bool StepSolver::sweep(const std::vector<Touch>& touches, const std::vector<doub
   return false;
 }
 
-bool StepSolver::solve(const std::vector<Touch>& touches, const std::vector<double>& A, const std::vector<double>& free, double h_s,
+bool StepSolver::solve(const std::vector<ContactLaw>& laws, const std::vector<double>& A, const std::vector<double>& free, double h_s,
                        std::vector<double>& f) {
   const std::size_t n = free.size();
   if (n == 1) {
-    solve_one(touches.front(), A[0], free[0], h_s, f[0]);
+    solve_one(laws.front(), A[0], free[0], h_s, f[0]);
     return true;
   }
   law_.resize(n);
   residual_.resize(n);
-  slopes_.resize(touches.size());
+  slopes_.resize(laws.size());
   all_.resize(n);
   std::iota(all_.begin(), all_.end(), std::size_t{0});
   moved_ = free;
   dense::get_functions().add_columns(A.data(), n, all_.data(), f.data(), n, moved_.data(), n);
   double size_normal = 1e-300, size_tangential = 1e-300;
-  for (const Touch& t : touches) {
-    const auto row = static_cast<std::size_t>(t.row);
+  for (const ContactLaw& t : laws) {
+    const auto row = t.row;
     size_normal = std::max({size_normal, std::abs(free[row]), 1e-3 * std::abs(t.compression_m)});
     if (t.friction > 0.0)
       size_tangential = std::max({size_tangential, std::abs(free[row + 1]), std::abs(free[row + 2]), std::abs(free[row])});
   }
   size_.assign(n, size_tangential);
-  for (const Touch& t : touches) size_[static_cast<std::size_t>(t.row)] = size_normal;
+  for (const ContactLaw& t : laws) size_[t.row] = size_normal;
   compliance_of_.clear();  // A may be another one
-  double error = calc_residual(touches, A, free, moved_, h_s, true);
+  double error = calc_residual(laws, A, free, moved_, h_s, true);
   bool is_fast = false, is_current = true;  // are forces and residual those of moved_?
   for (int iteration = 0; iteration < 40 && error > 1e-13; ++iteration) {
     const bool is_new = !is_fast || pressed_ != pressed_then_;
-    if (is_new && !factorise(touches, A)) break;
-    find_step(touches, A);
+    if (is_new && !factorise(laws, A)) break;
+    find_step(laws, A);
     double part = 1.0, next = error;
     for (int halving = 0; halving < 12; ++halving, part *= 0.5) {
       trial_ = moved_;
       for (std::size_t i = 0; i < n; ++i) trial_[i] -= part * step_[i];
-      next = calc_residual(touches, A, free, trial_, h_s, true);
+      next = calc_residual(laws, A, free, trial_, h_s, true);
       if (next < error || !is_new) break;
     }
     is_fast = next < kFast * error;
@@ -261,18 +261,18 @@ bool StepSolver::solve(const std::vector<Touch>& touches, const std::vector<doub
     } else if (is_new) {
       break;  // as near as rounding or a kink lets it
     } else {
-      error = calc_residual(touches, A, free, moved_, h_s, true);  // once more with a factorisation of its own
+      error = calc_residual(laws, A, free, moved_, h_s, true);  // once more with a factorisation of its own
       is_current = true;
     }
   }
-  if (!is_current) error = calc_residual(touches, A, free, moved_, h_s, false);
+  if (!is_current) error = calc_residual(laws, A, free, moved_, h_s, false);
   f = law_;
   if (error <= 1e-11) return true;
-  if (sweep(touches, A, free, h_s, true, f)) return true;
+  if (sweep(laws, A, free, h_s, true, f)) return true;
   // Without friction nothing can be won: what the anchor springs held is lost.
-  for (const Touch& t : touches)
-    if (t.friction > 0.0) f[static_cast<std::size_t>(t.row) + 1] = f[static_cast<std::size_t>(t.row) + 2] = 0.0;
-  sweep(touches, A, free, h_s, false, f);
+  for (const ContactLaw& t : laws)
+    if (t.friction > 0.0) f[t.row + 1] = f[t.row + 2] = 0.0;
+  sweep(laws, A, free, h_s, false, f);
   return false;
 }
 

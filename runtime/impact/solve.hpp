@@ -11,7 +11,7 @@
 namespace carillon::impact {
 
 /// A contact's law and its state at the beginning of a step. It has one row of the step's unknowns (the normal), or three where it rubs.
-struct Touch {
+struct ContactLaw {
   Spring spring;
   double friction = 0.0;                                   // mu; 0: one row
   double tangential_n_m = 0.0;                             // k_t of the anchor spring [N/m]
@@ -36,19 +36,19 @@ class StepSolver {
   /// separation along the normal and the slip along the tangents in the step. A: (rows, rows), symmetric positive semidefinite [m/N]. f
   /// comes in as a guess. Newton with the laws' derivatives and halved steps; where it fails, single contacts in turn (Gauss-Seidel);
   /// where that fails, the step without friction, which cannot gain energy, and the answer false.
-  bool solve(const std::vector<Touch>& touches, const std::vector<double>& A, const std::vector<double>& free, double h_s,
+  bool solve(const std::vector<ContactLaw>& laws, const std::vector<double>& A, const std::vector<double>& free, double h_s,
              std::vector<double>& f);
 
  private:
-  void solve_one(const Touch& touch, double compliance, double free, double h_s, double& f) const;
-  double calc_law(const std::vector<Touch>& touches, const std::vector<double>& moved, double h_s, bool with_slopes);
-  double calc_residual(const std::vector<Touch>& touches, const std::vector<double>& A, const std::vector<double>& free,
+  void solve_one(const ContactLaw& law, double compliance, double free, double h_s, double& f) const;
+  double calc_law(const std::vector<ContactLaw>& laws, const std::vector<double>& moved, double h_s, bool with_slopes);
+  double calc_residual(const std::vector<ContactLaw>& laws, const std::vector<double>& A, const std::vector<double>& free,
                        const std::vector<double>& moved, double h_s, bool with_slopes);
   static std::array<double, 2> solve_friction(const std::array<double, 3>& A, const std::array<double, 2>& c, double k, double limit);
-  bool sweep(const std::vector<Touch>& touches, const std::vector<double>& A, const std::vector<double>& free, double h_s, bool rubs,
+  bool sweep(const std::vector<ContactLaw>& laws, const std::vector<double>& A, const std::vector<double>& free, double h_s, bool rubs,
              std::vector<double>& f) const;
-  bool factorise(const std::vector<Touch>& touches, const std::vector<double>& A);
-  void find_step(const std::vector<Touch>& touches, const std::vector<double>& A);
+  bool factorise(const std::vector<ContactLaw>& laws, const std::vector<double>& A);
+  void find_step(const std::vector<ContactLaw>& laws, const std::vector<double>& A);
 
   using Slopes = std::vector<std::array<std::array<double, 3>, 3>>;  // per contact, of the forces by what moved
   std::vector<double> law_, residual_, size_, moved_, trial_, step_, solved_, change_;

@@ -1,7 +1,7 @@
 // Method: augmented Lagrangian. With the residual r = w - J v of the rows that hold and a compliance eps,
 //     (M + sum J^T J / eps) d = J^T r / eps,   lambda += (r - J d) / eps,   v = v_free + M^-1 J^T lambda,
-//   symmetric, positive and as sparse as the touches between bodies, until r is nothing: a few times, with one factorisation. Rows are let
-//   go and taken up by the signs of the answer.
+//   symmetric, positive and as sparse as the touches between bodies; iterated until r vanishes (2 to 4 times) with one factorisation. Rows
+//   are released and added by the signs of the answer.
 // Source: A. Enzenhoefer, N. Lefebvre, S. Andrews, "Efficient block pivoting for multibody simulations with contact" (2019): pivoting of
 //   blocks with a compliant system; factorisation by Eigen.
 // Deviations: the cone is round; the impulse of a sliding point lags by one guess.
@@ -21,6 +21,8 @@ using Row6 = Eigen::Matrix<double, 6, 1>;
 
 constexpr double kCompliance = 1e-5;  // of the mobility of a row
 constexpr double kAtCone = 0.9999;    // of the bound on friction: slides
+constexpr int kIterations = 12;       // of one guess,
+constexpr double kExact = 1e-10;      // of the velocities asked for: residual at which they end
 constexpr int kDense = 12;            // bodies; more are factorised as a sparse matrix
 
 enum class Hold : char { kOpen, kSticks, kSlides };
@@ -47,10 +49,10 @@ class System {
       full_.resize(6 * bodies, 6 * bodies);
       return;
     }
-    below_.resize(static_cast<std::size_t>(bodies));
-    for (int i = 0; i < bodies; ++i) below_[static_cast<std::size_t>(i)].push_back(i);
+    below_.resize(bodies);
+    for (int i = 0; i < bodies; ++i) below_[i].push_back(i);
     for (const Point& p : points)
-      if (p.a >= 0 && p.b >= 0 && p.a != p.b) below_[static_cast<std::size_t>(std::min(p.a, p.b))].push_back(std::max(p.a, p.b));
+      if (p.a >= 0 && p.b >= 0 && p.a != p.b) below_[std::min(p.a, p.b)].push_back(std::max(p.a, p.b));
     std::vector<int> counts;
     for (std::vector<int>& rows : below_) {
       std::sort(rows.begin(), rows.end());
@@ -60,7 +62,7 @@ class System {
     sparse_.resize(6 * bodies, 6 * bodies);
     sparse_.reserve(counts);
     for (int column = 0; column < 6 * bodies; ++column)
-      for (const int row : below_[static_cast<std::size_t>(column / 6)])
+      for (const int row : below_[column / 6])
         for (int i = 0; i < 6; ++i) sparse_.insert(6 * row + i, column) = 0.0;
     sparse_.makeCompressed();
     sparse_solver_.analyzePattern(sparse_);
@@ -109,7 +111,7 @@ class System {
   /// The block (row, column), row >= column.
   Place at(int row, int column) {
     if (is_dense()) return Place(&full_(6 * row, 6 * column), Eigen::OuterStride<>(full_.outerStride()));
-    const std::vector<int>& rows = below_[static_cast<std::size_t>(column)];
+    const std::vector<int>& rows = below_[column];
     const auto slot = std::lower_bound(rows.begin(), rows.end(), row) - rows.begin();
     return Place(sparse_.valuePtr() + sparse_.outerIndexPtr()[6 * column] + 6 * slot,
                  Eigen::OuterStride<>(6 * static_cast<Eigen::Index>(rows.size())));
@@ -123,186 +125,240 @@ class System {
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> sparse_solver_;
 };
 
+/// Which points carry, stick and roll, and the impulses that follow from it.
+class Guess {
+ public:
+  Guess(const std::vector<Mover>& free, const std::vector<Point>& points)
+      : free_(free), points_(points), system_(static_cast<int>(free.size()), points), right_(6 * static_cast<int>(free.size())) {
+    for (const Point& p : points) scale_ = std::max(scale_, norm(p.wanted - calc_relative_velocity(free, p)));
+  }
+  /// The next point. Masses: impulse per velocity along the normal, couple per spin (0: none). `is_swept`: its impulse is an answer.
+  void add(double normal_mass, double turning_mass, bool is_swept);
+  /// Impulses under which all points move as guessed, and the velocities that they give. False where the system is singular.
+  bool solve(std::vector<Mover>& movers);
+  /// Changes the guess by its answer; true where the answer confirms it. `may_stick`: points that slide or roll may stick again.
+  bool correct(const std::vector<Mover>& movers, bool may_stick);
+  /// Impulses into the points, and the velocities that these give, and no others.
+  void read(std::vector<Mover>& movers, std::vector<Point>& points) const;
+
+ private:
+  struct Held {
+    Hold hold = Hold::kOpen;
+    bool rolls = false;  // its couple is at its bound
+    double stiffness = 0.0, turning_mass = 0.0;
+    std::array<Vec3, 3> axes{};
+    Vec3 sliding{}, impulse{}, couple{};
+    bool sticks_turning() const { return turning_mass > 0.0 && !rolls; }
+  };
+
+  void assemble();
+  double iterate(std::vector<Mover>& movers);
+  Hold correct_hold(const std::vector<Mover>& movers, const Point& p, Held& held, bool may_stick, bool& confirmed);
+  bool correct_couple(const std::vector<Mover>& movers, const Point& p, Held& held, double push, bool may_stick);
+
+  const std::vector<Mover>& free_;
+  const std::vector<Point>& points_;
+  std::vector<Held> held_;  // of the points
+  System system_;
+  Eigen::VectorXd right_;
+  double scale_ = 0.0;  // m/s
+};
+
+void Guess::add(double normal_mass, double turning_mass, bool is_swept) {
+  const Point& p = points_[held_.size()];
+  Held& held = held_.emplace_back();
+  held.stiffness = normal_mass / kCompliance;
+  held.turning_mass = turning_mass;
+  const Vec3 tangent = find_across(p.normal);
+  held.axes = {p.normal, tangent, cross(p.normal, tangent)};
+  const double push = dot(p.impulse, p.normal);
+  const Vec3 across = p.impulse - push * p.normal;
+  const bool slides = is_swept && push > 0.0 && norm(across) >= kAtCone * p.friction * push;
+  if (slides) held.sliding = across;
+  held.hold = slides ? Hold::kSlides : push > 0.0 || p.impulse == Vec3{} ? Hold::kSticks : Hold::kOpen;
+  if (turning_mass > 0.0 && push > 0.0 && norm(clamp_couple(p, p.couple, kAtCone * push) - p.couple) > 1e-6 * norm(p.couple)) {
+    held.rolls = true;  // as in the step before
+    held.couple = p.couple;
+  }
+}
+
+/// The matrix of the points that hold.
+void Guess::assemble() {
+  system_.clear();
+  for (int i = 0; const Mover& m : free_) {
+    Eigen::Matrix3d inverse;
+    for (int r = 0; r < 3; ++r)
+      for (int c = 0; c < 3; ++c) inverse(r, c) = m.inverse_inertia[r][c];
+    system_.add_inertia(i++, 1.0 / m.inverse_mass, inverse.inverse());
+  }
+  for (int i = 0; const Held& held : held_) {
+    const Point& p = points_[i++];
+    if (held.hold == Hold::kOpen) continue;
+    for (int k = 0; k < (held.hold == Hold::kSticks ? 3 : 1); ++k)
+      system_.add(p.a, make_row(held.axes[k], cross(p.arm_a, held.axes[k])), p.b, -make_row(held.axes[k], cross(p.arm_b, held.axes[k])),
+                  held.stiffness);
+    if (!held.sticks_turning()) continue;
+    for (const Vec3& axis : held.axes) system_.add(p.a, make_row({}, axis), p.b, -make_row({}, axis), held.turning_mass / kCompliance);
+  }
+}
+
+bool Guess::solve(std::vector<Mover>& movers) {
+  assemble();
+  movers = free_;
+  for (int i = 0; Held & held : held_) {
+    const Point& p = points_[i++];
+    held.impulse = {};
+    if (held.hold == Hold::kSlides) {
+      held.impulse = held.sliding;
+      apply(movers, p, held.sliding);
+    }
+    if (held.hold == Hold::kOpen || held.sticks_turning())
+      held.couple = {};
+    else if (held.turning_mass > 0.0)
+      turn(movers, p, held.couple);
+  }
+  if (!system_.factorise()) return false;
+  for (int again = 0; again < kIterations && iterate(movers) > kExact * scale_; ++again) {
+  }
+  return true;
+}
+
+/// One correction of the impulses; returns the residual before it [m/s].
+double Guess::iterate(std::vector<Mover>& movers) {
+  right_.setZero();
+  const auto add = [&](int body, const Row6& row) {
+    if (body >= 0) right_.segment<6>(6 * body) += row;
+  };
+  std::vector<Vec3> left(points_.size()), left_spin(points_.size());
+  double largest = 0.0;
+  for (int i = 0; const Held& held : held_) {
+    const int n = i++;
+    const Point& p = points_[n];
+    if (held.hold == Hold::kOpen) continue;
+    left[n] = p.wanted - calc_relative_velocity(movers, p);
+    if (held.hold == Hold::kSlides) left[n] = dot(left[n], p.normal) * p.normal;
+    largest = std::max(largest, norm(left[n]));
+    const Vec3 pull = held.stiffness * left[n];
+    add(p.a, make_row(pull, cross(p.arm_a, pull)));
+    add(p.b, -make_row(pull, cross(p.arm_b, pull)));
+    if (!held.sticks_turning()) continue;
+    left_spin[n] = -1.0 * calc_relative_spin(movers, p);
+    const Vec3 couple = (held.turning_mass / kCompliance) * left_spin[n];
+    add(p.a, make_row({}, couple));
+    add(p.b, -make_row({}, couple));
+  }
+  if (largest <= kExact * scale_) return largest;
+  const Eigen::VectorXd d = system_.solve(right_);
+  const auto get = [&](int body, int from) {
+    const double* x = d.data() + 6 * body + from;
+    return Vec3{x[0], x[1], x[2]};
+  };
+  for (int i = 0; Held & held : held_) {
+    const int n = i++;
+    const Point& p = points_[n];
+    if (held.hold == Hold::kOpen) continue;
+    Vec3 moved{}, turned{};
+    if (p.a >= 0) moved = get(p.a, 0) + cross(get(p.a, 3), p.arm_a), turned = get(p.a, 3);
+    if (p.b >= 0) moved = moved - get(p.b, 0) - cross(get(p.b, 3), p.arm_b), turned = turned - get(p.b, 3);
+    if (held.hold == Hold::kSlides) moved = dot(moved, p.normal) * p.normal;
+    const Vec3 more = held.stiffness * (left[n] - moved);
+    held.impulse = held.impulse + more;
+    apply(movers, p, more);
+    if (!held.sticks_turning()) continue;
+    const Vec3 couple = (held.turning_mass / kCompliance) * (left_spin[n] - turned);
+    held.couple = held.couple + couple;
+    turn(movers, p, couple);
+  }
+  return largest;
+}
+
+bool Guess::correct(const std::vector<Mover>& movers, bool may_stick) {
+  bool confirmed = true;
+  for (int i = 0; Held & held : held_) {
+    const Point& p = points_[i++];
+    const double push = dot(held.impulse, p.normal);
+    const Hold now = correct_hold(movers, p, held, may_stick, confirmed);
+    if (held.turning_mass > 0.0 && !correct_couple(movers, p, held, std::max(push, 0.0), may_stick)) confirmed = false;
+    if (now != held.hold) confirmed = false;
+    held.hold = now;
+  }
+  return confirmed;
+}
+
+/// The hold that the answer asks for; impulses are brought back to the cone.
+Hold Guess::correct_hold(const std::vector<Mover>& movers, const Point& p, Held& held, bool may_stick, bool& confirmed) {
+  const double push = dot(held.impulse, p.normal), limit = p.friction * push;
+  if (held.hold == Hold::kOpen)
+    return dot(p.wanted - calc_relative_velocity(movers, p), p.normal) > 1e-9 * scale_ ? Hold::kSticks : Hold::kOpen;
+  if (!(push > 0.0)) {
+    held.impulse = {};
+    return Hold::kOpen;
+  }
+  if (held.hold == Hold::kSticks) {
+    const Vec3 across = held.impulse - push * p.normal;
+    const double size = norm(across);
+    if (!(size > limit)) return Hold::kSticks;
+    held.sliding = (limit / size) * across;
+    held.impulse = push * p.normal + held.sliding;
+    return Hold::kSlides;
+  }
+  // Slides on against its velocity; where that would not brake any more, it sticks.
+  const Vec3 short_of = p.wanted - calc_relative_velocity(movers, p);
+  const Vec3 across = short_of - dot(short_of, p.normal) * p.normal;
+  const double size = norm(across);
+  if (dot(across, held.sliding) < 0.0 && may_stick) return Hold::kSticks;
+  const Vec3 next = size > 0.0 ? (limit / size) * across : held.sliding;
+  const Vec3 mean = 0.5 * (next + held.sliding);
+  const double length = norm(mean);
+  const Vec3 turned = length > 0.0 ? (limit / length) * mean : Vec3{};
+  if (norm(turned - held.sliding) > 1e-3 * p.friction * push) confirmed = false;
+  held.sliding = turned;
+  held.impulse = push * p.normal + turned;
+  return Hold::kSlides;
+}
+
+/// A couple that sticks and would have to be above its bound rolls from now on. One that rolls is at its bound against the spin as it is
+/// now, and sticks again where less would stop that. True where it stays as guessed.
+bool Guess::correct_couple(const std::vector<Mover>& movers, const Point& p, Held& held, double push, bool may_stick) {
+  const Vec3 free_couple = held.rolls ? held.couple - held.turning_mass * calc_relative_spin(movers, p) : held.couple;
+  const Vec3 bounded = clamp_couple(p, free_couple, push);
+  const bool is_bound = norm(bounded - free_couple) > 1e-9 * norm(bounded);
+  if (!held.rolls && !is_bound) return true;
+  if (held.rolls && !is_bound && may_stick) {
+    held.rolls = false;
+    return false;
+  }
+  const bool stays = held.rolls && !(norm(bounded - held.couple) > 1e-3 * (p.rolling_m + p.twisting_m) * push);
+  held.rolls = true;
+  held.couple = bounded;
+  return stays;
+}
+
+void Guess::read(std::vector<Mover>& movers, std::vector<Point>& points) const {
+  movers = free_;
+  for (int i = 0; const Held& held : held_) {
+    Point& p = points[i++];
+    p.impulse = held.impulse;
+    p.couple = held.couple;
+    apply(movers, p, held.impulse);
+    if (held.turning_mass > 0.0) turn(movers, p, held.couple);
+  }
+}
+
 }  // namespace
 
 bool Solver::solve_directly(std::vector<Mover>& movers, std::vector<Point>& points, int max_guesses, bool are_swept) {
   if (std::any_of(movers.begin(), movers.end(), [](const Mover& m) { return m.linkage != nullptr; })) return false;
   prepare(movers, points);
-  const std::vector<sweeps::Row>& rows = problem_.rows;
-  const int bodies = static_cast<int>(movers.size());
   const std::vector<Mover> free = movers;
-  std::vector<Vec3> sliding(points.size()), impulses(points.size()), couples(points.size());
-  std::vector<char> rolls(points.size(), 0);  // its couple is at its bound
-  std::vector<Hold> holds;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const Point& p = points[i];
-    const double push = dot(p.impulse, p.normal);
-    const Vec3 across = p.impulse - push * p.normal;
-    const bool slides = are_swept && push > 0.0 && norm(across) >= kAtCone * p.friction * push;
-    if (slides) sliding[i] = across;
-    holds.push_back(slides ? Hold::kSlides : push > 0.0 || p.impulse == Vec3{} ? Hold::kSticks : Hold::kOpen);
-    if (get_turning_mass(rows[i]) > 0.0 && push > 0.0 &&
-        norm(clamp_couple(p, p.couple, kAtCone * push) - p.couple) > 1e-6 * norm(p.couple)) {
-      rolls[i] = 1;  // as in the step before
-      couples[i] = p.couple;
-    }
-  }
+  Guess guess(free, points);
+  for (const sweeps::Row& row : problem_.rows) guess.add(row.normal_mass, get_turning_mass(row), are_swept);
   bool confirmed = false;
-  std::vector<std::array<Vec3, 3>> axes;
-  for (const Point& p : points) {
-    const Vec3 across = find_across(p.normal);
-    axes.push_back({p.normal, across, cross(p.normal, across)});
+  for (int n = 0; n < max_guesses && !confirmed; ++n) {
+    if (!guess.solve(movers)) return false;
+    confirmed = guess.correct(movers, n < max_guesses / 2);
   }
-  double scale = 0.0;
-  for (const Point& p : points) scale = std::max(scale, norm(p.wanted - calc_relative_velocity(free, p)));
-  Eigen::VectorXd right(6 * bodies);
-  System system(bodies, points);
-  for (int guess = 0; guess < max_guesses && !confirmed; ++guess) {
-    system.clear();
-    for (int i = 0; i < bodies; ++i) {
-      const Mover& m = free[static_cast<std::size_t>(i)];
-      Eigen::Matrix3d inverse;
-      for (int r = 0; r < 3; ++r)
-        for (int c = 0; c < 3; ++c) inverse(r, c) = m.inverse_inertia[static_cast<std::size_t>(r)][static_cast<std::size_t>(c)];
-      system.add_inertia(i, 1.0 / m.inverse_mass, inverse.inverse());
-    }
-    movers = free;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      const Point& p = points[i];
-      impulses[i] = {};
-      if (holds[i] == Hold::kOpen) {
-        couples[i] = {};
-        continue;
-      }
-      const double stiffness = rows[i].normal_mass / kCompliance;
-      for (std::size_t k = 0; k < (holds[i] == Hold::kSticks ? 3u : 1u); ++k)
-        system.add(p.a, make_row(axes[i][k], cross(p.arm_a, axes[i][k])), p.b, -make_row(axes[i][k], cross(p.arm_b, axes[i][k])),
-                   stiffness);
-      if (holds[i] == Hold::kSlides) {
-        impulses[i] = sliding[i];
-        apply(movers, p, sliding[i]);
-      }
-      if (!(get_turning_mass(rows[i]) > 0.0)) continue;
-      if (rolls[i]) {
-        turn(movers, p, couples[i]);
-      } else {
-        couples[i] = {};
-        for (std::size_t k = 0; k < 3; ++k)
-          system.add(p.a, make_row({}, axes[i][k]), p.b, -make_row({}, axes[i][k]), get_turning_mass(rows[i]) / kCompliance);
-      }
-    }
-    if (!system.factorise()) return false;
-    for (int again = 0; again < 12; ++again) {
-      right.setZero();
-      const auto add = [&](int body, const Row6& row) {
-        if (body >= 0) right.segment<6>(6 * body) += row;
-      };
-      std::vector<Vec3> left(points.size()), left_spin(points.size());
-      double largest = 0.0;
-      for (std::size_t i = 0; i < points.size(); ++i) {
-        const Point& p = points[i];
-        if (holds[i] == Hold::kOpen) continue;
-        left[i] = p.wanted - calc_relative_velocity(movers, p);
-        if (holds[i] == Hold::kSlides) left[i] = dot(left[i], p.normal) * p.normal;
-        largest = std::max(largest, norm(left[i]));
-        const Vec3 pull = (rows[i].normal_mass / kCompliance) * left[i];
-        add(p.a, make_row(pull, cross(p.arm_a, pull)));
-        add(p.b, -make_row(pull, cross(p.arm_b, pull)));
-        if (!(get_turning_mass(rows[i]) > 0.0) || rolls[i]) continue;
-        left_spin[i] = -1.0 * calc_relative_spin(movers, p);
-        const Vec3 couple = (get_turning_mass(rows[i]) / kCompliance) * left_spin[i];
-        add(p.a, make_row({}, couple));
-        add(p.b, -make_row({}, couple));
-      }
-      if (largest <= 1e-10 * scale) break;
-      const Eigen::VectorXd d = system.solve(right);
-      const auto get = [&](int body, int from) {
-        const double* x = d.data() + 6 * body + from;
-        return Vec3{x[0], x[1], x[2]};
-      };
-      for (std::size_t i = 0; i < points.size(); ++i) {
-        const Point& p = points[i];
-        if (holds[i] == Hold::kOpen) continue;
-        Vec3 moved{}, turned{};
-        if (p.a >= 0) moved = get(p.a, 0) + cross(get(p.a, 3), p.arm_a), turned = get(p.a, 3);
-        if (p.b >= 0) moved = moved - get(p.b, 0) - cross(get(p.b, 3), p.arm_b), turned = turned - get(p.b, 3);
-        if (holds[i] == Hold::kSlides) moved = dot(moved, p.normal) * p.normal;
-        const Vec3 more = (rows[i].normal_mass / kCompliance) * (left[i] - moved);
-        impulses[i] = impulses[i] + more;
-        apply(movers, p, more);
-        if (!(get_turning_mass(rows[i]) > 0.0) || rolls[i]) continue;
-        const Vec3 couple = (get_turning_mass(rows[i]) / kCompliance) * (left_spin[i] - turned);
-        couples[i] = couples[i] + couple;
-        turn(movers, p, couple);
-      }
-    }
-    // What the answer says of the guess.
-    confirmed = true;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      const Point& p = points[i];
-      const double push = dot(impulses[i], p.normal);
-      Hold now = holds[i];
-      if (holds[i] == Hold::kOpen) {
-        if (dot(p.wanted - calc_relative_velocity(movers, p), p.normal) > 1e-9 * scale) now = Hold::kSticks;
-      } else if (!(push > 0.0)) {
-        now = Hold::kOpen;
-        impulses[i] = {};
-      } else if (holds[i] == Hold::kSticks) {
-        const Vec3 across = impulses[i] - push * p.normal;
-        const double size = norm(across);
-        if (size > p.friction * push) {
-          now = Hold::kSlides;
-          sliding[i] = (p.friction * push / size) * across;
-          impulses[i] = push * p.normal + sliding[i];
-        }
-      } else {
-        // Slides on against its velocity; where that would not brake any more, it sticks.
-        const Vec3 short_of = p.wanted - calc_relative_velocity(movers, p);
-        const Vec3 across = short_of - dot(short_of, p.normal) * p.normal;
-        const double size = norm(across);
-        if (dot(across, sliding[i]) < 0.0 && guess < max_guesses / 2) {
-          now = Hold::kSticks;
-        } else {
-          const Vec3 next = size > 0.0 ? (p.friction * push / size) * across : sliding[i];
-          const Vec3 mean = 0.5 * (next + sliding[i]);
-          const double length = norm(mean);
-          const Vec3 turned = length > 0.0 ? (p.friction * push / length) * mean : Vec3{};
-          if (norm(turned - sliding[i]) > 1e-3 * p.friction * push) confirmed = false;
-          sliding[i] = turned;
-          impulses[i] = push * p.normal + turned;
-        }
-      }
-      if (get_turning_mass(rows[i]) > 0.0) {
-        // A couple that sticks and would have to be above its bound rolls from now on. One that rolls is at its bound against the spin as
-        // it is now, and sticks again where less would stop that.
-        const double pressing = std::max(push, 0.0);
-        const Vec3 free_couple = rolls[i] ? couples[i] - get_turning_mass(rows[i]) * calc_relative_spin(movers, p) : couples[i];
-        const Vec3 bounded = clamp_couple(p, free_couple, pressing);
-        const bool is_bound = norm(bounded - free_couple) > 1e-9 * norm(bounded);
-        if (!rolls[i] && is_bound) {
-          rolls[i] = 1;
-          couples[i] = bounded;
-          confirmed = false;
-        } else if (rolls[i] && !is_bound && guess < max_guesses / 2) {
-          rolls[i] = 0;
-          confirmed = false;
-        } else if (rolls[i]) {
-          if (norm(bounded - couples[i]) > 1e-3 * (p.rolling_m + p.twisting_m) * pressing) confirmed = false;
-          couples[i] = bounded;
-        }
-      }
-      if (now != holds[i]) confirmed = false;
-      holds[i] = now;
-    }
-  }
-  // The velocities that these impulses give, and no others.
-  movers = free;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    points[i].impulse = impulses[i];
-    points[i].couple = couples[i];
-    apply(movers, points[i], impulses[i]);
-    if (get_turning_mass(rows[i]) > 0.0) turn(movers, points[i], couples[i]);
-  }
+  guess.read(movers, points);
   return confirmed;
 }
 

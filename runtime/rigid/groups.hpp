@@ -12,7 +12,7 @@ namespace carillon::rigid {
 /// Disjoint groups of the numbers 0 ... count - 1 (union-find). A group is represented by its smallest number.
 class Groups {
  public:
-  explicit Groups(int count) : parent_(static_cast<std::size_t>(count)) { std::iota(parent_.begin(), parent_.end(), 0); }
+  explicit Groups(int count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0); }
   /// The smallest number in the group of `i`.
   int find(int i) {
     while (at(i) != i) i = at(i) = at(at(i));
@@ -24,7 +24,7 @@ class Groups {
   }
 
  private:
-  int& at(int i) { return parent_[static_cast<std::size_t>(i)]; }
+  int& at(int i) { return parent_[i]; }
   std::vector<int> parent_;
 };
 

@@ -1,4 +1,4 @@
-// What an impulse on one body does to all bodies on the same joints, at one configuration.
+// Response of all members of an articulation to an impulse on one of them, at one configuration.
 #pragma once
 
 #include <cstddef>
@@ -12,20 +12,20 @@ namespace carillon::rigid {
 /// The mobility of one mechanism at one configuration. A column is calculated when it is first asked for, and stays valid until set().
 class Linkage {
  public:
-  /// Forgets what it knew of another configuration.
+  /// Discards the columns of another configuration.
   void set(joints::Mechanism& mechanism, joints::Coordinates at) {
     mechanism_ = &mechanism;
     at_ = std::move(at);
-    columns_.assign(static_cast<std::size_t>(mechanism.count_members()), {});
+    columns_.assign(mechanism.count_members(), {});
   }
   /// (6 n, 6): velocity and spin that all members gain per impulse and couple on one, world axes.
   const std::vector<double>& get_mobility(int member) const {
-    std::vector<double>& column = columns_[static_cast<std::size_t>(member)];
+    std::vector<double>& column = columns_[member];
     if (column.empty()) column = mechanism_->calc_mobility(at_, member);
     return column;
   }
   /// The 36 of them that `of` gains, by rows.
-  const double* get_block(int of, int by) const { return get_mobility(by).data() + 36 * static_cast<std::size_t>(of); }
+  const double* get_block(int of, int by) const { return get_mobility(by).data() + 36 * of; }
 
   std::vector<int> movers;  // indices of the members in the step's problem
 

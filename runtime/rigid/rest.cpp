@@ -1,8 +1,10 @@
-// Method: what has been slow for a while sleeps if contact forces exist that balance it at rest. A group sleeps as a whole. Where others of
-//   the group move, bodies sleep by themselves, with the forces of the others on them as they are. These forces are watched: where they
-//   change by more than a part of its weight a sleeping body wakes, alone, and so may those that lean on it, one after another.
+// Method: a body that has been slow for a while sleeps if contact forces exist that balance it at rest. An island sleeps as a whole. Where
+//   others of the island move, bodies sleep by themselves, with the forces of the others on them as they are. These forces are watched:
+//   where they change by more than a part of its weight a sleeping body wakes, alone, and so may those that lean on it, one after another.
 // Source: J. J. Moreau, "Unilateral contact and dry friction in finite freedom dynamics" (1988), the solution with zero velocities.
 // Deviations: none.
+#include "runtime/rigid/rest.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -10,324 +12,267 @@
 
 #include "runtime/rigid/groups.hpp"
 #include "runtime/rigid/limits.hpp"
-#include "runtime/rigid/space.hpp"
 
 namespace carillon::rigid {
 namespace {
 
-constexpr double kSlow = 5e-3;         // m/s; of what may be about to rest
-constexpr double kPatience = 0.02;     // s; for so long
-constexpr double kLong = 0.3;          // s; what was slow for so long is no faster than kSlow: less balance is enough
-constexpr double kApart = 0.1;         // s; slow for so long, a body may sleep among others that move,
-constexpr double kCalm = 0.05;         // s; if those that it touches have been slow for so long
-constexpr double kStill = 5e-4;        // m/s; and nothing is faster where it touches
-constexpr double kShift = 0.05;        // of its weight: change of the forces on it that wakes it
-constexpr int kProofSweeps = 120;      // that look for rest,
-constexpr int kMaxProofSweeps = 1200;  // of what was slow for kLong
-
-/// That a contact gave a in its last step [N].
-Vec3 calc_force(const Contact& c) { return c.touching && c.step_s > 0.0 ? (1.0 / c.step_s) * c.impulse : Vec3{}; }
+constexpr double kPatience = 0.02;  // s; slower than kSlow for so long, a body may be about to rest
+constexpr double kApart = 0.1;      // s; slow for so long, a body may sleep among others that move,
+constexpr double kCalm = 0.05;      // s; if those that it touches have been slow for so long
+constexpr double kStill = 5e-4;     // m/s; and nothing is faster where it touches
+constexpr double kShift = 0.05;     // of its weight: change of the forces on it that wakes it
 
 }  // namespace
 
-/// Counts how long the bodies of a group have been slow; true where it is time to look whether it rests.
-bool Space::may_rest(const Island& island, double h) {
+void Rest::reset(const std::vector<int>& bodies) {
+  for (const int body : bodies) paces_[body].slow_s = 0.0;
+}
+
+bool Rest::may_sleep(const std::vector<int>& bodies, double time_s) {
   bool all = true;
-  for (const int body : island.bodies) {
-    const auto i = static_cast<std::size_t>(body);
-    const double speed = norm(states_[i].velocity) + norm(placed_[i].spin) * solids_[i].radius_m;
-    paces_[i].slow_s = speed < kSlow && !has_impact(body) ? paces_[i].slow_s + h : 0.0;
-    all = all && paces_[i].slow_s > kPatience && time_s_ >= paces_[i].next_proof_s;
+  for (const int body : bodies) {
+    Pace& pace = paces_[body];
+    pace.slow_s = bodies_.calc_speed(body) < kSlow && !bodies_.is_moved_by_impact(body) ? pace.slow_s + time_s : 0.0;
+    all = all && pace.slow_s > kPatience && bodies_.get_time() >= pace.next_proof_s;
   }
   return all;
 }
 
-/// Are there contact forces that balance the bodies of a group, which have no velocity? What has been slower than kSlow for so long that
-/// its mean acceleration is below `bound` times gravity needs no better balance than that. `pulls`: forces and couples of others on each.
-bool Space::is_balanced(Island& island, double h, const std::vector<joints::Spatial>& pulls, double slow_s) {
-  predict(island, h, true);
-  for (std::size_t n = 0; n < pulls.size(); ++n) {
-    movers_[n].velocity = movers_[n].velocity + (h * movers_[n].inverse_mass) * pulls[n].linear;
-    movers_[n].spin = movers_[n].spin + h * (movers_[n].inverse_inertia * pulls[n].angular);
-  }
-  make_points(island, h, false);
-  // A gap that roughness bridges is none: here all that is near is in touch.
-  for (std::size_t n = 0; n < points_.size(); ++n) {
-    if (rows_[n].get().touch.gap_m <= kDeep) points_[n].wanted = {};
-  }
-  const std::vector<Point> moving = points_;
-  for (Point& p : points_) p.impulse = p.couple = {};
-  const std::vector<Point> unloaded = points_;
-  const double g = std::max(norm(gravity_), 1e-9);
-  const double bound = slow_s > kLong ? kSlow / (g * kLong) : kBalanced;
-  const std::vector<Mover> free = movers_;
-  const auto holds = [&] {
-    std::vector<char> carried(island.bodies.size(), 0);  // what drifts where nothing pulls is at rest nowhere
-    for (std::size_t n = 0; n < pulls.size(); ++n) carried[n] = dot(pulls[n].linear, gravity_) < 0.0 ? 1 : 0;
-    for (const Point& p : points_)
-      for (const int n : {p.a, p.b})
-        if (n >= 0 && dot(p.impulse, p.normal) > 0.0) carried[static_cast<std::size_t>(n)] = 1;
-    for_linked(island, [&](const Linked& linked) {
-      const std::vector<int>& members = linked.linkage.movers;
-      const bool any =
-          linked.hangs || std::any_of(members.begin(), members.end(), [&](int n) { return carried[static_cast<std::size_t>(n)] != 0; });
-      for (const int n : members) carried[static_cast<std::size_t>(n)] = any ? 1 : 0;
-    });
-    for (std::size_t n = 0; n < island.bodies.size(); ++n) {
-      const double radius = solid(island.bodies[n]).radius_m;
-      if (!carried[n] || norm(movers_[n].velocity) + norm(movers_[n].spin) * radius > bound * g * h) return false;
-    }
-    return true;
-  };
-  ++costs_.solves;
-  const bool balanced = solver_.solve_directly(movers_, points_, kMaxGuesses) && holds();
-  // By sweeps from the impulses of the motion, and from none.
-  const auto sweep_from = [&](const std::vector<Point>& from, int max_sweeps) {
-    movers_ = free;
-    points_ = from;
-    solver_.solve(movers_, points_, 1e-2 * bound * g * h, max_sweeps);
-    costs_.sweeps += solver_.get_sweeps();
-    return holds();
-  };
-  return balanced || sweep_from(moving, kProofSweeps) || sweep_from(unloaded, slow_s > kLong ? kMaxProofSweeps : kProofSweeps);
+bool Rest::try_articulation(Articulation& articulation, double length_s) {
+  if (!articulation.is_anchored || !may_sleep(articulation.bodies, length_s) || !bodies_.is_balanced(articulation)) return false;
+  for (const int body : articulation.bodies) ledger_.lose(calc_kinetic(bodies_.solid(body), bodies_.state(body)));
+  std::fill(articulation.now.u.begin(), articulation.now.u.end(), 0.0);
+  bodies_.place(articulation);
+  for (const int body : articulation.bodies) bodies_.set_asleep(body, true);
+  return true;
 }
 
-bool Space::Pair::has_closed_gap() const {
-  return std::any_of(contacts.begin(), contacts.end(), [](const Contact& c) { return c.touch.gap_m <= kDeep; });
-}
-
-/// Puts the group to sleep if it is balanced at rest.
-Space::Rest Space::rest(Island& island, double h, const std::vector<joints::Spatial>& pulls) {
+/// Puts an island, or a part of one on which others pull, to sleep if it is balanced at rest.
+Rest::Balance Rest::try_sleep(Island& island, double h, const std::vector<joints::Spatial>& pulls) {
   bool touches = !pulls.empty();
   double slow_s = std::numeric_limits<double>::infinity();
   for (const Pair* pair : island.pairs) touches = touches || pair->has_closed_gap();
-  for_linked(island, [&](const Linked& linked) { touches = touches || linked.hangs; });
-  if (!touches) return Rest::none;
+  bodies_.for_articulations(island.bodies, [&](const Articulation& articulation) { touches = touches || articulation.is_anchored; });
+  if (!touches) return Balance::none;
   std::vector<State> kept;
-  std::vector<joints::Coordinates> kept_linked;
-  for_linked(island, [&](Linked& linked) {
-    kept_linked.push_back(linked.now);
-    std::fill(linked.now.u.begin(), linked.now.u.end(), 0.0);
+  std::vector<joints::Coordinates> kept_coordinates;
+  bodies_.for_articulations(island.bodies, [&](Articulation& articulation) {
+    kept_coordinates.push_back(articulation.now);
+    std::fill(articulation.now.u.begin(), articulation.now.u.end(), 0.0);
   });
   for (const int body : island.bodies) {
-    State& s = states_[static_cast<std::size_t>(body)];
+    State& s = bodies_.state(body);
     kept.push_back(s);
-    slow_s = std::min(slow_s, paces_[static_cast<std::size_t>(body)].slow_s);
+    slow_s = std::min(slow_s, paces_[body].slow_s);
     s.velocity = s.momentum = {};
-    place_body(body);
+    bodies_.place(body);
   }
-  const bool balanced = is_balanced(island, h, pulls, slow_s);
-  bool stands = true;
-  if (balanced && !pulls.empty()) {
-    const std::vector<Point> points = points_;
-    const std::vector<Ref> rows = rows_;
-    stands = is_balanced(island, h, {}, slow_s);
-    points_ = points;
-    rows_ = rows;
-  }
-  for (std::size_t n = 0; n < island.bodies.size(); ++n) {
-    const auto i = static_cast<std::size_t>(island.bodies[n]);
+  trial_.begin(island);
+  const bool balanced = problem_.solve_rest(trial_, h, pulls, slow_s);
+  std::vector<Point> points = trial_.points;
+  const std::vector<ContactRef> rows = trial_.rows;
+  const bool stands = !balanced || pulls.empty() || problem_.solve_rest(trial_, h, {}, slow_s);
+  trial_.end();
+  for (int n = 0; const int body : island.bodies) {
+    const State& before = kept[n++];
     if (balanced) {
-      asleep_[i] = 1;
-      lost_j_ += rigid::calc_kinetic(solids_[i], kept[n]);
+      bodies_.set_asleep(body, true);
+      ledger_.lose(calc_kinetic(bodies_.solid(body), before));
     } else {
-      states_[i] = kept[n];
-      (pulls.empty() ? paces_[i].next_proof_s : paces_[i].next_part_s) = time_s_ + std::min(0.5 * slow_s, kLong);
-      place_body(island.bodies[n]);
+      bodies_.state(body) = before;
+      (pulls.empty() ? paces_[body].next_proof_s : paces_[body].next_part_s) = bodies_.get_time() + std::min(0.5 * slow_s, kLong);
+      bodies_.place(body);
     }
   }
   if (!balanced) {
-    std::size_t k = 0;
-    for_linked(island, [&](Linked& linked) {
-      linked.now = kept_linked[k++];
-      place_linked(linked);
+    bodies_.for_articulations(island.bodies, [&, k = 0](Articulation& articulation) mutable {
+      articulation.now = kept_coordinates[k++];
+      bodies_.place(articulation);
     });
+    return Balance::none;
   }
-  for (std::size_t n = 0; balanced && n < points_.size(); ++n) {
-    Contact& c = rows_[n].get();
-    c.impulse = points_[n].impulse;
+  for (int n = 0; const Point& p : points) {
+    Contact& c = rows[n++].get();
+    c.impulse = p.impulse;
     if (c.is_load) c.impulse = c.impulse + h * c.rest_n;
-    c.couple = points_[n].couple;
+    c.couple = p.couple;
     c.step_s = h;
     c.touching = dot(c.impulse, c.touch.normal) > 0.0;
     c.rests = c.is_load = c.touch.gap_m <= kDeep;
     c.rest_n = (1.0 / h) * c.impulse;
   }
-  return !balanced ? Rest::none : stands ? Rest::stands : Rest::leans;
+  return stands ? Balance::stands : Balance::leans;
 }
 
-/// Is one of its gaps so small that it counts as closed when the other body sleeps?
-bool Space::is_close(const Pair& pair) { return pair.touches() || pair.has_closed_gap(); }
-
-/// Puts bodies to sleep whose group keeps moving elsewhere. At the beginning of a window, on the contacts of the last step.
-void Space::rest_apart() {
-  const auto get_slow = [&](int body) { return paces_[static_cast<std::size_t>(body)].slow_s; };
-  std::vector<char> may(solids_.size(), 0);
-  bool any = false;
-  for (int i = 0; i < static_cast<int>(solids_.size()); ++i) {
-    const auto n = static_cast<std::size_t>(i);
-    const bool is_slow =
-        moves(i) && get_slow(i) > kApart && time_s_ >= paces_[n].next_part_s && !has_impact(i) && find_linked(i) == nullptr;
-    may[n] = is_slow ? 1 : 0;
-    any = any || is_slow;
-  }
-  if (!any) return;
-  const auto is_one = [&](int body) { return body >= 0 && may[static_cast<std::size_t>(body)] != 0; };
-  for (const Pair* pair : near_) {
+/// Bodies that may sleep while others of their island move.
+std::vector<char> Rest::find_slow() const {
+  std::vector<char> is_slow(bodies_.count(), 0);
+  for (int i = 0; i < bodies_.count(); ++i)
+    is_slow[i] = bodies_.moves(i) && paces_[i].slow_s > kApart && bodies_.get_time() >= paces_[i].next_part_s &&
+                 !bodies_.is_moved_by_impact(i) && bodies_.find_articulation(i) == nullptr;
+  if (std::none_of(is_slow.begin(), is_slow.end(), [](char slow) { return slow != 0; })) return {};
+  const auto is_one = [&](int body) { return body >= 0 && is_slow[body] != 0; };
+  for (const Pair* pair : windows_.near()) {
     if ((!is_one(pair->a) && !is_one(pair->b)) || !pair->touches()) continue;
     const bool moves_there = std::any_of(pair->contacts.begin(), pair->contacts.end(), [&](const Contact& c) {
-      return c.touching && norm(calc_velocity(c.a, c.touch.where_m) - calc_velocity(c.b, c.touch.where_m)) > kStill;
+      return c.touching && norm(bodies_.calc_velocity(c.a, c.touch.where_m) - bodies_.calc_velocity(c.b, c.touch.where_m)) > kStill;
     });
     for (const bool is_a : {true, false}) {
       const int body = is_a ? pair->a : pair->b, other = is_a ? pair->b : pair->a;
-      // Forces on what is on joints are the joints' affair.
-      const bool is_calm = other < 0 || !moves(other) || (get_slow(other) > kCalm && !has_impact(other) && find_linked(other) == nullptr);
-      if (is_one(body) && (pair->cord >= 0 || moves_there || !is_calm)) may[static_cast<std::size_t>(body)] = 0;
+      // Forces on articulated bodies belong to the joints.
+      const bool is_calm = !bodies_.moves(other) || (paces_[other].slow_s > kCalm && !bodies_.is_moved_by_impact(other) &&
+                                                     bodies_.find_articulation(other) == nullptr);
+      if (is_one(body) && (pair->cord >= 0 || moves_there || !is_calm)) is_slow[body] = 0;
     }
   }
-  Groups groups(static_cast<int>(solids_.size()));
-  for (const Pair* pair : near_)
+  return is_slow;
+}
+
+void Rest::try_parts() {
+  const std::vector<char> is_slow = find_slow();
+  if (is_slow.empty()) return;
+  const auto is_one = [&](int body) { return body >= 0 && is_slow[body] != 0; };
+  Groups groups(bodies_.count());
+  for (const Pair* pair : windows_.near())
     if (is_one(pair->a) && is_one(pair->b) && pair->touches()) groups.join(pair->a, pair->b);
   struct Part {
     Island island;
-    std::vector<Pair*> bounds;  // to what keeps moving, with or without forces
+    std::vector<Pair*> bounds;  // to bodies that keep moving, with or without forces
   };
   std::map<int, Part> parts;
-  for (Pair* pair : near_) {
+  for (Pair* pair : windows_.near()) {
     if (!is_one(pair->a) && !is_one(pair->b)) continue;
     Part& part = parts[groups.find(is_one(pair->a) ? pair->a : pair->b)];
-    const bool is_bound = (moves(pair->a) && !is_one(pair->a)) || (pair->b >= 0 && moves(pair->b) && !is_one(pair->b));
-    if (!is_bound)
+    const auto is_bound_to = [&](int body) { return bodies_.moves(body) && !is_one(body); };
+    if (!is_bound_to(pair->a) && !is_bound_to(pair->b))
       part.island.pairs.push_back(pair);
-    else if (is_close(*pair))
+    else if (pair->touches() || pair->has_closed_gap())
       part.bounds.push_back(pair);
   }
-  for (int i = 0; i < static_cast<int>(solids_.size()); ++i)
+  for (int i = 0; i < bodies_.count(); ++i)
     if (is_one(i)) parts[groups.find(i)].island.bodies.push_back(i);
   for (auto& [first, part] : parts) {
-    if (part.bounds.empty()) continue;  // a group of its own: step_island() handles it
-    stepped_ = &part.island.bodies;
+    if (part.bounds.empty()) continue;  // an island of its own: try_island() handles it
     std::vector<joints::Spatial> pulls(part.island.bodies.size());
-    for (std::size_t n = 0; n < part.island.bodies.size(); ++n)
-      index_[static_cast<std::size_t>(part.island.bodies[n])] = static_cast<int>(n);
-    for (const Pair* pair : part.bounds)
-      for (const Contact& c : pair->contacts)
-        add_pull(c, is_one(pair->a), calc_force(c), pulls[static_cast<std::size_t>(find_index(is_one(pair->a) ? pair->a : pair->b))]);
-    for (Pair* pair : part.island.pairs) refresh(*pair);
-    // What stands without the others bears them as a fixed body does; what leans on them, or is carried, lies on them as a load.
-    const Rest found = rest(part.island, options_.step_s, pulls);
-    for (const int body : part.island.bodies) index_[static_cast<std::size_t>(body)] = -1;
-    stepped_ = nullptr;
+    for (const Pair* pair : part.bounds) {
+      const bool is_a = is_one(pair->a);
+      const auto at = std::find(part.island.bodies.begin(), part.island.bodies.end(), is_a ? pair->a : pair->b);
+      for (const Contact& c : pair->contacts) add_pull(bodies_, c, is_a, c.calc_force(), pulls[at - part.island.bodies.begin()]);
+    }
+    for (Pair* pair : part.island.pairs) touches_.refresh(*pair);
+    // A part that stands without the others bears them as a fixed body does; one that leans on them, or is carried, is their load.
+    const Balance found = try_sleep(part.island, options_.step_s, pulls);
+    if (found == Balance::none) continue;
     for (Pair* pair : part.bounds)
-      for (Contact& c : pair->contacts)
-        if (found != Rest::none) {
-          c.rests = c.touch.gap_m <= kDeep;
-          c.is_load = found == Rest::leans && c.rests;
-          c.rest_n = calc_force(c);
-        }
+      for (Contact& c : pair->contacts) {
+        c.rests = c.touch.gap_m <= kDeep;
+        c.is_load = found == Balance::leans && c.rests;
+        c.rest_n = c.calc_force();
+      }
   }
 }
 
-/// What sleeps on bodies of a group pulls on them as it did when it fell asleep.
-void Space::add_loads(const Island& island, double h) {
-  loads_.assign(island.bodies.size(), {});
-  for (const Pair* pair : island.pairs) {
-    if (moves(pair->a) == moves(pair->b)) continue;
-    const bool is_a = moves(pair->a);
-    const int n = find_index(is_a ? pair->a : pair->b);
-    for (const Contact& c : pair->contacts)
-      if (n >= 0 && movers_[static_cast<std::size_t>(n)].linkage == nullptr && c.is_load)
-        add_pull(c, is_a, h * c.rest_n, loads_[static_cast<std::size_t>(n)]);
+/// Wakes a body and all that touch it, and so on, or it alone.
+std::vector<int> Rest::wake(int body, int by, bool alone) {
+  std::vector<int> woken{body}, awake;
+  while (!woken.empty()) {
+    const int i = woken.back();
+    woken.pop_back();
+    if (!bodies_.is_asleep(i)) continue;
+    bodies_.set_asleep(i, false);
+    awake.push_back(i);
+    paces_[i].slow_s = 0.0;
+    windows_.wake(i, by);
+    for (auto& [key, pair] : touches_.pairs()) {
+      if (key.first != i && key.second != i) continue;
+      windows_.add(pair);
+      const int other = key.first == i ? key.second : key.first;
+      const bool sleeps = bodies_.is_asleep(other);
+      if (!alone && pair.touches() && sleeps) woken.push_back(other);
+      for (Contact& c : pair.contacts)
+        if (!sleeps)
+          c.rests = c.is_load = false;
+        else if (dot((c.a == i ? 1.0 : -1.0) * c.rest_n, bodies_.gravity()) <= 0.0)
+          c.is_load = false;  // the sleeping body below it bears any load
+    }
+    for (Pair& pair : touches_.cord_pairs()) {
+      if (pair.a != i && pair.b != i) continue;
+      windows_.add(pair);
+      const int other = pair.a == i ? pair.b : pair.a;
+      Contact& c = pair.contacts.front();
+      c.rests = c.is_load = false;
+      if (c.touching && other >= 0) woken.push_back(other);
+    }
+    if (const Articulation* articulation = bodies_.find_articulation(i); articulation != nullptr)
+      woken.insert(woken.end(), articulation->bodies.begin(), articulation->bodies.end());
   }
-  for (std::size_t n = 0; n < island.bodies.size(); ++n) {
-    movers_[n].velocity = movers_[n].velocity + movers_[n].inverse_mass * loads_[n].linear;
-    movers_[n].spin = movers_[n].spin + movers_[n].inverse_inertia * loads_[n].angular;
-  }
+  return awake;
 }
 
-/// What the loads on the nth body of the group do on its way through a part of a step, at whose end it is at `to` [J].
-double Space::calc_load_work(std::size_t n, const State& to, double part_s, double step_s) const {
-  const auto i = static_cast<std::size_t>((*stepped_)[n]);
-  const double part = part_s / step_s;
-  const Vec3 turn = part_s * (placed_[i].spin + (0.5 * part) * (movers_[n].spin - placed_[i].spin));
-  return (1.0 / step_s) * (dot(loads_[n].linear, to.centre - states_[i].centre) + dot(loads_[n].angular, turn));
-}
-
-/// Adds a force at a contact, as a's or b's body feels it.
-void Space::add_pull(const Contact& c, bool is_a, const Vec3& force_n, joints::Spatial& pull) const {
-  const Vec3 force = (is_a ? 1.0 : -1.0) * force_n;
-  pull.linear = pull.linear + force;
-  pull.angular = pull.angular + cross(c.touch.where_m - state(is_a ? c.a : c.b).centre, force);
-}
-
-/// The touches of a pair, good for a step. What sleeps of it wakes where what it rested on has gone away, or where another is about to
-/// touch it.
-void Space::watch(Pair& pair, double step_s) {
+void Rest::watch(Pair& pair, double step_s) {
   const auto resting = std::count_if(pair.contacts.begin(), pair.contacts.end(), [](const Contact& c) { return c.rests; });
-  update(pair, step_s);
-  const bool a_moves = moves(pair.a);
+  touches_.update(pair, step_s);
+  const bool a_moves = bodies_.moves(pair.a);
   const int body = a_moves ? pair.b : pair.a, by = a_moves ? pair.a : pair.b;
-  if (is_fixed(body) || moves(body)) return;
+  if (!bodies_.is_asleep(body)) return;
   const auto left =
       std::count_if(pair.contacts.begin(), pair.contacts.end(), [](const Contact& c) { return c.rests && c.touch.gap_m <= kDeep; });
   if (left < resting) {
-    wake(body, by, find_linked(body) == nullptr);
+    wake(body, by, bodies_.find_articulation(body) == nullptr);
     return;
   }
   const bool comes = std::any_of(pair.contacts.begin(), pair.contacts.end(), [&](const Contact& c) {
-    const double approach = calc_approach(c), pull = (a_moves ? -1.0 : 1.0) * dot(gravity_, c.touch.normal);
+    const double approach = bodies_.calc_approach(c.touch, c.a, c.b);
+    const double pull = (a_moves ? -1.0 : 1.0) * dot(bodies_.gravity(), c.touch.normal);
     const double fallen_m = 0.5 * std::max(pull, 0.0) * step_s * step_s;
-    // Where the two rest on each other wake_unbalanced() watches what is slow.
+    // Where the two rest on each other, slow changes are left to wake_unbalanced().
     return (resting == 0 || approach > kSlowest) && c.touch.gap_m - approach * step_s - fallen_m <= kTouch;
   });
   if (comes) wake(body, by);
 }
 
-/// Wakes the bodies that sleep among others whose forces on them are no longer those under which they rest.
-void Space::wake_unbalanced() {
+void Rest::wake_unbalanced() {
   struct Change {
     joints::Spatial pull;
     int by = -1;
     bool is_struck = false;
   };
   std::map<int, Change> changes;
-  for (const Pair* pair : near_) {
+  for (const Pair* pair : windows_.near()) {
     if (pair->b < 0 || pair->cord >= 0) continue;
-    const bool is_a = asleep_[static_cast<std::size_t>(pair->a)] != 0;
+    const bool is_a = bodies_.is_asleep(pair->a);
     const int body = is_a ? pair->a : pair->b, other = is_a ? pair->b : pair->a;
-    if (!asleep_[static_cast<std::size_t>(body)] || !moves(other) || !is_due(other)) continue;
+    if (!bodies_.is_asleep(body) || !bodies_.moves(other) || !windows_.is_due(other)) continue;
     for (const Contact& c : pair->contacts) {
       if (!c.rests && !c.touching) continue;
       Change& change = changes[body];
       change.by = other;
-      change.is_struck = change.is_struck || has_impact(other);
-      add_pull(c, is_a, calc_force(c) - (c.rests ? c.rest_n : Vec3{}), change.pull);
+      change.is_struck = change.is_struck || bodies_.is_moved_by_impact(other);
+      add_pull(bodies_, c, is_a, c.calc_force() - (c.rests ? c.rest_n : Vec3{}), change.pull);
     }
   }
   for (const auto& [body, change] : changes) {
-    const Solid& solid = solids_[static_cast<std::size_t>(body)];
+    const Solid& solid = bodies_.solid(body);
     const double size = norm(change.pull.linear) + norm(change.pull.angular) / solid.radius_m;
-    if (change.is_struck || size > kShift * solid.mass_kg * norm(gravity_)) wake(body, change.by, find_linked(body) == nullptr);
+    if (change.is_struck || size > kShift * solid.mass_kg * norm(bodies_.gravity()))
+      wake(body, change.by, bodies_.find_articulation(body) == nullptr);
   }
 }
 
-/// Bodies of an impact that slept until now move from here on, in the group that is being stepped. True if there were any. If another group
-/// touches them, too, that touch waits for the next step, in which the groups are one (they take the same steps: join_sleeping()).
-bool Space::wake_struck(Island& island, const std::vector<Ref>& taken) {
+bool Rest::wake_struck(Step& step, const std::vector<ContactRef>& contacts) {
   bool any = false;
-  const auto take = [&](int body) {
-    index_[static_cast<std::size_t>(body)] = static_cast<int>(island.bodies.size());
-    island.bodies.push_back(body);
-    for (Pair* pair : near_)
-      if ((pair->a == body || pair->b == body) && is_stepped(*pair) &&
-          std::find(island.pairs.begin(), island.pairs.end(), pair) == island.pairs.end())
-        island.pairs.push_back(pair);
+  std::vector<Pair*>& pairs = step.island().pairs;
+  const auto add = [&](int body) {
+    step.add(body);
+    for (Pair* pair : windows_.near())
+      if ((pair->a == body || pair->b == body) && step.has(*pair) && std::find(pairs.begin(), pairs.end(), pair) == pairs.end())
+        pairs.push_back(pair);
   };
-  for (const Ref& ref : taken)
+  for (const ContactRef& ref : contacts)
     for (const int body : {ref.pair->a, ref.pair->b}) {
-      if (is_fixed(body) || moves(body)) continue;
+      if (!bodies_.is_asleep(body)) continue;
       any = true;
-      for (const int woken : wake(body, island.bodies.front(), true)) take(woken);
+      for (const int woken : wake(body, step.body(0), true)) add(woken);
     }
   return any;
 }

@@ -49,7 +49,7 @@ void give(std::vector<Mover>& movers, const Mover& on, const Vec3& impulse, cons
   const Linkage& linkage = *on.linkage;
   const double* rows = linkage.get_mobility(on.member).data();
   for (const int index : linkage.movers) {
-    Mover& m = movers[static_cast<std::size_t>(index)];
+    Mover& m = movers[index];
     for (std::size_t k = 0; k < 6; ++k, rows += 6) {
       double gained = 0.0;
       for (std::size_t c = 0; c < 6; ++c) gained += rows[c] * by[c];
@@ -87,8 +87,8 @@ Mat3 calc_pseudo_inverse(const Mat3& m, Mat3& range, double min) {
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) {
         const double both = axis[i] * axis[j];
-        range[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)] += both;
-        inverse[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)] += both / found.eigenvalues()[n];
+        range[i][j] += both;
+        inverse[i][j] += both / found.eigenvalues()[n];
       }
   }
   return inverse;
@@ -98,7 +98,7 @@ Mat3 calc_pseudo_inverse(const Mat3& m, Mat3& range, double min) {
 
 void apply(std::vector<Mover>& movers, const Point& p, const Vec3& impulse) {
   if (p.a >= 0) {
-    Mover& m = movers[static_cast<std::size_t>(p.a)];
+    Mover& m = movers[p.a];
     if (m.linkage == nullptr) {
       m.velocity = m.velocity + m.inverse_mass * impulse;
       m.spin = m.spin + m.inverse_inertia * cross(p.arm_a, impulse);
@@ -107,7 +107,7 @@ void apply(std::vector<Mover>& movers, const Point& p, const Vec3& impulse) {
     }
   }
   if (p.b >= 0) {
-    Mover& m = movers[static_cast<std::size_t>(p.b)];
+    Mover& m = movers[p.b];
     if (m.linkage == nullptr) {
       m.velocity = m.velocity - m.inverse_mass * impulse;
       m.spin = m.spin - m.inverse_inertia * cross(p.arm_b, impulse);
@@ -119,14 +119,14 @@ void apply(std::vector<Mover>& movers, const Point& p, const Vec3& impulse) {
 
 void turn(std::vector<Mover>& movers, const Point& p, const Vec3& couple) {
   if (p.a >= 0) {
-    Mover& m = movers[static_cast<std::size_t>(p.a)];
+    Mover& m = movers[p.a];
     if (m.linkage == nullptr)
       m.spin = m.spin + m.inverse_inertia * couple;
     else
       give(movers, m, {}, couple);
   }
   if (p.b >= 0) {
-    Mover& m = movers[static_cast<std::size_t>(p.b)];
+    Mover& m = movers[p.b];
     if (m.linkage == nullptr)
       m.spin = m.spin - m.inverse_inertia * couple;
     else
@@ -146,19 +146,19 @@ void set_columns(Four (&columns)[3], const Mat3& m) {
 
 Vec3 calc_relative_spin(const std::vector<Mover>& movers, const Point& p) {
   Vec3 w{};
-  if (p.a >= 0) w = w + movers[static_cast<std::size_t>(p.a)].spin;
-  if (p.b >= 0) w = w - movers[static_cast<std::size_t>(p.b)].spin;
+  if (p.a >= 0) w = w + movers[p.a].spin;
+  if (p.b >= 0) w = w - movers[p.b].spin;
   return w;
 }
 
 Vec3 calc_relative_velocity(const std::vector<Mover>& movers, const Point& p) {
   Vec3 u{};
   if (p.a >= 0) {
-    const Mover& m = movers[static_cast<std::size_t>(p.a)];
+    const Mover& m = movers[p.a];
     u = m.velocity + cross(m.spin, p.arm_a);
   }
   if (p.b >= 0) {
-    const Mover& m = movers[static_cast<std::size_t>(p.b)];
+    const Mover& m = movers[p.b];
     u = u - m.velocity - cross(m.spin, p.arm_b);
   }
   return u;
@@ -172,10 +172,10 @@ Mat3 calc_mobility(const std::vector<Mover>& movers, const Point& p) {
     else
       add_linked_mobility(k, m, arm, m, arm, 1.0);
   };
-  if (p.a >= 0) add(movers[static_cast<std::size_t>(p.a)], p.arm_a);
-  if (p.b >= 0) add(movers[static_cast<std::size_t>(p.b)], p.arm_b);
+  if (p.a >= 0) add(movers[p.a], p.arm_a);
+  if (p.b >= 0) add(movers[p.b], p.arm_b);
   if (p.a < 0 || p.b < 0) return k;
-  const Mover &a = movers[static_cast<std::size_t>(p.a)], &b = movers[static_cast<std::size_t>(p.b)];
+  const Mover &a = movers[p.a], &b = movers[p.b];
   if (a.linkage != nullptr && a.linkage == b.linkage) {
     add_linked_mobility(k, a, p.arm_a, b, p.arm_b, -1.0);
     add_linked_mobility(k, b, p.arm_b, a, p.arm_a, -1.0);
@@ -200,7 +200,7 @@ void Solver::prepare(const std::vector<Mover>& movers, const std::vector<Point>&
   problem_.locked.clear();
   problem_.responses.clear();
   const int still = static_cast<int>(movers.size());
-  const auto is_linked = [&](int body) { return body >= 0 && movers[static_cast<std::size_t>(body)].linkage != nullptr; };
+  const auto is_linked = [&](int body) { return body >= 0 && movers[body].linkage != nullptr; };
   const auto get_axes = [](const Point& p) {
     const Vec3 across = find_across(p.normal);
     return Mat3{p.normal, across, cross(p.normal, across)};
@@ -232,7 +232,7 @@ void Solver::prepare(const std::vector<Mover>& movers, const std::vector<Point>&
 
 /// A point on bodies on joints: an impulse moves all that hangs together, and not every way is free.
 void Solver::lock(const std::vector<Mover>& movers, const Point& p, const Mat3& axes, Row& row) {
-  Locked& locked = problem_.locked[static_cast<std::size_t>(row.locked)];
+  Locked& locked = problem_.locked[row.locked];
   const Mat3 k = axes * (calc_mobility(movers, p) * transpose(axes));
   const double kn = k[0][0], trace = k[0][0] + k[1][1] + k[2][2];
   Mat3 range{}, unused{};
@@ -253,8 +253,8 @@ void Solver::lock(const std::vector<Mover>& movers, const Point& p, const Mat3& 
 
 /// What the bodies on the joints of one gain by impulses along the axes of a point, or by couples about them.
 void Solver::add_responses(const std::vector<Mover>& movers, int body, const Vec3& arm, double sign, bool are_impulses, const Mat3& axes) {
-  if (body < 0 || movers[static_cast<std::size_t>(body)].linkage == nullptr) return;
-  const Mover& on = movers[static_cast<std::size_t>(body)];
+  if (body < 0 || movers[body].linkage == nullptr) return;
+  const Mover& on = movers[body];
   const double* rows = on.linkage->get_mobility(on.member).data();
   for (const int index : on.linkage->movers) {
     Response& response = problem_.responses.emplace_back();
@@ -264,7 +264,8 @@ void Solver::add_responses(const std::vector<Mover>& movers, int body, const Vec
       for (std::size_t r = 0; r < 6; ++r) {
         double gained = 0.0;
         for (std::size_t c = 0; c < 3; ++c) gained += rows[6 * r + c] * impulse[c] + rows[6 * r + 3 + c] * couple[c];
-        (r < 3 ? response.velocity : response.spin)[j][r % 3] = gained;
+        Four& to = r < 3 ? response.velocity[j] : response.spin[j];  // gcc's sanitizers lose an assignment through the condition
+        to[r % 3] = gained;
       }
     }
     rows += 36;
@@ -282,7 +283,7 @@ void Solver::add_turning(const std::vector<Mover>& movers, const Point& p, const
   double mobility = 0.0;
   const auto add = [&](int body, double sign, Four(&spun)[3]) {
     if (body < 0) return;
-    const Mover& m = movers[static_cast<std::size_t>(body)];
+    const Mover& m = movers[body];
     mobility += m.inverse_inertia[0][0] + m.inverse_inertia[1][1] + m.inverse_inertia[2][2];  // on joints a body turns more slowly
     for (std::size_t j = 0; j < 3 && m.linkage == nullptr; ++j) spun[j] = to_four(sign * (m.inverse_inertia * axes[j]));
     add_responses(movers, body, {}, sign, false, axes);
@@ -302,8 +303,7 @@ void Solver::take(std::vector<Mover>& movers, std::vector<Point>& points) const 
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Row& row = problem_.rows[i];
     points[i].impulse = to_vec(combine(row.axis, row.impulse));
-    points[i].couple =
-        row.turning >= 0 ? to_vec(combine(row.axis, problem_.turnings[static_cast<std::size_t>(row.turning)].couple)) : Vec3{};
+    points[i].couple = row.turning >= 0 ? to_vec(combine(row.axis, problem_.turnings[row.turning].couple)) : Vec3{};
   }
 }
 

@@ -58,9 +58,7 @@ class Solver {
   void add_responses(const std::vector<Mover>& movers, int body, const Vec3& arm, double sign, bool are_impulses, const Mat3& axes);
   double run(double tolerance_m_s, int max_sweeps);
   void take(std::vector<Mover>& movers, std::vector<Point>& points) const;
-  double get_turning_mass(const sweeps::Row& row) const {
-    return row.turning >= 0 ? problem_.turnings[static_cast<std::size_t>(row.turning)].mass : 0.0;
-  }
+  double get_turning_mass(const sweeps::Row& row) const { return row.turning >= 0 ? problem_.turnings[row.turning].mass : 0.0; }
 
   const sweeps::Functions* functions_;
   sweeps::Problem problem_;

@@ -20,7 +20,7 @@ inline Four drop_normal(const Four& from) {
 
 /// Velocity of the point of a less that of b, axes of the point.
 inline Four calc_velocity(const Problem& problem, const Row& row) {
-  const Body &a = problem.bodies[static_cast<std::size_t>(row.a)], &b = problem.bodies[static_cast<std::size_t>(row.b)];
+  const Body &a = problem.bodies[row.a], &b = problem.bodies[row.b];
   return combine(row.along, a.velocity - b.velocity) + (combine(row.turning_a, a.spin) + combine(row.turning_b, b.spin));
 }
 
@@ -36,7 +36,7 @@ void prepare(Problem& problem) {
   for (std::size_t n = 0; n < problem.rows.size(); ++n) {
     Row& row = problem.rows[n];
     const Arms& arms = problem.arms[n];
-    const Inertia &a = problem.inertias[static_cast<std::size_t>(row.a)], &b = problem.inertias[static_cast<std::size_t>(row.b)];
+    const Inertia &a = problem.inertias[row.a], &b = problem.inertias[row.b];
     transpose(row.axis, row.along);
     Four couples_a[3], couples_b[3];
     for (int j = 0; j < 3; ++j) {
@@ -68,27 +68,27 @@ void prepare(Problem& problem) {
 
 inline void respond(Problem& problem, const Range& range, const Four& by) {
   for (int n = range.begin; n < range.end; ++n) {
-    const Response& r = problem.responses[static_cast<std::size_t>(n)];
-    Body& body = problem.bodies[static_cast<std::size_t>(r.body)];
+    const Response& r = problem.responses[n];
+    Body& body = problem.bodies[r.body];
     body.velocity += combine(r.velocity, by);
     body.spin += combine(r.spin, by);
   }
 }
 
 inline void push(Problem& problem, const Row& row, const Four& impulse) {
-  Body &a = problem.bodies[static_cast<std::size_t>(row.a)], &b = problem.bodies[static_cast<std::size_t>(row.b)];
+  Body &a = problem.bodies[row.a], &b = problem.bodies[row.b];
   const Four world = combine(row.axis, impulse);
   a.velocity += row.mass_a * world;
   a.spin += combine(row.spun_a, impulse);
   b.velocity += row.mass_b * world;
   b.spin += combine(row.spun_b, impulse);
-  if (row.locked >= 0) respond(problem, problem.locked[static_cast<std::size_t>(row.locked)].pushed, impulse);
+  if (row.locked >= 0) respond(problem, problem.locked[row.locked].pushed, impulse);
 }
 
 /// The impulse that the point ought to have, seeing the velocities as they are, a part of the way to it.
 inline Four calc_impulse(const Problem& problem, const Row& row, double part) {
   const Four missing = row.wanted - calc_velocity(problem, row);
-  const Locked* locked = row.locked >= 0 ? &problem.locked[static_cast<std::size_t>(row.locked)] : nullptr;
+  const Locked* locked = row.locked >= 0 ? &problem.locked[row.locked] : nullptr;
   // What joints do not allow no impulse brings about.
   bool may_stick = part == 1.0;
   if (locked != nullptr && may_stick) {
@@ -113,14 +113,14 @@ inline Four calc_impulse(const Problem& problem, const Row& row, double part) {
 }
 
 inline void give_couple(Problem& problem, const Row& row, const Turning& turning, const Four& couple) {
-  problem.bodies[static_cast<std::size_t>(row.a)].spin += combine(turning.spun_a, couple);
-  problem.bodies[static_cast<std::size_t>(row.b)].spin += combine(turning.spun_b, couple);
+  problem.bodies[row.a].spin += combine(turning.spun_a, couple);
+  problem.bodies[row.b].spin += combine(turning.spun_b, couple);
   respond(problem, turning.turned, couple);
 }
 
 /// Brings the couple against rolling and drilling up to date. Returns the change of it as a velocity, squared.
 inline double turn(Problem& problem, const Row& row, Turning& turning) {
-  const Body &a = problem.bodies[static_cast<std::size_t>(row.a)], &b = problem.bodies[static_cast<std::size_t>(row.b)];
+  const Body &a = problem.bodies[row.a], &b = problem.bodies[row.b];
   Four next = turning.couple - turning.mass * combine(row.along, a.spin - b.spin);
   const double pushed = row.impulse[0], limit = turning.rolling_m * pushed, square = next[1] * next[1] + next[2] * next[2];
   const double twist = std::clamp(next[0], -turning.twisting_m * pushed, turning.twisting_m * pushed);
@@ -145,7 +145,7 @@ double sweep(Problem& problem, bool onward) {
       push(problem, row, change);
       row.impulse = wanted;
     }
-    if (row.turning >= 0) largest = std::max(largest, turn(problem, row, problem.turnings[static_cast<std::size_t>(row.turning)]));
+    if (row.turning >= 0) largest = std::max(largest, turn(problem, row, problem.turnings[row.turning]));
   }
   return largest;
 }
@@ -161,7 +161,7 @@ void begin(Problem& problem) {
   for (const Row& row : problem.rows) {
     push(problem, row, row.impulse);
     if (row.turning < 0) continue;
-    const Turning& turning = problem.turnings[static_cast<std::size_t>(row.turning)];
+    const Turning& turning = problem.turnings[row.turning];
     give_couple(problem, row, turning, turning.couple);
   }
 }

@@ -25,7 +25,6 @@ ALLOWED = {
     ("Options", "impact", "rigid"): SOLVER,
     ("Range", "base", "rigid::sweeps"): SOLVER,
     ("Side", "impact", "shape"): SOLVER,
-    ("Touch", "impact", "shape"): SOLVER,
     ("Body", "job", "run"): JOB,
     ("Body", "job", "shapes"): JOB,
     ("Factorisation", "eigen", "job"): JOB,

@@ -1,0 +1,98 @@
+// Contacts that persist from step to step, and the impacts and forces that are reported.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "runtime/rigid/body.hpp"
+#include "runtime/rigid/limits.hpp"
+#include "runtime/shape/touch.hpp"
+
+namespace carillon::rigid {
+
+/// A touch that is followed from step to step.
+struct Contact {
+  shape::Touch touch;
+  int a = 0, b = -1;  // bodies; -1: the ground
+  int cord = -1;      // of a cord or stop: gap = length until taut, normal from a to b; -1: a touch
+  bool touching = false;
+  bool presses = false;                           // in an impact with modes
+  Vec3 impulse{}, couple{};                       // of the last step, on a [N s, N m s]
+  double step_s = 0.0;                            // its length
+  double until_s = 0.0;                           // its end
+  double lost_j = 0.0;                            // by it, in that step
+  bool rests = false;                             // it was closed when one of its bodies fell asleep,
+  Vec3 rest_n{};                                  // with this force on a,
+  bool is_load = false;                           // which acts on the body that is awake; `impulse` includes it
+  std::array<std::int32_t, 2> triangles{-1, -1};  // of a and b, where it struck last
+
+  /// Force on a in its last step [N].
+  Vec3 calc_force() const { return touching && step_s > 0.0 ? (1.0 / step_s) * impulse : Vec3{}; }
+  /// Closed, and in no impact with modes; not of cords.
+  bool carries() const { return !presses && cord < 0 && touch.gap_m <= kTouch; }
+  bool is_closed() const { return touching && touch.gap_m <= kTouch; }
+};
+
+/// The contacts of two bodies, of a body and the ground, or of a cord.
+struct Pair {
+  int a = 0, b = -1;
+  shape::PairMemory memory;
+  std::vector<Contact> contacts;
+  double margin_m = 0.0, travelled_m = 0.0;  // since the last search
+  bool searched = false;
+  std::int64_t window = -1;  // in which it was last near
+  int cord = -1;             // it is one
+  double sag_m = 0.0;        // depth in which an impact with modes left it: not pushed out, as the surface has yielded
+
+  bool touches() const {
+    return std::any_of(contacts.begin(), contacts.end(), [](const Contact& c) { return c.touching; });
+  }
+  /// Within kDeep, with or without a force.
+  bool has_closed_gap() const {
+    return std::any_of(contacts.begin(), contacts.end(), [](const Contact& c) { return c.touch.gap_m <= kDeep; });
+  }
+};
+
+/// A contact by its place in a pair.
+struct ContactRef {
+  Pair* pair = nullptr;
+  int contact = 0;
+  Contact& get() const { return pair->contacts[contact]; }
+  bool operator==(const ContactRef&) const = default;
+};
+
+/// One point of an impact. Momentum and place in the world.
+struct Hit {
+  int a = 0, b = -1;
+  shape::Touch touch;
+  double approach_m_s = 0.0, restitution = 0.0;
+  Vec3 impulse{};                                       // on a [N s]
+  bool is_cord = false;                                 // comes taut
+  double linked_mass_kg = 0.0;                          // that meets there, where bodies are on joints
+  std::array<std::optional<shape::Place>, 2> places{};  // on a and b, where they were looked for
+  std::array<std::int32_t, 2> triangles{-1, -1};        // on which they may be
+};
+
+/// An instant of impact: its points, and the bodies that it moved, before and after.
+struct Strike {
+  double time_s = 0.0;
+  double together_s = 0.0;  // its points close within so much of that
+  std::vector<Hit> hits;
+  std::vector<int> bodies;
+  std::vector<State> before, after;
+  double modes_j = 0.0;  // given to modes
+};
+
+/// The force of one contact of an impact with modes, as impulses of equal steps; long ones come in pieces.
+struct Forces {
+  int a = 0, b = -1;
+  shape::Place place_a, place_b;
+  double time_s = 0.0, step_s = 0.0;
+  bool continues = false;
+  std::vector<Vec3> on_a, on_b;  // [N s], each in the frame of its body's mesh as it was then; on_b empty for the ground
+};
+
+}  // namespace carillon::rigid

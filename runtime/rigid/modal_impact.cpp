@@ -1,0 +1,292 @@
+// Method: an impact whose bodies ring is integrated with their modes, a small step at a time, until its contacts have parted.
+// Source: runtime/impact/impact.hpp; docs/decisions/impact.md.
+// Deviations: none.
+#include "runtime/rigid/modal_impact.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "runtime/rigid/limits.hpp"
+
+namespace carillon::rigid {
+namespace {
+
+constexpr double kLongest = 50e-3;   // s; an impact that lasts longer is a contact at rest
+constexpr double kRight = 0.01;      // of the kinetic energy: the most that a step of an impact on joints is corrected by
+constexpr double kSamePlace = 0.05;  // of the size
+
+}  // namespace
+
+ModalImpact* ModalImpacts::find(int body) {
+  if (const Articulation* articulation = bodies_.find_articulation(body); articulation != nullptr && articulation->struck >= 0)
+    body = articulation->bodies[articulation->struck];
+  if (!bodies_.is_in_impact(body)) return nullptr;
+  for (ModalImpact& modal : impacts_)
+    if (std::find(modal.bodies.begin(), modal.bodies.end(), body) != modal.bodies.end()) return &modal;
+  return nullptr;
+}
+
+/// Where the point of a contact is now, by the body that moves.
+Vec3 ModalImpacts::find_station(const ModalContact& contact) const {
+  const int body = bodies_.moves(contact.forces.a) ? contact.forces.a : contact.forces.b;
+  return bodies_.state(body).centre + bodies_.placed(body).rotation * contact.station;
+}
+
+bool ModalImpacts::is_pressed(const Pair& pair, const Vec3& where) const {
+  if (impacts_.empty()) return false;
+  const double near = kSamePlace * bodies_.calc_size(pair.a, pair.b);
+  for (const ModalImpact& modal : impacts_)
+    for (const ModalContact& contact : modal.contacts) {
+      const Forces& f = contact.forces;
+      const bool is_same = (f.a == pair.a && f.b == pair.b) || (f.b == pair.a && f.a == pair.b);
+      if (is_same && norm(find_station(contact) - where) < near) return true;
+    }
+  return false;
+}
+
+/// The motion of a body as an impact begins or continues with it.
+void ModalImpacts::set_motion(int body, impact::Body& b) const {
+  const State& state = bodies_.state(body);
+  const Placed& placed = bodies_.placed(body);
+  b.centre_m = state.centre;
+  b.inertia_kg_m2 = placed.rotation * (bodies_.solid(body).inertia_kg_m2 * transpose(placed.rotation));
+  b.acceleration_m_s2 = bodies_.gravity();
+  b.spin_acceleration_rad_s2 = placed.inverse_inertia * cross(state.momentum, placed.spin);
+  const Articulation* articulation = bodies_.find_articulation(body);
+  if (articulation == nullptr) return;
+  const int member = bodies_.get_member(body);
+  std::vector<joints::Spatial> rates;
+  articulation->mechanism->find_accelerations(articulation->now, rates);
+  b.on_joints = true;
+  b.mobility = bodies_.calc_own_mobility(*articulation, member);
+  b.velocity_m_s = state.velocity;
+  b.spin_rad_s = placed.spin;
+  b.acceleration_m_s2 = rates[member].linear;
+  b.spin_acceleration_rad_s2 = rates[member].angular;
+}
+
+/// Shapes of a body in world axes.
+std::vector<double> ModalImpacts::turn_to_world(int body, const std::vector<double>& shape) const {
+  const int size = static_cast<int>(shape.size());
+  std::vector<double> world(size);
+  const Mat3& r = bodies_.placed(body).rotation;
+  for (int m = 0; m + 2 < size; m += 3) {
+    const Vec3 v = r * Vec3{shape[m], shape[m + 1], shape[m + 2]};
+    world[m] = v[0];
+    world[m + 1] = v[1];
+    world[m + 2] = v[2];
+  }
+  return world;
+}
+
+void ModalImpacts::end(const std::vector<Hit>& hits, TouchSets& touches) {
+  for (const Hit& hit : hits)
+    for (const int body : {hit.a, hit.b})
+      if (bodies_.is_moved_by_impact(body)) end(*find(body), touches);
+}
+
+void ModalImpacts::end_where_resting(const Step& step, TouchSets& touches) {
+  if (impacts_.empty()) return;
+  for (const Pair* pair : step.island().pairs)
+    for (const Contact& c : pair->contacts) {
+      if (!c.carries()) continue;
+      for (const int body : {pair->a, pair->b}) {
+        ModalImpact* modal = bodies_.moves(body) ? find(body) : nullptr;
+        if (modal != nullptr && std::abs(bodies_.calc_approach(c.touch, c.a, c.b)) <= kSlowest) end(*modal, touches);
+      }
+    }
+}
+
+void ModalImpacts::advance(const Step& step, double to_s, double part_s, double window_end_s, TouchSets& touches) {
+  for (ModalImpact& modal : impacts_) {
+    const bool is_here = std::any_of(modal.bodies.begin(), modal.bodies.end(), [&](int body) { return step.find(body) >= 0; });
+    if (!is_here || !(part_s > 0.0)) continue;
+    std::vector<impact::Body> bodies = modal.impact->get_bodies();
+    const int count = static_cast<int>(bodies.size());
+    // A body that slept when it was struck has come to move, or belongs to another island: the impact cannot continue as it was.
+    bool is_whole = true;
+    for (int k = 0; k < count; ++k)
+      is_whole = is_whole && bodies_.moves(modal.bodies[k]) == (bodies[k].mass_kg > 0.0) && step.has(modal.bodies[k]);
+    if (!is_whole) {
+      release(modal, to_s, touches);  // its bodies stay where they are for this part
+      continue;
+    }
+    std::vector<joints::Spatial> pulls(count);
+    for (int k = 0; k < count; ++k) {
+      const int body = modal.bodies[k], n = step.find(body);
+      if (n < 0) continue;
+      impact::Body& b = bodies[k];
+      set_motion(body, b);
+      // Cords and other contacts act as long as the impact continues in this part, whose own steps may be longer.
+      const Vec3 free = b.on_joints ? step.free[n].state.velocity : bodies_.state(body).velocity + step.length_s * bodies_.gravity();
+      pulls[k] = {(1.0 / step.length_s) * (step.movers[n].velocity - free),
+                  (1.0 / step.length_s) * (step.movers[n].spin - step.free[n].placed.spin)};
+      b.acceleration_m_s2 = b.acceleration_m_s2 + pulls[k].linear;
+      b.spin_acceleration_rad_s2 = b.spin_acceleration_rad_s2 + pulls[k].angular;
+    }
+    std::vector<impact::Contact> springs;
+    std::list<std::vector<double>> shapes;
+    for (int k = 0; const ModalContact& contact : modal.contacts) {
+      impact::Contact& spring = springs.emplace_back(modal.impact->get_contact(k++));
+      spring.where_m = find_station(contact);
+      if (!contact.shape_a.empty()) spring.shape_a = shapes.emplace_back(turn_to_world(contact.forces.a, contact.shape_a));
+      if (!contact.shape_b.empty()) spring.shape_b = shapes.emplace_back(turn_to_world(contact.forces.b, contact.shape_b));
+    }
+    modal.impact->update(bodies, springs);
+    const double begun_s = modal.impact->get_time();
+    const bool ended = modal.impact->advance(to_s - modal.start_s);
+    bodies = modal.impact->get_bodies();
+    for (int k = 0; k < count; ++k) {
+      const int body = modal.bodies[k], n = step.find(body);
+      if (n < 0) continue;
+      if (const int number = step.free[n].articulation; number >= 0) {
+        move_articulation(step.articulations[number], bodies[k], modal.impact->get_time() - begun_s, step.length_s);
+        continue;
+      }
+      State& s = bodies_.state(body);
+      s.velocity = bodies[k].velocity_m_s;
+      s.centre = s.centre + bodies[k].moved_m;
+      s.rotation = normalise(multiply(make_turn(bodies[k].turned_rad), s.rotation));
+      const Mat3 rotation = make_rotation(s.rotation);
+      s.momentum = rotation * (bodies_.solid(body).inertia_kg_m2 * (transpose(rotation) * bodies[k].spin_rad_s));
+    }
+    keep_pulses(modal);
+    // Once a window: pieces of a small step each would be many.
+    if (to_s >= window_end_s - 1e-9)
+      for (ModalContact& contact : modal.contacts) report(contact);
+    if (!ended && to_s - modal.start_s <= kLongest) continue;
+    // It has gone beyond the end of the part, and so did the pulls.
+    const double beyond_s = modal.start_s + modal.impact->get_time() - to_s;
+    const std::vector<int> moved = modal.bodies;
+    release(modal, to_s, touches);
+    for (int k = 0; k < count; ++k)
+      if (beyond_s > 0.0 && bodies_.moves(moved[k])) undo_pull(step, moved[k], pulls[k], beyond_s);
+  }
+  impacts_.remove_if([](const ModalImpact& modal) { return modal.impact == nullptr; });
+}
+
+/// The articulation of a body that an impact has moved by `time_s`, of which the contacts of the step have their part.
+void ModalImpacts::move_articulation(const ArticulationStep& step, const impact::Body& struck, double time_s, double step_s) {
+  Articulation& articulation = *step.articulation;
+  joints::Mechanism& mechanism = *articulation.mechanism;
+  const auto calc = [&] {
+    double kinetic = 0.0, all = articulation.now.lost_j;
+    for (const int body : articulation.bodies) {
+      kinetic += calc_kinetic(bodies_.solid(body), bodies_.state(body));
+      all += calc_energy(bodies_.solid(body), bodies_.state(body), bodies_.gravity());
+    }
+    return std::pair(kinetic, all);
+  };
+  const double before = calc().second;
+  joints::Coordinates moved = bodies_.fly(articulation, articulation.now, time_s);
+  std::vector<joints::Spatial> impulses(articulation.bodies.size()), shifts(articulation.bodies.size());
+  impulses[articulation.struck] = {struck.impulse_n_s, struck.couple_n_m_s};
+  shifts[articulation.struck] = {struck.shift_n_s2, struck.turning_n_m_s2};
+  const std::vector<double> du = mechanism.calc_push(moved, impulses), dq = mechanism.calc_push(moved, shifts);
+  moved = mechanism.move(moved, dq, 0.0, 1.0);
+  moved = mechanism.move(moved, du, 1.0, 0.0);
+  if (!step.push.empty()) moved = mechanism.move(moved, step.push, time_s / step_s, 0.5 * time_s * time_s / step_s);
+  articulation.now = std::move(moved);
+  bodies_.place(articulation);
+  if (!step.push.empty() || !articulation.is_anchored) return;
+  // The impact has taken its mobility for constant: the difference of the motion's energy from the contacts' work is corrected, as a change
+  // of all its velocities by the same part.
+  const auto [kinetic, after] = calc();
+  const double gained = after - before - struck.work_j;
+  if (!(std::abs(gained) < kRight * kinetic)) return;
+  const double part = std::sqrt(1.0 - gained / kinetic);
+  for (double& u : articulation.now.u) u *= part;
+  bodies_.place(articulation);
+}
+
+/// Takes the effect of cords and other contacts on a body in the last `time_s` back.
+void ModalImpacts::undo_pull(const Step& step, int body, const joints::Spatial& pull, double time_s) {
+  if (pull.linear == Vec3{} && pull.angular == Vec3{}) return;
+  if (const int number = step.free[step.find(body)].articulation; number >= 0) {
+    const ArticulationStep& a = step.articulations[number];
+    joints::Coordinates& now = a.articulation->now;
+    if (!a.push.empty()) now = a.articulation->mechanism->move(now, a.push, -time_s / step.length_s, 0.5 * time_s * time_s / step.length_s);
+    bodies_.place(*a.articulation);
+    return;
+  }
+  State& s = bodies_.state(body);
+  const Mat3& rotation = bodies_.placed(body).rotation;
+  s.velocity = s.velocity - time_s * pull.linear;
+  s.centre = s.centre + (0.5 * time_s * time_s) * pull.linear;
+  const Mat3 inertia = rotation * (bodies_.solid(body).inertia_kg_m2 * transpose(rotation));
+  s.momentum = s.momentum - time_s * (inertia * pull.angular);
+  bodies_.place(body);
+}
+
+/// Takes the forces of an impact since the last time into the frames of its bodies, as they are now.
+void ModalImpacts::keep_pulses(ModalImpact& modal) {
+  for (const impact::Pulse& pulse : modal.impact->take_pulses()) {
+    ModalContact& contact = modal.contacts[pulse.contact];
+    Forces& forces = contact.forces;
+    const double start_s = modal.start_s + pulse.start_s;
+    // A contact that was open for a while begins again.
+    if (!forces.on_a.empty() &&
+        std::abs(start_s - forces.time_s - forces.step_s * static_cast<double>(forces.on_a.size())) > 0.5 * forces.step_s)
+      report(contact);
+    if (forces.on_a.empty()) forces.time_s = start_s;
+    forces.step_s = pulse.step_s;
+    const Mat3 to_a = transpose(bodies_.placed(forces.a).rotation),
+               to_b = forces.b >= 0 ? transpose(bodies_.placed(forces.b).rotation) : Mat3{};
+    for (const Vec3& impulse : pulse.impulse_n_s) {
+      forces.on_a.push_back(to_a * impulse);
+      if (forces.b >= 0) forces.on_b.push_back(to_b * (-1.0 * impulse));
+    }
+  }
+}
+
+void ModalImpacts::report(ModalContact& contact) {
+  Forces& forces = contact.forces;
+  if (forces.on_a.empty()) return;
+  forces_.push_back(forces);
+  forces.on_a.clear();
+  forces.on_b.clear();
+  forces.continues = true;
+}
+
+/// Returns the modal states of an impact's bodies. It may be ahead of `time_s` by a part of its step.
+void ModalImpacts::release(ModalImpact& modal, double time_s, TouchSets& touches) {
+  keep_pulses(modal);
+  for (ModalContact& contact : modal.contacts) report(contact);
+  const std::vector<impact::Body> bodies = modal.impact->get_bodies();
+  const double reached_s = modal.start_s + modal.impact->get_time();
+  const impact::Books books = modal.impact->get_books();
+  ledger_.lose(books.dissipated_modes + books.dissipated_contact + books.dissipated_friction + books.above_band + books.spring);
+  for (int k = 0; const impact::Body& b : bodies) {
+    const int body = modal.bodies[k++];
+    bodies_.set_in_impact(body, false);
+    if (bodies_.has_modes(body)) states_.set(body, {b.q, b.q_dot, reached_s});
+    if (Articulation* articulation = bodies_.find_articulation(body); articulation != nullptr && bodies_.moves(body)) {
+      articulation->struck = -1;
+      if (reached_s > time_s) articulation->now = bodies_.fly(*articulation, articulation->now, time_s - reached_s);
+      bodies_.place(*articulation);
+      continue;
+    }
+    State& s = bodies_.state(body);
+    if (bodies_.moves(body) && reached_s > time_s) s = fly(bodies_.solid(body), s, bodies_.gravity(), time_s - reached_s);
+    bodies_.place(body);
+  }
+  for (const ModalContact& contact : modal.contacts) touches.release(contact.forces.a, contact.forces.b);
+  modal.impact = nullptr;
+  modal.bodies.clear();
+}
+
+void ModalImpacts::end(ModalImpact& modal, TouchSets& touches) {
+  release(modal, bodies_.get_time(), touches);
+  impacts_.remove_if([](const ModalImpact& m) { return m.impact == nullptr; });
+}
+
+void ModalImpacts::add_to(Books& books) const {
+  for (const ModalImpact& modal : impacts_) {
+    const impact::Books inside = modal.impact->get_books();
+    books.modes_j += inside.modal;
+    books.springs_j += inside.spring;
+    books.lost_j += inside.dissipated_modes + inside.dissipated_contact + inside.dissipated_friction + inside.above_band;
+  }
+}
+
+}  // namespace carillon::rigid

@@ -1,0 +1,93 @@
+// Impacts in which modes take part.
+#pragma once
+
+#include <list>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "runtime/impact/impact.hpp"
+#include "runtime/rigid/instants.hpp"
+#include "runtime/rigid/modal_states.hpp"
+#include "runtime/rigid/rigid_impact.hpp"
+#include "runtime/rigid/step.hpp"
+
+namespace carillon::rigid {
+
+/// A contact of an impact with modes.
+struct ModalContact {
+  Forces forces;                         // bodies, places, and impulses that are not reported yet
+  std::vector<double> shape_a, shape_b;  // axes of the meshes; empty: does not ring
+  Vec3 station{};                        // of the point, from the centre of the one that moves, axes of its mesh
+};
+
+/// An impact with modes that is not over.
+struct ModalImpact {
+  std::unique_ptr<impact::Impact> impact;
+  double start_s = 0.0;
+  std::vector<int> bodies;  // in the order of the impact's
+  std::vector<ModalContact> contacts;
+};
+
+/// Impacts that are integrated with the modes of their bodies inside (runtime/impact), over as many small steps as they take. Their bodies
+/// take their motion from them; gravity and other contacts enter as accelerations, a small step at a time. Invariant: a
+/// body, and so its modal state, is in one impact at a time.
+class ModalImpacts {
+ public:
+  ModalImpacts(Bodies& bodies, ModalStates& states, Ledger& ledger) : bodies_(bodies), states_(states), ledger_(ledger) {}
+
+  const std::list<ModalImpact>& list() const { return impacts_; }
+  /// Is there an impact between the two bodies of a pair, at that place? Points get other names while bodies roll.
+  bool is_pressed(const Pair& pair, const Vec3& where) const;
+
+  /// Limits the restitution of every hit by the energy that its modes take; true where an impact has to be integrated.
+  bool predict(const Step& step, Collision& collision);
+  /// Begins an impact, or lets the hits join one that is not over. False where there are too many points: the rigid impact stands.
+  bool begin(const Step& step, Collision& collision, const Instants& instants, TouchSets& touches);
+  /// A rigid impact ends the impacts with modes that its bodies were moved by.
+  void end(const std::vector<Hit>& hits, TouchSets& touches);
+  /// An impact has no other contacts than its own: where one of its bodies comes to touch something slowly, it ends.
+  void end_where_resting(const Step& step, TouchSets& touches);
+  /// Moves the impacts of an island to the time `to_s`, `part_s` later. The step has the effect of gravity and of other contacts on
+  /// their bodies. Forces are reported where the window ends.
+  void advance(const Step& step, double to_s, double part_s, double window_end_s, TouchSets& touches);
+  /// Forces since the last call.
+  std::vector<Forces> take_forces() { return std::exchange(forces_, {}); }
+  /// Energies in modes and springs of impacts, and losses there.
+  void add_to(Books& books) const;
+
+ private:
+  /// Which hits and resting contacts of a collision become contacts of an impact.
+  struct Selection {
+    std::vector<int> order;
+    std::vector<char> rests;  // of all contacts of the collision
+  };
+
+  ModalImpact* find(int body);
+  ModalImpact* find_own(const Step& step, const Hit& hit);
+  std::optional<Selection> select(const Step& step, const Collision& collision, const Instants& instants);
+  bool add_resting(const Collision& collision, const Instants& instants, std::vector<int>& order) const;
+  bool shares_articulations(const std::vector<Hit>& hits, const std::vector<int>& order) const;
+  bool join(const std::vector<Hit>& hits, Selection& selection, TouchSets& touches, ModalImpact*& joined);
+  int add_body(ModalImpact& modal, int body, std::vector<impact::Body>& made);
+  std::pair<ModalContact, impact::Contact> make_contact(Hit& hit, bool rests);
+  impact::Body make_body(int body);
+  void set_motion(int body, impact::Body& made) const;
+  std::vector<double> turn_to_world(int body, const std::vector<double>& shape) const;
+  Vec3 find_station(const ModalContact& contact) const;
+  void move_articulation(const ArticulationStep& step, const impact::Body& struck, double time_s, double step_s);
+  void undo_pull(const Step& step, int body, const joints::Spatial& pull, double time_s);
+  void keep_pulses(ModalImpact& modal);
+  void report(ModalContact& contact);
+  void release(ModalImpact& modal, double time_s, TouchSets& touches);
+  void end(ModalImpact& modal, TouchSets& touches);
+
+  Bodies& bodies_;
+  ModalStates& states_;
+  Ledger& ledger_;
+  std::list<ModalImpact> impacts_;
+  std::vector<Forces> forces_;
+};
+
+}  // namespace carillon::rigid

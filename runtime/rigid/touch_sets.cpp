@@ -1,0 +1,109 @@
+// Method: a search with a margin of four steps' movement; touches are followed until their pair may have moved by it.
+// Source: runtime/shape/touch.hpp.
+// Deviations: none.
+#include "runtime/rigid/touch_sets.hpp"
+
+#include <algorithm>
+
+#include "runtime/rigid/cords.hpp"
+#include "runtime/rigid/limits.hpp"
+#include "runtime/rigid/modal_impact.hpp"
+
+namespace carillon::rigid {
+
+TouchSets::TouchSets(const Bodies& bodies, std::vector<Cord> cords, const ModalImpacts& impacts, Ledger& ledger)
+    : bodies_(bodies), impacts_(impacts), ledger_(ledger), cords_(std::move(cords)), cord_pairs_(cords_.size()) {
+  for (int n = 0; Pair & pair : cord_pairs_) {
+    pair.a = cords_[n].a;
+    pair.b = cords_[n].b;
+    pair.cord = n++;
+    refresh(pair);
+  }
+}
+
+Pair& TouchSets::get(int a, int b) {
+  Pair& pair = pairs_[{a, b}];
+  pair.a = a;
+  pair.b = b;
+  return pair;
+}
+
+void TouchSets::forget_far(std::int64_t window) {
+  std::erase_if(pairs_, [&](const auto& entry) {
+    const Pair& pair = entry.second;
+    return pair.window != window && (bodies_.moves(pair.a) || bodies_.moves(pair.b));
+  });
+}
+
+void TouchSets::search(Pair& pair, double step_s) {
+  if (pair.cord >= 0) return refresh(pair);
+  ++ledger_.costs.searches;
+  const double speed = bodies_.calc_closing_speed(pair.a, pair.b) + norm(bodies_.gravity()) * step_s;
+  pair.margin_m = std::min(std::max(2e-4, 4.0 * step_s * speed), kReach * bodies_.calc_size(pair.a, pair.b));
+  pair.travelled_m = 0.0;
+  pair.searched = true;
+  const std::vector<Contact> old = std::exchange(pair.contacts, {});
+  found_.clear();
+  const shape::Shape& a = *bodies_.get_shape(pair.a);
+  const shape::Frame frame_a = bodies_.get_frame(pair.a);
+  if (pair.b < 0)
+    shape::find_ground_touches(a, frame_a, bodies_.ground()->height_m, pair.margin_m, pair.memory, found_);
+  else
+    shape::find_touches(a, frame_a, *bodies_.get_shape(pair.b), bodies_.get_frame(pair.b), pair.margin_m, pair.memory, found_);
+  for (const shape::Touch& touch : found_) {
+    const auto same = std::find_if(old.begin(), old.end(), [&](const Contact& c) { return c.touch.id == touch.id; });
+    Contact contact;
+    if (same != old.end()) {
+      contact = *same;
+    } else {
+      contact.a = pair.a;
+      contact.b = pair.b;
+      contact.presses = impacts_.is_pressed(pair, touch.where_m);
+    }
+    contact.touch = touch;
+    pair.contacts.push_back(contact);
+  }
+}
+
+void TouchSets::refresh(Pair& pair) const {
+  if (pair.cord >= 0) return update_cord(bodies_, cords_[pair.cord], pair);
+  const shape::Frame a = bodies_.get_frame(pair.a), b = bodies_.get_frame(pair.b);
+  for (Contact& c : pair.contacts) shape::refresh(c.touch, *bodies_.get_shape(pair.a), a, bodies_.get_shape(pair.b), b, pair.memory);
+}
+
+void TouchSets::update(Pair& pair, double step_s) {
+  if (pair.cord >= 0) return refresh(pair);
+  const double way = (bodies_.calc_closing_speed(pair.a, pair.b) + norm(bodies_.gravity()) * step_s) * step_s;
+  if (!pair.searched || pair.travelled_m + way > pair.margin_m)
+    search(pair, step_s);
+  else if (!pair.contacts.empty() && (pair.travelled_m > 0.0))
+    refresh(pair);
+  if (!(pair.sag_m > 0.0)) return;
+  double deepest = 0.0;
+  for (const Contact& c : pair.contacts) deepest = std::max(deepest, -c.touch.gap_m);
+  pair.sag_m = std::min(pair.sag_m, deepest);
+}
+
+void TouchSets::travel(Pair& pair, double time_s, double step_s) const {
+  pair.travelled_m += (bodies_.calc_closing_speed(pair.a, pair.b) + norm(bodies_.gravity()) * step_s) * time_s + 1e-12;
+}
+
+void TouchSets::release(int a, int b) {
+  if (b >= 0 && a > b) std::swap(a, b);
+  const auto at = pairs_.find({a, b});
+  if (at == pairs_.end()) return;
+  Pair& pair = at->second;
+  for (Contact& c : pair.contacts) {
+    if (!c.presses) continue;
+    c.presses = c.touching = false;
+    // Where modes have yielded, the body stands lower than on a rigid surface.
+    pair.sag_m = std::max(pair.sag_m, -c.touch.gap_m);
+  }
+}
+
+shape::Touch TouchSets::find_moved(Pair& pair, shape::Touch touch, const shape::Frame& a, const shape::Frame& b) const {
+  shape::refresh(touch, *bodies_.get_shape(pair.a), a, bodies_.get_shape(pair.b), b, pair.memory);
+  return touch;
+}
+
+}  // namespace carillon::rigid

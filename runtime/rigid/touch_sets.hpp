@@ -1,0 +1,57 @@
+// Which touches the bodies have: found with a margin, followed from step to step, named.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "runtime/rigid/bodies.hpp"
+#include "runtime/rigid/contact.hpp"
+#include "runtime/rigid/links.hpp"
+
+namespace carillon::rigid {
+
+class ModalImpacts;
+
+/// The contacts of all pairs of bodies that are near, and of all cords. Invariant: after search() or update() a pair has every touch that
+/// can close within the step, as the speeds are then; a touch that stays keeps its name, and so its contact its impulses.
+class TouchSets {
+ public:
+  TouchSets(const Bodies& bodies, std::vector<Cord> cords, const ModalImpacts& impacts, Ledger& ledger);
+
+  /// Made where it is asked for first. b: -1, or greater than a.
+  Pair& get(int a, int b);
+  std::map<std::pair<int, int>, Pair>& pairs() { return pairs_; }
+  const std::map<std::pair<int, int>, Pair>& pairs() const { return pairs_; }
+  /// One a cord.
+  std::vector<Pair>& cord_pairs() { return cord_pairs_; }
+  const std::vector<Pair>& cord_pairs() const { return cord_pairs_; }
+  const Cord& cord(int number) const { return cords_[number]; }
+  /// Removes pairs that are not near in this window, unless both bodies are still.
+  void forget_far(std::int64_t window);
+
+  /// The touches as the bodies are now, found again.
+  void search(Pair& pair, double step_s);
+  /// The same touches as the bodies are now.
+  void refresh(Pair& pair) const;
+  /// Touches that are good for a step: searched again where the pair may have moved by its margin.
+  void update(Pair& pair, double step_s);
+  /// Counts a movement of `time_s` in a step.
+  void travel(Pair& pair, double time_s, double step_s) const;
+  /// The contacts of two bodies that were in an impact with modes are free again.
+  void release(int a, int b);
+  /// A touch of a pair whose bodies are at these frames.
+  shape::Touch find_moved(Pair& pair, shape::Touch touch, const shape::Frame& a, const shape::Frame& b) const;
+
+ private:
+  const Bodies& bodies_;
+  const ModalImpacts& impacts_;
+  Ledger& ledger_;
+  std::vector<Cord> cords_;
+  std::vector<Pair> cord_pairs_;
+  std::map<std::pair<int, int>, Pair> pairs_;
+  std::vector<shape::Touch> found_;  // work memory
+};
+
+}  // namespace carillon::rigid
