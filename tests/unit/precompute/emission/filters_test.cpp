@@ -5,7 +5,7 @@
 #include <complex>
 #include <vector>
 
-#include "precompute/emission/derivative.hpp"
+#include "precompute/emission/weights.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/recording/high_pass.hpp"
 #include "tests/unit/precompute/emission/motions.hpp"
@@ -97,16 +97,12 @@ TEST(HighPass, ItsCornerIsWhereItWasAsked) {
 }
 
 TEST(Derivative, IsThatOfATone) {
-  const Derivative weights = make_derivative();
+  const auto weights = make_derivative();
   for (int i = 1; i <= 420; ++i) {
     const double omega = kTwoPi * 1e-3 * i;
-    double first = 0.0, second = weights.second[0];
-    for (int j = 1; j <= kDerivativeHalf; ++j) {
-      first += 2.0 * weights.first[static_cast<std::size_t>(j)] * std::sin(j * omega);
-      second += 2.0 * weights.second[static_cast<std::size_t>(j)] * std::cos(j * omega);
-    }
-    EXPECT_NEAR(first / omega, 1.0, 5e-4) << i;
-    EXPECT_NEAR(-second / (omega * omega), 1.0, 5e-4) << i;
+    double derivative = 0.0;
+    for (int j = 1; j <= kDerivativeHalf; ++j) derivative += 2.0 * weights[static_cast<std::size_t>(j)] * std::sin(j * omega);
+    EXPECT_NEAR(derivative / omega, 1.0, 5e-4) << i;
   }
 }
 
