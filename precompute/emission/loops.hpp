@@ -7,7 +7,7 @@
 namespace carillon::emission {
 
 inline constexpr int kEntry = 4;            // half-samples over which a step is spread
-inline constexpr int kMotionHalf = 22;      // half-samples on either side of a sample that its place and velocity take
+inline constexpr int kMotionHalf = 24;      // half-samples on either side of a sample that its place and velocity take
 inline constexpr int kDerivativeHalf = 16;  // samples on either side that a derivative takes
 inline constexpr int kPoleSpan = 32;        // samples that a pole takes
 inline constexpr int kSplinePoints = 8;     // half-samples over which an arrival is spread

@@ -1,6 +1,7 @@
-// Method:     calc_entry(): a Kaiser window. The others: least squares of the relative error over the frequencies of the band, with a small
-//             weight on those above it, which keeps the weights small; of the motion also of what the stop band passes, both stages
-//             together. Normal equations, L D L^T.
+// Method:     calc_entry(): a Kaiser window. The others: least squares of the error of the response, of both stages together for the
+// motion,
+//             relative for derivatives, over the frequencies of pass band and stop band, with a weight of 1e-7 on those between or above,
+//             which keeps the weights small; normal equations, L D L^T.
 // Source:     Kaiser 1974; docs/equations.md E14.
 // Deviations: none.
 #include "precompute/emission/weights.hpp"
@@ -70,7 +71,7 @@ constexpr double kNeither = 1e-7;  // share of frequencies between the bands
 
 Wish wish_motion(double f) {
   if (f < 0.42) return {1.0, 1.0};
-  return {0.0, f > 0.58 ? 3.0 : kNeither};
+  return {0.0, f > 0.58 ? 1.0 : kNeither};
 }
 
 }  // namespace

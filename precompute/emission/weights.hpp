@@ -12,7 +12,7 @@ namespace carillon::emission {
 double calc_entry(double x);
 
 /// Places and velocities of samples from half-samples, per sample: x = even[0] y_0 + the sum of even[j] (y_j + y_-j), v = the sum of
-/// odd[j] (y_j - y_-j). Of steps, with calc_entry(): flat within 0.02 dB to 5/12 of the sample rate, -62 dB from 7/12 on. Exact for uniform
+/// odd[j] (y_j - y_-j). Of steps, with calc_entry(): flat within 0.01 dB to 5/12 of the sample rate, -64 dB from 7/12 on. Exact for uniform
 /// motion.
 struct MotionWeights {
   std::array<double, kMotionHalf + 1> even{}, odd{};
