@@ -1,5 +1,5 @@
-// Method:     steps become places and velocities at the audio rate, these volume accelerations of triangles, and these arrivals at the
-//             receivers. Triangles are evaluated once a sample.
+// Method:     from steps to places and velocities at the audio rate, to volume accelerations of triangles, to arrivals at the receivers.
+//             Triangles are evaluated once a sample.
 // Source:     OCE01 eq. 2 to 10; docs/equations.md E14.
 // Deviations: but for kPaper2001 the nodes are filtered instead of eq. 5: a normal turns by far less within a step than its node moves
 //             within a sample. a_n is d(v.S)/dt over the area at rest, so that a closed surface radiates its change of volume exactly.
@@ -73,8 +73,8 @@ struct Emission::State {
   std::optional<MotionFilter> motion;
   std::optional<Sources> sources;
   std::optional<PaperFilter> paper;
-  std::optional<Screens> screens;    // where the formula has delta, and it is wanted
-  std::optional<Recorder> recorder;  // where there is a file
+  std::optional<Screens> screens;    // of formulas with delta, if it is not switched off
+  std::optional<Recorder> recorder;  // of runs with a file
   std::vector<HighPass> blockers;    // (slots); none with kKirchhoff
   std::vector<Arrivals> arrivals;    // (receivers)
 
@@ -167,7 +167,7 @@ void Emission::State::emit(std::int64_t k, const double* x, Frames source, const
       std::fill(std::begin(plain), std::end(plain), 0.0);
       std::fill(std::begin(turned), std::end(turned), 0.0);
       if (options.radiation == Radiation::kKirchhoff) {
-        // Of two sides what is alike to all sides cancels, and the rest is there twice.
+        // Of the two sides of a sheet the monopoles cancel, and the dipoles are equal.
         for (std::size_t i = 0; i < count; ++i) {
           const bool is_pair = surfaces.has_twin[begin + i];
           plain[i] = is_pair ? 0.0 : share * from[i];

@@ -1,7 +1,5 @@
-// Method:     an arrival between two half-samples is spread over 8 of them by a spline of degree 7, in whole units of 2^-46 Pa; at the end
-// a
-//             filter takes half-samples to samples and gives all the response of runtime/base/sinc.hpp. The spline leaves -93 dB of the
-//             images of 20 kHz.
+// Method:     an arrival is spread over 8 half-samples by a spline of degree 7, in whole units of 2^-46 Pa; images of 20 kHz are at -93 dB.
+//             At the end a filter from half-samples to samples makes the response of both that of runtime/base/sinc.hpp.
 // Source:     OCE01 section 3.3 and figure 4; Schoenberg 1946 (spline); docs/equations.md E14.
 // Deviations: OCE01 spreads by a Gaussian of two samples, 2 to 9 dB too soft at 10 kHz.
 #include "precompute/emission/receivers.hpp"

@@ -1,4 +1,4 @@
-// Method:     a block of samples and a key are gathered from all ranks when they are whole, and written by rank 0.
+// Method:     whole blocks of samples, and keys, are gathered from all ranks and written by rank 0.
 // Source:     docs/surface-format.md.
 // Deviations: none.
 #include "precompute/emission/recorder.hpp"

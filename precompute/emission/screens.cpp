@@ -1,5 +1,5 @@
-// Method:     the places of all that hides sound are kept as they were when a sample began; 1000 times a second every triangle has a ray to
-//             every receiver, and delta is faded from one look to the next.
+// Method:     rays from every triangle to every receiver, 1000 times a second, past the places at the beginning of a sample; delta is faded
+//             from one look to the next.
 // Source:     OCE01 eq. 10; docs/equations.md E14.
 // Deviations: none.
 #include "precompute/emission/screens.hpp"

@@ -1,4 +1,4 @@
-// delta: the rays from triangles to receivers past all that hides sound. Internal to carillon::emission.
+// delta: the rays from triangles to receivers past surfaces, balls and walls. Internal to carillon::emission.
 #pragma once
 
 #include <array>
@@ -22,7 +22,7 @@ class Screens {
   void set_balls(std::span<const Vec3> centres_m) { balls_.assign(centres_m.begin(), centres_m.end()); }
   /// Places of the next sample, which begins with these displacements.
   void keep(const double* u);
-  /// Rays at sample k, x its places, when it is one of those that have rays. Collective.
+  /// Rays at sample k, x its places, every 1/1000 s; no work at the other samples. Collective.
   void look(std::int64_t k, const double* x);
   /// delta of a receiver at sample k, behind look(k): of `count` slots from the first on.
   void shade(std::int64_t k, std::size_t receiver, std::size_t first, std::size_t count, double* pa) const;

@@ -36,7 +36,7 @@ std::optional<std::int64_t> Sources::calc(const MotionFilter& motion, std::int64
   for (const Surfaces::Run& run : surfaces_.runs) {
     loops_->calc_rates(flux_.get(run.begin), from.data(), (run.middle - run.begin) / kLane, derivative_.data(), rates_.get(run.begin),
                        to.data());
-    // What one side sends away the other takes in.
+    // The flux of one side of a sheet is minus that of the other.
     if (has_twins_)
       for (std::size_t t = run.middle; t < run.end; ++t)
         if (const auto twin = static_cast<std::size_t>(surfaces_.twin[t]); surfaces_.twin[t] >= 0)

@@ -60,7 +60,7 @@ Surfaces::Surfaces(const comm::Communicator& communicator, const SurfacePart& pa
     std::copy(place_m.begin(), place_m.end(), rest.get() + row.back());
   }
 
-  // What all ranks know of all triangles.
+  // The triangles of all ranks.
   auto all = comm.all_gather([&] {
     std::vector<Gathered> own;
     for (std::size_t t = 0; t < part.triangles.size(); ++t) {

@@ -1,7 +1,6 @@
-// Method:     calc_entry(): a Kaiser window. The others: least squares of the error of the response, of both stages together for the
-// motion,
-//             relative for derivatives, over the frequencies of pass band and stop band, with a weight of 1e-7 on those between or above,
-//             which keeps the weights small; normal equations, L D L^T.
+// Method:     calc_entry(): a Kaiser window. The others: least squares of the error of the response over pass band and stop band, of both
+//             stages together for the motion, relative for derivatives, with a weight of 1e-7 on other frequencies, which keeps the weights
+//             small; normal equations, L D L^T.
 // Source:     Kaiser 1974; docs/equations.md E14.
 // Deviations: none.
 #include "precompute/emission/weights.hpp"
@@ -35,7 +34,7 @@ double calc_entry_response(double f) {
   return std::sinh(root) / root * kEntryBeta / std::sinh(kEntryBeta);
 }
 
-/// What a response should be at a frequency, and the share of its error there.
+/// The desired response at a frequency, and the share of its error.
 struct Wish {
   double response, share;
 };

@@ -7,8 +7,7 @@
 
 namespace carillon::emission {
 
-/// The weight of a step in a half-sample that is x half-samples away, |x| <= kEntry / 2: a Kaiser window, which leaves -68 dB of what it
-/// folds into the band.
+/// The weight of a step in a half-sample x half-samples away, |x| <= kEntry / 2: a Kaiser window, whose images in the band are at -68 dB.
 double calc_entry(double x);
 
 /// Places and velocities of samples from half-samples, per sample: x = even[0] y_0 + the sum of even[j] (y_j + y_-j), v = the sum of

@@ -57,7 +57,7 @@ TEST(LowPass, WhatIsFoldedIntoTheBandIsSixtyDecibelsDown) {
   // Folded to f - 48 kHz and so on; at 16 * 48 kHz - f and 32 * 48 kHz - f it is the boxes of steps that hold it back.
   for (const int steps : {16, 112})
     for (const double low_hz : {1000.0, 9000.0, 19000.0, 19900.0})
-      for (const double image_hz : {48e3, 96e3, 144e3, 384e3, 768e3}) {
+      for (const double image_hz : {48e3, 96e3, 144e3, 192e3, 384e3, 768e3}) {
         if (image_hz + low_hz > 0.5 * 48e3 * steps) continue;
         for (const double sign : {-1.0, 1.0})
           EXPECT_LT(to_db(find_gain(image_hz + sign * low_hz, low_hz, steps)), -60.0)
@@ -94,6 +94,34 @@ TEST(HighPass, ItsCornerIsWhereItWasAsked) {
   }
   EXPECT_NEAR(to_db(find_blocker_gain(738.0, kAlpha2001, 44100.0) * 0.95), half_power_db, 0.02);
   EXPECT_LT(find_blocker_gain(1.0, calc_alpha(20.0, 48000.0), 48000.0), 0.051);
+}
+
+TEST(LowPass, BothStagesHaveOneFlatResponse) {
+  const MotionWeights weights = make_motion_weights();
+  constexpr int kSteps = 64;  // a half-sample
+  const auto find_response = [&](double rate, bool is_velocity) {
+    double entry = 0.0, whole = 0.0;
+    for (int i = -2 * kSteps; i <= 2 * kSteps; ++i) {
+      const double x = static_cast<double>(i) / kSteps;
+      entry += calc_entry(x) * std::cos(0.5 * kTwoPi * rate * x);
+      whole += calc_entry(x);
+    }
+    double sum = is_velocity ? 0.0 : weights.even[0];
+    for (int j = 1; j <= kMotionHalf; ++j) {
+      const double turn = 0.5 * kTwoPi * rate * j;
+      const auto at = static_cast<std::size_t>(j);
+      sum += is_velocity ? 2.0 * weights.odd[at] * std::sin(turn) / (kTwoPi * rate) : 2.0 * weights.even[at] * std::cos(turn);
+    }
+    return entry / whole * sum;
+  };
+  for (const bool is_velocity : {false, true}) {
+    for (double rate = 0.002; rate <= 5.0 / 12.0; rate += 0.002)
+      EXPECT_NEAR(to_db(find_response(rate, is_velocity)), 0.0, 0.01) << rate << " " << is_velocity;
+    for (double rate = 7.0 / 12.0; rate < 8.0; rate += 0.0037)
+      if (std::abs(rate - std::round(rate)) <= 5.0 / 12.0) {
+        EXPECT_LT(to_db(std::abs(find_response(rate, is_velocity))), -60.0) << rate << " " << is_velocity;
+      }
+  }
 }
 
 TEST(Derivative, IsThatOfATone) {
