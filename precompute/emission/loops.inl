@@ -23,8 +23,10 @@ void add_places(double* __restrict sum, const double* __restrict u, const std::i
     for (std::size_t part = 0; part < 4; part += kQuad) {
       const Quad x = *reinterpret_cast<const Quad*>(u + 4 * static_cast<std::size_t>(node[i]) + part);
       Quad* to = reinterpret_cast<Quad*>(sum + 4 * i + part);
-      if (is_first) *to = x;
-      else *to += x;
+      if (is_first)
+        *to = x;
+      else
+        *to += x;
     }
 }
 
@@ -191,8 +193,7 @@ void radiate(const Facets* __restrict facets, const Ear* __restrict ear, double 
   }
 }
 
-bool scatter(std::int64_t* units, double now, double end, const double* time, const double* pa, std::size_t n,
-             const double* spline) {
+bool scatter(std::int64_t* units, double now, double end, const double* time, const double* pa, std::size_t n, const double* spline) {
   constexpr double kMiddle = 6755399441055744.0;  // 1.5 * 2^52
   constexpr std::int64_t kMiddleBits = 0x4338000000000000;
   constexpr double kMostPa = 30.0;  // whose units are read off the bits
