@@ -66,7 +66,7 @@ struct Emission::State {
   const RowLoops* loops = &find_loops();
   double alpha = 0.0;
   Surfaces surfaces;
-  std::vector<std::int64_t> counts;  // (blocks) of triangles, which are in front of the padding
+  std::vector<std::int64_t> counts;  // (blocks): triangles, in front of the padding
   std::vector<Ear> ears;
 
   // The chain of filters: the first two, or the third.
@@ -79,8 +79,8 @@ struct Emission::State {
   std::vector<Arrivals> arrivals;    // (receivers)
 
   int steps = 0;              // a sample
-  std::int64_t step = 0;      // steps of this sample that have come
-  std::int64_t samples = 0;   // that are behind us
+  std::int64_t step = 0;      // of this sample, so far
+  std::int64_t samples = 0;   // before this one
   std::uint64_t emitted = 0;  // samples
   bool is_finished = false, has_fault = false;
 };
@@ -119,7 +119,7 @@ void Emission::State::set_rate(int steps_per_sample) {
     motion->set_rate(steps);
   } else if (!paper) {
     paper.emplace(surfaces, options.sample_rate_hz, steps, options.air_density_kg_m3 * options.sound_speed_m_s, [this](std::int64_t k) {
-      if (k >= 0) emit(k, paper->get_places(), {const_cast<double*>(paper->get_pressures()), kLane}, nullptr);
+      if (k >= 0) emit(k, paper->get_places(), {paper->get_pressures(), kLane}, nullptr);
     });
   }
 }
@@ -220,7 +220,7 @@ void Emission::State::visit_state(Visit&& visit) {
   for (Arrivals& one : arrivals) one.visit_state(visit);
 }
 
-Emission::Emission(const comm::Communicator& comm, SurfacePart part, Options options)
+Emission::Emission(const comm::Communicator& comm, const SurfacePart& part, Options options)
     : state_(std::make_unique<State>(comm, part, std::move(options))) {}
 Emission::~Emission() = default;
 

@@ -70,7 +70,7 @@ class MotionFilter {
   std::vector<std::array<double, kEntry>> weight_;    // (values): of half-samples j - 1 to j + 2
   std::vector<std::array<double, kEntry>> distance_;  // in time, times the weight
 
-  // Of the steps that came.
+  // State.
   std::int64_t half_ = 0;  // between half-samples half_ and half_ + 1
   int value_ = 0;          // of this half-sample
   int in_box_ = 0;

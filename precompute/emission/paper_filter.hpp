@@ -22,8 +22,8 @@ class PaperFilter {
   /// All vertices at rest until is_done().
   void finish(const std::function<bool()>& is_done);
 
-  const double* get_places() const { return places_.get(); }      // (rows) m
-  const double* get_pressures() const { return sources_.get(); }  // (slots) Pa
+  const double* get_places() const { return places_.get(); }  // (rows) m
+  double* get_pressures() { return sources_.get(); }          // (slots) Pa
 
   template <typename Visit>
   void visit_state(Visit&& visit) {

@@ -21,8 +21,8 @@ class Sources {
   /// has_twins: second sides of sheets have volume accelerations of their own.
   Sources(const Surfaces& surfaces, double sample_rate_hz, double sound_speed_m_s, bool has_poles, bool has_twins);
 
-  /// From kBatch samples of motion, the first of which is k; k = -MotionFilter::kBefore, that + kBatch ... The first of the kBatch samples
-  /// that are there then, from 0 on.
+  /// From the motion of samples k to k + kBatch - 1, call after call from -MotionFilter::kBefore on. Result: the first of kBatch samples
+  /// that are ready for emission; none before sample 0.
   std::optional<std::int64_t> calc(const MotionFilter& motion, std::int64_t k);
   /// Volume accelerations of sample k of these [m3/s2], from a slot on that begins a block.
   Frames get(std::size_t slot, std::int64_t k) { return rates_.get(slot, k); }
