@@ -68,7 +68,7 @@ int find_steps(int least);
 class Emission {
  public:
   /// Throws InputError, the same on all ranks.
-  Emission(const comm::Communicator& comm, SurfacePart part, Options options);
+  Emission(const comm::Communicator& comm, const SurfacePart& part, Options options);
   ~Emission();
   Emission(const Emission&) = delete;
   Emission& operator=(const Emission&) = delete;

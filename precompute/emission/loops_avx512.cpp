@@ -5,6 +5,7 @@ namespace {
 #include "precompute/emission/loops.inl"
 }  // namespace
 
-const RowLoops kLoopsAvx512{add_places, add_rows, calc_derivatives, sum_frames, scatter};
+const RowLoops kLoopsAvx512{add_places, add_value,   close_value, calc_motion, calc_flux, calc_rates,
+                            sum_frames, find_facets, radiate,     scatter,     add_rows};
 
 }  // namespace carillon::emission

@@ -19,26 +19,28 @@ using recording::Microphone;
 /// (OCE01 section 4). Throws InputError when the view has no direction or goes straight up or down.
 std::vector<Microphone> make_ears(const Vec3& position_m, const Vec3& look_at_m, double distance_m = 0.2);
 
-/// Pressure over time at one place. What it keeps true: samples are whole numbers of 2^-46 Pa, so that their sums have the same bits in any
-/// order and on any number of ranks.
+/// Pressure over time at one place. What it keeps true: half-samples are whole numbers of 2^-46 Pa, so that their sums have the same bits
+/// in any order and on any number of ranks.
 class Arrivals {
  public:
   explicit Arrivals(std::size_t frames);
 
-  /// The pressure of one source sample, heard `time` samples after the first, spread over 32 samples: flat to 0.4 of the sample rate. What
-  /// comes after the end is left out. False: the pressure is not finite or over 1e4 Pa; nothing is added.
-  bool add(double time, double pressure_pa);
+  /// Pressures of a source sample [Pa], heard `time` half-samples after it: flat to 0.4 of the sample rate. What comes after the end is
+  /// left out. False: one is not finite or over 1e4 Pa; it is left out.
+  bool add(std::int64_t sample, std::span<const double> time, const double* pressure_pa);
 
   /// (frames) Pa, of all ranks. Collective.
   std::vector<double> sum(const comm::Communicator& comm) const;
 
-  void save(std::vector<std::byte>& to) const;
-  void load(std::span<const std::byte>& from);
+  template <typename Visit>
+  void visit_state(Visit&& visit) {
+    visit(units_);
+  }
 
  private:
   const RowLoops* loops_;
   std::size_t frames_;
-  std::vector<std::int64_t> units_;  // from sample -kSpread on
+  std::vector<std::int64_t> units_;  // by half-samples, from -kReach on
 };
 
 }  // namespace carillon::emission

@@ -144,7 +144,7 @@ std::string format_estimate(const char* word, const Body& body, double edge_m) {
   return fmt::format("{} {}", word, estimate.line());
 }
 
-/// Shows an estimate from the surface as it was read: its repair may take long.
+/// An estimate from the unrepaired surface: its repair may take long.
 void show_rough_estimate(const TriangleSurface& raw, const SurfaceOptions& options, bool is_sheet, Phases& phases) {
   const double volume = std::abs(calc_volume(raw)), area = calc_area(raw);
   if (is_sheet) {
@@ -154,7 +154,7 @@ void show_rough_estimate(const TriangleSurface& raw, const SurfaceOptions& optio
   if (!(volume > 0 && area > 0)) return;
   Body body;
   set_model(body, options, volume, area);
-  // So thin that it will probably be extruded.
+  // Thickness over diagonal below which a wall is probably extruded.
   constexpr double kThin = 0.03;
   if (options.method == Method::kAutomatic && options.order != 1 && body.thickness_m < kThin * calc_box(raw.points).diagonal()) {
     phases.show(fmt::format("rough {}", format_thin_estimate(options.wall_m ? area : area / 2, body.thickness_m, options)));

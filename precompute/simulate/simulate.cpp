@@ -397,12 +397,12 @@ std::int64_t count_later_bytes(const Simulation& simulation, int ranks, bool has
   const job::SimulationSpec& spec = simulation.spec;
   const transient::Assembly& assembly = *simulation.bodies.assembly;
   constexpr std::int64_t kNumber = sizeof(double);
-  std::int64_t pressures = 0, later = kLaterBytes;  // of all receivers; at the end of the run
+  std::int64_t arrivals = 0, later = kLaterBytes;  // half-samples of all receivers; at the end of the run
   if (simulation.makes_sound()) {
     const emission::Options sound = make_emission_options(spec, simulation.motion->get_steps_per_sample(), false);
     const auto frames = static_cast<std::int64_t>(sound.frames);
-    pressures = kNumber * frames * static_cast<std::int64_t>(sound.receivers.size());
-    later += pressures + 2 * kNumber * frames;  // channels, and the sum for one of them
+    arrivals = 2 * kNumber * frames * static_cast<std::int64_t>(sound.receivers.size());
+    later += arrivals / 2 + 3 * kNumber * frames;  // channels, and the sum for one of them
   }
   if (!spec.spectrogram.empty()) later += kPictureBytes;
   const double nodes = finer * assembly.node_count(), elements = finer * assembly.element_count();
@@ -410,9 +410,9 @@ std::int64_t count_later_bytes(const Simulation& simulation, int ranks, bool has
   if (!spec.motion.empty()) later += static_cast<std::int64_t>(nodes * kFilmBytesPerNode);
   // State of this rank (a vector grown by doubling); on rank 0 also that of all ranks and the bytes of the file.
   const std::int64_t state =
-      has_checkpoint ? kLaterBytes + (3 + 2 * ranks) * pressures + static_cast<std::int64_t>(3 * kNumber * (30.0 * nodes + 25.0 * elements))
+      has_checkpoint ? kLaterBytes + (3 + 2 * ranks) * arrivals + static_cast<std::int64_t>(3 * kNumber * (30.0 * nodes + 25.0 * elements))
                      : 0;
-  return pressures + std::max(later, state);
+  return arrivals + std::max(later, state);
 }
 
 /// CPU seconds of the sound of one sample, from surfaces at rest, after warm-up of all stages.
