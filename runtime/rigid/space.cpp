@@ -107,6 +107,7 @@ void Space::step_island(Island& island, double start_s, double length_s) {
     projection_.run(step_, may_sleep ? kDeep : kTooDeep);
     if (may_sleep && rest_.try_island(island, h)) break;
     modal_impacts_.end_where_resting(step_, touches_);
+    touches_.forget_closing(step_);
     for (int n = 0; n <= kMaxCompleted; ++n) {
       problem_.predict(step_, h, false);
       problem_.make_points(step_, impacts < max_impacts);

@@ -86,7 +86,7 @@ void TouchSets::update(Pair& pair, double step_s) {
 }
 
 /// Adds the deepest vertex of a pair to its touches where at the frames `a` and `b`, `length_s` later, it is deeper than all of them. True
-/// if it did.
+/// if it did, and where it found that a touch that is that deep closes until then.
 bool TouchSets::complete(Pair& pair, const shape::Frame& a, const shape::Frame& b, double length_s) {
   const shape::Shape& mine = *bodies_.get_shape(pair.a);
   const shape::Shape* theirs = bodies_.get_shape(pair.b);
@@ -96,8 +96,9 @@ bool TouchSets::complete(Pair& pair, const shape::Frame& a, const shape::Frame& 
   for (Contact& c : pair.contacts) {
     const double gap_m = find_moved(pair, c.touch, a, b).gap_m;
     if (gap_m > deepest.gap_m + kDeep) continue;
-    if (c.touch.gap_m > kTouch) c.closes_s = length_s * c.touch.gap_m / (c.touch.gap_m - gap_m);
-    return false;
+    if (c.touch.gap_m <= kTouch || !(length_s > 0.0)) return false;
+    c.touching = false;
+    return std::exchange(c.closes_s, length_s * c.touch.gap_m / (c.touch.gap_m - gap_m)) < 0.0;
   }
   Contact added;
   added.a = pair.a;
@@ -115,6 +116,11 @@ bool TouchSets::complete(Pair& pair, const shape::Frame& a, const shape::Frame& 
   return true;
 }
 
+void TouchSets::forget_closing(const Step& step) const {
+  for (Pair* pair : step.island().pairs)
+    for (Contact& c : pair->contacts) c.closes_s = -1.0;
+}
+
 bool TouchSets::complete(const Step& step) {
   std::vector<shape::Frame> then;
   for (int n = 0; n < step.count(); ++n) {
@@ -127,7 +133,6 @@ bool TouchSets::complete(const Step& step) {
   };
   bool any = false;
   for (Pair* pair : step.island().pairs) {
-    for (Contact& c : pair->contacts) c.closes_s = -1.0;
     if (pair->cord >= 0 || !step.has(*pair) || bodies_.is_moved_by_impact(pair->a) || bodies_.is_moved_by_impact(pair->b)) continue;
     if (complete(*pair, get_then(pair->a), get_then(pair->b), step.length_s)) any = true;
   }

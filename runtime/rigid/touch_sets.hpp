@@ -39,7 +39,9 @@ class TouchSets {
   void refresh(Pair& pair) const;
   /// Touches that are good for a step: searched again where the pair may have moved by its margin.
   void update(Pair& pair, double step_s);
-  /// Adds touches that are missing at the end of a step, by its predicted motion. True if there were any.
+  /// Contacts of a step are not known to close in it.
+  void forget_closing(const Step& step) const;
+  /// Adds touches that are missing at the end of a step, by its predicted motion, and finds those that close. True if there were any.
   bool complete(const Step& step);
   /// Counts a movement of `time_s` in a step.
   void travel(Pair& pair, double time_s, double step_s) const;
