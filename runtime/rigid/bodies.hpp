@@ -55,7 +55,7 @@ class Bodies {
   shape::Frame get_frame(int body) const { return body >= 0 ? placed_[body].frame : shape::Frame{}; }
   /// Frame and spin follow from the state. Throws SolveError where it is not finite.
   void place(int body);
-  /// Of the states, for messages.
+  /// The time of the states.
   void set_time(double time_s) { time_s_ = time_s; }
   double get_time() const { return time_s_; }
 

@@ -264,7 +264,8 @@ void Solver::add_responses(const std::vector<Mover>& movers, int body, const Vec
       for (std::size_t r = 0; r < 6; ++r) {
         double gained = 0.0;
         for (std::size_t c = 0; c < 3; ++c) gained += rows[6 * r + c] * impulse[c] + rows[6 * r + 3 + c] * couple[c];
-        (r < 3 ? response.velocity : response.spin)[j][r % 3] = gained;
+        Four& to = r < 3 ? response.velocity[j] : response.spin[j];  // gcc's sanitizers lose an assignment through the condition
+        to[r % 3] = gained;
       }
     }
     rows += 36;
