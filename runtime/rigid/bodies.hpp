@@ -86,6 +86,8 @@ class Bodies {
   /// Upper bound of the speed of any point of a body [m/s].
   double calc_speed(int body) const { return norm(states_[body].velocity) + norm(placed_[body].spin) * solids_[body].radius_m; }
   shape::Box calc_box(int body, double grown_m) const;
+  /// About its centre, world axes [kg m^2].
+  Mat3 calc_inertia(int body) const { return placed_[body].rotation * (solids_[body].inertia_kg_m2 * transpose(placed_[body].rotation)); }
   /// Kinetic and of gravity [J].
   double calc_energy(const std::vector<int>& bodies) const;
   double calc_kinetic(const std::vector<int>& bodies) const;

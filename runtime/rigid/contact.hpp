@@ -19,6 +19,7 @@ struct Contact {
   int a = 0, b = -1;  // bodies; -1: the ground
   int cord = -1;      // of a cord or stop: gap = length until taut, normal from a to b; -1: a touch
   bool touching = false;
+  double closes_s = -1.0;                         // from the begin of the step on, by the predicted paths; negative: not so found
   bool presses = false;                           // in an impact with modes
   Vec3 impulse{}, couple{};                       // of the last step, on a [N s, N m s]
   double step_s = 0.0;                            // its length

@@ -14,6 +14,8 @@
 namespace carillon::rigid {
 namespace {
 
+constexpr double kFarTooDeep = 5e-5;  // m; from here on a cord shortens even if that gains energy
+
 struct StopTouch {
   double gap_m = 0.0;
   Vec3 where_m{}, normal{};  // from b to a: a is pushed along it

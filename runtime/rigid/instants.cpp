@@ -47,7 +47,10 @@ bool Instants::find(const Step& step, double& at_s, std::vector<ContactRef>& fir
     if (!step.has(*pair)) continue;
     for (int k = 0; const Contact& c : pair->contacts) {
       const ContactRef ref{pair, k++};
-      if (!is_fast(bodies_, c, h)) continue;
+      if (!is_fast(bodies_, c, h)) {
+        if (c.closes_s >= 0.0 && !c.presses) candidates.push_back({ref, c.closes_s, 0.0});
+        continue;
+      }
       const double approach = bodies_.calc_approach(c.touch, c.a, c.b),
                    later = -dot(calc_relative_velocity(step.movers, make_point(bodies_, step, c)), c.touch.normal);
       const double rate = (later - approach) / h;

@@ -5,12 +5,13 @@
 
 namespace carillon::rigid {
 
-/// Energies now, or lost since the beginning [J]: motion + modes + springs + lost is constant.
+/// Energies now, or lost or lifted since the beginning [J]: motion + modes + springs + lost - lifted is constant.
 struct Books {
   double motion_j = 0.0;   // kinetic and of gravity
   double modes_j = 0.0;    // in the bodies' modes
   double springs_j = 0.0;  // of impacts with modes that are not over
   double lost_j = 0.0;     // by friction, in contacts, in the modes' damping, above their bands
+  double lifted_j = 0.0;   // given to bodies that were moved apart, beyond the payment of their motion
 };
 
 struct Costs {
@@ -18,6 +19,7 @@ struct Costs {
   std::int64_t body_steps = 0;  // of each, the bodies that moved
   std::int64_t solves = 0, sweeps = 0, searches = 0, impacts = 0;
   std::int64_t flights = 0;  // of mechanisms: integrations of their free motion
+  std::int64_t pushes = 0;   // displacements of islands whose bodies were too deep
 };
 
 /// Losses and costs of all stages. Energies that bodies, modes and springs hold are summed from these when they are asked for. Invariant: a
@@ -26,13 +28,17 @@ class Ledger {
  public:
   /// Negative: energy from nowhere [J].
   void lose(double energy_j) { lost_j_ += energy_j; }
-  /// Adds the losses to the books.
-  void add_to(Books& books) const { books.lost_j += lost_j_; }
+  void lift(double energy_j) { lifted_j_ += energy_j; }
+  /// Adds losses and gains to the books.
+  void add_to(Books& books) const {
+    books.lost_j += lost_j_;
+    books.lifted_j += lifted_j_;
+  }
 
   Costs costs;
 
  private:
-  double lost_j_ = 0.0;
+  double lost_j_ = 0.0, lifted_j_ = 0.0;
 };
 
 }  // namespace carillon::rigid

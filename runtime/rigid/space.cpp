@@ -14,6 +14,7 @@ namespace {
 
 constexpr double kShortest = 1e-9;  // s; a shorter rest of a step is left out
 constexpr int kMaxMissed = 30;      // in a step: instants at which nothing struck after all
+constexpr int kMaxCompleted = 4;    // solutions of a step that are repeated with touches that were missing
 constexpr int kMaxImpacts = 4;      // of an island in a step, each at its instant; an island with more is crowded
 constexpr int kMinImpacts = 2;      // the same of the largest islands, each of whose impacts costs more
 constexpr int kStruckBodies = 48;   // bodies of an island times its impacts in a step
@@ -28,6 +29,7 @@ Space::Space(std::vector<Solid> solids, std::vector<State> states, std::optional
       modal_impacts_(bodies_, modal_states_, ledger_),
       touches_(bodies_, links.cords, modal_impacts_, ledger_),
       windows_(bodies_, touches_, options_, ledger_),
+      projection_(bodies_, touches_, ledger_),
       problem_(bodies_, touches_, options_, ledger_),
       instants_(bodies_, touches_),
       rigid_impact_(bodies_, touches_),
@@ -101,11 +103,17 @@ void Space::step_island(Island& island, double start_s, double length_s) {
   while (length_s - done > kShortest) {
     const double h = length_s - done;
     bodies_.set_time(start_s + done);
-    if (!std::exchange(begun, true) && rest_.may_sleep(island.bodies, h) && rest_.try_island(island, h)) break;
+    const bool may_sleep = !std::exchange(begun, true) && rest_.may_sleep(island.bodies, h);
+    projection_.run(step_, may_sleep ? kDeep : kTooDeep);
+    if (may_sleep && rest_.try_island(island, h)) break;
     modal_impacts_.end_where_resting(step_, touches_);
-    problem_.predict(step_, h, false);
-    problem_.make_points(step_, impacts < max_impacts);
-    problem_.solve(step_);
+    touches_.forget_closing(step_);
+    for (int n = 0; n <= kMaxCompleted; ++n) {
+      problem_.predict(step_, h, false);
+      problem_.make_points(step_, impacts < max_impacts);
+      problem_.solve(step_);
+      if (!touches_.complete(step_)) break;
+    }
     double at = h;
     std::vector<ContactRef> first;
     step_.together_s = kTogether;

@@ -6,8 +6,8 @@
 // energy. A touch that comes fast is no part of that: its instant is found, the step ends there, and the impact is solved by itself.
 // An island that a solution with zero velocity balances is put to sleep.
 //
-// The stages of a step: Windows, TouchSets, Rest, StepProblem, Instants, RigidImpact, ModalImpacts, on the Bodies and their ModalStates;
-// each keeps its own state, and gets that of a step as a Step. All book their losses in the Ledger.
+// The stages of a step: Windows, TouchSets, Projection, Rest, StepProblem, Instants, RigidImpact, ModalImpacts, on the Bodies and their
+// ModalStates; each keeps its own state, and gets that of a step as a Step. All book their losses in the Ledger.
 #pragma once
 
 #include <optional>
@@ -22,6 +22,7 @@
 #include "runtime/rigid/modal_impact.hpp"
 #include "runtime/rigid/modal_states.hpp"
 #include "runtime/rigid/options.hpp"
+#include "runtime/rigid/projection.hpp"
 #include "runtime/rigid/rest.hpp"
 #include "runtime/rigid/rigid_impact.hpp"
 #include "runtime/rigid/step_problem.hpp"
@@ -95,6 +96,7 @@ class Space {
   ModalImpacts modal_impacts_;
   TouchSets touches_;
   Windows windows_;
+  Projection projection_;
   StepProblem problem_;
   Instants instants_;
   RigidImpact rigid_impact_;

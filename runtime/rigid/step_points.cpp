@@ -175,6 +175,15 @@ Point StepProblem::make_lasting_point(const Step& step, Pair& pair, const Contac
     p.arm_b = where - sb.centre;
     beyond = beyond - cross(step.free[p.b].placed.spin, sb.has_joints ? sb.last - p.arm_b : 0.5 * (sb.last - sb.first));
   }
+  // The normal half a step later: that of a plane turns with its body, and a touch that slides would leave the plane or sink in.
+  double turning = 0.0;  // closing speed by that
+  if (!t.smooth && c.touching) {
+    const int owner = t.side_b == shape::Side::plane ? c.b : t.side_a == shape::Side::plane ? c.a : -1;
+    if (bodies_.moves(owner)) {
+      p.normal = carillon::normalise(t.normal + (0.5 * h) * cross(bodies_.placed(owner).spin, t.normal));
+      turning = -dot(bodies_.calc_velocity(c.a, t.where_m) - bodies_.calc_velocity(c.b, t.where_m), p.normal) - approach;
+    }
+  }
   // A touch at rest stays so exactly: a picometre is no gap, and would be a force.
   const bool rests = t.gap_m <= kTouch && c.touching && std::abs(approach) < kAtRest;
   // A deep touch that parts may come back to its present depth: a push that ends its parting would do work.
@@ -183,10 +192,10 @@ Point StepProblem::make_lasting_point(const Step& step, Pair& pair, const Contac
   // A deep touch is pushed out, at half the power that the contact loses, so that no energy is gained.
   if (t.gap_m < -kDeep) {
     const double push = dot(c.impulse, t.normal), paid = push > 0.0 ? 0.5 * c.lost_j / push : 0.0;
-    const double up = std::min(0.02 * (-kDeep - t.gap_m) / h, t.gap_m < -kFarTooDeep - pair.sag_m ? 0.005 : paid);
+    const double up = std::min(0.02 * (-kDeep - t.gap_m) / h, paid);
     if (approach > -up) speed = up;
   }
-  p.wanted = speed * t.normal - beyond;
+  p.wanted = (speed + turning) * p.normal - beyond;
   const double curvature = t.curvature_a_per_m + t.curvature_b_per_m;
   if (t.smooth && curvature > 0.0) {
     p.rolling_m = options_.rolling_resistance / std::max(curvature, t.steepest_per_m);
@@ -207,7 +216,7 @@ void StepProblem::make_points(Step& step, bool leaves_impacts) const {
     for (int k = 0; const Contact& c : pair->contacts) {
       const ContactRef row{pair, k++};
       const double approach = bodies_.calc_approach(c.touch, c.a, c.b);
-      if (c.presses || (leaves_impacts && is_fast(bodies_, c, h))) continue;
+      if (c.presses || (leaves_impacts && (is_fast(bodies_, c, h) || c.closes_s >= 0.0))) continue;
       // The impact moves these bodies; static ones that ring continue to carry others.
       if (c.cord < 0 && (bodies_.is_moved_by_impact(pair->a) || bodies_.is_moved_by_impact(pair->b))) continue;
       if (c.touch.gap_m > kTouch + 2.0 * h * std::max(approach, 0.0) + 4.0 * norm(bodies_.gravity()) * h * h && !c.touching) continue;

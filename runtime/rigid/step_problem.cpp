@@ -183,7 +183,9 @@ void StepProblem::keep_impulses(const Step& step, double at_s) const {
     c.until_s = bodies_.get_time() + at_s;
     c.lost_j = step.calc_loss(p, 1.0);
     ledger_.lose(at_s < h ? step.calc_loss(p, at_s / h) : c.lost_j);
-    c.touching = dot(c.impulse, c.touch.normal) > 0.0 || c.is_closed();
+    // A gap that closes with speed at the end of the step strikes in the next one.
+    const bool comes = c.touch.gap_m > kTouch && dot(calc_relative_velocity(step.movers, p), p.normal) < -kSlowest;
+    c.touching = (dot(c.impulse, c.touch.normal) > 0.0 && !comes) || c.is_closed();
   }
 }
 

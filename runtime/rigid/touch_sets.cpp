@@ -78,10 +78,65 @@ void TouchSets::update(Pair& pair, double step_s) {
     search(pair, step_s);
   else if (!pair.contacts.empty() && (pair.travelled_m > 0.0))
     refresh(pair);
+  complete(pair, bodies_.get_frame(pair.a), bodies_.get_frame(pair.b), 0.0);
   if (!(pair.sag_m > 0.0)) return;
   double deepest = 0.0;
   for (const Contact& c : pair.contacts) deepest = std::max(deepest, -c.touch.gap_m);
   pair.sag_m = std::min(pair.sag_m, deepest);
+}
+
+/// Adds the deepest vertex of a pair to its touches where at the frames `a` and `b`, `length_s` later, it is deeper than all of them. True
+/// if it did, and where it found that a touch that is that deep closes until then.
+bool TouchSets::complete(Pair& pair, const shape::Frame& a, const shape::Frame& b, double length_s) {
+  const shape::Shape& mine = *bodies_.get_shape(pair.a);
+  const shape::Shape* theirs = bodies_.get_shape(pair.b);
+  const shape::Deepest deepest =
+      theirs == nullptr ? shape::find_lowest(mine, a, bodies_.ground()->height_m) : shape::find_deepest(mine, a, *theirs, b, -kDeep);
+  if (deepest.vertex < 0 || deepest.gap_m > -kDeep) return false;
+  for (Contact& c : pair.contacts) {
+    const double gap_m = find_moved(pair, c.touch, a, b).gap_m;
+    if (gap_m > deepest.gap_m + kDeep) continue;
+    if (c.touch.gap_m <= kTouch || !(length_s > 0.0)) return false;
+    c.touching = false;
+    return std::exchange(c.closes_s, length_s * c.touch.gap_m / (c.touch.gap_m - gap_m)) < 0.0;
+  }
+  Contact added;
+  added.a = pair.a;
+  added.b = pair.b;
+  added.touch = theirs == nullptr ? shape::make_ground_touch(mine, bodies_.get_frame(pair.a), bodies_.ground()->height_m, deepest.vertex)
+                                  : shape::make_touch(mine, bodies_.get_frame(pair.a), *theirs, bodies_.get_frame(pair.b), deepest);
+  const auto same =
+      std::find_if(pair.contacts.begin(), pair.contacts.end(), [&](const Contact& c) { return c.touch.id == added.touch.id; });
+  if (same != pair.contacts.end()) {  // it has travelled away from its vertex
+    same->touch = added.touch;
+    return true;
+  }
+  added.presses = impacts_.is_pressed(pair, added.touch.where_m);
+  pair.contacts.push_back(added);
+  return true;
+}
+
+void TouchSets::forget_closing(const Step& step) const {
+  for (Pair* pair : step.island().pairs)
+    for (Contact& c : pair->contacts) c.closes_s = -1.0;
+}
+
+bool TouchSets::complete(const Step& step) {
+  std::vector<shape::Frame> then;
+  for (int n = 0; n < step.count(); ++n) {
+    const int i = step.body(n);
+    then.push_back(bodies_.is_moved_by_impact(i) ? bodies_.get_frame(i) : place(bodies_.solid(i), step.calc_moved(n, step.length_s)).frame);
+  }
+  const auto get_then = [&](int body) {
+    const int n = step.find(body);
+    return n < 0 ? bodies_.get_frame(body) : then[n];
+  };
+  bool any = false;
+  for (Pair* pair : step.island().pairs) {
+    if (pair->cord >= 0 || !step.has(*pair) || bodies_.is_moved_by_impact(pair->a) || bodies_.is_moved_by_impact(pair->b)) continue;
+    if (complete(*pair, get_then(pair->a), get_then(pair->b), step.length_s)) any = true;
+  }
+  return any;
 }
 
 void TouchSets::travel(Pair& pair, double time_s, double step_s) const {

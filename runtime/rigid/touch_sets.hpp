@@ -9,13 +9,15 @@
 #include "runtime/rigid/bodies.hpp"
 #include "runtime/rigid/contact.hpp"
 #include "runtime/rigid/links.hpp"
+#include "runtime/rigid/step.hpp"
 
 namespace carillon::rigid {
 
 class ModalImpacts;
 
 /// The contacts of all pairs of bodies that are near, and of all cords. Invariant: after search() or update() a pair has every touch that
-/// can close within the step, as the speeds are then; a touch that stays keeps its name, and so its contact its impulses.
+/// can close within the step, as the speeds are then, and after complete() none
+/// is missing where its bodies would be deepest at the end of the step; a touch that stays keeps its name, and so its contact its impulses.
 class TouchSets {
  public:
   TouchSets(const Bodies& bodies, std::vector<Cord> cords, const ModalImpacts& impacts, Ledger& ledger);
@@ -37,6 +39,10 @@ class TouchSets {
   void refresh(Pair& pair) const;
   /// Touches that are good for a step: searched again where the pair may have moved by its margin.
   void update(Pair& pair, double step_s);
+  /// Contacts of a step are not known to close in it.
+  void forget_closing(const Step& step) const;
+  /// Adds touches that are missing at the end of a step, by its predicted motion, and finds those that close. True if there were any.
+  bool complete(const Step& step);
   /// Counts a movement of `time_s` in a step.
   void travel(Pair& pair, double time_s, double step_s) const;
   /// The contacts of two bodies that were in an impact with modes are free again.
@@ -45,6 +51,8 @@ class TouchSets {
   shape::Touch find_moved(Pair& pair, shape::Touch touch, const shape::Frame& a, const shape::Frame& b) const;
 
  private:
+  bool complete(Pair& pair, const shape::Frame& a, const shape::Frame& b, double length_s);
+
   const Bodies& bodies_;
   const ModalImpacts& impacts_;
   Ledger& ledger_;

@@ -62,10 +62,10 @@ void find_candidates(const Shape& a, const Frame& fa, double height, double marg
         const double reach = kWalk * std::max(1.5 * sample.reach_m, 2.0 * s.spacing_m);
         Touch before = t;
         before.stays = true;
-        const bool settled = settle(t, a, fa, nullptr, fa, reach);
+        bool settled = settle(t, a, fa, nullptr, fa, reach);
         if (settled && is_level(t, a, fa, nullptr, fa)) {
           t = before;
-          if (!settle(t, a, fa, nullptr, fa, reach)) continue;
+          settled = settle(t, a, fa, nullptr, fa, reach);
         } else if (norm(t.station_a - sample.point) > kGuard * a.get_size_m() && settle(before, a, fa, nullptr, fa, reach) &&
                    before.gap_m <= margin) {
           out.push_back(before);
@@ -85,6 +85,18 @@ void find_candidates(const Shape& a, const Frame& fa, double height, double marg
 }
 
 }  // namespace
+
+Touch make_ground_touch(const Shape& a, const Frame& fa, double height, int vertex) {
+  Touch t = make_ground_touch(a, fa, a.mesh().vertices[vertex], height);
+  t.id = make_id(Feature::corner_a, vertex, a.is_polyhedron() ? 0 : kDeepest);
+  const int face = a.skin().find_face(vertex);
+  if (a.is_polyhedron() || a.skin().is_flat(face) || a.skin().kind(vertex) == VertexKind::corner) return t;
+  t.side_a = Side::skin;
+  t.face_a = face;
+  t.smooth = t.stays = true;
+  settle(t, a, fa, nullptr, fa, kWalk * 2.0 * a.samples().spacing_m);
+  return t;
+}
 
 bool carries(const Mesh& mesh, int vertex, const Vec3& normal) {
   const int start = mesh.any_half_edge[vertex];

@@ -120,13 +120,7 @@ Samples::Samples(const Mesh& mesh, const Skin& skin) {
   };
   const auto add_vertex = [&](int v, VertexKind kind) {
     if (of_vertex[v] >= 0) return;
-    int face = mesh.any_half_edge[v] / 3;  // a curved one, if there is one
-    for (int e = mesh.any_half_edge[v];;) {
-      if (!skin.is_flat(e / 3)) face = e / 3;
-      e = Mesh::next(mesh.opposite[e]);
-      if (e == mesh.any_half_edge[v] || !skin.is_flat(face)) break;
-    }
-    of_vertex[v] = add(mesh.vertices[v], kind, v, face);
+    of_vertex[v] = add(mesh.vertices[v], kind, v, skin.find_face(v));
   };
   for (int v = 0; v < mesh.count_vertices(); ++v)
     if (skin.kind(v) == VertexKind::corner) add_vertex(v, VertexKind::corner);
@@ -261,6 +255,14 @@ Samples::Samples(const Mesh& mesh, const Skin& skin) {
   std::vector<Ridge> ordered;
   for (const int old : order) ordered.push_back(ridges[old]);
   ridges = std::move(ordered);
+
+  middles.clear();
+  for (int v = 0; v < mesh.count_vertices(); ++v)
+    if (skin.kind(v) != VertexKind::none) vertices.push_back(v), middles.push_back(mesh.vertices[v]);
+  radii.assign(middles.size(), 0.0);
+  vertex_tree = make_tree(middles, radii, order);
+  for (int& at : order) at = vertices[at];
+  vertices = std::move(order);
 }
 
 }  // namespace carillon::shape

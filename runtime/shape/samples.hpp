@@ -41,7 +41,8 @@ class Samples {
   std::vector<Sample> samples;  // in the order of their tree
   std::vector<int> neighbours;  // of samples that are smooth, flat list
   std::vector<Ridge> ridges;    // in the order of their tree
-  std::vector<Ball> sample_tree, ridge_tree;
+  std::vector<int> vertices;    // of the mesh, in the order of their tree: all but those amid flat facets and straight edges
+  std::vector<Ball> sample_tree, ridge_tree, vertex_tree;
   double spacing_m = 0.0;
 };
 

@@ -19,6 +19,8 @@ void find_polyhedra_touches(const Shape& a, const Frame& frame_a, const Shape& b
 /// May a corner or ridge vertex of the skin be the first to touch what has this outward normal (mesh frame)? No neighbour is lower.
 bool carries(const Mesh& mesh, int vertex, const Vec3& normal);
 
+inline constexpr int kDeepest = 2;  // second number of the name of a touch that a search lacked
+
 inline constexpr double kFlat = 0.02;   // slope: tolerance of a flat contact patch
 inline constexpr double kFlush = 0.01;  // slope: tolerance of parallel surfaces
 

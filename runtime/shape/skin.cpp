@@ -264,6 +264,16 @@ void Skin::make_groups() {
   }
 }
 
+int Skin::find_face(int vertex) const {
+  const int start = mesh_.any_half_edge[vertex];
+  int e = start;
+  do {
+    if (!is_flat(e / 3)) return e / 3;
+    e = Mesh::next(mesh_.opposite[e]);
+  } while (e != start);
+  return start / 3;
+}
+
 Patch Skin::make_patch(int face) const {
   Patch patch;
   for (int k = 0; k < 3; ++k) patch.p[k] = mesh_.corner(face, k);

@@ -53,6 +53,8 @@ class Skin {
   int count_regions() const { return regions_; }
   bool is_sharp(int half_edge) const { return sharp_[half_edge] != 0; }
   VertexKind kind(int vertex) const { return kinds_[vertex]; }
+  /// A face at a vertex: a curved one, if there is one.
+  int find_face(int vertex) const;
   /// The smoothing group of a face: faces joined over edges that are not sharp.
   int group(int face) const { return group_[face]; }
   int count_smooth_edges() const { return smooth_edges_; }  // between different regions
