@@ -4,12 +4,18 @@
 #include "runtime/rigid/touch_sets.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "runtime/rigid/cords.hpp"
 #include "runtime/rigid/limits.hpp"
 #include "runtime/rigid/modal_impact.hpp"
 
 namespace carillon::rigid {
+namespace {
+
+constexpr double kSagDecay = 10e-3;  // s
+
+}  // namespace
 
 TouchSets::TouchSets(const Bodies& bodies, std::vector<Cord> cords, const ModalImpacts& impacts, Ledger& ledger)
     : bodies_(bodies), impacts_(impacts), ledger_(ledger), cords_(std::move(cords)), cord_pairs_(cords_.size()) {
@@ -79,9 +85,11 @@ void TouchSets::update(Pair& pair, double step_s) {
   else if (!pair.contacts.empty() && (pair.travelled_m > 0.0))
     refresh(pair);
   complete(pair, bodies_.get_frame(pair.a), bodies_.get_frame(pair.b), 0.0);
-  if (!(pair.sag_m > 0.0)) return;
   double deepest = 0.0;
-  for (const Contact& c : pair.contacts) deepest = std::max(deepest, -c.touch.gap_m);
+  for (Contact& c : pair.contacts) {
+    c.is_calm = bodies_.get_time() < pair.calm_until_s;
+    deepest = std::max(deepest, -c.touch.gap_m);
+  }
   pair.sag_m = std::min(pair.sag_m, deepest);
 }
 
@@ -96,7 +104,7 @@ bool TouchSets::complete(Pair& pair, const shape::Frame& a, const shape::Frame& 
   for (Contact& c : pair.contacts) {
     const double gap_m = find_moved(pair, c.touch, a, b).gap_m;
     if (gap_m > deepest.gap_m + kDeep) continue;
-    if (c.touch.gap_m <= kTouch || !(length_s > 0.0)) return false;
+    if (c.touch.gap_m <= kTouch || c.rests || !(length_s > 0.0)) return false;
     c.touching = false;
     return std::exchange(c.closes_s, length_s * c.touch.gap_m / (c.touch.gap_m - gap_m)) < 0.0;
   }
@@ -141,19 +149,17 @@ bool TouchSets::complete(const Step& step) {
 
 void TouchSets::travel(Pair& pair, double time_s, double step_s) const {
   pair.travelled_m += (bodies_.calc_closing_speed(pair.a, pair.b) + norm(bodies_.gravity()) * step_s) * time_s + 1e-12;
+  if (pair.sag_m > 0.0) pair.sag_m *= std::exp(-time_s / kSagDecay);
 }
 
-void TouchSets::release(int a, int b) {
+void TouchSets::release(int a, int b, double depth_m) {
   if (b >= 0 && a > b) std::swap(a, b);
   const auto at = pairs_.find({a, b});
   if (at == pairs_.end()) return;
   Pair& pair = at->second;
-  for (Contact& c : pair.contacts) {
-    if (!c.presses) continue;
-    c.presses = c.touching = false;
-    // Where modes have yielded, the body stands lower than on a rigid surface.
-    pair.sag_m = std::max(pair.sag_m, -c.touch.gap_m);
-  }
+  for (Contact& c : pair.contacts)
+    if (c.presses) c.presses = c.touching = false;
+  pair.sag_m = std::max(pair.sag_m, depth_m);
 }
 
 shape::Touch TouchSets::find_moved(Pair& pair, shape::Touch touch, const shape::Frame& a, const shape::Frame& b) const {

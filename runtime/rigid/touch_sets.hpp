@@ -45,8 +45,8 @@ class TouchSets {
   bool complete(const Step& step);
   /// Counts a movement of `time_s` in a step.
   void travel(Pair& pair, double time_s, double step_s) const;
-  /// The contacts of two bodies that were in an impact with modes are free again.
-  void release(int a, int b);
+  /// The contacts of two bodies that were in an impact with modes, which explains that depth [m], are free again.
+  void release(int a, int b, double depth_m);
   /// A touch of a pair whose bodies are at these frames.
   shape::Touch find_moved(Pair& pair, shape::Touch touch, const shape::Frame& a, const shape::Frame& b) const;
 
