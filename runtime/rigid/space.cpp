@@ -113,7 +113,7 @@ void Space::step_island(Island& island, double start_s, double length_s) {
       problem_.predict(step_, h, false);
       problem_.make_points(step_, impacts < max_impacts);
       problem_.solve(step_);
-      if (!touches_.complete(step_)) break;
+      if (!touches_.complete(step_, missed == 0)) break;
     }
     double at = h;
     std::vector<ContactRef> first;

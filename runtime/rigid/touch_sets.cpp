@@ -13,6 +13,7 @@
 namespace carillon::rigid {
 namespace {
 
+constexpr double kMissing = 5e-6;    // m; a place deeper than all touches by this is missing
 constexpr double kSagDecay = 10e-3;  // s
 
 }  // namespace
@@ -93,25 +94,25 @@ void TouchSets::update(Pair& pair, double step_s) {
   pair.sag_m = std::min(pair.sag_m, deepest);
 }
 
-/// Adds the deepest vertex of a pair to its touches where at the frames `a` and `b`, `length_s` later, it is deeper than all of them. True
-/// if it did, and where it found that a touch that is that deep closes until then.
-bool TouchSets::complete(Pair& pair, const shape::Frame& a, const shape::Frame& b, double length_s) {
+/// Adds the deepest vertex of a pair to its touches where at the frames `a` and `b` it is deeper than all of them. True if it did, and where
+/// it found that a touch that is that deep closes until then: `closing_s` later, or 0.
+bool TouchSets::complete(Pair& pair, const shape::Frame& a, const shape::Frame& b, double closing_s) {
   const shape::Shape& mine = *bodies_.get_shape(pair.a);
   const shape::Shape* theirs = bodies_.get_shape(pair.b);
   const shape::Deepest deepest =
-      theirs == nullptr ? shape::find_lowest(mine, a, bodies_.ground()->height_m) : shape::find_deepest(mine, a, *theirs, b, -kDeep);
-  if (deepest.vertex < 0 || deepest.gap_m > -kDeep) return false;
+      theirs == nullptr ? shape::find_lowest(mine, a, bodies_.ground()->height_m) : shape::find_deepest(mine, a, *theirs, b, -kMissing);
+  if (deepest.place < 0 || deepest.gap_m > -kMissing) return false;
   for (Contact& c : pair.contacts) {
     const double gap_m = find_moved(pair, c.touch, a, b).gap_m;
-    if (gap_m > deepest.gap_m + kDeep) continue;
-    if (c.touch.gap_m <= kTouch || c.rests || !(length_s > 0.0)) return false;
+    if (gap_m > deepest.gap_m + kMissing) continue;
+    if (c.touch.gap_m <= kTouch || c.rests || !(closing_s > 0.0)) return false;
     c.touching = false;
-    return std::exchange(c.closes_s, length_s * c.touch.gap_m / (c.touch.gap_m - gap_m)) < 0.0;
+    return std::exchange(c.closes_s, closing_s * c.touch.gap_m / (c.touch.gap_m - gap_m)) < 0.0;
   }
   Contact added;
   added.a = pair.a;
   added.b = pair.b;
-  added.touch = theirs == nullptr ? shape::make_ground_touch(mine, bodies_.get_frame(pair.a), bodies_.ground()->height_m, deepest.vertex)
+  added.touch = theirs == nullptr ? shape::make_ground_touch(mine, bodies_.get_frame(pair.a), bodies_.ground()->height_m, deepest.place)
                                   : shape::make_touch(mine, bodies_.get_frame(pair.a), *theirs, bodies_.get_frame(pair.b), deepest);
   const auto same =
       std::find_if(pair.contacts.begin(), pair.contacts.end(), [&](const Contact& c) { return c.touch.id == added.touch.id; });
@@ -129,7 +130,7 @@ void TouchSets::forget_closing(const Step& step) const {
     for (Contact& c : pair->contacts) c.closes_s = -1.0;
 }
 
-bool TouchSets::complete(const Step& step) {
+bool TouchSets::complete(const Step& step, bool finds_closing) {
   std::vector<shape::Frame> then;
   for (int n = 0; n < step.count(); ++n) {
     const int i = step.body(n);
@@ -142,7 +143,7 @@ bool TouchSets::complete(const Step& step) {
   bool any = false;
   for (Pair* pair : step.island().pairs) {
     if (pair->cord >= 0 || !step.has(*pair) || bodies_.is_moved_by_impact(pair->a) || bodies_.is_moved_by_impact(pair->b)) continue;
-    if (complete(*pair, get_then(pair->a), get_then(pair->b), step.length_s)) any = true;
+    if (complete(*pair, get_then(pair->a), get_then(pair->b), finds_closing ? step.length_s : 0.0)) any = true;
   }
   return any;
 }
