@@ -70,6 +70,7 @@ void TouchSets::search(Pair& pair, double step_s) {
     contact.touch = touch;
     pair.contacts.push_back(contact);
   }
+  complete(pair, frame_a, bodies_.get_frame(pair.b), 0.0);
 }
 
 void TouchSets::refresh(Pair& pair) const {
@@ -85,7 +86,7 @@ void TouchSets::update(Pair& pair, double step_s) {
     search(pair, step_s);
   else if (!pair.contacts.empty() && (pair.travelled_m > 0.0))
     refresh(pair);
-  complete(pair, bodies_.get_frame(pair.a), bodies_.get_frame(pair.b), 0.0);
+  if (pair.travelled_m > 0.0) complete(pair, bodies_.get_frame(pair.a), bodies_.get_frame(pair.b), 0.0);
   double deepest = 0.0;
   for (Contact& c : pair.contacts) {
     c.is_calm = bodies_.get_time() < pair.calm_until_s;
@@ -102,12 +103,14 @@ bool TouchSets::complete(Pair& pair, const shape::Frame& a, const shape::Frame& 
   const shape::Deepest deepest =
       theirs == nullptr ? shape::find_lowest(mine, a, bodies_.ground()->height_m) : shape::find_deepest(mine, a, *theirs, b, -kMissing);
   if (deepest.place < 0 || deepest.gap_m > -kMissing) return false;
-  for (Contact& c : pair.contacts) {
-    const double gap_m = find_moved(pair, c.touch, a, b).gap_m;
-    if (gap_m > deepest.gap_m + kMissing) continue;
-    if (c.touch.gap_m <= kTouch || c.rests || !(closing_s > 0.0)) return false;
-    c.touching = false;
-    return std::exchange(c.closes_s, closing_s * c.touch.gap_m / (c.touch.gap_m - gap_m)) < 0.0;
+  Contact* lowest = nullptr;
+  double gap_m = deepest.gap_m + kMissing;
+  for (Contact& c : pair.contacts)
+    if (const double then_m = find_moved(pair, c.touch, a, b).gap_m; then_m <= gap_m) gap_m = then_m, lowest = &c;
+  if (lowest != nullptr) {
+    if (lowest->touch.gap_m <= kTouch || gap_m > -kMissing || lowest->rests || !(closing_s > 0.0)) return false;
+    lowest->touching = false;
+    return std::exchange(lowest->closes_s, closing_s * lowest->touch.gap_m / (lowest->touch.gap_m - gap_m)) < 0.0;
   }
   Contact added;
   added.a = pair.a;
