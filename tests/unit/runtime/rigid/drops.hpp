@@ -258,7 +258,7 @@ struct DropBounds {
 };
 inline constexpr DropBounds kWanted;
 /// What random drops keep at present.
-inline constexpr DropBounds kHeldToday{.ever = 4.0, .missed_m = 5e-5, .gained = 1e-4, .lifted = 0.3};
+inline constexpr DropBounds kHeldToday{.ever = 4.0, .missed_m = 5e-5, .gained = 1e-4, .lifted = 1.0};
 
 /// The bound that an outcome has violated; empty: none.
 inline std::string describe_fault(const DropOutcome& o, const DropBounds& bounds) {
