@@ -17,6 +17,7 @@
 #include "runtime/contact/lasting.hpp"
 #include "runtime/contact/mode_sets.hpp"
 #include "runtime/contact/pulses.hpp"
+#include "runtime/contact/watch.hpp"
 #include "runtime/rigid/limits.hpp"
 #include "runtime/rigid/space.hpp"
 
@@ -212,6 +213,7 @@ class World::Course {
     s.flights = costs.flights;
     s.seconds_cpu = seconds_cpu_;
     s.energy = energy_;
+    if (options_.audits_energy) s.contacts = watch_.find(space_);
     return s;
   }
 
@@ -231,6 +233,7 @@ class World::Course {
       begun_ = true;
       for (int i = 0; i < count(); ++i) sink(make_motion(i, space_.state(i), 0.0));
       audit();
+      watch_start();
       return;
     }
     const bool slept = space_.is_at_window() && space_.is_all_asleep();  // and nothing presses
@@ -238,8 +241,11 @@ class World::Course {
       space_.skip_window(options_.end_s);
     } else {
       space_.step(options_.end_s);
-      for (const rigid::Strike& strike : space_.take_strikes()) take(strike);
-      for (const rigid::Forces& forces : space_.take_forces()) take(forces);
+      const std::vector<rigid::Strike> strikes = space_.take_strikes();
+      const std::vector<rigid::Forces> all_forces = space_.take_forces();
+      for (const rigid::Strike& strike : strikes) take(strike);
+      for (const rigid::Forces& forces : all_forces) take(forces);
+      if (options_.audits_energy) watch(strikes, all_forces);
       if (options_.lasting_contacts) lasting_.update(space_, events_);
     }
     if (!space_.is_at_window()) return;
@@ -302,17 +308,43 @@ class World::Course {
     double kinetic = 0.0;
     for (int i = 0; i < count(); ++i) kinetic += rigid::calc_kinetic(space_.solid(i), space_.state(i));
     const rigid::Books books = space_.calc_books();
-    const double now = books.motion_j + books.modes_j + books.springs_j;
+    const double now = books.motion_j + books.modes_j + books.springs_j - books.lifted_j;
     if (!has_books_) energy_.start_j = now, has_books_ = true;
     energy_.motion_j = books.motion_j;
     energy_.modes_j = books.modes_j;
     energy_.max_modes_j = std::max(energy_.max_modes_j, books.modes_j);
     if (books.modes_j > 0.0) energy_.modes_share = std::max(energy_.modes_share, books.modes_j / (energy_.start_j - books.motion_j));
     energy_.lost_j = books.lost_j;
+    energy_.lifted_j = books.lifted_j;
     energy_.error_j = std::max(energy_.error_j, std::abs(now + books.lost_j - energy_.start_j));
     energy_.rise_j = std::max(energy_.rise_j, now + taken_j_ - min_j_);
     energy_.kinetic_j = std::max(energy_.kinetic_j, kinetic);
     min_j_ = std::min(min_j_, now + taken_j_);
+  }
+
+  void watch_start() {
+    if (!options_.audits_energy) return;
+    std::vector<ContactWatch::Bodies> pairs;
+    const std::vector<std::vector<int>> near = find_near();
+    for (int a = 0; a < count(); ++a)
+      for (const int b : near[static_cast<std::size_t>(a)])
+        if (!space_.is_joined(a, b)) pairs.emplace_back(a, b);
+    watch_.look_at_ground(space_);
+    watch_.look_at_pairs(space_, pairs, true);
+  }
+
+  void watch(const std::vector<rigid::Strike>& strikes, const std::vector<rigid::Forces>& all_forces) {
+    const double now_s = space_.get_time();
+    for (const rigid::Strike& strike : strikes)
+      for (const rigid::Hit& hit : strike.hits)
+        if (!hit.is_cord && hit.approach_m_s > 0.0 && norm(hit.impulse) > 0.0) watch_.add_hit(now_s, hit.a, hit.b);
+    for (const rigid::Forces& forces : all_forces)
+      if (!forces.continues) watch_.add_hit(now_s, forces.a, forces.b);
+    watch_.look_at_ground(space_);
+    if (!space_.is_at_window()) return;
+    std::vector<ContactWatch::Bodies> pairs;
+    for (const auto& [bodies, pair] : space_.pairs()) pairs.push_back(bodies);
+    watch_.look_at_pairs(space_, pairs, false);
   }
 
   /// What is earlier than any that may still come, in order of time; a Mark at the end.
@@ -347,6 +379,7 @@ class World::Course {
   bool begun_ = false;
   double reached_s_ = 0.0, seconds_cpu_ = 0.0;
   EnergyAudit energy_;
+  ContactWatch watch_;
   bool has_books_ = false;
   double taken_j_ = 0.0;                                    // by hits
   double min_j_ = std::numeric_limits<double>::infinity();  // energy there has been, with what hits took

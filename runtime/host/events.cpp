@@ -80,8 +80,10 @@ void run_physics(const Scene& scene, bool has_contacts, bool audits, const std::
                   [&](const events::Event& event) { events.take(event); });
     if (progress) progress(static_cast<double>(part) / kParts);
   }
-  happened.steps = world.get_statistics().steps;
-  happened.energy = world.get_statistics().energy;
+  const contact::Statistics statistics = world.get_statistics();
+  happened.steps = statistics.steps;
+  happened.energy = statistics.energy;
+  happened.contacts = statistics.contacts;
 }
 
 }  // namespace

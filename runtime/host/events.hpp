@@ -28,6 +28,7 @@ struct SceneEvents {
   Events events;
   std::int64_t steps = 0;  // of the physics
   contact::EnergyAudit energy{};
+  contact::ContactAudit contacts{};
   std::vector<Blow> blows{};  // of mallets
   std::vector<std::string> warnings{};
 };
@@ -50,8 +51,8 @@ bool has_physics(const Scene& scene);
 contact::WorldSpec make_world(const Scene& scene);
 
 /// Runs the physics, if any body can move, and adds the strikes. Every body's spec has its bank. `has_contacts`: with records of contacts
-/// that last; `audits`: with the books of energy. `progress` (may be empty) is called with the finished fraction. `spool` takes the events.
-/// Throws InputError and SolveError, which name the scene.
+/// that last; `audits`: with the books of energy and the audit of contacts. `progress` (may be empty) is called with the finished fraction.
+/// `spool` takes the events. Throws InputError and SolveError, which name the scene.
 SceneEvents simulate(const Scene& scene, bool has_contacts, bool audits, const std::function<void(double)>& progress,
                      base::Spool spool = base::Spool());
 

@@ -48,8 +48,9 @@ int main(int argc, char** argv) {
   app.add_option("--format", options.format, "pcm16, pcm24 (default), pcm32 or float, instead of the scene's")
       ->check(CLI::IsMember(carillon::host::kSampleFormatNames))
       ->option_text("FORMAT");
-  app.add_flag("--audit", options.audit,
-               "Keep the books of energy: motion, modes, what is lost, what is radiated, and whether any came from nowhere");
+  app.add_flag(
+      "--audit", options.audit,
+      "Keep the books of energy: motion, modes, losses, radiation, and energy from nowhere; measure depths of contacts and count hits");
   app.add_flag("--plan", options.plan, "Say for each body which effects are on, why, and what they will cost; no sound is made");
   app.add_flag("-q,--quiet", options.quiet, "Print nothing but warnings and errors");
   app.set_version_flag("--version", carillon::version::describe("carillon-render"));

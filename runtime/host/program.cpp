@@ -156,6 +156,24 @@ void print_bands(std::FILE* notes, const Scene& scene, double rate_hz) {
   }
 }
 
+void print_contacts(std::FILE* notes, const Scene& scene, const contact::ContactAudit& contacts) {
+  const auto print_depth = [&](const char* when, const contact::Depth& d) {
+    fmt::print(notes, "  {:<16} {:.3g} mm, {}, at {:.4g} s; unexplained {:.3g} mm\n", when, 1e3 * d.depth_m,
+               describe_pair(scene, d.body, d.other), d.time_s, 1e3 * d.unexplained_m);
+  };
+  fmt::print(notes, "depth              of bodies in each other and in the ground:\n");
+  print_depth("now", contacts.now);
+  print_depth("ever", contacts.deepest);
+  print_depth("most unexplained", contacts.unexplained);
+  fmt::print(notes, "  pushes           {}\n", contacts.pushes);
+  const contact::HitRate &worst = contacts.worst_pair, &busiest = contacts.busiest;
+  fmt::print(notes, "hits               {:.0f} in the last second, {:.0f} of them of {}; at most {:.0f} per s in half a second, of {}\n",
+             contacts.hits_per_s, worst.per_s, describe_pair(scene, worst.body, worst.other), busiest.per_s,
+             describe_pair(scene, busiest.body, busiest.other));
+  fmt::print(notes, "impacts with modes {:.3g} ms the longest; {} ended before their contacts had parted\n",
+             1e3 * contacts.longest_impact_s, contacts.ended_impacts);
+}
+
 void print_summary(std::FILE* notes, const Scene& scene, const Sound& sound, const Figures& figures) {
   fmt::print(notes, "bodies             {}\n", figures.bodies);
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
@@ -195,11 +213,14 @@ void print_summary(std::FILE* notes, const Scene& scene, const Sound& sound, con
     fmt::print(notes, "  motion           {:.4g} J, kinetic and of gravity\n", bodies.motion_j);
     fmt::print(notes, "  modes            {:.4g} J, and {:.4g} J at most\n", bodies.modes_j, bodies.max_modes_j);
     fmt::print(notes, "  lost             {:.4g} J, by friction, in contacts and by the damping of modes\n", bodies.lost_j);
+    fmt::print(notes, "  lifted           {:.3g} J, given to bodies that were moved apart ({:.2g} of the largest of motion)\n",
+               bodies.lifted_j, bodies.kinetic_j > 0.0 ? bodies.lifted_j / bodies.kinetic_j : 0.0);
     fmt::print(notes, "  difference       {:.2g} J at most\n", bodies.error_j);
     const synth::ModeEnergy& modes = figures.audit->modes;
     fmt::print(notes, "modes as played    were given {:.4g} J, of which they hold {:.4g} J at the end and have lost {:.4g} J\n",
                modes.given_j, modes.held_j, modes.lost_j);
     fmt::print(notes, "  radiated         {:.4g} J of what damping takes from modes, by their radiation gains\n", modes.radiated_j);
+    print_contacts(notes, scene, figures.contacts);
   }
   if (sound.peak_pa > 0.0) {
     fmt::print(notes, "peak               {:.4g} Pa at the {}\n", sound.peak_pa, scene.microphones_m.empty() ? "ears" : "microphones");
@@ -305,7 +326,14 @@ class Run {
       fmt::print(stderr, "warning: {}\n", base::printable(warning));
       scene_.warnings.push_back(warning);
     }
-    if (options_->audit) figures_.audit = make_books(scene_, happened_.energy, sound);
+    if (options_->audit) {
+      figures_.audit = make_books(scene_, happened_.energy, sound);
+      figures_.contacts = happened_.contacts;
+      for (const std::string& warning : list_contact_warnings(scene_, happened_.contacts, happened_.energy)) {
+        fmt::print(stderr, "warning: {}\n", warning);
+        scene_.warnings.push_back(warning);
+      }
+    }
     figures_.real_time_factor = (figures_.physics_s + figures_.sound_s) / scene_.duration_s;
     figures_.modes = sound.modes;
     figures_.gain = calc_gain(scene_.output, sound.peak_pa);

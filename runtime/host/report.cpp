@@ -138,6 +138,35 @@ base::Json make_mounting_json(const Mounting& mounting) {
       .set("decay_per_s", make_list_json(mounting.decay_per_s));
 }
 
+base::Json make_pair_json(const Scene& scene, int body, int other) {
+  const auto name = [&](int i) { return i < 0 ? base::Json() : base::Json(scene.bodies[static_cast<std::size_t>(i)].name); };
+  return base::Json::object().set("body", name(body)).set("other", name(other));
+}
+
+base::Json make_depth_json(const Scene& scene, const contact::Depth& depth) {
+  return make_pair_json(scene, depth.body, depth.other)
+      .set("depth_m", make_figure(depth.depth_m))
+      .set("unexplained_m", make_figure(depth.unexplained_m))
+      .set("time_s", make_figure(depth.time_s, 9));
+}
+
+base::Json make_rate_json(const Scene& scene, const contact::HitRate& rate) {
+  return make_pair_json(scene, rate.body, rate.other).set("hits_per_s", make_figure(rate.per_s)).set("time_s", make_figure(rate.time_s, 9));
+}
+
+base::Json make_contacts_json(const Scene& scene, const contact::ContactAudit& contacts) {
+  return base::Json::object()
+      .set("deepest_now", make_depth_json(scene, contacts.now))
+      .set("deepest", make_depth_json(scene, contacts.deepest))
+      .set("deepest_unexplained", make_depth_json(scene, contacts.unexplained))
+      .set("pushes", contacts.pushes)
+      .set("hits_per_s", make_figure(contacts.hits_per_s))
+      .set("worst_pair", make_rate_json(scene, contacts.worst_pair))
+      .set("busiest_half_second", make_rate_json(scene, contacts.busiest))
+      .set("ended_impacts", contacts.ended_impacts)
+      .set("longest_impact_s", make_figure(contacts.longest_impact_s));
+}
+
 base::Json make_audit_json(const EnergyBooks& books) {
   const contact::EnergyAudit& bodies = books.bodies;
   return base::Json::object()
@@ -152,6 +181,7 @@ base::Json make_audit_json(const EnergyBooks& books) {
       .set("max_modes_j", make_figure(bodies.max_modes_j))
       .set("modes_share", make_figure(bodies.modes_share))
       .set("lost_j", make_figure(bodies.lost_j, 9))
+      .set("lifted_j", make_figure(bodies.lifted_j))
       .set("difference_j", make_figure(bodies.error_j))
       .set("modes_given_j", make_figure(books.modes.given_j, 9))
       .set("modes_held_j", make_figure(books.modes.held_j, 9))
@@ -285,6 +315,31 @@ EnergyBooks make_books(const Scene& scene, const contact::EnergyAudit& physics, 
   return books;
 }
 
+std::string describe_pair(const Scene& scene, int body, int other) {
+  if (body < 0) return "none";
+  const auto name = [&](int i) { return "'" + base::printable(scene.bodies[static_cast<std::size_t>(i)].name) + "'"; };
+  return fmt::format("{} and {}", name(body), other < 0 ? "the ground" : name(other));
+}
+
+std::vector<std::string> list_contact_warnings(const Scene& scene, const contact::ContactAudit& contacts,
+                                               const contact::EnergyAudit& energy) {
+  constexpr double kMaxLifted = 0.01;  // of the largest kinetic energy
+  constexpr double kMaxHits = 500.0;   // per s, of two bodies, for half a second
+  std::vector<std::string> warnings;
+  if (const contact::Depth& d = contacts.unexplained; d.calc_excess() > 1.0)
+    warnings.push_back(fmt::format(
+        "{} were {:.3g} mm inside each other at {:.4g} s, beyond what their impacts explain (0.1 mm, or 5 % of the thickness, are right)",
+        describe_pair(scene, d.body, d.other), 1e3 * d.unexplained_m, d.time_s));
+  if (energy.lifted_j > kMaxLifted * energy.kinetic_j)
+    warnings.push_back(fmt::format("bodies that were moved apart gained {:.3g} J, {:.2g} % of the largest kinetic energy", energy.lifted_j,
+                                   100.0 * energy.lifted_j / energy.kinetic_j));
+  if (const contact::HitRate& r = contacts.busiest; r.per_s > kMaxHits)
+    warnings.push_back(
+        fmt::format("{} struck each other {:.0f} times a second in the half second before {:.4g} s: they rattle, or should rest",
+                    describe_pair(scene, r.body, r.other), r.per_s, r.time_s));
+  return warnings;
+}
+
 std::string describe_limited(const SceneBody& body) {
   if (body.limited.modes == 0) return {};
   return fmt::format("{} of {} modes would radiate more than their damping takes: softer by up to {:.1f} dB", body.limited.modes,
@@ -354,6 +409,7 @@ std::string make_report_json(const Scene& scene, const Sound& sound, const Plan&
       .set("gain_reduced", f.gain.reduced)
       .set("faded_end_s", make_figure(sound.faded_s));
   if (f.audit) json.set("energy", make_audit_json(*f.audit));
+  if (f.audit) json.set("depth_and_hits", make_contacts_json(scene, f.contacts));
   for (const Blow& blow : f.blows) json.member("mallets").add(make_blow_json(blow));
   base::Json warnings = base::Json::array(), bodies = base::Json::array();
   for (const std::string& warning : scene.warnings) warnings.add(base::printable(warning));

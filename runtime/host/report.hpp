@@ -29,6 +29,12 @@ struct EnergyBooks {
 /// came from outside (strikes, mallets, a contacts file).
 EnergyBooks make_books(const Scene& scene, const contact::EnergyAudit& physics, const Sound& sound);
 
+/// What the audit of contacts asks to look at, a sentence each; empty where all is sound.
+std::vector<std::string> list_contact_warnings(const Scene& scene, const contact::ContactAudit& contacts,
+                                               const contact::EnergyAudit& energy);
+/// "'ball' in the ground"
+std::string describe_pair(const Scene& scene, int body, int other);
+
 /// One line about modes whose gains came down to what their damping takes; empty where there are none.
 std::string describe_limited(const SceneBody& body);
 
@@ -43,8 +49,9 @@ struct Figures {
   double sound_s = 0.0;
   Gain gain;
   std::optional<EnergyBooks> audit;
-  std::vector<Blow> blows;        // of mallets
-  double real_time_factor = 0.0;  // (physics_s + sound_s) / duration: below 1 is faster than real time
+  contact::ContactAudit contacts{};  // with it
+  std::vector<Blow> blows;           // of mallets
+  double real_time_factor = 0.0;     // (physics_s + sound_s) / duration: below 1 is faster than real time
 };
 std::string make_report_json(const Scene& scene, const Sound& sound, const Plan& plan, const Figures& figures);
 

@@ -127,7 +127,6 @@ void ModalImpacts::end_where_unexplained(const Step& step, TouchSets& touches) {
       end(*modal, touches);
       pair->calm_until_s = bodies_.get_time() + kCalmTime;
       for (Contact& c : pair->contacts) c.is_calm = true;
-      ++ledger_.costs.ended_impacts;
     }
   }
 }
@@ -289,6 +288,8 @@ void ModalImpacts::release(ModalImpact& modal, double time_s, TouchSets& touches
   for (ModalContact& contact : modal.contacts) report(contact);
   const std::vector<impact::Body> bodies = modal.impact->get_bodies();
   const double reached_s = modal.start_s + modal.impact->get_time();
+  if (!modal.impact->has_ended()) ++ledger_.costs.ended_impacts;
+  ledger_.costs.longest_impact_s = std::max(ledger_.costs.longest_impact_s, modal.impact->get_time());
   const impact::Books books = modal.impact->get_books();
   ledger_.lose(books.dissipated_modes + books.dissipated_contact + books.dissipated_friction + books.above_band + books.spring);
   for (int k = 0; const impact::Body& b : bodies) {

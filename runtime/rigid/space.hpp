@@ -10,6 +10,7 @@
 // ModalStates; each keeps its own state, and gets that of a step as a Step. All book their losses in the Ledger.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -62,6 +63,13 @@ class Space {
   const Vec3& get_spin(int body) const { return bodies_.placed(body).spin; }
   /// Contacts of bodies that are awake.
   void list_contacts(std::vector<const Contact*>& out) const;
+  /// Of bodies that are near in this window, and of still ones that touch. b: -1 for the ground, or greater than a.
+  const std::map<std::pair<int, int>, Pair>& pairs() const { return touches_.pairs(); }
+  /// Depth of a pair that an impact with modes left in its surfaces [m].
+  double calc_explained_depth(int a, int b) const {
+    const auto at = pairs().find({a, b});
+    return at == pairs().end() ? 0.0 : at->second.sag_m;
+  }
   /// Impacts since the last call.
   std::vector<Strike> take_strikes() { return std::exchange(strikes_, {}); }
   /// Forces of impacts with modes since the last call.

@@ -21,7 +21,7 @@ sys.path.insert(0, str(HERE.parent / "support"))
 import ctest
 
 PAGE = HERE.parents[1] / "docs/reports/stability.md"
-GROUPS = ["meshes", "materials", "spectra", "ranks", "air", "motion", "time", "formats", "cross"]
+GROUPS = ["meshes", "materials", "spectra", "ranks", "air", "motion", "time", "depth", "formats", "cross"]
 KEYS = {"id", "title", "risk", "method", "figure"}
 HEAD = "| case | what could go wrong | what we do | figure | measured | bound |\n|---|---|---|---|---|---|\n"
 

@@ -378,9 +378,18 @@ class RenderProgram(unittest.TestCase):
             "  motion           ",
             "  modes            ",
             "  lost             ",
+            "  lifted           ",
             "  radiated         ",
+            "depth              ",
+            "  pushes           ",
+            "hits               ",
+            "impacts with modes ",
         ):
             self.assertIn("\n" + line, run.stdout)
+        audit = json.loads((self.root / "books-report.json").read_text())["depth_and_hits"]
+        self.assertEqual((audit["deepest"]["body"], audit["deepest"]["other"]), ("cube", None))
+        self.assertGreater(audit["deepest"]["depth_m"], 0.0)
+        self.assertGreater(audit["longest_impact_s"], 0.0)
 
     def test_what_is_radiated_is_the_share_of_the_radiation_in_the_damping(self):
         # An ideal impulse J at the corner (-, -, -) gives each of the five modes (1.1 J)^2 / 2. Of it 2 pi g^2 / (rho c d) is radiated, all

@@ -5,8 +5,10 @@
 //          when all slept [s]
 //        bench_piles steps
 //          prints what the longest step costs, and how far two motions are from their solutions
-//   SCENE: pile10 pile20 pile50 bars stack dominoes ball coin bottle cards bunnies2 bunnies3
+//   SCENE: pile10 pile20 pile50 heap bars stack dominoes ball coin bottle cards bunnies2 bunnies3
 //   TRIANGLES: of a box of a pile; 12, 512 or 8384
+#include <BulletCollision/Gimpact/btGImpactCollisionAlgorithm.h>
+#include <BulletCollision/Gimpact/btGImpactShape.h>
 #include <btBulletDynamicsCommon.h>
 #include <fmt/format.h>
 
@@ -18,6 +20,7 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <set>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -27,6 +30,7 @@
 #include "runtime/contact/world.hpp"
 #include "tests/unit/runtime/contact/leaning_train.hpp"
 #include "tests/unit/runtime/contact/solids.hpp"
+#include "tests/unit/runtime/rigid/drops.hpp"
 #include "tests/unit/runtime/shape/solids.hpp"
 
 namespace {
@@ -123,7 +127,8 @@ bank::Bank make_bunny(double height_m) {
 struct Scene {
   std::vector<std::unique_ptr<bank::Bank>> banks;
   contact::WorldSpec spec;
-  double ball_radius_m = 0.0;  // where the body is one; Bullet has a shape for it
+  double ball_radius_m = 0.0;          // where the body is one; Bullet has a shape for it
+  std::set<const bank::Bank*> hollow;  // not convex
 
   const bank::Bank* keep(bank::Bank bank) { return banks.emplace_back(std::make_unique<bank::Bank>(std::move(bank))).get(); }
   contact::BodySpec& add(const bank::Bank* bank, const Vec3& position) {
@@ -162,6 +167,15 @@ Scene make_scene(const std::string& name, int triangles) {
     for (int i = 0; i < count; ++i) {
       // From a grid of two by two, layer above layer, each turned.
       contact::BodySpec& body = scene.add(box, {0.045 * (i % 2 ? 1 : -1), 0.045 * (i / 2 % 2 ? 1 : -1), 0.06 + 0.09 * (i / 4)});
+      turn(body, 0.3 + 0.7 * i, {0.6, 0.0, 0.8});
+    }
+  } else if (name == "heap") {
+    std::vector<const bank::Bank*> kinds;  // coin, ring, bowl, rod
+    for (const int body : {1, 2, 6, 3}) kinds.push_back(scene.keep(make_bank(rigid::tests::make_drop_surface(body))));
+    scene.hollow = {kinds[1], kinds[2]};
+    for (int i = 0; i < 12; ++i) {
+      contact::BodySpec& body = scene.add(kinds[static_cast<std::size_t>((i + i / 4) % 4)],
+                                          {0.03 * (i % 2 ? 1 : -1), 0.03 * (i / 2 % 2 ? 1 : -1), 0.12 + 0.17 * i});
       turn(body, 0.3 + 0.7 * i, {0.6, 0.0, 0.8});
     }
   } else if (name == "bars") {
@@ -285,11 +299,22 @@ Cost run_bullet(const Scene& scene, double end_s) {
   ground_info.m_friction = btScalar(kFriction);
   btRigidBody ground(ground_info);
   world.addRigidBody(&ground);
-  std::map<const bank::Bank*, std::unique_ptr<btConvexShape>> shapes;
+  btGImpactCollisionAlgorithm::registerAlgorithm(&dispatcher);
+  std::vector<std::unique_ptr<btTriangleMesh>> meshes;
+  std::map<const bank::Bank*, std::unique_ptr<btCollisionShape>> shapes;
   std::vector<std::unique_ptr<btRigidBody>> bodies;
   for (const contact::BodySpec& spec : scene.spec.bodies) {
-    std::unique_ptr<btConvexShape>& shape = shapes[spec.bank];
+    std::unique_ptr<btCollisionShape>& shape = shapes[spec.bank];
     if (!shape && scene.ball_radius_m > 0.0) shape = std::make_unique<btSphereShape>(btScalar(scene.ball_radius_m));
+    if (!shape && scene.hollow.contains(spec.bank)) {
+      auto& mesh = meshes.emplace_back(std::make_unique<btTriangleMesh>());
+      const auto get = [&](std::int32_t vertex) { return to_bullet(spec.bank->vertices_m[static_cast<std::size_t>(vertex)]); };
+      for (const auto& t : spec.bank->triangles) mesh->addTriangle(get(t[0]), get(t[1]), get(t[2]));
+      auto triangles = std::make_unique<btGImpactMeshShape>(mesh.get());
+      triangles->setMargin(btScalar(0.0005));
+      triangles->updateBound();
+      shape = std::move(triangles);
+    }
     if (!shape) {
       auto hull = std::make_unique<btConvexHullShape>();
       for (const Vec3& x : spec.bank->vertices_m) hull->addPoint(to_bullet(x), false);

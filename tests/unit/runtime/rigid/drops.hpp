@@ -142,14 +142,35 @@ inline Drop decode_drop(const std::array<std::uint8_t, 16>& bytes) {
 
 struct DropOutcome {
   double deepest_m = 0.0, rests_m = 0.0;  // of the lowest vertex: ever, and in the last 0.2 s
-  double missed_m = 0.0;                  // a vertex below all touches and below the floor, at most
-  double gained = 0.0;                    // energy above that at the start, of the largest kinetic energy
+  double ends_m = 0.0;                    // at the end
+  double missed_m = 0.0;                  // a vertex below the floor and below all touches of a step, at its end, at most
+  double gained = 0.0;                    // energy above that at the start and what was lifted, of the largest kinetic energy
   double speed_m_s = 0.0;                 // at the end
   double lifted = 0.0;                    // of the largest kinetic energy
   int late_hits = 0;                      // in the last 0.5 s
   int hits = 0;
+  double thickness_m = 0.0;
   bool sleeps = false, is_on_floor = true;  // no part of it is beyond the slab's sides
 };
+
+/// Of the touches of body 0 and `other`, as they are now; 0 where there is none below the floor [m].
+inline double find_least_gap(const Space& space, int other) {
+  const auto at = space.pairs().find({0, other});
+  if (at == space.pairs().end()) return 0.0;
+  shape::PairMemory memory = at->second.memory;
+  const shape::Frame mine = place(space.solid(0), space.state(0)).frame;
+  const shape::Frame theirs = other < 0 ? shape::Frame{} : place(space.solid(other), space.state(other)).frame;
+  double least = 0.0;
+  for (const Contact& c : at->second.contacts) {
+    shape::Touch touch = c.touch;
+    shape::refresh(touch, *space.solid(0).shape, mine, other < 0 ? nullptr : space.solid(other).shape.get(), theirs, memory);
+    least = std::min(least, touch.gap_m);
+  }
+  return least;
+}
+
+/// How deep a rigid body may ever be: 50 um or 1 % of its thickness [m].
+inline double calc_allowed_depth(const DropOutcome& outcome) { return std::max(5e-5, 0.01 * outcome.thickness_m); }
 
 inline DropOutcome run_drop(const Drop& d, double seconds) {
   using shape::tests::make_turn;
@@ -194,9 +215,9 @@ inline DropOutcome run_drop(const Drop& d, double seconds) {
   }
   Space space(std::move(solids), std::move(states), ground, gravity, {});
   DropOutcome out;
+  out.thickness_m = space.solid(0).shape->get_thickness_m();
   const double before = space.calc_books().motion_j;
   double kinetic = 1e-3 * 9.81 * body.solid.mass_kg;  // 1 mm of height
-  std::vector<const Contact*> contacts;
   while (space.get_time() < seconds - 1e-9) {
     space.step(seconds);
     const double now = space.get_time();
@@ -211,16 +232,12 @@ inline DropOutcome run_drop(const Drop& d, double seconds) {
     if (!out.is_on_floor) return out;
     const double depth = std::max(0.0, -lowest);
     out.deepest_m = std::max(out.deepest_m, depth);
+    out.ends_m = depth;
     if (now > seconds - 0.2) out.rests_m = std::max(out.rests_m, depth);
-    if (!space.is_still(0)) {
-      space.list_contacts(contacts);
-      double gap = 0.0;
-      for (const Contact* c : contacts) gap = std::min(gap, c->touch.gap_m);
-      out.missed_m = std::max(out.missed_m, depth + gap);
-    }
+    if (!space.is_still(0)) out.missed_m = std::max(out.missed_m, depth + find_least_gap(space, d.floor == DropFloor::slab ? 1 : -1));
     const Books books = space.calc_books();
     kinetic = std::max(kinetic, calc_kinetic(body.solid, s));
-    out.gained = std::max(out.gained, (books.motion_j - before) / kinetic);
+    out.gained = std::max(out.gained, (books.motion_j - books.lifted_j - before) / kinetic);
     for (const Strike& strike : space.take_strikes())
       for (const Hit& hit : strike.hits)
         if (hit.approach_m_s > 0.0 && norm(hit.impulse) > 0.0) {
@@ -232,6 +249,25 @@ inline DropOutcome run_drop(const Drop& d, double seconds) {
   out.speed_m_s = norm(space.state(0).velocity);
   out.sleeps = space.is_still(0);
   return out;
+}
+
+/// Bounds of every drop of a rigid body.
+struct DropBounds {
+  double rests_m = 25e-6, ever = 1.0;  // asleep, or in the last 0.2 s; over calc_allowed_depth()
+  double missed_m = 2e-6, gained = 1e-5, lifted = 1e-3;
+};
+inline constexpr DropBounds kWanted;
+/// What random drops keep at present.
+inline constexpr DropBounds kHeldToday{.ever = 4.0, .missed_m = 5e-5, .gained = 1e-4, .lifted = 1.0};
+
+/// The bound that an outcome has violated; empty: none.
+inline std::string describe_fault(const DropOutcome& o, const DropBounds& bounds) {
+  if (o.sleeps && o.ends_m > bounds.rests_m) return "sleeps " + std::to_string(1e6 * o.ends_m) + " um deep";
+  if (o.deepest_m > bounds.ever * calc_allowed_depth(o)) return "was " + std::to_string(1e6 * o.deepest_m) + " um deep";
+  if (o.missed_m > bounds.missed_m) return "was " + std::to_string(1e6 * o.missed_m) + " um deeper than its touches";
+  if (o.gained > bounds.gained) return "gained a share of " + std::to_string(o.gained) + " of its energy";
+  if (o.lifted > bounds.lifted) return "was lifted by a share of " + std::to_string(o.lifted) + " of its energy";
+  return {};
 }
 
 }  // namespace carillon::rigid::tests

@@ -1,0 +1,112 @@
+// Hard cases of depth: chains of rings that must hold, and a heap of curved bodies.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "tests/hard/contact_course.hpp"
+#include "tests/hard/figure.hpp"
+#include "tests/unit/runtime/rigid/drops.hpp"
+
+namespace carillon::hard {
+namespace {
+
+constexpr double kWindow = 2e-3;  // s
+
+/// Rings that hang in each other, the first of them fixed, let go as a horizontal row.
+void swing(const std::string& id, int count, double seconds) {
+  constexpr double kRadius = 0.02, kWire = 0.003, kInner = 2.0 * (kRadius - kWire);
+  const bank::Bank ring = make_bank(shape::tests::make_ring(kRadius, kWire, 48, 16), 7800.0);
+  const double q = std::sqrt(0.5);
+  WorldSpec spec;
+  for (int i = 0; i < count; ++i) {
+    spec.bodies.push_back(make_body(ring, {(kInner - 2e-4) * i, 0, 0}));
+    if (i % 2 != 0) spec.bodies.back().initial.rotation = {q, q, 0, 0};
+  }
+  spec.bodies.front().fixed = true;
+  World world(spec, {.end_s = seconds, .modes = false, .lasting_contacts = false, .audits_energy = true});
+  std::vector<Vec3> at(spec.bodies.size());
+  double apart_m = 0.0;
+  world.advance(seconds, std::numeric_limits<double>::infinity(), [&](const events::Event& event) {
+    // Bodies are all known at the ends of windows.
+    if (const auto* m = std::get_if<events::BodyMotion>(&event);
+        m != nullptr && std::abs(m->time_s / kWindow - std::round(m->time_s / kWindow)) < 1e-9)
+      at[static_cast<std::size_t>(m->body)] = m->position_m;
+    if (std::holds_alternative<events::TimeWatermark>(event))
+      for (std::size_t i = 1; i < at.size(); ++i) apart_m = std::max(apart_m, norm(at[i] - at[i - 1]) - kInner);
+  });
+  const contact::Statistics statistics = world.get_statistics();
+  hold(id, apart_m, 5e-5, "distance of neighbours beyond the inner width [m]");
+  hold(id, statistics.contacts.deepest.depth_m, 6e-5, "deepest in each other ever [m]");
+  hold(id, statistics.energy.lifted_j / statistics.energy.kinetic_j, 1e-3, "energy lifted over the largest of motion");
+  hold(id, statistics.energy.error_j / statistics.energy.kinetic_j, 1e-3, "energy not accounted for over the largest of motion");
+}
+
+TEST(depth, chain_of_3) { swing("chain_of_3", 3, 5.0); }
+TEST(depth, chain_of_6) { swing("chain_of_6", 6, 5.0); }
+TEST(depth, chain_of_12) { swing("chain_of_12", 12, 0.8); }
+
+TEST(depth, heap) {
+  std::vector<bank::Bank> banks;
+  for (const int kind : {1, 2, 5, 6}) banks.push_back(make_bank(rigid::tests::make_drop_surface(kind), 2500.0));
+  const bank::Bank wall = make_dense_box({0.42, 0.02, 0.6}, 2700.0);
+  constexpr int kCount = 12;
+  constexpr double kEnd = 6.0;
+  WorldSpec spec;
+  spec.ground = GroundSpec{};
+  for (int i = 0; i < kCount; ++i) {
+    const bank::Bank& bank = banks[static_cast<std::size_t>((i + i / 4) % 4)];
+    spec.bodies.push_back(make_body(
+        bank, {0.09 * (i / 2 % 2 != 0 ? 1 : -1) + 0.002 * (i % 5), 0.09 * (i % 2 != 0 ? 1 : -1) - 0.001 * (i % 7), 0.12 + 0.17 * (i / 4)}));
+    const double half = 0.5 * (0.3 + 0.7 * i);
+    spec.bodies.back().initial.rotation = {std::cos(half), 0.6 * std::sin(half), 0, 0.8 * std::sin(half)};
+  }
+  const double q = std::sqrt(0.5);
+  for (const double side : {-0.2, 0.2})
+    for (const bool is_turned : {false, true}) {
+      spec.bodies.push_back(make_body(wall, is_turned ? Vec3{side, 0, 0.3} : Vec3{0, side, 0.3}));
+      spec.bodies.back().fixed = true;
+      if (is_turned) spec.bodies.back().initial.rotation = {q, 0, 0, q};
+    }
+  World world(spec, {.end_s = kEnd, .modes = false, .lasting_contacts = false, .audits_energy = true});
+  std::vector<events::BodyMotion> at(spec.bodies.size());
+  double awake_s = 0.0;
+  std::int64_t steps = 0;
+  for (int n = 1; n <= 60; ++n) {
+    world.advance(kEnd * n / 60, std::numeric_limits<double>::infinity(), [&](const events::Event& event) {
+      if (const auto* m = std::get_if<events::BodyMotion>(&event)) at[static_cast<std::size_t>(m->body)] = *m;
+    });
+    if (std::exchange(steps, world.get_statistics().steps) != steps) awake_s = kEnd * n / 60;
+  }
+  double in_ground_m = 0.0, in_bodies_m = 0.0;
+  std::vector<std::unique_ptr<shape::Shape>> shapes;
+  std::vector<shape::Frame> frames;
+  for (std::size_t i = 0; i < at.size(); ++i) {
+    const bank::Bank& bank = *spec.bodies[i].bank;
+    shapes.push_back(std::make_unique<shape::Shape>(bank.vertices_m, bank.triangles));
+    const contact::Pose pose = contact::calc_pose(at[i], bank.rigid.centre_m);
+    frames.push_back({rigid::make_rotation(pose.rotation), pose.position_m});
+    if (!spec.bodies[i].fixed) in_ground_m = std::max(in_ground_m, calc_depth(bank, at[i]));
+    for (std::size_t k = 0; k < i; ++k) {
+      Vec3 where{};
+      if (!spec.bodies[i].fixed || !spec.bodies[k].fixed)
+        in_bodies_m = std::max(in_bodies_m, shape::calc_overlap(*shapes[k], frames[k], *shapes[i], frames[i], where));
+    }
+  }
+  const contact::Statistics statistics = world.get_statistics();
+  hold("heap", in_ground_m, 1e-4, "in the ground at the end [m]");
+  hold("heap", in_bodies_m, 2e-4, "in each other at the end [m]");
+  hold("heap", statistics.contacts.deepest.depth_m, 5e-3, "deepest ever [m]");
+  hold("heap", awake_s, kEnd, "last moment awake [s]");
+  hold("heap", statistics.energy.lifted_j / statistics.energy.kinetic_j, 0.05, "energy lifted over the largest of motion");
+}
+
+}  // namespace
+}  // namespace carillon::hard
