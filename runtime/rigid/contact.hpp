@@ -46,7 +46,12 @@ struct Pair {
   bool searched = false;
   std::int64_t window = -1;  // in which it was last near
   int cord = -1;             // it is one
-  double sag_m = 0.0;        // depth in which an impact with modes left it: not pushed out, as the surface has yielded
+  struct SlowHit {
+    double time_s = -1.0, speed_m_s = 0.0;
+  };
+  std::array<SlowHit, 4> slow_hits{};  // its last impacts slower than kRattling, since a faster one
+  double rattles_until_s = -1.0;       // until then its slow touches last
+  double sag_m = 0.0;                  // depth in which an impact with modes left it: not pushed out, as the surface has yielded
 
   bool touches() const {
     return std::any_of(contacts.begin(), contacts.end(), [](const Contact& c) { return c.touching; });

@@ -83,6 +83,29 @@ TEST(step_problem, block_on_a_slope_balances_gravity_or_slides) {
   }
 }
 
+TEST(instants, slow_touches_of_a_pair_that_rattles_last) {
+  for (const bool decays : {false, true}) {
+    Stages stages({make_box(0.1, kBoxSides)}, {make_state({0, 0, 0.02 + 1e-6}, {0, 0, -0.02})}, kWood, {0, 0, -kGravity});
+    stages.begin({{0, -1}});
+    Pair& pair = *stages.island.pairs[0];
+    const std::vector<ContactRef> struck{{&pair, 0}};
+    const auto strikes = [&] { return is_fast(stages.bodies, pair, pair.contacts[0], 1e-3); };
+    double speed = 0.04;
+    for (int n = 0; n < 5; ++n) {
+      stages.bodies.set_time(1e-3 * n);
+      EXPECT_TRUE(strikes()) << n;
+      stages.instants.note(struck, {{.a = 0, .b = -1, .touch = pair.contacts[0].touch, .approach_m_s = speed}}, stages.bodies.get_time());
+      if (decays) speed *= stages.bodies.calc_restitution(0, -1);
+    }
+    EXPECT_EQ(strikes(), decays) << "a bounce that comes to rest is no rattle";
+    stages.bodies.state(0).velocity = {0, 0, -0.1};
+    EXPECT_TRUE(strikes());
+    stages.bodies.state(0).velocity = {0, 0, -0.02};
+    stages.bodies.set_time(0.02);
+    EXPECT_TRUE(strikes()) << "it rattles no longer";
+  }
+}
+
 TEST(instants, fall_onto_the_ground_is_found_by_its_closed_form) {
   const double gap = 2e-5, speed = 0.1, h = 5e-4;
   Stages stages({make_box(0.1, kBoxSides)}, {make_state({0, 0, 0.02 + gap}, {0, 0, -speed})}, kWood, {0, 0, -kGravity});
