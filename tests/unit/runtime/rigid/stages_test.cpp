@@ -8,6 +8,8 @@
 #include <memory>
 #include <random>
 
+#include "runtime/rigid/space.hpp"
+
 namespace carillon::rigid {
 namespace {
 
@@ -150,6 +152,37 @@ struct Boxes {
     return 1.0 / inverse;
   }
 };
+
+TEST(rigid_impact, a_row_of_equal_balls_passes_a_blow_on) {
+  const double radius = 0.02;
+  const shape::tests::Solid surface = shape::tests::make_ball(radius, 3);
+  const double pitch = 2 * radius - 7.46e-5;  // faces touch there
+  for (const double e : {1.0, 0.95})
+    for (const int struck : {1, 2}) {
+      std::vector<Solid> balls;
+      std::vector<State> states;
+      for (int i = 0; i < 5; ++i) {
+        balls.push_back(make_solid(surface, 0.1, {2 * radius, 2 * radius, 2 * radius}));
+        balls.back().restitution = e;
+        balls.back().friction = 0.0;
+        states.push_back(make_state({pitch * i + (i < struck ? -1e-3 : 0.0), 0, 0}, {i < struck ? 1.0 : 0.0, 0, 0}));
+      }
+      Space space(balls, states, std::nullopt, {}, {});
+      while (space.get_time() < 0.01) space.step(0.01);
+      double momentum = 0.0, kinetic = 0.0;
+      for (int i = 0; i < 5; ++i) {
+        const double v = space.state(i).velocity[0];
+        momentum += v;
+        kinetic += v * v;
+        if (e == 1.0) {
+          EXPECT_NEAR(v, i < 5 - struck ? 0.0 : 1.0, 1e-3) << struck << " struck, ball " << i;
+        }
+      }
+      EXPECT_NEAR(momentum, struck, 1e-9);
+      EXPECT_LE(kinetic, struck + 1e-9);
+      EXPECT_GT(space.state(4).velocity[0], std::pow(0.5 * (1.0 + e), 4.0) - 1e-3);
+    }
+}
 
 TEST(rigid_impact, impulse_and_loss_of_an_oblique_hit_are_those_of_newton) {
   const Boxes boxes;
