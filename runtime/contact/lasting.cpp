@@ -107,11 +107,26 @@ double LastingContacts::calc_impedance(int body, double patch_m) const {
   return bank::calc_wave_impedance(material) * std::numbers::pi * patch_m * patch_m;
 }
 
+/// What lay has had no record since. Its last values once more, so that nothing is interpolated over the time before it was struck.
+void LastingContacts::stir(const rigid::Space& space, Spot& spot, std::vector<events::Event>& events) {
+  if (!spot.lies) return;
+  spot.lies = false;
+  if (spot.begun_s < 0.0) return;
+  spot.rises_s = space.get_window_start();
+  spot.from_n = spot.last[0].force_n;
+  for (events::LastingContact& c : spot.last) {
+    if (c.body < 0) continue;
+    c.time_s = spot.rises_s;
+    events.push_back(c);
+  }
+}
+
 void LastingContacts::record(const rigid::Space& space, const Group& g, Spot& spot, std::vector<events::Event>& events) {
   const double time_s = space.get_time();
   const bool is_new = spot.begun_s < 0.0;
+  stir(space, spot, events);
   if (is_new) {
-    spot.begun_s = time_s;
+    spot.begun_s = spot.rises_s = time_s;
     spot.radius_m = 1.0 / std::clamp(g.curvature_per_m, 1.0 / (5.0 * calc_spot_radius(space, g.a, g.b)), 1.0 / kSharpest);
   }
   spot.recorded_s = time_s;
@@ -141,7 +156,7 @@ void LastingContacts::record(const rigid::Space& space, const Group& g, Spot& sp
     c.barycentric = place.barycentric;
     c.normal = back * (sign * g.normal);
     c.slip_m_s = back * (sign * slip);
-    c.force_n = spot.load_n * std::min(1.0, (time_s - spot.begun_s) / kRise);
+    c.force_n = spot.from_n + (spot.load_n - spot.from_n) * std::min(1.0, (time_s - spot.rises_s) / kRise);
     c.sweep_m_s = side == 0 ? sweep_a : sweep_b;
     c.other_sweep_m_s = side == 0 ? sweep_b : sweep_a;
     c.spin_rad_s = norm(g.turn);
@@ -187,6 +202,8 @@ void LastingContacts::update(const rigid::Space& space, std::vector<events::Even
       Spot spot;
       spot.a = g.a;
       spot.b = g.b;
+      spot.last[0].body = g.a;
+      spot.last[1].body = g.b;
       spot.where = g.where;
       spot.features = g.features;
       spot.load_n = g.push_n;
@@ -227,7 +244,7 @@ void LastingContacts::end_or_keep(const rigid::Space& space, std::vector<Spot>& 
       spot.seen_s = time_s;
       for (const int side : {0, 1}) {
         events::LastingContact& c = spot.last[static_cast<std::size_t>(side)];
-        if (spot.lies || spot.begun_s < 0.0 || (side == 0 ? spot.a : spot.b) < 0) continue;
+        if (spot.lies || spot.begun_s < 0.0 || c.body < 0) continue;
         c.time_s = time_s;
         c.state = events::ContactState::kHold;
         c.slip_m_s = {};
@@ -236,12 +253,13 @@ void LastingContacts::end_or_keep(const rigid::Space& space, std::vector<Spot>& 
         events.push_back(c);
       }
     }
+    if (!lies) stir(space, spot, events);
     spot.lies = lies;
     if (lies) continue;
     if (time_s - spot.seen_s <= kGone || spot.begun_s < 0.0) continue;
     for (const int side : {0, 1}) {
       events::LastingContact c = spot.last[static_cast<std::size_t>(side)];
-      if ((side == 0 ? spot.a : spot.b) < 0) continue;
+      if (c.body < 0) continue;
       c.time_s = time_s;
       c.state = events::ContactState::kEnd;
       c.force_n = 0.0;

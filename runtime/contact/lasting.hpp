@@ -63,6 +63,7 @@ class LastingContacts {
     double seen_s = 0.0;         // when it last touched
     double recorded_s = 0.0;
     double begun_s = -1.0;                       // time of its first record; below 0: none yet
+    double rises_s = 0.0, from_n = 0.0;          // the force rises from there, since its first record or since it lay
     double load_n = 0.0;                         // smoothed
     bool lies = false;                           // both bodies lie still
     double radius_m = 0.0;                       // of the Hertz contact of both surfaces there
@@ -78,6 +79,7 @@ class LastingContacts {
 
   void make_groups(const rigid::Space& space);
   Group make_group(const rigid::Space& space, std::span<Carrier> carriers);
+  void stir(const rigid::Space& space, Spot& spot, std::vector<events::Event>& events);
   void record(const rigid::Space& space, const Group& group, Spot& spot, std::vector<events::Event>& events);
   void end_or_keep(const rigid::Space& space, std::vector<Spot>& spots, std::vector<events::Event>& events);
   std::uint64_t make_id(const Spot& spot);

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "runtime/base/crossing.hpp"
 #include "runtime/rigid/cords.hpp"
@@ -19,22 +20,28 @@ constexpr double kInstant = 1e-9;  // m; tolerance of an instant of impact,
 constexpr int kLooks = 20;         // and evaluations at most
 constexpr double kNear = 1e-6;     // m; a touch that is nearer at the end of a step strikes there
 constexpr double kCrowded = 2e-3;  // s; for so long an island is crowded
-constexpr double kCalm = 20e-3;    // m/s; slower touches of calm contacts last
+constexpr double kRattle = 10e-3;  // s; within it a pair has more slow impacts than Pair::slow_hits holds, and then none for so long
 
-}  // namespace
-
-bool is_fast(const Bodies& bodies, const Contact& c, double h) {
+/// Will this touch close within the step, faster than `slowest`?
+bool is_faster(const Bodies& bodies, const Contact& c, double h, double slowest) {
   if (c.presses || c.is_closed()) return false;
   const double approach = bodies.calc_approach(c.touch, c.a, c.b), gap = std::max(c.touch.gap_m, 0.0);
   double pull = 0.0;  // closing acceleration in flight
   if (bodies.moves(c.a)) pull -= dot(bodies.gravity(), c.touch.normal);
   if (bodies.moves(c.b)) pull += dot(bodies.gravity(), c.touch.normal);
-  if (c.is_calm && approach < kCalm) return false;
   const double square = approach * approach + 2.0 * std::max(pull, 0.0) * gap;
-  if (square <= kSlowest * kSlowest) return false;
+  if (square <= slowest * slowest) return false;
   // A touch that has just rebounded comes back within the step only if it is slow.
   if (approach < 0.0) return pull > 0.0 && -approach + std::sqrt(square) <= pull * h;
   return gap <= approach * h + 0.5 * norm(bodies.gravity()) * h * h + 1e-6;
+}
+
+bool rattles(const Bodies& bodies, const Pair& pair) { return bodies.get_time() < pair.rattles_until_s; }
+
+}  // namespace
+
+bool is_fast(const Bodies& bodies, const Pair& pair, const Contact& c, double h) {
+  return is_faster(bodies, c, h, rattles(bodies, pair) ? kRattling : kSlowest);
 }
 
 bool Instants::find(const Step& step, double& at_s, std::vector<ContactRef>& first) const {
@@ -49,7 +56,8 @@ bool Instants::find(const Step& step, double& at_s, std::vector<ContactRef>& fir
     if (!step.has(*pair)) continue;
     for (int k = 0; const Contact& c : pair->contacts) {
       const ContactRef ref{pair, k++};
-      if (!is_fast(bodies_, c, h)) {
+      if (!is_fast(bodies_, *pair, c, h)) {
+        if (rattles(bodies_, *pair) && is_faster(bodies_, c, h, kSlowest)) pair->rattles_until_s = bodies_.get_time() + h + kRattle;
         if (c.closes_s >= 0.0 && !c.presses) candidates.push_back({ref, c.closes_s, 0.0});
         continue;
       }
@@ -116,7 +124,7 @@ std::vector<ContactRef> Instants::list_closing(const Step& step, double step_s) 
     if (!step.has(*pair)) continue;
     for (int k = 0; const Contact& c : pair->contacts) {
       const ContactRef ref{pair, k++};
-      if (is_fast(bodies_, c, step_s) && bodies_.calc_approach(c.touch, c.a, c.b) > 0.0) closing.push_back(ref);
+      if (is_fast(bodies_, *pair, c, step_s) && bodies_.calc_approach(c.touch, c.a, c.b) > 0.0) closing.push_back(ref);
     }
   }
   return closing;
@@ -142,6 +150,27 @@ bool Instants::confirm(const Step& step, std::vector<ContactRef>& first, double 
     }
   }
   return any;
+}
+
+void Instants::note(const std::vector<ContactRef>& contacts, const std::vector<Hit>& hits, double time_s) const {
+  std::map<Pair*, double> fastest;
+  for (int n = 0; const ContactRef& ref : contacts) {
+    const Hit& hit = hits[n++];
+    if (!hit.is_cord) fastest[ref.pair] = std::max(fastest[ref.pair], hit.approach_m_s);
+  }
+  for (const auto& [pair, speed] : fastest) {
+    if (speed <= kSlowest) continue;
+    if (speed >= kRattling) {
+      pair->slow_hits.fill({});
+      continue;
+    }
+    // A ball that bounces to rest strikes as often, but each time slower by its restitution e: by e^4 over these.
+    const Pair::SlowHit& first = pair->slow_hits.front();
+    const bool decays = speed < std::pow(bodies_.calc_restitution(pair->a, pair->b), 2.0) * first.speed_m_s;
+    if (first.time_s >= 0.0 && time_s - first.time_s < kRattle && !decays) pair->rattles_until_s = time_s + kRattle;
+    std::shift_left(pair->slow_hits.begin(), pair->slow_hits.end(), 1);
+    pair->slow_hits.back() = {time_s, speed};
+  }
 }
 
 void Instants::set_crowded(const Island& island, double time_s) {

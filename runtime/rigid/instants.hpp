@@ -9,8 +9,8 @@
 
 namespace carillon::rigid {
 
-/// Will this touch close within the step, and fast enough for an impact?
-bool is_fast(const Bodies& bodies, const Contact& contact, double step_s);
+/// Will this touch close within the step, and fast enough for an impact of its pair?
+bool is_fast(const Bodies& bodies, const Pair& pair, const Contact& contact, double step_s);
 
 /// Finds the instants of impacts on the predicted paths of a step, and knows which islands have so many that they are crowded: those strike
 /// once a step.
@@ -25,6 +25,9 @@ class Instants {
   /// Searches the pairs of an impact again, as they are at its instant: an edge that passes another one closely was taken for a plane until
   /// now. Keeps the touches that close within step.together_s of the first one, whose gap is at most `near_m` (infinite: of now).
   bool confirm(const Step& step, std::vector<ContactRef>& first, double step_s, double near_m) const;
+
+  /// An impact of these hits: a pair that has many slow ones rattles.
+  void note(const std::vector<ContactRef>& contacts, const std::vector<Hit>& hits, double time_s) const;
 
   void set_crowded(const Island& island, double time_s);
   bool is_crowded(int body, double time_s) const { return crowded_until_s_[body] > time_s; }

@@ -4,6 +4,7 @@
 namespace carillon::rigid {
 
 inline constexpr double kSlowest = 1e-3;   // m/s; a touch slower than this is no impact (a fall from 0.05 um)
+inline constexpr double kRattling = 5e-2;  // m/s; slower touches of a pair that rattles are no impacts
 inline constexpr double kTogether = 1e-4;  // s; touches nearer in time than this are one impact
 inline constexpr double kTouch = 1e-7;     // m; nearer than this is in touch
 inline constexpr double kDeep = 2e-6;      // m; deeper contacts are pushed out

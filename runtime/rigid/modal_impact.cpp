@@ -125,8 +125,7 @@ void ModalImpacts::end_where_unexplained(const Step& step, TouchSets& touches) {
       });
       if (!is_deep) continue;
       end(*modal, touches);
-      pair->calm_until_s = bodies_.get_time() + kCalmTime;
-      for (Contact& c : pair->contacts) c.is_calm = true;
+      pair->rattles_until_s = std::max(pair->rattles_until_s, bodies_.get_time() + kCalmTime);
     }
   }
 }

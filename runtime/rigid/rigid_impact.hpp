@@ -38,6 +38,8 @@ class RigidImpact {
   Strike apply(Collision& collision, double& lost_j);
 
  private:
+  bool is_row(const Collision& collision) const;
+  void solve_row(Collision& collision) const;
   Hit make_hit(const Collision& collision, const Contact& contact, Point& point) const;
 
   Bodies& bodies_;

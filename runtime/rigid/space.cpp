@@ -186,6 +186,7 @@ void Space::strike(const std::vector<ContactRef>& first) {
   std::vector<ContactRef> contacts = rigid_impact_.gather(step_, first);
   while (rest_.wake_struck(step_, contacts)) contacts = rigid_impact_.gather(step_, first);
   Collision collision = rigid_impact_.make(step_, std::move(contacts));
+  instants_.note(collision.contacts, collision.hits, get_time());
   const auto keep_triangles = [&](const std::vector<Hit>& hits) {
     for (int n = 0; const Hit& hit : hits) collision.contacts[n++].get().triangles = hit.triangles;
   };

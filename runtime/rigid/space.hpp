@@ -49,6 +49,8 @@ class Space {
   void step(double until_s);
   double get_time() const { return bodies_.get_time(); }
   bool is_at_window() const { return at_window_; }
+  /// Of the window of the last step.
+  double get_window_start() const { return windows_.get_start(); }
 
   const Solid& solid(int body) const { return bodies_.solid(body); }
   const State& state(int body) const { return bodies_.state(body); }

@@ -216,7 +216,7 @@ void StepProblem::make_points(Step& step, bool leaves_impacts) const {
     for (int k = 0; const Contact& c : pair->contacts) {
       const ContactRef row{pair, k++};
       const double approach = bodies_.calc_approach(c.touch, c.a, c.b);
-      if (c.presses || (leaves_impacts && (is_fast(bodies_, c, h) || c.closes_s >= 0.0))) continue;
+      if (c.presses || (leaves_impacts && (is_fast(bodies_, *pair, c, h) || c.closes_s >= 0.0))) continue;
       // The impact moves these bodies; static ones that ring continue to carry others.
       if (c.cord < 0 && (bodies_.is_moved_by_impact(pair->a) || bodies_.is_moved_by_impact(pair->b))) continue;
       if (c.touch.gap_m > kTouch + 2.0 * h * std::max(approach, 0.0) + 4.0 * norm(bodies_.gravity()) * h * h && !c.touching) continue;

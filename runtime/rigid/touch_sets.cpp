@@ -88,10 +88,7 @@ void TouchSets::update(Pair& pair, double step_s) {
     refresh(pair);
   if (pair.travelled_m > 0.0) complete(pair, bodies_.get_frame(pair.a), bodies_.get_frame(pair.b), 0.0);
   double deepest = 0.0;
-  for (Contact& c : pair.contacts) {
-    c.is_calm = bodies_.get_time() < pair.calm_until_s;
-    deepest = std::max(deepest, -c.touch.gap_m);
-  }
+  for (const Contact& c : pair.contacts) deepest = std::max(deepest, -c.touch.gap_m);
   pair.sag_m = std::min(pair.sag_m, deepest);
 }
 

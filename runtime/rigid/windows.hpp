@@ -34,6 +34,7 @@ class Windows {
   /// A window in which all bodies sleep.
   void skip(double end_s);
 
+  double get_start() const { return start_s_; }
   double get_end() const { return end_s_; }
   double get_length() const { return end_s_ - start_s_; }
   /// The time at which a small step begins.

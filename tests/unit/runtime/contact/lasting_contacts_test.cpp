@@ -1,10 +1,13 @@
 // Contacts that last: their force against weight, their speeds against Coulomb's and rolling's closed forms, and that nothing chatters.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <set>
+#include <string>
+#include <utility>
 
 #include "tests/unit/runtime/contact/checks.hpp"
 #include "tests/unit/runtime/contact/solids.hpp"
@@ -182,6 +185,62 @@ TEST(LastingContacts, OfABallThatRollsSweepBothSurfacesAndDoNotSlip) {
   EXPECT_NEAR(calc_mean(r, 0.1, 0.4, [](const LastingContact& c) { return c.other_sweep_m_s; }), now, 0.15 * now);
   EXPECT_LT(calc_mean(r, 0.1, 0.4, [](const LastingContact& c) { return norm(c.slip_m_s); }), 0.1 * now);
   EXPECT_NEAR(calc_mean(r, 0.1, 0.4, [](const LastingContact& c) { return c.spin_rad_s; }), now / radius, 0.1 * now / radius);
+}
+
+/// Nothing between two records may lead to what only the first hit on bodies at rest does.
+void expect_nothing_before_hit(const WorldSpec& spec, double end_s) {
+  const Outcome r = run(spec, end_s);
+  const double rested = 0.3;
+  const auto hit = std::find_if(r.impulses.begin(), r.impulses.end(), [&](const Impulse& p) { return p.time_s > rested; });
+  ASSERT_NE(hit, r.impulses.end());
+  const double struck = hit->time_s - 1e-4;  // hits so near in time are one
+  std::map<std::pair<std::uint64_t, std::int32_t>, LastingContact> held;
+  int seen = 0;
+  for (const LastingContact& c : r.contacts) {
+    const auto key = std::pair(c.id, c.body);
+    const auto before = held.find(key);
+    if (before != held.end()) {
+      EXPECT_GE(c.time_s, before->second.time_s);
+      if (before->second.time_s < struck && c.time_s > struck) {
+        EXPECT_GT(before->second.time_s, struck - 2.1e-3) << "a window";
+        EXPECT_EQ(norm(before->second.slip_m_s), 0.0);
+        EXPECT_EQ(before->second.sweep_m_s, 0.0);
+        ++seen;
+      }
+    }
+    if (c.state == ContactState::kEnd)
+      held.erase(key);
+    else
+      held[key] = c;
+  }
+  EXPECT_GT(seen, 0);
+}
+
+TEST(LastingContacts, ThatLayChangeNothingBeforeTheHit) {
+  const bank::Bank box = make_box({0.06, 0.05, 0.04}), ball = make_ball(0.03, 3);
+  WorldSpec stack = make_world(box, {0, 0, 0.02}, 0.4);
+  for (int i = 1; i < 8; ++i) {
+    BodySpec b = stack.bodies[0];
+    b.name = "box " + std::to_string(i);
+    b.initial.position_m[2] += 0.04 * i;
+    stack.bodies.push_back(b);
+  }
+  BodySpec thrown = stack.bodies[0];
+  thrown.name = "ball";
+  thrown.bank = &ball;
+  thrown.initial.position_m = {-0.8, 0.003, 0.3};
+  thrown.velocity_m_s = {1.5, 0, 2.4};
+  stack.bodies.push_back(thrown);
+  expect_nothing_before_hit(stack, 0.7);
+
+  WorldSpec block = make_world(box, {0, 0, 0.02}, 0.4);
+  for (const double side : {-1.0, 1.0}) {
+    thrown.name = side < 0.0 ? "left" : "right";
+    thrown.initial.position_m = {0.75 * side, 0.002 * side, 0.1};
+    thrown.velocity_m_s = {-1.5 * side, 0, 2.15 + 0.02 * side};
+    block.bodies.push_back(thrown);
+  }
+  expect_nothing_before_hit(block, 0.7);
 }
 
 TEST(LastingContacts, OfTwoBodiesComeInPairsOfOneId) {

@@ -3,8 +3,11 @@
 
 #include <cmath>
 #include <functional>
+#include <limits>
 
+#include "runtime/contact/world.hpp"
 #include "runtime/host/render.hpp"
+#include "tests/unit/runtime/contact/bodies.hpp"
 #include "tests/unit/runtime/host/heard.hpp"
 #include "tests/unit/runtime/synth/cube_bank.hpp"
 
@@ -162,6 +165,61 @@ TEST(Superposition, OfBodiesThatNeverMeetIsTheSumOfEachAlone) {
   EXPECT_GT(compare(two, one).share_db, -20.0);
   // Of equal touches too each body has a surface of its own.
   EXPECT_GT(compare(plate.play_all(list_events(0, 41, 0.3)), one).share_db, -20.0);
+}
+
+/// A stack of three at rest, struck from the side: nothing is heard before the hit, and its load adds no sound below 200 Hz.
+TEST(RestingContacts, AreNotHeardBeforeTheHit) {
+  const bank::Bank box = contact::tests::add_modes(contact::tests::make_box({0.06, 0.05, 0.04}), 24),
+                   ball = contact::tests::make_ball(0.03, 3);
+  Scene scene;
+  scene.file = "stack.json";
+  scene.duration_s = 0.7;
+  scene.ground.emplace();
+  scene.effects = synth::EffectSet::all().without(synth::Effect::kContactDamping);  // it takes from both bands
+  std::vector<const bank::Bank*> banks;
+  contact::WorldSpec world_spec;
+  world_spec.ground = contact::GroundSpec{};
+  const auto add = [&](const std::string& name, const bank::Bank& bank, const Vec3& position) -> contact::BodySpec& {
+    SceneBody body;
+    body.name = name;
+    body.spec = contact::tests::make_body(name, bank, position);
+    scene.bodies.push_back(body);
+    banks.push_back(&bank);
+    world_spec.bodies.push_back(body.spec);
+    return world_spec.bodies.back();
+  };
+  for (int i = 0; i < 3; ++i) add("box " + std::to_string(i), box, {0, 0, 0.02 + 0.04 * i});
+  add("ball", ball, {-0.8, 0.003, 0.1}).velocity_m_s = {1.6, 0, 2.4};
+  std::vector<events::Event> events, hits;
+  double struck_s = 0.0;
+  contact::World world(world_spec, {.end_s = scene.duration_s});
+  world.advance(scene.duration_s, std::numeric_limits<double>::infinity(), [&](const events::Event& e) {
+    events.push_back(e);
+    if (!std::holds_alternative<events::LastingContact>(e)) hits.push_back(e);
+    const bool is_hit = std::holds_alternative<events::Impulse>(e) || std::holds_alternative<events::Force>(e);
+    if (is_hit && struck_s == 0.0 && events::get_time_s(e) > 0.3) struck_s = events::get_time_s(e);
+  });
+  ASSERT_GT(struck_s, 0.3);
+  const Heard heard = calc_sound(scene, banks, events, {}), alone = calc_sound(scene, banks, hits, {});
+  const auto calc_power = [](const Heard& of, double from_s, double to_s, double above_hz, double below_hz) {
+    double sum = 0.0;
+    for (const std::vector<double>& channel : of.pressure_pa) {
+      // Poles of one order each: enough to separate a thump from a ring.
+      const double high = std::exp(-2.0 * M_PI * above_hz / of.rate_hz), low = 1.0 - std::exp(-2.0 * M_PI * below_hz / of.rate_hz);
+      double mean = 0.0, once = 0.0, twice = 0.0;
+      for (std::size_t n = 0; n < channel.size(); ++n) {
+        mean = high * mean + (1.0 - high) * channel[n];
+        once += low * (channel[n] - mean - once);
+        twice += low * (once - twice);
+        const double t = static_cast<double>(n) / of.rate_hz;
+        if (t > from_s && t < to_s) sum += twice * twice;
+      }
+    }
+    return 10.0 * std::log10(std::max(sum, 1e-300) / (to_s - from_s));
+  };
+  const double hit_db = calc_power(heard, struck_s, struck_s + 0.02, 200.0, 8000.0);
+  EXPECT_LT(calc_power(heard, struck_s - 0.045, struck_s - 0.003, 200.0, 8000.0), hit_db - 100.0) << "it lay still";
+  EXPECT_NEAR(calc_power(heard, struck_s, struck_s + 0.1, 10.0, 200.0), calc_power(alone, struck_s, struck_s + 0.1, 10.0, 200.0), 1.0);
 }
 
 }  // namespace

@@ -147,7 +147,7 @@ struct DropOutcome {
   double gained = 0.0;                    // energy above that at the start and what was lifted, of the largest kinetic energy
   double speed_m_s = 0.0;                 // at the end
   double lifted = 0.0;                    // of the largest kinetic energy
-  int late_hits = 0;                      // in the last 0.5 s
+  int late_hits = 0, late_strikes = 0;    // in the last 0.5 s: points, and instants
   int hits = 0;
   double thickness_m = 0.0;
   bool sleeps = false, is_on_floor = true;  // no part of it is beyond the slab's sides
@@ -238,12 +238,14 @@ inline DropOutcome run_drop(const Drop& d, double seconds) {
     const Books books = space.calc_books();
     kinetic = std::max(kinetic, calc_kinetic(body.solid, s));
     out.gained = std::max(out.gained, (books.motion_j - books.lifted_j - before) / kinetic);
-    for (const Strike& strike : space.take_strikes())
+    for (const Strike& strike : space.take_strikes()) {
+      if (now > seconds - 0.5) ++out.late_strikes;
       for (const Hit& hit : strike.hits)
         if (hit.approach_m_s > 0.0 && norm(hit.impulse) > 0.0) {
           ++out.hits;
           if (now > seconds - 0.5) ++out.late_hits;
         }
+    }
   }
   out.lifted = space.calc_books().lifted_j / kinetic;
   out.speed_m_s = norm(space.state(0).velocity);

@@ -8,6 +8,8 @@
 #include <memory>
 #include <random>
 
+#include "runtime/rigid/space.hpp"
+
 namespace carillon::rigid {
 namespace {
 
@@ -83,6 +85,29 @@ TEST(step_problem, block_on_a_slope_balances_gravity_or_slides) {
   }
 }
 
+TEST(instants, slow_touches_of_a_pair_that_rattles_last) {
+  for (const bool decays : {false, true}) {
+    Stages stages({make_box(0.1, kBoxSides)}, {make_state({0, 0, 0.02 + 1e-6}, {0, 0, -0.02})}, kWood, {0, 0, -kGravity});
+    stages.begin({{0, -1}});
+    Pair& pair = *stages.island.pairs[0];
+    const std::vector<ContactRef> struck{{&pair, 0}};
+    const auto strikes = [&] { return is_fast(stages.bodies, pair, pair.contacts[0], 1e-3); };
+    double speed = 0.04;
+    for (int n = 0; n < 5; ++n) {
+      stages.bodies.set_time(1e-3 * n);
+      EXPECT_TRUE(strikes()) << n;
+      stages.instants.note(struck, {{.a = 0, .b = -1, .touch = pair.contacts[0].touch, .approach_m_s = speed}}, stages.bodies.get_time());
+      if (decays) speed *= stages.bodies.calc_restitution(0, -1);
+    }
+    EXPECT_EQ(strikes(), decays) << "a bounce that comes to rest is no rattle";
+    stages.bodies.state(0).velocity = {0, 0, -0.1};
+    EXPECT_TRUE(strikes());
+    stages.bodies.state(0).velocity = {0, 0, -0.02};
+    stages.bodies.set_time(0.02);
+    EXPECT_TRUE(strikes()) << "it rattles no longer";
+  }
+}
+
 TEST(instants, fall_onto_the_ground_is_found_by_its_closed_form) {
   const double gap = 2e-5, speed = 0.1, h = 5e-4;
   Stages stages({make_box(0.1, kBoxSides)}, {make_state({0, 0, 0.02 + gap}, {0, 0, -speed})}, kWood, {0, 0, -kGravity});
@@ -127,6 +152,37 @@ struct Boxes {
     return 1.0 / inverse;
   }
 };
+
+TEST(rigid_impact, a_row_of_equal_balls_passes_a_blow_on) {
+  const double radius = 0.02;
+  const shape::tests::Solid surface = shape::tests::make_ball(radius, 3);
+  const double pitch = 2 * radius - 7.46e-5;  // faces touch there
+  for (const double e : {1.0, 0.95})
+    for (const int struck : {1, 2}) {
+      std::vector<Solid> balls;
+      std::vector<State> states;
+      for (int i = 0; i < 5; ++i) {
+        balls.push_back(make_solid(surface, 0.1, {2 * radius, 2 * radius, 2 * radius}));
+        balls.back().restitution = e;
+        balls.back().friction = 0.0;
+        states.push_back(make_state({pitch * i + (i < struck ? -1e-3 : 0.0), 0, 0}, {i < struck ? 1.0 : 0.0, 0, 0}));
+      }
+      Space space(balls, states, std::nullopt, {}, {});
+      while (space.get_time() < 0.01) space.step(0.01);
+      double momentum = 0.0, kinetic = 0.0;
+      for (int i = 0; i < 5; ++i) {
+        const double v = space.state(i).velocity[0];
+        momentum += v;
+        kinetic += v * v;
+        if (e == 1.0) {
+          EXPECT_NEAR(v, i < 5 - struck ? 0.0 : 1.0, 1e-3) << struck << " struck, ball " << i;
+        }
+      }
+      EXPECT_NEAR(momentum, struck, 1e-9);
+      EXPECT_LE(kinetic, struck + 1e-9);
+      EXPECT_GT(space.state(4).velocity[0], std::pow(0.5 * (1.0 + e), 4.0) - 1e-3);
+    }
+}
 
 TEST(rigid_impact, impulse_and_loss_of_an_oblique_hit_are_those_of_newton) {
   const Boxes boxes;
