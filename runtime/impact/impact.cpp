@@ -183,6 +183,10 @@ double Impact::calc_row_speed(const Row& row) const {
 
 double Impact::calc_approach(int contact) const { return -calc_row_speed(rows_[laws_[contact].row]); }
 
+double Impact::calc_depth(int contact) const {
+  return std::max(laws_[contact].compression_m, 0.0) + modes_.calc_displacement(laws_[contact].row);
+}
+
 /// Step length, hysteresis and anchor springs, from the elastic pulses that the rigid bodies would have. With h_ set: only of new contacts.
 void Impact::choose_step(const Options& options) {
   const std::size_t first = h_ > 0.0 ? laws_.size() - 1 : 0;

@@ -123,7 +123,9 @@ class Impact {
   Vec3 get_force(int contact) const;
   double get_compression(int contact) const { return laws_[contact].compression_m; }
   const Contact& get_contact(int contact) const { return contacts_[contact].given; }  // without its shapes
-  double get_impulse(int contact) const { return contacts_[contact].impulse_n_s; }    // normal, since the beginning [N s]
+  /// Depth of the rigid surfaces in each other that the spring and the modes of both bodies explain [m].
+  double calc_depth(int contact) const;
+  double get_impulse(int contact) const { return contacts_[contact].impulse_n_s; }  // normal, since the beginning [N s]
   /// Rigid approach speed of a contact [m/s], > 0 closing.
   double calc_approach(int contact) const;
 

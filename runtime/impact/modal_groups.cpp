@@ -123,6 +123,14 @@ void ModalGroups::add_approach(int row, double& approach, double& inverse_mass) 
     }
 }
 
+double ModalGroups::calc_displacement(int row) const {
+  double sum = 0.0;
+  for (const Group& group : groups_)
+    for (std::size_t r = 0; r < group.rows.size(); ++r)
+      if (group.rows[r] == row) sum += group.w[r];
+  return sum;
+}
+
 double ModalGroups::limit_step(double longest_s) const {
   for (const Group& group : groups_) {
     const double band = group.modes->get_band();

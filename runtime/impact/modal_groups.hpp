@@ -26,6 +26,8 @@ class ModalGroups {
   void place(int body, std::span<const double> shape, double sign, int row, std::span<const Vec3> axes, bool above_band);
   /// Subtracts the modal speed of a row from its approach, and adds the inverse of the modal mass.
   void add_approach(int row, double& approach, double& inverse_mass) const;
+  /// Displacement of a row by the modes inside the band and above it.
+  double calc_displacement(int row) const;
   /// At most this step, and a quarter of the period of the highest band.
   double limit_step(double longest_s) const;
 

@@ -20,6 +20,7 @@ struct Contact {
   int cord = -1;      // of a cord or stop: gap = length until taut, normal from a to b; -1: a touch
   bool touching = false;
   double closes_s = -1.0;                         // from the begin of the step on, by the predicted paths; negative: not so found
+  bool is_calm = false;                           // an impact with modes of its pair has just been ended: slow touches last
   bool presses = false;                           // in an impact with modes
   Vec3 impulse{}, couple{};                       // of the last step, on a [N s, N m s]
   double step_s = 0.0;                            // its length
@@ -44,14 +45,15 @@ struct Pair {
   std::vector<Contact> contacts;
   double margin_m = 0.0, travelled_m = 0.0;  // since the last search
   bool searched = false;
-  std::int64_t window = -1;  // in which it was last near
-  int cord = -1;             // it is one
+  std::int64_t window = -1;   // in which it was last near
+  int cord = -1;              // it is one
+  double sag_m = 0.0;         // depth by yielding in an impact with modes that is over: allowed, and decays
+  double calm_until_s = 0.0;  // impacts with modes begin again then
   struct SlowHit {
     double time_s = -1.0, speed_m_s = 0.0;
   };
   std::array<SlowHit, 4> slow_hits{};  // its last impacts slower than kRattling, since a faster one
   double rattles_until_s = -1.0;       // until then its slow touches last
-  double sag_m = 0.0;                  // depth in which an impact with modes left it: not pushed out, as the surface has yielded
 
   bool touches() const {
     return std::any_of(contacts.begin(), contacts.end(), [](const Contact& c) { return c.touching; });

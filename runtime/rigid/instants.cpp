@@ -21,6 +21,7 @@ constexpr int kLooks = 20;         // and evaluations at most
 constexpr double kNear = 1e-6;     // m; a touch that is nearer at the end of a step strikes there
 constexpr double kCrowded = 2e-3;  // s; for so long an island is crowded
 constexpr double kRattle = 10e-3;  // s; within it a pair has more slow impacts than Pair::slow_hits holds, and then none for so long
+constexpr double kCalm = 20e-3;    // m/s; slower touches of calm contacts last
 
 /// Will this touch close within the step, faster than `slowest`?
 bool is_faster(const Bodies& bodies, const Contact& c, double h, double slowest) {
@@ -29,6 +30,7 @@ bool is_faster(const Bodies& bodies, const Contact& c, double h, double slowest)
   double pull = 0.0;  // closing acceleration in flight
   if (bodies.moves(c.a)) pull -= dot(bodies.gravity(), c.touch.normal);
   if (bodies.moves(c.b)) pull += dot(bodies.gravity(), c.touch.normal);
+  if (c.is_calm && approach < kCalm) return false;
   const double square = approach * approach + 2.0 * std::max(pull, 0.0) * gap;
   if (square <= slowest * slowest) return false;
   // A touch that has just rebounded comes back within the step only if it is slow.

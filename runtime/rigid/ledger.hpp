@@ -18,8 +18,9 @@ struct Costs {
   std::int64_t steps = 0;       // small steps, and windows in which bodies only flew
   std::int64_t body_steps = 0;  // of each, the bodies that moved
   std::int64_t solves = 0, sweeps = 0, searches = 0, impacts = 0;
-  std::int64_t flights = 0;  // of mechanisms: integrations of their free motion
-  std::int64_t pushes = 0;   // displacements of islands whose bodies were too deep
+  std::int64_t flights = 0;        // of mechanisms: integrations of their free motion
+  std::int64_t ended_impacts = 0;  // with modes, where their bodies came to touch elsewhere
+  std::int64_t pushes = 0;         // displacements of islands whose bodies were too deep
 };
 
 /// Losses and costs of all stages. Energies that bodies, modes and springs hold are summed from these when they are asked for. Invariant: a

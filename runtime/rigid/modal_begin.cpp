@@ -233,6 +233,25 @@ std::pair<ModalContact, impact::Contact> ModalImpacts::make_contact(Hit& hit, bo
   return {std::move(contact), spring};
 }
 
+/// An impact that was ended has been computed by a part of its step beyond now, and so have the modes of its bodies: the next one begins
+/// then. Takes the bodies there; returns the time.
+double ModalImpacts::fly_to_modes(const std::vector<Hit>& hits, const std::vector<int>& order) {
+  const double now_s = bodies_.get_time();
+  double start_s = now_s;
+  std::set<int> moving;
+  for (const int n : order)
+    for (const int body : {hits[n].a, hits[n].b}) {
+      if (bodies_.has_modes(body)) start_s = std::max(start_s, states_.advance(body, now_s).time_s);
+      if (bodies_.moves(body) && bodies_.find_articulation(body) == nullptr) moving.insert(body);
+    }
+  if (!(start_s > now_s)) return now_s;
+  for (const int body : moving) {
+    bodies_.state(body) = fly(bodies_.solid(body), bodies_.state(body), bodies_.gravity(), start_s - now_s);
+    bodies_.place(body);
+  }
+  return start_s;
+}
+
 bool ModalImpacts::begin(const Step& step, Collision& collision, const Instants& instants, TouchSets& touches) {
   std::optional<Selection> selection = select(step, collision, instants);
   ModalImpact* joined = nullptr;
@@ -240,7 +259,7 @@ bool ModalImpacts::begin(const Step& step, Collision& collision, const Instants&
   const bool is_new = joined == nullptr;
   if (is_new) {
     joined = &impacts_.emplace_back();
-    joined->start_s = bodies_.get_time();
+    joined->start_s = fly_to_modes(collision.hits, selection->order);
   }
   ModalImpact& modal = *joined;
   std::vector<impact::Body> bodies;

@@ -14,6 +14,8 @@ namespace {
 constexpr double kLongest = 50e-3;   // s; an impact that lasts longer is a contact at rest
 constexpr double kRight = 0.01;      // of the kinetic energy: the most that a step of an impact on joints is corrected by
 constexpr double kSamePlace = 0.05;  // of the size
+constexpr double kExplained = 1.3;   // times the depth of spring and modes is explained
+constexpr double kCalmTime = 5e-3;   // s; for so long no impact of a pair begins slowly after one was ended
 
 }  // namespace
 
@@ -95,6 +97,39 @@ void ModalImpacts::end_where_resting(const Step& step, TouchSets& touches) {
         if (modal != nullptr && std::abs(bodies_.calc_approach(c.touch, c.a, c.b)) <= kSlowest) end(*modal, touches);
       }
     }
+}
+
+/// Depth that the contacts of an impact between the two bodies explain at a place [m].
+double ModalImpacts::calc_depth(const ModalImpact& modal, const Pair& pair, const Vec3& where) const {
+  const double near = kSamePlace * bodies_.calc_size(pair.a, pair.b);
+  double depth = 0.0;
+  for (int k = 0; const ModalContact& contact : modal.contacts) {
+    const Forces& f = contact.forces;
+    const int number = k++;
+    const bool is_same = (f.a == pair.a && f.b == pair.b) || (f.b == pair.a && f.a == pair.b);
+    if (is_same && norm(find_station(contact) - where) < near) depth = std::max(depth, modal.impact->calc_depth(number));
+  }
+  return depth;
+}
+
+void ModalImpacts::end_where_unexplained(const Step& step, TouchSets& touches) {
+  if (impacts_.empty()) return;
+  for (Pair* pair : step.island().pairs) {
+    if (pair->cord >= 0) continue;
+    for (const int body : {pair->a, pair->b}) {
+      ModalImpact* modal = bodies_.moves(body) ? find(body) : nullptr;
+      if (modal == nullptr) continue;
+      const bool is_deep = std::any_of(pair->contacts.begin(), pair->contacts.end(), [&](const Contact& c) {
+        const double depth = -c.touch.gap_m - pair->sag_m;
+        return depth > kTooDeep && depth > kTooDeep + kExplained * calc_depth(*modal, *pair, c.touch.where_m);
+      });
+      if (!is_deep) continue;
+      end(*modal, touches);
+      pair->calm_until_s = bodies_.get_time() + kCalmTime;
+      for (Contact& c : pair->contacts) c.is_calm = true;
+      ++ledger_.costs.ended_impacts;
+    }
+  }
 }
 
 void ModalImpacts::advance(const Step& step, double to_s, double part_s, double window_end_s, TouchSets& touches) {
@@ -270,7 +305,8 @@ void ModalImpacts::release(ModalImpact& modal, double time_s, TouchSets& touches
     if (bodies_.moves(body) && reached_s > time_s) s = fly(bodies_.solid(body), s, bodies_.gravity(), time_s - reached_s);
     bodies_.place(body);
   }
-  for (const ModalContact& contact : modal.contacts) touches.release(contact.forces.a, contact.forces.b);
+  for (int k = 0; const ModalContact& contact : modal.contacts)
+    touches.release(contact.forces.a, contact.forces.b, std::max(0.0, modal.impact->calc_depth(k++)));
   modal.impact = nullptr;
   modal.bodies.clear();
 }

@@ -49,6 +49,8 @@ class ModalImpacts {
   void end(const std::vector<Hit>& hits, TouchSets& touches);
   /// An impact has no other contacts than its own: where one of its bodies comes to touch something slowly, it ends.
   void end_where_resting(const Step& step, TouchSets& touches);
+  /// An impact knows no depth but that of its springs and modes: where its bodies touch deeper, it ends. Now is the time of the touches.
+  void end_where_unexplained(const Step& step, TouchSets& touches);
   /// Moves the impacts of an island to the time `to_s`, `part_s` later. The step has the effect of gravity and of other contacts on
   /// their bodies. Forces are reported where the window ends.
   void advance(const Step& step, double to_s, double part_s, double window_end_s, TouchSets& touches);
@@ -70,12 +72,14 @@ class ModalImpacts {
   bool add_resting(const Collision& collision, const Instants& instants, std::vector<int>& order) const;
   bool shares_articulations(const std::vector<Hit>& hits, const std::vector<int>& order) const;
   bool join(const std::vector<Hit>& hits, Selection& selection, TouchSets& touches, ModalImpact*& joined);
+  double fly_to_modes(const std::vector<Hit>& hits, const std::vector<int>& order);
   int add_body(ModalImpact& modal, int body, std::vector<impact::Body>& made);
   std::pair<ModalContact, impact::Contact> make_contact(Hit& hit, bool rests);
   impact::Body make_body(int body);
   void set_motion(int body, impact::Body& made) const;
   std::vector<double> turn_to_world(int body, const std::vector<double>& shape) const;
   Vec3 find_station(const ModalContact& contact) const;
+  double calc_depth(const ModalImpact& modal, const Pair& pair, const Vec3& where) const;
   void move_articulation(const ArticulationStep& step, const impact::Body& struck, double time_s, double step_s);
   void undo_pull(const Step& step, int body, const joints::Spatial& pull, double time_s);
   void keep_pulses(ModalImpact& modal);

@@ -103,6 +103,7 @@ void Space::step_island(Island& island, double start_s, double length_s) {
   while (length_s - done > kShortest) {
     const double h = length_s - done;
     bodies_.set_time(start_s + done);
+    modal_impacts_.end_where_unexplained(step_, touches_);
     const bool may_sleep = !std::exchange(begun, true) && rest_.may_sleep(island.bodies, h);
     projection_.run(step_, may_sleep ? kDeep : kTooDeep);
     if (may_sleep && rest_.try_island(island, h)) break;
@@ -112,7 +113,7 @@ void Space::step_island(Island& island, double start_s, double length_s) {
       problem_.predict(step_, h, false);
       problem_.make_points(step_, impacts < max_impacts);
       problem_.solve(step_);
-      if (!touches_.complete(step_)) break;
+      if (!touches_.complete(step_, missed == 0)) break;
     }
     double at = h;
     std::vector<ContactRef> first;

@@ -12,6 +12,7 @@
 namespace carillon::rigid {
 namespace {
 
+constexpr double kComes = 20e-3;             // m/s; a gap that closes so fast at the end of a step strikes in the next one
 constexpr double kSettling = 0.02;           // m/s; an island that is slower is about to rest
 constexpr int kMaxDirect = 24;               // points of a small island
 constexpr int kMaxAtOnce = 12;               // bodies that are about to rest and are factorised without sweeps before
@@ -183,8 +184,7 @@ void StepProblem::keep_impulses(const Step& step, double at_s) const {
     c.until_s = bodies_.get_time() + at_s;
     c.lost_j = step.calc_loss(p, 1.0);
     ledger_.lose(at_s < h ? step.calc_loss(p, at_s / h) : c.lost_j);
-    // A gap that closes with speed at the end of the step strikes in the next one.
-    const bool comes = c.touch.gap_m > kTouch && dot(calc_relative_velocity(step.movers, p), p.normal) < -kSlowest;
+    const bool comes = c.touch.gap_m > kTouch && dot(calc_relative_velocity(step.movers, p), p.normal) < -kComes;
     c.touching = (dot(c.impulse, c.touch.normal) > 0.0 && !comes) || c.is_closed();
   }
 }

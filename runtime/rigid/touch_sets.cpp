@@ -4,12 +4,19 @@
 #include "runtime/rigid/touch_sets.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "runtime/rigid/cords.hpp"
 #include "runtime/rigid/limits.hpp"
 #include "runtime/rigid/modal_impact.hpp"
 
 namespace carillon::rigid {
+namespace {
+
+constexpr double kMissing = 5e-6;    // m; a place deeper than all touches by this is missing
+constexpr double kSagDecay = 10e-3;  // s
+
+}  // namespace
 
 TouchSets::TouchSets(const Bodies& bodies, std::vector<Cord> cords, const ModalImpacts& impacts, Ledger& ledger)
     : bodies_(bodies), impacts_(impacts), ledger_(ledger), cords_(std::move(cords)), cord_pairs_(cords_.size()) {
@@ -63,6 +70,7 @@ void TouchSets::search(Pair& pair, double step_s) {
     contact.touch = touch;
     pair.contacts.push_back(contact);
   }
+  complete(pair, frame_a, bodies_.get_frame(pair.b), 0.0);
 }
 
 void TouchSets::refresh(Pair& pair) const {
@@ -78,32 +86,36 @@ void TouchSets::update(Pair& pair, double step_s) {
     search(pair, step_s);
   else if (!pair.contacts.empty() && (pair.travelled_m > 0.0))
     refresh(pair);
-  complete(pair, bodies_.get_frame(pair.a), bodies_.get_frame(pair.b), 0.0);
-  if (!(pair.sag_m > 0.0)) return;
+  if (pair.travelled_m > 0.0) complete(pair, bodies_.get_frame(pair.a), bodies_.get_frame(pair.b), 0.0);
   double deepest = 0.0;
-  for (const Contact& c : pair.contacts) deepest = std::max(deepest, -c.touch.gap_m);
+  for (Contact& c : pair.contacts) {
+    c.is_calm = bodies_.get_time() < pair.calm_until_s;
+    deepest = std::max(deepest, -c.touch.gap_m);
+  }
   pair.sag_m = std::min(pair.sag_m, deepest);
 }
 
-/// Adds the deepest vertex of a pair to its touches where at the frames `a` and `b`, `length_s` later, it is deeper than all of them. True
-/// if it did, and where it found that a touch that is that deep closes until then.
-bool TouchSets::complete(Pair& pair, const shape::Frame& a, const shape::Frame& b, double length_s) {
+/// Adds the deepest vertex of a pair to its touches where at the frames `a` and `b` it is deeper than all of them. True if it did, and where
+/// it found that a touch that is that deep closes until then: `closing_s` later, or 0.
+bool TouchSets::complete(Pair& pair, const shape::Frame& a, const shape::Frame& b, double closing_s) {
   const shape::Shape& mine = *bodies_.get_shape(pair.a);
   const shape::Shape* theirs = bodies_.get_shape(pair.b);
   const shape::Deepest deepest =
-      theirs == nullptr ? shape::find_lowest(mine, a, bodies_.ground()->height_m) : shape::find_deepest(mine, a, *theirs, b, -kDeep);
-  if (deepest.vertex < 0 || deepest.gap_m > -kDeep) return false;
-  for (Contact& c : pair.contacts) {
-    const double gap_m = find_moved(pair, c.touch, a, b).gap_m;
-    if (gap_m > deepest.gap_m + kDeep) continue;
-    if (c.touch.gap_m <= kTouch || !(length_s > 0.0)) return false;
-    c.touching = false;
-    return std::exchange(c.closes_s, length_s * c.touch.gap_m / (c.touch.gap_m - gap_m)) < 0.0;
+      theirs == nullptr ? shape::find_lowest(mine, a, bodies_.ground()->height_m) : shape::find_deepest(mine, a, *theirs, b, -kMissing);
+  if (deepest.place < 0 || deepest.gap_m > -kMissing) return false;
+  Contact* lowest = nullptr;
+  double gap_m = deepest.gap_m + kMissing;
+  for (Contact& c : pair.contacts)
+    if (const double then_m = find_moved(pair, c.touch, a, b).gap_m; then_m <= gap_m) gap_m = then_m, lowest = &c;
+  if (lowest != nullptr) {
+    if (lowest->touch.gap_m <= kTouch || gap_m > -kMissing || lowest->rests || !(closing_s > 0.0)) return false;
+    lowest->touching = false;
+    return std::exchange(lowest->closes_s, closing_s * lowest->touch.gap_m / (lowest->touch.gap_m - gap_m)) < 0.0;
   }
   Contact added;
   added.a = pair.a;
   added.b = pair.b;
-  added.touch = theirs == nullptr ? shape::make_ground_touch(mine, bodies_.get_frame(pair.a), bodies_.ground()->height_m, deepest.vertex)
+  added.touch = theirs == nullptr ? shape::make_ground_touch(mine, bodies_.get_frame(pair.a), bodies_.ground()->height_m, deepest.place)
                                   : shape::make_touch(mine, bodies_.get_frame(pair.a), *theirs, bodies_.get_frame(pair.b), deepest);
   const auto same =
       std::find_if(pair.contacts.begin(), pair.contacts.end(), [&](const Contact& c) { return c.touch.id == added.touch.id; });
@@ -121,7 +133,7 @@ void TouchSets::forget_closing(const Step& step) const {
     for (Contact& c : pair->contacts) c.closes_s = -1.0;
 }
 
-bool TouchSets::complete(const Step& step) {
+bool TouchSets::complete(const Step& step, bool finds_closing) {
   std::vector<shape::Frame> then;
   for (int n = 0; n < step.count(); ++n) {
     const int i = step.body(n);
@@ -134,26 +146,24 @@ bool TouchSets::complete(const Step& step) {
   bool any = false;
   for (Pair* pair : step.island().pairs) {
     if (pair->cord >= 0 || !step.has(*pair) || bodies_.is_moved_by_impact(pair->a) || bodies_.is_moved_by_impact(pair->b)) continue;
-    if (complete(*pair, get_then(pair->a), get_then(pair->b), step.length_s)) any = true;
+    if (complete(*pair, get_then(pair->a), get_then(pair->b), finds_closing ? step.length_s : 0.0)) any = true;
   }
   return any;
 }
 
 void TouchSets::travel(Pair& pair, double time_s, double step_s) const {
   pair.travelled_m += (bodies_.calc_closing_speed(pair.a, pair.b) + norm(bodies_.gravity()) * step_s) * time_s + 1e-12;
+  if (pair.sag_m > 0.0) pair.sag_m *= std::exp(-time_s / kSagDecay);
 }
 
-void TouchSets::release(int a, int b) {
+void TouchSets::release(int a, int b, double depth_m) {
   if (b >= 0 && a > b) std::swap(a, b);
   const auto at = pairs_.find({a, b});
   if (at == pairs_.end()) return;
   Pair& pair = at->second;
-  for (Contact& c : pair.contacts) {
-    if (!c.presses) continue;
-    c.presses = c.touching = false;
-    // Where modes have yielded, the body stands lower than on a rigid surface.
-    pair.sag_m = std::max(pair.sag_m, -c.touch.gap_m);
-  }
+  for (Contact& c : pair.contacts)
+    if (c.presses) c.presses = c.touching = false;
+  pair.sag_m = std::max(pair.sag_m, depth_m);
 }
 
 shape::Touch TouchSets::find_moved(Pair& pair, shape::Touch touch, const shape::Frame& a, const shape::Frame& b) const {

@@ -41,17 +41,18 @@ class TouchSets {
   void update(Pair& pair, double step_s);
   /// Contacts of a step are not known to close in it.
   void forget_closing(const Step& step) const;
-  /// Adds touches that are missing at the end of a step, by its predicted motion, and finds those that close. True if there were any.
-  bool complete(const Step& step);
+  /// Adds touches that are missing at the end of a step, by its predicted motion, and with `finds_closing` finds those that close. True if
+  /// there were any.
+  bool complete(const Step& step, bool finds_closing);
   /// Counts a movement of `time_s` in a step.
   void travel(Pair& pair, double time_s, double step_s) const;
-  /// The contacts of two bodies that were in an impact with modes are free again.
-  void release(int a, int b);
+  /// The contacts of two bodies that were in an impact with modes, which explains that depth [m], are free again.
+  void release(int a, int b, double depth_m);
   /// A touch of a pair whose bodies are at these frames.
   shape::Touch find_moved(Pair& pair, shape::Touch touch, const shape::Frame& a, const shape::Frame& b) const;
 
  private:
-  bool complete(Pair& pair, const shape::Frame& a, const shape::Frame& b, double length_s);
+  bool complete(Pair& pair, const shape::Frame& a, const shape::Frame& b, double closing_s);
 
   const Bodies& bodies_;
   const ModalImpacts& impacts_;

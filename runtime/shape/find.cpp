@@ -196,15 +196,14 @@ class Pass {
     }
   }
 
-  /// The vertex that is deepest in theirs; -1 where none is deeper than `gap_m`, which becomes its gap.
+  /// The sample that is deepest in theirs; -1 where none is deeper than `gap_m`, which becomes its gap.
   int find_deepest(double& gap_m) const {
     const Samples& s = mine_.samples();
-    const Mesh& mesh = mine_.mesh();
     int deepest = -1;
     std::vector<int> open;
-    if (!s.vertices.empty()) open.push_back(0);
+    if (!s.samples.empty()) open.push_back(0);
     while (!open.empty()) {
-      const Ball& ball = s.vertex_tree[open.back()];
+      const Ball& ball = s.sample_tree[open.back()];
       open.pop_back();
       if (ground_.find_bound(to_theirs(ball.middle)) - ball.radius_m > gap_m) continue;
       if (ball.child >= 0) {
@@ -213,28 +212,27 @@ class Pass {
         continue;
       }
       for (int i = ball.first; i < ball.first + ball.count; ++i)
-        if (const double d = ground_.estimate(to_theirs(mesh.vertices[s.vertices[i]]), 0.0); d < gap_m) gap_m = d, deepest = s.vertices[i];
+        if (const double d = ground_.estimate(to_theirs(s.samples[i].point), 0.0); d < gap_m) gap_m = d, deepest = i;
     }
     return deepest;
   }
 
-  /// A touch of a vertex with the nearest place of theirs; on a curved part it stays about the vertex.
-  Touch make_touch(int vertex) const {
-    const Vec3& station = mine_.mesh().vertices[vertex];
-    const Nearest at = ground_.find_nearest(to_theirs(station));
+  /// A touch of a sample with the nearest place of theirs.
+  Touch make_touch(int place) const {
+    const Sample& sample = mine_.samples().samples[place];
+    const Nearest at = ground_.find_nearest(to_theirs(sample.point));
     const Mesh& mesh = theirs_.mesh();
     const bool is_curved = !theirs_.skin().is_flat(at.face);
-    Touch t = begin(station, at.place, is_curved ? theirs_.skin().calc_normal(at.face, at.weights) : mesh.normals[at.face]);
+    Touch t = begin(sample.point, at.place, is_curved ? theirs_.skin().calc_normal(at.face, at.weights) : mesh.normals[at.face]);
     t.axis_b = mesh.normals[at.face];
     if (is_curved) t.side_b = Side::skin, t.face_b = at.face, t.smooth = true;
-    const VertexKind kind = mine_.skin().kind(vertex);
-    const int face = mine_.skin().find_face(vertex);
-    if (kind == VertexKind::smooth && !mine_.skin().is_flat(face))
-      t.side_a = Side::skin, t.face_a = face, t.smooth = t.stays = true;
-    else
-      t.curvature_a_per_m = curve(kind, mine_);
+    t.curvature_a_per_m = curve(sample.kind, mine_);
+    if (sample.kind == VertexKind::smooth) {
+      const Spot spot = mine_.skin().locate(sample.point, sample.face);
+      t.curvature_a_per_m = mine_.skin().calc_mean_curvature(spot.face, spot.weights);
+    }
     settle(t, mine_, fm_, &theirs_, ft_, mine_.samples().spacing_m, kFirst);
-    t.id = make_id(Feature::corner_a, vertex, kDeepest);
+    t.id = make_id(Feature::corner_a, place, kDeepest);
     return t;
   }
 
@@ -547,15 +545,15 @@ Deepest find_deepest(const Shape& a, const Frame& fa, const Shape& b, const Fram
   if (norm2(to_world(fa, a.get_middle_m()) - to_world(fb, b.get_middle_m())) > far * far || (a.is_polyhedron() && b.is_polyhedron()))
     return found;
   std::vector<Touch> none;
-  found.vertex = Pass(a, fa, b, fb, 0.0, none).find_deepest(found.gap_m);
-  if (const int vertex = Pass(b, fb, a, fa, 0.0, none).find_deepest(found.gap_m); vertex >= 0) found.vertex = vertex, found.is_of_a = false;
+  found.place = Pass(a, fa, b, fb, 0.0, none).find_deepest(found.gap_m);
+  if (const int place = Pass(b, fb, a, fa, 0.0, none).find_deepest(found.gap_m); place >= 0) found.place = place, found.is_of_a = false;
   return found;
 }
 
 Touch make_touch(const Shape& a, const Frame& fa, const Shape& b, const Frame& fb, const Deepest& at) {
   std::vector<Touch> none;
-  if (at.is_of_a) return Pass(a, fa, b, fb, 0.0, none).make_touch(at.vertex);
-  Touch t = Pass(b, fb, a, fa, 0.0, none).make_touch(at.vertex);
+  if (at.is_of_a) return Pass(a, fa, b, fb, 0.0, none).make_touch(at.place);
+  Touch t = Pass(b, fb, a, fa, 0.0, none).make_touch(at.place);
   turn_round(t);
   return t;
 }

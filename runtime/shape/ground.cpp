@@ -89,12 +89,7 @@ void find_candidates(const Shape& a, const Frame& fa, double height, double marg
 Touch make_ground_touch(const Shape& a, const Frame& fa, double height, int vertex) {
   Touch t = make_ground_touch(a, fa, a.mesh().vertices[vertex], height);
   t.id = make_id(Feature::corner_a, vertex, a.is_polyhedron() ? 0 : kDeepest);
-  const int face = a.skin().find_face(vertex);
-  if (a.is_polyhedron() || a.skin().is_flat(face) || a.skin().kind(vertex) == VertexKind::corner) return t;
-  t.side_a = Side::skin;
-  t.face_a = face;
-  t.smooth = t.stays = true;
-  settle(t, a, fa, nullptr, fa, kWalk * 2.0 * a.samples().spacing_m);
+  t.curvature_a_per_m = calc_vertex_curvature(a, vertex);
   return t;
 }
 

@@ -32,6 +32,16 @@ std::pair<int, double> find_lowest_vertex(const Mesh& mesh, const Samples& s, co
 
 }  // namespace
 
+double calc_vertex_curvature(const Shape& shape, int vertex) {
+  const Skin& skin = shape.skin();
+  const int face = skin.find_face(vertex);
+  if (shape.is_polyhedron() || skin.kind(vertex) == VertexKind::corner) return shape.get_corner_curvature_per_m();
+  if (skin.is_flat(face)) return 0.5 * shape.get_corner_curvature_per_m();
+  Vec3 at{};
+  for (int k = 0; k < 3; ++k) at[k] = shape.mesh().vertex_of(3 * face + k) == vertex ? 1.0 : 0.0;
+  return skin.calc_mean_curvature(face, at);
+}
+
 Deepest find_lowest(const Shape& a, const Frame& frame, double height_m) {
   const Vec3& up = frame.rotation[2];
   Deepest low{.gap_m = std::numeric_limits<double>::infinity()};
@@ -39,7 +49,7 @@ Deepest find_lowest(const Shape& a, const Frame& frame, double height_m) {
     for (std::size_t c = 0; c < body->corners.size(); ++c)
       if (const double h = dot(up, body->corners[c]); h < low.gap_m) low = {body->corner_vertices[c], h};
   } else {
-    std::tie(low.vertex, low.gap_m) = find_lowest_vertex(a.mesh(), a.samples(), up);
+    std::tie(low.place, low.gap_m) = find_lowest_vertex(a.mesh(), a.samples(), up);
   }
   low.gap_m += frame.position_m[2] - height_m;
   return low;

@@ -21,6 +21,9 @@ bool carries(const Mesh& mesh, int vertex, const Vec3& normal);
 
 inline constexpr int kDeepest = 2;  // second number of the name of a touch that a search lacked
 
+/// Mean curvature that stands for a vertex: of the skin, of an edge, or of a corner.
+double calc_vertex_curvature(const Shape& shape, int vertex);
+
 inline constexpr double kFlat = 0.02;   // slope: tolerance of a flat contact patch
 inline constexpr double kFlush = 0.01;  // slope: tolerance of parallel surfaces
 

@@ -51,14 +51,14 @@ void find_touches(const Shape& a, const Frame& frame_a, const Shape& b, const Fr
 void find_ground_touches(const Shape& a, const Frame& frame_a, double height_m, double margin_m, PairMemory& memory,
                          std::vector<Touch>& out);
 
-/// The deepest vertex of one body in another, or in the ground.
+/// The deepest place of one body in another, a sample, or in the ground, a vertex.
 struct Deepest {
-  int vertex = -1;
+  int place = -1;
   double gap_m = 0.0;  // negative: inside
   bool is_of_a = true;
 };
 Deepest find_lowest(const Shape& a, const Frame& frame, double height_m);
-/// None (-1) between two polyhedra, whose touches are complete, and where no vertex is deeper than `gap_m`.
+/// None (-1) between two polyhedra, whose touches are complete, and where no sample is deeper than `gap_m`.
 Deepest find_deepest(const Shape& a, const Frame& frame_a, const Shape& b, const Frame& frame_b, double gap_m);
 /// The touch of such a vertex, at these or other frames.
 Touch make_ground_touch(const Shape& a, const Frame& frame, double height_m, int vertex);
