@@ -92,8 +92,8 @@ void TouchSets::update(Pair& pair, double step_s) {
   pair.sag_m = std::min(pair.sag_m, deepest);
 }
 
-/// Adds the deepest vertex of a pair to its touches where at the frames `a` and `b` it is deeper than all of them. True if it did, and where
-/// it found that a touch that is that deep closes until then: `closing_s` later, or 0.
+/// Adds the deepest vertex of a pair to its touches where at the frames `a` and `b` it is deeper than all of them. True if it did, and
+/// where it found that a touch that is that deep closes until then: `closing_s` later, or 0.
 bool TouchSets::complete(Pair& pair, const shape::Frame& a, const shape::Frame& b, double closing_s) {
   const shape::Shape& mine = *bodies_.get_shape(pair.a);
   const shape::Shape* theirs = bodies_.get_shape(pair.b);
