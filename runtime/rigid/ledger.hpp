@@ -5,13 +5,15 @@
 
 namespace carillon::rigid {
 
-/// Energies now, or lost or lifted since the beginning [J]: motion + modes + springs + lost - lifted is constant.
+/// Energies now, or lost or lifted since the beginning [J]; their total is constant.
 struct Books {
   double motion_j = 0.0;   // kinetic and of gravity
   double modes_j = 0.0;    // in the bodies' modes
   double springs_j = 0.0;  // of impacts with modes that are not over
   double lost_j = 0.0;     // by friction, in contacts, in the modes' damping, above their bands
   double lifted_j = 0.0;   // given to bodies that were moved apart, beyond the payment of their motion
+
+  double calc_total() const { return motion_j + modes_j + springs_j + lost_j - lifted_j; }
 };
 
 struct Costs {
