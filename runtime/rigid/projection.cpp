@@ -96,7 +96,9 @@ void Projection::move(const Step& step, const std::vector<Mover>& displacements,
     for (const int body : {pair->a, pair->b})
       if (const int n = step.find(body); n >= 0)
         pair->travelled_m += norm(displacements[n].velocity) + norm(displacements[n].spin) * bodies_.solid(body).radius_m;
-    if (!pair->contacts.empty()) touches_.refresh(*pair);
+    if (pair->contacts.empty()) continue;
+    touches_.refresh(*pair);
+    touches_.remove_false(*pair);
   }
   if (const double owed_j = bodies_.calc_energy(step.island().bodies) - before_j; is_held && owed_j > 0.0) pay(step, displacements, owed_j);
   const double gained_j = bodies_.calc_energy(step.island().bodies) - before_j;

@@ -13,6 +13,7 @@
 namespace carillon::rigid {
 namespace {
 
+constexpr double kDoubtful = 2e-4;   // m; deeper touches of curved surfaces are confirmed
 constexpr double kMissing = 5e-6;    // m; a place deeper than all touches by this is missing
 constexpr double kSagDecay = 10e-3;  // s
 
@@ -70,6 +71,7 @@ void TouchSets::search(Pair& pair, double step_s) {
     contact.touch = touch;
     pair.contacts.push_back(contact);
   }
+  remove_false(pair);
   complete(pair, frame_a, bodies_.get_frame(pair.b), 0.0);
 }
 
@@ -79,6 +81,15 @@ void TouchSets::refresh(Pair& pair) const {
   for (Contact& c : pair.contacts) shape::refresh(c.touch, *bodies_.get_shape(pair.a), a, bodies_.get_shape(pair.b), b, pair.memory);
 }
 
+void TouchSets::remove_false(Pair& pair) const {
+  if (pair.b < 0) return;
+  std::erase_if(pair.contacts, [&](const Contact& c) {
+    return c.touch.gap_m < -kDoubtful && c.touch.smooth &&
+           !shape::is_overlap(c.touch, *bodies_.get_shape(pair.a), bodies_.get_frame(pair.a), *bodies_.get_shape(pair.b),
+                              bodies_.get_frame(pair.b));
+  });
+}
+
 void TouchSets::update(Pair& pair, double step_s) {
   if (pair.cord >= 0) return refresh(pair);
   const double way = (bodies_.calc_closing_speed(pair.a, pair.b) + norm(bodies_.gravity()) * step_s) * step_s;
@@ -86,7 +97,10 @@ void TouchSets::update(Pair& pair, double step_s) {
     search(pair, step_s);
   else if (!pair.contacts.empty() && (pair.travelled_m > 0.0))
     refresh(pair);
-  if (pair.travelled_m > 0.0) complete(pair, bodies_.get_frame(pair.a), bodies_.get_frame(pair.b), 0.0);
+  if (pair.travelled_m > 0.0) {
+    remove_false(pair);
+    complete(pair, bodies_.get_frame(pair.a), bodies_.get_frame(pair.b), 0.0);
+  }
   double deepest = 0.0;
   for (const Contact& c : pair.contacts) deepest = std::max(deepest, -c.touch.gap_m);
   pair.sag_m = std::min(pair.sag_m, deepest);

@@ -37,6 +37,8 @@ class TouchSets {
   void search(Pair& pair, double step_s);
   /// The same touches as the bodies are now.
   void refresh(Pair& pair) const;
+  /// Removes touches of curved surfaces that have settled on their far sides.
+  void remove_false(Pair& pair) const;
   /// Touches that are good for a step: searched again where the pair may have moved by its margin.
   void update(Pair& pair, double step_s);
   /// Contacts of a step are not known to close in it.

@@ -43,6 +43,11 @@ bool find_crossing(const Mesh& mesh, const Vec3& origin, const Vec3& way, double
 
 }  // namespace
 
+bool is_overlap(const Touch& touch, const Shape& a, const Frame& fa, const Shape& b, const Frame& fb) {
+  return calc_depth(b.mesh(), to_body(fb, to_world(fa, touch.station_a))) > 0.0 ||
+         calc_depth(a.mesh(), to_body(fa, to_world(fb, touch.station_b))) > 0.0;
+}
+
 double calc_overlap(const Shape& a, const Frame& fa, const Shape& b, const Frame& fb, Vec3& where) {
   const double far = a.get_radius_m() + b.get_radius_m();
   if (norm2(to_world(fa, a.get_middle_m()) - to_world(fb, b.get_middle_m())) > far * far) return 0.0;

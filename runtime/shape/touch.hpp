@@ -67,6 +67,9 @@ Touch make_touch(const Shape& a, const Frame& frame_a, const Shape& b, const Fra
 /// The same touch a small step later: gap, where, normal and stations follow. b == nullptr: the ground.
 void refresh(Touch& touch, const Shape& a, const Frame& frame_a, const Shape* b, const Frame& frame_b, PairMemory& memory);
 
+/// Is one of the two places of a touch inside the other body? Between curved surfaces a touch may have come to their far sides.
+bool is_overlap(const Touch& touch, const Shape& a, const Frame& frame_a, const Shape& b, const Frame& frame_b);
+
 /// How deep two bodies are inside each other [m]; 0 when they are apart. `where` gets the deepest point (world).
 double calc_overlap(const Shape& a, const Frame& frame_a, const Shape& b, const Frame& frame_b, Vec3& where);
 

