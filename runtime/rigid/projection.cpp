@@ -17,6 +17,7 @@ constexpr int kRounds = 3;           // each with the gaps that the last one lef
 constexpr int kMaxFactorised = 60;   // touches of an island
 constexpr double kTolerance = 1e-7;  // m; of sweeps,
 constexpr int kSweeps = 200;         // and their number
+constexpr double kMaxRatio = 10.0;   // of the excess of the deepest touch: displacement of any point
 constexpr double kMaxPaid = 0.5;     // of the kinetic energy
 constexpr double kDisplaced = 0.1;   // of the farthest displacement: bodies that pay
 
@@ -58,7 +59,9 @@ std::vector<Point> Projection::make_points(const Step& step, bool& is_held) cons
 }
 
 void Projection::run(const Step& step, double allowed_m) {
-  for (int round = 0; round < kRounds && find_excess(step) > allowed_m; ++round) {
+  for (int round = 0; round < kRounds; ++round) {
+    const double excess = find_excess(step);
+    if (excess <= allowed_m) return;
     std::vector<Mover> resting(step.count());
     for (int n = 0; n < step.count(); ++n) {
       const int i = step.body(n);
@@ -71,8 +74,22 @@ void Projection::run(const Step& step, double allowed_m) {
       displacements = resting;
       solver_.solve(displacements, points, kTolerance, kSweeps);
     }
+    limit(step, kMaxRatio * excess, displacements);
     move(step, displacements, is_held);
     ++ledger_.costs.pushes;
+  }
+}
+
+/// Touches that contradict each other, as in a jam, have no solution: shortens all displacements so that no point of a body moves farther
+/// than `most_m`.
+void Projection::limit(const Step& step, double most_m, std::vector<Mover>& displacements) const {
+  double farthest = 0.0;
+  for (int n = 0; n < step.count(); ++n)
+    farthest = std::max(farthest, norm(displacements[n].velocity) + norm(displacements[n].spin) * bodies_.solid(step.body(n)).radius_m);
+  if (farthest <= most_m) return;
+  for (Mover& d : displacements) {
+    d.velocity = (most_m / farthest) * d.velocity;
+    d.spin = (most_m / farthest) * d.spin;
   }
 }
 

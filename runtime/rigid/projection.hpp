@@ -27,6 +27,7 @@ class Projection {
   bool can_part(const Step& step, const Pair& pair) const;
   double find_excess(const Step& step) const;
   std::vector<Point> make_points(const Step& step, bool& is_held) const;
+  void limit(const Step& step, double most_m, std::vector<Mover>& displacements) const;
   void move(const Step& step, const std::vector<Mover>& displacements, bool is_held);
   void pay(const Step& step, const std::vector<Mover>& displacements, double owed_j);
   Vec3 calc_angular_momentum(const Step& step) const;
