@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
 
 #include "runtime/rigid/cords.hpp"
 #include "runtime/rigid/limits.hpp"
@@ -16,6 +18,13 @@ namespace {
 constexpr double kDoubtful = 2e-4;   // m; deeper touches of curved surfaces are confirmed
 constexpr double kMissing = 5e-6;    // m; a place deeper than all touches by this is missing
 constexpr double kSagDecay = 10e-3;  // s
+
+/// Lower bound of the gap of any vertex of a body over the ground, from that at an earlier frame.
+double calc_least_gap(const Pair& pair, const shape::Shape& shape, const shape::Frame& now) {
+  const Vec3 &middle = shape.get_middle_m(), turned = now.rotation[2] - pair.measured.rotation[2];
+  const double moved = now.position_m[2] - pair.measured.position_m[2] + dot(turned, middle);
+  return pair.lowest_m + moved - norm(turned) * shape.get_radius_m();
+}
 
 }  // namespace
 
@@ -111,17 +120,31 @@ void TouchSets::update(Pair& pair, double step_s) {
 bool TouchSets::complete(Pair& pair, const shape::Frame& a, const shape::Frame& b, double closing_s) {
   const shape::Shape& mine = *bodies_.get_shape(pair.a);
   const shape::Shape* theirs = bodies_.get_shape(pair.b);
-  const shape::Deepest deepest =
-      theirs == nullptr ? shape::find_lowest(mine, a, bodies_.ground()->height_m) : shape::find_deepest(mine, a, *theirs, b, -kMissing);
-  if (deepest.place < 0 || deepest.gap_m > -kMissing) return false;
-  Contact* lowest = nullptr;
-  double gap_m = deepest.gap_m + kMissing;
-  for (Contact& c : pair.contacts)
-    if (const double then_m = find_moved(pair, c.touch, a, b).gap_m; then_m <= gap_m) gap_m = then_m, lowest = &c;
-  if (lowest != nullptr) {
-    if (lowest->touch.gap_m <= kTouch || gap_m > -kMissing || lowest->rests || !(closing_s > 0.0)) return false;
-    lowest->touching = false;
-    return std::exchange(lowest->closes_s, closing_s * lowest->touch.gap_m / (lowest->touch.gap_m - gap_m)) < 0.0;
+  const auto find_least = [&]() -> std::pair<Contact*, double> {
+    std::pair<Contact*, double> least{nullptr, std::numeric_limits<double>::infinity()};
+    for (Contact& c : pair.contacts)
+      if (const double gap_m = find_moved(pair, c.touch, a, b).gap_m; gap_m < least.second) least = {&c, gap_m};
+    return least;
+  };
+  const double bound_m = theirs == nullptr ? calc_least_gap(pair, mine, a) : -std::numeric_limits<double>::infinity();
+  if (bound_m > -kMissing) return false;
+  shape::Deepest deepest{.gap_m = bound_m};
+  const auto is_missing = [&](double least_m) { return deepest.gap_m < std::min(least_m, 0.0) - kMissing; };
+  std::pair<Contact*, double> least{nullptr, 0.0};
+  if (theirs != nullptr) {
+    deepest = shape::find_deepest(mine, a, *theirs, b, -kMissing);
+    if (deepest.place < 0) return false;
+    least = find_least();
+  } else if (least = find_least(); is_missing(least.second)) {
+    deepest = shape::find_lowest(mine, a, bodies_.ground()->height_m);
+    pair.measured = a;
+    pair.lowest_m = deepest.gap_m;
+  }
+  if (!is_missing(least.second)) {
+    Contact* const c = least.first;
+    if (c == nullptr || c->touch.gap_m <= kTouch || least.second > -kMissing || c->rests || !(closing_s > 0.0)) return false;
+    c->touching = false;
+    return std::exchange(c->closes_s, closing_s * c->touch.gap_m / (c->touch.gap_m - least.second)) < 0.0;
   }
   Contact added;
   added.a = pair.a;
