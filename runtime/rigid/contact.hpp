@@ -44,8 +44,8 @@ struct Pair {
   std::vector<Contact> contacts;
   double margin_m = 0.0, travelled_m = 0.0;  // since the last search
   bool searched = false;
-  shape::Frame measured{};  // of a, when its lowest vertex over the ground was looked for,
-  double lowest_m = -1.0;   // and its gap
+  shape::Frame measured{};   // of a, when its lowest vertex over the ground was looked for,
+  double lowest_m = -1.0;    // and its gap
   std::int64_t window = -1;  // in which it was last near
   int cord = -1;             // it is one
   struct SlowHit {
