@@ -10,7 +10,7 @@ namespace carillon::bem {
 
 inline constexpr std::size_t kSideLanes = 16;
 
-/// Vectors of `unknowns` complex numbers, one for each side. What it keeps true: of each unknown first all real parts, then all imaginary
+/// Vectors of `unknowns` complex numbers, one for each side. Invariant: of each unknown first all real parts, then all imaginary
 /// ones, filled up with zeros to a multiple of kSideLanes.
 struct Sides {
   std::size_t unknowns = 0, count = 0, padded = 0;

@@ -28,7 +28,7 @@ struct EdgePoint {
   double size_m = 0.0;  // the smallest of the facets there
 };
 
-/// Closed, oriented surfaces with N nodes, T facets and E = 3 T / 2 edges. What it keeps true: facets that are near in the list are near in
+/// Closed, oriented surfaces with N nodes, T facets and E = 3 T / 2 edges. Invariant: facets that are near in the list are near in
 /// space; nodes and edges are numbered in the order in which the facets meet them; there is no facet without an area.
 class RadiatingSurface {
  public:

@@ -19,7 +19,7 @@ struct Stencil {
   std::vector<double> weights_without_farthest;
 };
 
-/// Ascending wave numbers. What it keeps true: they differ.
+/// Ascending wave numbers. Invariant: they differ.
 class WaveNumbers {
  public:
   /// For modes at `modes` [1/m] of a surface in a sphere of `radius_m`. The mean step of k R is `step`, two thirds of it at the lower end;

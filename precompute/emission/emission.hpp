@@ -61,7 +61,7 @@ struct Options {
 /// The least m >= `least` that can be filtered at little cost: a multiple of 16, 8 or 4, at most 7 % more than `least`, or 3 more.
 int find_steps(int least);
 
-/// What it keeps true: all sound has the same bits on any number of ranks, for surfaces that move with the same bits; a surface in uniform
+/// Invariant: all sound has the same bits on any number of ranks, for surfaces that move with the same bits; a surface in uniform
 /// motion is silent, before the first step, too. The velocity of a node between two steps is the difference of its displacements over the
 /// step, as in every integrator that moves nodes by the step times their velocity. Collective calls: the constructor, add_step() where
 /// there is visibility or a file, finish(), calc_sound().

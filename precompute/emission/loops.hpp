@@ -64,7 +64,7 @@ struct RowLoops {
   void (*radiate)(const Facets* facets, const Ear* ear, double per_speed, const double* plain, const double* turned, double* time,
                   double* pa);
   /// Each of n pressures, at now + time half-samples, is spread over kSplinePoints half-samples, from units[half-sample] on, in whole
-  /// units. What lies at or behind `end` is left out. False when one is not finite or over 1e4 Pa; it is left out. spline: factors of
+  /// units. Samples at or behind `end` are dropped, as are pressures that are not finite or over 1e4 Pa: then false. spline: factors of
   /// powers (kSplinePoints) of the points (kSplinePoints).
   bool (*scatter)(std::int64_t* units, double now, double end, const double* time, const double* pa, std::size_t n, const double* spline);
   /// open (rows, kSlots) += the sum over i of value (count, rows) x weight[i] (kSlots), one i after the other.

@@ -13,7 +13,7 @@
 namespace carillon::emission {
 
 /// Many signals (rows), each filtered by OCE01 eq. 6 and 7, a sinc with fmax = half the sample rate under a Hann window of kHalfWidth
-/// samples a side, w = ceil(3 / (fmax h)) steps. What it keeps true: every sample is a sum of weights that is divided by their sum. Rows: a
+/// samples a side, w = ceil(3 / (fmax h)) steps. Invariant: every sample is a sum of weights that is divided by their sum. Rows: a
 /// multiple of kLane.
 class LowPass {
  public:

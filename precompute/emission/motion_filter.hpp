@@ -14,7 +14,7 @@
 namespace carillon::emission {
 
 /// Half-sample j lies at the time of sample j / 2; it is a weighted mean of the steps (or means of a box of steps) within two half-samples.
-/// What it keeps true: the sum and the first moment of the weights of a half-sample are 1 and 0, so that uniform motion passes exactly even
+/// Invariant: the sum and the first moment of the weights of a half-sample are 1 and 0, so that uniform motion passes exactly even
 /// where the rate of the steps changes. Before the first step and behind the last one all vertices move uniformly.
 class MotionFilter {
  public:

@@ -19,13 +19,13 @@ using recording::Microphone;
 /// (OCE01 section 4). Throws InputError when the view has no direction or goes straight up or down.
 std::vector<Microphone> make_ears(const Vec3& position_m, const Vec3& look_at_m, double distance_m = 0.2);
 
-/// Pressure over time at one place. What it keeps true: half-samples are whole numbers of 2^-46 Pa, so that their sums have the same bits
+/// Pressure over time at one place. Invariant: half-samples are whole numbers of 2^-46 Pa, so that their sums have the same bits
 /// in any order and on any number of ranks.
 class Arrivals {
  public:
   explicit Arrivals(std::size_t frames);
 
-  /// Pressures of a source sample [Pa], heard `time` half-samples after it: flat to 0.4 of the sample rate. What comes after the end is
+  /// Pressures of a source sample [Pa], heard `time` half-samples after it: flat to 0.4 of the sample rate. Samples after the end are
   /// left out. False: one is not finite or over 1e4 Pa; it is left out.
   bool add(std::int64_t sample, std::span<const double> time, const double* pressure_pa);
 

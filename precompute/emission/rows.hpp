@@ -16,7 +16,7 @@ struct alignas(64) Block {
   std::array<double, kLane> value{};
 };
 
-/// Rows at one time, or one after another. What it keeps true: its memory begins at a multiple of 64 bytes.
+/// Rows at one time, or one after another. Invariant: its memory begins at a multiple of 64 bytes.
 class Rows {
  public:
   Rows() = default;
@@ -30,7 +30,7 @@ class Rows {
   std::vector<Block> blocks_;
 };
 
-/// The last frames of rows. What it keeps true: the frames of a block lie behind one another, where a filter reads them at once.
+/// The last frames of rows. Invariant: the frames of a block lie behind one another, where a filter reads them at once.
 class Ring {
  public:
   Ring(std::size_t rows, std::size_t frames)

@@ -12,7 +12,7 @@
 
 namespace carillon::emission {
 
-/// Silent surfaces, moving balls and walls, with the surfaces that sound. What it keeps true: delta is the same on any number of ranks.
+/// Silent surfaces, moving balls and walls, with the surfaces that sound. Invariant: delta is the same on any number of ranks.
 class Screens {
  public:
   /// Collective. options: as of Emission.

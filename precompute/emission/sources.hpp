@@ -14,7 +14,7 @@
 
 namespace carillon::emission {
 
-/// What it keeps true: the volume acceleration of a triangle is the derivative of its flux v . S, so that a closed surface radiates its
+/// Invariant: the volume acceleration of a triangle is the derivative of its flux v . S, so that a closed surface radiates its
 /// change of volume exactly; the second side of a sheet has that of the first, negative.
 class Sources {
  public:

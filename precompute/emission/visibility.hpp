@@ -16,7 +16,7 @@ using Corners = std::array<Vec3, 3>;  // of a triangle, m
 /// True if a part of the straight way, or one of its ends, lies inside the obstacle.
 bool is_between(const job::RigidObstacle& obstacle, const Vec3& from, const Vec3& to);
 
-/// Triangles under a tree of boxes. What it keeps true: an answer depends on the list of triangles alone, not on who asks.
+/// Triangles under a tree of boxes. Invariant: an answer depends on the list of triangles alone, not on who asks.
 class Visibility {
  public:
   Visibility() = default;

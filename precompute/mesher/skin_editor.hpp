@@ -17,7 +17,7 @@ struct Quad {
   std::array<std::int32_t, 2> faces{};
 };
 
-/// A triangulation under change. What it keeps true: every edge has at most two triangles; folds and borders stay folds and borders; no
+/// A triangulation under change. Invariant: every edge has at most two triangles; folds and borders stay folds and borders; no
 /// move or collapse turns a triangle over. Numbers of points and triangles stay until get(). The places must outlive it.
 class SkinEditor {
  public:

@@ -8,7 +8,7 @@
 
 namespace carillon::mesher {
 
-/// The triangles, folds and borders of a body's surface, and projections onto them. What it keeps true: no edge of three triangles, no
+/// The triangles, folds and borders of a body's surface, and projections onto them. Invariant: no edge of three triangles, no
 /// point shared by two parts. Refers to the body.
 class WallSource {
  public:

@@ -8,7 +8,7 @@
 
 namespace carillon::base {
 
-/// The hash of bytes that come in pieces (FIPS 180-4, 6.2). What it keeps true: `state_` is the hash of all whole blocks of 64 bytes so
+/// The hash of bytes that come in pieces (FIPS 180-4, 6.2). Invariant: `state_` is the hash of all whole blocks of 64 bytes so
 /// far, and `block_` begins with the bytes after them.
 class PlainSha256 {
  public:

@@ -39,7 +39,7 @@ struct EnergyAudit {
   double hit_rise_j = 0.0;  // the most that a hit has added; they only take
   double kinetic_j = 0.0;   // the largest there has been
   double weight_n = 0.0;    // of all bodies that move; rise_j over it is a height
-  // Now; start = motion + modes + lost - lifted + error. What is radiated is taken from the modes by the player, and is in `lost`.
+  // Now; start = motion + modes + lost - lifted + error. Radiated energy is taken from the modes by the player, and is in `lost`.
   double start_j = 0.0;      // all there was at the beginning; gravity counts from the origin
   double motion_j = 0.0;     // kinetic and of gravity
   double modes_j = 0.0;      // in the modes
@@ -68,7 +68,7 @@ struct HitRate {
   double per_s = 0.0, time_s = 0.0;
 };
 
-/// Whether contacts are sound. Depth in the ground is measured at every step, between bodies every 2 ms.
+/// Checks of the contacts. Depth in the ground is measured at every step, between bodies every 2 ms.
 struct ContactAudit {
   Depth now, deepest;              // the largest depth now, and there has been
   Depth unexplained;               // of most calc_excess() there has been

@@ -107,7 +107,7 @@ double LastingContacts::calc_impedance(int body, double patch_m) const {
   return bank::calc_wave_impedance(material) * std::numbers::pi * patch_m * patch_m;
 }
 
-/// What lay has had no record since. Its last values once more, so that nothing is interpolated over the time before it was struck.
+/// A contact at rest has no records. Its last values once more, so that nothing is interpolated over the time before it is struck.
 void LastingContacts::stir(const rigid::Space& space, Spot& spot, std::vector<events::Event>& events) {
   if (!spot.lies) return;
   spot.lies = false;

@@ -1,4 +1,4 @@
-// Measures how deep bodies are in each other and in the ground, and counts their hits, for an audit.
+// Depths of bodies in each other and in the ground, and counts of their hits, for an audit.
 #pragma once
 
 #include <array>

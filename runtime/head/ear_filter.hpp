@@ -15,7 +15,7 @@ namespace carillon::head {
 
 using base::kSincTaps;
 
-/// From the pressure at the middle of a head to that at its ears; one for each body and listener. What it keeps true: every sample that
+/// From the pressure at the middle of a head to that at its ears; one for each body and listener. Invariant: every sample that
 /// came in is heard with the response and the delay of the direction at its time, or with both of two directions while one fades into the
 /// other; while the direction stays the same, calls of any size give the same bits. Neither the level nor the pitch steps when the
 /// direction does.

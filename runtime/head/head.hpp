@@ -43,7 +43,7 @@ struct ByDirection {
   Directions directions;
 };
 
-/// One head at one sample rate. What it keeps true: it does not change; all responses have as many taps, a multiple of kTapUnit, and begin
+/// One head at one sample rate. Invariant: it does not change; all responses have as many taps, a multiple of kTapUnit, and begin
 /// at kOnset, so that they may be blended; delays are not negative. All that is heard lags by get_latency() behind what arrives at the
 /// origin. Any thread, several at once.
 class Head {

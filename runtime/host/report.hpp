@@ -29,7 +29,7 @@ struct EnergyBooks {
 /// came from outside (strikes, mallets, a contacts file).
 EnergyBooks make_books(const Scene& scene, const contact::EnergyAudit& physics, const Sound& sound);
 
-/// What the audit of contacts asks to look at, a sentence each; empty where all is sound.
+/// Warnings of the audit of contacts, a sentence each.
 std::vector<std::string> list_contact_warnings(const Scene& scene, const contact::ContactAudit& contacts,
                                                const contact::EnergyAudit& energy);
 /// "'ball' in the ground"

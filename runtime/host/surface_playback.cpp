@@ -128,7 +128,7 @@ base::Json make_surface_json(const Scene& scene, const SceneSurface& surface, co
       .set("peak_pa", base::finite_or_null(figures.peak_pa, base::significant, 6));
 }
 
-/// A recorded surface at all ears. What it keeps true: pieces come in order; a round of the recording that is over takes no memory.
+/// A recorded surface at all ears. Invariant: pieces come in order; a round of the recording that is over takes no memory.
 class SurfacePlayback::Voice {
  public:
   Voice(const Scene& scene, const SceneSurface& surface, const Microphones& microphones, const std::optional<synth::ListeningHead>& head,

@@ -40,7 +40,7 @@ struct SurfaceFigures {
 };
 base::Json make_surface_json(const Scene& scene, const SceneSurface& surface, const SurfaceFigures& figures);
 
-/// Plays all recorded surfaces of a scene, from its beginning on. What it keeps true: sample n is what arrives at n / rate, however calls
+/// Plays all recorded surfaces of a scene, from its beginning on. Invariant: sample n is what arrives at n / rate, however calls
 /// divide time; surfaces do not change each other's sound. Takes memory and reads files while it plays.
 class SurfacePlayback {
  public:

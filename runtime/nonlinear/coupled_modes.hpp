@@ -40,7 +40,7 @@ struct CoupledCounters {
 };
 
 /// The coupled modes of a bank in motion. A mode's state is as in synth::Voice: re = q' + d q, im = omega_d q, omega_d^2 = lambda - d^2,
-/// which turns and shrinks by itself: softly, it is the linear mode exactly. What it keeps true: the book
+/// which turns and shrinks by itself: softly, it is the linear mode exactly. Invariant: the book
 ///   H = sum of (q'^2 + lambda q^2) / 2 + V(q)
 /// is at most (1 + tolerance) of what pushes have put in less what damping took, whatever the energy and the blows. docs/equations.md E12.
 /// Memory is taken in the constructor only; one thread at a time; nothing throws but the constructor. Denormal numbers slow it down: flush

@@ -28,7 +28,7 @@ struct MovingMicrophone {
 /// Where a receiver is, seconds after the recording began; continuous in time.
 using Way = std::function<MovingMicrophone(std::size_t receiver, double time_s)>;
 
-/// Plays a recording once, from its beginning. What it keeps true: the pressure of any two receivers is that of the same surface; samples
+/// Plays a recording once, from its beginning. Invariant: the pressure of any two receivers is that of the same surface; samples
 /// come in order; the pressure at a receiver that moves is that at one at rest where it is at that time. Reads the file and takes memory
 /// while it plays: not for an audio thread. Costs some 45 ns for each triangle and sample of the recording, and 65 ns for each receiver.
 class Player {

@@ -15,7 +15,7 @@
 
 namespace carillon::recording {
 
-/// The file, open; tables in memory, blocks read when they are asked for. What it keeps true: every byte was checked against the digest
+/// The file, open; tables in memory, blocks read when they are asked for. Invariant: every byte was checked against the digest
 /// when it was opened; every number in its tables is in range and finite. A file that is changed afterwards gives wrong sound, never a
 /// crash.
 class RecordedSurface {

@@ -9,7 +9,7 @@
 namespace carillon::recording {
 
 /// One signal, sample by sample as it comes: what lies between samples is read by the windowed sinc of runtime/base/sinc.hpp, stretched to
-/// the lower of the two rates. What it keeps true: a constant passes as it is; sample n of the output is the input at the same time, n /
+/// the lower of the two rates. Invariant: a constant passes as it is; sample n of the output is the input at the same time, n /
 /// to_hz; before its first sample and after its last the input is 0. Flat within 0.01 dB to 0.4 of the lower rate, -90 dB from 0.6 on.
 class Resampler {
  public:

@@ -13,7 +13,7 @@ namespace carillon::support {
 /// InputError as calc_losses() does.
 std::vector<bank::HeardMode> mount(bank::Bank& played, const MountingRequest& request = {});
 
-/// What mount() returns; the bank stays as it is.
+/// Result of mount(); the bank is not changed.
 std::vector<bank::HeardMode> calc_heard_as_played(const bank::Bank& played);
 
 /// In a scene of default settings, by number in the file: corrected, in air for a bank with multipoles, on the bank's supports. Modes

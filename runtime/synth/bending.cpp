@@ -1,6 +1,6 @@
 // Method:     the displacement of a vertex is the sum over modes of phi q, at the antinodes of the lowest modes and at vertices spread over
 //             the surface; at the end of sub-blocks with forces, and every four samples without. The sum at a vertex ends as soon as the
-//             bound on what is left of it cannot bring it above the maximum.
+//             bound on its remaining terms cannot bring it above the maximum.
 // Source:     docs/equations.md E4, E13.
 // Deviations: under forces, and between these vertices, the true maximum is up to some per cent larger.
 #include "runtime/synth/bending.hpp"

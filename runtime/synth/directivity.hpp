@@ -37,7 +37,7 @@ struct BlockPoses {
 /// ahead, up to 16 blocks; beyond that the most audible ones come first and then all in turn, and those that wait stay as they are. In the
 /// first block that sounds all are looked up at once; those for which there is no share begin with their root mean square over directions.
 ///
-/// What it keeps true: in the block `get_block()` weights are those of that block; they depend on poses, shares and block numbers only, so
+/// Invariant: in the block `get_block()` weights are those of that block; they depend on poses, shares and block numbers only, so
 /// that the sizes of calls do not change a bit. Memory is taken in the constructor only. One thread at a time; nothing throws but the
 /// constructor.
 class Directivity {

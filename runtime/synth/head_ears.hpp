@@ -16,7 +16,7 @@ namespace carillon::synth {
 
 /// What both ears of a head hear of the sound of one body that comes by one way: straight, or from a floor. The sound comes as it would be
 /// in the middle of the head without it, with the delay and the spreading of the way to there; the head's own delays and levels are what
-/// the ears differ by. What it keeps true: it is silent, and as it was made, once all that came in is out; when that is follows from
+/// the ears differ by. Invariant: it is silent, and as it was made, once all that came in is out; when that is follows from
 /// the samples alone, not from how many come in one call of who feeds it. [audio-thread] but for the constructor.
 class HeadEars {
  public:

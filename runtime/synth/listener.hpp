@@ -32,7 +32,7 @@ events::Quaternion calc_level_head_rotation(const Vec3& left_m, const Vec3& righ
 /// This head between microphones, level where those are two, left and right: how a listener is turned that says no more.
 ListeningHead make_level_head(std::shared_ptr<const head::Head> head, const std::vector<Vec3>& microphones_m);
 
-/// Where the listener is over time, and how it is turned. What it keeps true: microphone m, which is at offset o from a listener that is
+/// Where the listener is over time, and how it is turned. Invariant: microphone m, which is at offset o from a listener that is
 /// not turned, is at get_track(m) + o, so that receivers need not know of turns; as long as no events::Listener was turned all tracks are
 /// one. Between waypoints every microphone goes its own cubic way. With a floor there are the mirrored tracks too, to which the mirrored
 /// offsets belong, and with a head its attitude. [audio-thread] but for the constructor.

@@ -31,7 +31,7 @@ struct PropagationOptions {
   int phase = 0;                      // of Directivity
 };
 
-/// The modes' sound with directivity: a delay line of its own for each ear, and for each mirrored one behind them. What it keeps true: the
+/// The modes' sound with directivity: a delay line of its own for each ear, and for each mirrored one behind them. Invariant: the
 /// centre of the multipoles is where body and attitude have it at each waypoint.
 class DirectedSound {
  public:
@@ -80,7 +80,7 @@ class DirectedSound {
   std::vector<Receiver> receivers_;
 };
 
-/// What it keeps true: all its delay lines have the same samples. Without directivity modes send one sound all round, with it one to each
+/// Invariant: all its delay lines have the same samples. Without directivity modes send one sound all round, with it one to each
 /// ear; acceleration noise sends its three dipoles in both cases. With ground reflection there is a mirrored ear for each. With a head
 /// there is one ear, in its middle, and what arrives there goes through the head in the direction from which it comes.
 struct Propagation {

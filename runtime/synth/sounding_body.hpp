@@ -97,7 +97,7 @@ using Mix = std::vector<std::array<double, kBlock>>;  // per microphone
 /// How what is heard of a propagation changes over a block. What is unheard is made and goes nowhere.
 enum class Fade : std::uint8_t { kNone, kIn, kOut, kUnheard };
 
-/// What it keeps true: it has the modules of its effects and no others; every module has done the same samples (rendered_); while a change
+/// Invariant: it has the modules of its effects and no others; every module has done the same samples (rendered_); while a change
 /// is under way the old and the new propagation sound together, and one fades into the other within one block. [main-thread] makes modules,
 /// [audio-thread] puts them in.
 class SoundingBody {

@@ -105,7 +105,7 @@ struct SynthesiserCounters {
   ContactRecordCounters contacts;
 };
 
-/// What it keeps true: body numbers name at most one body that sounds; all bodies have rendered the same samples, in blocks of kBlock from
+/// Invariant: body numbers name at most one body that sounds; all bodies have rendered the same samples, in blocks of kBlock from
 /// the first sample; an event acts in the order in which it was pushed; only process() touches what sounds, only the main thread takes and
 /// gives back memory.
 class Synthesiser {

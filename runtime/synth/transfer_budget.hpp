@@ -7,7 +7,7 @@
 namespace carillon::synth {
 
 /// Shares the transfers of a block among bodies by what each has asked for in the last ones. Bodies that ask for nothing, asleep or not,
-/// and those that ask for more than before share what is left, a quarter of all at least. What it keeps true: it is a pure function of what
+/// and those that ask for more than before share what is left, a quarter of all at least. Invariant: it is a pure function of what
 /// is known when a block begins, so that neither a clock nor the sizes of calls decide; all shares together are at most 5/4 of `whole`, but
 /// for bodies of more ears than that, which look up one transfer an ear.
 class TransferBudget {

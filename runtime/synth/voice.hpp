@@ -61,7 +61,7 @@ class VoiceHandover {
   std::vector<DampedState> damped_, old_damped_;
 };
 
-/// All modes of a model below the Nyquist frequency. What it keeps true: the states are those at the horizon, a multiple of kSubBlock
+/// All modes of a model below the Nyquist frequency. Invariant: the states are those at the horizon, a multiple of kSubBlock
 /// samples from the first one; all that is decided is decided there, so that the same strikes give the same bits whatever the sizes of the
 /// blocks; groups of modes beyond the live ones have no energy. Strikes wait in a StrikeQueue, modes that do not ring are DampedModes.
 /// Memory is taken in the constructor only. One thread at a time.

@@ -25,7 +25,7 @@ Drop make_drop(int body, int number) {
   return decode_drop(bytes);
 }
 
-/// What the drops of a body keep at present; the defaults are the wanted bounds.
+/// Present bounds of the drops of a body; the defaults are the wanted ones.
 struct Bounds {
   double rests_m = kWanted.rests_m, ever = kWanted.ever, lifted = kWanted.lifted, rattling = 0.0;
 };

@@ -25,7 +25,7 @@ inline Complex find_exact(int l, double k) { return 1.0 / (k * calc_hankel_slope
 /// Power over rho c / 2 times the integral of the squared velocity, which is 1: Re(i h_l / h_l') = 1 / |k h_l'|^2 by the Wronskian.
 inline double find_exact_efficiency(int l, double k) { return std::norm(find_exact(l, k)); }
 
-/// A sphere of radius 1 that moves in every one of some harmonics, solved once at each wave number. What it keeps true: all harmonics are
+/// A sphere of radius 1 that moves in every one of some harmonics, solved once at each wave number. Invariant: all harmonics are
 /// right sides of one solve, and each facet has the linear function nearest to its harmonic.
 class Spheres {
  public:

@@ -144,7 +144,7 @@ struct DropOutcome {
   double deepest_m = 0.0, rests_m = 0.0;  // of the lowest vertex: ever, and in the last 0.2 s
   double ends_m = 0.0;                    // at the end
   double missed_m = 0.0;                  // a vertex below the floor and below all touches of a step, at its end, at most
-  double gained = 0.0;                    // energy above that at the start and what was lifted, of the largest kinetic energy
+  double gained = 0.0;                    // energy above that at the start and the lifted energy, of the largest kinetic energy
   double speed_m_s = 0.0;                 // at the end
   double lifted = 0.0;                    // of the largest kinetic energy
   int late_hits = 0, late_strikes = 0;    // in the last 0.5 s: points, and instants
@@ -169,7 +169,7 @@ inline double find_least_gap(const Space& space, int other) {
   return least;
 }
 
-/// How deep a rigid body may ever be: 50 um or 1 % of its thickness [m].
+/// Largest depth allowed to a rigid body at any time: 50 um or 1 % of its thickness [m].
 inline double calc_allowed_depth(const DropOutcome& outcome) { return std::max(5e-5, 0.01 * outcome.thickness_m); }
 
 inline DropOutcome run_drop(const Drop& d, double seconds) {
@@ -259,7 +259,7 @@ struct DropBounds {
   double missed_m = 2e-6, gained = 1e-5, lifted = 1e-3;
 };
 inline constexpr DropBounds kWanted;
-/// What random drops keep at present.
+/// Present bounds of random drops.
 inline constexpr DropBounds kHeldToday{.ever = 4.0, .missed_m = 5e-5, .gained = 1e-4, .lifted = 1.0};
 
 /// The bound that an outcome has violated; empty: none.

@@ -119,7 +119,7 @@ TEST(instants, fall_onto_the_ground_is_found_by_its_closed_form) {
   ASSERT_TRUE(stages.instants.find(stages.step, at, first));
   EXPECT_EQ(first.size(), 4u);
   EXPECT_NEAR(at, (std::sqrt(speed * speed + 2.0 * kGravity * gap) - speed) / kGravity, 1e-9 / speed);
-  // What parts strikes nothing.
+  // Parting bodies strike nothing.
   stages.bodies.state(0).velocity = {0, 0, speed};
   stages.bodies.place(0);
   stages.solve(h, true);
