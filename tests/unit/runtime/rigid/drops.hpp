@@ -259,8 +259,8 @@ struct DropBounds {
   double missed_m = 2e-6, gained = 1e-5, lifted = 1e-3;
 };
 inline constexpr DropBounds kWanted;
-/// Present bounds of random drops.
-inline constexpr DropBounds kHeldToday{.ever = 4.0, .missed_m = 5e-5, .gained = 1e-4, .lifted = 1.0};
+/// Present bounds of any drop; pens on their tips are the worst.
+inline constexpr DropBounds kHeldToday{.rests_m = 1e-4, .ever = 20.0, .missed_m = 2e-3, .gained = 1e-3, .lifted = 10.0};
 
 /// The bound that an outcome has violated; empty: none.
 inline std::string describe_fault(const DropOutcome& o, const DropBounds& bounds) {
