@@ -84,10 +84,10 @@ def read_sound(file):
     return rate, numpy.frombuffer(data[begin:], dtype="<f4").reshape(-1, channels)[:, 0].astype(float)
 
 
-def find_peak_hz(file, low_hz, high_hz, from_s):
+def find_peak_hz(file, low_hz, high_hz, from_s, until_s=None):
     """The strongest line between two frequencies, placed by a parabola."""
     rate, sound = read_sound(file)
-    sound = sound[int(from_s * rate) :]
+    sound = sound[round(from_s * rate) : until_s and round(until_s * rate)]
     level = numpy.log(abs(numpy.fft.rfft(sound * numpy.hanning(len(sound)), 1 << 19)) + 1e-300)
     step = rate / (1 << 19)
     at = int(low_hz / step) + int(level[int(low_hz / step) : int(high_hz / step)].argmax())
