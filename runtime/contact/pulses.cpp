@@ -1,7 +1,6 @@
 // Method: the real contact lasts a Hertz time from the touch on, so its pulse is centred half that time later. Where several spots share an
 //   impact, each carries its part of the mass.
 // Source: J. O'Brien, C. Shen, C. Gatchalian, "Synthesizing sounds from rigid-body simulations" (2002), section 4.
-// Deviations: none.
 #include "runtime/contact/pulses.hpp"
 
 #include <algorithm>

@@ -8,13 +8,13 @@ namespace {
 /// The bodies as they are now; b: -1 for the ground.
 Depth measure(const rigid::Space& space, int a, int b) {
   const rigid::Solid& solid = space.solid(a);
-  const shape::Frame frame = rigid::place(solid, space.state(a)).frame;
+  const shape::Frame frame = space.get_frame(a);
   Depth depth{.body = a, .other = b, .thickness_m = solid.shape->get_thickness_m(), .time_s = space.get_time()};
   if (b < 0) {
     depth.depth_m = -shape::find_lowest(*solid.shape, frame, space.ground()->height_m).gap_m;
   } else {
     const shape::Shape& other = *space.solid(b).shape;
-    const shape::Frame frame_b = rigid::place(space.solid(b), space.state(b)).frame;
+    const shape::Frame frame_b = space.get_frame(b);
     depth.thickness_m = std::min(depth.thickness_m, other.get_thickness_m());
     if (solid.shape->is_polyhedron() && other.is_polyhedron()) {
       shape::PairMemory memory;

@@ -1,6 +1,5 @@
 // Method: the spectrum of sin^1.5 in a table, energy of the modes as if the pulse were that of rigid bodies.
 // Source: Hertz 1882; sin^1.5 after Hunt and Crossley 1975; lambda of Zener 1941 (Phys. Rev. 59, 669): loss 1 - e^2 = 3.4 lambda.
-// Deviations: none.
 #include "runtime/impact/predict.hpp"
 
 #include <algorithm>

@@ -6,7 +6,6 @@
 // min(1, R/m) (T^2 - U^2) - (min(T, R)^2 - U^2). m <= R: T <= R gives 0, T > R gives T^2 - R^2. m > R, T <= R: then U > R >= T, and it is
 // (1 - R/m) (U^2 - T^2). m > R, T > R: for T < U it is at least (U^2 - R^2) - (U^2 - T^2); for T >= U >= R at least U^2 - R^2; for U < R
 // at least 2 R (T - U) - (R - U)(R + U). None is negative.
-// Deviations: none.
 #include "runtime/impact/solve.hpp"
 
 #include <algorithm>

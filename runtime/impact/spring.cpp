@@ -1,7 +1,6 @@
 // Method: discrete gradient of the spring's potential (Gonzalez 1996), so that a step's work is a difference of potentials. For p = 1.5
 // with a = sqrt(y0), b = sqrt(y1) it is 2/5 K (b^5 - a^5)/(b^2 - a^2) = 2/5 K (a^4 + a^3 b + a^2 b^2 + a b^3 + b^4)/(a + b).
 // Source: Hertz 1882; Hunt and Crossley 1975 (J. Appl. Mech. 42, 440).
-// Deviations: none.
 #include "runtime/impact/spring.hpp"
 
 #include <algorithm>

@@ -1,6 +1,4 @@
 // Method: bodies on joints are moved in the coordinates of their mechanism: so joints stay closed to rounding.
-// Source: none.
-// Deviations: none.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -1,6 +1,5 @@
 // Method: states, and frames that follow from them; mean properties of two bodies that touch.
 // Source: K. L. Johnson, "Contact mechanics" (1985), eq. 11.24.
-// Deviations: none.
 #include "runtime/rigid/bodies.hpp"
 
 #include <fmt/format.h>

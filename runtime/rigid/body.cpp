@@ -1,6 +1,5 @@
 // Method: Runge-Kutta of fourth order on the quaternion, the angular momentum constant.
 // Source: E. Hairer, G. Wanner, "Solving ordinary differential equations I" (1993), II.1.
-// Deviations: none.
 #include "runtime/rigid/body.hpp"
 
 #include <algorithm>

@@ -1,7 +1,6 @@
 // Method: candidates from constant relative accelerations; instants by bracketing on the paths, as long as a candidate is earlier than the
 //   first instant found.
 // Source: B. Mirtich, "Impulse-based dynamic simulation of rigid body systems" (1996).
-// Deviations: none.
 #include "runtime/rigid/instants.hpp"
 
 #include <algorithm>

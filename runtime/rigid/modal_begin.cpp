@@ -1,7 +1,6 @@
 // Method: where modes would get less than 2 % of the energy, the rigid impact and the Hertz pulse stand; otherwise an impact begins, or one
 //   that is not over gets more contacts.
 // Source: runtime/impact/predict.hpp; docs/decisions/impact.md.
-// Deviations: none.
 #include <algorithm>
 #include <cmath>
 #include <map>

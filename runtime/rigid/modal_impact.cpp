@@ -1,6 +1,5 @@
 // Method: an impact whose bodies ring is integrated with their modes, a small step at a time, until its contacts have parted.
 // Source: runtime/impact/impact.hpp; docs/decisions/impact.md.
-// Deviations: none.
 #include "runtime/rigid/modal_impact.hpp"
 
 #include <algorithm>
@@ -34,16 +33,38 @@ Vec3 ModalImpacts::find_station(const ModalContact& contact) const {
   return bodies_.state(body).centre + bodies_.placed(body).rotation * contact.station;
 }
 
-bool ModalImpacts::is_pressed(const Pair& pair, const Vec3& where) const {
-  if (impacts_.empty()) return false;
-  const double near = kSamePlace * bodies_.calc_size(pair.a, pair.b);
+/// Calls with the impact and number of every contact between the two bodies of a pair.
+template <typename Do>
+void ModalImpacts::for_contacts(const Pair& pair, Do&& act) const {
   for (const ModalImpact& modal : impacts_)
-    for (const ModalContact& contact : modal.contacts) {
+    for (int k = 0; const ModalContact& contact : modal.contacts) {
       const Forces& f = contact.forces;
-      const bool is_same = (f.a == pair.a && f.b == pair.b) || (f.b == pair.a && f.a == pair.b);
-      if (is_same && norm(find_station(contact) - where) < near) return true;
+      if ((f.a == pair.a && f.b == pair.b) || (f.b == pair.a && f.a == pair.b)) act(modal, k);
+      ++k;
     }
-  return false;
+}
+
+bool ModalImpacts::is_pressed(const Pair& pair, const Vec3& where) const {
+  const double near = kSamePlace * bodies_.calc_size(pair.a, pair.b);
+  bool any = false;
+  for_contacts(pair, [&](const ModalImpact& modal, int k) { any = any || norm(find_station(modal.contacts[k]) - where) < near; });
+  return any;
+}
+
+double ModalImpacts::calc_depth(const Pair& pair) const {
+  double depth = 0.0;
+  for_contacts(pair, [&](const ModalImpact& modal, int k) { depth = std::max(depth, modal.impact->calc_depth(k)); });
+  return depth;
+}
+
+/// The same at a place.
+double ModalImpacts::calc_depth(const Pair& pair, const Vec3& where) const {
+  const double near = kSamePlace * bodies_.calc_size(pair.a, pair.b);
+  double depth = 0.0;
+  for_contacts(pair, [&](const ModalImpact& modal, int k) {
+    if (norm(find_station(modal.contacts[k]) - where) < near) depth = std::max(depth, modal.impact->calc_depth(k));
+  });
+  return depth;
 }
 
 /// The motion of a body as an impact begins or continues with it.
@@ -51,7 +72,7 @@ void ModalImpacts::set_motion(int body, impact::Body& b) const {
   const State& state = bodies_.state(body);
   const Placed& placed = bodies_.placed(body);
   b.centre_m = state.centre;
-  b.inertia_kg_m2 = placed.rotation * (bodies_.solid(body).inertia_kg_m2 * transpose(placed.rotation));
+  b.inertia_kg_m2 = bodies_.calc_inertia(body);
   b.acceleration_m_s2 = bodies_.gravity();
   b.spin_acceleration_rad_s2 = placed.inverse_inertia * cross(state.momentum, placed.spin);
   const Articulation* articulation = bodies_.find_articulation(body);
@@ -87,47 +108,21 @@ void ModalImpacts::end(const std::vector<Hit>& hits, TouchSets& touches) {
       if (bodies_.is_moved_by_impact(body)) end(*find(body), touches);
 }
 
-void ModalImpacts::end_where_resting(const Step& step, TouchSets& touches) {
+void ModalImpacts::end_where_touching(const Step& step, TouchSets& touches) {
   if (impacts_.empty()) return;
-  for (const Pair* pair : step.island().pairs)
-    for (const Contact& c : pair->contacts) {
-      if (!c.carries()) continue;
-      for (const int body : {pair->a, pair->b}) {
-        ModalImpact* modal = bodies_.moves(body) ? find(body) : nullptr;
-        if (modal != nullptr && std::abs(bodies_.calc_approach(c.touch, c.a, c.b)) <= kSlowest) end(*modal, touches);
-      }
-    }
-}
-
-/// Depth that the contacts of an impact between the two bodies explain at a place [m].
-double ModalImpacts::calc_depth(const ModalImpact& modal, const Pair& pair, const Vec3& where) const {
-  const double near = kSamePlace * bodies_.calc_size(pair.a, pair.b);
-  double depth = 0.0;
-  for (int k = 0; const ModalContact& contact : modal.contacts) {
-    const Forces& f = contact.forces;
-    const int number = k++;
-    const bool is_same = (f.a == pair.a && f.b == pair.b) || (f.b == pair.a && f.a == pair.b);
-    if (is_same && norm(find_station(contact) - where) < near) depth = std::max(depth, modal.impact->calc_depth(number));
-  }
-  return depth;
-}
-
-void ModalImpacts::end_where_unexplained(const Step& step, TouchSets& touches) {
-  if (impacts_.empty()) return;
-  for (Pair* pair : step.island().pairs) {
-    if (pair->cord >= 0) continue;
+  for (Pair* pair : step.island().pairs)
     for (const int body : {pair->a, pair->b}) {
       ModalImpact* modal = bodies_.moves(body) ? find(body) : nullptr;
-      if (modal == nullptr) continue;
-      const bool is_deep = std::any_of(pair->contacts.begin(), pair->contacts.end(), [&](const Contact& c) {
-        const double depth = -c.touch.gap_m - pair->sag_m;
-        return depth > kTooDeep && depth > kTooDeep + kExplained * calc_depth(*modal, *pair, c.touch.where_m);
-      });
-      if (!is_deep) continue;
-      end(*modal, touches);
-      pair->rattles_until_s = std::max(pair->rattles_until_s, bodies_.get_time() + kCalmTime);
+      if (modal == nullptr || pair->cord >= 0) continue;
+      bool is_deep = false, is_resting = false;
+      for (const Contact& c : pair->contacts) {
+        const double depth = -c.touch.gap_m - pair->sag_m - kTooDeep;
+        is_deep = is_deep || (depth > 0.0 && depth > kExplained * calc_depth(*pair, c.touch.where_m));
+        is_resting = is_resting || (c.carries() && std::abs(bodies_.calc_approach(c.touch, c.a, c.b)) <= kSlowest);
+      }
+      if (is_deep) pair->rattles_until_s = std::max(pair->rattles_until_s, bodies_.get_time() + kCalmTime);
+      if (is_deep || is_resting) end(*modal, touches);
     }
-  }
 }
 
 void ModalImpacts::advance(const Step& step, double to_s, double part_s, double window_end_s, TouchSets& touches) {
@@ -243,11 +238,9 @@ void ModalImpacts::undo_pull(const Step& step, int body, const joints::Spatial& 
     return;
   }
   State& s = bodies_.state(body);
-  const Mat3& rotation = bodies_.placed(body).rotation;
   s.velocity = s.velocity - time_s * pull.linear;
   s.centre = s.centre + (0.5 * time_s * time_s) * pull.linear;
-  const Mat3 inertia = rotation * (bodies_.solid(body).inertia_kg_m2 * transpose(rotation));
-  s.momentum = s.momentum - time_s * (inertia * pull.angular);
+  s.momentum = s.momentum - time_s * (bodies_.calc_inertia(body) * pull.angular);
   bodies_.place(body);
 }
 

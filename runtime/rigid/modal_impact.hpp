@@ -47,10 +47,11 @@ class ModalImpacts {
   bool begin(const Step& step, Collision& collision, const Instants& instants, TouchSets& touches);
   /// A rigid impact ends the impacts with modes that its bodies were moved by.
   void end(const std::vector<Hit>& hits, TouchSets& touches);
-  /// An impact has no other contacts than its own: where one of its bodies comes to touch something slowly, it ends.
-  void end_where_resting(const Step& step, TouchSets& touches);
-  /// An impact knows no depth but that of its springs and modes: where its bodies touch deeper, it ends. Now is the time of the touches.
-  void end_where_unexplained(const Step& step, TouchSets& touches);
+  /// An impact has no other contacts than its own, and knows no depth but that of its springs and modes: where its bodies come to touch
+  /// elsewhere slowly, or deeper, it ends. Now is the time of the touches.
+  void end_where_touching(const Step& step, TouchSets& touches);
+  /// Depth of the bodies of a pair that springs and modes of an impact between them explain [m].
+  double calc_depth(const Pair& pair) const;
   /// Moves the impacts of an island to the time `to_s`, `part_s` later. The step has the effect of gravity and of other contacts on
   /// their bodies. Forces are reported where the window ends.
   void advance(const Step& step, double to_s, double part_s, double window_end_s, TouchSets& touches);
@@ -79,7 +80,9 @@ class ModalImpacts {
   void set_motion(int body, impact::Body& made) const;
   std::vector<double> turn_to_world(int body, const std::vector<double>& shape) const;
   Vec3 find_station(const ModalContact& contact) const;
-  double calc_depth(const ModalImpact& modal, const Pair& pair, const Vec3& where) const;
+  template <typename Do>
+  void for_contacts(const Pair& pair, Do&& act) const;
+  double calc_depth(const Pair& pair, const Vec3& where) const;
   void move_articulation(const ArticulationStep& step, const impact::Body& struck, double time_s, double step_s);
   void undo_pull(const Step& step, int body, const joints::Spatial& pull, double time_s);
   void keep_pulses(ModalImpact& modal);

@@ -1,6 +1,5 @@
 // Method: free motion in closed form (runtime/impact/modes.hpp); pulses of rigid impacts by their spectrum.
 // Source: docs/decisions/impact.md.
-// Deviations: none.
 #include "runtime/rigid/modal_states.hpp"
 
 #include <algorithm>

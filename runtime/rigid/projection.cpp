@@ -34,8 +34,7 @@ double Projection::find_excess(const Step& step) const {
   double excess = 0.0;
   for (const Pair* pair : step.island().pairs) {
     if (!can_part(step, *pair)) continue;
-    for (const Contact& c : pair->contacts)
-      if (!c.presses) excess = std::max(excess, -c.touch.gap_m - pair->sag_m);
+    for (const Contact& c : pair->contacts) excess = std::max(excess, -c.touch.gap_m - pair->sag_m);
   }
   return excess;
 }

@@ -2,7 +2,6 @@
 //   others of the island move, bodies sleep by themselves, with the forces of the others on them as they are. These forces are watched:
 //   where they change by more than a part of its weight a sleeping body wakes, alone, and so may those that lean on it, one after another.
 // Source: J. J. Moreau, "Unilateral contact and dry friction in finite freedom dynamics" (1988), the solution with zero velocities.
-// Deviations: none.
 #include "runtime/rigid/rest.hpp"
 
 #include <algorithm>

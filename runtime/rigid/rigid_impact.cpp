@@ -130,21 +130,14 @@ void RigidImpact::solve_row(Collision& collision) const {
         std::max_element(points.begin(), points.end(), [&](const Point& x, const Point& y) { return calc_approach(x) < calc_approach(y); });
     const double approach = calc_approach(*fastest);
     if (approach <= 1e-9) break;
-    Hit& hit = collision.hits[static_cast<std::size_t>(fastest - points.begin())];
+    Hit& hit = collision.hits[fastest - points.begin()];
     if (!hit.is_cord && bodies_.moves(hit.a) && bodies_.moves(hit.b) && approach > kSlowest)
       hit.restitution = bodies_.calc_restitution(hit.a, hit.b);
     hit.approach_m_s = std::max(hit.approach_m_s, approach);
     const Vec3& n = fastest->normal;
     const Vec3 push =
         ((1.0 + (approach > kSlowest ? hit.restitution : 0.0)) * approach / dot(n, calc_mobility(collision.movers, *fastest) * n)) * n;
-    const auto give = [&](int mover, const Vec3& arm, const Vec3& impulse) {
-      if (mover < 0) return;
-      Mover& m = collision.movers[static_cast<std::size_t>(mover)];
-      m.velocity = m.velocity + m.inverse_mass * impulse;
-      m.spin = m.spin + m.inverse_inertia * cross(arm, impulse);
-    };
-    give(fastest->a, fastest->arm_a, push);
-    give(fastest->b, fastest->arm_b, -1.0 * push);
+    rigid::apply(collision.movers, *fastest, push);
     hit.impulse = hit.impulse + push;
   }
 }

@@ -1,6 +1,4 @@
 // Method: the loop over windows, steps, islands and the impacts within a step; the stages do the rest.
-// Source: none.
-// Deviations: none.
 #include "runtime/rigid/space.hpp"
 
 #include <algorithm>
@@ -103,11 +101,10 @@ void Space::step_island(Island& island, double start_s, double length_s) {
   while (length_s - done > kShortest) {
     const double h = length_s - done;
     bodies_.set_time(start_s + done);
-    modal_impacts_.end_where_unexplained(step_, touches_);
+    modal_impacts_.end_where_touching(step_, touches_);
     const bool may_sleep = !std::exchange(begun, true) && rest_.may_sleep(island.bodies, h);
     projection_.run(step_, may_sleep ? kDeep : kTooDeep);
     if (may_sleep && rest_.try_island(island, h)) break;
-    modal_impacts_.end_where_resting(step_, touches_);
     touches_.forget_closing(step_);
     for (int n = 0; n <= kMaxCompleted; ++n) {
       problem_.predict(step_, h, false);

@@ -10,6 +10,7 @@
 // ModalStates; each keeps its own state, and gets that of a step as a Step. All book their losses in the Ledger.
 #pragma once
 
+#include <algorithm>
 #include <map>
 #include <optional>
 #include <utility>
@@ -62,15 +63,16 @@ class Space {
   void skip_window(double end_s);
   /// Velocity of the point of a body at that place [m/s]; zero for the ground and fixed bodies.
   Vec3 calc_velocity(int body, const Vec3& where) const { return bodies_.calc_velocity(body, where); }
+  shape::Frame get_frame(int body) const { return bodies_.get_frame(body); }
   const Vec3& get_spin(int body) const { return bodies_.placed(body).spin; }
   /// Contacts of bodies that are awake.
   void list_contacts(std::vector<const Contact*>& out) const;
   /// Of bodies that are near in this window, and of still ones that touch. b: -1 for the ground, or greater than a.
   const std::map<std::pair<int, int>, Pair>& pairs() const { return touches_.pairs(); }
-  /// Depth of a pair that an impact with modes left in its surfaces [m].
+  /// Depth of a pair that an impact with modes explains, or left in its surfaces [m].
   double calc_explained_depth(int a, int b) const {
     const auto at = pairs().find({a, b});
-    return at == pairs().end() ? 0.0 : at->second.sag_m;
+    return at == pairs().end() ? 0.0 : std::max(at->second.sag_m, modal_impacts_.calc_depth(at->second));
   }
   /// Impacts since the last call.
   std::vector<Strike> take_strikes() { return std::exchange(strikes_, {}); }

@@ -1,7 +1,6 @@
 // Method: impulses act at the middle of a step, and places follow from the mean of the velocities at its two ends. On articulations they
 //   act where the mechanism is at the end of the step without contacts, at the place where they press half a step later.
 // Source: J. J. Moreau, "Unilateral contact and dry friction in finite freedom dynamics" (1988); in generalised coordinates for joints.
-// Deviations: none.
 #include "runtime/rigid/step.hpp"
 
 namespace carillon::rigid {

@@ -2,7 +2,6 @@
 //   middle of the step. With the arm from x0 + h v0 / 2 momentum and angular momentum of a free island are conserved to rounding, and a
 //   contact that neither slides nor strikes does no work.
 // Source: J. J. Moreau, "Unilateral contact and dry friction in finite freedom dynamics" (1988), the step with the impulse at its middle.
-// Deviations: none.
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -1,6 +1,5 @@
 // Method: a search with a margin of four steps' movement; touches are followed until their pair may have moved by it.
 // Source: runtime/shape/touch.hpp.
-// Deviations: none.
 #include "runtime/rigid/touch_sets.hpp"
 
 #include <algorithm>
@@ -110,6 +109,7 @@ void TouchSets::update(Pair& pair, double step_s) {
     remove_false(pair);
     complete(pair, bodies_.get_frame(pair.a), bodies_.get_frame(pair.b), 0.0);
   }
+  if (!(pair.sag_m > 0.0)) return;
   double deepest = 0.0;
   for (const Contact& c : pair.contacts) deepest = std::max(deepest, -c.touch.gap_m);
   pair.sag_m = std::min(pair.sag_m, deepest);

@@ -1,7 +1,6 @@
 // Method: nodes in bricks of 4^3 near the surface keep a distance and a near face, other bricks the distance of their middle. A distance
 //   changes by no more than the way, so both give a bound that holds everywhere. The search at a node begins with the face of the node
 //   before.
-// Source: none.
 // Deviations: the grid only finds; distances and signs come from the mesh, so that walls thinner than a cell are safe.
 #include "runtime/shape/grid.hpp"
 

@@ -1,7 +1,5 @@
 // Method: corners of a polyhedron by their height; of any other body the samples nearer than the margin, those of them that no neighbour is
 //   lower than, each moved to the lowest place of the skin about it.
-// Source: none.
-// Deviations: none.
 #include "runtime/shape/mesh.hpp"
 #include "runtime/shape/polyhedron.hpp"
 #include "runtime/shape/reduce.hpp"

@@ -2,7 +2,6 @@
 //   middles along the longest side of their box, down to four. Nearest places by branch and bound from a hint.
 // Source: C. Ericson, "Real-Time Collision Detection" (2005), 5.1.5, 6.1; sign by angle-weighted pseudo-normals: J. A. Baerentzen,
 //   H. Aanaes, "Signed distance computation using the angle weighted pseudonormal" (2005).
-// Deviations: none.
 #include "runtime/shape/mesh.hpp"
 
 #include <numeric>

@@ -1,7 +1,6 @@
 // Method: vertices of each in the other; middles of the pieces of edges of each that are inside the other (two plates that cross); places
 //   halfway from a face to the wall opposite (two bodies whose faces coincide). Only faces near the other body are looked at.
 // Source: T. Moeller, B. Trumbore, "Fast, minimum storage ray-triangle intersection" (1997).
-// Deviations: none.
 #include "runtime/shape/mesh.hpp"
 #include "runtime/shape/touch.hpp"
 

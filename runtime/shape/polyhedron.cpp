@@ -1,6 +1,5 @@
 // Method: regions of coplanar faces are the facets, corners of the skin their corners, in order about the facet's normal.
 // Source: textbook.
-// Deviations: none.
 #include "runtime/shape/polyhedron.hpp"
 
 #include <map>

@@ -1,7 +1,6 @@
 // Method: patches by single linkage; of each patch the deepest point, the one furthest from it, the one furthest from their line, and the
 //   one that adds most area on the other side. Names by nearness of the stations.
 // Source: textbook.
-// Deviations: none.
 #include "runtime/shape/reduce.hpp"
 
 #include <numeric>

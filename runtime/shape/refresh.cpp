@@ -1,8 +1,6 @@
 // Method: a point on a plane by its distance; the lowest place of a skin over a plane by walking its patches; two curved sides as the
 //   minimum of their gap over the common tangent plane, by Newton's method with slopes from the patches and curvatures of the smooth
 //   bodies. The normal is that of the patches, so that height and normal belong together.
-// Source: none.
-// Deviations: none.
 #include "runtime/shape/mesh.hpp"
 #include "runtime/shape/search.hpp"
 #include "runtime/shape/skin.hpp"

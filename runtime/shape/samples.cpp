@@ -1,8 +1,6 @@
 // Method: corners are kept; chains of sharp edges become polylines within a tolerance; vertices of curved parts, and lattice points of
 //   their large triangles, are thinned by a hash grid of 1/50 of the size, the place nearest to the middle of a cell for all in it. Trees
 //   of balls by halving along the longest side.
-// Source: none.
-// Deviations: none.
 #include "runtime/shape/samples.hpp"
 
 #include <cstdint>

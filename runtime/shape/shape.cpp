@@ -1,6 +1,4 @@
 // Method: the kind of body follows from the mesh; see the parts.
-// Source: none.
-// Deviations: none.
 #include "runtime/shape/shape.hpp"
 
 #include <optional>
