@@ -115,51 +115,55 @@ void TouchSets::update(Pair& pair, double step_s) {
   pair.sag_m = std::min(pair.sag_m, deepest);
 }
 
-/// Adds the deepest vertex of a pair to its touches where at the frames `a` and `b` it is deeper than all of them. True if it did, and
-/// where it found that a touch that is that deep closes until then: `closing_s` later, or 0.
+/// The touch with the least gap at the frames `a` and `b`, and that gap; none: infinite.
+std::pair<Contact*, double> TouchSets::find_least(Pair& pair, const shape::Frame& a, const shape::Frame& b) const {
+  std::pair<Contact*, double> least{nullptr, std::numeric_limits<double>::infinity()};
+  for (Contact& c : pair.contacts)
+    if (const double gap_m = find_moved(pair, c.touch, a, b).gap_m; gap_m < least.second) least = {&c, gap_m};
+  return least;
+}
+
+/// Adds the deepest place of a pair to its touches where at the frames `a` and `b` it is deeper than all of them. True if it did, and where
+/// it found that the deepest touch closes until then: `closing_s` later, or 0.
 bool TouchSets::complete(Pair& pair, const shape::Frame& a, const shape::Frame& b, double closing_s) {
   const shape::Shape& mine = *bodies_.get_shape(pair.a);
   const shape::Shape* theirs = bodies_.get_shape(pair.b);
-  const auto find_least = [&]() -> std::pair<Contact*, double> {
-    std::pair<Contact*, double> least{nullptr, std::numeric_limits<double>::infinity()};
-    for (Contact& c : pair.contacts)
-      if (const double gap_m = find_moved(pair, c.touch, a, b).gap_m; gap_m < least.second) least = {&c, gap_m};
-    return least;
-  };
-  const double bound_m = theirs == nullptr ? calc_least_gap(pair, mine, a) : -std::numeric_limits<double>::infinity();
-  if (bound_m > -kMissing) return false;
-  shape::Deepest deepest{.gap_m = bound_m};
-  const auto is_missing = [&](double least_m) { return deepest.gap_m < std::min(least_m, 0.0) - kMissing; };
-  std::pair<Contact*, double> least{nullptr, 0.0};
-  if (theirs != nullptr) {
+  shape::Deepest deepest;
+  if (theirs == nullptr)
+    deepest.gap_m = calc_least_gap(pair, mine, a);
+  else
     deepest = shape::find_deepest(mine, a, *theirs, b, -kMissing);
-    if (deepest.place < 0) return false;
-    least = find_least();
-  } else if (least = find_least(); is_missing(least.second)) {
+  if (deepest.gap_m >= -kMissing) return false;
+  const auto [lowest, least_m] = find_least(pair, a, b);
+  const double missing_m = std::min(least_m, 0.0) - kMissing;
+  if (theirs == nullptr && deepest.gap_m < missing_m) {  // by its bound
     deepest = shape::find_lowest(mine, a, bodies_.ground()->height_m);
     pair.measured = a;
     pair.lowest_m = deepest.gap_m;
   }
-  if (!is_missing(least.second)) {
-    Contact* const c = least.first;
-    if (c == nullptr || c->touch.gap_m <= kTouch || least.second > -kMissing || c->rests || !(closing_s > 0.0)) return false;
-    c->touching = false;
-    return std::exchange(c->closes_s, closing_s * c->touch.gap_m / (c->touch.gap_m - least.second)) < 0.0;
-  }
+  if (deepest.gap_m < missing_m) return add(pair, deepest), true;
+  if (lowest == nullptr || lowest->touch.gap_m <= kTouch || least_m > -kMissing || lowest->rests || !(closing_s > 0.0)) return false;
+  lowest->touching = false;
+  return std::exchange(lowest->closes_s, closing_s * lowest->touch.gap_m / (lowest->touch.gap_m - least_m)) < 0.0;
+}
+
+/// The touch of a place, as the bodies are now.
+void TouchSets::add(Pair& pair, const shape::Deepest& deepest) {
+  const shape::Shape& mine = *bodies_.get_shape(pair.a);
+  const shape::Frame a = bodies_.get_frame(pair.a), b = bodies_.get_frame(pair.b);
   Contact added;
   added.a = pair.a;
   added.b = pair.b;
-  added.touch = theirs == nullptr ? shape::make_ground_touch(mine, bodies_.get_frame(pair.a), bodies_.ground()->height_m, deepest.place)
-                                  : shape::make_touch(mine, bodies_.get_frame(pair.a), *theirs, bodies_.get_frame(pair.b), deepest);
+  added.touch = pair.b < 0 ? shape::make_ground_touch(mine, a, bodies_.ground()->height_m, deepest.place)
+                           : shape::make_touch(mine, a, *bodies_.get_shape(pair.b), b, deepest);
   const auto same =
       std::find_if(pair.contacts.begin(), pair.contacts.end(), [&](const Contact& c) { return c.touch.id == added.touch.id; });
-  if (same != pair.contacts.end()) {  // it has travelled away from its vertex
+  if (same != pair.contacts.end()) {  // it has travelled away from its place
     same->touch = added.touch;
-    return true;
+    return;
   }
   added.presses = impacts_.is_pressed(pair, added.touch.where_m);
   pair.contacts.push_back(added);
-  return true;
 }
 
 void TouchSets::forget_closing(const Step& step) const {

@@ -226,7 +226,7 @@ class Pass {
     Touch t = begin(sample.point, at.place, is_curved ? theirs_.skin().calc_normal(at.face, at.weights) : mesh.normals[at.face]);
     t.axis_b = mesh.normals[at.face];
     if (is_curved) t.side_b = Side::skin, t.face_b = at.face, t.smooth = true;
-    t.curvature_a_per_m = curve(sample.kind, mine_);
+    t.curvature_a_per_m = get_sharp_curvature(mine_, sample.kind);
     if (sample.kind == VertexKind::smooth) {
       const Spot spot = mine_.skin().locate(sample.point, sample.face);
       t.curvature_a_per_m = mine_.skin().calc_mean_curvature(spot.face, spot.weights);
@@ -238,9 +238,6 @@ class Pass {
 
  private:
   Vec3 to_theirs(const Vec3& x) const { return rotation_ * x + offset_; }
-  double curve(VertexKind kind, const Shape& shape) const {
-    return kind == VertexKind::corner ? shape.get_corner_curvature_per_m() : 0.5 * shape.get_corner_curvature_per_m();
-  }
   bool may_carry(const Sample& sample, const Vec3& normal) const {
     return carries(mine_.mesh(), sample.vertex, turn_back(rotation_, normal));
   }
@@ -286,14 +283,14 @@ class Pass {
       if (may_carry(sample, n)) {
         t = begin(sample.point, at.place, n);
         t.side_b = Side::point;
-        t.curvature_b_per_m = curve(facing.side == Side::point ? VertexKind::corner : VertexKind::ridge, theirs_);
+        t.curvature_b_per_m = get_sharp_curvature(theirs_, facing.side == Side::point ? VertexKind::corner : VertexKind::ridge);
         found = true;
       }
     }
     if (!found) return;
     if (t.side_b == Side::plane && sample.kind != VertexKind::corner && !mine_.skin().is_flat(sample.face) && add_rim(sample, t)) return;
     if (t.side_b != Side::skin) settle(t, mine_, fm_, &theirs_, ft_, reach_);
-    t.curvature_a_per_m = curve(sample.kind, mine_);
+    t.curvature_a_per_m = get_sharp_curvature(mine_, sample.kind);
     t.id = make_id(Feature::corner_a, sample.vertex, 0);
     if (t.gap_m <= reach_) out_.push_back(t);
   }
@@ -366,8 +363,8 @@ class Pass {
       t.side_b = facing.side;
       t.axis_b = facing.axis;
       t.face_b = facing.side == Side::skin ? at.face : -1;
-      if (facing.side == Side::line) t.curvature_b_per_m = curve(VertexKind::ridge, theirs_);
-      if (facing.side == Side::point) t.curvature_b_per_m = curve(VertexKind::corner, theirs_);
+      if (facing.side == Side::line) t.curvature_b_per_m = get_sharp_curvature(theirs_, VertexKind::ridge);
+      if (facing.side == Side::point) t.curvature_b_per_m = get_sharp_curvature(theirs_, VertexKind::corner);
       const Touch before = t;
       bool settled = settle(t, mine_, fm_, &theirs_, ft_, facing.side == Side::plane ? kWalk * reach : reach, kFirst);
       if (settled && facing.side == Side::plane && is_level(t, mine_, fm_, &theirs_, ft_)) {

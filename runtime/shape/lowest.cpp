@@ -35,8 +35,8 @@ std::pair<int, double> find_lowest_vertex(const Mesh& mesh, const Samples& s, co
 double calc_vertex_curvature(const Shape& shape, int vertex) {
   const Skin& skin = shape.skin();
   const int face = skin.find_face(vertex);
-  if (shape.is_polyhedron() || skin.kind(vertex) == VertexKind::corner) return shape.get_corner_curvature_per_m();
-  if (skin.is_flat(face)) return 0.5 * shape.get_corner_curvature_per_m();
+  if (shape.is_polyhedron()) return get_sharp_curvature(shape, VertexKind::corner);
+  if (skin.kind(vertex) != VertexKind::smooth || skin.is_flat(face)) return get_sharp_curvature(shape, skin.kind(vertex));
   Vec3 at{};
   for (int k = 0; k < 3; ++k) at[k] = shape.mesh().vertex_of(3 * face + k) == vertex ? 1.0 : 0.0;
   return skin.calc_mean_curvature(face, at);

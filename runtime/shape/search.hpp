@@ -21,7 +21,11 @@ bool carries(const Mesh& mesh, int vertex, const Vec3& normal);
 
 inline constexpr int kDeepest = 2;  // second number of the name of a touch that a search lacked
 
-/// Mean curvature that stands for a vertex: of the skin, of an edge, or of a corner.
+/// Mean curvature that stands for a corner, or for an edge.
+inline double get_sharp_curvature(const Shape& shape, VertexKind kind) {
+  return (kind == VertexKind::corner ? 1.0 : 0.5) * shape.get_corner_curvature_per_m();
+}
+/// The same of any vertex, on a curved part that of the skin.
 double calc_vertex_curvature(const Shape& shape, int vertex);
 
 inline constexpr double kFlat = 0.02;   // slope: tolerance of a flat contact patch
