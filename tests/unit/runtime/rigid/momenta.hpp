@@ -1,4 +1,4 @@
-// What a space holds of momentum, angular momentum about the origin and kinetic energy.
+// Momentum, angular momentum about the origin and kinetic energy of all bodies.
 #pragma once
 
 #include "runtime/rigid/space.hpp"
@@ -10,7 +10,9 @@ struct Momenta {
   double kinetic_j = 0.0;
 };
 
-inline Momenta add_up(const Space& space) {
+/// Of a Space, or of Bodies.
+template <typename World>
+Momenta add_up(const World& space) {
   Momenta sum;
   for (int i = 0; i < static_cast<int>(space.states().size()); ++i) {
     const State& s = space.state(i);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "runtime/rigid/modal_impact.hpp"
+#include "runtime/rigid/projection.hpp"
 #include "runtime/rigid/rest.hpp"
 #include "runtime/rigid/rigid_impact.hpp"
 #include "runtime/rigid/step_problem.hpp"
@@ -14,6 +15,8 @@
 
 namespace carillon::rigid {
 
+inline const Vec3 kBoxSides{0.06, 0.05, 0.04};
+inline constexpr double kGravity = 9.81;
 inline const Ground kWood{.restitution = 0.2, .friction = 0.4, .young_modulus_pa = 10e9, .poisson_ratio = 0.3};
 
 struct Stages {
@@ -57,6 +60,7 @@ struct Stages {
   ModalImpacts modal_impacts{bodies, modal_states, ledger};
   TouchSets touches{bodies, {}, modal_impacts, ledger};
   Windows windows{bodies, touches, options, ledger};
+  Projection projection{bodies, touches, ledger};
   StepProblem problem{bodies, touches, options, ledger};
   Instants instants{bodies, touches};
   RigidImpact rigid_impact{bodies, touches};

@@ -13,9 +13,6 @@
 namespace carillon::rigid {
 namespace {
 
-const Vec3 kBoxSides{0.06, 0.05, 0.04};
-constexpr double kGravity = 9.81;
-
 State make_turned(std::mt19937& random, double height_m) {
   std::normal_distribution<double> normal;
   State s = make_state({0, 0, height_m});
