@@ -183,7 +183,7 @@ class SoundingBody {
   ContactSurface surface_;                   // with the material of the model
   std::unique_ptr<Propagation> propagation_, next_propagation_;
   BodyChange* change_ = nullptr;
-  bool fading_ = false;        // from air_ to next_air_, in this block
+  bool fading_ = false;        // from propagation_ to next_propagation_, in this block
   std::int64_t first_ = 0;     // sample of the scene with which the voice began
   std::int64_t rendered_ = 0;  // samples of the scene that all modules have done
   int transfer_need_ = 0;
