@@ -126,7 +126,7 @@ class Builder {
   }
 
  private:
-  /// Somewhere from the beginning of what was read last to the byte behind it: that a token lies on one line is what counts.
+  /// An offset from the beginning of the last token to the byte behind it, which gives its line: a token lies on one line.
   std::ptrdiff_t get_offset() const { return stream_->src_ - stream_->head_; }
   bool add_number(std::string_view text) {
     std::int64_t integer = 0;
@@ -179,7 +179,7 @@ class Builder {
                                                              : "correct the text there"));
 }
 
-/// What is wrong with a word that begins like a number, as part of a sentence; nullptr when it is one by the grammar of JSON.
+/// The fault of a word that begins like a number, as part of a sentence; nullptr for a number by the grammar of JSON.
 const char* find_number_fault(std::string_view word) {
   const auto skip_digits = [&] {
     const std::size_t digits = std::min(word.find_first_not_of("0123456789"), word.size());
@@ -210,7 +210,7 @@ const char* find_number_fault(std::string_view word) {
   return word.empty() ? nullptr : "there is something behind the number; separate values by commas, and give units no letters";
 }
 
-/// What comes before the parser: the depth of brackets outside strings and comments, so that the parser's recursion is bounded before it
+/// The check before the parser: the depth of brackets outside strings and comments, so that the parser's recursion is bounded before it
 /// starts, and the form of numbers, with a better word than it has.
 void check_text(const DocumentData& data) {
   constexpr std::string_view kWord = "0123456789+-._abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ";

@@ -20,8 +20,8 @@ double calc_fade(Fade fade, std::int64_t sample) noexcept {
 
 }  // namespace
 
-/// What one ear hears, times a level, into the mix of its microphone, or of all where they are not `apart`. Returns how many samples came
-/// by a way that changes.
+/// Adds the sound at one ear, times a level, to the mix of its microphone, or to all mixes unless `apart`. Returns the number of samples
+/// with a changing travel time.
 int SoundingBody::hear_ear(Receiver& ear, const Source& source, const Trajectory& track, std::size_t microphone, double level,
                            std::int64_t sample, std::size_t count, Fade fade, bool apart, BodyScratch& scratch, Mix& mix) noexcept {
   if (apart && fade == Fade::kNone && level == 1.0) return ear.process(source, track, sample, std::span(mix[microphone]).first(count));
@@ -36,7 +36,7 @@ int SoundingBody::hear_ear(Receiver& ear, const Source& source, const Trajectory
   return moved;
 }
 
-/// What an ear has done, and how long it took.
+/// Counts the work and the time of an ear.
 void SoundingBody::count_ear(const Propagation& propagation, Effect sends, std::size_t microphone, bool is_mirrored, int moved,
                              std::size_t count, std::int64_t ticks) noexcept {
   const bool has_delay = has(propagation.effects, Effect::kAirDelay);
@@ -85,9 +85,8 @@ void SoundingBody::hear(Propagation& propagation, std::int64_t sample, std::size
   }
 }
 
-/// What arrives in the middle of the head straight, and then by way of the floor, each through the head's ears in the direction from which
-/// it comes. All that the body sends comes from one direction: that of its centre of mass, or of its multipoles where it sends nothing
-/// else.
+/// The straight sound in the middle of the head, then that by way of the floor, each through the head's ears from its own direction. All
+/// sound of a body has one direction: that of its centre of mass, or of its multipoles where they are its only source.
 void SoundingBody::hear_by_head(Propagation& propagation, std::int64_t sample, std::size_t count, const ListenerTracks& listener, Fade fade,
                                 BodyScratch& scratch, Mix& mix, TickFunction ticks) noexcept {
   const bool has_whole = propagation.monopole || propagation.dipole[0];

@@ -23,13 +23,13 @@ constexpr EffectSet kOfPropagation{Effect::kModal,   Effect::kAccelerationNoise,
 
 constexpr EffectSet kOfContacts = kContactEffects.common(kCompiledEffects);
 
-/// Whether lasting contacts do anything: they act on modes.
+/// True for effects of lasting contacts with modes, on which they act.
 constexpr bool needs_contacts(EffectSet effects) { return has(effects, Effect::kModal) && effects.has_any(kOfContacts); }
 
 /// The first of a set, or another where it is empty.
 constexpr Effect find_first(EffectSet effects, Effect otherwise) { return effects.is_empty() ? otherwise : *effects.begin(); }
 
-/// Whether the sound of two models of a body with directivity sets out from one sphere.
+/// True for two models of a body with directivity with one sphere of multipoles.
 bool has_same_sphere(const Model& a, const Model& b) {
   const ModelDirectivity &one = *a.get_directivity(), &other = *b.get_directivity();
   return one.offset_m == other.offset_m && one.transfers->get_radius_m() == other.transfers->get_radius_m();
@@ -54,7 +54,7 @@ EffectBytes BodyChange::calc_bytes() const {
   if (directivity) bytes[Effect::kDirectivity] += static_cast<std::int64_t>(directivity->calc_bytes());
   if (contacts) bytes[Effect::kRoughness] += static_cast<std::int64_t>(contacts->calc_bytes());
   if (!propagation) return bytes;
-  // What a delay line holds beyond one without travel time belongs to the travel time, or to the wait for what goes through a head.
+  // The surplus of a delay line over one without travel time counts as travel time, or as the wait for a head.
   const std::size_t still = DelayLine::calc_least_bytes(kBlock);
   const Effect waits = propagation->effects.has(Effect::kAirDelay) ? Effect::kAirDelay : Effect::kModal;
   const auto add = [&](const DelayLine& delay_line, Effect effect) {
@@ -209,7 +209,7 @@ void SoundingBody::direct_voice() noexcept {
   voice_->direct(weights[0], weights[1]);
 }
 
-/// Contacts begin, change what they do, or fall.
+/// Contacts begin, change their effects, or fall.
 void SoundingBody::put_contacts(BodyChange& change) noexcept {
   if (kOfContacts.is_empty()) return;
   if (change.contacts) {
@@ -227,14 +227,14 @@ void SoundingBody::put_contacts(BodyChange& change) noexcept {
   }
 }
 
-/// Whether the receivers of a new propagation find in its delay lines all that the old one could have given them.
+/// True when the delay lines of a new propagation reach back as far as its receivers read.
 bool SoundingBody::is_filled(const Propagation& propagation, const ListenerTracks& listener, std::int64_t sample) const noexcept {
   if (!propagation_ || propagation_->is_silent()) return true;
   const std::int64_t filled = sample - propagation.first;
   const DelayLine& delay_line = propagation.get_line();
   const double needed =
       propagation.calc_longest_s(listener, sample) * frame_.rate_hz + propagation.ears.front().get_latency() + kTaps + kBlock;
-  // What is in a head's filters has come from full lines.
+  // The filters of a head need full lines for their whole length.
   const std::int64_t full = filled - (propagation.head.empty() ? 0 : propagation.head.front().get_length());
   return static_cast<double>(full) >= needed || full >= delay_line.get_size();
 }
@@ -311,7 +311,7 @@ bool hit(Player& player, const events::Force& force, const Attitudes&... attitud
   return player.push(force, attitude...);
 }
 
-/// To all who play pulses. What continues a pulse is no strike of its own.
+/// To all players of pulses. The continuation of a pulse is no strike of its own.
 template <class Strike>
 bool SoundingBody::play(const Strike& strike, bool has_length, bool is_new, std::int64_t sample) noexcept {
   wake(sample);

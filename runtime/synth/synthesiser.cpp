@@ -113,7 +113,7 @@ void Synthesiser::check_model(const Model* model) const {
                      std::to_string(options_.rate_hz) + " Hz");
 }
 
-/// That what effects need of the scene is there.
+/// Throws InputError for effects without the head or the floor that they need.
 void Synthesiser::check_surroundings(EffectSet effects) const {
   if (effects.has(Effect::kHead) && !options_.head)
     throw InputError("head needs a listener with a head; give the synthesiser one, or leave the effect out");
@@ -197,7 +197,7 @@ void Synthesiser::set_effects(int body, EffectSet effects) {
   collect();
   Owned& owned = owned_[check_owned(body)];
   check_surroundings(effects);
-  // Refused here, whether it has to wait or not.
+  // Refused here, also for a change that has to wait.
   if (owned.wanted_model != nullptr)
     SoundingBody::check(effects, *owned.wanted_model);
   else
@@ -227,7 +227,7 @@ void Synthesiser::swap_model(int body, std::shared_ptr<const Model> model) {
 
 EffectSet Synthesiser::get_effects(int body) const { return owned_[check_owned(body)].wanted; }
 
-/// Makes the change to what is wanted, unless an earlier one is on its way.
+/// Makes the wanted change, unless an earlier one is on its way.
 void Synthesiser::send_change(int number) {
   Owned& owned = owned_[static_cast<std::size_t>(number)];
   if (owned.change != nullptr || owned.is_leaving || (owned.wanted == owned.effects && owned.wanted_model == nullptr)) return;
@@ -297,7 +297,7 @@ void Synthesiser::list_directed() noexcept {
     if (body != nullptr && body->is_directed()) directed_.push_back(body);
 }
 
-/// At the start of a block: how many transfers each body may look up in it.
+/// At the start of a block: the transfers of each body in it.
 void Synthesiser::share_transfers() noexcept {
   if (!kCompiledEffects.has(Effect::kDirectivity) || directed_.empty()) return;
   std::int64_t needs = 0;
@@ -336,7 +336,7 @@ void Synthesiser::for_awake(Work&& work) noexcept {
   }
 }
 
-/// Runs `work` on a body and adds to the totals what it has done.
+/// Runs `work` on a body and adds its counts to the totals.
 template <typename Work>
 void Synthesiser::count(const SoundingBody& body, Work&& work) noexcept {
   const BodyWork& now = body.get_work();
@@ -361,7 +361,7 @@ void Synthesiser::take(const events::TimeWatermark& mark) noexcept {
   has_marks_ = true;
 }
 
-/// At the start of a block: whether physics has run to its end. What is not known yet comes late, or not at all.
+/// At the start of a block: an underrun if physics has not run to its end. Later events come late, or not at all.
 void Synthesiser::watch_marks() noexcept {
   const bool is_overtaken = has_marks_ && marked_s_ * options_.rate_hz < static_cast<double>(sample_ + kBlock);
   work_.underruns += static_cast<std::int64_t>(is_overtaken && !is_overtaken_);
@@ -426,7 +426,7 @@ void Synthesiser::finish_changes() noexcept {
   if (changes) list_directed();
 }
 
-/// The floor for strikes in this block, whether the body is awake since its beginning or not; and no body wakes more modes than the whole
+/// The floor for strikes in this block, also of a body that wakes within it; and no body wakes more modes than the whole
 /// budget has room for: they would have to go at once, and take others with them for the work that they were.
 void Synthesiser::give_floor(SoundingBody& body) noexcept {
   Voice* voice = body.get_voice();
