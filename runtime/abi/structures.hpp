@@ -18,7 +18,6 @@ template <>
 inline constexpr std::size_t kMinSize<carillon_options> = offsetof(carillon_options, head_radius_m);
 template <>
 inline constexpr std::size_t kMinSize<carillon_effect_counters> = offsetof(carillon_effect_counters, head_units);
-
 template <>
 inline constexpr std::size_t kMinSize<carillon_counters> = offsetof(carillon_counters, contacts_accepted);
 

@@ -30,6 +30,7 @@ struct Range {
 };
 inline constexpr Range kPositive{0.0, std::numeric_limits<double>::infinity()};
 
+struct Value;
 struct DocumentData;  // the parsed text and the line table, shared by all views of one document
 
 struct Entry;
@@ -110,15 +111,15 @@ class Object {
   /// "file:line" of `key` (of the object itself when the key is absent or empty), for messages of later.
   std::string find_place(std::string_view key) const;
 
-  Object(std::shared_ptr<DocumentData> data, const void* value, std::string name);
+  Object(std::shared_ptr<DocumentData> data, const Value* value, std::string name);
 
  private:
-  /// The Json::Value of a required key; when it is missing, a similar unused key is named as the likely cause.
-  const void* require_value(std::string_view key);
+  /// The value of a required key; when it is missing, a similar unused key is named as the likely cause.
+  const Value& require_value(std::string_view key);
   void copy_numbers(std::string_view key, double* values, std::size_t count);
   std::shared_ptr<DocumentData> data_;
-  const void* value_ = nullptr;  // a Json::Value of *data_
-  std::string name_;             // dotted path, for messages
+  const Value* value_ = nullptr;  // of *data_
+  std::string name_;              // dotted path, for messages
   std::shared_ptr<std::vector<std::string>> asked_;
 };
 

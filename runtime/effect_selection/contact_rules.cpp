@@ -37,7 +37,7 @@ std::vector<double> calc_power(const SelectedBody& body, const events::LastingCo
   const auto [own, other] = find_surfaces(hearing.facts, contact);
   const synth::ContactNoise noise = synth::calc_contact_noise(contact, own, other, hearing.facts.rate_hz);
   if (!(noise.decay_length_m > 0.0)) return power;
-  const double drag = noise.sliding * std::sqrt(own.friction * other.friction), slip = calc_length(contact.slip_m_s);
+  const double drag = noise.sliding * std::sqrt(own.friction * other.friction), slip = norm(contact.slip_m_s);
   Vec3 along = contact.normal;
   for (std::size_t k = 0; k < 3 && slip > 0.0; ++k) along[k] -= drag / slip * contact.slip_m_s[k];
   if (!body.bank->calc_projections(contact.triangle, contact.barycentric, along, hearing.projection)) return power;
@@ -49,7 +49,7 @@ std::vector<double> calc_power(const SelectedBody& body, const events::LastingCo
 /// The ring of the modes that a contact drives, up to this record; every kRingS, and when the contact rests or ends. Returns the end of
 /// its audible sound at the body.
 double ring(SelectedBody& body, const events::LastingContact& contact, Hearing& hearing) {
-  const double speed_m_s = std::max({contact.sweep_m_s, contact.other_sweep_m_s, calc_length(contact.slip_m_s)});
+  const double speed_m_s = std::max({contact.sweep_m_s, contact.other_sweep_m_s, norm(contact.slip_m_s)});
   const double size = contact.force_n * speed_m_s;
   const bool drives = contact.state != events::ContactState::kEnd && contact.force_n > 0.0 && speed_m_s > kCreepMs;
   auto driving = std::find_if(body.driving.begin(), body.driving.end(), [&](const auto& one) { return one.id == contact.id; });
@@ -92,7 +92,7 @@ double ring(SelectedBody& body, const events::LastingContact& contact, Hearing& 
 
 /// The calls of a contact until that time; false for one at rest.
 bool call_motion(SelectedBody& body, const events::LastingContact& contact, double time_s, Hearing& hearing) {
-  const double slip = calc_length(contact.slip_m_s);
+  const double slip = norm(contact.slip_m_s);
   const double sweep = std::max(contact.sweep_m_s, contact.other_sweep_m_s);
   const bool presses = contact.force_n > 0.0;
   const auto offer = [&](Effect effect, double speed) {
@@ -124,9 +124,9 @@ void judge(SelectedBody& body, const events::LastingContact& contact, Hearing& h
   std::erase_if(body.lasting, [&](const SelectedBody::Lasting& one) { return one.id == contact.id; });
   // Without a strike the contact's ring is the only measure of the modes after it.
   if (const double end_s = ring(body, contact, hearing); end_s > contact.time_s) {
-    body.call(Effect::kModal, 1.0, end_s + hearing.find_ways(body.position_m, contact.time_s) / bank::kSoundSpeedMs,
-              {.rule = Rule::kSlip, .value = calc_length(contact.slip_m_s), .limit = kCreepMs});
-    body.call_directivity(body.bank->get_spread_db(), end_s + hearing.find_ways(body.position_m, contact.time_s) / bank::kSoundSpeedMs);
+    const double until_s = end_s + hearing.find_ways(body.position_m, contact.time_s) / bank::kSoundSpeedMs;
+    body.call(Effect::kModal, 1.0, until_s, {.rule = Rule::kSlip, .value = norm(contact.slip_m_s), .limit = kCreepMs});
+    body.call_directivity(body.bank->get_spread_db(), until_s);
     body.sounds_until_s = std::max(body.sounds_until_s, end_s);
     body.call_propagation(hearing, contact.time_s);
   }

@@ -1,4 +1,4 @@
-// What a unit of an effect's work costs on this machine.
+// The cost of a unit of each effect's work on this machine.
 #pragma once
 
 namespace carillon::effect_selection {

@@ -1,4 +1,4 @@
-// Which effects each body calls for, and why: decided from what is known before anything moves, and from the events as they come.
+// The effects of each body and their reasons, from the scene before any motion and from its events as they come.
 //
 //   effect_selection::EffectSelector selector(facts);                           // bodies, listener, overrides of the scene
 //   for (const events::Event& event : events) selector.watch(event);
@@ -37,12 +37,12 @@ inline constexpr double kAudibleShare = 1e-5;
 /// (Jesteadt, Wier & Green 1977).
 inline constexpr double kThumpHz = 300.0;
 inline constexpr double kThumpShare = 0.259;
-/// Not heard: what is below 0 dB(A), the threshold of the best ears (ISO 389-7 has -6 dB at its lowest, 2.4 dB at 1 kHz), and 70 dB below
+/// Inaudible: below 0 dB(A), the threshold of the best ears (ISO 389-7 has -6 dB at its lowest, 2.4 dB at 1 kHz), and 70 dB below
 /// the loudest strike so far as well, since files are played louder than life: at 90 dB(A) that is 20 dB(A), less than a quiet room has.
 inline constexpr double kInaudibleDb = 0.0;
 inline constexpr double kBelowLoudestDb = 70.0;
 /// Directivity is called for when the level of its modes varies over directions by so much (standard deviation, dB, each mode by its part
-/// of the exposure), the least that is heard, and the body is so far above what is not heard that this is heard.
+/// of the exposure), the least that is heard, and the body is more than kDirectionClearDb above the inaudible level.
 inline constexpr double kDirectionDb = 1.0;
 inline constexpr double kDirectionClearDb = 10.0;
 /// Nonlinear motion is called for when a strike makes a coupled mode stiffer by so much, the least that is heard of a lone tone.
@@ -61,16 +61,16 @@ inline constexpr double kHoldS = 0.25;
 /// Decisions are made on this grid of time.
 inline constexpr double kTickS = 0.01;
 
-/// How strictly a selector judges; the initialisers are what docs/accuracy.md chose.
+/// The thresholds of a selector; their initialisers are the choice of docs/accuracy.md.
 struct SelectionThresholds {
-  double audible_share = kAudibleShare;       // of a body's exposure: what changes it by less is left out
-  double below_loudest_db = kBelowLoudestDb;  // of the loudest strike: what is so far below it, and below kInaudibleDb, is not heard
+  double audible_share = kAudibleShare;       // of a body's exposure: smaller changes are left out
+  double below_loudest_db = kBelowLoudestDb;  // of the loudest strike: inaudible so far below it and below kInaudibleDb
   double lead_s = kLeadS;                     // an effect is on this long before it is needed
 };
 
-/// What the scene says about the effects of a body. `on` and `off` have nothing in common.
+/// The scene's own choice of effects of a body. `on` and `off` have nothing in common.
 struct EffectOverrides {
-  bool automatic = true;  // the selector decides about what is neither on nor off; without, that is off
+  bool automatic = true;  // the selector decides on all others; false: they are off
   EffectSet on{}, off{};
 };
 
@@ -100,7 +100,7 @@ struct SceneFacts {
   bool has_head = false;                // the listener, in the middle of two microphones
 };
 
-/// The numbers that decided, and what they mean.
+/// The rule of a decision, and its numbers.
 struct SelectionReason {
   enum class Rule : std::uint8_t {
     kForced,      // by the scene
@@ -123,16 +123,16 @@ struct SelectionReason {
     kNoSlip,     // value: speed [m/s], limit
     kSlip,
     kAirTravel,     // value: distance [m]
-    kNoMultipoles,  // the bank does not say what goes where
+    kNoMultipoles,  // none in the bank
     kSameAllRound,  // value: standard deviation of the level over directions [dB], limit
     kDirected,      // the same
-    kFaint,         // value: level [dB(A)], limit: of what has directions, distance [m]
+    kFaint,         // value: level [dB(A)], limit: of audible directions, distance [m]
     kNoFloor,       // none that reflects
-    kReflected,     // value: level of what the floor adds [dB], limit
+    kReflected,     // value: level of the reflection [dB], limit
     kNoHead,        // of the listener's
     kByHead,        // the body is heard, and by a head
-    kNoEnergy,      // the bank does not say what large motion makes of its modes
-    kHardens,       // value: how much higher the strike makes a coupled mode [cent], limit
+    kNoEnergy,      // no nonlinear energy in the bank
+    kHardens,       // value: rise of a coupled mode by the strike [cent], limit
     kNothingAbove   // the bank has no modes above the coupled ones, or does not say its mass or thickness
   };
   Rule rule = Rule::kNotStruck;
@@ -150,7 +150,7 @@ struct EffectSwitch {
   SelectionReason reason;
 };
 
-/// From `time_s` on a body has these effects. The first of a body lists all of them, later ones what changes.
+/// From `time_s` on a body has these effects. The first of a body lists all of them, later ones the changes.
 struct EffectChange {
   double time_s = 0.0;
   int body = 0;
@@ -164,7 +164,7 @@ struct EffectPlan {
   double on_s = 0.0;                   // for so long
   double first_s = 0.0, last_s = 0.0;  // from, until
   int switched = 0;                    // times that it was switched on
-  SelectionReason reason;              // of the decision that weighed most: what called loudest for it, or else why nothing did
+  SelectionReason reason;              // of the loudest call for it, or else of their absence
   double cost_us = 0.0;                // CPU time that it will take, all together
 };
 
@@ -173,8 +173,8 @@ struct BodyPlan {
   const EffectPlan& operator[](Effect effect) const { return effects[effect]; }
 };
 
-/// Decides, on a grid of kTickS, which effects each body has. A decision is final: it uses only what is known up to lead_s after its time,
-/// and does not depend on how the calls of advance() divide time.
+/// Decides on the effects of each body, on a grid of kTickS. A decision is final: it uses only events up to lead_s after its time, and does
+/// not depend on the division of time into calls of advance().
 class EffectSelector {
  public:
   /// Throws InputError when a body has no bank, or arrays of a bank disagree.
@@ -182,21 +182,21 @@ class EffectSelector {
   ~EffectSelector();
   EffectSelector(EffectSelector&&) noexcept;
 
-  /// What a body may call for whatever happens, by what is known before anything moves: banks, places, the listener's path, overrides.
+  /// All effects that a body may call for, by the scene before any motion: banks, places, the listener's path, overrides.
   EffectSet get_possible(int body) const;
-  /// Whether any plan may hang on contacts that last: the physics need not record them otherwise.
+  /// True when a plan may depend on lasting contacts, which the physics has to record then.
   bool needs_contacts() const;
 
   /// Events in order of their time, of the bodies by their index; others are not looked at.
   void watch(const events::Event& event);
 
-  /// Decides for all times for which is known what happens SelectionThresholds::lead_s later. `known_s`: nothing earlier will be watched
-  /// from now on. Changes in order of time; the first call gives one for every body.
+  /// Decides for all times up to SelectionThresholds::lead_s before `known_s`: nothing earlier will be watched from now on. Changes in
+  /// order of time; the first call gives one for every body.
   std::vector<EffectChange> advance(double known_s);
 
   double get_time_s() const;  // up to which it has decided
   BodyPlan get_plan(int body) const;
-  /// Below this pressure at 1 m [Pa] a body is not heard at any microphone, by what has been watched so far.
+  /// Below this pressure at 1 m [Pa] a body is inaudible at all microphones, by the events so far.
   double calc_silence_pa(int body) const;
 
  private:

@@ -31,7 +31,7 @@ double Hearing::find_ways(const Vec3& place_m, double time_s) {
   for (const Vec3& offset : facts.microphones_m) {
     Vec3 way{};
     for (std::size_t k = 0; k < 3; ++k) way[k] = ear[k] + offset[k] - place_m[k];
-    way_m.push_back(std::max(calc_length(way), synth::kNearestM));
+    way_m.push_back(std::max(norm(way), synth::kNearestM));
   }
   middle_m = 0.0;
   for (std::size_t k = 0; k < 3; ++k) middle_m += std::pow(ear[k] + middle[k] - place_m[k], 2.0);

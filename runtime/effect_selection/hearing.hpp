@@ -6,13 +6,13 @@
 #include <limits>
 #include <vector>
 
+#include "runtime/base/vector.hpp"
 #include "runtime/effect_selection/effect_selector.hpp"
 
 namespace carillon::effect_selection {
 
 inline constexpr double kNever = -std::numeric_limits<double>::infinity();
 
-inline double calc_length(const Vec3& x) { return std::hypot(x[0], x[1], x[2]); }
 /// Of a share of exposure.
 inline double to_db(double share) { return 10.0 * std::log10(std::max(share, 1e-30)); }
 

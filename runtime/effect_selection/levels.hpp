@@ -1,4 +1,4 @@
-// How loud a strike will be before it is played: of the modes, of the acceleration noise, and of what the length of the pulse takes away.
+// Loudness of a strike before it is played: of modes and acceleration noise, and its loss by the length of the pulse.
 #pragma once
 
 #include <span>
@@ -15,9 +15,9 @@ class Transfers;
 namespace carillon::effect_selection {
 
 inline constexpr double kReferencePa = 20e-6;
-inline constexpr double kLowestHz = 20.0, kHighestHz = 20000.0;  // what is heard
+inline constexpr double kLowestHz = 20.0, kHighestHz = 20000.0;  // audible
 using bank::calc_a_weight;
-/// The ear sums up what falls within about this time: a sound of that exposure is as loud as a steady one so long.
+/// Integration time of the ear: a short sound is as loud as a steady one of the same exposure in this time.
 using bank::kEarS;
 
 /// |P(f)| / P(0) of a contact pulse at `cycles` = frequency x duration >= 0. kHertz: Gamma(7/4)^2 / (Gamma(7/4 + x) Gamma(7/4 - x)), the
@@ -34,7 +34,7 @@ struct ClickLevels {
   double mean_hz = 0.0;           // root mean square of the frequency, weighted with the exposure
 };
 
-/// What of a bank decides how loud a strike is. Immutable; shared by all bodies of the bank.
+/// The properties of a bank that determine the loudness of strikes. Immutable; shared by all bodies of the bank.
 class BankLevels {
  public:
   /// Modes from kLowestHz to the lower of kHighestHz and half the rate. `bank` with the gains that it is played with; it must outlive this.
@@ -59,13 +59,13 @@ class BankLevels {
   /// triangle.
   bool calc_projections(std::int32_t triangle, const Vec3& barycentric, const Vec3& direction, std::vector<double>& projections) const;
 
-  /// A-weighted exposure at 1 m [Pa^2 s] of what a push moves below its lowest mode, where modes follow the force without ringing: their
+  /// A-weighted exposure at 1 m [Pa^2 s] of the motion by a push below its lowest mode, where modes follow the force without ringing: their
   /// pressure is the slope of the force times the sum of g (phi . J) / omega^2, from kLowestHz to 0.7 of the lowest. It is all that is
   /// heard of modes beyond hearing. 0 when there is no such triangle.
   double calc_pushed_pa2_s(std::int32_t triangle, const Vec3& barycentric, const Vec3& impulse_n_s, events::PulseShape shape,
                            double duration_s) const;
 
-  /// Whether there is any mode from kLowestHz to half the rate.
+  /// True with a mode from kLowestHz to half the rate.
   bool can_ring() const { return !pushed_.empty(); }
 
   /// The acceleration noise of an impulse [N s] at 1 m, on the side where it is loudest: a sphere of the outer volume and the mass

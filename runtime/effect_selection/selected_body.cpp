@@ -109,7 +109,7 @@ void SelectedBody::call_reflection(const Hearing& hearing, double time_s) {
   double part = 0.0, farthest_m = 0.0;
   for (std::size_t m = 0; m < hearing.way_m.size(); ++m) {
     const Vec3 mirrored = floor.mirror(ear + hearing.facts.microphones_m[m]);
-    const double distance_m = std::max(calc_length(mirrored - position_m), synth::kNearestM);
+    const double distance_m = std::max(norm(mirrored - position_m), synth::kNearestM);
     part = std::max(part, std::pow(floor.reflection * hearing.way_m[m] / distance_m, 2.0));
     farthest_m = std::max(farthest_m, distance_m);
   }

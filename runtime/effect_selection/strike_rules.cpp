@@ -35,7 +35,7 @@ StrikeSound hear(SelectedBody& body, const events::Impulse& impulse, Hearing& he
   sound.distance_m = hearing.find_ways(body.position_m, impulse.time_s);
   sound.travel_s = sound.distance_m / bank::kSoundSpeedMs;
   sound.spreading = 1.0 / (sound.distance_m * sound.distance_m);
-  if (!body.facts->fixed) sound.click = body.bank->calc_click_levels(calc_length(impulse.impulse_n_s), impulse.shape, impulse.duration_s);
+  if (!body.facts->fixed) sound.click = body.bank->calc_click_levels(norm(impulse.impulse_n_s), impulse.shape, impulse.duration_s);
   const double pushed =
       body.bank->calc_pushed_pa2_s(impulse.triangle, impulse.barycentric, impulse.impulse_n_s, impulse.shape, impulse.duration_s);
   sound.heard = (sound.levels.modal_pa2_s + pushed) * sound.spreading;

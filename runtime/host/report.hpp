@@ -32,7 +32,7 @@ EnergyBooks make_books(const Scene& scene, const contact::EnergyAudit& physics, 
 /// Warnings of the audit of contacts, a sentence each.
 std::vector<std::string> list_contact_warnings(const Scene& scene, const contact::ContactAudit& contacts,
                                                const contact::EnergyAudit& energy);
-/// "'ball' in the ground"
+/// "'ball' and the ground"; "none" without a body.
 std::string describe_pair(const Scene& scene, int body, int other);
 
 /// One line about modes whose gains came down to what their damping takes; empty where there are none.

@@ -16,8 +16,7 @@ inline constexpr std::size_t kMaxBodies = 1000;
 inline constexpr std::size_t kNotModal = std::numeric_limits<std::size_t>::max();
 using Names = std::map<std::string, std::size_t>;  // of bodies, with their indices in Scene::bodies; kNotModal: a recorded surface
 
-/// Reads the keys "bodies", "effects" and "variation" of a scene. Throws InputError
-/// "file:line: ...".
+/// Reads the keys "bodies", "effects" and "variation" of a scene. Throws InputError "file:line: ...".
 Names parse_bodies(base::Object& root, Scene& scene);
 
 /// The modal body that a key names.

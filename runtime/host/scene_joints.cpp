@@ -33,12 +33,9 @@ contact::JointSpec read_joint(base::Object& object, const Names& names) {
   if (!has_axis && object.has("axis")) object.fail("axis", fmt::format("a {} has none; take it away", kind));
   if (joint.kind == joints::Kind::kUniversal) {
     joint.second_axis = read_direction(object, "second_axis");
-    const double cosine =
-        joint.axis[0] * joint.second_axis[0] + joint.axis[1] * joint.second_axis[1] + joint.axis[2] * joint.second_axis[2];
+    const double cosine = dot(joint.axis, joint.second_axis);
     if (!(std::abs(cosine) < 1e-3)) object.fail("second_axis", "must be at right angles to \"axis\"");
-    for (std::size_t k = 0; k < 3; ++k) joint.second_axis[k] -= cosine * joint.axis[k];
-    const double length = norm(joint.second_axis);
-    for (double& x : joint.second_axis) x /= length;
+    joint.second_axis = normalise(joint.second_axis - cosine * joint.axis);
   } else if (object.has("second_axis")) {
     object.fail("second_axis", "belongs to a universal joint alone; take it away");
   }

@@ -9,7 +9,6 @@
 #include <string>
 #include <vector>
 
-#include "runtime/base/vector.hpp"
 #include "runtime/host/scene_values.hpp"
 #include "runtime/material/mallets.hpp"
 #include "runtime/material/table.hpp"
@@ -79,13 +78,7 @@ Mallet read_mallet(base::Object& object, std::vector<std::string>& warnings) {
   }
   mallet.restitution = read_within(object, "restitution", mallet.restitution, 0.0, 1.0);
   mallet.friction = read_within(object, "friction", mallet.friction, 0.0, 10.0);
-  if (object.has("direction")) {
-    Vec3 direction = read_vector(object, "direction", {}, kFarthestM);
-    const double length = norm(direction);
-    if (!(length > 1e-9)) object.fail("direction", "is no direction; give the way of the head as three numbers");
-    for (double& x : direction) x /= length;
-    mallet.direction = direction;
-  }
+  if (object.has("direction")) mallet.direction = read_direction(object, "direction");
   object.finish();
   return mallet;
 }

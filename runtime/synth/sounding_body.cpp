@@ -1,4 +1,4 @@
-// One body, whose effects, voices, delay lines and receivers change together; longer than most files.
+// One body: its effects, the events that act on it, and the sound that it sends.
 // Method:     modes and acceleration noise fill delay lines, which receivers read. A change of effects that touches the propagation makes
 //             a second one: both are fed until the new one holds all that its receivers read, then one fades into the other within a
 //             block, and the old one and the modules that are inaudible go back to the main thread.
@@ -23,24 +23,16 @@ constexpr EffectSet kOfPropagation{Effect::kModal,   Effect::kAccelerationNoise,
 
 constexpr EffectSet kOfContacts = kContactEffects.common(kCompiledEffects);
 
-/// Whether lasting contacts do anything: they act on modes.
+/// True for effects of lasting contacts with modes, on which they act.
 constexpr bool needs_contacts(EffectSet effects) { return has(effects, Effect::kModal) && effects.has_any(kOfContacts); }
 
 /// The first of a set, or another where it is empty.
 constexpr Effect find_first(EffectSet effects, Effect otherwise) { return effects.is_empty() ? otherwise : *effects.begin(); }
 
-/// Whether the sound of two models of a body with directivity sets out from one sphere.
+/// True for two models of a body with directivity with one sphere of multipoles.
 bool has_same_sphere(const Model& a, const Model& b) {
   const ModelDirectivity &one = *a.get_directivity(), &other = *b.get_directivity();
   return one.offset_m == other.offset_m && one.transfers->get_radius_m() == other.transfers->get_radius_m();
-}
-
-/// From 0 to 1 over a block, or back.
-double calc_fade(Fade fade, std::int64_t sample) noexcept {
-  if (fade == Fade::kNone) return 1.0;
-  if (fade == Fade::kUnheard) return 0.0;
-  const double u = static_cast<double>(sample % kBlock) / kBlock, in = u * u * (3.0 - 2.0 * u);
-  return fade == Fade::kIn ? in : 1.0 - in;
 }
 
 }  // namespace
@@ -62,7 +54,7 @@ EffectBytes BodyChange::calc_bytes() const {
   if (directivity) bytes[Effect::kDirectivity] += static_cast<std::int64_t>(directivity->calc_bytes());
   if (contacts) bytes[Effect::kRoughness] += static_cast<std::int64_t>(contacts->calc_bytes());
   if (!propagation) return bytes;
-  // What a delay line holds beyond one without travel time belongs to the travel time, or to the wait for what goes through a head.
+  // The surplus of a delay line over one without travel time counts as travel time, or as the wait for a head.
   const std::size_t still = DelayLine::calc_least_bytes(kBlock);
   const Effect waits = propagation->effects.has(Effect::kAirDelay) ? Effect::kAirDelay : Effect::kModal;
   const auto add = [&](const DelayLine& delay_line, Effect effect) {
@@ -217,7 +209,7 @@ void SoundingBody::direct_voice() noexcept {
   voice_->direct(weights[0], weights[1]);
 }
 
-/// Contacts begin, change what they do, or fall.
+/// Contacts begin, change their effects, or fall.
 void SoundingBody::put_contacts(BodyChange& change) noexcept {
   if (kOfContacts.is_empty()) return;
   if (change.contacts) {
@@ -235,14 +227,14 @@ void SoundingBody::put_contacts(BodyChange& change) noexcept {
   }
 }
 
-/// Whether the receivers of a new propagation find in its delay lines all that the old one could have given them.
+/// True when the delay lines of a new propagation reach back as far as its receivers read.
 bool SoundingBody::is_filled(const Propagation& propagation, const ListenerTracks& listener, std::int64_t sample) const noexcept {
   if (!propagation_ || propagation_->is_silent()) return true;
   const std::int64_t filled = sample - propagation.first;
   const DelayLine& delay_line = propagation.get_line();
   const double needed =
       propagation.calc_longest_s(listener, sample) * frame_.rate_hz + propagation.ears.front().get_latency() + kTaps + kBlock;
-  // What is in a head's filters has come from full lines.
+  // The filters of a head need full lines for their whole length.
   const std::int64_t full = filled - (propagation.head.empty() ? 0 : propagation.head.front().get_length());
   return static_cast<double>(full) >= needed || full >= delay_line.get_size();
 }
@@ -319,7 +311,7 @@ bool hit(Player& player, const events::Force& force, const Attitudes&... attitud
   return player.push(force, attitude...);
 }
 
-/// To all who play pulses. What continues a pulse is no strike of its own.
+/// To all players of pulses. The continuation of a pulse is no strike of its own.
 template <class Strike>
 bool SoundingBody::play(const Strike& strike, bool has_length, bool is_new, std::int64_t sample) noexcept {
   wake(sample);
@@ -379,7 +371,6 @@ bool SoundingBody::take(const events::BodyMotion& motion) noexcept {
   return true;
 }
 
-/// Modes and acceleration noise, into all delay lines.
 /// The modes' sound, into the delay lines. Returns the effect to which its time counts.
 Effect SoundingBody::make_modal_sound(std::span<float> mono) noexcept {
   const bool is_idle = voice_->is_idle();
@@ -490,6 +481,7 @@ void SoundingBody::begin_directed_block(std::int64_t sample, const ListenerTrack
   }
 }
 
+/// Modes and acceleration noise, into all delay lines.
 void SoundingBody::make_sound(std::int64_t sample, std::size_t count, const ListenerTracks& listener, BodyScratch& scratch,
                               TickFunction ticks) noexcept {
   std::uint64_t started = ticks != nullptr ? ticks() : 0;
@@ -508,134 +500,6 @@ void SoundingBody::make_sound(std::int64_t sample, std::size_t count, const List
     for (std::size_t k = 0; k < 3; ++k) dipole[k] = std::span(scratch.dipole[k]).first(count);
     make_acceleration_noise(dipole);
     end_part(Effect::kAccelerationNoise);
-  }
-}
-
-/// What one ear hears, times a level, into the mix of its microphone, or of all where they are not `apart`. Returns how many samples came
-/// by a way that changes.
-int SoundingBody::hear_ear(Receiver& ear, const Source& source, const Trajectory& track, std::size_t microphone, double level,
-                           std::int64_t sample, std::size_t count, Fade fade, bool apart, BodyScratch& scratch, Mix& mix) noexcept {
-  if (apart && fade == Fade::kNone && level == 1.0) return ear.process(source, track, sample, std::span(mix[microphone]).first(count));
-  const std::span<double> heard = std::span(scratch.heard).first(count);
-  std::fill(heard.begin(), heard.end(), 0.0);
-  const int moved = ear.process(source, track, sample, heard);
-  for (std::size_t n = 0; n < count && fade != Fade::kNone; ++n) heard[n] *= calc_fade(fade, sample + static_cast<std::int64_t>(n));
-  if (level != 1.0)
-    for (double& p : heard) p *= level;
-  for (std::size_t c = apart ? microphone : 0; c < (apart ? microphone + 1 : mix.size()); ++c)
-    for (std::size_t n = 0; n < count; ++n) mix[c][n] += heard[n];
-  return moved;
-}
-
-/// What an ear has done, and how long it took.
-void SoundingBody::count_ear(const Propagation& propagation, Effect sends, std::size_t microphone, bool is_mirrored, int moved,
-                             std::size_t count, std::int64_t ticks) noexcept {
-  const bool has_delay = has(propagation.effects, Effect::kAirDelay);
-  if (is_mirrored) {
-    work_.units[Effect::kGroundReflection] += static_cast<std::int64_t>(count);
-  } else {
-    if (has_delay) work_.units[Effect::kAirDelay] += static_cast<std::int64_t>(count);
-    if (has(propagation.effects, Effect::kDoppler)) work_.units[Effect::kDoppler] += moved;
-    if (microphone > 0) work_.units[Effect::kTwoEars] += static_cast<std::int64_t>(count);
-  }
-  const Effect carries = moved > 0 ? Effect::kDoppler : has_delay ? Effect::kAirDelay : sends;
-  work_.ticks[is_mirrored ? Effect::kGroundReflection : microphone > 0 ? Effect::kTwoEars : carries] += ticks;
-}
-
-void SoundingBody::hear(Propagation& propagation, std::int64_t sample, std::size_t count, const ListenerTracks& listener, Fade fade,
-                        BodyScratch& scratch, Mix& mix, TickFunction ticks) noexcept {
-  if (propagation.is_silent()) return;
-  if (kCompiledEffects.has(Effect::kHead) && !propagation.head.empty())
-    return hear_by_head(propagation, sample, count, listener, fade, scratch, mix, ticks);
-  if (fade == Fade::kUnheard) return;
-  std::uint64_t started = ticks != nullptr ? ticks() : 0;
-  const bool apart = has(propagation.effects, Effect::kTwoEars);
-  const auto add_work = [&](Effect sends, std::size_t m, bool is_mirrored, int moved) {
-    const std::uint64_t now = ticks != nullptr ? ticks() : 0;
-    count_ear(propagation, sends, m, is_mirrored, moved, count, static_cast<std::int64_t>(now - std::exchange(started, now)));
-  };
-  const Effect sends = propagation.monopole ? Effect::kModal : Effect::kAccelerationNoise;
-  for (std::size_t m = 0; m < propagation.ears.size() && (propagation.monopole || propagation.dipole[0]); ++m) {
-    const Trajectory& track = propagation.find_track(listener, m, false);
-    add_work(sends, m, false, hear_ear(propagation.ears[m], propagation.source, track, m, 1.0, sample, count, fade, apart, scratch, mix));
-    if (!kCompiledEffects.has(Effect::kGroundReflection) || propagation.mirrored.empty()) continue;
-    const Trajectory& mirrored = propagation.find_track(listener, m, true);
-    add_work(sends, m, true,
-             hear_ear(propagation.mirrored[m], propagation.source, mirrored, m, listener.get_floor()->reflection, sample, count, fade,
-                      apart, scratch, mix));
-  }
-  if (!kCompiledEffects.has(Effect::kDirectivity) || !propagation.directed) return;
-  DirectedSound& directed = *propagation.directed;
-  for (std::size_t e = 0; e < directed.get_ear_count(); ++e) {
-    const std::size_t m = directed.find_microphone(e);
-    const bool is_mirrored = directed.is_mirrored(e);
-    const double level = is_mirrored ? listener.get_floor()->reflection : 1.0;
-    add_work(Effect::kDirectivity, m, is_mirrored,
-             hear_ear(directed.get_receiver(e), directed.make_source(e), directed.find_track(listener, e), m, level, sample, count, fade,
-                      apart, scratch, mix));
-  }
-}
-
-/// What arrives in the middle of the head straight, and then by way of the floor, each through the head's ears in the direction from which
-/// it comes. All that the body sends comes from one direction: that of its centre of mass, or of its multipoles where it sends nothing
-/// else.
-void SoundingBody::hear_by_head(Propagation& propagation, std::int64_t sample, std::size_t count, const ListenerTracks& listener, Fade fade,
-                                BodyScratch& scratch, Mix& mix, TickFunction ticks) noexcept {
-  const bool has_whole = propagation.monopole || propagation.dipole[0];
-  const Effect sends = propagation.monopole ? Effect::kModal : has_whole ? Effect::kAccelerationNoise : Effect::kDirectivity;
-  for (std::size_t way = 0; way < propagation.head.size(); ++way) {
-    const bool is_mirrored = way > 0;
-    const double level = is_mirrored ? listener.get_floor()->reflection : 1.0;
-    std::uint64_t started = ticks != nullptr ? ticks() : 0;
-    const std::span<double> arrived = std::span(scratch.heard).first(count);
-    std::fill(arrived.begin(), arrived.end(), 0.0);
-    std::array<Vec3, kSubBlocks> direction{};  // from the body, at the end of each sub-block
-    int moved = 0;
-    const auto hear_one = [&](Receiver& ear, const Source& source, const Trajectory& track, bool is_first) {
-      for (std::size_t n = 0; n < count; n += kSubBlock) {
-        const std::span<double> piece = arrived.subspan(n, std::min<std::size_t>(kSubBlock, count - n));
-        const int changed = ear.process(source, track, sample + static_cast<std::int64_t>(n), piece);
-        if (!is_first) continue;
-        moved += changed;
-        direction[n / kSubBlock] = ear.get_direction();
-      }
-    };
-    if (has_whole)
-      hear_one(is_mirrored ? propagation.mirrored[0] : propagation.ears[0], propagation.source,
-               propagation.find_track(listener, 0, is_mirrored), true);
-    if (kCompiledEffects.has(Effect::kDirectivity) && propagation.directed) {
-      DirectedSound& directed = *propagation.directed;
-      hear_one(directed.get_receiver(way), directed.make_source(way), directed.find_track(listener, way), !has_whole);
-    }
-    std::uint64_t now = ticks != nullptr ? ticks() : 0;
-    count_ear(propagation, sends, 0, is_mirrored, moved, count, static_cast<std::int64_t>(now - std::exchange(started, now)));
-    if (level != 1.0)
-      for (double& p : arrived) p *= level;
-
-    std::array<std::span<double>, 2> ears{std::span(mix[0]).first(count), std::span(mix[1]).first(count)};
-    if (fade != Fade::kNone) {
-      for (std::size_t e = 0; e < 2; ++e) {
-        ears[e] = std::span(scratch.by_head[e]).first(count);
-        std::fill(ears[e].begin(), ears[e].end(), 0.0);
-      }
-    }
-    for (std::size_t n = 0; n < count; n += kSubBlock) {
-      const std::size_t size = std::min<std::size_t>(kSubBlock, count - n);
-      Vec3 from = -1.0 * direction[n / kSubBlock];
-      if (is_mirrored) from = listener.get_floor()->mirror_direction(from);
-      const double end_s = static_cast<double>(sample + static_cast<std::int64_t>(n + size) - Receiver::kLatency) / frame_.rate_hz;
-      propagation.head[way].process(listener.find_in_head(from, end_s), arrived.subspan(n, size), ears[0].subspan(n, size),
-                                    ears[1].subspan(n, size));
-    }
-    if (fade == Fade::kIn || fade == Fade::kOut) {
-      for (std::size_t n = 0; n < count; ++n) {
-        const double share = calc_fade(fade, sample + static_cast<std::int64_t>(n));
-        for (std::size_t e = 0; e < 2; ++e) mix[e][n] += share * ears[e][n];
-      }
-    }
-    work_.units[Effect::kHead] += static_cast<std::int64_t>(count);
-    now = ticks != nullptr ? ticks() : 0;
-    work_.ticks[Effect::kHead] += static_cast<std::int64_t>(now - started);
   }
 }
 

@@ -25,7 +25,7 @@
 
 namespace carillon::synth {
 
-/// What a body is made for, in addition to its model.
+/// The surroundings and limits of a body, in addition to its model.
 struct BodyFrame {
   double rate_hz = 0.0;
   std::vector<Vec3> microphones_m;  // from the listener
@@ -41,7 +41,7 @@ struct BodyFrame {
   int phase = 0;  // of Directivity
 };
 
-/// Memory that belongs to effects. What lasting contacts need counts as that of roughness here, whichever of the three effects need it.
+/// Memory by effect. That of lasting contacts counts as roughness here, for any of their three effects.
 using EffectBytes = PerEffect<std::int64_t>;
 
 /// The acceleration noise of a body with its attitude.
@@ -51,7 +51,7 @@ struct BodyAccelerationNoise {
   std::int64_t first = 0;  // sample of the scene with which it began
 };
 
-/// Modules on their way into a body, and what they took the place of on its way out. Made and destroyed on the main thread.
+/// Modules on their way into a body, or replaced ones on their way out. Made and destroyed on the main thread.
 struct BodyChange {
   EffectSet effects;
   std::unique_ptr<Voice> voice;
@@ -94,7 +94,7 @@ struct BodyScratch {
 
 using Mix = std::vector<std::array<double, kBlock>>;  // per microphone
 
-/// How what is heard of a propagation changes over a block. What is unheard is made and goes nowhere.
+/// The level of a propagation over a block. kUnheard: its sound is made and dropped.
 enum class Fade : std::uint8_t { kNone, kIn, kOut, kUnheard };
 
 /// Invariant: it has the modules of its effects and no others; every module has done the same samples (rendered_); while a change
@@ -128,7 +128,7 @@ class SoundingBody {
             ContactRecordCounters& counters) noexcept;
   bool take(const events::BodyMotion& motion) noexcept;
 
-  /// Adds to `mix` what is heard of it in samples `sample` to `sample + count`, all of one block.
+  /// Adds its sound at the microphones to `mix`, for samples `sample` to `sample + count`, all of one block.
   void render(std::int64_t sample, std::size_t count, const ListenerTracks& listener, BodyScratch& scratch, Mix& mix,
               TickFunction ticks) noexcept;
 
@@ -141,12 +141,12 @@ class SoundingBody {
   /// Its modes; nullptr without.
   Voice* get_voice() noexcept { return voice_.get(); }
   const Voice* get_voice() const noexcept { return voice_.get(); }
-  /// Whether it has Directivity, or goes over to it or from it.
+  /// True with Directivity, also during a change to it or from it.
   bool is_directed() const noexcept;
   /// At the first sample of a block: transfers that it needs, TransferBudget; then its share of them.
   int find_transfer_need(std::int64_t sample) noexcept;
   void set_transfer_share(const TransferBudget& budget) noexcept;
-  /// How many pascals 1 Pa at 1 m is at the nearest microphone, at a sample.
+  /// Pressure at the nearest microphone for 1 Pa at 1 m, at a sample.
   float calc_nearness(const ListenerTracks& listener, std::int64_t sample) const noexcept;
 
  private:
@@ -183,7 +183,7 @@ class SoundingBody {
   ContactSurface surface_;                   // with the material of the model
   std::unique_ptr<Propagation> propagation_, next_propagation_;
   BodyChange* change_ = nullptr;
-  bool fading_ = false;        // from air_ to next_air_, in this block
+  bool fading_ = false;        // from propagation_ to next_propagation_, in this block
   std::int64_t first_ = 0;     // sample of the scene with which the voice began
   std::int64_t rendered_ = 0;  // samples of the scene that all modules have done
   int transfer_need_ = 0;

@@ -1,4 +1,4 @@
-// One scene on two threads: what the main thread hands over, the audio thread takes here; longer than most files.
+// One scene on two threads: bodies, commands and events from the main thread, blocks of sound on the audio thread.
 // Method:     time is cut into blocks of kBlock samples from the first one; a call of the host is served from as many whole sub-blocks as
 //             it asks for, never across a block. Events are taken from the ring before each piece is made, and act at their own times.
 //             Bodies come and go at blocks, and effects change, handed over by two queues with one writer and one reader. Of bodies that
@@ -113,7 +113,7 @@ void Synthesiser::check_model(const Model* model) const {
                      std::to_string(options_.rate_hz) + " Hz");
 }
 
-/// That what effects need of the scene is there.
+/// Throws InputError for effects without the head or the floor that they need.
 void Synthesiser::check_surroundings(EffectSet effects) const {
   if (effects.has(Effect::kHead) && !options_.head)
     throw InputError("head needs a listener with a head; give the synthesiser one, or leave the effect out");
@@ -197,7 +197,7 @@ void Synthesiser::set_effects(int body, EffectSet effects) {
   collect();
   Owned& owned = owned_[check_owned(body)];
   check_surroundings(effects);
-  // Refused here, whether it has to wait or not.
+  // Refused here, also for a change that has to wait.
   if (owned.wanted_model != nullptr)
     SoundingBody::check(effects, *owned.wanted_model);
   else
@@ -227,7 +227,7 @@ void Synthesiser::swap_model(int body, std::shared_ptr<const Model> model) {
 
 EffectSet Synthesiser::get_effects(int body) const { return owned_[check_owned(body)].wanted; }
 
-/// Makes the change to what is wanted, unless an earlier one is on its way.
+/// Makes the wanted change, unless an earlier one is on its way.
 void Synthesiser::send_change(int number) {
   Owned& owned = owned_[static_cast<std::size_t>(number)];
   if (owned.change != nullptr || owned.is_leaving || (owned.wanted == owned.effects && owned.wanted_model == nullptr)) return;
@@ -244,19 +244,6 @@ void Synthesiser::send_change(int number) {
   for (const Effect effect : EffectSet::all()) owned.bytes[effect] += more[effect];
   publish_bytes(number);
   commands_->push({.body = owned.body.get(), .change = owned.change.get(), .number = number});
-}
-
-void Synthesiser::publish_bytes(int number) {
-  const auto i = static_cast<std::size_t>(number);
-  EffectBytes bytes = owned_[i].bytes;
-  const auto move_contacts_to = [&](Effect effect) { bytes[effect] += std::exchange(bytes[Effect::kRoughness], 0); };
-  if (!owned_[i].effects.has(Effect::kRoughness)) {
-    if (owned_[i].effects.has(Effect::kRolling))
-      move_contacts_to(Effect::kRolling);
-    else if (owned_[i].effects.has(Effect::kContactDamping))
-      move_contacts_to(Effect::kContactDamping);
-  }
-  for (const Effect effect : EffectSet::all()) published_bodies_[i].bytes[effect].store(bytes[effect], std::memory_order_relaxed);
 }
 
 void Synthesiser::remove_body(int body) {
@@ -310,7 +297,7 @@ void Synthesiser::list_directed() noexcept {
     if (body != nullptr && body->is_directed()) directed_.push_back(body);
 }
 
-/// At the start of a block: how many transfers each body may look up in it.
+/// At the start of a block: the transfers of each body in it.
 void Synthesiser::share_transfers() noexcept {
   if (!kCompiledEffects.has(Effect::kDirectivity) || directed_.empty()) return;
   std::int64_t needs = 0;
@@ -349,7 +336,7 @@ void Synthesiser::for_awake(Work&& work) noexcept {
   }
 }
 
-/// Runs `work` on a body and adds to the totals what it has done.
+/// Runs `work` on a body and adds its counts to the totals.
 template <typename Work>
 void Synthesiser::count(const SoundingBody& body, Work&& work) noexcept {
   const BodyWork& now = body.get_work();
@@ -374,7 +361,7 @@ void Synthesiser::take(const events::TimeWatermark& mark) noexcept {
   has_marks_ = true;
 }
 
-/// At the start of a block: whether physics has run to its end. What is not known yet comes late, or not at all.
+/// At the start of a block: an underrun if physics has not run to its end. Later events come late, or not at all.
 void Synthesiser::watch_marks() noexcept {
   const bool is_overtaken = has_marks_ && marked_s_ * options_.rate_hz < static_cast<double>(sample_ + kBlock);
   work_.underruns += static_cast<std::int64_t>(is_overtaken && !is_overtaken_);
@@ -439,7 +426,7 @@ void Synthesiser::finish_changes() noexcept {
   if (changes) list_directed();
 }
 
-/// The floor for strikes in this block, whether the body is awake since its beginning or not; and no body wakes more modes than the whole
+/// The floor for strikes in this block, also of a body that wakes within it; and no body wakes more modes than the whole
 /// budget has room for: they would have to go at once, and take others with them for the work that they were.
 void Synthesiser::give_floor(SoundingBody& body) noexcept {
   Voice* voice = body.get_voice();
@@ -555,89 +542,6 @@ void Synthesiser::process(float* const* out, int channels, int frames) noexcept 
   }
   position_.store(sample_ - held_, std::memory_order_relaxed);
   publish_counters();
-}
-
-void Synthesiser::publish(int number) noexcept {
-  const auto i = static_cast<std::size_t>(number);
-  const BodyWork& work = playing_[i]->get_work();
-  Published& published = published_bodies_[i];
-  for (const Effect effect : EffectSet::all()) {
-    published.units[effect].store(work.units[effect], std::memory_order_relaxed);
-    if (options_.ticks != nullptr) published.ticks[effect].store(work.ticks[effect], std::memory_order_relaxed);
-  }
-  published.peak_pa.store(work.peak_pa, std::memory_order_relaxed);
-  published.deflection.store(work.deflection, std::memory_order_relaxed);
-  published.energy_rise.store(work.energy_rise, std::memory_order_relaxed);
-  published.given_j.store(work.energy.given_j, std::memory_order_relaxed);
-  published.lost_j.store(work.energy.lost_j, std::memory_order_relaxed);
-  published.held_j.store(work.energy.held_j, std::memory_order_relaxed);
-  published.radiated_j.store(work.energy.radiated_j, std::memory_order_relaxed);
-}
-
-EffectCounters Synthesiser::get_effect_counters(int body) const noexcept {
-  EffectCounters counters;
-  if (body < 0 || body >= options_.max_bodies) return counters;
-  const Published& published = published_bodies_[static_cast<std::size_t>(body)];
-  for (const Effect effect : EffectSet::all()) {
-    counters.units[effect] = published.units[effect].load(std::memory_order_relaxed);
-    counters.ticks[effect] = published.ticks[effect].load(std::memory_order_relaxed);
-    counters.bytes[effect] = published.bytes[effect].load(std::memory_order_relaxed);
-  }
-  return counters;
-}
-
-double Synthesiser::get_peak_pa(int body) const noexcept {
-  if (body < 0 || body >= options_.max_bodies) return 0.0;
-  return static_cast<double>(published_bodies_[static_cast<std::size_t>(body)].peak_pa.load(std::memory_order_relaxed));
-}
-
-bool Synthesiser::measure_amplitudes(int body, std::span<float> by_bank_mode) const noexcept {
-  std::fill(by_bank_mode.begin(), by_bank_mode.end(), 0.0F);
-  if (body < 0 || body >= options_.max_bodies || playing_[static_cast<std::size_t>(body)] == nullptr) return false;
-  const Voice* voice = playing_[static_cast<std::size_t>(body)]->get_voice();
-  if (voice != nullptr) voice->measure_amplitudes(by_bank_mode);
-  return true;
-}
-
-double Synthesiser::get_deflection(int body) const noexcept {
-  if (body < 0 || body >= options_.max_bodies) return 0.0;
-  return published_bodies_[static_cast<std::size_t>(body)].deflection.load(std::memory_order_relaxed);
-}
-
-double Synthesiser::get_energy_rise(int body) const noexcept {
-  if (body < 0 || body >= options_.max_bodies) return 0.0;
-  return published_bodies_[static_cast<std::size_t>(body)].energy_rise.load(std::memory_order_relaxed);
-}
-
-ModeEnergy Synthesiser::get_mode_energy(int body) const noexcept {
-  if (body < 0 || body >= options_.max_bodies) return {};
-  const Published& of = published_bodies_[static_cast<std::size_t>(body)];
-  const auto get = [](const std::atomic<double>& x) { return x.load(std::memory_order_relaxed); };
-  return {get(of.given_j), get(of.lost_j), get(of.held_j), get(of.radiated_j)};
-}
-
-void Synthesiser::publish_counters() noexcept {
-  const ContactRecordCounters& contacts = work_.contacts;
-  const std::array values{work_.strikes,    work_.refused,    work_.late,          work_.resets,      work_.mode_samples,
-                          work_.faded,      work_.underruns,  work_.zeroed,        contacts.accepted, contacts.refused,
-                          contacts.dropped, contacts.thinned, contacts.without_use};
-  static_assert(values.size() == std::tuple_size_v<decltype(published_)>);
-  for (std::size_t i = 0; i < values.size(); ++i) published_[i].store(values[i], std::memory_order_relaxed);
-}
-
-SynthesiserCounters Synthesiser::get_counters() const noexcept {
-  const auto get = [this](std::size_t i) { return published_[i].load(std::memory_order_relaxed); };
-  return {.strikes = get(0),
-          .refused = get(1),
-          .late = get(2),
-          .faults = ring_.get_faults(),
-          .overflows = ring_.get_overflows(),
-          .resets = get(3),
-          .mode_samples = get(4),
-          .faded = get(5),
-          .underruns = get(6),
-          .zeroed = get(7),
-          .contacts = {.accepted = get(8), .refused = get(9), .dropped = get(10), .thinned = get(11), .without_use = get(12)}};
 }
 
 }  // namespace carillon::synth

@@ -5,7 +5,7 @@
 //   synthesiser.push(events::Impulse{.time_s = 0.01, .body = body, .triangle = 12, .impulse_n_s = {0, 0, 0.01}, .duration_s = 1e-4});
 //   synthesiser.process(channels, 2, 256);  // in the audio callback
 //
-// What a body costs is what its effects cost: an effect that it has not takes no memory and executes nothing.
+// The costs of a body are those of its effects: an effect that is off takes no memory and executes nothing.
 //
 // Threads: the constructor, add_body, remove_body, set_effects and collect() belong to one main thread, process() to one audio thread;
 // push() and the get_ members may be called by any thread at any time.
@@ -44,19 +44,19 @@ struct SynthesiserOptions {
   int max_forces = 128;                                     // events::Forces that it may
   int max_waypoints = 64;                                   // of a body's way that are remembered
   int ring_events = 4096;                                   // that may wait between two calls of process()
-  double longest_m = 60.0;                                  // what is further away is not heard
+  double longest_m = 60.0;                                  // sound from further away is inaudible
   double budget = std::numeric_limits<double>::infinity();  // set_budget()
   /// Of Effect::kDirectivity: transfers that all bodies together look up in a second; in a block a quarter more at most. By default those
   /// of 14 bodies with 228 modes and two ears that are all looked up in every block, at 48 kHz. Where bodies need n times as many, each is
   /// looked up every n-th block on average: its modes are that old, or go so long from one weight to the next (Directivity,
   /// TransferBudget).
   double transfers_per_s = 2.4e6;
-  ContactSurface ground = kGroundSurface;     // what contacts touch whose other body is none
-  std::optional<Floor> floor = std::nullopt;  // what bodies with Effect::kGroundReflection are reflected by
-  /// What bodies with Effect::kHead and Effect::kTwoEars are heard through, in the middle of microphones_m, which are two: left and right.
-  /// With it all that is heard comes later (get_latency()), whichever bodies have the effect.
+  ContactSurface ground = kGroundSurface;     // surface of the ground in contacts
+  std::optional<Floor> floor = std::nullopt;  // for Effect::kGroundReflection
+  /// For bodies with Effect::kHead and Effect::kTwoEars, in the middle of two microphones_m, left and right. It delays all sound
+  /// (get_latency()), also of bodies without the effect.
   std::optional<ListeningHead> head = std::nullopt;
-  /// A counter of time, for what effects cost; nullptr: nothing is measured, and nothing paid for that.
+  /// A counter of time for the costs of effects; nullptr: no measurement, at no cost.
   TickFunction ticks = nullptr;
 };
 
@@ -65,15 +65,15 @@ struct BodySettings {
   events::Quaternion rotation{1.0, 0.0, 0.0, 0.0};  // of the frame of its mesh until then
   EffectSet effects = kDefaultEffects;
   double silence_pa = 1e-10;  // VoiceOptions
-  ContactSurface surface{};   // what contacts that last touch
-  double longest_m = 0.0;     // as in SynthesiserOptions; 0: what it says there
-  int max_waypoints = 0;
-  int max_forces = -1;  // as there; -1: what it says there
+  ContactSurface surface{};   // in lasting contacts
+  double longest_m = 0.0;     // 0: that of SynthesiserOptions
+  int max_waypoints = 0;      // likewise
+  int max_forces = -1;        // -1: that of SynthesiserOptions
   Isa isa = Isa::kBest;
   bool audits_energy = false;  // get_energy_rise(), get_mode_energy()
 };
 
-/// What the effects of one body have done since it was added, and what they hold. An effect that is off keeps its units and holds nothing.
+/// Work of the effects of one body since it was added, and their memory. An effect that is off keeps its units and holds nothing.
 struct EffectCounters {
   /// Work: of modal mode-samples, of hertz_pulse pulses, of roughness and rolling samples of the texture that both read, contact by
   /// contact, of contact_damping samples in which a contact is at work, of acceleration_noise samples (of three dipoles), of air_delay
@@ -81,13 +81,12 @@ struct EffectCounters {
   /// all further, of directivity transfers that were looked up, of ground_reflection samples that mirrored ears read, of head samples that
   /// went through one, straight and mirrored, for both ears, of nonlinear coupled modes times samples.
   PerEffect<std::int64_t> units{};
-  /// Of SynthesiserOptions::ticks. What pulses cost is in modal, and what modes cost while a contact is at work is in the first of
-  /// roughness, rolling and contact_damping that the body has, as are their bytes; an ear's time is that of doppler where the way changes,
-  /// else of air_delay, else of what it hears, and of two_ears for the second microphone and all further. That of mirrored ears is in
-  /// ground_reflection; to multiply the modes with what directivity looked up is in modal, and so are coupled modes. A head's filters are
-  /// in head, and what arrives in its middle is one ear.
+  /// Of SynthesiserOptions::ticks. modal has pulses, coupled modes and the products of modes with transfers. The cost of modes during a
+  /// contact is in the first of roughness, rolling and contact_damping that the body has, as are their bytes. An ear's time is in
+  /// two_ears from the second microphone on; that of the first in doppler where the way changes, else in air_delay, else in the source.
+  /// That of mirrored ears is in ground_reflection. A head's filters are in head, and its middle is one ear.
   PerEffect<std::int64_t> ticks{};
-  EffectBytes bytes{};  // without the model, which bodies share, and without what a body has that has no effects
+  EffectBytes bytes{};  // without the model, which bodies share, and without the memory of a body without effects
 };
 
 /// Since the beginning.
@@ -121,7 +120,7 @@ class Synthesiser {
   int add_body(std::shared_ptr<const Model> model, const BodySettings& settings = {});
 
   /// Gives a body another set of effects: makes what it lacks here, and lets the audio thread put it in and take out what is not needed any
-  /// more, at a block and without a click: what is heard goes over within a block, as soon as the new way of the air is filled. One
+  /// more, at a block and without a click: the sound changes over within a block, as soon as the new way of the air is filled. One
   /// change of a body is on its way at a time: a later one waits, and begins with the first collect() (or call of this) after the earlier
   /// one is over. Throws InputError when there is no such body, or for an effect that this build or the body's model cannot have.
   /// [main-thread]
@@ -135,20 +134,20 @@ class Synthesiser {
   /// there, for a model of another rate, and for one that cannot have the body's effects. [main-thread]
   void swap_model(int body, std::shared_ptr<const Model> model);
 
-  /// What was asked for last. Throws InputError when there is no such body. [main-thread]
+  /// The effects of the last call. Throws InputError when there is no such body. [main-thread]
   EffectSet get_effects(int body) const;
 
   /// The body falls silent at the next block. Its number may be given to a new body after collect(). [main-thread]
   void remove_body(int body);
 
-  /// Whether add_body() would find no room. [main-thread]
+  /// True without room for another body. [main-thread]
   bool is_full() noexcept;
 
   /// Frees the memory of removed bodies and effects after their release by the audio thread, and sends pending changes. A change without
   /// enough memory stays pending. [main-thread]
   void collect() noexcept;
 
-  /// Full scale per pascal; 1 at first. What is no finite number counts as 0. [any-thread]
+  /// Full scale per pascal; 1 at first. Infinity and NaN count as 0. [any-thread]
   void set_gain(double per_pa) noexcept {
     gain_.store(std::isfinite(per_pa) ? static_cast<float>(per_pa) : 0.0F, std::memory_order_relaxed);
   }
@@ -165,13 +164,13 @@ class Synthesiser {
   bool push(const events::Event& event) noexcept { return ring_.push(event); }
 
   /// The next frames of up to as many channels as there are microphones; further channels are silent. out[c] has room for `frames` numbers.
-  /// Frame n is what arrives at (n - get_latency()) / rate. Any number of frames, in any order, gives the same bits, as long as events come
+  /// Frame n arrives at (n - get_latency()) / rate. Any number of frames, in any order, gives the same bits, as long as events come
   /// before the horizon. No frames: takes the events out of the ring, so that there is room for more. [audio-thread]: no heap, no lock, no
   /// system call, no throw.
   void process(float* const* out, int channels, int frames) noexcept;
 
   static constexpr int kLatency = Receiver::kLatency;  // without a head
-  /// Frames by which what is heard lags behind. [any-thread]
+  /// Delay of the sound [frames]. [any-thread]
   int get_latency() const noexcept { return latency_; }
   /// Events that fit into the ring between two calls of process(). [any-thread]
   std::size_t get_ring_room() const noexcept { return ring_.get_room(); }
@@ -188,8 +187,8 @@ class Synthesiser {
   /// Largest deflection by its modes so far, in thicknesses (find_judged_thickness_m()). 0 up to kLinearThicknesses, the range of linear
   /// modes, and without a judged thickness. [any-thread]
   double get_deflection(int body) const noexcept;
-  /// How far each mode of a body swings at this moment: the amplitude of its coordinate q [m kg^1/2], by number in the bank. Modes that do
-  /// not ring, and those that the model has not, are 0. False for a number that is no body's. [audio-thread], between calls of process().
+  /// The present amplitude of each mode's coordinate q [m kg^1/2], by number in the bank; 0 for modes that do not ring or are not in the
+  /// model. False for a number that is no body's. [audio-thread], between calls of process().
   bool measure_amplitudes(int body, std::span<float> by_bank_mode) const noexcept;
   /// Of a body that audits_energy: the largest share by which the energy of its modes rose over a block in which nothing acted on it.
   /// [any-thread]
@@ -199,7 +198,7 @@ class Synthesiser {
   ModeEnergy get_mode_energy(int body) const noexcept;
 
  private:
-  /// What the main thread asks of the audio thread, and what comes back: a body that goes, or a change that is over.
+  /// A request to the audio thread, and its answer: a removed body, or a finished change.
   struct Command {
     SoundingBody* body = nullptr;
     BodyChange* change = nullptr;
@@ -215,7 +214,7 @@ class Synthesiser {
     EffectBytes bytes;
     bool is_leaving = false;
   };
-  /// What all threads may see of a body.
+  /// Figures of a body for all threads.
   struct Published {
     PerEffect<std::atomic<std::int64_t>> units{}, ticks{}, bytes{};
     std::atomic<float> peak_pa{0.0F};

@@ -1,5 +1,4 @@
-// The effects directivity and ground_reflection against closed forms of monopoles and dipoles. Both are tried alone and together on one
-// way to play a body: longer than most files.
+// The effect directivity against closed forms of monopoles and dipoles, and against gains.
 #include "runtime/synth/directivity.hpp"
 
 #include <gtest/gtest.h>
@@ -8,120 +7,34 @@
 #include <array>
 #include <cmath>
 #include <complex>
-#include <functional>
 #include <limits>
-#include <numbers>
 #include <numeric>
-#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "runtime/base/error.hpp"
-#include "runtime/synth/synthesiser.hpp"
-#include "tests/unit/runtime/synth/cube_bank.hpp"
-#include "tests/unit/runtime/synth/multipole_cube.hpp"
+#include "tests/unit/runtime/synth/directed_scene.hpp"
 
 namespace carillon::synth {
 namespace {
 
-using std::numbers::pi;
-using Complex = std::complex<double>;
-using Sound = std::vector<std::vector<float>>;
-constexpr double kRate = 48000.0, kC = bank::kSoundSpeedMs;
-constexpr int kStruck = 480;  // sample at which a body is struck
-constexpr EffectSet kDirected = kDefaultEffects.with(Effect::kDirectivity);
+using namespace testing;
 
-/// What is played: one body of a bank, and what happens to it.
-struct Scene {
-  bank::Bank bank;
-  std::vector<Vec3> microphones_m;
-  EffectSet effects = kDirected;
-  Vec3 position_m{};
-  events::Quaternion rotation{1.0, 0.0, 0.0, 0.0};
-  std::optional<Floor> floor = std::nullopt;
-  std::vector<events::Event> events{};
-  int frames = 4800, block = 128;
-  double budget = std::numeric_limits<double>::infinity();
-  Isa isa = Isa::kBest;
-  std::function<void(Synthesiser&, int)> meddle = nullptr;  // after half of the frames
-};
-
-Sound play(const Scene& scene, EffectCounters* counters = nullptr) {
-  SynthesiserOptions options{.rate_hz = kRate, .microphones_m = scene.microphones_m, .max_waypoints = 4096, .ring_events = 16384};
-  options.floor = scene.floor;
-  options.budget = scene.budget;
-  Synthesiser synthesiser(options);
-  const int body =
-      synthesiser.add_body(Model::make(scene.bank, {.rate_hz = kRate}),
-                           {.position_m = scene.position_m, .rotation = scene.rotation, .effects = scene.effects, .isa = scene.isa});
-  for (const auto& event : scene.events) synthesiser.push(event);
-  Sound out(scene.microphones_m.size(), std::vector<float>(static_cast<std::size_t>(scene.frames)));
-  bool has_meddled = scene.meddle == nullptr;
-  for (int done = 0; done < scene.frames;) {
-    const int count = std::min(scene.block, scene.frames - done);
-    std::vector<float*> at;
-    for (auto& channel : out) at.push_back(channel.data() + done);
-    synthesiser.process(at.data(), static_cast<int>(at.size()), count);
-    done += count;
-    synthesiser.collect();
-    if (!has_meddled && 2 * done >= scene.frames) {
-      scene.meddle(synthesiser, body);
-      has_meddled = true;
-    }
+void expect_as_by_gains(Scene scene, double bound_db) {
+  const Sound directed = play(scene);
+  scene.effects = scene.effects.without(Effect::kDirectivity);
+  const Sound plain = play(scene);
+  for (std::size_t e = 0; e < directed.size(); ++e) {
+    ASSERT_GT(calc_rms(plain[e]), 0.0);
+    EXPECT_LT(calc_difference_db(directed[e], plain[e]), bound_db) << e;
   }
-  if (counters != nullptr) *counters = synthesiser.get_effect_counters(body);
-  return out;
-}
-
-events::Impulse make_blow(double duration_s = 0.0, int sample = kStruck) {
-  return {.time_s = sample / kRate, .body = 0, .impulse_n_s = {0.0, 0.0, 1.0}, .duration_s = duration_s};
-}
-
-/// A mode that rings for ever after a blow, with velocity cos(omega t).
-Scene make_tone(double freq_hz, const testing::ModeMultipoles& multipoles, double radius_m, std::vector<Vec3> microphones_m) {
-  Scene scene{.bank = testing::make_cube_bank({{freq_hz, 0.0}}), .microphones_m = std::move(microphones_m), .events = {make_blow()}};
-  testing::give_multipoles(scene.bank, {multipoles}, radius_m);
-  return scene;
-}
-
-/// The amplitude of a steady tone, times e^{i phase} of its cosine since the blow and the latency, by least squares.
-Complex measure(const std::vector<float>& sound, double freq_hz, std::size_t from = 2400) {
-  double cc = 0.0, cs = 0.0, ss = 0.0, pc = 0.0, ps = 0.0;
-  for (std::size_t n = from; n < sound.size(); ++n) {
-    const double angle = 2.0 * pi * freq_hz * (static_cast<double>(n) - kStruck - Synthesiser::kLatency) / kRate;
-    const double c = std::cos(angle), s = std::sin(angle), p = static_cast<double>(sound[n]);
-    cc += c * c, cs += c * s, ss += s * s, pc += p * c, ps += p * s;
-  }
-  const double det = cc * ss - cs * cs;
-  return {(pc * ss - ps * cs) / det, -(ps * cc - pc * cs) / det};  // Re(X e^{i angle}) = Re X cos - Im X sin
-}
-
-double calc_rms(const std::vector<float>& x, std::size_t from = 0) {
-  double sum = 0.0;
-  for (std::size_t n = from; n < x.size(); ++n) sum += static_cast<double>(x[n]) * static_cast<double>(x[n]);
-  return std::sqrt(sum / static_cast<double>(x.size() - from));
-}
-
-double calc_difference_db(const std::vector<float>& x, const std::vector<float>& reference, std::size_t from = 0) {
-  std::vector<float> rest(x.size());
-  for (std::size_t n = 0; n < x.size(); ++n) rest[n] = x[n] - reference[n];
-  return 20.0 * std::log10(calc_rms(rest, from) / calc_rms(reference, from) + 1e-30);
-}
-
-void expect_as_by_gains(Scene scene, double bound_db);
-
-double to_db(double x) { return 20.0 * std::log10(x + 1e-30); }
-
-events::Quaternion turn_about(const Vec3& axis, double angle) {
-  const double s = std::sin(0.5 * angle);
-  return {std::cos(0.5 * angle), s * axis[0], s * axis[1], s * axis[2]};
 }
 
 // A pulsating sphere is heard as its gain is, at the same time.
 TEST(Directivity, AMonopoleIsHeardAsItsGain) {
   constexpr double kFreq = 1500.0, kRadius = 0.1;
-  Scene scene = make_tone(kFreq, testing::make_monopole(1.0, kFreq, kRadius), kRadius, {{0.0, 0.5, 0.0}, {2.0, 0.3, -1.0}});
+  Scene scene = make_tone(kFreq, make_monopole(1.0, kFreq, kRadius), kRadius, {{0.0, 0.5, 0.0}, {2.0, 0.3, -1.0}});
   const Sound directed = play(scene);
   scene.effects = kDefaultEffects;
   const Sound plain = play(scene);
@@ -132,7 +45,7 @@ TEST(Directivity, AMonopoleIsHeardAsItsGain) {
 TEST(Directivity, PressureOfAPulsatingSphereLeadsItsVelocityByFortyFiveDegrees) {
   constexpr double kRadius = 0.2, kFreq = kC / (2.0 * pi * kRadius);
   // p / v = rho c (k^2 a^2 - i k a) / (1 + k^2 a^2), signs of e^{-i omega t} (research of the sphere: Morse & Ingard 7.1).
-  const Complex pressure = testing::kAirDensity * kC * Complex(0.5, -0.5);
+  const Complex pressure = kAirDensity * kC * Complex(0.5, -0.5);
   const double distance = 4.0;
   Scene scene = make_tone(kFreq, {pressure * std::sqrt(4.0 * pi)}, kRadius, {{0.0, distance, 0.0}});
   const Complex heard = measure(play(scene)[0], kFreq);
@@ -155,9 +68,9 @@ TEST(Directivity, ADipoleHasItsCosineAndItsNearField) {
       distances.push_back(r);
     }
   }
-  const Sound heard = play(make_tone(kFreq, testing::make_dipole(pressure), kRadius, microphones));
+  const Sound heard = play(make_tone(kFreq, make_dipole(pressure), kRadius, microphones));
   for (std::size_t e = 0; e < microphones.size(); ++e) {
-    const Complex fall = testing::calc_dipole_fall(k * distances[e], k * kRadius);
+    const Complex fall = calc_dipole_fall(k * distances[e], k * kRadius);
     const Complex expected = std::conj(pressure * cosines[e] * fall);
     EXPECT_LT(to_db(std::abs(measure(heard[e], kFreq) - expected) / std::abs(pressure * fall)), -60.0) << e;
   }
@@ -168,19 +81,19 @@ TEST(Directivity, ATurnedBodyAndACentreAside) {
   constexpr double kRadius = 0.05, kFreq = 1200.0, k = 2.0 * pi * kFreq / kC;
   const Vec3 centre{0.02, -0.01, 0.03}, position{0.4, 1.0, -0.2};
   const events::Quaternion rotation = turn_about(normalise(Vec3{1.0, 2.0, -0.5}), 1.1);
-  Scene scene{.bank = testing::make_cube_bank({{kFreq, 0.0}}),
+  Scene scene{.bank = make_cube_bank({{kFreq, 0.0}}),
               .microphones_m = {{0.0, 0.0, 0.0}, {2.0, 1.0, 0.7}},
               .position_m = position,
               .rotation = rotation,
               .events = {make_blow()}};
   scene.bank.rigid.centre_m = {0.005, 0.004, -0.003};
-  testing::give_multipoles(scene.bank, {testing::make_dipole(1.0)}, kRadius, centre);
+  give_multipoles(scene.bank, {make_dipole(1.0)}, kRadius, centre);
   const Vec3 from = position + turn(rotation, centre - scene.bank.rigid.centre_m), axis = turn(rotation, {0.0, 0.0, 1.0});
   const Sound heard = play(scene);
   for (std::size_t e = 0; e < 2; ++e) {
     const Vec3 way = scene.microphones_m[e] - from;
     const double r = norm(way);
-    const Complex fall = testing::calc_dipole_fall(k * r, k * kRadius);
+    const Complex fall = calc_dipole_fall(k * r, k * kRadius);
     EXPECT_LT(to_db(std::abs(measure(heard[e], kFreq) - std::conj(fall) * (dot(way, axis) / r)) / std::abs(fall)), -60.0) << e;
   }
 }
@@ -205,7 +118,7 @@ TEST(Directivity, ATurningBodyIsHeardAsItTurns) {
   for (const auto& [order, kRadius, kFreq, bound_db, step_db] :
        {Case{1, 0.05, 2000.0, -45.0, -60.0}, Case{4, 0.05, 2000.0, -45.0, -60.0}, Case{12, 0.05, 2000.0, -45.0, -60.0},
         Case{30, 0.3, 6000.0, -30.0, -45.0}}) {
-    testing::ModeMultipoles multipoles(static_cast<std::size_t>((order + 1) * (order + 1)));
+    ModeMultipoles multipoles(static_cast<std::size_t>((order + 1) * (order + 1)));
     multipoles.back() = 1.0;  // m = L: cos(L phi) sin^L(theta)
     Scene scene = make_tone(kFreq, multipoles, kRadius, {{kDistance, 0.0, 0.0}});
     scene.frames = 24000;
@@ -241,7 +154,7 @@ TEST(Directivity, ATurningBodyIsHeardAsItTurns) {
 // A body that passes a microphone, turning: the second difference of a low tone stays what a smooth sound has.
 TEST(Directivity, ABodyThatPassesDoesNotClick) {
   constexpr double kRadius = 0.05, kFreq = 200.0;
-  Scene scene = make_tone(kFreq, testing::make_dipole(1.0), kRadius, {{0.0, 0.3, 0.1}});
+  Scene scene = make_tone(kFreq, make_dipole(1.0), kRadius, {{0.0, 0.3, 0.1}});
   scene.frames = 48000;
   for (int i = 0; i <= 100; ++i) {
     const double t = 0.01 * i;
@@ -263,10 +176,10 @@ TEST(Directivity, ABodyThatPassesDoesNotClick) {
 // of a listener that walks what is left out, its own way while the sound travels, is 10 mm of 0.5 m here.
 TEST(Directivity, WhatMovesIsHeardAsByGains) {
   for (const bool walks : {false, true}) {
-    Scene scene{.bank = testing::make_cube_bank({{1000.0, 0.0}, {2300.0, 1.0}}), .microphones_m = {{0.0, 0.5, 0.1}, {1.0, 0.7, 0.0}}};
-    std::vector<testing::ModeMultipoles> multipoles;
+    Scene scene{.bank = make_cube_bank({{1000.0, 0.0}, {2300.0, 1.0}}), .microphones_m = {{0.0, 0.5, 0.1}, {1.0, 0.7, 0.0}}};
+    std::vector<ModeMultipoles> multipoles;
     for (std::size_t m = 0; m < 2; ++m) multipoles.push_back({1.0 / 1e-6 * std::sqrt(4.0 * pi)});
-    testing::give_multipoles(scene.bank, multipoles, 1e-6);
+    give_multipoles(scene.bank, multipoles, 1e-6);
     scene.frames = 48000;
     scene.events = {make_blow()};
     for (int i = 0; i <= 100; ++i) {
@@ -287,9 +200,9 @@ TEST(Directivity, WhatMovesIsHeardAsByGains) {
 TEST(Directivity, EnergyThatIsHeardIsThatOfTheBlow) {
   constexpr double kRadius = 0.1, kDistance = 5.0;
   const std::array<double, 2> freq{1500.0, 2300.0};
-  std::vector<testing::ModeMultipoles> multipoles{{0.3, Complex(0.1, 0.2), 1.0, -0.4, 0.2, Complex(0.0, 0.5), 0.3, 0.1, -0.6},
-                                                  {0.1, 0.6, Complex(-0.2, 0.9), 0.3}};
-  std::vector<testing::InventedMode> modes;
+  std::vector<ModeMultipoles> multipoles{{0.3, Complex(0.1, 0.2), 1.0, -0.4, 0.2, Complex(0.0, 0.5), 0.3, 0.1, -0.6},
+                                         {0.1, 0.6, Complex(-0.2, 0.9), 0.3}};
+  std::vector<InventedMode> modes;
   for (std::size_t m = 0; m < 2; ++m) {
     // P = sum of |c_lm|^2 / (2 rho c k^2), c_lm = a_lm / h_l(kR), by the orthonormal Y_lm of the far field (Williams 1999, 6.81); the
     // energy at unit velocity is 1/2, so that P is the decay.
@@ -302,12 +215,12 @@ TEST(Directivity, EnergyThatIsHeardIsThatOfTheBlow) {
                                  : (1.0 + 3.0 / (x * x) + 9.0 / (x * x * x * x)) / (x * x);  // |h_l|^2, DLMF 10.49.18
       sum += std::norm(multipoles[m][i]) / h2;
     }
-    const double decay = sum / (2.0 * testing::kAirDensity * kC * k * k), wanted = 20.0 + 10.0 * static_cast<double>(m);
+    const double decay = sum / (2.0 * kAirDensity * kC * k * k), wanted = 20.0 + 10.0 * static_cast<double>(m);
     for (auto& a : multipoles[m]) a *= std::sqrt(wanted / decay);
     modes.push_back({freq[m], wanted});
   }
-  Scene scene{.bank = testing::make_cube_bank(modes), .microphones_m = {}, .events = {make_blow()}, .frames = 24000};
-  testing::give_multipoles(scene.bank, multipoles, kRadius);
+  Scene scene{.bank = make_cube_bank(modes), .microphones_m = {}, .events = {make_blow()}, .frames = 24000};
+  give_multipoles(scene.bank, multipoles, kRadius);
   // Gauss-Legendre of four, exact to degree 7, times eight around.
   const std::array<double, 4> z{-0.8611363115940526, -0.3399810435848563, 0.3399810435848563, 0.8611363115940526};
   const std::array<double, 4> w{0.3478548451374538, 0.6521451548625461, 0.6521451548625461, 0.3478548451374538};
@@ -323,34 +236,9 @@ TEST(Directivity, EnergyThatIsHeardIsThatOfTheBlow) {
   double energy = 0.0;
   for (std::size_t e = 0; e < heard.size(); ++e)
     for (const float p : heard[e])
-      energy += weights[e] * static_cast<double>(p) * static_cast<double>(p) * kDistance * kDistance / (testing::kAirDensity * kC * kRate);
+      energy += weights[e] * static_cast<double>(p) * static_cast<double>(p) * kDistance * kDistance / (kAirDensity * kC * kRate);
   EXPECT_NEAR(energy, 2 * 0.5, 0.02);
 }
-
-/// Many modes, some of them overdamped, whose transfers are their gains over the distance: a sphere so small that all is real.
-Scene make_gains_scene() {
-  std::vector<testing::InventedMode> modes = testing::make_many_modes(60);
-  for (std::size_t m = 0; m < modes.size(); m += 20) modes[m].decay_per_s = 3.0 * 2.0 * pi * modes[m].freq_hz;
-  for (std::size_t m = 0; m < modes.size(); ++m) modes[m].gain = 1e-2 * (m % 3 == 0 ? -1.0 : 1.0) / (1.0 + 0.1 * static_cast<double>(m));
-  Scene scene{.bank = testing::make_cube_bank(modes), .microphones_m = {{0.0, 1.0, 0.0}, {0.5, 1.2, 0.0}}, .frames = 9600};
-  std::vector<testing::ModeMultipoles> multipoles;
-  constexpr double kRadius = 1e-6;
-  for (const auto& mode : modes) multipoles.push_back({mode.gain / kRadius * std::sqrt(4.0 * pi)});
-  testing::give_multipoles(scene.bank, multipoles, kRadius);
-  for (int i = 0; i < 12; ++i) scene.events.emplace_back(make_blow(i % 2 == 0 ? 0.0 : 1.1e-3, kStruck + 413 * i));
-  return scene;
-}
-
-void expect_as_by_gains(Scene scene, double bound_db) {
-  const Sound directed = play(scene);
-  scene.effects = scene.effects.without(Effect::kDirectivity);
-  const Sound plain = play(scene);
-  for (std::size_t e = 0; e < directed.size(); ++e) {
-    ASSERT_GT(calc_rms(plain[e]), 0.0);
-    EXPECT_LT(calc_difference_db(directed[e], plain[e]), bound_db) << e;
-  }
-}
-
 // Rounding of multipoles apart, 16 bits of one number, it is the same sound: -90 dB.
 TEST(Directivity, BlowsWhoseTransfersAreTheGainsSoundAsByGains) { expect_as_by_gains(make_gains_scene(), -85.0); }
 
@@ -415,10 +303,10 @@ TEST(Directivity, AnotherSizeIsHeardFromAnotherSphere) {
   Scene scene = make_gains_scene();
   scene.meddle = [&](Synthesiser& synthesiser, int body) {
     bank::Bank other = scene.bank;
-    std::vector<testing::ModeMultipoles> multipoles;
+    std::vector<ModeMultipoles> multipoles;
     constexpr double kRadius = 2e-6;
     for (const double gain : other.radiation_gain) multipoles.push_back({gain / kRadius * std::sqrt(4.0 * pi)});
-    testing::give_multipoles(other, multipoles, kRadius);
+    give_multipoles(other, multipoles, kRadius);
     synthesiser.swap_model(body, Model::make(other, {.rate_hz = kRate}));
   };
   expect_as_by_gains(scene, -60.0);
@@ -443,7 +331,7 @@ TEST(Directivity, GoesBeforeAModelThatCannotHaveIt) {
 // A body turns while it is silent: struck again it is heard from its new side at once.
 TEST(Directivity, ABodyThatTurnedInItsSleepIsHeardAsItLies) {
   constexpr double kFreq = 1000.0, kRadius = 0.05;
-  Scene scene = make_tone(kFreq, testing::make_dipole(1.0), kRadius, {{0.0, 0.0, 1.0}});
+  Scene scene = make_tone(kFreq, make_dipole(1.0), kRadius, {{0.0, 0.0, 1.0}});
   scene.bank.decay_per_s[0] = 2000.0;
   scene.frames = 14400;
   scene.events.emplace_back(events::BodyMotion{0.10, 0, {}, {}, {1.0, 0.0, 0.0, 0.0}});
@@ -486,8 +374,7 @@ TEST(Directivity, ItComesAndGoesWithoutAClick) {
 
 TEST(Directivity, BlocksOfAnySizeGiveTheSameBits) {
   Scene scene = make_gains_scene();
-  testing::give_multipoles(scene.bank, std::vector<testing::ModeMultipoles>(60, testing::ModeMultipoles{0.1, 0.5, Complex(1.0, -0.2), 0.3}),
-                           0.06);
+  give_multipoles(scene.bank, std::vector<ModeMultipoles>(60, ModeMultipoles{0.1, 0.5, Complex(1.0, -0.2), 0.3}), 0.06);
   scene.effects = kDirected.with(Effect::kGroundReflection);
   scene.floor = Floor{.point_m = {0.0, 0.0, -1.0}};
   for (const auto& event : make_turn(7.0, 0.2)) scene.events.push_back(event);
@@ -507,7 +394,7 @@ TEST(Directivity, WhatStandsStillIsLookedUpOnce) {
   EXPECT_EQ(counters.units[Effect::kDirectivity], 2 * ringing);
   EXPECT_GT(counters.bytes[Effect::kDirectivity], 0);
   EXPECT_EQ(counters.units[Effect::kGroundReflection], 0);
-  testing::give_multipoles(scene.bank, std::vector<testing::ModeMultipoles>(60, testing::make_dipole(1.0)), 0.06);
+  give_multipoles(scene.bank, std::vector<ModeMultipoles>(60, make_dipole(1.0)), 0.06);
   for (const auto& event : make_turn(5.0, 0.2)) scene.events.push_back(event);
   play(scene, &counters);
   const std::int64_t blocks = scene.frames / kBlock;
@@ -524,9 +411,9 @@ struct Crowd {
 
 Crowd play_crowd(double transfers_per_s, int frames = kBlock) {
   Scene of = make_gains_scene();
-  testing::ModeMultipoles multipoles(31 * 31);
+  ModeMultipoles multipoles(31 * 31);
   multipoles.back() = 1.0;
-  testing::give_multipoles(of.bank, std::vector<testing::ModeMultipoles>(Crowd::kModes, multipoles), 0.3);
+  give_multipoles(of.bank, std::vector<ModeMultipoles>(Crowd::kModes, multipoles), 0.3);
   Synthesiser synthesiser({.rate_hz = kRate, .transfers_per_s = transfers_per_s});
   const auto model = Model::make(of.bank, {.rate_hz = kRate});
   for (int b = 0; b < Crowd::kBodies; ++b) {
@@ -592,19 +479,19 @@ TEST(Directivity, RefusesABoundThatIsNone) {
 // A mode without a gain, silent at the ear when the body is struck, is heard once the body has turned: it is not dropped before.
 TEST(Directivity, WhatIsLoudElsewhereIsNotDropped) {
   constexpr double kFreq = 1000.0, kRadius = 0.05;
-  Scene scene = make_tone(kFreq, testing::make_dipole(1.0), kRadius, {{1.0, 0.0, 0.0}});
+  Scene scene = make_tone(kFreq, make_dipole(1.0), kRadius, {{1.0, 0.0, 0.0}});
   scene.bank.radiation_gain[0] = 0.0;
   scene.frames = 24000;
   scene.events.emplace_back(events::BodyMotion{0.2, 0, {}, {}, {1.0, 0.0, 0.0, 0.0}});
   scene.events.emplace_back(events::BodyMotion{0.4, 0, {}, {}, turn_about({0.0, 1.0, 0.0}, 0.5 * pi)});
   const std::vector<float> heard = play(scene)[0];
-  const double k = 2.0 * pi * kFreq / kC, loudest = std::abs(testing::calc_dipole_fall(k, k * kRadius));
+  const double k = 2.0 * pi * kFreq / kC, loudest = std::abs(calc_dipole_fall(k, k * kRadius));
   EXPECT_LT(std::abs(measure({heard.begin(), heard.begin() + 9000}, kFreq)), 1e-3 * loudest);
   EXPECT_NEAR(std::abs(measure(heard, kFreq, 20000)), loudest, 1e-3 * loudest);
 }
 
 TEST(Directivity, NeedsABankWithMultipoles) {
-  const auto model = Model::make(testing::make_cube_bank({{400.0, 5.0}}), {.rate_hz = kRate});
+  const auto model = Model::make(make_cube_bank({{400.0, 5.0}}), {.rate_hz = kRate});
   Synthesiser synthesiser({.rate_hz = kRate});
   EXPECT_THROW(synthesiser.add_body(model, {.effects = kDirected}), InputError);
   EXPECT_NO_THROW(synthesiser.add_body(model, {.effects = kDefaultEffects}));
@@ -623,118 +510,6 @@ TEST(Directivity, ASoloIsOneMode) {
   scene.effects = kDefaultEffects;
   const Sound plain = play(scene);
   EXPECT_LT(calc_difference_db(directed[0], plain[0], 6000), -60.0);
-}
-
-TEST(GroundReflection, DoublesThePressureOnTheFloor) {
-  for (const bool directed : {false, true}) {
-    constexpr double kFreq = 1100.0, kRadius = 0.05;
-    Scene scene = make_tone(kFreq, testing::make_dipole(1.0), kRadius, {{1.5, 0.4, 0.0}});
-    scene.position_m = {0.0, 0.0, 0.7};
-    scene.effects = directed ? kDirected : kDefaultEffects;
-    const Sound free = play(scene);
-    scene.effects = scene.effects.with(Effect::kGroundReflection);
-    scene.floor = Floor{};
-    const Sound heard = play(scene);
-    ASSERT_GT(calc_rms(free[0]), 0.0);
-    double worst = 0.0, peak = 0.0;
-    for (std::size_t n = 0; n < heard[0].size(); ++n) {
-      worst = std::max(worst, std::abs(static_cast<double>(heard[0][n]) - 2.0 * static_cast<double>(free[0][n])));
-      peak = std::max(peak, std::abs(static_cast<double>(free[0][n])));
-    }
-    EXPECT_LT(worst, 1e-5 * peak) << directed;
-  }
-}
-
-// Two ways, of which the longer is lengthened by odd halves of a wave in the nulls; a floor on the side, and one that swallows.
-TEST(GroundReflection, CombsTheSound) {
-  const Vec3 ear{2.0, 0.0, 1.2}, body{0.0, 0.3, 0.8};
-  const Floor slanted{.point_m = {0.1, 0.0, -0.4}, .normal = normalise(Vec3{0.2, -0.1, 1.0}), .reflection = 0.6};
-  for (const Floor& floor : {Floor{}, slanted}) {
-    const double straight = norm(ear - body), mirrored = norm(floor.mirror(ear) - body);
-    for (const double halves : {1.0, 2.0, 3.0, 3.5, 5.0}) {
-      const double freq = halves * 0.5 * kC / (mirrored - straight), k = 2.0 * pi * freq / kC;
-      Scene scene = make_tone(freq, testing::make_monopole(1.0, freq, 1e-3), 1e-3, {ear});
-      scene.position_m = body;
-      scene.floor = floor;
-      const Complex expected = std::polar(1.0 / straight, -k * straight) + floor.reflection * std::polar(1.0 / mirrored, -k * mirrored);
-      for (const bool directed : {false, true}) {
-        scene.effects = (directed ? kDirected : kDefaultEffects).with(Effect::kGroundReflection);
-        const Complex heard = measure(play(scene)[0], freq);
-        EXPECT_LT(to_db(std::abs(heard - expected) * straight), -60.0) << halves << directed;
-        if (halves == 1.0 && floor.reflection == 1.0) {
-          EXPECT_NEAR(std::abs(heard), 1.0 / straight - 1.0 / mirrored, 1e-3);
-        }
-      }
-    }
-  }
-}
-
-// A dipole sends something else down than it sends to the ear.
-TEST(GroundReflection, IsOfWhatTheBodySendsDown) {
-  constexpr double kRadius = 0.05, kFreq = 1700.0, k = 2.0 * pi * kFreq / kC;
-  const Vec3 ear{1.0, 0.5, 0.4}, body{0.0, 0.0, 0.9};
-  Scene scene = make_tone(kFreq, testing::make_dipole(1.0), kRadius, {ear});
-  scene.position_m = body;
-  scene.floor = Floor{};
-  scene.effects = kDirected.with(Effect::kGroundReflection);
-  Complex expected{};
-  for (const Vec3& place : {ear, Vec3{ear[0], ear[1], -ear[2]}}) {
-    const Vec3 way = place - body;
-    expected += std::conj(testing::calc_dipole_fall(k * norm(way), k * kRadius)) * (way[2] / norm(way));
-  }
-  EXPECT_LT(to_db(std::abs(measure(play(scene)[0], kFreq) - expected) / std::abs(expected)), -60.0);
-}
-
-// With a listener that walks and turns, and the click of a body as a whole: two ears on the floor hear it twice.
-TEST(GroundReflection, FollowsTheListenerAndReflectsTheClick) {
-  Scene scene = make_tone(700.0, testing::make_monopole(1.0, 700.0, 0.01), 0.01, {{-0.1, 0.0, 0.0}, {0.1, 0.0, 0.0}});
-  scene.events = {make_blow(3e-4)};
-  scene.position_m = {0.3, 0.8, 0.5};
-  for (int i = 0; i <= 10; ++i) {
-    scene.events.emplace_back(events::Listener{.time_s = 0.01 * i,
-                                               .position_m = {0.02 * i, 0.0, 0.0},
-                                               .velocity_m_s = {2.0, 0.0, 0.0},
-                                               .rotation = turn_about({0, 0, 1}, 0.1 * i)});
-  }
-  scene.effects = kDefaultEffects.with(Effect::kAccelerationNoise);
-  const Sound free = play(scene);
-  scene.effects = scene.effects.with(Effect::kGroundReflection);
-  scene.floor = Floor{};
-  const Sound heard = play(scene);
-  for (std::size_t e = 0; e < 2; ++e) {
-    std::vector<float> twice(free[e]);
-    for (float& p : twice) p *= 2.0F;
-    EXPECT_LT(calc_difference_db(heard[e], twice), -100.0);
-  }
-}
-
-TEST(GroundReflection, RefusesWhatCannotBe) {
-  const auto model = Model::make(testing::make_cube_bank({{400.0, 5.0}}), {.rate_hz = kRate});
-  Synthesiser without({.rate_hz = kRate});
-  EXPECT_THROW(without.add_body(model, {.effects = kDefaultEffects.with(Effect::kGroundReflection)}), InputError);
-  SynthesiserOptions options{.rate_hz = kRate};
-  options.floor = Floor{.point_m = {0.0, 0.0, 0.5}};
-  EXPECT_THROW(Synthesiser{options}, InputError);  // ears below
-  options.floor = Floor{.normal = {0.0, 0.0, 2.0}};
-  EXPECT_THROW(Synthesiser{options}, InputError);
-  options.floor = Floor{.reflection = 1.5};
-  EXPECT_THROW(Synthesiser{options}, InputError);
-}
-
-TEST(GroundReflection, OffItHoldsNothing) {
-  Scene scene = make_gains_scene();
-  scene.effects = kDefaultEffects;
-  scene.floor = Floor{.point_m = {0.0, 0.0, -1.0}};
-  EffectCounters off, on;
-  play(scene, &off);
-  scene.effects = kDefaultEffects.with(Effect::kGroundReflection);
-  play(scene, &on);
-  EXPECT_EQ(off.units[Effect::kGroundReflection], 0);
-  EXPECT_EQ(off.bytes[Effect::kGroundReflection], 0);
-  EXPECT_EQ(off.bytes[Effect::kDirectivity], 0);
-  EXPECT_GT(on.units[Effect::kGroundReflection], 0);
-  EXPECT_GT(on.bytes[Effect::kGroundReflection], 0);
-  EXPECT_EQ(on.units[Effect::kAirDelay], off.units[Effect::kAirDelay]);
 }
 
 }  // namespace
