@@ -61,7 +61,7 @@ std::optional<std::string> Store::find_bank_fault(const Id& id, Look look) const
     if (!folder) return "there is no bank";
     const char* main = find_main_file(*folder);
     const File file{open_regular(*folder, main)};
-    if (file.value < 0 && (errno == EACCES || errno == EPERM)) return std::nullopt;  // what may not be read is not damaged
+    if (file.value < 0 && (errno == EACCES || errno == EPERM)) return std::nullopt;  // no right to read is no damage
     if (file.value < 0 && errno == ENOENT) return "its bank is missing";
     struct stat info {};
     if (file.value < 0 || ::fstat(file.value, &info) != 0) return "its bank is no regular file";

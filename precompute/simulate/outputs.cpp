@@ -44,7 +44,7 @@ std::optional<double> find_closing_step(double step_s, double book_error) {
   return step_s * std::sqrt(kBookGoal / (kBookScatter * book_error));
 }
 
-/// Of what the bytes of the job say, without names of files: the picture from the store is that of a run by hand.
+/// Without names of files: the picture from the store is that of a run by hand.
 std::string make_title(const Simulation& simulation) {
   std::vector<std::string> names;
   for (const job::SimulatedBody& body : simulation.spec.bodies) names.push_back(base::printable(body.name));

@@ -21,7 +21,7 @@ transient::MotionOptions make_motion_options(const job::SimulationSpec& spec) {
   return options;
 }
 
-/// The line of the job of what overlaps at the start: the message of Contacts begins with it.
+/// The job's line of the body or striker at the beginning of a message of Contacts.
 std::string find_overlap_place(const job::SimulationSpec& spec, std::string_view message) {
   for (std::size_t i = 0; i < spec.strikers.size(); ++i)
     if (message.starts_with(fmt::format("striker {} ", i + 1))) return spec.strikers[i].place;
@@ -57,7 +57,7 @@ void make_motion(const comm::Communicator& comm, Simulation& simulation) {
     }
     return start;
   });
-  // The first forces, with the search for contacts: what overlaps is found here.
+  // The first forces, with the search for contacts: finds overlaps.
   try {
     simulation.motion->prepare();
   } catch (const InputError& error) {
