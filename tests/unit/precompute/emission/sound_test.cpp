@@ -81,8 +81,8 @@ TEST(Sound, TheImpulsesOfAClosedSurfaceAreThoseOfItsVolume) {
       size += std::abs(pressure) / options.sample_rate_hz;
     }
     const double sources = radiation == Radiation::kRayleigh ? 2.0 : 1.0;
-    EXPECT_LT(std::abs(sum), 1e-4 * size);
-    EXPECT_NEAR(twice / (sources * kRho * change / (2.0 * kTwoPi * 0.5)), 1.0, 2e-3);
+    EXPECT_LT(std::abs(sum), 1e-6 * size);
+    EXPECT_NEAR(twice / (sources * kRho * change / (2.0 * kTwoPi * 0.5)), 1.0, 2e-4);
   }
 }
 
