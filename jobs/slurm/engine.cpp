@@ -1,9 +1,7 @@
-// One life of a job in Slurm, whose submission, following, settling and cancelling change the same rows and folders; longer than most
-// files. Method:     Rows are claimed in one transaction; what is handed over is written to the jobs' folders, then sbatch is called, then
-// the
-//             number is written: a process that dies in between leaves enough to find the job in Slurm by its name, or to know that it is
-//             not there.
-// Source:     docs/howto/slurm.md. Deviations: none.
+// Method:     Rows are claimed in one transaction; jobs are written to their folders, then sbatch is called, then the number is written: a
+//             process that dies in between leaves enough to find the job in Slurm by its name, or to know that it is not there.
+// Source:     docs/howto/slurm.md.
+// Deviations: none.
 #include "jobs/slurm/engine.hpp"
 
 #include <fmt/core.h>

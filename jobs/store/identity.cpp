@@ -1,4 +1,3 @@
-// What a job is, from its file to its id, its copies of inputs and its folder of work: longer than most files.
 // Method:     The id is SHA-256 over the resolved job in one canonical line, the kind, format and SHA-256 of the input's bytes, and the
 //             solver's version. Jobs that ask for the same in other words resolve to the same line.
 // Source:     own; FIPS 180-4 for the hash.

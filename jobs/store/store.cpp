@@ -1,4 +1,3 @@
-// One tree of folders and all that is done to it, by one rule of publication: longer than most files.
 // Method:     A store is a tree of folders whose names are hashes. What is added is made in tmp/, synced and renamed, so that it is there
 //             whole or not at all; two who add the same make the same, and the second rename says so.
 // Source:     rename(2), fsync(2), flock(2).
@@ -12,7 +11,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
@@ -23,10 +21,9 @@
 #include <utility>
 
 #include "jobs/process/process.hpp"
+#include "jobs/store/bank_sum.hpp"
 #include "jobs/store/files.hpp"
-#include "jobs/store/identity.hpp"
-#include "jobs/store/order.hpp"
-#include "runtime/bank/bank.hpp"
+#include "jobs/store/seal.hpp"
 #include "runtime/base/error.hpp"
 #include "runtime/base/file.hpp"
 
@@ -37,9 +34,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kVersionText = "carillon store 1\n";
 constexpr std::uint64_t kMaxVersionBytes = 1000;
-constexpr std::size_t kSealBytes = 4096;  // the seal of a bank
 constexpr const char* kContentName = "content";
-constexpr off_t kMaxCopiedBytes = 16 << 20;
 constexpr std::size_t kMaxHostLength = 64;
 constexpr std::size_t kFewFolders = 8;  // are synced one by one; of more, the whole file system once
 const std::set<std::string> kFolders{"banks", "inputs", "work", "tmp"};
@@ -162,74 +157,6 @@ std::vector<Id> list_ids(const fs::path& root, const char* folder) {
 
 fs::path sharded(const fs::path& folder, const Id& id) { return folder / id.text().substr(0, 2) / id.text(); }
 
-/// A file by descriptor.
-struct File {
-  int value = -1;
-  ~File() {
-    if (value >= 0) ::close(value);
-  }
-};
-
-/// A regular file in a folder; its value is below 0, and errno set, when it cannot be opened. Never waits, follows no link.
-int open_regular(const OpenFolder& folder, const char* name) {
-  const int file = ::openat(folder.get(), name, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
-  struct stat info {};
-  if (file < 0 || (::fstat(file, &info) == 0 && S_ISREG(info.st_mode))) return file;
-  ::close(file);
-  errno = EINVAL;
-  return -1;
-}
-
-/// Makes a file read-only and syncs it; one that another user of the store owns, and one that has more names than it should have, is
-/// replaced by a copy: no file elsewhere changes its rights.
-void seal_file(const OpenFolder& folder, const std::string& name) {
-  File file{open_regular(folder, name.c_str())};
-  if (file.value < 0) throw_errno(folder.name() / name, "read", errno);
-  struct stat info {};
-  if (::fstat(file.value, &info) != 0) throw_errno(folder.name() / name, "read", errno);
-  const bool is_shared = info.st_nlink > 2 || (info.st_nlink > 1 && info.st_size < kMaxCopiedBytes) || info.st_uid != ::geteuid();
-  if (is_shared || ::fchmod(file.value, 0444) != 0) {
-    const std::string copy = name.substr(0, 200) + ".copy";
-    folder.remove(copy);
-    const File target{::openat(folder.get(), copy.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600)};
-    if (target.value < 0) throw_errno(folder.name() / name, "copy", errno);
-    std::string piece(1 << 20, '\0');
-    for (ssize_t got = 0; (got = ::read(file.value, piece.data(), piece.size())) != 0;) {
-      if (got < 0) throw_errno(folder.name() / name, "read", errno);
-      for (ssize_t done = 0; done < got;) {
-        const ssize_t put = ::write(target.value, piece.data() + done, static_cast<std::size_t>(got - done));
-        if (put <= 0) throw_errno(folder.name() / name, "copy", put < 0 ? errno : ENOSPC);
-        done += put;
-      }
-    }
-    if (::fchmod(target.value, 0444) != 0 || ::fsync(target.value) != 0 ||
-        ::renameat(folder.get(), copy.c_str(), folder.get(), name.c_str()) != 0)
-      throw_errno(folder.name() / name, "copy", errno);
-    return;
-  }
-  if (::fsync(file.value) != 0 && errno != EINVAL) throw_errno(folder.name() / name, "write", errno);
-}
-
-/// Syncs the folder and all in it; with `seal`, makes files and inner folders read-only. The folder itself stays writable: only then may
-/// it be renamed.
-void sync_tree(const OpenFolder& folder, bool seal) {
-  for (const std::string& name : folder.list()) {
-    const auto info = folder.look_at(name);
-    if (info && S_ISDIR(info->st_mode)) {
-      const auto inner = folder.find(name);
-      sync_tree(*inner, seal);
-      if (seal) ::fchmod(inner->get(), 0555);
-    } else if (!info || !S_ISREG(info->st_mode)) {
-      throw SystemError(fmt::format("{}: no regular file among the results; remove it", (folder.name() / name).string()));
-    } else if (seal) {
-      seal_file(folder, name);
-    } else {
-      sync_file(folder.path() / name);
-    }
-  }
-  folder.sync();
-}
-
 /// False when there is a folder of that name already. What else has the name goes: nothing but folders belongs there.
 bool rename_into(const OpenFolder& from, const std::string& name, const OpenFolder& shard, const Id& id) {
   for (int round = 0; round < 2; ++round) {
@@ -238,109 +165,6 @@ bool rename_into(const OpenFolder& from, const std::string& name, const OpenFold
     if (errno != ENOTDIR || ::unlinkat(shard.get(), id.text().c_str(), 0) != 0) break;
   }
   throw_errno(shard.name() / id.text(), "rename", errno);
-}
-
-/// bank.sum: what a bank was when it was published, on one line; then a line for each record next to it, with its name and SHA-256.
-struct Sum {
-  std::string id, sha256, head;  // head: SHA-256 of the first bytes
-  long long bytes = 0, written_ns = 0;
-  std::map<std::string, std::string> records;
-};
-constexpr std::size_t kMaxSumBytes = 4000;
-constexpr const char* kSumWord = "carillon-bank-sum-1";
-/// What bank.sum has a line for: the records of every job, and the files of a simulation.
-std::vector<const char*> list_records() {
-  std::vector<const char*> names{kJobFile, kRequestFile, kOutcomeFile};
-  for (const Output& output : kOutputs) names.push_back(output.file);
-  return names;
-}
-
-/// The file that a folder of banks/ is there for: the bank, or the record of a simulation, which was written last.
-const char* find_main_file(const OpenFolder& folder) {
-  return !folder.look_at(kBankFile) && folder.look_at(kRecordFile) ? kRecordFile : kBankFile;
-}
-
-std::string read_head(int file, std::size_t max) {
-  std::string head(max, '\0');
-  const ssize_t got = ::pread(file, head.data(), head.size(), 0);
-  head.resize(got > 0 ? static_cast<std::size_t>(got) : 0);
-  return head;
-}
-
-long long find_written_ns(const struct stat& info) { return info.st_mtim.tv_sec * 1'000'000'000LL + info.st_mtim.tv_nsec; }
-
-std::optional<Sum> read_sum(const OpenFolder& folder) {
-  const File file{open_regular(folder, kSumFile)};
-  if (file.value < 0) return std::nullopt;
-  std::istringstream stream(read_head(file.value, kMaxSumBytes));
-  std::string word;
-  Sum sum;
-  if (!(stream >> word >> sum.id >> sum.sha256 >> sum.head >> sum.bytes >> sum.written_ns) || word != kSumWord || !parse_id(sum.id))
-    return Sum{};  // damaged itself: fits nothing
-  for (std::string name, sha256; stream >> name >> sha256;) sum.records[name] = sha256;
-  return sum;
-}
-
-/// SHA-256 of a regular file in a folder; empty when there is none that can be read.
-std::string hash_record(const OpenFolder& folder, const char* name) {
-  const File file{open_regular(folder, name)};
-  return file.value < 0 ? "" : hash_file(fmt::format("/proc/self/fd/{}", file.value), "record").text();
-}
-
-/// With the records as they are.
-void write_sum(const OpenFolder& folder, const Sum& sum) {
-  std::string text = fmt::format("{} {} {} {} {} {}\n", kSumWord, sum.id, sum.sha256, sum.head, sum.bytes, sum.written_ns);
-  for (const char* name : list_records()) {
-    if (const std::string sha256 = hash_record(folder, name); !sha256.empty()) text += fmt::format("{} {}\n", name, sha256);
-  }
-  base::write_file(folder.path() / kSumFile, text);
-}
-
-Sum calc_sum(const OpenFolder& folder, const Id& id) {
-  const char* main = find_main_file(folder);
-  const File bank{open_regular(folder, main)};
-  struct stat info {};
-  if (bank.value < 0 || ::fstat(bank.value, &info) != 0) throw_errno(folder.name() / main, "read", errno);
-  return {id.text(),
-          hash_file(folder.path() / main, "bank").text(),
-          hash_text(read_head(bank.value, kSealBytes)).text(),
-          static_cast<long long>(info.st_size),
-          find_written_ns(info),
-          {}};
-}
-
-/// Which file of a simulation is not what was published: whether it is there, or, but for a quick look, all its bytes.
-std::optional<std::string> find_file_fault(const OpenFolder& folder, const Sum& sum, Look look) {
-  for (const Output& output : kOutputs) {
-    const auto known = sum.records.find(output.file);
-    if (known == sum.records.end()) continue;
-    const auto info = folder.look_at(output.file);
-    if (!info) return fmt::format("its {} is missing", output.file);
-    if (!S_ISREG(info->st_mode)) return fmt::format("its {} is no regular file", output.file);
-    if (look != Look::quick && hash_record(folder, output.file) != known->second)
-      return fmt::format("its {} is damaged: its bytes are no longer those that were computed", output.file);
-  }
-  return std::nullopt;
-}
-
-/// Why a bank is not sane, or was not made of the job of `id`, as all its bytes show. What its own records do not say is no fault where
-/// `has_sum` says that it is what was published.
-std::optional<std::string> find_content_fault(const OpenFolder& folder, const Id& id, bool has_sum) {
-  try {
-    const bool is_simulation = std::string_view(find_main_file(folder)) == kRecordFile;
-    const std::string provenance = is_simulation ? "" : bank::read_bank(folder.path() / kBankFile).provenance;
-    std::optional<Request> request;
-    try {
-      request = read_request(folder.path());
-    } catch (const InputError&) {
-    }
-    if (request && (request->id != id.text() || calc_id(*request) != id)) request.reset();
-    if (!request) return has_sum ? std::nullopt : std::optional("its request.json is not what was submitted");
-    if (is_simulation) return find_output_fault(folder.path(), *request);
-    return provenance.empty() ? std::nullopt : find_origin_fault(provenance, *request);
-  } catch (const InputError& error) {
-    return show_names(folder, error.what());
-  }
 }
 
 }  // namespace
@@ -403,74 +227,17 @@ bool Store::has_work(const Id& id) const {
   }
 }
 
-std::optional<std::string> Store::find_bank_fault(const Id& id, Look look) const {
-  try {
-    const auto shard = find_shard("banks", id);
-    const auto folder = shard ? shard->find(id.text()) : std::nullopt;
-    if (!folder) return "there is no bank";
-    const char* main = find_main_file(*folder);
-    const File file{open_regular(*folder, main)};
-    if (file.value < 0 && (errno == EACCES || errno == EPERM)) return std::nullopt;  // what may not be read is not damaged
-    if (file.value < 0 && errno == ENOENT) return "its bank is missing";
-    struct stat info {};
-    if (file.value < 0 || ::fstat(file.value, &info) != 0) return "its bank is no regular file";
-    if (info.st_size == 0) return "its bank is empty";
-    const auto sum = read_sum(*folder);
-    if (!sum) return look == Look::quick ? std::nullopt : find_content_fault(*folder, id, false);  // of an earlier version
-    if (sum->id.empty()) return "its bank.sum is damaged";
-    if (sum->id != id.text()) return "its folder is that of another bank";
-    if (info.st_size < sum->bytes) return fmt::format("its bank is cut: {} bytes of {}", info.st_size, sum->bytes);
-    if (info.st_size != sum->bytes) return fmt::format("its bank has {} bytes instead of {}", info.st_size, sum->bytes);
-    if (hash_text(read_head(file.value, kSealBytes)).text() != sum->head)
-      return "its bank is another one than was computed, or its seal is damaged";
-    if (main == std::string_view(kRecordFile))
-      if (auto fault = find_file_fault(*folder, *sum, look)) return fault;
-    if (look == Look::quick && find_written_ns(info) == sum->written_ns) return std::nullopt;
-    if (hash_file(fmt::format("/proc/self/fd/{}", file.value), "bank").text() != sum->sha256) {
-      // Every later look reads all of it, as its time is another.
-      const File own{::openat(folder->get(), main, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC)};
-      if (own.value >= 0) (void)!::futimens(own.value, nullptr);
-      return "its bank is damaged: its bytes are no longer those that were computed";
-    }
-    return look == Look::content ? find_content_fault(*folder, id, true) : std::nullopt;
-  } catch (const SystemError& error) {
-    return error.what();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-}
-
-std::optional<std::string> Store::find_record_change(const Id& id) const {
-  const OpenFolder folder = open_bank(id);
-  const auto sum = read_sum(folder);
-  for (const auto& [name, sha256] : sum ? sum->records : std::map<std::string, std::string>()) {
-    const std::vector<const char*> ours = list_records();
-    const bool is_ours = std::find(ours.begin(), ours.end(), name) != ours.end();
-    if (!is_ours) continue;
-    const auto info = folder.look_at(name);
-    if (!info) return fmt::format("its {} is missing", name);
-    if (!S_ISREG(info->st_mode)) return fmt::format("its {} is no regular file", name);
-    if (hash_record(folder, name.c_str()) != sha256)
-      return fmt::format("its {} is {}", name, info->st_size == 0 ? "empty" : "not what was published");
-  }
-  return std::nullopt;
-}
-
 void Store::replace_records(const Id& id, const Temporary& folder) const {
   const OpenFolder bank = open_bank(id);
   if (::fchmod(bank.get(), 0755) != 0) throw_errno(bank.name(), "write to this folder", errno);
   bool has_record = false;  // what else lies next to a bank must not make a damaged record look like one that was published
   for (const std::string& name : folder.content().list()) {
-    const std::vector<const char*> records = list_records();
-    has_record = has_record || std::any_of(records.begin(), records.end(), [&](const char* record) { return name == record; });
+    has_record = has_record || is_record(name);
     seal_file(folder.content(), name);
     if (bank.look_at(name)) bank.remove(name);
     if (::renameat(folder.content().get(), name.c_str(), bank.get(), name.c_str()) != 0) throw_errno(bank.name() / name, "write", errno);
   }
-  if (const auto sum = read_sum(bank); has_record && sum && sum->id == id.text()) {
-    write_sum(bank, *sum);
-    seal_file(bank, kSumFile);
-  }
+  if (const auto sum = read_sum(bank); has_record && sum && sum->id == id.text()) write_sum(bank, *sum);
   bank.sync();
   ::fchmod(bank.get(), 0555);
 }
@@ -553,7 +320,6 @@ bool Store::publish(const Id& id, const Temporary& folder) const {
     if (round == 0) {
       sync_tree(folder.content(), true);
       write_sum(folder.content(), calc_sum(folder.content(), id));
-      seal_file(folder.content(), kSumFile);
       folder.content().sync();
     }
     const OpenFolder banks = open_folder("banks"), shard = banks.make(id.text().substr(0, 2));

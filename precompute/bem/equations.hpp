@@ -49,8 +49,8 @@ class BlockInverse {
 /// The Galerkin form of the equation of Burton and Miller for sound that goes out from a closed surface, e^{-i omega t}:
 ///   [ 1/2 - K - alpha W ] p = - [ V + alpha (1/2 + K') ] q,      alpha = i / max(k, 1 / R),      q = dp / dn,
 /// p linear and continuous, q linear on each facet, W by parts (equation E10 in docs/equations.md). Unique at every wave number; with the
-/// other sign of alpha, or without it, the iteration does not converge or the solution is not unique. Invariant: what does not
-/// depend on the wave number is made once, in the constructor. n velocities.
+/// other sign of alpha, or without it, the iteration does not converge or the solution is not unique. Invariant: all that is
+/// independent of the wave number is made once, in the constructor. n velocities.
 class BoundaryEquations {
  public:
   /// `velocity`: (T, 3, n) normal velocities at the corners of the facets of `surface`; `sphere` is around it. The surface must outlive

@@ -130,7 +130,7 @@ void Emission::State::add_step(const double* u) {
     step = 0;
     ++samples;
   }
-  if (step++ == 0 && screens) screens->keep(u);
+  if (step++ == 0 && screens) screens->keep(samples, u);
   if (motion) {
     motion->add_step(u);
   } else {

@@ -46,8 +46,7 @@ MotionFilter::MotionFilter(const Surfaces& surfaces, std::uint64_t frames, std::
       open_(kEntry * sum_.size(), 0.0),
       last_(sum_),
       slope_(sum_),
-      ring_(surfaces.get_rows(), kSpan + 1),
-      offset_(kSpan) {
+      ring_(surfaces.get_rows(), kSpan + 1) {
   places_.fill(Rows(surfaces.get_rows()));
   velocities_.fill(Rows(surfaces.get_rows()));
 }
@@ -172,13 +171,14 @@ void MotionFilter::close_half() {
 /// Half-sample j is there.
 void MotionFilter::push(std::int64_t j) {
   if (j != 2 * (next_ + kBatch - 1 + kAhead)) return;
-  for (int i = 0; i < kSpan; ++i) offset_[static_cast<std::size_t>(i)] = ring_.find_offset(2 * (next_ - kAhead) + i);
+  std::array<std::size_t, kSpan> offset;
+  for (std::size_t i = 0; i < offset.size(); ++i) offset[i] = ring_.find_offset(2 * (next_ - kAhead) + static_cast<std::int64_t>(i));
   double *x[kBatch], *v[kBatch];
   for (int b = 0; b < kBatch; ++b) {
     x[b] = places_[find_kept(next_ + b)].get();
     v[b] = velocities_[find_kept(next_ + b) % kBatch].get();
   }
-  loops_->calc_motion(ring_.get(), offset_.data(), surfaces_.get_rows(), weights_.even.data(), weights_.odd.data(), surfaces_.rest.get(), x,
+  loops_->calc_motion(ring_.get(), offset.data(), surfaces_.get_rows(), weights_.even.data(), weights_.odd.data(), surfaces_.rest.get(), x,
                       v);
   next_ += kBatch;
   take_(next_ - kBatch);

@@ -85,7 +85,6 @@ class MotionFilter {
   Ring ring_;                                              // half-samples
   std::array<Rows, kKept> places_;                         // m
   std::array<Rows, kBatch> velocities_;                    // m a sample
-  std::vector<std::size_t> offset_;
 };
 
 }  // namespace carillon::emission

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 
 #include "precompute/emission/visibility.hpp"
 
@@ -26,10 +27,9 @@ Screens::Screens(const Surfaces& surfaces, const SurfacePart& part, const Option
       before_(surfaces.get_slots() * options.receivers.size(), 1.0F),
       now_(before_) {
   std::vector<std::int64_t> numbers;
-  std::map<std::int32_t, bool> own;
-  for (const Triangle& corner : part.silent)
-    for (const std::int32_t one : corner) own[one] = true;
-  for (const auto& [one, is_there] : own) {
+  std::set<std::int32_t> own;
+  for (const Triangle& corner : part.silent) own.insert(corner.begin(), corner.end());
+  for (const std::int32_t one : own) {
     node_.push_back(one);
     numbers.push_back(part.node_number[static_cast<std::size_t>(one)]);
     for (const double x : part.nodes_m[static_cast<std::size_t>(one)]) rest_.push_back(x);
@@ -49,8 +49,7 @@ Screens::Screens(const Surfaces& surfaces, const SurfacePart& part, const Option
   places_.assign(ring_ * rows_, 0.0);
 }
 
-void Screens::keep(const double* u) {
-  const std::int64_t k = samples_++;
+void Screens::keep(std::int64_t k, const double* u) {
   if (static_cast<std::size_t>(k) % every_ != 0) return;
   double* to = get_places(k);
   for (std::size_t s = 0; s < node_.size(); ++s)

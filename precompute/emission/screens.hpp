@@ -20,8 +20,8 @@ class Screens {
 
   /// Now [m].
   void set_balls(std::span<const Vec3> centres_m) { balls_.assign(centres_m.begin(), centres_m.end()); }
-  /// Places of the next sample, which begins with these displacements.
-  void keep(const double* u);
+  /// Places of sample k, which begins with these displacements.
+  void keep(std::int64_t k, const double* u);
   /// Rays at sample k, x its places, every 1/1000 s; no work at the other samples. Collective.
   void look(std::int64_t k, const double* x);
   /// delta of a receiver at sample k, behind look(k): of `count` slots from the first on.
@@ -29,7 +29,7 @@ class Screens {
 
   template <typename Visit>
   void visit_state(Visit&& visit) {
-    visit(samples_, places_, before_, now_);
+    visit(places_, before_, now_);
   }
 
  private:
@@ -41,7 +41,6 @@ class Screens {
   std::vector<double> rest_;                            // m
   std::vector<std::array<std::int64_t, 3>> triangles_;  // of all ranks, into the nodes of all ranks, one rank behind another
   std::size_t every_, rows_, ring_;                     // samples between two looks; numbers of a row of places_; rows that are kept
-  std::int64_t samples_ = 0;                            // that have begun
   std::vector<Vec3> balls_;
   std::vector<double> places_;       // (ring_, rows_): nodes, then balls [m]
   std::vector<float> before_, now_;  // (receivers, slots) at the last two looks

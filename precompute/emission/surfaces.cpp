@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "runtime/base/error.hpp"
+#include "runtime/base/used_points.hpp"
 
 namespace carillon::emission {
 namespace {
@@ -31,12 +32,13 @@ void check(const SurfacePart& part) {
   const std::size_t nodes = part.nodes_m.size();
   if (part.node_number.size() != nodes || part.triangle_number.size() != part.triangles.size() || part.body.size() != part.triangles.size())
     throw InputError("lists of nodes or triangles of a surface have different lengths");
-  for (const Triangle& corner : part.triangles)
-    for (const std::int32_t one : corner)
-      if (one < 0 || static_cast<std::size_t>(one) >= nodes) throw InputError("a triangle of a surface names a node that is not there");
-  for (const Triangle& corner : part.silent)
-    for (const std::int32_t one : corner)
-      if (one < 0 || static_cast<std::size_t>(one) >= nodes) throw InputError("a silent triangle names a node that is not there");
+  const auto check_corners = [&](const std::vector<Triangle>& triangles, const char* name) {
+    for (const Triangle& corner : triangles)
+      for (const std::int32_t one : corner)
+        if (one < 0 || static_cast<std::size_t>(one) >= nodes) throw InputError(fmt::format("a {} names a node that is not there", name));
+  };
+  check_corners(part.triangles, "triangle of a surface");
+  check_corners(part.silent, "silent triangle");
 }
 
 }  // namespace
@@ -44,15 +46,8 @@ void check(const SurfacePart& part) {
 Surfaces::Surfaces(const comm::Communicator& communicator, const SurfacePart& part) : comm(communicator) {
   comm.agree([&] { check(part); });
 
-  // Vertices: the nodes that triangles have, in their order.
-  std::vector<std::int32_t> vertex_of(part.nodes_m.size(), -1);
-  for (const Triangle& corner : part.triangles)
-    for (const std::int32_t one : corner) vertex_of[static_cast<std::size_t>(one)] = 0;
-  for (std::size_t i = 0; i < vertex_of.size(); ++i)
-    if (vertex_of[i] == 0) {
-      vertex_of[i] = static_cast<std::int32_t>(node.size());
-      node.push_back(static_cast<std::int32_t>(i));
-    }
+  base::UsedPoints used = base::find_used_points(part.triangles, part.nodes_m.size());
+  node = std::move(used.points);
   rest = Rows(get_rows());
   for (std::size_t v = 0; v < node.size(); ++v) {
     row.push_back(static_cast<std::int32_t>(v / kVertices * kLane + v % kVertices * 3));
@@ -121,7 +116,7 @@ Surfaces::Surfaces(const comm::Communicator& communicator, const SurfacePart& pa
   const auto add_slot = [&](std::size_t t, std::int32_t of_twin) {
     Triangle corner;
     for (std::size_t c = 0; c < 3; ++c)
-      corner[c] = row[static_cast<std::size_t>(vertex_of[static_cast<std::size_t>(part.triangles[t][c])])];
+      corner[c] = row[static_cast<std::size_t>(used.number[static_cast<std::size_t>(part.triangles[t][c])])];
     corners.push_back(corner);
     place.push_back(find_place(numbers, part.triangle_number[t]));
     area.push_back(tables.area_m2[static_cast<std::size_t>(place.back())]);

@@ -1,4 +1,4 @@
-// Whether one place sees another past surfaces.
+// Lines of sight past surfaces.
 #pragma once
 
 #include <array>

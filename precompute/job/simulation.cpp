@@ -10,13 +10,15 @@
 #include <set>
 
 #include "precompute/job/read_body.hpp"
-#include "runtime/base/document.hpp"
+#include "runtime/base/ranges.hpp"
 #include "runtime/material/read_material.hpp"
 
 namespace carillon::job {
 namespace {
 
 namespace fs = std::filesystem;
+using base::read_vector;
+using base::read_within;
 
 constexpr double kFarthestM = 1e4, kMaxSpeedMs = 343.0;  // of sound in air
 constexpr double kMaxSpinRadS = 1e5, kMaxGravity = 1e5;
@@ -26,24 +28,6 @@ constexpr int kMaxCells = 2000, kMaxBendMode = 20;
 constexpr std::size_t kMaxBodies = 100, kMaxBlows = 10000, kMaxRows = 100'000, kMaxGroups = 1000, kMaxMicrophones = 16;
 /// Where a law of loss that is not Rayleigh's has the same loss as the one that is simulated.
 constexpr double kFitLowHz = 200.0, kFitHighHz = 5000.0;
-
-Vec3 read_vector(base::Object& object, std::string_view key, const Vec3& fallback, double limit) {
-  const Vec3 v = object.numbers_or<3>(key, fallback);
-  for (const double x : v)
-    if (!(std::abs(x) <= limit)) object.fail(key, fmt::format("{} is out of range; give numbers between {} and {}", x, -limit, limit));
-  return v;
-}
-
-double read_within(base::Object& object, std::string_view key, double low, double high) {
-  const double value = object.number(key);
-  if (!(value >= low && value <= high))
-    object.fail(key, fmt::format("{:g} is out of range; give a number from {:g} to {:g}", value, low, high));
-  return value;
-}
-
-double read_within_or(base::Object& object, std::string_view key, double fallback, double low, double high) {
-  return object.has(key) ? read_within(object, key, low, high) : fallback;
-}
 
 NodeGroup read_group(base::Object group) {
   NodeGroup result;
@@ -157,7 +141,7 @@ Sheet read_sheet(base::Object object) {
   } else {
     sheet.length_m = read_scene_length(object, "length_m");
     sheet.width_m = read_scene_length(object, "width_m");
-    sheet.bow_m = read_within_or(object, "bow_m", 0.0, 0.0, kFarthestM);
+    sheet.bow_m = read_within(object, "bow_m", 0.0, 0.0, kFarthestM);
     if (sheet.bow_m > 0.4 * sheet.length_m)
       object.fail("bow_m", fmt::format("is more than 0.4 of the length; give {:g} at most", 0.4 * sheet.length_m));
   }
@@ -186,7 +170,7 @@ void read_form(base::Object& object, SimulatedBody& body) {
     object.fail("", "a body is one of \"mesh\" (a file), \"body\" or \"shape\" (as in a job of modes), and \"sheet\"; give one");
   if (object.has("mesh")) {
     body.mesh = object.path("mesh");
-    body.mesh_scale = read_within_or(object, "mesh_scale", 1.0, 1e-9, 1e6);
+    body.mesh_scale = read_within(object, "mesh_scale", 1.0, 1e-9, 1e6);
   } else if (object.has("shape")) {
     body.body = read_short_shape(object.object("shape"));
   } else if (object.has("body")) {
@@ -275,7 +259,7 @@ Blow read_blow(base::Object& object, const std::vector<SimulatedBody>& bodies) {
   blow.time_s = read_within(object, "time_s", 0.0, kMaxSeconds);
   blow.point_m = read_vector(object, "point_m", {}, kFarthestM);
   blow.impulse_n_s = object.numbers<3>("impulse_n_s");
-  blow.duration_s = read_within_or(object, "duration_s", 1e-4, 1e-7, kMaxSeconds);
+  blow.duration_s = read_within(object, "duration_s", 1e-4, 1e-7, kMaxSeconds);
   if (blow.time_s < 0.5 * blow.duration_s)
     object.fail("time_s", "is the middle of the blow, which would begin before the simulation; give half of its duration or more");
   object.finish();
@@ -286,8 +270,8 @@ Receivers read_receivers(base::Object& root) {
   Receivers receivers;
   if (auto listener = root.object_if("listener")) {
     receivers.position_m = read_vector(*listener, "position_m", receivers.position_m, kFarthestM);
-    receivers.ear_distance_m = read_within_or(*listener, "ear_distance_m", receivers.ear_distance_m, 0.0, 10.0);
-    receivers.cardioid = read_within_or(*listener, "directional", 0.0, 0.0, 1.0);
+    receivers.ear_distance_m = read_within(*listener, "ear_distance_m", receivers.ear_distance_m, 0.0, 10.0);
+    receivers.cardioid = read_within(*listener, "directional", 0.0, 0.0, 1.0);
     if (listener->has("look_at_m") && listener->has("facing"))
       listener->fail("look_at_m", "says the same thing as \"facing\"; keep one of them");
     const std::string key = listener->has("look_at_m") ? "look_at_m" : "facing";
@@ -331,7 +315,7 @@ SimulationSpec read_root(base::Object root, const fs::path& file) {
   if (job.has("step_s") && !job.has_string("step_s")) spec.step_s = read_within(job, "step_s", kMinStepS, kMaxStepS);
   if (job.has_string("step_s")) job.choice("step_s", {"automatic"});
   spec.gravity_m_s2 = read_vector(job, "gravity_m_s2", {}, kMaxGravity);
-  spec.settle_s = read_within_or(job, "settle_s", 0.0, 0.0, kMaxSeconds);
+  spec.settle_s = read_within(job, "settle_s", 0.0, 0.0, kMaxSeconds);
   for (base::Object& body : job.objects("bodies")) spec.bodies.push_back(read_simulated_body(body, spec.warnings));
   check_names(job, spec.bodies);
   for (base::Object& striker : job.objects("strikers")) spec.strikers.push_back(read_striker(striker));
@@ -339,9 +323,9 @@ SimulationSpec read_root(base::Object root, const fs::path& file) {
   for (base::Object& blow : job.objects("impulses")) spec.blows.push_back(read_blow(blow, spec.bodies));
   if (spec.blows.size() > kMaxBlows) job.fail("impulses", fmt::format("give {} at most", kMaxBlows));
   if (auto contact = job.object_if("contact")) {
-    spec.contact.stiffness = read_within_or(*contact, "stiffness", spec.contact.stiffness, 1e-6, 100.0);
-    spec.contact.restitution = read_within_or(*contact, "restitution", spec.contact.restitution, 0.05, 1.0);
-    spec.contact.friction = read_within_or(*contact, "friction", spec.contact.friction, 0.0, 10.0);
+    spec.contact.stiffness = read_within(*contact, "stiffness", spec.contact.stiffness, 1e-6, 100.0);
+    spec.contact.restitution = read_within(*contact, "restitution", spec.contact.restitution, 0.05, 1.0);
+    spec.contact.friction = read_within(*contact, "friction", spec.contact.friction, 0.0, 10.0);
     contact->finish();
   }
   spec.receivers = read_receivers(job);
@@ -352,8 +336,8 @@ SimulationSpec read_root(base::Object root, const fs::path& file) {
   spec.visibility = job.boolean_or("visibility", spec.radiation != SurfaceSound::kirchhoff);
   if (spec.visibility && spec.radiation == SurfaceSound::kirchhoff)
     job.fail("visibility", "hides triangles, and \"kirchhoff\" needs all of a closed surface; take \"rayleigh\", or leave it out");
-  spec.high_pass_hz = read_within_or(job, "high_pass_hz", 20.0, 0.0, 1000.0);
-  spec.motion_hz = read_within_or(job, "motion_hz", 60.0, 1.0, spec.sample_rate_hz);
+  spec.high_pass_hz = read_within(job, "high_pass_hz", 20.0, 0.0, 1000.0);
+  spec.motion_hz = read_within(job, "motion_hz", 60.0, 1.0, spec.sample_rate_hz);
   job.finish();
   read_outputs(root, spec);
   spec.resources = read_resources(root);

@@ -89,20 +89,23 @@ std::vector<double> find_sizes(const Skin& now, const SkinSizes& sizes) {
   return size;
 }
 
+/// Edges longer (sign 1) or shorter (sign -1) than `limit` of their wanted length; the longest or shortest first.
+std::vector<std::pair<double, Edge>> list_outside(const SkinEditor& skin, double limit, int sign) {
+  std::vector<std::pair<double, Edge>> edges;
+  for (const Edge& e : skin.list_edges())
+    if (const double part = skin.calc_part(e); sign * (part - limit) > 0) edges.emplace_back(-sign * part, e);
+  std::sort(edges.begin(), edges.end());
+  return edges;
+}
+
 void split_long(SkinEditor& skin) {
   const auto& x = skin.get_points();
   for (int round = 0; round < 12; ++round) {
-    std::vector<std::pair<double, Edge>> edges;
-    for (const Edge& e : skin.list_edges()) {
-      const double part = skin.calc_part(e);
-      if (part > kLong) edges.emplace_back(part, e);
-    }
+    const auto edges = list_outside(skin, kLong, 1);
     if (edges.empty()) return;
-    std::sort(edges.begin(), edges.end(),
-              [](const auto& p, const auto& q) { return p.first != q.first ? p.first > q.first : p.second < q.second; });
     // One edge of a triangle a round, the longest, keeps their shapes.
     std::vector<char> busy(skin.count_triangles(), 0);
-    for (const auto& [part, e] : edges) {
+    for (const auto& [order, e] : edges) {
       std::array<std::int32_t, 2> faces{};
       const int count = skin.find_faces(e[0], e[1], faces);
       bool is_free = count > 0;
@@ -118,14 +121,9 @@ void split_long(SkinEditor& skin) {
 void collapse_short(SkinEditor& skin) {
   const auto& x = skin.get_points();
   for (int round = 0; round < 6; ++round) {
-    std::vector<std::pair<double, Edge>> edges;
-    for (const Edge& e : skin.list_edges()) {
-      const double part = skin.calc_part(e);
-      if (part < kShort) edges.emplace_back(part, e);
-    }
-    std::sort(edges.begin(), edges.end());
+    const auto edges = list_outside(skin, kShort, -1);
     std::size_t done = 0;
-    for (const auto& [part, e] : edges) {
+    for (const auto& [order, e] : edges) {
       if (skin.get_star(e[0]).empty() || skin.get_star(e[1]).empty()) continue;
       std::array<std::int32_t, 2> faces{};
       if (skin.find_faces(e[0], e[1], faces) == 0) continue;

@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "precompute/mesh/parts.hpp"
+#include "runtime/base/used_points.hpp"
 
 namespace carillon::mesher {
 namespace {
@@ -295,20 +296,12 @@ void weld(TriangleSurface& surface, double tolerance) {
 }
 
 std::int64_t drop_unused_points(TriangleSurface& surface) {
-  std::vector<std::int32_t> number(surface.points.size(), -1);
-  for (const Triangle& t : surface.triangles)
-    for (const std::int32_t v : t) number[static_cast<std::size_t>(v)] = 0;
-  std::int32_t kept = 0;
-  for (std::size_t v = 0; v < number.size(); ++v)
-    if (number[v] == 0) {
-      surface.points[static_cast<std::size_t>(kept)] = surface.points[v];
-      number[v] = kept++;
-    }
-  const auto dropped = static_cast<std::int64_t>(surface.points.size()) - kept;
-  surface.points.resize(static_cast<std::size_t>(kept));
+  const base::UsedPoints used = base::find_used_points(surface.triangles, surface.points.size());
+  for (std::size_t v = 0; v < used.points.size(); ++v) surface.points[v] = surface.points[static_cast<std::size_t>(used.points[v])];
+  surface.points.resize(used.points.size());
   for (Triangle& t : surface.triangles)
-    for (std::int32_t& v : t) v = number[static_cast<std::size_t>(v)];
-  return dropped;
+    for (std::int32_t& v : t) v = used.number[static_cast<std::size_t>(v)];
+  return static_cast<std::int64_t>(used.number.size() - used.points.size());
 }
 
 Seams join_seams(TriangleSurface& surface) {

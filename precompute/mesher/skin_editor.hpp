@@ -1,4 +1,4 @@
-// A skin whose triangles change: its points, edges and the triangles around each point are kept together.
+// A skin under change: points, edges and the triangles around each point, kept together.
 #pragma once
 
 #include <array>

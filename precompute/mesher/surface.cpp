@@ -182,7 +182,7 @@ mesh::TetMesh make_mesh(const SurfaceOptions& given, SurfaceReport& report, Phas
   const double asked = static_cast<double>(options.nodes.value_or(0));
   std::optional<CpuLimit> cpu_limit(std::in_place, calc_limit(kMinCpuOfRepair, asked));
   std::optional<Sheet> sheet;
-  if (options.wall_m || options.refuses_open) phases.run("repairing", [&] { return sheet = find_sheet(raw, options), 0; });
+  if (options.wall_m || options.refuses_open) phases.run("repairing", [&] { sheet = find_sheet(raw, options); });
   if (sheet && !options.wall_m) refuse_open(options, *sheet);
   scale_surface(raw, options, report, sheet.has_value());
   report.unused_points = input.unused_points;
@@ -207,8 +207,8 @@ mesh::TetMesh make_mesh(const SurfaceOptions& given, SurfaceReport& report, Phas
   } else {
     body.repaired = phases.run("repairing", [&] { return repair_surface(std::move(raw), options, report); });
   }
-  phases.run("smoothing", [&] { return smooth(body, options, report), 0; });
-  phases.run("rounding", [&] { return round_to_height(body, options, report), 0; });
+  phases.run("smoothing", [&] { smooth(body, options, report); });
+  phases.run("rounding", [&] { round_to_height(body, options, report); });
   const TriangleSurface& surface = body.repaired.surface;
   report.input_area_m2 = calc_area(surface);
   report.input_volume_m3 = body.round ? body.round->calc_volume() : calc_volume(surface) - body.repaired.offset_m * report.input_area_m2;
@@ -228,8 +228,8 @@ mesh::TetMesh make_mesh(const SurfaceOptions& given, SurfaceReport& report, Phas
 
   mesh::TetMesh linear = make_volume_mesh(body, options, edge, report, phases);
   mesh::TetMesh out = options.order == 2 ? mesh::to_quadratic(linear) : std::move(linear);
-  if (options.order == 2 && !options.straight) phases.run("curving", [&] { return curve(out, body, report), 0; });
-  if (body.round || options.order == 2) phases.run("placing nodes", [&] { return place_nodes(out, body, options, report), 0; });
+  if (options.order == 2 && !options.straight) phases.run("curving", [&] { curve(out, body, report); });
+  if (body.round || options.order == 2) phases.run("placing nodes", [&] { place_nodes(out, body, options, report); });
   report.nodes = static_cast<std::int64_t>(out.nodes_m.size());
   report.mesh_extent_m = calc_box(out.nodes_m).extent();
   add_notes(options, body, report);

@@ -65,7 +65,6 @@ ThinSizes choose_sizes(double area_m2, double wall_m, const SurfaceOptions& opti
   }
 }
 
-/// What the skin is made of, and what leads back to the surface.
 /// The volume between the levels low and high [m] of the surface, along its normals, by Steiner's formula.
 double calc_parallel_volume(const TriangleSurface& surface, double low, double high) {
   std::map<Edge, std::vector<std::int32_t>> faces;
@@ -118,42 +117,41 @@ struct Attempt {
   std::int64_t nodes = 0;
 };
 
+/// Of a surface without unused points.
 std::int64_t count_mesh_nodes(const TriangleSurface& surface, int order, int layers) {
-  std::map<Edge, int> edges;
-  std::vector<char> used(surface.points.size(), 0);
-  for (const Triangle& t : surface.triangles)
-    for (int c = 0; c < 3; ++c) {
-      const std::int32_t a = t[c], b = t[(c + 1) % 3];
-      edges[make_edge(a, b)] = 1;
-      used[a] = 1;
-    }
-  const auto points = static_cast<std::int64_t>(std::count(used.begin(), used.end(), 1));
-  const auto count = static_cast<std::int64_t>(edges.size());
-  return order == 1 ? (layers + 1) * points : (2 * layers + 1) * (points + count);
+  const auto points = static_cast<std::int64_t>(surface.points.size());
+  return order == 1 ? (layers + 1) * points : (2 * layers + 1) * (points + static_cast<std::int64_t>(count_faces(surface).size()));
+}
+
+/// Of each point.
+std::vector<char> mark_border(const TriangleSurface& surface) {
+  std::vector<char> on_border(surface.points.size(), 0);
+  for (const auto& [a, b] : find_border(surface)) on_border[a] = on_border[b] = 1;
+  return on_border;
 }
 
 class ThinMesher {
  public:
-  ThinMesher(const ThinBody& body, const SurfaceOptions& options, SurfaceReport& report, const RunPhase& run)
+  ThinMesher(const ThinBody& body, const SurfaceOptions& options, const ThinSizes& sizes, SurfaceReport& report, Phases& phases)
       : body_(body),
         options_(options),
         report_(report),
-        run_(run),
-        edge_(find_thin_edge(body, options)),
+        phases_(phases),
+        edge_(sizes.edge_m),
         levels_(find_levels(body.side, body.wall_m)),
         source_(body.skin, options, edge_),
         order_(options.order == 1 ? 1 : 2),
-        layers_(choose_sizes(calc_area(body.skin.repaired.surface), body.wall_m, options).layers) {
+        layers_(sizes.layers) {
     places_ = {[&](const Vec3& p) { return source_.find(p); }, [&](const Vec3& p) { return source_.find_on_lines(p); }};
     if (body.low) low_source_.emplace(*body.low, options, edge_);
   }
 
   mesh::TetMesh make() {
     Attempt attempt;
-    run_("remeshing the skin", [&] { attempt = meet_count(); });
+    phases_.run("remeshing the skin", [&] { attempt = meet_count(); });
     Extruded extruded;
-    run_("extruding", [&] { extruded = extrude_or_retry(attempt); });
-    run_("comparing with the body", [&] { compare(attempt.skin, extruded.mesh); });
+    phases_.run("extruding", [&] { extruded = extrude_or_retry(attempt); });
+    phases_.run("comparing with the body", [&] { compare(attempt.skin, extruded.mesh); });
     fill_report(attempt, extruded);
     spread_doubt(attempt.skin.surface, extruded);
     return std::move(extruded.mesh);
@@ -174,8 +172,7 @@ class ThinMesher {
     const std::size_t points = plain.surface.points.size();
     const std::vector<Vec3> ways = find_ways_out(plain);
     const std::vector<Vec3> low = low_source_ ? find_low(plain, ways) : std::vector<Vec3>{};
-    std::vector<char> on_border(points, 0);
-    for (const auto& [a, b] : find_border(plain.surface)) on_border[a] = on_border[b] = 1;
+    const std::vector<char> on_border = mark_border(plain.surface);
     attempt.skin = add_rings(plain, places_, [&](const LeavingEdge& leaving) {
       const std::int32_t v = leaving.point;
       const Vec3 &out = ways[static_cast<std::size_t>(v)], &across = leaving.across;
@@ -262,8 +259,7 @@ class ThinMesher {
   /// The point of the other side for each point of the skin.
   std::vector<Vec3> find_low(const Skin& skin, const std::vector<Vec3>& ways) const {
     std::vector<Vec3> low;
-    std::vector<char> on_border(skin.surface.points.size(), 0);
-    for (const auto& [a, b] : find_border(skin.surface)) on_border[a] = on_border[b] = 1;
+    const std::vector<char> on_border = mark_border(skin.surface);
     for (std::size_t v = 0; v < skin.surface.points.size(); ++v) {
       const Vec3& p = skin.surface.points[v];
       if (on_border[v] != 0) {
@@ -387,7 +383,7 @@ class ThinMesher {
   const ThinBody& body_;
   const SurfaceOptions& options_;
   SurfaceReport& report_;
-  const RunPhase& run_;
+  Phases& phases_;
   double edge_;
   std::array<double, 2> levels_;
   WallSource source_;
@@ -416,13 +412,12 @@ std::string format_thin_estimate(double area_m2, double wall_m, const SurfaceOpt
   return estimate.line();
 }
 
-mesh::TetMesh mesh_thin_wall(const ThinBody& body, const SurfaceOptions& options, SurfaceReport& report, const RunPhase& run,
-                             const std::function<void(const std::string&)>& show) {
+mesh::TetMesh mesh_thin_wall(const ThinBody& body, const SurfaceOptions& options, SurfaceReport& report, Phases& phases) {
   const double area = calc_area(body.skin.repaired.surface);
   const ThinSizes sizes = choose_sizes(area, body.wall_m, options);
   check_edge(options, sizes.edge_m, calc_box(body.skin.repaired.surface.points).diagonal(), sizes.nodes, kMaxNodes);
-  show(fmt::format("estimate {}", format_thin_estimate(area, body.wall_m, options)));
-  return ThinMesher(body, options, report, run).make();
+  phases.show(fmt::format("estimate {}", format_thin_estimate(area, body.wall_m, options)));
+  return ThinMesher(body, options, sizes, report, phases).make();
 }
 
 }  // namespace carillon::mesher

@@ -1,12 +1,11 @@
 // Walls that are thin against the elements: from a surface to an extruded mesh.
 #pragma once
 
-#include <functional>
 #include <optional>
 #include <string>
 
 #include "precompute/mesher/body.hpp"
-#include "precompute/mesher/surface.hpp"
+#include "precompute/mesher/phases.hpp"
 
 namespace carillon::mesher {
 
@@ -21,9 +20,6 @@ struct Sheet {
 /// A sheet from unordered triangles: points joined, triangles turned alike, of a vessel outwards. Empty for a closed surface, or one
 /// without a hole larger than repair_surface closes.
 std::optional<Sheet> find_sheet(const TriangleSurface& surface, const SurfaceOptions& options);
-
-/// Runs one phase and keeps its time.
-using RunPhase = std::function<void(const std::string& name, const std::function<void()>& work)>;
 
 /// A thin wall between its skin and a second side.
 struct ThinBody {
@@ -45,7 +41,6 @@ std::string format_thin_estimate(double area_m2, double wall_m, const SurfaceOpt
 double find_thin_edge(const ThinBody& body, const SurfaceOptions& options);
 
 /// Makes the mesh. Throws WallError (extrude.hpp) with the place of an impossible wall; CountRefusal if the count cannot be met.
-mesh::TetMesh mesh_thin_wall(const ThinBody& body, const SurfaceOptions& options, SurfaceReport& report, const RunPhase& run,
-                             const std::function<void(const std::string&)>& show);
+mesh::TetMesh mesh_thin_wall(const ThinBody& body, const SurfaceOptions& options, SurfaceReport& report, Phases& phases);
 
 }  // namespace carillon::mesher

@@ -154,7 +154,7 @@ mesh::TetMesh make_delaunay_mesh(Body& body, const SurfaceOptions& options, doub
     const auto refine = [&](double edge) { return delaunay->refine(calc_sizes(body, options, edge)); };
     const auto finish = [&](mesh::TetMesh& mesh) {
       mesh = phases.run("removing slivers", [&] { return delaunay->optimise(options.sliver_deg); });
-      phases.run("repairing the mesh", [&] { return finish_mesh(mesh, body, report), 0; });
+      phases.run("repairing the mesh", [&] { finish_mesh(mesh, body, report); });
     };
     return meet_count(body, options, edge_m, report, phases, refine, finish);
   };

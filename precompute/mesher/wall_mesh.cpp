@@ -15,10 +15,7 @@ bool extrude_wall(const ThinBody& body, const SurfaceOptions& options, SurfaceRe
                   std::string& fault) {
   const SurfaceReport before = report;
   try {
-    out = mesh_thin_wall(
-        body, options, report,
-        [&](const std::string& name, const std::function<void()>& work) { phases.run(name, [&] { return work(), 0; }); },
-        [&](const std::string& text) { phases.show(text); });
+    out = mesh_thin_wall(body, options, report, phases);
     return true;
   } catch (const WallError& failure) {
     fault = failure.what();
@@ -41,7 +38,7 @@ mesh::TetMesh make_sheet(Sheet sheet, const SurfaceOptions& options, SurfaceRepo
     throw InputError(fmt::format("{}: it is an open sheet, which needs --method extrude or auto", options.surface.string()));
   Body body;
   body.repaired = {std::move(sheet.surface), 0, false};
-  phases.run("rounding", [&] { return round_to_height(body, options, report), 0; });
+  phases.run("rounding", [&] { round_to_height(body, options, report); });
   report.input_area_m2 = calc_area(body.repaired.surface);
   report.input_volume_m3 = *options.wall_m * report.input_area_m2;
   const Side side = options.side == Side::kAutomatic ? Side::kMiddle : options.side;
@@ -86,8 +83,7 @@ std::optional<mesh::TetMesh> make_thin(const Body& body, const SurfaceOptions& o
   }
   std::optional<TwoSides> sides;
   if (!report.wrapped && report.components <= 2)
-    phases.run("looking for a wall",
-               [&] { return sides = find_two_sides(body.round ? body.round->get_facets() : body.repaired.surface), 0; });
+    phases.run("looking for a wall", [&] { sides = find_two_sides(body.round ? body.round->get_facets() : body.repaired.surface); });
   if (!sides) {
     if (must)
       throw InputError(

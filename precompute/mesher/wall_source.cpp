@@ -16,7 +16,7 @@ namespace carillon::mesher {
 namespace {
 
 constexpr double kNoiseLength = 2;   // edges: shorter isolated folds are noise
-constexpr std::size_t kScan = 2000;  // triangles of a surface whose sharp edges may be noise
+constexpr std::size_t kScan = 2000;  // triangles; sharp edges of larger surfaces may be noise
 
 /// Removes isolated folds shorter than elements.
 void drop_noise(const TriangleSurface& facets, std::vector<Edge>& folds, double sharp_angle_deg, double edge_m) {

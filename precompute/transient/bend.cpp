@@ -14,6 +14,7 @@
 #include <limits>
 #include <optional>
 
+#include "precompute/transient/vectors.hpp"
 #include "runtime/base/chance.hpp"
 #include "runtime/base/error.hpp"
 
@@ -106,8 +107,7 @@ class Tangent {
             get_component(trial[static_cast<std::size_t>(node)], axis) =
                 get_component(const_cast<Quad&>(u[static_cast<std::size_t>(node)]), axis) + places * by;
           domain_.set_elastic_forces(trial.data(), force_.data());
-          for (std::size_t n = 0; n < slope.size(); ++n)
-            slope[n] = slope[n] + (weight / (12.0 * by)) * Vec3{force_[n].x, force_[n].y, force_[n].z};
+          for (std::size_t n = 0; n < slope.size(); ++n) slope[n] = slope[n] + (weight / (12.0 * by)) * to_vector(force_[n]);
         }
         for (const std::int32_t node : together) {
           const auto column = static_cast<std::size_t>(node);

@@ -1,4 +1,3 @@
-// One contact from search to force, on one set of surfaces; longer than most files.
 // Method:     a point of one surface against the nearest point of another: penalty k d (1 + a d' / v), never pulling, with the closing
 //             speed v at which the contact began; Coulomb friction that stops a node within one step at most.
 // Source:     docs/equations.md E11; Hunt and Crossley 1975; Gonthier, McPhee, Lange and Piedboeuf 2004 (restitution).
@@ -12,9 +11,9 @@
 #include <cstring>
 #include <limits>
 #include <unordered_map>
-#include <variant>
 
 #include "precompute/comm/exchange.hpp"
+#include "precompute/transient/vectors.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::transient {
@@ -30,47 +29,15 @@ constexpr double kBallSlide = 3.5;                    // 1 + m r^2 / I: how much
 constexpr double kSame = 1e-12;                       // distances that are the same, in mean edges
 constexpr double kFarthestM = 1e6, kFastestMs = 1e9;  // beyond which a motion is not stable
 
-/// What is no number counts as larger.
+/// A value that is no number counts as larger.
 void take_larger(double value, double& largest) {
   if (!(value <= largest)) largest = value;
 }
 
-Vec3 get_vector(const Quad& q) { return {q.x, q.y, q.z}; }
 void add(Quad& f, const Vec3& force) {
   f.x += force[0];
   f.y += force[1];
   f.z += force[2];
-}
-
-/// Where a point is against an obstacle: signed distance [m], positive outside, and the unit normal to the free side.
-struct Clearance {
-  double distance_m = 0;
-  Vec3 normal{};
-};
-
-Clearance find_clearance(const RigidObstacle& obstacle, const Vec3& p) {
-  if (const auto* plane = std::get_if<job::PlaneObstacle>(&obstacle)) return {dot(p - plane->point_m, plane->normal), plane->normal};
-  if (const auto* ball = std::get_if<job::BallObstacle>(&obstacle)) {
-    const Vec3 way = p - ball->centre_m;
-    const double size = norm(way);
-    return {size - ball->radius_m, size > 0 ? (1.0 / size) * way : Vec3{0, 0, 1}};
-  }
-  const auto& box = std::get<job::BoxObstacle>(obstacle);
-  Vec3 outside{};
-  double inside = -std::numeric_limits<double>::infinity();
-  Vec3 nearest_face{};
-  for (std::size_t k = 0; k < 3; ++k) {
-    const double low = box.min_m[k] - p[k], high = p[k] - box.max_m[k], beyond = std::max(low, high);
-    if (beyond > 0) outside[k] = low > 0 ? -low : high;
-    if (beyond > inside) {
-      inside = beyond;
-      nearest_face = {};
-      nearest_face[k] = low > high ? -1.0 : 1.0;
-    }
-  }
-  const double size = norm(outside);
-  if (size > 0) return {size, (1.0 / size) * outside};
-  return {inside, nearest_face};
 }
 
 /// Cells of a grid as keys.
@@ -96,39 +63,6 @@ double calc_hunt_crossley(double restitution) {
     (std::log1p(a) - std::log1p(-a * e) - a * (1.0 + e) > 0.0 ? high : low) = a;
   }
   return 0.5 * (low + high);
-}
-
-TouchSurface make_touch_surface(std::span<const Vec3> rest_m, std::span<const std::array<std::int32_t, 3>> triangles,
-                                std::span<const std::int32_t> body_of_triangle, std::span<const double> modulus_pa,
-                                std::span<const double> reach_m, double kappa) {
-  struct Sum {
-    double area = 0, edge = 0;
-    int edges = 0;
-    std::int32_t body = 0;
-  };
-  std::map<std::int32_t, Sum> sums;
-  for (std::size_t t = 0; t < triangles.size(); ++t) {
-    std::array<Vec3, 3> at{};
-    for (std::size_t c = 0; c < 3; ++c) at[c] = rest_m[static_cast<std::size_t>(triangles[t][c])];
-    const double area = 0.5 * norm(cross(at[1] - at[0], at[2] - at[0]));
-    for (std::size_t c = 0; c < 3; ++c) {
-      Sum& sum = sums[triangles[t][c]];
-      sum.area += area / 3.0;
-      sum.edge += norm(at[(c + 1) % 3] - at[c]);
-      ++sum.edges;
-      sum.body = body_of_triangle[t];
-    }
-  }
-  TouchSurface surface;
-  std::map<std::int32_t, std::int32_t> number;
-  for (const auto& [node, sum] : sums) {
-    const auto body = static_cast<std::size_t>(sum.body);
-    number[node] = static_cast<std::int32_t>(surface.nodes.size());
-    surface.nodes.push_back({node, sum.body, kappa * modulus_pa[body] * sum.area / (sum.edge / sum.edges), reach_m[body],
-                             rest_m[static_cast<std::size_t>(node)]});
-  }
-  for (const auto& triangle : triangles) surface.triangles.push_back({number[triangle[0]], number[triangle[1]], number[triangle[2]]});
-  return surface;
 }
 
 Contacts::Contacts(const Domain& domain, TouchSurface surface, std::vector<BallStriker> strikers, std::vector<RigidObstacle> obstacles,
@@ -226,7 +160,7 @@ void Contacts::search(const Quad* u) {
   std::vector<double> all(3 * surface_.nodes.size());
   for (const std::int32_t i : own_) {
     const auto s = static_cast<std::size_t>(i);
-    const Vec3 at = surface_.nodes[s].rest_m + get_vector(u[place_[s]]);
+    const Vec3 at = surface_.nodes[s].rest_m + to_vector(u[place_[s]]);
     for (std::size_t k = 0; k < 3; ++k) all[3 * s + k] = at[k];
   }
   comm_.sum(std::span(all));
@@ -325,7 +259,7 @@ void Contacts::gather_active(const Quad* u, const Quad* v) {
   const auto rank = static_cast<std::size_t>(comm_.rank());
   for (std::size_t k = static_cast<std::size_t>(active_begin_[rank]) / 6; k < static_cast<std::size_t>(active_begin_[rank + 1]) / 6; ++k) {
     const auto i = static_cast<std::size_t>(active_order_[k]);
-    const Vec3 x = surface_.nodes[i].rest_m + get_vector(u[place_[i]]), speed = get_vector(v[place_[i]]);
+    const Vec3 x = surface_.nodes[i].rest_m + to_vector(u[place_[i]]), speed = to_vector(v[place_[i]]);
     for (std::size_t c = 0; c < 3; ++c) sent_[at++] = x[c];
     for (std::size_t c = 0; c < 3; ++c) sent_[at++] = speed[c];
   }
@@ -369,8 +303,8 @@ void Contacts::add_obstacles(const StepTime& time, const Quad* u, const Quad* v,
   for (const auto& [i, o] : near_obstacles_) {
     const auto s = static_cast<std::size_t>(i);
     const TouchNode& node = surface_.nodes[s];
-    const Clearance at = find_clearance(obstacles_[static_cast<std::size_t>(o)], node.rest_m + get_vector(u[place_[s]]));
-    const Pair pair{node.stiffness_n_m, node.reach_m - at.distance_m, mass_kg_[s], at.normal, get_vector(v[place_[s]])};
+    const Clearance at = find_clearance(obstacles_[static_cast<std::size_t>(o)], node.rest_m + to_vector(u[place_[s]]));
+    const Pair pair{node.stiffness_n_m, node.reach_m - at.distance_m, mass_kg_[s], at.normal, to_vector(v[place_[s]])};
     Account account;
     add(f[place_[s]], calc_force(time, {i, -1 - o}, pair, account));
     if (account.stored_j != 0) stored_own_.add(account.stored_j);
@@ -461,8 +395,8 @@ void Contacts::look_around(const StepTime& time, const Quad* u, const Quad* v) {
   double moved = 0, fastest = 0;
   for (const std::int32_t i : own_) {
     const auto s = static_cast<std::size_t>(i);
-    take_larger(norm(surface_.nodes[s].rest_m + get_vector(u[place_[s]]) - found_at_m_[s]), moved);
-    take_larger(norm(get_vector(v[place_[s]])), fastest);
+    take_larger(norm(surface_.nodes[s].rest_m + to_vector(u[place_[s]]) - found_at_m_[s]), moved);
+    take_larger(norm(to_vector(v[place_[s]])), fastest);
   }
   for (std::size_t s = 0; s < strikers_.size(); ++s) {
     if (s < strikers_at_m_.size()) take_larger(norm(strikers_[s].position_m - strikers_at_m_[s]), moved);

@@ -1,4 +1,3 @@
-// One step, whose forces, supports, damping and books follow each other; longer than most files.
 // Method:     central differences as leapfrog; the work of every force is h f_n (v_{n-1/2} + v_{n+1/2}) / 2, which is exact, and the
 //             kinetic energy m v_{n-1/2} v_{n+1/2} / 2, which with the elastic one is constant for a linear body at any stable step.
 // Source:     docs/equations.md E11; O'Brien, Cook and Essl 2001; Belytschko, Liu and Moran 2000, 6.2 (stable step with lagged damping).
@@ -15,6 +14,7 @@
 
 #include "precompute/comm/exchange.hpp"
 #include "precompute/transient/order_free_sum.hpp"
+#include "precompute/transient/vectors.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::transient {
@@ -32,8 +32,6 @@ double calc_ramp(double x) {
 }
 
 double multiply(const Quad& a, const Quad& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-Vec3 to_vector(const Quad& a) { return {a.x, a.y, a.z}; }
-Quad to_quad(const Vec3& a) { return {a[0], a[1], a[2], 0.0}; }
 
 /// What is saved once; checked when it is loaded.
 struct SavedHead {
@@ -89,7 +87,8 @@ Motion::Motion(Domain& domain, const MotionOptions& options, std::vector<Constra
 
 void Motion::find_carried() {
   const Assembly& assembly = domain_.get_assembly();
-  is_carried_.assign(assembly.bodies.size(), 1);
+  is_carried_.clear();
+  for (const Assembly::Body& body : assembly.bodies) is_carried_.push_back(body.mass_damping_per_s > 0.0 ? 1 : 0);
   next_release_s_ = std::numeric_limits<double>::infinity();
   for (const Constraint& constraint : constraints_) {
     if (constraint.nodes.empty()) continue;  // or released
@@ -97,9 +96,7 @@ void Motion::find_carried() {
     for (const std::int32_t node : constraint.nodes)
       if (!constraint.is_hinge) is_carried_[static_cast<std::size_t>(assembly.find_body_of_node(node))] = 0;
   }
-  has_carried_ = false;
-  for (std::size_t b = 0; b < assembly.bodies.size(); ++b)
-    has_carried_ = has_carried_ || (assembly.bodies[b].mass_damping_per_s > 0.0 && is_carried_[b] != 0);
+  has_carried_ = std::find(is_carried_.begin(), is_carried_.end(), 1) != is_carried_.end();
 }
 
 void Motion::release() {
@@ -175,14 +172,9 @@ void Motion::find_hinges(const std::function<Vec3(std::int32_t)>& find_place) {
   hinges_.assign(domain_.get_assembly().bodies.size(), {});
   for (const Constraint& constraint : constraints_) {
     if (!constraint.is_hinge || constraint.nodes.empty()) continue;
-    Hinge& hinge = hinges_[static_cast<std::size_t>(domain_.get_assembly().find_body_of_node(constraint.nodes[0]))];
-    hinge = {true, find_place(constraint.nodes[0]), {}};
-    Vec3 way{};
-    for (const std::int32_t node : constraint.nodes) {
-      const Vec3 other = find_place(node) - hinge.point_m;
-      if (norm(other) > norm(way)) way = other;
-    }
-    if (norm(way) > 0.0) hinge.axis = (1.0 / norm(way)) * way;
+    std::vector<Vec3> places_m;
+    for (const std::int32_t node : constraint.nodes) places_m.push_back(find_place(node));
+    hinges_[static_cast<std::size_t>(domain_.get_assembly().find_body_of_node(constraint.nodes[0]))] = make_hinge(places_m);
   }
 }
 
@@ -365,59 +357,12 @@ Vec3 Motion::calc_reaction(std::size_t constraint) {
 
 void Motion::update_carried() {
   if (!has_carried_) return;
-  const Assembly& assembly = domain_.get_assembly();
-  const auto bodies = assembly.bodies.size();
-  constexpr std::size_t kSums = 16;  // m, m x, m v, m x (x) v as a vector, the six of m x x^T
-  std::vector<OrderFreeSum> sums(kSums * bodies);
-  const auto place_of = [&](std::size_t i) { return domain_.get_rest_m()[i] + to_vector(u_[i]); };
-  const auto own = static_cast<std::size_t>(domain_.own_count());
-  const auto moves = [&](std::size_t b) { return is_carried_[b] != 0 && assembly.bodies[b].mass_damping_per_s > 0.0; };
-  for (std::size_t i = 0; i < own; ++i) {
-    const auto b = static_cast<std::size_t>(domain_.find_body(static_cast<std::int32_t>(i)));
-    if (!moves(b) || !domain_.is_point(static_cast<std::int32_t>(i))) continue;
-    const double mass = domain_.get_masses_kg()[i];
-    const Vec3 x = place_of(i), v = to_vector(v_[i]), turn = cross(x, v);
-    OrderFreeSum* sum = &sums[kSums * b];
-    sum[0].add(mass);
-    for (std::size_t k = 0; k < 3; ++k) {
-      sum[1 + k].add(mass * x[k]);
-      sum[4 + k].add(mass * v[k]);
-      sum[7 + k].add(mass * turn[k]);
-      sum[10 + k].add(mass * x[k] * x[k]);
-      sum[13 + k].add(mass * x[(k + 1) % 3] * x[(k + 2) % 3]);
-    }
-  }
-  const std::vector<double> sum = calc_sums(domain_.get_comm(), sums);
-  struct Rigid {
-    Vec3 centre{}, velocity{}, spin{};
-  };
-  std::vector<Rigid> rigid(bodies);
-  for (std::size_t b = 0; b < bodies; ++b) {
-    const double* s = &sum[kSums * b];
-    if (!moves(b) || !(s[0] > 0.0)) continue;
-    // A hinged body turns about its hinge: its centre of mass has no motion of its own.
-    const Hinge& hinge = hinges_[b];
-    const Vec3 middle{s[1] / s[0], s[2] / s[0], s[3] / s[0]}, v{s[4] / s[0], s[5] / s[0], s[6] / s[0]};
-    const Vec3 c = hinge.is_there ? hinge.point_m : middle;
-    const Vec3 turn = Vec3{s[7], s[8], s[9]} - s[0] * cross(c, v);
-    Vec3 square, product;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const std::size_t i = (k + 1) % 3, j = (k + 2) % 3;
-      square[k] = s[10 + k] - s[0] * c[k] * (2.0 * middle[k] - c[k]);
-      product[k] = s[13 + k] - s[0] * (c[i] * middle[j] + c[j] * middle[i] - c[i] * c[j]);
-    }
-    const Mat3 inertia{Vec3{square[1] + square[2], -product[2], -product[1]}, Vec3{-product[2], square[0] + square[2], -product[0]},
-                       Vec3{-product[1], -product[0], square[0] + square[1]}};
-    if (!hinge.is_there)
-      rigid[b] = {c, v, calc_inverse(inertia) * turn};
-    else if (norm(hinge.axis) > 0.0)
-      rigid[b] = {c, {}, (dot(turn, hinge.axis) / dot(hinge.axis, inertia * hinge.axis)) * hinge.axis};
-    else
-      rigid[b] = {c, {}, calc_inverse(inertia) * turn};
-  }
-  for (std::size_t i = 0; i < own; ++i) {
-    const Rigid& body = rigid[static_cast<std::size_t>(domain_.find_body(static_cast<std::int32_t>(i)))];
-    if (domain_.is_point(static_cast<std::int32_t>(i))) carried_[i] = to_quad(body.velocity + cross(body.spin, place_of(i) - body.centre));
+  const std::vector<RigidMotion> rigid = calc_rigid_motions(domain_, u_, v_, is_carried_, hinges_);
+  for (std::size_t i = 0; i < carried_.size(); ++i) {
+    const auto node = static_cast<std::int32_t>(i);
+    if (!domain_.is_point(node)) continue;
+    const Vec3 place_m = domain_.get_rest_m()[i] + to_vector(u_[i]);
+    carried_[i] = to_quad(rigid[static_cast<std::size_t>(domain_.find_body(node))].calc_velocity(place_m));
   }
 }
 

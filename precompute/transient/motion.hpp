@@ -18,6 +18,7 @@
 
 #include "precompute/transient/domain.hpp"
 #include "precompute/transient/path.hpp"
+#include "precompute/transient/rigid_motion.hpp"
 #include "precompute/transient/stable_step.hpp"
 
 namespace carillon::transient {
@@ -200,12 +201,8 @@ class Motion {
   std::vector<char> is_constrained_for_ever_;  // (own)
   double next_release_s_ = std::numeric_limits<double>::infinity();
   std::vector<double> inverse_kg_, braked_kg_s_;  // (own)
-  std::vector<char> is_carried_;                  // (bodies) mass damping leaves rigid motion alone
-  struct Hinge {
-    bool is_there = false;
-    Vec3 point_m{}, axis{};  // unit; 0 where all nodes are one point
-  };
-  std::vector<Hinge> hinges_;  // (bodies)
+  std::vector<char> is_carried_;                  // (bodies) with mass damping that leaves rigid motion alone
+  std::vector<Hinge> hinges_;                     // (bodies)
   bool is_braked_ = false, has_carried_ = false, has_external_ = false, begun_ = false;
   std::vector<Quad> u_, v_, f_, external_, work_, brake_loss_, carried_;
   std::vector<Quad> home_, reaction_;  // (own) of constrained nodes: displacement at the start, reaction force

@@ -6,13 +6,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "precompute/transient/vectors.hpp"
 #include "runtime/base/instructions.hpp"
-#include "runtime/base/vector.hpp"
 
 namespace carillon::transient {
 namespace {
-
-Vec3 get_vector(const Quad& q) { return {q.x, q.y, q.z}; }
 
 /// Twice the tangent of half the dihedral angle at the edge from a to b, c on its left and d on its right.
 double calc_turn(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
@@ -146,7 +144,7 @@ double Sheets::calc_energy(std::size_t k, const Quad* x) const {
   std::array<double, kConstants> c{};
   for (std::size_t i = 0; i < kConstants; ++i) c[i] = block.constant[i][lane];
   std::array<Vec3, 6> at{};
-  for (std::size_t i = 0; i < 6; ++i) at[i] = get_vector(x[block.read[i][lane]]);
+  for (std::size_t i = 0; i < 6; ++i) at[i] = to_vector(x[block.read[i][lane]]);
   const Vec3 d1 = at[1] - at[0], d2 = at[2] - at[0], f1 = c[0] * d1, f2 = c[1] * d1 + c[2] * d2;
   const double e11 = 0.5 * (dot(f1, f1) - 1.0), e22 = 0.5 * (dot(f2, f2) - 1.0), e12 = 0.5 * dot(f1, f2);
   double energy = 0.5 * c[3] * (e11 + e22) * (e11 + e22) + 0.5 * c[4] * (e11 * e11 + e22 * e22 + 2.0 * e12 * e12);

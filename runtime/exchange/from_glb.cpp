@@ -26,6 +26,7 @@
 #include "runtime/base/json.hpp"
 #include "runtime/base/printable.hpp"
 #include "runtime/base/sort_order.hpp"
+#include "runtime/base/used_points.hpp"
 #include "runtime/base/vector.hpp"
 #include "runtime/exchange/damped.hpp"
 #include "runtime/exchange/glb.hpp"
@@ -278,17 +279,11 @@ class Reader {
 
   /// Removes points outside all triangles.
   void drop_unused_points() {
-    std::vector<std::int32_t> number(model_.positions.size(), -1);
-    for (const auto& triangle : model_.triangles)
-      for (const std::int32_t v : triangle) number[static_cast<std::size_t>(v)] = 0;
-    for (std::size_t v = 0; v < number.size(); ++v)
-      if (number[v] == 0) {
-        number[v] = static_cast<std::int32_t>(used_.size());
-        used_.push_back(v);
-      }
+    base::UsedPoints used = base::find_used_points(model_.triangles, model_.positions.size());
+    used_ = std::move(used.points);
     for (auto& triangle : model_.triangles)
-      for (std::int32_t& v : triangle) v = number[static_cast<std::size_t>(v)];
-    if (const std::size_t dropped = number.size() - used_.size(); dropped > 0)
+      for (std::int32_t& v : triangle) v = used.number[static_cast<std::size_t>(v)];
+    if (const std::size_t dropped = used.number.size() - used_.size(); dropped > 0)
       notes_.push_back(fmt::format("{} of its points belong to no triangle and were dropped", dropped));
   }
 
@@ -467,7 +462,7 @@ class Reader {
     const std::size_t modes = model_.freq_hz.size(), points = used_.size();
     const double node_scale = find_scale();
     bank::Bank bank;
-    for (const std::size_t v : used_) bank.vertices_m.push_back(model_.positions[v]);
+    for (const std::int32_t v : used_) bank.vertices_m.push_back(model_.positions[static_cast<std::size_t>(v)]);
     bank.triangles = model_.triangles;
     bank.material = read_material(extension, model);
     const bool is_of_unscaled_body = is_of_unscaled(model, node_scale, calc_solid(bank).volume_m3, bank.material.density_kg_m3);
@@ -483,7 +478,7 @@ class Reader {
       bank.decay_per_s.push_back(model_.decay_per_s[order[m]]);
       for (std::size_t v = 0; v < points; ++v)
         for (std::size_t c = 0; c < 3; ++c) {
-          const double phi = model_.shapes.get(order[m] * model_.positions.size() + used_[v], c);
+          const double phi = model_.shapes.get(order[m] * model_.positions.size() + static_cast<std::size_t>(used_[v]), c);
           if (!std::isfinite(phi)) model.fail("shapes", fmt::format("mode {} moves point {} by {}", order[m], v, phi));
           shapes[(v * modes + m) * 3 + c] = phi;
         }
@@ -515,7 +510,7 @@ class Reader {
   base::Object root_;
   std::size_t number_ = 0;  // of the model
   Model model_;
-  std::vector<std::size_t> used_;  // points in triangles, of a model of another program
+  std::vector<std::int32_t> used_;  // points in triangles, of a model of another program
   std::vector<std::string> notes_;
   std::map<std::string, bank::FieldBytes> fields_;
 };

@@ -46,7 +46,7 @@ void read_head(base::Object& object, Mallet& mallet) {
     for (const char* key : {"radius_m", "material", "young_modulus_pa", "poisson_ratio"}) {
       if (object.has(key)) object.fail(key, "is of a hard head, and there is a \"felt\"; keep one of them");
     }
-    mallet.felt = Felt{.stiffness_n_m_p = read_amount(*felt, "stiffness_n_m_p", 1e-3, 1e30)};
+    mallet.felt = Felt{.stiffness_n_m_p = read_within(*felt, "stiffness_n_m_p", 1e-3, 1e30)};
     mallet.felt->exponent = read_within(*felt, "exponent", mallet.felt->exponent, 1.0, 6.0);
     mallet.restitution = kFeltRestitution;
     felt->finish();
@@ -56,8 +56,8 @@ void read_head(base::Object& object, Mallet& mallet) {
   if (read_material(object, mallet.young_modulus_pa, mallet.poisson_ratio) == nullptr && !object.has("young_modulus_pa"))
     object.fail("young_modulus_pa",
                 "is missing; say how hard the head is: \"material\" or \"young_modulus_pa\", and \"radius_m\", or \"felt\"");
-  if (object.has("young_modulus_pa")) mallet.young_modulus_pa = read_amount(object, "young_modulus_pa", kSoftestPa, kStiffestPa);
-  mallet.radius_m = read_amount(object, "radius_m", 1e-4, 10.0);
+  if (object.has("young_modulus_pa")) mallet.young_modulus_pa = read_within(object, "young_modulus_pa", kSoftestPa, kStiffestPa);
+  mallet.radius_m = read_within(object, "radius_m", 1e-4, 10.0);
   mallet.poisson_ratio = object.number_or("poisson_ratio", mallet.poisson_ratio, {-1.0, 0.5});
 }
 
@@ -65,8 +65,8 @@ Mallet read_mallet(base::Object& object, std::vector<std::string>& warnings) {
   Mallet mallet;
   const bool is_derived = object.has("from");
   if (is_derived) mallet = read_named_mallet(object, "from");
-  if (!is_derived || object.has("mass_kg")) mallet.mass_kg = read_amount(object, "mass_kg", 1e-6, 1e3);
-  if (!is_derived || object.has("speed_m_s")) mallet.speed_m_s = read_amount(object, "speed_m_s", 1e-6, kMaxSpeedMs);
+  if (!is_derived || object.has("mass_kg")) mallet.mass_kg = read_within(object, "mass_kg", 1e-6, 1e3);
+  if (!is_derived || object.has("speed_m_s")) mallet.speed_m_s = read_within(object, "speed_m_s", 1e-6, kMaxSpeedMs);
   const bool has_head = object.has("felt") || object.has("material") || object.has("young_modulus_pa") || object.has("radius_m");
   if (!is_derived || has_head) read_head(object, mallet);
   const double sphere_kg_m3 = mallet.felt ? 0.0 : mallet.mass_kg / (4.0 / 3.0 * std::numbers::pi * std::pow(mallet.radius_m, 3));

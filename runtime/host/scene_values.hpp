@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <string_view>
 
-#include "runtime/base/document.hpp"
+#include "runtime/base/ranges.hpp"
 #include "runtime/base/vector.hpp"
 #include "runtime/material/material.hpp"
 
@@ -17,15 +17,13 @@ inline constexpr double kRoughestM = 1e-3;    // a higher roughness is a shape
 inline constexpr double kSoftestPa = 100.0;   // a jelly; the touch of a body lasts as long as a person's step on less
 inline constexpr double kStiffestPa = 1e13;   // ten times a diamond
 
-/// Three numbers, each of at most `limit` in size.
-Vec3 read_vector(base::Object& object, std::string_view key, const Vec3& fallback, double limit);
+using base::read_vector;
+using base::read_within;
+
+/// read_vector() of a required key.
 Vec3 read_required_vector(base::Object& object, std::string_view key, double limit = kFarthestM);
 /// A direction, of length 1.
 Vec3 read_direction(base::Object& object, std::string_view key);
-/// A number from low to high, both included.
-double read_within(base::Object& object, std::string_view key, double fallback, double low, double high);
-/// The same of a required number.
-double read_amount(base::Object& object, std::string_view key, double low, double high);
 /// The elastic constants of the key "material", which the object's own constants may follow; nullptr without the key.
 const material::Material* read_material(base::Object& object, double& young_modulus_pa, double& poisson_ratio);
 

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <iterator>
 
+#include "runtime/base/ranges.hpp"
 #include "runtime/material/solids.hpp"
 #include "runtime/material/table.hpp"
 
@@ -50,19 +51,12 @@ const Base& find_base(const std::vector<Base>& list, const std::string& name) {
   return *std::find_if(list.begin(), list.end(), [&](const Base& base) { return base.name == name; });
 }
 
-/// A number from 0 to `max`.
-double read_amount(base::Object& object, std::string_view key, double fallback, double max) {
-  const double value = object.number_or(key, fallback);
-  if (!(value >= 0.0 && value <= max)) object.fail(key, fmt::format("{:g} is out of range; give a number from 0 to {:g}", value, max));
-  return value;
-}
-
 Base read_lumped(base::Object& object) {
   Base base{.kind = BaseKind::kLumped};
-  base.mass_kg = read_amount(object, "mass_kg", 0.0, kMaxMassKg);
-  base.damping_n_s_m = read_amount(object, "damping_n_s_m", 0.0, kMaxDampingNsM);
-  base.stiffness_n_m = read_amount(object, "stiffness_n_m", 0.0, kMaxStiffnessNM);
-  base.loss_factor = read_amount(object, "loss_factor", 0.0, kMaxLoss);
+  base.mass_kg = base::read_within(object, "mass_kg", 0.0, 0.0, kMaxMassKg);
+  base.damping_n_s_m = base::read_within(object, "damping_n_s_m", 0.0, 0.0, kMaxDampingNsM);
+  base.stiffness_n_m = base::read_within(object, "stiffness_n_m", 0.0, 0.0, kMaxStiffnessNM);
+  base.loss_factor = base::read_within(object, "loss_factor", 0.0, 0.0, kMaxLoss);
   object.finish();
   return base;
 }
@@ -70,11 +64,6 @@ Base read_lumped(base::Object& object) {
 /// A wall of another thickness or material.
 Base read_wall(base::Object& object) {
   Base base{.kind = BaseKind::kPlate, .loss_factor = 0.01};
-  const auto read = [&](const char* key, double min, double max) {
-    const double value = object.number(key, base::kPositive);
-    if (!(value >= min && value <= max)) object.fail(key, fmt::format("{:g} is out of range; give {:g} to {:g}", value, min, max));
-    return value;
-  };
   if (object.has("material")) {
     const Material& material = MaterialTable::get().require(object.find_place("material"), object.string("material")).material;
     base.young_modulus_pa = material.young_modulus_pa;
@@ -83,11 +72,12 @@ Base read_wall(base::Object& object) {
     base.loss_factor = 2.0 * material.calc_decay_per_s(kWallRad2S2) / std::sqrt(kWallRad2S2);
   }
   if (!object.has("material") || object.has("young_modulus_pa"))
-    base.young_modulus_pa = read("young_modulus_pa", kMinStiffnessPa, kMaxStiffnessPa);
-  if (!object.has("material") || object.has("density_kg_m3")) base.density_kg_m3 = read("density_kg_m3", kMinDensityKgM3, kMaxDensityKgM3);
-  base.thickness_m = read("thickness_m", 1e-6, kMaxThicknessM);
+    base.young_modulus_pa = base::read_within(object, "young_modulus_pa", kMinStiffnessPa, kMaxStiffnessPa);
+  if (!object.has("material") || object.has("density_kg_m3"))
+    base.density_kg_m3 = base::read_within(object, "density_kg_m3", kMinDensityKgM3, kMaxDensityKgM3);
+  base.thickness_m = base::read_within(object, "thickness_m", 1e-6, kMaxThicknessM);
   base.poisson_ratio = object.number_or("poisson_ratio", base.poisson_ratio, {-1.0, 0.5});
-  base.loss_factor = read_amount(object, "loss_factor", base.loss_factor, kMaxLoss);
+  base.loss_factor = base::read_within(object, "loss_factor", base.loss_factor, 0.0, kMaxLoss);
   object.finish();
   return base;
 }
@@ -146,7 +136,7 @@ std::optional<Fixing> read_fixing(base::Object& object) {
     fixing.joint = object.choice("joint", list_joint_names());
     fixing.joint_loss = std::find_if(kJoints.begin(), kJoints.end(), [&](const Joint& joint) { return fixing.joint == joint.name; })->loss;
   } else {
-    fixing.joint_loss = read_amount(object, "loss", 0.0, kMaxLoss);
+    fixing.joint_loss = base::read_within(object, "loss", 0.0, 0.0, kMaxLoss);
   }
   return fixing;
 }

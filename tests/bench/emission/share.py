@@ -3,19 +3,14 @@
 
 usage: share.py BIN_DIR [BODY...]       of BODIES; CARILLON_INSTRUCTIONS=avx2 or plain takes fewer instructions
 """
-import json
 import pathlib
 import subprocess
 import sys
 import tempfile
 
-METAL = {
-    "young_modulus_pa": 70e9,
-    "poisson_ratio": 0.33,
-    "density_kg_m3": 2700,
-    "damping": {"rayleigh": {"alpha1_s": 1e-8, "alpha2_per_s": 2}},
-}
-STEEL = METAL | {"young_modulus_pa": 200e9, "poisson_ratio": 0.3, "density_kg_m3": 7850}
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "system/simulate"))
+from jobs import ALUMINIUM, PROGRAM, STEEL, write_job
+
 BAR = {"length_m": 0.2, "width_m": 0.02, "thickness_m": 0.01}
 PLATE = {"length_m": 0.2, "width_m": 0.2, "thickness_m": 0.006, "nodes": 3000}
 SHEET = {"shape": "rectangle", "length_m": 0.3, "width_m": 0.3, "thickness_m": 0.001, "cells": 24}
@@ -28,9 +23,12 @@ def blow(*point_m):
 
 
 BODIES = {
-    "plate, T4": ({"shape": {"plate": PLATE}, "element": "T4", "material": METAL, "fixed": "x-min"}, blow(0, 0, 0.003)),
-    "bar, T10": ({"shape": {"bar": BAR | {"nodes": 600}}, "material": METAL, "fixed": "x-min"}, blow(0.1, 0, 0.005)),
-    "small bar, T4": ({"shape": {"bar": BAR | {"nodes": 150}}, "element": "T4", "material": METAL, "fixed": "x-min"}, blow(0.1, 0, 0.005)),
+    "plate, T4": ({"shape": {"plate": PLATE}, "element": "T4", "material": ALUMINIUM, "fixed": "x-min"}, blow(0, 0, 0.003)),
+    "bar, T10": ({"shape": {"bar": BAR | {"nodes": 600}}, "material": ALUMINIUM, "fixed": "x-min"}, blow(0.1, 0, 0.005)),
+    "small bar, T4": (
+        {"shape": {"bar": BAR | {"nodes": 150}}, "element": "T4", "material": ALUMINIUM, "fixed": "x-min"},
+        blow(0.1, 0, 0.005),
+    ),
     "sheet": ({"sheet": SHEET, "material": STEEL, "fixed": "rim"}, blow(0, 0, 0)),
     "disc and ball": ({"sheet": DISC, "material": STEEL, "fixed": "rim"}, {"strikers": [BALL]}),
 }
@@ -38,15 +36,14 @@ SOUND = ("emission::", "memmove", "memset")
 
 
 def main():
-    program = pathlib.Path(sys.argv[1]).resolve() / "carillon-simulate"
     with tempfile.TemporaryDirectory(prefix="carillon-share-") as scratch:
         job, samples = pathlib.Path(scratch) / "job.json", pathlib.Path(scratch) / "samples"
         for name in sys.argv[2:] or BODIES:
             body, blows = BODIES[name]
-            job.write_text(json.dumps({"simulate": {"duration_s": 0.006, "bodies": [{"name": "b"} | body]} | blows, "sound": "sound.wav"}))
+            write_job(job, {"simulate": {"duration_s": 0.006, "bodies": [{"name": "b"} | body]} | blows, "sound": "sound.wav"})
             counts = [0, 0]
             for _ in range(3):
-                subprocess.run(["perf", "record", "-F", "5000", "-q", "-o", samples, program, "-q", job], check=True, capture_output=True)
+                subprocess.run(["perf", "record", "-F", "5000", "-q", "-o", samples, PROGRAM, "-q", job], check=True, capture_output=True)
                 report = ["perf", "report", "-i", samples, "--stdio", "-F", "sample,symbol"]
                 for line in subprocess.run(report, check=True, capture_output=True, text=True).stdout.splitlines():
                     count = line.split()[0] if line.strip() else ""

@@ -1,6 +1,7 @@
 // Moving, turning and coupled sources, receivers, changes of the step, checkpoints.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -56,6 +57,33 @@ TEST(Sound, AToneIsTheSameThroughAChangeOfTheStep) {
   sound.finish();
   const auto changed = sound.calc_sound(0);
   for (std::size_t n = 0; n < whole.size(); ++n) EXPECT_NEAR(changed[n], whole[n], 2e-3 * find_most(whole)) << n;
+}
+
+TEST(Sound, TheImpulsesOfAClosedSurfaceAreThoseOfItsVolume) {
+  // From rest to rest the integral of the pressure is 0, and the integral of that rho dV / (4 pi r), of one pole as of monopoles.
+  bem::testing::Skin skin = bem::testing::make_ball(2, 0.01);
+  const auto part = make_part(skin);
+  const auto shape = [](const Vec3& x) { return Vec3{0.01 * x[0], -0.004 * x[1], 0.002 * x[2]}; };
+  const auto time = [](double t) {
+    const double part = std::clamp((t - 0.001) / 0.003, 0.0, 1.0);
+    return part * part * part * (10.0 - part * (15.0 - 6.0 * part));
+  };
+  double change = -calc_volume(skin);
+  for (Vec3& x : skin.nodes_m) x = x + shape(x);
+  change += calc_volume(skin);
+  Options options = make_options(500, {0.3, 0.0, 0.4});
+  for (const Radiation radiation : {Radiation::kKirchhoff, Radiation::kRayleigh}) {
+    options.radiation = radiation;
+    double sum = 0.0, twice = 0.0, size = 0.0;
+    for (const double pressure : hear_shape(part, options, shape, time)) {
+      sum += pressure / options.sample_rate_hz;
+      twice += sum / options.sample_rate_hz;
+      size += std::abs(pressure) / options.sample_rate_hz;
+    }
+    const double sources = radiation == Radiation::kRayleigh ? 2.0 : 1.0;
+    EXPECT_LT(std::abs(sum), 1e-6 * size);
+    EXPECT_NEAR(twice / (sources * kRho * change / (2.0 * kTwoPi * 0.5)), 1.0, 2e-4);
+  }
 }
 
 TEST(Sound, ASwingingSourceIsHeardAsItsRetardedPotential) {
