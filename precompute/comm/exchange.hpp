@@ -120,10 +120,26 @@ auto all_to_all(const Communicator& comm, Items&& items, FindReceiver&& find_rec
   });
 }
 
-/// All items on rank 0, in the order of the ranks; empty elsewhere. `items`: a vector, or what returns one.
-template <typename Items>
-auto gather(const Communicator& comm, Items&& items) {
-  return all_to_all(comm, std::forward<Items>(items), [](const auto&) { return 0; }).items;
+/// All items on rank 0, in the order of the ranks; empty elsewhere.
+template <Plain T>
+std::vector<T> gather(const Communicator& comm, const std::vector<T>& items) {
+  Exchange exchange(comm, comm.agree([&] {
+    std::vector<std::int64_t> begin(static_cast<std::size_t>(comm.size()) + 1, static_cast<std::int64_t>(items.size()));
+    begin.front() = 0;
+    return begin;
+  }));
+  auto received = comm.agree([&] {
+    exchange.reserve(sizeof(T));
+    return std::vector<T>(static_cast<std::size_t>(exchange.received_count()));
+  });
+  exchange.forward(items.data(), received.data());
+  return received;
+}
+
+/// Gathers the vector that `make` returns.
+template <std::invocable Make>
+auto gather(const Communicator& comm, Make&& make) {
+  return gather(comm, comm.agree(std::forward<Make>(make)));
 }
 
 /// Asks for every question the rank that find_owner(question) names. There answer(question) returns an Answer, or answer(questions), which

@@ -47,7 +47,7 @@ with tempfile.TemporaryDirectory(prefix="carillon-simulate-") as scratch:
     ):
         write_job(folder / "job.json", job)
         said[name] = predict(folder, *words)
-        saves = ["--checkpoint-every", "2"] if words else []
+        saves = ["--checkpoint-every", "0.1"] if words else []
         took = measure_bytes(folder, *words, *saves)
         memory = said[name]["memory_bytes_a_rank"]
         print(f"{name}: {memory / 1e6:.0f} MB said, {took / 1e6:.0f} MB taken")
