@@ -31,18 +31,21 @@ Given look_at_place(const fs::path& file) {
 
 void check_same(const comm::Communicator& comm, const std::string& what, const Given& given) {
   if (comm.size() == 1) return;
-  std::vector<std::string> first = given.forms;
-  first.insert(first.begin(), given.shown);
-  first = comm.broadcast(std::move(first));
-  const bool is_known = first.size() > 1 && !given.forms.empty();
-  const bool is_same = !is_known || std::any_of(given.forms.begin(), given.forms.end(), [&](const std::string& form) {
-    return std::find(first.begin() + 1, first.end(), form) != first.end();
+  const std::vector<base::Sha256::Hash> own = comm.agree([&] {
+    std::vector<base::Sha256::Hash> sums;
+    for (const std::string& form : given.forms) sums.push_back(base::calc_sha256(form));
+    return sums;
   });
+  const std::vector<base::Sha256::Hash> first = comm.broadcast(std::vector(own));
+  const bool is_known = !first.empty() && !own.empty();
+  const bool is_same = !is_known || std::find_first_of(own.begin(), own.end(), first.begin(), first.end()) != own.end();
+  if (comm.max(std::int32_t{!is_same}) == 0) return;
+  const std::string shown = comm.broadcast(std::string(given.shown));
   comm.agree(is_same
                  ? std::string()
                  : fmt::format("the ranks of one run were given different {}: rank 0 has {}, and rank {} has {}; they do one job together: "
                                "start each job by itself (mpirun -np N ... JOB.json), or all by carillon submit",
-                               what, first[0], comm.rank(), given.shown));
+                               what, shown, comm.rank(), given.shown));
 }
 
 }  // namespace carillon::run
