@@ -79,8 +79,23 @@ void TouchSets::search(Pair& pair, double step_s) {
     contact.touch = touch;
     pair.contacts.push_back(contact);
   }
+  keep_deeper(pair, old);
   remove_false(pair);
   complete(pair, frame_a, bodies_.get_frame(pair.b), 0.0);
+}
+
+/// Of touches that a search has not found again those that are deeper than all found: they were added.
+void TouchSets::keep_deeper(Pair& pair, const std::vector<Contact>& old) const {
+  const shape::Frame a = bodies_.get_frame(pair.a), b = bodies_.get_frame(pair.b);
+  const double least_m = std::min(find_least(pair, a, b).second, pair.margin_m);
+  const auto is_found = [&](const Contact& c) {
+    return std::any_of(found_.begin(), found_.end(), [&](const shape::Touch& touch) { return touch.id == c.touch.id; });
+  };
+  for (const Contact& c : old) {
+    if (is_found(c)) continue;
+    const shape::Touch touch = find_moved(pair, c.touch, a, b);
+    if (touch.gap_m < least_m - kMissing) pair.contacts.emplace_back(c).touch = touch;
+  }
 }
 
 void TouchSets::refresh(Pair& pair) const {
