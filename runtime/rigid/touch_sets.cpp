@@ -16,6 +16,7 @@ namespace {
 
 constexpr double kDoubtful = 2e-4;   // m; deeper touches of curved surfaces are confirmed
 constexpr double kMissing = 5e-6;    // m; a place deeper than all touches by this is missing
+constexpr double kSame = 0.02;       // of the size: touches so near are one
 constexpr double kSagDecay = 10e-3;  // s
 
 /// Lower bound of the gap of any vertex of a body over the ground, from that at an earlier frame.
@@ -79,22 +80,24 @@ void TouchSets::search(Pair& pair, double step_s) {
     contact.touch = touch;
     pair.contacts.push_back(contact);
   }
-  keep_deeper(pair, old);
+  keep_added(pair, old);
   remove_false(pair);
   complete(pair, frame_a, bodies_.get_frame(pair.b), 0.0);
 }
 
-/// Of touches that a search has not found again those that are deeper than all found: they were added.
-void TouchSets::keep_deeper(Pair& pair, const std::vector<Contact>& old) const {
+/// Of added touches those that a search has not found again, and that are deeper than all found, or sharp and closed.
+void TouchSets::keep_added(Pair& pair, const std::vector<Contact>& old) const {
   const shape::Frame a = bodies_.get_frame(pair.a), b = bodies_.get_frame(pair.b);
   const double least_m = std::min(find_least(pair, a, b).second, pair.margin_m);
-  const auto is_found = [&](const Contact& c) {
-    return std::any_of(found_.begin(), found_.end(), [&](const shape::Touch& touch) { return touch.id == c.touch.id; });
+  const double near_m = kSame * bodies_.calc_size(pair.a, pair.b);
+  const auto is_found = [&](const shape::Touch& touch) {
+    return std::any_of(found_.begin(), found_.end(),
+                       [&](const shape::Touch& found) { return found.id == touch.id || norm(found.where_m - touch.where_m) < near_m; });
   };
   for (const Contact& c : old) {
-    if (is_found(c)) continue;
     const shape::Touch touch = find_moved(pair, c.touch, a, b);
-    if (touch.gap_m < least_m - kMissing) pair.contacts.emplace_back(c).touch = touch;
+    const double most_m = touch.smooth ? least_m - kMissing : std::max(least_m - kMissing, kTouch);
+    if (touch.gap_m <= most_m && !is_found(touch)) pair.contacts.emplace_back(c).touch = touch;
   }
 }
 
