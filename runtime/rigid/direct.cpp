@@ -10,6 +10,7 @@
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "runtime/rigid/solver.hpp"
 
@@ -19,10 +20,13 @@ namespace {
 using Block = Eigen::Matrix<double, 6, 6>;
 using Row6 = Eigen::Matrix<double, 6, 1>;
 
-constexpr double kCompliance = 1e-5;  // of the mobility of a row
+constexpr double kCompliance = 1e-3;  // of the mobility of a row: of one body,
+constexpr double kLeast = 1e-5;       // and at least
 constexpr double kAtCone = 0.9999;    // of the bound on friction: slides
 constexpr int kIterations = 12;       // of one guess,
-constexpr double kExact = 1e-10;      // of the velocities asked for: residual at which they end
+constexpr double kExact = 1e-10;      // of the velocities asked for: residual at which they end,
+constexpr double kStagnates = 0.9;    // or where it is more than this part of the one before: points that hold contradict each other
+constexpr double kNearBound = 0.5;    // of its bound: a couple that was larger in the step before is at it in the first guess
 constexpr int kDense = 12;            // bodies; more are factorised as a sparse matrix
 
 enum class Hold : char { kOpen, kSticks, kSlides };
@@ -33,12 +37,13 @@ Row6 make_row(const Vec3& linear, const Vec3& angular) {
   return r;
 }
 
-/// A couple, brought back to the bounds that the push of its point sets it.
-Vec3 clamp_couple(const Point& p, const Vec3& couple, double push) {
-  const double limit = p.rolling_m * push, twist = dot(couple, p.normal);
-  const Vec3 roll = couple - twist * p.normal;
-  const double size = norm(roll);
-  return (size > limit ? limit / size : 1.0) * roll + std::clamp(twist, -p.twisting_m * push, p.twisting_m * push) * p.normal;
+/// Of the mobility of a row. Rows that contradict each other by 1e-9 m/s, as those of a rolling body that touches at two places, must not
+/// give impulses that leave the cone; chains of many or unequal bodies must be stiff to converge.
+double choose_compliance(const std::vector<Mover>& movers) {
+  const auto [least, most] =
+      std::minmax_element(movers.begin(), movers.end(), [](const Mover& x, const Mover& y) { return x.inverse_mass < y.inverse_mass; });
+  const auto count = static_cast<double>(movers.size());
+  return std::max(kLeast, kCompliance * least->inverse_mass / (most->inverse_mass * count * count));
 }
 
 /// The matrix of a guess: blocks of 6 x 6 for pairs of bodies that touch, lower triangle. Its pattern is the same for all guesses.
@@ -129,7 +134,11 @@ class System {
 class Guess {
  public:
   Guess(const std::vector<Mover>& free, const std::vector<Point>& points)
-      : free_(free), points_(points), system_(static_cast<int>(free.size()), points), right_(6 * static_cast<int>(free.size())) {
+      : free_(free),
+        points_(points),
+        compliance_(choose_compliance(free)),
+        system_(static_cast<int>(free.size()), points),
+        right_(6 * static_cast<int>(free.size())) {
     for (const Point& p : points) scale_ = std::max(scale_, norm(p.wanted - calc_relative_velocity(free, p)));
   }
   /// The next point. Masses: impulse per velocity along the normal, couple per spin (0: none). `is_swept`: its impulse is an answer.
@@ -144,21 +153,32 @@ class Guess {
  private:
   struct Held {
     Hold hold = Hold::kOpen;
-    bool rolls = false;  // its couple is at its bound
+    bool rolls = false, twists = false;  // its couple against that is at its bound
     double stiffness = 0.0, turning_mass = 0.0;
     std::array<Vec3, 3> axes{};
     Vec3 sliding{}, impulse{}, couple{};
-    bool sticks_turning() const { return turning_mass > 0.0 && !rolls; }
+    /// The parts of a spin or couple along ways to turn that are held, and along the others.
+    Vec3 hold_turning(const Vec3& turning) const {
+      if (rolls && twists) return {};
+      const Vec3 twist = dot(turning, axes[0]) * axes[0];
+      return rolls ? twist : twists ? turning - twist : turning;
+    }
+    Vec3 free_turning(const Vec3& turning) const { return turning - hold_turning(turning); }
+    bool holds_turning(int axis) const { return turning_mass > 0.0 && !(axis == 0 ? twists : rolls); }
   };
 
   void assemble();
+  bool factorise();
+  void move(std::vector<Mover>& movers) const;
   double iterate(std::vector<Mover>& movers);
   Hold correct_hold(const std::vector<Mover>& movers, const Point& p, Held& held, bool may_stick, bool& confirmed);
   bool correct_couple(const std::vector<Mover>& movers, const Point& p, Held& held, double push, bool may_stick);
 
   const std::vector<Mover>& free_;
   const std::vector<Point>& points_;
-  std::vector<Held> held_;  // of the points
+  double compliance_;
+  std::vector<Held> held_;      // of the points
+  bool is_factorised_ = false;  // with the points that hold now
   System system_;
   Eigen::VectorXd right_;
   double scale_ = 0.0;  // m/s
@@ -167,7 +187,7 @@ class Guess {
 void Guess::add(double normal_mass, double turning_mass, bool is_swept) {
   const Point& p = points_[held_.size()];
   Held& held = held_.emplace_back();
-  held.stiffness = normal_mass / kCompliance;
+  held.stiffness = normal_mass / compliance_;
   held.turning_mass = turning_mass;
   const Vec3 tangent = find_across(p.normal);
   held.axes = {p.normal, tangent, cross(p.normal, tangent)};
@@ -176,9 +196,14 @@ void Guess::add(double normal_mass, double turning_mass, bool is_swept) {
   const bool slides = is_swept && push > 0.0 && norm(across) >= kAtCone * p.friction * push;
   if (slides) held.sliding = across;
   held.hold = slides ? Hold::kSlides : push > 0.0 || p.impulse == Vec3{} ? Hold::kSticks : Hold::kOpen;
-  if (turning_mass > 0.0 && push > 0.0 && norm(clamp_couple(p, p.couple, kAtCone * push) - p.couple) > 1e-6 * norm(p.couple)) {
-    held.rolls = true;  // as in the step before
-    held.couple = p.couple;
+  if (turning_mass > 0.0 && push > 0.0) {  // as in the step before, by the present bounds
+    const double twist = dot(p.couple, p.normal), most = p.twisting_m * push;
+    const Vec3 roll = p.couple - twist * p.normal;
+    const double size = norm(roll), limit = p.rolling_m * push;
+    held.twists = std::abs(twist) >= kNearBound * most;
+    held.rolls = size >= kNearBound * limit;
+    if (held.twists) held.couple = std::copysign(most, twist) * p.normal;
+    if (held.rolls && size > 0.0) held.couple = held.couple + (limit / size) * roll;
   }
 }
 
@@ -197,30 +222,44 @@ void Guess::assemble() {
     for (int k = 0; k < (held.hold == Hold::kSticks ? 3 : 1); ++k)
       system_.add(p.a, make_row(held.axes[k], cross(p.arm_a, held.axes[k])), p.b, -make_row(held.axes[k], cross(p.arm_b, held.axes[k])),
                   held.stiffness);
-    if (!held.sticks_turning()) continue;
-    for (const Vec3& axis : held.axes) system_.add(p.a, make_row({}, axis), p.b, -make_row({}, axis), held.turning_mass / kCompliance);
+    for (int k = 0; k < 3; ++k)
+      if (held.holds_turning(k))
+        system_.add(p.a, make_row({}, held.axes[k]), p.b, -make_row({}, held.axes[k]), held.turning_mass / compliance_);
   }
 }
 
-bool Guess::solve(std::vector<Mover>& movers) {
+/// Begins a new system of the points that hold at zero impulses.
+bool Guess::factorise() {
+  if (is_factorised_) return true;
   assemble();
-  movers = free_;
-  for (int i = 0; Held & held : held_) {
-    const Point& p = points_[i++];
-    held.impulse = {};
-    if (held.hold == Hold::kSlides) {
-      held.impulse = held.sliding;
-      apply(movers, p, held.sliding);
-    }
-    if (held.hold == Hold::kOpen || held.sticks_turning())
-      held.couple = {};
-    else if (held.turning_mass > 0.0)
-      turn(movers, p, held.couple);
+  for (Held& held : held_) {
+    held.impulse = held.hold == Hold::kSlides ? held.sliding : Vec3{};
+    held.couple = held.hold == Hold::kOpen ? Vec3{} : held.free_turning(held.couple);
   }
-  if (!system_.factorise()) return false;
-  for (int again = 0; again < kIterations && iterate(movers) > kExact * scale_; ++again) {
+  is_factorised_ = system_.factorise();
+  return is_factorised_;
+}
+
+bool Guess::solve(std::vector<Mover>& movers) {
+  if (!factorise()) return false;
+  move(movers);
+  double before = std::numeric_limits<double>::infinity();
+  for (int again = 0; again < kIterations; ++again) {
+    const double left = iterate(movers);
+    if (left <= kExact * scale_ || left > kStagnates * before) break;
+    before = left;
   }
   return true;
+}
+
+/// The velocities that all impulses give.
+void Guess::move(std::vector<Mover>& movers) const {
+  movers = free_;
+  for (int i = 0; const Held& held : held_) {
+    const Point& p = points_[i++];
+    if (held.impulse != Vec3{}) apply(movers, p, held.impulse);
+    if (held.couple != Vec3{}) turn(movers, p, held.couple);
+  }
 }
 
 /// One correction of the impulses; returns the residual before it [m/s].
@@ -241,9 +280,9 @@ double Guess::iterate(std::vector<Mover>& movers) {
     const Vec3 pull = held.stiffness * left[n];
     add(p.a, make_row(pull, cross(p.arm_a, pull)));
     add(p.b, -make_row(pull, cross(p.arm_b, pull)));
-    if (!held.sticks_turning()) continue;
-    left_spin[n] = -1.0 * calc_relative_spin(movers, p);
-    const Vec3 couple = (held.turning_mass / kCompliance) * left_spin[n];
+    if (!(held.turning_mass > 0.0)) continue;
+    left_spin[n] = -1.0 * held.hold_turning(calc_relative_spin(movers, p));
+    const Vec3 couple = (held.turning_mass / compliance_) * left_spin[n];
     add(p.a, make_row({}, couple));
     add(p.b, -make_row({}, couple));
   }
@@ -264,8 +303,8 @@ double Guess::iterate(std::vector<Mover>& movers) {
     const Vec3 more = held.stiffness * (left[n] - moved);
     held.impulse = held.impulse + more;
     apply(movers, p, more);
-    if (!held.sticks_turning()) continue;
-    const Vec3 couple = (held.turning_mass / kCompliance) * (left_spin[n] - turned);
+    if (!(held.turning_mass > 0.0)) continue;
+    const Vec3 couple = (held.turning_mass / compliance_) * (left_spin[n] - held.hold_turning(turned));
     held.couple = held.couple + couple;
     turn(movers, p, couple);
   }
@@ -279,7 +318,7 @@ bool Guess::correct(const std::vector<Mover>& movers, bool may_stick) {
     const double push = dot(held.impulse, p.normal);
     const Hold now = correct_hold(movers, p, held, may_stick, confirmed);
     if (held.turning_mass > 0.0 && !correct_couple(movers, p, held, std::max(push, 0.0), may_stick)) confirmed = false;
-    if (now != held.hold) confirmed = false;
+    if (now != held.hold) confirmed = is_factorised_ = false;
     held.hold = now;
   }
   return confirmed;
@@ -317,31 +356,32 @@ Hold Guess::correct_hold(const std::vector<Mover>& movers, const Point& p, Held&
   return Hold::kSlides;
 }
 
-/// A couple that sticks and would have to be above its bound rolls from now on. One that rolls is at its bound against the spin as it is
-/// now, and sticks again where less would stop that. True where it stays as guessed.
+/// A couple that holds and would have to be above its bound turns from now on, about the normal or across it. One that turns is at its
+/// bound against the spin as it is now, and holds again where less would stop that. True where it stays as guessed.
 bool Guess::correct_couple(const std::vector<Mover>& movers, const Point& p, Held& held, double push, bool may_stick) {
-  const Vec3 free_couple = held.rolls ? held.couple - held.turning_mass * calc_relative_spin(movers, p) : held.couple;
-  const Vec3 bounded = clamp_couple(p, free_couple, push);
-  const bool is_bound = norm(bounded - free_couple) > 1e-9 * norm(bounded);
-  if (!held.rolls && !is_bound) return true;
-  if (held.rolls && !is_bound && may_stick) {
-    held.rolls = false;
-    return false;
-  }
-  const bool stays = held.rolls && !(norm(bounded - held.couple) > 1e-3 * (p.rolling_m + p.twisting_m) * push);
-  held.rolls = true;
+  const Vec3 free_couple = held.couple - held.turning_mass * held.free_turning(calc_relative_spin(movers, p));
+  double twist = dot(free_couple, p.normal);
+  Vec3 roll = free_couple - twist * p.normal;
+  bool stays = true;
+  const auto correct = [&](bool& turns, double size, double limit) {
+    const bool is_bound = size >= limit;
+    if (turns != is_bound && (is_bound || may_stick)) turns = is_bound, stays = is_factorised_ = false;
+    return is_bound && size > 0.0 ? limit / size : 1.0;
+  };
+  twist *= correct(held.twists, std::abs(twist), p.twisting_m * push);
+  roll = correct(held.rolls, norm(roll), p.rolling_m * push) * roll;
+  const Vec3 bounded = twist * p.normal + roll;
+  if (norm(bounded - held.couple) > 1e-3 * (p.rolling_m + p.twisting_m) * push) stays = false;
   held.couple = bounded;
   return stays;
 }
 
 void Guess::read(std::vector<Mover>& movers, std::vector<Point>& points) const {
-  movers = free_;
+  move(movers);
   for (int i = 0; const Held& held : held_) {
     Point& p = points[i++];
     p.impulse = held.impulse;
     p.couple = held.couple;
-    apply(movers, p, held.impulse);
-    if (held.turning_mass > 0.0) turn(movers, p, held.couple);
   }
 }
 
