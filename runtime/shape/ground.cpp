@@ -106,13 +106,15 @@ bool carries(const Mesh& mesh, int vertex, const Vec3& normal) {
 bool recall(const PairMemory& memory, const Mat3& rotation, const Vec3& position, const Shape& a, double margin) {
   if (!memory.known) return false;
   double turned = 0.0;
-  Vec3 moved = position - memory.position_m;
+  Vec3 moved = position - memory.position_m, swept{};  // of the middle; of a corner of the box about it, at most
+  const Vec3 half = 0.5 * (a.mesh().box.high - a.mesh().box.low);
   for (int i = 0; i < 3; ++i) {
     const Vec3 row = rotation[i] - memory.rotation[i];
     turned += norm2(row);
     moved[i] += dot(row, a.get_middle_m());
+    for (int k = 0; k < 3; ++k) swept[i] += std::abs(row[k]) * (half[k] + a.skin().get_sag_m());
   }
-  return margin + norm(moved) + std::sqrt(turned) * a.get_radius_m() <= memory.reach_m;
+  return margin + norm(moved) + std::min(std::sqrt(turned) * a.get_radius_m(), norm(swept)) <= memory.reach_m;
 }
 
 void thin(std::vector<Touch>& touches, double spacing, double patch) {
