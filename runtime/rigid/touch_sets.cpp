@@ -88,7 +88,8 @@ void TouchSets::search(Pair& pair, double step_s) {
 /// Of added touches those that a search has not found again, and that are deeper than all found, or sharp and closed.
 void TouchSets::keep_added(Pair& pair, const std::vector<Contact>& old) const {
   const shape::Frame a = bodies_.get_frame(pair.a), b = bodies_.get_frame(pair.b);
-  const double least_m = std::min(find_least(pair, a, b).second, pair.margin_m);
+  double least_m = pair.margin_m;
+  for (const Contact& c : pair.contacts) least_m = std::min(least_m, c.touch.gap_m);
   const double near_m = kSame * bodies_.calc_size(pair.a, pair.b);
   const auto is_found = [&](const shape::Touch& touch) {
     return std::any_of(found_.begin(), found_.end(),
@@ -147,19 +148,18 @@ bool TouchSets::complete(Pair& pair, const shape::Frame& a, const shape::Frame& 
   const shape::Shape& mine = *bodies_.get_shape(pair.a);
   const shape::Shape* theirs = bodies_.get_shape(pair.b);
   shape::Deepest deepest;
-  if (theirs == nullptr)
-    deepest.gap_m = calc_least_gap(pair, mine, a);
-  else
-    deepest = shape::find_deepest(mine, a, *theirs, b, -kMissing);
-  if (deepest.gap_m >= -kMissing) return false;
-  const auto [lowest, least_m] = find_least(pair, a, b);
-  const double missing_m = std::min(least_m, 0.0) - kMissing;
-  if (theirs == nullptr && deepest.gap_m < missing_m) {  // by its bound
-    deepest = shape::find_lowest(mine, a, bodies_.ground()->height_m);
+  if (theirs == nullptr) {
+    if (calc_least_gap(pair, mine, a) >= -kMissing) return false;
+    deepest = shape::find_lowest(mine, a, bodies_.ground()->height_m, pair.memory);
     pair.measured = a;
     pair.lowest_m = deepest.gap_m;
+    if (deepest.gap_m - mine.get_sag_m() >= -kMissing) return false;  // nor is any touch deeper
+  } else {
+    deepest = shape::find_deepest(mine, a, *theirs, b, -kMissing);
+    if (deepest.gap_m >= -kMissing) return false;
   }
-  if (deepest.gap_m < missing_m) return add(pair, deepest), true;
+  const auto [lowest, least_m] = find_least(pair, a, b);
+  if (deepest.gap_m < std::min(least_m, 0.0) - kMissing) return add(pair, deepest), true;
   if (lowest == nullptr || lowest->touch.gap_m <= kTouch || least_m > -kMissing || lowest->rests || !(closing_s > 0.0)) return false;
   lowest->touching = false;
   return std::exchange(lowest->closes_s, closing_s * lowest->touch.gap_m / (lowest->touch.gap_m - least_m)) < 0.0;

@@ -32,6 +32,8 @@ Shape::Shape(std::span<const Vec3> vertices, std::span<const std::array<std::int
 
 Shape::~Shape() = default;
 
+double Shape::get_sag_m() const { return skin_->get_sag_m(); }
+
 double Shape::calc_radius_m(const Vec3& centre) const {
   double max = 0.0;
   for (const Vec3& x : mesh_->vertices) max = std::max(max, norm2(x - centre));

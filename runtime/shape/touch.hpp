@@ -42,6 +42,8 @@ class PairMemory {
   std::vector<Touch> last;          // touches given at the last call, to name those of the next
   std::uint64_t serial = 0;         // of names given
   std::array<int, 2> axis{-1, -1};  // that separated or carried last: kind, index
+  Vec3 up{}, low_up{};              // vertical in the frame of a, when the lowest vertex was last looked for; when those were:
+  std::vector<int> low;             // vertices that may be lowest while the vertical is near that
 };
 
 /// Replaces `out` by the touches not further apart than the margin: at most 4 for each patch of contact.
@@ -58,6 +60,8 @@ struct Deepest {
   bool is_of_a = true;
 };
 Deepest find_lowest(const Shape& a, const Frame& frame, double height_m);
+/// The same from memory, as long as the body leans little from how it did.
+Deepest find_lowest(const Shape& a, const Frame& frame, double height_m, PairMemory& memory);
 /// None (-1) between two polyhedra, whose touches are complete, and where no sample is deeper than `gap_m`.
 Deepest find_deepest(const Shape& a, const Frame& frame_a, const Shape& b, const Frame& frame_b, double gap_m);
 /// The touch of such a vertex, at these or other frames.
