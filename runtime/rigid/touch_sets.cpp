@@ -155,7 +155,7 @@ bool TouchSets::complete(Pair& pair, const shape::Frame& a, const shape::Frame& 
     pair.lowest_m = deepest.gap_m;
     if (deepest.gap_m - mine.get_sag_m() >= -kMissing) return false;  // nor is any touch deeper
   } else {
-    deepest = shape::find_deepest(mine, a, *theirs, b, -kMissing);
+    deepest = shape::find_deepest(mine, a, *theirs, b, -kMissing, pair.memory);
     if (deepest.gap_m >= -kMissing) return false;
   }
   const auto [lowest, least_m] = find_least(pair, a, b);
