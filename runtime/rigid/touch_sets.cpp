@@ -1,4 +1,4 @@
-// Method: a search with a margin of four steps' movement; touches are followed until their pair may have moved by it.
+// Method: a search with a margin of several steps' movement; touches are followed until their pair may have moved by it.
 // Source: runtime/shape/touch.hpp.
 #include "runtime/rigid/touch_sets.hpp"
 
@@ -14,10 +14,12 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr double kDoubtful = 2e-4;   // m; deeper touches of curved surfaces are confirmed
-constexpr double kMissing = 5e-6;    // m; a place deeper than all touches by this is missing
-constexpr double kSame = 0.02;       // of the size: touches so near are one
-constexpr double kSagDecay = 10e-3;  // s
+constexpr double kSteps = 4.0;           // in which a pair moves by the margin of a search,
+constexpr double kStepsOfRolling = 8.0;  // a curved body on the ground: few places come near
+constexpr double kDoubtful = 2e-4;       // m; deeper touches of curved surfaces are confirmed
+constexpr double kMissing = 5e-6;        // m; a place deeper than all touches by this is missing
+constexpr double kSame = 0.02;           // of the size: touches so near are one
+constexpr double kSagDecay = 10e-3;      // s
 
 /// Lower bound of the gap of any vertex of a body over the ground, from that at an earlier frame.
 double calc_least_gap(const Pair& pair, const shape::Shape& shape, const shape::Frame& now) {
@@ -56,7 +58,8 @@ void TouchSets::search(Pair& pair, double step_s) {
   if (pair.cord >= 0) return refresh(pair);
   ++ledger_.costs.searches;
   const double speed = bodies_.calc_closing_speed(pair.a, pair.b) + norm(bodies_.gravity()) * step_s;
-  pair.margin_m = std::min(std::max(2e-4, 4.0 * step_s * speed), kReach * bodies_.calc_size(pair.a, pair.b));
+  const double steps = pair.b < 0 && !bodies_.is_flat(pair.a) ? kStepsOfRolling : kSteps;
+  pair.margin_m = std::min(std::max(2e-4, steps * step_s * speed), kReach * bodies_.calc_size(pair.a, pair.b));
   pair.travelled_m = 0.0;
   pair.searched = true;
   const std::vector<Contact> old = std::exchange(pair.contacts, {});
