@@ -63,6 +63,7 @@ void TouchSets::search(Pair& pair, double step_s) {
   pair.travelled_m = 0.0;
   pair.searched = true;
   const std::vector<Contact> old = std::exchange(pair.contacts, {});
+  pair.ahead.touches.clear();
   found_.clear();
   const shape::Shape& a = *bodies_.get_shape(pair.a);
   const shape::Frame frame_a = bodies_.get_frame(pair.a);
@@ -108,16 +109,22 @@ void TouchSets::keep_added(Pair& pair, const std::vector<Contact>& old) const {
 void TouchSets::refresh(Pair& pair) const {
   if (pair.cord >= 0) return update_cord(bodies_, cords_[pair.cord], pair);
   const shape::Frame a = bodies_.get_frame(pair.a), b = bodies_.get_frame(pair.b);
-  for (Contact& c : pair.contacts) shape::refresh(c.touch, *bodies_.get_shape(pair.a), a, bodies_.get_shape(pair.b), b, pair.memory);
+  const bool is_there = !pair.ahead.touches.empty() && pair.ahead.a == a && pair.ahead.b == b;
+  for (std::size_t k = 0; k < pair.contacts.size(); ++k) {
+    shape::Touch& touch = pair.contacts[k].touch;
+    touch = is_there ? pair.ahead.touches[k] : find_moved(pair, touch, a, b);
+  }
+  pair.ahead.touches.clear();
 }
 
 void TouchSets::remove_false(Pair& pair) const {
   if (pair.b < 0) return;
-  std::erase_if(pair.contacts, [&](const Contact& c) {
+  const auto erased = std::erase_if(pair.contacts, [&](const Contact& c) {
     return c.touch.gap_m < -kDoubtful && c.touch.smooth &&
            !shape::is_overlap(c.touch, *bodies_.get_shape(pair.a), bodies_.get_frame(pair.a), *bodies_.get_shape(pair.b),
                               bodies_.get_frame(pair.b));
   });
+  if (erased > 0) pair.ahead.touches.clear();
 }
 
 void TouchSets::update(Pair& pair, double step_s) {
@@ -140,8 +147,13 @@ void TouchSets::update(Pair& pair, double step_s) {
 /// The touch with the least gap at the frames `a` and `b`, and that gap; none: infinite.
 std::pair<Contact*, double> TouchSets::find_least(Pair& pair, const shape::Frame& a, const shape::Frame& b) const {
   std::pair<Contact*, double> least{nullptr, std::numeric_limits<double>::infinity()};
-  for (Contact& c : pair.contacts)
-    if (const double gap_m = find_moved(pair, c.touch, a, b).gap_m; gap_m < least.second) least = {&c, gap_m};
+  pair.ahead.a = a;
+  pair.ahead.b = b;
+  pair.ahead.touches.clear();
+  for (Contact& c : pair.contacts) {
+    const shape::Touch& moved = pair.ahead.touches.emplace_back(find_moved(pair, c.touch, a, b));
+    if (moved.gap_m < least.second) least = {&c, moved.gap_m};
+  }
   return least;
 }
 
@@ -172,6 +184,7 @@ bool TouchSets::complete(Pair& pair, const shape::Frame& a, const shape::Frame& 
 void TouchSets::add(Pair& pair, const shape::Deepest& deepest) {
   const shape::Shape& mine = *bodies_.get_shape(pair.a);
   const shape::Frame a = bodies_.get_frame(pair.a), b = bodies_.get_frame(pair.b);
+  pair.ahead.touches.clear();
   Contact added;
   added.a = pair.a;
   added.b = pair.b;
