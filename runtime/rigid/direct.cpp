@@ -9,7 +9,6 @@
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "runtime/rigid/solver.hpp"
 
@@ -271,10 +270,10 @@ bool Guess::factorise() {
 bool Guess::solve(std::vector<Mover>& movers) {
   if (!factorise()) return false;
   move(movers);
-  double before = std::numeric_limits<double>::infinity();
+  double before = 0.0;
   for (int again = 0; again < kIterations; ++again) {
-    const double left = iterate(movers);
-    if (left <= kExact * scale_ || left > kStagnates * before) break;
+    const double left = iterate(movers), rate = before > 0.0 ? left / before : 0.0;
+    if (left <= kExact * scale_ || (rate > 0.0 && rate * left <= kExact * scale_) || rate > kStagnates) break;
     before = left;
   }
   return true;
