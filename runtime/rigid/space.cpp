@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kShortest = 1e-9;  // s; a shorter rest of a step is left out
 constexpr int kMaxMissed = 30;      // in a step: instants at which nothing struck after all
+constexpr int kMaxSought = 3;       // of these, until closings by the path are no longer looked for
 constexpr int kMaxCompleted = 4;    // solutions of a step that are repeated with touches that were missing
 constexpr int kMaxImpacts = 4;      // of an island in a step, each at its instant; an island with more is crowded
 constexpr int kMinImpacts = 2;      // the same of the largest islands, each of whose impacts costs more
@@ -112,7 +113,7 @@ void Space::step_island(Island& island, double start_s, double length_s) {
       problem_.predict(step_, h, false);
       problem_.make_points(step_, impacts < max_impacts);
       problem_.solve(step_);
-      if (!touches_.complete(step_, missed == 0)) break;
+      if (!touches_.complete(step_, missed < kMaxSought)) break;
       is_completed = true;
     }
     // Rows stop a touch at the end of a step, half of its way too deep: it strikes at the beginning where it was missing.
