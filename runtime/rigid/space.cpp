@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kShortest = 1e-9;  // s; a shorter rest of a step is left out
 constexpr int kMaxMissed = 30;      // in a step: instants at which nothing struck after all
+constexpr int kMaxSought = 3;       // of these, until closings by the path are no longer looked for
 constexpr int kMaxCompleted = 4;    // solutions of a step that are repeated with touches that were missing
 constexpr int kMaxImpacts = 4;      // of an island in a step, each at its instant; an island with more is crowded
 constexpr int kMinImpacts = 2;      // the same of the largest islands, each of whose impacts costs more
@@ -103,7 +104,8 @@ void Space::step_island(Island& island, double start_s, double length_s) {
     bodies_.set_time(start_s + done);
     modal_impacts_.end_where_touching(step_, touches_);
     const bool may_sleep = !std::exchange(begun, true) && rest_.may_sleep(island.bodies, h);
-    projection_.run(step_, may_sleep ? kDeep : kTooDeep);
+    const double too_deep_m = step_.count() <= options_.max_direct ? kTooDeepAlone : kTooDeep;
+    projection_.run(step_, may_sleep ? kDeep : too_deep_m);
     if (may_sleep && rest_.try_island(island, h)) break;
     touches_.forget_closing(step_);
     bool is_completed = false;
@@ -111,7 +113,7 @@ void Space::step_island(Island& island, double start_s, double length_s) {
       problem_.predict(step_, h, false);
       problem_.make_points(step_, impacts < max_impacts);
       problem_.solve(step_);
-      if (!touches_.complete(step_, missed == 0)) break;
+      if (!touches_.complete(step_, missed < kMaxSought)) break;
       is_completed = true;
     }
     // Rows stop a touch at the end of a step, half of its way too deep: it strikes at the beginning where it was missing.
