@@ -14,7 +14,6 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr double kDoubtful = 2e-4;   // m; deeper touches of curved surfaces are confirmed
 constexpr double kMissing = 5e-6;    // m; a place deeper than all touches by this is missing
 constexpr double kSagDecay = 10e-3;  // s
 
@@ -86,16 +85,21 @@ void TouchSets::search(Pair& pair, double step_s) {
 void TouchSets::refresh(Pair& pair) const {
   if (pair.cord >= 0) return update_cord(bodies_, cords_[pair.cord], pair);
   const shape::Frame a = bodies_.get_frame(pair.a), b = bodies_.get_frame(pair.b);
-  for (Contact& c : pair.contacts) shape::refresh(c.touch, *bodies_.get_shape(pair.a), a, bodies_.get_shape(pair.b), b, pair.memory);
+  std::erase_if(pair.contacts, [&](Contact& c) {
+    const bool follows = shape::refresh(c.touch, *bodies_.get_shape(pair.a), a, bodies_.get_shape(pair.b), b, pair.memory);
+    pair.searched = pair.searched && follows;
+    return !follows;
+  });
 }
 
 void TouchSets::remove_false(Pair& pair) const {
   if (pair.b < 0) return;
-  std::erase_if(pair.contacts, [&](const Contact& c) {
-    return c.touch.gap_m < -kDoubtful && c.touch.smooth &&
+  const auto removed = std::erase_if(pair.contacts, [&](const Contact& c) {
+    return c.touch.gap_m < -kTooDeep && c.touch.smooth &&
            !shape::is_overlap(c.touch, *bodies_.get_shape(pair.a), bodies_.get_frame(pair.a), *bodies_.get_shape(pair.b),
                               bodies_.get_frame(pair.b));
   });
+  pair.searched = pair.searched && removed == 0;
 }
 
 void TouchSets::update(Pair& pair, double step_s) {
@@ -132,7 +136,7 @@ bool TouchSets::complete(Pair& pair, const shape::Frame& a, const shape::Frame& 
   if (theirs == nullptr)
     deepest.gap_m = calc_least_gap(pair, mine, a);
   else
-    deepest = shape::find_deepest(mine, a, *theirs, b, -kMissing);
+    deepest = shape::find_deepest(mine, a, *theirs, b, -kMissing, pair.memory);
   if (deepest.gap_m >= -kMissing) return false;
   const auto [lowest, least_m] = find_least(pair, a, b);
   const double missing_m = std::min(least_m, 0.0) - kMissing;

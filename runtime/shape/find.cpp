@@ -20,11 +20,13 @@
 namespace carillon::shape {
 namespace {
 
-constexpr double kBrim = 1e-4;    // of the size: a corner may stand out so far beyond the brim of a face that it still stands on
-constexpr double kEnd = 1e-6;     // of an edge: two that cross where the next one begins must not be missed
-constexpr double kEdge = 1e-3;    // rad; the edges of two faces that lie on each other cross as well
-constexpr double kBend = 4.0;     // over the thickness: the curvature, halved, that is allowed for between samples
-constexpr double kThinCells = 4;  // a wall thinner than so many cells is thin: a node of the grid may look to its far side
+constexpr double kBrim = 1e-4;         // of the size: a corner may stand out so far beyond the brim of a face that it still stands on
+constexpr double kEnd = 1e-6;          // of an edge: two that cross where the next one begins must not be missed
+constexpr double kEdge = 1e-3;         // rad; the edges of two faces that lie on each other cross as well
+constexpr double kBend = 4.0;          // over the thickness: the curvature, halved, that is allowed for between samples
+constexpr double kLook = 5e-5;         // m; the deepest sample is looked for up to this gap,
+constexpr double kNearSamples = 5e-3;  // of the size: among those that were nearer than that and this, until the pair has moved by it
+constexpr double kThinCells = 4;       // a wall thinner than so many cells is thin: a node of the grid may look to its far side
 
 /// Distances of samples of one body to another, found once in a search.
 struct Distances {
@@ -75,6 +77,24 @@ class Ground {
       inside = mesh.is_inside(x, on);
     }
     return (inside ? -1.0 : 1.0) * std::sqrt(on.distance2);
+  }
+  /// Of a place over the skin; where it is more than `limit_m`, any such number.
+  double calc_gap(const Vec3& x, double limit_m) const {
+    if (body_ != nullptr) return find_outside(x);
+    const Skin& skin = shape_.skin();
+    const Mesh& mesh = shape_.mesh();
+    const Grid::Near near = grid_->find_near(x);
+    const double far = std::max(limit_m, 0.0) + skin.get_sag_m();
+    if (near.face < 0 || near.min_m > limit_m + skin.get_sag_m()) return near.min_m;
+    Nearest on = mesh.walk_nearest(x, near.face);
+    bool inside = mesh.is_inside(x, on);
+    if (!inside && on.distance2 > far * far) return std::sqrt(on.distance2);
+    if (inside && thin_ && on.distance2 > 0.01 * wall_m_ * wall_m_) {
+      on = mesh.find_nearest(x, Box::kFar, on.face);
+      inside = mesh.is_inside(x, on);
+    }
+    if (skin.is_flat(on.face)) return (inside ? -1.0 : 1.0) * std::sqrt(on.distance2);
+    return dot(skin.calc_normal(on.face, on.weights), x - skin.calc_point(on.face, on.weights));
   }
   Nearest find_nearest(const Vec3& x) const {
     return shape_.mesh().find_nearest(x, Box::kFar, body_ != nullptr ? -1 : grid_->find_near(x).face);
@@ -235,10 +255,10 @@ class Pass {
       if (ends[i] == ends[i - 1] && (i < 2 || ends[i] != ends[i - 2])) add_end(ends[i]);
   }
 
-  /// The sample that is deepest in theirs; -1 where none is deeper than `gap_m`, which becomes its gap.
-  int find_deepest(double& gap_m) const {
+  /// The samples that are nearer to theirs than `gap_m`, or deeper.
+  void list_near(double gap_m, std::vector<std::int32_t>& out) const {
     const Samples& s = mine_.samples();
-    int deepest = -1;
+    out.clear();
     std::vector<int> open;
     if (!s.samples.empty()) open.push_back(0);
     while (!open.empty()) {
@@ -251,10 +271,12 @@ class Pass {
         continue;
       }
       for (int i = ball.first; i < ball.first + ball.count; ++i)
-        if (const double d = calc_gap(to_theirs(s.samples[i].point), gap_m); d < gap_m) gap_m = d, deepest = i;
+        if (calc_gap(i, gap_m) <= gap_m) out.push_back(i);
     }
-    return deepest;
   }
+
+  /// Of a sample; where it is more than `limit_m`, any such number.
+  double calc_gap(int sample, double limit_m) const { return ground_.calc_gap(to_theirs(mine_.samples().samples[sample].point), limit_m); }
 
   /// A touch of a sample with the nearest place of theirs.
   Touch make_touch(int place) const {
@@ -277,14 +299,6 @@ class Pass {
 
  private:
   Vec3 to_theirs(const Vec3& x) const { return rotation_ * x + offset_; }
-  /// Of a place over their skin; more than `limit_m` where it is.
-  double calc_gap(const Vec3& x, double limit_m) const {
-    const double over_mesh = ground_.estimate(x, limit_m + sag_);
-    if (sag_ == 0.0 || over_mesh > limit_m + sag_) return over_mesh;
-    const Nearest at = ground_.find_nearest(x);
-    if (theirs_.skin().is_flat(at.face)) return over_mesh;
-    return dot(theirs_.skin().calc_normal(at.face, at.weights), x - theirs_.skin().calc_point(at.face, at.weights));
-  }
   bool may_carry(const Sample& sample, const Vec3& normal) const {
     return carries(mine_.mesh(), sample.vertex, turn_back(rotation_, normal));
   }
@@ -635,17 +649,38 @@ void find_candidates(const Shape& a, const Frame& fa, const Shape& b, const Fram
   cross_ridges(a, fa, b, fb, reach, out);
 }
 
+Pose find_pose(const Frame& fa, const Frame& fb) {
+  Pose pose{{}, to_body(fb, fa.position_m)};
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      for (int k = 0; k < 3; ++k) pose.rotation[i][j] += fb.rotation[k][i] * fa.rotation[k][j];
+  return pose;
+}
+
 }  // namespace
 
-Deepest find_deepest(const Shape& a, const Frame& fa, const Shape& b, const Frame& fb, double gap) {
+Deepest find_deepest(const Shape& a, const Frame& fa, const Shape& b, const Frame& fb, double gap, PairMemory& memory) {
   Deepest found{.gap_m = gap};
   const double far = a.get_radius_m() + b.get_radius_m();
   if (norm2(to_world(fa, a.get_middle_m()) - to_world(fb, b.get_middle_m())) > far * far || (a.is_polyhedron() && b.is_polyhedron()))
     return found;
+  const Pose pose = find_pose(fa, fb);
+  if (memory.deepest_m - calc_way(memory.measured, pose, a) >= gap) return found;
   std::vector<Touch> none;
-  found.place = Pass(a, fa, b, fb, 0.0, none).find_deepest(found.gap_m);
-  if (const int place = Pass(b, fb, a, fa, 0.0, none).find_deepest(found.gap_m); place >= 0) found.place = place, found.is_of_a = false;
-  return found;
+  const Pass pass_a(a, fa, b, fb, 0.0, none), pass_b(b, fb, a, fa, 0.0, none);
+  if (calc_way(memory.listed, pose, a) > memory.slack_m) {
+    memory.slack_m = kNearSamples * std::min(a.get_size_m(), b.get_size_m());
+    memory.listed = pose;
+    pass_a.list_near(kLook + memory.slack_m, memory.near[0]);
+    pass_b.list_near(kLook + memory.slack_m, memory.near[1]);
+  }
+  Deepest deepest{.gap_m = kLook};
+  for (const bool is_of_a : {true, false})
+    for (const std::int32_t i : memory.near[is_of_a ? 0 : 1])
+      if (const double d = (is_of_a ? pass_a : pass_b).calc_gap(i, deepest.gap_m); d < deepest.gap_m) deepest = {i, d, is_of_a};
+  memory.measured = pose;
+  memory.deepest_m = deepest.gap_m;
+  return deepest.gap_m < gap ? deepest : found;
 }
 
 Touch make_touch(const Shape& a, const Frame& fa, const Shape& b, const Frame& fb, const Deepest& at) {
@@ -665,19 +700,11 @@ void find_touches(const Shape& a, const Frame& fa, const Shape& b, const Frame& 
     find_polyhedra_touches(a, fa, b, fb, margin, memory, out);
     return;
   }
-  Mat3 rotation{};
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j)
-      for (int k = 0; k < 3; ++k) rotation[i][j] += fb.rotation[k][i] * fa.rotation[k][j];
-  const Vec3 position = to_body(fb, fa.position_m);
-  if (recall(memory, rotation, position, a, margin)) {
-    answer(a, fa, &b, fb, margin, true, memory, out);
-    return;
-  }
+  const Pose pose = find_pose(fa, fb);
+  if (recall(memory, pose, a, margin) && answer(a, fa, &b, fb, margin, true, memory, out)) return;
   const double size = std::min(a.get_size_m(), b.get_size_m());
   memory.known = true;
-  memory.rotation = rotation;
-  memory.position_m = position;
+  memory.searched = pose;
   memory.reach_m = margin + choose_slack(margin, size);
   memory.candidates.clear();
   find_candidates(a, fa, b, fb, memory.reach_m, memory.candidates);

@@ -103,16 +103,19 @@ bool carries(const Mesh& mesh, int vertex, const Vec3& normal) {
   return true;
 }
 
-bool recall(const PairMemory& memory, const Mat3& rotation, const Vec3& position, const Shape& a, double margin) {
-  if (!memory.known) return false;
+double calc_way(const Pose& from, const Pose& to, const Shape& a) {
   double turned = 0.0;
-  Vec3 moved = position - memory.position_m;
+  Vec3 moved = to.position_m - from.position_m;
   for (int i = 0; i < 3; ++i) {
-    const Vec3 row = rotation[i] - memory.rotation[i];
+    const Vec3 row = to.rotation[i] - from.rotation[i];
     turned += norm2(row);
     moved[i] += dot(row, a.get_middle_m());
   }
-  return margin + norm(moved) + std::sqrt(turned) * a.get_radius_m() <= memory.reach_m;
+  return norm(moved) + std::sqrt(turned) * a.get_radius_m();
+}
+
+bool recall(const PairMemory& memory, const Pose& pose, const Shape& a, double margin) {
+  return memory.known && margin + calc_way(memory.searched, pose, a) <= memory.reach_m;
 }
 
 void thin(std::vector<Touch>& touches, double spacing, double patch) {
@@ -135,16 +138,17 @@ void thin(std::vector<Touch>& touches, double spacing, double patch) {
   reduce(touches, patch);
 }
 
-void answer(const Shape& a, const Frame& fa, const Shape* b, const Frame& fb, double margin, bool moved, PairMemory& memory,
+bool answer(const Shape& a, const Frame& fa, const Shape* b, const Frame& fb, double margin, bool moved, PairMemory& memory,
             std::vector<Touch>& out) {
   const double size = b != nullptr ? std::min(a.get_size_m(), b->get_size_m()) : a.get_size_m();
   for (Touch& candidate : memory.candidates) {
-    if (moved) settle(candidate, a, fa, b, fb, 0.1 * size);
+    if (moved && !follow(candidate, a, fa, b, fb, 0.1 * size)) return out.clear(), false;
     out.push_back(candidate);
     if (out.back().gap_m > margin) out.pop_back();
   }
   if (moved) thin(out, 0.02 * size, kPatch * size);
   name(out, 0.1 * size, memory);
+  return true;
 }
 
 void find_ground_touches(const Shape& a, const Frame& fa, double height, double margin, PairMemory& memory, std::vector<Touch>& out) {
@@ -160,12 +164,11 @@ void find_ground_touches(const Shape& a, const Frame& fa, double height, double 
     reduce(out, Box::kFar);
     return;
   }
-  const Vec3 position = {0.0, 0.0, fa.position_m[2] - height};  // sideways and about the vertical nothing changes, but stations do
-  const Mat3 rotation = {Vec3{}, Vec3{}, fa.rotation[2]};
-  if (!recall(memory, rotation, position, a, margin)) {
+  // Sideways and about the vertical nothing changes, but stations do.
+  const Pose pose{{Vec3{}, Vec3{}, fa.rotation[2]}, {0.0, 0.0, fa.position_m[2] - height}};
+  if (!recall(memory, pose, a, margin)) {
     memory.known = true;
-    memory.rotation = rotation;
-    memory.position_m = position;
+    memory.searched = pose;
     memory.reach_m = margin + choose_slack(margin, a.get_size_m());
     memory.candidates.clear();
     find_candidates(a, fa, height, memory.reach_m, memory.candidates);

@@ -31,17 +31,27 @@ struct Touch {
   bool stays = false;            // of several on what is nearly level: stays about where it is and does not go to the lowest place
 };
 
+/// Of a in the frame of b.
+struct Pose {
+  Mat3 rotation{};
+  Vec3 position_m{};
+};
+
 /// The caller's, one per pair: what makes the next search cheap and gives touches their names. Of no meaning to the caller.
 class PairMemory {
  public:
   bool known = false;
-  Mat3 rotation{};  // of a in b at the last search
-  Vec3 position_m{};
+  Pose searched;                    // at the last search
   double reach_m = 0.0;             // margin of that search and what was added to it
   std::vector<Touch> candidates;    // of it, nearer than reach_m
   std::vector<Touch> last;          // touches given at the last call, to name those of the next
   std::uint64_t serial = 0;         // of names given
   std::array<int, 2> axis{-1, -1};  // that separated or carried last: kind, index
+  // Of the search for the deepest sample:
+  Pose listed, measured;
+  double slack_m = -1.0;                          // `near` is complete until the pair has moved by it since `listed`; negative: not there
+  std::array<std::vector<std::int32_t>, 2> near;  // samples of a and b
+  double deepest_m = -1.0;                        // gap of the deepest when `measured`
 };
 
 /// Replaces `out` by the touches not further apart than the margin: at most 4 for each patch of contact.
@@ -59,15 +69,17 @@ struct Deepest {
 };
 Deepest find_lowest(const Shape& a, const Frame& frame, double height_m);
 /// None (-1) between two polyhedra, whose touches are complete, and where no sample is deeper than `gap_m`.
-Deepest find_deepest(const Shape& a, const Frame& frame_a, const Shape& b, const Frame& frame_b, double gap_m);
+Deepest find_deepest(const Shape& a, const Frame& frame_a, const Shape& b, const Frame& frame_b, double gap_m, PairMemory& memory);
 /// The touch of such a vertex, at these or other frames.
 Touch make_ground_touch(const Shape& a, const Frame& frame, double height_m, int vertex);
 Touch make_touch(const Shape& a, const Frame& frame_a, const Shape& b, const Frame& frame_b, const Deepest& at);
 
-/// The same touch a small step later: gap, where, normal and stations follow. b == nullptr: the ground.
-void refresh(Touch& touch, const Shape& a, const Frame& frame_a, const Shape* b, const Frame& frame_b, PairMemory& memory);
+/// The same touch a small step later: gap, where, normal and stations follow. b == nullptr: the ground. False where it has left its
+/// surfaces, which are to be searched again.
+bool refresh(Touch& touch, const Shape& a, const Frame& frame_a, const Shape* b, const Frame& frame_b, PairMemory& memory);
 
-/// Is one of the two places of a touch inside the other body? Between curved surfaces a touch may have come to their far sides.
+/// Is one of the two places of a touch about as deep in the other body as the touch says, and are those on edges still there? A touch that
+/// is followed may have come to the far side of a curved surface, or past the end of its edge.
 bool is_overlap(const Touch& touch, const Shape& a, const Frame& frame_a, const Shape& b, const Frame& frame_b);
 
 /// How deep two bodies are inside each other [m]; 0 when they are apart. `where` gets the deepest point (world).
