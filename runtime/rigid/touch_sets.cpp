@@ -157,8 +157,9 @@ std::pair<Contact*, double> TouchSets::find_least(Pair& pair, const shape::Frame
   bool all_follow = true;
   for (Contact& c : pair.contacts) {
     shape::Touch& moved = pair.ahead.touches.emplace_back(c.touch);
-    all_follow = shape::refresh(moved, *bodies_.get_shape(pair.a), a, bodies_.get_shape(pair.b), b, pair.memory) && all_follow;
-    if (moved.gap_m < least.second) least = {&c, moved.gap_m};
+    const bool follows = shape::refresh(moved, *bodies_.get_shape(pair.a), a, bodies_.get_shape(pair.b), b, pair.memory);
+    all_follow = all_follow && follows;
+    if (follows && moved.gap_m < least.second) least = {&c, moved.gap_m};
   }
   if (!all_follow) pair.ahead.touches.clear();  // refresh() drops those that do not
   return least;
