@@ -14,8 +14,9 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr double kMissing = 5e-6;    // m; a place deeper than all touches by this is missing
-constexpr double kSagDecay = 10e-3;  // s
+constexpr double kMissing = 5e-6;      // m; a place deeper than all touches by this is missing
+constexpr double kSearchAgain = 2e-3;  // s; a pair with a missing touch is searched anew once in so long
+constexpr double kSagDecay = 10e-3;    // s
 
 /// Lower bound of the gap of any vertex of a body over the ground, from that at an earlier frame.
 double calc_least_gap(const Pair& pair, const shape::Shape& shape, const shape::Frame& now) {
@@ -188,7 +189,11 @@ bool TouchSets::complete(const Step& step, bool finds_closing) {
   bool any = false;
   for (Pair* pair : step.island().pairs) {
     if (pair->cord >= 0 || !step.has(*pair) || bodies_.is_moved_by_impact(pair->a) || bodies_.is_moved_by_impact(pair->b)) continue;
+    const std::size_t found = pair->contacts.size();
     if (complete(*pair, get_then(pair->a), get_then(pair->b), finds_closing ? step.length_s : 0.0)) any = true;
+    if (pair->contacts.size() == found || bodies_.get_time() < pair->next_search_s) continue;
+    pair->searched = pair->memory.known = false;  // a body that has come to lie has more touches than that
+    pair->next_search_s = bodies_.get_time() + kSearchAgain;
   }
   return any;
 }

@@ -104,14 +104,19 @@ bool carries(const Mesh& mesh, int vertex, const Vec3& normal) {
 }
 
 double calc_way(const Pose& from, const Pose& to, const Shape& a) {
-  double turned = 0.0;
+  const Box& box = a.mesh().box;
   Vec3 moved = to.position_m - from.position_m;
-  for (int i = 0; i < 3; ++i) {
-    const Vec3 row = to.rotation[i] - from.rotation[i];
-    turned += norm2(row);
-    moved[i] += dot(row, a.get_middle_m());
+  double turned = 0.0;  // way of the farthest corner of the box from its middle
+  for (int k = 0; k < 3; ++k) {
+    double square = 0.0;
+    for (int i = 0; i < 3; ++i) {
+      const double change = to.rotation[i][k] - from.rotation[i][k];
+      moved[i] += change * a.get_middle_m()[k];
+      square += change * change;
+    }
+    turned += std::sqrt(square) * (0.5 * (box.high[k] - box.low[k]) + a.skin().get_sag_m());
   }
-  return norm(moved) + std::sqrt(turned) * a.get_radius_m();
+  return norm(moved) + turned;
 }
 
 bool recall(const PairMemory& memory, const Pose& pose, const Shape& a, double margin) {
