@@ -17,6 +17,7 @@ namespace {
 constexpr double kSteps = 4.0;           // in which a pair moves by the margin of a search,
 constexpr double kStepsOfRolling = 8.0;  // a curved body on the ground: few places come near
 constexpr double kMissing = 5e-6;        // m; a place deeper than all touches by this is missing
+constexpr double kSearchAgain = 2e-3;    // s; a pair with a missing touch is searched anew once in so long
 constexpr double kSame = 0.02;           // of the size: touches so near are one
 constexpr double kSagDecay = 10e-3;      // s
 
@@ -226,7 +227,11 @@ bool TouchSets::complete(const Step& step, bool finds_closing) {
   bool any = false;
   for (Pair* pair : step.island().pairs) {
     if (pair->cord >= 0 || !step.has(*pair) || bodies_.is_moved_by_impact(pair->a) || bodies_.is_moved_by_impact(pair->b)) continue;
+    const std::size_t found = pair->contacts.size();
     if (complete(*pair, get_then(pair->a), get_then(pair->b), finds_closing ? step.length_s : 0.0)) any = true;
+    if (pair->contacts.size() == found || bodies_.get_time() < pair->next_search_s) continue;
+    pair->searched = pair->memory.known = false;  // a body that has come to lie has more touches than that
+    pair->next_search_s = bodies_.get_time() + kSearchAgain;
   }
   return any;
 }

@@ -239,7 +239,7 @@ bool is_level(const Touch& t, const Shape& a, const Frame& fa, const Shape* b, c
 }
 
 bool follow(Touch& touch, const Shape& a, const Frame& fa, const Shape* b, const Frame& fb, double reach) {
-  constexpr double kFall = 0.02;  // of the way of a place on its surface: by which a gap may shrink besides,
+  constexpr double kFall = 0.02;  // of the way of a place on its surface: by which a gap may shrink in addition,
   constexpr double kRoom = 2e-5;  // m; and this
   const Touch before = touch;
   const bool settled = settle(touch, a, fa, b, fb, reach);
