@@ -347,5 +347,18 @@ TEST(rest, island_that_is_slow_and_balanced_sleeps_and_wakes_where_it_is_struck)
   }
 }
 
+TEST(rest, body_that_has_yielded_comes_up_before_it_sleeps) {
+  Stages stages({make_box(0.1, kBoxSides)}, {make_state({0, 0, 0.02 - 1e-4})}, kWood, {0, 0, -kGravity});
+  stages.begin({{0, -1}});
+  double& sag_m = stages.island.pairs[0]->sag_m = 1e-4;
+  EXPECT_FALSE(stages.rest.may_sleep(stages.island.bodies, 0.015));
+  EXPECT_TRUE(stages.rest.may_sleep(stages.island.bodies, 0.015));
+  EXPECT_FALSE(stages.rest.try_island(stages.island, 5e-4));
+  sag_m = 0.0;
+  stages.projection.run(stages.step, kDeep);
+  EXPECT_TRUE(stages.rest.try_island(stages.island, 5e-4));
+  EXPECT_NEAR(stages.bodies.state(0).centre[2], 0.02, kDeep);
+}
+
 }  // namespace
 }  // namespace carillon::rigid
