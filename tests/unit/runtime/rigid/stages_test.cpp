@@ -287,6 +287,7 @@ TEST(ledger, pulses_give_modes_at_most_what_the_motion_lost) {
   const Books books = stages.calc_books();
   EXPECT_NEAR(books.modes_j, all_j, 0.1 * all_j);
   EXPECT_DOUBLE_EQ(strike.modes_j, books.modes_j);
+  EXPECT_EQ(stages.modal_states.advance(0, 0.0).time_s, strike.time_s);  // an impact that begins now finds them now
   EXPECT_NEAR(books.modes_j + books.lost_j, 2.0 * all_j, 1e-15);
   // Of a motion that lost next to nothing they get nothing.
   stages.modal_states.excite(strike, 1e-3 * all_j);
