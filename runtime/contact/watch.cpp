@@ -22,7 +22,8 @@ Depth measure(const rigid::Space& space, int a, int b) {
       shape::find_touches(*solid.shape, frame, other, frame_b, 0.0, memory, touches);
       for (const shape::Touch& touch : touches) depth.depth_m = std::max(depth.depth_m, -touch.gap_m);
     } else {
-      depth.depth_m = -shape::find_deepest(*solid.shape, frame, other, frame_b, 0.0).gap_m;
+      shape::PairMemory none;
+      depth.depth_m = -shape::find_deepest(*solid.shape, frame, other, frame_b, 0.0, none).gap_m;
     }
   }
   depth.depth_m = std::max(0.0, depth.depth_m);

@@ -105,16 +105,29 @@ bool carries(const Mesh& mesh, int vertex, const Vec3& normal) {
   return true;
 }
 
-bool recall(const PairMemory& memory, const Mat3& rotation, const Vec3& position, const Shape& a, double margin) {
-  if (!memory.known) return false;
+Frame calc_relative(const Frame& a, const Frame& b) {
+  Frame relative{.rotation = {}, .position_m = to_body(b, a.position_m)};
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      for (int k = 0; k < 3; ++k) relative.rotation[i][j] += b.rotation[k][i] * a.rotation[k][j];
+  return relative;
+}
+
+double calc_way(const Mat3& rotation_before, const Vec3& position_before, const Mat3& rotation, const Vec3& position, const Shape& a) {
   double turned = 0.0;
-  Vec3 moved = position - memory.position_m;
+  Vec3 moved = position - position_before, swept{};  // of the middle; of a corner of the box about it, at most
+  const Vec3 half = 0.5 * (a.mesh().box.high - a.mesh().box.low);
   for (int i = 0; i < 3; ++i) {
-    const Vec3 row = rotation[i] - memory.rotation[i];
+    const Vec3 row = rotation[i] - rotation_before[i];
     turned += norm2(row);
     moved[i] += dot(row, a.get_middle_m());
+    for (int k = 0; k < 3; ++k) swept[i] += std::abs(row[k]) * (half[k] + a.skin().get_sag_m());
   }
-  return margin + norm(moved) + std::sqrt(turned) * a.get_radius_m() <= memory.reach_m;
+  return norm(moved) + std::min(std::sqrt(turned) * a.get_radius_m(), norm(swept));
+}
+
+bool recall(const PairMemory& memory, const Mat3& rotation, const Vec3& position, const Shape& a, double margin) {
+  return memory.known && margin + calc_way(memory.rotation, memory.position_m, rotation, position, a) <= memory.reach_m;
 }
 
 void thin(std::vector<Touch>& touches, double spacing, double patch) {

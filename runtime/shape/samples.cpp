@@ -241,6 +241,7 @@ Samples::Samples(const Mesh& mesh, const Skin& skin) {
     s.first_neighbour = static_cast<int>(neighbours.size());
     s.neighbours = static_cast<int>(near.size());
     for (const int other : near) neighbours.push_back(moved[other]);
+    if (s.kind == VertexKind::smooth) reach_m = std::max(reach_m, s.reach_m);
     samples.push_back(s);
   }
   middles.clear();

@@ -4,7 +4,9 @@
 //     refresh(touch, a, frame_a, &b, frame_b, memory);                    // at each small step
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "runtime/shape/shape.hpp"
@@ -31,6 +33,15 @@ struct Touch {
   bool stays = false;            // of several on what is nearly level: stays about where it is and does not go to the lowest place
 };
 
+/// Samples of two bodies that are near the other one, with their distances to it: all that are nearer than reach_m.
+struct NearSamples {
+  bool known = false;
+  Mat3 rotation{};  // of a in b at that time
+  Vec3 position_m{};
+  double reach_m = 0.0, wanted_m = 0.0;                        // wanted by the last search
+  std::array<std::vector<std::pair<int, double>>, 2> samples;  // of a, of b
+};
+
 /// The caller's, one per pair: what makes the next search cheap and gives touches their names. Of no meaning to the caller.
 class PairMemory {
  public:
@@ -42,6 +53,9 @@ class PairMemory {
   std::vector<Touch> last;          // touches given at the last call, to name those of the next
   std::uint64_t serial = 0;         // of names given
   std::array<int, 2> axis{-1, -1};  // that separated or carried last: kind, index
+  Vec3 up{}, low_up{};              // vertical in the frame of a, when the lowest vertex was last looked for; when those were:
+  std::vector<int> low;             // vertices that may be lowest while the vertical is near that
+  NearSamples near;
 };
 
 /// Replaces `out` by the touches not further apart than the margin: at most 4 for each patch of contact.
@@ -59,8 +73,10 @@ struct Deepest {
   bool is_of_a = true;
 };
 Deepest find_lowest(const Shape& a, const Frame& frame, double height_m);
+/// The same from memory, as long as the body leans little from how it did.
+Deepest find_lowest(const Shape& a, const Frame& frame, double height_m, PairMemory& memory);
 /// None (-1) between two polyhedra, whose touches are complete, and where no sample is deeper than `gap_m`.
-Deepest find_deepest(const Shape& a, const Frame& frame_a, const Shape& b, const Frame& frame_b, double gap_m);
+Deepest find_deepest(const Shape& a, const Frame& frame_a, const Shape& b, const Frame& frame_b, double gap_m, PairMemory& memory);
 /// The touch of such a vertex, at these or other frames.
 Touch make_ground_touch(const Shape& a, const Frame& frame, double height_m, int vertex);
 Touch make_touch(const Shape& a, const Frame& frame_a, const Shape& b, const Frame& frame_b, const Deepest& at);

@@ -1,4 +1,4 @@
-// Hard cases of depth: chains of rings that must hold, and a heap of curved bodies.
+// Hard cases of depth: chains of rings that must hold, a heap of curved bodies, and a heavy load on a light cup.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <numbers>
 #include <string>
 #include <utility>
 #include <variant>
@@ -106,6 +107,33 @@ TEST(depth, heap) {
   hold("heap", statistics.contacts.deepest.depth_m, 5e-3, "deepest ever [m]");
   hold("heap", awake_s, kEnd, "last moment awake [s]");
   hold("heap", statistics.energy.lifted_j / statistics.energy.kinetic_j, 0.05, "energy lifted over the largest of motion");
+}
+
+// 390 times as heavy as the cup, which stands upright or upside down.
+TEST(depth, loaded_cup) {
+  const bank::Bank cup = make_bank(rigid::tests::make_drop_surface(5), 2500.0), block = make_dense_box({0.2, 0.2, 0.2}, 7875.0);
+  double rests_m = 0.0, falls_m = 0.0, error = 0.0;
+  for (const bool is_upright : {true, false})
+    for (const double tilt_deg : {0.0, 0.5, 2.0}) {
+      const double half = tilt_deg * std::numbers::pi / 360.0, low_m = 0.1 * (std::cos(2.0 * half) + std::sin(2.0 * half));
+      WorldSpec spec;
+      spec.ground = GroundSpec{};
+      spec.bodies = {make_body(cup, {0, 0, is_upright ? 1e-5 : 0.09 + 1e-5}), make_body(block, {0.003, 0.002, 0.09 + low_m + 1e-3})};
+      if (!is_upright) spec.bodies.front().initial.rotation = {0, 1, 0, 0};
+      spec.bodies.back().initial.rotation = {std::cos(half), std::sin(half), 0, 0};
+      World world(spec, {.end_s = 3.0, .modes = false, .lasting_contacts = false, .audits_energy = true});
+      events::BodyMotion load;
+      world.advance(3.0, std::numeric_limits<double>::infinity(), [&](const events::Event& event) {
+        if (const auto* m = std::get_if<events::BodyMotion>(&event); m != nullptr && m->body == 1) load = *m;
+      });
+      const contact::Statistics statistics = world.get_statistics();
+      rests_m = std::max(rests_m, statistics.contacts.now.depth_m);
+      error = std::max(error, statistics.energy.error_j / statistics.energy.kinetic_j);
+      falls_m = std::max(falls_m, std::abs(contact::calc_pose(load, block.rigid.centre_m).position_m[2] - 0.19));
+    }
+  hold("loaded_cup", rests_m, 5e-5, "deepest at the end [m]");
+  hold("loaded_cup", falls_m, 5e-5, "height of the load at the end, off that of the cup and half of its own [m]");
+  hold("loaded_cup", error, 1e-3, "energy not accounted for over the largest of motion");
 }
 
 }  // namespace
