@@ -136,7 +136,8 @@ struct Boxes {
     b.restitution = 0.4;
     contact.a = 0;
     contact.b = 1;
-    contact.touch.where_m = {0.03, 0.02, 0.01};
+    contact.touch.where_m = contact.touch.station_a = {0.03, 0.02, 0.01};
+    contact.touch.station_b = {-0.03, 0.02, 0.01};
     contact.touch.normal = {-1, 0, 0};
   }
   Stages make() const { return Stages({a, b}, {make_state({}, {speed, 0, 0}), make_state({0.06, 0, 0})}, std::nullopt, {}); }
