@@ -9,7 +9,6 @@
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "runtime/rigid/solver.hpp"
 
@@ -198,6 +197,7 @@ class Guess {
   void move(std::vector<Mover>& movers) const;
   double iterate(std::vector<Mover>& movers);
   Hold correct_hold(const std::vector<Mover>& movers, const Point& p, Held& held, bool may_stick, bool& confirmed);
+  static Vec3 calc_rest_of_bound(const std::vector<Mover>& movers, const Point& p, const Held& held);
   bool correct_couple(const std::vector<Mover>& movers, const Point& p, Held& held, double push, bool may_stick);
 
   const std::vector<Mover>& free_;
@@ -270,10 +270,10 @@ bool Guess::factorise() {
 bool Guess::solve(std::vector<Mover>& movers) {
   if (!factorise()) return false;
   move(movers);
-  double before = std::numeric_limits<double>::infinity();
+  double before = 0.0;
   for (int again = 0; again < kIterations; ++again) {
-    const double left = iterate(movers);
-    if (left <= kExact * scale_ || left > kStagnates * before) break;
+    const double left = iterate(movers), rate = before > 0.0 ? left / before : 0.0;
+    if (left <= kExact * scale_ || (rate > 0.0 && rate * left <= kExact * scale_) || rate > kStagnates) break;
     before = left;
   }
   return true;
@@ -330,7 +330,8 @@ double Guess::iterate(std::vector<Mover>& movers) {
     held.impulse = held.impulse + more;
     apply(movers, p, more);
     if (!(held.turning_mass > 0.0)) continue;
-    const Vec3 couple = (held.turning_mass / compliance_) * (left_spin_[n] - held.hold_turning(turned));
+    const Vec3 couple =
+        (held.turning_mass / compliance_) * (left_spin_[n] - held.hold_turning(turned)) + calc_rest_of_bound(movers, p, held);
     held.couple = held.couple + couple;
     turn(movers, p, couple);
   }
@@ -380,6 +381,18 @@ Hold Guess::correct_hold(const std::vector<Mover>& movers, const Point& p, Held&
   held.sliding = turned;
   held.impulse = push * p.normal + turned;
   return Hold::kSlides;
+}
+
+/// What the parts of a couple that are at their bounds lack of those by the present push and direction of rolling.
+Vec3 Guess::calc_rest_of_bound(const std::vector<Mover>& movers, const Point& p, const Held& held) {
+  if (!held.rolls && !held.twists) return {};
+  const double push = std::max(dot(held.impulse, p.normal), 0.0);
+  const Vec3 next = held.couple - held.turning_mass * calc_relative_spin(movers, p);
+  const Vec3 roll = next - dot(next, p.normal) * p.normal;
+  const double size = norm(roll);
+  const Vec3 bound =
+      std::copysign(p.twisting_m * push, dot(held.couple, p.normal)) * p.normal + (size > 0.0 ? p.rolling_m * push / size : 0.0) * roll;
+  return held.free_turning(bound - held.couple);
 }
 
 /// A couple that holds and would have to be above its bound turns from now on, about the normal or across it. One that turns is at its

@@ -77,6 +77,7 @@ class Ground {
   }
   /// The same, but behind a thin wall a bound.
   double find_distance(const Vec3& x, double limit) const { return thin_ ? find_bound(x) : estimate(x, limit); }
+  bool is_thin() const { return thin_; }
   Nearest find_nearest(const Vec3& x) const {
     return shape_.mesh().find_nearest(x, Box::kFar, body_ != nullptr ? -1 : grid_->find_near(x).face);
   }
@@ -181,6 +182,10 @@ class Pass {
       const Sample& sample = s.samples[i];
       const double within = reach_ + sag_ + (sample.kind == VertexKind::smooth ? calc_room(sample.reach_m) : 0.0);
       if (before - way_m > within) continue;
+      if (way_m == 0.0 && !ground_.is_thin()) {  // as it was just estimated
+        distances.stamps[i] = distances.stamp;
+        distances.values[i] = before;
+      }
       const double d = measure(i);
       if (d > within) continue;
       if (sample.kind != VertexKind::smooth) {
