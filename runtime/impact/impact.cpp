@@ -16,6 +16,7 @@ namespace {
 constexpr double kSlowest = 1e-6;  // m/s: speed for the choice of the step without an approach
 constexpr double kTaper = 0.05;    // of the time of pressing: time constant of a rebound at its limit
 constexpr double kStill = 1e-3;    // m/s: settled contacts are slower
+constexpr double kSoon = 1e-3;     // s; bodies that meet again so soon have not parted
 constexpr int kLimitings = 8;      // rounds for contacts that share bodies,
 constexpr double kOver = 1e-4;     // to this part of the force of a step
 
@@ -128,6 +129,8 @@ void Impact::add_contact(const Contact& contact) {
   history.given.shape_a = history.given.shape_b = {};  // now in modes_
   history.is_limited = contact.is_limit && !(contact.shape_a.empty() && contact.shape_b.empty());
   history.pulse.contact = index;
+  history.is_open = contact.gap_m > 0.0;
+  history.yielded_m = contact.yielded_m;
 }
 
 /// Axes, mobilities and shape values of a contact, new or moved; its rows begin with `row`.
@@ -184,7 +187,7 @@ double Impact::calc_row_speed(const Row& row) const {
 double Impact::calc_approach(int contact) const { return -calc_row_speed(rows_[laws_[contact].row]); }
 
 double Impact::calc_depth(int contact) const {
-  return std::max(laws_[contact].compression_m, 0.0) + modes_.calc_displacement(laws_[contact].row);
+  return std::max(laws_[contact].compression_m, 0.0) + contacts_[contact].yielded_m + modes_.calc_displacement(laws_[contact].row);
 }
 
 /// Step length, hysteresis and anchor springs, from the elastic pulses that the rigid bodies would have. With h_ set: only of new contacts.
@@ -206,24 +209,45 @@ void Impact::choose_step(const Options& options) {
   double shortest = options.longest_step_s * options.steps_per_pulse;
   for (std::size_t c = first; c < laws_.size(); ++c) {
     if (!(inverse_mass[c] > 0.0)) continue;
-    ContactLaw& law = laws_[c];
     // A contact that only its neighbours push is taken at the fastest speed.
     const double v = speed[c] > 0.01 * fastest_ ? speed[c] : fastest_;
-    const ElasticPulse pulse = calc_elastic_pulse(law.spring, 1.0 / inverse_mass[c], v);
+    const ElasticPulse pulse = set_law(static_cast<int>(c), inverse_mass[c], v);
     shortest = std::min(shortest, pulse.length_s);
     part_s_ = std::max(part_s_, pulse.length_s);
-    if (contacts_[c].given.restitution != hysteresis_of_) {
-      hysteresis_of_ = contacts_[c].given.restitution;
-      hysteresis_ = calc_hysteresis(hysteresis_of_, 1.0);
-    }
-    law.spring.hysteresis_s_m = hysteresis_ / v;
-    const double peak = std::max(pulse.compression_m, law.compression_m);
-    law.tangential_n_m = contacts_[c].given.tangential_ratio * law.spring.stiffness * std::pow(peak, law.spring.exponent - 1.0);
   }
   if (h_ > 0.0) return;
   if (options.part_s > 0.0) part_s_ = options.part_s;
   step_index_ = find_step(modes_.limit_step(std::min(shortest / options.steps_per_pulse, options.longest_step_s)));
   h_ = get_step(step_index_);
+}
+
+/// Hysteresis and anchor spring of a contact that is struck at that speed, and the pulse that it would have.
+ElasticPulse Impact::set_law(int contact, double inverse_mass, double speed_m_s) {
+  ContactLaw& law = laws_[contact];
+  const ElasticPulse pulse = calc_elastic_pulse(law.spring, 1.0 / inverse_mass, speed_m_s);
+  if (contacts_[contact].given.restitution != hysteresis_of_) {
+    hysteresis_of_ = contacts_[contact].given.restitution;
+    hysteresis_ = calc_hysteresis(hysteresis_of_, 1.0);
+  }
+  law.spring.hysteresis_s_m = hysteresis_ / speed_m_s;
+  const double peak = std::max(pulse.compression_m, law.compression_m);
+  law.tangential_n_m = contacts_[contact].given.tangential_ratio * law.spring.stiffness * std::pow(peak, law.spring.exponent - 1.0);
+  return pulse;
+}
+
+/// Contacts that were open when they were placed are struck at the speed at which they close.
+void Impact::close_contacts() {
+  for (std::size_t c = 0; c < laws_.size(); ++c) {
+    const std::size_t row = laws_[c].row;
+    if (!contacts_[c].is_open || !(laws_[c].compression_m - free_[row] > 0.0)) continue;
+    contacts_[c].is_open = false;
+    const double speed = -free_[row] / h_;
+    // The rebound is limited by the approach of the bodies; that of their modes counts for the first blow.
+    const bool is_first = std::all_of(contacts_.begin(), contacts_.end(), [](const History& h) { return h.impulse_n_s == 0.0; });
+    contacts_[c].closing_m_s = std::max(is_first ? speed : contacts_[c].impulse_n_s > 0.0 ? contacts_[c].closing_m_s : 0.0, -calc_row_speed(rows_[row]));
+    if (mobility_[row * rows_.size() + row] > 0.0)
+      set_law(static_cast<int>(c), mobility_[row * rows_.size() + row], std::max(speed, 0.01 * fastest_));
+  }
 }
 
 /// Propagators, A and the free motion of the first step with these contacts.
@@ -254,7 +278,7 @@ void Impact::solve_forces() {
 }
 
 /// Bounds the normal forces of modes under which rigid bodies would part too fast at the end of the step; true with any. The distance to
-/// the limit falls as exp(-t / tau), without an audible cut of a force.
+/// the limit falls as exp(-t / tau), without an audible cut of a force. A force that only ends their approach is never bounded.
 bool Impact::limit_forces() {
   const std::size_t n = rows_.size();
   bool any = false;
@@ -272,7 +296,7 @@ bool Impact::limit_forces() {
     }
     for (std::size_t r = 0; r < n; ++r) parting += h_ * mobility_[row * n + r] * force_[r];
     const double left = limit - before,
-                 allowed = left > 0.0 ? before - left * std::expm1(-h_ / (kTaper * (contacts_[c].pressed_s + h_))) : limit;
+                 allowed = left > 0.0 ? std::max(0.0, before - left * std::expm1(-h_ / (kTaper * (contacts_[c].pressed_s + h_)))) : limit;
     const double over = (parting - allowed) / gain;
     if (over <= kOver * force_[row]) continue;
     t.max_n = std::max(0.0, force_[row] - over);
@@ -295,6 +319,7 @@ void Impact::step() {
   modes_.add_free_motion(free_);
   for (std::size_t c = 0; c < laws_.size(); ++c)
     contacts_[c].closing_m_s = std::max(contacts_[c].closing_m_s, -calc_row_speed(rows_[laws_[c].row]));
+  close_contacts();
 
   const bool reached = std::any_of(laws_.begin(), laws_.end(),
                                    [&](const ContactLaw& t) { return t.compression_m > 0.0 || t.compression_m - free_[t.row] > 0.0; });
@@ -316,7 +341,17 @@ void Impact::step() {
     const double before = t.compression_m;
     t.compression_m -= moved_[row];
     // A contact without a force yields to further pressure: it takes up no energy, and gives back less than it has.
-    if (std::isfinite(t.max_n)) t.compression_m = std::min(t.compression_m, before);
+    double& yielded = contacts_[c].yielded_m;
+    if (std::isfinite(t.max_n) && t.compression_m > before) {
+      yielded += t.compression_m - before;
+      t.compression_m = before;
+    }
+    // What has yielded recovers as the surfaces part.
+    if (t.compression_m < 0.0 && yielded > 0.0) {
+      const double recovered = std::min(yielded, -t.compression_m);
+      yielded -= recovered;
+      t.compression_m += recovered;
+    }
     t.max_n = std::numeric_limits<double>::infinity();
     contacts_[c].pressed_s = t.compression_m > 0.0 ? contacts_[c].pressed_s + h_ : 0.0;
     books_.dissipated_contact -=
@@ -384,7 +419,10 @@ bool Impact::is_over() const {
   const double quiet_s = quiet_ * h_;
   if (quiet_s < part_s_) return false;
   for (std::size_t c = 0; c < laws_.size(); ++c) {
-    if (laws_[c].compression_m <= 0.0) continue;
+    if (laws_[c].compression_m <= 0.0) {
+      if (-laws_[c].compression_m < kSoon * calc_approach(static_cast<int>(c))) return false;
+      continue;
+    }
     if (!contacts_[c].given.rests) return false;
     const double moved = moved_[laws_[c].row];
     if (std::abs(moved) > kStill * h_ && quiet_s < settling_s_) return false;
@@ -463,6 +501,10 @@ void Impact::update(std::span<const Body> bodies, std::span<const Contact> conta
     place_contact(contact, static_cast<int>(c), t.row);
     contact.shape_a = contact.shape_b = {};
     contacts_[c].given = contact;
+    if (!(t.compression_m > 0.0) && contacts_[c].yielded_m == 0.0) {
+      t.compression_m = std::min(0.0, -contacts[c].gap_m);
+      contacts_[c].is_open = t.compression_m < 0.0;
+    }
     if (!rubs) continue;
     // The part of the anchor spring along the new normal is lost.
     t.stretch = {dot(stretch, rows_[row + 1].axis), dot(stretch, rows_[row + 2].axis)};

@@ -52,6 +52,7 @@ struct Contact {
   int a = 0, b = -1;                         // indices of the bodies; -1: what neither moves nor rings
   Vec3 where_m{}, normal{};                  // normal: unit, from b to a
   double gap_m = 0.0;                        // at the beginning; negative: compressed by that much
+  double yielded_m = 0.0;                    // compression without a force at the beginning, which recovers as the surfaces part
   Spring spring;                             // its hysteresis is set by `restitution`
   double restitution = 1.0;                  // of what the modes do not show: loss in the spring at the approach speed
   bool is_limit = false;                     // it limits the whole rebound, too: that of the rigid bodies, whatever modes throw back
@@ -104,7 +105,7 @@ class Impact {
   int join(const Body& body);
   void join(const Contact& contact);
   /// The same bodies and contacts, where they are now: takes centres, inertias and accelerations of `bodies` and places, normals and
-  /// shape values of `contacts` (all others are ignored). Compressions, anchors, modal states and the step stay; moved_m and turned_rad
+  /// shape values of `contacts`, and gaps of those that are open (all others are ignored). Compressions, anchors, modal states and the step stay; moved_m and turned_rad
   /// begin again, and velocities of bodies on joints are taken; what a turned inertia does to the energy of an unchanged spin is booked as
   /// given. Throws as the constructor does.
   void update(std::span<const Body> bodies, std::span<const Contact> contacts);
@@ -153,7 +154,9 @@ class Impact {
     double impulse_n_s = 0.0;  // normal
     bool is_limited = false;   // do modes push against a limit?
     Pulse pulse;
-    int silent = 0;  // steps without a force that the pulse does not have yet
+    double yielded_m = 0.0;  // compression without a force, by the limit of the rebound
+    bool is_open = false;  // until it closes for the first time where it is
+    int silent = 0;        // steps without a force that the pulse does not have yet
   };
 
   void check_contact(const Contact& contact) const;
@@ -162,6 +165,8 @@ class Impact {
   void add_contact(const Contact& contact);
   void place_contact(const Contact& contact, int index, int row);
   void choose_step(const Options& options);
+  ElasticPulse set_law(int contact, double inverse_mass, double speed_m_s);
+  void close_contacts();
   void set_up_step();
   void step();
   double calc_row_speed(const Row& row) const;

@@ -70,6 +70,9 @@ class Bodies {
   /// Is it, or are its modes, in an impact with modes?
   bool is_in_impact(int body) const { return body >= 0 && in_impact_[body] != 0; }
   void set_in_impact(int body, bool is_in) { in_impact_[body] = is_in ? 1 : 0; }
+  /// Bound of the displacement of its surface by its modes between impacts [m].
+  double get_swing(int body) const { return body >= 0 ? swings_m_[body] : 0.0; }
+  void set_swing(int body, double swing_m) { swings_m_[body] = swing_m; }
   /// Does an impact with modes move it, or the articulation that it belongs to?
   bool is_moved_by_impact(int body) const {
     if (!moves(body)) return false;
@@ -154,6 +157,7 @@ class Bodies {
   std::vector<State> states_;
   std::vector<Placed> placed_;
   std::vector<char> asleep_, in_impact_;
+  std::vector<double> swings_m_;
   std::optional<Ground> ground_;
   Vec3 gravity_{};
   std::vector<Articulation> articulations_;

@@ -59,6 +59,7 @@ struct Pair {
   };
   std::array<SlowHit, 4> slow_hits{};  // its last impacts slower than kRattling, since a faster one
   double rattles_until_s = -1.0;       // until then its slow touches last
+  double stored_j = 0.0;               // that the springs of that impact held: lifts the bodies out of the depth
   double sag_m = 0.0;                  // depth by yielding in an impact with modes that is over: allowed, and decays
 
   bool touches() const {

@@ -14,6 +14,7 @@ namespace carillon::rigid {
 namespace {
 
 constexpr int kMaxHits = 8;       // of one impact
+constexpr double kEarly = 1e-2;   // m/s; slower touches of bodies that ring wait until their rigid surfaces meet
 constexpr int kMaxTogether = 12;  // with those that rest
 
 /// (n) along a direction.
@@ -208,28 +209,64 @@ int ModalImpacts::add_body(ModalImpact& modal, int body, std::vector<impact::Bod
   return static_cast<int>(made.size()) - 1;
 }
 
-/// A contact and how the impact sees it, without its bodies and shapes.
-std::pair<ModalContact, impact::Contact> ModalImpacts::make_contact(Hit& hit, bool rests) {
+/// Displacement of the surfaces at a contact away from each other, by the modes of both bodies [m].
+double ModalImpacts::calc_yield(const impact::Contact& contact, const std::vector<impact::Body>& bodies) {
+  double yield = 0.0;
+  for (const bool is_a : {true, false}) {
+    const std::span<const double> shape = is_a ? contact.shape_a : contact.shape_b;
+    if (shape.empty()) continue;
+    const std::vector<double>& q = bodies[is_a ? contact.a : contact.b].q;
+    const Vec3 n = (is_a ? 1.0 : -1.0) * contact.normal;
+    for (std::size_t i = 0; i < q.size(); ++i) yield += q[i] * (n[0] * shape[3 * i] + n[1] * shape[3 * i + 1] + n[2] * shape[3 * i + 2]);
+  }
+  return yield;
+}
+
+/// A touch becomes a contact of an impact. It is open where the deformed surfaces are apart. Where they overlap, an earlier impact has left
+/// them so (`sag_m`), or it was missed: no spring is pressed by that.
+void ModalImpacts::add_contact(ModalImpact& modal, Contact& touch, double sag_m, Hit& hit, bool rests, Made& made) {
+  impact::Contact spring;
+  spring.a = add_body(modal, hit.a, made.bodies);
+  spring.b = add_body(modal, hit.b, made.bodies);
   ModalContact contact;
+  contact.touch = touch.touch.id;
   contact.forces.a = hit.a;
   contact.forces.b = hit.b;
-  const int body = bodies_.moves(hit.a) ? hit.a : hit.b;
-  contact.station = transpose(bodies_.placed(body).rotation) * (hit.touch.where_m - bodies_.state(body).centre);
+  contact.station = find_station(hit.a, hit.b, hit.touch);
   contact.forces.place_a = find_place(bodies_, hit, true);
   if (bodies_.has_modes(hit.a)) contact.shape_a = find_shape(bodies_, hit, true);
   if (hit.b >= 0) contact.forces.place_b = find_place(bodies_, hit, false);
   if (bodies_.has_modes(hit.b)) contact.shape_b = find_shape(bodies_, hit, false);
-  impact::Contact spring;
   spring.where_m = hit.touch.where_m;
   spring.normal = hit.touch.normal;
-  // The gap is that of rigid surfaces: the displacement by modes is small, and must not press a spring.
   spring.rests = rests;
-  spring.gap_m = rests ? 0.0 : std::max(hit.touch.gap_m, 0.0);
   spring.spring = make_spring(bodies_, hit);
   spring.restitution = bodies_.calc_restitution(hit.a, hit.b);
   spring.is_limit = true;
   spring.friction = bodies_.calc_friction(hit.a, hit.b);
-  return {std::move(contact), spring};
+  if (!contact.shape_a.empty()) spring.shape_a = made.shapes.emplace_back(turn_to_world(hit.a, contact.shape_a));
+  if (!contact.shape_b.empty()) spring.shape_b = made.shapes.emplace_back(turn_to_world(hit.b, contact.shape_b));
+  if (spring.a < 0) {
+    // Static bodies are side b.
+    std::swap(spring.a, spring.b);
+    spring.normal = -1.0 * spring.normal;
+    std::swap(spring.shape_a, spring.shape_b);
+    std::swap(contact.forces.a, contact.forces.b);
+    std::swap(contact.forces.place_a, contact.forces.place_b);
+    std::swap(contact.shape_a, contact.shape_b);
+  }
+  const double gap_m = rests ? 0.0 : hit.touch.gap_m;
+  const double open_m = gap_m + calc_yield(spring, modal.impact != nullptr ? modal.impact->get_bodies() : made.bodies);
+  spring.gap_m = std::max(open_m, 0.0);
+  spring.yielded_m = std::clamp(-open_m, 0.0, sag_m);
+  touch.presses = true;
+  touch.touching = false;
+  touch.impulse = touch.couple = {};
+  modal.contacts.push_back(std::move(contact));
+  if (modal.impact != nullptr)
+    modal.impact->join(spring);
+  else
+    made.springs.push_back(spring);
 }
 
 /// An impact that was ended has been computed by a part of its step beyond now, and so have the modes of its bodies: the next one begins
@@ -251,6 +288,56 @@ double ModalImpacts::fly_to_modes(const std::vector<Hit>& hits, const std::vecto
   return start_s;
 }
 
+/// Bound of the displacement of both surfaces at a touch by their modes.
+double ModalImpacts::calc_swing(const Contact& touch) {
+  Hit hit{.a = touch.a, .b = touch.b, .touch = touch.touch, .triangles = touch.triangles};
+  double swing = 0.0;
+  for (const bool is_a : {true, false}) {
+    const int body = is_a ? hit.a : hit.b;
+    if (!bodies_.has_modes(body)) continue;
+    const ModalState& state = states_.advance(body, bodies_.get_time());
+    const std::vector<double> amplitudes = calc_amplitudes(*bodies_.solid(body).modes, state.q, state.q_dot),
+                              phi = project(find_shape(bodies_, hit, is_a), transpose(bodies_.placed(body).rotation) * hit.touch.normal);
+    for (std::size_t m = 0; m < phi.size(); ++m) swing += std::abs(phi[m]) * amplitudes[m];
+  }
+  return swing;
+}
+
+/// May modes move the surfaces of a pair towards each other, and can an impact between its bodies begin?
+bool ModalImpacts::may_begin_early(const Step& step, const Pair& pair, const Instants& instants) const {
+  if (pair.cord >= 0 || !step.has(pair) || bodies_.get_swing(pair.a) + bodies_.get_swing(pair.b) <= kTooDeep) return false;
+  const auto is_free = [&](int body) {
+    return body < 0 ||
+           (!bodies_.is_in_impact(body) && bodies_.find_articulation(body) == nullptr && !instants.is_crowded(body, bodies_.get_time()));
+  };
+  return is_free(pair.a) && is_free(pair.b);
+}
+
+void ModalImpacts::begin_early(const Step& step, double length_s, const Instants& instants) {
+  for (Pair* pair : step.island().pairs) {
+    if (!may_begin_early(step, *pair, instants)) continue;
+    std::vector<Contact*> early;
+    std::vector<Hit> hits;
+    std::vector<int> order;
+    for (Contact& c : pair->contacts) {
+      const double approach = bodies_.calc_approach(c.touch, c.a, c.b);
+      if (c.presses || c.is_closed() || approach < kEarly) continue;
+      const double open_m = c.touch.gap_m - (approach + norm(bodies_.gravity()) * length_s) * length_s;
+      if (open_m > bodies_.get_swing(c.a) + bodies_.get_swing(c.b)) continue;
+      if (const double swing_m = calc_swing(c); swing_m <= kTooDeep || open_m >= swing_m) continue;
+      early.push_back(&c);
+      order.push_back(static_cast<int>(hits.size()));
+      hits.push_back({.a = c.a, .b = c.b, .touch = c.touch, .triangles = c.triangles});
+    }
+    if (early.empty()) continue;
+    ModalImpact& modal = impacts_.emplace_back();
+    modal.start_s = fly_to_modes(hits, order);
+    Made made;
+    for (int n = 0; Contact * c : early) add_contact(modal, *c, pair->sag_m, hits[n++], false, made);
+    modal.impact = std::make_unique<impact::Impact>(std::move(made.bodies), std::move(made.springs));
+  }
+}
+
 bool ModalImpacts::begin(const Step& step, Collision& collision, const Instants& instants, TouchSets& touches) {
   std::optional<Selection> selection = select(step, collision, instants);
   ModalImpact* joined = nullptr;
@@ -261,37 +348,10 @@ bool ModalImpacts::begin(const Step& step, Collision& collision, const Instants&
     joined->start_s = fly_to_modes(collision.hits, selection->order);
   }
   ModalImpact& modal = *joined;
-  std::vector<impact::Body> bodies;
-  std::vector<impact::Contact> springs;
-  std::list<std::vector<double>> shapes;  // kept until the impact has them
-  for (const int n : selection->order) {
-    Hit& hit = collision.hits[n];
-    int a = add_body(modal, hit.a, bodies), b = add_body(modal, hit.b, bodies);
-    auto [contact, spring] = make_contact(hit, selection->rests[n] != 0);
-    if (!contact.shape_a.empty()) spring.shape_a = shapes.emplace_back(turn_to_world(hit.a, contact.shape_a));
-    if (!contact.shape_b.empty()) spring.shape_b = shapes.emplace_back(turn_to_world(hit.b, contact.shape_b));
-    if (a < 0) {
-      // Static bodies are side b.
-      std::swap(a, b);
-      spring.normal = -1.0 * spring.normal;
-      std::swap(spring.shape_a, spring.shape_b);
-      std::swap(contact.forces.a, contact.forces.b);
-      std::swap(contact.forces.place_a, contact.forces.place_b);
-      std::swap(contact.shape_a, contact.shape_b);
-    }
-    spring.a = a;
-    spring.b = b;
-    Contact& c = collision.contacts[n].get();
-    c.presses = true;
-    c.touching = false;
-    c.impulse = c.couple = {};
-    modal.contacts.push_back(std::move(contact));
-    if (is_new)
-      springs.push_back(spring);
-    else
-      modal.impact->join(spring);
-  }
-  if (is_new) modal.impact = std::make_unique<impact::Impact>(std::move(bodies), std::move(springs));
+  Made made;
+  for (const int n : selection->order)
+    add_contact(modal, collision.contacts[n].get(), collision.contacts[n].pair->sag_m, collision.hits[n], selection->rests[n] != 0, made);
+  if (is_new) modal.impact = std::make_unique<impact::Impact>(std::move(made.bodies), std::move(made.springs));
   ++ledger_.costs.impacts;
   return true;
 }

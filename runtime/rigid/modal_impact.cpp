@@ -10,11 +10,14 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr double kLongest = 50e-3;   // s; an impact that lasts longer is a contact at rest
-constexpr double kRight = 0.01;      // of the kinetic energy: the most that a step of an impact on joints is corrected by
-constexpr double kSamePlace = 0.05;  // of the size
-constexpr double kExplained = 1.3;   // times the depth of spring and modes is explained
-constexpr double kCalmTime = 5e-3;   // s; for so long no impact of a pair begins slowly after one was ended
+constexpr double kLongest = 50e-3;     // s; a slow impact that lasts longer is a contact at rest,
+constexpr double kLongestOfAll = 0.5;  // s; and any other
+constexpr double kRight = 0.01;        // of the kinetic energy: the most that a step of an impact on joints is corrected by
+constexpr double kSamePlace = 0.05;    // of the size
+constexpr double kMoved = 0.02;        // of the size: a contact is taken to its touch where that is farther away
+constexpr int kMaxFollowed = 8;        // contacts of an impact, with open ones
+constexpr double kExplained = 1.3;     // times the depth of spring and modes is explained
+constexpr double kCalmTime = 5e-3;     // s; for so long no impact of a pair begins slowly after one was ended
 
 }  // namespace
 
@@ -25,6 +28,11 @@ ModalImpact* ModalImpacts::find(int body) {
   for (ModalImpact& modal : impacts_)
     if (std::find(modal.bodies.begin(), modal.bodies.end(), body) != modal.bodies.end()) return &modal;
   return nullptr;
+}
+
+/// The place of a touch on the body that moves, from its centre, axes of its mesh.
+Vec3 ModalImpacts::find_station(int a, int b, const shape::Touch& touch) const {
+  return bodies_.moves(a) ? touch.station_a - bodies_.solid(a).centre_m : touch.station_b - bodies_.solid(b).centre_m;
 }
 
 /// Where the point of a contact is now, by the body that moves.
@@ -38,8 +46,7 @@ template <typename Do>
 void ModalImpacts::for_contacts(const Pair& pair, Do&& act) const {
   for (const ModalImpact& modal : impacts_)
     for (int k = 0; const ModalContact& contact : modal.contacts) {
-      const Forces& f = contact.forces;
-      if ((f.a == pair.a && f.b == pair.b) || (f.b == pair.a && f.a == pair.b)) act(modal, k);
+      if (contact.is_between(pair.a, pair.b)) act(modal, k);
       ++k;
     }
 }
@@ -125,6 +132,90 @@ void ModalImpacts::end_where_touching(const Step& step, TouchSets& touches) {
     }
 }
 
+/// A contact goes to its touch.
+void ModalImpacts::place(ModalContact& contact, Contact& touch, const shape::Touch& at) {
+  Forces& forces = contact.forces;
+  const bool is_swapped = forces.a != touch.a;
+  contact.touch = touch.touch.id;
+  contact.is_followed = true;
+  contact.normal = (is_swapped ? -1.0 : 1.0) * at.normal;
+  contact.gap_m = at.gap_m;
+  touch.presses = true;
+  touch.touching = false;
+  touch.impulse = touch.couple = {};
+  const Vec3 station = find_station(touch.a, touch.b, at);
+  if (norm(contact.station - station) < kMoved * bodies_.calc_size(touch.a, touch.b)) return;
+  report(contact);
+  forces.continues = false;
+  Hit hit{.a = touch.a, .b = touch.b, .touch = at, .triangles = touch.triangles};
+  contact.station = station;
+  for (const bool is_a : {true, false}) {
+    if ((is_a ? touch.a : touch.b) < 0) continue;
+    const bool is_first = is_a != is_swapped;
+    (is_first ? forces.place_a : forces.place_b) = find_place(bodies_, hit, is_a);
+    if (bodies_.has_modes(is_a ? touch.a : touch.b)) (is_first ? contact.shape_a : contact.shape_b) = find_shape(bodies_, hit, is_a);
+  }
+}
+
+/// The contact of an impact that a touch with another name takes: the nearest at the same place, or for one that may close an open one.
+ModalContact* ModalImpacts::find_nearest(ModalImpact& modal, const Contact& touch, bool is_near) const {
+  ModalContact* nearest = nullptr;
+  double least_m = kSamePlace * bodies_.calc_size(touch.a, touch.b);
+  for (int n = 0; ModalContact & contact : modal.contacts) {
+    const bool is_open = !(modal.impact->get_compression(n++) > 0.0);
+    if (contact.is_followed || !contact.is_between(touch.a, touch.b)) continue;
+    const double away_m = norm(find_station(contact) - touch.touch.where_m);
+    if (away_m >= least_m && !(is_near && is_open && nearest == nullptr)) continue;
+    nearest = &contact;
+    least_m = std::min(least_m, away_m);
+  }
+  return nearest;
+}
+
+void ModalImpacts::follow(ModalImpact& modal, Pair& pair, double length_s, TouchSets& touches) {
+  const double reach_m =
+      2.0 * bodies_.calc_closing_speed(pair.a, pair.b) * length_s + bodies_.get_swing(pair.a) + bodies_.get_swing(pair.b) + kTooDeep;
+  std::vector<Contact*> others;
+  for (Contact& c : pair.contacts) {
+    const auto same = std::find_if(modal.contacts.begin(), modal.contacts.end(), [&](const ModalContact& contact) {
+      return !contact.is_followed && contact.is_between(pair.a, pair.b) && contact.touch == c.touch.id;
+    });
+    if (same != modal.contacts.end())
+      place(*same, c, touches.find_closing(pair, c, length_s));
+    else
+      others.push_back(&c);
+  }
+  for (Contact* c : others) {
+    const bool is_near = c->touch.gap_m < reach_m;
+    if (ModalContact* nearest = find_nearest(modal, *c, is_near); nearest != nullptr) {
+      place(*nearest, *c, touches.find_closing(pair, *c, length_s));
+    } else if (is_near && modal.contacts.size() < kMaxFollowed) {
+      Hit hit{.a = c->a, .b = c->b, .touch = touches.find_closing(pair, *c, length_s), .triangles = c->triangles};
+      Made made;
+      add_contact(modal, *c, pair.sag_m, hit, false, made);
+      place(modal.contacts.back(), *c, hit.touch);
+    }
+  }
+}
+
+void ModalImpacts::follow(const Step& step, double length_s, TouchSets& touches) {
+  for (ModalImpact& modal : impacts_) {
+    if (std::none_of(modal.bodies.begin(), modal.bodies.end(), [&](int body) { return step.find(body) >= 0; })) continue;
+    for (ModalContact& contact : modal.contacts) contact.is_followed = false;
+    for (int n = 0; const impact::Body& b : modal.impact->get_bodies())
+      if (const int body = modal.bodies[n++]; bodies_.has_modes(body)) note_swing(bodies_, body, b.q, b.q_dot);
+    const auto is_in = [&](int body) { return std::find(modal.bodies.begin(), modal.bodies.end(), body) != modal.bodies.end(); };
+    const auto may_join = [&](int body) { return is_in(body) || (!bodies_.moves(body) && !bodies_.has_modes(body)); };
+    for (Pair* pair : step.island().pairs) {
+      if (pair->cord >= 0 || !step.has(*pair) || !(is_in(pair->a) || is_in(pair->b))) continue;
+      if (!may_join(pair->a) || !may_join(pair->b)) continue;
+      touches.search(*pair, length_s);
+      touches.complete_in_flight(*pair, length_s);
+      follow(modal, *pair, length_s, touches);
+    }
+  }
+}
+
 void ModalImpacts::advance(const Step& step, double to_s, double part_s, double window_end_s, TouchSets& touches) {
   for (ModalImpact& modal : impacts_) {
     const bool is_here = std::any_of(modal.bodies.begin(), modal.bodies.end(), [&](int body) { return step.find(body) >= 0; });
@@ -157,8 +248,11 @@ void ModalImpacts::advance(const Step& step, double to_s, double part_s, double 
     for (int k = 0; const ModalContact& contact : modal.contacts) {
       impact::Contact& spring = springs.emplace_back(modal.impact->get_contact(k++));
       spring.where_m = find_station(contact);
+      if (contact.is_followed) spring.normal = contact.normal;
       if (!contact.shape_a.empty()) spring.shape_a = shapes.emplace_back(turn_to_world(contact.forces.a, contact.shape_a));
       if (!contact.shape_b.empty()) spring.shape_b = shapes.emplace_back(turn_to_world(contact.forces.b, contact.shape_b));
+      spring.gap_m =
+          contact.is_followed ? std::max(contact.gap_m + calc_yield(spring, bodies), 0.0) : -modal.impact->get_compression(k - 1);
     }
     modal.impact->update(bodies, springs);
     const double begun_s = modal.impact->get_time();
@@ -182,7 +276,9 @@ void ModalImpacts::advance(const Step& step, double to_s, double part_s, double 
     // Once a window: pieces of a small step each would be many.
     if (to_s >= window_end_s - 1e-9)
       for (ModalContact& contact : modal.contacts) report(contact);
-    if (!ended && to_s - modal.start_s <= kLongest) continue;
+    const bool is_slow = std::all_of(modal.bodies.begin(), modal.bodies.end(),
+                                     [&](int body) { return !bodies_.moves(body) || bodies_.calc_speed(body) < kRattling; });
+    if (!ended && to_s - modal.start_s <= (is_slow ? kLongest : kLongestOfAll)) continue;
     // It has gone beyond the end of the part, and so did the pulls.
     const double beyond_s = modal.start_s + modal.impact->get_time() - to_s;
     const std::vector<int> moved = modal.bodies;
@@ -298,8 +394,9 @@ void ModalImpacts::release(ModalImpact& modal, double time_s, TouchSets& touches
     if (bodies_.moves(body) && reached_s > time_s) s = fly(bodies_.solid(body), s, bodies_.gravity(), time_s - reached_s);
     bodies_.place(body);
   }
+  const double stored_j = books.spring / static_cast<double>(modal.contacts.size());
   for (int k = 0; const ModalContact& contact : modal.contacts)
-    touches.release(contact.forces.a, contact.forces.b, std::max(0.0, modal.impact->calc_depth(k++)));
+    touches.release(contact.forces.a, contact.forces.b, std::max(0.0, modal.impact->calc_depth(k++)), stored_j);
   modal.impact = nullptr;
   modal.bodies.clear();
 }

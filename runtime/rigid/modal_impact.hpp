@@ -20,6 +20,12 @@ struct ModalContact {
   Forces forces;                         // bodies, places, and impulses that are not reported yet
   std::vector<double> shape_a, shape_b;  // axes of the meshes; empty: does not ring
   Vec3 station{};                        // of the point, from the centre of the one that moves, axes of its mesh
+  std::uint64_t touch = 0;               // its name
+  bool is_followed = false;              // that touch is there,
+  Vec3 normal{};                         // with this normal to side a
+  double gap_m = 0.0;                    // and this gap of the rigid surfaces
+
+  bool is_between(int a, int b) const { return (forces.a == a && forces.b == b) || (forces.a == b && forces.b == a); }
 };
 
 /// An impact with modes that is not over.
@@ -50,6 +56,10 @@ class ModalImpacts {
   /// An impact has no other contacts than its own, and knows no depth but that of its springs and modes: where its bodies come to touch
   /// elsewhere slowly, or deeper, it ends. Now is the time of the touches.
   void end_where_touching(const Step& step, TouchSets& touches);
+  /// The contacts of impacts go to where their touches are now, and touches that may close in a step become contacts, which are open.
+  void follow(const Step& step, double length_s, TouchSets& touches);
+  /// Begins impacts of bodies that ring before their deformed surfaces can touch in a step.
+  void begin_early(const Step& step, double length_s, const Instants& instants);
   /// Depth of the bodies of a pair that springs and modes of an impact between them explain [m].
   double calc_depth(const Pair& pair) const;
   /// Moves the impacts of an island to the time `to_s`, `part_s` later. The step has the effect of gravity and of other contacts on
@@ -67,18 +77,32 @@ class ModalImpacts {
     std::vector<char> rests;  // of all contacts of the collision
   };
 
+  /// Bodies and contacts of an impact that has not begun.
+  struct Made {
+    std::vector<impact::Body> bodies;
+    std::vector<impact::Contact> springs;
+    std::list<std::vector<double>> shapes;  // kept until an impact has them
+  };
+
   ModalImpact* find(int body);
   ModalImpact* find_own(const Step& step, const Hit& hit);
   std::optional<Selection> select(const Step& step, const Collision& collision, const Instants& instants);
+  void follow(ModalImpact& modal, Pair& pair, double length_s, TouchSets& touches);
+  ModalContact* find_nearest(ModalImpact& modal, const Contact& touch, bool is_near) const;
+  void place(ModalContact& contact, Contact& touch, const shape::Touch& at);
+  static double calc_yield(const impact::Contact& contact, const std::vector<impact::Body>& bodies);
   bool add_resting(const Collision& collision, const Instants& instants, std::vector<int>& order) const;
   bool shares_articulations(const std::vector<Hit>& hits, const std::vector<int>& order) const;
   bool join(const std::vector<Hit>& hits, Selection& selection, TouchSets& touches, ModalImpact*& joined);
+  double calc_swing(const Contact& touch);
+  bool may_begin_early(const Step& step, const Pair& pair, const Instants& instants) const;
   double fly_to_modes(const std::vector<Hit>& hits, const std::vector<int>& order);
   int add_body(ModalImpact& modal, int body, std::vector<impact::Body>& made);
-  std::pair<ModalContact, impact::Contact> make_contact(Hit& hit, bool rests);
+  void add_contact(ModalImpact& modal, Contact& touch, double sag_m, Hit& hit, bool rests, Made& made);
   impact::Body make_body(int body);
   void set_motion(int body, impact::Body& made) const;
   std::vector<double> turn_to_world(int body, const std::vector<double>& shape) const;
+  Vec3 find_station(int a, int b, const shape::Touch& touch) const;
   Vec3 find_station(const ModalContact& contact) const;
   template <typename Do>
   void for_contacts(const Pair& pair, Do&& act) const;

@@ -11,6 +11,11 @@
 #include "runtime/rigid/limits.hpp"
 
 namespace carillon::rigid {
+namespace {
+
+constexpr double kLargestShape = 4.0;  // of a mode, over 1/sqrt(mass): at the corners of a plate
+
+}  // namespace
 
 const shape::Place& find_place(const Bodies& bodies, Hit& hit, bool is_a) {
   const int side = is_a ? 0 : 1, body = is_a ? hit.a : hit.b;
@@ -40,8 +45,22 @@ ModalState& ModalStates::advance(int body, double time_s) {
     if (before > 0.0) modes.move_freely(state.q, state.q_dot, time_s - state.time_s);
     ledger_.lose(before - modes.calc_energy(state.q, state.q_dot));
     state.time_s = time_s;
+    note_swing(bodies_, body, state.q, state.q_dot);
   }
   return state;
+}
+
+std::vector<double> calc_amplitudes(const impact::Modes& modes, const std::vector<double>& q, const std::vector<double>& q_dot) {
+  const std::vector<double>& omega = modes.get_omega();
+  std::vector<double> amplitudes(q.size());
+  for (std::size_t m = 0; m < q.size(); ++m) amplitudes[m] = omega[m] > 0.0 ? std::hypot(q[m], q_dot[m] / omega[m]) : 0.0;
+  return amplitudes;
+}
+
+void note_swing(Bodies& bodies, int body, const std::vector<double>& q, const std::vector<double>& q_dot) {
+  double sum = 0.0;
+  for (const double amplitude : calc_amplitudes(*bodies.solid(body).modes, q, q_dot)) sum += amplitude;
+  bodies.set_swing(body, kLargestShape / std::sqrt(bodies.solid(body).mass_kg) * sum);
 }
 
 void ModalStates::excite(Strike& strike, double available_j) {
@@ -60,7 +79,7 @@ void ModalStates::excite(Strike& strike, double available_j) {
       if (!(mass > 0.0)) continue;
       const double length = bodies_.calc_contact_time(hit.touch, hit.a, hit.b, mass, hit.approach_m_s);
       before.try_emplace(body, states_[body]);
-      ModalState& state = advance(body, strike.time_s + 0.5 * length);
+      ModalState& state = advance(body, strike.time_s);
       const impact::Modes& modes = *bodies_.solid(body).modes;
       const auto& omega = modes.get_omega();
       const double energy = modes.calc_energy(state.q, state.q_dot);
@@ -76,6 +95,7 @@ void ModalStates::excite(Strike& strike, double available_j) {
     ledger_ = ledger_before;
     given = 0.0;
   }
+  for (const auto& [body, state] : before) note_swing(bodies_, body, states_[body].q, states_[body].q_dot);
   strike.modes_j = given;
   ledger_.lose(available_j - given);
 }

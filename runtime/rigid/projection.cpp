@@ -117,7 +117,13 @@ void Projection::move(const Step& step, const std::vector<Mover>& displacements,
     touches_.remove_false(*pair);
   }
   if (const double owed_j = bodies_.calc_energy(step.island().bodies) - before_j; is_held && owed_j > 0.0) pay(step, displacements, owed_j);
-  const double gained_j = bodies_.calc_energy(step.island().bodies) - before_j;
+  double gained_j = bodies_.calc_energy(step.island().bodies) - before_j;
+  for (Pair* pair : step.island().pairs) {
+    const double spent_j = std::clamp(gained_j, 0.0, pair->stored_j);
+    pair->stored_j -= spent_j;
+    gained_j -= spent_j;
+    ledger_.lose(-spent_j);
+  }
   if (gained_j > 0.0)
     ledger_.lift(gained_j);
   else

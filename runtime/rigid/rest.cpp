@@ -50,7 +50,10 @@ bool Rest::try_articulation(Articulation& articulation, double length_s) {
 Rest::Balance Rest::try_sleep(Island& island, double h, const std::vector<joints::Spatial>& pulls) {
   bool touches = !pulls.empty();
   double slow_s = std::numeric_limits<double>::infinity();
-  for (const Pair* pair : island.pairs) touches = touches || pair->has_closed_gap();
+  for (const Pair* pair : island.pairs) {
+    if (pair->sag_m > kDeep) return Balance::none;  // it comes up first
+    touches = touches || pair->has_closed_gap();
+  }
   bodies_.for_articulations(island.bodies, [&](const Articulation& articulation) { touches = touches || articulation.is_anchored; });
   if (!touches) return Balance::none;
   std::vector<State> kept;
@@ -112,7 +115,7 @@ std::vector<char> Rest::find_slow() const {
   if (std::none_of(is_slow.begin(), is_slow.end(), [](char slow) { return slow != 0; })) return {};
   const auto is_one = [&](int body) { return body >= 0 && is_slow[body] != 0; };
   for (const Pair* pair : windows_.near()) {
-    if ((!is_one(pair->a) && !is_one(pair->b)) || !pair->touches()) continue;
+    if ((!is_one(pair->a) && !is_one(pair->b)) || !(pair->touches() || pair->sag_m > kDeep)) continue;
     const bool moves_there = std::any_of(pair->contacts.begin(), pair->contacts.end(), [&](const Contact& c) {
       return c.touching && norm(bodies_.calc_velocity(c.a, c.touch.where_m) - bodies_.calc_velocity(c.b, c.touch.where_m)) > kStill;
     });
@@ -121,7 +124,7 @@ std::vector<char> Rest::find_slow() const {
       // Forces on articulated bodies belong to the joints.
       const bool is_calm = !bodies_.moves(other) || (paces_[other].slow_s > kCalm && !bodies_.is_moved_by_impact(other) &&
                                                      bodies_.find_articulation(other) == nullptr);
-      if (is_one(body) && (pair->cord >= 0 || moves_there || !is_calm)) is_slow[body] = 0;
+      if (is_one(body) && (pair->cord >= 0 || moves_there || !is_calm || pair->sag_m > kDeep)) is_slow[body] = 0;
     }
   }
   return is_slow;

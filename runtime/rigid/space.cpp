@@ -11,6 +11,7 @@ namespace carillon::rigid {
 namespace {
 
 constexpr double kShortest = 1e-9;  // s; a shorter rest of a step is left out
+constexpr double kStruck = 5e-5;    // s; longest part of the rest of a step after an impact with modes has begun
 constexpr int kMaxMissed = 30;      // in a step: instants at which nothing struck after all
 constexpr int kMaxSought = 3;       // of these, until closings by the path are no longer looked for
 constexpr int kMaxCompleted = 4;    // solutions of a step that are repeated with touches that were missing
@@ -100,8 +101,10 @@ void Space::step_island(Island& island, double start_s, double length_s) {
     impacts = max_impacts;
   }
   while (length_s - done > kShortest) {
-    const double h = length_s - done;
+    const double h = impacts > 0 && !modal_impacts_.list().empty() ? std::min(length_s - done, kStruck) : length_s - done;
     bodies_.set_time(start_s + done);
+    modal_impacts_.begin_early(step_, h, instants_);
+    modal_impacts_.follow(step_, h, touches_);
     modal_impacts_.end_where_touching(step_, touches_);
     const bool may_sleep = !std::exchange(begun, true) && rest_.may_sleep(island.bodies, h);
     const double too_deep_m = step_.count() <= options_.max_direct ? kTooDeepAlone : kTooDeep;

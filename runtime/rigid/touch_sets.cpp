@@ -20,6 +20,7 @@ constexpr double kMissing = 5e-6;        // m; a place deeper than all touches b
 constexpr double kSearchAgain = 2e-3;    // s; a pair with a missing touch is searched anew once in so long
 constexpr double kSame = 0.02;           // of the size: touches so near are one
 constexpr double kSagDecay = 10e-3;      // s
+constexpr int kMaxAdded = 4;             // touches that are missing at the end of a flight
 
 /// Lower bound of the gap of any vertex of a body over the ground, from that at an earlier frame.
 double calc_least_gap(const Pair& pair, const shape::Shape& shape, const shape::Frame& now) {
@@ -60,6 +61,7 @@ void TouchSets::search(Pair& pair, double step_s) {
   const double speed = bodies_.calc_closing_speed(pair.a, pair.b) + norm(bodies_.gravity()) * step_s;
   const double steps = pair.b < 0 && !bodies_.is_flat(pair.a) ? kStepsOfRolling : kSteps;
   pair.margin_m = std::min(std::max(2e-4, steps * step_s * speed), kReach * bodies_.calc_size(pair.a, pair.b));
+  const double margin_m = pair.margin_m + bodies_.get_swing(pair.a) + bodies_.get_swing(pair.b);
   pair.travelled_m = 0.0;
   pair.searched = true;
   const std::vector<Contact> old = std::exchange(pair.contacts, {});
@@ -68,9 +70,9 @@ void TouchSets::search(Pair& pair, double step_s) {
   const shape::Shape& a = *bodies_.get_shape(pair.a);
   const shape::Frame frame_a = bodies_.get_frame(pair.a);
   if (pair.b < 0)
-    shape::find_ground_touches(a, frame_a, bodies_.ground()->height_m, pair.margin_m, pair.memory, found_);
+    shape::find_ground_touches(a, frame_a, bodies_.ground()->height_m, margin_m, pair.memory, found_, bodies_.is_moved_by_impact(pair.a));
   else
-    shape::find_touches(a, frame_a, *bodies_.get_shape(pair.b), bodies_.get_frame(pair.b), pair.margin_m, pair.memory, found_);
+    shape::find_touches(a, frame_a, *bodies_.get_shape(pair.b), bodies_.get_frame(pair.b), margin_m, pair.memory, found_);
   for (const shape::Touch& touch : found_) {
     const auto same = std::find_if(old.begin(), old.end(), [&](const Contact& c) { return c.touch.id == touch.id; });
     Contact contact;
@@ -236,12 +238,40 @@ bool TouchSets::complete(const Step& step, bool finds_closing) {
   return any;
 }
 
-void TouchSets::travel(Pair& pair, double time_s, double step_s) const {
-  pair.travelled_m += (bodies_.calc_closing_speed(pair.a, pair.b) + norm(bodies_.gravity()) * step_s) * time_s + 1e-12;
-  if (pair.sag_m > 0.0) pair.sag_m *= std::exp(-time_s / kSagDecay);
+shape::Frame TouchSets::find_flown(int body, double time_s) const {
+  if (!bodies_.moves(body)) return bodies_.get_frame(body);
+  return place(bodies_.solid(body), fly(bodies_.solid(body), bodies_.state(body), bodies_.gravity(), time_s)).frame;
 }
 
-void TouchSets::release(int a, int b, double depth_m) {
+void TouchSets::complete_in_flight(Pair& pair, double time_s) {
+  const shape::Frame a = find_flown(pair.a, time_s), b = find_flown(pair.b, time_s);
+  for (int n = 0; n < kMaxAdded && complete(pair, a, b, 0.0); ++n) {
+  }
+}
+
+shape::Touch TouchSets::find_closing(Pair& pair, const Contact& contact, double time_s) const {
+  const double approach = bodies_.calc_approach(contact.touch, contact.a, contact.b);
+  if (!contact.touch.smooth || !(contact.touch.gap_m > kTouch) || !(approach > 0.0)) return contact.touch;
+  const double closes_s = std::min(time_s, contact.touch.gap_m / approach);
+  shape::Touch touch = find_moved(pair, contact.touch, find_flown(pair.a, closes_s), find_flown(pair.b, closes_s));
+  const auto find_now = [&](int body, const Vec3& station) {
+    const shape::Frame frame = bodies_.get_frame(body);
+    return body < 0 ? station : frame.position_m + frame.rotation * station;
+  };
+  const Vec3 at_a = find_now(pair.a, touch.station_a), at_b = find_now(pair.b, touch.station_b);
+  touch.gap_m = dot(at_a - at_b, touch.normal);
+  touch.where_m = at_a;
+  return touch;
+}
+
+void TouchSets::travel(Pair& pair, double time_s, double step_s) const {
+  pair.travelled_m += (bodies_.calc_closing_speed(pair.a, pair.b) + norm(bodies_.gravity()) * step_s) * time_s + 1e-12;
+  if (!(pair.sag_m > 0.0)) return;
+  pair.sag_m *= std::exp(-time_s / kSagDecay);
+  if (pair.sag_m < kDeep) pair.stored_j = 0.0;
+}
+
+void TouchSets::release(int a, int b, double depth_m, double stored_j) {
   if (b >= 0 && a > b) std::swap(a, b);
   const auto at = pairs_.find({a, b});
   if (at == pairs_.end()) return;
@@ -249,6 +279,7 @@ void TouchSets::release(int a, int b, double depth_m) {
   for (Contact& c : pair.contacts)
     if (c.presses) c.presses = c.touching = false;
   pair.sag_m = std::max(pair.sag_m, depth_m);
+  pair.stored_j += stored_j;
 }
 
 shape::Touch TouchSets::find_moved(Pair& pair, shape::Touch touch, const shape::Frame& a, const shape::Frame& b) const {

@@ -46,10 +46,15 @@ class TouchSets {
   /// Adds touches that are missing at the end of a step, by its predicted motion, and with `finds_closing` finds those that close. True if
   /// there were any.
   bool complete(const Step& step, bool finds_closing);
+  /// The same for a pair of an impact with modes, as if its bodies flew.
+  void complete_in_flight(Pair& pair, double time_s);
+  /// The place, as the bodies are now, at which a touch of a curved surface closes within a time, if its bodies fly.
+  shape::Touch find_closing(Pair& pair, const Contact& contact, double time_s) const;
   /// Counts a movement of `time_s` in a step.
   void travel(Pair& pair, double time_s, double step_s) const;
-  /// The contacts of two bodies that were in an impact with modes, which explains that depth [m], are free again.
-  void release(int a, int b, double depth_m);
+  /// The contacts of two bodies that were in an impact with modes, which explains that depth [m], are free again;
+  /// so much energy of its springs can lift them [J].
+  void release(int a, int b, double depth_m, double stored_j);
   /// A touch of a pair whose bodies are at these frames.
   shape::Touch find_moved(Pair& pair, shape::Touch touch, const shape::Frame& a, const shape::Frame& b) const;
 
@@ -57,6 +62,7 @@ class TouchSets {
   void keep_added(Pair& pair, const std::vector<Contact>& old) const;
   std::pair<Contact*, double> find_least(Pair& pair, const shape::Frame& a, const shape::Frame& b) const;
   bool complete(Pair& pair, const shape::Frame& a, const shape::Frame& b, double closing_s);
+  shape::Frame find_flown(int body, double time_s) const;
   void add(Pair& pair, const shape::Deepest& deepest);
 
   const Bodies& bodies_;

@@ -76,7 +76,7 @@ void Windows::open(double end_s, const std::list<ModalImpact>& impacts) {
     reach_m_s_[i] = bodies_.moves(i) ? bodies_.calc_speed(i) + g * length : 0.0;
     if (const Articulation* articulation = bodies_.find_articulation(i); articulation != nullptr && bodies_.moves(i))
       reach_m_s_[i] += bodies_.calc_joint_acceleration(*articulation) * length;
-    boxes[i] = bodies_.calc_box(i, bodies_.moves(i) ? reach_m_s_[i] * length + kRoom : 0.0);
+    boxes[i] = bodies_.calc_box(i, bodies_.moves(i) ? reach_m_s_[i] * length + bodies_.get_swing(i) + kRoom : 0.0);
   }
   std::vector<int> order(count);
   std::iota(order.begin(), order.end(), 0);

@@ -9,6 +9,8 @@
 namespace carillon::shape {
 namespace {
 
+constexpr double kFacesDown = -0.7;  // vertical part of the normal of a facet whose corners may all touch the ground
+
 Touch make_ground_touch(const Shape& a, const Frame& fa, const Vec3& x, double height) {
   Touch t;
   t.station_a = x;
@@ -161,13 +163,18 @@ bool answer(const Shape& a, const Frame& fa, const Shape* b, const Frame& fb, do
   return true;
 }
 
-void find_ground_touches(const Shape& a, const Frame& fa, double height, double margin, PairMemory& memory, std::vector<Touch>& out) {
+void find_ground_touches(const Shape& a, const Frame& fa, double height, double margin, PairMemory& memory, std::vector<Touch>& out,
+                         bool with_all) {
   out.clear();
   if (to_world(fa, a.get_middle_m())[2] - a.get_radius_m() > height + margin) return;
   if (const Polyhedron* body = a.polyhedron()) {
+    std::vector<char> faces_down(body->corners.size(), 0);
+    for (std::size_t f = 0; f < body->loops.size() && with_all; ++f)
+      if (dot(fa.rotation[2], body->normals[f]) < kFacesDown)
+        for (const int c : body->loops[f]) faces_down[c] = 1;
     for (std::size_t c = 0; c < body->corners.size(); ++c) {
       const double h = dot(fa.rotation[2], body->corners[c]) + fa.position_m[2] - height;
-      if (h > margin || !carries(a.mesh(), body->corner_vertices[c], fa.rotation[2])) continue;
+      if (h > margin || (!faces_down[c] && !carries(a.mesh(), body->corner_vertices[c], fa.rotation[2]))) continue;
       out.push_back(make_ground_touch(a, fa, body->corners[c], height));
       out.back().id = make_id(Feature::corner_a, body->corner_vertices[c], 0);
     }

@@ -59,9 +59,10 @@ class PairMemory {
 /// Replaces `out` by the touches not further apart than the margin: at most 4 for each patch of contact.
 void find_touches(const Shape& a, const Frame& frame_a, const Shape& b, const Frame& frame_b, double margin_m, PairMemory& memory,
                   std::vector<Touch>& out);
-/// The ground is the half space z <= height_m.
+/// The ground is the half space z <= height_m. `with_all`: of a polyhedron all corners of facets that face
+/// the ground, not only those that no other is lower than.
 void find_ground_touches(const Shape& a, const Frame& frame_a, double height_m, double margin_m, PairMemory& memory,
-                         std::vector<Touch>& out);
+                         std::vector<Touch>& out, bool with_all = false);
 
 /// The deepest place of one body in another, a sample, or in the ground, a vertex.
 struct Deepest {

@@ -216,8 +216,11 @@ TEST_P(Falling, GivesItsModesLessThanTheMotionLost) {
       if (const auto* f = std::get_if<events::Force>(&e)) forces.push_back(*f);
       if (const auto* m = std::get_if<events::BodyMotion>(&e)) last = *m;
     });
-    const EnergyAudit energy = world.get_statistics().energy;
+    const Statistics statistics = world.get_statistics();
+    const EnergyAudit& energy = statistics.energy;
     ASSERT_FALSE(forces.empty());
+    // Springs and modes explain the depth, also where the next corner comes while it rings by millimetres.
+    EXPECT_LT(statistics.contacts.unexplained.unexplained_m, 1e-4) << turn << " at " << statistics.contacts.unexplained.time_s;
     EXPECT_GT(energy.max_modes_j, 1e-4 * plate.rigid.mass_kg);
     EXPECT_LT(energy.modes_share, 1.0);
     EXPECT_LT(energy.max_modes_j, plate.rigid.mass_kg * 9.81 * 0.6);

@@ -136,5 +136,31 @@ TEST(Limit, OfTwoContactsThatShareABarHoldsForBoth) {
   }
 }
 
+TEST(Limit, DoesNotLetThroughWhatIsPressedForLong) {
+  // A ball lies on a plate for 0.3 s; then something presses it down. Springs and modes yield by some 20 um.
+  const Plate plate = make_plate(0.2, 0.18, 0.004, 15e3, 0.094, 0.0954, 50.0);
+  const Modes modes(plate.omega, plate.decay, 2.0 * kPi * 15e3);
+  Body ball = make_ball(0.02, {}), below;
+  ball.acceleration_m_s2 = {0, 0, -9.81};
+  below.modes = &modes;
+  std::vector<Contact> contacts{make_contact(0.02, 0, 1)};
+  contacts[0].shape_b = plate.shape;
+  contacts[0].restitution = 0.5;
+  contacts[0].is_limit = true;
+  Impact impact({ball, below}, contacts);
+  EXPECT_FALSE(impact.advance(0.3));
+  const double before_m = impact.get_bodies()[0].moved_m[2];
+  impact.push(0, {0, 0, -0.05}, {});
+  double deepest_m = 0.0;
+  for (int n = 1; n <= 40; ++n) {
+    impact.advance(0.3 + 5e-4 * n);
+    deepest_m = std::max(deepest_m, before_m - impact.get_bodies()[0].moved_m[2]);
+    // Depth is compression, what has yielded, and the bending of the plate.
+    if (impact.get_compression(0) > 0.0) EXPECT_NEAR(impact.calc_depth(0), -impact.get_bodies()[0].moved_m[2], 1e-9);
+  }
+  EXPECT_LT(deepest_m, 1e-4);
+  expect_sound(impact, contacts);
+}
+
 }  // namespace
 }  // namespace carillon::impact::tests

@@ -285,5 +285,60 @@ TEST(Ringing, SecondHitTakesEnergyAsWellAsItGives) {
   EXPECT_LT(modal[1], 0.02);
 }
 
+TEST(Ringing, AnOpenContactIsStruckAtTheSpeedWithWhichItCloses) {
+  // From 0.05 m/s to 0.29 m/s on the way of 40 um; the same from there on.
+  const double pull = 1e3, way = 4e-5, speed = std::sqrt(0.05 * 0.05 + 2.0 * pull * way);
+  double rebound[2] = {};
+  for (const int begins_open : {0, 1}) {
+    Body ball = make_ball(0.01, {0, 0, begins_open ? -0.05 : -speed});
+    ball.acceleration_m_s2 = {0, 0, -pull};
+    std::vector<Contact> contacts{make_contact(0.01)};
+    contacts[0].restitution = 0.5;
+    contacts[0].gap_m = begins_open ? way : 0.0;
+    Impact impact({ball}, contacts, {.steps_per_pulse = 60});
+    double fastest = 0.0;
+    for (int n = 0; n < 200; ++n) {
+      impact.advance(1e-5 * n);
+      fastest = std::max(fastest, impact.get_bodies()[0].velocity_m_s[2]);
+    }
+    rebound[begins_open] = fastest / speed;
+    expect_sound(impact, contacts);
+  }
+  EXPECT_GT(rebound[0], 0.3);
+  EXPECT_NEAR(rebound[1], rebound[0], 0.02);
+}
+
+TEST(Ringing, AnOpenContactGoesWithItsTouchAndAPressedOneKeepsItsCompression) {
+  Body ball = make_ball(0.01, {0, 0, -1.0});
+  std::vector<Contact> contacts(2, make_contact(0.01));
+  contacts[1].gap_m = 1e-3;
+  Impact impact({ball}, contacts);
+  EXPECT_FALSE(impact.advance(1e-5));
+  const double pressed = impact.get_compression(0);
+  EXPECT_GT(pressed, 0.0);
+  EXPECT_LT(impact.get_compression(1), 0.0);
+  contacts[0].gap_m = contacts[1].gap_m = 2e-4;
+  impact.update(impact.get_bodies(), contacts);
+  EXPECT_EQ(impact.get_compression(0), pressed);
+  EXPECT_EQ(impact.get_compression(1), -2e-4);
+}
+
+TEST(Ringing, WhatHasYieldedRecoversAsTheSurfacesPart) {
+  for (const double speed : {-1.0, 1.0}) {
+    std::vector<Contact> contacts{make_contact(0.01)};
+    contacts[0].yielded_m = 1e-4;
+    Impact impact({make_ball(0.01, {0, 0, speed})}, contacts);
+    EXPECT_EQ(impact.calc_depth(0), 1e-4);
+    impact.advance(2e-5);
+    EXPECT_NEAR(impact.calc_depth(0), 1e-4 - impact.get_bodies()[0].moved_m[2], 1e-12);
+    EXPECT_EQ(impact.get_compression(0) > 0.0, speed < 0.0);  // pressed again, it pushes at once
+    if (speed < 0.0) continue;
+    impact.advance(1.0);
+    EXPECT_TRUE(impact.has_ended());
+    EXPECT_EQ(impact.calc_depth(0), 0.0);
+    EXPECT_EQ(impact.get_impulse(0), 0.0);
+  }
+}
+
 }  // namespace
 }  // namespace carillon::impact::tests

@@ -109,5 +109,19 @@ TEST(projection, allowed_depth_stays) {
   }
 }
 
+TEST(projection, springs_of_an_impact_lift_the_bodies_out_of_the_depth_that_it_left) {
+  std::mt19937 random(7);
+  Stages stages = make_box_in_ground(random, 1e-4, 0.0);
+  stages.begin({{0, -1}});
+  stages.touches.release(0, -1, 0.0, 1.0);
+  const double total = stages.calc_books().calc_total();
+  stages.projection.run(stages.step, kTooDeep);
+  const Books books = stages.calc_books();
+  EXPECT_GT(find_least_gap(stages), -kTooDeep);
+  EXPECT_EQ(books.lifted_j, 0.0);
+  EXPECT_LT(books.lost_j, 0.0);  // it was booked as lost
+  EXPECT_NEAR(books.calc_total(), total, 1e-13);
+}
+
 }  // namespace
 }  // namespace carillon::rigid

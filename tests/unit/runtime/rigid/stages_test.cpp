@@ -136,7 +136,8 @@ struct Boxes {
     b.restitution = 0.4;
     contact.a = 0;
     contact.b = 1;
-    contact.touch.where_m = {0.03, 0.02, 0.01};
+    contact.touch.where_m = contact.touch.station_a = {0.03, 0.02, 0.01};
+    contact.touch.station_b = {-0.03, 0.02, 0.01};
     contact.touch.normal = {-1, 0, 0};
   }
   Stages make() const { return Stages({a, b}, {make_state({}, {speed, 0, 0}), make_state({0.06, 0, 0})}, std::nullopt, {}); }
@@ -287,6 +288,7 @@ TEST(ledger, pulses_give_modes_at_most_what_the_motion_lost) {
   const Books books = stages.calc_books();
   EXPECT_NEAR(books.modes_j, all_j, 0.1 * all_j);
   EXPECT_DOUBLE_EQ(strike.modes_j, books.modes_j);
+  EXPECT_EQ(stages.modal_states.advance(0, 0.0).time_s, strike.time_s);  // an impact that begins now finds them now
   EXPECT_NEAR(books.modes_j + books.lost_j, 2.0 * all_j, 1e-15);
   // Of a motion that lost next to nothing they get nothing.
   stages.modal_states.excite(strike, 1e-3 * all_j);
@@ -345,6 +347,19 @@ TEST(rest, island_that_is_slow_and_balanced_sleeps_and_wakes_where_it_is_struck)
     EXPECT_TRUE(stages.bodies.is_asleep(0) && stages.bodies.moves(1));
     EXPECT_FALSE(stages.rest.wake_struck(stages.step, {{third.pairs[0], 0}}));
   }
+}
+
+TEST(rest, body_that_has_yielded_comes_up_before_it_sleeps) {
+  Stages stages({make_box(0.1, kBoxSides)}, {make_state({0, 0, 0.02 - 1e-4})}, kWood, {0, 0, -kGravity});
+  stages.begin({{0, -1}});
+  double& sag_m = stages.island.pairs[0]->sag_m = 1e-4;
+  EXPECT_FALSE(stages.rest.may_sleep(stages.island.bodies, 0.015));
+  EXPECT_TRUE(stages.rest.may_sleep(stages.island.bodies, 0.015));
+  EXPECT_FALSE(stages.rest.try_island(stages.island, 5e-4));
+  sag_m = 0.0;
+  stages.projection.run(stages.step, kDeep);
+  EXPECT_TRUE(stages.rest.try_island(stages.island, 5e-4));
+  EXPECT_NEAR(stages.bodies.state(0).centre[2], 0.02, kDeep);
 }
 
 }  // namespace

@@ -54,6 +54,19 @@ TEST(ground, corner_keeps_its_name_while_a_box_turns) {
   }
 }
 
+TEST(ground, all_corners_of_a_side_that_faces_it_are_found_where_they_are_asked_for) {
+  const auto box = make_box({0.06, 0.05, 0.004}, 2).make();
+  Frame frame;
+  frame.rotation = multiply(make_turn({1, 0, 0}, 0.02), make_turn({0, 1, 0}, 0.05));
+  std::vector<Touch> touches;
+  for (const bool with_all : {false, true}) {
+    PairMemory memory;
+    find_ground_touches(*box, frame, 0.0, 0.01, memory, touches, with_all);
+    EXPECT_EQ(touches.size() == 4U, with_all);
+    for (const Touch& t : touches) EXPECT_LT(t.station_a[2], 0.0);  // none of the upper side
+  }
+}
+
 TEST(ground, lowest_vertex_from_memory_is_that_of_a_whole_search) {
   const std::shared_ptr<const Shape> shapes[] = {make_lumpy(0.05, 4, 0.2).make(), make_cylinder(0.012, 0.002, 48).make(),
                                                  make_ring(0.02, 0.003, 48, 16).make(), make_cylinder(0.005, 0.2, 24).make()};
