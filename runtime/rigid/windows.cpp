@@ -19,8 +19,9 @@ constexpr double kMaxSteps = 1024;        // of a window
 constexpr double kThin = 0.15;            // of the thickness of the thinner body: a pair that moves as far in a long step takes short ones
 constexpr double kSag = 5e-6;             // m; a point on an arc may leave its chord by this in a step,
 constexpr double kSagOfThickness = 5e-4;  // or by so much of the thickness of its body
-constexpr double kFlatSteps = 2.0;        // times the step of others: that of groups in which flat bodies alone touch
-constexpr double kRoom = 1e-4;            // m; by which boxes are larger than they must be
+constexpr double kRolls = 4.0;  // times the arc bounded by a body's box: with it a long body that rolls and hops is not deeper than 50 um
+constexpr double kFlatSteps = 2.0;  // times the step of others: that of groups in which flat bodies alone touch
+constexpr double kRoom = 1e-4;      // m; by which boxes are larger than they must be
 
 bool overlap(const shape::Box& x, const shape::Box& y) {
   for (int k = 0; k < 3; ++k)
@@ -203,10 +204,11 @@ void Windows::choose_steps() {
   for (int i = 0; i < count; ++i) {
     if (!bodies_.moves(i)) continue;
     if (bodies_.find_articulation(i) != nullptr || bodies_.is_moved_by_impact(i)) ask(i, length_s / options_.step_s);
-    // The arc of a point leaves its chord by w v h^2 / 2 within a step, v its speed by the spin w.
+    // The arc of a point leaves its chord by w v h^2 / 2 within a step, v its speed by the spin w, at most w times the radius.
     const Solid& solid = bodies_.solid(i);
     const double sag = std::max(kSag, kSagOfThickness * solid.shape->get_thickness_m());
-    ask(i, length_s * std::sqrt(norm(bodies_.placed(i).spin) * bodies_.calc_turning_speed(i) / (2.0 * sag)));
+    const double spin = norm(bodies_.placed(i).spin);
+    ask(i, length_s * std::sqrt(spin * std::min(kRolls * bodies_.calc_turning_speed(i), spin * solid.radius_m) / (2.0 * sag)));
   }
   // Powers of two: then the steps of a group are the same whatever others ask for.
   const auto round = [](double n) {
