@@ -69,7 +69,7 @@ double Bodies::calc_closing_speed(int a, int b) const {
   for (const int body : {a, b}) {
     if (!moves(body)) continue;
     v = body == a ? v + states_[body].velocity : v - states_[body].velocity;
-    turning += calc_turning_speed(body);
+    turning += norm(placed_[body].spin) * solids_[body].radius_m;
   }
   return norm(v) + turning;
 }

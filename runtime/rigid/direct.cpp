@@ -1,6 +1,6 @@
 // Method: augmented Lagrangian. With the residual r = w - J v of the rows that hold and a compliance eps,
 //     (M + sum J^T J / eps) d = J^T r / eps,   lambda += (r - J d) / eps,   v = v_free + M^-1 J^T lambda,
-//   symmetric, positive and as sparse as the touches between bodies; iterated until r vanishes (2 to 4 times) with one factorisation. Rows
+//   symmetric, positive and as sparse as the touches between bodies; iterated until r vanishes (3 to 5 times) with one factorisation. Rows
 //   are released and added by the signs of the answer.
 // Source: A. Enzenhoefer, N. Lefebvre, S. Andrews, "Efficient block pivoting for multibody simulations with contact" (2019): pivoting of
 //   blocks with a compliant system; factorisation by Eigen.

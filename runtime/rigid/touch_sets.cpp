@@ -16,8 +16,8 @@ namespace {
 
 constexpr double kSteps = 4.0;           // in which a pair moves by the margin of a search,
 constexpr double kStepsOfRolling = 8.0;  // a curved body on the ground: few places come near
-constexpr double kDoubtful = 2e-4;       // m; deeper touches of curved surfaces are confirmed
 constexpr double kMissing = 5e-6;        // m; a place deeper than all touches by this is missing
+constexpr double kSearchAgain = 2e-3;    // s; a pair with a missing touch is searched anew once in so long
 constexpr double kSame = 0.02;           // of the size: touches so near are one
 constexpr double kSagDecay = 10e-3;      // s
 constexpr int kMaxAdded = 4;             // touches that are missing at the end of a flight
@@ -112,21 +112,26 @@ void TouchSets::refresh(Pair& pair) const {
   if (pair.cord >= 0) return update_cord(bodies_, cords_[pair.cord], pair);
   const shape::Frame a = bodies_.get_frame(pair.a), b = bodies_.get_frame(pair.b);
   const bool is_there = !pair.ahead.touches.empty() && pair.ahead.a == a && pair.ahead.b == b;
-  for (std::size_t k = 0; k < pair.contacts.size(); ++k) {
-    shape::Touch& touch = pair.contacts[k].touch;
-    touch = is_there ? pair.ahead.touches[k] : find_moved(pair, touch, a, b);
-  }
+  std::size_t k = 0;
+  std::erase_if(pair.contacts, [&](Contact& c) {
+    if (is_there) return c.touch = pair.ahead.touches[k++], false;
+    const bool follows = shape::refresh(c.touch, *bodies_.get_shape(pair.a), a, bodies_.get_shape(pair.b), b, pair.memory);
+    pair.searched = pair.searched && follows;
+    return !follows;
+  });
   pair.ahead.touches.clear();
 }
 
 void TouchSets::remove_false(Pair& pair) const {
   if (pair.b < 0) return;
   const auto erased = std::erase_if(pair.contacts, [&](const Contact& c) {
-    return c.touch.gap_m < -kDoubtful && c.touch.smooth &&
+    return c.touch.gap_m < -kTooDeep && c.touch.smooth &&
            !shape::is_overlap(c.touch, *bodies_.get_shape(pair.a), bodies_.get_frame(pair.a), *bodies_.get_shape(pair.b),
                               bodies_.get_frame(pair.b));
   });
-  if (erased > 0) pair.ahead.touches.clear();
+  if (erased == 0) return;
+  pair.ahead.touches.clear();
+  pair.searched = false;
 }
 
 void TouchSets::update(Pair& pair, double step_s) {
@@ -152,10 +157,14 @@ std::pair<Contact*, double> TouchSets::find_least(Pair& pair, const shape::Frame
   pair.ahead.a = a;
   pair.ahead.b = b;
   pair.ahead.touches.clear();
+  bool all_follow = true;
   for (Contact& c : pair.contacts) {
-    const shape::Touch& moved = pair.ahead.touches.emplace_back(find_moved(pair, c.touch, a, b));
-    if (moved.gap_m < least.second) least = {&c, moved.gap_m};
+    shape::Touch& moved = pair.ahead.touches.emplace_back(c.touch);
+    const bool follows = shape::refresh(moved, *bodies_.get_shape(pair.a), a, bodies_.get_shape(pair.b), b, pair.memory);
+    all_follow = all_follow && follows;
+    if (follows && moved.gap_m < least.second) least = {&c, moved.gap_m};
   }
+  if (!all_follow) pair.ahead.touches.clear();  // refresh() drops those that do not
   return least;
 }
 
@@ -220,7 +229,11 @@ bool TouchSets::complete(const Step& step, bool finds_closing) {
   bool any = false;
   for (Pair* pair : step.island().pairs) {
     if (pair->cord >= 0 || !step.has(*pair) || bodies_.is_moved_by_impact(pair->a) || bodies_.is_moved_by_impact(pair->b)) continue;
+    const std::size_t found = pair->contacts.size();
     if (complete(*pair, get_then(pair->a), get_then(pair->b), finds_closing ? step.length_s : 0.0)) any = true;
+    if (pair->contacts.size() == found || bodies_.get_time() < pair->next_search_s) continue;
+    pair->searched = pair->memory.known = false;  // a body that has come to lie has more touches than that
+    pair->next_search_s = bodies_.get_time() + kSearchAgain;
   }
   return any;
 }

@@ -35,9 +35,9 @@ class TouchSets {
 
   /// The touches as the bodies are now, found again.
   void search(Pair& pair, double step_s);
-  /// The same touches as the bodies are now.
+  /// The same touches as the bodies are now, but those that have left their surfaces: the pair is searched at its next update then.
   void refresh(Pair& pair) const;
-  /// Removes touches of curved surfaces that have settled on their far sides.
+  /// Removes deep touches of curved surfaces that have come to their far sides, or past the ends of edges and facets.
   void remove_false(Pair& pair) const;
   /// Touches that are good for a step: searched again where the pair may have moved by its margin.
   void update(Pair& pair, double step_s);

@@ -2,12 +2,15 @@
 // most files.
 // Method: convex polyhedra by clipping. Of any other pair, the samples of each that the other's grid does not show to be further than the
 //   margin; of those, corners and ridge points that no neighbour is lower than, and samples of curved parts that are the nearest among
-//   their neighbours; each against the nearest place of the other's fine mesh, and settled there. Ridges against ridges by two trees and
-//   the arcs on the Gauss map. The candidates are kept with a slack, so that a pair that has moved less than it is answered from memory,
-//   and so are the samples that are near: a distance changes by no more than the way.
+//   their neighbours; each against the nearest place of the other's fine mesh, and settled there. Ridges against curved parts: the lowest
+//   place of each straight piece, and ends that both pieces rise from. Ridges against ridges by two trees and the arcs on the Gauss map.
+//   The candidates are kept with a slack, so that a pair that has moved less than it is answered from memory, and so are the samples that
+//   are near: a distance changes by no more than the way.
 // Source: C. Ericson, "Real-Time Collision Detection" (2005), 5.1.9; Gauss map of edges: D. Gregorius (GDC 2013).
 // Deviations: estimates from the grid's face by way of neighbours, not the nearest face of all, decide which sample is the nearest among
 //   its neighbours, but for bodies with walls thinner than four cells.
+#include <optional>
+
 #include "runtime/shape/grid.hpp"
 #include "runtime/shape/mesh.hpp"
 #include "runtime/shape/polyhedron.hpp"
@@ -78,6 +81,24 @@ class Ground {
   /// The same, but behind a thin wall a bound.
   double find_distance(const Vec3& x, double limit) const { return thin_ ? find_bound(x) : estimate(x, limit); }
   bool is_thin() const { return thin_; }
+  /// Of a place over the skin; where it is more than `limit_m`, any such number.
+  double calc_gap(const Vec3& x, double limit_m) const {
+    if (body_ != nullptr) return find_outside(x);
+    const Skin& skin = shape_.skin();
+    const Mesh& mesh = shape_.mesh();
+    const Grid::Near near = grid_->find_near(x);
+    const double far = std::max(limit_m, 0.0) + skin.get_sag_m();
+    if (near.face < 0 || near.min_m > limit_m + skin.get_sag_m()) return near.min_m;
+    Nearest on = mesh.walk_nearest(x, near.face);
+    bool inside = mesh.is_inside(x, on);
+    if (!inside && on.distance2 > far * far) return std::sqrt(on.distance2);
+    if (inside && thin_ && on.distance2 > 0.01 * wall_m_ * wall_m_) {
+      on = mesh.find_nearest(x, Box::kFar, on.face);
+      inside = mesh.is_inside(x, on);
+    }
+    if (skin.is_flat(on.face)) return (inside ? -1.0 : 1.0) * std::sqrt(on.distance2);
+    return dot(skin.calc_normal(on.face, on.weights), x - skin.calc_point(on.face, on.weights));
+  }
   Nearest find_nearest(const Vec3& x) const {
     return shape_.mesh().find_nearest(x, Box::kFar, body_ != nullptr ? -1 : grid_->find_near(x).face);
   }
@@ -129,6 +150,19 @@ Facing describe(const Mesh& mesh, const Skin& skin, const Nearest& at) {
   }
   if (skin.is_flat(at.face)) return {Side::plane, mesh.normals[at.face], -1};
   return {Side::skin, {}, -1};
+}
+
+/// The outward normal of a face at the place of it that is nearest to x; of a curved one that of the skin.
+Vec3 find_normal(const Shape& shape, int face, const Vec3& x) {
+  return shape.skin().calc_normal(face, shape.mesh().find_nearest_on_face(x, face).weights);
+}
+
+/// Ridge::into at a place of the ridge, in the tangent plane of a curved side.
+Vec3 find_into(const Shape& shape, const Ridge& ridge, int side, const Vec3& x) {
+  const int face = ridge.faces[side];
+  if (shape.skin().is_flat(face)) return ridge.into[side];
+  const Vec3 n = find_normal(shape, face, x);
+  return normalise(side == 0 ? cross(n, ridge.along) : cross(ridge.along, n));
 }
 
 /// One direction of a search: samples of `mine` before the surface of `theirs`. Touches are made with mine as a.
@@ -219,9 +253,32 @@ class Pass {
   int find_deepest(double& gap_m, const std::vector<std::pair<int, double>>& near, double way_m) const {
     int deepest = -1;
     for (const auto& [i, before] : near)
-      if (before - way_m < gap_m)
-        if (const double d = ground_.estimate(to_theirs(mine_.samples().samples[i].point), 0.0); d < gap_m) gap_m = d, deepest = i;
+      if (before - way_m - sag_ < gap_m)
+        if (const double d = ground_.calc_gap(to_theirs(mine_.samples().samples[i].point), gap_m); d < gap_m) gap_m = d, deepest = i;
     return deepest;
+  }
+
+  /// Ridges of mine before curved parts of theirs: the lowest places of their straight pieces, and corners between two pieces that both
+  /// rise.
+  void run_ridges() {
+    const Samples& s = mine_.samples();
+    if (s.ridges.empty() || theirs_.is_polyhedron()) return;
+    std::vector<int> open{0}, ends;
+    while (!open.empty()) {
+      const Ball& ball = s.ridge_tree[open.back()];
+      open.pop_back();
+      if (ground_.find_bound(to_theirs(ball.middle)) - ball.radius_m > reach_ + sag_) continue;
+      if (ball.child >= 0) {
+        open.push_back(ball.child + 1);
+        open.push_back(ball.child);
+        continue;
+      }
+      for (int i = ball.first; i < ball.first + ball.count; ++i)
+        if (const int end = add_ridge(i); end >= 0) ends.push_back(end);
+    }
+    std::sort(ends.begin(), ends.end());
+    for (std::size_t i = 1; i < ends.size(); ++i)
+      if (ends[i] == ends[i - 1] && (i < 2 || ends[i] != ends[i - 2])) add_end(ends[i]);
   }
 
   /// A touch of a sample with the nearest place of theirs.
@@ -301,6 +358,55 @@ class Pass {
     t.curvature_a_per_m = get_sharp_curvature(mine_, sample.kind);
     t.id = make_id(Feature::corner_a, sample.vertex, 0);
     if (t.gap_m <= reach_) out_.push_back(t);
+  }
+
+  /// A touch of a place of a ridge of mine with a curved part of theirs; none over a flat one.
+  std::optional<Touch> begin_ridge(const Vec3& point) const {
+    const Nearest at = ground_.find_nearest(to_theirs(point));
+    if (theirs_.skin().is_flat(at.face)) return std::nullopt;
+    Touch t = begin(point, at.place, theirs_.skin().calc_normal(at.face, at.weights));
+    t.side_b = Side::skin;
+    t.face_b = at.face;
+    t.smooth = true;
+    t.curvature_a_per_m = get_sharp_curvature(mine_, VertexKind::ridge);
+    return t;
+  }
+
+  /// The lowest place of a straight piece of a ridge. Returns the vertex at the end to which it falls; -1 where there is none.
+  int add_ridge(int ridge) {
+    const Ridge& r = mine_.samples().ridges[ridge];
+    const double length = norm(r.end - r.begin);
+    double least = reach_ + sag_ + 0.25 * length;
+    Vec3 lowest{};
+    bool found = false;
+    for (const double part : {0.0, 0.5, 1.0}) {
+      const Vec3 x = r.begin + part * (r.end - r.begin);
+      const double d = ground_.estimate(to_theirs(x), least);
+      if (d < least) least = d, lowest = x, found = true;
+    }
+    if (!found) return -1;
+    std::optional<Touch> t = begin_ridge(lowest);
+    if (!t) return -1;
+    t->side_a = Side::line;
+    t->axis_a = r.along;
+    const bool settled = settle(*t, mine_, fm_, &theirs_, ft_, length, kFirst);
+    const double at = dot(t->station_a - r.begin, r.along);
+    if (at < 0.0) return r.vertices[0];
+    if (at > length) return r.vertices[1];
+    const Vec3 n = turn_back(fm_.rotation, t->normal);
+    for (const int k : {0, 1})
+      if (dot(n, find_into(mine_, r, k, t->station_a)) < -kFlush) return -1;
+    t->id = make_id(Feature::corner_a, ridge, 3);
+    if (settled && t->gap_m <= reach_) out_.push_back(*t);
+    return -1;
+  }
+
+  /// A corner of a ridge that is lower than both pieces next to it.
+  void add_end(int vertex) {
+    std::optional<Touch> t = begin_ridge(mine_.mesh().vertices[vertex]);
+    if (!t || !settle(*t, mine_, fm_, &theirs_, ft_, 0.05 * mine_.get_size_m(), kFirst) || t->gap_m > reach_) return;
+    t->id = make_id(Feature::corner_a, vertex, 0);
+    out_.push_back(*t);
   }
 
   /// A flat face about x on which the sample carries, though it is not the nearest one: a corner in the plane of a side.
@@ -431,7 +537,8 @@ class Pass {
       if (!theirs_.skin().is_sharp(e)) return false;
       const Vec3 along = normalise(mesh.vertices[mesh.vertex_of(Mesh::next(e))] - mesh.vertices[mesh.vertex_of(e)]);
       if (std::abs(dot(along, t.axis_b)) < 0.99) return false;
-      const Vec3 in = cross(mesh.normals[e / 3], along), out = cross(along, mesh.normals[mesh.opposite[e] / 3]);
+      const Vec3 in = cross(find_normal(theirs_, e / 3, foot.place), along);
+      const Vec3 out = cross(along, find_normal(theirs_, mesh.opposite[e] / 3, foot.place));
       return dot(n, in) <= kFlush && dot(n, out) <= kFlush;
     };
     for (int k = 0; k < 3; ++k) {
@@ -475,7 +582,6 @@ void cross_ridges(const Shape& a, const Frame& fa, const Shape& b, const Frame& 
   if (sa.ridges.empty() || sb.ridges.empty()) return;
   const double deepest = 0.3 * std::min(a.get_thickness_m(), b.get_thickness_m());
   const auto to_b = [&](const Vec3& x) { return to_body(fb, to_world(fa, x)); };
-  const auto turn = [&](const Vec3& x) { return turn_back(fb.rotation, fa.rotation * x); };
   const auto meet = [&](int i, int j) {
     const Ridge &ra = sa.ridges[i], &rb = sb.ridges[j];
     const Vec3 p = to_b(ra.begin), d = to_b(ra.end) - p, q = rb.begin, e = rb.end - rb.begin, r = p - q;
@@ -485,15 +591,16 @@ void cross_ridges(const Shape& a, const Frame& fa, const Shape& b, const Frame& 
     if (s < -kEnd || s > 1.0 + kEnd || t < -kEnd || t > 1.0 + kEnd) return;
     Vec3 n = normalise(cross(d, e));
     if (dot(n, rb.into[0] + rb.into[1]) > 0.0) n = -1.0 * n;  // outward of b
-    if (dot(n, rb.into[0]) > kEdge || dot(n, rb.into[1]) > kEdge || dot(n, turn(ra.into[0])) < -kEdge || dot(n, turn(ra.into[1])) < -kEdge)
-      return;
+    const Vec3 on_a = ra.begin + s * (ra.end - ra.begin), on_b = q + t * e, m = turn_back(fa.rotation, fb.rotation * n);
+    for (const int k : {0, 1})
+      if (dot(n, find_into(b, rb, k, on_b)) > kEdge || dot(m, find_into(a, ra, k, on_a)) < -kEdge) return;
     const double gap = dot(n, r + s * d - t * e);
     if (gap > reach || -gap > std::min(deepest, 0.5 * std::sqrt(std::min(dd, ee)))) return;
     Touch touch;
     touch.side_a = touch.side_b = Side::line;
     touch.normal = fb.rotation * n;
-    touch.station_a = ra.begin + s * (ra.end - ra.begin);
-    touch.station_b = rb.begin + t * e;
+    touch.station_a = on_a;
+    touch.station_b = on_b;
     touch.axis_a = ra.along;
     touch.axis_b = rb.along;
     touch.id = make_id(Feature::edges, i, j);
@@ -530,12 +637,11 @@ void cross_ridges(const Shape& a, const Frame& fa, const Shape& b, const Frame& 
 double update_near(const Shape& a, const Frame& fa, const Shape& b, const Frame& fb, double wanted, NearSamples& near) {
   const Frame relative = calc_relative(fa, fb);
   if (near.known) {
-    const double way = calc_way(near.rotation, near.position_m, relative.rotation, relative.position_m, a);
+    const double way = calc_way(near.pose, relative, a);
     if (wanted + way <= near.reach_m) return way;
   }
   near.known = true;
-  near.rotation = relative.rotation;
-  near.position_m = relative.position_m;
+  near.pose = relative;
   near.reach_m = std::max(wanted, near.wanted_m) + kNear * std::min(a.get_size_m(), b.get_size_m());
   std::vector<Touch> none;
   Pass(a, fa, b, fb, 0.0, none).list(near.reach_m, near.samples[0]);
@@ -560,6 +666,10 @@ void find_candidates(const Shape& a, const Frame& fa, const Shape& b, const Fram
     pass_b.run(distances_b, near.samples[1], way);
     for (std::size_t i = first; i < out.size(); ++i) turn_round(out[i]);
   }
+  pass_a.run_ridges();
+  const std::size_t first = out.size();
+  pass_b.run_ridges();
+  for (std::size_t i = first; i < out.size(); ++i) turn_round(out[i]);
   cross_ridges(a, fa, b, fb, reach, out);
 }
 
@@ -596,15 +706,11 @@ void find_touches(const Shape& a, const Frame& fa, const Shape& b, const Frame& 
     find_polyhedra_touches(a, fa, b, fb, margin, memory, out);
     return;
   }
-  const auto [rotation, position] = calc_relative(fa, fb);
-  if (recall(memory, rotation, position, a, margin)) {
-    answer(a, fa, &b, fb, margin, true, memory, out);
-    return;
-  }
+  const Frame pose = calc_relative(fa, fb);
+  if (recall(memory, pose, a, margin) && answer(a, fa, &b, fb, margin, true, memory, out)) return;
   const double size = std::min(a.get_size_m(), b.get_size_m());
   memory.known = true;
-  memory.rotation = rotation;
-  memory.position_m = position;
+  memory.searched = pose;
   memory.reach_m = margin + choose_slack(margin, size);
   memory.candidates.clear();
   find_candidates(a, fa, b, fb, memory.reach_m, memory.near, memory.candidates);

@@ -113,12 +113,12 @@ Frame calc_relative(const Frame& a, const Frame& b) {
   return relative;
 }
 
-double calc_way(const Mat3& rotation_before, const Vec3& position_before, const Mat3& rotation, const Vec3& position, const Shape& a) {
+double calc_way(const Frame& from, const Frame& to, const Shape& a) {
   double turned = 0.0;
-  Vec3 moved = position - position_before, swept{};  // of the middle; of a corner of the box about it, at most
+  Vec3 moved = to.position_m - from.position_m, swept{};  // of the middle; of a corner of the box about it, at most
   const Vec3 half = 0.5 * (a.mesh().box.high - a.mesh().box.low);
   for (int i = 0; i < 3; ++i) {
-    const Vec3 row = rotation[i] - rotation_before[i];
+    const Vec3 row = to.rotation[i] - from.rotation[i];
     turned += norm2(row);
     moved[i] += dot(row, a.get_middle_m());
     for (int k = 0; k < 3; ++k) swept[i] += std::abs(row[k]) * (half[k] + a.skin().get_sag_m());
@@ -126,8 +126,8 @@ double calc_way(const Mat3& rotation_before, const Vec3& position_before, const 
   return norm(moved) + std::min(std::sqrt(turned) * a.get_radius_m(), norm(swept));
 }
 
-bool recall(const PairMemory& memory, const Mat3& rotation, const Vec3& position, const Shape& a, double margin) {
-  return memory.known && margin + calc_way(memory.rotation, memory.position_m, rotation, position, a) <= memory.reach_m;
+bool recall(const PairMemory& memory, const Frame& pose, const Shape& a, double margin) {
+  return memory.known && margin + calc_way(memory.searched, pose, a) <= memory.reach_m;
 }
 
 void thin(std::vector<Touch>& touches, double spacing, double patch) {
@@ -150,16 +150,17 @@ void thin(std::vector<Touch>& touches, double spacing, double patch) {
   reduce(touches, patch);
 }
 
-void answer(const Shape& a, const Frame& fa, const Shape* b, const Frame& fb, double margin, bool moved, PairMemory& memory,
+bool answer(const Shape& a, const Frame& fa, const Shape* b, const Frame& fb, double margin, bool moved, PairMemory& memory,
             std::vector<Touch>& out) {
   const double size = b != nullptr ? std::min(a.get_size_m(), b->get_size_m()) : a.get_size_m();
   for (Touch& candidate : memory.candidates) {
-    if (moved) settle(candidate, a, fa, b, fb, 0.1 * size);
+    if (moved && !follow(candidate, a, fa, b, fb, 0.1 * size)) return out.clear(), false;
     out.push_back(candidate);
     if (out.back().gap_m > margin) out.pop_back();
   }
   if (moved) thin(out, 0.02 * size, kPatch * size);
   name(out, 0.1 * size, memory);
+  return true;
 }
 
 void find_ground_touches(const Shape& a, const Frame& fa, double height, double margin, PairMemory& memory, std::vector<Touch>& out,
@@ -180,20 +181,16 @@ void find_ground_touches(const Shape& a, const Frame& fa, double height, double 
     reduce(out, Box::kFar);
     return;
   }
-  const Vec3 position = {0.0, 0.0, fa.position_m[2] - height};  // sideways and about the vertical nothing changes, but stations do
-  const Mat3 rotation = {Vec3{}, Vec3{}, fa.rotation[2]};
-  if (!recall(memory, rotation, position, a, margin)) {
-    memory.known = true;
-    memory.rotation = rotation;
-    memory.position_m = position;
-    memory.reach_m = margin + choose_slack(margin, a.get_size_m());
-    memory.candidates.clear();
-    find_candidates(a, fa, height, memory.reach_m, memory.candidates);
-    thin(memory.candidates, a.samples().spacing_m, kPatch * a.get_size_m());
-    answer(a, fa, nullptr, fa, margin, false, memory, out);
-  } else {
-    answer(a, fa, nullptr, fa, margin, true, memory, out);
-  }
+  // Sideways and about the vertical nothing changes, but stations do.
+  const Frame pose{{Vec3{}, Vec3{}, fa.rotation[2]}, {0.0, 0.0, fa.position_m[2] - height}};
+  if (recall(memory, pose, a, margin) && answer(a, fa, nullptr, fa, margin, true, memory, out)) return;
+  memory.known = true;
+  memory.searched = pose;
+  memory.reach_m = margin + choose_slack(margin, a.get_size_m());
+  memory.candidates.clear();
+  find_candidates(a, fa, height, memory.reach_m, memory.candidates);
+  thin(memory.candidates, a.samples().spacing_m, kPatch * a.get_size_m());
+  answer(a, fa, nullptr, fa, margin, false, memory, out);
 }
 
 }  // namespace carillon::shape

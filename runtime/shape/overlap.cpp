@@ -2,18 +2,35 @@
 //   halfway from a face to the wall opposite (two bodies whose faces coincide). Only faces near the other body are looked at.
 // Source: T. Moeller, B. Trumbore, "Fast, minimum storage ray-triangle intersection" (1997).
 #include "runtime/shape/mesh.hpp"
+#include "runtime/shape/skin.hpp"
 #include "runtime/shape/touch.hpp"
 
 namespace carillon::shape {
 namespace {
 
-constexpr int kProbes = 200;  // faces of each body that are looked behind
+constexpr double kBrim = 1e-3;      // of the size: how far from its edge or facet a touch on it may be
+constexpr double kDoubtful = 2e-4;  // m; of deeper touches the depth is confirmed
+constexpr double kDepth = 0.25;     // of the depth of a touch: that of one of its places in the other body at least
+constexpr int kProbes = 200;        // faces of each body that are looked behind
 
 /// How deep x is inside; 0 outside.
 double calc_depth(const Mesh& mesh, const Vec3& x) {
   if (mesh.box.calc_distance2(x) > 0.0) return 0.0;
   const Nearest at = mesh.find_nearest(x, Box::kFar, -1);
   return mesh.is_inside(x, at) ? std::sqrt(at.distance2) : 0.0;
+}
+
+/// The same under the curved skin.
+double calc_skin_depth(const Shape& shape, const Vec3& x) {
+  const Mesh& mesh = shape.mesh();
+  const Skin& skin = shape.skin();
+  const double sag = skin.get_sag_m();
+  if (mesh.box.calc_distance2(x) > sag * sag) return 0.0;
+  const Nearest at = mesh.find_nearest(x, Box::kFar, -1);
+  const bool is_inside = mesh.is_inside(x, at);
+  if (!is_inside && at.distance2 > sag * sag) return 0.0;
+  if (skin.is_flat(at.face)) return is_inside ? std::sqrt(at.distance2) : 0.0;
+  return dot(skin.calc_normal(at.face, at.weights), skin.calc_point(at.face, at.weights) - x);
 }
 
 /// The first crossing of a ray with the surface; false where there is none within `length`.
@@ -43,8 +60,15 @@ bool find_crossing(const Mesh& mesh, const Vec3& origin, const Vec3& way, double
 }  // namespace
 
 bool is_overlap(const Touch& touch, const Shape& a, const Frame& fa, const Shape& b, const Frame& fb) {
-  return calc_depth(b.mesh(), to_body(fb, to_world(fa, touch.station_a))) > 0.0 ||
-         calc_depth(a.mesh(), to_body(fa, to_world(fb, touch.station_b))) > 0.0;
+  const auto is_off = [](Side side, const Shape& shape, const Vec3& station) {
+    const double brim = kBrim * shape.get_size_m();
+    return (side == Side::line || side == Side::plane) && shape.mesh().find_nearest(station, Box::kFar, -1).distance2 > brim * brim;
+  };
+  if (is_off(touch.side_a, a, touch.station_a) || is_off(touch.side_b, b, touch.station_b)) return false;
+  if (touch.gap_m > -kDoubtful) return true;
+  const double depth = std::max(calc_skin_depth(b, to_body(fb, to_world(fa, touch.station_a))),
+                                calc_skin_depth(a, to_body(fa, to_world(fb, touch.station_b))));
+  return depth > -kDepth * touch.gap_m;
 }
 
 double calc_overlap(const Shape& a, const Frame& fa, const Shape& b, const Frame& fb, Vec3& where) {

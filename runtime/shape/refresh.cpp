@@ -238,9 +238,30 @@ bool is_level(const Touch& t, const Shape& a, const Frame& fa, const Shape* b, c
   return false;
 }
 
-void refresh(Touch& touch, const Shape& a, const Frame& fa, const Shape* b, const Frame& fb, PairMemory& /*memory*/) {
+bool follow(Touch& touch, const Shape& a, const Frame& fa, const Shape* b, const Frame& fb, double reach) {
+  constexpr double kFall = 0.02;  // of the way of a place on its surface: by which a gap may shrink in addition,
+  constexpr double kRoom = 2e-5;  // m; and this
+  const Touch before = touch;
+  const bool settled = settle(touch, a, fa, b, fb, reach);
+  const Vec3 p = to_world(fa, before.station_a), q = b == nullptr ? Vec3{p[0], p[1], before.station_b[2]} : to_world(fb, before.station_b);
+  if (b == nullptr) {  // the lowest place of a level body may go from one end to the other
+    if (norm(touch.station_a - before.station_a) <= reach) return true;
+  } else {
+    // A gap shrinks no faster than its places approach. Otherwise the touch has left its features, and stays at its places instead.
+    const double moved = norm((p - q) - before.gap_m * before.normal);
+    const double way = std::max(norm(touch.station_a - before.station_a), norm(touch.station_b - before.station_b));
+    const bool is_on_plane = touch.side_a == Side::plane || touch.side_b == Side::plane;
+    if ((settled || is_on_plane) && touch.gap_m >= before.gap_m - moved - kFall * way - kRoom) return true;
+  }
+  touch = before;
+  touch.gap_m = dot(touch.normal, p - q);
+  touch.where_m = 0.5 * (p + q);
+  return false;
+}
+
+bool refresh(Touch& touch, const Shape& a, const Frame& fa, const Shape* b, const Frame& fb, PairMemory& /*memory*/) {
   const double size = b != nullptr ? std::min(a.get_size_m(), b->get_size_m()) : a.get_size_m();
-  settle(touch, a, fa, b, fb, 0.1 * size);
+  return follow(touch, a, fa, b, fb, 0.1 * size);
 }
 
 }  // namespace carillon::shape

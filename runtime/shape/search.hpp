@@ -38,6 +38,9 @@ inline constexpr int kFirst = 12, kAgain = 2;  // iterations between two curved 
 bool settle(Touch& touch, const Shape& a, const Frame& frame_a, const Shape* b, const Frame& frame_b, double reach_m,
             int iterations = kAgain);
 
+/// The same from a place known. False where the touch would jump: between curved sides it stays at its places then.
+bool follow(Touch& touch, const Shape& a, const Frame& frame_a, const Shape* b, const Frame& frame_b, double reach_m);
+
 /// Of a touch at the lowest place of a skin over a plane: would that place move by more than a twentieth of the body's size if the body
 /// tilted by 2e-3 rad? It would under a rod or a coin that lies, which stand on several places, and not under a coin that leans by more
 /// than a degree.
@@ -45,14 +48,15 @@ bool is_level(const Touch& touch, const Shape& a, const Frame& frame_a, const Sh
 
 /// Where a is in the frame of b.
 Frame calc_relative(const Frame& a, const Frame& b);
-/// Upper bound of the way of any point of a from where it was to where it is, in one frame.
-double calc_way(const Mat3& rotation_before, const Vec3& position_before_m, const Mat3& rotation, const Vec3& position_m, const Shape& a);
+/// Upper bound of the way of any point of a from where it was to where it is, in one frame [m].
+double calc_way(const Frame& from, const Frame& to, const Shape& a);
 /// Is all that is nearer than margin_m now among the candidates of the last search?
-bool recall(const PairMemory& memory, const Mat3& rotation, const Vec3& position_m, const Shape& a, double margin_m);
+bool recall(const PairMemory& memory, const Frame& pose, const Shape& a, double margin_m);
 /// Keeps of touches that travel and have met one, the deepest; then few of a patch.
 void thin(std::vector<Touch>& touches, double spacing_m, double patch_m);
-/// The candidates of the memory that are nearer than the margin now, with names; `moved`: they have not been settled since.
-void answer(const Shape& a, const Frame& frame_a, const Shape* b, const Frame& frame_b, double margin_m, bool moved, PairMemory& memory,
+/// The candidates of the memory that are nearer than the margin now, with names; `moved`: they have not been settled since. False, and
+/// nothing, where one of them can no longer be followed.
+bool answer(const Shape& a, const Frame& frame_a, const Shape* b, const Frame& frame_b, double margin_m, bool moved, PairMemory& memory,
             std::vector<Touch>& out);
 
 /// Of two bodies at a distance of 0 to `size`: how far a search looks beyond the margin, so that the next ones can be spared.

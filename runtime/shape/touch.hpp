@@ -36,8 +36,7 @@ struct Touch {
 /// Samples of two bodies that are near the other one, with their distances to it: all that are nearer than reach_m.
 struct NearSamples {
   bool known = false;
-  Mat3 rotation{};  // of a in b at that time
-  Vec3 position_m{};
+  Frame pose;                                                  // a in b, at that time
   double reach_m = 0.0, wanted_m = 0.0;                        // wanted by the last search
   std::array<std::vector<std::pair<int, double>>, 2> samples;  // of a, of b
 };
@@ -46,8 +45,7 @@ struct NearSamples {
 class PairMemory {
  public:
   bool known = false;
-  Mat3 rotation{};  // of a in b at the last search
-  Vec3 position_m{};
+  Frame searched;                   // a in b, at the last search
   double reach_m = 0.0;             // margin of that search and what was added to it
   std::vector<Touch> candidates;    // of it, nearer than reach_m
   std::vector<Touch> last;          // touches given at the last call, to name those of the next
@@ -81,10 +79,12 @@ Deepest find_deepest(const Shape& a, const Frame& frame_a, const Shape& b, const
 Touch make_ground_touch(const Shape& a, const Frame& frame, double height_m, int vertex);
 Touch make_touch(const Shape& a, const Frame& frame_a, const Shape& b, const Frame& frame_b, const Deepest& at);
 
-/// The same touch a small step later: gap, where, normal and stations follow. b == nullptr: the ground.
-void refresh(Touch& touch, const Shape& a, const Frame& frame_a, const Shape* b, const Frame& frame_b, PairMemory& memory);
+/// The same touch a small step later: gap, where, normal and stations follow. b == nullptr: the ground. False where it has left its
+/// surfaces, which are to be searched again.
+bool refresh(Touch& touch, const Shape& a, const Frame& frame_a, const Shape* b, const Frame& frame_b, PairMemory& memory);
 
-/// Is one of the two places of a touch inside the other body? Between curved surfaces a touch may have come to their far sides.
+/// Is one of the two places of a touch about as deep in the other body as the touch says, and are those on edges still there? A touch that
+/// is followed may have come to the far side of a curved surface, or past the end of its edge.
 bool is_overlap(const Touch& touch, const Shape& a, const Frame& frame_a, const Shape& b, const Frame& frame_b);
 
 /// How deep two bodies are inside each other [m]; 0 when they are apart. `where` gets the deepest point (world).

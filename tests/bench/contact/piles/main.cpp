@@ -5,7 +5,7 @@
 //          when all slept [s]
 //        bench_piles steps
 //          prints what the longest step costs, and how far two motions are from their solutions
-//   SCENE: pile10 pile20 pile50 heap bars stack dominoes ball coin bottle cards bunnies2 bunnies3
+//   SCENE: pile10 pile20 pile50 heap bars stack dominoes ball coin bottle pen cards bunnies2 bunnies3
 //   TRIANGLES: of a box of a pile; 12, 512 or 8384
 #include <BulletCollision/Gimpact/btGImpactCollisionAlgorithm.h>
 #include <BulletCollision/Gimpact/btGImpactShape.h>
@@ -214,6 +214,12 @@ Scene make_scene(const std::string& name, int triangles) {
     body.initial.rotation = {q, q, 0, 0};
     body.velocity_m_s = {1.0, 0, 0};
     body.angular_velocity_rad_s = {0, 1.0 / radius, 0};
+  } else if (name == "pen") {
+    // Down a slope of 5 degrees.
+    const double a = 5.0 * M_PI / 180.0, radius = 0.0045, q = std::sqrt(0.5);
+    contact::BodySpec& body = scene.add(scene.keep(make_bank(rigid::tests::make_drop_surface(4))), {0, 0, radius});
+    body.initial.rotation = {q, q, 0, 0};
+    scene.spec.gravity_m_s2 = {9.81 * std::sin(a), 0, -9.81 * std::cos(a)};
   } else if (name == "cards") {
     // Three storeys of cards of 88 x 63 x 0.3 mm that lean by 20 degrees.
     bank::Bank paper = contact::tests::make_box({0.0003, 0.063, 0.088});

@@ -321,6 +321,89 @@ TEST(pairs, smooth_body_behind_the_facets_against_all_triangles_of_a_finer_mesh)
   EXPECT_EQ(compared, 10);
 }
 
+/// Moves b along `way` to where the meshes begin to overlap, and `deeper_m` further. False where they pass each other.
+bool bring_together(const Shape& a, const Frame& fa, const Shape& b, Frame& fb, const Vec3& way, double deeper_m) {
+  const Vec3 aside = fb.position_m;
+  const auto overlap_at = [&](double distance) {
+    Vec3 where{};
+    fb.position_m = aside + distance * way;
+    return calc_overlap(a, fa, b, fb, where) > 0.0;
+  };
+  const double step = 2e-3, far = a.get_radius_m() + b.get_radius_m();
+  double apart = far;
+  while (apart > -far && !overlap_at(apart)) apart -= step;
+  if (apart <= -far) return false;
+  double together = apart;
+  for (apart += step; apart - together > 1e-7;) {
+    const double between = 0.5 * (apart + together);
+    (overlap_at(between) ? together : apart) = between;
+  }
+  fb.position_m = aside + (together - deeper_m) * way;
+  return true;
+}
+
+std::unique_ptr<Shape> make_cup() {
+  return make_lathe({{0, 0}, {0.025, 0}, {0.0325, 0.02}, {0.04, 0.09}, {0.037, 0.09}, {0.0295, 0.021}, {0.023, 0.004}, {0, 0.004}}, 40,
+                    false)
+      .make();
+}
+
+TEST(pairs, rims_find_their_touches_with_curved_parts) {
+  const auto coin = make_cylinder(0.012, 0.002, 48).make(), ring = make_ring(0.02, 0.003, 48, 16).make();
+  const auto cup = make_cup();
+  Dice dice(7);
+  int compared = 0, missed = 0;
+  using Two = std::pair<const Shape*, const Shape*>;
+  for (const auto& [a, b] : {Two{ring.get(), coin.get()}, {cup.get(), coin.get()}, {cup.get(), ring.get()}, {cup.get(), cup.get()}}) {
+    for (int i = 0; i < 25; ++i) {
+      Frame fa, fb;
+      fa.rotation = dice.roll_turn();
+      fb.rotation = dice.roll_turn();
+      const Vec3 way = dice.roll_way(), aside = dice.roll_way();
+      fb.position_m = (0.3 * a->get_radius_m()) * (aside - dot(aside, way) * way);
+      if (!bring_together(*a, fa, *b, fb, way, 3e-4)) continue;
+      ++compared;
+      const auto touches = find(*a, fa, *b, fb, 2e-4);
+      if (touches.empty() || find_min(touches) > 0.0) ++missed;
+    }
+  }
+  EXPECT_GE(compared, 80);
+  EXPECT_LE(missed, 4);  // where curved parts meet with a kink
+}
+
+TEST(pairs, a_gap_shrinks_no_faster_than_its_places_approach) {
+  const auto cup = make_cup();
+  const auto bowl = [] {
+    std::vector<std::array<double, 2>> outline;
+    for (int i = 0; i <= 12; ++i) outline.push_back({0.08 * std::sin(0.1 * i), 0.08 * (1 - std::cos(0.1 * i))});
+    for (int i = 12; i >= 0; --i) outline.push_back({0.076 * std::sin(0.1 * i), 0.08 - 0.076 * std::cos(0.1 * i)});
+    return make_lathe(outline, 48, false).make();
+  }();
+  Dice dice(11);
+  int followed = 0;
+  for (int i = 0; i < 30; ++i) {
+    Frame fa, fb;
+    fa.rotation = dice.roll_turn();
+    fb.rotation = dice.roll_turn();
+    if (!bring_together(*bowl, fa, *cup, fb, dice.roll_way(), 0.0)) continue;
+    auto touches = find(*bowl, fa, *cup, fb, 3e-3);
+    PairMemory memory;
+    const Vec3 way = dice.roll_way(), axis = dice.roll_way();
+    constexpr double kWay = 3e-4;
+    for (int n = 0; n < 15; ++n) {
+      fb.position_m = fb.position_m + kWay * way;
+      fb.rotation = multiply(make_turn(axis, 5e-3), fb.rotation);
+      for (Touch& t : touches) {
+        const double before = t.gap_m;
+        refresh(t, *bowl, fa, cup.get(), fb, memory);
+        EXPECT_GT(t.gap_m, before - 2e-3) << i;
+        ++followed;
+      }
+    }
+  }
+  EXPECT_GE(followed, 300);
+}
+
 TEST(pairs, memory_gives_what_a_new_search_gives) {
   const double R = 0.05;
   const auto a = make_lumpy(R, 16).make(), b = make_lumpy(R, 16, 0.1).make();
