@@ -244,7 +244,9 @@ void Impact::close_contacts() {
     const double speed = -free_[row] / h_;
     // The rebound is limited by the approach of the bodies; that of their modes counts for the first blow.
     const bool is_first = std::all_of(contacts_.begin(), contacts_.end(), [](const History& h) { return h.impulse_n_s == 0.0; });
-    contacts_[c].closing_m_s = std::max(is_first ? speed : contacts_[c].impulse_n_s > 0.0 ? contacts_[c].closing_m_s : 0.0, -calc_row_speed(rows_[row]));
+    double& closing_m_s = contacts_[c].closing_m_s;
+    if (contacts_[c].impulse_n_s == 0.0) closing_m_s = is_first ? speed : 0.0;
+    closing_m_s = std::max(closing_m_s, -calc_row_speed(rows_[row]));
     if (mobility_[row * rows_.size() + row] > 0.0)
       set_law(static_cast<int>(c), mobility_[row * rows_.size() + row], std::max(speed, 0.01 * fastest_));
   }

@@ -105,9 +105,9 @@ class Impact {
   int join(const Body& body);
   void join(const Contact& contact);
   /// The same bodies and contacts, where they are now: takes centres, inertias and accelerations of `bodies` and places, normals and
-  /// shape values of `contacts`, and gaps of those that are open (all others are ignored). Compressions, anchors, modal states and the step stay; moved_m and turned_rad
-  /// begin again, and velocities of bodies on joints are taken; what a turned inertia does to the energy of an unchanged spin is booked as
-  /// given. Throws as the constructor does.
+  /// shape values of `contacts`, and gaps of those that are open (all others are ignored). Compressions, anchors, modal states and the step
+  /// stay; moved_m and turned_rad begin again, and velocities of bodies on joints are taken; what a turned inertia does to the energy of an
+  /// unchanged spin is booked as given. Throws as the constructor does.
   void update(std::span<const Body> bodies, std::span<const Contact> contacts);
 
   /// Changes the motion of a body at once, as other contacts do; what that does to the energy is booked as given. Throws where it is not
@@ -155,8 +155,8 @@ class Impact {
     bool is_limited = false;   // do modes push against a limit?
     Pulse pulse;
     double yielded_m = 0.0;  // compression without a force, by the limit of the rebound
-    bool is_open = false;  // until it closes for the first time where it is
-    int silent = 0;        // steps without a force that the pulse does not have yet
+    bool is_open = false;    // until it closes for the first time where it is
+    int silent = 0;          // steps without a force that the pulse does not have yet
   };
 
   void check_contact(const Contact& contact) const;
