@@ -56,13 +56,19 @@ double Bodies::calc_approach(const shape::Touch& touch, int a, int b) const {
   return -dot(calc_velocity(a, touch.where_m) - calc_velocity(b, touch.where_m), touch.normal);
 }
 
+double Bodies::calc_turning_speed(int body) const {
+  const Solid& solid = solids_[body];
+  const Vec3& spin = placed_[body].spin;
+  return std::min(norm(spin) * solid.radius_m, solid.shape->calc_turning_speed(solid.centre_m, turn_back(placed_[body].rotation, spin)));
+}
+
 double Bodies::calc_closing_speed(int a, int b) const {
   Vec3 v{};
   double turning = 0.0;
   for (const int body : {a, b}) {
     if (!moves(body)) continue;
     v = body == a ? v + states_[body].velocity : v - states_[body].velocity;
-    turning += norm(placed_[body].spin) * solids_[body].radius_m;
+    turning += calc_turning_speed(body);
   }
   return norm(v) + turning;
 }

@@ -81,6 +81,8 @@ class Bodies {
   Vec3 calc_velocity(int body, const Vec3& where) const;
   /// Closing speed of the surfaces of a and b at a touch [m/s].
   double calc_approach(const shape::Touch& touch, int a, int b) const;
+  /// Upper bound of the speed of any point of a body about its centre [m/s].
+  double calc_turning_speed(int body) const;
   /// Upper bound of the closing speed of any two points of a pair [m/s].
   double calc_closing_speed(int a, int b) const;
   /// Upper bound of the speed of any point of a body [m/s].

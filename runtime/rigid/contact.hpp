@@ -42,6 +42,11 @@ struct Pair {
   int a = 0, b = -1;
   shape::PairMemory memory;
   std::vector<Contact> contacts;
+  struct Ahead {
+    shape::Frame a{}, b{};
+    std::vector<shape::Touch> touches;  // of the contacts, if their touches have not changed since
+  };
+  Ahead ahead;                               // where the bodies are predicted to be
   double margin_m = 0.0, travelled_m = 0.0;  // since the last search
   bool searched = false;
   double next_search_s = 0.0;  // when a missing touch may have it searched anew

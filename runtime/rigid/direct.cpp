@@ -5,7 +5,6 @@
 // Source: A. Enzenhoefer, N. Lefebvre, S. Andrews, "Efficient block pivoting for multibody simulations with contact" (2019): pivoting of
 //   blocks with a compliant system; factorisation by Eigen.
 // Deviations: the cone is round; the impulse of a sliding point lags by one guess.
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <Eigen/SparseCholesky>
 #include <algorithm>
@@ -19,10 +18,13 @@ namespace {
 using Block = Eigen::Matrix<double, 6, 6>;
 using Row6 = Eigen::Matrix<double, 6, 1>;
 
-constexpr double kCompliance = 1e-5;  // of the mobility of a row
+constexpr double kCompliance = 1e-3;  // of the mobility of a row: of one body,
+constexpr double kLeast = 1e-5;       // and at least
 constexpr double kAtCone = 0.9999;    // of the bound on friction: slides
 constexpr int kIterations = 12;       // of one guess,
-constexpr double kExact = 1e-10;      // of the velocities asked for: residual at which they end
+constexpr double kExact = 1e-10;      // of the velocities asked for: residual at which they end,
+constexpr double kStagnates = 0.9;    // or where it is more than this part of the one before: points that hold contradict each other
+constexpr double kNearBound = 0.5;    // of its bound: a couple that was larger in the step before is at it in the first guess
 constexpr int kDense = 12;            // bodies; more are factorised as a sparse matrix
 
 enum class Hold : char { kOpen, kSticks, kSlides };
@@ -33,12 +35,13 @@ Row6 make_row(const Vec3& linear, const Vec3& angular) {
   return r;
 }
 
-/// A couple, brought back to the bounds that the push of its point sets it.
-Vec3 clamp_couple(const Point& p, const Vec3& couple, double push) {
-  const double limit = p.rolling_m * push, twist = dot(couple, p.normal);
-  const Vec3 roll = couple - twist * p.normal;
-  const double size = norm(roll);
-  return (size > limit ? limit / size : 1.0) * roll + std::clamp(twist, -p.twisting_m * push, p.twisting_m * push) * p.normal;
+/// Of the mobility of a row. Rows that contradict each other by 1e-9 m/s, as those of a rolling body that touches at two places, must not
+/// give impulses that leave the cone; chains of many or unequal bodies must be stiff to converge.
+double choose_compliance(const std::vector<Mover>& movers) {
+  const auto [least, most] =
+      std::minmax_element(movers.begin(), movers.end(), [](const Mover& x, const Mover& y) { return x.inverse_mass < y.inverse_mass; });
+  const auto count = static_cast<double>(movers.size());
+  return std::max(kLeast, kCompliance * least->inverse_mass / (most->inverse_mass * count * count));
 }
 
 /// The matrix of a guess: blocks of 6 x 6 for pairs of bodies that touch, lower triangle. Its pattern is the same for all guesses.
@@ -46,7 +49,7 @@ class System {
  public:
   System(int bodies, const std::vector<Point>& points) : bodies_(bodies) {
     if (is_dense()) {
-      full_.resize(6 * bodies, 6 * bodies);
+      full_.resize(36 * bodies * bodies);
       return;
     }
     below_.resize(bodies);
@@ -70,7 +73,7 @@ class System {
 
   void clear() {
     if (is_dense())
-      full_.setZero();
+      std::fill(full_.begin(), full_.end(), 0.0);
     else
       std::fill_n(sparse_.valuePtr(), sparse_.nonZeros(), 0.0);
   }
@@ -92,16 +95,16 @@ class System {
   }
 
   bool factorise() {
-    if (is_dense()) {
-      dense_solver_.compute(full_);
-      return dense_solver_.info() == Eigen::Success;
-    }
+    if (is_dense()) return factorise_dense();
     sparse_solver_.factorize(sparse_);
     return sparse_solver_.info() == Eigen::Success;
   }
-  Eigen::VectorXd solve(const Eigen::VectorXd& right) const {
-    if (is_dense()) return dense_solver_.solve(right);
-    return sparse_solver_.solve(right);
+  /// Replaces the right side by the solution.
+  void solve(Eigen::VectorXd& right) const {
+    if (is_dense())
+      solve_dense(right.data());
+    else
+      right = sparse_solver_.solve(right);
   }
 
  private:
@@ -110,18 +113,43 @@ class System {
   bool is_dense() const { return bodies_ <= kDense; }
   /// The block (row, column), row >= column.
   Place at(int row, int column) {
-    if (is_dense()) return Place(&full_(6 * row, 6 * column), Eigen::OuterStride<>(full_.outerStride()));
+    const int size = 6 * bodies_;
+    if (is_dense()) return Place(&full_[6 * column * size + 6 * row], Eigen::OuterStride<>(size));
     const std::vector<int>& rows = below_[column];
     const auto slot = std::lower_bound(rows.begin(), rows.end(), row) - rows.begin();
     return Place(sparse_.valuePtr() + sparse_.outerIndexPtr()[6 * column] + 6 * slot,
                  Eigen::OuterStride<>(6 * static_cast<Eigen::Index>(rows.size())));
   }
 
+  /// L D L^T in place, by columns; for few bodies several times as fast as a general library.
+  bool factorise_dense() {
+    const int size = 6 * bodies_;
+    for (int k = 0; k < size; ++k) {
+      double* from = &full_[k * size];
+      if (!(from[k] > 0.0)) return false;
+      for (int j = k + 1; j < size; ++j) {
+        const double factor = from[j] / from[k];
+        double* to = &full_[j * size];
+        for (int i = j; i < size; ++i) to[i] -= factor * from[i];
+      }
+      for (int i = k + 1; i < size; ++i) from[i] /= from[k];
+    }
+    return true;
+  }
+  void solve_dense(double* x) const {
+    const int size = 6 * bodies_;
+    for (int k = 0; k < size; ++k)
+      for (int i = k + 1; i < size; ++i) x[i] -= full_[k * size + i] * x[k];
+    for (int k = size - 1; k >= 0; --k) {
+      x[k] /= full_[k * size + k];
+      for (int i = k + 1; i < size; ++i) x[k] -= full_[k * size + i] * x[i];
+    }
+  }
+
   int bodies_;
   std::vector<std::vector<int>> below_;  // rows of the blocks of each column
-  Eigen::MatrixXd full_;
+  std::vector<double> full_;
   Eigen::SparseMatrix<double> sparse_;
-  Eigen::LDLT<Eigen::MatrixXd> dense_solver_;
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> sparse_solver_;
 };
 
@@ -129,7 +157,13 @@ class System {
 class Guess {
  public:
   Guess(const std::vector<Mover>& free, const std::vector<Point>& points)
-      : free_(free), points_(points), system_(static_cast<int>(free.size()), points), right_(6 * static_cast<int>(free.size())) {
+      : free_(free),
+        points_(points),
+        compliance_(choose_compliance(free)),
+        system_(static_cast<int>(free.size()), points),
+        right_(6 * static_cast<int>(free.size())),
+        left_(points.size()),
+        left_spin_(points.size()) {
     for (const Point& p : points) scale_ = std::max(scale_, norm(p.wanted - calc_relative_velocity(free, p)));
   }
   /// The next point. Masses: impulse per velocity along the normal, couple per spin (0: none). `is_swept`: its impulse is an answer.
@@ -144,30 +178,43 @@ class Guess {
  private:
   struct Held {
     Hold hold = Hold::kOpen;
-    bool rolls = false;  // its couple is at its bound
+    bool rolls = false, twists = false;  // its couple against that is at its bound
     double stiffness = 0.0, turning_mass = 0.0;
     std::array<Vec3, 3> axes{};
     Vec3 sliding{}, impulse{}, couple{};
-    bool sticks_turning() const { return turning_mass > 0.0 && !rolls; }
+    /// The parts of a spin or couple along ways to turn that are held, and along the others.
+    Vec3 hold_turning(const Vec3& turning) const {
+      if (rolls && twists) return {};
+      const Vec3 twist = dot(turning, axes[0]) * axes[0];
+      return rolls ? twist : twists ? turning - twist : turning;
+    }
+    Vec3 free_turning(const Vec3& turning) const { return turning - hold_turning(turning); }
+    bool holds_turning(int axis) const { return turning_mass > 0.0 && !(axis == 0 ? twists : rolls); }
   };
 
   void assemble();
+  bool factorise();
+  void move(std::vector<Mover>& movers) const;
   double iterate(std::vector<Mover>& movers);
   Hold correct_hold(const std::vector<Mover>& movers, const Point& p, Held& held, bool may_stick, bool& confirmed);
+  static Vec3 calc_rest_of_bound(const std::vector<Mover>& movers, const Point& p, const Held& held);
   bool correct_couple(const std::vector<Mover>& movers, const Point& p, Held& held, double push, bool may_stick);
 
   const std::vector<Mover>& free_;
   const std::vector<Point>& points_;
-  std::vector<Held> held_;  // of the points
+  double compliance_;
+  std::vector<Held> held_;      // of the points
+  bool is_factorised_ = false;  // with the points that hold now
   System system_;
-  Eigen::VectorXd right_;
-  double scale_ = 0.0;  // m/s
+  Eigen::VectorXd right_;               // work memory
+  std::vector<Vec3> left_, left_spin_;  // the same
+  double scale_ = 0.0;                  // m/s
 };
 
 void Guess::add(double normal_mass, double turning_mass, bool is_swept) {
   const Point& p = points_[held_.size()];
   Held& held = held_.emplace_back();
-  held.stiffness = normal_mass / kCompliance;
+  held.stiffness = normal_mass / compliance_;
   held.turning_mass = turning_mass;
   const Vec3 tangent = find_across(p.normal);
   held.axes = {p.normal, tangent, cross(p.normal, tangent)};
@@ -176,9 +223,14 @@ void Guess::add(double normal_mass, double turning_mass, bool is_swept) {
   const bool slides = is_swept && push > 0.0 && norm(across) >= kAtCone * p.friction * push;
   if (slides) held.sliding = across;
   held.hold = slides ? Hold::kSlides : push > 0.0 || p.impulse == Vec3{} ? Hold::kSticks : Hold::kOpen;
-  if (turning_mass > 0.0 && push > 0.0 && norm(clamp_couple(p, p.couple, kAtCone * push) - p.couple) > 1e-6 * norm(p.couple)) {
-    held.rolls = true;  // as in the step before
-    held.couple = p.couple;
+  if (turning_mass > 0.0 && push > 0.0) {  // as in the step before, by the present bounds
+    const double twist = dot(p.couple, p.normal), most = p.twisting_m * push;
+    const Vec3 roll = p.couple - twist * p.normal;
+    const double size = norm(roll), limit = p.rolling_m * push;
+    held.twists = std::abs(twist) >= kNearBound * most;
+    held.rolls = size >= kNearBound * limit;
+    if (held.twists) held.couple = std::copysign(most, twist) * p.normal;
+    if (held.rolls && size > 0.0) held.couple = held.couple + (limit / size) * roll;
   }
 }
 
@@ -197,30 +249,44 @@ void Guess::assemble() {
     for (int k = 0; k < (held.hold == Hold::kSticks ? 3 : 1); ++k)
       system_.add(p.a, make_row(held.axes[k], cross(p.arm_a, held.axes[k])), p.b, -make_row(held.axes[k], cross(p.arm_b, held.axes[k])),
                   held.stiffness);
-    if (!held.sticks_turning()) continue;
-    for (const Vec3& axis : held.axes) system_.add(p.a, make_row({}, axis), p.b, -make_row({}, axis), held.turning_mass / kCompliance);
+    for (int k = 0; k < 3; ++k)
+      if (held.holds_turning(k))
+        system_.add(p.a, make_row({}, held.axes[k]), p.b, -make_row({}, held.axes[k]), held.turning_mass / compliance_);
   }
 }
 
-bool Guess::solve(std::vector<Mover>& movers) {
+/// Begins a new system of the points that hold at zero impulses.
+bool Guess::factorise() {
+  if (is_factorised_) return true;
   assemble();
-  movers = free_;
-  for (int i = 0; Held & held : held_) {
-    const Point& p = points_[i++];
-    held.impulse = {};
-    if (held.hold == Hold::kSlides) {
-      held.impulse = held.sliding;
-      apply(movers, p, held.sliding);
-    }
-    if (held.hold == Hold::kOpen || held.sticks_turning())
-      held.couple = {};
-    else if (held.turning_mass > 0.0)
-      turn(movers, p, held.couple);
+  for (Held& held : held_) {
+    held.impulse = held.hold == Hold::kSlides ? held.sliding : Vec3{};
+    held.couple = held.hold == Hold::kOpen ? Vec3{} : held.free_turning(held.couple);
   }
-  if (!system_.factorise()) return false;
-  for (int again = 0; again < kIterations && iterate(movers) > kExact * scale_; ++again) {
+  is_factorised_ = system_.factorise();
+  return is_factorised_;
+}
+
+bool Guess::solve(std::vector<Mover>& movers) {
+  if (!factorise()) return false;
+  move(movers);
+  double before = 0.0;
+  for (int again = 0; again < kIterations; ++again) {
+    const double left = iterate(movers), rate = before > 0.0 ? left / before : 0.0;
+    if (left <= kExact * scale_ || (rate > 0.0 && rate * left <= kExact * scale_) || rate > kStagnates) break;
+    before = left;
   }
   return true;
+}
+
+/// The velocities that all impulses give.
+void Guess::move(std::vector<Mover>& movers) const {
+  movers = free_;
+  for (int i = 0; const Held& held : held_) {
+    const Point& p = points_[i++];
+    if (held.impulse != Vec3{}) apply(movers, p, held.impulse);
+    if (held.couple != Vec3{}) turn(movers, p, held.couple);
+  }
 }
 
 /// One correction of the impulses; returns the residual before it [m/s].
@@ -229,28 +295,27 @@ double Guess::iterate(std::vector<Mover>& movers) {
   const auto add = [&](int body, const Row6& row) {
     if (body >= 0) right_.segment<6>(6 * body) += row;
   };
-  std::vector<Vec3> left(points_.size()), left_spin(points_.size());
   double largest = 0.0;
   for (int i = 0; const Held& held : held_) {
     const int n = i++;
     const Point& p = points_[n];
     if (held.hold == Hold::kOpen) continue;
-    left[n] = p.wanted - calc_relative_velocity(movers, p);
-    if (held.hold == Hold::kSlides) left[n] = dot(left[n], p.normal) * p.normal;
-    largest = std::max(largest, norm(left[n]));
-    const Vec3 pull = held.stiffness * left[n];
+    left_[n] = p.wanted - calc_relative_velocity(movers, p);
+    if (held.hold == Hold::kSlides) left_[n] = dot(left_[n], p.normal) * p.normal;
+    largest = std::max(largest, norm(left_[n]));
+    const Vec3 pull = held.stiffness * left_[n];
     add(p.a, make_row(pull, cross(p.arm_a, pull)));
     add(p.b, -make_row(pull, cross(p.arm_b, pull)));
-    if (!held.sticks_turning()) continue;
-    left_spin[n] = -1.0 * calc_relative_spin(movers, p);
-    const Vec3 couple = (held.turning_mass / kCompliance) * left_spin[n];
+    if (!(held.turning_mass > 0.0)) continue;
+    left_spin_[n] = -1.0 * held.hold_turning(calc_relative_spin(movers, p));
+    const Vec3 couple = (held.turning_mass / compliance_) * left_spin_[n];
     add(p.a, make_row({}, couple));
     add(p.b, -make_row({}, couple));
   }
   if (largest <= kExact * scale_) return largest;
-  const Eigen::VectorXd d = system_.solve(right_);
+  system_.solve(right_);
   const auto get = [&](int body, int from) {
-    const double* x = d.data() + 6 * body + from;
+    const double* x = right_.data() + 6 * body + from;
     return Vec3{x[0], x[1], x[2]};
   };
   for (int i = 0; Held & held : held_) {
@@ -261,11 +326,12 @@ double Guess::iterate(std::vector<Mover>& movers) {
     if (p.a >= 0) moved = get(p.a, 0) + cross(get(p.a, 3), p.arm_a), turned = get(p.a, 3);
     if (p.b >= 0) moved = moved - get(p.b, 0) - cross(get(p.b, 3), p.arm_b), turned = turned - get(p.b, 3);
     if (held.hold == Hold::kSlides) moved = dot(moved, p.normal) * p.normal;
-    const Vec3 more = held.stiffness * (left[n] - moved);
+    const Vec3 more = held.stiffness * (left_[n] - moved);
     held.impulse = held.impulse + more;
     apply(movers, p, more);
-    if (!held.sticks_turning()) continue;
-    const Vec3 couple = (held.turning_mass / kCompliance) * (left_spin[n] - turned);
+    if (!(held.turning_mass > 0.0)) continue;
+    const Vec3 couple =
+        (held.turning_mass / compliance_) * (left_spin_[n] - held.hold_turning(turned)) + calc_rest_of_bound(movers, p, held);
     held.couple = held.couple + couple;
     turn(movers, p, couple);
   }
@@ -279,7 +345,7 @@ bool Guess::correct(const std::vector<Mover>& movers, bool may_stick) {
     const double push = dot(held.impulse, p.normal);
     const Hold now = correct_hold(movers, p, held, may_stick, confirmed);
     if (held.turning_mass > 0.0 && !correct_couple(movers, p, held, std::max(push, 0.0), may_stick)) confirmed = false;
-    if (now != held.hold) confirmed = false;
+    if (now != held.hold) confirmed = is_factorised_ = false;
     held.hold = now;
   }
   return confirmed;
@@ -317,31 +383,44 @@ Hold Guess::correct_hold(const std::vector<Mover>& movers, const Point& p, Held&
   return Hold::kSlides;
 }
 
-/// A couple that sticks and would have to be above its bound rolls from now on. One that rolls is at its bound against the spin as it is
-/// now, and sticks again where less would stop that. True where it stays as guessed.
+/// What the parts of a couple that are at their bounds lack of those by the present push and direction of rolling.
+Vec3 Guess::calc_rest_of_bound(const std::vector<Mover>& movers, const Point& p, const Held& held) {
+  if (!held.rolls && !held.twists) return {};
+  const double push = std::max(dot(held.impulse, p.normal), 0.0);
+  const Vec3 next = held.couple - held.turning_mass * calc_relative_spin(movers, p);
+  const Vec3 roll = next - dot(next, p.normal) * p.normal;
+  const double size = norm(roll);
+  const Vec3 bound =
+      std::copysign(p.twisting_m * push, dot(held.couple, p.normal)) * p.normal + (size > 0.0 ? p.rolling_m * push / size : 0.0) * roll;
+  return held.free_turning(bound - held.couple);
+}
+
+/// A couple that holds and would have to be above its bound turns from now on, about the normal or across it. One that turns is at its
+/// bound against the spin as it is now, and holds again where less would stop that. True where it stays as guessed.
 bool Guess::correct_couple(const std::vector<Mover>& movers, const Point& p, Held& held, double push, bool may_stick) {
-  const Vec3 free_couple = held.rolls ? held.couple - held.turning_mass * calc_relative_spin(movers, p) : held.couple;
-  const Vec3 bounded = clamp_couple(p, free_couple, push);
-  const bool is_bound = norm(bounded - free_couple) > 1e-9 * norm(bounded);
-  if (!held.rolls && !is_bound) return true;
-  if (held.rolls && !is_bound && may_stick) {
-    held.rolls = false;
-    return false;
-  }
-  const bool stays = held.rolls && !(norm(bounded - held.couple) > 1e-3 * (p.rolling_m + p.twisting_m) * push);
-  held.rolls = true;
+  const Vec3 free_couple = held.couple - held.turning_mass * held.free_turning(calc_relative_spin(movers, p));
+  double twist = dot(free_couple, p.normal);
+  Vec3 roll = free_couple - twist * p.normal;
+  bool stays = true;
+  const auto correct = [&](bool& turns, double size, double limit) {
+    const bool is_bound = size >= limit;
+    if (turns != is_bound && (is_bound || may_stick)) turns = is_bound, stays = is_factorised_ = false;
+    return is_bound && size > 0.0 ? limit / size : 1.0;
+  };
+  twist *= correct(held.twists, std::abs(twist), p.twisting_m * push);
+  roll = correct(held.rolls, norm(roll), p.rolling_m * push) * roll;
+  const Vec3 bounded = twist * p.normal + roll;
+  if (norm(bounded - held.couple) > 1e-3 * (p.rolling_m + p.twisting_m) * push) stays = false;
   held.couple = bounded;
   return stays;
 }
 
 void Guess::read(std::vector<Mover>& movers, std::vector<Point>& points) const {
-  movers = free_;
+  move(movers);
   for (int i = 0; const Held& held : held_) {
     Point& p = points[i++];
     p.impulse = held.impulse;
     p.couple = held.couple;
-    apply(movers, p, held.impulse);
-    if (held.turning_mass > 0.0) turn(movers, p, held.couple);
   }
 }
 

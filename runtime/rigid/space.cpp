@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kShortest = 1e-9;  // s; a shorter rest of a step is left out
 constexpr int kMaxMissed = 30;      // in a step: instants at which nothing struck after all
+constexpr int kMaxSought = 3;       // of these, until closings by the path are no longer looked for
 constexpr int kMaxCompleted = 4;    // solutions of a step that are repeated with touches that were missing
 constexpr int kMaxImpacts = 4;      // of an island in a step, each at its instant; an island with more is crowded
 constexpr int kMinImpacts = 2;      // the same of the largest islands, each of whose impacts costs more
@@ -91,7 +92,7 @@ void Space::open_window(double end_s) {
 void Space::step_island(Island& island, double start_s, double length_s) {
   step_.begin(island);
   double done = 0.0;
-  int impacts = 0, missed = 0;
+  int impacts = 0, missed = 0, more = 0;
   bool begun = false;
   const int max_impacts = std::clamp(kStruckBodies / step_.count(), kMinImpacts, kMaxImpacts);
   if (instants_.is_crowded(island, start_s)) {
@@ -103,15 +104,20 @@ void Space::step_island(Island& island, double start_s, double length_s) {
     bodies_.set_time(start_s + done);
     modal_impacts_.end_where_touching(step_, touches_);
     const bool may_sleep = !std::exchange(begun, true) && rest_.may_sleep(island.bodies, h);
-    projection_.run(step_, may_sleep ? kDeep : kTooDeep);
+    const double too_deep_m = step_.count() <= options_.max_direct ? kTooDeepAlone : kTooDeep;
+    projection_.run(step_, may_sleep ? kDeep : too_deep_m);
     if (may_sleep && rest_.try_island(island, h)) break;
     touches_.forget_closing(step_);
+    bool is_completed = false;
     for (int n = 0; n <= kMaxCompleted; ++n) {
       problem_.predict(step_, h, false);
       problem_.make_points(step_, impacts < max_impacts);
       problem_.solve(step_);
-      if (!touches_.complete(step_, missed == 0)) break;
+      if (!touches_.complete(step_, missed < kMaxSought)) break;
+      is_completed = true;
     }
+    // Rows stop a touch at the end of a step, half of its way too deep: it strikes at the beginning where it was missing.
+    if (is_completed && impacts >= max_impacts && more++ < kMaxCompleted && strike_at_once(start_s + done, h)) continue;
     double at = h;
     std::vector<ContactRef> first;
     step_.together_s = kTogether;
@@ -137,14 +143,17 @@ void Space::step_island(Island& island, double start_s, double length_s) {
   step_.end();
 }
 
-/// The impacts of a crowded island: all touches that close within a step strike at its beginning.
-void Space::strike_at_once(double start_s, double length_s) {
+/// The impacts of a crowded island: all touches that close within a step strike at its beginning. False: none
+/// closes, and touches are as before.
+bool Space::strike_at_once(double start_s, double length_s) {
   bodies_.set_time(start_s);
   step_.together_s = length_s;
   std::vector<ContactRef> first = instants_.list_closing(step_, length_s);
-  if (!instants_.confirm(step_, first, length_s, std::numeric_limits<double>::infinity())) return;
+  if (first.empty()) return false;
+  if (!instants_.confirm(step_, first, length_s, std::numeric_limits<double>::infinity())) return true;
   if (first.front().pair != first.back().pair) instants_.set_crowded(step_.island(), start_s + length_s);
   strike(first);
+  return true;
 }
 
 /// Takes the bodies of an island through the part of a step that is made.

@@ -1,4 +1,4 @@
-// Method: a search with a margin of four steps' movement; touches are followed until their pair may have moved by it.
+// Method: a search with a margin of several steps' movement; touches are followed until their pair may have moved by it.
 // Source: runtime/shape/touch.hpp.
 #include "runtime/rigid/touch_sets.hpp"
 
@@ -14,9 +14,12 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr double kMissing = 5e-6;      // m; a place deeper than all touches by this is missing
-constexpr double kSearchAgain = 2e-3;  // s; a pair with a missing touch is searched anew once in so long
-constexpr double kSagDecay = 10e-3;    // s
+constexpr double kSteps = 4.0;           // in which a pair moves by the margin of a search,
+constexpr double kStepsOfRolling = 8.0;  // a curved body on the ground: few places come near
+constexpr double kMissing = 5e-6;        // m; a place deeper than all touches by this is missing
+constexpr double kSame = 0.02;           // of the size: touches so near are one
+constexpr double kSearchAgain = 2e-3;    // s; a pair with a missing touch is searched anew once in so long
+constexpr double kSagDecay = 10e-3;      // s
 
 /// Lower bound of the gap of any vertex of a body over the ground, from that at an earlier frame.
 double calc_least_gap(const Pair& pair, const shape::Shape& shape, const shape::Frame& now) {
@@ -55,10 +58,12 @@ void TouchSets::search(Pair& pair, double step_s) {
   if (pair.cord >= 0) return refresh(pair);
   ++ledger_.costs.searches;
   const double speed = bodies_.calc_closing_speed(pair.a, pair.b) + norm(bodies_.gravity()) * step_s;
-  pair.margin_m = std::min(std::max(2e-4, 4.0 * step_s * speed), kReach * bodies_.calc_size(pair.a, pair.b));
+  const double steps = pair.b < 0 && !bodies_.is_flat(pair.a) ? kStepsOfRolling : kSteps;
+  pair.margin_m = std::min(std::max(2e-4, steps * step_s * speed), kReach * bodies_.calc_size(pair.a, pair.b));
   pair.travelled_m = 0.0;
   pair.searched = true;
   const std::vector<Contact> old = std::exchange(pair.contacts, {});
+  pair.ahead.touches.clear();
   found_.clear();
   const shape::Shape& a = *bodies_.get_shape(pair.a);
   const shape::Frame frame_a = bodies_.get_frame(pair.a);
@@ -79,28 +84,52 @@ void TouchSets::search(Pair& pair, double step_s) {
     contact.touch = touch;
     pair.contacts.push_back(contact);
   }
+  keep_added(pair, old);
   remove_false(pair);
   complete(pair, frame_a, bodies_.get_frame(pair.b), 0.0);
+}
+
+/// Of added touches those that a search has not found again, and that are deeper than all found, or sharp and closed.
+void TouchSets::keep_added(Pair& pair, const std::vector<Contact>& old) const {
+  const shape::Frame a = bodies_.get_frame(pair.a), b = bodies_.get_frame(pair.b);
+  double least_m = pair.margin_m;
+  for (const Contact& c : pair.contacts) least_m = std::min(least_m, c.touch.gap_m);
+  const double near_m = kSame * bodies_.calc_size(pair.a, pair.b);
+  const auto is_found = [&](const shape::Touch& touch) {
+    return std::any_of(found_.begin(), found_.end(),
+                       [&](const shape::Touch& found) { return found.id == touch.id || norm(found.where_m - touch.where_m) < near_m; });
+  };
+  for (const Contact& c : old) {
+    shape::Touch touch = c.touch;
+    if (!follow(pair, touch, a, b)) continue;
+    const double most_m = touch.smooth ? least_m - kMissing : std::max(least_m - kMissing, kTouch);
+    if (touch.gap_m <= most_m && !is_found(touch)) pair.contacts.emplace_back(c).touch = touch;
+  }
 }
 
 void TouchSets::refresh(Pair& pair) const {
   if (pair.cord >= 0) return update_cord(bodies_, cords_[pair.cord], pair);
   const shape::Frame a = bodies_.get_frame(pair.a), b = bodies_.get_frame(pair.b);
-  std::erase_if(pair.contacts, [&](Contact& c) {
-    const bool follows = shape::refresh(c.touch, *bodies_.get_shape(pair.a), a, bodies_.get_shape(pair.b), b, pair.memory);
+  const bool is_there = !pair.ahead.touches.empty() && pair.ahead.a == a && pair.ahead.b == b;
+  std::erase_if(pair.contacts, [&, k = std::size_t{0}](Contact& c) mutable {
+    const bool follows = is_there || follow(pair, c.touch, a, b);
+    if (is_there) c.touch = pair.ahead.touches[k++];
     pair.searched = pair.searched && follows;
     return !follows;
   });
+  pair.ahead.touches.clear();
 }
 
 void TouchSets::remove_false(Pair& pair) const {
   if (pair.b < 0) return;
-  const auto removed = std::erase_if(pair.contacts, [&](const Contact& c) {
+  const auto erased = std::erase_if(pair.contacts, [&](const Contact& c) {
     return c.touch.gap_m < -kTooDeep && c.touch.smooth &&
            !shape::is_overlap(c.touch, *bodies_.get_shape(pair.a), bodies_.get_frame(pair.a), *bodies_.get_shape(pair.b),
                               bodies_.get_frame(pair.b));
   });
-  pair.searched = pair.searched && removed == 0;
+  if (erased == 0) return;
+  pair.ahead.touches.clear();
+  pair.searched = false;
 }
 
 void TouchSets::update(Pair& pair, double step_s) {
@@ -123,8 +152,16 @@ void TouchSets::update(Pair& pair, double step_s) {
 /// The touch with the least gap at the frames `a` and `b`, and that gap; none: infinite.
 std::pair<Contact*, double> TouchSets::find_least(Pair& pair, const shape::Frame& a, const shape::Frame& b) const {
   std::pair<Contact*, double> least{nullptr, std::numeric_limits<double>::infinity()};
-  for (Contact& c : pair.contacts)
-    if (const double gap_m = find_moved(pair, c.touch, a, b).gap_m; gap_m < least.second) least = {&c, gap_m};
+  pair.ahead.a = a;
+  pair.ahead.b = b;
+  pair.ahead.touches.clear();
+  bool follows = true;
+  for (Contact& c : pair.contacts) {
+    shape::Touch& moved = pair.ahead.touches.emplace_back(c.touch);
+    follows = follow(pair, moved, a, b) && follows;
+    if (moved.gap_m < least.second) least = {&c, moved.gap_m};
+  }
+  if (!follows) pair.ahead.touches.clear();
   return least;
 }
 
@@ -134,19 +171,18 @@ bool TouchSets::complete(Pair& pair, const shape::Frame& a, const shape::Frame& 
   const shape::Shape& mine = *bodies_.get_shape(pair.a);
   const shape::Shape* theirs = bodies_.get_shape(pair.b);
   shape::Deepest deepest;
-  if (theirs == nullptr)
-    deepest.gap_m = calc_least_gap(pair, mine, a);
-  else
-    deepest = shape::find_deepest(mine, a, *theirs, b, -kMissing, pair.memory);
-  if (deepest.gap_m >= -kMissing) return false;
-  const auto [lowest, least_m] = find_least(pair, a, b);
-  const double missing_m = std::min(least_m, 0.0) - kMissing;
-  if (theirs == nullptr && deepest.gap_m < missing_m) {  // by its bound
-    deepest = shape::find_lowest(mine, a, bodies_.ground()->height_m);
+  if (theirs == nullptr) {
+    if (calc_least_gap(pair, mine, a) >= -kMissing) return false;
+    deepest = shape::find_lowest(mine, a, bodies_.ground()->height_m, pair.memory);
     pair.measured = a;
     pair.lowest_m = deepest.gap_m;
+    if (deepest.gap_m - mine.get_sag_m() >= -kMissing) return false;  // nor is any touch deeper
+  } else {
+    deepest = shape::find_deepest(mine, a, *theirs, b, -kMissing, pair.memory);
+    if (deepest.gap_m >= -kMissing) return false;
   }
-  if (deepest.gap_m < missing_m) return add(pair, deepest), true;
+  const auto [lowest, least_m] = find_least(pair, a, b);
+  if (deepest.gap_m < std::min(least_m, 0.0) - kMissing) return add(pair, deepest), true;
   if (lowest == nullptr || lowest->touch.gap_m <= kTouch || least_m > -kMissing || lowest->rests || !(closing_s > 0.0)) return false;
   lowest->touching = false;
   return std::exchange(lowest->closes_s, closing_s * lowest->touch.gap_m / (lowest->touch.gap_m - least_m)) < 0.0;
@@ -156,6 +192,7 @@ bool TouchSets::complete(Pair& pair, const shape::Frame& a, const shape::Frame& 
 void TouchSets::add(Pair& pair, const shape::Deepest& deepest) {
   const shape::Shape& mine = *bodies_.get_shape(pair.a);
   const shape::Frame a = bodies_.get_frame(pair.a), b = bodies_.get_frame(pair.b);
+  pair.ahead.touches.clear();
   Contact added;
   added.a = pair.a;
   added.b = pair.b;
@@ -214,8 +251,12 @@ void TouchSets::release(int a, int b, double depth_m) {
 }
 
 shape::Touch TouchSets::find_moved(Pair& pair, shape::Touch touch, const shape::Frame& a, const shape::Frame& b) const {
-  shape::refresh(touch, *bodies_.get_shape(pair.a), a, bodies_.get_shape(pair.b), b, pair.memory);
+  follow(pair, touch, a, b);
   return touch;
+}
+
+bool TouchSets::follow(Pair& pair, shape::Touch& touch, const shape::Frame& a, const shape::Frame& b) const {
+  return shape::refresh(touch, *bodies_.get_shape(pair.a), a, bodies_.get_shape(pair.b), b, pair.memory);
 }
 
 }  // namespace carillon::rigid

@@ -54,6 +54,8 @@ class TouchSets {
   shape::Touch find_moved(Pair& pair, shape::Touch touch, const shape::Frame& a, const shape::Frame& b) const;
 
  private:
+  void keep_added(Pair& pair, const std::vector<Contact>& old) const;
+  bool follow(Pair& pair, shape::Touch& touch, const shape::Frame& a, const shape::Frame& b) const;
   std::pair<Contact*, double> find_least(Pair& pair, const shape::Frame& a, const shape::Frame& b) const;
   bool complete(Pair& pair, const shape::Frame& a, const shape::Frame& b, double closing_s);
   void add(Pair& pair, const shape::Deepest& deepest);

@@ -203,10 +203,10 @@ void Windows::choose_steps() {
   for (int i = 0; i < count; ++i) {
     if (!bodies_.moves(i)) continue;
     if (bodies_.find_articulation(i) != nullptr || bodies_.is_moved_by_impact(i)) ask(i, length_s / options_.step_s);
-    // The arc of a point of a spinning body leaves its chord by r (w h)^2 / 2 within a step.
+    // The arc of a point leaves its chord by w v h^2 / 2 within a step, v its speed by the spin w.
     const Solid& solid = bodies_.solid(i);
     const double sag = std::max(kSag, kSagOfThickness * solid.shape->get_thickness_m());
-    ask(i, length_s * norm(bodies_.placed(i).spin) * std::sqrt(solid.radius_m / (2.0 * sag)));
+    ask(i, length_s * std::sqrt(norm(bodies_.placed(i).spin) * bodies_.calc_turning_speed(i) / (2.0 * sag)));
   }
   // Powers of two: then the steps of a group are the same whatever others ask for.
   const auto round = [](double n) {

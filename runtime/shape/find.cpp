@@ -4,7 +4,8 @@
 //   margin; of those, corners and ridge points that no neighbour is lower than, and samples of curved parts that are the nearest among
 //   their neighbours; each against the nearest place of the other's fine mesh, and settled there. Ridges against curved parts: the lowest
 //   place of each straight piece, and ends that both pieces rise from. Ridges against ridges by two trees and the arcs on the Gauss map.
-//   The candidates are kept with a slack, so that a pair that has moved less than it is answered from memory.
+//   The candidates are kept with a slack, so that a pair that has moved less than it is answered from memory,
+//   and so are the samples that are near: a distance changes by no more than the way.
 // Source: C. Ericson, "Real-Time Collision Detection" (2005), 5.1.9; Gauss map of edges: D. Gregorius (GDC 2013).
 // Deviations: estimates from the grid's face by way of neighbours, not the nearest face of all, decide which sample is the nearest among
 //   its neighbours, but for bodies with walls thinner than four cells.
@@ -20,13 +21,14 @@
 namespace carillon::shape {
 namespace {
 
-constexpr double kBrim = 1e-4;         // of the size: a corner may stand out so far beyond the brim of a face that it still stands on
-constexpr double kEnd = 1e-6;          // of an edge: two that cross where the next one begins must not be missed
-constexpr double kEdge = 1e-3;         // rad; the edges of two faces that lie on each other cross as well
-constexpr double kBend = 4.0;          // over the thickness: the curvature, halved, that is allowed for between samples
-constexpr double kLook = 5e-5;         // m; the deepest sample is looked for up to this gap,
-constexpr double kNearSamples = 5e-3;  // of the size: among those that were nearer than that and this, until the pair has moved by it
-constexpr double kThinCells = 4;       // a wall thinner than so many cells is thin: a node of the grid may look to its far side
+constexpr double kBrim = 1e-4;     // of the size: a corner may stand out so far beyond the brim of a face that it still stands on
+constexpr double kEnd = 1e-6;      // of an edge: two that cross where the next one begins must not be missed
+constexpr double kEdge = 1e-3;     // rad; the edges of two faces that lie on each other cross as well
+constexpr double kBend = 4.0;      // over the thickness: the curvature, halved, that is allowed for between samples
+constexpr double kNear = 0.01;     // of the size of the smaller body: ways for which the samples that are near are kept
+constexpr double kLook = 5e-5;     // m; the deepest sample is looked for up to this gap,
+constexpr double kDeepWay = 5e-3;  // of the size: among those that were nearer than that and this, until the pair has moved by it
+constexpr double kThinCells = 4;   // a wall thinner than so many cells is thin: a node of the grid may look to its far side
 
 /// Distances of samples of one body to another, found once in a search.
 struct Distances {
@@ -96,6 +98,9 @@ class Ground {
     if (skin.is_flat(on.face)) return (inside ? -1.0 : 1.0) * std::sqrt(on.distance2);
     return dot(skin.calc_normal(on.face, on.weights), x - skin.calc_point(on.face, on.weights));
   }
+  /// The same, but behind a thin wall a bound.
+  double find_distance(const Vec3& x, double limit) const { return thin_ ? find_bound(x) : estimate(x, limit); }
+  bool is_thin() const { return thin_; }
   Nearest find_nearest(const Vec3& x) const {
     return shape_.mesh().find_nearest(x, Box::kFar, body_ != nullptr ? -1 : grid_->find_near(x).face);
   }
@@ -167,14 +172,36 @@ class Pass {
  public:
   Pass(const Shape& mine, const Frame& fm, const Shape& theirs, const Frame& ft, double reach, std::vector<Touch>& out)
       : mine_(mine), theirs_(theirs), fm_(fm), ft_(ft), ground_(theirs), reach_(reach), sag_(theirs.skin().get_sag_m()), out_(out) {
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j)
-        for (int k = 0; k < 3; ++k) rotation_[i][j] += ft.rotation[k][i] * fm.rotation[k][j];
-    offset_ = to_body(ft, fm.position_m);
+    const Frame relative = calc_relative(fm, ft);
+    rotation_ = relative.rotation;
+    offset_ = relative.position_m;
     bend_ = kBend * (1.0 / mine.get_thickness_m() + 1.0 / theirs.get_thickness_m());
   }
 
-  void run(Distances& distances) {
+  /// The samples that are nearer than `reach_m`.
+  void list(double reach_m, std::vector<std::pair<int, double>>& near) const {
+    const Samples& s = mine_.samples();
+    near.clear();
+    std::vector<int> open;
+    if (!s.samples.empty()) open.push_back(0);
+    while (!open.empty()) {
+      const Ball& ball = s.sample_tree[open.back()];
+      open.pop_back();
+      if (ground_.find_bound(to_theirs(ball.middle)) - ball.radius_m > reach_m) continue;
+      if (ball.child >= 0) {
+        open.push_back(ball.child + 1);
+        open.push_back(ball.child);
+        continue;
+      }
+      for (int i = ball.first; i < ball.first + ball.count; ++i)
+        if (const double d = ground_.find_distance(to_theirs(s.samples[i].point), reach_m); d <= reach_m) near.emplace_back(i, d);
+    }
+  }
+  /// How far beyond the reach of a search a sample may be that stands for a place within it.
+  double find_room() const { return calc_room(mine_.samples().reach_m) + reach_ + sag_; }
+
+  /// `near`: samples that were near before the bodies moved by at most `way_m`.
+  void run(Distances& distances, const std::vector<std::pair<int, double>>& near, double way_m) {
     const Samples& s = mine_.samples();
     if (s.samples.empty()) return;
     distances.begin(s.samples.size());
@@ -187,35 +214,27 @@ class Pass {
       return distances.values[i];
     };
     std::vector<std::pair<double, int>> pits;
-    std::vector<int> open{0};
-    while (!open.empty()) {
-      const Ball& ball = s.sample_tree[open.back()];
-      open.pop_back();
-      if (ground_.find_bound(to_theirs(ball.middle)) - ball.radius_m > reach_ + sag_) continue;
-      if (ball.child >= 0) {
-        open.push_back(ball.child + 1);
-        open.push_back(ball.child);
+    for (const auto& [i, before] : near) {
+      const Sample& sample = s.samples[i];
+      const double within = reach_ + sag_ + (sample.kind == VertexKind::smooth ? calc_room(sample.reach_m) : 0.0);
+      if (before - way_m > within) continue;
+      if (way_m == 0.0 && !ground_.is_thin()) {  // as it was just estimated
+        distances.stamps[i] = distances.stamp;
+        distances.values[i] = before;
+      }
+      const double d = measure(i);
+      if (d > within) continue;
+      if (sample.kind != VertexKind::smooth) {
+        add_point(sample);
         continue;
       }
-      for (int i = ball.first; i < ball.first + ball.count; ++i) {
-        const Sample& sample = s.samples[i];
-        const double d = measure(i);
-        bool nearest = true;
-        if (sample.kind == VertexKind::smooth) {
-          if (d - std::min(sample.reach_m, bend_ * sample.reach_m * sample.reach_m) > reach_ + sag_) continue;
-          for (int k = 0; k < sample.neighbours && nearest; ++k) {
-            const int other = s.neighbours[sample.first_neighbour + k];
-            const double step2 = norm2(s.samples[other].point - sample.point), fall = measure(other) - d;
-            nearest = fall >= 0.0 || fall * fall <= kFlat * kFlat * step2;
-          }
-        }
-        if (!nearest) continue;
-        if (sample.kind == VertexKind::smooth) {
-          pits.emplace_back(d, i);
-        } else if (d <= reach_ + sag_) {
-          add_point(sample);
-        }
+      bool nearest = true;
+      for (int k = 0; k < sample.neighbours && nearest; ++k) {
+        const int other = s.neighbours[sample.first_neighbour + k];
+        const double step2 = norm2(s.samples[other].point - sample.point), fall = measure(other) - d;
+        nearest = fall >= 0.0 || fall * fall <= kFlat * kFlat * step2;
       }
+      if (nearest) pits.emplace_back(d, i);
     }
     // Those next to one that has been settled lower would come to the same place.
     std::sort(pits.begin(), pits.end());
@@ -255,28 +274,15 @@ class Pass {
       if (ends[i] == ends[i - 1] && (i < 2 || ends[i] != ends[i - 2])) add_end(ends[i]);
   }
 
-  /// The samples that are nearer to theirs than `gap_m`, or deeper.
-  void list_near(double gap_m, std::vector<std::int32_t>& out) const {
-    const Samples& s = mine_.samples();
-    out.clear();
-    std::vector<int> open;
-    if (!s.samples.empty()) open.push_back(0);
-    while (!open.empty()) {
-      const Ball& ball = s.sample_tree[open.back()];
-      open.pop_back();
-      if (ground_.find_bound(to_theirs(ball.middle)) - ball.radius_m > gap_m + sag_) continue;
-      if (ball.child >= 0) {
-        open.push_back(ball.child + 1);
-        open.push_back(ball.child);
-        continue;
-      }
-      for (int i = ball.first; i < ball.first + ball.count; ++i)
-        if (calc_gap(i, gap_m) <= gap_m) out.push_back(i);
-    }
-  }
-
-  /// Of a sample; where it is more than `limit_m`, any such number.
+  /// Of a sample over their skin; where it is more than `limit_m`, any such number.
   double calc_gap(int sample, double limit_m) const { return ground_.calc_gap(to_theirs(mine_.samples().samples[sample].point), limit_m); }
+
+  /// Of the samples that were near those that are nearer than `gap_m`, or deeper.
+  void list_deep(double gap_m, const std::vector<std::pair<int, double>>& near, double way_m, std::vector<int>& deep) const {
+    deep.clear();
+    for (const auto& [i, before] : near)
+      if (before - way_m - sag_ <= gap_m && calc_gap(i, gap_m) <= gap_m) deep.push_back(i);
+  }
 
   /// A touch of a sample with the nearest place of theirs.
   Touch make_touch(int place) const {
@@ -299,6 +305,7 @@ class Pass {
 
  private:
   Vec3 to_theirs(const Vec3& x) const { return rotation_ * x + offset_; }
+  double calc_room(double reach_m) const { return std::min(reach_m, bend_ * reach_m * reach_m); }
   bool may_carry(const Sample& sample, const Vec3& normal) const {
     return carries(mine_.mesh(), sample.vertex, turn_back(rotation_, normal));
   }
@@ -629,32 +636,45 @@ void cross_ridges(const Shape& a, const Frame& fa, const Shape& b, const Frame& 
   }
 }
 
-void find_candidates(const Shape& a, const Frame& fa, const Shape& b, const Frame& fb, double reach, std::vector<Touch>& out) {
+/// Renews the samples that are near where `wanted` and the way since then are beyond their reach. Returns that way.
+double update_near(const Shape& a, const Frame& fa, const Shape& b, const Frame& fb, double wanted, NearSamples& near) {
+  const Frame relative = calc_relative(fa, fb);
+  if (near.known) {
+    const double way = calc_way(near.rotation, near.position_m, relative.rotation, relative.position_m, a);
+    if (wanted + way <= near.reach_m) return way;
+  }
+  near.known = true;
+  near.rotation = relative.rotation;
+  near.position_m = relative.position_m;
+  near.reach_m = std::max(wanted, near.wanted_m) + kNear * std::min(a.get_size_m(), b.get_size_m());
+  std::vector<Touch> none;
+  Pass(a, fa, b, fb, 0.0, none).list(near.reach_m, near.samples[0]);
+  Pass(b, fb, a, fa, 0.0, none).list(near.reach_m, near.samples[1]);
+  return 0.0;
+}
+
+void find_candidates(const Shape& a, const Frame& fa, const Shape& b, const Frame& fb, double reach, NearSamples& near,
+                     std::vector<Touch>& out) {
   static thread_local Distances distances_a, distances_b;
   // A body that is curved all over and not much larger than the other finds everything itself: its samples are dense enough.
   const bool a_alone = a.skin().is_all_curved() && a.get_size_m() < 2.0 * b.get_size_m();
   const bool b_alone = b.skin().is_all_curved() && b.get_size_m() < 2.0 * a.get_size_m();
   const bool a_first = a.samples().samples.size() <= b.samples().samples.size();
   const bool by_a = !b_alone || (a_alone && a_first), by_b = !a_alone || (b_alone && !a_first);
-  if (by_a) Pass(a, fa, b, fb, reach, out).run(distances_a);
+  Pass pass_a(a, fa, b, fb, reach, out), pass_b(b, fb, a, fa, reach, out);
+  near.wanted_m = std::max(pass_a.find_room(), pass_b.find_room());
+  const double way = update_near(a, fa, b, fb, near.wanted_m, near);
+  if (by_a) pass_a.run(distances_a, near.samples[0], way);
   if (by_b) {
     const std::size_t first = out.size();
-    Pass(b, fb, a, fa, reach, out).run(distances_b);
+    pass_b.run(distances_b, near.samples[1], way);
     for (std::size_t i = first; i < out.size(); ++i) turn_round(out[i]);
   }
-  Pass(a, fa, b, fb, reach, out).run_ridges();
+  pass_a.run_ridges();
   const std::size_t first = out.size();
-  Pass(b, fb, a, fa, reach, out).run_ridges();
+  pass_b.run_ridges();
   for (std::size_t i = first; i < out.size(); ++i) turn_round(out[i]);
   cross_ridges(a, fa, b, fb, reach, out);
-}
-
-Pose find_pose(const Frame& fa, const Frame& fb) {
-  Pose pose{{}, to_body(fb, fa.position_m)};
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j)
-      for (int k = 0; k < 3; ++k) pose.rotation[i][j] += fb.rotation[k][i] * fa.rotation[k][j];
-  return pose;
 }
 
 }  // namespace
@@ -664,22 +684,25 @@ Deepest find_deepest(const Shape& a, const Frame& fa, const Shape& b, const Fram
   const double far = a.get_radius_m() + b.get_radius_m();
   if (norm2(to_world(fa, a.get_middle_m()) - to_world(fb, b.get_middle_m())) > far * far || (a.is_polyhedron() && b.is_polyhedron()))
     return found;
-  const Pose pose = find_pose(fa, fb);
-  if (memory.deepest_m - calc_way(memory.measured, pose, a) >= gap) return found;
+  DeepSamples& deep = memory.deep;
+  const Frame now = calc_relative(fa, fb);
+  const auto calc_way_since = [&](const Frame& then) { return calc_way(then.rotation, then.position_m, now.rotation, now.position_m, a); };
+  if (deep.deepest_m - calc_way_since(deep.measured) >= gap) return found;
   std::vector<Touch> none;
   const Pass pass_a(a, fa, b, fb, 0.0, none), pass_b(b, fb, a, fa, 0.0, none);
-  if (calc_way(memory.listed, pose, a) > memory.slack_m) {
-    memory.slack_m = kNearSamples * std::min(a.get_size_m(), b.get_size_m());
-    memory.listed = pose;
-    pass_a.list_near(kLook + memory.slack_m, memory.near[0]);
-    pass_b.list_near(kLook + memory.slack_m, memory.near[1]);
+  if (calc_way_since(deep.listed) > deep.slack_m) {
+    deep.slack_m = kDeepWay * std::min(a.get_size_m(), b.get_size_m());
+    deep.listed = now;
+    const double reach = kLook + deep.slack_m, way = update_near(a, fa, b, fb, reach + std::max(a.get_sag_m(), b.get_sag_m()), memory.near);
+    pass_a.list_deep(reach, memory.near.samples[0], way, deep.samples[0]);
+    pass_b.list_deep(reach, memory.near.samples[1], way, deep.samples[1]);
   }
   Deepest deepest{.gap_m = kLook};
   for (const bool is_of_a : {true, false})
-    for (const std::int32_t i : memory.near[is_of_a ? 0 : 1])
+    for (const int i : deep.samples[is_of_a ? 0 : 1])
       if (const double d = (is_of_a ? pass_a : pass_b).calc_gap(i, deepest.gap_m); d < deepest.gap_m) deepest = {i, d, is_of_a};
-  memory.measured = pose;
-  memory.deepest_m = deepest.gap_m;
+  deep.measured = now;
+  deep.deepest_m = deepest.gap_m;
   return deepest.gap_m < gap ? deepest : found;
 }
 
@@ -700,14 +723,15 @@ void find_touches(const Shape& a, const Frame& fa, const Shape& b, const Frame& 
     find_polyhedra_touches(a, fa, b, fb, margin, memory, out);
     return;
   }
-  const Pose pose = find_pose(fa, fb);
-  if (recall(memory, pose, a, margin) && answer(a, fa, &b, fb, margin, true, memory, out)) return;
+  const auto [rotation, position] = calc_relative(fa, fb);
+  if (recall(memory, rotation, position, a, margin) && answer(a, fa, &b, fb, margin, true, memory, out)) return;
   const double size = std::min(a.get_size_m(), b.get_size_m());
   memory.known = true;
-  memory.searched = pose;
+  memory.rotation = rotation;
+  memory.position_m = position;
   memory.reach_m = margin + choose_slack(margin, size);
   memory.candidates.clear();
-  find_candidates(a, fa, b, fb, memory.reach_m, memory.candidates);
+  find_candidates(a, fa, b, fb, memory.reach_m, memory.near, memory.candidates);
   thin(memory.candidates, 0.02 * size, kPatch * size);
   answer(a, fa, &b, fb, margin, false, memory, out);
 }

@@ -103,24 +103,29 @@ bool carries(const Mesh& mesh, int vertex, const Vec3& normal) {
   return true;
 }
 
-double calc_way(const Pose& from, const Pose& to, const Shape& a) {
-  const Box& box = a.mesh().box;
-  Vec3 moved = to.position_m - from.position_m;
-  double turned = 0.0;  // way of the farthest corner of the box from its middle
-  for (int k = 0; k < 3; ++k) {
-    double square = 0.0;
-    for (int i = 0; i < 3; ++i) {
-      const double change = to.rotation[i][k] - from.rotation[i][k];
-      moved[i] += change * a.get_middle_m()[k];
-      square += change * change;
-    }
-    turned += std::sqrt(square) * (0.5 * (box.high[k] - box.low[k]) + a.skin().get_sag_m());
-  }
-  return norm(moved) + turned;
+Frame calc_relative(const Frame& a, const Frame& b) {
+  Frame relative{.rotation = {}, .position_m = to_body(b, a.position_m)};
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      for (int k = 0; k < 3; ++k) relative.rotation[i][j] += b.rotation[k][i] * a.rotation[k][j];
+  return relative;
 }
 
-bool recall(const PairMemory& memory, const Pose& pose, const Shape& a, double margin) {
-  return memory.known && margin + calc_way(memory.searched, pose, a) <= memory.reach_m;
+double calc_way(const Mat3& rotation_before, const Vec3& position_before, const Mat3& rotation, const Vec3& position, const Shape& a) {
+  double turned = 0.0;
+  Vec3 moved = position - position_before, swept{};  // of the middle; of a corner of the box about it, at most
+  const Vec3 half = 0.5 * (a.mesh().box.high - a.mesh().box.low);
+  for (int i = 0; i < 3; ++i) {
+    const Vec3 row = rotation[i] - rotation_before[i];
+    turned += norm2(row);
+    moved[i] += dot(row, a.get_middle_m());
+    for (int k = 0; k < 3; ++k) swept[i] += std::abs(row[k]) * (half[k] + a.skin().get_sag_m());
+  }
+  return norm(moved) + std::min(std::sqrt(turned) * a.get_radius_m(), norm(swept));
+}
+
+bool recall(const PairMemory& memory, const Mat3& rotation, const Vec3& position, const Shape& a, double margin) {
+  return memory.known && margin + calc_way(memory.rotation, memory.position_m, rotation, position, a) <= memory.reach_m;
 }
 
 void thin(std::vector<Touch>& touches, double spacing, double patch) {
@@ -169,11 +174,12 @@ void find_ground_touches(const Shape& a, const Frame& fa, double height, double 
     reduce(out, Box::kFar);
     return;
   }
-  // Sideways and about the vertical nothing changes, but stations do.
-  const Pose pose{{Vec3{}, Vec3{}, fa.rotation[2]}, {0.0, 0.0, fa.position_m[2] - height}};
-  if (!recall(memory, pose, a, margin)) {
+  const Vec3 position = {0.0, 0.0, fa.position_m[2] - height};  // sideways and about the vertical nothing changes, but stations do
+  const Mat3 rotation = {Vec3{}, Vec3{}, fa.rotation[2]};
+  if (!recall(memory, rotation, position, a, margin)) {
     memory.known = true;
-    memory.searched = pose;
+    memory.rotation = rotation;
+    memory.position_m = position;
     memory.reach_m = margin + choose_slack(margin, a.get_size_m());
     memory.candidates.clear();
     find_candidates(a, fa, height, memory.reach_m, memory.candidates);

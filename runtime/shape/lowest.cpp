@@ -1,4 +1,6 @@
-// Method: the tree of vertices, the lower of two balls first; of a polyhedron all corners.
+// Method: the tree of vertices, the lower of two balls first; of a polyhedron all corners. Under directions within an angle of one, a
+// vertex
+//   is lowest only if it is no higher than the lowest one and than its neighbours by that angle times the distance: few are kept.
 #include <limits>
 #include <tuple>
 #include <utility>
@@ -6,9 +8,14 @@
 #include "runtime/shape/mesh.hpp"
 #include "runtime/shape/polyhedron.hpp"
 #include "runtime/shape/search.hpp"
+#include "runtime/shape/skin.hpp"
 
 namespace carillon::shape {
 namespace {
+
+constexpr double kLean = 0.05;            // rad
+constexpr double kLeans = 0.999 * kLean;  // with room for rounding
+constexpr double kTurns = 0.25 * kLean;   // a body that turns by more between two calls is searched anew
 
 /// The vertex that is lowest along `up` (mesh frame), and its height.
 std::pair<int, double> find_lowest_vertex(const Mesh& mesh, const Samples& s, const Vec3& up) {
@@ -28,6 +35,42 @@ std::pair<int, double> find_lowest_vertex(const Mesh& mesh, const Samples& s, co
       if (const double h = dot(up, mesh.vertices[s.vertices[i]]); h < lowest.second) lowest = {s.vertices[i], h};
   }
   return lowest;
+}
+
+/// Those that may be lowest along a direction that is off `up` by less than kLean.
+void find_low_vertices(const Mesh& mesh, const Skin& skin, const Samples& s, const Vec3& up, std::vector<int>& low) {
+  low.clear();
+  const auto [lowest, height] = find_lowest_vertex(mesh, s, up);
+  const Vec3& at = mesh.vertices[lowest];
+  const auto is_below = [&](int vertex, const Vec3& other) {
+    const Vec3 d = mesh.vertices[vertex] - other;
+    const double rise = dot(up, d);
+    return rise <= 0.0 || rise * rise <= kLean * kLean * norm2(d);
+  };
+  const auto may_be_lowest = [&](int vertex) {
+    if (!is_below(vertex, at)) return false;
+    const int start = mesh.any_half_edge[vertex];
+    int e = start;
+    do {
+      const int other = mesh.vertex_of(Mesh::next(e));
+      if (skin.kind(other) != VertexKind::none && !is_below(vertex, mesh.vertices[other])) return false;
+      e = Mesh::next(mesh.opposite[e]);
+    } while (e != start);
+    return true;
+  };
+  std::vector<int> open{0};
+  while (!open.empty()) {
+    const Ball& ball = s.vertex_tree[open.back()];
+    open.pop_back();
+    if (dot(up, ball.middle) - ball.radius_m > height + kLean * (norm(ball.middle - at) + ball.radius_m)) continue;
+    if (ball.child >= 0) {
+      open.push_back(ball.child);
+      open.push_back(ball.child + 1);
+      continue;
+    }
+    for (int i = ball.first; i < ball.first + ball.count; ++i)
+      if (may_be_lowest(s.vertices[i])) low.push_back(s.vertices[i]);
+  }
 }
 
 }  // namespace
@@ -51,6 +94,20 @@ Deepest find_lowest(const Shape& a, const Frame& frame, double height_m) {
   } else {
     std::tie(low.place, low.gap_m) = find_lowest_vertex(a.mesh(), a.samples(), up);
   }
+  low.gap_m += frame.position_m[2] - height_m;
+  return low;
+}
+
+Deepest find_lowest(const Shape& a, const Frame& frame, double height_m, PairMemory& memory) {
+  const Vec3 &up = frame.rotation[2], before = std::exchange(memory.up, up);
+  if (a.is_polyhedron() || norm2(up - before) > kTurns * kTurns) return find_lowest(a, frame, height_m);
+  if (memory.low.empty() || norm2(up - memory.low_up) > kLeans * kLeans) {
+    memory.low_up = up;
+    find_low_vertices(a.mesh(), a.skin(), a.samples(), up, memory.low);
+  }
+  Deepest low{.gap_m = std::numeric_limits<double>::infinity()};
+  for (const int vertex : memory.low)
+    if (const double h = dot(up, a.mesh().vertices[vertex]); h < low.gap_m) low.place = vertex, low.gap_m = h;
   low.gap_m += frame.position_m[2] - height_m;
   return low;
 }

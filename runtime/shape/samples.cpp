@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kSpacing = 1.0 / 50.0;  // of the size
 constexpr double kStraight = 5e-5;       // of the size: how far a polyline is off its chain
-constexpr int kLeaf = 6;
+constexpr int kLeafBall = 6;
 
 /// Halves things with middles and radii into a tree of balls; `order` becomes theirs.
 std::vector<Ball> make_tree(const std::vector<Vec3>& middles, const std::vector<double>& radii, std::vector<int>& order) {
@@ -29,7 +29,7 @@ std::vector<Ball> make_tree(const std::vector<Vec3>& middles, const std::vector<
     ball.middle = 0.5 * (box.low + box.high);
     for (int i = ball.first; i < ball.first + ball.count; ++i)
       ball.radius_m = std::max(ball.radius_m, norm(middles[order[i]] - ball.middle) + radii[order[i]]);
-    if (ball.count > kLeaf) {
+    if (ball.count > kLeafBall) {
       const Vec3 side = box.high - box.low;
       const int axis = side[0] >= side[1] && side[0] >= side[2] ? 0 : side[1] >= side[2] ? 1 : 2;
       const int half = ball.count / 2;
@@ -241,6 +241,7 @@ Samples::Samples(const Mesh& mesh, const Skin& skin) {
     s.first_neighbour = static_cast<int>(neighbours.size());
     s.neighbours = static_cast<int>(near.size());
     for (const int other : near) neighbours.push_back(moved[other]);
+    if (s.kind == VertexKind::smooth) reach_m = std::max(reach_m, s.reach_m);
     samples.push_back(s);
   }
   middles.clear();

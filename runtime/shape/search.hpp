@@ -46,10 +46,12 @@ bool follow(Touch& touch, const Shape& a, const Frame& frame_a, const Shape* b, 
 /// than a degree.
 bool is_level(const Touch& touch, const Shape& a, const Frame& frame_a, const Shape* b, const Frame& frame_b);
 
-/// Upper bound of the way of any place of a in the frame of b from one pose to another [m].
-double calc_way(const Pose& from, const Pose& to, const Shape& a);
+/// Where a is in the frame of b.
+Frame calc_relative(const Frame& a, const Frame& b);
+/// Upper bound of the way of any point of a from where it was to where it is, in one frame.
+double calc_way(const Mat3& rotation_before, const Vec3& position_before_m, const Mat3& rotation, const Vec3& position_m, const Shape& a);
 /// Is all that is nearer than margin_m now among the candidates of the last search?
-bool recall(const PairMemory& memory, const Pose& pose, const Shape& a, double margin_m);
+bool recall(const PairMemory& memory, const Mat3& rotation, const Vec3& position_m, const Shape& a, double margin_m);
 /// Keeps of touches that travel and have met one, the deepest; then few of a patch.
 void thin(std::vector<Touch>& touches, double spacing_m, double patch_m);
 /// The candidates of the memory that are nearer than the margin now, with names; `moved`: they have not been settled since. False, and

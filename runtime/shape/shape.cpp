@@ -32,10 +32,22 @@ Shape::Shape(std::span<const Vec3> vertices, std::span<const std::array<std::int
 
 Shape::~Shape() = default;
 
+double Shape::get_sag_m() const { return skin_->get_sag_m(); }
+
 double Shape::calc_radius_m(const Vec3& centre) const {
   double max = 0.0;
   for (const Vec3& x : mesh_->vertices) max = std::max(max, norm2(x - centre));
   return std::sqrt(max) + skin_->get_sag_m();
+}
+
+double Shape::calc_turning_speed(const Vec3& centre, const Vec3& spin) const {
+  Vec3 reach{}, speed{};
+  for (int k = 0; k < 3; ++k) reach[k] = skin_->get_sag_m() + std::max(mesh_->box.high[k] - centre[k], centre[k] - mesh_->box.low[k]);
+  for (int k = 0; k < 3; ++k) {
+    const int l = (k + 1) % 3, m = (k + 2) % 3;
+    speed[k] = std::abs(spin[l]) * reach[m] + std::abs(spin[m]) * reach[l];
+  }
+  return norm(speed);
 }
 
 Box Shape::calc_box(const Frame& frame) const {

@@ -4,7 +4,9 @@
 //     refresh(touch, a, frame_a, &b, frame_b, memory);                    // at each small step
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "runtime/shape/shape.hpp"
@@ -31,27 +33,37 @@ struct Touch {
   bool stays = false;            // of several on what is nearly level: stays about where it is and does not go to the lowest place
 };
 
-/// Of a in the frame of b.
-struct Pose {
-  Mat3 rotation{};
+/// Samples of two bodies that are near the other one, with their distances to it: all that are nearer than reach_m.
+struct NearSamples {
+  bool known = false;
+  Mat3 rotation{};  // of a in b at that time
   Vec3 position_m{};
+  double reach_m = 0.0, wanted_m = 0.0;                        // wanted by the last search
+  std::array<std::vector<std::pair<int, double>>, 2> samples;  // of a, of b
+};
+
+/// Of these the samples that may be deepest, until the pair has moved by slack_m since `listed`, and the deepest gap when `measured`.
+struct DeepSamples {
+  Frame listed, measured;  // of a in b
+  double slack_m = -1.0, deepest_m = -1.0;
+  std::array<std::vector<int>, 2> samples;  // of a, of b
 };
 
 /// The caller's, one per pair: what makes the next search cheap and gives touches their names. Of no meaning to the caller.
 class PairMemory {
  public:
   bool known = false;
-  Pose searched;                    // at the last search
+  Mat3 rotation{};  // of a in b at the last search
+  Vec3 position_m{};
   double reach_m = 0.0;             // margin of that search and what was added to it
   std::vector<Touch> candidates;    // of it, nearer than reach_m
   std::vector<Touch> last;          // touches given at the last call, to name those of the next
   std::uint64_t serial = 0;         // of names given
   std::array<int, 2> axis{-1, -1};  // that separated or carried last: kind, index
-  // Of the search for the deepest sample:
-  Pose listed, measured;
-  double slack_m = -1.0;                          // `near` is complete until the pair has moved by it since `listed`; negative: not there
-  std::array<std::vector<std::int32_t>, 2> near;  // samples of a and b
-  double deepest_m = -1.0;                        // gap of the deepest when `measured`
+  Vec3 up{}, low_up{};              // vertical in the frame of a, when the lowest vertex was last looked for; when those were:
+  std::vector<int> low;             // vertices that may be lowest while the vertical is near that
+  NearSamples near;
+  DeepSamples deep;
 };
 
 /// Replaces `out` by the touches not further apart than the margin: at most 4 for each patch of contact.
@@ -68,6 +80,8 @@ struct Deepest {
   bool is_of_a = true;
 };
 Deepest find_lowest(const Shape& a, const Frame& frame, double height_m);
+/// The same from memory, as long as the body leans little from how it did.
+Deepest find_lowest(const Shape& a, const Frame& frame, double height_m, PairMemory& memory);
 /// None (-1) between two polyhedra, whose touches are complete, and where no sample is deeper than `gap_m`.
 Deepest find_deepest(const Shape& a, const Frame& frame_a, const Shape& b, const Frame& frame_b, double gap_m, PairMemory& memory);
 /// The touch of such a vertex, at these or other frames.

@@ -16,6 +16,7 @@ inline double norm2(const Vec3& a) { return dot(a, a); }
 struct Frame {
   Mat3 rotation{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
   Vec3 position_m{};
+  bool operator==(const Frame&) const = default;
 };
 inline Vec3 to_world(const Frame& f, const Vec3& x) { return f.rotation * x + f.position_m; }
 inline Vec3 to_body(const Frame& f, const Vec3& x) { return turn_back(f.rotation, x - f.position_m); }

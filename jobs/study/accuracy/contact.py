@@ -1,5 +1,5 @@
 """What the knobs of the physics cost and buy, against motions that have a closed form: the step of contacts, the triangles of a body,
-impacts with and without modes."""
+impacts with and without modes; and how deep falling discs are in the ground, by the step."""
 import json
 import math
 
@@ -31,6 +31,14 @@ PLATE = {
     "band_hz": [20, 6000],
     "material": STEEL,
 }
+DISC = {
+    "body": {"shape": "disc", "radius_m": 0.0375, "thickness_m": 0.006, "nodes": 1500},
+    "element": "T10",
+    "band_hz": [20, 20000],
+    "material": STEEL,
+}
+DISC_TILTS_DEG = (0.2, 1, 3, 8, 20, 45, 70, 89)  # thin bodies that land nearly flat were the deepest
+QUICK_TILTS_DEG = (0.2, 20)
 LEAN, SPIN_RAD_S = 0.2, 200.0
 SLOPE = 0.05  # rad
 HEAD = ("error of the motion", "CPU of the physics, ms for 1 s", "spread")
@@ -151,6 +159,41 @@ def calc_roll_error(poses):
     return abs((poses[-1, 1] - poses[0, 1]) / way - 1)
 
 
+# --- discs that fall
+
+
+def make_discs(bank, step_s, tilts_deg, seconds=2.0):
+    """Rigid, a metre apart: each is an island of its own."""
+    bodies = [
+        {
+            "name": f"disc {n}",
+            "bank": str(bank),
+            "position_m": [float(n), 0, 0.1],
+            "rotation_deg": [tilt, 0, 37.0 * n],
+            "velocity_m_s": [0.1, 0, 0],
+            "friction": 0.3,
+            "restitution": 0.5,
+        }
+        for n, tilt in enumerate(tilts_deg)
+    ]
+    scene = make_scene(seconds, bodies[0], {"friction": 0.3}, step_s)
+    scene["quality"]["modes_in_impacts"] = False
+    return scene | {"bodies": bodies}
+
+
+def list_depths(found, steps):
+    """(setting, is it the usual one, largest depth, that at the end [um], [CPU ms a body])"""
+    return [
+        (
+            f"{step:g}",
+            step == USUAL_STEP_S,
+            *(1e6 * report["depth_and_hits"][name]["depth_m"] for name in ("deepest", "deepest_now")),
+            [cpu / report["bodies"] for cpu in cpus],
+        )
+        for step, (report, _, cpus) in zip(steps, (found[f"discs-{n}"] for n in range(len(steps))))
+    ]
+
+
 # --- words and tables
 
 
@@ -197,7 +240,9 @@ def study(lab, bodies):
     section = Section(NAME, TITLE, lab.make_command(NAME))
     steps = (STEPS[0], USUAL_STEP_S, STEPS[-1]) if lab.quick else STEPS
     nodes = QUICK_NODES if lab.quick else NODES
-    jobs = {"top": TOP, "plate": PLATE} | {f"ball {count}": BALL | {"body": BALL["body"] | {"nodes": count}} for count in nodes}
+    jobs = {"top": TOP, "plate": PLATE, "disc": DISC} | {
+        f"ball {count}": BALL | {"body": BALL["body"] | {"nodes": count}} for count in nodes
+    }
     paths = banks.solve(lab, [banks.Sounding(name, name, job) for name, job in jobs.items()])
     section.say(
         f"A top of steel on its tip leans by {LEAN:g} rad and spins at {SPIN_RAD_S:g} rad/s for a second: its precession has a closed form."
@@ -208,6 +253,8 @@ def study(lab, bodies):
         f"roll-{n}": make_roll(paths[f"ball {USUAL_NODES}"], step) for n, step in enumerate(steps)
     }
     scenes |= {f"nodes-{count}": make_roll(paths[f"ball {count}"]) for count in nodes}
+    tilts = QUICK_TILTS_DEG if lab.quick else DISC_TILTS_DEG
+    scenes |= {f"discs-{n}": make_discs(paths["disc"], step, tilts) for n, step in enumerate(steps)}
     falls = {
         name: make_scene(1.0, {"name": "plate", "bank": str(paths["plate"]), "position_m": [0, 0, 0.3], "rotation_deg": [20, 15, 0]}, {})
         for name in ("with modes", "without")
@@ -231,6 +278,33 @@ def study(lab, bodies):
         "The same for the ball: error of its way, relative; what does not fall with the step is the shape of the ball.",
     )
     section.conclude(describe("Step of contacts (`contact_step_s`), way of a ball that rolls", roll))
+
+    discs = list_depths(found, steps)
+    section.add_table(
+        "contact_step_s_depth",
+        [
+            ("contact_step_s", "deepest, um", "at the end, um", "CPU of the physics, ms a body for 1 s", "spread"),
+            *(
+                (
+                    setting + (" (default)" if usual else ""),
+                    f"{ever:.1f}",
+                    f"{last:.1f}",
+                    f"{measuring.find_median(cpu):.1f}",
+                    f"{100 * sounds.find_spread(cpu):.0f} %",
+                )
+                for setting, usual, ever, last, cpu in discs
+            ),
+        ],
+        f"Depth in the ground of {len(tilts)} rigid steel discs of 75 x 6 mm that fall 0.1 m at tilts of {tilts[0]:g} to {tilts[-1]:g}"
+        " degrees, 2 s: thin bodies take shorter steps of their own.",
+    )
+    usual_depth = next(row for row in discs if row[1])
+    section.conclude(
+        f"Step of contacts (`contact_step_s`), depth of falling discs: {usual_depth[2]:.0f} um at most with the default, {usual_depth[0]}, in"
+        f" {measuring.find_median(usual_depth[4]):.1f} ms of the physics a body for a second; {discs[0][2]:.0f} um with {discs[0][0]}, in"
+        f" {measuring.find_median(discs[0][4]):.1f} ms; {discs[-1][2]:.0f} um with {discs[-1][0]}, in"
+        f" {measuring.find_median(discs[-1][4]):.1f} ms."
+    )
 
     triangles = {count: len(sounds.read_arrays(paths[f"ball {count}"], {"mesh/triangles"})["mesh/triangles"]) for count in nodes}
     shape = [
@@ -270,6 +344,16 @@ def study(lab, bodies):
         plots.Panel(name, "physics, ms for a second", "error, relative", {"settings": to_points(rows)}, x_log=True, y_log=True)
         for name, rows in (("contact_step_s, top", top), ("contact_step_s, ball", roll), ("triangles of the ball", shape))
     ]
+    panels.append(
+        plots.Panel(
+            "contact_step_s, falling discs",
+            "physics, ms a body for a second",
+            "deepest, um",
+            {"settings": [(measuring.find_median(cpu), ever) for _, _, ever, _, cpu in discs]},
+            x_log=True,
+            y_log=True,
+        )
+    )
     rows = [("knob", "setting", *DATA)] + [
         (name, setting, float(error), float(measuring.find_median(cpu)), float(sounds.find_spread(cpu)))
         for name, table in (("contact_step_s, top", top), ("contact_step_s, ball", roll), ("triangles", shape))
@@ -277,8 +361,10 @@ def study(lab, bodies):
     ]
     section.add_chart(
         "errors",
-        plots.draw_panels(panels, "Knobs of the physics", "error of a motion against its closed form, and the CPU of a second of it", 3),
-        "Error of a motion against CPU, setting by setting.",
+        plots.draw_panels(
+            panels, "Knobs of the physics", "error of a motion against its closed form, depth of falling discs, and the CPU of a second", 2
+        ),
+        "Error of a motion, and depth of falling discs, against CPU, setting by setting.",
         rows,
     )
     return section

@@ -54,6 +54,26 @@ TEST(ground, corner_keeps_its_name_while_a_box_turns) {
   }
 }
 
+TEST(ground, lowest_vertex_from_memory_is_that_of_a_whole_search) {
+  const std::shared_ptr<const Shape> shapes[] = {make_lumpy(0.05, 4, 0.2).make(), make_cylinder(0.012, 0.002, 48).make(),
+                                                 make_ring(0.02, 0.003, 48, 16).make(), make_cylinder(0.005, 0.2, 24).make()};
+  Dice dice(3);
+  for (const auto& shape : shapes) {
+    PairMemory memory;
+    Frame frame;
+    int kept = 0;
+    for (int i = 0; i < 3000; ++i) {
+      const double turn = i % 100 == 0 ? 1.0 : i % 20 == 0 ? 0.02 : 0.004;
+      frame.rotation = multiply(make_turn(dice.roll_way(), turn), frame.rotation);
+      frame.position_m[2] = 0.01 * dice.roll();
+      const auto before = memory.low_up;
+      EXPECT_EQ(find_lowest(*shape, frame, 0.001, memory).gap_m, find_lowest(*shape, frame, 0.001).gap_m);
+      if (memory.low_up == before) ++kept;
+    }
+    EXPECT_GT(kept, 2700);
+  }
+}
+
 /// Height of the lowest point over many turns: the smooth ball has none.
 double calc_ripple(int n) {
   const auto ball = make_ball(1.0, n).make();

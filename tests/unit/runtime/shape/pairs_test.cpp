@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <set>
+#include <tuple>
 
 #include "tests/unit/runtime/shape/solids.hpp"
 
@@ -425,6 +426,32 @@ TEST(pairs, memory_gives_what_a_new_search_gives) {
     for (const Touch& t : out)
       if (t.gap_m == find_min(out)) kept = t;
   }
+}
+
+TEST(pairs, deepest_sample_from_memory_is_that_of_a_whole_search) {
+  const auto lumpy = make_lumpy(0.05, 12, 0.1).make(), ring = make_ring(0.05, 0.008, 48, 16).make(),
+             box = make_box({0.1, 0.1, 0.03}, 6).make();
+  const auto cup = make_lathe({{0, 0}, {0.03, 0}, {0.035, 0.08}, {0.033, 0.08}, {0.028, 0.002}, {0, 0.002}}, 40, false).make();
+  Dice dice(11);
+  int deep = 0;
+  for (const auto& [first, second, height] : {std::tuple(lumpy.get(), lumpy.get(), 0.1), std::tuple(ring.get(), lumpy.get(), 0.056),
+                                              std::tuple(cup.get(), ring.get(), 0.0075), std::tuple(lumpy.get(), box.get(), 0.063)}) {
+    PairMemory memory;
+    Frame fa, fb;
+    fb.rotation = dice.roll_turn();
+    if (second == box.get() || first == cup.get()) fb.rotation = Frame{}.rotation;
+    fa.position_m = {0, 0, height};
+    for (int i = 0; i < 400; ++i) {
+      fa.position_m = fa.position_m + (i % 50 == 0 ? 1e-3 : 1e-4) * dice.roll_way();
+      fa.rotation = multiply(make_turn(dice.roll_way(), 2e-3), fa.rotation);
+      PairMemory none;
+      const Deepest kept = find_deepest(*first, fa, *second, fb, -5e-6, memory), fresh = find_deepest(*first, fa, *second, fb, -5e-6, none);
+      EXPECT_EQ(kept.gap_m, fresh.gap_m) << i;
+      EXPECT_EQ(kept.place, fresh.place) << i;
+      if (fresh.place >= 0) ++deep;
+    }
+  }
+  EXPECT_GT(deep, 300);
 }
 
 TEST(pairs, fine_and_coarse_meshes_of_a_body_touch_alike) {
