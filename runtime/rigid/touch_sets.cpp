@@ -102,7 +102,8 @@ void TouchSets::keep_added(Pair& pair, const std::vector<Contact>& old) const {
                        [&](const shape::Touch& found) { return found.id == touch.id || norm(found.where_m - touch.where_m) < near_m; });
   };
   for (const Contact& c : old) {
-    const shape::Touch touch = find_moved(pair, c.touch, a, b);
+    shape::Touch touch = c.touch;
+    if (!follow(pair, touch, a, b)) continue;
     const double most_m = touch.smooth ? least_m - kMissing : std::max(least_m - kMissing, kTouch);
     if (touch.gap_m <= most_m && !is_found(touch)) pair.contacts.emplace_back(c).touch = touch;
   }
@@ -112,10 +113,9 @@ void TouchSets::refresh(Pair& pair) const {
   if (pair.cord >= 0) return update_cord(bodies_, cords_[pair.cord], pair);
   const shape::Frame a = bodies_.get_frame(pair.a), b = bodies_.get_frame(pair.b);
   const bool is_there = !pair.ahead.touches.empty() && pair.ahead.a == a && pair.ahead.b == b;
-  std::size_t k = 0;
-  std::erase_if(pair.contacts, [&](Contact& c) {
-    if (is_there) return c.touch = pair.ahead.touches[k++], false;
-    const bool follows = shape::refresh(c.touch, *bodies_.get_shape(pair.a), a, bodies_.get_shape(pair.b), b, pair.memory);
+  std::erase_if(pair.contacts, [&, k = std::size_t{0}](Contact& c) mutable {
+    const bool follows = is_there || follow(pair, c.touch, a, b);
+    if (is_there) c.touch = pair.ahead.touches[k++];
     pair.searched = pair.searched && follows;
     return !follows;
   });
@@ -160,7 +160,7 @@ std::pair<Contact*, double> TouchSets::find_least(Pair& pair, const shape::Frame
   bool all_follow = true;
   for (Contact& c : pair.contacts) {
     shape::Touch& moved = pair.ahead.touches.emplace_back(c.touch);
-    const bool follows = shape::refresh(moved, *bodies_.get_shape(pair.a), a, bodies_.get_shape(pair.b), b, pair.memory);
+    const bool follows = follow(pair, moved, a, b);
     all_follow = all_follow && follows;
     if (follows && moved.gap_m < least.second) least = {&c, moved.gap_m};
   }
@@ -283,8 +283,12 @@ void TouchSets::release(int a, int b, double depth_m, double stored_j) {
 }
 
 shape::Touch TouchSets::find_moved(Pair& pair, shape::Touch touch, const shape::Frame& a, const shape::Frame& b) const {
-  shape::refresh(touch, *bodies_.get_shape(pair.a), a, bodies_.get_shape(pair.b), b, pair.memory);
+  follow(pair, touch, a, b);
   return touch;
+}
+
+bool TouchSets::follow(Pair& pair, shape::Touch& touch, const shape::Frame& a, const shape::Frame& b) const {
+  return shape::refresh(touch, *bodies_.get_shape(pair.a), a, bodies_.get_shape(pair.b), b, pair.memory);
 }
 
 }  // namespace carillon::rigid

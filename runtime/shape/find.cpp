@@ -681,7 +681,7 @@ Deepest find_deepest(const Shape& a, const Frame& fa, const Shape& b, const Fram
   if (norm2(to_world(fa, a.get_middle_m()) - to_world(fb, b.get_middle_m())) > far * far || (a.is_polyhedron() && b.is_polyhedron()))
     return found;
   std::vector<Touch> none;
-  const double way = update_near(a, fa, b, fb, 0.0, memory.near);
+  const double way = update_near(a, fa, b, fb, std::max(a.get_sag_m(), b.get_sag_m()), memory.near);
   const auto& [of_a, of_b] = memory.near.samples;
   found.place = Pass(a, fa, b, fb, 0.0, none).find_deepest(found.gap_m, of_a, way);
   if (const int place = Pass(b, fb, a, fa, 0.0, none).find_deepest(found.gap_m, of_b, way); place >= 0)
