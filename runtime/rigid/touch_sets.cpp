@@ -17,7 +17,7 @@ namespace {
 constexpr double kSteps = 4.0;           // in which a pair moves by the margin of a search,
 constexpr double kStepsOfRolling = 8.0;  // a curved body on the ground: few places come near
 constexpr double kMissing = 5e-6;        // m; a place deeper than all touches by this is missing
-constexpr double kSearchAgain = 2e-3;    // s; a pair with a missing touch is searched anew once in so long
+constexpr double kSearchAgain = 2e-3;    // s; a pair with a missing touch is searched again once in so long
 constexpr double kSame = 0.02;           // of the size: touches so near are one
 constexpr double kSagDecay = 10e-3;      // s
 constexpr int kMaxAdded = 4;             // touches that are missing at the end of a flight
