@@ -49,7 +49,7 @@ struct Pair {
   Ahead ahead;                               // where the bodies are predicted to be
   double margin_m = 0.0, travelled_m = 0.0;  // since the last search
   bool searched = false;
-  double next_search_s = 0.0;  // when a missing touch may have it searched anew
+  double next_search_s = 0.0;  // when a missing touch may have it searched again
   shape::Frame measured{};     // of a, when its lowest vertex over the ground was looked for,
   double lowest_m = -1.0;      // and its gap
   std::int64_t window = -1;    // in which it was last near

@@ -18,7 +18,7 @@ constexpr double kSteps = 4.0;           // in which a pair moves by the margin 
 constexpr double kStepsOfRolling = 8.0;  // a curved body on the ground: few places come near
 constexpr double kMissing = 5e-6;        // m; a place deeper than all touches by this is missing
 constexpr double kSame = 0.02;           // of the size: touches so near are one
-constexpr double kSearchAgain = 2e-3;    // s; a pair with a missing touch is searched anew once in so long
+constexpr double kSearchAgain = 2e-3;    // s; a pair with a missing touch is searched again once in so long
 constexpr double kSagDecay = 10e-3;      // s
 
 /// Lower bound of the gap of any vertex of a body over the ground, from that at an earlier frame.

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kLean = 0.05;            // rad
 constexpr double kLeans = 0.999 * kLean;  // with room for rounding
-constexpr double kTurns = 0.25 * kLean;   // a body that turns by more between two calls is searched anew
+constexpr double kTurns = 0.25 * kLean;   // a body that turns by more between two calls is searched again
 
 /// The vertex that is lowest along `up` (mesh frame), and its height.
 std::pair<int, double> find_lowest_vertex(const Mesh& mesh, const Samples& s, const Vec3& up) {
