@@ -52,7 +52,7 @@ void swing(const std::string& id, int count, double seconds) {
 
 TEST(depth, chain_of_3) { swing("chain_of_3", 3, 5.0); }
 TEST(depth, chain_of_6) { swing("chain_of_6", 6, 5.0); }
-TEST(depth, chain_of_12) { swing("chain_of_12", 12, 3.0); }
+TEST(depth, chain_of_12) { swing("chain_of_12", 12, 5.0); }
 
 /// Coins, rings, cups and bowls that fall into a box.
 void heap(const std::string& id, int count, double end_s) {
