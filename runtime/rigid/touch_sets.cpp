@@ -86,12 +86,12 @@ void TouchSets::search(Pair& pair, double step_s) {
     contact.touch = touch;
     pair.contacts.push_back(contact);
   }
-  keep_added(pair, old);
+  if (pair.b < 0) keep_added(pair, old);
   remove_false(pair);
   complete(pair, frame_a, bodies_.get_frame(pair.b), 0.0);
 }
 
-/// Of added touches those that a search has not found again, and that are deeper than all found, or sharp and closed.
+/// Of added touches with the ground those that a search has not found again, and that are deeper than all found, or sharp and closed.
 void TouchSets::keep_added(Pair& pair, const std::vector<Contact>& old) const {
   const shape::Frame a = bodies_.get_frame(pair.a), b = bodies_.get_frame(pair.b);
   double least_m = pair.margin_m;
