@@ -301,8 +301,8 @@ def study(lab, bodies):
     usual_depth = next(row for row in discs if row[1])
     section.conclude(
         f"Step of contacts (`contact_step_s`), depth of falling discs: {usual_depth[2]:.0f} um at most with the default, {usual_depth[0]},"
-        f" in {measuring.find_median(usual_depth[4]):.1f} ms of the physics a body for a second; {discs[0][2]:.0f} um with {discs[0][0]}, in"
-        f" {measuring.find_median(discs[0][4]):.1f} ms; {discs[-1][2]:.0f} um with {discs[-1][0]}, in"
+        f" in {measuring.find_median(usual_depth[4]):.1f} ms of the physics a body for a second; {discs[0][2]:.0f} um with {discs[0][0]},"
+        f" in {measuring.find_median(discs[0][4]):.1f} ms; {discs[-1][2]:.0f} um with {discs[-1][0]}, in"
         f" {measuring.find_median(discs[-1][4]):.1f} ms."
     )
 
