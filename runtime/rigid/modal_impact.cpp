@@ -379,7 +379,7 @@ void ModalImpacts::release(ModalImpact& modal, double time_s, TouchSets& touches
   if (!modal.impact->has_ended()) ++ledger_.costs.ended_impacts;
   ledger_.costs.longest_impact_s = std::max(ledger_.costs.longest_impact_s, modal.impact->get_time());
   const impact::Books books = modal.impact->get_books();
-  ledger_.lose(books.dissipated_modes + books.dissipated_contact + books.dissipated_friction + books.above_band + books.spring);
+  ledger_.lose(books.dissipated_modes + books.dissipated_contact + books.dissipated_friction + books.above_band);
   for (int k = 0; const impact::Body& b : bodies) {
     const int body = modal.bodies[k++];
     bodies_.set_in_impact(body, false);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <utility>
 
@@ -49,10 +50,12 @@ Pair& TouchSets::get(int a, int b) {
 }
 
 void TouchSets::forget_far(std::int64_t window) {
-  std::erase_if(pairs_, [&](const auto& entry) {
-    const Pair& pair = entry.second;
-    return pair.window != window && (bodies_.moves(pair.a) || bodies_.moves(pair.b));
-  });
+  for (auto at = pairs_.begin(); at != pairs_.end();) {
+    Pair& pair = at->second;
+    const bool is_far = pair.window != window && (bodies_.moves(pair.a) || bodies_.moves(pair.b));
+    if (is_far) lose_stored(pair);
+    at = is_far ? pairs_.erase(at) : std::next(at);
+  }
 }
 
 void TouchSets::search(Pair& pair, double step_s) {
@@ -266,20 +269,26 @@ shape::Touch TouchSets::find_closing(Pair& pair, const Contact& contact, double 
 
 void TouchSets::travel(Pair& pair, double time_s, double step_s) const {
   pair.travelled_m += (bodies_.calc_closing_speed(pair.a, pair.b) + norm(bodies_.gravity()) * step_s) * time_s + 1e-12;
-  if (!(pair.sag_m > 0.0)) return;
-  pair.sag_m *= std::exp(-time_s / kSagDecay);
-  if (pair.sag_m < kDeep) pair.stored_j = 0.0;
+  if (pair.sag_m > 0.0) pair.sag_m *= std::exp(-time_s / kSagDecay);
+  if (pair.sag_m < kDeep) lose_stored(pair);
+}
+
+void TouchSets::lose_stored(Pair& pair) const {
+  ledger_.store(-pair.stored_j);
+  ledger_.lose(pair.stored_j);
+  pair.stored_j = 0.0;
 }
 
 void TouchSets::release(int a, int b, double depth_m, double stored_j) {
   if (b >= 0 && a > b) std::swap(a, b);
   const auto at = pairs_.find({a, b});
-  if (at == pairs_.end()) return;
+  if (at == pairs_.end()) return ledger_.lose(stored_j);
   Pair& pair = at->second;
   for (Contact& c : pair.contacts)
     if (c.presses) c.presses = c.touching = false;
   pair.sag_m = std::max(pair.sag_m, depth_m);
   pair.stored_j += stored_j;
+  ledger_.store(stored_j);
 }
 
 shape::Touch TouchSets::find_moved(Pair& pair, shape::Touch touch, const shape::Frame& a, const shape::Frame& b) const {

@@ -61,6 +61,7 @@ class TouchSets {
  private:
   void keep_added(Pair& pair, const std::vector<Contact>& old) const;
   bool follow(Pair& pair, shape::Touch& touch, const shape::Frame& a, const shape::Frame& b) const;
+  void lose_stored(Pair& pair) const;
   std::pair<Contact*, double> find_least(Pair& pair, const shape::Frame& a, const shape::Frame& b) const;
   bool complete(Pair& pair, const shape::Frame& a, const shape::Frame& b, double closing_s);
   shape::Frame find_flown(int body, double time_s) const;
