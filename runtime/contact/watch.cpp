@@ -16,14 +16,13 @@ Depth measure(const rigid::Space& space, int a, int b) {
     const shape::Shape& other = *space.solid(b).shape;
     const shape::Frame frame_b = space.get_frame(b);
     depth.thickness_m = std::min(depth.thickness_m, other.get_thickness_m());
+    shape::PairMemory memory;
     if (solid.shape->is_polyhedron() && other.is_polyhedron()) {
-      shape::PairMemory memory;
       std::vector<shape::Touch> touches;
       shape::find_touches(*solid.shape, frame, other, frame_b, 0.0, memory, touches);
       for (const shape::Touch& touch : touches) depth.depth_m = std::max(depth.depth_m, -touch.gap_m);
     } else {
-      shape::PairMemory none;
-      depth.depth_m = -shape::find_deepest(*solid.shape, frame, other, frame_b, 0.0, none).gap_m;
+      depth.depth_m = -shape::find_deepest(*solid.shape, frame, other, frame_b, 0.0, memory).gap_m;
     }
   }
   depth.depth_m = std::max(0.0, depth.depth_m);

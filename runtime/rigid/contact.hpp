@@ -32,6 +32,12 @@ struct Contact {
 
   /// Force on a in its last step [N].
   Vec3 calc_force() const { return touching && step_s > 0.0 ? (1.0 / step_s) * impulse : Vec3{}; }
+  /// Becomes a contact of an impact with modes.
+  void press() {
+    presses = true;
+    touching = false;
+    impulse = couple = {};
+  }
   /// Closed, and in no impact with modes; not of cords.
   bool carries() const { return !presses && cord < 0 && touch.gap_m <= kTouch; }
   bool is_closed() const { return touching && touch.gap_m <= kTouch; }
@@ -44,7 +50,7 @@ struct Pair {
   std::vector<Contact> contacts;
   struct Ahead {
     shape::Frame a{}, b{};
-    std::vector<shape::Touch> touches;  // of the contacts, if their touches have not changed since
+    std::vector<shape::Touch> touches;  // of the contacts; cleared by every change of them
   };
   Ahead ahead;                               // where the bodies are predicted to be
   double margin_m = 0.0, travelled_m = 0.0;  // since the last search

@@ -33,19 +33,16 @@ class Ledger {
   /// Negative: energy from nowhere [J].
   void lose(double energy_j) { lost_j_ += energy_j; }
   void lift(double energy_j) { lifted_j_ += energy_j; }
-  /// In springs of impacts that are over, until they lift their bodies or it is lost.
-  void store(double energy_j) { stored_j_ += energy_j; }
   /// Adds losses and gains to the books.
   void add_to(Books& books) const {
     books.lost_j += lost_j_;
     books.lifted_j += lifted_j_;
-    books.springs_j += stored_j_;
   }
 
   Costs costs;
 
  private:
-  double lost_j_ = 0.0, lifted_j_ = 0.0, stored_j_ = 0.0;
+  double lost_j_ = 0.0, lifted_j_ = 0.0;
 };
 
 }  // namespace carillon::rigid

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 #include <set>
+#include <span>
 
 #include "runtime/impact/predict.hpp"
 #include "runtime/rigid/limits.hpp"
@@ -18,7 +19,7 @@ constexpr double kEarly = 1e-2;   // m/s; slower touches of bodies that ring wai
 constexpr int kMaxTogether = 12;  // with those that rest
 
 /// (n) along a direction.
-std::vector<double> project(const std::vector<double>& shape, const Vec3& along) {
+std::vector<double> project(std::span<const double> shape, const Vec3& along) {
   std::vector<double> phi(shape.size() / 3);
   for (int m = 0; double& value : phi) {
     value = shape[m] * along[0] + shape[m + 1] * along[1] + shape[m + 2] * along[2];
@@ -216,8 +217,8 @@ double ModalImpacts::calc_yield(const impact::Contact& contact, const std::vecto
     const std::span<const double> shape = is_a ? contact.shape_a : contact.shape_b;
     if (shape.empty()) continue;
     const std::vector<double>& q = bodies[is_a ? contact.a : contact.b].q;
-    const Vec3 n = (is_a ? 1.0 : -1.0) * contact.normal;
-    for (std::size_t i = 0; i < q.size(); ++i) yield += q[i] * (n[0] * shape[3 * i] + n[1] * shape[3 * i + 1] + n[2] * shape[3 * i + 2]);
+    const std::vector<double> phi = project(shape, (is_a ? 1.0 : -1.0) * contact.normal);
+    for (std::size_t m = 0; m < q.size(); ++m) yield += q[m] * phi[m];
   }
   return yield;
 }
@@ -259,9 +260,7 @@ void ModalImpacts::add_contact(ModalImpact& modal, Contact& touch, double sag_m,
   const double open_m = gap_m + calc_yield(spring, modal.impact != nullptr ? modal.impact->get_bodies() : made.bodies);
   spring.gap_m = std::max(open_m, 0.0);
   spring.yielded_m = std::clamp(-open_m, 0.0, sag_m);
-  touch.presses = true;
-  touch.touching = false;
-  touch.impulse = touch.couple = {};
+  touch.press();
   modal.contacts.push_back(std::move(contact));
   if (modal.impact != nullptr)
     modal.impact->join(spring);

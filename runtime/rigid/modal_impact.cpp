@@ -140,9 +140,7 @@ void ModalImpacts::place(ModalContact& contact, Contact& touch, const shape::Tou
   contact.is_followed = true;
   contact.normal = (is_swapped ? -1.0 : 1.0) * at.normal;
   contact.gap_m = at.gap_m;
-  touch.presses = true;
-  touch.touching = false;
-  touch.impulse = touch.couple = {};
+  touch.press();
   const Vec3 station = find_station(touch.a, touch.b, at);
   if (norm(contact.station - station) < kMoved * bodies_.calc_size(touch.a, touch.b)) return;
   report(contact);

@@ -122,7 +122,6 @@ void Projection::move(const Step& step, const std::vector<Mover>& displacements,
     const double spent_j = std::clamp(gained_j, 0.0, pair->stored_j);
     pair->stored_j -= spent_j;
     gained_j -= spent_j;
-    ledger_.store(-spent_j);
   }
   if (gained_j > 0.0)
     ledger_.lift(gained_j);

@@ -48,6 +48,7 @@ Books Space::calc_books() const {
   bodies_.add_to(books);
   modal_states_.add_to(books, get_time());
   modal_impacts_.add_to(books);
+  touches_.add_to(books);
   ledger_.add_to(books);
   return books;
 }

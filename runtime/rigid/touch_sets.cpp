@@ -274,9 +274,12 @@ void TouchSets::travel(Pair& pair, double time_s, double step_s) const {
 }
 
 void TouchSets::lose_stored(Pair& pair) const {
-  ledger_.store(-pair.stored_j);
   ledger_.lose(pair.stored_j);
   pair.stored_j = 0.0;
+}
+
+void TouchSets::add_to(Books& books) const {
+  for (const auto& [bodies, pair] : pairs_) books.springs_j += pair.stored_j;
 }
 
 void TouchSets::release(int a, int b, double depth_m, double stored_j) {
@@ -288,16 +291,15 @@ void TouchSets::release(int a, int b, double depth_m, double stored_j) {
     if (c.presses) c.presses = c.touching = false;
   pair.sag_m = std::max(pair.sag_m, depth_m);
   pair.stored_j += stored_j;
-  ledger_.store(stored_j);
 }
 
-shape::Touch TouchSets::find_moved(Pair& pair, shape::Touch touch, const shape::Frame& a, const shape::Frame& b) const {
+shape::Touch TouchSets::find_moved(const Pair& pair, shape::Touch touch, const shape::Frame& a, const shape::Frame& b) const {
   follow(pair, touch, a, b);
   return touch;
 }
 
-bool TouchSets::follow(Pair& pair, shape::Touch& touch, const shape::Frame& a, const shape::Frame& b) const {
-  return shape::refresh(touch, *bodies_.get_shape(pair.a), a, bodies_.get_shape(pair.b), b, pair.memory);
+bool TouchSets::follow(const Pair& pair, shape::Touch& touch, const shape::Frame& a, const shape::Frame& b) const {
+  return shape::refresh(touch, *bodies_.get_shape(pair.a), a, bodies_.get_shape(pair.b), b);
 }
 
 }  // namespace carillon::rigid

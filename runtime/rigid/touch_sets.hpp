@@ -52,15 +52,16 @@ class TouchSets {
   shape::Touch find_closing(Pair& pair, const Contact& contact, double time_s) const;
   /// Counts a movement of `time_s` in a step.
   void travel(Pair& pair, double time_s, double step_s) const;
-  /// The contacts of two bodies that were in an impact with modes, which explains that depth [m], are free again;
-  /// so much energy of its springs can lift them [J].
+  /// Frees the contacts of two bodies after an impact with modes. depth_m: explained by it; stored_j: energy of its springs, for lifting.
   void release(int a, int b, double depth_m, double stored_j);
+  /// Adds the energy of springs of impacts that are over to the books.
+  void add_to(Books& books) const;
   /// A touch of a pair whose bodies are at these frames.
-  shape::Touch find_moved(Pair& pair, shape::Touch touch, const shape::Frame& a, const shape::Frame& b) const;
+  shape::Touch find_moved(const Pair& pair, shape::Touch touch, const shape::Frame& a, const shape::Frame& b) const;
 
  private:
   void keep_added(Pair& pair, const std::vector<Contact>& old) const;
-  bool follow(Pair& pair, shape::Touch& touch, const shape::Frame& a, const shape::Frame& b) const;
+  bool follow(const Pair& pair, shape::Touch& touch, const shape::Frame& a, const shape::Frame& b) const;
   void lose_stored(Pair& pair) const;
   std::pair<Contact*, double> find_least(Pair& pair, const shape::Frame& a, const shape::Frame& b) const;
   bool complete(Pair& pair, const shape::Frame& a, const shape::Frame& b, double closing_s);

@@ -24,64 +24,59 @@ Touch make_ground_touch(const Shape& a, const Frame& fa, const Vec3& x, double h
   return t;
 }
 
-void find_candidates(const Shape& a, const Frame& fa, double height, double margin, std::vector<Touch>& out) {
+/// No neighbour of the sample is lower.
+bool is_lowest(const Shape& a, const Sample& sample, const Vec3& up) {
+  if (sample.kind != VertexKind::smooth) return carries(a.mesh(), sample.vertex, up);
   const Samples& s = a.samples();
-  const Mesh& mesh = a.mesh();
-  const Vec3& up = fa.rotation[2];  // of the world, in the frame of a
-  const double below = height + margin - fa.position_m[2];
-  std::vector<int> open{0};
-  while (!open.empty()) {
-    const Ball& ball = s.sample_tree[open.back()];
-    open.pop_back();
-    if (dot(up, ball.middle) - ball.radius_m > below) continue;
-    if (ball.child >= 0) {
-      open.push_back(ball.child + 1);
-      open.push_back(ball.child);
-      continue;
+  const double h = dot(up, sample.point);
+  for (int k = 0; k < sample.neighbours; ++k) {
+    const Vec3& x = s.samples[s.neighbours[sample.first_neighbour + k]].point;
+    if (dot(up, x) - h < -kFlat * norm(x - sample.point)) return false;
+  }
+  return true;
+}
+
+/// The touches of a sample: at it, or where the skin about it is lowest.
+void add_candidates(const Shape& a, const Frame& fa, double height, double margin, const Sample& sample, std::vector<Touch>& out) {
+  Touch t = make_ground_touch(a, fa, sample.point, height);
+  t.id = make_id(Feature::corner_a, sample.vertex, 0);
+  if (sample.kind != VertexKind::corner && !a.skin().is_flat(sample.face)) {
+    t.side_a = Side::skin;
+    t.face_a = sample.face;
+    t.smooth = true;
+    const double reach = kWalk * std::max(1.5 * sample.reach_m, 2.0 * a.samples().spacing_m);
+    Touch before = t;
+    before.stays = true;
+    bool settled = settle(t, a, fa, nullptr, fa, reach);
+    if (settled && is_level(t, a, fa, nullptr, fa)) {
+      t = before;
+      settled = settle(t, a, fa, nullptr, fa, reach);
+    } else if (norm(t.station_a - sample.point) > kGuard * a.get_size_m() && settle(before, a, fa, nullptr, fa, reach) &&
+               before.gap_m <= margin) {
+      out.push_back(before);
     }
-    for (int i = ball.first; i < ball.first + ball.count; ++i) {
-      const Sample& sample = s.samples[i];
-      const double h = dot(up, sample.point);
-      if (h - sample.reach_m > below) continue;
-      bool lowest = true;
-      if (sample.kind == VertexKind::smooth) {
-        for (int k = 0; k < sample.neighbours && lowest; ++k) {
-          const Vec3& x = s.samples[s.neighbours[sample.first_neighbour + k]].point;
-          lowest = dot(up, x) - h >= -kFlat * norm(x - sample.point);
-        }
-      } else {
-        lowest = carries(mesh, sample.vertex, up);
-      }
-      if (!lowest) continue;
-      Touch t = make_ground_touch(a, fa, sample.point, height);
-      t.id = make_id(Feature::corner_a, sample.vertex, 0);
-      if (sample.kind != VertexKind::corner && !a.skin().is_flat(sample.face)) {
-        t.side_a = Side::skin;
-        t.face_a = sample.face;
-        t.smooth = true;
-        const double reach = kWalk * std::max(1.5 * sample.reach_m, 2.0 * s.spacing_m);
-        Touch before = t;
-        before.stays = true;
-        bool settled = settle(t, a, fa, nullptr, fa, reach);
-        if (settled && is_level(t, a, fa, nullptr, fa)) {
-          t = before;
-          settled = settle(t, a, fa, nullptr, fa, reach);
-        } else if (norm(t.station_a - sample.point) > kGuard * a.get_size_m() && settle(before, a, fa, nullptr, fa, reach) &&
-                   before.gap_m <= margin) {
-          out.push_back(before);
-        }
-        if (!settled) {
-          // Falling on beyond its reach: of another sample, unless it is nearly parallel to the ground.
-          t = before;
-          const Spot spot = a.skin().locate(t.station_a, t.face_a);
-          if (norm(a.skin().calc_normal(spot.face, spot.weights) + up) > kFlush) continue;
-        } else {
-          settle(t, a, fa, nullptr, fa, reach);  // the spring's centre is now there
-        }
-      }
-      if (t.gap_m <= margin) out.push_back(t);
+    if (settled) {
+      settle(t, a, fa, nullptr, fa, reach);  // the spring's centre is now there
+    } else {
+      // Falling on beyond its reach: of another sample, unless it is nearly parallel to the ground.
+      t = before;
+      const Spot spot = a.skin().locate(t.station_a, t.face_a);
+      if (norm(a.skin().calc_normal(spot.face, spot.weights) + fa.rotation[2]) > kFlush) return;
     }
   }
+  if (t.gap_m <= margin) out.push_back(t);
+}
+
+void find_candidates(const Shape& a, const Frame& fa, double height, double margin, std::vector<Touch>& out) {
+  const Samples& s = a.samples();
+  const Vec3& up = fa.rotation[2];  // of the world, in the frame of a
+  const double below = height + margin - fa.position_m[2];
+  for_near(
+      s.sample_tree, [&](const Ball& ball) { return dot(up, ball.middle) - ball.radius_m > below; },
+      [&](int i) {
+        const Sample& sample = s.samples[i];
+        if (dot(up, sample.point) - sample.reach_m <= below && is_lowest(a, sample, up)) add_candidates(a, fa, height, margin, sample, out);
+      });
 }
 
 }  // namespace
@@ -168,13 +163,14 @@ void find_ground_touches(const Shape& a, const Frame& fa, double height, double 
   out.clear();
   if (to_world(fa, a.get_middle_m())[2] - a.get_radius_m() > height + margin) return;
   if (const Polyhedron* body = a.polyhedron()) {
-    std::vector<char> faces_down(body->corners.size(), 0);
+    std::vector<char> faces_down;
+    if (with_all) faces_down.assign(body->corners.size(), 0);
     for (std::size_t f = 0; f < body->loops.size() && with_all; ++f)
       if (dot(fa.rotation[2], body->normals[f]) < kFacesDown)
         for (const int c : body->loops[f]) faces_down[c] = 1;
     for (std::size_t c = 0; c < body->corners.size(); ++c) {
       const double h = dot(fa.rotation[2], body->corners[c]) + fa.position_m[2] - height;
-      if (h > margin || (!faces_down[c] && !carries(a.mesh(), body->corner_vertices[c], fa.rotation[2]))) continue;
+      if (h > margin || (!(with_all && faces_down[c] != 0) && !carries(a.mesh(), body->corner_vertices[c], fa.rotation[2]))) continue;
       out.push_back(make_ground_touch(a, fa, body->corners[c], height));
       out.back().id = make_id(Feature::corner_a, body->corner_vertices[c], 0);
     }

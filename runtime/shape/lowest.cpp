@@ -1,6 +1,6 @@
-// Method: the tree of vertices, the lower of two balls first; of a polyhedron all corners. Under directions within an angle of one, a
-// vertex
-//   is lowest only if it is no higher than the lowest one and than its neighbours by that angle times the distance: few are kept.
+// Method: the tree of vertices, the lower of two balls first; of a polyhedron all corners. For directions within an angle of a first one
+// few
+//   vertices can be lowest: those no higher than the lowest vertex and than their neighbours by that angle times the distance.
 #include <limits>
 #include <tuple>
 #include <utility>
@@ -58,19 +58,12 @@ void find_low_vertices(const Mesh& mesh, const Skin& skin, const Samples& s, con
     } while (e != start);
     return true;
   };
-  std::vector<int> open{0};
-  while (!open.empty()) {
-    const Ball& ball = s.vertex_tree[open.back()];
-    open.pop_back();
-    if (dot(up, ball.middle) - ball.radius_m > height + kLean * (norm(ball.middle - at) + ball.radius_m)) continue;
-    if (ball.child >= 0) {
-      open.push_back(ball.child);
-      open.push_back(ball.child + 1);
-      continue;
-    }
-    for (int i = ball.first; i < ball.first + ball.count; ++i)
-      if (may_be_lowest(s.vertices[i])) low.push_back(s.vertices[i]);
-  }
+  for_near(
+      s.vertex_tree,
+      [&](const Ball& ball) { return dot(up, ball.middle) - ball.radius_m > height + kLean * (norm(ball.middle - at) + ball.radius_m); },
+      [&](int i) {
+        if (may_be_lowest(s.vertices[i])) low.push_back(s.vertices[i]);
+      });
 }
 
 }  // namespace

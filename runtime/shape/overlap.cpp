@@ -1,17 +1,15 @@
 // Method: vertices of each in the other; middles of the pieces of edges of each that are inside the other (two plates that cross); places
 //   halfway from a face to the wall opposite (two bodies whose faces coincide). Only faces near the other body are looked at.
 // Source: T. Moeller, B. Trumbore, "Fast, minimum storage ray-triangle intersection" (1997).
-#include "runtime/shape/mesh.hpp"
-#include "runtime/shape/skin.hpp"
-#include "runtime/shape/touch.hpp"
+#include "runtime/shape/facing.hpp"
 
 namespace carillon::shape {
 namespace {
 
-constexpr double kBrim = 1e-3;      // of the size: how far from its edge or facet a touch on it may be
+constexpr double kOff = 1e-3;       // of the size: distance of a touch from its edge or facet, at most
 constexpr double kDoubtful = 2e-4;  // m; of deeper touches the depth is confirmed
-constexpr double kDepth = 0.25;     // of the depth of a touch: that of one of its places in the other body at least
-constexpr int kProbes = 200;        // faces of each body that are looked behind
+constexpr double kDepth = 0.25;     // of the depth of a touch: least depth of its deeper place in the other body
+constexpr int kProbes = 200;        // faces of each body with a look behind them
 
 /// How deep x is inside; 0 outside.
 double calc_depth(const Mesh& mesh, const Vec3& x) {
@@ -23,14 +21,11 @@ double calc_depth(const Mesh& mesh, const Vec3& x) {
 /// The same under the curved skin.
 double calc_skin_depth(const Shape& shape, const Vec3& x) {
   const Mesh& mesh = shape.mesh();
-  const Skin& skin = shape.skin();
-  const double sag = skin.get_sag_m();
+  const double sag = shape.get_sag_m();
   if (mesh.box.calc_distance2(x) > sag * sag) return 0.0;
   const Nearest at = mesh.find_nearest(x, Box::kFar, -1);
   const bool is_inside = mesh.is_inside(x, at);
-  if (!is_inside && at.distance2 > sag * sag) return 0.0;
-  if (skin.is_flat(at.face)) return is_inside ? std::sqrt(at.distance2) : 0.0;
-  return dot(skin.calc_normal(at.face, at.weights), skin.calc_point(at.face, at.weights) - x);
+  return !is_inside && at.distance2 > sag * sag ? 0.0 : -calc_skin_gap(shape, x, at, is_inside);
 }
 
 /// The first crossing of a ray with the surface; false where there is none within `length`.
@@ -61,7 +56,7 @@ bool find_crossing(const Mesh& mesh, const Vec3& origin, const Vec3& way, double
 
 bool is_overlap(const Touch& touch, const Shape& a, const Frame& fa, const Shape& b, const Frame& fb) {
   const auto is_off = [](Side side, const Shape& shape, const Vec3& station) {
-    const double brim = kBrim * shape.get_size_m();
+    const double brim = kOff * shape.get_size_m();
     return (side == Side::line || side == Side::plane) && shape.mesh().find_nearest(station, Box::kFar, -1).distance2 > brim * brim;
   };
   if (is_off(touch.side_a, a, touch.station_a) || is_off(touch.side_b, b, touch.station_b)) return false;

@@ -259,7 +259,7 @@ bool follow(Touch& touch, const Shape& a, const Frame& fa, const Shape* b, const
   return false;
 }
 
-bool refresh(Touch& touch, const Shape& a, const Frame& fa, const Shape* b, const Frame& fb, PairMemory& /*memory*/) {
+bool refresh(Touch& touch, const Shape& a, const Frame& fa, const Shape* b, const Frame& fb) {
   const double size = b != nullptr ? std::min(a.get_size_m(), b->get_size_m()) : a.get_size_m();
   return follow(touch, a, fa, b, fb, 0.1 * size);
 }

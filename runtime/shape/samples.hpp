@@ -32,6 +32,24 @@ struct Ball {
   int child = -1;  // the other is the next; -1: a leaf
 };
 
+/// Calls act(i) for the things in the balls of a tree that are not far.
+template <typename IsFar, typename Act>
+void for_near(const std::vector<Ball>& tree, IsFar&& is_far, Act&& act) {
+  std::vector<int> open;
+  if (!tree.empty()) open.push_back(0);
+  while (!open.empty()) {
+    const Ball& ball = tree[open.back()];
+    open.pop_back();
+    if (is_far(ball)) continue;
+    if (ball.child >= 0) {
+      open.push_back(ball.child + 1);
+      open.push_back(ball.child);
+      continue;
+    }
+    for (int i = ball.first; i < ball.first + ball.count; ++i) act(i);
+  }
+}
+
 /// Never changes once it is made. Every corner of the mesh is a sample, convex sharp edges are covered by ridges, and every place of the
 /// curved skin lies within `reach_m` of its sample.
 class Samples {

@@ -16,6 +16,9 @@ inline std::uint64_t make_id(Feature feature, int i, int j) {
 void find_polyhedra_touches(const Shape& a, const Frame& frame_a, const Shape& b, const Frame& frame_b, double margin_m, PairMemory& memory,
                             std::vector<Touch>& out);
 
+/// Adds touches of ridges of a with ridges of b.
+void cross_ridges(const Shape& a, const Frame& frame_a, const Shape& b, const Frame& frame_b, double reach_m, std::vector<Touch>& out);
+
 /// May a corner or ridge vertex of the skin be the first to touch what has this outward normal (mesh frame)? No neighbour is lower.
 bool carries(const Mesh& mesh, int vertex, const Vec3& normal);
 

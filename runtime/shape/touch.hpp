@@ -1,7 +1,7 @@
 // Where two bodies touch, or a body and the ground.
 //
 //     find_touches(a, frame_a, b, frame_b, margin, memory, touches);      // at the search, 1 kHz
-//     refresh(touch, a, frame_a, &b, frame_b, memory);                    // at each small step
+//     refresh(touch, a, frame_a, &b, frame_b);                            // at each small step
 #pragma once
 
 #include <array>
@@ -81,7 +81,7 @@ Touch make_touch(const Shape& a, const Frame& frame_a, const Shape& b, const Fra
 
 /// The same touch a small step later: gap, where, normal and stations follow. b == nullptr: the ground. False where it has left its
 /// surfaces, which are to be searched again.
-bool refresh(Touch& touch, const Shape& a, const Frame& frame_a, const Shape* b, const Frame& frame_b, PairMemory& memory);
+bool refresh(Touch& touch, const Shape& a, const Frame& frame_a, const Shape* b, const Frame& frame_b);
 
 /// Is one of the two places of a touch about as deep in the other body as the touch says, and are those on edges still there? A touch that
 /// is followed may have come to the far side of a curved surface, or past the end of its edge.

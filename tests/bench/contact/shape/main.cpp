@@ -43,7 +43,7 @@ void report(const char* name, const Shape& a, Frame fa, const Shape& b, const Fr
   });
   std::vector<Touch> touches = out;
   const double moved = time_us([&](int) {
-    for (Touch& t : touches) refresh(t, a, fa, &b, fb, memory);
+    for (Touch& t : touches) refresh(t, a, fa, &b, fb);
   });
   std::printf("%-44s %8.2f %8.2f %8.2f %6zu\n", name, again, fresh, touches.empty() ? 0.0 : moved / static_cast<double>(touches.size()),
               touches.size());
@@ -59,7 +59,7 @@ void report_ground(const char* name, const Shape& a, const Frame& fa, double mar
   });
   std::vector<Touch> touches = out;
   const double moved = time_us([&](int) {
-    for (Touch& t : touches) refresh(t, a, fa, nullptr, {}, memory);
+    for (Touch& t : touches) refresh(t, a, fa, nullptr, {});
   });
   std::printf("%-44s %8.2f %8.2f %8.2f %6zu\n", name, again, fresh, touches.empty() ? 0.0 : moved / static_cast<double>(touches.size()),
               touches.size());

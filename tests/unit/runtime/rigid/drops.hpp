@@ -163,7 +163,7 @@ inline double find_least_gap(const Space& space, int other) {
   double least = 0.0;
   for (const Contact& c : at->second.contacts) {
     shape::Touch touch = c.touch;
-    shape::refresh(touch, *space.solid(0).shape, mine, other < 0 ? nullptr : space.solid(other).shape.get(), theirs, memory);
+    shape::refresh(touch, *space.solid(0).shape, mine, other < 0 ? nullptr : space.solid(other).shape.get(), theirs);
     least = std::min(least, touch.gap_m);
   }
   return least;

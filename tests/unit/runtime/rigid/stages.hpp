@@ -49,6 +49,7 @@ struct Stages {
     bodies.add_to(books);
     modal_states.add_to(books, bodies.get_time());
     modal_impacts.add_to(books);
+    touches.add_to(books);
     ledger.add_to(books);
     return books;
   }

@@ -64,6 +64,30 @@ TEST(touch_sets, touch_that_stays_keeps_its_contact) {
   for (const Contact& c : pair.contacts) EXPECT_LT(norm(c.impulse - c.touch.where_m), 1.01e-5);
 }
 
+TEST(touch_sets, energy_of_springs_that_lifts_nothing_is_lost_and_never_forgotten) {
+  Stages stages({make_box(0.1, kBoxSides), make_box(0.1, kBoxSides)}, {make_state({0, 0, 0.02}), make_state({1, 0, 0.02})}, kWood,
+                {0, 0, -kGravity});
+  stages.begin({{0, -1}, {1, -1}});
+  const double total_j = stages.calc_books().calc_total();
+  const auto expect = [&](double springs_j, double lost_j) {
+    const Books books = stages.calc_books();
+    EXPECT_EQ(books.springs_j, springs_j);
+    EXPECT_EQ(books.lost_j, lost_j);
+  };
+  stages.touches.release(0, -1, 1e-4, 1.0);
+  stages.touches.release(1, -1, 1e-4, 2.0);
+  stages.touches.release(0, 1, 1e-4, 4.0);  // of a pair that is not followed
+  expect(3.0, 4.0);
+  stages.touches.travel(stages.touches.get(0, -1), 1e-3, 1e-3);  // still deep
+  expect(3.0, 4.0);
+  stages.touches.travel(stages.touches.get(0, -1), 0.1, 1e-3);
+  expect(2.0, 5.0);
+  stages.touches.get(0, -1).window = 7;
+  stages.touches.forget_far(7);
+  expect(0.0, 7.0);
+  EXPECT_EQ(stages.calc_books().calc_total(), total_j + 7.0);
+}
+
 TEST(step_problem, block_on_a_slope_balances_gravity_or_slides) {
   const double h = 5e-4, mass = 0.1;
   for (const double slope : {0.0, 0.2, 0.35, 0.5}) {  // friction 0.4 holds up to 0.3805 rad

@@ -134,7 +134,7 @@ TEST(ground, rolling_ball_has_one_touch_with_one_name_and_refresh_agrees_with_se
     EXPECT_NEAR(norm(to_world(frame, t.station_a) - t.station_b), std::abs(t.gap_m), 1e-12);
     if (i > 0) {
       EXPECT_EQ(t.id, id);
-      refresh(kept, *ball, frame, nullptr, {}, memory);
+      refresh(kept, *ball, frame, nullptr, {});
       EXPECT_NEAR(kept.gap_m, t.gap_m, 2e-6 * r);  // patches meet with small kinks
       EXPECT_NEAR(norm(kept.where_m - t.where_m), 0.0, 2e-3 * r);
     }

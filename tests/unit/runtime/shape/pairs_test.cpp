@@ -395,7 +395,7 @@ TEST(pairs, a_gap_shrinks_no_faster_than_its_places_approach) {
       fb.rotation = multiply(make_turn(axis, 5e-3), fb.rotation);
       for (Touch& t : touches) {
         const double before = t.gap_m;
-        refresh(t, *bowl, fa, cup.get(), fb, memory);
+        refresh(t, *bowl, fa, cup.get(), fb);
         EXPECT_GT(t.gap_m, before - 2e-3) << i;
         ++followed;
       }
@@ -420,7 +420,7 @@ TEST(pairs, memory_gives_what_a_new_search_gives) {
     ASSERT_FALSE(out.empty());
     EXPECT_NEAR(find_min(out), find_min(fresh), 1e-5 * R) << i;
     if (i > 0) {
-      refresh(kept, *a, fa, b.get(), fb, memory);
+      refresh(kept, *a, fa, b.get(), fb);
       EXPECT_NEAR(kept.gap_m, find_min(out), 2e-5 * R) << i;
     }
     for (const Touch& t : out)

@@ -63,7 +63,7 @@ TEST(polyhedra, crossed_edges_touch_in_one_point) {
   Touch t = touches[0];
   above.position_m = {0.012, 0.004, 0.02 * std::sqrt(2.0) - 1e-5};
   PairMemory memory;
-  refresh(t, *bar, above, bar.get(), below, memory);
+  refresh(t, *bar, above, bar.get(), below);
   EXPECT_NEAR(t.gap_m, -1e-5, 1e-9);
   EXPECT_NEAR(norm(to_world(above, t.station_a) - to_world(below, t.station_b)), 1e-5, 1e-9);
 }
