@@ -33,7 +33,7 @@ std::optional<std::string> find_file_fault(const OpenFolder& folder, const BankS
   return std::nullopt;
 }
 
-/// The fault of a bank that is not sane or not made of the job of `id`, by all its bytes. Gaps of its own records are no fault with a sum.
+/// Fault of a bank in its content or its job (`id`), by all its bytes. With a sum, gaps of its own records are no fault.
 std::optional<std::string> find_content_fault(const OpenFolder& folder, const Id& id, bool has_sum) {
   try {
     const bool is_simulation = std::string_view(find_main_file(folder)) == kRecordFile;
@@ -61,7 +61,7 @@ std::optional<std::string> Store::find_bank_fault(const Id& id, Look look) const
     if (!folder) return "there is no bank";
     const char* main = find_main_file(*folder);
     const File file{open_regular(*folder, main)};
-    if (file.value < 0 && (errno == EACCES || errno == EPERM)) return std::nullopt;  // no right to read is no damage
+    if (file.value < 0 && (errno == EACCES || errno == EPERM)) return std::nullopt;  // unreadable, not damaged
     if (file.value < 0 && errno == ENOENT) return "its bank is missing";
     struct stat info {};
     if (file.value < 0 || ::fstat(file.value, &info) != 0) return "its bank is no regular file";
@@ -77,7 +77,7 @@ std::optional<std::string> Store::find_bank_fault(const Id& id, Look look) const
       if (auto fault = find_file_fault(*folder, *sum, look)) return fault;
     if (look == Look::quick && find_written_ns(info) == sum->written_ns) return std::nullopt;
     if (hash_file(fmt::format("/proc/self/fd/{}", file.value), "bank").text() != sum->sha256) {
-      // Every later look reads all of it, as its time is another.
+      // Later looks read the whole file, as its time differs.
       const File own{::openat(folder->get(), main, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC)};
       if (own.value >= 0) (void)!::futimens(own.value, nullptr);
       return "its bank is damaged: its bytes are no longer those that were computed";

@@ -20,8 +20,8 @@ struct File {
 /// A regular file in a folder; its value is below 0, and errno set, when it cannot be opened. Never waits, follows no link.
 int open_regular(const OpenFolder& folder, const char* name);
 
-/// Makes a file read-only and syncs it; one that another user of the store owns, and one that has more names than it should have, is
-/// replaced by a copy: no file elsewhere changes its rights. SystemError when the disk refuses.
+/// Makes a file read-only and syncs it. A file of another user of the store, or with further names, is replaced by a copy first: no file
+/// elsewhere changes its rights. SystemError when the disk refuses.
 void seal_file(const OpenFolder& folder, const std::string& name);
 
 /// Syncs the folder and all in it; with `seal`, makes files and inner folders read-only. The folder itself stays writable: only then may

@@ -38,7 +38,7 @@ base::Json describe(const EnergyBook& book) {
   return json;
 }
 
-/// The step with which the book is expected to close to kBookGoal, as its error falls with the square of the step; none where it does.
+/// Step at which the energy book should close to kBookGoal: its error falls with the square of the step. None: it closes.
 std::optional<double> find_closing_step(double step_s, double book_error) {
   if (!(book_error > kBookGoal) || !std::isfinite(book_error)) return std::nullopt;
   return step_s * std::sqrt(kBookGoal / (kBookScatter * book_error));

@@ -29,7 +29,7 @@ constexpr double kBallSlide = 3.5;                    // 1 + m r^2 / I: how much
 constexpr double kSame = 1e-12;                       // distances that are the same, in mean edges
 constexpr double kFarthestM = 1e6, kFastestMs = 1e9;  // beyond which a motion is not stable
 
-/// A value that is no number counts as larger.
+/// NaN counts as larger.
 void take_larger(double value, double& largest) {
   if (!(value <= largest)) largest = value;
 }

@@ -211,7 +211,7 @@ const char* find_number_fault(std::string_view word) {
 }
 
 /// The check before the parser: the depth of brackets outside strings and comments, so that the parser's recursion is bounded before it
-/// starts, and the form of numbers, with a better word than it has.
+/// starts, and the form of numbers, with a clearer message.
 void check_text(const DocumentData& data) {
   constexpr std::string_view kWord = "0123456789+-._abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ";
   const std::string_view text = data.text;

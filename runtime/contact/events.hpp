@@ -54,7 +54,7 @@ struct EnergyAudit {
 struct Depth {
   int body = -1, other = -1;
   double depth_m = 0.0;
-  double unexplained_m = 0.0;  // beyond the depth that an impact with modes explains, or left in the two
+  double unexplained_m = 0.0;  // beyond the depth explained or left by an impact with modes
   double thickness_m = 0.0;    // of the thinner one
   double time_s = 0.0;
 

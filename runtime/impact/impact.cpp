@@ -16,7 +16,7 @@ namespace {
 constexpr double kSlowest = 1e-6;  // m/s: speed for the choice of the step without an approach
 constexpr double kTaper = 0.05;    // of the time of pressing: time constant of a rebound at its limit
 constexpr double kStill = 1e-3;    // m/s: settled contacts are slower
-constexpr double kSoon = 1e-3;     // s; bodies that meet again so soon have not parted
+constexpr double kSoon = 1e-3;     // s; time to the next touch of bodies still in contact, at most
 constexpr int kLimitings = 8;      // rounds for contacts that share bodies,
 constexpr double kOver = 1e-4;     // to this part of the force of a step
 
@@ -221,7 +221,7 @@ void Impact::choose_step(const Options& options) {
   h_ = get_step(step_index_);
 }
 
-/// Hysteresis and anchor spring of a contact that is struck at that speed, and the pulse that it would have.
+/// Hysteresis and anchor spring of a contact by its striking speed. Returns its elastic pulse.
 ElasticPulse Impact::set_law(int contact, double inverse_mass, double speed_m_s) {
   ContactLaw& law = laws_[contact];
   const ElasticPulse pulse = calc_elastic_pulse(law.spring, 1.0 / inverse_mass, speed_m_s);
@@ -235,7 +235,7 @@ ElasticPulse Impact::set_law(int contact, double inverse_mass, double speed_m_s)
   return pulse;
 }
 
-/// Contacts that were open when they were placed are struck at the speed at which they close.
+/// Open contacts are struck at their closing speed.
 void Impact::close_contacts() {
   for (std::size_t c = 0; c < laws_.size(); ++c) {
     const std::size_t row = laws_[c].row;
@@ -280,7 +280,7 @@ void Impact::solve_forces() {
 }
 
 /// Bounds the normal forces of modes under which rigid bodies would part too fast at the end of the step; true with any. The distance to
-/// the limit falls as exp(-t / tau), without an audible cut of a force. A force that only ends their approach is never bounded.
+/// the limit falls as exp(-t / tau), without an audible cut of a force. Forces up to the end of the approach are unbounded.
 bool Impact::limit_forces() {
   const std::size_t n = rows_.size();
   bool any = false;
@@ -348,7 +348,7 @@ void Impact::step() {
       yielded += t.compression_m - before;
       t.compression_m = before;
     }
-    // What has yielded recovers as the surfaces part.
+    // Yielded compression recovers before the surfaces part.
     if (t.compression_m < 0.0 && yielded > 0.0) {
       const double recovered = std::min(yielded, -t.compression_m);
       yielded -= recovered;

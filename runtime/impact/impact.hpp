@@ -52,7 +52,7 @@ struct Contact {
   int a = 0, b = -1;                         // indices of the bodies; -1: what neither moves nor rings
   Vec3 where_m{}, normal{};                  // normal: unit, from b to a
   double gap_m = 0.0;                        // at the beginning; negative: compressed by that much
-  double yielded_m = 0.0;                    // compression without a force at the beginning, which recovers as the surfaces part
+  double yielded_m = 0.0;                    // compression without a force at the beginning; recovers on parting
   Spring spring;                             // its hysteresis is set by `restitution`
   double restitution = 1.0;                  // of what the modes do not show: loss in the spring at the approach speed
   bool is_limit = false;                     // it limits the whole rebound, too: that of the rigid bodies, whatever modes throw back
@@ -104,10 +104,10 @@ class Impact {
   /// One more body from now on (its index), or one more contact (`gap_m` is that of now); the step stays what it is.
   int join(const Body& body);
   void join(const Contact& contact);
-  /// The same bodies and contacts, where they are now: takes centres, inertias and accelerations of `bodies` and places, normals and
-  /// shape values of `contacts`, and gaps of those that are open (all others are ignored). Compressions, anchors, modal states and the step
-  /// stay; moved_m and turned_rad begin again, and velocities of bodies on joints are taken; what a turned inertia does to the energy of an
-  /// unchanged spin is booked as given. Throws as the constructor does.
+  /// Updates the same bodies and contacts: centres, inertias and accelerations of `bodies`, velocities of bodies on joints; places, normals
+  /// and shape values of `contacts`, gaps of open ones. Everything else is ignored. Compressions, anchors, modal states and the step stay;
+  /// moved_m and turned_rad begin again. The energy change of an unchanged spin by a turned inertia is booked as given. Throws as the
+  /// constructor does.
   void update(std::span<const Body> bodies, std::span<const Contact> contacts);
 
   /// Changes the motion of a body at once, as other contacts do; what that does to the energy is booked as given. Throws where it is not
@@ -155,7 +155,7 @@ class Impact {
     bool is_limited = false;   // do modes push against a limit?
     Pulse pulse;
     double yielded_m = 0.0;  // compression without a force, by the limit of the rebound
-    bool is_open = false;    // until it closes for the first time where it is
+    bool is_open = false;    // not closed yet at its present place
     int silent = 0;          // steps without a force that the pulse does not have yet
   };
 

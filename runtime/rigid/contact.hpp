@@ -52,21 +52,21 @@ struct Pair {
     shape::Frame a{}, b{};
     std::vector<shape::Touch> touches;  // of the contacts; cleared by every change of them
   };
-  Ahead ahead;                               // where the bodies are predicted to be
+  Ahead ahead;                               // at predicted frames
   double margin_m = 0.0, travelled_m = 0.0;  // since the last search
   bool searched = false;
-  double next_search_s = 0.0;  // when a missing touch may have it searched again
-  shape::Frame measured{};     // of a, when its lowest vertex over the ground was looked for,
+  double next_search_s = 0.0;  // earliest next search for missing touches
+  shape::Frame measured{};     // of a, at the last search for its lowest vertex over the ground,
   double lowest_m = -1.0;      // and its gap
   std::int64_t window = -1;    // in which it was last near
-  int cord = -1;               // it is one
+  int cord = -1;               // number of the cord; -1: two bodies
   struct SlowHit {
     double time_s = -1.0, speed_m_s = 0.0;
   };
   std::array<SlowHit, 4> slow_hits{};  // its last impacts slower than kRattling, since a faster one
   double rattles_until_s = -1.0;       // until then its slow touches last
-  double stored_j = 0.0;               // that the springs of that impact held: lifts the bodies out of the depth
-  double sag_m = 0.0;                  // depth by yielding in an impact with modes that is over: allowed, and decays
+  double stored_j = 0.0;               // energy left in the springs of ended impacts, for lifting
+  double sag_m = 0.0;                  // depth left by an ended impact with modes: allowed, decays
 
   bool touches() const {
     return std::any_of(contacts.begin(), contacts.end(), [](const Contact& c) { return c.touching; });

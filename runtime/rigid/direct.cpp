@@ -22,9 +22,9 @@ constexpr double kCompliance = 1e-3;  // of the mobility of a row: of one body,
 constexpr double kLeast = 1e-5;       // and at least
 constexpr double kAtCone = 0.9999;    // of the bound on friction: slides
 constexpr int kIterations = 12;       // of one guess,
-constexpr double kExact = 1e-10;      // of the velocities asked for: residual at which they end,
-constexpr double kStagnates = 0.9;    // or where it is more than this part of the one before: points that hold contradict each other
-constexpr double kNearBound = 0.5;    // of its bound: a couple that was larger in the step before is at it in the first guess
+constexpr double kExact = 1e-10;      // of the wanted velocities: final residual,
+constexpr double kStagnates = 0.9;    // or ratio of consecutive residuals, of held points that contradict each other
+constexpr double kNearBound = 0.5;    // of its bound: larger couples of the step before are first guessed at it
 constexpr int kDense = 12;            // bodies; more are factorised as a sparse matrix
 
 enum class Hold : char { kOpen, kSticks, kSlides };
@@ -35,8 +35,8 @@ Row6 make_row(const Vec3& linear, const Vec3& angular) {
   return r;
 }
 
-/// Of the mobility of a row. Rows that contradict each other by 1e-9 m/s, as those of a rolling body that touches at two places, must not
-/// give impulses that leave the cone; chains of many or unequal bodies must be stiff to converge.
+/// Compliance of a row over its mobility. Soft enough for rows in contradiction by 1e-9 m/s (two touches of a rolling body), whose impulses
+/// must stay in the cone; stiff enough for convergence of chains and of unequal masses.
 double choose_compliance(const std::vector<Mover>& movers) {
   const auto [least, most] =
       std::minmax_element(movers.begin(), movers.end(), [](const Mover& x, const Mover& y) { return x.inverse_mass < y.inverse_mass; });
@@ -178,11 +178,11 @@ class Guess {
  private:
   struct Held {
     Hold hold = Hold::kOpen;
-    bool rolls = false, twists = false;  // its couple against that is at its bound
+    bool rolls = false, twists = false;  // couple at its bound, across the normal and about it
     double stiffness = 0.0, turning_mass = 0.0;
     std::array<Vec3, 3> axes{};
     Vec3 sliding{}, impulse{}, couple{};
-    /// The parts of a spin or couple along ways to turn that are held, and along the others.
+    /// Held part of a spin or couple.
     Vec3 hold_turning(const Vec3& turning) const {
       if (rolls && twists) return {};
       const Vec3 twist = dot(turning, axes[0]) * axes[0];
@@ -204,7 +204,7 @@ class Guess {
   const std::vector<Point>& points_;
   double compliance_;
   std::vector<Held> held_;      // of the points
-  bool is_factorised_ = false;  // with the points that hold now
+  bool is_factorised_ = false;  // for the present holds
   System system_;
   Eigen::VectorXd right_;               // work memory
   std::vector<Vec3> left_, left_spin_;  // the same
@@ -255,7 +255,7 @@ void Guess::assemble() {
   }
 }
 
-/// Begins a new system of the points that hold at zero impulses.
+/// A new system for the present holds, from zero impulses.
 bool Guess::factorise() {
   if (is_factorised_) return true;
   assemble();
@@ -383,7 +383,7 @@ Hold Guess::correct_hold(const std::vector<Mover>& movers, const Point& p, Held&
   return Hold::kSlides;
 }
 
-/// What the parts of a couple that are at their bounds lack of those by the present push and direction of rolling.
+/// Missing part of a couple at its bounds, for the present push and direction of rolling.
 Vec3 Guess::calc_rest_of_bound(const std::vector<Mover>& movers, const Point& p, const Held& held) {
   if (!held.rolls && !held.twists) return {};
   const double push = std::max(dot(held.impulse, p.normal), 0.0);
@@ -395,8 +395,8 @@ Vec3 Guess::calc_rest_of_bound(const std::vector<Mover>& movers, const Point& p,
   return held.free_turning(bound - held.couple);
 }
 
-/// A couple that holds and would have to be above its bound turns from now on, about the normal or across it. One that turns is at its
-/// bound against the spin as it is now, and holds again where less would stop that. True where it stays as guessed.
+/// Releases a couple above its bounds, about the normal and across it, and sets it to its bound against the present spin; holds it again
+/// where a smaller one stops the spin. True without a change.
 bool Guess::correct_couple(const std::vector<Mover>& movers, const Point& p, Held& held, double push, bool may_stick) {
   const Vec3 free_couple = held.couple - held.turning_mass * held.free_turning(calc_relative_spin(movers, p));
   double twist = dot(free_couple, p.normal);

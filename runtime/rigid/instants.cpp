@@ -65,7 +65,7 @@ bool Instants::find(const Step& step, double& at_s, std::vector<ContactRef>& fir
       const double rate = (later - approach) / h;
       // gap = approach s + rate s^2 / 2
       const double gap = std::max(c.touch.gap_m, 0.0), root = approach * approach + 2.0 * rate * gap;
-      if (root < 0.0) {  // turned back in the middle of the step, where impulses act: after it has closed?
+      if (root < 0.0) {  // an impulse in the middle of the step turns it back, maybe after it has closed
         if (approach * 0.5 * h >= gap) candidates.push_back({ref, gap / approach, 0.0});
         continue;
       }

@@ -15,7 +15,7 @@ namespace carillon::rigid {
 namespace {
 
 constexpr int kMaxHits = 8;       // of one impact
-constexpr double kEarly = 1e-2;   // m/s; slower touches of bodies that ring wait until their rigid surfaces meet
+constexpr double kEarly = 1e-2;   // m/s; least approach for an impact before contact of the rigid surfaces
 constexpr int kMaxTogether = 12;  // with those that rest
 
 /// (n) along a direction.
@@ -223,8 +223,8 @@ double ModalImpacts::calc_yield(const impact::Contact& contact, const std::vecto
   return yield;
 }
 
-/// A touch becomes a contact of an impact. It is open where the deformed surfaces are apart. Where they overlap, an earlier impact has left
-/// them so (`sag_m`), or it was missed: no spring is pressed by that.
+/// A touch becomes a contact of an impact, open where the deformed surfaces are apart. Their overlap, left by an earlier impact (`sag_m`)
+/// or missed, presses no spring.
 void ModalImpacts::add_contact(ModalImpact& modal, Contact& touch, double sag_m, Hit& hit, bool rests, Made& made) {
   impact::Contact spring;
   spring.a = add_body(modal, hit.a, made.bodies);
@@ -302,7 +302,7 @@ double ModalImpacts::calc_swing(const Contact& touch) {
   return swing;
 }
 
-/// May modes move the surfaces of a pair towards each other, and can an impact between its bodies begin?
+/// True for a pair with a relevant swing of its surfaces and bodies in no impact.
 bool ModalImpacts::may_begin_early(const Step& step, const Pair& pair, const Instants& instants) const {
   if (pair.cord >= 0 || !step.has(pair) || bodies_.get_swing(pair.a) + bodies_.get_swing(pair.b) <= kTooDeep) return false;
   const auto is_free = [&](int body) {

@@ -10,14 +10,14 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr double kLongest = 50e-3;     // s; a slow impact that lasts longer is a contact at rest,
-constexpr double kLongestOfAll = 0.5;  // s; and any other
-constexpr double kRight = 0.01;        // of the kinetic energy: the most that a step of an impact on joints is corrected by
+constexpr double kLongest = 50e-3;     // s; end of slow impacts, which become contacts at rest,
+constexpr double kLongestOfAll = 0.5;  // s; and of all others
+constexpr double kRight = 0.01;        // of the kinetic energy: largest correction of a step of an impact on joints
 constexpr double kSamePlace = 0.05;    // of the size
-constexpr double kMoved = 0.02;        // of the size: a contact is taken to its touch where that is farther away
-constexpr int kMaxFollowed = 8;        // contacts of an impact, with open ones
+constexpr double kMoved = 0.02;        // of the size: least way of a contact to its touch for a move
+constexpr int kMaxFollowed = 8;        // contacts of an impact, open ones included
 constexpr double kExplained = 1.3;     // times the depth of spring and modes is explained
-constexpr double kCalmTime = 5e-3;     // s; for so long no impact of a pair begins slowly after one was ended
+constexpr double kCalmTime = 5e-3;     // s; after the end of an impact, without slow impacts of the pair
 
 }  // namespace
 
@@ -41,7 +41,7 @@ Vec3 ModalImpacts::find_station(const ModalContact& contact) const {
   return bodies_.state(body).centre + bodies_.placed(body).rotation * contact.station;
 }
 
-/// Calls with the impact and number of every contact between the two bodies of a pair.
+/// Calls act(impact, number) for all contacts between the bodies of a pair.
 template <typename Do>
 void ModalImpacts::for_contacts(const Pair& pair, Do&& act) const {
   for (const ModalImpact& modal : impacts_)
@@ -132,7 +132,7 @@ void ModalImpacts::end_where_touching(const Step& step, TouchSets& touches) {
     }
 }
 
-/// A contact goes to its touch.
+/// Moves a contact to its touch.
 void ModalImpacts::place(ModalContact& contact, Contact& touch, const shape::Touch& at) {
   Forces& forces = contact.forces;
   const bool is_swapped = forces.a != touch.a;
@@ -155,7 +155,7 @@ void ModalImpacts::place(ModalContact& contact, Contact& touch, const shape::Tou
   }
 }
 
-/// The contact of an impact that a touch with another name takes: the nearest at the same place, or for one that may close an open one.
+/// The contact for a touch under a new name: the nearest one at its place, or an open one for a touch that may close.
 ModalContact* ModalImpacts::find_nearest(ModalImpact& modal, const Contact& touch, bool is_near) const {
   ModalContact* nearest = nullptr;
   double least_m = kSamePlace * bodies_.calc_size(touch.a, touch.b);

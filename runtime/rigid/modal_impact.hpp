@@ -20,8 +20,8 @@ struct ModalContact {
   Forces forces;                         // bodies, places, and impulses that are not reported yet
   std::vector<double> shape_a, shape_b;  // axes of the meshes; empty: does not ring
   Vec3 station{};                        // of the point, from the centre of the one that moves, axes of its mesh
-  std::uint64_t touch = 0;               // its name
-  bool is_followed = false;              // that touch is there,
+  std::uint64_t touch = 0;               // name of its touch
+  bool is_followed = false;              // in the present touch set,
   Vec3 normal{};                         // with this normal to side a
   double gap_m = 0.0;                    // and this gap of the rigid surfaces
 
@@ -53,14 +53,13 @@ class ModalImpacts {
   bool begin(const Step& step, Collision& collision, const Instants& instants, TouchSets& touches);
   /// A rigid impact ends the impacts with modes that its bodies were moved by.
   void end(const std::vector<Hit>& hits, TouchSets& touches);
-  /// An impact has no other contacts than its own, and knows no depth but that of its springs and modes: where its bodies come to touch
-  /// elsewhere slowly, or deeper, it ends. Now is the time of the touches.
+  /// Ends impacts with slow touches elsewhere, or touches deeper than by their springs and modes, at the time of the touches.
   void end_where_touching(const Step& step, TouchSets& touches);
-  /// The contacts of impacts go to where their touches are now, and touches that may close in a step become contacts, which are open.
+  /// Moves contacts of impacts to their touches; touches that may close in a step become open contacts.
   void follow(const Step& step, double length_s, TouchSets& touches);
-  /// Begins impacts of bodies that ring before their deformed surfaces can touch in a step.
+  /// Begins impacts of ringing bodies before contact of their deformed surfaces in a step.
   void begin_early(const Step& step, double length_s, const Instants& instants);
-  /// Depth of the bodies of a pair that springs and modes of an impact between them explain [m].
+  /// Depth of a pair by springs and modes of its impact [m].
   double calc_depth(const Pair& pair) const;
   /// Moves the impacts of an island to the time `to_s`, `part_s` later. The step has the effect of gravity and of other contacts on
   /// their bodies. Forces are reported where the window ends.
@@ -77,11 +76,11 @@ class ModalImpacts {
     std::vector<char> rests;  // of all contacts of the collision
   };
 
-  /// Bodies and contacts of an impact that has not begun.
+  /// Bodies and contacts of a new impact.
   struct Made {
     std::vector<impact::Body> bodies;
     std::vector<impact::Contact> springs;
-    std::list<std::vector<double>> shapes;  // kept until an impact has them
+    std::list<std::vector<double>> shapes;  // of the contacts
   };
 
   ModalImpact* find(int body);

@@ -11,9 +11,9 @@ namespace carillon::rigid {
 namespace {
 
 constexpr double kShortest = 1e-9;  // s; a shorter rest of a step is left out
-constexpr double kStruck = 5e-5;    // s; longest part of the rest of a step after an impact with modes has begun
+constexpr double kStruck = 5e-5;    // s; longest part of a step after the begin of an impact with modes
 constexpr int kMaxMissed = 30;      // in a step: instants at which nothing struck after all
-constexpr int kMaxSought = 3;       // of these, until closings by the path are no longer looked for
+constexpr int kMaxSought = 3;       // of these, with a search for closings on the path
 constexpr int kMaxCompleted = 4;    // solutions of a step that are repeated with touches that were missing
 constexpr int kMaxImpacts = 4;      // of an island in a step, each at its instant; an island with more is crowded
 constexpr int kMinImpacts = 2;      // the same of the largest islands, each of whose impacts costs more
@@ -119,7 +119,7 @@ void Space::step_island(Island& island, double start_s, double length_s) {
       if (!touches_.complete(step_, missed < kMaxSought)) break;
       is_completed = true;
     }
-    // Rows stop a touch at the end of a step, half of its way too deep: it strikes at the beginning where it was missing.
+    // A row stops a touch only at the end of a step, half of its way too deep: missing touches strike at the beginning instead.
     if (is_completed && impacts >= max_impacts && more++ < kMaxCompleted && strike_at_once(start_s + done, h)) continue;
     double at = h;
     std::vector<ContactRef> first;
@@ -146,8 +146,7 @@ void Space::step_island(Island& island, double start_s, double length_s) {
   step_.end();
 }
 
-/// The impacts of a crowded island: all touches that close within a step strike at its beginning. False: none
-/// closes, and touches are as before.
+/// The impacts of a crowded island: all touches closing within a step strike at its beginning. False: none closes, touches unchanged.
 bool Space::strike_at_once(double start_s, double length_s) {
   bodies_.set_time(start_s);
   step_.together_s = length_s;

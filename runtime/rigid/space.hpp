@@ -69,7 +69,7 @@ class Space {
   void list_contacts(std::vector<const Contact*>& out) const;
   /// Of bodies that are near in this window, and of still ones that touch. b: -1 for the ground, or greater than a.
   const std::map<std::pair<int, int>, Pair>& pairs() const { return touches_.pairs(); }
-  /// Depth of a pair that an impact with modes explains, or left in its surfaces [m].
+  /// Depth of a pair explained or left by an impact with modes [m].
   double calc_explained_depth(int a, int b) const {
     const auto at = pairs().find({a, b});
     return at == pairs().end() ? 0.0 : std::max(at->second.sag_m, modal_impacts_.calc_depth(at->second));

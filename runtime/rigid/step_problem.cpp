@@ -75,7 +75,7 @@ void StepProblem::find_impulses(Step& step) {
   const bool may_guess = std::all_of(bodies.begin(), bodies.end(), [&](int body) { return bodies_.get_time() >= next_guess_s_[body]; });
   const bool at_once = is_small || (settles && count <= kMaxAtOnce);
   if (at_once && may_guess) {
-    // A point that slid in the last step is guessed to slide.
+    // First guess: the sliding points of the last step.
     if (factorise(is_small)) return;
     movers = free;
     points = begun;

@@ -15,13 +15,13 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr double kSteps = 4.0;           // in which a pair moves by the margin of a search,
-constexpr double kStepsOfRolling = 8.0;  // a curved body on the ground: few places come near
-constexpr double kMissing = 5e-6;        // m; a place deeper than all touches by this is missing
-constexpr double kSearchAgain = 2e-3;    // s; a pair with a missing touch is searched again once in so long
-constexpr double kSame = 0.02;           // of the size: touches so near are one
+constexpr double kSteps = 4.0;           // of movement in the margin of a search,
+constexpr double kStepsOfRolling = 8.0;  // the same of curved bodies on the ground: few places come near
+constexpr double kMissing = 5e-6;        // m; excess of a missing place over all touches
+constexpr double kSearchAgain = 2e-3;    // s; between searches for missing touches of a pair
+constexpr double kSame = 0.02;           // of the size: distance of touches counted as one
 constexpr double kSagDecay = 10e-3;      // s
-constexpr int kMaxAdded = 4;             // touches that are missing at the end of a flight
+constexpr int kMaxAdded = 4;             // missing touches at the end of a flight
 
 /// Lower bound of the gap of any vertex of a body over the ground, from that at an earlier frame.
 double calc_least_gap(const Pair& pair, const shape::Shape& shape, const shape::Frame& now) {
@@ -94,7 +94,7 @@ void TouchSets::search(Pair& pair, double step_s) {
   complete(pair, frame_a, bodies_.get_frame(pair.b), 0.0);
 }
 
-/// Of added touches with the ground those that a search has not found again, and that are deeper than all found, or sharp and closed.
+/// Keeps added touches with the ground that a search has lost: deeper ones than all found, and sharp closed ones.
 void TouchSets::keep_added(Pair& pair, const std::vector<Contact>& old) const {
   const shape::Frame a = bodies_.get_frame(pair.a), b = bodies_.get_frame(pair.b);
   double least_m = pair.margin_m;
@@ -167,12 +167,12 @@ std::pair<Contact*, double> TouchSets::find_least(Pair& pair, const shape::Frame
     all_follow = all_follow && follows;
     if (follows && moved.gap_m < least.second) least = {&c, moved.gap_m};
   }
-  if (!all_follow) pair.ahead.touches.clear();  // refresh() drops those that do not
+  if (!all_follow) pair.ahead.touches.clear();  // refresh() drops lost ones
   return least;
 }
 
-/// Adds the deepest place of a pair to its touches where at the frames `a` and `b` it is deeper than all of them. True if it did, and where
-/// it found that the deepest touch closes until then: `closing_s` later, or 0.
+/// Adds the deepest place of a pair at the frames `a` and `b`, `closing_s` later (0: unused), if it is deeper than all touches. True for an
+/// addition, and for a closing deepest touch.
 bool TouchSets::complete(Pair& pair, const shape::Frame& a, const shape::Frame& b, double closing_s) {
   const shape::Shape& mine = *bodies_.get_shape(pair.a);
   const shape::Shape* theirs = bodies_.get_shape(pair.b);
@@ -235,7 +235,7 @@ bool TouchSets::complete(const Step& step, bool finds_closing) {
     const std::size_t found = pair->contacts.size();
     if (complete(*pair, get_then(pair->a), get_then(pair->b), finds_closing ? step.length_s : 0.0)) any = true;
     if (pair->contacts.size() == found || bodies_.get_time() < pair->next_search_s) continue;
-    pair->searched = pair->memory.known = false;  // a body that has come to lie has more touches than that
+    pair->searched = pair->memory.known = false;  // a lying body has more touches
     pair->next_search_s = bodies_.get_time() + kSearchAgain;
   }
   return any;

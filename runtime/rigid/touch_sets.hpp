@@ -35,9 +35,9 @@ class TouchSets {
 
   /// The touches as the bodies are now, found again.
   void search(Pair& pair, double step_s);
-  /// The same touches as the bodies are now, but those that have left their surfaces: the pair is searched at its next update then.
+  /// Moves the touches with the bodies. Touches off their surfaces are dropped, and the pair is searched at its next update.
   void refresh(Pair& pair) const;
-  /// Removes deep touches of curved surfaces that have come to their far sides, or past the ends of edges and facets.
+  /// Removes deep touches of curved surfaces on far sides or past the ends of edges and facets.
   void remove_false(Pair& pair) const;
   /// Touches that are good for a step: searched again where the pair may have moved by its margin.
   void update(Pair& pair, double step_s);
@@ -46,15 +46,15 @@ class TouchSets {
   /// Adds touches that are missing at the end of a step, by its predicted motion, and with `finds_closing` finds those that close. True if
   /// there were any.
   bool complete(const Step& step, bool finds_closing);
-  /// The same for a pair of an impact with modes, as if its bodies flew.
+  /// The same for a pair in an impact with modes, by free flight.
   void complete_in_flight(Pair& pair, double time_s);
-  /// The place, as the bodies are now, at which a touch of a curved surface closes within a time, if its bodies fly.
+  /// The closing place of a touch of a curved surface within a time of free flight, moved back with the bodies.
   shape::Touch find_closing(Pair& pair, const Contact& contact, double time_s) const;
   /// Counts a movement of `time_s` in a step.
   void travel(Pair& pair, double time_s, double step_s) const;
   /// Frees the contacts of two bodies after an impact with modes. depth_m: explained by it; stored_j: energy of its springs, for lifting.
   void release(int a, int b, double depth_m, double stored_j);
-  /// Adds the energy of springs of impacts that are over to the books.
+  /// Adds the energy left in springs of ended impacts to the books.
   void add_to(Books& books) const;
   /// A touch of a pair whose bodies are at these frames.
   shape::Touch find_moved(const Pair& pair, shape::Touch touch, const shape::Frame& a, const shape::Frame& b) const;

@@ -19,9 +19,9 @@ constexpr double kMaxSteps = 1024;        // of a window
 constexpr double kThin = 0.15;            // of the thickness of the thinner body: a pair that moves as far in a long step takes short ones
 constexpr double kSag = 5e-6;             // m; a point on an arc may leave its chord by this in a step,
 constexpr double kSagOfThickness = 5e-4;  // or by so much of the thickness of its body
-constexpr double kRolls = 4.0;  // times the arc bounded by a body's box: with it a long body that rolls and hops is not deeper than 50 um
-constexpr double kFlatSteps = 2.0;  // times the step of others: that of groups in which flat bodies alone touch
-constexpr double kRoom = 1e-4;      // m; by which boxes are larger than they must be
+constexpr double kRolls = 4.0;            // times the arc bounded by the box of a body: keeps long rolling bodies within 50 um
+constexpr double kFlatSteps = 2.0;        // times the step of others: that of groups in which flat bodies alone touch
+constexpr double kRoom = 1e-4;            // m; excess of boxes
 
 bool overlap(const shape::Box& x, const shape::Box& y) {
   for (int k = 0; k < 3; ++k)

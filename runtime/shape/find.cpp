@@ -19,7 +19,7 @@ void turn_round(Touch& t) {
   t.id ^= static_cast<std::uint64_t>(Feature::corner_a) << 56 ^ static_cast<std::uint64_t>(Feature::corner_b) << 56;
 }
 
-/// Renews the samples that are near where `wanted` and the way since then are beyond their reach. Returns that way.
+/// Renews the near samples if `wanted` and the movement since then exceed their reach. Returns that movement.
 double update_near(const Shape& a, const Frame& fa, const Shape& b, const Frame& fb, double wanted, NearSamples& near) {
   const Frame relative = calc_relative(fa, fb);
   if (near.known) {

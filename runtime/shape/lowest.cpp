@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kLean = 0.05;            // rad
 constexpr double kLeans = 0.999 * kLean;  // with room for rounding
-constexpr double kTurns = 0.25 * kLean;   // a body that turns by more between two calls is searched as a whole
+constexpr double kTurns = 0.25 * kLean;   // turn between two calls beyond which memory does not pay
 
 /// The vertex that is lowest along `up` (mesh frame), and its height.
 std::pair<int, double> find_lowest_vertex(const Mesh& mesh, const Samples& s, const Vec3& up) {
@@ -37,7 +37,7 @@ std::pair<int, double> find_lowest_vertex(const Mesh& mesh, const Samples& s, co
   return lowest;
 }
 
-/// Those that may be lowest along a direction that is off `up` by less than kLean.
+/// Candidates for the lowest vertex along directions within kLean of `up`.
 void find_low_vertices(const Mesh& mesh, const Skin& skin, const Samples& s, const Vec3& up, std::vector<int>& low) {
   low.clear();
   const auto [lowest, height] = find_lowest_vertex(mesh, s, up);

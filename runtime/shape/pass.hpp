@@ -34,13 +34,13 @@ struct Distances {
 class Pass {
  public:
   Pass(const Shape& mine, const Frame& fm, const Shape& theirs, const Frame& ft, double reach, std::vector<Touch>& out);
-  /// The samples that are nearer than `reach_m`.
+  /// The samples within `reach_m`.
   void list(double reach_m, std::vector<std::pair<int, double>>& near) const;
-  /// How far beyond the reach of a search a sample may be that stands for a place within it.
+  /// Largest distance of a sample that covers a place within the reach.
   double find_room() const { return calc_room(mine_.samples().reach_m) + reach_ + sag_; }
-  /// `near`: samples that were near before the bodies moved by at most `way_m`.
+  /// `near`: samples listed before a movement of the bodies by at most `way_m`.
   void run(Distances& distances, const std::vector<std::pair<int, double>>& near, double way_m);
-  /// The sample that is deepest in theirs; -1 where none is deeper than `gap_m`, which becomes its gap.
+  /// The deepest sample in theirs below `gap_m`, which becomes its gap; -1: none.
   int find_deepest(double& gap_m, const std::vector<std::pair<int, double>>& near, double way_m) const;
   /// Ridges of mine before curved parts of theirs: the lowest places of their straight pieces, and corners between two pieces that both
   /// rise.
@@ -60,17 +60,17 @@ class Pass {
   void add_point(const Sample& sample);
   /// A touch of a place of a ridge of mine with a curved part of theirs; none over a flat one.
   std::optional<Touch> begin_ridge(const Vec3& point) const;
-  /// The lowest place of a straight piece of a ridge. Returns the vertex at the end to which it falls; -1 where there is none.
+  /// The lowest place of a straight piece of a ridge. Returns the end vertex of a piece with its lowest place beyond; otherwise -1.
   int add_ridge(int ridge);
-  /// A corner of a ridge that is lower than both pieces next to it.
+  /// A corner of a ridge below both pieces next to it.
   void add_end(int vertex);
-  /// A flat face about x on which the sample carries, though it is not the nearest one: a corner in the plane of a side.
+  /// A flat face about x under the sample other than the nearest one: a corner in the plane of a side.
   bool find_brim(const Sample& sample, const Vec3& x, double d, Touch& t) const;
   /// A rim over a facet is round: the lowest place of the skin about the sample. False where that is not over the facet.
   bool add_rim(const Sample& sample, Touch t);
   /// A place of a curved part.
   void add_smooth(const Sample& sample);
-  /// Does the normal of a touch on an edge of theirs lie between the normals of its two faces?
+  /// True for a normal of a touch on an edge of theirs between the normals of its two faces.
   bool is_between(const Touch& t, const Nearest& foot) const;
 
   const Shape &mine_, &theirs_;

@@ -239,7 +239,7 @@ bool is_level(const Touch& t, const Shape& a, const Frame& fa, const Shape* b, c
 }
 
 bool follow(Touch& touch, const Shape& a, const Frame& fa, const Shape* b, const Frame& fb, double reach) {
-  constexpr double kFall = 0.02;  // of the way of a place on its surface: by which a gap may shrink in addition,
+  constexpr double kFall = 0.02;  // of the way of a place on its surface: additional shrinkage of a gap,
   constexpr double kRoom = 2e-5;  // m; and this
   const Touch before = touch;
   const bool settled = settle(touch, a, fa, b, fb, reach);
@@ -247,7 +247,7 @@ bool follow(Touch& touch, const Shape& a, const Frame& fa, const Shape* b, const
   if (b == nullptr) {  // the lowest place of a level body may go from one end to the other
     if (norm(touch.station_a - before.station_a) <= reach) return true;
   } else {
-    // A gap shrinks no faster than its places approach. Otherwise the touch has left its features, and stays at its places instead.
+    // Gaps shrink no faster than their places approach; other touches have left their features.
     const double moved = norm((p - q) - before.gap_m * before.normal);
     const double way = std::max(norm(touch.station_a - before.station_a), norm(touch.station_b - before.station_b));
     const bool is_on_plane = touch.side_a == Side::plane || touch.side_b == Side::plane;

@@ -61,7 +61,7 @@ class Samples {
   std::vector<Ridge> ridges;    // in the order of their tree
   std::vector<int> vertices;    // of the mesh, in the order of their tree: all but those amid flat facets and straight edges
   std::vector<Ball> sample_tree, ridge_tree, vertex_tree;
-  double spacing_m = 0.0, reach_m = 0.0;  // the largest reach of a smooth one
+  double spacing_m = 0.0, reach_m = 0.0;  // reach_m: largest of smooth samples
 };
 
 }  // namespace carillon::shape

@@ -24,7 +24,7 @@ bool carries(const Mesh& mesh, int vertex, const Vec3& normal);
 
 inline constexpr int kDeepest = 2;  // second number of the name of a touch that a search lacked
 
-/// Mean curvature that stands for a corner, or for an edge.
+/// Mean curvature of a corner or an edge.
 inline double get_sharp_curvature(const Shape& shape, VertexKind kind) {
   return (kind == VertexKind::corner ? 1.0 : 0.5) * shape.get_corner_curvature_per_m();
 }
@@ -41,7 +41,7 @@ inline constexpr int kFirst = 12, kAgain = 2;  // iterations between two curved 
 bool settle(Touch& touch, const Shape& a, const Frame& frame_a, const Shape* b, const Frame& frame_b, double reach_m,
             int iterations = kAgain);
 
-/// The same from a place known. False where the touch would jump: between curved sides it stays at its places then.
+/// The same from a known place. False for a touch off its features, which stays at its places.
 bool follow(Touch& touch, const Shape& a, const Frame& frame_a, const Shape* b, const Frame& frame_b, double reach_m);
 
 /// Of a touch at the lowest place of a skin over a plane: would that place move by more than a twentieth of the body's size if the body
@@ -49,16 +49,16 @@ bool follow(Touch& touch, const Shape& a, const Frame& frame_a, const Shape* b, 
 /// than a degree.
 bool is_level(const Touch& touch, const Shape& a, const Frame& frame_a, const Shape* b, const Frame& frame_b);
 
-/// Where a is in the frame of b.
+/// Pose of a in b.
 Frame calc_relative(const Frame& a, const Frame& b);
-/// Upper bound of the way of any point of a from where it was to where it is, in one frame [m].
+/// Upper bound of the movement of any point of a between two poses [m].
 double calc_way(const Frame& from, const Frame& to, const Shape& a);
 /// Is all that is nearer than margin_m now among the candidates of the last search?
 bool recall(const PairMemory& memory, const Frame& pose, const Shape& a, double margin_m);
 /// Keeps of touches that travel and have met one, the deepest; then few of a patch.
 void thin(std::vector<Touch>& touches, double spacing_m, double patch_m);
-/// The candidates of the memory that are nearer than the margin now, with names; `moved`: they have not been settled since. False, and
-/// nothing, where one of them can no longer be followed.
+/// The candidates of the memory that are nearer than the margin now, with names; `moved`: they have not been settled since. False,
+/// without touches: one of them cannot be followed.
 bool answer(const Shape& a, const Frame& frame_a, const Shape* b, const Frame& frame_b, double margin_m, bool moved, PairMemory& memory,
             std::vector<Touch>& out);
 

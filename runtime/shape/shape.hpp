@@ -42,11 +42,11 @@ class Shape {
   double get_thickness_m() const { return thickness_m_; }  // its shortest side
   const Vec3& get_middle_m() const { return middle_m_; }   // of the bounding box
   double get_radius_m() const { return radius_m_; }        // of a ball about the middle that holds all
-  /// No place of the curved surface is further from the mesh.
+  /// Largest distance of the curved surface from the mesh.
   double get_sag_m() const;
   /// Of a ball about `centre` (mesh frame) that holds all.
   double calc_radius_m(const Vec3& centre) const;
-  /// Upper bound of the speed of a point of a body that turns about `centre` (mesh frame).
+  /// Upper bound of the speed of any point by a spin about `centre` (mesh frame).
   double calc_turning_speed(const Vec3& centre, const Vec3& spin) const;
   /// Along the world's axes.
   Box calc_box(const Frame& frame) const;

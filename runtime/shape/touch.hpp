@@ -33,7 +33,7 @@ struct Touch {
   bool stays = false;            // of several on what is nearly level: stays about where it is and does not go to the lowest place
 };
 
-/// Samples of two bodies that are near the other one, with their distances to it: all that are nearer than reach_m.
+/// All samples of two bodies within reach_m of the other one, with their distances.
 struct NearSamples {
   bool known = false;
   Frame pose;                                                  // a in b, at that time
@@ -51,16 +51,16 @@ class PairMemory {
   std::vector<Touch> last;          // touches given at the last call, to name those of the next
   std::uint64_t serial = 0;         // of names given
   std::array<int, 2> axis{-1, -1};  // that separated or carried last: kind, index
-  Vec3 up{}, low_up{};              // vertical in the frame of a, when the lowest vertex was last looked for; when those were:
-  std::vector<int> low;             // vertices that may be lowest while the vertical is near that
+  Vec3 up{}, low_up{};              // vertical in the frame of a at the last search for the lowest vertex, and at that for `low`
+  std::vector<int> low;             // candidates for the lowest vertex near low_up
   NearSamples near;
 };
 
 /// Replaces `out` by the touches not further apart than the margin: at most 4 for each patch of contact.
 void find_touches(const Shape& a, const Frame& frame_a, const Shape& b, const Frame& frame_b, double margin_m, PairMemory& memory,
                   std::vector<Touch>& out);
-/// The ground is the half space z <= height_m. `with_all`: of a polyhedron all corners of facets that face
-/// the ground, not only those that no other is lower than.
+/// The ground is the half space z <= height_m. `with_all`: of a polyhedron all corners of facets that face the
+/// ground, not its lowest ones alone.
 void find_ground_touches(const Shape& a, const Frame& frame_a, double height_m, double margin_m, PairMemory& memory,
                          std::vector<Touch>& out, bool with_all = false);
 
@@ -71,7 +71,7 @@ struct Deepest {
   bool is_of_a = true;
 };
 Deepest find_lowest(const Shape& a, const Frame& frame, double height_m);
-/// The same from memory, as long as the body leans little from how it did.
+/// The same from memory, for small turns.
 Deepest find_lowest(const Shape& a, const Frame& frame, double height_m, PairMemory& memory);
 /// None (-1) between two polyhedra, whose touches are complete, and where no sample is deeper than `gap_m`.
 Deepest find_deepest(const Shape& a, const Frame& frame_a, const Shape& b, const Frame& frame_b, double gap_m, PairMemory& memory);
@@ -79,12 +79,12 @@ Deepest find_deepest(const Shape& a, const Frame& frame_a, const Shape& b, const
 Touch make_ground_touch(const Shape& a, const Frame& frame, double height_m, int vertex);
 Touch make_touch(const Shape& a, const Frame& frame_a, const Shape& b, const Frame& frame_b, const Deepest& at);
 
-/// The same touch a small step later: gap, where, normal and stations follow. b == nullptr: the ground. False where it has left its
-/// surfaces, which are to be searched again.
+/// The same touch a small step later: gap, where, normal and stations follow. b == nullptr: the ground. False: off its surfaces, which
+/// have to be searched again.
 bool refresh(Touch& touch, const Shape& a, const Frame& frame_a, const Shape* b, const Frame& frame_b);
 
-/// Is one of the two places of a touch about as deep in the other body as the touch says, and are those on edges still there? A touch that
-/// is followed may have come to the far side of a curved surface, or past the end of its edge.
+/// True for a touch with a place about as deep in the other body as its gap, and places on edges and facets within them. Followed touches
+/// can come to far sides of curved surfaces, or past the ends of edges.
 bool is_overlap(const Touch& touch, const Shape& a, const Frame& frame_a, const Shape& b, const Frame& frame_b);
 
 /// How deep two bodies are inside each other [m]; 0 when they are apart. `where` gets the deepest point (world).

@@ -14,6 +14,7 @@
 #include "runtime/bank/reduce.hpp"
 #include "tests/support/folder.hpp"
 #include "tests/support/paths.hpp"
+#include "tests/unit/runtime/bank/bank_arrays.hpp"
 #include "tests/unit/runtime/bank/example_bank.hpp"
 #include "tests/unit/runtime/bank/seal_again.hpp"
 
@@ -45,8 +46,6 @@ class BankFile : public testing::Test {
   const fs::path& folder_ = scratch_.path();
   const fs::path file_ = folder_ / "bank.hdf";
 };
-
-std::span<const std::byte> bytes_of(std::string_view text) { return std::as_bytes(std::span(text)); }
 
 void expect_equal(const Bank& a, const Bank& b) {
   EXPECT_EQ(a.vertices_m, b.vertices_m);

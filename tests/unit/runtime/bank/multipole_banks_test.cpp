@@ -20,6 +20,7 @@
 #include "runtime/bank/select.hpp"
 #include "runtime/bank/write.hpp"
 #include "tests/support/folder.hpp"
+#include "tests/unit/runtime/bank/bank_arrays.hpp"
 #include "tests/unit/runtime/bank/example_bank.hpp"
 #include "tests/unit/runtime/bank/seal_again.hpp"
 
@@ -27,8 +28,6 @@ namespace carillon::bank {
 namespace {
 
 constexpr std::size_t kModes = 9;
-
-std::span<const std::byte> bytes_of(std::string_view text) { return std::as_bytes(std::span(text)); }
 
 // ---- files ----
 
@@ -90,34 +89,12 @@ TEST(MultipoleFile, ABankWithoutThemIsOfTheVersionsBefore) {
   EXPECT_TRUE(read_bank(file).multipoles.is_empty());
 }
 
-/// The arrays of a bank, each of which may be changed before they are put together.
-struct Arrays {
-  Bank bank = example::make_radiating_bank(2, kModes);
-  FileForm form = make_file_form(bank);
-  std::vector<FieldBytes> list;
-
-  Arrays() {
-    for (const Field& field : list_fields(bank, form))
-      list.push_back({field, {static_cast<const std::byte*>(field.data), calc_bytes(field)}});
-  }
-  FieldBytes& find(const std::string& name) {
-    return *std::find_if(list.begin(), list.end(), [&](const FieldBytes& array) { return array.field.name == name; });
-  }
-  /// The message, or "".
-  std::string find_error() const {
-    try {
-      (void)assemble_bank(list, "arrays");
-    } catch (const InputError& error) {
-      return error.what();
-    }
-    return "";
-  }
-};
+Arrays make_arrays() { return Arrays(example::make_radiating_bank(2, kModes)); }
 
 TEST(MultipoleFile, HoldsAllOfItsArraysOrNone) {
   std::size_t count = 0;
-  for (std::size_t i = 0; i < Arrays().list.size(); ++i) {
-    Arrays arrays;
+  for (std::size_t i = 0; i < make_arrays().list.size(); ++i) {
+    Arrays arrays = make_arrays();
     const std::string name = arrays.list[i].field.name;
     if (!name.starts_with("radiation/")) continue;
     ++count;
@@ -125,32 +102,32 @@ TEST(MultipoleFile, HoldsAllOfItsArraysOrNone) {
     EXPECT_NE(arrays.find_error().find("the array " + name + " is missing"), std::string::npos) << arrays.find_error();
   }
   EXPECT_EQ(count, 13u);
-  Arrays none;
+  Arrays none = make_arrays();
   std::erase_if(none.list, [](const FieldBytes& array) { return array.field.name.starts_with("radiation/"); });
   EXPECT_EQ(none.find_error(), "");
 }
 
 TEST(MultipoleFile, ArraysOfOtherSizesAndTypesAreRefused) {
-  ASSERT_EQ(Arrays().find_error(), "");
+  ASSERT_EQ(make_arrays().find_error(), "");
   for (const char* name : {"freq_hz", "scale", "decay", "added_mass", "error_db", "order"}) {
-    Arrays fewer;
+    Arrays fewer = make_arrays();
     FieldBytes& array = fewer.find(std::string("radiation/") + name);
     array.field.shape = {kModes - 1};
     array.bytes = array.bytes.first(array.bytes.size() / kModes * (kModes - 1));
     EXPECT_NE(fewer.find_error().find("arrays disagree"), std::string::npos) << name << ": " << fewer.find_error();
-    Arrays none;
+    Arrays none = make_arrays();
     none.find(std::string("radiation/") + name).field.shape = {0};
     none.find(std::string("radiation/") + name).bytes = {};
     EXPECT_NE(none.find_error().find("arrays disagree"), std::string::npos) << name << ": " << none.find_error();
   }
   const auto expect_refused = [](const char* name, const char* dtype, std::vector<std::uint64_t> shape) {
-    Arrays arrays;
+    Arrays arrays = make_arrays();
     FieldBytes& array = arrays.find(name);
     array.field.dtype = dtype;
     array.field.shape = std::move(shape);
     EXPECT_NE(arrays.find_error(), "") << name;
   };
-  const std::uint64_t rows = Arrays().bank.multipoles.coefficient.size() / 2;
+  const std::uint64_t rows = make_arrays().bank.multipoles.coefficient.size() / 2;
   expect_refused("radiation/coefficient", "<i2", {2 * rows});
   expect_refused("radiation/coefficient", "<i2", {rows, 2, 1});
   expect_refused("radiation/coefficient", "<i2", {2, rows});

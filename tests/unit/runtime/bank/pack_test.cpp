@@ -13,14 +13,13 @@
 #include "runtime/bank/reduce.hpp"
 #include "runtime/bank/write.hpp"
 #include "tests/support/folder.hpp"
+#include "tests/unit/runtime/bank/bank_arrays.hpp"
 #include "tests/unit/runtime/bank/example_bank.hpp"
 #include "tests/unit/runtime/bank/seal_again.hpp"
 #include "tests/unit/runtime/codec/surfaces.hpp"
 
 namespace carillon::bank {
 namespace {
-
-std::span<const std::byte> bytes_of(std::string_view text) { return std::as_bytes(std::span(text)); }
 
 /// A ball of steel of 100 mm with smooth shapes, which may be fixed where z > 80 mm.
 Bank make_ball_bank(int divisions, std::size_t modes, bool is_fixed = false) {

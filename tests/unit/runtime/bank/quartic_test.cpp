@@ -16,6 +16,7 @@
 #include "runtime/bank/select.hpp"
 #include "runtime/bank/write.hpp"
 #include "tests/support/folder.hpp"
+#include "tests/unit/runtime/bank/bank_arrays.hpp"
 #include "tests/unit/runtime/bank/example_bank.hpp"
 #include "tests/unit/runtime/bank/seal_again.hpp"
 
@@ -221,41 +222,21 @@ TEST_P(QuarticFaults, AreNamedAndNotWritten) {
 
 INSTANTIATE_TEST_SUITE_P(, QuarticFaults, testing::ValuesIn(kSpoiled), [](const auto& info) { return std::string(info.param.name); });
 
-/// The arrays of a bank, each of which may be changed before they are put together.
-struct Arrays {
-  Bank bank;
-  FileForm form;
-  std::vector<FieldBytes> list;
-
-  explicit Arrays(Kind kind) : bank(make_nonlinear_bank(kind)), form(make_file_form(bank)) {
-    for (const Field& field : list_fields(bank, form))
-      list.push_back({field, {static_cast<const std::byte*>(field.data), calc_bytes(field)}});
-  }
-  /// The message, or "".
-  std::string find_error() const {
-    try {
-      (void)assemble_bank(list, "arrays");
-    } catch (const InputError& error) {
-      return error.what();
-    }
-    return "";
-  }
-};
-
 TEST(QuarticFile, ArraysOfOtherSizesAndTypesAreRefused) {
   for (const Kind kind : kKinds) {
-    ASSERT_EQ(Arrays(kind).find_error(), "");
-    for (std::size_t i = 0; i < Arrays(kind).list.size(); ++i) {
-      const std::string name = Arrays(kind).list[i].field.name;
+    const Bank bank = make_nonlinear_bank(kind);
+    ASSERT_EQ(Arrays(bank).find_error(), "");
+    for (std::size_t i = 0; i < Arrays(bank).list.size(); ++i) {
+      const std::string name = Arrays(bank).list[i].field.name;
       if (!name.starts_with("nonlinear/")) continue;
-      Arrays missing(kind);
+      Arrays missing(bank);
       missing.list.erase(missing.list.begin() + static_cast<std::ptrdiff_t>(i));
       if (name != "nonlinear/linear") {  // of a flat body, then
         EXPECT_NE(missing.find_error(), "") << name;
       }
       for (const std::vector<std::uint64_t>& shape :
            {std::vector<std::uint64_t>{0}, {}, {0, 7}, {1, 1}, {1, 0, 1}, {std::uint64_t{1} << 62, 0, 4}, {2, 9, 0}, {3, 10, 1}}) {
-        Arrays other(kind);
+        Arrays other(bank);
         FieldBytes& array = other.list[i];
         if (array.field.shape == shape) continue;
         array.field.shape = shape;
@@ -264,7 +245,7 @@ TEST(QuarticFile, ArraysOfOtherSizesAndTypesAreRefused) {
         array.bytes = array.bytes.first(std::min<std::size_t>(count, array.bytes.size()));
         EXPECT_NE(other.find_error(), "") << name << " of " << shape.size() << " extents";
       }
-      Arrays double_type(kind);
+      Arrays double_type(bank);
       double_type.list[i].field.dtype = "<i8";
       EXPECT_NE(double_type.find_error(), "") << name;
     }

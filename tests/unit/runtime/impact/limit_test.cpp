@@ -155,7 +155,7 @@ TEST(Limit, DoesNotLetThroughWhatIsPressedForLong) {
   for (int n = 1; n <= 40; ++n) {
     impact.advance(0.3 + 5e-4 * n);
     deepest_m = std::max(deepest_m, before_m - impact.get_bodies()[0].moved_m[2]);
-    // Depth is compression, what has yielded, and the bending of the plate.
+    // Depth is compression, yielded compression and the bending of the plate.
     if (impact.get_compression(0) > 0.0) {
       EXPECT_NEAR(impact.calc_depth(0), -impact.get_bodies()[0].moved_m[2], 1e-9);
     }

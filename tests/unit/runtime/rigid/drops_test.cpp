@@ -20,7 +20,7 @@ TEST(drops, touches_with_the_floor_are_complete_at_the_end_of_every_step) {
   }
 }
 
-// One side lands and throws the other down within a step: its touch is no part of the set when the step begins. Before added touches were
+// One side lands and throws the other down within a step: its touch is missing at the beginning of the step. Before added touches were
 // kept these drops were 70 to 170 um deep.
 TEST(drops, the_other_side_of_a_body_that_lands_is_not_too_deep) {
   const std::array<std::uint8_t, 16> drops[] = {{0, 222, 225, 252, 142, 195, 61, 83, 236, 253, 11, 205, 5, 84, 11, 2},

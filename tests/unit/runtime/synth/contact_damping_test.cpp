@@ -208,7 +208,7 @@ TEST(ContactForces, LeaveTheRingingExactWhenTheyHaveGone) {
 }
 
 TEST(ContactForces, DampWithoutZipperNoise) {
-  // A pure tone under a contact that comes, changes at every record, and goes: what is far from the tone stays far below it.
+  // A pure tone under a contact that comes, changes at every record, and goes: the rest of the spectrum stays far below it.
   const auto model = Model::make(make_cube_bank({{500.0, 0.5, 1.0}}));
   ContactForces contacts(model, {.effects = kBrake});
   Voice voice(model);
