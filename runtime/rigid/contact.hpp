@@ -67,6 +67,7 @@ struct Pair {
   double rattles_until_s = -1.0;       // until then its slow touches last
   double stored_j = 0.0;               // energy left in the springs of ended impacts, for lifting
   double sag_m = 0.0;                  // depth left by an ended impact with modes: allowed, decays
+  Vec3 apart_m{};                      // displacement of a for finding touches, where bodies are deep for their thickness
 
   bool touches() const {
     return std::any_of(contacts.begin(), contacts.end(), [](const Contact& c) { return c.touching; });

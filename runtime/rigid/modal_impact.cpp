@@ -196,6 +196,19 @@ void ModalImpacts::follow(ModalImpact& modal, Pair& pair, double length_s, Touch
   }
 }
 
+void ModalImpacts::part(Pair& pair, const TouchSets& touches) const {
+  double deepest_m = 0.0;
+  Vec3 normal{};
+  for_contacts(pair, [&](const ModalImpact& modal, int k) {
+    const double depth_m = modal.impact->calc_depth(k);
+    if (depth_m <= deepest_m) return;
+    deepest_m = depth_m;
+    const ModalContact& contact = modal.contacts[k];
+    normal = (contact.forces.a == pair.a ? 1.0 : -1.0) * contact.normal;
+  });
+  if (normal != Vec3{}) touches.part(pair, deepest_m, normal);
+}
+
 void ModalImpacts::follow(const Step& step, double length_s, TouchSets& touches) {
   for (ModalImpact& modal : impacts_) {
     if (std::none_of(modal.bodies.begin(), modal.bodies.end(), [&](int body) { return step.find(body) >= 0; })) continue;
@@ -207,6 +220,7 @@ void ModalImpacts::follow(const Step& step, double length_s, TouchSets& touches)
     for (Pair* pair : step.island().pairs) {
       if (pair->cord >= 0 || !step.has(*pair) || !(is_in(pair->a) || is_in(pair->b))) continue;
       if (!may_join(pair->a) || !may_join(pair->b)) continue;
+      part(*pair, touches);
       touches.search(*pair, length_s);
       touches.complete_in_flight(*pair, length_s);
       follow(modal, *pair, length_s, touches);

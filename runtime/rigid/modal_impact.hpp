@@ -87,6 +87,7 @@ class ModalImpacts {
   ModalImpact* find_own(const Step& step, const Hit& hit);
   std::optional<Selection> select(const Step& step, const Collision& collision, const Instants& instants);
   void follow(ModalImpact& modal, Pair& pair, double length_s, TouchSets& touches);
+  void part(Pair& pair, const TouchSets& touches) const;
   ModalContact* find_nearest(ModalImpact& modal, const Contact& touch, bool is_near) const;
   void place(ModalContact& contact, Contact& touch, const shape::Touch& at);
   static double calc_yield(const impact::Contact& contact, const std::vector<impact::Body>& bodies);

@@ -15,19 +15,31 @@
 namespace carillon::rigid {
 namespace {
 
-constexpr double kSteps = 4.0;           // of movement in the margin of a search,
-constexpr double kStepsOfRolling = 8.0;  // the same of curved bodies on the ground: few places come near
-constexpr double kMissing = 5e-6;        // m; excess of a missing place over all touches
-constexpr double kSearchAgain = 2e-3;    // s; between searches for missing touches of a pair
-constexpr double kSame = 0.02;           // of the size: distance of touches counted as one
-constexpr double kSagDecay = 10e-3;      // s
-constexpr int kMaxAdded = 4;             // missing touches at the end of a flight
+constexpr double kSteps = 4.0;             // of movement in the margin of a search,
+constexpr double kStepsOfRolling = 8.0;    // the same of curved bodies on the ground: few places come near
+constexpr double kMissing = 5e-6;          // m; excess of a missing place over all touches
+constexpr double kSearchAgain = 2e-3;      // s; between searches for missing touches of a pair
+constexpr double kSame = 0.02;             // of the size: distance of touches counted as one
+constexpr double kSagDecay = 10e-3;        // s
+constexpr int kMaxAdded = 4;               // missing touches at the end of a flight
+constexpr double kDeepForThickness = 0.1;  // depth at which touches are found with the bodies apart
 
 /// Lower bound of the gap of any vertex of a body over the ground, from that at an earlier frame.
 double calc_least_gap(const Pair& pair, const shape::Shape& shape, const shape::Frame& now) {
   const Vec3 &middle = shape.get_middle_m(), turned = now.rotation[2] - pair.measured.rotation[2];
   const double moved = now.position_m[2] - pair.measured.position_m[2] + dot(turned, middle);
   return pair.lowest_m + moved - norm(turned) * shape.get_radius_m();
+}
+
+shape::Frame move(shape::Frame frame, const Vec3& by) {
+  frame.position_m = frame.position_m + by;
+  return frame;
+}
+
+shape::Touch move(shape::Touch touch, const Vec3& by) {
+  touch.gap_m += dot(touch.normal, by);
+  touch.where_m = touch.where_m + by;
+  return touch;
 }
 
 }  // namespace
@@ -75,8 +87,10 @@ void TouchSets::search(Pair& pair, double step_s) {
   if (pair.b < 0)
     shape::find_ground_touches(a, frame_a, bodies_.ground()->height_m, margin_m, pair.memory, found_, bodies_.is_moved_by_impact(pair.a));
   else
-    shape::find_touches(a, frame_a, *bodies_.get_shape(pair.b), bodies_.get_frame(pair.b), margin_m, pair.memory, found_);
-  for (const shape::Touch& touch : found_) {
+    shape::find_touches(a, move(frame_a, pair.apart_m), *bodies_.get_shape(pair.b), bodies_.get_frame(pair.b), margin_m, pair.memory,
+                        found_);
+  for (shape::Touch& touch : found_) {
+    if (pair.apart_m != Vec3{}) touch = move(touch, -1.0 * pair.apart_m);
     const auto same = std::find_if(old.begin(), old.end(), [&](const Contact& c) { return c.touch.id == touch.id; });
     Contact contact;
     if (same != old.end()) {
@@ -128,9 +142,10 @@ void TouchSets::refresh(Pair& pair) const {
 void TouchSets::remove_false(Pair& pair) const {
   if (pair.b < 0) return;
   const auto erased = std::erase_if(pair.contacts, [&](const Contact& c) {
-    return c.touch.gap_m < -kTooDeep && c.touch.smooth &&
-           !shape::is_overlap(c.touch, *bodies_.get_shape(pair.a), bodies_.get_frame(pair.a), *bodies_.get_shape(pair.b),
-                              bodies_.get_frame(pair.b));
+    if (!c.touch.smooth || !(c.touch.gap_m < -kTooDeep)) return false;
+    const shape::Touch touch = move(c.touch, pair.apart_m);
+    return touch.gap_m < -kTooDeep && !shape::is_overlap(touch, *bodies_.get_shape(pair.a), move(bodies_.get_frame(pair.a), pair.apart_m),
+                                                         *bodies_.get_shape(pair.b), bodies_.get_frame(pair.b));
   });
   if (erased == 0) return;
   pair.ahead.touches.clear();
@@ -152,9 +167,10 @@ void TouchSets::update(Pair& pair, double step_s) {
   double deepest = 0.0;
   for (const Contact& c : pair.contacts) deepest = std::max(deepest, -c.touch.gap_m);
   pair.sag_m = std::min(pair.sag_m, deepest);
+  limit_apart(pair);
 }
 
-/// The touch with the least gap at the frames `a` and `b`, and that gap; none: infinite.
+/// The touch with the least gap at the frames `a` and `b`, with the bodies apart, and that gap; none: infinite.
 std::pair<Contact*, double> TouchSets::find_least(Pair& pair, const shape::Frame& a, const shape::Frame& b) const {
   std::pair<Contact*, double> least{nullptr, std::numeric_limits<double>::infinity()};
   pair.ahead.a = a;
@@ -165,7 +181,8 @@ std::pair<Contact*, double> TouchSets::find_least(Pair& pair, const shape::Frame
     shape::Touch& moved = pair.ahead.touches.emplace_back(c.touch);
     const bool follows = follow(pair, moved, a, b);
     all_follow = all_follow && follows;
-    if (follows && moved.gap_m < least.second) least = {&c, moved.gap_m};
+    const double gap_m = moved.gap_m + dot(moved.normal, pair.apart_m);
+    if (follows && gap_m < least.second) least = {&c, gap_m};
   }
   if (!all_follow) pair.ahead.touches.clear();  // refresh() drops lost ones
   return least;
@@ -184,7 +201,7 @@ bool TouchSets::complete(Pair& pair, const shape::Frame& a, const shape::Frame& 
     pair.lowest_m = deepest.gap_m;
     if (deepest.gap_m - mine.get_sag_m() >= -kMissing) return false;  // nor is any touch deeper
   } else {
-    deepest = shape::find_deepest(mine, a, *theirs, b, -kMissing, pair.memory);
+    deepest = shape::find_deepest(mine, move(a, pair.apart_m), *theirs, b, -kMissing, pair.memory);
     if (deepest.gap_m >= -kMissing) return false;
   }
   const auto [lowest, least_m] = find_least(pair, a, b);
@@ -202,8 +219,9 @@ void TouchSets::add(Pair& pair, const shape::Deepest& deepest) {
   Contact added;
   added.a = pair.a;
   added.b = pair.b;
-  added.touch = pair.b < 0 ? shape::make_ground_touch(mine, a, bodies_.ground()->height_m, deepest.place)
-                           : shape::make_touch(mine, a, *bodies_.get_shape(pair.b), b, deepest);
+  added.touch = pair.b < 0
+                    ? shape::make_ground_touch(mine, a, bodies_.ground()->height_m, deepest.place)
+                    : move(shape::make_touch(mine, move(a, pair.apart_m), *bodies_.get_shape(pair.b), b, deepest), -1.0 * pair.apart_m);
   const auto same =
       std::find_if(pair.contacts.begin(), pair.contacts.end(), [&](const Contact& c) { return c.touch.id == added.touch.id; });
   if (same != pair.contacts.end()) {  // it has travelled away from its place
@@ -270,7 +288,17 @@ shape::Touch TouchSets::find_closing(Pair& pair, const Contact& contact, double 
 void TouchSets::travel(Pair& pair, double time_s, double step_s) const {
   pair.travelled_m += (bodies_.calc_closing_speed(pair.a, pair.b) + norm(bodies_.gravity()) * step_s) * time_s + 1e-12;
   if (pair.sag_m > 0.0) pair.sag_m *= std::exp(-time_s / kSagDecay);
+  limit_apart(pair);
   if (pair.sag_m < kDeep) lose_stored(pair);
+}
+
+void TouchSets::part(Pair& pair, double depth_m, const Vec3& normal) const {
+  pair.apart_m = pair.b >= 0 && depth_m > kDeepForThickness * bodies_.calc_thickness(pair.a, pair.b) ? depth_m * normal : Vec3{};
+}
+
+/// The bodies of a pair are as far apart as is explained now.
+void TouchSets::limit_apart(Pair& pair) const {
+  if (pair.apart_m != Vec3{}) part(pair, std::max(pair.sag_m, impacts_.calc_depth(pair)), (1.0 / norm(pair.apart_m)) * pair.apart_m);
 }
 
 void TouchSets::lose_stored(Pair& pair) const {
@@ -299,7 +327,11 @@ shape::Touch TouchSets::find_moved(const Pair& pair, shape::Touch touch, const s
 }
 
 bool TouchSets::follow(const Pair& pair, shape::Touch& touch, const shape::Frame& a, const shape::Frame& b) const {
-  return shape::refresh(touch, *bodies_.get_shape(pair.a), a, bodies_.get_shape(pair.b), b);
+  if (pair.apart_m == Vec3{}) return shape::refresh(touch, *bodies_.get_shape(pair.a), a, bodies_.get_shape(pair.b), b);
+  touch = move(touch, pair.apart_m);
+  const bool follows = shape::refresh(touch, *bodies_.get_shape(pair.a), move(a, pair.apart_m), bodies_.get_shape(pair.b), b);
+  touch = move(touch, -1.0 * pair.apart_m);
+  return follows;
 }
 
 }  // namespace carillon::rigid

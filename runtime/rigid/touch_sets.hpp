@@ -52,6 +52,9 @@ class TouchSets {
   shape::Touch find_closing(Pair& pair, const Contact& contact, double time_s) const;
   /// Counts a movement of `time_s` in a step.
   void travel(Pair& pair, double time_s, double step_s) const;
+  /// Touches are found with bodies as far apart as springs and modes explain, along `normal` (to a). Past the middle of a thin body the
+  /// nearest surface would be that of its other side.
+  void part(Pair& pair, double depth_m, const Vec3& normal) const;
   /// Frees the contacts of two bodies after an impact with modes. depth_m: explained by it; stored_j: energy of its springs, for lifting.
   void release(int a, int b, double depth_m, double stored_j);
   /// Adds the energy left in springs of ended impacts to the books.
@@ -63,6 +66,7 @@ class TouchSets {
   void keep_added(Pair& pair, const std::vector<Contact>& old) const;
   bool follow(const Pair& pair, shape::Touch& touch, const shape::Frame& a, const shape::Frame& b) const;
   void lose_stored(Pair& pair) const;
+  void limit_apart(Pair& pair) const;
   std::pair<Contact*, double> find_least(Pair& pair, const shape::Frame& a, const shape::Frame& b) const;
   bool complete(Pair& pair, const shape::Frame& a, const shape::Frame& b, double closing_s);
   shape::Frame find_flown(int body, double time_s) const;

@@ -64,6 +64,42 @@ TEST(touch_sets, touch_that_stays_keeps_its_contact) {
   for (const Contact& c : pair.contacts) EXPECT_LT(norm(c.impulse - c.touch.where_m), 1.01e-5);
 }
 
+TEST(touch_sets, body_deep_in_what_bends_touches_the_side_that_it_came_from) {
+  // Past the middle plane of a shelf of 4 mm, which springs and modes explain. Depth: that of the lowest vertex below the upper side.
+  const Vec3 sides{0.3, 0.3, 0.004};
+  const shape::tests::Solid lumpy = shape::tests::make_lumpy(0.025, 16);
+  std::mt19937 random(3);
+  for (int n = 0; n < 20; ++n) {
+    Solid shelf = make_solid(shape::tests::make_box(sides, 12), 1.0, sides);
+    shelf.fixed = true;
+    Stages stages({make_solid(lumpy, 0.5, {0.04, 0.04, 0.04}), std::move(shelf)}, {make_turned(random, 0.0), make_state({})}, std::nullopt,
+                  {0, 0, -kGravity});
+    const double depth_m = 2.2e-3 + 5e-4 * n;
+    Mat3 turned = make_rotation(stages.bodies.state(0).rotation);
+    double lowest_m = 1.0;
+    for (const Vec3& x : lumpy.vertices) lowest_m = std::min(lowest_m, (turned * x)[2]);
+    stages.bodies.state(0).centre[2] = 0.5 * sides[2] - depth_m - lowest_m;
+    stages.bodies.place(0);
+    Pair& pair = stages.touches.get(0, 1);
+    stages.touches.part(pair, depth_m, {0, 0, 1});
+    stages.begin({{0, 1}});
+    const auto expect = [&](double deep_m) {
+      ASSERT_FALSE(pair.contacts.empty());
+      double least_m = 1.0;
+      for (const Contact& c : pair.contacts) {
+        EXPECT_GT(c.touch.normal[2], 0.99) << n;
+        least_m = std::min(least_m, c.touch.gap_m);
+      }
+      EXPECT_NEAR(least_m, -deep_m, 1e-4) << n;
+    };
+    expect(depth_m);
+    stages.bodies.state(0).centre[2] -= 1e-5;
+    stages.bodies.place(0);
+    stages.touches.refresh(pair);
+    expect(depth_m + 1e-5);
+  }
+}
+
 TEST(touch_sets, energy_of_springs_that_lifts_nothing_is_lost_and_never_forgotten) {
   Stages stages({make_box(0.1, kBoxSides), make_box(0.1, kBoxSides)}, {make_state({0, 0, 0.02}), make_state({1, 0, 0.02})}, kWood,
                 {0, 0, -kGravity});
