@@ -58,8 +58,9 @@ void add_candidates(const Shape& a, const Frame& fa, double height, double margi
     if (settled) {
       settle(t, a, fa, nullptr, fa, reach);  // the spring's centre is now there
     } else {
-      // Falling on beyond its reach: of another sample, unless it is nearly parallel to the ground.
+      // Falling on beyond its reach: of another sample, unless the skin about it is nearly parallel to the ground.
       t = before;
+      settle(t, a, fa, nullptr, fa, reach);
       const Spot spot = a.skin().locate(t.station_a, t.face_a);
       if (norm(a.skin().calc_normal(spot.face, spot.weights) + fa.rotation[2]) > kFlush) return;
     }

@@ -1,6 +1,13 @@
 // Bodies on the ground.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <numbers>
+#include <random>
+#include <vector>
+
 #include "tests/unit/runtime/shape/solids.hpp"
 
 namespace carillon::shape::tests {
@@ -174,6 +181,29 @@ TEST(ground, cylinder_lies_on_a_line_and_stands_on_a_ring) {
   for (const Touch& t : touches) {
     EXPECT_NEAR(t.gap_m, 0.0, 1e-12);
     EXPECT_NEAR(std::hypot(t.where_m[0], t.where_m[1]), 0.02, 1e-5);
+  }
+}
+
+TEST(ground, nearly_level_tube_touches_at_both_ends) {
+  // It lies on the middle of facets, so no vertex is near the ground. An end that is missing sinks unseen while the tube rocks.
+  std::vector<std::array<double, 2>> outline;
+  for (int n = 0; n <= 20; ++n) outline.push_back({0.04, -0.05 + 0.005 * n});
+  for (int n = 20; n >= 0; --n) outline.push_back({0.037, -0.05 + 0.005 * n});
+  const std::unique_ptr<Shape> tube = make_lathe(outline, 24, true).make();
+  std::mt19937 random(2);
+  std::uniform_real_distribution<double> roll(0.0, 6.28), tilt(-1e-3, 1e-3);
+  for (int n = 0; n < 40; ++n) {
+    Frame frame;
+    frame.rotation = multiply(multiply(make_turn({0, 1, 0}, tilt(random)), make_turn({0, 1, 0}, std::numbers::pi / 2)),
+                              make_turn({0, 0, 1}, roll(random)));
+    frame.position_m[2] = 0.04;
+    double least_m = 0.0, most_m = 0.0;
+    for (const Touch& t : find_touches(*tube, frame, 5e-4)) {
+      least_m = std::min(least_m, t.where_m[0]);
+      most_m = std::max(most_m, t.where_m[0]);
+    }
+    EXPECT_LT(least_m, -0.045) << n;
+    EXPECT_GT(most_m, 0.045) << n;
   }
 }
 
