@@ -197,7 +197,7 @@ void Mallets::play(const SceneBody& body, const bank::Bank& bank, std::vector<St
     for (std::size_t i = 0; i < heads.size(); ++i) blows.push_back(make_blow(body.name, impact, heads, i, after, warnings));
     blows[first].motion_j = calc_rigid_energy(after[0]);
     blows[first].modes_j = books.modal - rang_j;
-    blows[first].lost_j = books.dissipated_modes + books.dissipated_contact + books.dissipated_friction + books.above_band;
+    blows[first].lost_j = books.dissipated_modes + books.dissipated_contact + books.yielded + books.dissipated_friction + books.above_band;
     add_forces(impact, heads, std::span(blows).subspan(first), events);
     q = after[0].q;
     q_dot = after[0].q_dot;

@@ -9,6 +9,7 @@
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 namespace carillon::impact {
 namespace {
@@ -17,6 +18,7 @@ constexpr double kSlowest = 1e-6;  // m/s: speed for the choice of the step with
 constexpr double kTaper = 0.05;    // of the time of pressing: time constant of a rebound at its limit
 constexpr double kStill = 1e-3;    // m/s: settled contacts are slower
 constexpr double kSoon = 1e-3;     // s; time to the next touch of bodies still in contact, at most
+constexpr double kHeld = 0.9;      // of the energy that a limit takes, until what has yielded recovers
 constexpr int kLimitings = 8;      // rounds for contacts that share bodies,
 constexpr double kOver = 1e-4;     // to this part of the force of a step
 
@@ -47,7 +49,7 @@ void check(bool right, const char* what) {
 }  // namespace
 
 double Books::calc_error() const {
-  const double end = rigid + spring + modal + dissipated_modes + dissipated_contact + dissipated_friction + above_band;
+  const double end = rigid + spring + yielded + modal + dissipated_modes + dissipated_contact + dissipated_friction + above_band;
   const double largest = std::max({std::abs(start), std::abs(given), std::abs(end), rigid, 1e-300});
   return (start + given - end) / largest;
 }
@@ -235,6 +237,23 @@ ElasticPulse Impact::set_law(int contact, double inverse_mass, double speed_m_s)
   return pulse;
 }
 
+/// The energies of the spring and of its anchor stay. A pressed contact keeps its spring where the other one would be softer.
+void Impact::exchange_spring(int contact, const Spring& spring) {
+  ContactLaw& law = laws_[contact];
+  History& history = contacts_[contact];
+  const double before_m = law.compression_m, after_m = calc_compression(spring, calc_spring_energy(law.spring, before_m));
+  if (after_m > std::max(before_m, 0.0)) return;
+  history.given.spring = spring;
+  law.spring.stiffness = spring.stiffness;
+  law.spring.exponent = spring.exponent;
+  if (!(before_m > 0.0)) return;
+  law.compression_m = after_m;
+  history.yielded_m += before_m - after_m;
+  const double tangential_n_m = history.given.tangential_ratio * spring.stiffness * std::pow(after_m, spring.exponent - 1.0);
+  for (double& stretch : law.stretch) stretch *= std::sqrt(law.tangential_n_m / tangential_n_m);
+  law.tangential_n_m = tangential_n_m;
+}
+
 /// Open contacts are struck at their closing speed.
 void Impact::close_contacts() {
   for (std::size_t c = 0; c < laws_.size(); ++c) {
@@ -343,21 +362,28 @@ void Impact::step() {
     const double before = t.compression_m;
     t.compression_m -= moved_[row];
     // A contact without a force yields to further pressure: it takes up no energy, and gives back less than it has.
-    double& yielded = contacts_[c].yielded_m;
-    if (std::isfinite(t.max_n) && t.compression_m > before) {
+    double &yielded = contacts_[c].yielded_m, &yielded_j = contacts_[c].yielded_j;
+    const bool is_limited = std::isfinite(t.max_n);
+    if (is_limited && t.compression_m > before) {
       yielded += t.compression_m - before;
       t.compression_m = before;
     }
     // Yielded compression recovers before the surfaces part.
     if (t.compression_m < 0.0 && yielded > 0.0) {
-      const double recovered = std::min(yielded, -t.compression_m);
+      const double recovered = std::min(yielded, -t.compression_m), recovered_j = yielded_j * recovered / yielded;
+      yielded_j -= recovered_j;
+      books_.dissipated_contact += recovered_j;
       yielded -= recovered;
       t.compression_m += recovered;
     }
     t.max_n = std::numeric_limits<double>::infinity();
     contacts_[c].pressed_s = t.compression_m > 0.0 ? contacts_[c].pressed_s + h_ : 0.0;
-    books_.dissipated_contact -=
-        force_[row] * moved_[row] + (calc_spring_energy(t.spring, t.compression_m) - calc_spring_energy(t.spring, before));
+    const double taken_j =
+        -(force_[row] * moved_[row] + (calc_spring_energy(t.spring, t.compression_m) - calc_spring_energy(t.spring, before)));
+    const double held_j = is_limited ? kHeld * taken_j : 0.0;
+    yielded_j += held_j;
+    books_.dissipated_contact += taken_j - held_j;
+    if (!(t.compression_m > 0.0) && yielded == 0.0) books_.dissipated_contact += std::exchange(yielded_j, 0.0);
     Vec3 impulse = h_ * force_[row] * rows_[row].axis;
     contacts_[c].impulse_n_s += h_ * force_[row];
     if (t.friction > 0.0) {
@@ -494,6 +520,7 @@ void Impact::update(std::span<const Body> bodies, std::span<const Contact> conta
     ContactLaw& t = laws_[c];
     const auto row = t.row;
     const bool rubs = t.friction > 0.0;
+    if (contacts[c].spring != contacts_[c].given.spring) exchange_spring(static_cast<int>(c), contacts[c].spring);
     const Vec3 stretch = rubs ? t.stretch[0] * rows_[row + 1].axis + t.stretch[1] * rows_[row + 2].axis : Vec3{};
     Contact contact = contacts_[c].given;
     contact.where_m = contacts[c].where_m;
@@ -549,6 +576,7 @@ Books Impact::get_books() const {
   Books books = books_;
   books.rigid = calc_rigid_energy();
   books.spring = calc_spring_energies();
+  for (const History& contact : contacts_) books.yielded += contact.yielded_j;
   const ModalEnergy modes = modes_.calc_energy();
   books.modal = modes.modal;
   books.dissipated_modes = modes.dissipated;

@@ -77,11 +77,12 @@ struct Pulse {
   std::vector<Vec3> impulse_n_s;       // one a step, from the first step with a force to the last
 };
 
-/// Energies [J]. start + given = rigid + spring + modal + dissipated + error.
+/// Energies [J]. start + given = rigid + spring + yielded + modal + dissipated + error.
 struct Books {
   double start = 0.0;                // all of the motion, springs and modes at the beginning
   double given = 0.0;                // work of the bodies' accelerations
   double rigid = 0.0, spring = 0.0;  // now; spring: normal and tangential
+  double yielded = 0.0;              // now: taken by compression without a force, until it has recovered
   double modal = 0.0;                // now, inside the band
   double dissipated_modes = 0.0;     // by the modes' own damping
   double dissipated_contact = 0.0;   // hysteresis
@@ -91,7 +92,7 @@ struct Books {
 };
 
 /// All bodies, contacts and modes of one impact, integrated with one step length, which never changes. At any time get_books() closes to
-/// rounding: start + given = rigid + spring + modal + dissipated + above_band.
+/// rounding: start + given = rigid + spring + yielded + modal + dissipated + above_band.
 class Impact {
  public:
   /// Throws std::invalid_argument where indices, sizes, signs or values are wrong. Meant for up to 8 contacts; cost grows with the cube.
@@ -105,9 +106,9 @@ class Impact {
   int join(const Body& body);
   void join(const Contact& contact);
   /// Updates the same bodies and contacts: centres, inertias and accelerations of `bodies`, velocities of bodies on joints; places, normals
-  /// and shape values of `contacts`, gaps of open ones. Everything else is ignored. Compressions, anchors, modal states and the step stay;
-  /// moved_m and turned_rad begin again. The energy change of an unchanged spin by a turned inertia is booked as given. Throws as the
-  /// constructor does.
+  /// and shape values of `contacts`, gaps of open ones, springs. Everything else is ignored. Compressions, anchors, modal states and the
+  /// step stay; moved_m and turned_rad begin again. A new spring takes the energy of the old one; the rest of the compression has yielded.
+  /// The energy change of an unchanged spin by a turned inertia is booked as given. Throws as the constructor does.
   void update(std::span<const Body> bodies, std::span<const Contact> contacts);
 
   /// Changes the motion of a body at once, as other contacts do; what that does to the energy is booked as given. Throws where it is not
@@ -154,7 +155,8 @@ class Impact {
     double impulse_n_s = 0.0;  // normal
     bool is_limited = false;   // do modes push against a limit?
     Pulse pulse;
-    double yielded_m = 0.0;  // compression without a force, by the limit of the rebound
+    double yielded_m = 0.0;  // compression without a force, by the limit of the rebound,
+    double yielded_j = 0.0;  // and the energy that the limit took
     bool is_open = false;    // not closed yet at its present place
     int silent = 0;          // steps without a force that the pulse does not have yet
   };
@@ -167,6 +169,7 @@ class Impact {
   void choose_step(const Options& options);
   ElasticPulse set_law(int contact, double inverse_mass, double speed_m_s);
   void close_contacts();
+  void exchange_spring(int contact, const Spring& spring);
   void set_up_step();
   void step();
   double calc_row_speed(const Row& row) const;

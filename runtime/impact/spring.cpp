@@ -42,8 +42,17 @@ double calc_hertz_stiffness(double young_a_pa, double poisson_a, double young_b_
 
 double calc_hertz_stiffness(double compliance_per_pa, double radius_m) { return 4.0 / 3.0 / compliance_per_pa * std::sqrt(radius_m); }
 
+double calc_face_stiffness(double compliance_per_pa, double area_m2) {
+  return 2.0 / compliance_per_pa * std::sqrt(area_m2 / std::numbers::pi);
+}
+
 double calc_spring_energy(const Spring& spring, double y) {
   return y > 0.0 ? spring.stiffness * y * calc_power(y, spring.exponent) / (spring.exponent + 1.0) : 0.0;
+}
+
+double calc_compression(const Spring& spring, double energy_j) {
+  const double p = spring.exponent + 1.0;
+  return std::pow(p * energy_j / spring.stiffness, 1.0 / p);
 }
 
 StepForce calc_step_force(const Spring& spring, double y0, double y1, double h_s) {

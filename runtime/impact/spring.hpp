@@ -6,6 +6,8 @@ namespace carillon::impact {
 /// F = K y^p for y > 0, none for y < 0. Hertz: p = 1.5, K = 4/3 E* sqrt(R). Felt of mallets and hammers: p of 2.2 to 3.5.
 /// With hysteresis chi: F = K y^p (1 + chi y'), never negative (Hunt and Crossley 1975).
 struct Spring {
+  bool operator==(const Spring&) const = default;
+
   double stiffness = 0.0;       // K [N/m^p]
   double exponent = 1.5;        // p >= 1
   double hysteresis_s_m = 0.0;  // chi >= 0
@@ -21,8 +23,14 @@ double calc_patch_radius(double force_n, double radius_m, double compliance_per_
 double calc_hertz_stiffness(double young_a_pa, double poisson_a, double young_b_pa, double poisson_b, double radius_m);
 double calc_hertz_stiffness(double compliance_per_pa, double radius_m);
 
+/// 2 E* sqrt(A/pi) [N/m] of a flat face of that area [m^2]: that of a flat round punch (K. L. Johnson, "Contact mechanics" (1985),
+/// eq. 3.36).
+double calc_face_stiffness(double compliance_per_pa, double area_m2);
+
 /// V(y) = K y^(p+1)/(p+1) [J]; 0 for y < 0.
 double calc_spring_energy(const Spring& spring, double y);
+/// The y > 0 [m] at which a spring holds that energy.
+double calc_compression(const Spring& spring, double energy_j);
 
 /// The force of a step from y0 to y1 in h: (V(y1) - V(y0))/(y1 - y0) (1 + chi (y1 - y0)/h), the first factor without cancellation, the
 /// second not below 0; and its derivative by y1. The work of this force over the step is V(y1) - V(y0) plus a loss >= 0, whatever h.

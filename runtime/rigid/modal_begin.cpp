@@ -241,7 +241,8 @@ void ModalImpacts::add_contact(ModalImpact& modal, Contact& touch, double sag_m,
   spring.where_m = hit.touch.where_m;
   spring.normal = hit.touch.normal;
   spring.rests = rests;
-  spring.spring = make_spring(bodies_, hit);
+  spring.spring = contact.spring = make_spring(bodies_, hit);
+  contact.is_sharp = !hit.touch.smooth;
   spring.restitution = bodies_.calc_restitution(hit.a, hit.b);
   spring.is_limit = true;
   spring.friction = bodies_.calc_friction(hit.a, hit.b);

@@ -17,7 +17,21 @@ constexpr double kSamePlace = 0.05;    // of the size
 constexpr double kMoved = 0.02;        // of the size: least way of a contact to its touch for a move
 constexpr int kMaxFollowed = 8;        // contacts of an impact, open ones included
 constexpr double kExplained = 1.3;     // times the depth of spring and modes is explained
+constexpr double kOneFace = 0.99;      // cosine between the normals of one face
 constexpr double kCalmTime = 5e-3;     // s; after the end of an impact, without slow impacts of the pair
+
+/// Area of the convex polygon of some points [m^2].
+double calc_area(std::vector<Vec3> corners, const Vec3& normal) {
+  Vec3 middle{};
+  for (const Vec3& x : corners) middle = middle + (1.0 / static_cast<double>(corners.size())) * x;
+  const Vec3 s = find_across(normal), t = cross(normal, s);
+  const auto calc_angle = [&](const Vec3& x) { return std::atan2(dot(t, x - middle), dot(s, x - middle)); };
+  std::sort(corners.begin(), corners.end(), [&](const Vec3& x, const Vec3& y) { return calc_angle(x) < calc_angle(y); });
+  double area = 0.0;
+  for (std::size_t k = 0; k < corners.size(); ++k)
+    area += 0.5 * dot(normal, cross(corners[k] - middle, corners[(k + 1) % corners.size()] - middle));
+  return area;
+}
 
 }  // namespace
 
@@ -138,6 +152,7 @@ void ModalImpacts::place(ModalContact& contact, Contact& touch, const shape::Tou
   const bool is_swapped = forces.a != touch.a;
   contact.touch = touch.touch.id;
   contact.is_followed = true;
+  contact.is_sharp = !at.smooth;
   contact.normal = (is_swapped ? -1.0 : 1.0) * at.normal;
   contact.gap_m = at.gap_m;
   touch.press();
@@ -168,6 +183,40 @@ ModalContact* ModalImpacts::find_nearest(ModalImpact& modal, const Contact& touc
     least_m = std::min(least_m, away_m);
   }
   return nearest;
+}
+
+/// The springs of an impact: three corners of a face that are pressed within `part_s` by more than it is flat share the spring of the face.
+std::vector<impact::Spring> ModalImpacts::find_springs(const ModalImpact& modal, double part_s) const {
+  const int count = static_cast<int>(modal.contacts.size());
+  std::vector<impact::Spring> springs;
+  for (int k = 0; const ModalContact& contact : modal.contacts) {
+    springs.push_back(modal.impact->get_compression(k) > 0.0 ? modal.impact->get_contact(k).spring : contact.spring);
+    ++k;
+  }
+  std::vector<char> is_taken(count, 0);
+  for (int first = 0; first < count; ++first) {
+    const ModalContact& one = modal.contacts[first];
+    std::vector<int> face;
+    std::vector<Vec3> corners;
+    for (int k = first; k < count; ++k) {
+      const ModalContact& contact = modal.contacts[k];
+      const double flat_m = springs[k].exponent == 1.0 ? 0.0 : kTooDeep,
+                   pressed_m = modal.impact->get_compression(k) + std::max(modal.impact->calc_approach(k), 0.0) * part_s;
+      if (is_taken[k] != 0 || !contact.is_sharp || !contact.is_followed || !contact.is_between(one.forces.a, one.forces.b) ||
+          dot(contact.normal, one.normal) < kOneFace || !(pressed_m > flat_m))
+        continue;
+      face.push_back(k);
+      corners.push_back(find_station(contact));
+    }
+    if (face.size() < 3 || face.front() != first) continue;
+    const double stiffness =
+        impact::calc_face_stiffness(bodies_.calc_compliance(one.forces.a, one.forces.b), calc_area(corners, one.normal));
+    for (const int k : face) {
+      is_taken[k] = 1;
+      if (stiffness > 0.0) springs[k] = {.stiffness = stiffness / static_cast<double>(face.size()), .exponent = 1.0};
+    }
+  }
+  return springs;
 }
 
 void ModalImpacts::follow(ModalImpact& modal, Pair& pair, double length_s, TouchSets& touches) {
@@ -257,8 +306,10 @@ void ModalImpacts::advance(const Step& step, double to_s, double part_s, double 
     }
     std::vector<impact::Contact> springs;
     std::list<std::vector<double>> shapes;
+    const std::vector<impact::Spring> laws = find_springs(modal, part_s);
     for (int k = 0; const ModalContact& contact : modal.contacts) {
-      impact::Contact& spring = springs.emplace_back(modal.impact->get_contact(k++));
+      impact::Contact& spring = springs.emplace_back(modal.impact->get_contact(k));
+      spring.spring = laws[k++];
       spring.where_m = find_station(contact);
       if (contact.is_followed) spring.normal = contact.normal;
       if (!contact.shape_a.empty()) spring.shape_a = shapes.emplace_back(turn_to_world(contact.forces.a, contact.shape_a));
@@ -391,7 +442,12 @@ void ModalImpacts::release(ModalImpact& modal, double time_s, TouchSets& touches
   if (!modal.impact->has_ended()) ++ledger_.costs.ended_impacts;
   ledger_.costs.longest_impact_s = std::max(ledger_.costs.longest_impact_s, modal.impact->get_time());
   const impact::Books books = modal.impact->get_books();
-  ledger_.lose(books.dissipated_modes + books.dissipated_contact + books.dissipated_friction + books.above_band);
+  // What has yielded recovers slowly, and keeps the work that this takes against the weight.
+  double deepest_m = 0.0, weight_n = 0.0;
+  for (int k = 0; k < static_cast<int>(modal.contacts.size()); ++k) deepest_m = std::max(deepest_m, modal.impact->calc_depth(k));
+  for (const impact::Body& b : bodies) weight_n += b.mass_kg * norm(bodies_.gravity());
+  const double kept_j = std::clamp(weight_n * deepest_m - books.spring, 0.0, std::max(books.yielded, 0.0));
+  ledger_.lose(books.dissipated_modes + books.dissipated_contact + books.yielded - kept_j + books.dissipated_friction + books.above_band);
   for (int k = 0; const impact::Body& b : bodies) {
     const int body = modal.bodies[k++];
     bodies_.set_in_impact(body, false);
@@ -406,7 +462,7 @@ void ModalImpacts::release(ModalImpact& modal, double time_s, TouchSets& touches
     if (bodies_.moves(body) && reached_s > time_s) s = fly(bodies_.solid(body), s, bodies_.gravity(), time_s - reached_s);
     bodies_.place(body);
   }
-  const double stored_j = books.spring / static_cast<double>(modal.contacts.size());
+  const double stored_j = (books.spring + kept_j) / static_cast<double>(modal.contacts.size());
   for (int k = 0; const ModalContact& contact : modal.contacts)
     touches.release(contact.forces.a, contact.forces.b, std::max(0.0, modal.impact->calc_depth(k++)), stored_j);
   modal.impact = nullptr;
@@ -422,7 +478,7 @@ void ModalImpacts::add_to(Books& books) const {
   for (const ModalImpact& modal : impacts_) {
     const impact::Books inside = modal.impact->get_books();
     books.modes_j += inside.modal;
-    books.springs_j += inside.spring;
+    books.springs_j += inside.spring + inside.yielded;
     books.lost_j += inside.dissipated_modes + inside.dissipated_contact + inside.dissipated_friction + inside.above_band;
   }
 }

@@ -18,9 +18,11 @@ namespace carillon::rigid {
 /// A contact of an impact with modes.
 struct ModalContact {
   Forces forces;                         // bodies, places, and impulses that are not reported yet
+  impact::Spring spring;                 // of this place alone
   std::vector<double> shape_a, shape_b;  // axes of the meshes; empty: does not ring
   Vec3 station{};                        // of the point, from the centre of the one that moves, axes of its mesh
   std::uint64_t touch = 0;               // name of its touch
+  bool is_sharp = false;                 // a corner: where it bears with others, of a face
   bool is_followed = false;              // in the present touch set,
   Vec3 normal{};                         // with this normal to side a
   double gap_m = 0.0;                    // and this gap of the rigid surfaces
@@ -90,6 +92,7 @@ class ModalImpacts {
   void part(Pair& pair, const TouchSets& touches) const;
   ModalContact* find_nearest(ModalImpact& modal, const Contact& touch, bool is_near) const;
   void place(ModalContact& contact, Contact& touch, const shape::Touch& at);
+  std::vector<impact::Spring> find_springs(const ModalImpact& modal, double part_s) const;
   static double calc_yield(const impact::Contact& contact, const std::vector<impact::Body>& bodies);
   bool add_resting(const Collision& collision, const Instants& instants, std::vector<int>& order) const;
   bool shares_articulations(const std::vector<Hit>& hits, const std::vector<int>& order) const;

@@ -323,6 +323,28 @@ TEST(Ringing, AnOpenContactGoesWithItsTouchAndAPressedOneKeepsItsCompression) {
   EXPECT_EQ(impact.get_compression(1), -2e-4);
 }
 
+TEST(Ringing, AStifferSpringTakesTheEnergyAndTheDepthOfTheOldOne) {
+  for (const double factor : {1.0, 30.0}) {
+    std::vector<Contact> contacts{make_contact(0.01)};
+    contacts[0].restitution = 1.0;
+    Impact impact({make_ball(0.01, {0, 0, -1.0})}, contacts);
+    EXPECT_FALSE(impact.advance(1e-5));
+    const double depth_m = impact.calc_depth(0), compression_m = impact.get_compression(0);
+    const double spring_j = impact.get_books().spring;
+    contacts[0].spring = {.stiffness = factor * contacts[0].spring.stiffness * std::sqrt(compression_m), .exponent = 1.0};
+    impact.update(impact.get_bodies(), contacts);
+    EXPECT_NEAR(impact.calc_depth(0), depth_m, 1e-12 * depth_m);
+    EXPECT_NEAR(impact.get_compression(0), compression_m * std::sqrt(0.8 / factor), 1e-9 * compression_m);  // 2/5 y F = y' F' / 2
+    EXPECT_NEAR(impact.get_books().spring, spring_j, 1e-12 * spring_j);
+    contacts[0].spring.stiffness *= 0.1;  // a softer one is not taken while it presses
+    impact.update(impact.get_bodies(), contacts);
+    EXPECT_NEAR(impact.get_books().spring, spring_j, 1e-12 * spring_j);
+    impact.advance(1.0);
+    EXPECT_NEAR(impact.get_bodies()[0].velocity_m_s[2], 1.0, 1e-6);
+    EXPECT_NEAR(impact.get_books().calc_error(), 0.0, 1e-12);
+  }
+}
+
 TEST(Ringing, WhatHasYieldedRecoversAsTheSurfacesPart) {
   for (const double speed : {-1.0, 1.0}) {
     std::vector<Contact> contacts{make_contact(0.01)};

@@ -320,6 +320,32 @@ TEST(modal_impact, impact_keeps_momentum_and_the_books) {
   EXPECT_NEAR(pushed[0], 0.1 * (stages.bodies.state(0).velocity[0] - boxes.speed), 1e-6);
 }
 
+TEST(modal_impact, soft_face_that_lands_flat_is_as_stiff_as_a_punch) {
+  // Half a period of a mass on k = 2 E* sqrt(A / pi), the stiffness of a flat punch: depth v sqrt(m / k). On Hertz springs at its corners
+  // it is six times as deep.
+  const Vec3 sides{0.1, 0.08, 0.04};
+  const double mass = 0.35, speed = 0.5, young = 1e7, poisson = 0.45;
+  Solid box = make_box(mass, sides);
+  box.restitution = 1.0;
+  box.friction = 0.0;
+  box.young_modulus_pa = young;
+  box.poisson_ratio = poisson;
+  box.modes = std::make_shared<impact::Modes>(std::vector{2.0 * std::acos(-1.0) * 50.0}, std::vector{10.0});
+  const double phi = 0.2 / std::sqrt(mass);
+  box.find_shape = [phi](const shape::Place&) { return std::vector{0.0, 0.0, phi}; };
+  const Ground ground{.restitution = 1.0, .friction = 0.0, .young_modulus_pa = 1e13, .poisson_ratio = 0.3};
+  Space space({box}, {make_state({0, 0, 0.5 * sides[2] + 1e-4}, {0, 0, -speed})}, ground, {}, {});
+  double deepest_m = 0.0;
+  while (space.get_time() < 0.03) {
+    space.step(0.03);
+    deepest_m = std::max(deepest_m, 0.5 * sides[2] - space.state(0).centre[2]);
+  }
+  const double stiffness = 2.0 * young / (1.0 - poisson * poisson) * std::sqrt(sides[0] * sides[1] / std::acos(-1.0));
+  EXPECT_NEAR(deepest_m, speed * std::sqrt(mass / stiffness), 0.1 * deepest_m);
+  EXPECT_GT(space.state(0).velocity[2], 0.8 * speed);
+  EXPECT_LT(space.get_costs().impacts, 3);
+}
+
 TEST(ledger, damping_of_modes_is_booked_when_they_are_moved_or_asked_for) {
   const double decay = 50.0;
   Stages stages({make_ringing(make_box(0.1, kBoxSides), 1e3, decay)}, {make_state({0, 0, 1}, {0, 0, 2})}, std::nullopt, {0, 0, -kGravity});
