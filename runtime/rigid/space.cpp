@@ -108,7 +108,7 @@ void Space::step_island(Island& island, double start_s, double length_s) {
     modal_impacts_.follow(step_, h, touches_);
     modal_impacts_.end_where_touching(step_, touches_);
     const bool may_sleep = !std::exchange(begun, true) && rest_.may_sleep(island.bodies, h);
-    projection_.run(step_, may_sleep ? kDeep : kTooDeep);
+    projection_.run(step_, may_sleep || step_.count() == 1 ? kDeep : kTooDeep);
     if (may_sleep && rest_.try_island(island, h)) break;
     touches_.forget_closing(step_);
     bool is_completed = false;

@@ -18,6 +18,8 @@ namespace {
 
 constexpr double kDrilling = 3.0 * std::numbers::pi / 16.0;  // of friction times patch radius: arm of the couple against drilling
 constexpr double kAtRest = 1e-6;                             // m/s
+constexpr double kWobbling = 0.15;                           // of the loss of rolling: that of a wobbling rim, on the same way
+constexpr double kFalls = 10.0;                              // of gravity times the step: uncertainty of the way of a touch
 constexpr int kTurns = 16;                                   // points that take turns by their pairs
 
 /// From below to above, so that a sweep carries the weight down a pile. Of each kTurns points in that order those that are the first of
@@ -124,6 +126,20 @@ double StepProblem::calc_patch_radius(const Contact& c) const {
   return impact::calc_patch_radius(push, bodies_.calc_contact_radius(c.touch, c.a, c.b), bodies_.calc_compliance(c.a, c.b));
 }
 
+/// The couple against rolling takes its arm times the force on each radian. The touch of a wobbling disc runs around the rim while the disc
+/// hardly turns, and what yields there is lost on the way of the touch (contour friction; R. I. Leine, Arch. Appl. Mech. 79 (2009) 1063).
+/// So the couple grows with that way over the angle. `travel_m_s`: velocity of the place of the touch; falls_m_s: its error.
+double StepProblem::calc_wobbling(const Contact& c, const Vec3& travel_m_s, double falls_m_s) const {
+  const shape::Touch& t = c.touch;
+  const auto get_spin = [&](int body) { return body >= 0 ? bodies_.placed(body).spin : Vec3{}; };
+  const Vec3 spin = get_spin(c.a) - get_spin(c.b);
+  const double curvature = std::max(t.curvature_a_per_m + t.curvature_b_per_m, t.steepest_per_m),
+               turns_m_s = norm(spin - dot(spin, t.normal) * t.normal) / curvature;
+  double way_m_s = norm(travel_m_s - bodies_.calc_velocity(c.a, t.where_m));
+  way_m_s = std::min(way_m_s, norm(travel_m_s - bodies_.calc_velocity(c.b, t.where_m))) - kFalls * falls_m_s;
+  return kWobbling * way_m_s > turns_m_s && turns_m_s > 0.0 ? kWobbling * way_m_s / turns_m_s : 1.0;
+}
+
 /// A touch that lasts, as a row of the step.
 Point StepProblem::make_lasting_point(const Step& step, Pair& pair, const Contact& c) const {
   const shape::Touch& t = c.touch;
@@ -198,6 +214,7 @@ Point StepProblem::make_lasting_point(const Step& step, Pair& pair, const Contac
   const double curvature = t.curvature_a_per_m + t.curvature_b_per_m;
   if (t.smooth && curvature > 0.0) {
     p.rolling_m = options_.rolling_resistance / std::max(curvature, t.steepest_per_m);
+    p.rolling_m *= calc_wobbling(c, (1.0 / h) * (later - t.where_m), h * norm(bodies_.gravity()));
     p.twisting_m = kDrilling * p.friction * calc_patch_radius(c);
   }
   p.impulse = (c.step_s > 0.0 ? h / c.step_s : 0.0) * c.impulse;

@@ -223,13 +223,14 @@ bool settle(Touch& t, const Shape& a, const Frame& fa, const Shape* b, const Fra
 }
 
 bool is_level(const Touch& t, const Shape& a, const Frame& fa, const Shape* b, const Frame& fb) {
-  constexpr double kTilt = 2e-3, kFar = 0.05;
+  constexpr double kTilt = 2e-3, kTiltOnGround = 2e-4, kFar = 0.05;  // the lower one lets a coin wobble down to 0.2 degrees
+  const double most = b == nullptr ? kTiltOnGround : kTilt;
   const bool on_b = t.side_b == Side::plane;
   const Shape& shape = on_b || b == nullptr ? a : *b;
   const Vec3 n = on_b ? (b != nullptr ? fb.rotation * t.axis_b : t.axis_b) : fa.rotation * t.axis_a;
   const Vec3 up = turn_back((on_b ? fa : fb).rotation, n), s = find_across(up), along[2] = {s, cross(up, s)};
   for (const Vec3& way : along)
-    for (const double tilt : {-kTilt, kTilt})
+    for (const double tilt : {-most, most})
       if (!shape.skin()
                .walk_lowest(normalise(up + tilt * way), on_b ? t.face_a : t.face_b, on_b ? t.station_a : t.station_b,
                             kFar * shape.get_size_m(), false)

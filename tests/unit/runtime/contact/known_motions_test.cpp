@@ -226,6 +226,38 @@ TEST(Rolling, ACoinOnItsRimPrecessesAtTheSteadyRate) {
   }
 }
 
+TEST(Rolling, AWobblingDiscSpeedsUpTowardsItsEnd) {
+  // Contour friction: (3/2) m g r da/dt = -k c m g r W with W^2 = 4 g/(r a), k the part of the loss of rolling on the same way. Its solution
+  // a = ((t0 - t) k c sqrt(4 g/r))^(2/3) ends at t0, and W grows as (t0 - t)^(-1/3): R. I. Leine, Arch. Appl. Mech. 79 (2009) 1063.
+  const double radius = 0.0375, thickness = 0.006, k = 0.15, loss = k * kRollingResistance * std::sqrt(4.0 * kGravity / radius);
+  const bank::Bank disc = make_bank(shape::tests::make_cylinder(radius, thickness, 96));
+  WorldSpec w;
+  w.ground = GroundSpec{.restitution = 0.0, .friction = 0.5};
+  const double a = 2.5 * M_PI / 180, rate = std::sqrt(4.0 * kGravity / (radius * std::sin(a)));
+  w.bodies = {make_body(disc, {0, 0, radius * std::sin(a) + 0.5 * thickness * std::cos(a)}, 0.5)};
+  w.bodies[0].initial.rotation = {std::cos(a / 2), std::sin(a / 2), 0, 0};
+  w.bodies[0].angular_velocity_rad_s = {0, rate * std::sin(a) * std::cos(a), rate * std::sin(a) * std::sin(a)};
+  std::vector<std::array<double, 2>> leans;  // time, mean of a period
+  double sum = 0.0;
+  int count = 0;
+  const auto path = run(w, 2.2)[0];
+  for (const auto& m : path) {
+    const Vec3 axis = rotate(m.rotation, {0, 0, 1});
+    sum += std::atan2(std::hypot(axis[0], axis[1]), axis[2]);
+    if (++count % 10 != 0) continue;
+    leans.push_back({m.time_s, sum / 10});
+    sum = 0.0;
+  }
+  const auto find_time = [&](double degrees) {
+    const auto found = std::find_if(leans.begin(), leans.end(), [&](const auto& lean) { return lean[1] < degrees * M_PI / 180; });
+    return found == leans.end() ? 0.0 : (*found)[0];
+  };
+  for (const auto& [from, to] : {std::pair{2.2, 1.4}, std::pair{1.4, 0.7}, std::pair{0.7, 0.3}}) {
+    const double expected = (std::pow(from * M_PI / 180, 1.5) - std::pow(to * M_PI / 180, 1.5)) / loss;
+    EXPECT_NEAR((find_time(to) - find_time(from)) / expected, 1.0, 0.1) << from << " to " << to << " degrees";
+  }
+}
+
 /// Bottom, wall of 3 mm, shoulder and neck.
 shape::tests::Solid make_bottle(double radius, int around) {
   std::vector<std::array<double, 2>> outline{{0, 0}, {radius, 0}}, inside;
