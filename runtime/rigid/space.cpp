@@ -108,8 +108,8 @@ void Space::step_island(Island& island, double start_s, double length_s) {
     modal_impacts_.follow(step_, h, touches_);
     modal_impacts_.end_where_touching(step_, touches_);
     const bool may_sleep = !std::exchange(begun, true) && rest_.may_sleep(island.bodies, h);
-    projection_.run(step_, may_sleep ? kDeep : kTooDeep);
-    if (may_sleep && rest_.try_island(island, h)) break;
+    projection_.run(step_, kTooDeep);
+    if (may_sleep && try_rest(island, h)) break;
     touches_.forget_closing(step_);
     bool is_completed = false;
     for (int n = 0; n <= kMaxCompleted; ++n) {
@@ -144,6 +144,33 @@ void Space::step_island(Island& island, double start_s, double length_s) {
       for (Pair* pair : island.pairs) touches_.update(*pair, length_s - done);
   }
   step_.end();
+}
+
+/// Puts an island to sleep if it is balanced, its touches opened if it is so with open ones, too. Nothing moves otherwise: bodies that fall
+/// back would never come to rest.
+bool Space::try_rest(Island& island, double h) {
+  std::vector<State> kept;
+  std::vector<double> stored_j;
+  for (const int body : island.bodies) kept.push_back(bodies_.state(body));
+  for (const Pair* pair : island.pairs) stored_j.push_back(pair->stored_j);
+  Books before, after;
+  ledger_.add_to(before);
+  const std::int64_t pushes = ledger_.costs.pushes;
+  projection_.run(step_, kDeep);
+  if (rest_.try_island(island, h)) return true;
+  if (ledger_.costs.pushes == pushes) return false;
+  ledger_.add_to(after);
+  ledger_.lose(before.lost_j - after.lost_j);
+  ledger_.lift(before.lifted_j - after.lifted_j);
+  for (int n = 0; const int body : island.bodies) {
+    bodies_.state(body) = kept[n++];
+    bodies_.place(body);
+  }
+  for (int n = 0; Pair * pair : island.pairs) {
+    pair->stored_j = stored_j[n++];
+    if (!pair->contacts.empty()) touches_.refresh(*pair);
+  }
+  return rest_.try_island(island, h);
 }
 
 /// The impacts of a crowded island: all touches closing within a step strike at its beginning. False: none closes, touches unchanged.
