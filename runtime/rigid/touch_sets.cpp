@@ -89,7 +89,7 @@ void TouchSets::search(Pair& pair, double step_s) {
     contact.touch = touch;
     pair.contacts.push_back(contact);
   }
-  keep_added(pair, old);
+  if (pair.b < 0 || !bodies_.is_flat(pair.a) || !bodies_.is_flat(pair.b)) keep_added(pair, old);  // those of polyhedra are complete
   remove_false(pair);
   complete(pair, frame_a, bodies_.get_frame(pair.b), 0.0);
 }
