@@ -59,7 +59,7 @@ class PairMemory {
   NearSamples near;
 };
 
-/// Replaces `out` by the touches not further apart than the margin: at most 4 for each patch of contact.
+/// Replaces `out` by the touches not further apart than the margin: at most 8 for each patch of contact.
 void find_touches(const Shape& a, const Frame& frame_a, const Shape& b, const Frame& frame_b, double margin_m, PairMemory& memory,
                   std::vector<Touch>& out);
 /// The ground is the half space z <= height_m. `with_all`: of a polyhedron all corners of facets that face the
