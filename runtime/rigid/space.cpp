@@ -156,6 +156,12 @@ bool Space::try_rest(Island& island, double h) {
   Books before, after;
   ledger_.add_to(before);
   const std::int64_t pushes = ledger_.costs.pushes;
+  // A body that has come to lie may have more touches than the one on which it rocked.
+  for (Pair* pair : island.pairs) {
+    if (pair->b >= 0 || pair->contacts.size() != 1 || !pair->touches()) continue;
+    pair->memory.known = false;
+    touches_.search(*pair, h);
+  }
   projection_.run(step_, kDeep);
   if (rest_.try_island(island, h)) return true;
   if (ledger_.costs.pushes == pushes) return false;

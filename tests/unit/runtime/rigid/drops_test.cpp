@@ -59,5 +59,18 @@ TEST(drops, cup_or_bowl_in_a_bowl_is_not_lifted) {
   }
 }
 
+// A coin that rocks on its rim, 2 mm wide: its one touch goes from edge to edge. At rest it has touches on both edges.
+TEST(drops, coin_that_stands_on_its_rim_sleeps) {
+  const Solid coin = make_drop_body(1, 0).solid;
+  const double tilt = 4e-3, half = 0.5 * (0.5 * std::numbers::pi + tilt);
+  State at;
+  at.rotation = {std::cos(half), std::sin(half), 0, 0};
+  at.centre = {0, 0, 0.012 * std::cos(tilt) + 0.001 * std::sin(tilt) + 1e-6};
+  Space space({coin}, {at}, Ground{0.0, 0.3, 0.5, 30e9, 0.2}, {0, 0, -9.81}, {});
+  while (space.get_time() < 1.5 - 1e-9) space.step(1.5);
+  EXPECT_TRUE(space.is_still(0));
+  EXPECT_NEAR(space.state(0).centre[2], 0.012, 2e-6);
+}
+
 }  // namespace
 }  // namespace carillon::rigid::tests
