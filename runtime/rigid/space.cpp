@@ -11,6 +11,7 @@ namespace carillon::rigid {
 namespace {
 
 constexpr double kShortest = 1e-9;  // s; a shorter rest of a step is left out
+constexpr double kUnseen = 5e-6;    // m; a place of a curved body may be deeper than its touches by this
 constexpr double kStruck = 5e-5;    // s; longest part of a step after the begin of an impact with modes
 constexpr int kMaxMissed = 30;      // in a step: instants at which nothing struck after all
 constexpr int kMaxSought = 3;       // of these, with a search for closings on the path
@@ -96,6 +97,8 @@ void Space::step_island(Island& island, double start_s, double length_s) {
   double done = 0.0;
   int impacts = 0, missed = 0, more = 0;
   bool begun = false;
+  const bool wobbles = std::any_of(island.bodies.begin(), island.bodies.end(),
+                                   [&](int body) { return !bodies_.is_flat(body) && bodies_.calc_speed(body) > kSlow; });
   const int max_impacts = std::clamp(kStruckBodies / step_.count(), kMinImpacts, kMaxImpacts);
   if (instants_.is_crowded(island, start_s)) {
     strike_at_once(start_s, length_s);
@@ -108,7 +111,7 @@ void Space::step_island(Island& island, double start_s, double length_s) {
     modal_impacts_.follow(step_, h, touches_);
     modal_impacts_.end_where_touching(step_, touches_);
     const bool may_sleep = !std::exchange(begun, true) && rest_.may_sleep(island.bodies, h);
-    projection_.run(step_, kTooDeep);
+    projection_.run(step_, wobbles ? kTooDeep - kUnseen : kTooDeep);
     if (may_sleep && try_rest(island, h)) break;
     touches_.forget_closing(step_);
     bool is_completed = false;
