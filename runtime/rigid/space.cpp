@@ -11,6 +11,7 @@ namespace carillon::rigid {
 namespace {
 
 constexpr double kShortest = 1e-9;  // s; a shorter rest of a step is left out
+constexpr double kUnseen = 5e-6;    // m; a place of a curved body may be deeper than its touches by this
 constexpr double kStruck = 5e-5;    // s; longest part of a step after the begin of an impact with modes
 constexpr int kMaxMissed = 30;      // in a step: instants at which nothing struck after all
 constexpr int kMaxSought = 3;       // of these, with a search for closings on the path
@@ -96,6 +97,11 @@ void Space::step_island(Island& island, double start_s, double length_s) {
   double done = 0.0;
   int impacts = 0, missed = 0, more = 0;
   bool begun = false;
+  const bool wobbles = std::any_of(island.bodies.begin(), island.bodies.end(),
+                                   [&](int body) { return !bodies_.is_flat(body) && bodies_.calc_speed(body) > kSlow; });
+  const bool is_on_ground =
+      step_.count() == 1 && std::all_of(island.pairs.begin(), island.pairs.end(), [](const Pair* pair) { return pair->b < 0; });
+  const double open_m = is_on_ground ? kDeep : wobbles ? kTooDeep - kUnseen : kTooDeep;
   const int max_impacts = std::clamp(kStruckBodies / step_.count(), kMinImpacts, kMaxImpacts);
   if (instants_.is_crowded(island, start_s)) {
     strike_at_once(start_s, length_s);
@@ -108,8 +114,8 @@ void Space::step_island(Island& island, double start_s, double length_s) {
     modal_impacts_.follow(step_, h, touches_);
     modal_impacts_.end_where_touching(step_, touches_);
     const bool may_sleep = !std::exchange(begun, true) && rest_.may_sleep(island.bodies, h);
-    projection_.run(step_, may_sleep || step_.count() == 1 ? kDeep : kTooDeep);
-    if (may_sleep && rest_.try_island(island, h)) break;
+    projection_.run(step_, open_m);
+    if (may_sleep && try_rest(island, h)) break;
     touches_.forget_closing(step_);
     bool is_completed = false;
     for (int n = 0; n <= kMaxCompleted; ++n) {
@@ -144,6 +150,39 @@ void Space::step_island(Island& island, double start_s, double length_s) {
       for (Pair* pair : island.pairs) touches_.update(*pair, length_s - done);
   }
   step_.end();
+}
+
+/// Puts an island to sleep if it is balanced, its touches opened if it is so with open ones, too. Nothing moves otherwise: bodies that fall
+/// back would never come to rest.
+bool Space::try_rest(Island& island, double h) {
+  std::vector<State> kept;
+  std::vector<double> stored_j;
+  for (const int body : island.bodies) kept.push_back(bodies_.state(body));
+  for (const Pair* pair : island.pairs) stored_j.push_back(pair->stored_j);
+  Books before, after;
+  ledger_.add_to(before);
+  const std::int64_t pushes = ledger_.costs.pushes;
+  // A body that has come to lie may have more touches than the one on which it rocked.
+  for (Pair* pair : island.pairs) {
+    if (pair->b >= 0 || pair->contacts.size() != 1 || !pair->touches()) continue;
+    pair->memory.known = false;
+    touches_.search(*pair, h);
+  }
+  projection_.run(step_, kDeep);
+  if (rest_.try_island(island, h)) return true;
+  if (ledger_.costs.pushes == pushes) return false;
+  ledger_.add_to(after);
+  ledger_.lose(before.lost_j - after.lost_j);
+  ledger_.lift(before.lifted_j - after.lifted_j);
+  for (int n = 0; const int body : island.bodies) {
+    bodies_.state(body) = kept[n++];
+    bodies_.place(body);
+  }
+  for (int n = 0; Pair * pair : island.pairs) {
+    pair->stored_j = stored_j[n++];
+    if (!pair->contacts.empty()) touches_.refresh(*pair);
+  }
+  return rest_.try_island(island, h);
 }
 
 /// The impacts of a crowded island: all touches closing within a step strike at its beginning. False: none closes, touches unchanged.

@@ -97,6 +97,7 @@ class Space {
  private:
   void open_window(double end_s);
   void step_island(Island& island, double start_s, double length_s);
+  bool try_rest(Island& island, double length_s);
   bool strike_at_once(double start_s, double length_s);
   void move(double to_s, double part_s);
   void strike(const std::vector<ContactRef>& first);

@@ -18,8 +18,8 @@ namespace {
 
 constexpr double kDrilling = 3.0 * std::numbers::pi / 16.0;  // of friction times patch radius: arm of the couple against drilling
 constexpr double kAtRest = 1e-6;                             // m/s
-constexpr double kWobbling = 0.15;                           // of the loss of rolling: that of a wobbling rim, on the same way
-constexpr double kFalls = 10.0;                              // of gravity times the step: uncertainty of the way of a touch
+constexpr double kAtRestTurned = 1e-7;                       // rad in a step
+constexpr double kMaxRolling = 20.0;                         // of the size: way of a touch for an angle of rolling
 constexpr int kTurns = 16;                                   // points that take turns by their pairs
 
 /// From below to above, so that a sweep carries the weight down a pile. Of each kTurns points in that order those that are the first of
@@ -126,18 +126,16 @@ double StepProblem::calc_patch_radius(const Contact& c) const {
   return impact::calc_patch_radius(push, bodies_.calc_contact_radius(c.touch, c.a, c.b), bodies_.calc_compliance(c.a, c.b));
 }
 
-/// The couple against rolling takes its arm times the force on each radian. The touch of a wobbling disc runs around the rim while the disc
-/// hardly turns, and what yields there is lost on the way of the touch (contour friction; R. I. Leine, Arch. Appl. Mech. 79 (2009) 1063).
-/// So the couple grows with that way over the angle. `travel_m_s`: velocity of the place of the touch; falls_m_s: its error.
-double StepProblem::calc_wobbling(const Contact& c, const Vec3& travel_m_s, double falls_m_s) const {
+/// Way of a touch over the more curved surface for an angle of rolling [m]; at rest the radius of the largest curvature.
+double StepProblem::calc_rolling_radius(const Step& step, const Point& p, const Contact& c, const shape::Touch& moved) const {
   const shape::Touch& t = c.touch;
-  const auto get_spin = [&](int body) { return body >= 0 ? bodies_.placed(body).spin : Vec3{}; };
-  const Vec3 spin = get_spin(c.a) - get_spin(c.b);
-  const double curvature = std::max(t.curvature_a_per_m + t.curvature_b_per_m, t.steepest_per_m),
-               turns_m_s = norm(spin - dot(spin, t.normal) * t.normal) / curvature;
-  double way_m_s = norm(travel_m_s - bodies_.calc_velocity(c.a, t.where_m));
-  way_m_s = std::min(way_m_s, norm(travel_m_s - bodies_.calc_velocity(c.b, t.where_m))) - kFalls * falls_m_s;
-  return kWobbling * way_m_s > turns_m_s && turns_m_s > 0.0 ? kWobbling * way_m_s / turns_m_s : 1.0;
+  const double at_rest = 1.0 / std::max(t.curvature_a_per_m + t.curvature_b_per_m, t.steepest_per_m);
+  const Vec3 spin = (p.a >= 0 ? step.free[p.a].placed.spin : Vec3{}) - (p.b >= 0 ? step.free[p.b].placed.spin : Vec3{});
+  const double turned = step.length_s * norm(spin - dot(spin, t.normal) * t.normal);
+  if (turned < kAtRestTurned) return at_rest;
+  const bool is_on_a = t.curvature_a_per_m >= t.curvature_b_per_m;
+  const double way = is_on_a ? norm(moved.station_a - t.station_a) : norm(moved.station_b - t.station_b);
+  return std::clamp(way / turned, at_rest, std::max(at_rest, kMaxRolling * bodies_.calc_size(c.a, c.b)));
 }
 
 /// A touch that lasts, as a row of the step.
@@ -150,7 +148,8 @@ Point StepProblem::make_lasting_point(const Step& step, Pair& pair, const Contac
     const int n = step.find(body);
     return n >= 0 ? step.free[n].placed.frame : bodies_.get_frame(body);
   };
-  const Vec3 later = t.smooth ? touches_.find_moved(pair, t, get_frame(pair.a), get_frame(pair.b)).where_m : Vec3{};
+  const shape::Touch moved = t.smooth ? touches_.find_moved(pair, t, get_frame(pair.a), get_frame(pair.b)) : t;
+  const Vec3& later = moved.where_m;
   // Where the impulse acts: half a step later, the same point for both bodies.
   struct Side {
     Vec3 middle{}, first{}, last{};  // centre half a step later; arms at both ends
@@ -213,8 +212,7 @@ Point StepProblem::make_lasting_point(const Step& step, Pair& pair, const Contac
   p.wanted = (speed + turning) * p.normal - beyond;
   const double curvature = t.curvature_a_per_m + t.curvature_b_per_m;
   if (t.smooth && curvature > 0.0) {
-    p.rolling_m = options_.rolling_resistance / std::max(curvature, t.steepest_per_m);
-    p.rolling_m *= calc_wobbling(c, (1.0 / h) * (later - t.where_m), h * norm(bodies_.gravity()));
+    p.rolling_m = options_.rolling_resistance * calc_rolling_radius(step, p, c, moved);
     p.twisting_m = kDrilling * p.friction * calc_patch_radius(c);
   }
   p.impulse = (c.step_s > 0.0 ? h / c.step_s : 0.0) * c.impulse;

@@ -22,7 +22,7 @@ constexpr double kLoosest = 0.3 * kSlowest;  // and no more than this: standing 
 constexpr int kGuesses = 6;                  // of a factorised problem in a step
 constexpr double kRetry = 4e-3;              // s; an island whose guesses failed goes by sweeps for so long,
 constexpr double kRetrySmall = 1e-3;         // s; a small one for so long
-constexpr int kProofSweeps = 120;            // that look for rest,
+constexpr int kProofSweeps = 600;            // that look for rest,
 constexpr int kMaxProofSweeps = 1200;        // of bodies that were slow for kLong
 
 }  // namespace

@@ -34,7 +34,7 @@ class StepProblem {
  private:
   void predict_articulation(Step& step, int number, bool at_rest);
   void add_loads(Step& step) const;
-  double calc_wobbling(const Contact& contact, const Vec3& travel_m_s, double falls_m_s) const;
+  double calc_rolling_radius(const Step& step, const Point& point, const Contact& contact, const shape::Touch& moved) const;
   Point make_lasting_point(const Step& step, Pair& pair, const Contact& contact) const;
   double calc_patch_radius(const Contact& contact) const;
   static bool gains_energy(const std::vector<Mover>& free, const Step& step);

@@ -103,25 +103,28 @@ void TouchSets::search(Pair& pair, double step_s) {
     contact.touch = touch;
     pair.contacts.push_back(contact);
   }
-  if (pair.b < 0) keep_added(pair, old);
+  if (pair.b < 0 || !bodies_.is_flat(pair.a) || !bodies_.is_flat(pair.b)) keep_added(pair, old);  // those of polyhedra are complete
   remove_false(pair);
   complete(pair, frame_a, bodies_.get_frame(pair.b), 0.0);
 }
 
-/// Keeps added touches with the ground that a search has lost: deeper ones than all found, and sharp closed ones.
+/// Keeps touches that a search has lost: closed ones of two bodies that carried, and of added ones with the ground those deeper than all
+/// found, and sharp closed ones.
 void TouchSets::keep_added(Pair& pair, const std::vector<Contact>& old) const {
   const shape::Frame a = bodies_.get_frame(pair.a), b = bodies_.get_frame(pair.b);
   double least_m = pair.margin_m;
   for (const Contact& c : pair.contacts) least_m = std::min(least_m, c.touch.gap_m);
   const double near_m = kSame * bodies_.calc_size(pair.a, pair.b);
   const auto is_found = [&](const shape::Touch& touch) {
-    return std::any_of(found_.begin(), found_.end(),
-                       [&](const shape::Touch& found) { return found.id == touch.id || norm(found.where_m - touch.where_m) < near_m; });
+    return std::any_of(pair.contacts.begin(), pair.contacts.end(), [&](const Contact& found) {
+      return found.touch.id == touch.id || norm(found.touch.where_m - touch.where_m) < near_m;
+    });
   };
   for (const Contact& c : old) {
+    if (pair.b >= 0 && !c.touching) continue;
     shape::Touch touch = c.touch;
     if (!follow(pair, touch, a, b)) continue;
-    const double most_m = touch.smooth ? least_m - kMissing : std::max(least_m - kMissing, kTouch);
+    const double most_m = pair.b >= 0 ? kDeep : touch.smooth ? least_m - kMissing : std::max(least_m - kMissing, kTouch);
     if (touch.gap_m <= most_m && !is_found(touch)) pair.contacts.emplace_back(c).touch = touch;
   }
 }

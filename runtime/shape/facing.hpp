@@ -49,14 +49,14 @@ class SurfaceProbe {
   /// The same, but behind a thin wall a bound.
   double find_distance(const Vec3& x, double limit_m) const { return thin_ ? find_bound(x) : estimate(x, limit_m); }
   bool is_thin() const { return thin_; }
-  /// Gap over the skin; beyond `limit_m` any larger number.
+  /// Gap over the skin; beyond `limit_m` a bound of it, also after movements shorter than the excess.
   double calc_gap(const Vec3& x, double limit_m) const {
     if (body_ != nullptr) return find_outside(x);
     const double sag = shape_.get_sag_m(), far = std::max(limit_m, 0.0) + sag;
     const Grid::Near near = grid_->find_near(x);
-    if (near.face < 0 || near.min_m > limit_m + sag) return near.min_m;
+    if (near.face < 0) return near.min_m - sag;
     const auto [on, is_inside] = find_side(x, near.face);
-    return !is_inside && on.distance2 > far * far ? std::sqrt(on.distance2) : calc_skin_gap(shape_, x, on, is_inside);
+    return !is_inside && on.distance2 > far * far ? std::sqrt(on.distance2) - sag : calc_skin_gap(shape_, x, on, is_inside);
   }
   Nearest find_nearest(const Vec3& x) const {
     return shape_.mesh().find_nearest(x, Box::kFar, body_ != nullptr ? -1 : grid_->find_near(x).face);

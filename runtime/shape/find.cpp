@@ -32,6 +32,12 @@ double update_near(const Shape& a, const Frame& fa, const Shape& b, const Frame&
   std::vector<Touch> none;
   Pass(a, fa, b, fb, 0.0, none).list(near.reach_m, near.samples[0]);
   Pass(b, fb, a, fa, 0.0, none).list(near.reach_m, near.samples[1]);
+  near.last = relative;
+  near.gone_m = 0.0;
+  for (std::size_t k : {0, 1}) {
+    near.least_m[k].clear();
+    for (const auto& [sample, distance] : near.samples[k]) near.least_m[k].push_back(distance - (k == 0 ? b : a).get_sag_m());
+  }
   return 0.0;
 }
 
@@ -67,10 +73,13 @@ Deepest find_deepest(const Shape& a, const Frame& fa, const Shape& b, const Fram
   if (norm2(to_world(fa, a.get_middle_m()) - to_world(fb, b.get_middle_m())) > far * far || (a.is_polyhedron() && b.is_polyhedron()))
     return found;
   std::vector<Touch> none;
-  const double way = update_near(a, fa, b, fb, std::max(a.get_sag_m(), b.get_sag_m()), memory.near);
-  const auto& [of_a, of_b] = memory.near.samples;
-  found.place = Pass(a, fa, b, fb, 0.0, none).find_deepest(found.gap_m, of_a, way);
-  if (const int place = Pass(b, fb, a, fa, 0.0, none).find_deepest(found.gap_m, of_b, way); place >= 0)
+  NearSamples& near = memory.near;
+  update_near(a, fa, b, fb, std::max(a.get_sag_m(), b.get_sag_m()), near);
+  const Frame relative = calc_relative(fa, fb);
+  near.gone_m += calc_way(near.last, relative, a);
+  near.last = relative;
+  found.place = Pass(a, fa, b, fb, 0.0, none).find_deepest(found.gap_m, near.samples[0], near.gone_m, near.least_m[0]);
+  if (const int place = Pass(b, fb, a, fa, 0.0, none).find_deepest(found.gap_m, near.samples[1], near.gone_m, near.least_m[1]); place >= 0)
     found.place = place, found.is_of_a = false;
   return found;
 }

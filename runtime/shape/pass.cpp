@@ -83,11 +83,14 @@ void Pass::run(Distances& distances, const std::vector<std::pair<int, double>>& 
   }
 }
 
-int Pass::find_deepest(double& gap_m, const std::vector<std::pair<int, double>>& near, double way_m) const {
+int Pass::find_deepest(double& gap_m, const std::vector<std::pair<int, double>>& near, double gone_m, std::vector<double>& least_m) const {
   int deepest = -1;
-  for (const auto& [i, before] : near)
-    if (before - way_m - sag_ < gap_m)
-      if (const double d = surface_.calc_gap(to_theirs(mine_.samples().samples[i].point), gap_m); d < gap_m) gap_m = d, deepest = i;
+  for (std::size_t n = 0; n < near.size(); ++n) {
+    if (least_m[n] - gone_m >= gap_m) continue;
+    const double d = surface_.calc_gap(to_theirs(mine_.samples().samples[near[n].first].point), gap_m);
+    least_m[n] = d + gone_m;
+    if (d < gap_m) gap_m = d, deepest = near[n].first;
+  }
   return deepest;
 }
 

@@ -1,5 +1,5 @@
 // Method: patches by single linkage; of each patch the deepest point, the one furthest from it, the one furthest from their line, and the
-//   one that adds most area on the other side. Names by nearness of the stations.
+//   one that adds most area on the other side; then those below the planes of these. Names by nearness of the stations.
 // Source: textbook.
 #include "runtime/shape/reduce.hpp"
 
@@ -8,8 +8,12 @@
 namespace carillon::shape {
 namespace {
 
-constexpr double kNormal = 0.966;  // cosine of 15 degrees
-constexpr double kLevel = 1e-5;    // slope
+constexpr double kNormal = 0.966;        // cosine of 15 degrees
+constexpr double kLevel = 1e-5;          // slope
+constexpr double kLower = 1e-6;          // m; a touch lower than the plane of others about it by this is kept,
+constexpr double kOutside = 0.05;        // of the sides: and of one next to these others,
+constexpr std::size_t kMostInPatch = 8;  // up to so many
+constexpr double kFlatTriangle = 1e-6;   // area over the square of a side: no plane
 constexpr std::uint64_t kTravels = 1ULL << 63;
 
 /// Of the touches [first, last) of one patch those to keep, as indices.
@@ -57,6 +61,40 @@ void keep_four(const std::vector<Touch>& t, const std::vector<int>& patch, std::
   if (gain(fourth) > 1e-6 * scale && fourth != first && fourth != second && fourth != third) kept.push_back(fourth);
 }
 
+/// How much lower a touch is than the kept ones about it, in whatever way the patch tilts [m]; negative: higher, or none is about it.
+double find_excess(const std::vector<Touch>& t, int i, const std::vector<int>& kept) {
+  const Vec3 &x = t[i].where_m, &n = t[kept[0]].normal;
+  double lowest = -Box::kFar;
+  for (std::size_t a = 0; a < kept.size(); ++a)
+    for (std::size_t b = 0; b < a; ++b)
+      for (std::size_t c = 0; c < b; ++c) {
+        const Touch &p = t[kept[a]], &q = t[kept[b]], &r = t[kept[c]];
+        const double parts[3] = {dot(n, cross(q.where_m - x, r.where_m - x)), dot(n, cross(r.where_m - x, p.where_m - x)),
+                                 dot(n, cross(p.where_m - x, q.where_m - x))};
+        const double area = parts[0] + parts[1] + parts[2];
+        if (std::abs(area) < kFlatTriangle * norm2(q.where_m - p.where_m)) continue;
+        const double u = parts[0] / area, v = parts[1] / area, w = parts[2] / area;
+        if (std::min({u, v, w}) < -kOutside) continue;
+        const double gap = u * p.gap_m + v * q.gap_m + w * r.gap_m;
+        lowest = lowest == -Box::kFar ? gap : std::min(lowest, gap);
+      }
+  return lowest - t[i].gap_m;
+}
+
+/// Adds the touches of a patch that may carry before those kept: one below the plane of three others about it stays below however the
+/// bodies tilt.
+void keep_low(const std::vector<Touch>& t, const std::vector<int>& patch, std::vector<int>& kept) {
+  while (kept.size() < kMostInPatch) {
+    double most = kLower;
+    int lowest = -1;
+    for (const int i : patch)
+      if (std::find(kept.begin(), kept.end(), i) == kept.end())
+        if (const double excess = find_excess(t, i, kept); excess > most) most = excess, lowest = i;
+    if (lowest < 0) return;
+    kept.push_back(lowest);
+  }
+}
+
 }  // namespace
 
 void reduce(std::vector<Touch>& touches, double patch_m) {
@@ -76,13 +114,16 @@ void reduce(std::vector<Touch>& touches, double patch_m) {
       group[std::max(p, q)] = std::min(p, q);
     }
   }
-  std::vector<int> patch, kept;
+  std::vector<int> patch, kept, of_patch;
   for (int r = 0; r < count; ++r) {
     if (root(r) != r) continue;
     patch.clear();
     for (int i = r; i < count; ++i)
       if (root(i) == r) patch.push_back(i);
-    keep_four(touches, patch, kept);
+    of_patch.clear();
+    keep_four(touches, patch, of_patch);
+    keep_low(touches, patch, of_patch);
+    kept.insert(kept.end(), of_patch.begin(), of_patch.end());
   }
   std::sort(kept.begin(), kept.end());
   std::vector<Touch> few;

@@ -39,6 +39,9 @@ struct NearSamples {
   Frame pose;                                                  // a in b, at that time
   double reach_m = 0.0, wanted_m = 0.0;                        // wanted by the last search
   std::array<std::vector<std::pair<int, double>>, 2> samples;  // of a, of b
+  Frame last;                                                  // pose at the last search for the deepest,
+  double gone_m = 0.0;                                         // and movement until then, to and fro
+  std::array<std::vector<double>, 2> least_m;                  // bounds of the samples' gaps, and the movement at which they were found
 };
 
 /// The caller's, one per pair: what makes the next search cheap and gives touches their names. Of no meaning to the caller.
@@ -56,7 +59,7 @@ class PairMemory {
   NearSamples near;
 };
 
-/// Replaces `out` by the touches not further apart than the margin: at most 4 for each patch of contact.
+/// Replaces `out` by the touches not further apart than the margin: at most 8 for each patch of contact.
 void find_touches(const Shape& a, const Frame& frame_a, const Shape& b, const Frame& frame_b, double margin_m, PairMemory& memory,
                   std::vector<Touch>& out);
 /// The ground is the half space z <= height_m. `with_all`: of a polyhedron all corners of facets that face the

@@ -224,6 +224,18 @@ TEST(ground, tilted_coin_rolls_on_a_round_rim) {
   EXPECT_NEAR(low, 0.0, 2e-6 * r);
 }
 
+TEST(ground, feet_between_corners_that_hang_lower_than_the_margin_are_kept) {
+  // A plate on a pentagonal foot, its own corners 0.15 mm above the ground: all ten are nearer than the margin.
+  const auto plate = make_lathe({{0, 0}, {0.02, 0}, {0.024, 1e-4}, {0.1, 1.5e-4}, {0.1, 0.02}, {0, 0.02}}, 5, false).make();
+  for (const double tilt : {0.0, 1e-4, 5e-4}) {
+    Frame frame;
+    frame.rotation = make_turn({1, 0.3, 0}, tilt);
+    int low = 0;
+    for (const Touch& t : find_touches(*plate, frame, 2e-4)) low += std::hypot(t.where_m[0], t.where_m[1]) < 0.021 ? 1 : 0;
+    EXPECT_GE(low, 3) << tilt;
+  }
+}
+
 TEST(ground, leaning_cone_stands_on_its_tip) {
   // However round its mantle is; further than its own angle, 16.7 degrees from the ground, its rim is lower.
   for (const int around : {12, 64}) {
