@@ -179,7 +179,7 @@ bool TouchSets::complete(Pair& pair, const shape::Frame& a, const shape::Frame& 
   shape::Deepest deepest;
   if (theirs == nullptr) {
     if (calc_least_gap(pair, mine, a) >= -kMissing) return false;
-    deepest = shape::find_lowest(mine, a, bodies_.ground()->height_m, pair.memory);
+    deepest = shape::find_lowest(mine, a, bodies_.ground()->height_m);
     pair.measured = a;
     pair.lowest_m = deepest.gap_m;
     if (deepest.gap_m - mine.get_sag_m() >= -kMissing) return false;  // nor is any touch deeper
