@@ -139,8 +139,7 @@ void TouchSets::remove_false(Pair& pair) const {
 
 void TouchSets::update(Pair& pair, double step_s) {
   if (pair.cord >= 0) return refresh(pair);
-  const double way = (bodies_.calc_closing_speed(pair.a, pair.b) + norm(bodies_.gravity()) * step_s) * step_s;
-  if (!pair.searched || pair.travelled_m + way > pair.margin_m)
+  if (!pair.searched || pair.travelled_m + calc_way(pair, step_s, step_s) > pair.margin_m)
     search(pair, step_s);
   else if (!pair.contacts.empty() && (pair.travelled_m > 0.0))
     refresh(pair);
@@ -267,8 +266,15 @@ shape::Touch TouchSets::find_closing(Pair& pair, const Contact& contact, double 
   return touch;
 }
 
+/// Upper bound of the approach of any two points in `time_s` of a step; over the ground vertical motion alone counts.
+double TouchSets::calc_way(const Pair& pair, double time_s, double step_s) const {
+  const bool is_over_ground = pair.b < 0 && bodies_.moves(pair.a);
+  const double speed = is_over_ground ? bodies_.calc_sinking_speed(pair.a) : bodies_.calc_closing_speed(pair.a, pair.b);
+  return (speed + norm(bodies_.gravity()) * step_s) * time_s;
+}
+
 void TouchSets::travel(Pair& pair, double time_s, double step_s) const {
-  pair.travelled_m += (bodies_.calc_closing_speed(pair.a, pair.b) + norm(bodies_.gravity()) * step_s) * time_s + 1e-12;
+  pair.travelled_m += calc_way(pair, time_s, step_s) + 1e-12;
   if (pair.sag_m > 0.0) pair.sag_m *= std::exp(-time_s / kSagDecay);
   if (pair.sag_m < kDeep) lose_stored(pair);
 }

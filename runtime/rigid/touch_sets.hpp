@@ -62,6 +62,7 @@ class TouchSets {
  private:
   void keep_added(Pair& pair, const std::vector<Contact>& old) const;
   bool follow(const Pair& pair, shape::Touch& touch, const shape::Frame& a, const shape::Frame& b) const;
+  double calc_way(const Pair& pair, double time_s, double step_s) const;
   void lose_stored(Pair& pair) const;
   std::pair<Contact*, double> find_least(Pair& pair, const shape::Frame& a, const shape::Frame& b) const;
   bool complete(Pair& pair, const shape::Frame& a, const shape::Frame& b, double closing_s);
