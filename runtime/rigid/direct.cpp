@@ -236,7 +236,10 @@ void Guess::add(double normal_mass, double turning_mass, bool is_swept) {
   const Vec3 across = p.impulse - push * p.normal;
   const bool slides = is_swept && push > 0.0 && norm(across) >= kAtCone * p.friction * push;
   if (slides) held.sliding = across;
-  held.hold = slides ? Hold::kSlides : push > 0.0 || p.impulse == Vec3{} ? Hold::kSticks : Hold::kOpen;
+  // A new touch that is open stays open, unless it would close without impulses.
+  const double wanted = dot(p.wanted, p.normal);
+  const bool is_open = wanted < 0.0 && wanted <= dot(calc_relative_velocity(free_, p), p.normal);
+  held.hold = slides ? Hold::kSlides : push > 0.0 || (p.impulse == Vec3{} && !is_open) ? Hold::kSticks : Hold::kOpen;
   if (turning_mass > 0.0 && push > 0.0) {  // as in the step before, by the present bounds
     const double twist = dot(p.couple, p.normal), most = p.twisting_m * push;
     const Vec3 roll = p.couple - twist * p.normal;
@@ -358,7 +361,8 @@ bool Guess::correct(const std::vector<Mover>& movers, bool may_stick) {
     const Point& p = points_[i++];
     const double push = dot(held.impulse, p.normal);
     const Hold now = correct_hold(movers, p, held, may_stick, confirmed);
-    if (held.turning_mass > 0.0 && !correct_couple(movers, p, held, std::max(push, 0.0), may_stick)) confirmed = false;
+    const bool carries = held.hold != Hold::kOpen || now != Hold::kOpen;
+    if (carries && held.turning_mass > 0.0 && !correct_couple(movers, p, held, std::max(push, 0.0), may_stick)) confirmed = false;
     if (now != held.hold) confirmed = is_factorised_ = false;
     held.hold = now;
   }
