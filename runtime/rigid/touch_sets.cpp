@@ -16,10 +16,13 @@ namespace carillon::rigid {
 namespace {
 
 constexpr double kSteps = 4.0;           // of movement in the margin of a search,
-constexpr double kStepsOfRolling = 8.0;  // the same of curved bodies on the ground: few places come near
+constexpr double kStepsOfRolling = 8.0;  // the same of curved bodies on the ground: few places come near,
+constexpr double kAhead = 4e-3;          // s; for no longer than this
 constexpr double kMissing = 5e-6;        // m; excess of a missing place over all touches
 constexpr double kSearchAgain = 2e-3;    // s; between searches for missing touches of a pair
 constexpr double kSame = 0.02;           // of the size: distance of touches counted as one
+constexpr double kOnePlace = 1e-4;       // of the size: touches nearer than this have come to one place
+constexpr double kJump = 0.2;            // rad; turn of the normal in the body by which a touch has jumped
 constexpr double kSagDecay = 10e-3;      // s
 constexpr int kMaxAdded = 4;             // missing touches at the end of a flight
 
@@ -62,8 +65,8 @@ void TouchSets::search(Pair& pair, double step_s) {
   if (pair.cord >= 0) return refresh(pair);
   ++ledger_.costs.searches;
   const double speed = bodies_.calc_closing_speed(pair.a, pair.b) + norm(bodies_.gravity()) * step_s;
-  const double steps = pair.b < 0 && !bodies_.is_flat(pair.a) ? kStepsOfRolling : kSteps;
-  pair.margin_m = std::min(std::max(2e-4, steps * step_s * speed), kReach * bodies_.calc_size(pair.a, pair.b));
+  const double ahead_s = pair.b < 0 && !bodies_.is_flat(pair.a) ? std::min(kStepsOfRolling * step_s, kAhead) : kSteps * step_s;
+  pair.margin_m = std::min(std::max(2e-4, ahead_s * speed), kReach * bodies_.calc_size(pair.a, pair.b));
   const double margin_m = pair.margin_m + bodies_.get_swing(pair.a) + bodies_.get_swing(pair.b);
   pair.travelled_m = 0.0;
   pair.searched = true;
@@ -81,6 +84,7 @@ void TouchSets::search(Pair& pair, double step_s) {
     Contact contact;
     if (same != old.end()) {
       contact = *same;
+      if (is_jump(pair, same->touch, touch)) contact.touching = false;  // another place has its name, and may strike
     } else {
       contact.a = pair.a;
       contact.b = pair.b;
@@ -89,27 +93,53 @@ void TouchSets::search(Pair& pair, double step_s) {
     contact.touch = touch;
     pair.contacts.push_back(contact);
   }
-  if (pair.b < 0) keep_added(pair, old);
+  if (pair.b < 0) keep_lost(pair, old);
   remove_false(pair);
   complete(pair, frame_a, bodies_.get_frame(pair.b), 0.0);
 }
 
-/// Keeps added touches with the ground that a search has lost: deeper ones than all found, and sharp closed ones.
-void TouchSets::keep_added(Pair& pair, const std::vector<Contact>& old) const {
+/// Keeps touches with the ground that a search has lost: deeper ones than all found, those that carry, and sharp closed ones.
+void TouchSets::keep_lost(Pair& pair, const std::vector<Contact>& old) const {
   const shape::Frame a = bodies_.get_frame(pair.a), b = bodies_.get_frame(pair.b);
   double least_m = pair.margin_m;
   for (const Contact& c : pair.contacts) least_m = std::min(least_m, c.touch.gap_m);
   const double near_m = kSame * bodies_.calc_size(pair.a, pair.b);
-  const auto is_found = [&](const shape::Touch& touch) {
-    return std::any_of(found_.begin(), found_.end(),
-                       [&](const shape::Touch& found) { return found.id == touch.id || norm(found.where_m - touch.where_m) < near_m; });
-  };
   for (const Contact& c : old) {
     shape::Touch touch = c.touch;
     if (!follow(pair, touch, a, b)) continue;
-    const double most_m = touch.smooth ? least_m - kMissing : std::max(least_m - kMissing, kTouch);
-    if (touch.gap_m <= most_m && !is_found(touch)) pair.contacts.emplace_back(c).touch = touch;
+    const bool is_found = std::any_of(pair.contacts.begin(), pair.contacts.end(), [&](const Contact& found) {
+      return found.touch.id == touch.id || norm(found.touch.where_m - touch.where_m) < near_m;
+    });
+    const bool carries = c.touching && dot(c.impulse, c.touch.normal) > 0.0;
+    const double most_m = touch.smooth && !carries ? least_m - kMissing : std::max(least_m - kMissing, kTouch);
+    if (touch.gap_m <= most_m && !is_found) pair.contacts.emplace_back(c).touch = touch;
   }
+}
+
+/// Touches of curved surfaces that have come to one place become one.
+void TouchSets::merge(Pair& pair) const {
+  const double near_m = kOnePlace * bodies_.calc_size(pair.a, pair.b);
+  for (auto c = pair.contacts.begin(); c != pair.contacts.end();) {
+    const auto same = std::find_if(pair.contacts.begin(), c, [&](const Contact& other) {
+      return c->touch.smooth && other.touch.smooth && !c->presses && !other.presses &&
+             norm(c->touch.where_m - other.touch.where_m) < near_m;
+    });
+    if (same == c) {
+      ++c;
+      continue;
+    }
+    same->impulse = same->impulse + c->impulse;
+    same->couple = same->couple + c->couple;
+    same->touching = same->touching || c->touching;
+    c = pair.contacts.erase(c);
+    pair.ahead.touches.clear();
+  }
+}
+
+/// Has a touch gone to another part of its surface?
+bool TouchSets::is_jump(const Pair& pair, const shape::Touch& from, const shape::Touch& to) const {
+  const double way_m = norm(to.station_a - from.station_a);
+  return way_m > kSame * bodies_.calc_size(pair.a, pair.b) && way_m * from.steepest_per_m > kJump;
 }
 
 void TouchSets::refresh(Pair& pair) const {
@@ -117,9 +147,16 @@ void TouchSets::refresh(Pair& pair) const {
   const shape::Frame a = bodies_.get_frame(pair.a), b = bodies_.get_frame(pair.b);
   const bool is_there = !pair.ahead.touches.empty() && pair.ahead.a == a && pair.ahead.b == b;
   std::erase_if(pair.contacts, [&, k = std::size_t{0}](Contact& c) mutable {
+    const shape::Touch before = c.touch;
     const bool follows = is_there || follow(pair, c.touch, a, b);
     if (is_there) c.touch = pair.ahead.touches[k++];
     pair.searched = pair.searched && follows;
+    if (c.touching && c.touch.smooth) {
+      const double way_m = norm(c.touch.station_a - before.station_a);
+      pair.errors.drift_m = std::max(pair.errors.drift_m, std::abs(c.touch.gap_m - before.gap_m));
+      pair.errors.way_m = std::max(pair.errors.way_m, way_m);
+      pair.errors.turn = std::max(pair.errors.turn, way_m * c.touch.steepest_per_m);
+    }
     return !follows;
   });
   pair.ahead.touches.clear();
@@ -141,8 +178,10 @@ void TouchSets::update(Pair& pair, double step_s) {
   if (pair.cord >= 0) return refresh(pair);
   if (!pair.searched || pair.travelled_m + calc_way(pair, step_s, step_s) > pair.margin_m)
     search(pair, step_s);
-  else if (!pair.contacts.empty() && (pair.travelled_m > 0.0))
+  else if (!pair.contacts.empty() && (pair.travelled_m > 0.0)) {
     refresh(pair);
+    merge(pair);
+  }
   if (pair.travelled_m > 0.0) {
     remove_false(pair);
     complete(pair, bodies_.get_frame(pair.a), bodies_.get_frame(pair.b), 0.0);

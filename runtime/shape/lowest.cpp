@@ -92,14 +92,31 @@ void LowVertices::fill(const Shape& shape, const Cell& cell, std::vector<int>& l
       });
 }
 
-std::pair<int, double> LowVertices::find(const Shape& shape, const Vec3& up) {
+const std::vector<int>& LowVertices::list(const Shape& shape, const Vec3& up) {
   const Cell cell = find_cell(up);
   std::vector<int>& low = low_[((2 * cell.axis + cell.sign) * kSide + cell.rows[0]) * kSide + cell.rows[1]];
   if (low.empty()) fill(shape, cell, low);
+  return low;
+}
+
+std::pair<int, double> LowVertices::find(const Shape& shape, const Vec3& up) {
   std::pair<int, double> lowest{-1, std::numeric_limits<double>::infinity()};
-  for (const int vertex : low)
+  for (const int vertex : list(shape, up))
     if (const double h = dot(up, shape.mesh().vertices[vertex]); h < lowest.second) lowest = {vertex, h};
   return lowest;
+}
+
+bool may_tip(const Shape& a, const Frame& frame, const Vec3& normal, const Vec3& spin, std::span<const Vec3> touches, double far_m,
+             double time_s) {
+  const Vec3 up = turn_back(frame.rotation, normal), lever = turn_back(frame.rotation, cross(normal, spin));
+  const Vec3 &first = touches.front(), along = touches.back() - first;
+  for (const int vertex : a.low_vertices().list(a, up)) {
+    const Vec3 from = a.mesh().vertices[vertex] - first;
+    if (dot(up, from) + time_s * dot(lever, from) > 0.0) continue;
+    const double part = norm2(along) > 0.0 ? std::clamp(dot(from, along) / norm2(along), 0.0, 1.0) : 0.0;
+    if (norm2(from - part * along) > far_m * far_m) return true;
+  }
+  return false;
 }
 
 double calc_vertex_curvature(const Shape& shape, int vertex) {

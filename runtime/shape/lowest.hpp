@@ -17,6 +17,8 @@ class LowVertices {
  public:
   /// The vertex that is lowest along `up` (mesh frame), and its height. Always of the same shape.
   std::pair<int, double> find(const Shape& shape, const Vec3& up);
+  /// All vertices that may be lowest along a direction near `up`.
+  const std::vector<int>& list(const Shape& shape, const Vec3& up);
 
  private:
   static constexpr int kSide = 16;  // cells along an edge of the cube

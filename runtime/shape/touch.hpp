@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -69,6 +70,10 @@ struct Deepest {
   bool is_of_a = true;
 };
 Deepest find_lowest(const Shape& a, const Frame& frame, double height_m);
+/// May a place of the body come down to a plane within a time of the present spin, farther than `far_m` from its touches (mesh frame) and
+/// from the line between the first and the last? `normal`: of the plane.
+bool may_tip(const Shape& a, const Frame& frame, const Vec3& normal, const Vec3& spin, std::span<const Vec3> touches, double far_m,
+             double time_s);
 /// None (-1) between two polyhedra, whose touches are complete, and where no sample is deeper than `gap_m`.
 Deepest find_deepest(const Shape& a, const Frame& frame_a, const Shape& b, const Frame& frame_b, double gap_m, PairMemory& memory);
 /// The touch of such a vertex, at these or other frames.
