@@ -104,13 +104,19 @@ void TouchSets::keep_lost(Pair& pair, const std::vector<Contact>& old) const {
   double least_m = pair.margin_m;
   for (const Contact& c : pair.contacts) least_m = std::min(least_m, c.touch.gap_m);
   const double near_m = kSame * bodies_.calc_size(pair.a, pair.b);
+  const auto is_between = [&](const shape::Touch& touch) {  // two closed ones, which carry without it
+    for (const shape::Touch& f : found_)
+      for (const shape::Touch& g : found_)
+        if (std::max(f.gap_m, g.gap_m) <= kTouch && dot(f.where_m - touch.where_m, g.where_m - touch.where_m) < 0.0) return true;
+    return false;
+  };
   for (const Contact& c : old) {
     shape::Touch touch = c.touch;
     if (!follow(pair, touch, a, b)) continue;
     const bool is_found = std::any_of(pair.contacts.begin(), pair.contacts.end(), [&](const Contact& found) {
       return found.touch.id == touch.id || norm(found.touch.where_m - touch.where_m) < near_m;
     });
-    const bool carries = c.touching && dot(c.impulse, c.touch.normal) > 0.0;
+    const bool carries = c.touching && dot(c.impulse, c.touch.normal) > 0.0 && !is_between(touch);
     const double most_m = touch.smooth && !carries ? least_m - kMissing : std::max(least_m - kMissing, kTouch);
     if (touch.gap_m <= most_m && !is_found) pair.contacts.emplace_back(c).touch = touch;
   }
