@@ -25,6 +25,7 @@ constexpr int kTurns = 16;                                   // points that take
 /// their pairs come first, then the second ones, and so on: sweeps over such an order need a tenth fewer.
 void sort_points(Step& step, const Vec3& gravity) {
   const int count = static_cast<int>(step.points.size());
+  if (count < 2) return;
   std::vector<double> heights;
   heights.reserve(count);
   for (const ContactRef& row : step.rows) heights.push_back(-dot(row.get().touch.where_m, gravity));
