@@ -63,6 +63,14 @@ double Bodies::calc_turning_speed(int body) const {
   return std::min(norm(spin) * solid.radius_m, solid.shape->calc_turning_speed(solid.centre_m, turn_back(placed_[body].rotation, spin)));
 }
 
+double Bodies::calc_sinking_speed(int body) const {
+  const Solid& solid = solids_[body];
+  const Vec3& spin = placed_[body].spin;
+  const Vec3 lever{-spin[1], spin[0], 0.0};  // a point at r from the centre rises by lever . r
+  return std::abs(states_[body].velocity[2]) +
+         std::min(norm(lever) * solid.radius_m, solid.shape->calc_reach_m(solid.centre_m, turn_back(placed_[body].rotation, lever)));
+}
+
 double Bodies::calc_closing_speed(int a, int b) const {
   Vec3 v{};
   double turning = 0.0;

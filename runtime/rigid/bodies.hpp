@@ -86,6 +86,8 @@ class Bodies {
   double calc_approach(const shape::Touch& touch, int a, int b) const;
   /// Upper bound of the speed of any point of a body about its centre [m/s].
   double calc_turning_speed(int body) const;
+  /// Upper bound of the vertical speed of any point of a body [m/s].
+  double calc_sinking_speed(int body) const;
   /// Upper bound of the closing speed of any two points of a pair [m/s].
   double calc_closing_speed(int a, int b) const;
   /// Upper bound of the speed of any point of a body [m/s].

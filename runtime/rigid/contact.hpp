@@ -54,6 +54,10 @@ struct Pair {
   };
   Ahead ahead;                               // at predicted frames
   double margin_m = 0.0, travelled_m = 0.0;  // since the last search
+  struct Errors {
+    double drift_m = 0.0, way_m = 0.0, turn = 0.0;
+  };
+  Errors errors;  // of its lasting touches, see TouchSets::refresh()
   bool searched = false;
   double next_search_s = 0.0;  // earliest next search for missing touches
   shape::Frame measured{};     // of a, at the last search for its lowest vertex over the ground,

@@ -9,6 +9,7 @@
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 #include "runtime/rigid/solver.hpp"
 
@@ -19,7 +20,8 @@ using Block = Eigen::Matrix<double, 6, 6>;
 using Row6 = Eigen::Matrix<double, 6, 1>;
 
 constexpr double kCompliance = 1e-3;  // of the mobility of a row: of one body,
-constexpr double kLeast = 1e-5;       // and at least
+constexpr double kLeast = 1e-5;       // and at least;
+constexpr double kOnePoint = 1e-6;    // of one point, whose rows cannot contradict each other
 constexpr double kAtCone = 0.9999;    // of the bound on friction: slides
 constexpr int kIterations = 12;       // of one guess,
 constexpr double kExact = 1e-10;      // of the wanted velocities: final residual,
@@ -37,7 +39,8 @@ Row6 make_row(const Vec3& linear, const Vec3& angular) {
 
 /// Compliance of a row over its mobility. Soft enough for rows in contradiction by 1e-9 m/s (two touches of a rolling body), whose impulses
 /// must stay in the cone; stiff enough for convergence of chains and of unequal masses.
-double choose_compliance(const std::vector<Mover>& movers) {
+double choose_compliance(const std::vector<Mover>& movers, std::size_t points) {
+  if (points == 1) return kOnePoint;
   const auto [least, most] =
       std::minmax_element(movers.begin(), movers.end(), [](const Mover& x, const Mover& y) { return x.inverse_mass < y.inverse_mass; });
   const auto count = static_cast<double>(movers.size());
@@ -121,29 +124,40 @@ class System {
                  Eigen::OuterStride<>(6 * static_cast<Eigen::Index>(rows.size())));
   }
 
-  /// L D L^T in place, by columns; for few bodies several times as fast as a general library.
+  /// Calls with the size of the matrix, a constant where bodies are few: several times as fast as a general library.
+  template <typename Do>
+  decltype(auto) with_size(Do&& act) const {
+    if (bodies_ == 1) return act(std::integral_constant<int, 6>{});
+    if (bodies_ == 2) return act(std::integral_constant<int, 12>{});
+    return act(6 * bodies_);
+  }
+
+  /// L D L^T in place, by columns.
   bool factorise_dense() {
-    const int size = 6 * bodies_;
-    for (int k = 0; k < size; ++k) {
-      double* from = &full_[k * size];
-      if (!(from[k] > 0.0)) return false;
-      for (int j = k + 1; j < size; ++j) {
-        const double factor = from[j] / from[k];
-        double* to = &full_[j * size];
-        for (int i = j; i < size; ++i) to[i] -= factor * from[i];
+    return with_size([&](auto size) {
+      for (int k = 0; k < size; ++k) {
+        double* from = &full_[k * size];
+        if (!(from[k] > 0.0)) return false;
+        const double part = 1.0 / from[k];
+        for (int j = k + 1; j < size; ++j) {
+          const double factor = from[j] * part;
+          double* to = &full_[j * size];
+          for (int i = j; i < size; ++i) to[i] -= factor * from[i];
+        }
+        for (int i = k + 1; i < size; ++i) from[i] *= part;
       }
-      for (int i = k + 1; i < size; ++i) from[i] /= from[k];
-    }
-    return true;
+      return true;
+    });
   }
   void solve_dense(double* x) const {
-    const int size = 6 * bodies_;
-    for (int k = 0; k < size; ++k)
-      for (int i = k + 1; i < size; ++i) x[i] -= full_[k * size + i] * x[k];
-    for (int k = size - 1; k >= 0; --k) {
-      x[k] /= full_[k * size + k];
-      for (int i = k + 1; i < size; ++i) x[k] -= full_[k * size + i] * x[i];
-    }
+    with_size([&](auto size) {
+      for (int k = 0; k < size; ++k)
+        for (int i = k + 1; i < size; ++i) x[i] -= full_[k * size + i] * x[k];
+      for (int k = size - 1; k >= 0; --k) {
+        x[k] /= full_[k * size + k];
+        for (int i = k + 1; i < size; ++i) x[k] -= full_[k * size + i] * x[i];
+      }
+    });
   }
 
   int bodies_;
@@ -159,7 +173,7 @@ class Guess {
   Guess(const std::vector<Mover>& free, const std::vector<Point>& points)
       : free_(free),
         points_(points),
-        compliance_(choose_compliance(free)),
+        compliance_(choose_compliance(free, points.size())),
         system_(static_cast<int>(free.size()), points),
         right_(6 * static_cast<int>(free.size())),
         left_(points.size()),
@@ -222,7 +236,10 @@ void Guess::add(double normal_mass, double turning_mass, bool is_swept) {
   const Vec3 across = p.impulse - push * p.normal;
   const bool slides = is_swept && push > 0.0 && norm(across) >= kAtCone * p.friction * push;
   if (slides) held.sliding = across;
-  held.hold = slides ? Hold::kSlides : push > 0.0 || p.impulse == Vec3{} ? Hold::kSticks : Hold::kOpen;
+  // A new touch that is open stays open, unless it would close without impulses.
+  const double wanted = dot(p.wanted, p.normal);
+  const bool is_open = wanted < 0.0 && wanted <= dot(calc_relative_velocity(free_, p), p.normal);
+  held.hold = slides ? Hold::kSlides : push > 0.0 || (p.impulse == Vec3{} && !is_open) ? Hold::kSticks : Hold::kOpen;
   if (turning_mass > 0.0 && push > 0.0) {  // as in the step before, by the present bounds
     const double twist = dot(p.couple, p.normal), most = p.twisting_m * push;
     const Vec3 roll = p.couple - twist * p.normal;
@@ -344,7 +361,8 @@ bool Guess::correct(const std::vector<Mover>& movers, bool may_stick) {
     const Point& p = points_[i++];
     const double push = dot(held.impulse, p.normal);
     const Hold now = correct_hold(movers, p, held, may_stick, confirmed);
-    if (held.turning_mass > 0.0 && !correct_couple(movers, p, held, std::max(push, 0.0), may_stick)) confirmed = false;
+    const bool carries = held.hold != Hold::kOpen || now != Hold::kOpen;
+    if (carries && held.turning_mass > 0.0 && !correct_couple(movers, p, held, std::max(push, 0.0), may_stick)) confirmed = false;
     if (now != held.hold) confirmed = is_factorised_ = false;
     held.hold = now;
   }
@@ -424,14 +442,26 @@ void Guess::read(std::vector<Mover>& movers, std::vector<Point>& points) const {
   }
 }
 
+/// Impulse per velocity along the normal [kg].
+double calc_normal_mass(const std::vector<Mover>& movers, const Point& p) {
+  double mobility = 0.0;
+  const auto add = [&](int body, const Vec3& arm) {
+    if (body < 0) return;
+    const Vec3 couple = cross(arm, p.normal);
+    mobility += movers[body].inverse_mass + dot(couple, movers[body].inverse_inertia * couple);
+  };
+  add(p.a, p.arm_a);
+  add(p.b, p.arm_b);
+  return 1.0 / mobility;
+}
+
 }  // namespace
 
 bool Solver::solve_directly(std::vector<Mover>& movers, std::vector<Point>& points, int max_guesses, bool are_swept) {
   if (std::any_of(movers.begin(), movers.end(), [](const Mover& m) { return m.linkage != nullptr; })) return false;
-  prepare(movers, points);
   const std::vector<Mover> free = movers;
   Guess guess(free, points);
-  for (const sweeps::Row& row : problem_.rows) guess.add(row.normal_mass, get_turning_mass(row), are_swept);
+  for (const Point& p : points) guess.add(calc_normal_mass(movers, p), calc_turning_mass(movers, p), are_swept);
   bool confirmed = false;
   for (int n = 0; n < max_guesses && !confirmed; ++n) {
     if (!guess.solve(movers)) return false;

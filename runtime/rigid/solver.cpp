@@ -280,18 +280,16 @@ void Solver::add_turning(const std::vector<Mover>& movers, const Point& p, const
   turning.arm_m = norm(p.a >= 0 ? p.arm_a : p.arm_b);
   turning.couple = to_four(axes * p.couple);
   turning.turned.begin = static_cast<int>(problem_.responses.size());
-  double mobility = 0.0;
   const auto add = [&](int body, double sign, Four(&spun)[3]) {
     if (body < 0) return;
     const Mover& m = movers[body];
-    mobility += m.inverse_inertia[0][0] + m.inverse_inertia[1][1] + m.inverse_inertia[2][2];  // on joints a body turns more slowly
     for (std::size_t j = 0; j < 3 && m.linkage == nullptr; ++j) spun[j] = to_four(sign * (m.inverse_inertia * axes[j]));
     add_responses(movers, body, {}, sign, false, axes);
   };
   add(p.a, 1.0, turning.spun_a);
   add(p.b, -1.0, turning.spun_b);
   turning.turned.end = static_cast<int>(problem_.responses.size());
-  turning.mass = 1.0 / mobility;
+  turning.mass = calc_turning_mass(movers, p);
 }
 
 /// Writes the answer.
@@ -305,6 +303,14 @@ void Solver::take(std::vector<Mover>& movers, std::vector<Point>& points) const 
     points[i].impulse = to_vec(combine(row.axis, row.impulse));
     points[i].couple = row.turning >= 0 ? to_vec(combine(row.axis, problem_.turnings[row.turning].couple)) : Vec3{};
   }
+}
+
+double calc_turning_mass(const std::vector<Mover>& movers, const Point& p) {
+  if (!(p.rolling_m > 0.0) && !(p.twisting_m > 0.0)) return 0.0;
+  double mobility = 0.0;
+  for (const int body : {p.a, p.b})
+    for (std::size_t k = 0; k < 3 && body >= 0; ++k) mobility += movers[body].inverse_inertia[k][k];
+  return 1.0 / mobility;
 }
 
 double Solver::solve(std::vector<Mover>& movers, std::vector<Point>& points, double tolerance_m_s, int max_sweeps) {

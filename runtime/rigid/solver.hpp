@@ -58,7 +58,6 @@ class Solver {
   void add_responses(const std::vector<Mover>& movers, int body, const Vec3& arm, double sign, bool are_impulses, const Mat3& axes);
   double run(double tolerance_m_s, int max_sweeps);
   void take(std::vector<Mover>& movers, std::vector<Point>& points) const;
-  double get_turning_mass(const sweeps::Row& row) const { return row.turning >= 0 ? problem_.turnings[row.turning].mass : 0.0; }
 
   const sweeps::Functions* functions_;
   sweeps::Problem problem_;
@@ -73,6 +72,9 @@ Vec3 calc_relative_spin(const std::vector<Mover>& movers, const Point& point);
 /// Gives both bodies of a point an impulse, or a couple.
 void apply(std::vector<Mover>& movers, const Point& point, const Vec3& impulse);
 void turn(std::vector<Mover>& movers, const Point& point, const Vec3& couple);
+
+/// Couple per spin that all couples of a point are scaled by [kg m^2]: on joints a body turns more slowly. 0: it has none.
+double calc_turning_mass(const std::vector<Mover>& movers, const Point& point);
 
 /// The mobility at a point [1/kg]: u gained per impulse.
 Mat3 calc_mobility(const std::vector<Mover>& movers, const Point& point);

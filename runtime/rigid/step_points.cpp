@@ -17,6 +17,7 @@ namespace carillon::rigid {
 namespace {
 
 constexpr double kDrilling = 3.0 * std::numbers::pi / 16.0;  // of friction times patch radius: arm of the couple against drilling
+constexpr double kPushOut = 80.0;                            // 1/s; rate at which a deep touch is pushed out
 constexpr double kAtRest = 1e-6;                             // m/s
 constexpr double kAtRestTurned = 1e-7;                       // rad in a step
 constexpr double kMaxRolling = 20.0;                         // of the size: way of a touch for an angle of rolling
@@ -26,6 +27,7 @@ constexpr int kTurns = 16;                                   // points that take
 /// their pairs come first, then the second ones, and so on: sweeps over such an order need a tenth fewer.
 void sort_points(Step& step, const Vec3& gravity) {
   const int count = static_cast<int>(step.points.size());
+  if (count < 2) return;
   std::vector<double> heights;
   heights.reserve(count);
   for (const ContactRef& row : step.rows) heights.push_back(-dot(row.get().touch.where_m, gravity));
@@ -206,7 +208,7 @@ Point StepProblem::make_lasting_point(const Step& step, Pair& pair, const Contac
   // A deep touch is pushed out, at half the power that the contact loses, so that no energy is gained.
   if (t.gap_m < -kDeep) {
     const double push = dot(c.impulse, t.normal), paid = push > 0.0 ? 0.5 * c.lost_j / push : 0.0;
-    const double up = std::min(0.02 * (-kDeep - t.gap_m) / h, paid);
+    const double up = std::min(kPushOut * (-kDeep - t.gap_m), paid);
     if (approach > -up) speed = up;
   }
   p.wanted = (speed + turning) * p.normal - beyond;

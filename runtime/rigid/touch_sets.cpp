@@ -16,10 +16,13 @@ namespace carillon::rigid {
 namespace {
 
 constexpr double kSteps = 4.0;             // of movement in the margin of a search,
-constexpr double kStepsOfRolling = 8.0;    // the same of curved bodies on the ground: few places come near
+constexpr double kStepsOfRolling = 8.0;    // the same of curved bodies on the ground: few places come near,
+constexpr double kAhead = 4e-3;            // s; for no longer than this
 constexpr double kMissing = 5e-6;          // m; excess of a missing place over all touches
 constexpr double kSearchAgain = 2e-3;      // s; between searches for missing touches of a pair
 constexpr double kSame = 0.02;             // of the size: distance of touches counted as one
+constexpr double kOnePlace = 1e-4;         // of the size: touches nearer than this have come to one place
+constexpr double kJump = 0.2;              // rad; turn of the normal in the body by which a touch has jumped
 constexpr double kSagDecay = 10e-3;        // s
 constexpr int kMaxAdded = 4;               // missing touches at the end of a flight
 constexpr double kDeepForThickness = 0.1;  // depth at which touches are found with the bodies apart
@@ -74,8 +77,8 @@ void TouchSets::search(Pair& pair, double step_s) {
   if (pair.cord >= 0) return refresh(pair);
   ++ledger_.costs.searches;
   const double speed = bodies_.calc_closing_speed(pair.a, pair.b) + norm(bodies_.gravity()) * step_s;
-  const double steps = pair.b < 0 && !bodies_.is_flat(pair.a) ? kStepsOfRolling : kSteps;
-  pair.margin_m = std::min(std::max(2e-4, steps * step_s * speed), kReach * bodies_.calc_size(pair.a, pair.b));
+  const double ahead_s = pair.b < 0 && !bodies_.is_flat(pair.a) ? std::min(kStepsOfRolling * step_s, kAhead) : kSteps * step_s;
+  pair.margin_m = std::min(std::max(2e-4, ahead_s * speed), kReach * bodies_.calc_size(pair.a, pair.b));
   const double margin_m = pair.margin_m + bodies_.get_swing(pair.a) + bodies_.get_swing(pair.b);
   pair.travelled_m = 0.0;
   pair.searched = true;
@@ -95,6 +98,7 @@ void TouchSets::search(Pair& pair, double step_s) {
     Contact contact;
     if (same != old.end()) {
       contact = *same;
+      if (is_jump(pair, same->touch, touch)) contact.touching = false;  // another place has its name, and may strike
     } else {
       contact.a = pair.a;
       contact.b = pair.b;
@@ -103,30 +107,60 @@ void TouchSets::search(Pair& pair, double step_s) {
     contact.touch = touch;
     pair.contacts.push_back(contact);
   }
-  if (pair.b < 0 || !bodies_.is_flat(pair.a) || !bodies_.is_flat(pair.b)) keep_added(pair, old);  // those of polyhedra are complete
+  if (pair.b < 0 || !bodies_.is_flat(pair.a) || !bodies_.is_flat(pair.b)) keep_lost(pair, old);  // those of polyhedra are complete
   remove_false(pair);
   complete(pair, frame_a, bodies_.get_frame(pair.b), 0.0);
 }
 
-/// Keeps touches that a search has lost: closed ones of two bodies that carried, and of added ones with the ground those deeper than all
-/// found, and sharp closed ones.
-void TouchSets::keep_added(Pair& pair, const std::vector<Contact>& old) const {
+/// Keeps touches that a search has lost: closed ones that carry, and with the ground deeper ones than all found, and sharp closed ones.
+void TouchSets::keep_lost(Pair& pair, const std::vector<Contact>& old) const {
   const shape::Frame a = bodies_.get_frame(pair.a), b = bodies_.get_frame(pair.b);
   double least_m = pair.margin_m;
   for (const Contact& c : pair.contacts) least_m = std::min(least_m, c.touch.gap_m);
   const double near_m = kSame * bodies_.calc_size(pair.a, pair.b);
-  const auto is_found = [&](const shape::Touch& touch) {
-    return std::any_of(pair.contacts.begin(), pair.contacts.end(), [&](const Contact& found) {
-      return found.touch.id == touch.id || norm(found.touch.where_m - touch.where_m) < near_m;
-    });
+  const auto is_between = [&](const shape::Touch& touch) {  // two closed ones, which carry without it
+    for (const shape::Touch& f : found_)
+      for (const shape::Touch& g : found_)
+        if (std::max(f.gap_m, g.gap_m) <= kTouch && dot(f.where_m - touch.where_m, g.where_m - touch.where_m) < 0.0) return true;
+    return false;
   };
   for (const Contact& c : old) {
     if (pair.b >= 0 && !c.touching) continue;
     shape::Touch touch = c.touch;
     if (!follow(pair, touch, a, b)) continue;
-    const double most_m = pair.b >= 0 ? kDeep : touch.smooth ? least_m - kMissing : std::max(least_m - kMissing, kTouch);
-    if (touch.gap_m <= most_m && !is_found(touch)) pair.contacts.emplace_back(c).touch = touch;
+    const bool is_found = std::any_of(pair.contacts.begin(), pair.contacts.end(), [&](const Contact& found) {
+      return found.touch.id == touch.id || norm(found.touch.where_m - touch.where_m) < near_m;
+    });
+    const bool carries = c.touching && dot(c.impulse, c.touch.normal) > 0.0 && !is_between(touch);
+    const double most_m = pair.b >= 0 ? kDeep : touch.smooth && !carries ? least_m - kMissing : std::max(least_m - kMissing, kTouch);
+    if (touch.gap_m <= most_m && !is_found) pair.contacts.emplace_back(c).touch = touch;
   }
+}
+
+/// Touches of curved surfaces that have come to one place become one.
+void TouchSets::merge(Pair& pair) const {
+  const double near_m = kOnePlace * bodies_.calc_size(pair.a, pair.b);
+  for (auto c = pair.contacts.begin(); c != pair.contacts.end();) {
+    const auto same = std::find_if(pair.contacts.begin(), c, [&](const Contact& other) {
+      return c->touch.smooth && other.touch.smooth && !c->presses && !other.presses &&
+             norm(c->touch.where_m - other.touch.where_m) < near_m;
+    });
+    if (same == c) {
+      ++c;
+      continue;
+    }
+    same->impulse = same->impulse + c->impulse;
+    same->couple = same->couple + c->couple;
+    same->touching = same->touching || c->touching;
+    c = pair.contacts.erase(c);
+    pair.ahead.touches.clear();
+  }
+}
+
+/// Has a touch gone to another part of its surface?
+bool TouchSets::is_jump(const Pair& pair, const shape::Touch& from, const shape::Touch& to) const {
+  const double way_m = norm(to.station_a - from.station_a);
+  return way_m > kSame * bodies_.calc_size(pair.a, pair.b) && way_m * from.steepest_per_m > kJump;
 }
 
 void TouchSets::refresh(Pair& pair) const {
@@ -134,9 +168,16 @@ void TouchSets::refresh(Pair& pair) const {
   const shape::Frame a = bodies_.get_frame(pair.a), b = bodies_.get_frame(pair.b);
   const bool is_there = !pair.ahead.touches.empty() && pair.ahead.a == a && pair.ahead.b == b;
   std::erase_if(pair.contacts, [&, k = std::size_t{0}](Contact& c) mutable {
+    const shape::Touch before = c.touch;
     const bool follows = is_there || follow(pair, c.touch, a, b);
     if (is_there) c.touch = pair.ahead.touches[k++];
     pair.searched = pair.searched && follows;
+    if (c.touching && c.touch.smooth) {
+      const double way_m = norm(c.touch.station_a - before.station_a);
+      pair.errors.drift_m = std::max(pair.errors.drift_m, std::abs(c.touch.gap_m - before.gap_m));
+      pair.errors.way_m = std::max(pair.errors.way_m, way_m);
+      pair.errors.turn = std::max(pair.errors.turn, way_m * c.touch.steepest_per_m);
+    }
     return !follows;
   });
   pair.ahead.touches.clear();
@@ -157,11 +198,12 @@ void TouchSets::remove_false(Pair& pair) const {
 
 void TouchSets::update(Pair& pair, double step_s) {
   if (pair.cord >= 0) return refresh(pair);
-  const double way = (bodies_.calc_closing_speed(pair.a, pair.b) + norm(bodies_.gravity()) * step_s) * step_s;
-  if (!pair.searched || pair.travelled_m + way > pair.margin_m)
+  if (!pair.searched || pair.travelled_m + calc_way(pair, step_s, step_s) > pair.margin_m)
     search(pair, step_s);
-  else if (!pair.contacts.empty() && (pair.travelled_m > 0.0))
+  else if (!pair.contacts.empty() && (pair.travelled_m > 0.0)) {
     refresh(pair);
+    merge(pair);
+  }
   if (pair.travelled_m > 0.0) {
     remove_false(pair);
     complete(pair, bodies_.get_frame(pair.a), bodies_.get_frame(pair.b), 0.0);
@@ -199,7 +241,7 @@ bool TouchSets::complete(Pair& pair, const shape::Frame& a, const shape::Frame& 
   shape::Deepest deepest;
   if (theirs == nullptr) {
     if (calc_least_gap(pair, mine, a) >= -kMissing) return false;
-    deepest = shape::find_lowest(mine, a, bodies_.ground()->height_m, pair.memory);
+    deepest = shape::find_lowest(mine, a, bodies_.ground()->height_m);
     pair.measured = a;
     pair.lowest_m = deepest.gap_m;
     if (deepest.gap_m - mine.get_sag_m() >= -kMissing) return false;  // nor is any touch deeper
@@ -288,8 +330,15 @@ shape::Touch TouchSets::find_closing(Pair& pair, const Contact& contact, double 
   return touch;
 }
 
+/// Upper bound of the approach of any two points in `time_s` of a step; over the ground vertical motion alone counts.
+double TouchSets::calc_way(const Pair& pair, double time_s, double step_s) const {
+  const bool is_over_ground = pair.b < 0 && bodies_.moves(pair.a);
+  const double speed = is_over_ground ? bodies_.calc_sinking_speed(pair.a) : bodies_.calc_closing_speed(pair.a, pair.b);
+  return (speed + norm(bodies_.gravity()) * step_s) * time_s;
+}
+
 void TouchSets::travel(Pair& pair, double time_s, double step_s) const {
-  pair.travelled_m += (bodies_.calc_closing_speed(pair.a, pair.b) + norm(bodies_.gravity()) * step_s) * time_s + 1e-12;
+  pair.travelled_m += calc_way(pair, time_s, step_s) + 1e-12;
   if (pair.sag_m > 0.0) pair.sag_m *= std::exp(-time_s / kSagDecay);
   limit_apart(pair);
   if (pair.sag_m < kDeep) lose_stored(pair);

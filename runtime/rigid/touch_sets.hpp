@@ -35,7 +35,8 @@ class TouchSets {
 
   /// The touches as the bodies are now, found again.
   void search(Pair& pair, double step_s);
-  /// Moves the touches with the bodies. Touches off their surfaces are dropped, and the pair is searched at its next update.
+  /// Moves the touches with the bodies. Touches off their surfaces are dropped, and the pair is searched at its next update. The pair notes
+  /// the largest changes of curved touches that last: of the gap, of the place on body a, and of the normal in it.
   void refresh(Pair& pair) const;
   /// Removes deep touches of curved surfaces on far sides or past the ends of edges and facets.
   void remove_false(Pair& pair) const;
@@ -63,8 +64,11 @@ class TouchSets {
   shape::Touch find_moved(const Pair& pair, shape::Touch touch, const shape::Frame& a, const shape::Frame& b) const;
 
  private:
-  void keep_added(Pair& pair, const std::vector<Contact>& old) const;
+  void keep_lost(Pair& pair, const std::vector<Contact>& old) const;
+  void merge(Pair& pair) const;
+  bool is_jump(const Pair& pair, const shape::Touch& from, const shape::Touch& to) const;
   bool follow(const Pair& pair, shape::Touch& touch, const shape::Frame& a, const shape::Frame& b) const;
+  double calc_way(const Pair& pair, double time_s, double step_s) const;
   void lose_stored(Pair& pair) const;
   void limit_apart(Pair& pair) const;
   std::pair<Contact*, double> find_least(Pair& pair, const shape::Frame& a, const shape::Frame& b) const;

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <numeric>
 #include <tuple>
+#include <utility>
 
 #include "runtime/rigid/limits.hpp"
 
@@ -22,6 +23,14 @@ constexpr double kSagOfThickness = 5e-4;  // or by so much of the thickness of i
 constexpr double kRolls = 4.0;            // times the arc bounded by the box of a body: keeps long rolling bodies within 50 um
 constexpr double kFlatSteps = 2.0;        // times the step of others: that of groups in which flat bodies alone touch
 constexpr double kRoom = 1e-4;            // m; excess of boxes
+// A body that rolls by itself, on smooth touches that last, takes longer steps:
+constexpr double kRollingSteps = 4.0;  // times those of others at most,
+constexpr double kCalm = 10e-3;        // s; if nothing has struck it for so long,
+constexpr double kNear = 0.02;         // of its size, and
+constexpr double kAlong = 3.0;         // times the way of its touches in a window: no place farther from them comes down within one;
+constexpr double kDrift = 5e-7;        // m; the gaps of its touches change by less in a step,
+constexpr double kTurn = 0.05;         // rad; and so do their normals in the body
+constexpr double kSpan = 0.25;         // of its size: touches that lie farther apart keep it from hopping
 
 bool overlap(const shape::Box& x, const shape::Box& y) {
   for (int k = 0; k < 3; ++k)
@@ -39,6 +48,7 @@ Windows::Windows(Bodies& bodies, TouchSets& touches, const Options& options, Led
       active_(bodies.count(), 0),
       flying_(bodies.count(), 0),
       strides_(bodies.count(), 1),
+      rolling_(bodies.count()),
       reach_m_s_(bodies.count(), 0.0),
       flew_from_(bodies.states()),
       articulation_flew_from_(bodies.articulations().size()) {}
@@ -173,6 +183,52 @@ void Windows::join_sleeping(Groups& groups) const {
     for (const int body : articulation.bodies) groups.join(articulation.bodies.front(), body);
 }
 
+/// Finds the bodies that roll by themselves, and how many steps they need by the errors of their last window. The change of a gap in a step
+/// grows with its cube.
+void Windows::find_rolling(Groups& groups) {
+  const int count = bodies_.count();
+  const double most = get_length() / options_.step_s;
+  const auto find_steps = [&](int body) { return rolling_[body].steps > 0 ? rolling_[body].steps : most; };  // of the last window
+  std::vector<int> sizes(count, 0);
+  for (int i = 0; i < count; ++i) ++sizes[groups.find(i)];
+  std::vector<char> rolls(count, 0), touches(count, 0);
+  for (int i = 0; i < count; ++i) {
+    if (bodies_.is_moved_by_impact(i)) rolling_[i].struck_s = start_s_;
+    rolls[i] = bodies_.moves(i) && sizes[groups.find(i)] == 1 && !bodies_.is_flat(i) && bodies_.find_articulation(i) == nullptr &&
+               start_s_ - rolling_[i].struck_s > kCalm;
+  }
+  std::vector<double> errors(count, 0.0);  // over those allowed
+  std::vector<Vec3> stations;
+  for (Pair* pair : near_) {
+    const int body = bodies_.moves(pair->a) ? pair->a : pair->b;
+    if (!bodies_.moves(body)) continue;
+    const Pair::Errors last = std::exchange(pair->errors, {});
+    errors[body] = std::max({errors[body], std::cbrt(last.drift_m / kDrift), last.turn / kTurn});
+    if (pair->cord >= 0 || start_s_ < pair->rattles_until_s || pair->sag_m > 0.0) rolls[body] = 0;
+    if (rolls[body] == 0) continue;
+    stations.clear();
+    Vec3 up{};
+    for (const Contact& c : pair->contacts) {
+      if (c.presses || (c.touching && !c.touch.smooth)) rolls[body] = 0;
+      if (!c.touching) continue;
+      stations.push_back(body == pair->a ? c.touch.station_a : c.touch.station_b);
+      up = (body == pair->a ? 1.0 : -1.0) * c.touch.normal;
+    }
+    if (stations.empty()) continue;
+    touches[body] = 1;
+    const shape::Shape& shape = *bodies_.get_shape(body);
+    rolling_[body].spans = norm(stations.front() - stations.back()) > kSpan * shape.get_size_m();
+    const double far_m = std::max(kNear * shape.get_size_m(), kAlong * last.way_m * find_steps(body));
+    if (shape::may_tip(shape, bodies_.get_frame(body), up, bodies_.placed(body).spin, stations, far_m, get_length())) rolls[body] = 0;
+  }
+  for (int i = 0; i < count; ++i) {
+    Rolling& r = rolling_[i];
+    const double before = find_steps(i);
+    r.asked =
+        rolls[i] == 0 || touches[i] == 0 ? 0.0 : std::clamp(std::max(errors[i], 0.5) * before, std::max(most / kRollingSteps, 1.0), most);
+  }
+}
+
 void Windows::choose_steps() {
   const double length_s = get_length();
   const int count = bodies_.count();
@@ -187,7 +243,10 @@ void Windows::choose_steps() {
   }
   if (any_asleep) join_sleeping(groups);
   const double g = norm(bodies_.gravity());
+  find_rolling(groups);
   std::vector<double> steps(count, std::max(1.0, length_s / (kFlatSteps * options_.step_s)));
+  for (int i = 0; i < count; ++i)
+    if (rolling_[i].asked > 0.0) steps[groups.find(i)] = rolling_[i].asked;
   const auto ask = [&](int body, double asked) {
     double& max = steps[groups.find(body)];
     max = std::max(max, asked);
@@ -198,6 +257,7 @@ void Windows::choose_steps() {
     // Bodies that are fast for their size must not pass through each other between two searches, and thin ones must not sink in.
     const double speed = bodies_.calc_closing_speed(pair->a, pair->b) + g * length_s;
     ask(body, 2.0 * length_s * speed / (kReach * bodies_.calc_size(pair->a, pair->b)));
+    if (rolling_[body].asked > 0.0) continue;
     const bool is_thin = kFlatSteps * options_.step_s * speed > kThin * bodies_.calc_thickness(pair->a, pair->b);
     if (is_thin || pair->cord >= 0 || !bodies_.is_flat(pair->a) || !bodies_.is_flat(pair->b)) ask(body, length_s / options_.step_s);
   }
@@ -208,7 +268,8 @@ void Windows::choose_steps() {
     const Solid& solid = bodies_.solid(i);
     const double sag = std::max(kSag, kSagOfThickness * solid.shape->get_thickness_m());
     const double spin = norm(bodies_.placed(i).spin);
-    ask(i, length_s * std::sqrt(spin * std::min(kRolls * bodies_.calc_turning_speed(i), spin * solid.radius_m) / (2.0 * sag)));
+    const double rolls = rolling_[i].asked > 0.0 && rolling_[i].spans ? 1.0 : kRolls;
+    ask(i, length_s * std::sqrt(spin * std::min(rolls * bodies_.calc_turning_speed(i), spin * solid.radius_m) / (2.0 * sag)));
   }
   // Powers of two: then the steps of a group are the same whatever others ask for.
   const auto round = [](double n) {
@@ -217,7 +278,10 @@ void Windows::choose_steps() {
   steps_ = 1;
   for (int i = 0; i < count; ++i)
     if (any_active_ && bodies_.moves(i)) steps_ = std::max(steps_, round(steps[groups.find(i)]));
-  for (int i = 0; i < count; ++i) strides_[i] = std::max(1, steps_ / round(options_.islands ? steps[groups.find(i)] : steps_));
+  for (int i = 0; i < count; ++i) {
+    strides_[i] = std::max(1, steps_ / round(options_.islands ? steps[groups.find(i)] : steps_));
+    rolling_[i].steps = rolling_[i].asked > 0.0 ? steps_ / strides_[i] : 0;
+  }
   step_ = 0;
 }
 
@@ -300,6 +364,7 @@ void Windows::undo_flight(int body, int by) {
 }
 
 void Windows::extend(int body) {
+  rolling_[body].struck_s = bodies_.get_time();
   const double left = end_s_ - bodies_.get_time();
   const double others_left = end_s_ - get_time();  // of islands whose step is still to be made
   const double speed = bodies_.calc_speed(body) + norm(bodies_.gravity()) * left;

@@ -67,7 +67,16 @@ class Windows {
   void extend(int body);
 
  private:
+  /// Of a body that may roll by itself, on smooth touches that last.
+  struct Rolling {
+    double struck_s = 0.0;  // when something struck it last
+    bool spans = false;     // its touches lie far apart
+    int steps = 0;          // of the last window; 0: it did not roll
+    double asked = 0.0;     // of this window; 0: it does not roll
+  };
+
   void open_cords();
+  void find_rolling(Groups& groups);
   void join_sleeping(Groups& groups) const;
   void undo_flight(int body, int by);
 
@@ -83,6 +92,7 @@ class Windows {
   std::vector<char> active_, flying_;  // active: may meet something
   std::vector<int> flown_;
   std::vector<int> strides_;       // small steps that a body takes at once
+  std::vector<Rolling> rolling_;   // of the bodies
   std::vector<double> reach_m_s_;  // the speed that the window was planned for
   std::vector<State> flew_from_;   // of bodies that fly; and of the articulations:
   std::vector<joints::Coordinates> articulation_flew_from_;

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "runtime/shape/grid.hpp"
+#include "runtime/shape/lowest.hpp"
 #include "runtime/shape/polyhedron.hpp"
 #include "runtime/shape/samples.hpp"
 
@@ -18,7 +19,9 @@ constexpr double kFaces = -0.2;   // unless it looks away from the way asked: co
 }  // namespace
 
 Shape::Shape(std::span<const Vec3> vertices, std::span<const std::array<std::int32_t, 3>> triangles)
-    : mesh_(std::make_unique<const Mesh>(vertices, triangles)), skin_(std::make_unique<const Skin>(*mesh_)) {
+    : mesh_(std::make_unique<const Mesh>(vertices, triangles)),
+      skin_(std::make_unique<const Skin>(*mesh_)),
+      low_vertices_(std::make_unique<LowVertices>()) {
   constexpr int kMaxFacets = 26;
   const Vec3 side = mesh_->box.high - mesh_->box.low;
   size_m_ = norm(side);
@@ -48,6 +51,12 @@ double Shape::calc_turning_speed(const Vec3& centre, const Vec3& spin) const {
     speed[k] = std::abs(spin[l]) * reach[m] + std::abs(spin[m]) * reach[l];
   }
   return norm(speed);
+}
+
+double Shape::calc_reach_m(const Vec3& centre, const Vec3& way) const {
+  double reach = std::abs(dot(way, middle_m_ - centre)) + norm(way) * skin_->get_sag_m();
+  for (int k = 0; k < 3; ++k) reach += 0.5 * std::abs(way[k]) * (mesh_->box.high[k] - mesh_->box.low[k]);
+  return reach;
 }
 
 Box Shape::calc_box(const Frame& frame) const {

@@ -20,6 +20,7 @@ class Skin;
 struct Polyhedron;
 class Samples;
 class Grid;
+class LowVertices;
 
 /// A place of the mesh that was given: its triangle, where in it, and the mean curvature of the smooth body there (convex positive).
 struct Place {
@@ -48,6 +49,8 @@ class Shape {
   double calc_radius_m(const Vec3& centre) const;
   /// Upper bound of the speed of any point by a spin about `centre` (mesh frame).
   double calc_turning_speed(const Vec3& centre, const Vec3& spin) const;
+  /// Upper bound of |way . (x - centre)| of any point x; mesh frame.
+  double calc_reach_m(const Vec3& centre, const Vec3& way) const;
   /// Along the world's axes.
   Box calc_box(const Frame& frame) const;
   /// The triangle of the fine mesh at a point of the surface whose normal is `outward`; mesh frame. `hint`: a triangle that may be it; -1:
@@ -65,6 +68,7 @@ class Shape {
   const Polyhedron* polyhedron() const { return polyhedron_.get(); }
   const Samples& samples() const;
   const Grid& grid() const;
+  LowVertices& low_vertices() const { return *low_vertices_; }
 
  private:
   Place choose_face(const Nearest& on, const Vec3& point, const Vec3& outward) const;
@@ -74,6 +78,7 @@ class Shape {
   std::unique_ptr<const Polyhedron> polyhedron_;
   mutable std::unique_ptr<const Samples> samples_;
   mutable std::unique_ptr<const Grid> grid_;
+  std::unique_ptr<LowVertices> low_vertices_;
   Vec3 middle_m_{};
   double size_m_ = 0.0, thickness_m_ = 0.0, radius_m_ = 0.0;
 };

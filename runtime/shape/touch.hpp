@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -54,8 +55,6 @@ class PairMemory {
   std::vector<Touch> last;          // touches given at the last call, to name those of the next
   std::uint64_t serial = 0;         // of names given
   std::array<int, 2> axis{-1, -1};  // that separated or carried last: kind, index
-  Vec3 up{}, low_up{};              // vertical in the frame of a at the last search for the lowest vertex, and at that for `low`
-  std::vector<int> low;             // candidates for the lowest vertex near low_up
   NearSamples near;
 };
 
@@ -74,8 +73,10 @@ struct Deepest {
   bool is_of_a = true;
 };
 Deepest find_lowest(const Shape& a, const Frame& frame, double height_m);
-/// The same from memory, for small turns.
-Deepest find_lowest(const Shape& a, const Frame& frame, double height_m, PairMemory& memory);
+/// May a place of the body come down to a plane within a time of the present spin, farther than `far_m` from its touches (mesh frame) and
+/// from the line between the first and the last? `normal`: of the plane.
+bool may_tip(const Shape& a, const Frame& frame, const Vec3& normal, const Vec3& spin, std::span<const Vec3> touches, double far_m,
+             double time_s);
 /// None (-1) between two polyhedra, whose touches are complete, and where no sample is deeper than `gap_m`.
 Deepest find_deepest(const Shape& a, const Frame& frame_a, const Shape& b, const Frame& frame_b, double gap_m, PairMemory& memory);
 /// The touch of such a vertex, at these or other frames.
