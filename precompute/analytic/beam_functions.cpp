@@ -1,9 +1,10 @@
 #include "precompute/analytic/beam_functions.hpp"
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+
+#include "precompute/la/decompositions.hpp"
 
 namespace carillon::analytic {
 namespace {
@@ -127,7 +128,7 @@ std::vector<double> find_beam_roots(const std::array<Edge, 2>& ends, double max_
 }
 
 BeamFunction make_beam_function(const std::array<Edge, 2>& ends, double beta) {
-  Eigen::Matrix4d conditions;
+  la::Matrix conditions(4, 4);
   for (int end = 0; end < 2; ++end) {
     const std::array<int, 2> orders = get_conditions(ends[end]);
     for (int i = 0; i < 2; ++i) {
@@ -135,9 +136,9 @@ BeamFunction make_beam_function(const std::array<Edge, 2>& ends, double beta) {
       for (int k = 0; k < 4; ++k) conditions(2 * end + i, k) = parts[k];
     }
   }
-  const Eigen::JacobiSVD<Eigen::Matrix4d> svd(conditions, Eigen::ComputeFullV);
+  const la::Matrix v = la::calc_svd(conditions).v;
   BeamFunction function{beta, {}};
-  for (int k = 0; k < 4; ++k) function.coefficients[k] = svd.matrixV()(k, 3);
+  for (int k = 0; k < 4; ++k) function.coefficients[k] = v(k, 3);
   // Largest at the first end where it moves there, so that a shape has one sign for all who compute it.
   double sign = function.calc(0.0);
   if (std::abs(sign) < 1e-3) sign = function.calc(0.0, 1);

@@ -2,7 +2,6 @@
 
 #include <fmt/core.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -207,20 +206,16 @@ void Beam::add_timoshenko(Motion motion, double second_moment_m4, double high_hz
       if (edge == job::Edge::sliding || edge == job::Edge::clamped) conditions.push_back(slope);
     }
     const la::Matrix basis = make_null_space(2 * n, conditions);
-    const la::Matrix m = basis.transpose() * weight * basis;
     // Of (K + shift M)^-1 M the lowest modes are the largest eigenvalues, which keep their digits however stiff the shear is.
-    const Eigen::LLT<la::Matrix> factor(basis.transpose() * stiffness * basis + shift * m);
-    if (factor.info() != Eigen::Success) throw SolveError("the dense factorisation failed on the beam");
-    la::Matrix inner = factor.matrixL().solve(m);
-    inner = factor.matrixL().solve(inner.transpose()).eval();
-    la::Matrix vectors = 0.5 * (inner + inner.transpose());
-    la::Vector values(vectors.rows());
-    if (la::calc_eigenpairs_by_division(vectors, values) != 0) throw SolveError("the dense eigensolver failed on the beam");
+    la::Matrix vectors = basis.transpose() * weight * basis, shifted = basis.transpose() * stiffness * basis + shift * vectors;
+    la::Vector values;
+    if (la::calc_generalised_eigenpairs_by_division(vectors, shifted, values) != 0)
+      throw SolveError("the dense eigensolver failed on the beam");
     Eigen::Index count = 0;
     while (count < values.size() && values(values.size() - 1 - count) * (1.02 * high + shift) >= 1.0) ++count;
     const la::Matrix last = vectors.rightCols(count).rowwise().reverse();
     const la::Vector found = values.tail(count).reverse();
-    shapes = basis * factor.matrixU().solve(last) * found.cwiseSqrt().cwiseInverse().asDiagonal();
+    shapes = basis * last * found.cwiseSqrt().cwiseInverse().asDiagonal();
     return la::Vector(found.cwiseInverse().array() - shift);
   };
   la::Matrix shapes, ignored;

@@ -1,13 +1,11 @@
 #include "precompute/analytic/particular_solutions.hpp"
 
-#include <Eigen/QR>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "precompute/analytic/triangulate.hpp"
-#include "precompute/la/lapack.hpp"
+#include "precompute/la/decompositions.hpp"
 
 namespace carillon::analytic {
 namespace {
@@ -52,20 +50,18 @@ std::vector<double> calc_bessel(double first, int count, double x) {
 /// a tenth of the work of all singular values. Too large where no gap follows the small ones.
 double calc_small_singular_value(const la::Matrix& a, int rank) {
   const Eigen::Index n = a.cols(), width = std::min<Eigen::Index>(n, rank + 2);
-  const Eigen::HouseholderQR<la::Matrix> qr(a);
-  la::Matrix r = qr.matrixQR().topRows(n).triangularView<Eigen::Upper>(), v(n, width);
+  la::Matrix r = la::calc_qr(a, 0).r, v(n, width);
   for (Eigen::Index i = 0; i < n; ++i) {
     if (r(i, i) == 0.0) r(i, i) = 1e-300;
     for (Eigen::Index j = 0; j < width; ++j) v(i, j) = std::cos((2.0 * j + 1.0) * (i + 0.5));  // anything that is no special vector
   }
   for (int step = 0; step < 4; ++step) {
-    v = Eigen::HouseholderQR<la::Matrix>(v).householderQ() * la::Matrix::Identity(n, width);
+    v = la::calc_qr(v, width).q;
     r.transpose().triangularView<Eigen::Lower>().solveInPlace(v);
     r.triangularView<Eigen::Upper>().solveInPlace(v);
   }
-  v = Eigen::HouseholderQR<la::Matrix>(v).householderQ() * la::Matrix::Identity(n, width);
-  const la::Matrix image = r * v;
-  return Eigen::JacobiSVD<la::Matrix>(image).singularValues()(std::max<Eigen::Index>(width - rank, 0));
+  v = la::calc_qr(v, width).q;
+  return la::calc_svd(r * v).values(std::max<Eigen::Index>(width - rank, 0));
 }
 
 bool is_regular(double angle) {
@@ -144,8 +140,7 @@ double ParticularSolutions::calc_sine(double kappa, int rank) const {
     const double norm = a.col(c).norm();
     if (norm > 0.0) a.col(c) /= norm;
   }
-  const Eigen::HouseholderQR<la::Matrix> qr(a);
-  const la::Matrix basis = qr.householderQ() * la::Matrix::Identity(rows, count);
+  const la::Matrix basis = la::calc_qr(a, count).q;
   // Singular values of the rim's part are sines of the angles; the small ones come from it with all their digits.
   return calc_small_singular_value(basis.topRows(static_cast<Eigen::Index>(rim_.size())), rank);
 }

@@ -1,9 +1,10 @@
 #include "precompute/analytic/polynomials.hpp"
 
-#include <Eigen/QR>
 #include <array>
 #include <cmath>
 #include <numbers>
+
+#include "precompute/la/decompositions.hpp"
 
 namespace carillon::analytic {
 
@@ -105,9 +106,7 @@ la::Matrix make_null_space(int n, const std::vector<la::Vector>& conditions) {
   if (conditions.empty()) return la::Matrix::Identity(n, n);
   la::Matrix columns(n, conditions.size());
   for (std::size_t r = 0; r < conditions.size(); ++r) columns.col(static_cast<Eigen::Index>(r)) = conditions[r].normalized();
-  const Eigen::HouseholderQR<la::Matrix> qr(columns);
-  const la::Matrix q = qr.householderQ() * la::Matrix::Identity(n, n);
-  return q.rightCols(n - static_cast<int>(conditions.size()));
+  return la::calc_qr(columns, n).q.rightCols(n - static_cast<int>(conditions.size()));
 }
 
 }  // namespace carillon::analytic

@@ -1,12 +1,12 @@
 #include <fmt/core.h>
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "precompute/analytic/flat_bodies.hpp"
 #include "precompute/analytic/polynomials.hpp"
+#include "precompute/la/decompositions.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::analytic {
@@ -48,10 +48,7 @@ std::vector<RitzPlate::Line> RitzPlate::make_lines(int polynomials, Edge first, 
       la::Matrix even = basis;
       for (int k = 0; k < polynomials; ++k)
         if (k % 2 != parity) even.row(k).setZero();
-      const Eigen::ColPivHouseholderQR<la::Matrix> qr(even);
-      Eigen::Index rank = 0;
-      while (rank < std::min(even.rows(), even.cols()) && std::abs(qr.matrixR()(rank, rank)) > 1e-8) ++rank;
-      basis = (qr.householderQ() * la::Matrix::Identity(polynomials, polynomials)).leftCols(rank);
+      basis = la::calc_column_space(even, 1e-8);
     }
     const la::Matrix bent = bending * basis;
     la::Matrix stiffness = bent.transpose() * bent;

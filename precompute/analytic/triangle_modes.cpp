@@ -1,6 +1,5 @@
 #include "precompute/analytic/triangle_modes.hpp"
 
-#include <Eigen/LU>
 #include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
@@ -128,7 +127,7 @@ TriangleBasis::TriangleBasis(int order) : order_(order) {
     }
   la::Matrix values(size(), size());
   for (int q = 0; q < size(); ++q) values.row(q) = calc_polynomials(points_[q][0], points_[q][1]).col(0).transpose();
-  inverse_ = values.inverse();
+  inverse_ = la::calc_inverse(values);
   mass = inverse_.transpose() * inverse_;
   // The square (x, y) -> (r, s) = (x (1 - y), y) makes Gauss's rule one of the triangle.
   const GaussRule rule = make_gauss_rule(order + 1);

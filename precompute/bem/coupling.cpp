@@ -5,12 +5,11 @@
 // Deviations: none.
 #include "precompute/bem/coupling.hpp"
 
-#include <Eigen/Core>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
+#include "precompute/la/lapack.hpp"
 #include "runtime/base/error.hpp"
 
 namespace carillon::bem {
@@ -22,17 +21,19 @@ constexpr std::size_t kRunFacets = 128;
 using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 struct Problem {
-  Eigen::MatrixXd inertia;  // 1 + M
-  Eigen::VectorXd squares;  // k_i^2
-  Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> solver;
+  la::Matrix inertia;  // 1 + M
+  la::Vector squares;  // k_i^2
+  la::Matrix vectors;
+  la::Vector values;
 
   Problem(std::span<const double> wave_number_1_m, std::span<const double> mass) {
     const auto n = static_cast<Eigen::Index>(wave_number_1_m.size());
     inertia = Eigen::Map<const Matrix>(mass.data(), n, n);
     inertia.diagonal().array() += 1.0;
     squares = Eigen::Map<const Eigen::VectorXd>(wave_number_1_m.data(), n).cwiseAbs2();
-    if (Eigen::LLT<Eigen::MatrixXd>(inertia).info() == Eigen::Success) solver.compute(squares.asDiagonal().toDenseMatrix(), inertia);
-    if (n == 0 || solver.info() != Eigen::Success || solver.eigenvectors().cols() != n)
+    vectors = squares.asDiagonal();
+    la::Matrix destroyed = inertia;
+    if (n == 0 || la::calc_generalised_eigenpairs(vectors, destroyed, values) != 0)
       throw InputError(
           "the air takes more than the whole mass of a motion of the modes, as in a resonance of a cavity that this method cannot couple; "
           "end the band lower, or leave the air out with \"radiation\": \"none\"");
@@ -52,7 +53,7 @@ Mixture make_mixture(const Problem& problem, Eigen::VectorXd parts, std::vector<
 
 std::vector<Mixture> couple_modes(std::span<const double> wave_number_1_m, std::span<const double> mass, double kept) {
   const Problem problem(wave_number_1_m, mass);
-  const Eigen::MatrixXd& vectors = problem.solver.eigenvectors();
+  const la::Matrix& vectors = problem.vectors;
   const auto n = static_cast<std::size_t>(vectors.cols());
   // By falling part: each motion gets the mode that is most of it.
   std::vector<std::size_t> order(n * n);
@@ -75,7 +76,7 @@ std::vector<Mixture> couple_modes(std::span<const double> wave_number_1_m, std::
       mixture.motions.push_back(static_cast<std::int32_t>(i));
       mixture.parts.push_back(part);
     }
-    mixture.wave_number_1_m = std::sqrt(std::max(0.0, problem.solver.eigenvalues()[static_cast<Eigen::Index>(mode)]));
+    mixture.wave_number_1_m = std::sqrt(std::max(0.0, problem.values[static_cast<Eigen::Index>(mode)]));
     mixture.added_mass = 1.0 / parts.squaredNorm() - 1.0;
   }
   return mixtures;
@@ -83,8 +84,8 @@ std::vector<Mixture> couple_modes(std::span<const double> wave_number_1_m, std::
 
 Mixture follow_mode(std::span<const double> wave_number_1_m, std::span<const double> mass, const Mixture& before) {
   const Problem problem(wave_number_1_m, mass);
-  const Eigen::MatrixXd& vectors = problem.solver.eigenvectors();
-  const Eigen::VectorXd& values = problem.solver.eigenvalues();
+  const la::Matrix& vectors = problem.vectors;
+  const la::Vector& values = problem.values;
   const Eigen::VectorXd old = Eigen::Map<const Eigen::VectorXd>(before.parts.data(), static_cast<Eigen::Index>(before.parts.size()));
   const Eigen::VectorXd overlap = vectors.transpose() * (problem.inertia * old);
   Eigen::Index best = 0;

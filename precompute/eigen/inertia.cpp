@@ -9,12 +9,12 @@
 
 #include <fmt/core.h>
 
-#include <Eigen/Dense>
 #include <algorithm>
 
 #include "precompute/eigen/memory.hpp"
 #include "precompute/eigen/timer.hpp"
 #include "precompute/la/block_kernels.hpp"
+#include "precompute/la/lapack.hpp"
 #include "precompute/petsc/session.hpp"
 #include "precompute/petsc/work.hpp"
 #include "runtime/base/error.hpp"
@@ -117,10 +117,13 @@ std::int64_t InertiaCounter::count_negative() {
   }
   factor_->solve(images.values, solved.values, solved.stride, rigid);
   statistics_.solves += rigid;
-  const la::Matrix s = multiply_transposed(comm_, images, solved);
-  const auto positive = comm_.broadcast(std::int64_t{
-      (Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(0.5 * (s + s.transpose()), Eigen::EigenvaluesOnly).eigenvalues().array() > 0)
-          .count()});
+  la::Matrix s = multiply_transposed(comm_, images, solved);
+  s = (0.5 * (s + s.transpose())).eval();
+  la::Vector values;
+  comm_.agree([&] {
+    if (comm_.is_root() && la::calc_eigenpairs(s, values) != 0) throw SolveError("The dense eigensolver failed on the rigid motions.");
+  });
+  const auto positive = comm_.broadcast(std::int64_t{(values.array() > 0).count()});
   return all + positive;  // all + n(S) - dim R without the rigid ones, and dim R of these; n(S) of -s
 }
 

@@ -9,12 +9,13 @@
 
 #include <fmt/core.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "precompute/comm/communicator.hpp"
+#include "precompute/la/decompositions.hpp"
 #include "precompute/petsc/session.hpp"
 #include "runtime/base/error.hpp"
 
@@ -89,19 +90,13 @@ std::vector<Body> calc_bodies(const comm::Communicator& comm, const NodeLayout& 
 Motions calc_admissible_motions(const Body& body, const std::vector<Vec3>& fixed) {
   if (fixed.empty()) return Motions::Identity(6, 6);
   // H^T H would square the condition; H R with H = Q R is as small and keeps it.
-  Eigen::MatrixXd constraints(3 * static_cast<Eigen::Index>(fixed.size()), 6);
+  la::Matrix constraints(3 * static_cast<Eigen::Index>(fixed.size()), 6);
   for (std::size_t i = 0; i < fixed.size(); ++i)
     constraints.middleRows<3>(3 * static_cast<Eigen::Index>(i)) = calc_basis(body, to_vector(fixed[i]));
-  Eigen::Matrix<double, Eigen::Dynamic, 6> small = constraints;
-  if (constraints.rows() > 6) {
-    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(constraints);
-    small = qr.matrixQR().topRows(6).triangularView<Eigen::Upper>();
-  }
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(small, Eigen::ComputeFullV);
+  const la::Svd svd = la::calc_svd(constraints.rows() > 6 ? la::calc_qr(constraints, 0).r : constraints);
   Eigen::Index rank = 0;
-  const auto& singular = svd.singularValues();
-  while (rank < singular.size() && singular[rank] > kRankTolerance * singular[0]) ++rank;
-  return svd.matrixV().rightCols(6 - rank);
+  while (rank < svd.values.size() && svd.values[rank] > kRankTolerance * svd.values[0]) ++rank;
+  return svd.v.rightCols(6 - rank);
 }
 
 double calc_dot(Vec a, Vec b) {

@@ -8,7 +8,6 @@
 // Deviations: the rounding term is a multiple of eps phi^T diag(K) phi, which is what it grows like, not a strict bound.
 #include "precompute/estimate/algebraic.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -16,18 +15,19 @@
 #include <numbers>
 
 #include "precompute/fem/element.hpp"
+#include "precompute/la/decompositions.hpp"
 #include "precompute/petsc/handle.hpp"
 #include "precompute/petsc/session.hpp"
 
 namespace carillon::estimate {
 namespace {
 
-using Matrix10 = Eigen::Matrix<double, 10, 10>;
-
-MassBounds find_bounds(const Matrix10& mass) {
-  const Eigen::Matrix<double, 10, 1> scale = mass.diagonal().cwiseSqrt().cwiseInverse();
-  const Eigen::SelfAdjointEigenSolver<Matrix10> solver(scale.asDiagonal() * mass * scale.asDiagonal(), Eigen::EigenvaluesOnly);
-  return {solver.eigenvalues()[0], solver.eigenvalues()[9]};
+MassBounds find_bounds(const la::Matrix& mass) {
+  const la::Vector scale = mass.diagonal().cwiseSqrt().cwiseInverse();
+  la::Matrix scaled = scale.asDiagonal() * mass * scale.asDiagonal();
+  la::Vector values;
+  if (la::calc_eigenpairs(scaled, values) != 0) return {0.0, std::numeric_limits<double>::infinity()};
+  return {values[0], values[9]};
 }
 
 MassBounds find_element_bounds(const std::array<Vec3, 10>& x) {
@@ -35,7 +35,7 @@ MassBounds find_element_bounds(const std::array<Vec3, 10>& x) {
   material::Material unit;
   unit.young_modulus_pa = unit.density_kg_m3 = 1.0;
   if (!fem::calc_element(x, unit, job::Mass::consistent, element)) return {0.0, std::numeric_limits<double>::infinity()};
-  return find_bounds(Eigen::Map<const Matrix10>(element.mass.data()));
+  return find_bounds(Eigen::Map<const la::Matrix>(element.mass.data(), 10, 10));
 }
 
 double calc_determinant(const Vec3& a, const Vec3& b, const Vec3& c) {
@@ -46,13 +46,13 @@ double calc_determinant(const Vec3& a, const Vec3& b, const Vec3& c) {
 struct Cubic {
   static constexpr int kTerms = 20;
   std::vector<std::array<int, 4>> powers;
-  Eigen::Matrix<double, kTerms, kTerms> to_bernstein;
+  la::Matrix to_bernstein;
 
   Cubic() {
     for (int i = 0; i <= 3; ++i)
       for (int j = 0; i + j <= 3; ++j)
         for (int k = 0; i + j + k <= 3; ++k) powers.push_back({i, j, k, 3 - i - j - k});
-    Eigen::Matrix<double, kTerms, kTerms> values;
+    la::Matrix values(kTerms, kTerms);
     constexpr std::array<double, 4> kFactorial{1, 1, 2, 6};
     for (int p = 0; p < kTerms; ++p)
       for (int t = 0; t < kTerms; ++t) {
@@ -60,7 +60,7 @@ struct Cubic {
         for (int i = 0; i < 4; ++i) value *= std::pow(powers[p][i] / 3.0, powers[t][i]) / kFactorial[powers[t][i]];
         values(p, t) = value;
       }
-    to_bernstein = values.inverse();
+    to_bernstein = la::calc_inverse(values);
   }
 };
 

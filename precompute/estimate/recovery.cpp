@@ -16,7 +16,7 @@
 
 #include <fmt/core.h>
 
-#include <Eigen/Dense>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <compare>
@@ -26,6 +26,7 @@
 
 #include "precompute/estimate/surface.hpp"
 #include "precompute/fem/element.hpp"
+#include "precompute/la/decompositions.hpp"
 #include "precompute/mesh/faces.hpp"
 #include "precompute/petsc/session.hpp"
 
@@ -97,11 +98,11 @@ std::array<double, 4> find_place(int samples, int s) {
 
 std::array<float, 36> calc_root(const Solid& solid) {
   using Matrix6 = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
-  const Eigen::LLT<Matrix6> llt(Eigen::Map<const Matrix6>(solid.elasticity_pa.data()));
-  if (llt.info() != Eigen::Success) throw InputError("a material's elasticity is not positive definite; correct its constants");
+  la::Matrix upper = Eigen::Map<const Matrix6>(solid.elasticity_pa.data());
+  if (la::factorise_cholesky(upper) != 0) throw InputError("a material's elasticity is not positive definite; correct its constants");
   std::array<float, 36> root{};
-  const Matrix6 upper = llt.matrixU();
-  for (int i = 0; i < 36; ++i) root[i] = static_cast<float>(upper.data()[i]);
+  for (int r = 0; r < 6; ++r)
+    for (int c = r; c < 6; ++c) root[6 * r + c] = static_cast<float>(upper(r, c));
   return root;
 }
 
@@ -140,9 +141,9 @@ class Patches {
       if (normal(0, 0) == 0.0) continue;
       const Eigen::VectorXd scale =
           normal.diagonal().unaryExpr([&](double d) { return d > 1e-12 * normal(0, 0) ? 1 / std::sqrt(d) : 0.0; });
-      Eigen::MatrixXd scaled = scale.asDiagonal() * normal * scale.asDiagonal();
+      la::Matrix scaled = scale.asDiagonal() * normal * scale.asDiagonal();
       for (int i = 0; i < terms_; ++i) scaled(i, i) += scale[i] == 0.0 ? 1.0 : i == 0 ? 0.0 : i < first ? kFlatness : ridge;
-      normal = scale.asDiagonal() * scaled.inverse() * scale.asDiagonal();
+      normal = scale.asDiagonal() * la::calc_inverse(scaled) * scale.asDiagonal();
     }
   }
 
@@ -329,10 +330,7 @@ std::vector<Shift> find_shifts(const std::vector<SurfaceEdge>& edges, const part
 Eigen::Matrix<double, 6, 3> find_traction_parts(const std::array<float, 36>& root, const std::array<float, 3>& n) {
   Eigen::Matrix<double, 6, 3> strain;
   strain << n[0], 0, 0, 0, n[1], 0, 0, 0, n[2], 0, n[2], n[1], n[2], 0, n[0], n[1], n[0], 0;
-  const Eigen::Matrix<double, 6, 3> scaled =
-      Eigen::Map<const Eigen::Matrix<float, 6, 6, Eigen::RowMajor>>(root.data()).cast<double>() * strain;
-  const Eigen::HouseholderQR<Eigen::Matrix<double, 6, 3>> qr(scaled);
-  return qr.householderQ() * Eigen::Matrix<double, 6, 3>::Identity();
+  return la::calc_qr(Eigen::Map<const Eigen::Matrix<float, 6, 6, Eigen::RowMajor>>(root.data()).cast<double>() * strain, 3).q;
 }
 
 /// Of T10, at the middles of the edges, where three of them integrate squares of linear fields exactly. Neighbours on one smooth surface

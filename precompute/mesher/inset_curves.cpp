@@ -5,7 +5,7 @@
 // Deviations: only along edges that are known to be sharp.
 #include "precompute/mesher/inset_curves.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -41,11 +41,20 @@ Normals group_sides(const Normals& area_normals) {
 
 Vec3 calc_inset(const Normals& sides, double wall_m) {
   if (sides.empty()) return {};
-  Eigen::MatrixXd n(sides.size(), 3);
-  for (std::size_t i = 0; i < sides.size(); ++i) n.row(static_cast<Eigen::Index>(i)) << sides[i][0], sides[i][1], sides[i][2];
-  Eigen::JacobiSVD<Eigen::MatrixXd> svd(n, Eigen::ComputeThinU | Eigen::ComputeThinV);
-  svd.setThreshold(0.1);  // the facets of a rounded side differ a little: that is no third direction
-  const Eigen::Vector3d x = svd.solve(Eigen::VectorXd::Constant(n.rows(), -wall_m));
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();  // of the least squares
+  Eigen::Vector3d right = Eigen::Vector3d::Zero(), x = right;
+  for (const Vec3& side : sides) {
+    const Eigen::Vector3d n(side[0], side[1], side[2]);
+    normal += n * n.transpose();
+    right -= wall_m * n;
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(normal);
+  for (int i = 0; i < 3; ++i) {
+    const double square = solver.eigenvalues()[i];
+    const auto direction = solver.eigenvectors().col(i);
+    // The facets of a rounded side differ a little: that is no third direction.
+    if (square >= 0.01 * solver.eigenvalues()[2]) x += direction * (direction.dot(right) / square);
+  }
   return {x[0], x[1], x[2]};
 }
 

@@ -18,9 +18,10 @@ constexpr double kSlowest = 1e-6;  // m/s: speed for the choice of the step with
 constexpr double kTaper = 0.05;    // of the time of pressing: time constant of a rebound at its limit
 constexpr double kStill = 1e-3;    // m/s: settled contacts are slower
 constexpr double kSoon = 1e-3;     // s; time to the next touch of bodies still in contact, at most
-constexpr double kHeld = 0.9;      // of the energy that a limit takes, until what has yielded recovers
-constexpr int kLimitings = 8;      // rounds for contacts that share bodies,
-constexpr double kOver = 1e-4;     // to this part of the force of a step
+constexpr double kHeld =
+    0.9;  // of the energy that a limit takes, until what has yielded recovers; the rest covers the error of the rotation
+constexpr int kLimitings = 8;   // rounds for contacts that share bodies,
+constexpr double kOver = 1e-4;  // to this part of the force of a step
 
 bool is_finite(const Vec3& x) { return std::isfinite(x[0]) && std::isfinite(x[1]) && std::isfinite(x[2]); }
 

@@ -29,6 +29,7 @@ Bodies::Bodies(std::vector<Solid> solids, std::vector<State> states, std::option
   placed_.resize(solids_.size());
   asleep_.assign(solids_.size(), 0);
   in_impact_.assign(solids_.size(), 0);
+  struck_s_.assign(solids_.size(), -1.0);
   swings_m_.assign(solids_.size(), 0.0);
   for (int i = 0; i < count(); ++i) placed_[i] = rigid::place(solids_[i], states_[i]);
   make_articulations(joints);

@@ -69,7 +69,13 @@ class Bodies {
   bool is_flat(int body) const { return body < 0 || solids_[body].shape->is_polyhedron(); }
   /// Is it, or are its modes, in an impact with modes?
   bool is_in_impact(int body) const { return body >= 0 && in_impact_[body] != 0; }
-  void set_in_impact(int body, bool is_in) { in_impact_[body] = is_in ? 1 : 0; }
+  /// Begin and end of an impact with modes count as blows.
+  void set_in_impact(int body, bool is_in) {
+    in_impact_[body] = is_in ? 1 : 0;
+    note_struck(body);
+  }
+  void note_struck(int body) { struck_s_[body] = get_time(); }
+  double get_struck_s(int body) const { return struck_s_[body]; }  // of the last impact
   /// Bound of the displacement of its surface by its modes between impacts [m].
   double get_swing(int body) const { return body >= 0 ? swings_m_[body] : 0.0; }
   void set_swing(int body, double swing_m) { swings_m_[body] = swing_m; }
@@ -159,6 +165,7 @@ class Bodies {
   std::vector<State> states_;
   std::vector<Placed> placed_;
   std::vector<char> asleep_, in_impact_;
+  std::vector<double> struck_s_;
   std::vector<double> swings_m_;
   std::optional<Ground> ground_;
   Vec3 gravity_{};

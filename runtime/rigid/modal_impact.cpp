@@ -17,7 +17,8 @@ constexpr double kSamePlace = 0.05;    // of the size
 constexpr double kMoved = 0.02;        // of the size: least way of a contact to its touch for a move
 constexpr int kMaxFollowed = 8;        // contacts of an impact, open ones included
 constexpr double kExplained = 1.3;     // times the depth of spring and modes is explained
-constexpr double kOneFace = 0.99;      // cosine between the normals of one face
+constexpr double kOneFace = 0.99;      // cosine between the normals of one face,
+constexpr double kOnePlane = 0.02;     // of the size: and distance of its corners from its plane
 constexpr double kCalmTime = 5e-3;     // s; after the end of an impact, without slow impacts of the pair
 
 /// Area of the convex polygon of some points [m^2].
@@ -196,6 +197,7 @@ std::vector<impact::Spring> ModalImpacts::find_springs(const ModalImpact& modal,
   std::vector<char> is_taken(count, 0);
   for (int first = 0; first < count; ++first) {
     const ModalContact& one = modal.contacts[first];
+    if (is_taken[first] != 0 || !one.is_sharp || !one.is_followed) continue;
     std::vector<int> face;
     std::vector<Vec3> corners;
     for (int k = first; k < count; ++k) {
@@ -203,7 +205,8 @@ std::vector<impact::Spring> ModalImpacts::find_springs(const ModalImpact& modal,
       const double flat_m = springs[k].exponent == 1.0 ? 0.0 : kTooDeep,
                    pressed_m = modal.impact->get_compression(k) + std::max(modal.impact->calc_approach(k), 0.0) * part_s;
       if (is_taken[k] != 0 || !contact.is_sharp || !contact.is_followed || !contact.is_between(one.forces.a, one.forces.b) ||
-          dot(contact.normal, one.normal) < kOneFace || !(pressed_m > flat_m))
+          dot(contact.normal, one.normal) < kOneFace || !(pressed_m > flat_m) ||
+          std::abs(dot(one.normal, find_station(contact) - find_station(one))) > kOnePlane * bodies_.calc_size(one.forces.a, one.forces.b))
         continue;
       face.push_back(k);
       corners.push_back(find_station(contact));

@@ -73,7 +73,7 @@ Vec3 calc_relative_spin(const std::vector<Mover>& movers, const Point& point);
 void apply(std::vector<Mover>& movers, const Point& point, const Vec3& impulse);
 void turn(std::vector<Mover>& movers, const Point& point, const Vec3& couple);
 
-/// Couple per spin that all couples of a point are scaled by [kg m^2]: on joints a body turns more slowly. 0: it has none.
+/// Scale of the couples at a point: couple per spin [kg m^2], as without joints. 0: the point has no couple.
 double calc_turning_mass(const std::vector<Mover>& movers, const Point& point);
 
 /// The mobility at a point [1/kg]: u gained per impulse.

@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tuple>
+#include <utility>
+#include <vector>
 
 #include "runtime/rigid/limits.hpp"
 
@@ -152,13 +155,13 @@ void Space::step_island(Island& island, double start_s, double length_s) {
   step_.end();
 }
 
-/// Puts an island to sleep if it is balanced, its touches opened if it is so with open ones, too. Nothing moves otherwise: bodies that fall
-/// back would never come to rest.
-bool Space::try_rest(Island& island, double h) {
+/// Puts an island to sleep if contact forces balance it: first with its bodies moved apart to kDeep, then as it is. If neither balances, no
+/// body is displaced: bodies that fall back from a lift would never come to rest.
+bool Space::try_rest(Island& island, double length_s) {
   std::vector<State> kept;
-  std::vector<double> stored_j;
+  std::vector<std::pair<double, Pair::Errors>> kept_pairs;
   for (const int body : island.bodies) kept.push_back(bodies_.state(body));
-  for (const Pair* pair : island.pairs) stored_j.push_back(pair->stored_j);
+  for (const Pair* pair : island.pairs) kept_pairs.emplace_back(pair->stored_j, pair->errors);
   Books before, after;
   ledger_.add_to(before);
   const std::int64_t pushes = ledger_.costs.pushes;
@@ -166,10 +169,10 @@ bool Space::try_rest(Island& island, double h) {
   for (Pair* pair : island.pairs) {
     if (pair->b >= 0 || pair->contacts.size() != 1 || !pair->touches()) continue;
     pair->memory.known = false;
-    touches_.search(*pair, h);
+    touches_.search(*pair, length_s);
   }
   projection_.run(step_, kDeep);
-  if (rest_.try_island(island, h)) return true;
+  if (rest_.try_island(island, length_s)) return true;
   if (ledger_.costs.pushes == pushes) return false;
   ledger_.add_to(after);
   ledger_.lose(before.lost_j - after.lost_j);
@@ -179,10 +182,10 @@ bool Space::try_rest(Island& island, double h) {
     bodies_.place(body);
   }
   for (int n = 0; Pair * pair : island.pairs) {
-    pair->stored_j = stored_j[n++];
     if (!pair->contacts.empty()) touches_.refresh(*pair);
+    std::tie(pair->stored_j, pair->errors) = kept_pairs[n++];
   }
-  return rest_.try_island(island, h);
+  return rest_.try_island(island, length_s);
 }
 
 /// The impacts of a crowded island: all touches closing within a step strike at its beginning. False: none closes, touches unchanged.

@@ -16,8 +16,8 @@ namespace carillon::rigid {
 namespace {
 
 constexpr double kSteps = 4.0;             // of movement in the margin of a search,
-constexpr double kStepsOfRolling = 8.0;    // the same of curved bodies on the ground: few places come near,
-constexpr double kAhead = 4e-3;            // s; for no longer than this
+constexpr double kStepsOfRolling = 8.0;    // the same of curved bodies on the ground: few places come near
+constexpr double kAhead = 4e-3;            // s; longest look-ahead of these
 constexpr double kMissing = 5e-6;          // m; excess of a missing place over all touches
 constexpr double kSearchAgain = 2e-3;      // s; between searches for missing touches of a pair
 constexpr double kSame = 0.02;             // of the size: distance of touches counted as one
@@ -25,7 +25,7 @@ constexpr double kOnePlace = 1e-4;         // of the size: touches nearer than t
 constexpr double kJump = 0.2;              // rad; turn of the normal in the body by which a touch has jumped
 constexpr double kSagDecay = 10e-3;        // s
 constexpr int kMaxAdded = 4;               // missing touches at the end of a flight
-constexpr double kDeepForThickness = 0.1;  // depth at which touches are found with the bodies apart
+constexpr double kDeepForThickness = 0.1;  // of the thickness: bodies deeper than this are searched apart
 
 /// Lower bound of the gap of any vertex of a body over the ground, from that at an earlier frame.
 double calc_least_gap(const Pair& pair, const shape::Shape& shape, const shape::Frame& now) {
@@ -112,7 +112,8 @@ void TouchSets::search(Pair& pair, double step_s) {
   complete(pair, frame_a, bodies_.get_frame(pair.b), 0.0);
 }
 
-/// Keeps touches that a search has lost: closed ones that carry, and with the ground deeper ones than all found, and sharp closed ones.
+/// Keeps touches that a search has lost. Between two bodies: those that touched and are within kDeep. With the ground: closed ones that
+/// carry, sharp closed ones, and any deeper than all found.
 void TouchSets::keep_lost(Pair& pair, const std::vector<Contact>& old) const {
   const shape::Frame a = bodies_.get_frame(pair.a), b = bodies_.get_frame(pair.b);
   double least_m = pair.margin_m;
@@ -131,7 +132,7 @@ void TouchSets::keep_lost(Pair& pair, const std::vector<Contact>& old) const {
     const bool is_found = std::any_of(pair.contacts.begin(), pair.contacts.end(), [&](const Contact& found) {
       return found.touch.id == touch.id || norm(found.touch.where_m - touch.where_m) < near_m;
     });
-    const bool carries = c.touching && dot(c.impulse, c.touch.normal) > 0.0 && !is_between(touch);
+    const bool carries = pair.b < 0 && c.touching && dot(c.impulse, c.touch.normal) > 0.0 && !is_between(touch);
     const double most_m = pair.b >= 0 ? kDeep : touch.smooth && !carries ? least_m - kMissing : std::max(least_m - kMissing, kTouch);
     if (touch.gap_m <= most_m && !is_found) pair.contacts.emplace_back(c).touch = touch;
   }
@@ -159,7 +160,7 @@ void TouchSets::merge(Pair& pair) const {
 
 /// Has a touch gone to another part of its surface?
 bool TouchSets::is_jump(const Pair& pair, const shape::Touch& from, const shape::Touch& to) const {
-  const double way_m = norm(to.station_a - from.station_a);
+  const double way_m = std::max(norm(to.station_a - from.station_a), norm(to.station_b - from.station_b));
   return way_m > kSame * bodies_.calc_size(pair.a, pair.b) && way_m * from.steepest_per_m > kJump;
 }
 
@@ -173,7 +174,7 @@ void TouchSets::refresh(Pair& pair) const {
     if (is_there) c.touch = pair.ahead.touches[k++];
     pair.searched = pair.searched && follows;
     if (c.touching && c.touch.smooth) {
-      const double way_m = norm(c.touch.station_a - before.station_a);
+      const double way_m = bodies_.moves(pair.a) ? norm(c.touch.station_a - before.station_a) : norm(c.touch.station_b - before.station_b);
       pair.errors.drift_m = std::max(pair.errors.drift_m, std::abs(c.touch.gap_m - before.gap_m));
       pair.errors.way_m = std::max(pair.errors.way_m, way_m);
       pair.errors.turn = std::max(pair.errors.turn, way_m * c.touch.steepest_per_m);
@@ -350,7 +351,7 @@ void TouchSets::part(Pair& pair, double depth_m, const Vec3& normal) const {
 
 /// The bodies of a pair are as far apart as is explained now.
 void TouchSets::limit_apart(Pair& pair) const {
-  if (pair.apart_m != Vec3{}) part(pair, std::max(pair.sag_m, impacts_.calc_depth(pair)), (1.0 / norm(pair.apart_m)) * pair.apart_m);
+  if (pair.apart_m != Vec3{}) part(pair, std::max(pair.sag_m, impacts_.calc_depth(pair)), carillon::normalise(pair.apart_m));
 }
 
 void TouchSets::lose_stored(Pair& pair) const {

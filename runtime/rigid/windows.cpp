@@ -23,14 +23,14 @@ constexpr double kSagOfThickness = 5e-4;  // or by so much of the thickness of i
 constexpr double kRolls = 4.0;            // times the arc bounded by the box of a body: keeps long rolling bodies within 50 um
 constexpr double kFlatSteps = 2.0;        // times the step of others: that of groups in which flat bodies alone touch
 constexpr double kRoom = 1e-4;            // m; excess of boxes
-// A body that rolls by itself, on smooth touches that last, takes longer steps:
-constexpr double kRollingSteps = 4.0;  // times those of others at most,
-constexpr double kCalm = 10e-3;        // s; if nothing has struck it for so long,
-constexpr double kNear = 0.02;         // of its size, and
-constexpr double kAlong = 3.0;         // times the way of its touches in a window: no place farther from them comes down within one;
-constexpr double kDrift = 5e-7;        // m; the gaps of its touches change by less in a step,
-constexpr double kTurn = 0.05;         // rad; and so do their normals in the body
-constexpr double kSpan = 0.25;         // of its size: touches that lie farther apart keep it from hopping
+// A body that rolls by itself on smooth touches takes longer steps:
+constexpr double kRollingSteps = 4.0;  // longest step, times options.step_s
+constexpr double kCalm = 10e-3;        // s; time without an impact before it does
+constexpr double kNear = 0.02;         // of its size,
+constexpr double kAlong = 3.0;         // or travels of its touches in a window: no vertex farther from them may come down
+constexpr double kDrift = 5e-7;        // m; largest change of a gap in a step
+constexpr double kTurn = 0.05;         // rad; largest turn of a normal in the body in a step
+constexpr double kSpan = 0.25;         // of its size: touches farther apart keep it from hopping
 
 bool overlap(const shape::Box& x, const shape::Box& y) {
   for (int k = 0; k < 3; ++k)
@@ -183,8 +183,8 @@ void Windows::join_sleeping(Groups& groups) const {
     for (const int body : articulation.bodies) groups.join(articulation.bodies.front(), body);
 }
 
-/// Finds the bodies that roll by themselves, and how many steps they need by the errors of their last window. The change of a gap in a step
-/// grows with its cube.
+/// Finds bodies that roll by themselves and their number of steps from the errors of the last window. The change of a gap grows with the
+/// cube of the step.
 void Windows::find_rolling(Groups& groups) {
   const int count = bodies_.count();
   const double most = get_length() / options_.step_s;
@@ -193,9 +193,9 @@ void Windows::find_rolling(Groups& groups) {
   for (int i = 0; i < count; ++i) ++sizes[groups.find(i)];
   std::vector<char> rolls(count, 0), touches(count, 0);
   for (int i = 0; i < count; ++i) {
-    if (bodies_.is_moved_by_impact(i)) rolling_[i].struck_s = start_s_;
+    if (bodies_.is_moved_by_impact(i)) bodies_.note_struck(i);
     rolls[i] = bodies_.moves(i) && sizes[groups.find(i)] == 1 && !bodies_.is_flat(i) && bodies_.find_articulation(i) == nullptr &&
-               start_s_ - rolling_[i].struck_s > kCalm;
+               start_s_ - bodies_.get_struck_s(i) > kCalm;
   }
   std::vector<double> errors(count, 0.0);  // over those allowed
   std::vector<Vec3> stations;
@@ -364,7 +364,7 @@ void Windows::undo_flight(int body, int by) {
 }
 
 void Windows::extend(int body) {
-  rolling_[body].struck_s = bodies_.get_time();
+  bodies_.note_struck(body);
   const double left = end_s_ - bodies_.get_time();
   const double others_left = end_s_ - get_time();  // of islands whose step is still to be made
   const double speed = bodies_.calc_speed(body) + norm(bodies_.gravity()) * left;

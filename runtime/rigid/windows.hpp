@@ -69,10 +69,9 @@ class Windows {
  private:
   /// Of a body that may roll by itself, on smooth touches that last.
   struct Rolling {
-    double struck_s = 0.0;  // when something struck it last
-    bool spans = false;     // its touches lie far apart
-    int steps = 0;          // of the last window; 0: it did not roll
-    double asked = 0.0;     // of this window; 0: it does not roll
+    bool spans = false;  // its touches lie far apart
+    int steps = 0;       // of the last window; 0: it did not roll
+    double asked = 0.0;  // of this window; 0: it does not roll
   };
 
   void open_cords();

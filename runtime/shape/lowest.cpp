@@ -110,13 +110,18 @@ bool may_tip(const Shape& a, const Frame& frame, const Vec3& normal, const Vec3&
              double time_s) {
   const Vec3 up = turn_back(frame.rotation, normal), lever = turn_back(frame.rotation, cross(normal, spin));
   const Vec3 &first = touches.front(), along = touches.back() - first;
-  for (const int vertex : a.low_vertices().list(a, up)) {
+  const auto tips = [&](int vertex) {
     const Vec3 from = a.mesh().vertices[vertex] - first;
-    if (dot(up, from) + time_s * dot(lever, from) > 0.0) continue;
+    if (dot(up, from) + time_s * dot(lever, from) > 0.0) return false;
     const double part = norm2(along) > 0.0 ? std::clamp(dot(from, along) / norm2(along), 0.0, 1.0) : 0.0;
-    if (norm2(from - part * along) > far_m * far_m) return true;
-  }
-  return false;
+    return norm2(from - part * along) > far_m * far_m;
+  };
+  // `up` may leave its cell within the time.
+  const auto tips_any = [&](const Vec3& way) {
+    const std::vector<int>& low = a.low_vertices().list(a, way);
+    return std::any_of(low.begin(), low.end(), tips);
+  };
+  return tips_any(up) || tips_any(normalise(up + time_s * lever));
 }
 
 double calc_vertex_curvature(const Shape& shape, int vertex) {

@@ -17,7 +17,7 @@ class LowVertices {
  public:
   /// The vertex that is lowest along `up` (mesh frame), and its height. Always of the same shape.
   std::pair<int, double> find(const Shape& shape, const Vec3& up);
-  /// All vertices that may be lowest along a direction near `up`.
+  /// All vertices that may be lowest along a direction in the cell of `up`.
   const std::vector<int>& list(const Shape& shape, const Vec3& up);
 
  private:

@@ -40,8 +40,8 @@ class Pass {
   double find_room() const { return calc_room(mine_.samples().reach_m) + reach_ + sag_; }
   /// `near`: samples listed before a movement of the bodies by at most `way_m`.
   void run(Distances& distances, const std::vector<std::pair<int, double>>& near, double way_m);
-  /// The deepest sample in theirs below `gap_m`, which becomes its gap; -1: none. `least_m`: of each near sample a gap that it had, and the
-  /// movement `gone_m` at that time, together; those looked at are replaced.
+  /// The deepest sample in theirs below `gap_m`, which becomes its gap; -1: none. `least_m`: for each near sample a bound of its gap
+  /// plus `gone_m` when it was found; renewed where a sample is measured.
   int find_deepest(double& gap_m, const std::vector<std::pair<int, double>>& near, double gone_m, std::vector<double>& least_m) const;
   /// Ridges of mine before curved parts of theirs: the lowest places of their straight pieces, and corners between two pieces that both
   /// rise.

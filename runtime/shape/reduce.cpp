@@ -10,9 +10,9 @@ namespace {
 
 constexpr double kNormal = 0.966;        // cosine of 15 degrees
 constexpr double kLevel = 1e-5;          // slope
-constexpr double kLower = 1e-6;          // m; a touch lower than the plane of others about it by this is kept,
-constexpr double kOutside = 0.05;        // of the sides: and of one next to these others,
-constexpr std::size_t kMostInPatch = 8;  // up to so many
+constexpr double kLower = 1e-6;          // m; a touch this far below the plane of three kept ones is kept, too
+constexpr double kOutside = 0.05;        // barycentric: how far outside their triangle it may lie
+constexpr std::size_t kMostInPatch = 8;  // touches kept of a patch
 constexpr double kFlatTriangle = 1e-6;   // area over the square of a side: no plane
 constexpr std::uint64_t kTravels = 1ULL << 63;
 

@@ -73,8 +73,8 @@ struct Deepest {
   bool is_of_a = true;
 };
 Deepest find_lowest(const Shape& a, const Frame& frame, double height_m);
-/// May a place of the body come down to a plane within a time of the present spin, farther than `far_m` from its touches (mesh frame) and
-/// from the line between the first and the last? `normal`: of the plane.
+/// Can a vertex reach the plane through the first touch within `time_s` at the present spin, if it is farther than `far_m` from the line
+/// between the first and the last touch? `touches`: mesh frame; `normal`: of the plane, world.
 bool may_tip(const Shape& a, const Frame& frame, const Vec3& normal, const Vec3& spin, std::span<const Vec3> touches, double far_m,
              double time_s);
 /// None (-1) between two polyhedra, whose touches are complete, and where no sample is deeper than `gap_m`.

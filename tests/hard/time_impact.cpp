@@ -28,7 +28,7 @@ double calc_fault(Impact& impact, const std::vector<Contact>& contacts) {
   const Books books = impact.get_books();
   const double scale = std::max({books.start, std::abs(books.given), books.rigid, 1e-300});
   double fault = std::abs(books.calc_error());
-  for (const double loss : {books.dissipated_modes, books.dissipated_contact, books.dissipated_friction, books.above_band})
+  for (const double loss : {books.dissipated_modes, books.dissipated_contact, books.yielded, books.dissipated_friction, books.above_band})
     fault = std::max(fault, -loss / scale);
   for (const Body& body : impact.get_bodies()) {
     double sum = dot(body.velocity_m_s, body.velocity_m_s) + dot(body.spin_rad_s, body.spin_rad_s) + dot(body.moved_m, body.moved_m);

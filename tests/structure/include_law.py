@@ -216,6 +216,7 @@ LAW = {
             "precompute/mesh",
             "precompute/comm",
             "precompute/petsc",
+            "precompute/la",
             "precompute/fem",
         ],
         ["fmt", "mpi", "petsc", "eigen"],
@@ -247,7 +248,7 @@ LAW = {
         ["fmt", "petsc", "eigen"],
     ),
     "precompute/emission": (["runtime/base", "runtime/bank", "runtime/recording", "precompute/job", "precompute/comm"], ["fmt", "hdf5"]),
-    "precompute/bem": (["runtime/base", "runtime/bank", "precompute/comm"], ["fmt", "eigen"]),
+    "precompute/bem": (["runtime/base", "runtime/bank", "precompute/comm", "precompute/la"], ["fmt", "eigen"]),
     "precompute/transient": (
         ["runtime/base", "precompute/job", "partition", "precompute/mesh", "precompute/comm"],
         ["fmt", "mpi", "eigen"],
