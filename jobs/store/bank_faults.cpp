@@ -33,7 +33,7 @@ std::optional<std::string> find_file_fault(const OpenFolder& folder, const BankS
   return std::nullopt;
 }
 
-/// Fault of a bank in its content or its job (`id`), by all its bytes. With a sum, gaps of its own records are no fault.
+/// First fault of a bank: content, job (`id`), sum over all bytes. Gaps in the records of a summed bank are allowed.
 std::optional<std::string> find_content_fault(const OpenFolder& folder, const Id& id, bool has_sum) {
   try {
     const bool is_simulation = std::string_view(find_main_file(folder)) == kRecordFile;

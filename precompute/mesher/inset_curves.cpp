@@ -52,7 +52,7 @@ Vec3 calc_inset(const Normals& sides, double wall_m) {
   for (int i = 0; i < 3; ++i) {
     const double square = solver.eigenvalues()[i];
     const auto direction = solver.eigenvectors().col(i);
-    // The facets of a rounded side differ a little: that is no third direction.
+    // Tolerance for the facets of a rounded side.
     if (square >= 0.01 * solver.eigenvalues()[2]) x += direction * (direction.dot(right) / square);
   }
   return {x[0], x[1], x[2]};

@@ -18,10 +18,8 @@ constexpr double kSlowest = 1e-6;  // m/s: speed for the choice of the step with
 constexpr double kTaper = 0.05;    // of the time of pressing: time constant of a rebound at its limit
 constexpr double kStill = 1e-3;    // m/s: settled contacts are slower
 constexpr double kSoon = 1e-3;     // s; time to the next touch of bodies still in contact, at most
-constexpr double kHeld =
-    0.9;  // of the energy that a limit takes, until what has yielded recovers; the rest covers the error of the rotation
-constexpr int kLimitings = 8;   // rounds for contacts that share bodies,
-constexpr double kOver = 1e-4;  // to this part of the force of a step
+constexpr int kLimitings = 8;      // rounds for contacts that share bodies,
+constexpr double kOver = 1e-4;     // to this part of the force of a step
 
 bool is_finite(const Vec3& x) { return std::isfinite(x[0]) && std::isfinite(x[1]) && std::isfinite(x[2]); }
 
@@ -381,9 +379,7 @@ void Impact::step() {
     contacts_[c].pressed_s = t.compression_m > 0.0 ? contacts_[c].pressed_s + h_ : 0.0;
     const double taken_j =
         -(force_[row] * moved_[row] + (calc_spring_energy(t.spring, t.compression_m) - calc_spring_energy(t.spring, before)));
-    const double held_j = is_limited ? kHeld * taken_j : 0.0;
-    yielded_j += held_j;
-    books_.dissipated_contact += taken_j - held_j;
+    (is_limited ? yielded_j : books_.dissipated_contact) += taken_j;
     if (!(t.compression_m > 0.0) && yielded == 0.0) books_.dissipated_contact += std::exchange(yielded_j, 0.0);
     Vec3 impulse = h_ * force_[row] * rows_[row].axis;
     contacts_[c].impulse_n_s += h_ * force_[row];

@@ -300,6 +300,7 @@ void ModalImpacts::advance(const Step& step, double to_s, double part_s, double 
       if (n < 0) continue;
       impact::Body& b = bodies[k];
       set_motion(body, b);
+      if (!b.on_joints) b.spin_acceleration_rad_s2 = (1.0 / step.length_s) * (step.free[n].placed.spin - bodies_.placed(body).spin);
       // Cords and other contacts act as long as the impact continues in this part, whose own steps may be longer.
       const Vec3 free = b.on_joints ? step.free[n].state.velocity : bodies_.state(body).velocity + step.length_s * bodies_.gravity();
       pulls[k] = {(1.0 / step.length_s) * (step.movers[n].velocity - free),
@@ -445,7 +446,7 @@ void ModalImpacts::release(ModalImpact& modal, double time_s, TouchSets& touches
   if (!modal.impact->has_ended()) ++ledger_.costs.ended_impacts;
   ledger_.costs.longest_impact_s = std::max(ledger_.costs.longest_impact_s, modal.impact->get_time());
   const impact::Books books = modal.impact->get_books();
-  // What has yielded recovers slowly, and keeps the work that this takes against the weight.
+  // Yielded compression keeps the work of its recovery against the weight.
   double deepest_m = 0.0, weight_n = 0.0;
   for (int k = 0; k < static_cast<int>(modal.contacts.size()); ++k) deepest_m = std::max(deepest_m, modal.impact->calc_depth(k));
   for (const impact::Body& b : bodies) weight_n += b.mass_kg * norm(bodies_.gravity());

@@ -135,9 +135,7 @@ double StepProblem::calc_rolling_radius(const Step& step, const Point& p, const 
   const Vec3 spin = (p.a >= 0 ? step.free[p.a].placed.spin : Vec3{}) - (p.b >= 0 ? step.free[p.b].placed.spin : Vec3{});
   const double turned = step.length_s * norm(spin - dot(spin, t.normal) * t.normal);
   if (turned < kAtRestTurned) return at_rest;
-  const bool is_on_a = t.curvature_a_per_m >= t.curvature_b_per_m;
-  const double way = is_on_a ? norm(moved.station_a - t.station_a) : norm(moved.station_b - t.station_b);
-  return std::clamp(way / turned, at_rest, std::max(at_rest, kMaxRolling * bodies_.calc_size(c.a, c.b)));
+  return std::clamp(shape::calc_travel(t, moved) / turned, at_rest, std::max(at_rest, kMaxRolling * bodies_.calc_size(c.a, c.b)));
 }
 
 /// A touch that lasts, as a row of the step.

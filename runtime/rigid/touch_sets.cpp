@@ -160,7 +160,7 @@ void TouchSets::merge(Pair& pair) const {
 
 /// Has a touch gone to another part of its surface?
 bool TouchSets::is_jump(const Pair& pair, const shape::Touch& from, const shape::Touch& to) const {
-  const double way_m = std::max(norm(to.station_a - from.station_a), norm(to.station_b - from.station_b));
+  const double way_m = shape::calc_travel(from, to);
   return way_m > kSame * bodies_.calc_size(pair.a, pair.b) && way_m * from.steepest_per_m > kJump;
 }
 
@@ -174,7 +174,7 @@ void TouchSets::refresh(Pair& pair) const {
     if (is_there) c.touch = pair.ahead.touches[k++];
     pair.searched = pair.searched && follows;
     if (c.touching && c.touch.smooth) {
-      const double way_m = bodies_.moves(pair.a) ? norm(c.touch.station_a - before.station_a) : norm(c.touch.station_b - before.station_b);
+      const double way_m = shape::calc_travel(before, c.touch);
       pair.errors.drift_m = std::max(pair.errors.drift_m, std::abs(c.touch.gap_m - before.gap_m));
       pair.errors.way_m = std::max(pair.errors.way_m, way_m);
       pair.errors.turn = std::max(pair.errors.turn, way_m * c.touch.steepest_per_m);

@@ -14,7 +14,7 @@
 namespace carillon::shape {
 namespace {
 
-constexpr double kRounding = 1e-9;  // of the distance: what rounding may hide
+constexpr double kRounding = 1e-9;  // of the distance: rounding
 
 /// The vertex that is lowest along `up` (mesh frame), and its height.
 std::pair<int, double> find_lowest_vertex(const Mesh& mesh, const Samples& s, const Vec3& up) {

@@ -263,7 +263,7 @@ bool Pass::add_rim(const Sample& sample, Touch t) {
 }
 
 void Pass::add_smooth(const Sample& sample) {
-  constexpr int kMax = 4;  // looks at what it faces
+  constexpr int kMax = 4;  // facets tried
   const Mesh& mesh = theirs_.mesh();
   const double reach = std::max(1.5 * sample.reach_m, 2.0 * mine_.samples().spacing_m), brim = kBrim * mine_.get_size_m();
   Spot spot = mine_.skin().locate(sample.point, sample.face);
@@ -302,7 +302,7 @@ void Pass::add_smooth(const Sample& sample) {
     if (facing.side == Side::plane || facing.side == Side::line) {
       const Nearest foot = mesh.find_nearest(t.station_b, Box::kFar, at.face);
       if (foot.distance2 > brim * brim || (facing.side == Side::line && !is_between(t, foot))) {
-        // Past the facet or the edge: what is there?
+        // Past the facet or the edge: its neighbour.
         at = foot;
         if (facing.side == Side::line && foot.distance2 <= brim * brim) {
           at = surface_.find_nearest(to_theirs(t.station_a));

@@ -66,6 +66,11 @@ void find_touches(const Shape& a, const Frame& frame_a, const Shape& b, const Fr
 void find_ground_touches(const Shape& a, const Frame& frame_a, double height_m, double margin_m, PairMemory& memory,
                          std::vector<Touch>& out, bool with_all = false);
 
+/// Distance that a touch travels on the more curved surface [m].
+inline double calc_travel(const Touch& from, const Touch& to) {
+  return from.curvature_a_per_m >= from.curvature_b_per_m ? norm(to.station_a - from.station_a) : norm(to.station_b - from.station_b);
+}
+
 /// The deepest place of one body in another, a sample, or in the ground, a vertex.
 struct Deepest {
   int place = -1;

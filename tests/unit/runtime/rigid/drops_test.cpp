@@ -17,7 +17,7 @@ TEST(drops, touches_with_the_floor_are_complete_at_the_end_of_every_step) {
     bytes[0] = static_cast<std::uint8_t>(n);  // each body twice
     const Drop drop = decode_drop(bytes);
     SCOPED_TRACE(kDropBodies.at(static_cast<std::size_t>(drop.body)));
-    EXPECT_LE(run_drop(drop, 0.5).missed_m, 5e-6 + 1e-9);  // kMissing of touch_sets.cpp
+    EXPECT_LE(run_drop(drop, 0.5).missed_m, 2e-6 + 1e-9);
   }
 }
 
