@@ -57,8 +57,7 @@ double calc_way(const Frame& from, const Frame& to, const Shape& a);
 bool recall(const PairMemory& memory, const Frame& pose, const Shape& a, double margin_m);
 /// Keeps of touches that travel and have met one, the deepest; then few of a patch.
 void thin(std::vector<Touch>& touches, double spacing_m, double patch_m);
-/// The candidates of the memory that are nearer than the margin now, with names; `moved`: they have not been settled since. False,
-/// without touches: one of them cannot be followed.
+/// Candidates of the memory within the margin, with names; `moved`: to be settled first. False, without touches: a lost candidate.
 bool answer(const Shape& a, const Frame& frame_a, const Shape* b, const Frame& frame_b, double margin_m, bool moved, PairMemory& memory,
             std::vector<Touch>& out);
 
