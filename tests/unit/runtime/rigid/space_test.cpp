@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <vector>
@@ -86,6 +87,49 @@ TEST(space, what_parts_from_the_ground_while_it_turns_is_no_impact) {
   space.step(2e-3);
   EXPECT_EQ(space.get_costs().impacts, 0);
   EXPECT_LE(space.get_costs().solves, 2) << "after " << space.get_time() << " s";
+}
+
+TEST(space, disc_on_its_rim_without_resistance_precesses_at_the_steady_rate) {
+  // A disc of thickness 2 e that leans by a about a fixed centre: W^2 sin a (A cos a - C e/r sin a) = m g (r cos a - e sin a), derived in
+  // Rolling.ACoinOnItsRimPrecessesAtTheSteadyRate; for e = 0 that of H. K. Moffatt, Nature 404 (2000), eq. 2. It comes no lower.
+  struct Case {
+    double radius, e, degrees, end_s;
+  };
+  for (const Case& d : {Case{0.075, 0.001, 14, 1.0}, Case{0.075, 0.001, 30, 1.0}, Case{0.012, 0.001, 8, 0.3}, Case{0.012, 0.001, 14, 0.3},
+                        Case{0.012, 0.001, 30, 0.3}}) {
+    const double mass = 7850.0 * 2.0 * M_PI * d.radius * d.radius * d.e, gravity = 9.81, a = d.degrees * M_PI / 180, s = std::sin(a),
+                 c = std::cos(a);
+    const double across = mass * (0.25 * d.radius * d.radius + d.e * d.e / 3.0), along = 0.5 * mass * d.radius * d.radius;
+    const double rate = std::sqrt(mass * gravity * (d.radius * c - d.e * s) / (s * (across * c - along * d.e / d.radius * s)));
+    Solid disc = make_solid(shape::tests::make_cylinder(d.radius, 2.0 * d.e, 96), mass, {});
+    for (std::size_t k = 0; k < 3; ++k) {
+      disc.inertia_kg_m2[k][k] = k == 2 ? along : across;
+      disc.inverse_inertia[k][k] = 1.0 / disc.inertia_kg_m2[k][k];
+    }
+    disc.restitution = 0.0;
+    disc.friction = 0.8;
+    disc.young_modulus_pa = 200e9;
+    State start;
+    start.rotation = {std::cos(0.5 * a), std::sin(0.5 * a), 0, 0};
+    start.centre = {0, 0, d.radius * s + d.e * c};
+    const Mat3 rotation = make_rotation(start.rotation);
+    const Vec3 spin = -rate * s * (Vec3{0, -c, -s} - (d.e / d.radius) * Vec3{0, -s, c});
+    start.momentum = rotation * (disc.inertia_kg_m2 * (transpose(rotation) * spin));
+    Space space({disc}, {start}, Ground{0.0, 0.0, 0.8, 200e9, 0.3}, {0, 0, -gravity}, {.rolling_resistance = 0.0});
+    double turned = 0.0, before = -0.5 * M_PI, lowest_m = start.centre[2];
+    while (space.get_time() < d.end_s - 1e-9) {
+      space.step(d.end_s);
+      const Mat3 now = make_rotation(space.state(0).rotation);
+      const double angle = std::atan2(now[1][2], now[0][2]);
+      turned += std::remainder(angle - before, 2 * M_PI);
+      before = angle;
+      lowest_m = std::min(lowest_m, space.state(0).centre[2]);
+    }
+    const double kinetic_j = calc_kinetic(disc, start);
+    EXPECT_NEAR(std::abs(turned) / (rate * d.end_s), 1.0, 0.01) << d.radius << " m, " << d.degrees << " degrees";
+    EXPECT_GT(lowest_m, start.centre[2] - 2e-3) << d.radius << " m, " << d.degrees << " degrees";
+    EXPECT_NEAR(space.calc_books().calc_total(), mass * gravity * start.centre[2] + kinetic_j, 1e-3 * kinetic_j);
+  }
 }
 
 }  // namespace
