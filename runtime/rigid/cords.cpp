@@ -63,7 +63,7 @@ Point make_stop_point(const Bodies& bodies, const Step& step, const Stop& stop, 
   if (p.b >= 0) p.arm_b = end.where_m - step.free[p.b].state.centre;
   const double approach = bodies.calc_approach(c.touch, c.a, c.b), gap = c.touch.gap_m;
   double speed = c.touching && gap <= kTouch ? 0.0 : approach - 2.0 * std::max(gap, 0.0) / h;
-  if (gap < -kDeep) speed += std::min(0.02 * (-kDeep - gap) / h, 5e-3);
+  if (gap < -kDeep) speed += std::min(kPushOut * (-kDeep - gap), 5e-3);
   p.wanted = speed * p.normal;
   p.impulse = (c.step_s > 0.0 ? h / c.step_s : 0.0) * c.impulse;
   return p;
@@ -148,7 +148,7 @@ Point make_cord_point(const Bodies& bodies, const Step& step, const Cord& cord, 
   // Excess length is taken in as depth is pushed out, at half the power that the cord loses (step_points.cpp).
   if (gap < -kDeep) {
     const double pull = dot(c.impulse, c.touch.normal), paid = pull > 0.0 ? std::max(0.5 * c.lost_j / pull, 0.0) : 0.0;
-    speed += std::min(0.02 * (-kDeep - gap) / h, gap < -kFarTooDeep ? 5e-3 : paid);
+    speed += std::min(kPushOut * (-kDeep - gap), gap < -kFarTooDeep ? 5e-3 : paid);
   }
   p.wanted = speed * p.normal - (a.beyond - b.beyond);
   p.impulse = (c.step_s > 0.0 ? h / c.step_s : 0.0) * c.impulse;

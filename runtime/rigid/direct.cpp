@@ -442,26 +442,14 @@ void Guess::read(std::vector<Mover>& movers, std::vector<Point>& points) const {
   }
 }
 
-/// Impulse per velocity along the normal [kg].
-double calc_normal_mass(const std::vector<Mover>& movers, const Point& p) {
-  double mobility = 0.0;
-  const auto add = [&](int body, const Vec3& arm) {
-    if (body < 0) return;
-    const Vec3 couple = cross(arm, p.normal);
-    mobility += movers[body].inverse_mass + dot(couple, movers[body].inverse_inertia * couple);
-  };
-  add(p.a, p.arm_a);
-  add(p.b, p.arm_b);
-  return 1.0 / mobility;
-}
-
 }  // namespace
 
 bool Solver::solve_directly(std::vector<Mover>& movers, std::vector<Point>& points, int max_guesses, bool are_swept) {
   if (std::any_of(movers.begin(), movers.end(), [](const Mover& m) { return m.linkage != nullptr; })) return false;
   const std::vector<Mover> free = movers;
   Guess guess(free, points);
-  for (const Point& p : points) guess.add(calc_normal_mass(movers, p), calc_turning_mass(movers, p), are_swept);
+  for (const Point& p : points)
+    guess.add(1.0 / dot(p.normal, calc_mobility(movers, p) * p.normal), calc_turning_mass(movers, p), are_swept);
   bool confirmed = false;
   for (int n = 0; n < max_guesses && !confirmed; ++n) {
     if (!guess.solve(movers)) return false;

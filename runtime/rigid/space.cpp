@@ -14,7 +14,6 @@ namespace carillon::rigid {
 namespace {
 
 constexpr double kShortest = 1e-9;  // s; a shorter rest of a step is left out
-constexpr double kUnseen = 5e-6;    // m; a place of a curved body may be deeper than its touches by this
 constexpr double kStruck = 5e-5;    // s; longest part of a step after the begin of an impact with modes
 constexpr int kMaxMissed = 30;      // in a step: instants at which nothing struck after all
 constexpr int kMaxSought = 3;       // of these, with a search for closings on the path
@@ -104,7 +103,7 @@ void Space::step_island(Island& island, double start_s, double length_s) {
                                    [&](int body) { return !bodies_.is_flat(body) && bodies_.calc_speed(body) > kSlow; });
   const bool is_on_ground =
       step_.count() == 1 && std::all_of(island.pairs.begin(), island.pairs.end(), [](const Pair* pair) { return pair->b < 0; });
-  const double open_m = is_on_ground ? kDeep : wobbles ? kTooDeep - kUnseen : kTooDeep;
+  const double open_m = is_on_ground ? kDeep : wobbles ? kTooDeep - kMissing : kTooDeep;
   const int max_impacts = std::clamp(kStruckBodies / step_.count(), kMinImpacts, kMaxImpacts);
   if (instants_.is_crowded(island, start_s)) {
     strike_at_once(start_s, length_s);

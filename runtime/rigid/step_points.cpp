@@ -17,7 +17,6 @@ namespace carillon::rigid {
 namespace {
 
 constexpr double kDrilling = 3.0 * std::numbers::pi / 16.0;  // of friction times patch radius: arm of the couple against drilling
-constexpr double kPushOut = 80.0;                            // 1/s; rate at which a deep touch is pushed out
 constexpr double kAtRest = 1e-6;                             // m/s
 constexpr double kAtRestTurned = 1e-7;                       // rad in a step
 constexpr double kMaxRolling = 20.0;                         // of the size: way of a touch for an angle of rolling

@@ -18,7 +18,6 @@ namespace {
 constexpr double kSteps = 4.0;             // of movement in the margin of a search,
 constexpr double kStepsOfRolling = 8.0;    // the same of curved bodies on the ground: few places come near
 constexpr double kAhead = 4e-3;            // s; longest look-ahead of these
-constexpr double kMissing = 5e-6;          // m; excess of a missing place over all touches
 constexpr double kSearchAgain = 2e-3;      // s; between searches for missing touches of a pair
 constexpr double kSame = 0.02;             // of the size: distance of touches counted as one
 constexpr double kOnePlace = 1e-4;         // of the size: touches nearer than this have come to one place

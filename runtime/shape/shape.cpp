@@ -19,9 +19,7 @@ constexpr double kFaces = -0.2;   // unless it looks away from the way asked: co
 }  // namespace
 
 Shape::Shape(std::span<const Vec3> vertices, std::span<const std::array<std::int32_t, 3>> triangles)
-    : mesh_(std::make_unique<const Mesh>(vertices, triangles)),
-      skin_(std::make_unique<const Skin>(*mesh_)),
-      low_vertices_(std::make_unique<LowVertices>()) {
+    : mesh_(std::make_unique<const Mesh>(vertices, triangles)), skin_(std::make_unique<const Skin>(*mesh_)) {
   constexpr int kMaxFacets = 26;
   const Vec3 side = mesh_->box.high - mesh_->box.low;
   size_m_ = norm(side);
@@ -128,6 +126,11 @@ void Shape::prepare(bool meets_bodies) const {
 const Samples& Shape::samples() const {
   if (!samples_) samples_ = std::make_unique<const Samples>(*mesh_, *skin_);
   return *samples_;
+}
+
+LowVertices& Shape::low_vertices() const {
+  if (!low_vertices_) low_vertices_ = std::make_unique<LowVertices>();
+  return *low_vertices_;
 }
 
 const Grid& Shape::grid() const {

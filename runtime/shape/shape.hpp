@@ -68,7 +68,7 @@ class Shape {
   const Polyhedron* polyhedron() const { return polyhedron_.get(); }
   const Samples& samples() const;
   const Grid& grid() const;
-  LowVertices& low_vertices() const { return *low_vertices_; }
+  LowVertices& low_vertices() const;
 
  private:
   Place choose_face(const Nearest& on, const Vec3& point, const Vec3& outward) const;
@@ -78,7 +78,7 @@ class Shape {
   std::unique_ptr<const Polyhedron> polyhedron_;
   mutable std::unique_ptr<const Samples> samples_;
   mutable std::unique_ptr<const Grid> grid_;
-  std::unique_ptr<LowVertices> low_vertices_;
+  mutable std::unique_ptr<LowVertices> low_vertices_;
   Vec3 middle_m_{};
   double size_m_ = 0.0, thickness_m_ = 0.0, radius_m_ = 0.0;
 };

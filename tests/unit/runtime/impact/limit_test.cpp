@@ -77,6 +77,34 @@ TEST(Limit, OfABallOnASupportedPlateIsTheRestitutionGiven) {
   EXPECT_GT(limited, 8);
 }
 
+TEST(Limit, BooksTheEnergyThatItTakesAsYieldedThenAsDissipated) {
+  int limited = 0;
+  for (const double thickness : {0.002, 0.004, 0.01})
+    for (const double radius : {0.01, 0.02, 0.04}) {
+      const Plate plate = make_plate(0.2, 0.18, thickness, 15e3, 0.094, 0.0954);
+      const Modes modes(plate.omega, plate.decay, 2.0 * kPi * 15e3);
+      Body below;
+      below.modes = &modes;
+      std::vector<Contact> contacts{make_contact(radius, 0, 1)};
+      contacts[0].shape_b = plate.shape;
+      contacts[0].restitution = 0.1;
+      contacts[0].is_limit = true;
+      Impact impact({make_ball(radius, {0, 0, -1.0}), below}, contacts);
+      double most_j = 0.0;
+      for (int n = 1; n < 10000 && !impact.advance(5e-6 * n); ++n) {
+        const Books books = impact.get_books();
+        EXPECT_LE(std::abs(books.calc_error()), 1e-10);
+        EXPECT_GE(books.yielded, 0.0);
+        most_j = std::max(most_j, books.yielded);
+      }
+      EXPECT_TRUE(impact.has_ended());
+      EXPECT_GE(impact.get_books().dissipated_contact + impact.get_books().yielded, most_j);
+      limited += most_j > 1e-3 * impact.get_books().start ? 1 : 0;
+      expect_sound(impact, contacts);
+    }
+  EXPECT_GT(limited, 2);
+}
+
 /// A bar that flies, with its modes.
 Body make_free(const Bar& bar, const Modes& modes) {
   Body body;

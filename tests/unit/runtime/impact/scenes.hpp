@@ -64,6 +64,7 @@ inline void expect_sound(Impact& impact, const std::vector<Contact>& contacts) {
   EXPECT_EQ(impact.get_misses(), 0);
   EXPECT_GE(books.dissipated_modes, -1e-10 * scale);
   EXPECT_GE(books.dissipated_contact, -1e-10 * scale);
+  EXPECT_GE(books.yielded, -1e-10 * scale);
   EXPECT_GE(books.dissipated_friction, -1e-10 * scale);
   EXPECT_GE(books.above_band, -1e-10 * scale);
   for (const Body& body : impact.get_bodies()) {
