@@ -89,6 +89,21 @@ Slot* find_slot(const fs::path& folder) {
   return nullptr;
 }
 
+/// False if something is left. Safe in a signal handler.
+bool remove_by_rm(const char* folder) {
+  const pid_t child = ::_Fork();
+  if (child == 0) {
+    const int null = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
+    if (null >= 0) ::dup2(null, STDERR_FILENO);
+    ::execl("/bin/rm", "rm", "-rf", "--", folder, nullptr);
+    ::_exit(127);
+  }
+  int status = 0;
+  while (child > 0 && ::waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  return child > 0 && status == 0;
+}
+
 /// Takes a folder out of the table of the handler.
 void release(Slot& slot) {
   slot.state.store(1);
@@ -174,13 +189,8 @@ void end_children_and_temporaries() noexcept {
   }
   for (Slot& slot : slots) {
     if (slot.state.load() != 2) continue;
-    const pid_t child = ::_Fork();
-    if (child == 0) {
-      ::execl("/bin/rm", "rm", "-rf", "--", slot.path.data(), nullptr);
-      ::_exit(127);
-    }
-    while (child > 0 && ::waitpid(child, nullptr, 0) < 0 && errno == EINTR) {
-    }
+    // Grandchildren, as the mkdir of a shell, may write for a moment after the end of the child: rm then finds a folder that is not empty.
+    for (int waited_ms = 0; !remove_by_rm(slot.path.data()) && waited_ms < kPatienceMs; waited_ms += kStepMs) ::poll(nullptr, 0, kStepMs);
   }
 }
 
